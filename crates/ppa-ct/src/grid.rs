@@ -1,0 +1,172 @@
+//! The lattice of voxel centres: how many, and where in the world.
+
+use nalgebra::{Affine3, Matrix3, Matrix4, Point3, Vector3};
+
+/// Why a lattice cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GridError {
+    /// At least one side has no voxels.
+    #[error("a volume of {0:?} voxels is empty; every side needs at least one")]
+    Empty([usize; 3]),
+    /// The affine has no inverse or holds NaN.
+    #[error("the voxel-to-world affine is singular or not finite (determinant {determinant})")]
+    Singular {
+        /// Determinant of the 3x3 part, mm³.
+        determinant: f64,
+    },
+}
+
+/// A regular lattice of voxel centres in the `ct` frame (LPS, mm).
+///
+/// The affine may shear (gantry tilt) and may be left-handed; it is kept exactly as read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    size: [usize; 3],
+    ct_from_voxel: Affine3<f64>,
+}
+
+impl Grid {
+    /// A lattice of `size` voxels (i, j, k) whose centres lie at `ct_from_voxel * (i, j, k)`.
+    ///
+    /// # Errors
+    /// [`GridError`] when a side is 0 or the affine is singular.
+    pub fn new(size: [usize; 3], ct_from_voxel: Affine3<f64>) -> Result<Self, GridError> {
+        if size.contains(&0) {
+            return Err(GridError::Empty(size));
+        }
+        let determinant = ct_from_voxel
+            .matrix()
+            .fixed_view::<3, 3>(0, 0)
+            .determinant();
+        let finite = ct_from_voxel.matrix().iter().all(|v| v.is_finite());
+        if !finite || determinant.abs() < 1e-12 {
+            return Err(GridError::Singular { determinant });
+        }
+        Ok(Self {
+            size,
+            ct_from_voxel,
+        })
+    }
+
+    /// An unrotated lattice: axes along LPS, `spacing_mm` apart, first centre at `origin_mm`.
+    ///
+    /// # Errors
+    /// As [`Grid::new`].
+    pub fn axis_aligned(
+        size: [usize; 3],
+        spacing_mm: Vector3<f64>,
+        origin_mm: Point3<f64>,
+    ) -> Result<Self, GridError> {
+        Self::from_parts(size, Matrix3::identity(), spacing_mm, origin_mm)
+    }
+
+    /// A lattice from unit axis directions (columns), spacing and first centre.
+    ///
+    /// # Errors
+    /// As [`Grid::new`].
+    pub fn from_parts(
+        size: [usize; 3],
+        direction: Matrix3<f64>,
+        spacing_mm: Vector3<f64>,
+        origin_mm: Point3<f64>,
+    ) -> Result<Self, GridError> {
+        let mut matrix = Matrix4::identity();
+        matrix
+            .fixed_view_mut::<3, 3>(0, 0)
+            .copy_from(&(direction * Matrix3::from_diagonal(&spacing_mm)));
+        matrix
+            .fixed_view_mut::<3, 1>(0, 3)
+            .copy_from(&origin_mm.coords);
+        Self::new(size, Affine3::from_matrix_unchecked(matrix))
+    }
+
+    /// Voxels along i, j, k.
+    pub fn size(&self) -> [usize; 3] {
+        self.size
+    }
+
+    /// Number of voxels.
+    pub fn len(&self) -> usize {
+        self.size.iter().product()
+    }
+
+    /// Never true: a grid has at least one voxel.
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// Position of voxel (i, j, k) in the linear order, i fastest.
+    pub fn index(&self, [i, j, k]: [usize; 3]) -> usize {
+        i + self.size[0] * (j + self.size[1] * k)
+    }
+
+    /// Voxel (i, j, k) at a position of the linear order; the inverse of [`Grid::index`].
+    pub fn voxel(&self, index: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.size;
+        [index % nx, index / nx % ny, index / (nx * ny)]
+    }
+
+    /// The affine from voxel indices to the `ct` frame.
+    pub fn ct_from_voxel(&self) -> &Affine3<f64> {
+        &self.ct_from_voxel
+    }
+
+    /// The affine from the `ct` frame to (fractional) voxel indices.
+    pub fn voxel_from_ct(&self) -> Affine3<f64> {
+        self.ct_from_voxel.inverse()
+    }
+
+    /// Centre of a (fractional) voxel in the `ct` frame.
+    pub fn centre(&self, voxel: [f64; 3]) -> Point3<f64> {
+        self.ct_from_voxel * Point3::from(voxel)
+    }
+
+    fn linear(&self) -> Matrix3<f64> {
+        self.ct_from_voxel
+            .matrix()
+            .fixed_view::<3, 3>(0, 0)
+            .into_owned()
+    }
+
+    /// Distance between neighbouring centres along i, j, k in mm.
+    pub fn spacing_mm(&self) -> Vector3<f64> {
+        let linear = self.linear();
+        Vector3::from_fn(|axis, _| linear.column(axis).norm())
+    }
+
+    /// Unit directions of the i, j, k axes in LPS, as columns.
+    pub fn direction(&self) -> Matrix3<f64> {
+        let mut linear = self.linear();
+        for mut column in linear.column_iter_mut() {
+            column.normalize_mut();
+        }
+        linear
+    }
+
+    /// Centre of the first voxel in the `ct` frame, mm.
+    pub fn origin_mm(&self) -> Point3<f64> {
+        self.centre([0.0; 3])
+    }
+
+    /// The sub-lattice of voxels `low..high` (half-open on every axis), at the same world place.
+    ///
+    /// # Errors
+    /// [`GridError::Empty`] when the range is empty or leaves the lattice.
+    pub fn crop(&self, low: [usize; 3], high: [usize; 3]) -> Result<Self, GridError> {
+        if (0..3).any(|axis| high[axis] > self.size[axis] || low[axis] >= high[axis]) {
+            return Err(GridError::Empty([0, 1, 2].map(|axis| {
+                high[axis].min(self.size[axis]).saturating_sub(low[axis])
+            })));
+        }
+        let mut matrix = *self.ct_from_voxel.matrix();
+        let origin = self.centre(low.map(|v| v as f64));
+        matrix
+            .fixed_view_mut::<3, 1>(0, 3)
+            .copy_from(&origin.coords);
+        Self::new(
+            [0, 1, 2].map(|axis| high[axis] - low[axis]),
+            Affine3::from_matrix_unchecked(matrix),
+        )
+    }
+}

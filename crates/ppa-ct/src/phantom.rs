@@ -1,0 +1,1 @@
+//! Analytic phantoms built from signed-distance shapes.

@@ -1,0 +1,116 @@
+//! A CT volume: Hounsfield units on a [`Grid`].
+
+use nalgebra::Point3;
+
+use crate::grid::{Grid, GridError};
+
+/// Why a volume cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum VolumeError {
+    /// The lattice itself is unusable.
+    #[error(transparent)]
+    Grid(#[from] GridError),
+    /// Number of values and number of voxels differ.
+    #[error("{found} values for {expected} voxels")]
+    Length {
+        /// Values given.
+        found: usize,
+        /// Voxels of the grid.
+        expected: usize,
+    },
+    /// A value is NaN or infinite.
+    #[error("voxel {0:?} holds a value that is not a number")]
+    NotFinite([usize; 3]),
+}
+
+/// Hounsfield units on a lattice; i runs fastest in memory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Volume {
+    grid: Grid,
+    hu: Vec<f32>,
+}
+
+impl Volume {
+    /// A volume from one value per voxel, i fastest.
+    ///
+    /// # Errors
+    /// [`VolumeError`] when the number of values is wrong or one is not finite.
+    pub fn new(grid: Grid, hu: Vec<f32>) -> Result<Self, VolumeError> {
+        if hu.len() != grid.len() {
+            return Err(VolumeError::Length {
+                found: hu.len(),
+                expected: grid.len(),
+            });
+        }
+        if let Some(bad) = hu.iter().position(|v| !v.is_finite()) {
+            return Err(VolumeError::NotFinite(grid.voxel(bad)));
+        }
+        Ok(Self { grid, hu })
+    }
+
+    /// The lattice.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// All values, i fastest.
+    pub fn hu(&self) -> &[f32] {
+        &self.hu
+    }
+
+    /// The value of voxel (i, j, k).
+    ///
+    /// # Panics
+    /// When the voxel lies outside the grid.
+    pub fn at(&self, voxel: [usize; 3]) -> f32 {
+        self.hu[self.grid.index(voxel)]
+    }
+
+    /// Trilinear interpolation at a world point; `None` outside the box of voxel centres.
+    pub fn sample(&self, point_ct: &Point3<f64>) -> Option<f64> {
+        let p = self.grid.voxel_from_ct() * point_ct;
+        let size = self.grid.size();
+        let mut base = [0; 3];
+        let mut frac = [0.0; 3];
+        for axis in 0..3 {
+            let last = (size[axis] - 1) as f64;
+            if !(0.0..=last).contains(&p[axis]) {
+                return None;
+            }
+            base[axis] = (p[axis] as usize).min(size[axis].saturating_sub(2));
+            frac[axis] = p[axis] - base[axis] as f64;
+        }
+        let mut sum = 0.0;
+        for corner in 0..8 {
+            let mut weight = 1.0;
+            let mut voxel = base;
+            for axis in 0..3 {
+                if corner >> axis & 1 == 1 {
+                    weight *= frac[axis];
+                    voxel[axis] = (voxel[axis] + 1).min(size[axis] - 1);
+                } else {
+                    weight *= 1.0 - frac[axis];
+                }
+            }
+            sum += weight * f64::from(self.at(voxel));
+        }
+        Some(sum)
+    }
+
+    /// The voxels `low..high` (half-open on every axis), at the same world place.
+    ///
+    /// # Errors
+    /// [`VolumeError::Grid`] when the range is empty or leaves the volume.
+    pub fn crop(&self, low: [usize; 3], high: [usize; 3]) -> Result<Self, VolumeError> {
+        let grid = self.grid.crop(low, high)?;
+        let mut hu = Vec::with_capacity(grid.len());
+        for k in low[2]..high[2] {
+            for j in low[1]..high[1] {
+                let start = self.grid.index([low[0], j, k]);
+                hu.extend_from_slice(&self.hu[start..start + high[0] - low[0]]);
+            }
+        }
+        Ok(Self { grid, hu })
+    }
+}
