@@ -1,1 +1,41 @@
-//! In progress.
+//! Metrics of pose assessment, as Laufer et al., MELBA 2026:027 (doi:10.59275/j.melba.2026-c874), define them.
+//!
+//! A *label* x is the quality radiologists gave a pose, from 1 (ideal) to 3 (inadequate), in steps of 0.5; a
+//! *prediction* y is what a network says, continuous. From [`NON_DIAGNOSTIC`] = 2.5 on, a pose is non-diagnostic, which
+//! is what "positive" means here. [`evaluate`] gives the whole [`Report`]; each metric stands alone as well. Two
+//! cameras or several frames are averaged first ([`mean_per_pose`], [`mean_of_views`]).
+//!
+//! [`pose_delta`] and [`pose_margin_accuracy`] rank one good against two bad poses ([`PoseTriple`]).
+//! [`sign_flip_permutation`] is the exact paired test on seeds.
+//!
+//! Every function refuses empty, unequal, infinite or NaN input with a [`MetricError`]; none returns NaN.
+//!
+//! ```
+//! let labels = [1.0, 1.5, 2.5, 3.0];
+//! let predictions = [1.2, 1.4, 2.1, 2.9];
+//! let report = ppa_metrics::evaluate(&labels, &predictions)?;
+//! assert_eq!((report.accuracy, report.diagnostic_accuracy), (1.0, 0.75));
+//! assert_eq!((report.sensitivity, report.specificity), (0.5, 1.0));
+//! # Ok::<(), ppa_metrics::MetricError>(())
+//! ```
+
+#![warn(missing_docs)]
+
+mod error;
+
+mod diagnostic;
+mod regression;
+mod spearman;
+
+mod poses;
+mod report;
+
+mod permutation;
+
+pub use diagnostic::{NON_DIAGNOSTIC, diagnostic_accuracy, sensitivity, specificity};
+pub use error::MetricError;
+pub use permutation::{MAX_PAIRS, PermutationTest, sign_flip_permutation};
+pub use poses::{PoseTriple, mean_of_views, mean_per_pose, pose_delta, pose_margin_accuracy};
+pub use regression::{ANNOTATION_STEP, accuracy, mae, mse};
+pub use report::{Report, evaluate};
+pub use spearman::spearman;

@@ -1,0 +1,120 @@
+//! What stands in front of the camera.
+
+use nalgebra::Isometry3;
+
+use crate::mesh_body::MeshBody;
+use crate::nearest::Ray;
+use crate::surfel_body::SurfelBody;
+
+/// A surface in its own frame, indexed once for rays and then placed in many poses.
+#[derive(Debug, Clone)]
+pub enum Body {
+    /// Triangles.
+    Mesh(MeshBody),
+    /// Oriented discs.
+    Surfels(SurfelBody),
+}
+
+/// A body and where it stands.
+#[derive(Debug, Clone, Copy)]
+pub struct PlacedBody<'a> {
+    /// The surface.
+    pub body: &'a Body,
+    /// Rigid motion from the body's frame to the camera's, mm.
+    pub camera_from_body: Isometry3<f64>,
+}
+
+/// Why points or triangles do not make a body.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BodyError {
+    /// No triangle or no point.
+    #[error("the surface is empty: no {0}")]
+    Empty(&'static str),
+    /// A coordinate is infinite, NaN, or beyond 1e6 mm.
+    #[error("point {index} is at {found:?}, expected finite coordinates within 1e6 mm")]
+    Coordinate {
+        /// Which vertex or point.
+        index: usize,
+        /// Its coordinates, mm.
+        found: [f32; 3],
+    },
+    /// A triangle names a vertex that does not exist.
+    #[error("triangle {triangle} uses vertex {vertex}, but there are {vertices}")]
+    Vertex {
+        /// Which triangle.
+        triangle: usize,
+        /// The vertex it names.
+        vertex: u32,
+        /// How many vertices there are.
+        vertices: usize,
+    },
+    /// More primitives than the index can number.
+    #[error("the surface has {0} triangles or points, expected fewer than 2^31")]
+    TooMany(usize),
+    /// Points and normals differ in number.
+    #[error("{points} points but {normals} normals")]
+    NormalCount {
+        /// Points found.
+        points: usize,
+        /// Normals found.
+        normals: usize,
+    },
+    /// A normal has no direction.
+    #[error("normal {index} is {found:?}, expected a vector with a direction")]
+    Normal {
+        /// Which normal.
+        index: usize,
+        /// Its components.
+        found: [f32; 3],
+    },
+    /// The disc radius is zero, negative or not finite.
+    #[error("disc radius {0} mm, expected a positive number")]
+    Radius(f64),
+}
+
+/// Largest coordinate of a body, mm: a kilometre.
+const MAX_COORDINATE_MM: f32 = 1e6;
+
+/// Whether there is something, and all of it is where a body can be.
+pub(crate) fn check_points(points: &[nalgebra::Point3<f32>]) -> Result<(), BodyError> {
+    let outside = |value: &f32| value.is_nan() || value.abs() > MAX_COORDINATE_MM;
+    match points.iter().position(|point| point.iter().any(outside)) {
+        Some(index) => Err(BodyError::Coordinate {
+            index,
+            found: points[index].into(),
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Whether the number of primitives fits the index.
+pub(crate) fn check_count(count: usize, what: &'static str) -> Result<(), BodyError> {
+    match count {
+        0 => Err(BodyError::Empty(what)),
+        count if count >= 1 << 31 => Err(BodyError::TooMany(count)),
+        _ => Ok(()),
+    }
+}
+
+impl From<MeshBody> for Body {
+    fn from(mesh: MeshBody) -> Self {
+        Self::Mesh(mesh)
+    }
+}
+
+impl From<SurfelBody> for Body {
+    fn from(surfels: SurfelBody) -> Self {
+        Self::Surfels(surfels)
+    }
+}
+
+impl Body {
+    /// Smallest t in (0, limit) at which the ray meets the surface, from either side.
+    pub(crate) fn nearest(&self, ray: &Ray, limit: f64) -> Option<f64> {
+        match self {
+            Self::Mesh(mesh) => mesh.nearest(ray, limit),
+            Self::Surfels(surfels) => surfels.nearest(ray, limit),
+        }
+    }
+}

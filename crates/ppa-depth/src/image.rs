@@ -1,0 +1,230 @@
+//! Depth images in memory.
+
+use std::path::PathBuf;
+
+/// Depth along the camera's z axis in mm, row-major from the top left; 0 where nothing was seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DepthImage {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width * height` depths in mm.
+    pub z_mm: Vec<f32>,
+}
+
+/// A depth image in whole millimetres, as 16-bit files hold it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DepthU16 {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// `width * height` depths in mm; 0 is invalid.
+    pub z_mm: Vec<u16>,
+    /// Pixels that were too far for 16 bits (65.535 m) and became 0.
+    pub too_far: usize,
+}
+
+/// What can go wrong with a depth image.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DepthError {
+    /// No pixel has a depth.
+    #[error(
+        "the camera sees nothing: none of the {width} x {height} pixels has a depth (check the camera's pose)"
+    )]
+    NothingVisible {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// Two images that belong together differ in size.
+    #[error("depth images of {} x {} and {} x {} pixels cannot be merged", first[0], first[1], second[0], second[1])]
+    SizeMismatch {
+        /// Columns and rows of the first image.
+        first: [u32; 2],
+        /// Columns and rows of the second image.
+        second: [u32; 2],
+    },
+    /// The number of depths is not columns times rows.
+    #[error("depth image of {width} x {height} pixels with {found} depths")]
+    Length {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Depths found.
+        found: usize,
+    },
+    /// The file cannot be written.
+    #[error("cannot write {}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file cannot be read.
+    #[error("cannot read {}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system or the decoder said.
+        source: std::io::Error,
+    },
+    /// The PNG is no 16-bit grey image.
+    #[error("{} holds {found} pixels, expected 16-bit grey", path.display())]
+    PixelFormat {
+        /// The file.
+        path: PathBuf,
+        /// Colour type and bit depth found.
+        found: String,
+    },
+}
+
+impl DepthImage {
+    /// An image in which nothing was seen.
+    pub fn empty(width: u32, height: u32) -> Self {
+        Self {
+            width,
+            height,
+            z_mm: vec![0.0; width as usize * height as usize],
+        }
+    }
+
+    /// Number of pixels with a depth.
+    pub fn valid_pixels(&self) -> usize {
+        self.valid().count()
+    }
+
+    /// Smallest depth in mm, of the pixels that have one.
+    pub fn min_mm(&self) -> Option<f32> {
+        self.valid().reduce(f32::min)
+    }
+
+    /// Largest depth in mm, of the pixels that have one.
+    pub fn max_mm(&self) -> Option<f32> {
+        self.valid().reduce(f32::max)
+    }
+
+    fn valid(&self) -> impl Iterator<Item = f32> {
+        self.z_mm.iter().copied().filter(|z_mm| *z_mm > 0.0)
+    }
+
+    /// Refuses an image in which nothing was seen.
+    ///
+    /// # Errors
+    /// [`DepthError::NothingVisible`].
+    pub fn require_visible(&self) -> Result<(), DepthError> {
+        match self.valid().next() {
+            Some(_) => Ok(()),
+            None => Err(DepthError::NothingVisible {
+                width: self.width,
+                height: self.height,
+            }),
+        }
+    }
+
+    /// Per pixel the nearer of two images of one camera: a background rendered once, merged with each pose of a limb.
+    ///
+    /// # Errors
+    /// [`DepthError::SizeMismatch`].
+    pub fn nearer_of(first: &Self, second: &Self) -> Result<Self, DepthError> {
+        let size = |image: &Self| [image.width, image.height];
+        if size(first) != size(second) || first.z_mm.len() != second.z_mm.len() {
+            return Err(DepthError::SizeMismatch {
+                first: size(first),
+                second: size(second),
+            });
+        }
+        let nearer = |(&a, &b): (&f32, &f32)| match (a > 0.0, b > 0.0) {
+            (true, true) => a.min(b),
+            (true, false) => a,
+            (false, true) => b,
+            (false, false) => 0.0,
+        };
+        let z_mm = first.z_mm.iter().zip(&second.z_mm).map(nearer).collect();
+        Ok(Self {
+            width: first.width,
+            height: first.height,
+            z_mm,
+        })
+    }
+
+    /// Depths rounded to whole millimetres. Those beyond 65 535 mm become 0 and are counted.
+    pub fn to_u16(&self) -> DepthU16 {
+        let mut too_far = 0;
+        let round = |&z_mm: &f32| {
+            let rounded = z_mm.round();
+            let fits = rounded <= f32::from(u16::MAX);
+            too_far += usize::from(!fits);
+            if fits { rounded as u16 } else { 0 }
+        };
+        let z_mm = self.z_mm.iter().map(round).collect();
+        DepthU16 {
+            width: self.width,
+            height: self.height,
+            z_mm,
+            too_far,
+        }
+    }
+
+    /// Refuses an image whose buffer does not fit its size, before a file is begun.
+    pub(crate) fn check_length(&self) -> Result<(), DepthError> {
+        if self.z_mm.len() == self.width as usize * self.height as usize {
+            return Ok(());
+        }
+        Err(DepthError::Length {
+            width: self.width,
+            height: self.height,
+            found: self.z_mm.len(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(z_mm: &[f32]) -> DepthImage {
+        DepthImage {
+            width: z_mm.len() as u32,
+            height: 1,
+            z_mm: z_mm.to_vec(),
+        }
+    }
+
+    #[test]
+    fn the_nearer_surface_wins_and_zero_is_no_surface() {
+        let merged = DepthImage::nearer_of(
+            &image(&[0.0, 0.0, 5.0, 5.0, 5.0]),
+            &image(&[0.0, 7.0, 0.0, 3.0, 9.0]),
+        );
+        assert_eq!(merged.unwrap().z_mm, [0.0, 7.0, 5.0, 3.0, 5.0]);
+        let mismatch = DepthImage::nearer_of(&image(&[1.0]), &image(&[1.0, 2.0]));
+        assert!(matches!(mismatch, Err(DepthError::SizeMismatch { .. })));
+    }
+
+    #[test]
+    fn millimetres_are_rounded_and_what_does_not_fit_is_counted() {
+        let rounded = image(&[0.0, 0.4, 999.5, 65_535.4, 65_535.5, 1e9]).to_u16();
+        assert_eq!(rounded.z_mm, [0, 0, 1000, 65_535, 0, 0]);
+        assert_eq!(rounded.too_far, 2);
+    }
+
+    #[test]
+    fn an_empty_view_is_refused() {
+        assert!(matches!(
+            DepthImage::empty(4, 3).require_visible(),
+            Err(DepthError::NothingVisible { .. })
+        ));
+        let seen = image(&[0.0, 800.0, 1200.0]);
+        assert!(seen.require_visible().is_ok());
+        assert_eq!(
+            (seen.valid_pixels(), seen.min_mm(), seen.max_mm()),
+            (2, Some(800.0), Some(1200.0))
+        );
+    }
+}

@@ -1,0 +1,140 @@
+//! 16-bit grey PNG in millimetres.
+
+use std::fs::File;
+use std::io::{self, BufReader};
+use std::path::Path;
+
+use crate::atomic::write_whole;
+use crate::image::{DepthError, DepthImage};
+
+impl DepthImage {
+    /// Writes a 16-bit grey PNG in whole millimetres, 0 for nothing; whole or not at all.
+    ///
+    /// Returns the number of pixels too far for 16 bits (65.535 m), which are 0 in the file.
+    ///
+    /// # Errors
+    /// [`DepthError::Write`] names the file; [`DepthError::Length`] for a buffer that does not fit the size.
+    pub fn write_png(&self, path: &Path) -> Result<usize, DepthError> {
+        self.check_length()?;
+        let rounded = self.to_u16();
+        let bytes: Vec<u8> = rounded
+            .z_mm
+            .iter()
+            .flat_map(|z_mm| z_mm.to_be_bytes())
+            .collect();
+        write_whole(path, |writer| {
+            let mut encoder = png::Encoder::new(writer, self.width, self.height);
+            encoder.set_color(png::ColorType::Grayscale);
+            encoder.set_depth(png::BitDepth::Sixteen);
+            let mut image = encoder.write_header()?;
+            image.write_image_data(&bytes)?;
+            Ok(image.finish()?)
+        })
+        .map_err(|source| DepthError::Write {
+            path: path.into(),
+            source,
+        })?;
+        Ok(rounded.too_far)
+    }
+
+    /// Reads a 16-bit grey PNG in millimetres.
+    ///
+    /// # Errors
+    /// [`DepthError::Read`] for a missing or broken file, [`DepthError::PixelFormat`] for any other kind of PNG.
+    pub fn read_png(path: &Path) -> Result<Self, DepthError> {
+        let broken = |source: io::Error| DepthError::Read {
+            path: path.into(),
+            source,
+        };
+        let file = File::open(path).map_err(broken)?;
+        let mut reader = png::Decoder::new(BufReader::new(file))
+            .read_info()
+            .map_err(|e| broken(e.into()))?;
+        let (colour, depth) = reader.output_color_type();
+        if (colour, depth) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
+            return Err(DepthError::PixelFormat {
+                path: path.into(),
+                found: format!("{depth:?}-bit {colour:?}"),
+            });
+        }
+        let (width, height) = reader.info().size();
+        let too_large = || broken(io::Error::other("the image is too large for this machine"));
+        let mut bytes = vec![0; reader.output_buffer_size().ok_or_else(too_large)?];
+        reader
+            .next_frame(&mut bytes)
+            .map_err(|e| broken(e.into()))?;
+        let z_mm = bytes
+            .as_chunks::<2>()
+            .0
+            .iter()
+            .map(|&pair| f32::from(u16::from_be_bytes(pair)))
+            .collect();
+        Ok(Self {
+            width,
+            height,
+            z_mm,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_png_holds_every_millimetre_exactly() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("depth.png");
+        let mut image = DepthImage {
+            width: 256,
+            height: 256,
+            z_mm: (0..65_536).map(|z| z as f32).collect(),
+        };
+        image.z_mm[7] = 70_000.0;
+        assert_eq!(image.write_png(&path).unwrap(), 1);
+        image.z_mm[7] = 0.0;
+        assert_eq!(DepthImage::read_png(&path).unwrap(), image);
+        assert_eq!(
+            std::fs::read_dir(folder.path()).unwrap().count(),
+            1,
+            "nothing but the image remains"
+        );
+    }
+
+    #[test]
+    fn bad_files_and_folders_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let grey8 = folder.path().join("grey8.png");
+        let mut encoder = png::Encoder::new(File::create(&grey8).unwrap(), 1, 1);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder
+            .write_header()
+            .unwrap()
+            .write_image_data(&[5])
+            .unwrap();
+        assert!(matches!(
+            DepthImage::read_png(&grey8),
+            Err(DepthError::PixelFormat { .. })
+        ));
+        std::fs::write(&grey8, b"no image").unwrap();
+        assert!(matches!(
+            DepthImage::read_png(&grey8),
+            Err(DepthError::Read { .. })
+        ));
+        let missing = folder.path().join("no folder/depth.png");
+        assert!(matches!(
+            DepthImage::empty(2, 2).write_png(&missing),
+            Err(DepthError::Write { .. })
+        ));
+        let torn = DepthImage {
+            width: 2,
+            height: 2,
+            z_mm: vec![1.0],
+        };
+        assert!(matches!(
+            torn.write_png(&folder.path().join("torn.png")),
+            Err(DepthError::Length { .. })
+        ));
+        assert!(!folder.path().join("torn.png").exists());
+    }
+}

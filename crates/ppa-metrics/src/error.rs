@@ -1,0 +1,93 @@
+//! Why a metric has no value.
+
+/// Why a metric has no value.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MetricError {
+    /// Nothing to average.
+    #[error("no {0}: a metric needs at least one")]
+    Empty(&'static str),
+    /// Two lists that belong together differ in length.
+    #[error("{first_count} {first} but {second_count} {second}, expected as many")]
+    Length {
+        /// What the first list holds.
+        first: &'static str,
+        /// Its length.
+        first_count: usize,
+        /// What the second list holds.
+        second: &'static str,
+        /// Its length.
+        second_count: usize,
+    },
+    /// A value is infinite or NaN.
+    #[error("{what} {index} is {found}, expected a finite number")]
+    NotFinite {
+        /// Which list.
+        what: &'static str,
+        /// Position in it, from 0.
+        index: usize,
+        /// The value.
+        found: f64,
+    },
+    /// All values are the same, so they have no order that could correlate.
+    #[error("all {count} {what} are {value}: a rank correlation needs two different values")]
+    Constant {
+        /// Which list.
+        what: &'static str,
+        /// Its length.
+        count: usize,
+        /// The value.
+        value: f64,
+    },
+    /// No label is non-diagnostic, so there is no sensitivity.
+    #[error("no label is non-diagnostic (2.5 or above), so sensitivity is not defined")]
+    NoPositives,
+    /// No label is diagnostic, so there is no specificity.
+    #[error("no label is diagnostic (below 2.5), so specificity is not defined")]
+    NoNegatives,
+    /// More pairs than the exact test counts.
+    #[error("{found} pairs, expected at most {max}: the exact test counts all 2^n sign patterns")]
+    TooManyPairs {
+        /// Pairs found.
+        found: usize,
+        /// Most that are counted.
+        max: usize,
+    },
+}
+
+/// Refuses an empty list and values that are not finite.
+pub(crate) fn check_values(what: &'static str, values: &[f64]) -> Result<(), MetricError> {
+    if values.is_empty() {
+        return Err(MetricError::Empty(what));
+    }
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(index) => Err(MetricError::NotFinite {
+            what,
+            index,
+            found: values[index],
+        }),
+        None => Ok(()),
+    }
+}
+
+/// [`check_values`] of two lists, and that they are equally long.
+pub(crate) fn check_pair(
+    first: (&'static str, &[f64]),
+    second: (&'static str, &[f64]),
+) -> Result<(), MetricError> {
+    if first.1.len() != second.1.len() {
+        return Err(MetricError::Length {
+            first: first.0,
+            first_count: first.1.len(),
+            second: second.0,
+            second_count: second.1.len(),
+        });
+    }
+    check_values(first.0, first.1)?;
+    check_values(second.0, second.1)
+}
+
+/// [`check_pair`] of labels and predictions.
+pub(crate) fn check_scores(labels: &[f64], predictions: &[f64]) -> Result<(), MetricError> {
+    check_pair(("labels", labels), ("predictions", predictions))
+}
