@@ -1,0 +1,156 @@
+//! Radiographs as files: 16-bit PNG to look at, EXR with every layer to compute with.
+
+use std::{
+    io::{Cursor, Write},
+    path::{Path, PathBuf},
+};
+
+use ::exr::prelude::{self as exr, WritableImage};
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+
+use crate::presentation::{Presentation, PresentationError};
+use crate::radiograph::{Engine, Radiograph};
+use crate::tally::Category;
+
+/// Why an image file could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum OutputError {
+    /// The file system said no.
+    #[error("cannot write {}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The PNG encoder failed.
+    #[error("cannot encode {} as PNG", path.display())]
+    Png {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: image::ImageError,
+    },
+    /// The EXR encoder failed.
+    #[error("cannot encode {} as EXR", path.display())]
+    Exr {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: exr::Error,
+    },
+    /// The presentation is not usable.
+    #[error(transparent)]
+    Presentation(#[from] PresentationError),
+}
+
+/// Name of the one EXR attribute that carries what is not pixels, as `key = value` lines (TOML).
+///
+/// One only: the encoder keeps further attributes in a hash map, whose order changes from run to run.
+pub const EXR_ATTRIBUTE: &str = "ppaXray";
+
+impl Radiograph {
+    /// Writes the presentation image as 16-bit grey PNG; the file appears whole or not at all.
+    ///
+    /// # Errors
+    /// [`OutputError`] naming the file.
+    pub fn write_png(&self, path: &Path, presentation: &Presentation) -> Result<(), OutputError> {
+        let grey = self.present(presentation)?;
+        let bytes: Vec<u8> = grey.iter().flat_map(|v| v.to_ne_bytes()).collect();
+        let mut encoded = Vec::new();
+        PngEncoder::new(&mut encoded)
+            .write_image(
+                &bytes,
+                self.detector.columns,
+                self.detector.rows,
+                ExtendedColorType::L16,
+            )
+            .map_err(|source| OutputError::Png {
+                path: path.into(),
+                source,
+            })?;
+        write_whole(path, &encoded)
+    }
+
+    /// Writes all layers as 32-bit EXR; the file appears whole or not at all.
+    ///
+    /// Channels: `Y`, the total, and per [`Category`] `<name>.value` and `<name>.sigma`, eV/cm² per history.
+    /// The attribute [`EXR_ATTRIBUTE`] holds seed, histories, units and geometry. The bytes depend on
+    /// nothing but the radiograph.
+    ///
+    /// # Errors
+    /// [`OutputError`] naming the file.
+    pub fn write_exr(&self, path: &Path) -> Result<(), OutputError> {
+        let mut channels = exr::SmallVec::new();
+        let mut add = |name: &str, samples: Vec<f32>| {
+            channels.push(exr::AnyChannel::new(name, exr::FlatSamples::F32(samples)));
+        };
+        add("Y", self.total());
+        for category in Category::ALL {
+            let layer = self.layer(category);
+            add(&format!("{}.value", category.name()), layer.value.clone());
+            add(&format!("{}.sigma", category.name()), layer.sigma.clone());
+        }
+        let mut attributes = exr::LayerAttributes::default();
+        attributes.other.insert(
+            exr::Text::from(EXR_ATTRIBUTE),
+            exr::AttributeValue::Text(exr::Text::from(self.describe().as_str())),
+        );
+        let layer = exr::Layer::new(
+            (self.columns(), self.rows()),
+            attributes,
+            exr::Encoding::SMALL_LOSSLESS,
+            exr::AnyChannels::sort(channels),
+        );
+        let mut encoded = Cursor::new(Vec::new());
+        exr::Image::from_layer(layer)
+            .write()
+            .non_parallel()
+            .to_buffered(&mut encoded)
+            .map_err(|source| OutputError::Exr {
+                path: path.into(),
+                source,
+            })?;
+        write_whole(path, &encoded.into_inner())
+    }
+
+    fn describe(&self) -> String {
+        let engine = match self.engine {
+            Engine::Analog => "analog",
+            Engine::Fast => "fast",
+        };
+        format!(
+            "engine = \"{engine}\"\nseed = {}\nhistories = {:e}\nunit = \"eV/cm2 per history\"\n\
+             pixel_mm = {}\nsource_detector_mm = {}\nopen_field_ev_cm2 = {}\n",
+            self.seed,
+            self.histories,
+            self.detector.pixel_mm,
+            self.source_detector_mm,
+            self.open_field_ev_cm2,
+        )
+    }
+}
+
+/// Writes beside the target and renames, so that no reader ever meets half a file.
+fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    let failed = |source| OutputError::Write {
+        path: path.into(),
+        source,
+    };
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    let builder = {
+        use std::os::unix::fs::PermissionsExt;
+        // Temporary files are private by default; a result is as readable as any new file.
+        builder.permissions(std::fs::Permissions::from_mode(0o666))
+    };
+    let mut file = builder.tempfile_in(folder).map_err(failed)?;
+    file.write_all(bytes).map_err(failed)?;
+    file.persist(path).map_err(|error| failed(error.error))?;
+    Ok(())
+}

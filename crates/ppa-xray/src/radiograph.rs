@@ -1,0 +1,177 @@
+//! The result of both engines: energy per pixel by category, with standard errors.
+
+use nalgebra::Point2;
+use serde::{Deserialize, Serialize};
+
+use crate::projection::{Detector, Projection};
+use crate::spectrum::Spectrum;
+use crate::tally::Category;
+
+/// How a radiograph was computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Engine {
+    /// Every history as nature plays it.
+    Analog,
+    /// Ray-traced primary, Monte Carlo scatter, added quantum noise.
+    Fast,
+}
+
+/// One image plane, row-major, eV/cm² per history.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layer {
+    /// Energy that arrives at the pixel, per area of it and per history.
+    pub value: Vec<f32>,
+    /// Standard error of `value`.
+    pub sigma: Vec<f32>,
+}
+
+/// Energy on the whole detector by category, eV per history, each with its standard error.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct CategorySums {
+    /// Photons without interaction.
+    pub primary_ev_per_history: f64,
+    /// Its standard error.
+    pub primary_ev_per_history_se: f64,
+    /// Photons with one Compton scattering.
+    pub compton_ev_per_history: f64,
+    /// Its standard error.
+    pub compton_ev_per_history_se: f64,
+    /// Photons with one Rayleigh scattering.
+    pub rayleigh_ev_per_history: f64,
+    /// Its standard error.
+    pub rayleigh_ev_per_history_se: f64,
+    /// Photons scattered twice or more.
+    pub multiple_ev_per_history: f64,
+    /// Its standard error.
+    pub multiple_ev_per_history_se: f64,
+}
+
+impl CategorySums {
+    /// Energy and its standard error of one category, eV per history.
+    pub fn of(&self, category: Category) -> (f64, f64) {
+        match category {
+            Category::Primary => (self.primary_ev_per_history, self.primary_ev_per_history_se),
+            Category::Compton => (self.compton_ev_per_history, self.compton_ev_per_history_se),
+            Category::Rayleigh => (self.rayleigh_ev_per_history, self.rayleigh_ev_per_history_se),
+            Category::Multiple => (self.multiple_ev_per_history, self.multiple_ev_per_history_se),
+        }
+    }
+
+    /// Energy of all categories together, eV per history.
+    pub fn total_ev_per_history(&self) -> f64 {
+        Category::ALL.iter().map(|&category| self.of(category).0).sum()
+    }
+
+    pub(crate) fn from_kev(of: impl Fn(Category) -> (f64, f64)) -> Self {
+        let ev = |category| {
+            let (mean_kev, se_kev) = of(category);
+            (1e3 * mean_kev, 1e3 * se_kev)
+        };
+        let (primary, compton) = (ev(Category::Primary), ev(Category::Compton));
+        let (rayleigh, multiple) = (ev(Category::Rayleigh), ev(Category::Multiple));
+        Self {
+            primary_ev_per_history: primary.0,
+            primary_ev_per_history_se: primary.1,
+            compton_ev_per_history: compton.0,
+            compton_ev_per_history_se: compton.1,
+            rayleigh_ev_per_history: rayleigh.0,
+            rayleigh_ev_per_history_se: rayleigh.1,
+            multiple_ev_per_history: multiple.0,
+            multiple_ev_per_history_se: multiple.1,
+        }
+    }
+}
+
+/// Energy on an ideal detector, split by what happened to the photons.
+///
+/// Pixel (column, row) stands at `row * columns + column`; columns run along device x, rows along
+/// device y. Values are eV/cm² per history, the unit of MC-GPU: summed over the pixels and
+/// multiplied by the pixel area they give eV per history.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Radiograph {
+    /// Pixels and their size.
+    pub detector: Detector,
+    /// Which engine made it.
+    pub engine: Engine,
+    /// Histories that the noise of the image stands for; infinite for the expected image.
+    pub histories: f64,
+    /// Seed it was made from.
+    pub seed: u64,
+    /// Source-detector distance, mm.
+    pub source_detector_mm: f64,
+    /// What the pixels would read with nothing in the beam, at its centre, eV/cm² per history.
+    pub open_field_ev_cm2: f64,
+    /// The layers, in the order of [`Category::ALL`].
+    pub layers: [Layer; 4],
+    /// Energy on the whole detector. For the fast engine: before quantum noise is added, so that
+    /// the primary has no standard error.
+    pub sums: CategorySums,
+}
+
+impl Radiograph {
+    /// Pixels along device x.
+    pub fn columns(&self) -> usize {
+        self.detector.columns as usize
+    }
+
+    /// Pixels along device y.
+    pub fn rows(&self) -> usize {
+        self.detector.rows as usize
+    }
+
+    /// The plane of one category.
+    pub fn layer(&self, category: Category) -> &Layer {
+        &self.layers[category as usize]
+    }
+
+    /// All energy per pixel, eV/cm² per history.
+    pub fn total(&self) -> Vec<f32> {
+        self.per_pixel(|pixel| {
+            self.layers
+                .iter()
+                .map(|layer| f64::from(layer.value[pixel]))
+                .sum()
+        })
+    }
+
+    /// Standard error of [`Radiograph::total`]; the categories are independent to first order.
+    pub fn sigma(&self) -> Vec<f32> {
+        self.per_pixel(|pixel| {
+            self.layers
+                .iter()
+                .map(|layer| f64::from(layer.sigma[pixel]).powi(2))
+                .sum::<f64>()
+                .sqrt()
+        })
+    }
+
+    /// Reading of a pixel with nothing in the beam, eV/cm² per history: falls off as cos³θ.
+    pub fn open_field_at(&self, pixel: usize) -> f64 {
+        let at = pixel_centre_mm(&self.detector, pixel);
+        let d = self.source_detector_mm;
+        let cos = d / (d * d + at.coords.norm_squared()).sqrt();
+        self.open_field_ev_cm2 * cos.powi(3)
+    }
+
+    fn per_pixel(&self, value: impl Fn(usize) -> f64) -> Vec<f32> {
+        (0..self.detector.pixels())
+            .map(|pixel| value(pixel) as f32)
+            .collect()
+    }
+}
+
+/// Centre of a pixel in device x, y.
+fn pixel_centre_mm(detector: &Detector, pixel: usize) -> Point2<f64> {
+    let [half_x, half_y] = detector.half_mm();
+    let columns = detector.columns as usize;
+    Point2::new(
+        ((pixel % columns) as f64 + 0.5) * detector.pixel_mm - half_x,
+        ((pixel / columns) as f64 + 0.5) * detector.pixel_mm - half_y,
+    )
+}
+
+/// Reading at the centre of the bare field, eV/cm² per history.
+pub(crate) fn open_field_ev_cm2(projection: &Projection, spectrum: &Spectrum) -> f64 {
+    1e3 * spectrum.mean_energy_kev() * projection.open_fluence_cm2(Point2::origin())
+}

@@ -1,0 +1,149 @@
+//! Integer tallies of the energy that reaches the detector.
+
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// What happened to a detected photon on its way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Category {
+    /// No interaction.
+    Primary,
+    /// One Compton scattering, nothing else.
+    Compton,
+    /// One Rayleigh scattering, nothing else.
+    Rayleigh,
+    /// Two scatterings or more.
+    Multiple,
+}
+
+impl Category {
+    /// All four, in the order of the layers.
+    pub const ALL: [Self; 4] = [Self::Primary, Self::Compton, Self::Rayleigh, Self::Multiple];
+
+    /// Lower-case name, as in layer names and JSON keys.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Primary => "primary",
+            Self::Compton => "compton",
+            Self::Rayleigh => "rayleigh",
+            Self::Multiple => "multiple",
+        }
+    }
+}
+
+/// Energy quantum 1/64 eV: a cell holds 1.9e12 photons of 150 keV before it overflows.
+const STEPS_PER_KEV: f64 = 64_000.0;
+
+/// Quantum of the squared energy, 2⁻¹⁰ keV²: room for 8e11 photons of 150 keV in one cell.
+const STEPS_PER_KEV2: f64 = 1_024.0;
+
+/// A rectangle centred on the central beam in the detector plane, cut into equal cells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Raster {
+    pub columns: usize,
+    pub rows: usize,
+    /// Extent along device x and y.
+    pub extent_mm: [f64; 2],
+}
+
+impl Raster {
+    pub fn cells(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    pub fn cell_cm2(&self) -> f64 {
+        self.extent_mm[0] * self.extent_mm[1] / 100.0 / self.cells() as f64
+    }
+
+    /// Row-major cell under a point of the plane (device x, y in mm).
+    #[inline]
+    pub fn cell_at(&self, x_mm: f64, y_mm: f64) -> Option<usize> {
+        let column = (x_mm / self.extent_mm[0] + 0.5) * self.columns as f64;
+        let row = (y_mm / self.extent_mm[1] + 0.5) * self.rows as f64;
+        let inside = column >= 0.0
+            && row >= 0.0
+            && column < self.columns as f64
+            && row < self.rows as f64;
+        inside.then(|| row as usize * self.columns + column as usize)
+    }
+}
+
+/// Sums of energy and squared energy per cell and category.
+///
+/// Integer additions commute, so any number of threads may add in any order and leave the same bytes.
+#[derive(Debug)]
+pub(crate) struct Tally {
+    pub raster: Raster,
+    sums: Vec<[[AtomicU64; 2]; 4]>,
+}
+
+/// First two moments per history of one quantity.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Moments {
+    /// Mean energy, keV per history.
+    pub mean_kev: f64,
+    /// Mean squared energy, keV² per history.
+    pub square_kev2: f64,
+}
+
+impl Moments {
+    /// Standard error of the mean over `histories`, each of which scores at most once.
+    pub fn standard_error_kev(&self, histories: f64) -> f64 {
+        ((self.square_kev2 - self.mean_kev * self.mean_kev).max(0.0) / histories).sqrt()
+    }
+}
+
+impl Tally {
+    pub fn new(raster: Raster) -> Self {
+        Self {
+            raster,
+            sums: (0..raster.cells()).map(|_| Default::default()).collect(),
+        }
+    }
+
+    /// Counts a photon that crosses the plane at device (x, y); outside the raster nothing happens.
+    #[inline]
+    pub fn score(&self, x_mm: f64, y_mm: f64, category: Category, energy_kev: f64) {
+        let Some(cell) = self.raster.cell_at(x_mm, y_mm) else {
+            return;
+        };
+        let [energy, square] = &self.sums[cell][category as usize];
+        energy.fetch_add((energy_kev * STEPS_PER_KEV).round() as u64, Relaxed);
+        square.fetch_add(
+            (energy_kev * energy_kev * STEPS_PER_KEV2).round() as u64,
+            Relaxed,
+        );
+    }
+
+    /// Moments per history of every cell, row-major.
+    pub fn moments(&self, category: Category, histories: u64) -> Vec<Moments> {
+        self.sums
+            .iter()
+            .map(|cell| {
+                let [energy, square] = &cell[category as usize];
+                moments(
+                    u128::from(energy.load(Relaxed)),
+                    u128::from(square.load(Relaxed)),
+                    histories,
+                )
+            })
+            .collect()
+    }
+
+    /// Moments per history of the whole raster.
+    pub fn total(&self, category: Category, histories: u64) -> Moments {
+        let (mut energy, mut square) = (0, 0);
+        for cell in &self.sums {
+            energy += u128::from(cell[category as usize][0].load(Relaxed));
+            square += u128::from(cell[category as usize][1].load(Relaxed));
+        }
+        moments(energy, square, histories)
+    }
+}
+
+fn moments(energy: u128, square: u128, histories: u64) -> Moments {
+    let histories = histories as f64;
+    Moments {
+        mean_kev: energy as f64 / STEPS_PER_KEV / histories,
+        square_kev2: square as f64 / STEPS_PER_KEV2 / histories,
+    }
+}

@@ -1,0 +1,4 @@
+//! Checks of the public interface, some against reference data that is not part of the repository.
+
+mod case_a;
+mod shared;
