@@ -1,0 +1,218 @@
+//! Cross sections of the elements, embedded: photoelectric, Rayleigh and Compton, F(q) and S(q).
+//!
+//! Made by `scripts/make_cross_sections.py` from xraylib 4.3.0 (EPDL97); see `data/README.md`.
+
+use std::{io::Read, ops::Add, sync::OnceLock};
+
+/// Planck's constant times the speed of light in keV Å: q = sin(θ/2) E / hc in 1/Å.
+pub(crate) const HC_KEV_ANGSTROM: f64 = 12.398_419_843_320_026;
+/// Rest energy of the electron in keV (CODATA 2018).
+pub(crate) const ELECTRON_REST_KEV: f64 = 510.998_95;
+
+/// Lowest photon energy of the tables in keV.
+pub const MIN_ENERGY_KEV: f64 = 1.0;
+/// Highest photon energy of the tables in keV.
+pub const MAX_ENERGY_KEV: f64 = 150.0;
+
+/// Mass attenuation by interaction in cm²/g.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CrossSections {
+    /// Absorption by the photoelectric effect.
+    pub photoelectric: f64,
+    /// Elastic scattering off bound electrons.
+    pub rayleigh: f64,
+    /// Inelastic scattering.
+    pub compton: f64,
+}
+
+impl CrossSections {
+    /// Sum of the three in cm²/g.
+    #[inline]
+    #[must_use]
+    pub fn total(&self) -> f64 {
+        self.photoelectric + self.rayleigh + self.compton
+    }
+
+    pub(crate) fn scaled(self, factor: f64) -> Self {
+        Self {
+            photoelectric: self.photoelectric * factor,
+            rayleigh: self.rayleigh * factor,
+            compton: self.compton * factor,
+        }
+    }
+}
+
+impl Add for CrossSections {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self {
+            photoelectric: self.photoelectric + other.photoelectric,
+            rayleigh: self.rayleigh + other.rayleigh,
+            compton: self.compton + other.compton,
+        }
+    }
+}
+
+/// Straight lines in log-log between nodes; a doubled abscissa is an edge, where the upper side counts.
+struct LogLog {
+    ln_x: Vec<f64>,
+    ln_y: Vec<f64>,
+}
+
+impl LogLog {
+    fn new(x: &[f32], y: &[f32]) -> Self {
+        let ln = |values: &[f32]| values.iter().map(|&v| f64::from(v).ln()).collect();
+        Self {
+            ln_x: ln(x),
+            ln_y: ln(y),
+        }
+    }
+
+    fn at(&self, ln_x: f64) -> f64 {
+        let upper = self
+            .ln_x
+            .partition_point(|&node| node <= ln_x)
+            .clamp(1, self.ln_x.len() - 1);
+        let (x0, x1) = (self.ln_x[upper - 1], self.ln_x[upper]);
+        let (y0, y1) = (self.ln_y[upper - 1], self.ln_y[upper]);
+        (y0 + (y1 - y0) * (ln_x - x0) / (x1 - x0)).exp()
+    }
+
+    /// Abscissae that stand twice.
+    fn edges(&self) -> impl Iterator<Item = f64> {
+        self.ln_x
+            .windows(2)
+            .filter(|pair| pair[0] == pair[1])
+            .map(|pair| pair[0].exp())
+    }
+}
+
+/// One element's tables.
+pub(crate) struct Element {
+    /// Atomic weight in g/mol.
+    pub(crate) atomic_weight: f64,
+    photoelectric: LogLog,
+    rayleigh: LogLog,
+    compton: LogLog,
+    form_factor: Vec<f64>,
+    incoherent: Vec<f64>,
+}
+
+impl Element {
+    /// Mass attenuation at an energy inside the tables.
+    pub(crate) fn cross_sections(&self, energy_kev: f64) -> CrossSections {
+        let ln_e = energy_kev.ln();
+        CrossSections {
+            photoelectric: self.photoelectric.at(ln_e),
+            rayleigh: self.rayleigh.at(ln_e),
+            compton: self.compton.at(ln_e),
+        }
+    }
+
+    /// Absorption edges inside the tables, keV, ascending.
+    pub(crate) fn edges_kev(&self) -> impl Iterator<Item = f64> {
+        self.photoelectric.edges()
+    }
+
+    /// Form factor F(q), F(0) = Z; q = sin(θ/2)/λ in 1/Å.
+    pub(crate) fn form_factor(&self, q: f64) -> f64 {
+        scattering_factor(&elements().q, &self.form_factor, q)
+    }
+
+    /// Incoherent scattering function S(q), from 0 at q = 0 to nearly Z.
+    pub(crate) fn incoherent(&self, q: f64) -> f64 {
+        scattering_factor(&elements().q, &self.incoherent, q)
+    }
+}
+
+/// Log-log between positive nodes, a straight line from q = 0 to the first of them.
+fn scattering_factor(nodes: &[f64], values: &[f64], q: f64) -> f64 {
+    let upper = nodes
+        .partition_point(|&node| node <= q)
+        .clamp(1, nodes.len() - 1);
+    let (q0, q1) = (nodes[upper - 1], nodes[upper]);
+    let (f0, f1) = (values[upper - 1], values[upper]);
+    if upper == 1 {
+        f0 + (f1 - f0) * q / q1
+    } else {
+        f0 * (f1 / f0).powf((q / q0).ln() / (q1 / q0).ln())
+    }
+}
+
+/// All elements by atomic number less one, and the grid that F and S share.
+pub(crate) struct Elements {
+    q: Vec<f64>,
+    by_z: Vec<Element>,
+}
+
+impl Elements {
+    /// The element of atomic number `z`, if it is in the tables (Z = 1 to 92).
+    pub(crate) fn get(&self, z: u8) -> Option<&Element> {
+        self.by_z.get(usize::from(z).checked_sub(1)?)
+    }
+}
+
+/// The embedded tables, unpacked once.
+pub(crate) fn elements() -> &'static Elements {
+    static ELEMENTS: OnceLock<Elements> = OnceLock::new();
+    ELEMENTS.get_or_init(|| {
+        let mut data = Unpacked::new(include_bytes!("../data/elements.bin.deflate"));
+        let [n_elements, n_energy, n_q] = std::array::from_fn(|_| data.count());
+        let energies = data.floats(n_energy);
+        let q = data.doubles(n_q);
+        let by_z = (0..n_elements)
+            .map(|_| {
+                let atomic_weight = f64::from(data.floats(1)[0]);
+                let n_photo = data.count();
+                let photo_energies = data.floats(n_photo);
+                Element {
+                    atomic_weight,
+                    photoelectric: LogLog::new(&photo_energies, &data.floats(n_photo)),
+                    rayleigh: LogLog::new(&energies, &data.floats(n_energy)),
+                    compton: LogLog::new(&energies, &data.floats(n_energy)),
+                    form_factor: data.doubles(n_q),
+                    incoherent: data.doubles(n_q),
+                }
+            })
+            .collect();
+        Elements { q, by_z }
+    })
+}
+
+/// Reader of an embedded, deflated table of little-endian numbers.
+///
+/// The tables are part of the program: a table that does not parse is a bug, and panics.
+pub(crate) struct Unpacked {
+    bytes: Vec<u8>,
+    position: usize,
+}
+
+impl Unpacked {
+    pub(crate) fn new(deflated: &[u8]) -> Self {
+        let mut bytes = Vec::new();
+        flate2::read::DeflateDecoder::new(deflated)
+            .read_to_end(&mut bytes)
+            .expect("embedded table inflates");
+        Self { bytes, position: 0 }
+    }
+
+    fn word(&mut self) -> [u8; 4] {
+        let word = self.bytes[self.position..self.position + 4]
+            .try_into()
+            .expect("four bytes");
+        self.position += 4;
+        word
+    }
+
+    pub(crate) fn count(&mut self) -> usize {
+        u32::from_le_bytes(self.word()) as usize
+    }
+
+    pub(crate) fn floats(&mut self, n: usize) -> Vec<f32> {
+        (0..n).map(|_| f32::from_le_bytes(self.word())).collect()
+    }
+
+    pub(crate) fn doubles(&mut self, n: usize) -> Vec<f64> {
+        self.floats(n).into_iter().map(f64::from).collect()
+    }
+}
