@@ -169,4 +169,44 @@ impl Grid {
             Affine3::from_matrix_unchecked(matrix),
         )
     }
+
+    /// Half-open bounds of the voxels whose centres lie in the world box `min..=max`.
+    pub(crate) fn block_inside(
+        &self,
+        min: &Point3<f64>,
+        max: &Point3<f64>,
+    ) -> Option<([usize; 3], [usize; 3])> {
+        /// Centres on the faces of the box are inside despite rounding, in voxels.
+        const SLACK: f64 = 1e-9;
+        let [nx, ny, nz] = self.size;
+        let along_i = self.linear().column(0).into_owned();
+        let (mut low, mut high) = (self.size, [0; 3]);
+        for k in 0..nz {
+            for j in 0..ny {
+                let start = self.centre([0.0, j as f64, k as f64]);
+                let (mut first, mut last) = (0.0_f64, (nx - 1) as f64);
+                for axis in 0..3 {
+                    let (to_min, to_max) = (min[axis] - start[axis], max[axis] - start[axis]);
+                    let step = along_i[axis];
+                    if step.abs() < 1e-12 {
+                        if to_min > SLACK || to_max < -SLACK {
+                            last = -1.0;
+                        }
+                        continue;
+                    }
+                    let (a, b) = (to_min / step, to_max / step);
+                    first = first.max((a.min(b) - SLACK).ceil());
+                    last = last.min((a.max(b) + SLACK).floor());
+                }
+                if first <= last {
+                    let block = [(first as usize, last as usize), (j, j), (k, k)];
+                    for (axis, (from, to)) in block.into_iter().enumerate() {
+                        low[axis] = low[axis].min(from);
+                        high[axis] = high[axis].max(to + 1);
+                    }
+                }
+            }
+        }
+        (high[0] > 0).then_some((low, high))
+    }
 }

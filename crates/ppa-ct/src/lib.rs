@@ -1,11 +1,41 @@
 //! CT volumes in Hounsfield units with a typed voxel-to-world affine.
 //!
+//! [`read`] turns a DICOM series or a NIfTI file into a [`Scan`] with a [`Volume`], or refuses it
+//! with the reason; [`write_nifti`] writes one; [`Info`] tells the facts; [`phantom`] makes limbs
+//! whose true shape is known.
+//!
 //! Units: mm, Hounsfield units. Frames: `voxel` (i, j, k; the centre of the first voxel is
 //! (0, 0, 0)) and `ct` (DICOM patient axes LPS: x to the left, y posterior, z superior).
+//! A volume may be sheared (gantry tilt) or left-handed: its affine stays as acquired.
+//! Nothing that names a person, a place or a date passes from a file into these types.
+//!
+//! Features: `dicom` and `nifti` (both on by default) hold the readers; without them the crate is
+//! geometry and phantoms only.
+//!
+//! ```
+//! use nalgebra::{Point3, Vector3};
+//! use ppa_ct::{Grid, Volume};
+//! let grid = Grid::axis_aligned([2, 2, 3], Vector3::new(1.0, 1.0, 2.5), Point3::origin())?;
+//! let volume = Volume::new(grid, vec![40.0; 12])?;
+//! assert_eq!(volume.sample(&Point3::new(0.5, 0.5, 3.0)), Some(40.0));
+//! # Ok::<(), ppa_ct::VolumeError>(())
+//! ```
 
+#[cfg(feature = "dicom")]
+mod dicom_series;
+mod error;
 mod grid;
+mod info;
+#[cfg(feature = "nifti")]
+mod nifti_file;
 pub mod phantom;
+mod scan;
 mod volume;
 
+pub use error::{Gap, ReadError, WriteError};
 pub use grid::{Grid, GridError};
+pub use info::Info;
+#[cfg(feature = "nifti")]
+pub use nifti_file::write as write_nifti;
+pub use scan::{Scan, SeriesSummary, Warning, WarningCode, read};
 pub use volume::{Volume, VolumeError};

@@ -113,4 +113,17 @@ impl Volume {
         }
         Ok(Self { grid, hu })
     }
+
+    /// The smallest block of voxels that holds every voxel whose centre lies in the world box
+    /// `min..=max` (LPS, mm).
+    ///
+    /// # Errors
+    /// [`VolumeError::Grid`] when no centre lies in the box.
+    pub fn crop_world(&self, min: &Point3<f64>, max: &Point3<f64>) -> Result<Self, VolumeError> {
+        let (low, high) = self
+            .grid
+            .block_inside(min, max)
+            .ok_or(GridError::Empty([0; 3]))?;
+        self.crop(low, high)
+    }
 }

@@ -1,0 +1,242 @@
+//! Why a scan could not be read or written.
+
+use std::path::PathBuf;
+
+use crate::scan::SeriesSummary;
+use crate::volume::VolumeError;
+
+/// An error of a file-format library, kept as the source of ours.
+type Cause = Box<dyn std::error::Error + Send + Sync>;
+
+/// Why a scan was refused.
+///
+/// Messages name files and numbers only, never what a header says about a person.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// The file or folder cannot be opened or read.
+    #[error("cannot read {}", path.display())]
+    Io {
+        /// What was asked for.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// Neither a folder of DICOM files, nor a DICOM file, nor NIfTI.
+    #[error("{} is no scan ppa can read: expected a folder with one DICOM series, a DICOM file, .nii or .nii.gz", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The crate was built without this reader.
+    #[error("{} needs the feature `{feature}` of ppa-ct, which this build lacks", path.display())]
+    FeatureOff {
+        /// The file or folder.
+        path: PathBuf,
+        /// Cargo feature that holds the reader.
+        feature: &'static str,
+    },
+    /// A folder without a single DICOM image.
+    #[error("no DICOM image in {} ({files} files looked at; subfolders are not searched)", path.display())]
+    NoDicom {
+        /// The folder.
+        path: PathBuf,
+        /// Files in it.
+        files: usize,
+    },
+    /// A file that starts as DICOM cannot be parsed to the end.
+    #[error("{} is damaged or no valid DICOM file", path.display())]
+    Dicom {
+        /// The file.
+        path: PathBuf,
+        /// What the parser says.
+        source: Cause,
+    },
+    /// An attribute that the geometry or the pixel values need is missing.
+    #[error("{} lacks {tag}", path.display())]
+    MissingTag {
+        /// The file.
+        path: PathBuf,
+        /// DICOM keyword.
+        tag: &'static str,
+    },
+    /// An attribute holds something unusable.
+    #[error("{}: {tag} is {found}, expected {expected}", path.display())]
+    BadTag {
+        /// The file.
+        path: PathBuf,
+        /// DICOM keyword.
+        tag: &'static str,
+        /// The value.
+        found: String,
+        /// What it should have been.
+        expected: &'static str,
+    },
+    /// Another modality than CT: its values are not Hounsfield units.
+    #[error("{} holds modality {modality}, not CT; its values are not Hounsfield units", path.display())]
+    NotCt {
+        /// The modality found.
+        modality: String,
+        /// The file or folder.
+        path: PathBuf,
+    },
+    /// More than one series in a folder.
+    #[error("{} holds {} series, expected one: {}", path.display(), series.len(), list_series(series))]
+    SeveralSeries {
+        /// The folder.
+        path: PathBuf,
+        /// Each series, by number.
+        series: Vec<SeriesSummary>,
+    },
+    /// Nothing but localizers (scout views).
+    #[error("{} holds {localizers} localizer images and no slices", path.display())]
+    OnlyLocalizers {
+        /// The folder.
+        path: PathBuf,
+        /// Localizers found.
+        localizers: usize,
+    },
+    /// A multi-frame (enhanced) object.
+    #[error("{} is a multi-frame DICOM object ({frames} frames); only one slice per file is read", path.display())]
+    MultiFrame {
+        /// The file.
+        path: PathBuf,
+        /// Frames in it.
+        frames: u32,
+    },
+    /// No decoder for the way the pixels are packed.
+    #[error("cannot unpack the pixels of {}: transfer syntax {name} ({uid})", path.display())]
+    TransferSyntax {
+        /// The file.
+        path: PathBuf,
+        /// Transfer syntax UID: names an encoding, never a person.
+        uid: String,
+        /// Its name.
+        name: &'static str,
+        /// What the decoder says.
+        source: Cause,
+    },
+    /// The pixel data do not have the size that the header promises.
+    #[error("{} holds {found} bytes of pixels, expected {expected}", path.display())]
+    PixelCount {
+        /// The file.
+        path: PathBuf,
+        /// Bytes found.
+        found: u64,
+        /// Bytes promised.
+        expected: u64,
+    },
+    /// Slices of one series that do not fit on one lattice.
+    #[error("{}: {what} is {found}, but {expected} in the other slices", path.display())]
+    Mixed {
+        /// First file that differs.
+        path: PathBuf,
+        /// What differs.
+        what: &'static str,
+        /// Its value there.
+        found: String,
+        /// The value in the first slice.
+        expected: String,
+    },
+    /// Several slices in one place, as in a series with phases or without true positions.
+    #[error(
+        "{}: {slices} slices share the position ({:.3}, {:.3}, {:.3}) mm; {total} slices lie in {positions} places",
+        path.display(), position_mm[0], position_mm[1], position_mm[2]
+    )]
+    SamePosition {
+        /// The folder.
+        path: PathBuf,
+        /// Slices at the most crowded position.
+        slices: usize,
+        /// That position, LPS.
+        position_mm: [f64; 3],
+        /// Slices altogether.
+        total: usize,
+        /// Distinct positions.
+        positions: usize,
+    },
+    /// Slices are missing, or their steps vary.
+    #[error("the slices in {} are not evenly spaced: expected steps of {expected_mm:.3} mm, found {}", path.display(), list_gaps(gaps))]
+    UnevenSteps {
+        /// The folder.
+        path: PathBuf,
+        /// Usual distance between neighbours (the median).
+        expected_mm: f64,
+        /// Steps that differ.
+        gaps: Vec<Gap>,
+    },
+    /// A NIfTI file whose header cannot be used.
+    #[error("{}: {problem}", path.display())]
+    Nifti {
+        /// The file.
+        path: PathBuf,
+        /// What was found and what expected.
+        problem: String,
+    },
+    /// The values or the affine do not make a volume.
+    #[error("{} does not hold a usable volume", path.display())]
+    Volume {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why not.
+        source: VolumeError,
+    },
+}
+
+/// A step between two neighbouring slices that differs from the others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    /// Slice before the step, counted from 0 along the slice normal.
+    pub after_slice: usize,
+    /// Length of the step.
+    pub found_mm: f64,
+}
+
+fn list_series(series: &[SeriesSummary]) -> String {
+    let names = series.iter().map(|s| {
+        let number = s.number.map_or("?".to_owned(), |n| n.to_string());
+        let modality = s.modality.as_deref().unwrap_or("no modality");
+        format!("number {number} ({modality}, {} images)", s.slices)
+    });
+    names.collect::<Vec<_>>().join("; ")
+}
+
+fn list_gaps(gaps: &[Gap]) -> String {
+    const SHOWN: usize = 5;
+    let mut text = gaps
+        .iter()
+        .take(SHOWN)
+        .map(|gap| format!("{:.3} mm after slice {}", gap.found_mm, gap.after_slice))
+        .collect::<Vec<_>>()
+        .join(", ");
+    if gaps.len() > SHOWN {
+        text += &format!(" and {} more", gaps.len() - SHOWN);
+    }
+    text
+}
+
+/// Why a volume could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WriteError {
+    /// The name does not say a format that can be written.
+    #[error("cannot write {}: expected a name ending in .nii or .nii.gz", path.display())]
+    Extension {
+        /// The name given.
+        path: PathBuf,
+    },
+    /// The format cannot hold so many voxels along one axis.
+    #[error("a volume of {size:?} voxels does not fit NIfTI-1, which holds 32767 along an axis")]
+    TooLarge {
+        /// Voxels along i, j, k.
+        size: [usize; 3],
+    },
+    /// The file could not be written; nothing is left behind.
+    #[error("cannot write {}", path.display())]
+    Io {
+        /// The file asked for.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+}

@@ -1,0 +1,148 @@
+//! Writing NIfTI-1.
+
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use nifti::NiftiHeader;
+
+use super::affine::set_affine;
+use crate::error::WriteError;
+use crate::volume::Volume;
+
+/// Voxels follow the header and four bytes that announce no extension.
+const VOXELS_AT: f32 = 352.0;
+
+/// Writes a volume as NIfTI-1: `.nii`, or `.nii.gz` compressed.
+///
+/// Whole numbers that fit are stored as int16, anything else as float32. The affine stands in the
+/// sform, and in the qform too unless it is sheared; both hold it as f32. The file appears whole
+/// or not at all, and its bytes depend on the volume only.
+///
+/// # Errors
+/// [`WriteError`] for another extension, more than 32767 voxels along an axis, and a file system
+/// that refuses.
+pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = name.to_ascii_lowercase();
+    let compress = name.ends_with(".nii.gz");
+    if !compress && !name.ends_with(".nii") {
+        return Err(WriteError::Extension {
+            path: path.to_owned(),
+        });
+    }
+    let size = volume.grid().size();
+    if size.iter().any(|&n| n > i16::MAX as usize) {
+        return Err(WriteError::TooLarge { size });
+    }
+    write_whole(path, |out| {
+        if compress {
+            // CT noise hardly compresses: higher levels cost time and save a few percent.
+            let mut gzip = GzEncoder::new(out, Compression::fast());
+            write_stream(&mut gzip, volume)?;
+            gzip.finish().map(|_| ())
+        } else {
+            write_stream(out, volume)
+        }
+    })
+    .map_err(|source| WriteError::Io {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Fills a temporary file beside `path` and renames it when it is complete.
+fn write_whole(
+    path: &Path,
+    fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
+) -> std::io::Result<()> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // As any new file, instead of readable by its owner only; the umask still applies.
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut file = BufWriter::new(builder.tempfile_in(folder)?);
+    fill(&mut file)?;
+    let file = file.into_inner().map_err(|e| e.into_error())?;
+    file.persist(path)?;
+    Ok(())
+}
+
+fn write_stream(out: &mut dyn Write, volume: &Volume) -> std::io::Result<()> {
+    let whole = volume
+        .hu()
+        .iter()
+        .all(|&v| v.fract() == 0.0 && (f32::from(i16::MIN)..=f32::from(i16::MAX)).contains(&v));
+    out.write_all(&header_bytes(&header(volume, whole)))?;
+    let mut bytes = Vec::with_capacity(1 << 16);
+    for values in volume.hu().chunks(1 << 14) {
+        bytes.clear();
+        if whole {
+            bytes.extend(values.iter().flat_map(|&v| (v as i16).to_le_bytes()));
+        } else {
+            bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+        }
+        out.write_all(&bytes)?;
+    }
+    Ok(())
+}
+
+fn header(volume: &Volume, whole: bool) -> NiftiHeader {
+    let [nx, ny, nz] = volume.grid().size().map(|n| n as u16);
+    let (datatype, bitpix) = if whole { (4, 16) } else { (16, 32) };
+    let mut header = NiftiHeader {
+        dim: [3, nx, ny, nz, 1, 1, 1, 1],
+        datatype,
+        bitpix,
+        vox_offset: VOXELS_AT,
+        scl_slope: 1.0,
+        xyzt_units: 2, // mm
+        magic: *b"n+1\0",
+        ..NiftiHeader::default()
+    };
+    set_affine(&mut header, volume.grid().ct_from_voxel());
+    header
+}
+
+/// The fields that say something, little-endian at their places in `nifti1.h`; all others are 0.
+fn header_bytes(header: &NiftiHeader) -> [u8; VOXELS_AT as usize] {
+    let mut bytes = [0; VOXELS_AT as usize];
+    let mut put = |at: usize, field: &[u8]| bytes[at..at + field.len()].copy_from_slice(field);
+    put(0, &header.sizeof_hdr.to_le_bytes());
+    put(38, b"r"); // "regular", which old readers look for
+    for (n, v) in header.dim.iter().enumerate() {
+        put(40 + 2 * n, &v.to_le_bytes());
+    }
+    put(70, &header.datatype.to_le_bytes());
+    put(72, &header.bitpix.to_le_bytes());
+    for (n, v) in header.pixdim.iter().enumerate() {
+        put(76 + 4 * n, &v.to_le_bytes());
+    }
+    put(108, &header.vox_offset.to_le_bytes());
+    put(112, &header.scl_slope.to_le_bytes());
+    put(116, &header.scl_inter.to_le_bytes());
+    put(123, &[header.xyzt_units]);
+    put(252, &header.qform_code.to_le_bytes());
+    put(254, &header.sform_code.to_le_bytes());
+    let turn = [
+        header.quatern_b,
+        header.quatern_c,
+        header.quatern_d,
+        header.quatern_x,
+        header.quatern_y,
+        header.quatern_z,
+    ];
+    let rows = [header.srow_x, header.srow_y, header.srow_z].concat();
+    for (n, v) in turn.into_iter().chain(rows).enumerate() {
+        put(256 + 4 * n, &v.to_le_bytes());
+    }
+    put(344, &header.magic);
+    bytes
+}

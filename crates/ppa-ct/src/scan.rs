@@ -1,0 +1,151 @@
+//! A scan as read: the volume, and what a user should know about it.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::error::ReadError;
+use crate::volume::Volume;
+
+/// One CT, as read from disk.
+///
+/// Holds no name, date, description or UID of its source: there is no field for any.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scan {
+    /// Hounsfield units in the `ct` frame.
+    pub volume: Volume,
+    /// Modality the source declares (`CT`); `None` for NIfTI, which cannot say.
+    pub modality: Option<String>,
+    /// The DICOM series read; empty for NIfTI.
+    pub series: Vec<SeriesSummary>,
+    /// What was odd, but did not stop the reading.
+    pub warnings: Vec<Warning>,
+}
+
+/// A DICOM series, told apart without its UID.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct SeriesSummary {
+    /// Series Number, if the source has one.
+    pub number: Option<i32>,
+    /// Modality, e.g. `CT`.
+    pub modality: Option<String>,
+    /// Images of the series.
+    pub slices: usize,
+}
+
+/// Something about a scan that a user should know.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Warning {
+    /// Stable code for scripts.
+    pub code: WarningCode,
+    /// One sentence for people.
+    pub text: String,
+}
+
+/// Kinds of [`Warning`]; written in kebab-case, e.g. `gantry-tilt`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum WarningCode {
+    /// The slice step is not along the slice normal; the affine is sheared.
+    GantryTilt,
+    /// One slice: its thickness stands in for the step.
+    SingleSlice,
+    /// Localizers (scout views) were left out.
+    LocalizersDropped,
+    /// DICOM objects that are no images were left out.
+    NonImagesDropped,
+    /// No rescale slope and intercept: stored values are taken as HU.
+    NoRescale,
+    /// The values do not look like Hounsfield units.
+    NotHu,
+    /// The NIfTI header gives no orientation; the axes are assumed to be right, anterior, superior.
+    NiftiNoOrientation,
+}
+
+/// Reads a CT: a folder with one DICOM series, a single DICOM slice, `.nii` or `.nii.gz`.
+///
+/// DICOM slices are sorted by their position along the slice normal; names and instance numbers
+/// are ignored. A tilted gantry gives a sheared affine, exactly as acquired.
+///
+/// # Errors
+/// [`ReadError`]: other formats, modalities other than CT, several series, missing slices,
+/// slices in the same place, mixed geometry, damaged files, pixel encodings without a decoder.
+pub fn read(path: &Path) -> Result<Scan, ReadError> {
+    let io = |source| ReadError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    if std::fs::metadata(path).map_err(io)?.is_dir() {
+        return read_dicom_folder(path);
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = name.to_ascii_lowercase();
+    if name.ends_with(".nii") || name.ends_with(".nii.gz") {
+        read_nifti(path)
+    } else if name.ends_with(".dcm") || starts_as_dicom(path).map_err(io)? {
+        read_dicom_file(path)
+    } else {
+        Err(ReadError::Unsupported {
+            path: path.to_owned(),
+        })
+    }
+}
+
+/// Whether `DICM` follows a preamble of 128 bytes (DICOM PS3.10, section 7.1).
+pub(crate) fn starts_as_dicom(path: &Path) -> std::io::Result<bool> {
+    use std::io::Read;
+    let mut start = Vec::with_capacity(132);
+    std::fs::File::open(path)?
+        .take(132)
+        .read_to_end(&mut start)?;
+    Ok(start.get(128..) == Some(b"DICM"))
+}
+
+/// Warns when no voxel is near air: every scan of a limb shows some.
+#[cfg(any(feature = "dicom", feature = "nifti"))]
+pub(crate) fn hu_plausibility(volume: &Volume) -> Option<Warning> {
+    /// Fat is about −100 HU and lung −850: above this, nothing in the volume is air.
+    const NO_AIR_HU: f32 = -200.0;
+    let (min, max) = crate::info::range(volume.hu());
+    let window = if min >= 0.0 && max <= 255.0 {
+        "; this looks like a picture windowed to 8 bits"
+    } else {
+        ""
+    };
+    (min > NO_AIR_HU).then(|| Warning {
+        code: WarningCode::NotHu,
+        text: format!(
+            "values run from {min} to {max}, without air near -1000: probably not Hounsfield units{window}"
+        ),
+    })
+}
+
+#[cfg(feature = "dicom")]
+use crate::dicom_series::{read_file as read_dicom_file, read_folder as read_dicom_folder};
+
+#[cfg(feature = "nifti")]
+use crate::nifti_file::read as read_nifti;
+
+#[cfg(not(feature = "dicom"))]
+fn read_dicom_folder(path: &Path) -> Result<Scan, ReadError> {
+    feature_off(path, "dicom")
+}
+
+#[cfg(not(feature = "dicom"))]
+fn read_dicom_file(path: &Path) -> Result<Scan, ReadError> {
+    feature_off(path, "dicom")
+}
+
+#[cfg(not(feature = "nifti"))]
+fn read_nifti(path: &Path) -> Result<Scan, ReadError> {
+    feature_off(path, "nifti")
+}
+
+#[cfg(not(all(feature = "dicom", feature = "nifti")))]
+fn feature_off(path: &Path, feature: &'static str) -> Result<Scan, ReadError> {
+    Err(ReadError::FeatureOff {
+        path: path.to_owned(),
+        feature,
+    })
+}

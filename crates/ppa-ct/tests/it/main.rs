@@ -1,0 +1,6 @@
+//! Reading and writing scans through the public API.
+
+mod dicom;
+mod nifti;
+mod real;
+mod series;

@@ -1,0 +1,203 @@
+//! NIfTI: round trips, precedence of orientations, scaling, damage.
+
+use nalgebra::{Affine3, Matrix3, Matrix4, Point3, Rotation3, Vector3};
+use ppa_ct::{Grid, ReadError, Volume, WarningCode, WriteError, read, write_nifti};
+use proptest::prelude::*;
+
+/// Volumes with any rotation, handedness, shear and odd sizes; whole or fractional values.
+fn volumes() -> impl Strategy<Value = Volume> {
+    (
+        prop::array::uniform3(1..8_usize),
+        prop::array::uniform3(-4.0..4.0_f64),
+        prop::array::uniform3(0.05..5.0_f64),
+        prop::array::uniform3(-1500.0..1500.0_f64),
+        prop_oneof![Just(0.0), -0.4..0.4_f64],
+        any::<[bool; 3]>(),
+        any::<bool>(),
+        any::<u32>(),
+    )
+        .prop_map(
+            |(size, angles, spacing, origin, shear, mirrored, whole, seed)| {
+                let mut axes = Rotation3::from_euler_angles(angles[0], angles[1], angles[2])
+                    .matrix()
+                    * Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, shear, 0.0, 0.0, 1.0);
+                for (axis, mirrored) in mirrored.into_iter().enumerate() {
+                    let sign = if mirrored { -1.0 } else { 1.0 };
+                    axes.column_mut(axis).scale_mut(sign * spacing[axis]);
+                }
+                let mut matrix = axes.to_homogeneous();
+                for (row, v) in origin.into_iter().enumerate() {
+                    matrix[(row, 3)] = v;
+                }
+                let grid = Grid::new(size, Affine3::from_matrix_unchecked(matrix)).unwrap();
+                let value = |n: usize| {
+                    let noise = (n as u32).wrapping_mul(2_654_435_761).wrapping_add(seed);
+                    let hu = (noise % 4096) as f32 - 1024.0;
+                    if whole { hu } else { hu + 0.37 }
+                };
+                let hu = (0..grid.len()).map(value).collect();
+                Volume::new(grid, hu).unwrap()
+            },
+        )
+}
+
+fn max_abs(a: &Matrix4<f64>, b: &Matrix4<f64>) -> f64 {
+    (a - b).amax()
+}
+
+proptest! {
+    /// Values come back equal, positions up to the f32 of the header.
+    #[test]
+    fn what_is_written_comes_back(volume in volumes(), compress in any::<bool>()) {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join(if compress { "v.nii.gz" } else { "v.nii" });
+        write_nifti(&path, &volume)?;
+        let back = read(&path).map_err(|e| TestCaseError::fail(e.to_string()))?.volume;
+        prop_assert_eq!(back.hu(), volume.hu());
+        let (a, b) = (back.grid().ct_from_voxel(), volume.grid().ct_from_voxel());
+        // f32 has 24 bits, half a unit in the last place below 2048: 6.1e-5.
+        prop_assert!(max_abs(a.matrix(), b.matrix()) < 6.2e-5);
+        prop_assert_eq!(std::fs::read_dir(folder.path())?.count(), 1, "temporary files left");
+
+        // With the sform switched off, the qform alone must say the same, unless it is sheared.
+        if !compress {
+            let mut bytes = std::fs::read(&path)?;
+            bytes[254..256].fill(0);
+            let qform = bytes[252] > 0;
+            std::fs::write(&path, bytes)?;
+            let scan = read(&path).map_err(|e| TestCaseError::fail(e.to_string()))?;
+            if qform {
+                let by_qform = scan.volume.grid().ct_from_voxel();
+                // Near a half turn, the scalar part is the root of a small difference of f32 squares.
+                prop_assert!(max_abs(by_qform.matrix(), b.matrix()) < 5e-3);
+            } else {
+                prop_assert_eq!(scan.warnings[0].code, WarningCode::NiftiNoOrientation);
+            }
+        }
+    }
+}
+
+fn small() -> Volume {
+    let grid = Grid::axis_aligned(
+        [3, 2, 2],
+        Vector3::new(1.0, 2.0, 3.0),
+        Point3::new(-5.0, 6.0, 7.0),
+    );
+    let hu = (0..12).map(|n| n as f32 - 1000.0).collect();
+    Volume::new(grid.unwrap(), hu).unwrap()
+}
+
+/// Writes [`small`], changes some bytes, reads it again.
+fn patched(patches: &[(usize, &[u8])]) -> Result<ppa_ct::Scan, ReadError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("v.nii");
+    write_nifti(&path, &small()).unwrap();
+    let mut bytes = std::fs::read(&path).unwrap();
+    for (at, patch) in patches {
+        bytes[*at..at + patch.len()].copy_from_slice(patch);
+    }
+    std::fs::write(&path, bytes).unwrap();
+    read(&path)
+}
+
+#[test]
+fn sform_wins_over_qform() {
+    let shifted = patched(&[(268, &99.0_f32.to_le_bytes())]).unwrap(); // qoffset_x
+    assert_eq!(shifted.volume, small());
+    let by_qform = patched(&[(268, &99.0_f32.to_le_bytes()), (254, &[0, 0])]).unwrap();
+    assert_eq!(
+        by_qform.volume.grid().origin_mm(),
+        Point3::new(-99.0, 6.0, 7.0)
+    );
+}
+
+#[test]
+fn a_slope_of_nan_or_zero_means_as_stored() {
+    for slope in [f32::NAN, 0.0] {
+        let intercept = 500.0_f32.to_le_bytes();
+        let scan = patched(&[(112, &slope.to_le_bytes()), (116, &intercept)]).unwrap();
+        assert_eq!(scan.volume.at([0, 0, 0]), -1000.0);
+    }
+    let half = patched(&[
+        (112, &0.5_f32.to_le_bytes()),
+        (116, &(-7.0_f32).to_le_bytes()),
+    ]);
+    assert_eq!(half.unwrap().volume.at([1, 0, 0]), -506.5);
+}
+
+#[test]
+fn units_of_the_header_are_honoured() {
+    let metres = patched(&[(123, &[1])]).unwrap();
+    let spacing = metres.volume.grid().spacing_mm();
+    assert_eq!(spacing, Vector3::new(1000.0, 2000.0, 3000.0));
+}
+
+#[test]
+fn values_that_are_no_hounsfield_units_are_flagged() {
+    let scan = patched(&[(116, &1000.0_f32.to_le_bytes())]).unwrap(); // 0 to 11
+    let codes = scan.warnings.iter().map(|w| w.code).collect::<Vec<_>>();
+    assert_eq!(codes, [WarningCode::NotHu]);
+}
+
+#[test]
+fn headers_that_make_no_volume_are_refused() {
+    let nan = f32::NAN.to_le_bytes();
+    let damage: [&[(usize, &[u8])]; 8] = [
+        &[(40, &[4]), (48, &[2])],      // four axes, two time points
+        &[(40, &[2])],                  // two axes
+        &[(42, &[0xff, 0xff])],         // −1 voxels
+        &[(42, &[0xff, 0x7f])],         // more voxels than bytes
+        &[(70, &[128])],                // RGB
+        &[(108, &nan)],                 // voxels nowhere
+        &[(280, &nan)],                 // sform of NaN
+        &[(0, &540_i32.to_le_bytes())], // NIfTI-2
+    ];
+    for patches in damage {
+        assert!(patched(patches).is_err(), "{patches:?}");
+    }
+}
+
+#[test]
+fn a_cut_file_is_an_error_at_every_length() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["v.nii", "v.nii.gz"] {
+        let path = folder.path().join(name);
+        write_nifti(&path, &small()).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        // The last 8 bytes of gzip are a checksum behind complete data.
+        let needed = if name.ends_with("gz") {
+            bytes.len() - 8
+        } else {
+            bytes.len()
+        };
+        for length in 0..needed {
+            std::fs::write(&path, &bytes[..length]).unwrap();
+            assert!(
+                read(&path).is_err(),
+                "{length} of {} bytes of {name}",
+                bytes.len()
+            );
+        }
+    }
+}
+
+#[test]
+fn a_failed_write_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let wrong = folder.path().join("v.nrrd");
+    assert!(matches!(
+        write_nifti(&wrong, &small()),
+        Err(WriteError::Extension { .. })
+    ));
+    let nowhere = folder.path().join("missing/v.nii");
+    assert!(matches!(
+        write_nifti(&nowhere, &small()),
+        Err(WriteError::Io { .. })
+    ));
+    // The rename onto a folder fails when all bytes are already written.
+    let taken = folder.path().join("v.nii");
+    std::fs::create_dir(&taken).unwrap();
+    assert!(write_nifti(&taken, &small()).is_err());
+    std::fs::remove_dir(&taken).unwrap();
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
