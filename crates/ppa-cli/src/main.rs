@@ -1,2 +1,90 @@
-//! In progress.
-fn main() {}
+//! `ppa`: CT scans in, paired depth images and radiographs out.
+//!
+//! Parses, calls the libraries, prints. Results go to stdout, everything else to stderr.
+
+mod commands;
+mod output;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::output::Output;
+
+/// Paired Time-of-Flight depth images and radiographs of posed limbs, made from CT scans.
+///
+/// Start with `ppa demo`. With a CT of your own: `ppa ct info`, `ppa prepare`, then
+/// `ppa generate` with a plan.
+#[derive(Debug, Parser)]
+#[command(name = "ppa", version, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// Print one JSON object instead of text
+    #[arg(long, global = true)]
+    json: bool,
+    /// Worker threads [default: one per core]
+    #[arg(long, global = true, value_name = "N")]
+    threads: Option<std::num::NonZeroUsize>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// From the built-in phantom to a small dataset and a contact sheet, in minutes
+    Demo(commands::demo::DemoArgs),
+    /// Look at, convert or make a CT
+    #[command(subcommand)]
+    Ct(commands::ct::CtCommand),
+    /// Find skin, axis and plane of a limb and write them down as a case
+    Prepare(commands::prepare::PrepareArgs),
+    /// Surfaces of a CT
+    #[command(subcommand)]
+    Mesh(commands::mesh::MeshCommand),
+    /// The table, and the limb on it
+    #[command(subcommand)]
+    Scene(commands::scene::SceneCommand),
+    /// Depth images and the camera model
+    #[command(subcommand)]
+    Depth(commands::depth::DepthCommand),
+    /// Radiographs, spectra and materials
+    #[command(subcommand)]
+    Xray(commands::xray::XrayCommand),
+    /// Make, or go on with, the dataset of a plan
+    Generate(commands::generate::GenerateArgs),
+    /// Metrics of predictions against labels
+    Metrics(commands::metrics::MetricsArgs),
+    /// Statistical tests
+    #[command(subcommand)]
+    Stats(commands::stats::StatsCommand),
+}
+
+fn run(cli: Cli) -> anyhow::Result<()> {
+    if let Some(threads) = cli.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads.get())
+            .build_global()?;
+    }
+    let output = Output { json: cli.json };
+    match cli.command {
+        Command::Demo(args) => commands::demo::run(&args, output),
+        Command::Ct(command) => commands::ct::run(&command, output),
+        Command::Prepare(args) => commands::prepare::run(&args, output),
+        Command::Mesh(command) => commands::mesh::run(&command, output),
+        Command::Scene(command) => commands::scene::run(&command, output),
+        Command::Depth(command) => commands::depth::run(&command, output),
+        Command::Xray(command) => commands::xray::run(&command, output),
+        Command::Generate(args) => commands::generate::run(&args, output),
+        Command::Metrics(args) => commands::metrics::run(&args, output),
+        Command::Stats(command) => commands::stats::run(&command, output),
+    }
+}
+
+fn main() -> ExitCode {
+    match run(Cli::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("ppa: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,1 +1,40 @@
-//! In progress.
+//! Cases, plans and paired depth/radiograph datasets of posed limbs.
+//!
+//! [`prepare`] turns a CT into a [`Case`] that records every preprocessing decision; a [`Plan`]
+//! names cases, room, cameras, beam, rotations and body shapes; [`generate`] makes the dataset
+//! in the layout published by the paper's authors ([`layout`]), with a [`Manifest`].
+//!
+//! Units: mm, degrees in files; 16-bit depth in mm, 0 invalid. Frames: as in `ppa-scene`.
+//! Repeatable: the same plan and seed give the same bytes for any number of threads and after
+//! any interruption.
+//!
+//! Source of the method: Laufer et al., Patient Pose Assessment Using a CT-Based Framework for
+//! Synthetic Data Generation, MELBA 2026:027, doi:10.59275/j.melba.2026-c874.
+
+mod body_shape;
+mod case;
+mod contact_sheet;
+mod description;
+mod files;
+mod generate;
+pub mod layout;
+mod manifest;
+mod plan;
+mod prepare;
+mod radiograph;
+mod record;
+mod seed;
+mod stage;
+mod unit;
+
+pub use body_shape::{BodyShape, ShapeSettings, body_shape};
+pub use case::{Case, CaseError, Found, Source};
+pub use contact_sheet::{ContactSheetError, contact_sheet};
+pub use files::{FileError, sha256_of_file, write_whole};
+pub use generate::{GenerateError, Progress, Summary, generate};
+pub use manifest::{FileKind, FileRow, Manifest, RoiFile, RoiRow, Rows};
+pub use plan::{DepthSettings, Plan, PlanCase, PlanError, PlanRoom, XraySettings};
+pub use prepare::{PrepareError, PreparedLimb, prepare, volume_sha256};
+pub use radiograph::{JointError, joint_phantom, projection};
+pub use stage::{PlacedCamera, Stage, StageError, Table, spectrum};
+pub use unit::UnitError;

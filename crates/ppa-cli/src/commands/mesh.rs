@@ -1,0 +1,189 @@
+//! `ppa mesh`: surfaces of a CT, and clusters of points.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use ppa_ct::read;
+use ppa_dataset::{BodyShape, Case, PreparedLimb, ShapeSettings, body_shape, layout::LimbId};
+use ppa_mesh::{Border, Mesh, dbscan, iso_surface, read_ply, write_ply};
+use serde::Serialize;
+
+use crate::output::{Output, Seconds, Stopwatch};
+
+#[derive(Debug, Subcommand)]
+pub enum MeshCommand {
+    /// Iso-surface of a CT as PLY
+    Extract(ExtractArgs),
+    /// The skin of a case, or a body shape of it, as PLY
+    Augment(AugmentArgs),
+    /// DBSCAN clusters of a point cloud
+    Cluster(ClusterArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct ExtractArgs {
+    /// DICOM folder or file, .nii or .nii.gz
+    volume: PathBuf,
+    /// Hounsfield units of the surface
+    #[arg(long, default_value_t = -500.0, allow_negative_numbers = true)]
+    iso: f32,
+    /// Close the surface where the volume ends
+    #[arg(long)]
+    close: bool,
+    /// PLY file to write
+    #[arg(long)]
+    out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct AugmentArgs {
+    /// Case written by `ppa prepare`
+    case: PathBuf,
+    /// Body shape: orig, big, small, bumps_a or bumps_b
+    #[arg(long, default_value = "orig", value_parser = body_shape_named)]
+    shape: BodyShape,
+    /// Shift of big and small in mm [default: 4]
+    #[arg(long)]
+    offset_mm: Option<f64>,
+    /// Seed of the bumps
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// PLY file to write
+    #[arg(long)]
+    out: PathBuf,
+}
+
+fn body_shape_named(name: &str) -> Result<BodyShape, String> {
+    let known = BodyShape::ALL.into_iter().find(|shape| shape.name() == name);
+    known.ok_or_else(|| {
+        let names = BodyShape::ALL.map(BodyShape::name).join(", ");
+        format!("expected one of {names}")
+    })
+}
+
+#[derive(Debug, Args)]
+pub struct ClusterArgs {
+    /// PLY point cloud
+    cloud: PathBuf,
+    /// Neighbours are at most this far away
+    #[arg(long)]
+    eps_mm: f64,
+    /// Points within that distance, itself included, that make a core point
+    #[arg(long)]
+    min_points: usize,
+}
+
+pub fn run(command: &MeshCommand, output: Output) -> anyhow::Result<()> {
+    match command {
+        MeshCommand::Extract(args) => extract(args, output),
+        MeshCommand::Augment(args) => augment(args, output),
+        MeshCommand::Cluster(args) => cluster(args, output),
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct Surface {
+    vertices: usize,
+    triangles: usize,
+    area_mm2: f64,
+    volume_mm3: f64,
+    components: usize,
+    boundary_edges: usize,
+    euler: i64,
+    #[serde(flatten)]
+    seconds: Seconds,
+}
+
+impl Surface {
+    fn of(mesh: &Mesh, seconds: Seconds) -> Self {
+        let topology = mesh.topology();
+        Self {
+            vertices: mesh.vertices.len(),
+            triangles: mesh.triangles.len(),
+            area_mm2: mesh.area_mm2(),
+            volume_mm3: mesh.volume_mm3(),
+            components: topology.components,
+            boundary_edges: topology.boundary_edges,
+            euler: topology.euler,
+            seconds,
+        }
+    }
+
+    fn describe(&self) -> String {
+        format!(
+            "{} vertices, {} triangles, {:.1} mm², {:.1} mm³, {} components, {} boundary edges, Euler number {}",
+            self.vertices,
+            self.triangles,
+            self.area_mm2,
+            self.volume_mm3,
+            self.components,
+            self.boundary_edges,
+            self.euler
+        )
+    }
+}
+
+fn extract(args: &ExtractArgs, output: Output) -> anyhow::Result<()> {
+    let volume = read(&args.volume)?.volume;
+    let border = if args.close {
+        Border::Closed
+    } else {
+        Border::Open
+    };
+    let watch = Stopwatch::start();
+    let mesh = iso_surface(&volume, args.iso, border)?;
+    let seconds = watch.read();
+    write_ply(&args.out, &mesh)?;
+    output.print(&Surface::of(&mesh, seconds), Surface::describe)
+}
+
+fn augment(args: &AugmentArgs, output: Output) -> anyhow::Result<()> {
+    let case = Case::read(&args.case)?;
+    let prepared = PreparedLimb::of_case(&case)?;
+    let mut settings = ShapeSettings::default();
+    settings.offset_mm = args.offset_mm.unwrap_or(settings.offset_mm);
+    let limb = LimbId {
+        patient: 0,
+        side: case.side,
+    };
+    let watch = Stopwatch::start();
+    let mesh = body_shape(
+        &prepared.limb.mesh,
+        &prepared.landmarks,
+        args.shape,
+        &settings,
+        limb,
+        args.seed,
+    )?;
+    let seconds = watch.read();
+    write_ply(&args.out, &mesh)?;
+    output.print(&Surface::of(&mesh, seconds), Surface::describe)
+}
+
+#[derive(Debug, Serialize)]
+struct Clustering {
+    clusters: usize,
+    noise: usize,
+    core_points: usize,
+    sizes: Vec<usize>,
+}
+
+fn cluster(args: &ClusterArgs, output: Output) -> anyhow::Result<()> {
+    anyhow::ensure!(
+        args.eps_mm.is_finite() && args.eps_mm > 0.0,
+        "--eps-mm is {}, expected a length above 0",
+        args.eps_mm
+    );
+    anyhow::ensure!(args.min_points > 0, "--min-points is 0, expected at least 1");
+    let cloud = read_ply(&args.cloud)?.cloud;
+    let clusters = dbscan(&cloud.points, args.eps_mm, args.min_points);
+    let clustering = Clustering {
+        clusters: clusters.sizes().len(),
+        noise: clusters.noise(),
+        core_points: clusters.core_points(),
+        sizes: clusters.sizes(),
+    };
+    output.print(&clustering, |c| {
+        format!("{} clusters of {:?} points, {} noise", c.clusters, c.sizes, c.noise)
+    })
+}

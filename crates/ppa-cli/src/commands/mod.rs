@@ -1,0 +1,32 @@
+//! One file per command.
+
+pub mod ct;
+pub mod demo;
+pub mod depth;
+pub mod generate;
+pub mod mesh;
+pub mod metrics;
+pub mod prepare;
+pub mod scene;
+pub mod stats;
+pub mod xray;
+
+use std::path::Path;
+
+use anyhow::Context;
+use serde::de::DeserializeOwned;
+
+/// Reads the rows of a CSV file with a header line.
+fn read_csv<T: DeserializeOwned>(path: &Path) -> anyhow::Result<Vec<T>> {
+    let mut reader =
+        csv::Reader::from_path(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let rows = reader.deserialize().collect::<Result<_, _>>();
+    rows.with_context(|| format!("{} is not the expected table", path.display()))
+}
+
+/// Reads a JSON file.
+fn read_json<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
+    let text =
+        std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    serde_json::from_str(&text).with_context(|| format!("{} is not valid", path.display()))
+}

@@ -1,0 +1,127 @@
+//! `ppa prepare`: find skin, axis and plane of a limb and write them down as a case.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use ppa_dataset::{Case, prepare};
+use ppa_mesh::{LimbSettings, write_ply};
+use ppa_scene::{LandmarkOverrides, LimbKind, Side};
+
+use crate::output::{Output, working};
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum SideName {
+    L,
+    R,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum LimbName {
+    /// Lower leg with its ankle
+    LowerLeg,
+    /// Anything else: turned about its axis at the middle of its length
+    Other,
+}
+
+#[derive(Debug, Args)]
+pub struct PrepareArgs {
+    /// DICOM folder or file, .nii or .nii.gz
+    ct: PathBuf,
+    /// Which limb it is
+    #[arg(long, value_enum)]
+    side: SideName,
+    /// Case file to write
+    #[arg(long)]
+    out: PathBuf,
+    /// Save the skin as PLY, ct frame
+    #[arg(long)]
+    ply: Option<PathBuf>,
+    /// Kind of limb
+    #[arg(long, value_enum)]
+    limb: Option<LimbName>,
+    /// A point inside the wanted limb when the scan shows several, ct frame
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    inside: Option<[f64; 3]>,
+    /// Centre of the joint, ct frame
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    joint: Option<[f64; 3]>,
+    /// Region just proximal to the joint, mm from the joint towards proximal
+    #[arg(long, value_name = "FROM,TO", value_parser = range, allow_hyphen_values = true)]
+    joint_region: Option<[f64; 2]>,
+    /// Region around the calf, mm from the joint towards proximal
+    #[arg(long, value_name = "FROM,TO", value_parser = range, allow_hyphen_values = true)]
+    calf_region: Option<[f64; 2]>,
+    /// Direction that faces up at angle 0, ct frame
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    anterior: Option<[f64; 3]>,
+    /// A point of the plane under the limb, ct frame; give three: one distal, two proximal
+    #[arg(long = "plane-point", value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    plane_points: Vec<[f64; 3]>,
+}
+
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let numbers = numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok());
+    let finite = numbers.filter(|numbers| numbers.iter().all(|n| n.is_finite()));
+    finite.ok_or_else(|| format!("expected {N} numbers separated by commas"))
+}
+
+fn point(text: &str) -> Result<[f64; 3], String> {
+    numbers(text)
+}
+
+fn range(text: &str) -> Result<[f64; 2], String> {
+    numbers(text)
+}
+
+pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
+    let plane_points = match args.plane_points[..] {
+        [] => None,
+        [a, b, c] => Some([a, b, c]),
+        _ => anyhow::bail!("--plane-point was given {} times, expected 3", args.plane_points.len()),
+    };
+    let surface = LimbSettings {
+        inside: args.inside,
+        ..LimbSettings::default()
+    };
+    let choices = LandmarkOverrides {
+        limb: args.limb.map(|limb| match limb {
+            LimbName::LowerLeg => LimbKind::LowerLeg,
+            LimbName::Other => LimbKind::Other,
+        }),
+        joint_centre: args.joint,
+        joint_region: args.joint_region,
+        calf_region: args.calf_region,
+        anterior: args.anterior,
+        plane_points,
+        ..LandmarkOverrides::default()
+    };
+    let side = match args.side {
+        SideName::L => Side::Left,
+        SideName::R => Side::Right,
+    };
+    let working = working("finding the limb");
+    let (case, prepared) = prepare(&args.ct, side, &surface, &choices)?;
+    if let Some(ply) = &args.ply {
+        write_ply(ply, &prepared.limb.mesh)?;
+    }
+    case.write(&args.out)?;
+    working.finish_and_clear();
+    output.print(&case, |case| describe(case, args))
+}
+
+fn describe(case: &Case, args: &PrepareArgs) -> String {
+    let landmarks = &case.found.landmarks;
+    let [x, y, z] = landmarks.joint_centre;
+    let [dx, dy, dz] = landmarks.axis_direction;
+    let mut lines = vec![
+        format!("case       {}", args.out.display()),
+        format!("joint      {x:.1} {y:.1} {z:.1} mm (LPS)"),
+        format!("axis       {dx:.4} {dy:.4} {dz:.4}"),
+    ];
+    for [x, y, z] in landmarks.plane_points {
+        lines.push(format!("plane      {x:.1} {y:.1} {z:.1} mm"));
+    }
+    lines.extend(landmarks.notes.iter().map(|note| format!("note       {note}")));
+    lines.join("\n")
+}

@@ -1,0 +1,124 @@
+//! `ppa scene`: the table, and the limb on it.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::{Args, Subcommand};
+use ppa_dataset::{Case, Plan, PreparedLimb, Table};
+use ppa_mesh::{read_ply, write_ply};
+use ppa_scene::{Contact, PlaneSettings, place, table_plane};
+use serde::Serialize;
+
+use crate::output::{Output, working};
+
+#[derive(Debug, Subcommand)]
+pub enum SceneCommand {
+    /// Table plane of a point cloud
+    Plane(PlaneArgs),
+    /// Lay the limb of a case on the table
+    Place(PlaceArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct PlaneArgs {
+    /// PLY point cloud, mm, z up
+    cloud: PathBuf,
+    /// Seed of the search
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+#[derive(Debug, Args)]
+pub struct PlaceArgs {
+    /// Case written by `ppa prepare`
+    case: PathBuf,
+    /// Medial rotation in degrees
+    #[arg(long, default_value_t = 0.0)]
+    angle: f64,
+    /// Take the room from this plan
+    #[arg(long)]
+    plan: Option<PathBuf>,
+    /// Write the placed skin in room coordinates as PLY
+    #[arg(long)]
+    ply: Option<PathBuf>,
+}
+
+pub fn run(command: &SceneCommand, output: Output) -> anyhow::Result<()> {
+    match command {
+        SceneCommand::Plane(args) => plane(args, output),
+        SceneCommand::Place(args) => place_limb(args, output),
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct FoundPlane {
+    normal: [f64; 3],
+    offset_mm: f64,
+    inliers: usize,
+    rms_mm: f64,
+}
+
+fn plane(args: &PlaneArgs, output: Output) -> anyhow::Result<()> {
+    let cloud = read_ply(&args.cloud)?.cloud;
+    let found = table_plane(&cloud, &PlaneSettings::default(), args.seed)
+        .with_context(|| args.cloud.display().to_string())?;
+    let plane = FoundPlane {
+        normal: found.plane.normal.into_inner().into(),
+        offset_mm: found.plane.offset_mm,
+        inliers: found.inliers,
+        rms_mm: found.rms_mm,
+    };
+    output.print(&plane, |p| {
+        let [x, y, z] = p.normal;
+        format!(
+            "normal ({x:.6}, {y:.6}, {z:.6}), offset {:.3} mm, {} inliers, rms {:.3} mm",
+            p.offset_mm, p.inliers, p.rms_mm
+        )
+    })
+}
+
+#[derive(Debug, Serialize)]
+struct Placed {
+    #[serde(flatten)]
+    contact: Contact,
+    patient_from_ct: [[f64; 4]; 4],
+    room_from_patient: [[f64; 4]; 4],
+}
+
+fn place_limb(args: &PlaceArgs, output: Output) -> anyhow::Result<()> {
+    let plan = match &args.plan {
+        Some(path) => Plan::read(path)?,
+        None => Plan::new(Vec::new()),
+    };
+    let case = Case::read(&args.case)?;
+    let working = working("preparing the limb");
+    let prepared = PreparedLimb::of_case(&case)
+        .with_context(|| format!("cannot prepare the limb of {}", args.case.display()))?;
+    let table = Table::of_plan(&plan)?;
+    let skin = &prepared.limb.mesh;
+    let placement = place(
+        &skin.vertices,
+        &prepared.landmarks,
+        args.angle.to_radians(),
+        &table.plane.plane,
+        &table.room.device,
+    )?;
+    let patient_from_ct = prepared.landmarks.patient_from_ct();
+    if let Some(ply) = &args.ply {
+        let room_from_ct = placement.room_from_patient * patient_from_ct;
+        write_ply(ply, &skin.transformed(room_from_ct.isometry()))?;
+    }
+    working.finish_and_clear();
+    let placed = Placed {
+        contact: placement.contact,
+        patient_from_ct: patient_from_ct.to_homogeneous_rows(),
+        room_from_patient: placement.room_from_patient.to_homogeneous_rows(),
+    };
+    output.print(&placed, |placed| {
+        let c = &placed.contact;
+        format!(
+            "distal part {:.3} mm, proximal part {:.3} mm above the table; penetration {:.3} mm; {} iterations",
+            c.distal_mm, c.proximal_mm, c.penetration_mm, c.iterations
+        )
+    })
+}

@@ -1,0 +1,76 @@
+//! Results on stdout, as text or as one JSON object; progress on stderr.
+
+use std::io::{self, Write};
+use std::time::Instant;
+
+use cpu_time::ProcessTime;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+
+/// How results are printed.
+#[derive(Debug, Clone, Copy)]
+pub struct Output {
+    /// One JSON object instead of text.
+    pub json: bool,
+}
+
+impl Output {
+    /// Prints a result: `value` as JSON or the text that `text` makes of it.
+    pub fn print<T: Serialize>(
+        self,
+        value: &T,
+        text: impl FnOnce(&T) -> String,
+    ) -> anyhow::Result<()> {
+        let line = if self.json {
+            serde_json::to_string(value)?
+        } else {
+            text(value)
+        };
+        match writeln!(io::stdout(), "{line}") {
+            // The reader has seen enough, as `head` has.
+            Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+            result => Ok(result?),
+        }
+    }
+}
+
+/// A step that may take more than a second: says on stderr that it runs.
+pub fn working(what: &str) -> ProgressBar {
+    let spinner = ProgressBar::new_spinner().with_message(what.to_owned());
+    spinner.enable_steady_tick(std::time::Duration::from_millis(120));
+    spinner
+}
+
+/// A progress bar on stderr with the remaining time.
+pub fn bar(what: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len} {eta} left")
+        .expect("the template is a constant");
+    ProgressBar::new(0).with_style(style).with_message(what.to_owned())
+}
+
+/// Wall-clock and processor time of a step.
+pub struct Stopwatch(Instant, ProcessTime);
+
+/// Seconds since a [`Stopwatch`] was started.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Seconds {
+    /// Wall clock.
+    pub wall_s: f64,
+    /// Processor, all threads.
+    pub cpu_s: f64,
+}
+
+impl Stopwatch {
+    /// Starts now.
+    pub fn start() -> Self {
+        Self(Instant::now(), ProcessTime::now())
+    }
+
+    /// Reads it.
+    pub fn read(&self) -> Seconds {
+        Seconds {
+            wall_s: self.0.elapsed().as_secs_f64(),
+            cpu_s: self.1.elapsed().as_secs_f64(),
+        }
+    }
+}

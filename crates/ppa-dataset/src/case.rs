@@ -1,0 +1,151 @@
+//! `case.toml`: every preprocessing decision for one limb of one CT.
+
+use std::path::{Path, PathBuf};
+
+use ppa_mesh::{LimbReport, LimbSettings};
+use ppa_scene::{LandmarkOverrides, Landmarks, Side};
+use serde::{Deserialize, Serialize};
+
+use crate::files::{FileError, read_text, write_whole};
+
+/// One limb of one CT. `ppa prepare` proposes it; a person changes `side`, `surface` and
+/// `choices`, and everything else is computed again when the case is used.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Case {
+    /// Format of this file; 1.
+    pub version: u32,
+    /// Left or right limb.
+    pub side: Side,
+    /// The scan.
+    pub source: Source,
+    /// How the skin is found and freed from the couch.
+    pub surface: LimbSettings,
+    /// Landmark decisions, filled in with what was found; edit them to overrule it.
+    pub choices: LandmarkOverrides,
+    /// What followed from them when the case was written; for reading only.
+    pub found: Found,
+}
+
+/// The scan a case was made from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Source {
+    /// DICOM folder or NIfTI file; relative paths start at the case file.
+    pub path: PathBuf,
+    /// SHA-256 over size, affine and Hounsfield units of the volume: the scan's identity.
+    pub volume_sha256: String,
+}
+
+/// Results of the preparation, recorded for a person to read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Found {
+    /// Axis, joint and plane in the ct frame, mm.
+    pub landmarks: Landmarks,
+    /// What was cut away to free the skin.
+    pub surface: LimbReport,
+}
+
+/// Why a case cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CaseError {
+    /// The file cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The file is not a case.
+    #[error("{} is not a case: {message}", path.display())]
+    Parse {
+        /// The case file.
+        path: PathBuf,
+        /// What is wrong and where.
+        message: String,
+    },
+    /// The file is of another format version.
+    #[error("{} has case version {found}; this program reads version 1", path.display())]
+    Version {
+        /// The case file.
+        path: PathBuf,
+        /// Its version.
+        found: u32,
+    },
+}
+
+impl Case {
+    /// Reads a case; the path of its scan becomes relative to the current folder.
+    ///
+    /// # Errors
+    /// [`CaseError`] naming the file and the line or key at fault.
+    pub fn read(path: &Path) -> Result<Self, CaseError> {
+        let text = read_text(path)?;
+        let mut case: Self = toml::from_str(&text).map_err(|error| CaseError::Parse {
+            path: path.to_owned(),
+            message: error.to_string().trim_end().to_owned(),
+        })?;
+        if case.version != 1 {
+            return Err(CaseError::Version {
+                path: path.to_owned(),
+                found: case.version,
+            });
+        }
+        case.source.path = path.parent().unwrap_or(Path::new("")).join(&case.source.path);
+        Ok(case)
+    }
+
+    /// Writes the case, whole or not at all.
+    ///
+    /// A relative scan path is rewritten to start at the case file's folder.
+    ///
+    /// # Errors
+    /// [`CaseError::File`].
+    pub fn write(&self, path: &Path) -> Result<(), CaseError> {
+        let mut case = self.clone();
+        case.source.path = relative_to(&case.source.path, path.parent().unwrap_or(Path::new("")))?;
+        let text = toml::to_string(&case).expect("a case holds only values that TOML can write");
+        Ok(write_whole(path, format!("{HEADER}{text}").as_bytes())?)
+    }
+}
+
+const HEADER: &str = "\
+# One limb of one CT, prepared for ppa. Lengths in mm, positions in the scan's LPS frame.
+# Change `side`, [surface] or [choices]; leave a key of [choices] out to have it found again.
+# [found] tells what followed; it is computed again whenever the case is used.
+
+";
+
+/// `path` as seen from `folder`: with `..` where the two part; absolute paths stay absolute.
+fn relative_to(path: &Path, folder: &Path) -> Result<PathBuf, FileError> {
+    if path.is_absolute() {
+        return Ok(path.to_owned());
+    }
+    let absolute = |p: &Path| std::path::absolute(p).map_err(FileError::at("resolve", p));
+    let folder = if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    };
+    let (path, folder) = (absolute(path)?, absolute(folder)?);
+    let shared = path
+        .components()
+        .zip(folder.components())
+        .take_while(|(a, b)| a == b)
+        .count();
+    let up = folder.components().skip(shared).map(|_| Path::new(".."));
+    let down = path.components().skip(shared);
+    Ok(up.map(PathBuf::from).chain(down.map(|c| PathBuf::from(&c))).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scan_paths_are_written_as_seen_from_the_case() {
+        let see = |path: &str, folder: &str| relative_to(Path::new(path), Path::new(folder)).unwrap();
+        assert_eq!(see("scans/ct", "cases"), Path::new("../scans/ct"));
+        assert_eq!(see("scans/ct", "scans"), Path::new("ct"));
+        assert_eq!(see("p01.nii.gz", ""), Path::new("p01.nii.gz"));
+        assert_eq!(see("../data/ct", "out"), Path::new("../../data/ct"));
+    }
+}

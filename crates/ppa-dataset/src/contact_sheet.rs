@@ -1,0 +1,239 @@
+//! One picture of a dataset: depth images in false colour and radiographs, a column per pose.
+
+use std::path::{Path, PathBuf};
+
+use image::imageops::{FilterType, resize};
+use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
+
+use crate::body_shape::BodyShape;
+use crate::files::FileError;
+use crate::layout::{LimbId, View, angle_text};
+use crate::manifest::{FileKind, FileRow, Manifest, RoiRow};
+
+const TILE: u32 = 208;
+const GAP: u32 = 6;
+const CAPTION: u32 = 22;
+const MARGIN: u32 = 96;
+
+/// Why a contact sheet could not be drawn.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ContactSheetError {
+    /// A file of the dataset cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// An image of the dataset cannot be decoded.
+    #[error("cannot decode {}", path.display())]
+    Image {
+        /// The image.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: image::ImageError,
+    },
+    /// The dataset shows no poses of this limb.
+    #[error("{} holds no depth images of {limb:?}", root.display())]
+    Empty {
+        /// The dataset.
+        root: PathBuf,
+        /// The limb.
+        limb: LimbId,
+    },
+}
+
+/// Draws up to `columns` poses of one limb, evenly chosen: each body shape and camera once per
+/// row, the radiographs below.
+///
+/// Depth images are cropped to their region of interest and share one colour scale: the 1st to
+/// the 99th percentile of all depths shown, near red, far blue, invalid black.
+///
+/// # Errors
+/// [`ContactSheetError`] when an image is missing or unreadable.
+pub fn contact_sheet(
+    root: &Path,
+    limb: LimbId,
+    columns: usize,
+) -> Result<RgbImage, ContactSheetError> {
+    let manifest = Manifest::read(root)?;
+    let rois = manifest.rois(limb)?;
+    let of_limb = |kind| {
+        let rows = manifest.files.iter();
+        rows.filter(move |row| row.kind == kind && row.limb == limb)
+    };
+    let mut steps: Vec<u32> = of_limb(FileKind::Depth).map(|row| row.step).collect();
+    steps.dedup();
+    if steps.is_empty() {
+        return Err(ContactSheetError::Empty {
+            root: root.to_owned(),
+            limb,
+        });
+    }
+    let steps = evenly_chosen(&steps, columns);
+
+    let mut rows: Vec<(String, Vec<Tile>)> = Vec::new();
+    for (shape, view) in depth_rows(of_limb(FileKind::Depth)) {
+        let tiles = steps.iter().map(|&step| {
+            let depth = read_gray16(&root.join(limb.depth(shape, view, step)))?;
+            let roi = &rois[&LimbId::depth_name(view, step)];
+            Ok(Tile::Depth(crop(&depth, roi)))
+        });
+        let caption = format!("{} {}", shape.name(), view.name().trim_start_matches("cam_"));
+        rows.push((caption, tiles.collect::<Result<_, ContactSheetError>>()?));
+    }
+    if of_limb(FileKind::Radiograph).next().is_some() {
+        let tiles = steps.iter().map(|&step| {
+            let image = read_gray16(&root.join(limb.radiograph_png(step)))?;
+            Ok(Tile::Radiograph(image))
+        });
+        let tiles = tiles.collect::<Result<_, ContactSheetError>>()?;
+        rows.push(("radiograph".to_owned(), tiles));
+    }
+    Ok(draw(&rows, &steps))
+}
+
+type Gray16 = ImageBuffer<Luma<u16>, Vec<u16>>;
+
+enum Tile {
+    Depth(Gray16),
+    Radiograph(Gray16),
+}
+
+/// The original in both views, then each further shape in the left view.
+fn depth_rows<'a>(files: impl Iterator<Item = &'a FileRow>) -> Vec<(BodyShape, View)> {
+    let mut rows: Vec<_> = files
+        .filter_map(|row| Some((row.shape, row.camera?)))
+        .filter(|(shape, view)| *shape == BodyShape::Orig || *view == View::Left)
+        .collect();
+    rows.sort_unstable();
+    rows.dedup();
+    rows
+}
+
+fn evenly_chosen(steps: &[u32], columns: usize) -> Vec<u32> {
+    let count = columns.clamp(1, steps.len());
+    let last = (steps.len() - 1) as f64;
+    let at = |i: usize| (i as f64 * last / (count.max(2) - 1) as f64).round() as usize;
+    (0..count).map(|i| steps[at(i)]).collect()
+}
+
+fn read_gray16(path: &Path) -> Result<Gray16, ContactSheetError> {
+    let bytes = std::fs::read(path).map_err(FileError::at("read", path))?;
+    let image = image::load_from_memory(&bytes).map_err(|source| ContactSheetError::Image {
+        path: path.to_owned(),
+        source,
+    })?;
+    Ok(image.into_luma16())
+}
+
+fn crop(depth: &Gray16, roi: &RoiRow) -> Gray16 {
+    image::imageops::crop_imm(depth, roi.x_start, roi.y_start, roi.size, roi.size).to_image()
+}
+
+/// Nearest and farthest depth of the colour scale, mm.
+fn depth_range(rows: &[(String, Vec<Tile>)]) -> (f64, f64) {
+    let mut depths: Vec<u16> = rows
+        .iter()
+        .flat_map(|(_, tiles)| tiles)
+        .filter_map(|tile| match tile {
+            Tile::Depth(depth) => Some(depth),
+            Tile::Radiograph(_) => None,
+        })
+        .flat_map(|depth| depth.pixels().map(|p| p.0[0]).filter(|&z| z > 0))
+        .collect();
+    if depths.is_empty() {
+        return (0.0, 1.0);
+    }
+    depths.sort_unstable();
+    let at = |fraction: f64| f64::from(depths[((depths.len() - 1) as f64 * fraction) as usize]);
+    (at(0.01), at(0.99).max(at(0.01) + 1.0))
+}
+
+fn false_colour(z_mm: u16, (near, far): (f64, f64)) -> Rgb<u8> {
+    if z_mm == 0 {
+        return Rgb([0; 3]);
+    }
+    let t = ((far - f64::from(z_mm)) / (far - near)).clamp(0.0, 1.0);
+    let colour = colorous::TURBO.eval_continuous(t);
+    Rgb([colour.r, colour.g, colour.b])
+}
+
+fn draw(rows: &[(String, Vec<Tile>)], steps: &[u32]) -> RgbImage {
+    let range = depth_range(rows);
+    let width = MARGIN + steps.len() as u32 * (TILE + GAP) + GAP;
+    let height = rows.len() as u32 * (TILE + CAPTION + GAP) + GAP;
+    let mut sheet = RgbImage::from_pixel(width, height, Rgb([24; 3]));
+    for (r, (caption, tiles)) in rows.iter().enumerate() {
+        let y = GAP + r as u32 * (TILE + CAPTION + GAP);
+        for (line, word) in caption.split(' ').enumerate() {
+            write_text(&mut sheet, word, GAP, y + 12 * line as u32, 1);
+        }
+        for (c, tile) in tiles.iter().enumerate() {
+            let x = MARGIN + c as u32 * (TILE + GAP);
+            let picture = match tile {
+                Tile::Depth(depth) => {
+                    let small = resize(depth, TILE, TILE, FilterType::Nearest);
+                    RgbImage::from_fn(TILE, TILE, |x, y| {
+                        false_colour(small.get_pixel(x, y).0[0], range)
+                    })
+                }
+                Tile::Radiograph(image) => fit(image),
+            };
+            image::imageops::replace(&mut sheet, &picture, i64::from(x), i64::from(y));
+            let angle = format!("{} deg", angle_text(steps[c]));
+            write_text(&mut sheet, &angle, x + 4, y + TILE + 4, 2);
+        }
+    }
+    sheet
+}
+
+/// A grey image scaled into a tile, its shape kept.
+fn fit(image: &Gray16) -> RgbImage {
+    let scale = f64::from(TILE) / f64::from(image.width().max(image.height()));
+    let side = |pixels: u32| ((f64::from(pixels) * scale).round() as u32).clamp(1, TILE);
+    let gray: GrayImage = image::DynamicImage::ImageLuma16(image.clone()).into_luma8();
+    let small = resize(&gray, side(image.width()), side(image.height()), FilterType::Triangle);
+    let mut tile = RgbImage::new(TILE, TILE);
+    let (x, y) = ((TILE - small.width()) / 2, (TILE - small.height()) / 2);
+    let colour = image::DynamicImage::ImageLuma8(small).into_rgb8();
+    image::imageops::replace(&mut tile, &colour, i64::from(x), i64::from(y));
+    tile
+}
+
+/// Writes ASCII text with its top left corner at (x, y), each dot `scale` pixels wide.
+fn write_text(sheet: &mut RgbImage, text: &str, x: u32, y: u32, scale: u32) {
+    for (i, byte) in text.bytes().filter(u8::is_ascii).enumerate() {
+        let glyph = font8x8::legacy::BASIC_LEGACY[usize::from(byte)];
+        for dot in 0..64 {
+            let (column, row) = (dot % 8, dot / 8);
+            if glyph[row as usize] >> column & 1 == 0 {
+                continue;
+            }
+            for pixel in 0..scale * scale {
+                let px = x + (i as u32 * 8 + column) * scale + pixel % scale;
+                let py = y + row * scale + pixel / scale;
+                if let Some(pixel) = sheet.get_pixel_mut_checked(px, py) {
+                    *pixel = Rgb([235; 3]);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poses_are_chosen_from_end_to_end() {
+        assert_eq!(evenly_chosen(&[0, 36, 90, 180], 9), [0, 36, 90, 180]);
+        assert_eq!(evenly_chosen(&(0..=180).collect::<Vec<_>>(), 3), [0, 90, 180]);
+        assert_eq!(evenly_chosen(&[4, 5], 1), [4]);
+    }
+
+    #[test]
+    fn near_is_red_far_is_blue_invalid_is_black() {
+        let range = (900.0, 1000.0);
+        let (near, far) = (false_colour(900, range).0, false_colour(1000, range).0);
+        assert!(near[0] > near[2] && far[2] > far[0], "{near:?} {far:?}");
+        assert_eq!(false_colour(0, range).0, [0; 3]);
+    }
+}

@@ -1,0 +1,134 @@
+//! `dataset.json`: what all images of a dataset share, free of paths and identities.
+
+use std::path::Path;
+
+use ppa_depth::CameraSpec;
+use ppa_mesh::LimbSettings;
+use ppa_scene::{LandmarkOverrides, PlaneSettings, RoomSpec};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use crate::body_shape::ShapeSettings;
+use crate::case::Case;
+use crate::files::{FileError, hex, sha256_of_file, write_whole};
+use crate::layout::{LimbId, View};
+use crate::manifest::Rows;
+use crate::plan::{Plan, XraySettings};
+use crate::stage::Stage;
+use crate::unit::rows;
+
+/// The settings of a plan that decide the bytes of its images; files stand by their hashes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Settings {
+    generator: &'static str,
+    seed: u64,
+    shapes: ShapeSettings,
+    room_ply_sha256: Option<String>,
+    room: RoomSpec,
+    table: Option<PlaneSettings>,
+    room_from_device: Option<Rows>,
+    rig_sha256: Option<String>,
+    roi_mm: f64,
+    xray: XraySettings,
+}
+
+impl Settings {
+    pub fn of(plan: &Plan) -> Result<Self, FileError> {
+        let hash = |path: &Option<std::path::PathBuf>| {
+            path.as_deref().map(sha256_of_file).transpose()
+        };
+        Ok(Self {
+            generator: concat!("ppa ", env!("CARGO_PKG_VERSION")),
+            seed: plan.seed,
+            shapes: plan.shapes.clone(),
+            room_ply_sha256: hash(&plan.room.ply)?,
+            room: plan.room.parametric.clone(),
+            table: plan.room.table.clone(),
+            room_from_device: plan.room.room_from_device,
+            rig_sha256: hash(&plan.depth.rig)?,
+            roi_mm: plan.depth.roi_mm,
+            xray: plan.xray.clone(),
+        })
+    }
+
+    /// Hash of everything the images of a limb follow from, but the pose.
+    pub fn unit_key(&self, id: LimbId, case: &Case) -> String {
+        let address = (self, id, &case.source.volume_sha256, &case.surface, &case.choices);
+        let text = serde_json::to_string(&address).expect("settings hold only JSON values");
+        hex(&Sha256::digest(text.as_bytes()))
+    }
+}
+
+/// `dataset.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Description<'a> {
+    version: u32,
+    units: &'static str,
+    settings: Settings,
+    room_from_device: Rows,
+    source_detector_mm: f64,
+    table: Table,
+    cameras: Vec<CameraRow>,
+    limbs: Vec<LimbRow<'a>>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Table {
+    normal: [f64; 3],
+    offset_mm: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct CameraRow {
+    view: View,
+    intrinsics: CameraSpec,
+    room_from_camera: Rows,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct LimbRow<'a> {
+    #[serde(flatten)]
+    limb: LimbId,
+    volume_sha256: &'a str,
+    surface: &'a LimbSettings,
+    choices: &'a LandmarkOverrides,
+}
+
+impl<'a> Description<'a> {
+    pub fn of(
+        settings: Settings,
+        stage: &Stage,
+        cases: impl Iterator<Item = (LimbId, &'a Case)>,
+    ) -> Self {
+        let cameras = stage.cameras.iter().map(|camera| CameraRow {
+            view: camera.view,
+            intrinsics: camera.camera.spec().clone(),
+            room_from_camera: rows(&camera.camera_from_room.inverse()),
+        });
+        let limbs = cases.map(|(limb, case)| LimbRow {
+            limb,
+            volume_sha256: &case.source.volume_sha256,
+            surface: &case.surface,
+            choices: &case.choices,
+        });
+        Self {
+            version: 1,
+            units: "mm; depth images: Z in mm, 0 invalid; tallies: eV/cm2 per history; \
+                    transforms: row-major target_from_source; ct frame: LPS",
+            settings,
+            room_from_device: rows(stage.table.room.device.room_from_device.isometry()),
+            source_detector_mm: stage.table.room.device.source_detector_mm,
+            table: Table {
+                normal: stage.table.plane.plane.normal.into_inner().into(),
+                offset_mm: stage.table.plane.plane.offset_mm,
+            },
+            cameras: cameras.collect(),
+            limbs: limbs.collect(),
+        }
+    }
+
+    pub fn write(&self, root: &Path) -> Result<(), FileError> {
+        let text = serde_json::to_string_pretty(self).expect("settings hold only JSON values");
+        write_whole(&root.join("dataset.json"), text.as_bytes())
+    }
+}

@@ -1,0 +1,113 @@
+//! Where each file of a dataset lies: the layout published by the paper's authors.
+//!
+//! ```text
+//! patient_0/depth/{l,r}/{orig,big,small,bumps_a,bumps_b}/depth_cam_{left,right}_{angle}.png
+//! patient_0/xray/{l,r}/xray_image_{step}.png   .exr
+//! patient_0/labels/{l,r}/roi_depth.json
+//! ```
+//! with `angle = step / 2` degrees, written with one decimal. All paths are relative to the
+//! dataset's root and use `/`.
+
+use ppa_scene::Side;
+use serde::{Deserialize, Serialize};
+
+use crate::body_shape::BodyShape;
+
+/// Which of the two cameras on the tube housing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum View {
+    /// The paper's V1.
+    #[serde(rename = "cam_left")]
+    Left,
+    /// The paper's V2.
+    #[serde(rename = "cam_right")]
+    Right,
+}
+
+impl View {
+    /// Both cameras, left first.
+    pub const ALL: [Self; 2] = [Self::Left, Self::Right];
+
+    /// The camera's name in file names and JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Left => "cam_left",
+            Self::Right => "cam_right",
+        }
+    }
+}
+
+/// One limb of one person: the unit of everything below `patient_N/*/{l,r}`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct LimbId {
+    /// N of `patient_N`.
+    pub patient: u32,
+    /// Left or right.
+    pub side: Side,
+}
+
+impl LimbId {
+    /// `l` or `r`.
+    pub fn side_letter(self) -> &'static str {
+        match self.side {
+            Side::Left => "l",
+            Side::Right => "r",
+        }
+    }
+
+    fn folder(self, kind: &str) -> String {
+        format!("patient_{}/{kind}/{}", self.patient, self.side_letter())
+    }
+
+    /// The file name of a depth image, the key of `roi_depth.json`.
+    pub fn depth_name(view: View, step: u32) -> String {
+        format!("depth_{}_{}.png", view.name(), angle_text(step))
+    }
+
+    /// A depth image: 16-bit PNG, Z in mm, 0 invalid.
+    pub fn depth(self, shape: BodyShape, view: View, step: u32) -> String {
+        let name = Self::depth_name(view, step);
+        format!("{}/{}/{name}", self.folder("depth"), shape.name())
+    }
+
+    /// The 16-bit presentation image of a radiograph.
+    pub fn radiograph_png(self, step: u32) -> String {
+        format!("{}/xray_image_{step}.png", self.folder("xray"))
+    }
+
+    /// The tallies of a radiograph as named layers.
+    pub fn radiograph_exr(self, step: u32) -> String {
+        format!("{}/xray_image_{step}.exr", self.folder("xray"))
+    }
+
+    /// Regions of interest of all depth images of this limb.
+    pub fn roi_file(self) -> String {
+        format!("{}/roi_depth.json", self.folder("labels"))
+    }
+}
+
+/// The angle of a step as it stands in file names: `step / 2` degrees with one decimal.
+pub fn angle_text(step: u32) -> String {
+    format!("{}.{}", step / 2, if step.is_multiple_of(2) { 0 } else { 5 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The examples given in the README of the published dataset.
+    #[test]
+    fn names_are_those_of_the_published_dataset() {
+        let limb = LimbId {
+            patient: 0,
+            side: Side::Right,
+        };
+        assert_eq!(
+            limb.depth(BodyShape::Orig, View::Left, 180),
+            "patient_0/depth/r/orig/depth_cam_left_90.0.png"
+        );
+        assert_eq!(LimbId::depth_name(View::Right, 91), "depth_cam_right_45.5.png");
+        assert_eq!(limb.radiograph_png(180), "patient_0/xray/r/xray_image_180.png");
+        assert_eq!(limb.roi_file(), "patient_0/labels/r/roi_depth.json");
+    }
+}

@@ -1,0 +1,134 @@
+//! The manifest: `manifest.jsonl` with one row per image, `dataset.json` with what all share.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::body_shape::BodyShape;
+use crate::files::{FileError, read_text, write_whole};
+use crate::layout::{LimbId, View};
+
+const MANIFEST_FILE: &str = "manifest.jsonl";
+
+/// A rigid motion as four rows of a homogeneous matrix, mm.
+pub type Rows = [[f64; 4]; 4];
+
+/// What a file is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FileKind {
+    /// 16-bit PNG, Z in mm, 0 invalid.
+    Depth,
+    /// 16-bit PNG for viewing.
+    Radiograph,
+    /// OpenEXR with the tallies, eV/cm² per history.
+    RadiographTallies,
+}
+
+/// One image of the dataset.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FileRow {
+    /// Path from the dataset's root.
+    pub file: String,
+    /// SHA-256 of its bytes.
+    pub sha256: String,
+    /// What it is.
+    pub kind: FileKind,
+    /// Person and side.
+    #[serde(flatten)]
+    pub limb: LimbId,
+    /// Half degrees of medial rotation.
+    pub step: u32,
+    /// Degrees of medial rotation.
+    pub angle_deg: f64,
+    /// Camera of a depth image.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub camera: Option<View>,
+    /// Body shape; radiographs show the scan itself.
+    pub shape: BodyShape,
+    /// The limb's frame in the scan: T^P_CT.
+    pub patient_from_ct: Rows,
+    /// Pose of the limb: T^ToF_P = T_opt · T_mat · T_rot.
+    pub room_from_patient: Rows,
+    /// Radiographs: pose of the x-ray device in the scan.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub ct_from_device: Option<Rows>,
+    /// Radiographs: seed of histories and noise.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub seed: Option<u64>,
+}
+
+/// Region of interest of a depth image, as published: pixels from the top left corner.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RoiRow {
+    /// The camera.
+    pub camera: View,
+    /// Number of the pose: the step.
+    pub image_number: u32,
+    /// First column.
+    pub x_start: u32,
+    /// First row.
+    pub y_start: u32,
+    /// Columns and rows.
+    pub size: u32,
+}
+
+/// `roi_depth.json`: depth image name to region; the same for all body shapes.
+pub type RoiFile = BTreeMap<String, RoiRow>;
+
+/// All rows of a dataset, in the order of its plan.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Manifest {
+    /// Root of the dataset.
+    pub root: PathBuf,
+    /// One row per image.
+    pub files: Vec<FileRow>,
+}
+
+impl Manifest {
+    /// Reads `manifest.jsonl`.
+    ///
+    /// # Errors
+    /// [`FileError`] when the file is missing or one of its lines is not a row.
+    pub fn read(root: &Path) -> Result<Self, FileError> {
+        let path = root.join(MANIFEST_FILE);
+        let text = read_text(&path)?;
+        let rows = text.lines().map(serde_json::from_str).collect::<Result<_, _>>();
+        Ok(Self {
+            root: root.to_owned(),
+            files: rows.map_err(|e| FileError::at("parse", &path)(e.into()))?,
+        })
+    }
+
+    /// Writes `manifest.jsonl`, whole or not at all.
+    ///
+    /// # Errors
+    /// [`FileError`] when it cannot be written.
+    pub fn write(&self) -> Result<(), FileError> {
+        let mut text = String::new();
+        for row in &self.files {
+            text += &serde_json::to_string(row).expect("rows hold only JSON values");
+            text.push('\n');
+        }
+        write_whole(&self.root.join(MANIFEST_FILE), text.as_bytes())
+    }
+
+    /// The regions of interest of one limb.
+    ///
+    /// # Errors
+    /// [`FileError`] when its `roi_depth.json` is missing or malformed.
+    pub fn rois(&self, limb: LimbId) -> Result<RoiFile, FileError> {
+        let path = self.root.join(limb.roi_file());
+        serde_json::from_str(&read_text(&path)?)
+            .map_err(|e| FileError::at("parse", &path)(e.into()))
+    }
+
+    /// The limbs in it, in order.
+    pub fn limbs(&self) -> Vec<LimbId> {
+        let mut limbs: Vec<_> = self.files.iter().map(|row| row.limb).collect();
+        limbs.sort_unstable();
+        limbs.dedup();
+        limbs
+    }
+}

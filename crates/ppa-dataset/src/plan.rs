@@ -1,0 +1,246 @@
+//! `plan.toml`: what a dataset is made of.
+
+use std::path::{Path, PathBuf};
+
+use ppa_scene::{PlaneSettings, PoseAngle, RoomSpec, Sweep};
+use ppa_xray::{Detector, FastSettings, HuCalibration, Presentation};
+use serde::{Deserialize, Serialize};
+
+use crate::body_shape::ShapeSettings;
+use crate::files::{FileError, read_text};
+use crate::manifest::Rows;
+
+/// Everything a dataset is made of; unknown keys are refused.
+///
+/// Relative paths are taken from the folder of the plan file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Format of this file; 1.
+    pub version: u32,
+    /// Everything random follows from it.
+    #[serde(default)]
+    pub seed: u64,
+    /// The limbs.
+    #[serde(rename = "case")]
+    pub cases: Vec<PlanCase>,
+    /// Medial rotations about the limb's axis (T_rot).
+    #[serde(default)]
+    pub rotation: Sweep,
+    /// Body shapes.
+    #[serde(default)]
+    pub shapes: ShapeSettings,
+    /// The x-ray room.
+    #[serde(default)]
+    pub room: PlanRoom,
+    /// Depth images.
+    #[serde(default)]
+    pub depth: DepthSettings,
+    /// Radiographs.
+    #[serde(default)]
+    pub xray: XraySettings,
+}
+
+/// One limb of a plan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlanCase {
+    /// The case file that `ppa prepare` wrote.
+    pub file: PathBuf,
+    /// N of the dataset's folder `patient_N`; both limbs of a person share it.
+    pub patient: u32,
+}
+
+/// The x-ray room: built in, or a recorded one.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlanRoom {
+    /// Point cloud of a recorded room, mm. Replaces the built-in furniture.
+    pub ply: Option<PathBuf>,
+    /// Pose of the x-ray device in a recorded room (row-major 4x4; source at the origin, z along
+    /// the beam, y towards the patient's feet). When absent, the recorded frame is that of the
+    /// built-in room: z up, y towards the head, origin where the beam meets the table.
+    pub room_from_device: Option<Rows>,
+    /// The built-in room, and the x-ray device in either room.
+    pub parametric: RoomSpec,
+    /// How the table plane is searched; when absent, it is what the central beam hits first.
+    pub table: Option<PlaneSettings>,
+}
+
+/// How depth images are made.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DepthSettings {
+    /// Camera rig (JSON); the built-in Azure Kinect pair when absent.
+    pub rig: Option<PathBuf>,
+    /// Side of the square region of interest around the joint, mm at the joint.
+    pub roi_mm: f64,
+}
+
+impl Default for DepthSettings {
+    fn default() -> Self {
+        Self {
+            rig: None,
+            roi_mm: 260.0,
+        }
+    }
+}
+
+/// How radiographs are made.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct XraySettings {
+    /// Tube voltage in kV.
+    pub kvp: f64,
+    /// Angle of the tungsten anode in degrees.
+    pub anode_angle_deg: f64,
+    /// Filters as `MATERIAL:mm`.
+    pub filters: Vec<String>,
+    /// Image receptor.
+    pub detector: Detector,
+    /// Length of limb kept on either side of the joint, mm.
+    pub half_length_mm: f64,
+    /// HU to material and density.
+    pub calibration: HuCalibration,
+    /// The engine.
+    pub engine: FastSettings,
+    /// The mapping to a radiograph for viewing.
+    pub presentation: Presentation,
+}
+
+impl Default for XraySettings {
+    fn default() -> Self {
+        Self {
+            kvp: 60.0,
+            anode_angle_deg: 12.0,
+            filters: vec!["Al:2.5".to_owned()],
+            detector: Detector {
+                columns: 448,
+                rows: 448,
+                pixel_mm: 0.5,
+            },
+            half_length_mm: 120.0,
+            calibration: HuCalibration::default(),
+            engine: FastSettings::default(),
+            presentation: Presentation::default(),
+        }
+    }
+}
+
+/// Why a plan cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The file is not a plan.
+    #[error("{} is not a plan: {message}", path.display())]
+    Parse {
+        /// The plan file.
+        path: PathBuf,
+        /// What is wrong and where.
+        message: String,
+    },
+    /// The file is of another format version.
+    #[error("{} has plan version {found}; this program reads version 1", path.display())]
+    Version {
+        /// The plan file.
+        path: PathBuf,
+        /// Its version.
+        found: u32,
+    },
+    /// Something in it cannot work.
+    #[error("{}: {message}", path.display())]
+    Invalid {
+        /// The plan file.
+        path: PathBuf,
+        /// What, and what was expected.
+        message: String,
+    },
+}
+
+impl Plan {
+    /// A plan with the paper's settings: 0 to 90 degrees in half degrees, all shapes.
+    pub fn new(cases: Vec<PlanCase>) -> Self {
+        Self {
+            version: 1,
+            seed: 0,
+            cases,
+            rotation: Sweep::default(),
+            shapes: ShapeSettings::default(),
+            room: PlanRoom::default(),
+            depth: DepthSettings::default(),
+            xray: XraySettings::default(),
+        }
+    }
+
+    /// Reads a plan and makes its paths relative to the current folder.
+    ///
+    /// # Errors
+    /// [`PlanError`] naming the file and the line, key or value at fault.
+    pub fn read(path: &Path) -> Result<Self, PlanError> {
+        let text = read_text(path)?;
+        let mut plan: Self = toml::from_str(&text).map_err(|error| PlanError::Parse {
+            path: path.to_owned(),
+            message: error.to_string().trim_end().to_owned(),
+        })?;
+        if plan.version != 1 {
+            return Err(PlanError::Version {
+                path: path.to_owned(),
+                found: plan.version,
+            });
+        }
+        plan.check().map_err(|message| PlanError::Invalid {
+            path: path.to_owned(),
+            message,
+        })?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for case in &mut plan.cases {
+            case.file = folder.join(&case.file);
+        }
+        for file in [&mut plan.room.ply, &mut plan.depth.rig].into_iter().flatten() {
+            *file = folder.join(&*file);
+        }
+        Ok(plan)
+    }
+
+    /// The poses of every limb.
+    ///
+    /// # Panics
+    /// When `rotation` was changed to an invalid one after reading.
+    pub fn poses(&self) -> Vec<PoseAngle> {
+        self.rotation.poses().expect("the rotation of a plan is checked when it is read")
+    }
+
+    /// The plan as TOML.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("a plan holds only values that TOML can write")
+    }
+
+    fn check(&self) -> Result<(), String> {
+        if self.cases.is_empty() {
+            return Err("no [[case]]: a plan needs at least one limb".to_owned());
+        }
+        if self.shapes.variants.is_empty() {
+            return Err("shapes.variants is empty: at least \"orig\" is needed".to_owned());
+        }
+        let mut shapes = self.shapes.variants.clone();
+        shapes.sort_unstable();
+        shapes.dedup();
+        if shapes.len() != self.shapes.variants.len() {
+            return Err("shapes.variants names a shape twice".to_owned());
+        }
+        for (name, value) in [
+            ("shapes.offset_mm", self.shapes.offset_mm),
+            ("depth.roi_mm", self.depth.roi_mm),
+            ("xray.half_length_mm", self.xray.half_length_mm),
+        ] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(format!("{name} is {value}, expected a length above 0 mm"));
+            }
+        }
+        self.rotation.poses().map_err(|error| format!("rotation: {error}"))?;
+        Ok(())
+    }
+}

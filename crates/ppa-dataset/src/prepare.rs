@@ -1,0 +1,130 @@
+//! From a CT to a case: every decision proposed automatically, every one open to change.
+
+use std::path::Path;
+
+use ppa_ct::Volume;
+use ppa_mesh::{Limb, LimbSettings, extract_limb};
+use ppa_scene::{LandmarkOverrides, Landmarks, Side, find_landmarks};
+use sha2::{Digest, Sha256};
+
+use crate::case::{Case, Found, Source};
+use crate::files::hex;
+
+/// Why a limb could not be prepared.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PrepareError {
+    /// The scan cannot be read.
+    #[error(transparent)]
+    Read(#[from] ppa_ct::ReadError),
+    /// No limb was found in it.
+    #[error(transparent)]
+    Limb(#[from] ppa_mesh::LimbError),
+    /// Its landmarks were not found.
+    #[error(transparent)]
+    Landmarks(#[from] ppa_scene::LandmarkError),
+    /// The scan is not the one the case was made from.
+    #[error(
+        "{} is not the scan this case was made from (volume hash {found}, expected {expected})",
+        path.display()
+    )]
+    OtherScan {
+        /// The scan.
+        path: std::path::PathBuf,
+        /// Its hash.
+        found: String,
+        /// The hash in the case.
+        expected: String,
+    },
+}
+
+/// One limb, ready to be placed: its scan, skin and landmarks, all in the ct frame.
+pub struct PreparedLimb {
+    /// The scan.
+    pub volume: Volume,
+    /// Skin and voxels of the limb.
+    pub limb: Limb,
+    /// Axis, joint and plane.
+    pub landmarks: Landmarks,
+}
+
+impl PreparedLimb {
+    fn new(
+        volume: Volume,
+        side: Side,
+        surface: &LimbSettings,
+        choices: &LandmarkOverrides,
+    ) -> Result<Self, PrepareError> {
+        let limb = extract_limb(&volume, surface)?;
+        let landmarks = find_landmarks(&volume, &limb.mesh, &limb.mask, side, choices)?;
+        Ok(Self {
+            volume,
+            limb,
+            landmarks,
+        })
+    }
+
+    /// Carries out the decisions of a case.
+    ///
+    /// # Errors
+    /// [`PrepareError`]; a scan other than the one the case was made from is refused.
+    pub fn of_case(case: &Case) -> Result<Self, PrepareError> {
+        let scan = ppa_ct::read(&case.source.path)?;
+        let found = volume_sha256(&scan.volume);
+        if found != case.source.volume_sha256 {
+            return Err(PrepareError::OtherScan {
+                path: case.source.path.clone(),
+                found,
+                expected: case.source.volume_sha256.clone(),
+            });
+        }
+        Self::new(scan.volume, case.side, &case.surface, &case.choices)
+    }
+}
+
+/// Proposes a case for one limb of the scan at `path`.
+///
+/// Given `surface` and `choices` are kept; what they leave open is found.
+///
+/// # Errors
+/// [`PrepareError`] when the scan is unreadable, holds no limb, or shows no landmarks.
+pub fn prepare(
+    path: &Path,
+    side: Side,
+    surface: &LimbSettings,
+    choices: &LandmarkOverrides,
+) -> Result<(Case, PreparedLimb), PrepareError> {
+    let volume = ppa_ct::read(path)?.volume;
+    let volume_sha256 = volume_sha256(&volume);
+    let prepared = PreparedLimb::new(volume, side, surface, choices)?;
+    let case = Case {
+        version: 1,
+        side,
+        source: Source {
+            path: path.to_owned(),
+            volume_sha256,
+        },
+        surface: surface.clone(),
+        choices: prepared.landmarks.as_choices(choices),
+        found: Found {
+            landmarks: prepared.landmarks.clone(),
+            surface: prepared.limb.report.clone(),
+        },
+    };
+    Ok((case, prepared))
+}
+
+/// SHA-256 over size, affine and values as read: the identity of a scan.
+pub fn volume_sha256(volume: &Volume) -> String {
+    let mut hasher = Sha256::new();
+    for side in volume.grid().size() {
+        hasher.update((side as u64).to_le_bytes());
+    }
+    for value in volume.grid().ct_from_voxel().matrix() {
+        hasher.update(value.to_le_bytes());
+    }
+    for hu in volume.hu() {
+        hasher.update(hu.to_le_bytes());
+    }
+    hex(&hasher.finalize())
+}

@@ -1,0 +1,78 @@
+//! The exposure of a posed limb: its voxels around the joint, and the device as the scan sees it.
+
+use nalgebra::{Point3, Unit, Vector3};
+use ppa_scene::{Landmarks, Placement, XrayDevice, ct_from_device};
+use ppa_xray::{Detector, Projection, VoxelPhantom};
+
+use crate::plan::XraySettings;
+use crate::prepare::PreparedLimb;
+
+/// Why the joint cannot be turned into voxels of material and density.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum JointError {
+    /// No voxel of the limb lies near the joint.
+    #[error("no voxel of the limb lies within {half_length_mm} mm of the joint along its axis")]
+    NoLimb {
+        /// Half the length that was looked at.
+        half_length_mm: f64,
+    },
+    /// The cropped scan.
+    #[error(transparent)]
+    Volume(#[from] ppa_ct::VolumeError),
+    /// Materials and densities.
+    #[error(transparent)]
+    Phantom(#[from] ppa_xray::PhantomError),
+}
+
+/// The limb around the joint as voxels of material and density; couch and sheet become air.
+///
+/// # Errors
+/// [`JointError`] when there is no limb near the joint or the HU calibration is unusable.
+pub fn joint_phantom(
+    prepared: &PreparedLimb,
+    settings: &XraySettings,
+) -> Result<VoxelPhantom, JointError> {
+    let (volume, mask) = (&prepared.volume, &prepared.limb.mask);
+    let grid = volume.grid();
+    let joint = Point3::from(prepared.landmarks.joint_centre);
+    let axis = Unit::new_normalize(Vector3::from(prepared.landmarks.axis_direction));
+    let half_length_mm = settings.half_length_mm;
+    let (mut low, mut high) = (grid.size(), [0; 3]);
+    for index in (0..grid.len()).filter(|&index| mask[index]) {
+        let voxel = grid.voxel(index);
+        let along_mm = (grid.centre(voxel.map(|v| v as f64)) - joint).dot(&axis);
+        if along_mm.abs() <= half_length_mm {
+            for a in 0..3 {
+                low[a] = low[a].min(voxel[a]);
+                high[a] = high[a].max(voxel[a] + 1);
+            }
+        }
+    }
+    if high == [0; 3] {
+        return Err(JointError::NoLimb { half_length_mm });
+    }
+    let joint_volume = volume.crop(low, high)?;
+    let in_limb: Vec<bool> = (0..joint_volume.grid().len())
+        .map(|index| {
+            let [i, j, k] = joint_volume.grid().voxel(index);
+            mask[grid.index([i + low[0], j + low[1], k + low[2]])]
+        })
+        .collect();
+    let calibration = &settings.calibration;
+    Ok(VoxelPhantom::from_volume(&joint_volume, calibration, Some(&in_limb))?)
+}
+
+/// The exposure of a placed limb: the device moves into the scan, the voxels stay.
+pub fn projection(
+    placement: &Placement,
+    landmarks: &Landmarks,
+    device: &XrayDevice,
+    detector: Detector,
+) -> Projection {
+    Projection {
+        ct_from_device: *ct_from_device(placement, landmarks, device).isometry(),
+        source_detector_mm: device.source_detector_mm,
+        detector,
+    }
+}

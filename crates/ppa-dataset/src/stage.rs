@@ -1,0 +1,176 @@
+//! What all limbs of a plan share: room, table, x-ray device, cameras, x-ray beam.
+
+use nalgebra::Isometry3;
+use ppa_depth::{Body, Camera, DepthImage, MeshBody, PlacedBody, RigSpec, SurfelBody};
+use ppa_mesh::{CloudError, estimate_normals, mean_spacing_mm};
+use ppa_scene::{PlaneSettings, Rigid, Room, RoomError, TablePlane, XrayDevice, table_plane};
+use ppa_xray::{Spectrum, TubeSpec};
+
+use crate::layout::View;
+use crate::plan::{Plan, PlanRoom, XraySettings};
+use crate::seed::{Purpose, plan_seed};
+
+/// Why a plan's room, cameras or beam cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StageError {
+    /// The room.
+    #[error(transparent)]
+    Room(#[from] RoomError),
+    /// The pose of the device in a recorded room.
+    #[error("room.room_from_device of the plan")]
+    DevicePose(#[from] ppa_depth::RigidError),
+    /// Points of a recorded room.
+    #[error(transparent)]
+    Cloud(#[from] CloudError),
+    /// Its table.
+    #[error(transparent)]
+    Table(#[from] ppa_scene::PlaneError),
+    /// The camera rig.
+    #[error(transparent)]
+    Rig(#[from] ppa_depth::RigError),
+    /// Furniture that cannot be rendered.
+    #[error(transparent)]
+    Body(#[from] ppa_depth::BodyError),
+    /// The x-ray beam.
+    #[error(transparent)]
+    Spectrum(#[from] ppa_xray::SpectrumError),
+}
+
+/// A camera in its place, with the empty room as it sees it.
+pub struct PlacedCamera {
+    /// Left or right.
+    pub view: View,
+    /// Lens and sensor.
+    pub camera: Camera,
+    /// Its pose.
+    pub camera_from_room: Isometry3<f64>,
+    /// Depth image of the room without the limb; rendered once, since nothing in it moves.
+    pub background: DepthImage,
+}
+
+/// Room, table and x-ray device: all that placing a limb needs.
+pub struct Table {
+    /// The room with its furniture and device.
+    pub room: Room,
+    /// Π_T.
+    pub plane: TablePlane,
+}
+
+impl Table {
+    /// Loads or builds the room of a plan and finds its table.
+    ///
+    /// # Errors
+    /// [`StageError`] naming the room or table at fault.
+    pub fn of_plan(plan: &Plan) -> Result<Self, StageError> {
+        let room = load_room(&plan.room)?;
+        let seed = plan_seed(plan.seed, Purpose::TablePlane);
+        let by_device = PlaneSettings::for_device(&room.device);
+        let settings = plan.room.table.as_ref().unwrap_or(&by_device);
+        let plane = table_plane(&room.cloud, settings, seed)?;
+        Ok(Self { room, plane })
+    }
+}
+
+/// Everything that stands still while the limb turns.
+pub struct Stage {
+    /// Room, table and device.
+    pub table: Table,
+    /// Both cameras, left first.
+    pub cameras: Vec<PlacedCamera>,
+    /// The beam.
+    pub spectrum: Spectrum,
+}
+
+impl Stage {
+    /// Sets the stage of a plan.
+    ///
+    /// # Errors
+    /// [`StageError`] naming the room, table, camera or beam at fault.
+    pub fn of_plan(plan: &Plan) -> Result<Self, StageError> {
+        let table = Table::of_plan(plan)?;
+        let rig = match &plan.depth.rig {
+            Some(path) => RigSpec::read(path)?,
+            None => RigSpec::default(),
+        };
+        let furniture = furniture(&table.room)?;
+        let device = &table.room.device;
+        let place = |view, mounted: &ppa_depth::MountedCamera| {
+            let camera = Camera::try_from(mounted.camera.clone()).map_err(|source| {
+                let side = if view == View::Left { "left" } else { "right" };
+                ppa_depth::RigError::Camera { side, source }
+            })?;
+            let room_from_camera = device.room_from_device.isometry() * mounted.pose()?;
+            let camera_from_room = room_from_camera.inverse();
+            let empty_room = PlacedBody {
+                body: &furniture,
+                camera_from_body: camera_from_room,
+            };
+            let background = ppa_depth::render(&camera, &[empty_room]);
+            Ok::<_, StageError>(PlacedCamera {
+                view,
+                camera,
+                camera_from_room,
+                background,
+            })
+        };
+        let cameras = vec![place(View::Left, &rig.left)?, place(View::Right, &rig.right)?];
+        Ok(Self {
+            table,
+            cameras,
+            spectrum: spectrum(&plan.xray)?,
+        })
+    }
+}
+
+/// The beam of a plan.
+///
+/// # Errors
+/// [`StageError::Spectrum`] for a voltage, anode or filter out of range.
+pub fn spectrum(settings: &XraySettings) -> Result<Spectrum, StageError> {
+    let filters = settings.filters.iter().map(|filter| filter.parse());
+    let tube = TubeSpec {
+        kvp: settings.kvp,
+        anode_angle_deg: settings.anode_angle_deg,
+        filters: filters.collect::<Result<_, ppa_xray::SpectrumError>>()?,
+    };
+    Ok(Spectrum::tungsten(&tube)?)
+}
+
+fn load_room(plan: &PlanRoom) -> Result<Room, StageError> {
+    let built_in = Room::parametric(&plan.parametric)?;
+    let Some(path) = &plan.ply else {
+        return Ok(built_in);
+    };
+    let device = match &plan.room_from_device {
+        Some(rows) => XrayDevice {
+            room_from_device: Rigid::new(ppa_depth::isometry_from_rows(rows)?),
+            ..built_in.device
+        },
+        None => built_in.device,
+    };
+    Ok(Room::from_ply(path, device)?)
+}
+
+/// Neighbours from which the normal of a recorded point is estimated.
+const NORMAL_NEIGHBOURS: usize = 16;
+
+/// Radius of the discs of a recorded room over the mean distance of its points; leaves no holes
+/// in scattered points (see [`SurfelBody`]).
+const DISC_RADIUS: f64 = 1.5;
+
+fn furniture(room: &Room) -> Result<Body, StageError> {
+    if let Some(mesh) = &room.mesh {
+        return Ok(Body::Mesh(MeshBody::new(&mesh.vertices, &mesh.triangles)?));
+    }
+    let points = &room.cloud.points;
+    let estimated;
+    let normals = if room.cloud.normals.len() == points.len() {
+        &room.cloud.normals
+    } else {
+        estimated = estimate_normals(points, NORMAL_NEIGHBOURS)?;
+        &estimated
+    };
+    let radius_mm = DISC_RADIUS * mean_spacing_mm(points)?;
+    Ok(Body::Surfels(SurfelBody::new(points, normals, radius_mm)?))
+}

@@ -1,0 +1,241 @@
+//! One pose of one limb: its depth images and its radiograph.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Point3};
+use ppa_depth::{Body, DepthImage, MeshBody, PlacedBody, roi_around};
+use ppa_mesh::Mesh;
+use ppa_scene::{Placement, PoseAngle, place};
+use ppa_xray::{FastSettings, VoxelPhantom};
+
+use crate::body_shape::{BodyShape, body_shape};
+use crate::files::{FileError, sha256_of_file};
+use crate::layout::LimbId;
+use crate::manifest::{FileKind, FileRow, RoiFile, RoiRow, Rows};
+use crate::plan::Plan;
+use crate::prepare::PreparedLimb;
+use crate::radiograph::{JointError, joint_phantom, projection};
+use crate::seed::{Purpose, item_seed};
+use crate::stage::{PlacedCamera, Stage};
+
+/// Why a pose could not be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum UnitError {
+    /// A body shape.
+    #[error(transparent)]
+    Shape(#[from] ppa_mesh::BumpError),
+    /// A skin that cannot be rendered.
+    #[error(transparent)]
+    Body(#[from] ppa_depth::BodyError),
+    /// The limb could not be laid on the table.
+    #[error(transparent)]
+    Place(#[from] ppa_scene::PlaceError),
+    /// A depth image.
+    #[error(transparent)]
+    Depth(#[from] ppa_depth::DepthError),
+    /// A region of interest.
+    #[error(transparent)]
+    Roi(#[from] ppa_depth::RoiError),
+    /// The voxels of the joint.
+    #[error(transparent)]
+    Joint(#[from] JointError),
+    /// The radiograph.
+    #[error(transparent)]
+    Transport(#[from] ppa_xray::TransportError),
+    /// The radiograph's files.
+    #[error(transparent)]
+    Output(#[from] ppa_xray::OutputError),
+    /// A file.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+struct ShapedSkin {
+    shape: BodyShape,
+    mesh: Mesh,
+    body: Body,
+}
+
+/// A limb with everything that all its poses share.
+pub(crate) struct PosableLimb<'a> {
+    id: LimbId,
+    plan: &'a Plan,
+    stage: &'a Stage,
+    prepared: &'a PreparedLimb,
+    /// The skin of the scan: it decides the pose of the radiograph and the regions of interest.
+    skin: &'a Mesh,
+    shapes: Vec<ShapedSkin>,
+    phantom: VoxelPhantom,
+}
+
+impl<'a> PosableLimb<'a> {
+    pub(crate) fn new(
+        id: LimbId,
+        plan: &'a Plan,
+        stage: &'a Stage,
+        prepared: &'a PreparedLimb,
+    ) -> Result<Self, UnitError> {
+        let skin = &prepared.limb.mesh;
+        let shaped = |&shape: &BodyShape| {
+            let (landmarks, settings) = (&prepared.landmarks, &plan.shapes);
+            let mesh = body_shape(skin, landmarks, shape, settings, id, plan.seed)?;
+            let body = Body::Mesh(MeshBody::new(&mesh.vertices, &mesh.triangles)?);
+            Ok::<_, UnitError>(ShapedSkin { shape, mesh, body })
+        };
+        Ok(Self {
+            id,
+            plan,
+            stage,
+            prepared,
+            skin,
+            shapes: plan.shapes.variants.iter().map(shaped).collect::<Result<_, _>>()?,
+            phantom: joint_phantom(prepared, &plan.xray)?,
+        })
+    }
+
+    /// Makes all images of one pose under `root`.
+    pub(crate) fn make(
+        &self,
+        pose: PoseAngle,
+        root: &Path,
+    ) -> Result<(Vec<FileRow>, RoiFile), UnitError> {
+        let mut files = Vec::new();
+        let placement = self.place(self.skin, pose)?;
+        for shaped in &self.shapes {
+            let placement = match shaped.shape {
+                BodyShape::Orig => placement.clone(),
+                _ => self.place(&shaped.mesh, pose)?,
+            };
+            for camera in &self.stage.cameras {
+                let file = self.id.depth(shaped.shape, camera.view, pose.step);
+                let image = self.depth_image(&shaped.body, camera, &placement)?;
+                let path = prepare_folder(root, &file)?;
+                image.write_png(&path)?;
+                files.push(FileRow {
+                    camera: Some(camera.view),
+                    shape: shaped.shape,
+                    ..self.row(root, file, FileKind::Depth, pose, &placement)?
+                });
+            }
+        }
+        files.extend(self.radiograph(pose, &placement, root)?);
+        let rois = self.stage.cameras.iter().map(|camera| self.roi(camera, &placement, pose));
+        Ok((files, rois.collect::<Result<_, _>>()?))
+    }
+
+    fn place(&self, skin: &Mesh, pose: PoseAngle) -> Result<Placement, UnitError> {
+        let table = &self.stage.table;
+        Ok(place(
+            &skin.vertices,
+            &self.prepared.landmarks,
+            pose.angle_rad(),
+            &table.plane.plane,
+            &table.room.device,
+        )?)
+    }
+
+    /// T^V_CT: through the patient and the room into the camera.
+    fn camera_from_ct(&self, camera: &PlacedCamera, placement: &Placement) -> Isometry3<f64> {
+        let room_from_ct = placement.room_from_patient * self.prepared.landmarks.patient_from_ct();
+        camera.camera_from_room * room_from_ct.isometry()
+    }
+
+    fn depth_image(
+        &self,
+        body: &Body,
+        camera: &PlacedCamera,
+        placement: &Placement,
+    ) -> Result<DepthImage, UnitError> {
+        let camera_from_body = self.camera_from_ct(camera, placement);
+        let limb = ppa_depth::render(&camera.camera, &[PlacedBody { body, camera_from_body }]);
+        limb.require_visible()?;
+        Ok(DepthImage::nearer_of(&camera.background, &limb)?)
+    }
+
+    fn roi(
+        &self,
+        camera: &PlacedCamera,
+        placement: &Placement,
+        pose: PoseAngle,
+    ) -> Result<(String, RoiRow), UnitError> {
+        let joint = Point3::from(self.prepared.landmarks.joint_centre);
+        let joint_in_camera = self.camera_from_ct(camera, placement) * joint;
+        let roi = roi_around(&camera.camera, &joint_in_camera, self.plan.depth.roi_mm)?;
+        let row = RoiRow {
+            camera: camera.view,
+            image_number: pose.step,
+            x_start: roi.x_start,
+            y_start: roi.y_start,
+            size: roi.size,
+        };
+        Ok((LimbId::depth_name(camera.view, pose.step), row))
+    }
+
+    fn radiograph(
+        &self,
+        pose: PoseAngle,
+        placement: &Placement,
+        root: &Path,
+    ) -> Result<[FileRow; 2], UnitError> {
+        let settings = &self.plan.xray;
+        let device = &self.stage.table.room.device;
+        let projection = projection(placement, &self.prepared.landmarks, device, settings.detector);
+        let seed = item_seed(self.plan.seed, Purpose::Radiograph, self.id, pose.step);
+        let engine = FastSettings {
+            seed,
+            ..settings.engine.clone()
+        };
+        let radiograph =
+            ppa_xray::fast(&self.phantom, &self.stage.spectrum, &projection, &engine)?;
+        let png = self.id.radiograph_png(pose.step);
+        radiograph.write_png(&prepare_folder(root, &png)?, &settings.presentation)?;
+        let exr = self.id.radiograph_exr(pose.step);
+        radiograph.write_exr(&root.join(&exr))?;
+        let row = |file, kind| {
+            Ok::<_, UnitError>(FileRow {
+                ct_from_device: Some(rows(&projection.ct_from_device)),
+                seed: Some(seed),
+                ..self.row(root, file, kind, pose, placement)?
+            })
+        };
+        Ok([row(png, FileKind::Radiograph)?, row(exr, FileKind::RadiographTallies)?])
+    }
+
+    fn row(
+        &self,
+        root: &Path,
+        file: String,
+        kind: FileKind,
+        pose: PoseAngle,
+        placement: &Placement,
+    ) -> Result<FileRow, UnitError> {
+        Ok(FileRow {
+            sha256: sha256_of_file(&root.join(&file))?,
+            file,
+            kind,
+            limb: self.id,
+            step: pose.step,
+            angle_deg: pose.angle_deg,
+            camera: None,
+            shape: BodyShape::Orig,
+            patient_from_ct: rows(self.prepared.landmarks.patient_from_ct().isometry()),
+            room_from_patient: rows(placement.room_from_patient.isometry()),
+            ct_from_device: None,
+            seed: None,
+        })
+    }
+}
+
+fn prepare_folder(root: &Path, file: &str) -> Result<std::path::PathBuf, FileError> {
+    let path = root.join(file);
+    let folder = path.parent().expect("files lie in folders of the dataset");
+    std::fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
+    Ok(path)
+}
+
+/// Four rows of the homogeneous matrix.
+pub(crate) fn rows(motion: &Isometry3<f64>) -> Rows {
+    let matrix = motion.to_homogeneous();
+    std::array::from_fn(|r| std::array::from_fn(|c| matrix[(r, c)]))
+}

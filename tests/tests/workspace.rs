@@ -1,0 +1,129 @@
+//! The structure of the workspace: which crate may know which.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Crates of the workspace and the crates each may depend on outside its tests.
+const ARROWS: &[(&str, &[&str])] = &[
+    ("ppa-ct", &[]),
+    ("ppa-mesh", &["ppa-ct"]),
+    ("ppa-scene", &["ppa-ct", "ppa-mesh"]),
+    ("ppa-depth", &[]),
+    ("ppa-xray", &["ppa-ct"]),
+    (
+        "ppa-dataset",
+        &["ppa-ct", "ppa-mesh", "ppa-scene", "ppa-depth", "ppa-xray"],
+    ),
+    ("ppa-metrics", &[]),
+    (
+        "ppa-cli",
+        &[
+            "ppa-ct",
+            "ppa-mesh",
+            "ppa-scene",
+            "ppa-depth",
+            "ppa-xray",
+            "ppa-dataset",
+            "ppa-metrics",
+        ],
+    ),
+];
+
+/// Foreign crates that a crate must not pull in, by prefix.
+const FORBIDDEN: &[(&str, &[&str])] = &[
+    ("ppa-mesh", &["dicom", "nifti", "candle"]),
+    ("ppa-depth", &["dicom", "nifti", "candle", "clap"]),
+    ("ppa-xray", &["dicom", "nifti", "candle", "clap"]),
+    ("ppa-dataset", &["clap", "indicatif", "candle"]),
+];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn manifest(path: &Path) -> toml::Table {
+    let text = fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    text.parse().unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+fn members() -> BTreeMap<String, toml::Table> {
+    let folders = fs::read_dir(root().join("crates")).unwrap();
+    folders
+        .map(|folder| manifest(&folder.unwrap().path().join("Cargo.toml")))
+        .map(|manifest| (manifest["package"]["name"].as_str().unwrap().to_owned(), manifest))
+        .collect()
+}
+
+fn dependencies<'a>(manifest: &'a toml::Table, section: &str) -> Vec<&'a str> {
+    let table = manifest.get(section).and_then(toml::Value::as_table);
+    table.into_iter().flat_map(|t| t.keys().map(String::as_str)).collect()
+}
+
+#[test]
+fn crates_depend_only_along_the_arrows() {
+    let members = members();
+    let listed: Vec<_> = ARROWS.iter().map(|(name, _)| *name).collect();
+    for name in members.keys() {
+        assert!(listed.contains(&name.as_str()), "{name} has no entry in ARROWS");
+    }
+    for (name, allowed) in ARROWS {
+        for dependency in dependencies(&members[*name], "dependencies") {
+            assert!(
+                !dependency.starts_with("ppa-") || allowed.contains(&dependency),
+                "{name} must not depend on {dependency}"
+            );
+        }
+    }
+}
+
+/// Follows the lock file, so that a feature switched on by mistake is seen as well.
+#[test]
+fn libraries_used_alone_pull_in_no_reader_network_or_frontend() {
+    for (name, forbidden) in FORBIDDEN {
+        let tree = std::process::Command::new(env!("CARGO"))
+            .args(["tree", "--locked", "--edges", "normal", "--prefix", "none", "--package", name])
+            .current_dir(root())
+            .output()
+            .unwrap();
+        assert!(tree.status.success(), "{}", String::from_utf8_lossy(&tree.stderr));
+        for line in String::from_utf8(tree.stdout).unwrap().lines() {
+            for prefix in *forbidden {
+                assert!(!line.starts_with(prefix), "{name} pulls in {line}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_crate_is_ready_to_publish() {
+    for (name, manifest) in members() {
+        let package = manifest["package"].as_table().unwrap();
+        for key in ["description", "keywords", "documentation", "readme", "license", "repository"] {
+            assert!(package.contains_key(key), "{name} lacks package.{key}");
+        }
+        assert!(
+            root().join("crates").join(&name).join("README.md").is_file(),
+            "{name} has no README.md"
+        );
+        assert!(manifest.contains_key("lints"), "{name} does not take the workspace's lints");
+    }
+}
+
+#[test]
+fn versions_stand_only_in_the_root_manifest() {
+    for (name, manifest) in members() {
+        for section in ["dependencies", "dev-dependencies", "build-dependencies"] {
+            let Some(table) = manifest.get(section).and_then(toml::Value::as_table) else {
+                continue;
+            };
+            for (dependency, value) in table {
+                let inherited = value
+                    .get("workspace")
+                    .and_then(toml::Value::as_bool)
+                    .unwrap_or(false);
+                assert!(inherited, "{name}: {section}.{dependency} states its own version");
+            }
+        }
+    }
+}
