@@ -1,1 +1,35 @@
-//! In progress.
+//! Scene of a synthetic radiograph: a limb from a CT scan, laid on the table under the x-ray beam.
+//!
+//! [`find_landmarks`] tells how a limb lies in its scan, [`Room`] is the x-ray room with its
+//! device, [`table_plane`] finds the table in the room's cloud, and [`place`] rotates the limb
+//! and lays it down. [`ct_from_device`] takes the device back into the scan, where the
+//! radiograph is computed without rotating a voxel.
+//!
+//! Units: mm, radians (degrees where a name ends in `_deg`). Frames are types ([`Ct`],
+//! [`Patient`], [`Room`], [`Device`], [`Camera`]); a [`Rigid`] is named `target_from_source`.
+//! Source of the method: Laufer et al., MELBA 2026:027, section "Framework", doi:10.59275/j.melba.2026-c874.
+
+mod ankle;
+mod contact;
+mod device;
+mod find_landmarks;
+mod frames;
+mod landmarks;
+mod limb_sections;
+mod patch;
+mod placement;
+mod plane;
+mod room;
+mod room_parts;
+mod sweep;
+mod table_plane;
+
+pub use device::XrayDevice;
+pub use find_landmarks::{LandmarkError, LandmarkOverrides, find_landmarks};
+pub use frames::{Camera, Ct, Device, NotRigid, Patient, Rigid};
+pub use landmarks::{AxisRegion, AxisSource, Landmarks, LimbKind, Side};
+pub use placement::{Contact, PlaceError, Placement, ct_from_device, medial_rotation, place};
+pub use plane::Plane;
+pub use room::{Room, RoomError, RoomSpec};
+pub use sweep::{PoseAngle, Sweep, SweepError};
+pub use table_plane::{PlaneError, PlaneSettings, TablePlane, table_plane};

@@ -1,0 +1,168 @@
+//! Where the ankle joint is: the gap between tibial plafond and talar dome.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::limb_sections::Sections;
+
+/// The ankle of a lower leg.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Ankle {
+    /// Level of the joint gap along the scan's limb direction, mm.
+    pub(crate) level_mm: f64,
+    /// How much less dense the gap is than the bone on either side of it.
+    pub(crate) depth_hu: f64,
+}
+
+/// The tibia flares when its outline is this much larger than at its thinnest.
+const FLARE: f64 = 1.8;
+
+/// The flare starts this far above the joint, mm: the distal tibia widens over 15 to 40 mm.
+const FLARE_TO_JOINT_MM: [f64; 2] = [5.0, 50.0];
+
+/// Radius of the column through the tibia whose density is followed, mm. The talar dome
+/// (radius about 20 mm) falls by less than 1 mm over it.
+const COLUMN_MM: f64 = 6.0;
+
+/// Subchondral plates lie within this distance of the gap, mm.
+const PLATE_MM: f64 = 10.0;
+
+/// The gap must be darker than the plates by this much.
+const MIN_DEPTH_HU: f64 = 30.0;
+
+/// Follows the tibia from its thin shaft to the flare above the ankle and looks for the joint
+/// gap below: the first clear dip between two dense plates in a column along the shaft.
+///
+/// `None` when there is no shaft with a second, thinner bone (the fibula) beside it, no flare or
+/// no gap.
+pub(crate) fn find_ankle(sections: &Sections) -> Option<Ankle> {
+    let slices = sections.proximal_to_distal();
+    let (flare, shaft) = flare(sections, &slices)?;
+    let line = ShaftLine::through(&shaft)?;
+    let top_mm = sections.level(slices[flare]);
+    let column: Vec<(f64, f64)> = slices
+        .iter()
+        .map(|slice| (sections.level(*slice), *slice))
+        .filter(|(level, _)| {
+            let below = top_mm - level;
+            (FLARE_TO_JOINT_MM[0] - PLATE_MM..=FLARE_TO_JOINT_MM[1] + PLATE_MM).contains(&below)
+        })
+        .filter_map(|(level, slice)| {
+            let hu = sections.mean_hu(slice, &line.at(level), COLUMN_MM)?;
+            Some((level, hu))
+        })
+        .collect();
+    let dips: Vec<(usize, f64)> = (0..column.len())
+        .filter(|i| {
+            let below = top_mm - column[*i].0;
+            (FLARE_TO_JOINT_MM[0]..=FLARE_TO_JOINT_MM[1]).contains(&below)
+        })
+        .filter_map(|i| Some((i, depth(&column, i)?)))
+        .collect();
+    let deepest = dips.iter().map(|(_, depth)| *depth).fold(0.0, f64::max);
+    // The subtalar joint, below, can be as dark: the most proximal clear gap is the ankle.
+    let (i, depth_hu) = dips
+        .into_iter()
+        .find(|(_, depth)| *depth >= MIN_DEPTH_HU.max(0.5 * deepest))?;
+    Some(Ankle {
+        level_mm: vertex(&column, i),
+        depth_hu,
+    })
+}
+
+/// Index (into `slices`) where the flare starts, and the tibia's centres from there 40 mm up.
+fn flare(sections: &Sections, slices: &[usize]) -> Option<(usize, Vec<(f64, Point3<f64>)>)> {
+    const SUSTAINED_MM: f64 = 4.0;
+    const SHAFT_MM: f64 = 40.0;
+    let mut centres: Vec<(f64, Point3<f64>)> = Vec::new();
+    let mut thinnest: Option<(f64, bool)> = None;
+    let mut start: Option<usize> = None;
+    for (index, slice) in slices.iter().enumerate() {
+        let level = sections.level(*slice);
+        let bones = sections.bones(*slice);
+        let Some(tibia) = bones.first().filter(|bone| bone.area_mm2 >= 50.0) else {
+            continue;
+        };
+        let has_fibula = bones
+            .get(1)
+            .is_some_and(|bone| (0.05..0.7).contains(&(bone.area_mm2 / tibia.area_mm2)));
+        centres.push((level, tibia.centre));
+        match thinnest {
+            Some((area, true)) if tibia.area_mm2 >= FLARE * area => {
+                let first = *start.get_or_insert(index);
+                let top = sections.level(slices[first]);
+                if top - level >= SUSTAINED_MM && index > first {
+                    let shaft = |level: f64| (top..=top + SHAFT_MM).contains(&level);
+                    centres.retain(|(level, _)| shaft(*level));
+                    return Some((first, centres));
+                }
+            }
+            Some((area, _)) if tibia.area_mm2 >= area => start = None,
+            _ => {
+                thinnest = Some((tibia.area_mm2, has_fibula));
+                start = None;
+            }
+        }
+    }
+    None
+}
+
+/// Centre of the shaft as a straight function of the level.
+struct ShaftLine {
+    level_mm: f64,
+    centre: Vector3<f64>,
+    slope: Vector3<f64>,
+}
+
+impl ShaftLine {
+    /// Least squares; `None` for fewer than three centres.
+    fn through(centres: &[(f64, Point3<f64>)]) -> Option<Self> {
+        if centres.len() < 3 {
+            return None;
+        }
+        let n = centres.len() as f64;
+        let level_mm = centres.iter().map(|(level, _)| level).sum::<f64>() / n;
+        let centre = centres.iter().map(|(_, c)| c.coords).sum::<Vector3<f64>>() / n;
+        let spread: f64 = centres.iter().map(|(l, _)| (l - level_mm).powi(2)).sum();
+        let moment: Vector3<f64> = centres
+            .iter()
+            .map(|(level, c)| (c.coords - centre) * (level - level_mm))
+            .sum();
+        Some(Self {
+            level_mm,
+            centre,
+            slope: moment / spread,
+        })
+    }
+
+    fn at(&self, level_mm: f64) -> Point3<f64> {
+        Point3::from(self.centre + self.slope * (level_mm - self.level_mm))
+    }
+}
+
+/// How far the lowest value of a local minimum lies below the plates on either side.
+fn depth(column: &[(f64, f64)], i: usize) -> Option<f64> {
+    let (level, hu) = column[i];
+    let neighbour = |j: usize| column.get(j).map(|c| c.1);
+    if neighbour(i.checked_sub(1)?)? < hu || neighbour(i + 1)? < hu {
+        return None;
+    }
+    let plate = |side: f64| {
+        column
+            .iter()
+            .filter(|(l, _)| (0.0..=PLATE_MM).contains(&((l - level) * side)))
+            .map(|(_, hu)| *hu)
+            .fold(f64::NEG_INFINITY, f64::max)
+    };
+    Some(plate(1.0).min(plate(-1.0)) - hu)
+}
+
+/// Level of the parabola's vertex through a minimum and its neighbours.
+fn vertex(column: &[(f64, f64)], i: usize) -> f64 {
+    let [(x0, y0), (x1, y1), (x2, y2)] = [column[i - 1], column[i], column[i + 1]];
+    let (left, right) = ((x1 - x0) * (y1 - y2), (x1 - x2) * (y1 - y0));
+    let curvature = left - right;
+    if curvature == 0.0 {
+        return x1;
+    }
+    x1 - 0.5 * ((x1 - x0) * left - (x1 - x2) * right) / curvature
+}

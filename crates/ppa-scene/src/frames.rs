@@ -1,0 +1,194 @@
+//! Coordinate frames as types, and rigid motions that only compose when their frames meet.
+//!
+//! The room (ToF) frame has no marker of its own: [`Room`](crate::Room) itself names it.
+
+use std::fmt;
+use std::marker::PhantomData;
+use std::ops::Mul;
+
+use nalgebra::{
+    Isometry3, Matrix3, Matrix4, Point3, Rotation3, Translation3, UnitQuaternion, Vector3,
+};
+use serde::{Deserialize, Serialize};
+
+/// Patient world of the scan: DICOM LPS, mm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Ct;
+
+/// Limb frame P: x to the patient's right, y anterior, z along the limb towards proximal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Patient;
+
+/// X-ray device: source at the origin, z along the central beam towards the detector.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Device;
+
+/// A depth camera, OpenCV axes: x right, y down, z forward.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Camera;
+
+/// Why sixteen numbers are not a rigid motion.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NotRigid {
+    /// A number is NaN or infinite.
+    #[error("the 4x4 matrix holds a value that is not a number")]
+    NotFinite,
+    /// The last row is not 0 0 0 1.
+    #[error("the last row of the 4x4 matrix is {0:?}, expected [0, 0, 0, 1]")]
+    LastRow([f64; 4]),
+    /// The 3x3 part scales, shears or mirrors.
+    #[error(
+        "the 3x3 part of the matrix is not a rotation: it is {deviation} away from \
+         orthonormal and its determinant is {determinant}, expected 0 and 1"
+    )]
+    NotARotation {
+        /// Largest entry of |RᵀR − 1|.
+        deviation: f64,
+        /// Determinant of R.
+        determinant: f64,
+    },
+}
+
+/// Rigid motion that takes coordinates in `From` to coordinates in `To`; millimetres.
+///
+/// Values are named `target_from_source`, so that products read as chains, and a product whose
+/// inner frames differ does not compile:
+///
+/// ```
+/// # use ppa_scene::{Rigid, Room, Patient, Ct};
+/// # let (room_from_patient, patient_from_ct): (Rigid<Room, Patient>, Rigid<Patient, Ct>) =
+/// #     (Rigid::identity(), Rigid::identity());
+/// let room_from_ct: Rigid<Room, Ct> = room_from_patient * patient_from_ct;
+/// ```
+///
+/// ```compile_fail
+/// # use ppa_scene::{Rigid, Room, Patient, Ct};
+/// # let (room_from_patient, patient_from_ct): (Rigid<Room, Patient>, Rigid<Patient, Ct>) =
+/// #     (Rigid::identity(), Rigid::identity());
+/// let swapped = patient_from_ct * room_from_patient;
+/// ```
+///
+/// In files it is a row-major 4x4 matrix.
+#[derive(Serialize, Deserialize)]
+#[serde(try_from = "[[f64; 4]; 4]", into = "[[f64; 4]; 4]", bound = "")]
+pub struct Rigid<To, From> {
+    isometry: Isometry3<f64>,
+    frames: PhantomData<fn(From) -> To>,
+}
+
+// Written out because a derive would ask the frames, which are only names, for the same traits.
+impl<To, From> Clone for Rigid<To, From> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<To, From> Copy for Rigid<To, From> {}
+
+impl<To, From> PartialEq for Rigid<To, From> {
+    fn eq(&self, other: &Self) -> bool {
+        self.isometry == other.isometry
+    }
+}
+
+impl<To, From> fmt::Debug for Rigid<To, From> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Rigid").field(&self.isometry).finish()
+    }
+}
+
+impl<To, From> Rigid<To, From> {
+    /// Names the frames of an isometry.
+    pub fn new(isometry: Isometry3<f64>) -> Self {
+        Self {
+            isometry,
+            frames: PhantomData,
+        }
+    }
+
+    /// The frames coincide.
+    pub fn identity() -> Self {
+        Self::new(Isometry3::identity())
+    }
+
+    /// A motion from the axes of `From` written in `To` (columns) and its origin in `To`.
+    ///
+    /// `axes` must be a rotation to rounding error; it is orthonormalised to the last bit.
+    pub(crate) fn from_axes(axes: Matrix3<f64>, origin: Point3<f64>) -> Self {
+        let rotation = Rotation3::from_matrix_unchecked(axes);
+        Self::new(Isometry3::from_parts(
+            Translation3::from(origin),
+            UnitQuaternion::from_rotation_matrix(&rotation),
+        ))
+    }
+
+    /// The motion back.
+    pub fn inverse(&self) -> Rigid<From, To> {
+        Rigid::new(self.isometry.inverse())
+    }
+
+    /// The plain nalgebra isometry, for crates that do not know these frames.
+    pub fn isometry(&self) -> &Isometry3<f64> {
+        &self.isometry
+    }
+
+    /// Turns a direction; the translation plays no part.
+    pub fn rotate(&self, direction: &Vector3<f64>) -> Vector3<f64> {
+        self.isometry.rotation * direction
+    }
+
+    /// Row-major homogeneous 4x4 matrix, mm, as manifests hold it.
+    pub fn to_homogeneous_rows(&self) -> [[f64; 4]; 4] {
+        let matrix = self.isometry.to_homogeneous();
+        std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
+    }
+}
+
+impl<To, From> TryFrom<[[f64; 4]; 4]> for Rigid<To, From> {
+    type Error = NotRigid;
+
+    /// Accepts rotations that are orthonormal within 1e-6, the rounding of printed matrices.
+    fn try_from(rows: [[f64; 4]; 4]) -> Result<Self, NotRigid> {
+        let matrix = Matrix4::from_fn(|row, column| rows[row][column]);
+        if !matrix.iter().all(|v| v.is_finite()) {
+            return Err(NotRigid::NotFinite);
+        }
+        if rows[3] != [0.0, 0.0, 0.0, 1.0] {
+            return Err(NotRigid::LastRow(rows[3]));
+        }
+        let linear: Matrix3<f64> = matrix.fixed_view::<3, 3>(0, 0).into_owned();
+        let deviation = (linear.transpose() * linear - Matrix3::identity()).amax();
+        let determinant = linear.determinant();
+        if deviation > 1e-6 || determinant < 0.0 {
+            return Err(NotRigid::NotARotation {
+                deviation,
+                determinant,
+            });
+        }
+        let origin = Point3::new(rows[0][3], rows[1][3], rows[2][3]);
+        Ok(Self::from_axes(linear, origin))
+    }
+}
+
+impl<To, From> std::convert::From<Rigid<To, From>> for [[f64; 4]; 4] {
+    fn from(rigid: Rigid<To, From>) -> Self {
+        rigid.to_homogeneous_rows()
+    }
+}
+
+impl<A, B, C> Mul<Rigid<B, C>> for Rigid<A, B> {
+    type Output = Rigid<A, C>;
+
+    fn mul(self, rhs: Rigid<B, C>) -> Rigid<A, C> {
+        Rigid::new(self.isometry * rhs.isometry)
+    }
+}
+
+impl<To, From> Mul<Point3<f64>> for Rigid<To, From> {
+    type Output = Point3<f64>;
+
+    fn mul(self, point: Point3<f64>) -> Point3<f64> {
+        self.isometry * point
+    }
+}

@@ -1,0 +1,113 @@
+//! What has to be known about a limb before it can be posed, and the frame that follows.
+
+use nalgebra::{Matrix3, Point3, Unit, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::frames::{Ct, Patient, Rigid};
+use crate::plane::Plane;
+
+/// The patient's left or right; "l" or "r" in files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Side {
+    /// Left limb.
+    #[serde(rename = "l")]
+    Left,
+    /// Right limb.
+    #[serde(rename = "r")]
+    Right,
+}
+
+impl Side {
+    /// "l" or "r", as folders of a dataset are named.
+    pub fn letter(self) -> &'static str {
+        match self {
+            Self::Left => "l",
+            Self::Right => "r",
+        }
+    }
+}
+
+/// What kind of limb a scan shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LimbKind {
+    /// Lower leg with its ankle.
+    LowerLeg,
+    /// Anything else: the reference level is the middle of the limb unless it is given.
+    Other,
+}
+
+/// Whose cross-sections give the longitudinal axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AxisSource {
+    /// The tibia: swelling and calf muscle do not move the axis off the joint.
+    Bone,
+    /// The whole cross-section inside the skin.
+    Limb,
+}
+
+/// A stretch of the limb and the centre of its cross-sections.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AxisRegion {
+    /// First and last distance proximal of the joint level along the scan's limb direction, mm.
+    pub range_mm: [f64; 2],
+    /// Mean of the cross-section centres, `ct` frame, mm.
+    pub centre_mm: [f64; 3],
+}
+
+/// Every choice made about one limb; all in the `ct` frame, mm.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Landmarks {
+    /// Which limb.
+    pub side: Side,
+    /// What was recognised.
+    pub limb: LimbKind,
+    /// What the two region centres are centres of.
+    pub axis_source: AxisSource,
+    /// Unit direction across the scan's slices, towards proximal; region ranges run along it.
+    pub scan_direction: [f64; 3],
+    /// The distal region, just proximal to the joint.
+    pub joint_region: AxisRegion,
+    /// The proximal region, around the calf.
+    pub calf_region: AxisRegion,
+    /// A point of the rotation axis.
+    pub axis_point: [f64; 3],
+    /// Unit direction of the rotation axis, towards proximal.
+    pub axis_direction: [f64; 3],
+    /// Direction that faces up at angle 0; only its part across the axis counts.
+    pub anterior: [f64; 3],
+    /// The point of the axis at the level of the joint: origin of the patient frame.
+    pub joint_centre: [f64; 3],
+    /// One distal and two proximal points of the plane Π_P under the limb.
+    pub plane_points: [[f64; 3]; 3],
+    /// What was decided on the way and why.
+    pub notes: Vec<String>,
+}
+
+impl Landmarks {
+    /// T^P_CT: the patient frame has z along the axis, y anterior, x to the patient's right and
+    /// its origin at the joint centre.
+    pub fn patient_from_ct(&self) -> Rigid<Patient, Ct> {
+        let z = Vector3::from(self.axis_direction).normalize();
+        let anterior = Vector3::from(self.anterior);
+        let y = (anterior - z * z.dot(&anterior)).normalize();
+        let axes = Matrix3::from_columns(&[y.cross(&z), y, z]);
+        let ct_from_patient =
+            Rigid::<Ct, Patient>::from_axes(axes, Point3::from(self.joint_centre));
+        ct_from_patient.inverse()
+    }
+
+    /// Π_P in the patient frame; its normal points to the limb (anterior).
+    pub fn plane_patient(&self) -> Plane {
+        let patient_from_ct = self.patient_from_ct();
+        let [a, b, c] = self.plane_points.map(|p| patient_from_ct * Point3::from(p));
+        let mut normal = Unit::new_normalize((b - a).cross(&(c - a)));
+        if normal.y < 0.0 {
+            normal = -normal;
+        }
+        Plane::through(&a, normal)
+    }
+}

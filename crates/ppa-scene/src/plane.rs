@@ -1,0 +1,57 @@
+//! A plane with a front side.
+
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// The points p with `normal · p = offset_mm`; the normal points to the side where things lie.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Plane {
+    /// Unit normal.
+    pub normal: Unit<Vector3<f64>>,
+    /// Signed distance of the plane from the origin along the normal, mm.
+    pub offset_mm: f64,
+}
+
+impl Plane {
+    /// The plane through a point.
+    pub fn through(point: &Point3<f64>, normal: Unit<Vector3<f64>>) -> Self {
+        Self {
+            normal,
+            offset_mm: normal.dot(&point.coords),
+        }
+    }
+
+    /// Distance of a point above (+) or below (−) the plane, mm.
+    pub fn signed_distance(&self, point: &Point3<f64>) -> f64 {
+        self.normal.dot(&point.coords) - self.offset_mm
+    }
+
+    /// The foot of the perpendicular from a point.
+    pub fn project(&self, point: &Point3<f64>) -> Point3<f64> {
+        point - self.normal.into_inner() * self.signed_distance(point)
+    }
+
+    /// The same plane seen from the other side.
+    pub fn flipped(&self) -> Self {
+        Self {
+            normal: -self.normal,
+            offset_mm: -self.offset_mm,
+        }
+    }
+
+    /// The plane in the frame that `target_from_source` leads to.
+    pub fn transformed(&self, target_from_source: &Isometry3<f64>) -> Self {
+        let point = Point3::from(self.normal.into_inner() * self.offset_mm);
+        Self::through(
+            &(target_from_source * point),
+            target_from_source * self.normal,
+        )
+    }
+
+    /// Where the ray `origin + s · direction`, s ≥ 0, meets the plane; `None` if it never does.
+    pub fn hit(&self, origin: &Point3<f64>, direction: &Vector3<f64>) -> Option<Point3<f64>> {
+        let approach = self.normal.dot(direction);
+        let s = -self.signed_distance(origin) / approach;
+        (s.is_finite() && s >= 0.0).then(|| origin + direction * s)
+    }
+}

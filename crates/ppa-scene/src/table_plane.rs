@@ -1,0 +1,313 @@
+//! Finding the table top in a cloud of a room.
+
+use nalgebra::{Point3, Unit, Vector3};
+use ppa_mesh::PointCloud;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::device::XrayDevice;
+use crate::patch::{Patch, Sheet};
+use crate::plane::Plane;
+
+/// What counts as a table top.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlaneSettings {
+    /// Distance from the plane up to which a point belongs to it, mm.
+    pub threshold_mm: f64,
+    /// Planes tried per search.
+    pub iterations: u32,
+    /// The direction that is up; the normal of the result points there.
+    pub up: [f64; 3],
+    /// Largest angle between normal and up, degrees.
+    pub max_tilt_deg: f64,
+    /// Cell of the lattice that tells connected from separate patches, mm.
+    pub cell_mm: f64,
+    /// Smallest area of a table top, mm².
+    pub min_area_mm2: f64,
+    /// Only points in this box (low and high corner) are looked at, mm.
+    pub region: Option<[[f64; 3]; 2]>,
+    /// Central beam: a point and a direction. The table is the first large patch that it hits;
+    /// without a beam it is the largest patch.
+    pub beam: Option<[[f64; 3]; 2]>,
+}
+
+impl Default for PlaneSettings {
+    fn default() -> Self {
+        Self {
+            threshold_mm: 10.0,
+            iterations: 1000,
+            up: [0.0, 0.0, 1.0],
+            max_tilt_deg: 20.0,
+            cell_mm: 60.0,
+            min_area_mm2: 60_000.0,
+            region: None,
+            beam: None,
+        }
+    }
+}
+
+impl PlaneSettings {
+    /// The default for a device: up is against its beam, the table is what the beam hits first.
+    pub fn for_device(device: &XrayDevice) -> Self {
+        let (source, beam) = (device.source(), device.beam_direction());
+        Self {
+            up: (-beam).into(),
+            beam: Some([source.coords.into(), beam.into()]),
+            ..Self::default()
+        }
+    }
+}
+
+/// The table top found in a cloud.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TablePlane {
+    /// Π_T, facing up.
+    pub plane: Plane,
+    /// Points of the patch within the threshold.
+    pub inliers: usize,
+    /// Root mean square distance of these points from the plane, mm.
+    pub rms_mm: f64,
+    /// Their mean, on the plane.
+    pub centre: Point3<f64>,
+}
+
+/// Why no table was found.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlaneError {
+    /// A setting does not make sense.
+    #[error("{name} is {found}, expected {expected}")]
+    Setting {
+        /// Field of [`PlaneSettings`].
+        name: &'static str,
+        /// Its value.
+        found: f64,
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// Too few points to fit a plane.
+    #[error("{found} finite points in the region, expected at least {expected}")]
+    TooFewPoints {
+        /// Points left after the region was cut out.
+        found: usize,
+        /// Points needed.
+        expected: usize,
+    },
+    /// Nothing flat, level, large and in the right place.
+    #[error(
+        "no plane: of {points} points none lie in a connected flat patch of {min_area_mm2} mm² \
+         or more, within {max_tilt_deg} degrees of level{}",
+        if *beam { ", under the central beam" } else { "" }
+    )]
+    NoPlane {
+        /// Points looked at.
+        points: usize,
+        /// Smallest area that was asked for.
+        min_area_mm2: f64,
+        /// Largest tilt that was asked for.
+        max_tilt_deg: f64,
+        /// Whether the patch had to be under the beam.
+        beam: bool,
+    },
+}
+
+/// How many points a search scores; more would not sharpen the choice, least squares does that.
+const SCORED_POINTS: usize = 8_000;
+
+/// How many planes are taken out of a cloud, largest first, before the search gives up.
+const MAX_PLANES: usize = 10;
+
+const MIN_POINTS: usize = 30;
+
+/// Finds the table top: planes by RANSAC, each refined by total least squares on one connected
+/// patch until its points no longer change, then the patch the beam hits first (or the largest).
+///
+/// Only the connected patch counts, so that a wall or a cabinet cut by the plane does not tilt
+/// it. The floor is often larger than the table; the beam tells them apart. The result depends
+/// on the cloud, the settings and the seed only, not on the number of threads.
+///
+/// # Errors
+/// [`PlaneError`] when a setting is unusable, there are too few points, or no plane qualifies.
+pub fn table_plane(
+    cloud: &PointCloud,
+    settings: &PlaneSettings,
+    seed: u64,
+) -> Result<TablePlane, PlaneError> {
+    let search = Search::new(settings)?;
+    let mut points: Vec<Point3<f64>> = cloud
+        .points
+        .iter()
+        .map(|p| p.cast::<f64>())
+        .filter(|p| search.wants(p))
+        .collect();
+    let found = points.len();
+    if found < MIN_POINTS {
+        return Err(PlaneError::TooFewPoints {
+            found,
+            expected: MIN_POINTS,
+        });
+    }
+    let mut best: Option<(f64, Sheet)> = None;
+    for round in 0..MAX_PLANES {
+        let Some(plane) = search.consensus(&points, seed, round as u64) else {
+            break;
+        };
+        for patch in Patch::of_plane(&points, &plane, settings) {
+            let Some(sheet) = patch.refined(&points, settings) else {
+                continue;
+            };
+            if let Some(merit) = search.merit(&sheet)
+                && best.as_ref().is_none_or(|(most, _)| *most < merit)
+            {
+                best = Some((merit, sheet));
+            }
+        }
+        points.retain(|p| plane.signed_distance(p).abs() > 2.0 * settings.threshold_mm);
+        if points.len() < MIN_POINTS {
+            break;
+        }
+    }
+    let (_, sheet) = best.ok_or(PlaneError::NoPlane {
+        points: found,
+        min_area_mm2: settings.min_area_mm2,
+        max_tilt_deg: settings.max_tilt_deg,
+        beam: settings.beam.is_some(),
+    })?;
+    Ok(TablePlane {
+        plane: sheet.plane,
+        inliers: sheet.inliers,
+        rms_mm: sheet.rms_mm,
+        centre: sheet.centre,
+    })
+}
+
+/// Settings that make sense.
+struct Search<'a> {
+    settings: &'a PlaneSettings,
+    up: Unit<Vector3<f64>>,
+    beam: Option<(Point3<f64>, Unit<Vector3<f64>>)>,
+    min_cos: f64,
+}
+
+impl<'a> Search<'a> {
+    fn new(settings: &'a PlaneSettings) -> Result<Self, PlaneError> {
+        let positive = [
+            ("threshold_mm", settings.threshold_mm),
+            ("iterations", f64::from(settings.iterations)),
+            ("cell_mm", settings.cell_mm),
+            ("min_area_mm2", settings.min_area_mm2),
+        ];
+        for (name, found) in positive {
+            if !(found > 0.0 && found.is_finite()) {
+                return Err(PlaneError::Setting {
+                    name,
+                    found,
+                    expected: "a positive number",
+                });
+            }
+        }
+        if !(0.0..=90.0).contains(&settings.max_tilt_deg) {
+            return Err(PlaneError::Setting {
+                name: "max_tilt_deg",
+                found: settings.max_tilt_deg,
+                expected: "0 to 90 degrees",
+            });
+        }
+        let unit = |name, v: [f64; 3]| {
+            Unit::try_new(Vector3::from(v), 1e-9).ok_or(PlaneError::Setting {
+                name,
+                found: Vector3::from(v).norm(),
+                expected: "a direction of length above 0",
+            })
+        };
+        let beam = settings
+            .beam
+            .map(|[from, along]| Ok((Point3::from(from), unit("beam", along)?)))
+            .transpose()?;
+        Ok(Self {
+            settings,
+            up: unit("up", settings.up)?,
+            beam,
+            min_cos: settings.max_tilt_deg.to_radians().cos(),
+        })
+    }
+
+    fn wants(&self, p: &Point3<f64>) -> bool {
+        p.iter().all(|c| c.is_finite())
+            && self.settings.region.is_none_or(|[low, high]| {
+                (0..3).all(|axis| (low[axis]..=high[axis]).contains(&p[axis]))
+            })
+    }
+
+    /// The level plane with the most points within the threshold, among many through three.
+    fn consensus(&self, points: &[Point3<f64>], seed: u64, round: u64) -> Option<Plane> {
+        let near_beam = self.beam.map(|(from, along)| {
+            let reach = 2.0 * self.settings.min_area_mm2.sqrt();
+            points
+                .iter()
+                .filter(|p| {
+                    let v = *p - from;
+                    let s = v.dot(&along);
+                    s > 0.0 && (v - along.into_inner() * s).norm() < reach
+                })
+                .copied()
+                .collect::<Vec<_>>()
+        });
+        let pool = near_beam.as_deref().unwrap_or(points);
+        if pool.len() < MIN_POINTS {
+            return None;
+        }
+        let stride = pool.len().div_ceil(SCORED_POINTS);
+        let scored: Vec<Point3<f64>> = pool.iter().step_by(stride).copied().collect();
+        let best = (0..u64::from(self.settings.iterations))
+            .into_par_iter()
+            .filter_map(|iteration| {
+                let plane = self.candidate(pool, seed, round << 32 | iteration)?;
+                let threshold = self.settings.threshold_mm;
+                let votes = scored
+                    .iter()
+                    .filter(|p| plane.signed_distance(p).abs() <= threshold)
+                    .count();
+                Some((votes, std::cmp::Reverse(iteration), plane))
+            })
+            .max_by_key(|(votes, iteration, _)| (*votes, *iteration))?;
+        Some(best.2)
+    }
+
+    fn candidate(&self, pool: &[Point3<f64>], seed: u64, index: u64) -> Option<Plane> {
+        let pick = |corner: u64| {
+            let random = mixed(mixed(seed) ^ mixed(4 * index + corner));
+            // The high product maps 64 random bits evenly onto the points.
+            pool[((u128::from(random) * pool.len() as u128) >> 64) as usize]
+        };
+        let [a, b, c] = [0, 1, 2].map(pick);
+        let normal = Unit::try_new((b - a).cross(&(c - a)), 1e-6)?;
+        let cos = normal.dot(&self.up);
+        let normal = if cos < 0.0 { -normal } else { normal };
+        (cos.abs() >= self.min_cos).then(|| Plane::through(&a, normal))
+    }
+
+    /// How well a sheet fits as the table; `None` if it does not.
+    fn merit(&self, sheet: &Sheet) -> Option<f64> {
+        if sheet.plane.normal.dot(&self.up).abs() < self.min_cos {
+            return None;
+        }
+        match self.beam {
+            None => Some(sheet.inliers as f64),
+            Some((from, along)) => {
+                let hit = sheet.plane.hit(&from, &along)?;
+                sheet.covers(&hit).then(|| -(hit - from).norm())
+            }
+        }
+    }
+}
+
+/// Steele, Lea and Flood's 64-bit finaliser (SplitMix64, doi:10.1145/2660193.2660195): an
+/// addressed random number is the mix of its address.
+fn mixed(address: u64) -> u64 {
+    let mut z = address.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ z >> 31
+}
