@@ -27,6 +27,7 @@ mod philox;
 mod rayleigh;
 mod sampler;
 mod spectrum;
+mod spectrum_file;
 mod tube;
 
 mod analog;

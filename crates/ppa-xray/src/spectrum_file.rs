@@ -1,0 +1,175 @@
+//! Spectra from files: two-column CSV and MC-GPU's `.spc`.
+
+use std::{fs, path::Path};
+
+use crate::spectrum::{Spectrum, SpectrumError};
+
+impl Spectrum {
+    /// Reads `energy in keV, weight` lines, the energy being the centre of a bin; edges lie half-way between centres.
+    ///
+    /// Comma, semicolon, tab or blanks part the columns. Lines that are empty or begin with `#` are skipped, and so
+    /// is one headline.
+    ///
+    /// # Errors
+    /// A file that cannot be read, a line that is not two numbers, fewer than two lines, and everything that
+    /// [`Spectrum::from_bins`] refuses.
+    pub fn from_csv(path: impl AsRef<Path>) -> Result<Self, SpectrumError> {
+        let path = path.as_ref();
+        let text = read(path)?;
+        let mut rows = Vec::new();
+        let mut headline_allowed = true;
+        for (index, line) in lines(&text) {
+            let columns: Vec<&str> = columns(line).collect();
+            match columns[..]
+                .iter()
+                .map(|column| column.parse::<f64>())
+                .collect::<Result<Vec<_>, _>>()
+            {
+                Ok(numbers) if numbers.len() == 2 => rows.push((numbers[0], numbers[1])),
+                Err(_) if headline_allowed => {}
+                _ => {
+                    return Err(wrong_line(
+                        path,
+                        index,
+                        line,
+                        "bin centre in keV and weight",
+                    ));
+                }
+            }
+            headline_allowed = false;
+        }
+        if rows.len() < 2 {
+            return Err(wrong_line(
+                path,
+                text.lines().count(),
+                "",
+                "at least two energy bins",
+            ));
+        }
+        let middle = |pair: &[(f64, f64)]| 0.5 * (pair[0].0 + pair[1].0);
+        let inner: Vec<f64> = rows.windows(2).map(middle).collect();
+        let (first, last) = (rows[0].0, rows[rows.len() - 1].0);
+        let mut edges = vec![2.0 * first - inner[0]];
+        edges.extend_from_slice(&inner);
+        edges.push(2.0 * last - inner[inner.len() - 1]);
+        Self::from_bins(&edges, &rows.iter().map(|row| row.1).collect::<Vec<_>>())
+    }
+
+    /// Reads an MC-GPU spectrum: `lower bin edge in eV, weight` lines, ended by the upper edge with a negative weight.
+    ///
+    /// # Errors
+    /// A file that cannot be read, a line that does not begin with two numbers, no end, and everything that
+    /// [`Spectrum::from_bins`] refuses.
+    pub fn from_spc(path: impl AsRef<Path>) -> Result<Self, SpectrumError> {
+        const EXPECTED: &str = "lower bin edge in eV and weight";
+        let path = path.as_ref();
+        let text = read(path)?;
+        let (mut edges, mut weights) = (Vec::new(), Vec::new());
+        for (index, line) in lines(&text) {
+            let mut columns = columns(line).map(str::parse::<f64>);
+            let (Some(Ok(energy_ev)), Some(Ok(weight))) = (columns.next(), columns.next()) else {
+                return Err(wrong_line(path, index, line, EXPECTED));
+            };
+            edges.push(energy_ev / 1000.0);
+            if weight < 0.0 {
+                return Self::from_bins(&edges, &weights);
+            }
+            weights.push(weight);
+        }
+        Err(wrong_line(
+            path,
+            text.lines().count(),
+            "",
+            "an upper edge with a negative weight at the end",
+        ))
+    }
+}
+
+fn read(path: &Path) -> Result<String, SpectrumError> {
+    fs::read_to_string(path).map_err(|source| SpectrumError::Read {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Lines that say something, with their index.
+fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let lines = text.lines().map(str::trim).enumerate();
+    lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
+
+fn columns(line: &str) -> impl Iterator<Item = &str> {
+    line.split(|c: char| c.is_whitespace() || c == ',' || c == ';')
+        .filter(|column| !column.is_empty())
+}
+
+fn wrong_line(path: &Path, index: usize, found: &str, expected: &'static str) -> SpectrumError {
+    SpectrumError::Line {
+        path: path.to_owned(),
+        line: index + 1,
+        found: found.to_owned(),
+        expected,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+
+    fn file(text: &str) -> tempfile::NamedTempFile {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(text.as_bytes()).unwrap();
+        file
+    }
+
+    #[test]
+    fn csv_centres_and_spc_edges_mean_the_same_bins() {
+        let csv = Spectrum::from_csv(file("keV,weight\n20.5,1\n21.5,3\n22.5,0\n").path()).unwrap();
+        let spc = Spectrum::from_spc(
+            file("# MC-GPU\n20000 2 # low\n21000 6\n22000 0\n23000 -1\n99 9\n").path(),
+        )
+        .unwrap();
+        assert_eq!(csv, spc);
+        assert_eq!(csv.edges_kev(), [20.0, 21.0, 22.0]);
+        assert_eq!(csv.bins().collect::<Vec<_>>(), [(20.5, 0.25), (21.5, 0.75)]);
+    }
+
+    #[test]
+    fn bad_files_are_refused_with_the_reason() {
+        let csv = |text| Spectrum::from_csv(file(text).path()).unwrap_err();
+        assert!(matches!(
+            csv("20,1\n21,x\n"),
+            SpectrumError::Line { line: 2, .. }
+        ));
+        assert!(matches!(
+            csv("20,1\n21,-3\n"),
+            SpectrumError::Weight { bin: 1, .. }
+        ));
+        assert!(matches!(
+            csv("20,1\n21,NaN\n"),
+            SpectrumError::Weight { bin: 1, .. }
+        ));
+        assert!(matches!(
+            csv("21,1\n20,1\n"),
+            SpectrumError::Edges { bin: 0, .. }
+        ));
+        assert!(matches!(csv("20,0\n21,0\n"), SpectrumError::Dark));
+        assert!(matches!(
+            csv("149.5,1\n151,1\n"),
+            SpectrumError::Range { .. }
+        ));
+        assert!(matches!(csv(""), SpectrumError::Line { .. }));
+        let spc = |text| Spectrum::from_spc(file(text).path()).unwrap_err();
+        assert!(matches!(
+            spc("20000 1\n21000 1\n"),
+            SpectrumError::Line { .. }
+        ));
+        assert!(matches!(spc("20000 -1\n"), SpectrumError::Dark));
+        assert!(matches!(
+            Spectrum::from_spc("nowhere.spc").unwrap_err(),
+            SpectrumError::Read { .. }
+        ));
+    }
+}
