@@ -90,8 +90,8 @@ pub enum MaterialError {
 /// use ppa_xray::Material;
 /// let water = Material::named("water")?;
 /// assert!((water.total_cm2_g(60.0)? / 0.2059 - 1.0).abs() < 0.01); // NIST XCOM
-/// let hydroxyapatite = Material::parse_composition("hydroxyapatite", "Ca:0.3989,P:0.1850,O:0.4141,H:0.0020", 3.16)?;
-/// assert!(hydroxyapatite.photoelectric_cm2_g(30.0)? > water.photoelectric_cm2_g(30.0)?);
+/// let apatite = Material::parse_composition("apatite", 3.16, "Ca:0.3989,P:0.1850,O:0.4141,H:0.0020")?;
+/// assert!(apatite.photoelectric_cm2_g(30.0)? > water.photoelectric_cm2_g(30.0)?);
 /// # Ok::<(), ppa_xray::MaterialError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -164,8 +164,8 @@ impl Material {
     /// Text of another form, and everything [`Material::from_composition`] refuses.
     pub fn parse_composition(
         name: impl Into<String>,
-        composition: &str,
         density_g_cm3: f64,
+        composition: &str,
     ) -> Result<Self, MaterialError> {
         let mass_fractions = composition
             .split(',')
