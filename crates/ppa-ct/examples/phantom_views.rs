@@ -1,0 +1,163 @@
+//! Pictures of phantom P01: slices, parallel projections under internal rotation, and its skin.
+//!
+//! `cargo run --release -p ppa-ct --example phantom_views -- OUT_DIR [SPACING_MM]`
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use image::{GrayImage, Luma};
+use nalgebra::{Point3, Rotation3, Vector3};
+use ppa_ct::Volume;
+use ppa_ct::phantom::{LowerLeg, TableTop};
+
+/// Edge of a pixel of every picture, mm.
+const PIXEL_MM: f64 = 0.6;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut args = std::env::args().skip(1);
+    let out = PathBuf::from(args.next().ok_or("expected an output folder")?);
+    let spacing_mm = args.next().map_or(Ok(0.8), |s| s.parse())?;
+    std::fs::create_dir_all(&out)?;
+
+    let limb = LowerLeg::p01();
+    let ct = limb.voxelise(spacing_mm, TableTop::Present)?;
+    let joint = limb.truth().joint_centre;
+    for (name, across, down, centre, size) in [
+        (
+            "coronal",
+            Vector3::x(),
+            -Vector3::z(),
+            joint,
+            [130.0, 150.0],
+        ),
+        (
+            "coronal_talus",
+            Vector3::x(),
+            -Vector3::z(),
+            joint - 6.0 * Vector3::y(),
+            [130.0, 150.0],
+        ),
+        (
+            "sagittal",
+            -Vector3::y(),
+            -Vector3::z(),
+            joint - Vector3::new(0.0, 50.0, -60.0),
+            [330.0, 330.0],
+        ),
+        (
+            "sagittal_medial",
+            -Vector3::y(),
+            -Vector3::z(),
+            joint - Vector3::new(-22.0, 50.0, -60.0),
+            [330.0, 330.0],
+        ),
+        (
+            "axial_shaft",
+            Vector3::x(),
+            Vector3::y(),
+            joint + 120.0 * Vector3::z(),
+            [140.0, 160.0],
+        ),
+        (
+            "axial_incisura",
+            Vector3::x(),
+            Vector3::y(),
+            joint + 12.0 * Vector3::z(),
+            [140.0, 160.0],
+        ),
+        (
+            "axial_mortise",
+            Vector3::x(),
+            Vector3::y(),
+            joint - 9.0 * Vector3::z(),
+            [140.0, 160.0],
+        ),
+        (
+            "axial_foot",
+            Vector3::x(),
+            Vector3::y(),
+            joint - Vector3::new(0.0, 70.0, 46.0),
+            [130.0, 300.0],
+        ),
+    ] {
+        let corner = centre - across * size[0] / 2.0 - down * size[1] / 2.0;
+        picture(size, |u, v| {
+            let hu = ct
+                .sample(&(corner + across * u + down * v))
+                .unwrap_or(-1000.0);
+            (hu + 250.0) / 1500.0
+        })
+        .save(out.join(format!("slice_{name}.png")))?;
+    }
+    let small = limb.voxelise(spacing_mm, TableTop::Absent)?;
+    for degrees in [0.0, 18.0, 45.0, 90.0] {
+        projection(&small, &joint, f64::to_radians(degrees))
+            .save(out.join(format!("projection_{degrees:02}.png")))?;
+    }
+    for (name, towards_limb) in [
+        ("front", Vector3::new(0.0, 1.0, 0.0)),
+        ("medial", Vector3::new(-1.0, 0.1, 0.0)),
+        ("oblique", Vector3::new(0.7, 1.0, -0.6)),
+        ("sole", Vector3::new(0.2, 0.3, 1.0)),
+    ] {
+        skin(&limb, towards_limb.normalize()).save(out.join(format!("skin_{name}.png")))?;
+    }
+    Ok(())
+}
+
+/// Picture of a function of mm to 0 (black) … 1 (white).
+fn picture(size_mm: [f64; 2], value: impl Fn(f64, f64) -> f64) -> GrayImage {
+    let [width, height] = size_mm.map(|s| (s / PIXEL_MM) as u32);
+    GrayImage::from_fn(width, height, |i, j| {
+        let grey = value(f64::from(i) * PIXEL_MM, f64::from(j) * PIXEL_MM);
+        Luma([(255.0 * grey.clamp(0.0, 1.0)) as u8])
+    })
+}
+
+/// Sum of attenuation along parallel rays from front to back, the limb turned inwards about z.
+fn projection(ct: &Volume, joint: &Point3<f64>, internal_rotation_rad: f64) -> GrayImage {
+    let limb_from_room = Rotation3::from_axis_angle(&Vector3::z_axis(), -internal_rotation_rad);
+    let (across, along) = (limb_from_room * Vector3::x(), limb_from_room * Vector3::y());
+    let corner = joint - across * 80.0 + Vector3::z() * 100.0;
+    picture([160.0, 190.0], |u, v| {
+        let start = corner + across * u - Vector3::z() * v;
+        let sum: f64 = (-220..=120)
+            .filter_map(|step| ct.sample(&(start + along * f64::from(step))))
+            .map(|hu| 0.02 * (1.0 + hu / 1000.0) * if hu > 150.0 { 1.4 } else { 1.0 })
+            .sum();
+        1.25 * (1.0 - (-sum / 4.0).exp()) - 0.1
+    })
+}
+
+/// The skin under a light from the viewer, by sphere tracing.
+fn skin(limb: &LowerLeg, towards_limb: Vector3<f64>) -> GrayImage {
+    let truth = limb.truth();
+    let up = if towards_limb.z.abs() > 0.8 {
+        -Vector3::y()
+    } else {
+        Vector3::z()
+    };
+    let across = towards_limb.cross(&up).normalize();
+    let down = towards_limb.cross(&across);
+    let middle = truth.joint_centre + Vector3::new(0.0, -40.0, 60.0);
+    let corner = middle - across * 170.0 - down * 200.0 - towards_limb * 400.0;
+    picture([340.0, 400.0], |u, v| {
+        let mut p = corner + across * u + down * v;
+        for _ in 0..300 {
+            let d = limb.skin_distance_mm(&p);
+            if d < 0.02 {
+                let slope = Vector3::from_fn(|a, _| {
+                    let step = Vector3::ith(a, 0.2);
+                    limb.skin_distance_mm(&(p + step)) - limb.skin_distance_mm(&(p - step))
+                });
+                let light = (-towards_limb + 0.6 * up - 0.5 * across).normalize();
+                return 0.15 + 0.8 * slope.normalize().dot(&light).max(0.0);
+            }
+            if (p - corner).norm() > 900.0 || p.z > truth.joint_centre.z + 255.0 {
+                break;
+            }
+            p += towards_limb * (0.7 * d);
+        }
+        0.0
+    })
+}

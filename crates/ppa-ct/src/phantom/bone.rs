@@ -1,0 +1,156 @@
+//! Bones: a solid, the joints cut into it, and what fills it.
+
+use nalgebra::{Point3, Unit, Vector3};
+
+use super::sdf::{Bounds, Shape, smooth_max, smooth_step};
+
+/// How sharply a joint surface meets the rest of the bone, mm.
+const EDGE_MM: f64 = 0.8;
+
+/// Filling of a bone at one station along it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Knot {
+    pub station_mm: f64,
+    /// Thickness of the cortex.
+    pub cortex_mm: f64,
+    /// Share of fatty marrow in the core; the rest is trabecular bone.
+    pub marrow: f64,
+}
+
+/// What lies inside the surface of a bone, as a profile along one direction.
+#[derive(Debug, Clone)]
+pub(super) struct Filling {
+    pub origin: Point3<f64>,
+    pub direction: Unit<Vector3<f64>>,
+    /// In increasing order of station, at least one; constant beyond the ends.
+    pub knots: Vec<Knot>,
+    /// HU of trabecular bone far from the surface.
+    pub trabecular_hu: f64,
+}
+
+impl Filling {
+    /// The same everywhere: a thin shell over trabecular bone.
+    pub(super) fn spongy(cortex_mm: f64, trabecular_hu: f64) -> Self {
+        Self {
+            origin: Point3::origin(),
+            direction: Vector3::z_axis(),
+            knots: vec![Knot {
+                station_mm: 0.0,
+                cortex_mm,
+                marrow: 0.0,
+            }],
+            trabecular_hu,
+        }
+    }
+
+    /// A long bone of the foot: thick-walled shaft with marrow, spongy ends.
+    pub(super) fn tubular(
+        from: [f64; 3],
+        to: [f64; 3],
+        shaft_cortex_mm: f64,
+        trabecular_hu: f64,
+    ) -> Self {
+        let (origin, end): (Point3<f64>, Point3<f64>) = (from.into(), to.into());
+        let length = (end - origin).norm();
+        let knot = |share: f64, cortex_mm: f64, marrow: f64| Knot {
+            station_mm: share * length,
+            cortex_mm,
+            marrow,
+        };
+        Self {
+            origin,
+            direction: Unit::new_normalize(end - origin),
+            knots: vec![
+                knot(0.1, 0.8, 0.0),
+                knot(0.35, shaft_cortex_mm, 0.8),
+                knot(0.6, shaft_cortex_mm, 0.8),
+                knot(0.85, 0.8, 0.0),
+            ],
+            trabecular_hu,
+        }
+    }
+
+    /// Filling at a point.
+    pub(super) fn at(&self, p: &Point3<f64>) -> Knot {
+        let station_mm = (p - self.origin).dot(&self.direction);
+        let after = self.knots.partition_point(|k| k.station_mm < station_mm);
+        let next = self.knots[after.min(self.knots.len() - 1)];
+        let previous = self.knots[after.saturating_sub(1)];
+        let share = smooth_step(
+            previous.station_mm,
+            next.station_mm.max(previous.station_mm + 1e-9),
+            station_mm,
+        );
+        Knot {
+            station_mm,
+            cortex_mm: previous.cortex_mm + share * (next.cortex_mm - previous.cortex_mm),
+            marrow: previous.marrow + share * (next.marrow - previous.marrow),
+        }
+    }
+}
+
+/// One bone.
+#[derive(Debug, Clone)]
+pub(super) struct Bone {
+    pub name: &'static str,
+    /// The bone before its joints are cut.
+    pub solid: Shape,
+    /// Joint spaces cut out of the solid.
+    pub hollows: Vec<Shape>,
+    /// Neighbours that are there first, and the joint space they keep, mm.
+    pub yields_to: Vec<(usize, f64)>,
+    pub filling: Filling,
+}
+
+/// All bones; a bone yields only to bones before it.
+#[derive(Debug, Clone)]
+pub(super) struct Skeleton {
+    bones: Vec<Bone>,
+    bounds: Vec<Bounds>,
+}
+
+impl Skeleton {
+    pub(super) fn new(bones: Vec<Bone>) -> Self {
+        let bounds = bones.iter().map(|b| b.solid.bounds()).collect();
+        Self { bones, bounds }
+    }
+
+    pub(super) fn bones(&self) -> &[Bone] {
+        &self.bones
+    }
+
+    /// The bone that holds a point, and the signed distance to its surface.
+    pub(super) fn bone_at(&self, p: &Point3<f64>) -> Option<(&Bone, f64)> {
+        (0..self.bones.len())
+            .filter(|&bone| self.box_distance(bone, p) == 0.0)
+            .map(|bone| (&self.bones[bone], self.distance(bone, p)))
+            .find(|(_, distance)| *distance < 0.0)
+    }
+
+    /// Distance to the box around a bone: a lower bound of the distance to the bone.
+    pub(super) fn box_distance(&self, bone: usize, p: &Point3<f64>) -> f64 {
+        self.bounds[bone].distance(p)
+    }
+
+    /// Signed distance to a bone in mm.
+    pub(super) fn distance(&self, bone: usize, p: &Point3<f64>) -> f64 {
+        let Bone {
+            solid,
+            hollows,
+            yields_to,
+            ..
+        } = &self.bones[bone];
+        let mut distance = solid.distance(p);
+        for hollow in hollows {
+            distance = smooth_max(distance, -hollow.distance(p), EDGE_MM);
+        }
+        for &(other, gap_mm) in yields_to {
+            if self.box_distance(other, p) > gap_mm - distance + EDGE_MM {
+                continue; // too far to matter
+            }
+            let space = gap_mm - self.bones[other].solid.distance(p);
+            distance = smooth_max(distance, space, EDGE_MM);
+        }
+        distance
+    }
+}

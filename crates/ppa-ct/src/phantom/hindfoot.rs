@@ -1,0 +1,175 @@
+//! Talus and calcaneus, and the mortise frame in which the talus sits.
+
+use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
+
+use super::bone::{Bone, Filling};
+use super::parameters::Parameters;
+use super::sdf::{Cone, Shape};
+
+/// The ankle mortise: medial, posterior and proximal axes turned out from the limb by the mortise angle,
+/// origin in the middle of the superior gutter.
+#[derive(Debug, Clone)]
+pub(super) struct Mortise {
+    pub limb_from_mortise: Isometry3<f64>,
+    /// Height of the joint axis in the middle of the trochlea.
+    pub axis_z: f64,
+    half_width: f64,
+    half_wedge: f64,
+}
+
+/// Height at which the width of the trochlea is meant, below the joint centre.
+const WIDTH_LEVEL_MM: f64 = -4.0;
+
+impl Mortise {
+    pub(super) fn new(p: &Parameters) -> Self {
+        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -p.mortise_angle_rad);
+        Self {
+            limb_from_mortise: Isometry3::from_parts(Translation3::identity(), turn),
+            axis_z: -0.5 * p.superior_gutter_mm
+                - p.trochlea_radius_mm * p.axis_inclination_rad.cos(),
+            half_width: 0.5 * p.trochlea_width_mm,
+            half_wedge: 0.5 * p.trochlea_wedge_rad,
+        }
+    }
+
+    /// A point given as medial, posterior, proximal.
+    pub(super) fn point(&self, medial: f64, posterior: f64, proximal: f64) -> [f64; 3] {
+        (self.limb_from_mortise * Point3::new(medial, posterior, proximal))
+            .coords
+            .into()
+    }
+
+    /// An ellipsoid along the mortise axes.
+    pub(super) fn ellipsoid(&self, centre: [f64; 3], semi: [f64; 3]) -> Shape {
+        let [m, p, z] = centre;
+        Shape::turned_ellipsoid(
+            self.point(m, p, z),
+            semi,
+            self.limb_from_mortise.rotation.to_rotation_matrix(),
+        )
+    }
+
+    /// The talocrural axis towards its medial end.
+    pub(super) fn axis(&self, p: &Parameters) -> Unit<Vector3<f64>> {
+        let (sine, cosine) = p.axis_inclination_rad.sin_cos();
+        self.limb_from_mortise * Unit::new_unchecked(Vector3::new(cosine, 0.0, sine))
+    }
+
+    /// The cone of the trochlea.
+    pub(super) fn cone(&self, p: &Parameters) -> Shape {
+        Shape::Cone(Cone {
+            centre: self.point(0.0, 0.0, self.axis_z).into(),
+            axis: self.axis(p),
+            radius: p.trochlea_radius_mm,
+            taper: p.axis_inclination_rad.tan(),
+            groove_depth: p.trochlea_groove_mm,
+            crest: 0.75 * self.half_width,
+        })
+    }
+
+    /// Half-space behind a facet; `side` is 1 for the medial and -1 for the lateral one.
+    fn facet(&self, side: f64, slope_rad: f64) -> Shape {
+        let (wedge, slope) = (self.half_wedge.sin_cos(), slope_rad.sin_cos());
+        let normal = Unit::new_normalize(Vector3::new(
+            side * wedge.1 * slope.1,
+            wedge.0 * slope.1,
+            slope.0,
+        ));
+        let on_facet = Vector3::new(side * self.half_width, 0.0, WIDTH_LEVEL_MM);
+        Shape::HalfSpace {
+            normal: self.limb_from_mortise * normal,
+            offset: normal.dot(&on_facet),
+        }
+    }
+
+    /// Half-space on the talar side of the medial facet.
+    pub(super) fn medial_facet(&self, p: &Parameters) -> Shape {
+        self.facet(1.0, p.medial_facet_slope_rad)
+    }
+
+    /// Half-space on the talar side of the lateral facet.
+    pub(super) fn lateral_facet(&self, p: &Parameters) -> Shape {
+        self.facet(-1.0, p.lateral_facet_slope_rad)
+    }
+
+    /// Half-space with a normal along the mortise axes.
+    fn wall(&self, normal: [f64; 3], offset: f64) -> Shape {
+        Shape::HalfSpace {
+            normal: self.limb_from_mortise * Unit::new_normalize(Vector3::from(normal)),
+            offset,
+        }
+    }
+}
+
+/// Trochlea with lateral and posterior process, neck and head.
+pub(super) fn talus(p: &Parameters, mortise: &Mortise) -> Bone {
+    let block = Shape::common(
+        2.0,
+        vec![
+            mortise.cone(p),
+            mortise.wall([0.0, -1.0, 0.0], 17.0),
+            mortise.wall([0.0, 1.0, 0.0], 16.5),
+            mortise.wall([0.0, 0.0, -1.0], 27.0),
+        ],
+    );
+    let at = |m, b, z| mortise.point(m, b, z);
+    let body = Shape::union(
+        4.0,
+        vec![
+            block,
+            Shape::round_cone(at(-10.0, 1.0, -20.0), 8.0, at(-18.0, 0.0, -26.5), 3.5),
+            Shape::round_cone(at(0.0, 12.0, -20.0), 8.0, at(2.0, 20.0, -22.5), 3.5),
+        ],
+    );
+    let body = Shape::common(
+        2.0,
+        vec![body, mortise.medial_facet(p), mortise.lateral_facet(p)],
+    );
+    let head = [8.0, -29.0, -26.0];
+    let solid = Shape::union(
+        5.0,
+        vec![
+            body,
+            Shape::round_cone(at(0.0, -10.0, -18.0), 10.5, [6.0, -24.0, -24.0], 10.5),
+            Shape::turned_ellipsoid(
+                head,
+                [16.0, 15.0, 12.0],
+                Rotation3::from_axis_angle(&Vector3::y_axis(), 30.0_f64.to_radians()),
+            ),
+        ],
+    );
+    Bone {
+        name: "talus",
+        solid,
+        hollows: vec![],
+        yields_to: vec![],
+        filling: Filling::spongy(1.1, 380.0),
+    }
+}
+
+/// Tuberosity, body, sustentaculum and anterior process.
+pub(super) fn calcaneus(p: &Parameters, talus: usize) -> Bone {
+    let floor = 18.0 - p.sole_depth_mm; // the heel pad is 18 mm
+    let solid = Shape::union(
+        8.0,
+        vec![
+            Shape::ellipsoid([-4.0, 36.0, floor + 20.0], [14.0, 14.0, 20.0]),
+            Shape::round_cone(
+                [-4.0, 26.0, floor + 19.0],
+                14.5,
+                [-11.0, -18.0, floor + 22.5],
+                11.5,
+            ),
+            Shape::ellipsoid([-8.0, 4.0, floor + 30.0], [13.0, 17.0, 11.0]),
+            Shape::ellipsoid([-12.0, -24.0, floor + 22.0], [12.0, 13.0, 12.0]),
+            Shape::ellipsoid([9.0, -4.0, floor + 26.0], [11.0, 10.0, 5.5]),
+        ],
+    );
+    Bone {
+        name: "calcaneus",
+        solid,
+        hollows: vec![],
+        yields_to: vec![(talus, p.small_joint_mm)],
+        filling: Filling::spongy(1.0, 230.0),
+    }
+}

@@ -1,0 +1,256 @@
+//! Navicular, cuboid, cuneiforms, metatarsals and phalanges.
+//!
+//! Solids overlap on purpose: each yields a joint space to its neighbours, which gives the flat and
+//! cupped faces of the real bones.
+
+use nalgebra::{Rotation3, Vector3};
+
+use super::bone::{Bone, Filling};
+use super::parameters::Parameters;
+use super::sdf::Shape;
+
+/// Indices of the bones that carry the midfoot.
+pub(super) struct Hindfoot {
+    pub talus: usize,
+    pub calcaneus: usize,
+}
+
+/// Base, waist and head of a metatarsal: centres, and semi-axes across and upwards.
+struct Metatarsal {
+    name: &'static str,
+    base: [f64; 3],
+    base_semi: [f64; 3],
+    head: [f64; 3],
+    head_semi: [f64; 3],
+    waist: f64,
+}
+
+const METATARSALS: [Metatarsal; 5] = [
+    Metatarsal {
+        name: "first metatarsal",
+        base: [20.5, -99.0, -43.0],
+        base_semi: [9.0, 9.0, 13.5],
+        head: [27.0, -147.0, -64.5],
+        head_semi: [10.0, 9.5, 9.5],
+        waist: 6.3,
+    },
+    Metatarsal {
+        name: "second metatarsal",
+        base: [6.0, -88.0, -35.0],
+        base_semi: [7.5, 8.0, 9.5],
+        head: [5.0, -147.5, -65.0],
+        head_semi: [5.5, 8.0, 8.0],
+        waist: 4.3,
+    },
+    Metatarsal {
+        name: "third metatarsal",
+        base: [-7.5, -92.0, -40.0],
+        base_semi: [7.0, 8.0, 9.5],
+        head: [-9.5, -143.0, -66.0],
+        head_semi: [5.3, 7.7, 7.6],
+        waist: 4.0,
+    },
+    Metatarsal {
+        name: "fourth metatarsal",
+        base: [-20.0, -85.0, -47.5],
+        base_semi: [7.0, 8.0, 8.5],
+        head: [-24.0, -136.5, -67.0],
+        head_semi: [5.2, 7.4, 7.2],
+        waist: 3.9,
+    },
+    Metatarsal {
+        name: "fifth metatarsal",
+        base: [-31.0, -77.0, -57.0],
+        base_semi: [8.0, 10.0, 7.0],
+        head: [-38.0, -128.0, -69.0],
+        head_semi: [5.2, 7.2, 6.5],
+        waist: 4.0,
+    },
+];
+
+/// Phalanges of one toe: x and z of the base, then per phalanx both ends along y, x and z of the far end, waist.
+struct Toe {
+    names: &'static [&'static str],
+    /// Base and far end per phalanx.
+    ends: &'static [([f64; 3], [f64; 3])],
+    waist: f64,
+}
+
+const TOES: [Toe; 5] = [
+    Toe {
+        names: &["proximal phalanx of toe 1", "distal phalanx of toe 1"],
+        ends: &[
+            ([27.0, -162.0, -67.5], [24.0, -184.0, -71.0]),
+            ([23.5, -193.0, -71.5], [22.0, -203.0, -72.5]),
+        ],
+        waist: 5.2,
+    },
+    Toe {
+        names: &[
+            "proximal phalanx of toe 2",
+            "middle phalanx of toe 2",
+            "distal phalanx of toe 2",
+        ],
+        ends: &[
+            ([4.5, -161.0, -66.0], [3.5, -178.0, -67.5]),
+            ([3.2, -188.0, -69.5], [3.0, -193.0, -72.0]),
+            ([3.0, -201.5, -74.0], [3.0, -205.5, -74.5]),
+        ],
+        waist: 3.1,
+    },
+    Toe {
+        names: &[
+            "proximal phalanx of toe 3",
+            "middle phalanx of toe 3",
+            "distal phalanx of toe 3",
+        ],
+        ends: &[
+            ([-10.5, -156.5, -67.0], [-11.5, -172.0, -68.5]),
+            ([-11.8, -181.5, -70.5], [-12.0, -185.5, -72.5]),
+            ([-12.0, -193.5, -74.5], [-12.0, -197.0, -75.0]),
+        ],
+        waist: 3.0,
+    },
+    Toe {
+        names: &[
+            "proximal phalanx of toe 4",
+            "middle phalanx of toe 4",
+            "distal phalanx of toe 4",
+        ],
+        ends: &[
+            ([-25.0, -149.5, -68.0], [-25.5, -164.0, -69.5]),
+            ([-25.5, -173.0, -71.5], [-25.5, -175.5, -73.0]),
+            ([-25.5, -183.0, -74.5], [-25.3, -186.0, -75.0]),
+        ],
+        waist: 2.9,
+    },
+    Toe {
+        names: &[
+            "proximal phalanx of toe 5",
+            "middle phalanx of toe 5",
+            "distal phalanx of toe 5",
+        ],
+        ends: &[
+            ([-38.5, -140.5, -69.5], [-38.0, -153.5, -71.0]),
+            ([-37.5, -162.0, -72.5], [-37.3, -163.5, -73.5]),
+            ([-37.0, -170.5, -74.5], [-36.5, -172.5, -75.0]),
+        ],
+        waist: 2.9,
+    },
+];
+
+impl Metatarsal {
+    fn solid(&self) -> Shape {
+        Shape::union(
+            4.0,
+            vec![
+                Shape::ellipsoid(self.base, self.base_semi),
+                Shape::round_cone(self.base, self.waist + 1.2, self.head, self.waist),
+                Shape::ellipsoid(self.head, self.head_semi),
+            ],
+        )
+    }
+}
+
+fn phalanx(base: [f64; 3], end: [f64; 3], waist: f64) -> Shape {
+    Shape::union(
+        2.5,
+        vec![
+            Shape::ellipsoid(base, [1.6 * waist, 1.25 * waist, 1.4 * waist]),
+            Shape::round_cone(base, waist, end, 0.9 * waist),
+            Shape::ellipsoid(end, [1.4 * waist, 1.1 * waist, 1.15 * waist]),
+        ],
+    )
+}
+
+/// Appends the bones in front of talus and calcaneus.
+pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot) {
+    let gap = p.small_joint_mm;
+    let mut push = |name, solid, neighbours: &[(usize, f64)], filling| {
+        bones.push(Bone {
+            name,
+            solid,
+            hollows: vec![],
+            yields_to: neighbours.to_vec(),
+            filling,
+        });
+        bones.len() - 1
+    };
+    let spongy = || Filling::spongy(0.9, 260.0);
+    let about_y =
+        |degrees: f64| Rotation3::from_axis_angle(&Vector3::y_axis(), degrees.to_radians());
+
+    let navicular = push(
+        "navicular",
+        Shape::union(
+            6.0,
+            vec![
+                Shape::turned_ellipsoid([9.0, -48.0, -29.5], [19.0, 12.5, 13.0], about_y(25.0)),
+                Shape::ellipsoid([23.0, -45.0, -37.0], [7.0, 8.0, 7.0]),
+            ],
+        ),
+        &[(hindfoot.talus, gap), (hindfoot.calcaneus, gap)],
+        spongy(),
+    );
+    let cuboid = push(
+        "cuboid",
+        Shape::union(
+            6.0,
+            vec![
+                Shape::ellipsoid([-18.0, -58.0, -50.0], [13.5, 21.0, 13.0]),
+                Shape::ellipsoid([-20.0, -50.0, -51.0], [12.0, 17.0, 11.0]),
+            ],
+        ),
+        &[
+            (hindfoot.calcaneus, gap),
+            (hindfoot.talus, gap),
+            (navicular, gap),
+        ],
+        spongy(),
+    );
+    let intermediate = push(
+        "intermediate cuneiform",
+        Shape::ellipsoid([6.5, -68.0, -29.5], [8.0, 14.5, 11.0]),
+        &[(navicular, gap), (cuboid, gap)],
+        spongy(),
+    );
+    let medial = push(
+        "medial cuneiform",
+        Shape::turned_ellipsoid([19.5, -74.0, -38.0], [9.0, 20.0, 15.0], about_y(-10.0)),
+        &[(navicular, gap), (intermediate, 0.8 * gap)],
+        spongy(),
+    );
+    let lateral = push(
+        "lateral cuneiform",
+        Shape::ellipsoid([-6.5, -72.0, -36.0], [8.5, 18.0, 11.5]),
+        &[
+            (navicular, gap),
+            (cuboid, 0.8 * gap),
+            (intermediate, 0.8 * gap),
+            (medial, 0.8 * gap),
+        ],
+        spongy(),
+    );
+    let tarsals = [medial, intermediate, lateral, cuboid, navicular].map(|t| (t, gap));
+
+    let mut previous: Option<usize> = None;
+    for (metatarsal, toe) in METATARSALS.iter().zip(&TOES) {
+        let mut neighbours = tarsals.to_vec();
+        neighbours.extend(previous.map(|m| (m, 0.8 * gap)));
+        let mut last = push(
+            metatarsal.name,
+            metatarsal.solid(),
+            &neighbours,
+            Filling::tubular(metatarsal.base, metatarsal.head, 2.0, 220.0),
+        );
+        previous = Some(last);
+        for (&name, &(base, end)) in toe.names.iter().zip(toe.ends) {
+            last = push(
+                name,
+                phalanx(base, end, toe.waist),
+                &[(last, 0.8 * gap)],
+                Filling::tubular(base, end, 1.2, 180.0),
+            );
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! From shapes to Hounsfield units on a lattice, with partial volume.
+
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+
+use crate::grid::Grid;
+use crate::volume::{Volume, VolumeError};
+
+use super::LowerLeg;
+use super::tissue::Local;
+
+/// Why a phantom cannot be voxelised.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PhantomError {
+    /// The spacing is not a number between the finest and the coarsest that make sense.
+    #[error("voxels of {found_mm} mm, expected {} to {} mm", SPACING_MM[0], SPACING_MM[1])]
+    Spacing {
+        /// Spacing asked for, mm.
+        found_mm: f64,
+    },
+    /// The lattice or its values were refused.
+    #[error(transparent)]
+    Volume(#[from] VolumeError),
+}
+
+/// Whether the limb lies on a table top.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum TableTop {
+    /// Only the limb, in air.
+    Absent,
+    /// A flat sandwich of carbon fibre and foam, 30 mm thick, which heel and calf touch; it leaves the
+    /// field of view on four sides.
+    Present,
+}
+
+const SPACING_MM: [f64; 2] = [0.25, 8.0];
+const AIR_HU: f64 = -1000.0;
+/// Air around the limb inside the field of view.
+const MARGIN_MM: f64 = 12.0;
+/// Thickness of the whole table top and of each of its two carbon sheets.
+const TABLE_MM: f64 = 30.0;
+const TABLE_SHEET_MM: f64 = 2.0;
+const TABLE_SHEET_HU: f64 = -150.0;
+const TABLE_FOAM_HU: f64 = -940.0;
+/// Edge of the blocks that are ruled out as a whole, voxels.
+const BLOCK: usize = 8;
+/// Distances are estimates: trust them only within this factor.
+const CAUTION: f64 = 1.3;
+/// Largest sub-sample of a voxel with a boundary, mm.
+const SUBSAMPLE_MM: f64 = 0.5;
+
+/// How much of `y ± half` lies between `low` and `high`.
+fn share_between(y: f64, half: f64, low: f64, high: f64) -> f64 {
+    (((y + half).min(high) - (y - half).max(low)) / (2.0 * half)).max(0.0)
+}
+
+/// Mean Hounsfield unit at height `y_mm` where there is no limb.
+fn background_hu(y_mm: f64, half_mm: f64, table_top_mm: Option<f64>) -> f64 {
+    let Some(top) = table_top_mm else {
+        return AIR_HU;
+    };
+    let table = share_between(y_mm, half_mm, top, top + TABLE_MM);
+    let foam = share_between(
+        y_mm,
+        half_mm,
+        top + TABLE_SHEET_MM,
+        top + TABLE_MM - TABLE_SHEET_MM,
+    );
+    AIR_HU + foam * (TABLE_FOAM_HU - AIR_HU) + (table - foam) * (TABLE_SHEET_HU - AIR_HU)
+}
+
+impl LowerLeg {
+    /// The phantom as a CT with isotropic voxels, axes along LPS.
+    ///
+    /// The field of view holds toes, heel and the lower leg up to mid-calf, where it cuts the leg.
+    /// Voxels that a boundary may cross are sampled in parts of at most half a millimetre, each
+    /// with the share of tissues on either side. The result does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// [`PhantomError::Spacing`] when `spacing_mm` is not between 0.25 and 8.
+    pub fn voxelise(&self, spacing_mm: f64, table: TableTop) -> Result<Volume, PhantomError> {
+        if !(SPACING_MM[0]..=SPACING_MM[1]).contains(&spacing_mm) {
+            return Err(PhantomError::Spacing {
+                found_mm: spacing_mm,
+            });
+        }
+        let table_top_mm = match table {
+            TableTop::Absent => None,
+            TableTop::Present => Some(self.table_top_y()),
+        };
+        let grid = self.field_of_view(spacing_mm, table_top_mm)?;
+        let [nx, ny, nz] = grid.size();
+        let mut hu = vec![AIR_HU as f32; grid.len()];
+        let slab = nx * ny * BLOCK;
+        hu.par_chunks_mut(slab).enumerate().for_each(|(n, hu)| {
+            let painter = Painter {
+                limb: self,
+                grid: &grid,
+                spacing_mm,
+                table_top_mm,
+                first_slice: n * BLOCK,
+            };
+            for j in (0..ny).step_by(BLOCK) {
+                for i in (0..nx).step_by(BLOCK) {
+                    let low = [i, j, n * BLOCK];
+                    let high = [
+                        (i + BLOCK).min(nx),
+                        (j + BLOCK).min(ny),
+                        ((n + 1) * BLOCK).min(nz),
+                    ];
+                    painter.paint(low, high, hu);
+                }
+            }
+        });
+        Ok(Volume::new(grid, hu)?)
+    }
+
+    /// Height of the table top, `ct` y in mm.
+    pub(super) fn table_top_y(&self) -> f64 {
+        self.ct_from_limb.translation.y + self.parameters.table_depth_mm
+    }
+
+    fn field_of_view(
+        &self,
+        spacing_mm: f64,
+        table_top_mm: Option<f64>,
+    ) -> Result<Grid, VolumeError> {
+        let (mut low, mut high) = self.skin_box();
+        low -= Vector3::repeat(MARGIN_MM);
+        high += Vector3::new(MARGIN_MM, MARGIN_MM, 0.0);
+        if let Some(top) = table_top_mm {
+            high.y = top + TABLE_MM + MARGIN_MM;
+        }
+        let size = [0, 1, 2].map(|a| ((high[a] - low[a]) / spacing_mm).floor() as usize + 1);
+        Ok(Grid::axis_aligned(size, Vector3::repeat(spacing_mm), low)?)
+    }
+}
+
+/// Fills blocks of voxels of one slab.
+struct Painter<'a> {
+    limb: &'a LowerLeg,
+    grid: &'a Grid,
+    spacing_mm: f64,
+    table_top_mm: Option<f64>,
+    first_slice: usize,
+}
+
+impl Painter<'_> {
+    fn centre(&self, low: [usize; 3], high: [usize; 3]) -> Point3<f64> {
+        self.grid
+            .centre([0, 1, 2].map(|a| 0.5 * (low[a] + high[a] - 1) as f64))
+    }
+
+    fn paint(&self, low: [usize; 3], high: [usize; 3], hu: &mut [f32]) {
+        let limb = self.limb;
+        let half = self.spacing_mm * 0.5;
+        let extent = Vector3::from_fn(|a, _| (high[a] - low[a]) as f64 * half);
+        let radius_mm = extent.norm();
+        let centre_ct = self.centre(low, high);
+        let centre = limb.limb_point(&centre_ct);
+        let skin_mm = limb.envelope.skin_distance(&centre);
+        let [nx, ny, _] = self.grid.size();
+        let slot = |[i, j, k]: [usize; 3]| i + nx * (j + ny * (k - self.first_slice));
+        let voxels = (low[2]..high[2])
+            .flat_map(|k| (low[1]..high[1]).map(move |j| (j, k)))
+            .flat_map(|(j, k)| (low[0]..high[0]).map(move |i| [i, j, k]));
+
+        if skin_mm > CAUTION * radius_mm + 1.0 {
+            let y = |voxel: [usize; 3]| self.grid.centre(voxel.map(|v| v as f64)).y;
+            for voxel in voxels {
+                hu[slot(voxel)] = background_hu(y(voxel), half, self.table_top_mm) as f32;
+            }
+            return;
+        }
+        let cover_mm = limb.envelope.cover_mm(&centre) + 1.0;
+        let near_skin = skin_mm > -(CAUTION * radius_mm + cover_mm);
+        let bones: Vec<usize> = (0..limb.skeleton.bones().len())
+            .filter(|&b| {
+                limb.skeleton.box_distance(b, &centre) < radius_mm
+                    && limb.skeleton.distance(b, &centre) < CAUTION * radius_mm + 1.0
+            })
+            .collect();
+        let mut local = Local::default();
+        for voxel in voxels {
+            let centre = self.grid.centre(voxel.map(|v| v as f64));
+            hu[slot(voxel)] = self.voxel_hu(&centre, near_skin, &bones, &mut local) as f32;
+        }
+    }
+
+    fn voxel_hu(
+        &self,
+        centre: &Point3<f64>,
+        near_skin: bool,
+        bones: &[usize],
+        local: &mut Local,
+    ) -> f64 {
+        let limb = self.limb;
+        let p = limb.limb_point(centre);
+        limb.measure(&p, near_skin, bones.iter().copied(), local);
+        let half = 0.5 * self.spacing_mm;
+        let background = background_hu(centre.y, half, self.table_top_mm);
+        let blend = |(hu, inside): (f64, f64)| hu + (1.0 - inside) * (background - AIR_HU);
+        let parts = (self.spacing_mm / SUBSAMPLE_MM).ceil() as usize;
+        let reach_mm = half * 3.0_f64.sqrt() * CAUTION;
+        if parts == 1 || !limb.boundary_near(&p, local, reach_mm) {
+            return blend(limb.mixture(&p, local, self.spacing_mm));
+        }
+        let width_mm = self.spacing_mm / parts as f64;
+        let offset = |n: usize| (n as f64 + 0.5) * width_mm - half;
+        let mut sum = 0.0;
+        for n in 0..parts.pow(3) {
+            let shift = Vector3::new(
+                offset(n % parts),
+                offset(n / parts % parts),
+                offset(n / parts.pow(2)),
+            );
+            let q = limb.limb_point(&(centre + shift));
+            limb.measure(&q, near_skin, bones.iter().copied(), local);
+            sum += blend(limb.mixture(&q, local, width_mm));
+        }
+        sum / parts.pow(3) as f64
+    }
+}
