@@ -1,1 +1,107 @@
-fn main() {}
+//! Pixel rays, indexing, and one limb-like mesh before a recorded room, at the resolution of the device.
+//!
+//! Units of work: pixels for images and rays, triangles for the index. The seed is the formula.
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use nalgebra::{Isometry3, Point2, Point3, Vector3};
+use ppa_depth::{Body, Camera, CameraSpec, DepthImage, MeshBody, PlacedBody, SurfelBody, render};
+
+/// A bent, bumpy tube of 400 x 400 quads, about 400 mm long and 100 mm thick: 320 000 triangles.
+fn limb() -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {
+    const SIDE: u32 = 400;
+    let point = |i: u32, j: u32| {
+        let (angle, along) = (
+            i as f32 / SIDE as f32 * std::f32::consts::TAU,
+            j as f32 / SIDE as f32,
+        );
+        let radius = 50.0 * (1.0 + 0.2 * (3.0 * angle).sin() * (7.0 * along).cos());
+        let (x, y) = (
+            radius * angle.cos() + 40.0 * along * along,
+            400.0 * along - 200.0,
+        );
+        Point3::new(x, y, radius * angle.sin())
+    };
+    let vertices = (0..=SIDE)
+        .flat_map(|j| (0..SIDE).map(move |i| point(i, j)))
+        .collect();
+    let corner = |i: u32, j: u32| j * SIDE + i % SIDE;
+    let quads = (0..SIDE).flat_map(|j| (0..SIDE).map(move |i| (i, j)));
+    let triangles = quads
+        .flat_map(|(i, j)| {
+            let [a, b, c, d] = [
+                corner(i, j),
+                corner(i + 1, j),
+                corner(i, j + 1),
+                corner(i + 1, j + 1),
+            ];
+            [[a, b, c], [b, d, c]]
+        })
+        .collect();
+    (vertices, triangles)
+}
+
+/// Table top above a floor, 5 mm between points: 165 000 discs.
+fn room() -> SurfelBody {
+    let sheet = |columns: i32, rows: i32, z: f32| {
+        let at = move |i: i32, j: i32| {
+            Point3::new(
+                5.0 * (i - columns / 2) as f32,
+                5.0 * (j - rows / 2) as f32,
+                z,
+            )
+        };
+        (0..rows).flat_map(move |j| (0..columns).map(move |i| at(i, j)))
+    };
+    let points: Vec<_> = sheet(140, 320, 60.0)
+        .chain(sheet(300, 400, 800.0))
+        .collect();
+    SurfelBody::new(&points, &vec![Vector3::z(); points.len()], 3.6).expect("a valid cloud")
+}
+
+fn depth(c: &mut Criterion) {
+    let camera = Camera::try_from(CameraSpec::azure_kinect_nfov()).expect("the default camera");
+    let pixels = u64::from(camera.width() * camera.height());
+    let (vertices, triangles) = limb();
+    let limb = Body::from(MeshBody::new(&vertices, &triangles).expect("a valid mesh"));
+    let room = Body::from(room());
+    let camera_from_body =
+        Isometry3::new(Vector3::new(0.0, 0.0, 1000.0), Vector3::new(0.0, 0.2, 0.0));
+    let placed = |body| PlacedBody {
+        body,
+        camera_from_body,
+    };
+    let background = render(&camera, &[placed(&room)]);
+
+    let mut group = c.benchmark_group("depth");
+    group.sample_size(10);
+    group.throughput(Throughput::Elements(triangles.len() as u64));
+    group.bench_function("index_320k_triangles", |b| {
+        b.iter(|| MeshBody::new(&vertices, &triangles))
+    });
+    group.throughput(Throughput::Elements(pixels));
+    let unproject = |index: u64| {
+        let (u, v) = (
+            index % u64::from(camera.width()),
+            index / u64::from(camera.width()),
+        );
+        camera.unproject(&Point2::new(u as f64, v as f64))
+    };
+    group.bench_function("unproject_one_thread", |b| {
+        b.iter(|| (0..pixels).filter_map(unproject).count())
+    });
+    group.bench_function("limb", |b| b.iter(|| render(&camera, &[placed(&limb)])));
+    group.bench_function("limb_and_room", |b| {
+        b.iter(|| render(&camera, &[placed(&limb), placed(&room)]))
+    });
+    group.bench_function("limb_onto_background", |b| {
+        b.iter(|| DepthImage::nearer_of(&render(&camera, &[placed(&limb)]), &background))
+    });
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    group.bench_function("write_png", |b| {
+        b.iter(|| background.write_png(&folder.path().join("depth.png")))
+    });
+    group.finish();
+}
+
+criterion_group!(benches, depth);
+criterion_main!(benches);

@@ -77,12 +77,17 @@ pub fn isometry_from_rows(rows: &[[f64; 4]; 4]) -> Result<Isometry3<f64>, RigidE
     if block.determinant() < 0.0 {
         return Err(RigidError::Mirror);
     }
-    let start = Rotation3::from_matrix_unchecked(block);
-    let rotation = Rotation3::from_matrix_eps(&block, 1e-15, 100, start);
+    // Nearest rotation in the Frobenius norm: the orthogonal factor of the polar decomposition, U Vᵀ.
+    let factors = block.svd(true, true);
+    let (Some(u), Some(v_t)) = (factors.u, factors.v_t) else {
+        unreachable!("both factors were asked for");
+    };
+    let nearest = Rotation3::from_matrix_unchecked(u * v_t);
+    let rotation = UnitQuaternion::from_rotation_matrix(&nearest).into_inner();
     let translation = Translation3::new(rows[0][3], rows[1][3], rows[2][3]);
     Ok(Isometry3::from_parts(
         translation,
-        UnitQuaternion::from_rotation_matrix(&rotation),
+        UnitQuaternion::new_normalize(rotation),
     ))
 }
 

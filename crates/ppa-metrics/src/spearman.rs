@@ -22,7 +22,8 @@ pub fn spearman(labels: &[f64], predictions: &[f64]) -> Result<f64, MetricError>
     }
     let (x, y) = (centred_ranks(labels), centred_ranks(predictions));
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    Ok((dot(&x, &y) / (dot(&x, &x).sqrt() * dot(&y, &y).sqrt())).clamp(-1.0, 1.0))
+    // One root of the product: lists of the same order give exactly 1.
+    Ok((dot(&x, &y) / (dot(&x, &x) * dot(&y, &y)).sqrt()).clamp(-1.0, 1.0))
 }
 
 /// Mid-ranks minus their mean (N + 1)/2; multiples of one half, hence exact.
