@@ -61,10 +61,8 @@ pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
 /// # Errors
 /// [`FileError`] when the file cannot be read.
 pub fn sha256_of_file(path: &Path) -> Result<String, FileError> {
-    let mut file = fs::File::open(path).map_err(FileError::at("read", path))?;
-    let mut hasher = Sha256::new();
-    io::copy(&mut file, &mut hasher).map_err(FileError::at("read", path))?;
-    Ok(hex(&hasher.finalize()))
+    let bytes = fs::read(path).map_err(FileError::at("read", path))?;
+    Ok(hex(&Sha256::digest(bytes)))
 }
 
 /// Lower-case hexadecimal.

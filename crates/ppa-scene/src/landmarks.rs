@@ -7,7 +7,7 @@ use crate::frames::{Ct, Patient, Rigid};
 use crate::plane::Plane;
 
 /// The patient's left or right; "l" or "r" in files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Side {
     /// Left limb.
     #[serde(rename = "l")]
@@ -15,16 +15,6 @@ pub enum Side {
     /// Right limb.
     #[serde(rename = "r")]
     Right,
-}
-
-impl Side {
-    /// "l" or "r", as folders of a dataset are named.
-    pub fn letter(self) -> &'static str {
-        match self {
-            Self::Left => "l",
-            Self::Right => "r",
-        }
-    }
 }
 
 /// What kind of limb a scan shows.
