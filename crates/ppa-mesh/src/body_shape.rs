@@ -1,0 +1,273 @@
+//! Other body shapes from one skin surface: thicker, thinner, swollen here and there.
+
+use std::cmp::Ordering;
+use std::collections::{BinaryHeap, HashMap};
+
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+
+use crate::mesh::Mesh;
+
+/// Heights of [`seeded_bumps`], mm: mild to marked swelling.
+const HEIGHT_MM: [f64; 2] = [4.0, 10.0];
+/// Widths of [`seeded_bumps`], mm.
+const SIGMA_MM: [f64; 2] = [8.0, 20.0];
+/// A bump ends at this many sigma; there it is exp(−8) of its height.
+const REACH_SIGMA: f64 = 4.0;
+/// Paths along triangle edges are longer than the surface allows, by at most about this factor on a
+/// lattice of diagonals.
+const EDGE_PATH_EXCESS: f64 = 1.15;
+/// Rounds of averaging over neighbours that make normals smooth.
+const SMOOTHING_ROUNDS: usize = 12;
+
+/// A swelling: a Gaussian along the normals.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bump {
+    /// Middle, in the frame of the mesh; the nearest vertex is taken.
+    pub centre: Point3<f64>,
+    /// Displacement in the middle, mm; negative for a dent.
+    pub height_mm: f64,
+    /// Standard deviation along the surface, mm.
+    pub sigma_mm: f64,
+}
+
+/// A region in which bumps may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BumpSite {
+    /// Middle, in the frame of the mesh.
+    pub centre: Point3<f64>,
+    /// Vertices within this distance qualify, mm.
+    pub radius_mm: f64,
+}
+
+/// Why no bumps could be chosen.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BumpError {
+    /// Bumps are wanted but there is nowhere to put them.
+    #[error("{count} bumps are wanted but no site is given")]
+    NoSite {
+        /// Bumps wanted.
+        count: usize,
+    },
+    /// A site holds no vertex.
+    #[error("no vertex of the mesh lies within {radius_mm} mm of bump site {site}")]
+    EmptySite {
+        /// Index of the site.
+        site: usize,
+        /// Its radius.
+        radius_mm: f64,
+    },
+}
+
+/// The mesh moved along its smoothed normals, outward for a positive distance.
+///
+/// Normals are averaged over a few rings of neighbours first, so that creases and noise do not
+/// make spikes. Meant for distances below the radius of the thinnest part: moved inward by more, a
+/// toe turns inside out.
+pub fn offset(mesh: &Mesh, distance_mm: f64) -> Mesh {
+    displaced(mesh, &vec![distance_mm; mesh.vertices.len()])
+}
+
+/// The mesh with bumps along its smoothed normals; overlapping bumps add up.
+///
+/// Distance from the middle is measured along the surface, so that the other side of a thin limb
+/// stays where it is. A mesh without vertices stays as it is.
+pub fn add_bumps(mesh: &Mesh, bumps: &[Bump]) -> Mesh {
+    let neighbours = Neighbours::of(mesh);
+    let mut heights = vec![0.0; mesh.vertices.len()];
+    for bump in bumps {
+        let reach = REACH_SIGMA * bump.sigma_mm;
+        for (vertex, distance) in surface_distances(mesh, &neighbours, &bump.centre, reach) {
+            heights[vertex as usize] +=
+                bump.height_mm * (-0.5 * (distance / bump.sigma_mm).powi(2)).exp();
+        }
+    }
+    displaced(mesh, &heights)
+}
+
+/// `count` bumps of 4 to 10 mm height and 8 to 20 mm sigma at vertices of the sites, taken in turn.
+///
+/// The result depends on the mesh, the sites and the seed only; bump i is the same for any count.
+///
+/// # Errors
+/// [`BumpError`] when there is no site or a site holds no vertex.
+pub fn seeded_bumps(
+    mesh: &Mesh,
+    sites: &[BumpSite],
+    count: usize,
+    seed: u64,
+) -> Result<Vec<Bump>, BumpError> {
+    if sites.is_empty() && count > 0 {
+        return Err(BumpError::NoSite { count });
+    }
+    (0..count)
+        .map(|index| {
+            let at = index % sites.len();
+            let site = sites[at];
+            let candidates: Vec<Point3<f64>> = mesh
+                .vertices
+                .iter()
+                .map(|v| v.cast::<f64>())
+                .filter(|v| (v - site.centre).norm() <= site.radius_mm)
+                .collect();
+            if candidates.is_empty() {
+                return Err(BumpError::EmptySite {
+                    site: at,
+                    radius_mm: site.radius_mm,
+                });
+            }
+            let draw = |what: u64| uniform(seed, 3 * index as u64 + what);
+            let within = |range: [f64; 2], u: f64| range[0] + (range[1] - range[0]) * u;
+            Ok(Bump {
+                centre: candidates[(draw(0) * candidates.len() as f64) as usize],
+                height_mm: within(HEIGHT_MM, draw(1)),
+                sigma_mm: within(SIGMA_MM, draw(2)),
+            })
+        })
+        .collect()
+}
+
+/// Uniform in [0, 1): the SplitMix64 output function (Steele et al. 2014) of seed and index.
+fn uniform(seed: u64, index: u64) -> f64 {
+    let mix = |mut z: u64| {
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    };
+    let stream = mix(seed.wrapping_add(0x9E37_79B9_7F4A_7C15));
+    let z = stream.wrapping_add((index + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    (mix(z) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+fn displaced(mesh: &Mesh, heights_mm: &[f64]) -> Mesh {
+    let normals = smooth_normals(mesh, &Neighbours::of(mesh));
+    let vertices = mesh
+        .vertices
+        .iter()
+        .zip(&normals)
+        .zip(heights_mm)
+        .map(|((vertex, normal), &height)| (vertex.cast::<f64>() + normal * height).cast())
+        .collect();
+    let mut moved = Mesh {
+        vertices,
+        normals: Vec::new(),
+        triangles: mesh.triangles.clone(),
+    };
+    // Where nothing moved nearby the normals of the original are the better ones.
+    let turned = moved.geometric_normals();
+    let before = mesh.geometric_normals();
+    moved.normals = turned
+        .into_iter()
+        .zip(before)
+        .zip(&mesh.normals)
+        .map(|((now, then), &exact)| {
+            if (now - then).norm() < 1e-6 { exact } else { now }
+        })
+        .collect();
+    moved
+}
+
+fn smooth_normals(mesh: &Mesh, neighbours: &Neighbours) -> Vec<Vector3<f64>> {
+    let mut normals: Vec<Vector3<f64>> = mesh.normals.iter().map(|n| n.cast()).collect();
+    for _ in 0..SMOOTHING_ROUNDS {
+        normals = (0..normals.len())
+            .into_par_iter()
+            .map(|vertex| {
+                let around = neighbours.of_vertex(vertex).iter();
+                let sum = around.fold(normals[vertex], |sum, &v| sum + normals[v as usize]);
+                sum.try_normalize(1e-9).unwrap_or(normals[vertex])
+            })
+            .collect();
+    }
+    normals
+}
+
+/// Vertices joined by an edge, for every vertex.
+struct Neighbours {
+    start: Vec<usize>,
+    list: Vec<u32>,
+}
+
+impl Neighbours {
+    fn of(mesh: &Mesh) -> Self {
+        let mut edges: Vec<(u32, u32)> = mesh
+            .triangles
+            .iter()
+            .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
+            .flat_map(|(a, b)| [(a, b), (b, a)])
+            .collect();
+        edges.sort_unstable();
+        edges.dedup();
+        let start = (0..=mesh.vertices.len() as u32)
+            .map(|vertex| edges.partition_point(|&(from, _)| from < vertex))
+            .collect();
+        Self {
+            start,
+            list: edges.into_iter().map(|(_, to)| to).collect(),
+        }
+    }
+
+    fn of_vertex(&self, vertex: usize) -> &[u32] {
+        &self.list[self.start[vertex]..self.start[vertex + 1]]
+    }
+}
+
+#[derive(PartialEq)]
+struct Reached(f64, u32);
+
+impl Eq for Reached {}
+
+impl PartialOrd for Reached {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Reached {
+    fn cmp(&self, other: &Self) -> Ordering {
+        // Nearest first out of a max-heap; the vertex settles ties.
+        other.0.total_cmp(&self.0).then(other.1.cmp(&self.1))
+    }
+}
+
+/// Vertices within `reach_mm` of the vertex nearest to `centre`, and how far along the surface.
+///
+/// Shortest edge paths (Dijkstra) overestimate; the straight distance is a lower bound and nearly
+/// right where the surface is flat. The larger of straight and shortened path is continuous
+/// and never lets a bump through to the other side.
+fn surface_distances(
+    mesh: &Mesh,
+    neighbours: &Neighbours,
+    centre: &Point3<f64>,
+    reach_mm: f64,
+) -> Vec<(u32, f64)> {
+    let squared = |v: &Point3<f32>| (v.cast::<f64>() - centre).norm_squared();
+    let nearest = (0..mesh.vertices.len())
+        .min_by(|&a, &b| squared(&mesh.vertices[a]).total_cmp(&squared(&mesh.vertices[b])));
+    let Some(seed) = nearest else {
+        return Vec::new();
+    };
+    let position = |v: u32| mesh.vertices[v as usize].cast::<f64>();
+    let start = position(seed as u32);
+    let mut best = HashMap::from([(seed as u32, 0.0)]);
+    let mut heap = BinaryHeap::from([Reached(0.0, seed as u32)]);
+    let mut found = Vec::new();
+    while let Some(Reached(path, vertex)) = heap.pop() {
+        if path > best[&vertex] {
+            continue;
+        }
+        let here = position(vertex);
+        found.push((vertex, (here - start).norm().max(path / EDGE_PATH_EXCESS)));
+        for &next in neighbours.of_vertex(vertex as usize) {
+            let longer = path + (position(next) - here).norm();
+            if longer <= reach_mm * EDGE_PATH_EXCESS
+                && best.get(&next).is_none_or(|&known| longer < known)
+            {
+                best.insert(next, longer);
+                heap.push(Reached(longer, next));
+            }
+        }
+    }
+    found
+}

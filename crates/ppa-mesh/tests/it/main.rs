@@ -1,0 +1,5 @@
+//! Tests through the public interface.
+
+mod fields;
+mod reference;
+mod surface;

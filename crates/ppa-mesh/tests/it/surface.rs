@@ -1,0 +1,1 @@
+//! The iso-surface against answers that can be derived.
