@@ -1,7 +1,9 @@
 //! A folder of DICOM slices, or a single one, becomes a scan.
 
 mod header;
+mod open;
 mod pixels;
+mod rle;
 mod stack;
 mod syntax;
 

@@ -17,7 +17,7 @@
 //! use ppa_ct::{Grid, Volume};
 //! let grid = Grid::axis_aligned([2, 2, 3], Vector3::new(1.0, 1.0, 2.5), Point3::origin())?;
 //! let volume = Volume::new(grid, vec![40.0; 12])?;
-//! assert_eq!(volume.sample(&Point3::new(0.5, 0.5, 3.0)), Some(40.0));
+//! assert_eq!(volume.sample(&Point3::new(0.5, 0.5, 2.5)), Some(40.0));
 //! # Ok::<(), ppa_ct::VolumeError>(())
 //! ```
 

@@ -127,3 +127,71 @@ impl Volume {
         self.crop(low, high)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Affine3, Matrix4, Rotation3, Vector3};
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Against a walk over all voxels, on turned, sheared and mirrored lattices.
+        #[test]
+        fn world_crop_is_the_tightest_block_around_the_box(
+            size in prop::array::uniform3(1..7_usize),
+            angles in prop::array::uniform3(-3.0..3.0_f64),
+            (shear, mirror) in (-0.5..0.5_f64, any::<bool>()),
+            corner in prop::array::uniform3(-6.0..6.0_f64),
+            side in prop::array::uniform3(0.0..9.0_f64),
+        ) {
+            let mut axes = *Rotation3::from_euler_angles(angles[0], angles[1], angles[2]).matrix();
+            let lean = axes.column(1) * shear;
+            axes.column_mut(2).axpy(1.0, &lean, 1.0);
+            if mirror {
+                axes.column_mut(0).neg_mut();
+            }
+            let matrix: Matrix4<f64> = axes.to_homogeneous();
+            let grid = Grid::new(size, Affine3::from_matrix_unchecked(matrix)).unwrap();
+            let hu = (0..grid.len()).map(|n| n as f32).collect();
+            let volume = Volume::new(grid, hu).unwrap();
+
+            let min = Point3::from(corner);
+            let max = min + Vector3::from(side);
+            let inside = (0..volume.grid().len()).map(|n| volume.grid().voxel(n)).filter(|v| {
+                let centre = volume.grid().centre(v.map(|c| c as f64));
+                min <= centre && centre <= max
+            }).collect::<Vec<_>>();
+            let cropped = volume.crop_world(&min, &max);
+            let bound = |axis: usize, pick: fn(usize, usize) -> usize| {
+                inside.iter().map(|v| v[axis]).reduce(pick)
+            };
+            match bound(0, usize::min) {
+                None => prop_assert!(cropped.is_err()),
+                Some(_) => {
+                    let low = [0, 1, 2].map(|axis| bound(axis, usize::min).unwrap());
+                    let high = [0, 1, 2].map(|axis| bound(axis, usize::max).unwrap() + 1);
+                    prop_assert_eq!(cropped.unwrap(), volume.crop(low, high).unwrap());
+                }
+            }
+        }
+    }
+
+    /// Linear in each coordinate, so that trilinear interpolation is exact.
+    #[test]
+    fn sampling_a_ramp_returns_the_ramp() {
+        let grid = Grid::axis_aligned([4, 5, 6], Vector3::new(0.5, 1.0, 2.0), Point3::origin());
+        let grid = grid.unwrap();
+        let ramp = |p: &Point3<f64>| 3.0 * p.x - 2.0 * p.y + 0.5 * p.z;
+        let centres = (0..grid.len()).map(|n| grid.centre(grid.voxel(n).map(|v| v as f64)));
+        let hu = centres.map(|p| ramp(&p) as f32).collect();
+        let volume = Volume::new(grid, hu).unwrap();
+        for p in [
+            Point3::new(0.7, 3.9, 9.99),
+            Point3::new(1.5, 4.0, 10.0),
+            Point3::origin(),
+        ] {
+            assert!((volume.sample(&p).unwrap() - ramp(&p)).abs() < 1e-6);
+        }
+        assert_eq!(volume.sample(&Point3::new(1.51, 0.0, 0.0)), None);
+    }
+}

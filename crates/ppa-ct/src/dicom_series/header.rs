@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use dicom_core::Tag;
 use dicom_dictionary_std::{tags, uids};
-use dicom_object::{DefaultDicomObject, OpenFileOptions};
+use dicom_object::DefaultDicomObject;
 use nalgebra::{Point3, Vector3};
 
-use super::syntax;
+use super::open::{Extent, open};
 use crate::error::ReadError;
 
 /// What a DICOM file turned out to be.
@@ -66,10 +66,7 @@ pub(super) struct PixelFormat {
 
 /// Reads the header of `path`, up to the pixels.
 pub(super) fn scan(path: &Path) -> Result<Found, ReadError> {
-    let object = OpenFileOptions::new()
-        .read_until(tags::PIXEL_DATA)
-        .open_file(path)
-        .map_err(|e| syntax::open_error(path, e))?;
+    let object = open(path, Extent::Header)?;
     Header {
         path,
         object: &object,

@@ -3,20 +3,18 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use dicom_core::{DicomValue, PrimitiveValue};
-use dicom_dictionary_std::tags;
-use dicom_object::{DefaultDicomObject, OpenFileOptions};
+use dicom_dictionary_std::{tags, uids};
+use dicom_object::DefaultDicomObject;
 use dicom_pixeldata::PixelDecoder;
 
 use super::header::{PixelFormat, Slice};
-use super::syntax;
+use super::open::{Extent, open};
+use super::{rle, syntax};
 use crate::error::ReadError;
 
 /// Fills `hu` (rows x columns, columns fastest) with the slice's pixels.
 pub(super) fn decode(slice: &Slice, hu: &mut [f32]) -> Result<(), ReadError> {
-    let object = OpenFileOptions::new()
-        .read_to(tags::PIXEL_DATA)
-        .open_file(&slice.path)
-        .map_err(|e| syntax::open_error(&slice.path, e))?;
+    let object = open(&slice.path, Extent::Pixels)?;
     let Some(element) = object.get(tags::PIXEL_DATA) else {
         return Err(ReadError::MissingTag {
             path: slice.path.clone(),
@@ -54,17 +52,23 @@ pub(super) fn decode(slice: &Slice, hu: &mut [f32]) -> Result<(), ReadError> {
 
 /// Decompresses encapsulated pixels.
 fn unpack(slice: &Slice, object: &DefaultDicomObject) -> Result<Vec<u8>, ReadError> {
-    let uid = object.meta().transfer_syntax();
-    // Decoders index out of bounds on some damaged streams; to a caller that is a damaged file.
-    let decoded = catch_unwind(AssertUnwindSafe(|| object.decode_pixel_data()));
-    match decoded {
+    let uid = object
+        .meta()
+        .transfer_syntax()
+        .trim_end_matches(['\0', ' ']);
+    let damaged = || syntax::unsupported(&slice.path, uid, "the compressed stream is damaged");
+    if uid == uids::RLE_LOSSLESS {
+        let element = object.get(tags::PIXEL_DATA);
+        let fragments = element.and_then(|e| e.fragments()).unwrap_or_default();
+        let width = slice.pixel.bits_allocated as usize / 8;
+        return rle::unpack(&fragments.concat(), slice.rows * slice.columns, width)
+            .ok_or_else(damaged);
+    }
+    // The JPEG adapter slices out of bounds when a frame is larger than its header says.
+    match catch_unwind(AssertUnwindSafe(|| object.decode_pixel_data())) {
         Ok(Ok(pixels)) => Ok(pixels.into_data()),
         Ok(Err(error)) => Err(syntax::unsupported(&slice.path, uid, error)),
-        Err(_) => Err(syntax::unsupported(
-            &slice.path,
-            uid,
-            "the compressed stream is damaged",
-        )),
+        Err(_) => Err(damaged()),
     }
 }
 

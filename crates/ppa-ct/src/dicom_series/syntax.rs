@@ -1,31 +1,8 @@
-//! Transfer syntaxes: their names, and errors that give them.
+//! Transfer syntaxes: their names, and the error that gives them.
 
 use std::path::Path;
 
 use crate::error::ReadError;
-
-/// Error for a file that does not open, told apart by cause.
-pub(super) fn open_error(path: &Path, error: dicom_object::ReadError) -> ReadError {
-    use dicom_object::ReadError as Cause;
-    let uid = match &error {
-        Cause::OpenFile { .. } => {
-            return ReadError::Io {
-                path: path.to_owned(),
-                source: std::io::Error::other(error),
-            };
-        }
-        Cause::ReadUnrecognizedTransferSyntax { uid, .. } => uid.clone(),
-        Cause::ReadUnsupportedTransferSyntax { uid, .. }
-        | Cause::ReadUnsupportedTransferSyntaxWithSuggestion { uid, .. } => (*uid).to_owned(),
-        _ => {
-            return ReadError::Dicom {
-                path: path.to_owned(),
-                source: Box::new(error),
-            };
-        }
-    };
-    unsupported(path, &uid, error)
-}
 
 /// Error for pixels that cannot be unpacked.
 pub(super) fn unsupported(

@@ -67,7 +67,7 @@ fn stored_bits_and_rescale_are_honoured_per_slice_in_every_plain_encoding() {
     let encodings = [
         uids::IMPLICIT_VR_LITTLE_ENDIAN,
         uids::EXPLICIT_VR_LITTLE_ENDIAN,
-        uids::EXPLICIT_VR_BIG_ENDIAN,
+        "1.2.840.10008.1.2.2", // explicit VR big endian, retired
         uids::DEFLATED_EXPLICIT_VR_LITTLE_ENDIAN,
     ];
     for syntax in encodings {
@@ -147,14 +147,15 @@ fn slices_in_one_place_are_counted() {
 
 #[test]
 fn slices_that_do_not_match_are_refused() {
-    let spoil: [(&str, fn(&mut SliceSpec)); 3] = [
+    type Spoil = fn(&mut SliceSpec);
+    let cases: [(&str, Spoil); 3] = [
         ("the image size", |s| {
             (s.size, s.stored) = ([2, 3], vec![0; 6]);
         }),
         ("the pixel spacing", |s| s.spacing_mm = [0.75, 0.5]),
         ("the orientation", |s| s.along_row = -Vector3::x()),
     ];
-    for (expected, spoil) in spoil {
+    for (expected, spoil) in cases {
         let folder = tempfile::tempdir().unwrap();
         let mut slices = axial_stack(&[0.0, 1.0, 2.0]);
         spoil(&mut slices[1]);
@@ -226,6 +227,23 @@ fn a_cut_file_is_an_error_at_every_length() {
         std::fs::write(&cut, &bytes[..length]).unwrap();
         assert!(read(&cut).is_err(), "{length} of {} bytes", bytes.len());
     }
+}
+
+/// Seen in public test images: an application title of 18 characters, where 16 are allowed.
+#[test]
+fn a_mistake_in_the_meta_group_does_not_stop_the_reading() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("slice.dcm");
+    SliceSpec::axial([4, 3], 0.0, |i, _| i as i16 - 1000).write(&path);
+    let right = read(&path).unwrap();
+    let mut bytes = std::fs::read(&path).unwrap();
+    let length = u32::from_le_bytes(bytes[140..144].try_into().unwrap());
+    let end = 144 + length as usize;
+    let title = [b"\x02\0\x16\0AE\x12\0".as_slice(), &[b' '; 18]].concat();
+    bytes.splice(end..end, title.iter().copied());
+    bytes[140..144].copy_from_slice(&(length + title.len() as u32).to_le_bytes());
+    std::fs::write(&path, &bytes).unwrap();
+    assert_eq!(read(&path).unwrap(), right);
 }
 
 #[test]

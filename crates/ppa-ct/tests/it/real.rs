@@ -16,7 +16,15 @@ fn data(path: &str) -> PathBuf {
 }
 
 fn open(path: &str) -> Scan {
-    read(&data(path)).unwrap_or_else(|e| panic!("{e}"))
+    read(&data(path)).unwrap_or_else(|e| panic!("{}", chain(&e)))
+}
+
+/// An error with all its causes.
+fn chain(error: &dyn std::error::Error) -> String {
+    let cause = error
+        .source()
+        .map_or(String::new(), |e| format!(": {}", chain(e)));
+    format!("{error}{cause}")
 }
 
 fn codes(scan: &Scan) -> Vec<WarningCode> {
