@@ -97,7 +97,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (name, towards_limb) in [
         ("front", Vector3::new(0.0, 1.0, 0.0)),
         ("medial", Vector3::new(-1.0, 0.1, 0.0)),
-        ("oblique", Vector3::new(0.7, 1.0, -0.6)),
+        ("oblique", Vector3::new(0.8, 1.0, 0.35)),
         ("sole", Vector3::new(0.2, 0.3, 1.0)),
     ] {
         skin(&limb, towards_limb.normalize()).save(out.join(format!("skin_{name}.png")))?;

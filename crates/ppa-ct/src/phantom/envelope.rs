@@ -7,7 +7,7 @@ use nalgebra::{
 use super::hindfoot::Mortise;
 use super::loft::{End, Loft, Section};
 use super::parameters::Parameters;
-use super::sdf::{Shape, smooth_max, smooth_min, smooth_step};
+use super::sdf::{Bounds, Shape, smooth_max, smooth_min, smooth_step};
 
 /// Station above the joint, centre (x, y) and radii every 30° from medial over posterior.
 type ShankSection = (f64, [f64; 2], [f64; 12]);
@@ -122,10 +122,10 @@ const FOOT: [FootSection; 8] = [
     (
         92.0,
         &[
-            [25.0, 28.0],
-            [20.0, 45.0],
-            [6.0, 50.0],
-            [-18.0, 37.0],
+            [26.0, 28.0],
+            [20.5, 49.0],
+            [6.0, 54.0],
+            [-18.0, 41.0],
             [-35.0, 18.0],
             [-33.0, 12.5],
             [-8.0, 13.0],
@@ -136,11 +136,11 @@ const FOOT: [FootSection; 8] = [
     (
         122.0,
         &[
-            [33.0, 17.0],
-            [28.0, 30.0],
-            [8.0, 37.0],
-            [-20.0, 28.0],
-            [-40.0, 14.0],
+            [34.0, 17.0],
+            [28.5, 33.0],
+            [8.0, 40.0],
+            [-20.0, 31.0],
+            [-40.0, 14.5],
             [-38.0, 11.0],
             [0.0, 11.0],
             [28.0, 12.0],
@@ -150,10 +150,10 @@ const FOOT: [FootSection; 8] = [
     (
         145.0,
         &[
-            [37.0, 13.0],
-            [32.0, 22.0],
-            [8.0, 26.0],
-            [-20.0, 20.0],
+            [38.0, 13.0],
+            [32.0, 23.5],
+            [8.0, 28.0],
+            [-20.0, 22.0],
             [-42.0, 12.0],
             [-40.0, 10.0],
             [0.0, 10.0],
@@ -164,11 +164,11 @@ const FOOT: [FootSection; 8] = [
     (
         166.0,
         &[
-            [34.0, 10.0],
-            [30.0, 16.0],
-            [5.0, 18.0],
-            [-16.0, 14.0],
-            [-32.0, 9.5],
+            [35.0, 10.5],
+            [30.0, 18.0],
+            [5.0, 20.5],
+            [-16.0, 16.0],
+            [-32.0, 10.0],
             [-30.0, 9.0],
             [0.0, 9.0],
             [32.0, 9.0],
@@ -179,19 +179,39 @@ const FOOT: [FootSection; 8] = [
 
 /// Ball of the toe and its tip: x, y, height above the sole; radii.
 const TOES: [([f64; 3], f64, [f64; 3], f64); 5] = [
-    ([27.5, -160.0, 13.5], 13.0, [22.5, -197.5, 11.5], 11.5),
-    ([4.5, -160.0, 13.0], 9.5, [3.0, -201.0, 9.0], 8.5),
-    ([-11.0, -156.0, 12.0], 9.0, [-12.0, -192.5, 8.5], 8.2),
-    ([-25.5, -148.0, 11.0], 8.5, [-25.5, -182.0, 8.2], 7.8),
-    ([-38.5, -139.0, 10.5], 8.5, [-37.0, -169.0, 8.2], 8.0),
+    ([27.5, -160.0, 14.0], 13.5, [22.5, -196.5, 11.5], 11.5),
+    ([4.5, -160.0, 14.0], 10.5, [3.0, -198.5, 9.0], 8.8),
+    ([-11.0, -156.0, 13.0], 10.0, [-12.0, -190.5, 8.8], 8.5),
+    ([-25.5, -148.0, 12.0], 9.2, [-25.5, -181.0, 8.5], 8.2),
+    ([-38.5, -139.0, 11.0], 8.8, [-37.0, -168.0, 8.5], 8.2),
 ];
+
+/// Where the table has pressed the skin flat, the edge of the flat patch is rounded over so many mm; heel and calf would
+/// sink at least as deep, so that their middle touches the table.
+const TABLE_EDGE_MM: f64 = 3.0;
+
+/// A shape and the box around it, which tells when the shape is too far away to matter.
+#[derive(Debug, Clone)]
+struct Bounded {
+    shape: Shape,
+    bounds: Bounds,
+}
+
+impl Bounded {
+    fn new(shape: Shape) -> Self {
+        Self {
+            bounds: shape.bounds(),
+            shape,
+        }
+    }
+}
 
 /// The soft tissues.
 #[derive(Debug, Clone)]
 pub(super) struct Envelope {
-    shank: Shape,
-    foot: Shape,
-    toes: Shape,
+    shank: Bounded,
+    foot: Bounded,
+    toes: Bounded,
     floor: f64,
     /// Table top in limb coordinates: the skin is pressed flat where it would cross it.
     table_normal: Unit<Vector3<f64>>,
@@ -238,7 +258,7 @@ impl Envelope {
             End::Capped { blend: 12.0 },
             End::Capped { blend: 10.0 },
         );
-        let heel = Shape::ellipsoid([-3.0, 27.0, floor + 30.0], [31.0, 31.5, 34.0]);
+        let heel = Shape::ellipsoid([-3.0, 27.0, floor + 30.0], [31.0, 34.5, 34.0]);
         let above = |[x, y, height]: [f64; 3]| [x, y, floor + height];
         let toes = TOES
             .iter()
@@ -247,9 +267,9 @@ impl Envelope {
             })
             .collect();
         Self {
-            shank: Shape::union(10.0, leg),
-            foot: Shape::union(14.0, vec![Shape::Loft(Box::new(foot)), heel]),
-            toes: Shape::union(3.0, toes),
+            shank: Bounded::new(Shape::union(10.0, leg)),
+            foot: Bounded::new(Shape::union(14.0, vec![Shape::Loft(Box::new(foot)), heel])),
+            toes: Bounded::new(Shape::union(3.0, toes)),
             floor,
             table_normal,
             table_offset: p.table_depth_mm,
@@ -266,13 +286,28 @@ impl Envelope {
         }
     }
 
+    /// The most forward point of the skin, given the transform to the frame in which -y is forward.
+    pub(super) fn toe_tip(&self, ct_from_limb: &Isometry3<f64>) -> Point3<f64> {
+        TOES.iter()
+            .map(|&(_, _, [x, y, height], radius)| {
+                ct_from_limb * Point3::new(x, y, self.floor + height) - radius * Vector3::y()
+            })
+            .fold(Point3::from(Vector3::repeat(f64::INFINITY)), |best, tip| {
+                if tip.y < best.y { tip } else { best }
+            })
+    }
+
     /// Signed distance to the skin, mm.
     pub(super) fn skin_distance(&self, p: &Point3<f64>) -> f64 {
-        let foot = smooth_min(self.foot.distance(p), self.toes.distance(p), 8.0);
-        let body = smooth_min(self.shank.distance(p), foot, 22.0);
+        let mut body = self.foot.shape.distance(p);
+        for (part, blend) in [(&self.toes, 8.0), (&self.shank, 22.0)] {
+            if part.bounds.distance(p) < body + blend {
+                body = smooth_min(body, part.shape.distance(p), blend);
+            }
+        }
         let body = smooth_max(body, self.floor - p.z, 8.0);
         let above_table = self.table_normal.dot(&p.coords) - self.table_offset;
-        smooth_max(body, above_table, 8.0)
+        smooth_max(body, above_table, TABLE_EDGE_MM)
     }
 
     pub(super) fn skin_mm(&self) -> f64 {

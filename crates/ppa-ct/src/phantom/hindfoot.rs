@@ -110,6 +110,8 @@ pub(super) fn talus(p: &Parameters, mortise: &Mortise) -> Bone {
             mortise.wall([0.0, -1.0, 0.0], 17.0),
             mortise.wall([0.0, 1.0, 0.0], 16.5),
             mortise.wall([0.0, 0.0, -1.0], 27.0),
+            // Below the comma of the medial facet the body recedes.
+            mortise.wall([0.8, 0.0, -0.6], 23.0),
         ],
     );
     let at = |m, b, z| mortise.point(m, b, z);
@@ -125,7 +127,7 @@ pub(super) fn talus(p: &Parameters, mortise: &Mortise) -> Bone {
         2.0,
         vec![body, mortise.medial_facet(p), mortise.lateral_facet(p)],
     );
-    let head = [8.0, -29.0, -26.0];
+    let head = [7.5, -29.0, -25.0];
     let solid = Shape::union(
         5.0,
         vec![
@@ -133,7 +135,7 @@ pub(super) fn talus(p: &Parameters, mortise: &Mortise) -> Bone {
             Shape::round_cone(at(0.0, -10.0, -18.0), 10.5, [6.0, -24.0, -24.0], 10.5),
             Shape::turned_ellipsoid(
                 head,
-                [16.0, 15.0, 12.0],
+                [15.5, 14.5, 11.0],
                 Rotation3::from_axis_angle(&Vector3::y_axis(), 30.0_f64.to_radians()),
             ),
         ],
@@ -153,14 +155,14 @@ pub(super) fn calcaneus(p: &Parameters, talus: usize) -> Bone {
     let solid = Shape::union(
         8.0,
         vec![
-            Shape::ellipsoid([-4.0, 36.0, floor + 20.0], [14.0, 14.0, 20.0]),
+            Shape::ellipsoid([-4.0, 36.0, floor + 20.5], [14.0, 13.5, 20.5]),
             Shape::round_cone(
                 [-4.0, 26.0, floor + 19.0],
                 14.5,
                 [-11.0, -18.0, floor + 22.5],
                 11.5,
             ),
-            Shape::ellipsoid([-8.0, 4.0, floor + 30.0], [13.0, 17.0, 11.0]),
+            Shape::ellipsoid([-8.0, 4.0, floor + 31.0], [13.0, 17.0, 12.0]),
             Shape::ellipsoid([-12.0, -24.0, floor + 22.0], [12.0, 13.0, 12.0]),
             Shape::ellipsoid([9.0, -4.0, floor + 26.0], [11.0, 10.0, 5.5]),
         ],

@@ -28,8 +28,8 @@ struct Metatarsal {
 const METATARSALS: [Metatarsal; 5] = [
     Metatarsal {
         name: "first metatarsal",
-        base: [20.5, -99.0, -43.0],
-        base_semi: [9.0, 9.0, 13.5],
+        base: [20.5, -98.0, -44.0],
+        base_semi: [9.0, 9.5, 13.0],
         head: [27.0, -147.0, -64.5],
         head_semi: [10.0, 9.5, 9.5],
         waist: 6.3,
@@ -52,7 +52,7 @@ const METATARSALS: [Metatarsal; 5] = [
     },
     Metatarsal {
         name: "fourth metatarsal",
-        base: [-20.0, -85.0, -47.5],
+        base: [-20.0, -83.5, -47.5],
         base_semi: [7.0, 8.0, 8.5],
         head: [-24.0, -136.5, -67.0],
         head_semi: [5.2, 7.4, 7.2],
@@ -80,8 +80,8 @@ const TOES: [Toe; 5] = [
     Toe {
         names: &["proximal phalanx of toe 1", "distal phalanx of toe 1"],
         ends: &[
-            ([27.0, -162.0, -67.5], [24.0, -184.0, -71.0]),
-            ([23.5, -193.0, -71.5], [22.0, -203.0, -72.5]),
+            ([27.0, -162.0, -68.0], [24.0, -183.0, -70.5]),
+            ([23.5, -191.5, -71.0], [22.3, -199.5, -72.0]),
         ],
         waist: 5.2,
     },
@@ -92,9 +92,9 @@ const TOES: [Toe; 5] = [
             "distal phalanx of toe 2",
         ],
         ends: &[
-            ([4.5, -161.0, -66.0], [3.5, -178.0, -67.5]),
-            ([3.2, -188.0, -69.5], [3.0, -193.0, -72.0]),
-            ([3.0, -201.5, -74.0], [3.0, -205.5, -74.5]),
+            ([4.5, -161.0, -67.0], [3.5, -177.5, -69.5]),
+            ([3.2, -186.5, -71.5], [3.0, -191.0, -73.0]),
+            ([3.0, -198.0, -74.0], [3.0, -201.0, -74.3]),
         ],
         waist: 3.1,
     },
@@ -105,9 +105,9 @@ const TOES: [Toe; 5] = [
             "distal phalanx of toe 3",
         ],
         ends: &[
-            ([-10.5, -156.5, -67.0], [-11.5, -172.0, -68.5]),
-            ([-11.8, -181.5, -70.5], [-12.0, -185.5, -72.5]),
-            ([-12.0, -193.5, -74.5], [-12.0, -197.0, -75.0]),
+            ([-10.5, -156.5, -68.0], [-11.5, -171.5, -70.0]),
+            ([-11.8, -180.0, -71.5], [-12.0, -183.5, -73.0]),
+            ([-12.0, -190.5, -74.2], [-12.0, -193.0, -74.5]),
         ],
         waist: 3.0,
     },
@@ -118,9 +118,9 @@ const TOES: [Toe; 5] = [
             "distal phalanx of toe 4",
         ],
         ends: &[
-            ([-25.0, -149.5, -68.0], [-25.5, -164.0, -69.5]),
-            ([-25.5, -173.0, -71.5], [-25.5, -175.5, -73.0]),
-            ([-25.5, -183.0, -74.5], [-25.3, -186.0, -75.0]),
+            ([-25.0, -149.5, -69.0], [-25.5, -163.5, -71.0]),
+            ([-25.5, -171.5, -72.5], [-25.5, -174.0, -73.5]),
+            ([-25.5, -181.0, -74.3], [-25.3, -183.5, -74.6]),
         ],
         waist: 2.9,
     },
@@ -132,8 +132,8 @@ const TOES: [Toe; 5] = [
         ],
         ends: &[
             ([-38.5, -140.5, -69.5], [-38.0, -153.5, -71.0]),
-            ([-37.5, -162.0, -72.5], [-37.3, -163.5, -73.5]),
-            ([-37.0, -170.5, -74.5], [-36.5, -172.5, -75.0]),
+            ([-37.5, -161.0, -73.0], [-37.3, -162.5, -73.5]),
+            ([-37.0, -168.8, -74.3], [-36.8, -170.5, -74.6]),
         ],
         waist: 2.9,
     },
@@ -197,7 +197,7 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
         Shape::union(
             6.0,
             vec![
-                Shape::ellipsoid([-18.0, -58.0, -50.0], [13.5, 21.0, 13.0]),
+                Shape::ellipsoid([-18.0, -57.0, -50.0], [13.5, 19.5, 12.5]),
                 Shape::ellipsoid([-20.0, -50.0, -51.0], [12.0, 17.0, 11.0]),
             ],
         ),
@@ -216,13 +216,13 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
     );
     let medial = push(
         "medial cuneiform",
-        Shape::turned_ellipsoid([19.5, -74.0, -38.0], [9.0, 20.0, 15.0], about_y(-10.0)),
+        Shape::turned_ellipsoid([19.5, -75.0, -38.5], [9.0, 16.0, 14.5], about_y(-10.0)),
         &[(navicular, gap), (intermediate, 0.8 * gap)],
         spongy(),
     );
     let lateral = push(
         "lateral cuneiform",
-        Shape::ellipsoid([-6.5, -72.0, -36.0], [8.5, 18.0, 11.5]),
+        Shape::ellipsoid([-6.5, -71.0, -37.0], [8.5, 15.5, 11.5]),
         &[
             (navicular, gap),
             (cuboid, 0.8 * gap),
@@ -244,10 +244,12 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
             Filling::tubular(metatarsal.base, metatarsal.head, 2.0, 220.0),
         );
         previous = Some(last);
-        for (&name, &(base, end)) in toe.names.iter().zip(toe.ends) {
+        let distal = toe.names.len() - 1;
+        for (place, (&name, &(base, end))) in toe.names.iter().zip(toe.ends).enumerate() {
+            let waist = toe.waist * if place == distal { 0.8 } else { 1.0 };
             last = push(
                 name,
-                phalanx(base, end, toe.waist),
+                phalanx(base, end, waist),
                 &[(last, 0.8 * gap)],
                 Filling::tubular(base, end, 1.2, 180.0),
             );

@@ -36,6 +36,10 @@ pub struct Truth {
     pub lateral_malleolus_mm: f64,
     /// Plane under the limb, which heel and calf touch: y of the table top.
     pub back_plane_y_mm: f64,
+    /// The most anterior point of the skin: the tip of the big toe.
+    pub toe_tip: Point3<f64>,
+    /// From the back of the heel to the tip of the longest toe, along y.
+    pub foot_length_mm: f64,
     /// From the joint centre to the sole, along the shaft.
     pub sole_depth_mm: f64,
     /// Thickness of the skin.
@@ -46,6 +50,7 @@ impl Truth {
     pub(super) fn of(limb: &LowerLeg) -> Self {
         let p = &limb.parameters;
         let ct = &limb.ct_from_limb;
+        let toe_tip = limb.envelope.toe_tip(ct);
         let half_wedge = 0.5 * p.trochlea_wedge_rad;
         Self {
             joint_centre: ct * Point3::origin(),
@@ -62,6 +67,8 @@ impl Truth {
             medial_malleolus_mm: p.medial_malleolus_mm,
             lateral_malleolus_mm: p.lateral_malleolus_mm,
             back_plane_y_mm: limb.table_top_y(),
+            foot_length_mm: limb.table_top_y() - toe_tip.y,
+            toe_tip,
             sole_depth_mm: p.sole_depth_mm,
             skin_mm: p.skin_mm,
         }

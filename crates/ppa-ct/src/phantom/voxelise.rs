@@ -44,11 +44,11 @@ const TABLE_SHEET_MM: f64 = 2.0;
 const TABLE_SHEET_HU: f64 = -150.0;
 const TABLE_FOAM_HU: f64 = -940.0;
 /// Edge of the blocks that are ruled out as a whole, voxels.
-const BLOCK: usize = 8;
+const BLOCK: usize = 4;
 /// Distances are estimates: trust them only within this factor.
 const CAUTION: f64 = 1.3;
-/// Largest sub-sample of a voxel with a boundary, mm.
-const SUBSAMPLE_MM: f64 = 0.5;
+/// Largest part of a voxel that counts as crossed by flat boundaries, mm; larger voxels are divided.
+const FLAT_MM: f64 = 1.0;
 
 /// How much of `y ± half` lies between `low` and `high`.
 fn share_between(y: f64, half: f64, low: f64, high: f64) -> f64 {
@@ -74,8 +74,9 @@ impl LowerLeg {
     /// The phantom as a CT with isotropic voxels, axes along LPS.
     ///
     /// The field of view holds toes, heel and the lower leg up to mid-calf, where it cuts the leg.
-    /// Voxels that a boundary may cross are sampled in parts of at most half a millimetre, each
-    /// with the share of tissues on either side. The result does not depend on the number of threads.
+    /// Every tissue counts with its share of a voxel. The share follows from the distance to the boundary, taken as
+    /// flat; voxels above 1 mm that a boundary may cross are divided into parts first. The result does not
+    /// depend on the number of threads.
     ///
     /// # Errors
     /// [`PhantomError::Spacing`] when `spacing_mm` is not between 0.25 and 8.
@@ -181,10 +182,11 @@ impl Painter<'_> {
                     && limb.skeleton.distance(b, &centre) < CAUTION * radius_mm + 1.0
             })
             .collect();
-        let mut local = Local::default();
+        let (mut local, mut part) = (Local::default(), Local::default());
         for voxel in voxels {
             let centre = self.grid.centre(voxel.map(|v| v as f64));
-            hu[slot(voxel)] = self.voxel_hu(&centre, near_skin, &bones, &mut local) as f32;
+            hu[slot(voxel)] =
+                self.voxel_hu(&centre, near_skin, &bones, [&mut local, &mut part]) as f32;
         }
     }
 
@@ -193,7 +195,7 @@ impl Painter<'_> {
         centre: &Point3<f64>,
         near_skin: bool,
         bones: &[usize],
-        local: &mut Local,
+        [local, part]: [&mut Local; 2],
     ) -> f64 {
         let limb = self.limb;
         let p = limb.limb_point(centre);
@@ -201,11 +203,16 @@ impl Painter<'_> {
         let half = 0.5 * self.spacing_mm;
         let background = background_hu(centre.y, half, self.table_top_mm);
         let blend = |(hu, inside): (f64, f64)| hu + (1.0 - inside) * (background - AIR_HU);
-        let parts = (self.spacing_mm / SUBSAMPLE_MM).ceil() as usize;
+        let parts = (self.spacing_mm / FLAT_MM).ceil() as usize;
         let reach_mm = half * 3.0_f64.sqrt() * CAUTION;
         if parts == 1 || !limb.boundary_near(&p, local, reach_mm) {
             return blend(limb.mixture(&p, local, self.spacing_mm));
         }
+        // Only what can change inside the voxel is measured again.
+        let near_skin = local
+            .skin_mm
+            .is_some_and(|skin| skin > -(limb.envelope.cover_mm(&p) + reach_mm));
+        local.bones.retain(|&(_, distance)| distance < reach_mm);
         let width_mm = self.spacing_mm / parts as f64;
         let offset = |n: usize| (n as f64 + 0.5) * width_mm - half;
         let mut sum = 0.0;
@@ -216,8 +223,8 @@ impl Painter<'_> {
                 offset(n / parts.pow(2)),
             );
             let q = limb.limb_point(&(centre + shift));
-            limb.measure(&q, near_skin, bones.iter().copied(), local);
-            sum += blend(limb.mixture(&q, local, width_mm));
+            limb.measure(&q, near_skin, local.bones.iter().map(|b| b.0), part);
+            sum += blend(limb.mixture(&q, part, width_mm));
         }
         sum / parts.pow(3) as f64
     }
