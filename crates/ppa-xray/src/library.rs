@@ -284,13 +284,18 @@ pub(crate) fn names() -> impl Iterator<Item = &'static str> {
         .chain(ELEMENT_NAMES.iter().map(|&(name, _)| name))
 }
 
-/// Material of a name or an element symbol.
+/// Material of a name or an element symbol, in any case.
 pub(crate) fn find(name: &str) -> Option<Material> {
-    if let Some(entry) = MIXTURES.iter().find(|entry| entry.name == name) {
+    if let Some(entry) = MIXTURES
+        .iter()
+        .find(|entry| entry.name.eq_ignore_ascii_case(name))
+    {
         return Material::from_composition(entry.name, entry.density_g_cm3, entry.mass_fractions)
             .ok();
     }
-    let element = ELEMENT_NAMES.iter().find(|(element, _)| *element == name);
+    let element = ELEMENT_NAMES
+        .iter()
+        .find(|(element, _)| element.eq_ignore_ascii_case(name));
     let z = element.map(|&(_, z)| z).or_else(|| atomic_number(name))?;
     let name = element.map_or_else(|| symbol(z), |&(name, _)| Some(name))?;
     Material::from_composition(name, density_g_cm3(z)?, &[(z, 1.0)]).ok()

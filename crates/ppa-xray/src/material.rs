@@ -6,83 +6,8 @@ use crate::{
     },
     element::{atomic_number, symbol},
     library,
+    material_error::MaterialError,
 };
-
-/// Why something is not a material, or has no cross section.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum MaterialError {
-    /// The density is not a positive, finite number.
-    #[error("material {name:?} has density {found} g/cm³, expected a positive number")]
-    Density {
-        /// Material at fault.
-        name: String,
-        /// Density given, g/cm³.
-        found: f64,
-    },
-    /// A composition without elements.
-    #[error("material {name:?} has no elements")]
-    Empty {
-        /// Material at fault.
-        name: String,
-    },
-    /// An element outside the tables.
-    #[error("material {name:?} has an element of atomic number {z}, expected 1 to 92")]
-    AtomicNumber {
-        /// Material at fault.
-        name: String,
-        /// Atomic number given.
-        z: u8,
-    },
-    /// The same element twice.
-    #[error("material {name:?} names {symbol} twice")]
-    Duplicate {
-        /// Material at fault.
-        name: String,
-        /// Symbol of the element.
-        symbol: &'static str,
-    },
-    /// A mass fraction that is negative or not a number.
-    #[error("material {name:?} has mass fraction {found} of {symbol}, expected 0 to 1")]
-    Fraction {
-        /// Material at fault.
-        name: String,
-        /// Symbol of the element.
-        symbol: &'static str,
-        /// Fraction given.
-        found: f64,
-    },
-    /// Mass fractions that do not add up.
-    #[error("the mass fractions of material {name:?} add up to {found}, expected 1 within 1 %")]
-    Sum {
-        /// Material at fault.
-        name: String,
-        /// Sum of the fractions given.
-        found: f64,
-    },
-    /// A name that is not in the library.
-    #[error("no material is named {name:?}; known are {} and the symbols of the elements H to U", known.join(", "))]
-    Unknown {
-        /// Name given.
-        name: String,
-        /// Names in the library.
-        known: Vec<&'static str>,
-    },
-    /// A composition that cannot be read.
-    #[error("cannot read {found:?} in a composition, expected Symbol:fraction such as Ca:0.4")]
-    Syntax {
-        /// The part at fault.
-        found: String,
-    },
-    /// An energy outside the tables.
-    #[error(
-        "{found_kev} keV is outside the tables, which go from {MIN_ENERGY_KEV} to {MAX_ENERGY_KEV} keV"
-    )]
-    Energy {
-        /// Energy asked for, keV.
-        found_kev: f64,
-    },
-}
 
 /// A homogeneous material: elements by mass fraction and a nominal density.
 ///
@@ -332,5 +257,127 @@ impl Material {
                 fraction,
             )
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// A mixture attenuates as its elements do, by weight.
+        #[test]
+        fn mixtures_follow_the_weights(z1 in 1..=46_u8, z2 in 47..=92_u8, share in 0.0..1.0_f64, energy_kev in 1.0..150.0_f64) {
+            let alone = |z| Material::from_composition("element", 1.0, &[(z, 1.0)]).unwrap().total_cm2_g(energy_kev).unwrap();
+            let mixture = Material::from_composition("mixture", 1.0, &[(z2, 1.0 - share), (z1, share)]).unwrap();
+            let expected = share * alone(z1) + (1.0 - share) * alone(z2);
+            prop_assert!((mixture.total_cm2_g(energy_kev).unwrap() / expected - 1.0).abs() < 1e-12);
+        }
+
+        /// Every element at every energy: finite, positive, F(0) = Z, S from 0 to no more than Z.
+        #[test]
+        fn every_element_has_sound_tables(z in 1..=92_u8, energy_kev in 1.0..=150.0_f64) {
+            let element = elements().get(z).unwrap();
+            let sections = element.cross_sections(energy_kev);
+            for value in [sections.photoelectric, sections.rayleigh, sections.compton] {
+                prop_assert!(value.is_finite() && value > 0.0);
+            }
+            let q = energy_kev / HC_KEV_ANGSTROM;
+            prop_assert!((element.form_factor(0.0) / f64::from(z) - 1.0).abs() < 1e-6);
+            prop_assert!(element.form_factor(q) < f64::from(z) && element.form_factor(q) > 0.0);
+            prop_assert!(element.incoherent(0.0) == 0.0 && element.incoherent(q) > 0.0);
+            prop_assert!(element.incoherent(q) < f64::from(z) * 1.001);
+        }
+    }
+
+    /// Integrating Thomson × F² and Klein–Nishina × S gives the tabulated cross sections back.
+    ///
+    /// σ = ½ π rₑ² N_A Σ w/A ∫ … dcos; 4 % for Rayleigh, whose table includes anomalous scattering.
+    #[test]
+    fn cross_sections_are_the_integrals_of_their_distributions() {
+        const THOMSON_CM2_MOL: f64 = 0.079_407_877 * 6.022_140_76e-1; // rₑ² in barn × N_A × 1e-24
+        for (name, energy_kev, tolerance) in [
+            ("water", 20.0, 0.02),
+            ("water", 80.0, 0.02),
+            ("titanium", 60.0, 0.04),
+        ] {
+            let material = Material::named(name).unwrap();
+            let alpha = energy_kev / ELECTRON_REST_KEV;
+            let (mut rayleigh, mut compton, n) = (0.0, 0.0, 4000);
+            for i in 0..n {
+                let s = (f64::from(i) + 0.5) / f64::from(n);
+                let (cos, q) = (1.0 - 2.0 * s * s, s * energy_kev / HC_KEV_ANGSTROM);
+                let ratio = 1.0 / (1.0 + alpha * (1.0 - cos));
+                let solid_angle = 2.0 * std::f64::consts::PI * 4.0 * s / f64::from(n);
+                rayleigh += solid_angle
+                    * 0.5
+                    * (1.0 + cos * cos)
+                    * material.form_factor_squared_per_gram(q);
+                compton += solid_angle
+                    * 0.5
+                    * ratio.powi(2)
+                    * (ratio + 1.0 / ratio - 1.0 + cos * cos)
+                    * material.incoherent_per_gram(q);
+            }
+            let table = material.cross_sections(energy_kev).unwrap();
+            for (integral, table) in [(rayleigh, table.rayleigh), (compton, table.compton)] {
+                let ratio = integral * THOMSON_CM2_MOL / table;
+                assert!(
+                    (ratio - 1.0).abs() < tolerance,
+                    "{name} at {energy_kev} keV: {ratio}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn compositions_that_make_no_sense_are_refused() {
+        let made = |density, fractions: &[(u8, f64)]| {
+            Material::from_composition("x", density, fractions).unwrap_err()
+        };
+        assert!(matches!(
+            made(f64::NAN, &[(1, 1.0)]),
+            MaterialError::Density { .. }
+        ));
+        assert!(matches!(made(1.0, &[]), MaterialError::Empty { .. }));
+        assert!(matches!(
+            made(1.0, &[(0, 1.0)]),
+            MaterialError::AtomicNumber { z: 0, .. }
+        ));
+        assert!(matches!(
+            made(1.0, &[(93, 1.0)]),
+            MaterialError::AtomicNumber { z: 93, .. }
+        ));
+        assert!(matches!(
+            made(1.0, &[(1, 0.5), (1, 0.5)]),
+            MaterialError::Duplicate { .. }
+        ));
+        assert!(matches!(
+            made(1.0, &[(1, 1.5), (8, -0.5)]),
+            MaterialError::Fraction { .. }
+        ));
+        assert!(matches!(
+            made(1.0, &[(1, 0.5), (8, 0.4)]),
+            MaterialError::Sum { .. }
+        ));
+        assert!(matches!(
+            Material::parse_composition("x", 1.0, "Ca 0.4"),
+            Err(MaterialError::Syntax { .. })
+        ));
+        assert!(matches!(
+            Material::named("unobtainium"),
+            Err(MaterialError::Unknown { .. })
+        ));
+        let water = Material::named("water").unwrap();
+        for found_kev in [0.99, 150.01, f64::NAN] {
+            assert!(matches!(
+                water.total_cm2_g(found_kev),
+                Err(MaterialError::Energy { .. })
+            ));
+        }
+        let parsed = Material::parse_composition("water", 1.0, "H:0.112, O:0.889").unwrap();
+        assert!((parsed.mass_fractions()[0].1 - 0.112 / 1.001).abs() < 1e-15);
     }
 }

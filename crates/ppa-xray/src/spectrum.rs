@@ -2,105 +2,12 @@
 
 use crate::{
     cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
-    material::{Material, MaterialError},
+    material::Material,
+    spectrum_error::SpectrumError,
 };
 
-/// One electronvolt-gram in joule-kilogram: keV/g to Gy.
+/// Dose of one keV in one gram, in Gy.
 const GRAY_PER_KEV_G: f64 = 1.602_176_634e-13;
-
-/// Why something is not a spectrum.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SpectrumError {
-    /// The tube voltage is outside the tube model.
-    #[error("tube voltage {found} kV is outside the tube model, which goes from {min} to {max} kV")]
-    TubeVoltage {
-        /// Voltage asked for, kV.
-        found: f64,
-        /// Lowest voltage, kV.
-        min: f64,
-        /// Highest voltage, kV.
-        max: f64,
-    },
-    /// The anode angle is outside the tube model.
-    #[error("anode angle {found}° is outside the tube model, which goes from {min}° to {max}°")]
-    AnodeAngle {
-        /// Angle asked for, degrees.
-        found: f64,
-        /// Smallest angle, degrees.
-        min: f64,
-        /// Largest angle, degrees.
-        max: f64,
-    },
-    /// A filter whose thickness is negative or not finite.
-    #[error("filter of {material} has thickness {found_mm} mm, expected zero or more")]
-    FilterThickness {
-        /// Name of the filter's material.
-        material: String,
-        /// Thickness given, mm.
-        found_mm: f64,
-    },
-    /// A filter that is not written as `Material:thickness`.
-    #[error("cannot read filter {found:?}, expected Material:millimetres such as Al:2.5")]
-    FilterSyntax {
-        /// Text given.
-        found: String,
-    },
-    /// A filter of an unknown material, or an energy outside the cross-section tables.
-    #[error(transparent)]
-    Material(#[from] MaterialError),
-    /// Bin edges that do not ascend.
-    #[error("energy bin {bin} goes from {low_kev} to {high_kev} keV, expected ascending edges")]
-    Edges {
-        /// Index of the bin.
-        bin: usize,
-        /// Its lower edge, keV.
-        low_kev: f64,
-        /// Its upper edge, keV.
-        high_kev: f64,
-    },
-    /// A weight that is negative or not finite.
-    #[error("energy bin {bin} has weight {found}, expected zero or more")]
-    Weight {
-        /// Index of the bin.
-        bin: usize,
-        /// Weight given.
-        found: f64,
-    },
-    /// Photons at energies without cross sections.
-    #[error(
-        "the spectrum has photons between {low_kev} and {high_kev} keV, expected them from {MIN_ENERGY_KEV} to {MAX_ENERGY_KEV} keV"
-    )]
-    Range {
-        /// Lower edge of the lowest filled bin, keV.
-        low_kev: f64,
-        /// Upper edge of the highest filled bin, keV.
-        high_kev: f64,
-    },
-    /// No photon is left.
-    #[error("the spectrum has no photons")]
-    Dark,
-    /// A file that cannot be read.
-    #[error("cannot read spectrum {}", path.display())]
-    Read {
-        /// File at fault.
-        path: std::path::PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// A line of a file that is not what it should be.
-    #[error("{}, line {line}: found {found:?}, expected {expected}", path.display())]
-    Line {
-        /// File at fault.
-        path: std::path::PathBuf,
-        /// Line number, from 1.
-        line: usize,
-        /// Text of the line.
-        found: String,
-        /// What belongs there.
-        expected: &'static str,
-    },
-}
 
 /// Photon energies in bins, uniform within each, as a probability distribution.
 ///
@@ -174,11 +81,13 @@ impl Spectrum {
         if low_kev < MIN_ENERGY_KEV || high_kev > MAX_ENERGY_KEV {
             return Err(SpectrumError::Range { low_kev, high_kev });
         }
-        let sum: f64 = weights[first..=last].iter().sum();
-        let probabilities: Vec<f64> = weights[first..=last]
+        // Relative to the largest, so that the sum stays finite.
+        let relative: Vec<f64> = weights[first..=last]
             .iter()
-            .map(|weight| weight / sum)
+            .map(|weight| weight / largest)
             .collect();
+        let sum: f64 = relative.iter().sum();
+        let probabilities: Vec<f64> = relative.iter().map(|weight| weight / sum).collect();
         let mut cumulative: Vec<f64> = probabilities
             .iter()
             .scan(0.0, |sum, probability| {
@@ -330,4 +239,58 @@ impl Spectrum {
 
 fn named(material: &str) -> Material {
     Material::named(material).expect("in the library")
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// The sampler inverts the cumulative distribution, whatever the weights.
+        #[test]
+        fn sampling_inverts_the_cumulative_distribution(
+            weights in prop::collection::vec(prop_oneof![Just(0.0), 1e-9..1e300_f64], 1..40),
+            u in 0.0..1.0_f64,
+        ) {
+            prop_assume!(weights.iter().any(|&weight| weight > 0.0));
+            let edges: Vec<f64> = (0..=weights.len()).map(|i| 10.0 + 0.5 * i as f64).collect();
+            let spectrum = Spectrum::from_bins(&edges, &weights).unwrap();
+            let energy = spectrum.sample(u);
+            let below: f64 = spectrum
+                .edges_kev()
+                .windows(2)
+                .zip(spectrum.bins())
+                .map(|(edges, (_, p))| p * ((energy - edges[0]) / (edges[1] - edges[0])).clamp(0.0, 1.0))
+                .sum();
+            prop_assert!((below - u).abs() < 1e-9, "{below} of the photons below {energy} keV, expected {u}");
+        }
+    }
+
+    /// Narrow-beam attenuation of one energy is exponential: HVL = ln 2/μ, and the second is the first.
+    #[test]
+    fn one_energy_has_the_hvl_of_its_attenuation() {
+        let spectrum = Spectrum::monoenergetic(60.0).unwrap();
+        let aluminium = named("aluminium");
+        let mu_per_mm = aluminium.total_cm2_g(60.0).unwrap() * aluminium.density_g_cm3() / 10.0;
+        let hvl_mm = std::f64::consts::LN_2 / mu_per_mm;
+        assert!((spectrum.hvl1_mm_al() / hvl_mm - 1.0).abs() < 1e-8);
+        assert!((spectrum.hvl2_mm_al() / hvl_mm - 1.0).abs() < 1e-8);
+        assert_eq!(spectrum.sample(0.7), 60.0);
+        assert!(matches!(
+            Spectrum::monoenergetic(0.5),
+            Err(SpectrumError::Range { .. })
+        ));
+    }
+
+    /// E μ_en/ρ with μ_en/ρ = 0.03041 cm²/g at 60 keV in dry air (NISTIR 5632).
+    #[test]
+    fn kerma_agrees_with_the_energy_absorption_of_nist() {
+        let kerma = Spectrum::monoenergetic(60.0).unwrap().kerma_gy_cm2();
+        assert!(
+            (kerma / (60.0 * 0.03041 * GRAY_PER_KEV_G) - 1.0).abs() < 0.01,
+            "{kerma:e}"
+        );
+    }
 }

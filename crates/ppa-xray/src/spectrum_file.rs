@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use crate::spectrum::{Spectrum, SpectrumError};
+use crate::{spectrum::Spectrum, spectrum_error::SpectrumError};
 
 impl Spectrum {
     /// Reads `energy in keV, weight` lines, the energy being the centre of a bin; edges lie half-way between centres.
@@ -116,6 +116,8 @@ fn wrong_line(path: &Path, index: usize, found: &str, expected: &'static str) ->
 mod tests {
     use std::io::Write;
 
+    use proptest::prelude::*;
+
     use super::*;
 
     fn file(text: &str) -> tempfile::NamedTempFile {
@@ -171,5 +173,15 @@ mod tests {
             Spectrum::from_spc("nowhere.spc").unwrap_err(),
             SpectrumError::Read { .. }
         ));
+    }
+
+    proptest! {
+        /// Whatever a file holds, reading ends in a spectrum or an error.
+        #[test]
+        fn any_text_is_read_or_refused(text in "([-0-9.eNainf#, \n]{0,12}\n?){0,12}") {
+            let file = file(&text);
+            let _ = Spectrum::from_csv(file.path());
+            let _ = Spectrum::from_spc(file.path());
+        }
     }
 }

@@ -6,9 +6,7 @@
 use std::sync::OnceLock;
 
 use crate::{
-    cross_sections::Unpacked,
-    material::Material,
-    spectrum::{Spectrum, SpectrumError},
+    cross_sections::Unpacked, material::Material, spectrum::Spectrum, spectrum_error::SpectrumError,
 };
 
 /// A line grows as (U − 1)^1.63, U = kVp over its edge (Green & Cosslett 1968, doi:10.1088/0022-3727/1/4/302).

@@ -1,0 +1,79 @@
+//! What can be wrong with a material.
+
+use crate::cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV};
+
+/// Why something is not a material, or has no cross section.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MaterialError {
+    /// The density is not a positive, finite number.
+    #[error("material {name:?} has density {found} g/cm³, expected a positive number")]
+    Density {
+        /// Material at fault.
+        name: String,
+        /// Density given, g/cm³.
+        found: f64,
+    },
+    /// A composition without elements.
+    #[error("material {name:?} has no elements")]
+    Empty {
+        /// Material at fault.
+        name: String,
+    },
+    /// An element outside the tables.
+    #[error("material {name:?} has an element of atomic number {z}, expected 1 to 92")]
+    AtomicNumber {
+        /// Material at fault.
+        name: String,
+        /// Atomic number given.
+        z: u8,
+    },
+    /// The same element twice.
+    #[error("material {name:?} names {symbol} twice")]
+    Duplicate {
+        /// Material at fault.
+        name: String,
+        /// Symbol of the element.
+        symbol: &'static str,
+    },
+    /// A mass fraction that is negative or not a number.
+    #[error("material {name:?} has mass fraction {found} of {symbol}, expected 0 to 1")]
+    Fraction {
+        /// Material at fault.
+        name: String,
+        /// Symbol of the element.
+        symbol: &'static str,
+        /// Fraction given.
+        found: f64,
+    },
+    /// Mass fractions that do not add up.
+    #[error("the mass fractions of material {name:?} add up to {found}, expected 1 within 1 %")]
+    Sum {
+        /// Material at fault.
+        name: String,
+        /// Sum of the fractions given.
+        found: f64,
+    },
+    /// A name that is not in the library.
+    #[error("no material is named {name:?}; known are {} and the symbols of the elements H to U", known.join(", "))]
+    Unknown {
+        /// Name given.
+        name: String,
+        /// Names in the library.
+        known: Vec<&'static str>,
+    },
+    /// A composition that cannot be read.
+    #[error("cannot read {found:?} in a composition, expected Symbol:fraction such as Ca:0.4")]
+    Syntax {
+        /// The part at fault.
+        found: String,
+    },
+    /// An energy outside the tables.
+    #[error(
+        "{found_kev} keV is outside the tables, which go from {MIN_ENERGY_KEV} to {MAX_ENERGY_KEV} keV"
+    )]
+    Energy {
+        /// Energy asked for, keV.
+        found_kev: f64,
+    },
+}

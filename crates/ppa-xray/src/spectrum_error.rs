@@ -1,0 +1,100 @@
+//! What can be wrong with a spectrum.
+
+use crate::{
+    cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    material_error::MaterialError,
+};
+
+/// Why something is not a spectrum.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SpectrumError {
+    /// The tube voltage is outside the tube model.
+    #[error("tube voltage {found} kV is outside the tube model, which goes from {min} to {max} kV")]
+    TubeVoltage {
+        /// Voltage asked for, kV.
+        found: f64,
+        /// Lowest voltage, kV.
+        min: f64,
+        /// Highest voltage, kV.
+        max: f64,
+    },
+    /// The anode angle is outside the tube model.
+    #[error("anode angle {found}° is outside the tube model, which goes from {min}° to {max}°")]
+    AnodeAngle {
+        /// Angle asked for, degrees.
+        found: f64,
+        /// Smallest angle, degrees.
+        min: f64,
+        /// Largest angle, degrees.
+        max: f64,
+    },
+    /// A filter whose thickness is negative or not finite.
+    #[error("filter of {material} has thickness {found_mm} mm, expected zero or more")]
+    FilterThickness {
+        /// Name of the filter's material.
+        material: String,
+        /// Thickness given, mm.
+        found_mm: f64,
+    },
+    /// A filter that is not written as `Material:thickness`.
+    #[error("cannot read filter {found:?}, expected Material:millimetres such as Al:2.5")]
+    FilterSyntax {
+        /// Text given.
+        found: String,
+    },
+    /// A filter of an unknown material, or an energy outside the cross-section tables.
+    #[error(transparent)]
+    Material(#[from] MaterialError),
+    /// Bin edges that do not ascend.
+    #[error("energy bin {bin} goes from {low_kev} to {high_kev} keV, expected ascending edges")]
+    Edges {
+        /// Index of the bin.
+        bin: usize,
+        /// Its lower edge, keV.
+        low_kev: f64,
+        /// Its upper edge, keV.
+        high_kev: f64,
+    },
+    /// A weight that is negative or not finite.
+    #[error("energy bin {bin} has weight {found}, expected zero or more")]
+    Weight {
+        /// Index of the bin.
+        bin: usize,
+        /// Weight given.
+        found: f64,
+    },
+    /// Photons at energies without cross sections.
+    #[error(
+        "the spectrum has photons between {low_kev} and {high_kev} keV, expected them from {MIN_ENERGY_KEV} to {MAX_ENERGY_KEV} keV"
+    )]
+    Range {
+        /// Lower edge of the lowest filled bin, keV.
+        low_kev: f64,
+        /// Upper edge of the highest filled bin, keV.
+        high_kev: f64,
+    },
+    /// No photon is left.
+    #[error("the spectrum has no photons")]
+    Dark,
+    /// A file that cannot be read.
+    #[error("cannot read spectrum {}", path.display())]
+    Read {
+        /// File at fault.
+        path: std::path::PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A line of a file that is not what it should be.
+    #[error("{}, line {line}: found {found:?}, expected {expected}", path.display())]
+    Line {
+        /// File at fault.
+        path: std::path::PathBuf,
+        /// Line number, from 1.
+        line: usize,
+        /// Text of the line.
+        found: String,
+        /// What belongs there.
+        expected: &'static str,
+    },
+}
