@@ -19,15 +19,33 @@ pub struct LandmarkOverrides {
     /// The joint centre, `ct` frame, mm; the axis is moved parallel to itself to pass through it.
     pub joint_centre: Option<[f64; 3]>,
     /// Distances proximal of the joint level where the joint region begins and ends, mm.
-    pub joint_region_mm: Option<[f64; 2]>,
+    pub joint_region: Option<[f64; 2]>,
     /// The same for the calf region.
-    pub calf_region_mm: Option<[f64; 2]>,
+    pub calf_region: Option<[f64; 2]>,
     /// What the region centres are centres of.
     pub axis_source: Option<AxisSource>,
     /// The direction that faces up at angle 0, `ct` frame.
     pub anterior: Option<[f64; 3]>,
     /// One distal and two proximal points of Π_P, `ct` frame, mm.
     pub plane_points: Option<[[f64; 3]; 3]>,
+}
+
+impl Landmarks {
+    /// These landmarks as choices, so that a person finds every decision in one place and edits
+    /// it: found again with the result, the patient frame is the same.
+    ///
+    /// The plane points stay open unless `given` has them, as they follow from axis and front.
+    pub fn as_choices(&self, given: &LandmarkOverrides) -> LandmarkOverrides {
+        LandmarkOverrides {
+            limb: Some(self.limb),
+            joint_centre: Some(self.joint_centre),
+            joint_region: Some(self.joint_region.range_mm),
+            calf_region: Some(self.calf_region.range_mm),
+            axis_source: Some(self.axis_source),
+            anterior: Some(self.anterior),
+            plane_points: given.plane_points,
+        }
+    }
 }
 
 /// Why the landmarks of a limb cannot be told.
@@ -109,7 +127,7 @@ pub enum LandmarkError {
 ///
 /// * Joint level of a lower leg: the gap between plafond and talar dome in a column along the
 ///   tibia's shaft. Other limbs: the middle of the limb.
-/// * Axis: through the centres of two regions, 30 to 70 mm and 130 to 200 mm proximal of the joint
+/// * Axis: through the centres of two regions, 50 to 90 mm and 130 to 200 mm proximal of the joint
 ///   level, closer together when the scan is short; of other limbs around a quarter and three
 ///   quarters of the length. The centres are those of the tibia, because the paper wants the axis
 ///   to pass through the joint and a swelling moves the centre of the skin; without bone, or on
@@ -331,14 +349,14 @@ impl<'a> Reference<'a> {
         overrides: &LandmarkOverrides,
         notes: &mut Vec<String>,
     ) -> Result<([f64; 2], [f64; 2]), LandmarkError> {
-        const JOINT_MM: [f64; 2] = [30.0, 70.0];
+        // Below 50 mm tibia and fibula can touch: the syndesmosis is thinner than two voxels.
+        const JOINT_MM: [f64; 2] = [50.0, 90.0];
         const CALF_MM: [f64; 2] = [130.0, 200.0];
         const SHORTEST_MM: f64 = 60.0;
         let (joint, calf) = match self.kind {
             LimbKind::LowerLeg => {
                 let reach = self.extent_mm[1];
-                let given =
-                    overrides.joint_region_mm.is_some() && overrides.calf_region_mm.is_some();
+                let given = overrides.joint_region.is_some() && overrides.calf_region.is_some();
                 if reach < SHORTEST_MM && !given {
                     return Err(LandmarkError::TooShort {
                         found_mm: reach,
@@ -361,8 +379,8 @@ impl<'a> Reference<'a> {
             }
         };
         Ok((
-            overrides.joint_region_mm.unwrap_or(joint),
-            overrides.calf_region_mm.unwrap_or(calf),
+            overrides.joint_region.unwrap_or(joint),
+            overrides.calf_region.unwrap_or(calf),
         ))
     }
 
@@ -376,7 +394,8 @@ impl<'a> Reference<'a> {
         let (mut sum, mut count) = (Vector3::zeros(), 0_u32);
         for slice in 0..self.sections.count() {
             let above = self.sections.level(slice) - self.level_mm;
-            if !(from_mm..=to_mm).contains(&above) {
+            // A level that went through a file and back may have lost its last bit.
+            if !(from_mm - 1e-6..=to_mm + 1e-6).contains(&above) {
                 continue;
             }
             let centre = match source {

@@ -10,6 +10,7 @@
 //! Source of the method: Laufer et al., MELBA 2026:027, section "Framework", doi:10.59275/j.melba.2026-c874.
 
 mod ankle;
+mod bump_sites;
 mod contact;
 mod device;
 mod find_landmarks;
@@ -24,6 +25,7 @@ mod room_parts;
 mod sweep;
 mod table_plane;
 
+pub use bump_sites::bump_sites;
 pub use device::XrayDevice;
 pub use find_landmarks::{LandmarkError, LandmarkOverrides, find_landmarks};
 pub use frames::{Camera, Ct, Device, NotRigid, Patient, Rigid};

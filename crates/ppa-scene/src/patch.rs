@@ -66,7 +66,7 @@ impl Patch {
     /// The connected patches of at least the smallest area, largest first.
     ///
     /// A cell counts as filled when it holds at least a tenth of the points of a typical cell,
-    /// so that stray points do not bridge gaps.
+    /// and no fewer than three, so that stray points neither bridge gaps nor look like a surface.
     pub(crate) fn of_plane(
         points: &[Point3<f64>],
         plane: &Plane,
@@ -91,7 +91,7 @@ impl Patch {
                 seen >= half
             })
             .unwrap_or(0);
-        let filled_from = (typical / 10).max(1);
+        let filled_from = (typical / 10).max(3);
         let mut open: BTreeSet<Cell> = counts
             .into_iter()
             .filter(|(_, count)| *count >= filled_from)
@@ -124,8 +124,8 @@ impl Patch {
 
     /// The total-least-squares plane of the patch's points, fitted until they stay the same.
     ///
-    /// `None` when the points do not gather on a plane: then there are as many in the
-    /// layer from one to three thresholds as an even spread would put there.
+    /// `None` when the points do not gather on a plane: evenly spread points put twice as many
+    /// between one and three thresholds as within one.
     pub(crate) fn refined(
         &self,
         points: &[Point3<f64>],

@@ -1,5 +1,7 @@
 //! The x-ray room: built in from a few lengths, or recorded by a user.
 
+use std::path::{Path, PathBuf};
+
 use nalgebra::{Point3, Vector3};
 use ppa_mesh::{Mesh, PointCloud};
 use serde::{Deserialize, Serialize};
@@ -88,6 +90,15 @@ pub enum RoomError {
         /// What it should be.
         expected: &'static str,
     },
+    /// A file holds no points.
+    #[error("{} holds no points", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file cannot be read as PLY.
+    #[error(transparent)]
+    Ply(#[from] ppa_mesh::PlyError),
 }
 
 impl Room {
@@ -104,6 +115,29 @@ impl Room {
             cloud: parts.cloud(spec.point_spacing_mm),
             mesh: Some(parts.mesh()),
             device: XrayDevice::overhead(source_z, spec.source_detector_mm),
+        })
+    }
+
+    /// Reads a recorded room from a PLY file in mm; its frame becomes the room frame.
+    ///
+    /// Triangles are kept if the file has any. The device is given, as no cloud tells it.
+    ///
+    /// # Errors
+    /// [`RoomError`] when the file is missing, broken or empty.
+    pub fn from_ply(path: impl AsRef<Path>, device: XrayDevice) -> Result<Self, RoomError> {
+        let path = path.as_ref();
+        let contents = ppa_mesh::read_ply(path)?;
+        if contents.cloud.points.is_empty() {
+            return Err(RoomError::Empty {
+                path: path.to_path_buf(),
+            });
+        }
+        let cloud = contents.cloud.clone();
+        let mesh = (!contents.triangles.is_empty()).then(|| contents.into_mesh());
+        Ok(Self {
+            cloud,
+            mesh,
+            device,
         })
     }
 }
@@ -140,8 +174,8 @@ impl RoomSpec {
             (
                 "point_spacing_mm",
                 self.point_spacing_mm,
-                self.point_spacing_mm >= 1.0,
-                "at least 1 mm",
+                (1.0..=30.0).contains(&self.point_spacing_mm),
+                "1 to 30 mm",
             ),
             (
                 "table_foot_mm",

@@ -27,9 +27,11 @@ pub struct PlaneSettings {
     pub min_area_mm2: f64,
     /// Only points in this box (low and high corner) are looked at, mm.
     pub region: Option<[[f64; 3]; 2]>,
-    /// Central beam: a point and a direction. The table is the first large patch that it hits;
+    /// Central beam: the source and a direction. The table is the first large patch that it hits;
     /// without a beam it is the largest patch.
     pub beam: Option<[[f64; 3]; 2]>,
+    /// How far from the source the table is at least, mm: keeps collimator and housing out.
+    pub min_beam_mm: f64,
 }
 
 impl Default for PlaneSettings {
@@ -43,6 +45,7 @@ impl Default for PlaneSettings {
             min_area_mm2: 60_000.0,
             region: None,
             beam: None,
+            min_beam_mm: 300.0,
         }
     }
 }
@@ -249,7 +252,7 @@ impl<'a> Search<'a> {
                 .filter(|p| {
                     let v = *p - from;
                     let s = v.dot(&along);
-                    s > 0.0 && (v - along.into_inner() * s).norm() < reach
+                    s > self.settings.min_beam_mm && (v - along.into_inner() * s).norm() < reach
                 })
                 .copied()
                 .collect::<Vec<_>>()
@@ -297,7 +300,9 @@ impl<'a> Search<'a> {
             None => Some(sheet.inliers as f64),
             Some((from, along)) => {
                 let hit = sheet.plane.hit(&from, &along)?;
-                sheet.covers(&hit).then(|| -(hit - from).norm())
+                let distance_mm = (hit - from).norm();
+                let is_table = distance_mm >= self.settings.min_beam_mm && sheet.covers(&hit);
+                is_table.then_some(-distance_mm)
             }
         }
     }

@@ -1,0 +1,7 @@
+//! Tests across the modules of ppa-scene.
+
+mod boot;
+mod frames;
+mod landmarks;
+mod placement;
+mod table;
