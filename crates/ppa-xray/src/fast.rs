@@ -38,7 +38,7 @@ impl Default for FastSettings {
             dose_histories: 2e10,
             scatter_histories: 4_000_000,
             scatter_pixel_mm: 20.0,
-            samples_per_side: 2,
+            samples_per_side: 3,
             seed: 0,
         }
     }
@@ -141,12 +141,7 @@ struct Expected {
 }
 
 impl Expected {
-    fn scatter(
-        tally: &Tally,
-        category: Category,
-        histories: u64,
-        upsampling: &Upsampling,
-    ) -> Self {
+    fn scatter(tally: &Tally, category: Category, histories: u64, upsampling: &Upsampling) -> Self {
         let cells = tally.moments(category, histories);
         let plane = |of: fn(&Moments) -> f64| -> Vec<f64> { cells.iter().map(of).collect() };
         let mean = upsampling.densities(&plane(|cell| cell.mean_kev));
@@ -171,7 +166,8 @@ impl Expected {
 
 fn scatter_raster(detector: &Detector, cell_mm: f64) -> Raster {
     let fine = detector.raster();
-    let cells = |extent_mm: f64, most: usize| ((extent_mm / cell_mm).ceil() as usize).clamp(1, most);
+    let cells =
+        |extent_mm: f64, most: usize| ((extent_mm / cell_mm).ceil() as usize).clamp(1, most);
     Raster {
         columns: cells(fine.extent_mm[0], fine.columns),
         rows: cells(fine.extent_mm[1], fine.rows),

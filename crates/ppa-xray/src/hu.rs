@@ -179,8 +179,7 @@ mod tests {
         let calibration = HuCalibration::default();
         calibration.validate().unwrap();
         // Water 1.0, muscle 1.05 and dense cortical bone 1.92 g/cm³ (ICRU 44).
-        for (hu, density, within) in [(0.0, 1.0, 0.02), (50.0, 1.05, 0.01), (1_524.0, 1.92, 0.01)]
-        {
+        for (hu, density, within) in [(0.0, 1.0, 0.02), (50.0, 1.05, 0.01), (1_524.0, 1.92, 0.01)] {
             let found = calibration.density_g_cm3(hu);
             assert!((found - density).abs() < within, "{hu} HU: {found}");
         }

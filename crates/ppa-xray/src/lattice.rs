@@ -23,7 +23,8 @@ pub(crate) struct Ray {
 
 impl Lattice {
     pub fn new(grid: &Grid, ct_from_device: &Isometry3<f64>) -> Self {
-        let cell_from_device = grid.voxel_from_ct().to_homogeneous() * ct_from_device.to_homogeneous();
+        let cell_from_device =
+            grid.voxel_from_ct().to_homogeneous() * ct_from_device.to_homogeneous();
         Self {
             size: grid.size(),
             linear: cell_from_device.fixed_view::<3, 3>(0, 0).into_owned(),

@@ -70,7 +70,9 @@ fn ln_factorial(k: f64) -> f64 {
         return (2..=k as u64).map(|i| (i as f64).ln()).sum();
     }
     let x = k + 1.0;
-    let series = (1.0 / 12.0 - (1.0 / 360.0 - (1.0 / 1260.0 - 1.0 / (1680.0 * x * x)) / (x * x)) / (x * x)) / x;
+    let series = (1.0 / 12.0
+        - (1.0 / 360.0 - (1.0 / 1260.0 - 1.0 / (1680.0 * x * x)) / (x * x)) / (x * x))
+        / x;
     (x - 0.5) * x.ln() - x + 0.5 * (std::f64::consts::TAU).ln() + series
 }
 

@@ -42,10 +42,10 @@ impl Default for Presentation {
     fn default() -> Self {
         Self {
             centre: 2.4,
-            width: 2.8,
+            width: 4.2,
             gamma: 1.0,
-            detail: 0.6,
-            detail_radius_mm: 5.0,
+            detail: 0.9,
+            detail_radius_mm: 12.0,
         }
     }
 }
@@ -62,8 +62,18 @@ impl Presentation {
         let positive = |v: f64| v.is_finite() && v > 0.0;
         for (what, found, fine, expected) in [
             ("centre", self.centre, self.centre.is_finite(), "a number"),
-            ("width", self.width, positive(self.width), "a positive number"),
-            ("gamma", self.gamma, positive(self.gamma), "a positive number"),
+            (
+                "width",
+                self.width,
+                positive(self.width),
+                "a positive number",
+            ),
+            (
+                "gamma",
+                self.gamma,
+                positive(self.gamma),
+                "a positive number",
+            ),
             (
                 "detail",
                 self.detail,
@@ -109,7 +119,9 @@ impl Radiograph {
             .iter()
             .enumerate()
             .map(|(pixel, &reading)| {
-                -(f64::from(reading) / self.open_field_at(pixel)).max(DARKEST).ln()
+                -(f64::from(reading) / self.open_field_at(pixel))
+                    .max(DARKEST)
+                    .ln()
             })
             .collect();
         let radius_px = presentation.detail_radius_mm / self.detector.pixel_mm;

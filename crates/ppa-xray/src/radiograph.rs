@@ -53,14 +53,23 @@ impl CategorySums {
         match category {
             Category::Primary => (self.primary_ev_per_history, self.primary_ev_per_history_se),
             Category::Compton => (self.compton_ev_per_history, self.compton_ev_per_history_se),
-            Category::Rayleigh => (self.rayleigh_ev_per_history, self.rayleigh_ev_per_history_se),
-            Category::Multiple => (self.multiple_ev_per_history, self.multiple_ev_per_history_se),
+            Category::Rayleigh => (
+                self.rayleigh_ev_per_history,
+                self.rayleigh_ev_per_history_se,
+            ),
+            Category::Multiple => (
+                self.multiple_ev_per_history,
+                self.multiple_ev_per_history_se,
+            ),
         }
     }
 
     /// Energy of all categories together, eV per history.
     pub fn total_ev_per_history(&self) -> f64 {
-        Category::ALL.iter().map(|&category| self.of(category).0).sum()
+        Category::ALL
+            .iter()
+            .map(|&category| self.of(category).0)
+            .sum()
     }
 
     pub(crate) fn from_kev(of: impl Fn(Category) -> (f64, f64)) -> Self {

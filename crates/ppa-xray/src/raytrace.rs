@@ -134,8 +134,11 @@ impl<'a> Beam<'a> {
             }
         }
         let mut sum = Moments::default();
-        for ((&exponent, &weight), &energy_kev) in
-            scratch.exponent.iter().zip(&self.weight).zip(&self.energy_kev)
+        for ((&exponent, &weight), &energy_kev) in scratch
+            .exponent
+            .iter()
+            .zip(&self.weight)
+            .zip(&self.energy_kev)
         {
             let energy = weight * (-exponent).exp() * energy_kev;
             sum.mean_kev += energy;

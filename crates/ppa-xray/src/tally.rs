@@ -59,10 +59,8 @@ impl Raster {
     pub fn cell_at(&self, x_mm: f64, y_mm: f64) -> Option<usize> {
         let column = (x_mm / self.extent_mm[0] + 0.5) * self.columns as f64;
         let row = (y_mm / self.extent_mm[1] + 0.5) * self.rows as f64;
-        let inside = column >= 0.0
-            && row >= 0.0
-            && column < self.columns as f64
-            && row < self.rows as f64;
+        let inside =
+            column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
         inside.then(|| row as usize * self.columns + column as usize)
     }
 }

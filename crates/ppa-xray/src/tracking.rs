@@ -99,7 +99,11 @@ impl<'a> Transport<'a> {
                 percent: 100.0 * outside,
             });
         }
-        let samplers: Vec<_> = phantom.materials().iter().map(MaterialTables::new).collect();
+        let samplers: Vec<_> = phantom
+            .materials()
+            .iter()
+            .map(MaterialTables::new)
+            .collect();
         let attenuation = Attenuation::new(&samplers);
         Ok(Self {
             phantom,
@@ -191,7 +195,10 @@ impl<'a> Transport<'a> {
             let block_end = next.min(end);
             loop {
                 let tentative = at + depth / bound;
-                if !matches!(tentative.partial_cmp(&block_end), Some(std::cmp::Ordering::Less)) {
+                if !matches!(
+                    tentative.partial_cmp(&block_end),
+                    Some(std::cmp::Ordering::Less)
+                ) {
                     depth -= (block_end - at).max(0.0) * bound;
                     at = block_end;
                     break;
@@ -274,7 +281,8 @@ fn check_placement(phantom: &VoxelPhantom, projection: &Projection) -> Result<()
     }
     let source = grid.voxel_from_ct() * Point3::from(projection.ct_from_device.translation.vector);
     let nearest = source.coords.map(f64::round);
-    let inside = (0..3).all(|axis| nearest[axis] >= 0.0 && nearest[axis] < grid.size()[axis] as f64);
+    let inside =
+        (0..3).all(|axis| nearest[axis] >= 0.0 && nearest[axis] < grid.size()[axis] as f64);
     if inside {
         let voxel = [0, 1, 2].map(|axis| nearest[axis] as usize);
         let density_g_cm3 = phantom.density_g_cm3()[grid.index(voxel)];

@@ -1,0 +1,91 @@
+//! Pictures and files.
+
+use exr::prelude::{ReadChannels, ReadLayers, read};
+use nalgebra::Isometry3;
+use ppa_xray::{
+    Category, EXR_ATTRIBUTE, FastSettings, Presentation, Radiograph, Spectrum, fast,
+};
+
+use crate::scenes::{frontal, limb};
+
+fn radiograph() -> Radiograph {
+    let settings = FastSettings {
+        scatter_histories: 50_000,
+        seed: 77,
+        ..FastSettings::default()
+    };
+    let spectrum = Spectrum::monoenergetic(40.0).unwrap();
+    fast(&limb(&Isometry3::identity()), &spectrum, &frontal(60, 3.0), &settings).unwrap()
+}
+
+#[test]
+fn exr_returns_every_layer_and_the_same_bytes_each_time() {
+    let (image, folder) = (radiograph(), tempfile::tempdir().unwrap());
+    let (one, two) = (folder.path().join("one.exr"), folder.path().join("two.exr"));
+    image.write_exr(&one).unwrap();
+    image.write_exr(&two).unwrap();
+    assert_eq!(std::fs::read(&one).unwrap(), std::fs::read(&two).unwrap());
+    let file = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(&one)
+        .unwrap();
+    let channels = &file.layer_data.channel_data.list;
+    assert_eq!(channels.len(), 9);
+    for category in Category::ALL {
+        for (part, expected) in [
+            ("value", &image.layer(category).value),
+            ("sigma", &image.layer(category).sigma),
+        ] {
+            let name = format!("{}.{part}", category.name());
+            let channel = channels.iter().find(|c| c.name == *name.as_str()).unwrap();
+            let found: Vec<f32> = channel.sample_data.values_as_f32().collect();
+            assert_eq!(&found, expected, "{name}");
+        }
+    }
+    let (_, text) = file.layer_data.attributes.other.iter().next().unwrap();
+    let text = format!("{text:?}");
+    assert!(text.contains("seed = 77") && text.contains("eV/cm2"), "{EXR_ATTRIBUTE}: {text}");
+}
+
+#[test]
+fn png_holds_sixteen_bits_with_bone_white_and_air_black() {
+    let (image, folder) = (radiograph(), tempfile::tempdir().unwrap());
+    let path = folder.path().join("limb.png");
+    image.write_png(&path, &Presentation::default()).unwrap();
+    let png = image::open(&path).unwrap().into_luma16();
+    assert_eq!(png.as_raw(), &image.present(&Presentation::default()).unwrap());
+    let (corner, centre) = (png.get_pixel(2, 2).0[0], png.get_pixel(30, 30).0[0]);
+    assert!(corner < 2_000 && centre > 40_000, "{corner} {centre}");
+}
+
+/// The window is fixed: a metal plate in one corner leaves the far corner as it was.
+#[test]
+fn grey_values_do_not_depend_on_the_rest_of_the_image() {
+    let image = radiograph();
+    let mut with_plate = image.clone();
+    for row in 0..10 {
+        for layer in &mut with_plate.layers {
+            layer.value[row * 60..row * 60 + 10].fill(0.0);
+        }
+    }
+    let presentation = Presentation::default();
+    let (a, b) = (
+        image.present(&presentation).unwrap(),
+        with_plate.present(&presentation).unwrap(),
+    );
+    assert_eq!(a[59 * 60 + 59], b[59 * 60 + 59]);
+    assert!(b[0] > a[0]);
+}
+
+#[test]
+fn a_failed_write_leaves_nothing_and_names_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("missing").join("image.exr");
+    let error = radiograph().write_exr(&path).unwrap_err();
+    assert!(error.to_string().contains("image.exr"), "{error}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}

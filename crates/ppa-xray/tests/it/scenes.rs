@@ -1,0 +1,70 @@
+//! Small scenes that several tests look at.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
+use ppa_ct::Grid;
+use ppa_xray::{Detector, Material, Projection, VoxelPhantom};
+
+/// Device axes along ct axes, source 1 m before the ct origin.
+pub fn frontal(pixels: u32, pixel_mm: f64) -> Projection {
+    Projection {
+        ct_from_device: Isometry3::translation(0.0, 0.0, -1_000.0),
+        source_detector_mm: 1_100.0,
+        detector: Detector {
+            columns: pixels,
+            rows: pixels,
+            pixel_mm,
+        },
+    }
+}
+
+/// A water slab across the beam, centred on the ct origin.
+pub fn slab(thickness_mm: f64, density_g_cm3: f32) -> VoxelPhantom {
+    let size = [30, 30, 10];
+    let spacing = Vector3::new(10.0, 10.0, thickness_mm / 10.0);
+    let first = Point3::new(-145.0, -145.0, -0.45 * thickness_mm);
+    let grid = Grid::axis_aligned(size, spacing, first).unwrap();
+    let voxels = grid.len();
+    let water = Material::named("water").unwrap();
+    VoxelPhantom::new(
+        grid,
+        vec![0; voxels],
+        vec![density_g_cm3; voxels],
+        vec![water],
+    )
+    .unwrap()
+}
+
+/// A tilted limb of uneven density with bone and a titanium pin, voxels of unequal sides.
+pub fn limb(pose: &Isometry3<f64>) -> VoxelPhantom {
+    let size = [36, 30, 40];
+    let tilt = Isometry3::from_parts(
+        Translation3::identity(),
+        UnitQuaternion::from_euler_angles(0.3, -0.2, 0.5),
+    );
+    let direction: Matrix3<f64> = (pose.rotation * tilt.rotation)
+        .to_rotation_matrix()
+        .into_inner();
+    let spacing = Vector3::new(2.0, 2.5, 1.7);
+    let half = Vector3::new(35.0, 36.25, 33.15);
+    let origin = pose * tilt * Point3::from(-half);
+    let grid = Grid::from_parts(size, direction, spacing, origin).unwrap();
+    let (material, density) = (0..grid.len())
+        .map(|index| {
+            let [i, j, k] = grid.voxel(index);
+            let (x, y) = (i as f64 * 2.0 - 35.0, j as f64 * 2.5 - 36.25);
+            if x.hypot(y) > 33.0 {
+                (0, 0.001_2)
+            } else if (18..20).contains(&i) && (14..16).contains(&j) && (10..25).contains(&k) {
+                (3, 4.5)
+            } else if (x - 8.0).hypot(y) < 12.0 {
+                (2, 1.2 + 0.05 * (k % 12) as f32)
+            } else {
+                (1, 0.95 + 0.01 * (k % 12) as f32)
+            }
+        })
+        .unzip();
+    let materials = ["air", "soft_tissue", "bone_cortical", "titanium"]
+        .map(|name| Material::named(name).unwrap())
+        .to_vec();
+    VoxelPhantom::new(grid, material, density, materials).unwrap()
+}
