@@ -6,9 +6,10 @@
 //! two diagonal corners are inside and two outside, one bit says whether the inside ones are
 //! joined (asymptotic decider, Nielson and Hamann 1991, doi:10.1109/VISUAL.1991.175782). Both
 //! cells at a face see the same four values and decide alike, so segments always close to loops
-//! and the surface never has a hole. Each loop is filled by the triangulation of least edge length
-//! that has no diagonal within a face, as the neighbour could have chosen the same diagonal and four
-//! triangles would meet in it; where there is none, the loop is a fan about an extra vertex.
+//! and the surface never has a hole. Each loop is filled by the triangulation whose diagonals stay
+//! nearest to the trilinear surface of the sign pattern, without diagonals within a face: the
+//! neighbour could have chosen the same one, and four triangles would meet in it. Where there is none,
+//! the loop is a fan about an extra vertex.
 
 use std::sync::LazyLock;
 
@@ -101,7 +102,10 @@ fn configuration(inside: u8) -> Configuration {
                 bit.is_some_and(|bit| decisions >> bit & 1 == 1)
             };
             Pattern {
-                disks: loops(&is_inside, &joined).into_iter().map(fill).collect(),
+                disks: loops(&is_inside, &joined)
+                    .into_iter()
+                    .map(|ring| fill(inside, ring))
+                    .collect(),
             }
         })
         .collect();
@@ -157,31 +161,43 @@ fn loops(is_inside: &dyn Fn(u8) -> bool, joined: &dyn Fn(u8) -> bool) -> Vec<Vec
     rings
 }
 
-fn middle_distance(a: u8, b: u8) -> f64 {
-    let middle = |edge: u8| {
-        let [p, q] = edge_corners(edge);
-        [0, 1, 2].map(|axis| 0.5 * f64::from((p >> axis & 1) + (q >> axis & 1)))
-    };
-    let (a, b) = (middle(a), middle(b));
-    (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
+fn middle(edge: u8) -> [f64; 3] {
+    let [p, q] = edge_corners(edge);
+    [0, 1, 2].map(|axis| 0.5 * f64::from((p >> axis & 1) + (q >> axis & 1)))
 }
 
 /// Length of an interior edge between two crossings; infinite within a face.
 pub fn diagonal_cost(a: u8, b: u8) -> f64 {
     if share_a_face(a, b) {
-        f64::INFINITY
-    } else {
-        middle_distance(a, b)
+        return f64::INFINITY;
     }
+    let (a, b) = (middle(a), middle(b));
+    (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Triangulation of least total diagonal length (dynamic programming over sub-polygons).
-fn fill(ring: Vec<u8>) -> Disk {
+/// How far the middle of a diagonal is from the surface: the trilinear interpolant there of ±1 at
+/// the corners; infinite within a face. Length settles ties.
+fn diagonal_misfit(inside: u8, a: u8, b: u8) -> f64 {
+    let (p, q) = (middle(a), middle(b));
+    let at = [0, 1, 2].map(|axis| 0.5 * (p[axis] + q[axis]));
+    let value = (0..8).map(|corner| {
+        let weights = [0, 1, 2].map(|axis| match corner >> axis & 1 {
+            1 => at[axis],
+            _ => 1.0 - at[axis],
+        });
+        let sign = if inside >> corner & 1 == 1 { 1.0 } else { -1.0 };
+        sign * weights.iter().product::<f64>()
+    });
+    value.sum::<f64>().powi(2) + 1e-3 * diagonal_cost(a, b)
+}
+
+/// Triangulation of least total misfit (dynamic programming over sub-polygons).
+fn fill(inside: u8, ring: Vec<u8>) -> Disk {
     let n = ring.len();
     let side = |i: usize, j: usize| match j - i {
         1 => 0.0,
         gap if gap == n - 1 => 0.0,
-        _ => diagonal_cost(ring[i], ring[j]),
+        _ => diagonal_misfit(inside, ring[i], ring[j]),
     };
     let mut cost = vec![vec![0.0; n]; n];
     let mut apex = vec![vec![0; n]; n];

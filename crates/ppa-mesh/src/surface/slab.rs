@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::cell::{CONFIGURATIONS, Configuration, edge_corners, inside_joined};
+use super::cell::{CONFIGURATIONS, edge_corners, inside_joined};
 use super::field::Field;
 use super::tunnel;
 
@@ -231,54 +231,128 @@ impl March<'_> {
             }
         };
         let configuration = &CONFIGURATIONS[inside];
-        let mut decisions = 0;
-        let mut tube = None;
-        if !configuration.ambiguous.is_empty() || configuration.patterns[0].disks.len() > 1 {
-            let values = std::array::from_fn(|corner| {
-                let voxel = [i + (corner & 1), j + (corner >> 1 & 1), k + (corner >> 2)];
-                self.field.above(self.field.index(voxel))
-            });
-            for (bit, &face) in configuration.ambiguous.iter().enumerate() {
-                decisions |= usize::from(inside_joined(face, &values)) << bit;
+        let several = configuration.patterns[0].disks.len() > 1;
+        let ambiguous = !configuration.ambiguous.is_empty();
+        if !several && !ambiguous {
+            let disk = &configuration.patterns[0].disks[0];
+            if let [a, b, c, d] = disk.ring[..] {
+                let [p, q, r, s] = [a, b, c, d].map(id);
+                if first_diagonal_fits_better([a, b, c, d], &self.corner_values([i, j, k])) {
+                    self.triangle([p, q, r]);
+                    self.triangle([p, r, s]);
+                } else {
+                    self.triangle([p, q, s]);
+                    self.triangle([q, r, s]);
+                }
+            } else {
+                for triangle in &disk.triangles {
+                    self.triangle(triangle.map(id));
+                }
             }
-            tube = tube_of(configuration, decisions, &values);
+            return;
+        }
+
+        let values = self.corner_values([i, j, k]);
+        let mut decisions = 0;
+        for (bit, &face) in configuration.ambiguous.iter().enumerate() {
+            decisions |= usize::from(inside_joined(face, &values)) << bit;
         }
         let pattern = &configuration.patterns[decisions];
+        let tube = tunnel::tube(configuration, decisions, pattern, &values);
+        if let Some(pair) = tube {
+            let [first, second] = pair.map(|at| pattern.disks[at].ring.as_slice());
+            match tunnel::tube_triangles(first, second) {
+                Some(triangles) => triangles.iter().for_each(|t| self.triangle(t.map(id))),
+                None => {
+                    let rings = [first, second].map(|ring| ring.iter().map(|&e| id(e)).collect());
+                    self.waist([i, j, k], [first, second], rings);
+                }
+            }
+        }
         for (at, disk) in pattern.disks.iter().enumerate() {
-            if tube.as_ref().is_some_and(|(pair, _)| pair.contains(&at)) {
+            if tube.is_some_and(|pair| pair.contains(&at)) {
                 continue;
             }
             if disk.triangles.is_empty() {
                 let ring: Vec<u32> = disk.ring.iter().map(|&edge| id(edge)).collect();
-                self.fan(&ring, &disk.ring, [i, j, k]);
+                let (position, gradient) = self.middle([i, j, k], &disk.ring);
+                let middle = self.push(position, gradient);
+                for at in 0..ring.len() {
+                    self.triangle([ring[at], ring[(at + 1) % ring.len()], middle]);
+                }
             }
             for triangle in &disk.triangles {
                 self.triangle(triangle.map(id));
             }
         }
-        for triangle in tube.iter().flat_map(|(_, triangles)| triangles) {
-            self.triangle(triangle.map(id));
-        }
     }
 
-    /// Triangles from every side of the ring to a new vertex in its middle.
-    fn fan(&mut self, ring: &[u32], edges: &[u8], voxel: [usize; 3]) {
+    fn corner_values(&self, [i, j, k]: [usize; 3]) -> [f64; 8] {
+        std::array::from_fn(|corner| {
+            let voxel = [i + (corner & 1), j + (corner >> 1 & 1), k + (corner >> 2)];
+            self.field.above(self.field.index(voxel))
+        })
+    }
+
+    /// Where a cell edge is crossed, and the gradient there.
+    fn crossing(&self, voxel: [usize; 3], edge: u8) -> (Vector3<f64>, Vector3<f64>) {
+        let [a, b] = edge_corners(edge).map(|corner| {
+            let corner = usize::from(corner);
+            [0, 1, 2].map(|axis| voxel[axis] + (corner >> axis & 1))
+        });
+        let (va, vb) = [a, b].map(|v| self.field.above(self.field.index(v))).into();
+        let t = va / (va - vb);
+        let [p, q] = [a, b].map(|v| Vector3::from(v.map(|c| c as f64)));
+        let gradient = self.field.gradient(a) * (1.0 - t) + self.field.gradient(b) * t;
+        (p + (q - p) * t, gradient)
+    }
+
+    /// Mean crossing and gradient of a ring.
+    fn middle(&self, voxel: [usize; 3], ring: &[u8]) -> (Vector3<f64>, Vector3<f64>) {
         let (mut position, mut gradient) = (Vector3::zeros(), Vector3::zeros());
-        for &edge in edges {
-            let [a, b] = edge_corners(edge).map(|corner| {
-                let corner = corner as usize;
-                [0, 1, 2].map(|axis| voxel[axis] + (corner >> axis & 1))
-            });
-            let (va, vb) = [a, b].map(|v| self.field.above(self.field.index(v))).into();
-            let t = va / (va - vb);
-            let [p, q] = [a, b].map(|v| Vector3::from(v.map(|c| c as f64)));
-            position += p + (q - p) * t;
-            gradient += self.field.gradient(a) * (1.0 - t) + self.field.gradient(b) * t;
+        for &edge in ring {
+            let (p, g) = self.crossing(voxel, edge);
+            position += p;
+            gradient += g;
         }
-        let n = ring.len() as f64;
-        let middle = self.push(position / n, gradient / n);
-        for at in 0..ring.len() {
-            self.triangle([ring[at], ring[(at + 1) % ring.len()], middle]);
+        (position / ring.len() as f64, gradient / ring.len() as f64)
+    }
+
+    /// A tube between two rings with a ring of extra vertices half-way, none of which lies in a
+    /// face of the cell, so that every bridge is allowed.
+    fn waist(&mut self, voxel: [usize; 3], edges: [&[u8]; 2], [first, second]: [Vec<u32>; 2]) {
+        let [here, there] = edges.map(|ring| self.middle(voxel, ring).0);
+        let shift = 0.5 * (there - here);
+        let waist: Vec<u32> = edges[0]
+            .iter()
+            .map(|&edge| {
+                let (position, gradient) = self.crossing(voxel, edge);
+                self.push(here + shift + 0.5 * (position - here), gradient)
+            })
+            .collect();
+        let (m, n) = (waist.len(), second.len());
+        for at in 0..m {
+            let next = (at + 1) % m;
+            self.triangle([first[at], first[next], waist[at]]);
+            self.triangle([first[next], waist[next], waist[at]]);
+        }
+        // The second ring runs the other way; both are paced evenly from their nearest vertices.
+        let back: Vec<u32> = second.iter().rev().copied().collect();
+        let positions: Vec<_> =
+            edges[1].iter().rev().map(|&edge| self.crossing(voxel, edge).0).collect();
+        let start = self.slab.positions[waist[0] as usize];
+        let away = |at: &usize| (positions[*at] - start).norm();
+        let turn = (0..n).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0);
+        let (mut i, mut j) = (0, 0);
+        while i < m || j < n {
+            let (p, q) = (waist[i % m], back[(j + turn) % n]);
+            if j == n || (i < m && i * n <= j * m) {
+                i += 1;
+                self.triangle([p, waist[i % m], q]);
+            } else {
+                j += 1;
+                self.triangle([p, back[(j + turn) % n], q]);
+            }
         }
     }
 
@@ -290,16 +364,22 @@ impl March<'_> {
     }
 }
 
-type Tube = ([usize; 2], Vec<[u8; 3]>);
-
-fn tube_of(configuration: &Configuration, decisions: usize, values: &[f64; 8]) -> Option<Tube> {
-    let pattern = &configuration.patterns[decisions];
-    if pattern.disks.len() < 2 {
-        return None;
-    }
-    let pair = tunnel::tube(configuration, decisions, pattern, values)?;
-    let [first, second] = pair.map(|at| pattern.disks[at].ring.as_slice());
-    Some((pair, tunnel::tube_triangles(first, second)?))
+/// Which diagonal of a four-sided ring has its middle nearer to the trilinear surface.
+fn first_diagonal_fits_better(ring: [u8; 4], values: &[f64; 8]) -> bool {
+    let crossings = ring.map(|edge| {
+        let [a, b] = edge_corners(edge);
+        let (va, vb) = (values[a as usize], values[b as usize]);
+        let mut place = [0, 1, 2].map(|axis| f64::from(a >> axis & 1));
+        place[usize::from(edge / 4)] = va / (va - vb);
+        place
+    });
+    let misfit = |p: [f64; 3], q: [f64; 3]| {
+        let [x, y, z] = [0, 1, 2].map(|axis| 0.5 * (p[axis] + q[axis]));
+        let along_x = |at: usize| values[at] + (values[at + 1] - values[at]) * x;
+        let along_y = |at: usize| along_x(at) + (along_x(at + 2) - along_x(at)) * y;
+        (along_y(0) + (along_y(4) - along_y(0)) * z).abs()
+    };
+    misfit(crossings[0], crossings[2]) <= misfit(crossings[1], crossings[3])
 }
 
 fn bits(mut word: u64) -> impl Iterator<Item = usize> {

@@ -136,47 +136,72 @@ pub fn tube_triangles(first: &[u8], second: &[u8]) -> Option<Vec<[u8; 3]>> {
     // Both loops are oriented as borders of disks with the body on the same side, so across the
     // tube they run against each other.
     let back: Vec<u8> = second.iter().rev().copied().collect();
-    let mut best: Option<(f64, Vec<[u8; 3]>)> = None;
+    let mut zipper = Zipper {
+        p: first,
+        q: back.clone(),
+        steps: Vec::new(),
+        best: None,
+    };
     for shift in 0..back.len() {
-        let turned: Vec<u8> = (0..back.len()).map(|i| back[(i + shift) % back.len()]).collect();
-        if let Some(found) = zip(first, &turned)
-            && best.as_ref().is_none_or(|(cost, _)| found.0 < *cost)
-        {
-            best = Some(found);
-        }
+        zipper.q = (0..back.len()).map(|i| back[(i + shift) % back.len()]).collect();
+        zipper.advance([0, 0], diagonal_cost(first[0], zipper.q[0]));
     }
-    best.map(|(_, triangles)| triangles)
+    zipper.best.map(|(_, triangles)| triangles)
 }
 
-/// Cheapest way to advance along `p` and `q` alternately, from (p0, q0) around to itself.
-fn zip(p: &[u8], q: &[u8]) -> Option<(f64, Vec<[u8; 3]>)> {
-    let (m, n) = (p.len(), q.len());
-    let bridge = |i: usize, j: usize| diagonal_cost(p[i % m], q[j % n]);
-    let mut cost = vec![vec![f64::INFINITY; n + 1]; m + 1];
-    cost[0][0] = bridge(0, 0);
-    for i in 0..=m {
-        for j in 0..=n {
-            if i + j > 0 {
-                let from_p = if i > 0 { cost[i - 1][j] } else { f64::INFINITY };
-                let from_q = if j > 0 { cost[i][j - 1] } else { f64::INFINITY };
-                cost[i][j] = from_p.min(from_q) + bridge(i, j);
+/// Tries all ways to advance along `p` and `q` alternately, once around.
+struct Zipper<'a> {
+    p: &'a [u8],
+    q: Vec<u8>,
+    /// Whether each step so far went along `p`.
+    steps: Vec<bool>,
+    best: Option<(f64, Vec<[u8; 3]>)>,
+}
+
+impl Zipper<'_> {
+    fn advance(&mut self, [i, j]: [usize; 2], cost: f64) {
+        let (m, n) = (self.p.len(), self.q.len());
+        let known = self.best.as_ref().map_or(f64::INFINITY, |(cost, _)| *cost);
+        if cost >= known {
+            return;
+        }
+        if [i, j] == [m, n] {
+            if let Some(triangles) = self.triangles() {
+                self.best = Some((cost, triangles));
+            }
+            return;
+        }
+        for (along_p, next) in [(true, [i + 1, j]), (false, [i, j + 1])] {
+            if next[0] <= m && next[1] <= n {
+                let bridge = diagonal_cost(self.p[next[0] % m], self.q[next[1] % n]);
+                self.steps.push(along_p);
+                self.advance(next, cost + bridge);
+                self.steps.pop();
             }
         }
     }
-    if !cost[m][n].is_finite() {
-        return None;
-    }
-    let mut triangles = Vec::new();
-    let (mut i, mut j) = (m, n);
-    while i + j > 0 {
-        if i > 0 && (j == 0 || cost[i - 1][j] <= cost[i][j - 1]) {
-            triangles.push([p[i - 1], p[i % m], q[j % n]]);
-            i -= 1;
-        } else {
-            triangles.push([p[i % m], q[j % n], q[j - 1]]);
-            j -= 1;
+
+    /// The strip of the steps taken, unless it uses one bridge twice.
+    fn triangles(&self) -> Option<Vec<[u8; 3]>> {
+        let (m, n) = (self.p.len(), self.q.len());
+        let (mut i, mut j) = (0, 0);
+        let mut bridges = Vec::new();
+        let mut triangles = Vec::new();
+        for &along_p in &self.steps {
+            let bridge = (i % m, j % n);
+            if bridges.contains(&bridge) {
+                return None;
+            }
+            bridges.push(bridge);
+            let (p, q) = (self.p[i % m], self.q[j % n]);
+            if along_p {
+                i += 1;
+                triangles.push([p, self.p[i % m], q]);
+            } else {
+                j += 1;
+                triangles.push([p, self.q[j % n], q]);
+            }
         }
+        Some(triangles)
     }
-    // The seam (p0, q0) must be used by two triangles only: both loops advance at least once.
-    Some((cost[m][n], triangles))
 }
