@@ -159,7 +159,7 @@ impl Distortion {
             }
         }
         let mut inside = 0.0;
-        for _ in 0..24 {
+        for _ in 0..12 {
             let middle = 0.5 * (inside + outside);
             if image_of(middle)? < target {
                 inside = middle;

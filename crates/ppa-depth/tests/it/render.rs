@@ -318,6 +318,25 @@ fn a_disc_covers_exactly_the_pixels_within_its_radius() {
     }
 }
 
+/// Recordings hold repeated points and meshes triangles without area; neither may break the index.
+#[test]
+fn repeated_points_and_flat_triangles_do_no_harm() {
+    let points = vec![Point3::new(0.0, 0.0, 500.0); 20_000];
+    let cloud = SurfelBody::new(&points, &vec![Vector3::z(); points.len()], 50.0).unwrap();
+    let corners =
+        [(-50.0, -50.0), (50.0, -50.0), (0.0, 50.0)].map(|(x, y)| Point3::new(x, y, 500.0));
+    let flat = [[0, 1, 1], [2, 2, 2], [0, 1, 2], [1, 0, 2]];
+    let mesh = MeshBody::new(&corners, &flat).unwrap();
+    for body in [Body::from(cloud), Body::from(mesh)] {
+        let placed = PlacedBody {
+            body: &body,
+            camera_from_body: Isometry3::identity(),
+        };
+        let image = render(&pinhole(11, 11, 500.0), &[placed]);
+        assert_eq!((image.min_mm(), image.valid_pixels()), (Some(500.0), 121));
+    }
+}
+
 #[test]
 fn what_is_no_surface_is_refused() {
     let corners = [
