@@ -30,6 +30,9 @@ mod tissue;
 mod truth;
 mod voxelise;
 
+#[cfg(test)]
+mod tests;
+
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use self::bone::Skeleton;

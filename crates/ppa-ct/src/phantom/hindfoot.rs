@@ -92,11 +92,12 @@ impl Mortise {
         self.facet(-1.0, p.lateral_facet_slope_rad)
     }
 
-    /// Half-space with a normal along the mortise axes.
-    fn wall(&self, normal: [f64; 3], offset: f64) -> Shape {
+    /// Half-space behind a plane through a point; both given along the mortise axes.
+    pub(super) fn wall(&self, outwards: [f64; 3], through: [f64; 3]) -> Shape {
+        let normal = Unit::new_normalize(Vector3::from(outwards));
         Shape::HalfSpace {
-            normal: self.limb_from_mortise * Unit::new_normalize(Vector3::from(normal)),
-            offset,
+            normal: self.limb_from_mortise * normal,
+            offset: normal.dot(&Vector3::from(through)),
         }
     }
 }
@@ -107,11 +108,11 @@ pub(super) fn talus(p: &Parameters, mortise: &Mortise) -> Bone {
         2.0,
         vec![
             mortise.cone(p),
-            mortise.wall([0.0, -1.0, 0.0], 17.0),
-            mortise.wall([0.0, 1.0, 0.0], 16.5),
-            mortise.wall([0.0, 0.0, -1.0], 27.0),
+            mortise.wall([0.0, -1.0, 0.0], [0.0, -17.0, 0.0]),
+            mortise.wall([0.0, 1.0, 0.0], [0.0, 16.5, 0.0]),
+            mortise.wall([0.0, 0.0, -1.0], [0.0, 0.0, -27.0]),
             // Below the comma of the medial facet the body recedes.
-            mortise.wall([0.8, 0.0, -0.6], 23.0),
+            mortise.wall([0.8, 0.0, -0.6], [17.5, 0.0, -15.0]),
         ],
     );
     let at = |m, b, z| mortise.point(m, b, z);

@@ -29,7 +29,7 @@ const METATARSALS: [Metatarsal; 5] = [
     Metatarsal {
         name: "first metatarsal",
         base: [20.5, -98.0, -44.0],
-        base_semi: [9.0, 9.5, 13.0],
+        base_semi: [8.3, 9.0, 11.5],
         head: [27.0, -147.0, -64.5],
         head_semi: [10.0, 9.5, 9.5],
         waist: 6.3,
@@ -37,7 +37,7 @@ const METATARSALS: [Metatarsal; 5] = [
     Metatarsal {
         name: "second metatarsal",
         base: [6.0, -88.0, -35.0],
-        base_semi: [7.5, 8.0, 9.5],
+        base_semi: [6.8, 8.5, 8.5],
         head: [5.0, -147.5, -65.0],
         head_semi: [5.5, 8.0, 8.0],
         waist: 4.3,
@@ -45,7 +45,7 @@ const METATARSALS: [Metatarsal; 5] = [
     Metatarsal {
         name: "third metatarsal",
         base: [-7.5, -92.0, -40.0],
-        base_semi: [7.0, 8.0, 9.5],
+        base_semi: [6.3, 8.0, 8.5],
         head: [-9.5, -143.0, -66.0],
         head_semi: [5.3, 7.7, 7.6],
         waist: 4.0,
@@ -53,7 +53,7 @@ const METATARSALS: [Metatarsal; 5] = [
     Metatarsal {
         name: "fourth metatarsal",
         base: [-20.0, -83.5, -47.5],
-        base_semi: [7.0, 8.0, 8.5],
+        base_semi: [6.3, 8.0, 7.5],
         head: [-24.0, -136.5, -67.0],
         head_semi: [5.2, 7.4, 7.2],
         waist: 3.9,
@@ -61,7 +61,7 @@ const METATARSALS: [Metatarsal; 5] = [
     Metatarsal {
         name: "fifth metatarsal",
         base: [-31.0, -77.0, -57.0],
-        base_semi: [8.0, 10.0, 7.0],
+        base_semi: [7.0, 10.0, 6.2],
         head: [-38.0, -128.0, -69.0],
         head_semi: [5.2, 7.2, 6.5],
         waist: 4.0,
@@ -144,7 +144,7 @@ impl Metatarsal {
         Shape::union(
             4.0,
             vec![
-                Shape::ellipsoid(self.base, self.base_semi),
+                Shape::block(self.base, self.base_semi, 4.5, Rotation3::identity()),
                 Shape::round_cone(self.base, self.waist + 1.2, self.head, self.waist),
                 Shape::ellipsoid(self.head, self.head_semi),
             ],
@@ -185,8 +185,8 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
         Shape::union(
             6.0,
             vec![
-                Shape::turned_ellipsoid([9.0, -48.0, -29.5], [19.0, 12.5, 13.0], about_y(25.0)),
-                Shape::ellipsoid([23.0, -45.0, -37.0], [7.0, 8.0, 7.0]),
+                Shape::block([8.5, -49.5, -30.0], [18.0, 8.5, 11.0], 7.5, about_y(25.0)),
+                Shape::ellipsoid([23.5, -45.0, -37.0], [6.5, 8.0, 7.0]),
             ],
         ),
         &[(hindfoot.talus, gap), (hindfoot.calcaneus, gap)],
@@ -195,10 +195,15 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
     let cuboid = push(
         "cuboid",
         Shape::union(
-            6.0,
+            5.0,
             vec![
-                Shape::ellipsoid([-18.0, -57.0, -50.0], [13.5, 19.5, 12.5]),
-                Shape::ellipsoid([-20.0, -50.0, -51.0], [12.0, 17.0, 11.0]),
+                Shape::block(
+                    [-17.5, -57.0, -49.0],
+                    [11.8, 18.5, 10.8],
+                    6.0,
+                    about_y(20.0),
+                ),
+                Shape::ellipsoid([-18.0, -48.0, -53.0], [11.0, 12.0, 10.0]),
             ],
         ),
         &[
@@ -210,19 +215,19 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
     );
     let intermediate = push(
         "intermediate cuneiform",
-        Shape::ellipsoid([6.5, -68.0, -29.5], [8.0, 14.5, 11.0]),
+        Shape::block([6.5, -67.0, -28.5], [7.5, 13.0, 9.5], 4.0, about_y(8.0)),
         &[(navicular, gap), (cuboid, gap)],
         spongy(),
     );
     let medial = push(
         "medial cuneiform",
-        Shape::turned_ellipsoid([19.5, -75.0, -38.5], [9.0, 16.0, 14.5], about_y(-10.0)),
+        Shape::block([19.5, -74.0, -38.5], [8.0, 16.0, 13.5], 5.5, about_y(-12.0)),
         &[(navicular, gap), (intermediate, 0.8 * gap)],
         spongy(),
     );
     let lateral = push(
         "lateral cuneiform",
-        Shape::ellipsoid([-6.5, -71.0, -37.0], [8.5, 15.5, 11.5]),
+        Shape::block([-5.5, -70.0, -35.5], [7.5, 15.5, 10.5], 4.5, about_y(18.0)),
         &[
             (navicular, gap),
             (cuboid, 0.8 * gap),

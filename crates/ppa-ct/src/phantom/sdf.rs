@@ -94,6 +94,13 @@ pub(super) enum Shape {
         semi: Vector3<f64>,
         local_from_limb: Rotation3<f64>,
     },
+    /// Cuboid with rounded edges, axes as for the ellipsoid; `half` is measured to the faces.
+    Block {
+        centre: Point3<f64>,
+        half: Vector3<f64>,
+        round: f64,
+        local_from_limb: Rotation3<f64>,
+    },
     /// Convex hull of two balls.
     RoundCone {
         from: Point3<f64>,
@@ -169,6 +176,21 @@ impl Shape {
         }
     }
 
+    /// Cuboid rounded by `round`, with half-edges along `limb_from_local` times x, y, z.
+    pub(super) fn block(
+        centre: [f64; 3],
+        half: [f64; 3],
+        round: f64,
+        limb_from_local: Rotation3<f64>,
+    ) -> Self {
+        Self::Block {
+            centre: centre.into(),
+            half: half.into(),
+            round,
+            local_from_limb: limb_from_local.inverse(),
+        }
+    }
+
     /// Convex hull of a ball at `from` and a ball at `to`.
     pub(super) fn round_cone(
         from: [f64; 3],
@@ -200,6 +222,16 @@ impl Shape {
                 semi,
                 local_from_limb,
             } => ellipsoid_distance(&(local_from_limb * (p - centre)), semi),
+            Self::Block {
+                centre,
+                half,
+                round,
+                local_from_limb,
+            } => {
+                let core = half.add_scalar(-round);
+                let q = (local_from_limb * (p - centre)).abs() - core;
+                q.sup(&Vector3::zeros()).norm() + q.max().min(0.0) - round
+            }
             Self::RoundCone {
                 from,
                 to,
@@ -227,6 +259,7 @@ impl Shape {
     pub(super) fn bounds(&self) -> Bounds {
         match self {
             Self::Ellipsoid { centre, semi, .. } => Bounds::ball(centre, semi.max()),
+            Self::Block { centre, half, .. } => Bounds::ball(centre, half.norm()),
             Self::RoundCone {
                 from,
                 to,

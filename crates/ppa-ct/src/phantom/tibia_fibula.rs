@@ -123,9 +123,9 @@ const TIBIA: [TibiaSection; 8] = [
 
 /// Station, centre (medial, posterior) and semi-axes of the fibula in the mortise frame.
 const FIBULA: [(f64, [f64; 2], [f64; 2]); 8] = [
-    (-14.0, [-26.0, 3.5], [7.0, 9.5]),
-    (-4.0, [-25.5, 3.0], [7.8, 10.5]),
-    (8.0, [-24.5, 3.0], [8.0, 9.8]),
+    (-14.0, [-24.6, 3.0], [9.0, 10.5]),
+    (-4.0, [-23.4, 2.5], [9.0, 10.8]),
+    (8.0, [-24.0, 3.0], [8.3, 10.0]),
     (22.0, [-23.5, 3.0], [7.3, 8.2]),
     (45.0, [-22.5, 3.5], [6.0, 6.8]),
     (90.0, [-24.0, 4.5], [5.5, 6.2]),
@@ -180,9 +180,11 @@ pub(super) fn tibia(p: &Parameters, mortise: &Mortise, talus: usize) -> Bone {
             grown(p.medial_gutter_mm, mortise.medial_facet(p)),
         ],
     );
+    // The tubercles beside the fibula end at the joint line, while the lips in front and behind reach lower.
+    let below_tubercles = mortise.wall([-0.45, 0.0, -0.89], [-14.0, 0.0, -3.0]);
     Bone {
         name: "tibia",
-        solid,
+        solid: Shape::common(2.0, vec![solid, below_tubercles]),
         hollows: vec![mortise_space],
         yields_to: vec![(talus, 0.8 * p.medial_gutter_mm)],
         filling: shaft(&[
@@ -213,8 +215,8 @@ pub(super) fn fibula(p: &Parameters, mortise: &Mortise, tibia: usize, talus: usi
         vec![
             Shape::Loft(Box::new(shaft_to_malleolus)),
             Shape::round_cone(
-                mortise.point(-25.5, 2.0, -6.0),
-                7.5,
+                mortise.point(-25.0, 2.5, -6.0),
+                8.0,
                 mortise.point(-26.0, 4.5, tip + 5.5),
                 5.5,
             ),
