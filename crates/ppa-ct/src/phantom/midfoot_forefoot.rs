@@ -177,15 +177,23 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
         bones.len() - 1
     };
     let spongy = || Filling::spongy(0.9, 260.0);
-    let about_y =
-        |degrees: f64| Rotation3::from_axis_angle(&Vector3::y_axis(), degrees.to_radians());
+    // Turned about the foot's length by the transverse arch, then forward and down with the longitudinal one.
+    let arched = |transverse: f64, longitudinal: f64| {
+        Rotation3::from_axis_angle(&Vector3::x_axis(), longitudinal.to_radians())
+            * Rotation3::from_axis_angle(&Vector3::y_axis(), transverse.to_radians())
+    };
 
     let navicular = push(
         "navicular",
         Shape::union(
             6.0,
             vec![
-                Shape::block([8.5, -49.5, -30.0], [18.0, 8.5, 11.0], 7.5, about_y(25.0)),
+                Shape::block(
+                    [8.5, -49.5, -30.0],
+                    [18.0, 8.5, 11.0],
+                    7.5,
+                    arched(25.0, 12.0),
+                ),
                 Shape::ellipsoid([23.5, -45.0, -37.0], [6.5, 8.0, 7.0]),
             ],
         ),
@@ -200,8 +208,8 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
                 Shape::block(
                     [-17.5, -57.0, -49.0],
                     [11.8, 18.5, 10.8],
-                    6.0,
-                    about_y(20.0),
+                    8.0,
+                    arched(20.0, 6.0),
                 ),
                 Shape::ellipsoid([-18.0, -48.0, -53.0], [11.0, 12.0, 10.0]),
             ],
@@ -215,19 +223,34 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
     );
     let intermediate = push(
         "intermediate cuneiform",
-        Shape::block([6.5, -67.0, -28.5], [7.5, 13.0, 9.5], 4.0, about_y(8.0)),
+        Shape::block(
+            [6.5, -67.0, -28.5],
+            [7.5, 13.0, 9.5],
+            5.5,
+            arched(8.0, 15.0),
+        ),
         &[(navicular, gap), (cuboid, gap)],
         spongy(),
     );
     let medial = push(
         "medial cuneiform",
-        Shape::block([19.5, -74.0, -38.5], [8.0, 16.0, 13.5], 5.5, about_y(-12.0)),
+        Shape::block(
+            [19.5, -74.0, -38.5],
+            [8.0, 16.0, 13.5],
+            6.5,
+            arched(-12.0, 15.0),
+        ),
         &[(navicular, gap), (intermediate, 0.8 * gap)],
         spongy(),
     );
     let lateral = push(
         "lateral cuneiform",
-        Shape::block([-5.5, -70.0, -35.5], [7.5, 15.5, 10.5], 4.5, about_y(18.0)),
+        Shape::block(
+            [-5.5, -70.0, -35.5],
+            [7.5, 15.5, 10.5],
+            5.5,
+            arched(18.0, 13.0),
+        ),
         &[
             (navicular, gap),
             (cuboid, 0.8 * gap),

@@ -316,3 +316,50 @@ fn round_cone_distance(p: &Point3<f64>, a: &Point3<f64>, b: &Point3<f64>, ra: f6
         across * cosine + along * sine - ra
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn point(reach: f64) -> impl Strategy<Value = Point3<f64>> {
+        [-reach..reach, -reach..reach, -reach..reach].prop_map(Point3::from)
+    }
+
+    proptest! {
+        /// A round cone is the union of the balls between its ends.
+        #[test]
+        fn round_cone_is_the_nearest_of_its_balls(p in point(30.0), to in point(15.0), ra in 1.0..6.0_f64, rb in 1.0..6.0_f64) {
+            let cone = Shape::round_cone([0.0; 3], ra, to.coords.into(), rb);
+            let steps = 4000;
+            let nearest = (0..=steps)
+                .map(|n| f64::from(n) / f64::from(steps))
+                .map(|t| (p.coords - to.coords * t).norm() - (ra + t * (rb - ra)))
+                .fold(f64::INFINITY, f64::min);
+            let distance = cone.distance(&p);
+            prop_assert!(if nearest > 0.0 { (distance - nearest).abs() < 0.02 } else { distance < 0.02 },
+                "{distance} against {nearest}");
+        }
+
+        /// A blend adds material, at most a quarter of its width, and nothing away from the seam.
+        #[test]
+        fn smooth_min_stays_within_a_quarter_of_the_blend(a in -20.0..20.0_f64, b in -20.0..20.0_f64, k in 0.1..10.0_f64) {
+            let (sharp, smooth) = (a.min(b), smooth_min(a, b, k));
+            prop_assert!(smooth <= sharp && smooth >= sharp - k / 4.0 - 1e-12);
+            prop_assert!((a - b).abs() < k || smooth == sharp);
+        }
+
+        /// The surface of an ellipsoid is where the formula of an ellipsoid puts it, with slope 1.
+        #[test]
+        fn ellipsoid_is_exact_to_first_order(direction in point(1.0), offset in -0.5..0.5_f64) {
+            prop_assume!(direction.coords.norm() > 0.1);
+            let semi = Vector3::new(16.0, 9.0, 12.0);
+            let unit = direction.coords.normalize();
+            let on_surface = unit.component_mul(&semi);
+            let normal = unit.component_div(&semi).normalize();
+            let ellipsoid = Shape::ellipsoid([0.0; 3], semi.into());
+            let distance = ellipsoid.distance(&Point3::from(on_surface + normal * offset));
+            prop_assert!((distance - offset).abs() < 0.05 * offset.abs() + 1e-9, "{distance} for {offset}");
+        }
+    }
+}
