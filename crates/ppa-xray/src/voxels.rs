@@ -4,7 +4,8 @@ use nalgebra::Point3;
 use ppa_ct::{Grid, Volume};
 
 use crate::hu::{CalibrationError, HuCalibration, Tissue};
-use crate::material::{Material, MaterialError};
+use crate::material::Material;
+use crate::material_error::MaterialError;
 
 /// Why a voxel phantom cannot be made.
 #[derive(Debug, thiserror::Error)]
