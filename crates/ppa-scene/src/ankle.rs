@@ -19,6 +19,9 @@ const FLARE: f64 = 1.8;
 /// The flare starts this far above the joint, mm: the distal tibia widens over 15 to 40 mm.
 const FLARE_TO_JOINT_MM: [f64; 2] = [5.0, 50.0];
 
+/// Outline of the thinnest adult tibia, roughly; those of adults measure 300 to 500 mm².
+const MIN_TIBIA_MM2: f64 = 220.0;
+
 /// Radius of the column through the tibia whose density is followed, mm. The talar dome
 /// (radius about 20 mm) falls by less than 1 mm over it.
 const COLUMN_MM: f64 = 6.0;
@@ -69,41 +72,68 @@ pub(crate) fn find_ankle(sections: &Sections) -> Option<Ankle> {
     })
 }
 
+/// A level with its largest bone.
+struct Level {
+    level_mm: f64,
+    centre: Point3<f64>,
+    has_fibula: bool,
+}
+
 /// Index (into `slices`) where the flare starts, and the tibia's centres from there 40 mm up.
+///
+/// A forearm's radius is thinner than any adult tibia, and a femur has only the short kneecap
+/// beside it: neither counts as a tibia.
 fn flare(sections: &Sections, slices: &[usize]) -> Option<(usize, Vec<(f64, Point3<f64>)>)> {
     const SUSTAINED_MM: f64 = 4.0;
     const SHAFT_MM: f64 = 40.0;
-    let mut centres: Vec<(f64, Point3<f64>)> = Vec::new();
-    let mut thinnest: Option<(f64, bool)> = None;
+    let mut levels: Vec<Level> = Vec::new();
+    let mut thinnest_mm2 = f64::INFINITY;
     let mut start: Option<usize> = None;
     for (index, slice) in slices.iter().enumerate() {
-        let level = sections.level(*slice);
+        let level_mm = sections.level(*slice);
         let bones = sections.bones(*slice);
-        let Some(tibia) = bones.first().filter(|bone| bone.area_mm2 >= 50.0) else {
+        let Some(tibia) = bones.first().filter(|bone| bone.area_mm2 >= MIN_TIBIA_MM2) else {
             continue;
         };
-        let has_fibula = bones
-            .get(1)
-            .is_some_and(|bone| (0.05..0.7).contains(&(bone.area_mm2 / tibia.area_mm2)));
-        centres.push((level, tibia.centre));
-        match thinnest {
-            Some((area, true)) if tibia.area_mm2 >= FLARE * area => {
-                let first = *start.get_or_insert(index);
-                let top = sections.level(slices[first]);
-                if top - level >= SUSTAINED_MM && index > first {
-                    let shaft = |level: f64| (top..=top + SHAFT_MM).contains(&level);
-                    centres.retain(|(level, _)| shaft(*level));
-                    return Some((first, centres));
-                }
+        levels.push(Level {
+            level_mm,
+            centre: tibia.centre,
+            has_fibula: bones
+                .get(1)
+                .is_some_and(|bone| (0.05..0.7).contains(&(bone.area_mm2 / tibia.area_mm2))),
+        });
+        if tibia.area_mm2 < FLARE * thinnest_mm2 {
+            thinnest_mm2 = thinnest_mm2.min(tibia.area_mm2);
+            start = None;
+            continue;
+        }
+        let first = *start.get_or_insert(index);
+        let top_mm = sections.level(slices[first]);
+        if top_mm - level_mm >= SUSTAINED_MM {
+            if !fibula_beside(&levels, top_mm) {
+                return None;
             }
-            Some((area, _)) if tibia.area_mm2 >= area => start = None,
-            _ => {
-                thinnest = Some((tibia.area_mm2, has_fibula));
-                start = None;
-            }
+            let centres = levels
+                .iter()
+                .filter(|l| (top_mm..=top_mm + SHAFT_MM).contains(&l.level_mm))
+                .map(|l| (l.level_mm, l.centre))
+                .collect();
+            return Some((first, centres));
         }
     }
     None
+}
+
+/// Whether a thinner bone runs along most of the shaft above a level.
+fn fibula_beside(levels: &[Level], top_mm: f64) -> bool {
+    const ALONG_MM: f64 = 80.0;
+    let shaft: Vec<bool> = levels
+        .iter()
+        .filter(|l| (top_mm..=top_mm + ALONG_MM).contains(&l.level_mm))
+        .map(|l| l.has_fibula)
+        .collect();
+    let with_fibula = shaft.iter().filter(|has| **has).count();
+    5 * with_fibula >= 3 * shaft.len()
 }
 
 /// Centre of the shaft as a straight function of the level.

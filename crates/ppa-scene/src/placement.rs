@@ -1,6 +1,8 @@
 //! Laying a rotated limb on the table under the central beam: T_rot, T_mat and T_opt.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{
+    Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::contact::{Profile, Tilt, split_level};
@@ -138,7 +140,7 @@ pub fn place(
     }
     let t_rot = medial_rotation(landmarks.side, angle_rad);
     let (room_axes, limb_axes) = (table_axes(table, device)?, plane_axes(&under_limb));
-    let rotation = UnitQuaternion::from_matrix(&(room_axes * limb_axes.transpose()));
+    let rotation = axes_rotation(&room_axes, &limb_axes);
 
     // Heights and lengths about the joint centre, in table axes.
     let table_from_ct = limb_axes.transpose()
@@ -234,6 +236,12 @@ fn plane_axes(under_limb: &Plane) -> Matrix3<f64> {
     let up = under_limb.normal.into_inner();
     let y = (Vector3::z() - up * up.z).normalize();
     Matrix3::from_columns(&[y.cross(&up), y, up])
+}
+
+/// The rotation that takes one triad to another.
+fn axes_rotation(to: &Matrix3<f64>, from: &Matrix3<f64>) -> UnitQuaternion<f64> {
+    let matrix = Rotation3::from_matrix_unchecked(to * from.transpose());
+    UnitQuaternion::from_rotation_matrix(&matrix)
 }
 
 /// The point of the central beam at a height above the table.

@@ -178,6 +178,24 @@ proptest! {
         prop_assert!((here.room_from_patient * p - there.room_from_patient * p).norm() < 0.1);
     }
 
+    /// Wherever Π_P lies, T_mat brings it onto the table and T_opt the limb to rest. T_mat is
+    /// close to half a turn here, where matrices are hard to turn into quaternions.
+    #[test]
+    fn any_plane_under_the_limb_will_do(slopes in prop::array::uniform2(-0.6..0.6_f64), angle in 0.0..1.6_f64) {
+        let mut landmarks = boot_landmarks(Side::Right);
+        let points = boot(Side::Right);
+        for p in &mut landmarks.plane_points {
+            p[1] += slopes[0] * p[0] + slopes[1] * p[2];
+        }
+        let placement = place(&points, &landmarks, angle, &table(), &device()).unwrap();
+        let matched = landmarks.plane_patient().transformed(placement.t_mat.isometry());
+        prop_assert!((matched.normal.into_inner() - Vector3::z()).norm() < 1e-9);
+        prop_assert!(matched.offset_mm.abs() < 1e-9);
+        let contact = placement.contact;
+        prop_assert!(contact.penetration_mm < 1e-9 && contact.gap_mm < 1e-9, "{contact:?}");
+        prop_assert!((contact.distal_mm - contact.proximal_mm).abs() < 0.051, "{contact:?}");
+    }
+
     /// A recorded room may stand in any frame, with the table tilted against the beam.
     #[test]
     fn placement_follows_the_room_frame(room in isometries(), angle in 0.0..1.6_f64) {
