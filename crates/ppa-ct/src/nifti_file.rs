@@ -152,7 +152,9 @@ fn read_voxels(
     let gap = offset as u64 - HEADER_BYTES as u64;
     let mut bytes = Vec::new();
     std::io::copy(&mut (&mut stream).take(gap), &mut std::io::sink())
-        .and_then(|_| stream.take(expected).read_to_end(&mut bytes))
+        .and_then(|_| (&mut stream).take(expected).read_to_end(&mut bytes))
+        // To the very end: only there does gzip compare its checksum.
+        .and_then(|_| std::io::copy(&mut stream, &mut std::io::sink()))
         .map_err(|e| context.io(e))?;
     if bytes.len() as u64 != expected {
         return Err(ReadError::PixelCount {
