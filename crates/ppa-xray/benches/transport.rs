@@ -4,8 +4,8 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;
 use ppa_xray::{
-    AnalogSettings, Detector, FastSettings, Material, Projection, Spectrum, TubeSpec,
-    VoxelPhantom, analog, fast, primary,
+    AnalogSettings, Detector, FastSettings, Material, Projection, Spectrum, TubeSpec, VoxelPhantom,
+    analog, fast, primary,
 };
 
 /// A 20 cm water cube in 2 mm voxels with a 3 cm bone cylinder, as in case a of the reference data;
@@ -75,17 +75,21 @@ fn images(criterion: &mut Criterion) {
     for pixels in [150, 300] {
         let projection = projection(pixels);
         group.throughput(Throughput::Elements(u64::from(pixels * pixels)));
-        group.bench_with_input(BenchmarkId::new("primary", pixels), &projection, |b, projection| {
-            b.iter(|| primary(&phantom, &spectrum, projection, 2).unwrap())
-        });
+        group.bench_with_input(
+            BenchmarkId::new("primary", pixels),
+            &projection,
+            |b, projection| b.iter(|| primary(&phantom, &spectrum, projection, 2).unwrap()),
+        );
         let settings = FastSettings {
             scatter_histories: 100_000,
             samples_per_side: 2,
             ..FastSettings::default()
         };
-        group.bench_with_input(BenchmarkId::new("fast", pixels), &projection, |b, projection| {
-            b.iter(|| fast(&phantom, &spectrum, projection, &settings).unwrap())
-        });
+        group.bench_with_input(
+            BenchmarkId::new("fast", pixels),
+            &projection,
+            |b, projection| b.iter(|| fast(&phantom, &spectrum, projection, &settings).unwrap()),
+        );
     }
 }
 

@@ -45,7 +45,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let radiograph = fast(&phantom, &spectrum, &projection, &FastSettings::default())?;
     for category in Category::ALL {
         let (energy, se) = radiograph.sums.of(category);
-        println!("{:9} {energy:9.2} ± {se:.2} eV per history", category.name());
+        println!(
+            "{:9} {energy:9.2} ± {se:.2} eV per history",
+            category.name()
+        );
     }
     radiograph.write_png(format!("{stem}.png").as_ref(), &Presentation::default())?;
     radiograph.write_exr(format!("{stem}.exr").as_ref())?;

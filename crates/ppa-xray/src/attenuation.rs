@@ -217,3 +217,61 @@ fn round_up(density: f32, ratio: f32) -> f32 {
     let exponent = (density.ln() / ratio.ln()).ceil();
     ratio.powf(exponent).max(density)
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Point3, Vector3};
+    use ppa_ct::Grid;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::material::Material;
+
+    /// Woodcock tracking is right only if no voxel exceeds the bound of its block.
+    #[test]
+    fn no_voxel_exceeds_the_bound_of_its_block() {
+        let grid =
+            Grid::axis_aligned([61, 83, 70], Vector3::repeat(1.0), Point3::origin()).unwrap();
+        let materials = ["air", "soft_tissue", "bone_cortical", "titanium"]
+            .map(|n| Material::named(n).unwrap());
+        // Many densities, so that blocks must share classes.
+        let scramble = |n: usize| (n.wrapping_mul(2_654_435_761) >> 7) % 10_007;
+        let (material, density) = (0..grid.len())
+            .map(|n| {
+                let region = scramble(grid.voxel(n).map(|v| v / 5).iter().sum::<usize>());
+                ((region % 4) as u8, scramble(n) as f32 / 4_000.0)
+            })
+            .unzip();
+        let phantom = VoxelPhantom::new(grid, material, density, materials.to_vec()).unwrap();
+        let tables: Vec<_> = phantom
+            .materials()
+            .iter()
+            .map(MaterialTables::new)
+            .collect();
+        let attenuation = Attenuation::new(&tables);
+        let majorants = Majorants::new(&phantom, &attenuation);
+        assert!((2..=Majorants::MOST_CLASSES).contains(&majorants.classes));
+        for energy_kev in [5.0, 5.03, 33.17, 59.999, 149.99, 150.0] {
+            let (energy, row) = (attenuation.locate(energy_kev), majorants.row(energy_kev));
+            for voxel in (0..phantom.grid().len()).step_by(7) {
+                let [i, j, k] = phantom.grid().voxel(voxel).map(|v| v / 8);
+                let blocks = majorants.blocks.map(|n| n as usize);
+                let bound = majorants.bound(row, i + blocks[0] * (j + blocks[1] * k));
+                let total = attenuation.at(phantom.material()[voxel], energy).total;
+                let mu = f64::from(phantom.density_g_cm3()[voxel] * total);
+                assert!(
+                    mu <= bound * (1.0 + 1e-6),
+                    "{energy_kev} keV, voxel {voxel}: {mu} {bound}"
+                );
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn rounding_up_never_rounds_down(density in 1e-6..20.0_f32, ratio in 1.02..3.0_f32) {
+            let rounded = round_up(density, ratio);
+            prop_assert!(rounded >= density && rounded <= density * ratio * 1.001);
+        }
+    }
+}

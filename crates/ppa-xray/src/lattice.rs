@@ -89,10 +89,10 @@ impl Walk {
             count,
         };
         let mut stride = 1;
-        for axis in 0..3 {
+        for (axis, &cells) in count.iter().enumerate() {
             let (origin, slope) = (ray.origin[axis], ray.slope[axis]);
             let at = (origin + slope * start_mm) / edge;
-            let cell = (at as u32).min(count[axis] - 1);
+            let cell = (at as u32).min(cells - 1);
             walk.cell[axis] = cell;
             walk.index += cell as usize * stride;
             if slope != 0.0 {
@@ -108,7 +108,7 @@ impl Walk {
                     stride.wrapping_neg()
                 };
             }
-            stride *= count[axis] as usize;
+            stride *= cells as usize;
         }
         walk
     }

@@ -177,15 +177,19 @@ impl Projection {
     pub(crate) fn field_may_meet(&self, corners: &[Point3<f64>]) -> bool {
         let [half_x, half_y] = self.detector.half_mm();
         let d = self.source_detector_mm;
-        let faces: [&dyn Fn(&Point3<f64>) -> bool; 6] = [
-            &|p| p.x * d > half_x * p.z,
-            &|p| -p.x * d > half_x * p.z,
-            &|p| p.y * d > half_y * p.z,
-            &|p| -p.y * d > half_y * p.z,
-            &|p| p.z < 0.0,
-            &|p| p.z > d,
+        let outward = [
+            (Vector3::new(d, 0.0, -half_x), 0.0),
+            (Vector3::new(-d, 0.0, -half_x), 0.0),
+            (Vector3::new(0.0, d, -half_y), 0.0),
+            (Vector3::new(0.0, -d, -half_y), 0.0),
+            (Vector3::new(0.0, 0.0, -1.0), 0.0),
+            (Vector3::new(0.0, 0.0, 1.0), d),
         ];
-        faces.iter().all(|outside| !corners.iter().all(outside))
+        outward.iter().all(|(normal, offset)| {
+            corners
+                .iter()
+                .any(|corner| normal.dot(&corner.coords) <= *offset)
+        })
     }
 }
 

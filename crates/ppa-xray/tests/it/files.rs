@@ -2,9 +2,7 @@
 
 use exr::prelude::{ReadChannels, ReadLayers, read};
 use nalgebra::Isometry3;
-use ppa_xray::{
-    Category, EXR_ATTRIBUTE, FastSettings, Presentation, Radiograph, Spectrum, fast,
-};
+use ppa_xray::{Category, EXR_ATTRIBUTE, FastSettings, Presentation, Radiograph, Spectrum, fast};
 
 use crate::scenes::{frontal, limb};
 
@@ -15,7 +13,13 @@ fn radiograph() -> Radiograph {
         ..FastSettings::default()
     };
     let spectrum = Spectrum::monoenergetic(40.0).unwrap();
-    fast(&limb(&Isometry3::identity()), &spectrum, &frontal(60, 3.0), &settings).unwrap()
+    fast(
+        &limb(&Isometry3::identity()),
+        &spectrum,
+        &frontal(60, 3.0),
+        &settings,
+    )
+    .unwrap()
 }
 
 #[test]
@@ -48,7 +52,10 @@ fn exr_returns_every_layer_and_the_same_bytes_each_time() {
     }
     let (_, text) = file.layer_data.attributes.other.iter().next().unwrap();
     let text = format!("{text:?}");
-    assert!(text.contains("seed = 77") && text.contains("eV/cm2"), "{EXR_ATTRIBUTE}: {text}");
+    assert!(
+        text.contains("seed = 77") && text.contains("eV/cm2"),
+        "{EXR_ATTRIBUTE}: {text}"
+    );
 }
 
 #[test]
@@ -57,7 +64,10 @@ fn png_holds_sixteen_bits_with_bone_white_and_air_black() {
     let path = folder.path().join("limb.png");
     image.write_png(&path, &Presentation::default()).unwrap();
     let png = image::open(&path).unwrap().into_luma16();
-    assert_eq!(png.as_raw(), &image.present(&Presentation::default()).unwrap());
+    assert_eq!(
+        png.as_raw(),
+        &image.present(&Presentation::default()).unwrap()
+    );
     let (corner, centre) = (png.get_pixel(2, 2).0[0], png.get_pixel(30, 30).0[0]);
     assert!(corner < 2_000 && centre > 40_000, "{corner} {centre}");
 }

@@ -1,10 +1,10 @@
 //! Checks of the public interface, some against reference data that is not part of the repository.
 
+mod attenuation;
 mod case_a;
 mod files;
 mod placement;
 mod scenes;
 mod shared;
-mod transport;
-mod attenuation;
 mod spectra;
+mod transport;

@@ -47,7 +47,10 @@ fn slab_follows_beer_lambert() {
     let z = (detected - histories as f64 * p) / sigma;
     assert!(z.abs() < 4.0, "{z:.1} sigma from exp(−μt)"); // 6e-5
     let se = image.sums.primary_ev_per_history_se / 60e3 * histories as f64;
-    assert!((se / sigma - 1.0).abs() < 0.02, "standard error {se}, binomial {sigma}");
+    assert!(
+        (se / sigma - 1.0).abs() < 0.02,
+        "standard error {se}, binomial {sigma}"
+    );
 }
 
 #[test]
@@ -56,15 +59,22 @@ fn nothing_in_the_beam_brings_all_energy_to_the_detector() {
     let mean_ev = 1e3 * spectrum.mean_energy_kev();
     let image = analog(&vacuum, &spectrum, &projection, &settings(100_000, 3)).unwrap();
     let (energy, se) = image.sums.of(Category::Primary);
-    assert!((energy - mean_ev).abs() < 4.0 * se, "{energy} ± {se}, expected {mean_ev}");
+    assert!(
+        (energy - mean_ev).abs() < 4.0 * se,
+        "{energy} ± {se}, expected {mean_ev}"
+    );
     assert_eq!(image.sums.total_ev_per_history(), energy);
     let area_cm2 = 0.25;
     let on_pixels: f64 = image.total().iter().map(|&v| f64::from(v) * area_cm2).sum();
     assert!((on_pixels / energy - 1.0).abs() < 1e-6);
     // The midpoint rule in pixels of 5 mm at 1.1 m leaves less than 1e-5.
-    let traced: f64 = primary(&vacuum, &spectrum, &projection, 1).unwrap().iter().sum();
+    let traced: f64 = primary(&vacuum, &spectrum, &projection, 1)
+        .unwrap()
+        .iter()
+        .sum();
     assert!((traced * area_cm2 / mean_ev - 1.0).abs() < 1e-5);
-    let open = image.open_field_at(30 * 60 + 30) / primary(&vacuum, &spectrum, &projection, 1).unwrap()[30 * 60 + 30];
+    let open = image.open_field_at(30 * 60 + 30)
+        / primary(&vacuum, &spectrum, &projection, 1).unwrap()[30 * 60 + 30];
     assert!((open - 1.0).abs() < 1e-4);
 }
 
@@ -81,7 +91,9 @@ fn tallied_and_ray_traced_primary_agree_pixel_by_pixel() {
         .iter()
         .zip(layer.value.iter().zip(&layer.sigma))
         .filter(|(expected, _)| **expected * 0.25 * histories as f64 > 50.0 * 40e3)
-        .map(|(expected, (value, sigma))| ((f64::from(*value) - expected) / f64::from(*sigma)).powi(2))
+        .map(|(expected, (value, sigma))| {
+            ((f64::from(*value) - expected) / f64::from(*sigma)).powi(2)
+        })
         .collect();
     let n = z2.len() as f64;
     assert!(n > 350.0, "{n} pixels");
@@ -89,7 +101,10 @@ fn tallied_and_ray_traced_primary_agree_pixel_by_pixel() {
     assert!(deviation.abs() < 4.5, "χ² is {deviation:.1} sigma off"); // 1e-5
     let total: f64 = traced.iter().sum::<f64>() * 0.25;
     let (energy, se) = tallied.sums.of(Category::Primary);
-    assert!((energy - total).abs() < 4.0 * se, "{energy} ± {se}, ray-traced {total}");
+    assert!(
+        (energy - total).abs() < 4.0 * se,
+        "{energy} ± {se}, ray-traced {total}"
+    );
 }
 
 #[test]
@@ -171,13 +186,21 @@ fn fast_scatter_is_that_of_analog() {
     for category in [Category::Compton, Category::Rayleigh, Category::Multiple] {
         let (a, se_a) = image.sums.of(category);
         let (b, se_b) = expected.sums.of(category);
-        assert!((a - b).abs() < 4.0 * se_a.hypot(se_b), "{category:?}: {a} {b}");
-        let blocks = blocks(&image, category).into_iter().zip(blocks(&expected, category));
+        assert!(
+            (a - b).abs() < 4.0 * se_a.hypot(se_b),
+            "{category:?}: {a} {b}"
+        );
+        let blocks = blocks(&image, category)
+            .into_iter()
+            .zip(blocks(&expected, category));
         chi2 += blocks
             .map(|((found, _), (expected, variance))| (found - expected).powi(2) / (2.0 * variance))
             .sum::<f64>();
     }
-    assert!((20.0..97.0).contains(&chi2), "χ² = {chi2} with 48 degrees of freedom"); // 4e-5
+    assert!(
+        (20.0..97.0).contains(&chi2),
+        "χ² = {chi2} with 48 degrees of freedom"
+    ); // 4e-5
 }
 
 #[test]
@@ -193,7 +216,10 @@ fn added_noise_has_the_stated_error() {
         fast(&phantom, &spectrum, &projection, &settings).unwrap()
     };
     let (noisy, expected) = (image(1e7), image(f64::INFINITY));
-    let (noisy, expected) = (noisy.layer(Category::Primary), expected.layer(Category::Primary));
+    let (noisy, expected) = (
+        noisy.layer(Category::Primary),
+        expected.layer(Category::Primary),
+    );
     let z: Vec<f64> = (0..noisy.value.len())
         .map(|i| f64::from(noisy.value[i] - expected.value[i]) / f64::from(noisy.sigma[i]))
         .collect();
@@ -201,5 +227,8 @@ fn added_noise_has_the_stated_error() {
     let mean = z.iter().sum::<f64>() / n;
     let variance = z.iter().map(|z| z * z).sum::<f64>() / n;
     assert!(mean.abs() * n.sqrt() < 4.5, "mean {mean}");
-    assert!((variance - 1.0).abs() < 5.0 * (2.0 / n).sqrt(), "variance {variance}");
+    assert!(
+        (variance - 1.0).abs() < 5.0 * (2.0 / n).sqrt(),
+        "variance {variance}"
+    );
 }
