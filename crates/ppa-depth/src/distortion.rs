@@ -170,3 +170,27 @@ impl Distortion {
         Some(distorted * (0.5 * (inside + outside) / target))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Central differences err by h² times the third derivative, far below 1e-7 here.
+        #[test]
+        fn the_derivative_is_that_of_the_distortion(x in -0.8..0.8_f64, y in -0.8..0.8_f64, p1 in -0.01..0.01_f64,
+            p2 in -0.01..0.01_f64, early: bool) {
+            let model = if early { CameraModel::Rational6Kt } else { CameraModel::BrownConrady };
+            let lens = Distortion::new(&CameraSpec { model, p1, p2, ..CameraSpec::azure_kinect_nfov() });
+            let at = Vector2::new(x, y);
+            let (_, jacobian) = lens.distort(&at).unwrap();
+            let h = 1e-5;
+            for axis in [Vector2::x(), Vector2::y()] {
+                let image = |point: Vector2<f64>| lens.distort(&point).unwrap().0;
+                let slope = (image(at + axis * h) - image(at - axis * h)) / (2.0 * h);
+                prop_assert!((jacobian * axis - slope).amax() < 1e-7);
+            }
+        }
+    }
+}

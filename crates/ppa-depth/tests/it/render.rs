@@ -1,6 +1,6 @@
 //! Depth images of shapes whose depth is known.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use ppa_depth::{
     Body, BodyError, Camera, CameraModel, CameraSpec, DepthImage, MeshBody, PlacedBody, SurfelBody,
     render,
@@ -301,9 +301,12 @@ fn a_recorded_plane_is_covered_and_flat() {
 
 #[test]
 fn a_disc_covers_exactly_the_pixels_within_its_radius() {
-    let body = Body::from(SurfelBody::new(&[Point3::origin()], &[Vector3::z()], 31.7).unwrap());
+    // Oblique in its own frame, turned to face the camera.
+    let normal = Vector3::new(1.0, -2.0, 3.0);
+    let body = Body::from(SurfelBody::new(&[Point3::origin()], &[normal], 31.7).unwrap());
+    let facing = UnitQuaternion::rotation_between(&normal.cast(), &Vector3::z()).unwrap();
     let camera = pinhole(101, 101, 500.0);
-    let camera_from_body = Isometry3::translation(0.0, 0.0, 400.0);
+    let camera_from_body = Isometry3::from_parts(Translation3::new(0.0, 0.0, 400.0), facing);
     let image = render(
         &camera,
         &[PlacedBody {
