@@ -54,9 +54,9 @@ impl Profile {
     /// The tilt at which both halves reach equally low, within [`TAU_MM`].
     ///
     /// Algorithm 2 of the paper: make the line through the closest points parallel to the table
-    /// and look for the closest points again. That can step between two pairs of points for
-    /// ever, so after [`MAX_STEPS`] the sign change of the height difference is bisected.
-    /// `None` when no tilt within [`MAX_TILT_RAD`] does it.
+    /// and look for the closest points again. When a pair of points close to the joint sends a
+    /// step beyond [`MAX_TILT_RAD`], or [`MAX_STEPS`] are not enough, the sign change of the height
+    /// difference is bisected instead. `None` when no tilt within [`MAX_TILT_RAD`] does it.
     pub(crate) fn resting_tilt(&self) -> Option<Tilt> {
         let mut angle_rad: f64 = 0.0;
         for iterations in 1..=MAX_STEPS {
@@ -119,3 +119,57 @@ const MAX_STEPS: u32 = 30;
 
 /// A limb on a table does not tip by more; 60 degrees.
 const MAX_TILT_RAD: f64 = std::f64::consts::FRAC_PI_3;
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn half(range: std::ops::Range<f64>) -> impl Strategy<Value = Vec<[f64; 2]>> {
+        prop::collection::vec((range, -80.0..80.0_f64).prop_map(|(y, z)| [y, z]), 1..40)
+    }
+
+    proptest! {
+        /// The paper's steps and the bisection agree that both halves reach equally low, also
+        /// for ragged limbs; both fail together only where the steps stop at 60 degrees.
+        #[test]
+        fn both_searches_bring_the_limb_to_rest(
+            distal in half(-200.0..-60.0),
+            proximal in half(60.0..300.0),
+        ) {
+            let profile = Profile { distal, proximal };
+            let bisected = profile.bisected_tilt().unwrap();
+            for tilt in [profile.resting_tilt().unwrap(), bisected] {
+                let [distal, proximal] = profile.heights(tilt.angle_rad);
+                prop_assert!((distal - proximal).abs() <= TAU_MM);
+            }
+        }
+    }
+
+    /// The line through the two lowest points, 5 mm on either side of the joint, is 76 degrees
+    /// steep; at 23 degrees the limb rests on its far distal point.
+    #[test]
+    fn steep_first_steps_end_in_bisection() {
+        let profile = Profile {
+            distal: vec![[-5.0, 0.0], [-100.0, 5.0]],
+            proximal: vec![[5.0, -40.0], [100.0, -20.0]],
+        };
+        let tilt = profile.resting_tilt().unwrap();
+        assert!(tilt.iterations > MAX_STEPS, "{tilt:?}");
+        let [distal, proximal] = profile.heights(tilt.angle_rad);
+        assert!((distal - proximal).abs() <= TAU_MM, "{distal} {proximal}");
+        // −100 sin + 5 cos = 5 sin − 40 cos
+        let exact = f64::atan2(45.0, 105.0);
+        assert!((tilt.angle_rad - exact).abs() < TAU_MM / 100.0, "{tilt:?}");
+    }
+
+    #[test]
+    fn a_limb_that_cannot_rest_is_told() {
+        let profile = Profile {
+            distal: vec![[-1.0, 500.0]],
+            proximal: vec![[1.0, 0.0]],
+        };
+        assert!(profile.resting_tilt().is_none());
+    }
+}

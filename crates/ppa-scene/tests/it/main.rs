@@ -4,4 +4,5 @@ mod boot;
 mod frames;
 mod landmarks;
 mod placement;
+mod real_scans;
 mod table;
