@@ -11,6 +11,8 @@ use crate::{
 
 /// Bins per octave of energy, as a power of two: straight lines in E are then within 1e-4 of E⁻³ laws.
 const ENERGY_BITS: u32 = 8;
+/// Largest relative departure from a straight line in a bin; beyond it the material itself is asked.
+const STRAIGHT: f64 = 5e-4;
 /// Bins per octave of q², as a power of two.
 const Q_SQUARED_BITS: u32 = 5;
 /// Smallest q² node in 1/Å²: below it F² and S are linear in q².
@@ -35,7 +37,8 @@ struct Bin {
 }
 
 impl Bin {
-    /// Marks a bin that an absorption edge cuts: there the material itself is asked.
+    /// Marks a bin in which the photoelectric part is no straight line, because of an edge or the fine structure
+    /// below one: there the material itself is asked.
     const CUT: f32 = f32::NAN;
 
     fn new(low: CrossSections, high: CrossSections) -> Self {
@@ -44,6 +47,16 @@ impl Bin {
             photoelectric: line(low.photoelectric, high.photoelectric),
             rayleigh: line(low.rayleigh, high.rayleigh),
             compton: line(low.compton, high.compton),
+        }
+    }
+
+    #[inline]
+    fn at(&self, fraction: f64) -> CrossSections {
+        let line = |[low, change]: [f32; 2]| f64::from(low) + f64::from(change) * fraction;
+        CrossSections {
+            photoelectric: line(self.photoelectric),
+            rayleigh: line(self.rayleigh),
+            compton: line(self.compton),
         }
     }
 }
@@ -57,7 +70,16 @@ impl MaterialTables {
         let mut bins: Vec<Bin> = (0..grid.bins())
             .map(|index| {
                 let high = material.cross_sections_unchecked(grid.node(index + 1));
-                let bin = Bin::new(low, high);
+                let mut bin = Bin::new(low, high);
+                let width = grid.node(index + 1) - grid.node(index);
+                let bent = [0.25, 0.5, 0.75].into_iter().any(|fraction| {
+                    let direct =
+                        material.cross_sections_unchecked(grid.node(index) + fraction * width);
+                    (bin.at(fraction).photoelectric / direct.photoelectric - 1.0).abs() > STRAIGHT
+                });
+                if bent {
+                    bin.photoelectric = [Bin::CUT; 2];
+                }
                 low = high;
                 bin
             })
@@ -85,7 +107,7 @@ impl MaterialTables {
         &self.material
     }
 
-    /// Mass attenuation by interaction in cm²/g, within 0.1 % of [`Material::cross_sections`] (0.3 % below 5 keV).
+    /// Mass attenuation by interaction in cm²/g, within 0.1 % of [`Material::cross_sections`].
     ///
     /// Energies outside 1 to 150 keV get the values at the nearer end.
     #[inline]
@@ -94,18 +116,13 @@ impl MaterialTables {
         let (index, fraction) = self.grid.locate(energy_kev);
         let bin = &self.bins[index];
         if bin.photoelectric[0].is_nan() {
-            return self.beside_an_edge(energy_kev);
+            return self.asked(energy_kev);
         }
-        let at = |[low, change]: [f32; 2]| f64::from(low) + f64::from(change) * fraction;
-        CrossSections {
-            photoelectric: at(bin.photoelectric),
-            rayleigh: at(bin.rayleigh),
-            compton: at(bin.compton),
-        }
+        bin.at(fraction)
     }
 
     #[cold]
-    fn beside_an_edge(&self, energy_kev: f64) -> CrossSections {
+    fn asked(&self, energy_kev: f64) -> CrossSections {
         self.material
             .cross_sections_unchecked(energy_kev.clamp(MIN_ENERGY_KEV, MAX_ENERGY_KEV))
     }
