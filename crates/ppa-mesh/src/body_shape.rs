@@ -162,7 +162,11 @@ fn displaced(mesh: &Mesh, heights_mm: &[f64]) -> Mesh {
         .zip(before)
         .zip(&mesh.normals)
         .map(|((now, then), &exact)| {
-            if (now - then).norm() < 1e-6 { exact } else { now }
+            if (now - then).norm() < 1e-6 {
+                exact
+            } else {
+                now
+            }
         })
         .collect();
     moved

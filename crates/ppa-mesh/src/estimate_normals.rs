@@ -77,10 +77,7 @@ pub fn mean_spacing_mm(points: &[Point3<f32>]) -> Result<f64, CloudError> {
     Ok(distances.iter().sum::<f64>() / distances.len() as f64)
 }
 
-fn tree(
-    points: &[Point3<f32>],
-    expected: usize,
-) -> Result<ImmutableKdTree<f32, 3>, CloudError> {
+fn tree(points: &[Point3<f32>], expected: usize) -> Result<ImmutableKdTree<f32, 3>, CloudError> {
     let found = points.len();
     if found < expected {
         return Err(CloudError::TooFewPoints { found, expected });
@@ -97,7 +94,10 @@ mod tests {
     use super::*;
 
     fn tilted_grid() -> (Vec<Point3<f32>>, Vector3<f32>) {
-        let (u, v) = (Vector3::new(3.0, 0.0, 4.0) / 5.0, Vector3::new(0.0, 1.0, 0.0));
+        let (u, v) = (
+            Vector3::new(3.0, 0.0, 4.0) / 5.0,
+            Vector3::new(0.0, 1.0, 0.0),
+        );
         let at = |n: u16| u * f32::from(n % 20) * 2.0 + v * f32::from(n / 20) * 2.0;
         let points = (0..400).map(|n| Point3::from(at(n))).collect();
         (points, u.cross(&v))
@@ -117,8 +117,17 @@ mod tests {
     fn few_or_broken_points_are_refused() {
         let (mut points, _) = tilted_grid();
         let few = estimate_normals(&points[..4], 9).unwrap_err();
-        assert_eq!(few, CloudError::TooFewPoints { found: 4, expected: 9 });
+        assert_eq!(
+            few,
+            CloudError::TooFewPoints {
+                found: 4,
+                expected: 9
+            }
+        );
         points[7].x = f32::NAN;
-        assert_eq!(mean_spacing_mm(&points).unwrap_err(), CloudError::NotFinite(7));
+        assert_eq!(
+            mean_spacing_mm(&points).unwrap_err(),
+            CloudError::NotFinite(7)
+        );
     }
 }

@@ -1,6 +1,14 @@
 //! Body surfaces from CT volumes.
 //!
-//! Units: mm. Frame: whatever frame the volume's affine leads to, normally `ct` (LPS).
+//! [`iso_surface`] turns a volume into a triangle [`Mesh`]; [`extract_limb`] finds the limb in a scan
+//! and cuts couch, sheets and neighbours; [`offset`], [`add_bumps`] and [`seeded_bumps`] make other
+//! body shapes of it; [`dbscan`] clusters points; [`write_ply`] and [`read_ply`] exchange meshes and
+//! clouds with other programs.
+//!
+//! Units: mm, HU. Frame: whatever frame the volume's affine leads to, normally `ct` (LPS).
+//! Triangles are counter-clockwise seen from outside and normals point outward.
+//! Repeatable: the same input gives the same vertices in the same order for any number of threads.
+//! Left out: decimation, self-intersection tests, and any file format but PLY.
 
 mod body_shape;
 mod dbscan;
@@ -14,9 +22,7 @@ mod topology;
 pub use body_shape::{Bump, BumpError, BumpSite, add_bumps, offset, seeded_bumps};
 pub use dbscan::{Clusters, dbscan};
 pub use estimate_normals::{CloudError, estimate_normals, mean_spacing_mm};
-pub use limb::{
-    Body, CutFace, Limb, LimbError, LimbReport, LimbSettings, VoxelBox, extract_limb,
-};
+pub use limb::{Body, CutFace, Limb, LimbError, LimbReport, LimbSettings, VoxelBox, extract_limb};
 pub use mesh::{Mesh, PointCloud};
 pub use ply::{PlyContents, PlyError, read_ply, write_ply, write_ply_cloud};
 pub use surface::{Border, SurfaceError, iso_surface};

@@ -73,7 +73,12 @@ impl Mesh {
     /// Only meaningful without boundary edges: for an open mesh it depends on where the mesh
     /// lies, as cones from the first vertex close it.
     pub fn volume_mm3(&self) -> f64 {
-        let origin = self.vertices.first().copied().unwrap_or_default().cast::<f64>();
+        let origin = self
+            .vertices
+            .first()
+            .copied()
+            .unwrap_or_default()
+            .cast::<f64>();
         self.triangles
             .iter()
             .map(|triangle| {

@@ -182,7 +182,11 @@ fn write(
         .enumerate()
         .map(|(at, point)| Vertex {
             position: point.coords.into(),
-            normal: if with_normals { normals[at].into() } else { [0.0; 3] },
+            normal: if with_normals {
+                normals[at].into()
+            } else {
+                [0.0; 3]
+            },
         })
         .collect();
     let faces: Vec<Face> = triangles
@@ -198,10 +202,14 @@ fn write(
     header.encoding = Encoding::BinaryLittleEndian;
     let mut vertex = ElementDef::new("vertex".to_owned());
     vertex.count = vertices.len();
-    let names = POSITION.iter().chain(NORMAL.iter().filter(|_| with_normals));
+    let names = POSITION
+        .iter()
+        .chain(NORMAL.iter().filter(|_| with_normals));
     for name in names {
         let kind = PropertyType::Scalar(ScalarType::Float);
-        vertex.properties.add(PropertyDef::new((*name).to_owned(), kind));
+        vertex
+            .properties
+            .add(PropertyDef::new((*name).to_owned(), kind));
     }
     let mut face = ElementDef::new("face".to_owned());
     face.count = faces.len();

@@ -53,8 +53,11 @@ pub fn bodies(
                 Some(main) if main == other => main,
                 Some(main) => {
                     let peak = |b: u32| basins[b as usize].peak_mm;
-                    let (higher, lower) =
-                        if peak(main) >= peak(other) { (main, other) } else { (other, main) };
+                    let (higher, lower) = if peak(main) >= peak(other) {
+                        (main, other)
+                    } else {
+                        (other, main)
+                    };
                     if here >= neck_ratio * peak(lower) {
                         merge(&mut parent, &mut basins, higher, lower)
                     } else {
@@ -107,7 +110,10 @@ fn deepest_first(depth_sq: &[f32], least_depth_mm: f64) -> Vec<usize> {
     let step = |squared: f32| (f64::from(squared).sqrt() / DEPTH_STEP_MM).min(1e5) as usize;
     let least_sq = (least_depth_mm * least_depth_mm) as f32;
     let deep = |at: &usize| depth_sq[*at] >= least_sq;
-    let steps: Vec<u32> = depth_sq.iter().map(|&squared| step(squared) as u32).collect();
+    let steps: Vec<u32> = depth_sq
+        .iter()
+        .map(|&squared| step(squared) as u32)
+        .collect();
     let last = steps.iter().copied().max().unwrap_or(0);
     let mut starts = vec![0_usize; last as usize + 2];
     for at in (0..depth_sq.len()).filter(deep) {

@@ -50,7 +50,12 @@ pub fn couch_columns(
     for (at, label) in pieces.labels.iter().enumerate() {
         if let Some(span) = spans.get_mut(*label as usize) {
             let (i, j) = (at % size[0], at / size[0]);
-            *span = [span[0].min(i), span[1].max(i), span[2].min(j), span[3].max(j)];
+            *span = [
+                span[0].min(i),
+                span[1].max(i),
+                span[2].min(j),
+                span[3].max(j),
+            ];
         }
     }
     let long = |label: u32| {

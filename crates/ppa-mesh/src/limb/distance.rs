@@ -12,7 +12,10 @@ const FAR_MM2: f32 = 1e12;
 /// (Felzenszwalb and Huttenlocher 2012, doi:10.4086/toc.2012.v008a019).
 pub fn nearest(size: [usize; 3], spacing_mm: [f64; 3], target: &[bool]) -> (Vec<f32>, Vec<u32>) {
     let [nx, ny, nz] = size;
-    let mut squared: Vec<f32> = target.iter().map(|&t| if t { 0.0 } else { FAR_MM2 }).collect();
+    let mut squared: Vec<f32> = target
+        .iter()
+        .map(|&t| if t { 0.0 } else { FAR_MM2 })
+        .collect();
     let mut source: Vec<u32> = (0..target.len() as u32)
         .map(|at| if target[at as usize] { at } else { u32::MAX })
         .collect();
@@ -44,7 +47,11 @@ pub fn nearest(size: [usize; 3], spacing_mm: [f64; 3], target: &[bool]) -> (Vec<
             }
             for i in 0..nx {
                 let column = i * nz..(i + 1) * nz;
-                envelope.sweep(&mut row.0[column.clone()], &mut row.1[column], spacing_mm[2]);
+                envelope.sweep(
+                    &mut row.0[column.clone()],
+                    &mut row.1[column],
+                    spacing_mm[2],
+                );
             }
             row
         })

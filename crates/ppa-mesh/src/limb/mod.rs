@@ -7,6 +7,7 @@
 //! enclosed by it belongs to it; and of the surface of that, connectivity and DBSCAN keep one piece.
 
 mod bodies;
+mod cleaned;
 mod couch;
 mod distance;
 mod lattice;
@@ -20,16 +21,13 @@ use crate::dbscan::dbscan;
 use crate::mesh::Mesh;
 use crate::surface::{Border, SurfaceError, iso_surface};
 use bodies::{Bodies, bodies};
+use cleaned::cleaned;
 use couch::couch_columns;
 use distance::nearest;
 use lattice::Lattice;
 pub use report::{Body, CutFace, LimbReport};
 pub use settings::{LimbSettings, VoxelBox};
 
-/// HU put where something was removed.
-const AIR_HU: f32 = -1000.0;
-/// HU put into air enclosed by the limb.
-const FILL_HU: f32 = 0.0;
 /// Tissue beyond the grown-back core is skin relief up to this far, and something that touches the
 /// limb where it goes on, mm.
 const RELIEF_MM: f64 = 4.0;
@@ -113,7 +111,9 @@ pub fn extract_limb(volume: &Volume, settings: &LimbSettings) -> Result<Limb, Li
     let mut mask = vec![false; volume.grid().len()];
     for (at, _) in limb.mask.iter().enumerate().filter(|(_, m)| **m) {
         let voxel = part.grid().voxel(at);
-        mask[volume.grid().index([0, 1, 2].map(|x| voxel[x] + crop.low[x]))] = true;
+        mask[volume
+            .grid()
+            .index([0, 1, 2].map(|x| voxel[x] + crop.low[x]))] = true;
     }
     limb.mask = mask;
     for corner in [&mut limb.report.low, &mut limb.report.high] {
@@ -173,7 +173,9 @@ fn within(volume: &Volume, settings: &LimbSettings) -> Result<Limb, LimbError> {
         }
     }
 
-    let hollow: Vec<bool> = (0..hu.len()).map(|at| !(tissue[at] && hu[at] >= core_hu)).collect();
+    let hollow: Vec<bool> = (0..hu.len())
+        .map(|at| !(tissue[at] && hu[at] >= core_hu))
+        .collect();
     let (depth_sq, _) = nearest(lattice.size, lattice.spacing_mm, &hollow);
     drop(hollow);
     let found = bodies(
@@ -191,7 +193,11 @@ fn within(volume: &Volume, settings: &LimbSettings) -> Result<Limb, LimbError> {
             max_hu: hu.iter().copied().fold(f32::MIN, f32::max),
         });
     }
-    let solid: Vec<bool> = found.labels.iter().map(|&label| label != u32::MAX).collect();
+    let solid: Vec<bool> = found
+        .labels
+        .iter()
+        .map(|&label| label != u32::MAX)
+        .collect();
     let (reach_sq, source) = nearest(lattice.size, lattice.spacing_mm, &solid);
     let chosen = match settings.inside {
         Some(point) => body_at(volume, &tissue, &found, &source, point)?,
@@ -214,8 +220,7 @@ fn within(volume: &Volume, settings: &LimbSettings) -> Result<Limb, LimbError> {
     report.interior_voxels = count(&enclosed);
     describe_limb(&lattice, &mask, &mut report);
 
-    let cleaned = cleaned(volume, &mask, iso);
-    let surface = iso_surface(&cleaned, iso, Border::Open)?;
+    let surface = iso_surface(&cleaned(volume, &mask, iso), iso, Border::Open)?;
     let mesh = one_piece(&surface, settings, &mut report);
     Ok(Limb { mesh, mask, report })
 }
@@ -229,7 +234,11 @@ fn best_body(lattice: &Lattice, found: &Bodies) -> u32 {
     let any_bone = found.basins.iter().any(|b| b.bone_voxels > 0);
     let score = |at: usize| {
         let basin = &found.basins[at];
-        let amount = if any_bone { basin.bone_voxels } else { basin.voxels } as f64;
+        let amount = if any_bone {
+            basin.bone_voxels
+        } else {
+            basin.voxels
+        } as f64;
         let size_mm2 = (basin.voxels as f64 * lattice.voxel_mm3()).powf(2.0 / 3.0);
         amount / (1.0 + SIDE_CUT_WEIGHT * basin.side_cut_mm2 / size_mm2)
     };
@@ -264,7 +273,12 @@ fn body_at(
 /// erosion wore off, one that reaches far (a sheet, an electrode) only touches the limb.
 fn grown_back(lattice: &Lattice, tissue: &[bool], reach_sq: &[f32], radius_mm: f64) -> Vec<bool> {
     // The core is counted from voxel centre to voxel centre; its border lies half a voxel out.
-    let half_voxel = 0.5 * lattice.spacing_mm.iter().copied().fold(f64::INFINITY, f64::min);
+    let half_voxel = 0.5
+        * lattice
+            .spacing_mm
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
     let near_sq = (radius_mm + half_voxel).powi(2) as f32;
     let far_sq = (radius_mm + RELIEF_MM).powi(2) as f32;
     let beyond: Vec<bool> = (0..tissue.len())
@@ -300,16 +314,6 @@ fn keep_largest(lattice: &Lattice, mask: &mut [bool]) -> usize {
         }
     }
     removed
-}
-
-/// The volume with everything but the limb removed and the limb filled.
-fn cleaned(volume: &Volume, mask: &[bool], iso: f32) -> Volume {
-    let hu = volume.hu().iter().zip(mask).map(|(&value, &limb)| match limb {
-        true if value < iso => FILL_HU.max(iso),
-        false if value >= iso => AIR_HU.min(iso - 1.0),
-        _ => value,
-    });
-    Volume::new(volume.grid().clone(), hu.collect()).expect("same grid, finite values")
 }
 
 /// The largest connected piece of the main cluster of surface points.
@@ -360,7 +364,9 @@ fn describe_bodies(
         })
         .collect();
     report.bodies.sort_by(|a, b| {
-        b.bone_mm3.total_cmp(&a.bone_mm3).then(b.core_mm3.total_cmp(&a.core_mm3))
+        b.bone_mm3
+            .total_cmp(&a.bone_mm3)
+            .then(b.core_mm3.total_cmp(&a.core_mm3))
     });
 }
 

@@ -235,17 +235,20 @@ mod tests {
     fn every_crossing_lies_in_exactly_one_loop_and_fillings_avoid_faces() {
         for (inside, configuration) in CONFIGURATIONS.iter().enumerate() {
             let crossed = (0..12_u8)
-                .filter(|&e| edge_corners(e).map(|c| inside >> c & 1) == [0, 1]
-                    || edge_corners(e).map(|c| inside >> c & 1) == [1, 0])
+                .filter(|&e| {
+                    edge_corners(e).map(|c| inside >> c & 1) == [0, 1]
+                        || edge_corners(e).map(|c| inside >> c & 1) == [1, 0]
+                })
                 .collect::<Vec<_>>();
             for pattern in &configuration.patterns {
-                let mut seen: Vec<u8> =
-                    pattern.disks.iter().flat_map(|d| d.ring.clone()).collect();
+                let mut seen: Vec<u8> = pattern.disks.iter().flat_map(|d| d.ring.clone()).collect();
                 seen.sort_unstable();
                 assert_eq!(seen, crossed, "configuration {inside:08b}");
                 for disk in &pattern.disks {
                     assert!(disk.ring.len() >= 3);
-                    assert!(disk.triangles.is_empty() || disk.triangles.len() == disk.ring.len() - 2);
+                    assert!(
+                        disk.triangles.is_empty() || disk.triangles.len() == disk.ring.len() - 2
+                    );
                 }
             }
         }

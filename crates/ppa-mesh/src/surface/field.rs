@@ -73,10 +73,18 @@ impl<'a> Field<'a> {
         Vector3::from_fn(|axis, _| {
             let (low, high) = (
                 if voxel[axis] > 0 { strides[axis] } else { 0 },
-                if voxel[axis] + 1 < self.size[axis] { strides[axis] } else { 0 },
+                if voxel[axis] + 1 < self.size[axis] {
+                    strides[axis]
+                } else {
+                    0
+                },
             );
             let rise = f64::from(self.hu[at + high]) - f64::from(self.hu[at - low]);
-            if low > 0 && high > 0 { 0.5 * rise } else { rise }
+            if low > 0 && high > 0 {
+                0.5 * rise
+            } else {
+                rise
+            }
         })
     }
 }

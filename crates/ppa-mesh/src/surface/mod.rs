@@ -32,9 +32,7 @@ pub enum Border {
 #[non_exhaustive]
 pub enum SurfaceError {
     /// No crossing of the iso value.
-    #[error(
-        "no surface at {iso_hu} HU: the volume's values lie between {min_hu} and {max_hu} HU"
-    )]
+    #[error("no surface at {iso_hu} HU: the volume's values lie between {min_hu} and {max_hu} HU")]
     Empty {
         /// Iso value asked for.
         iso_hu: f32,

@@ -54,7 +54,11 @@ pub fn march(field: &Field, layers: Range<usize>) -> Slab {
     for k in layers.clone() {
         // The slice on top belongs to the slab above, if there is one; its numbers start at 0.
         let own = k + 1 < layers.end || k + 1 == last_slice;
-        let first = if own { march.slab.positions.len() as u32 } else { NEXT_SLAB };
+        let first = if own {
+            march.slab.positions.len() as u32
+        } else {
+            NEXT_SLAB
+        };
         let high = march.slice(k + 1, first, own);
         let upright = march.upright(k, &low, &high);
         march.layer(k, &low, &high, &upright);
@@ -117,11 +121,23 @@ impl March<'_> {
                 let at = j * self.words + word;
                 let here = slice.inside[at];
                 let valid = u64::MAX >> (64 - (nx - 64 * word).min(64));
-                let carry = if word + 1 < self.words { slice.inside[at + 1] << 63 } else { here & (1 << 63) };
+                let carry = if word + 1 < self.words {
+                    slice.inside[at + 1] << 63
+                } else {
+                    here & (1 << 63)
+                };
                 // The last voxel of a row has no right neighbour.
-                let last = if word + 1 == self.words { 1 << ((nx - 1) % 64) } else { 0 };
+                let last = if word + 1 == self.words {
+                    1 << ((nx - 1) % 64)
+                } else {
+                    0
+                };
                 let x_crossed = (here ^ (here >> 1 | carry)) & valid & !last;
-                let y_crossed = if j + 1 < ny { (here ^ slice.inside[at + self.words]) & valid } else { 0 };
+                let y_crossed = if j + 1 < ny {
+                    (here ^ slice.inside[at + self.words]) & valid
+                } else {
+                    0
+                };
                 for bit in bits(x_crossed | y_crossed) {
                     let i = 64 * word + bit;
                     for (axis, crossed) in [x_crossed, y_crossed].into_iter().enumerate() {
@@ -152,7 +168,11 @@ impl March<'_> {
                 for bit in bits(low.inside[at] ^ high.inside[at]) {
                     let i = 64 * word + bit;
                     let here = i + nx * j;
-                    let inner = if low.inside[at] >> bit & 1 == 1 { low } else { high };
+                    let inner = if low.inside[at] >> bit & 1 == 1 {
+                        low
+                    } else {
+                        high
+                    };
                     upright[here] = match inner.at_voxel[here] {
                         u32::MAX => self.vertex([i, j, k], [i, j, k + 1]),
                         id => id,
@@ -165,8 +185,14 @@ impl March<'_> {
 
     /// Stores the crossing between two neighbouring voxels (or at one) and returns its number.
     fn vertex(&mut self, from: [usize; 3], to: [usize; 3]) -> u32 {
-        let (a, b) = [from, to].map(|v| self.field.above(self.field.index(v))).into();
-        let t = if from == to { 0.0 } else { (a / (a - b)).clamp(NEAREST, 1.0 - NEAREST) };
+        let (a, b) = [from, to]
+            .map(|v| self.field.above(self.field.index(v)))
+            .into();
+        let t = if from == to {
+            0.0
+        } else {
+            (a / (a - b)).clamp(NEAREST, 1.0 - NEAREST)
+        };
         let [p, q] = [from, to].map(|v| Vector3::from(v.map(|c| c as f64)));
         let position = p + (q - p) * t;
         let mut gradient = self.field.gradient(from);
@@ -217,7 +243,10 @@ impl March<'_> {
     fn cell(&mut self, [i, j, k]: [usize; 3], low: &Slice, high: &Slice, upright: &[u32]) {
         let nx = self.field.size()[0];
         let mut inside = 0_usize;
-        for (corner, slice) in [low, low, low, low, high, high, high, high].iter().enumerate() {
+        for (corner, slice) in [low, low, low, low, high, high, high, high]
+            .iter()
+            .enumerate()
+        {
             let bit = self.bit(slice, i + (corner & 1), j + (corner >> 1 & 1));
             inside |= usize::from(bit) << corner;
         }
@@ -258,11 +287,21 @@ impl March<'_> {
             decisions |= usize::from(inside_joined(face, &values)) << bit;
         }
         let pattern = &configuration.patterns[decisions];
-        let tube = tunnel::tube(configuration, decisions, pattern, &values);
+        // Voxels at the iso value merge vertices of a ring; extra vertices could then lie on its sides.
+        let distinct = |ring: &[u8]| {
+            let mut ids: Vec<u32> = ring.iter().map(|&edge| id(edge)).collect();
+            ids.sort_unstable();
+            ids.dedup();
+            ids.len()
+        };
+        let mut tube = tunnel::tube(configuration, decisions, pattern, &values);
         if let Some(pair) = tube {
             let [first, second] = pair.map(|at| pattern.disks[at].ring.as_slice());
             match tunnel::tube_triangles(first, second) {
                 Some(triangles) => triangles.iter().for_each(|t| self.triangle(t.map(id))),
+                None if distinct(first) < first.len() || distinct(second) < second.len() => {
+                    tube = None;
+                }
                 None => {
                     let rings = [first, second].map(|ring| ring.iter().map(|&e| id(e)).collect());
                     self.waist([i, j, k], [first, second], rings);
@@ -273,7 +312,7 @@ impl March<'_> {
             if tube.is_some_and(|pair| pair.contains(&at)) {
                 continue;
             }
-            if disk.triangles.is_empty() {
+            if disk.triangles.is_empty() && distinct(&disk.ring) >= 3 {
                 let ring: Vec<u32> = disk.ring.iter().map(|&edge| id(edge)).collect();
                 let (position, gradient) = self.middle([i, j, k], &disk.ring);
                 let middle = self.push(position, gradient);
@@ -338,11 +377,16 @@ impl March<'_> {
         }
         // The second ring runs the other way; both are paced evenly from their nearest vertices.
         let back: Vec<u32> = second.iter().rev().copied().collect();
-        let positions: Vec<_> =
-            edges[1].iter().rev().map(|&edge| self.crossing(voxel, edge).0).collect();
+        let positions: Vec<_> = edges[1]
+            .iter()
+            .rev()
+            .map(|&edge| self.crossing(voxel, edge).0)
+            .collect();
         let start = self.slab.positions[waist[0] as usize];
         let away = |at: &usize| (positions[*at] - start).norm();
-        let turn = (0..n).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0);
+        let turn = (0..n)
+            .min_by(|a, b| away(a).total_cmp(&away(b)))
+            .unwrap_or(0);
         let (mut i, mut j) = (0, 0);
         while i < m || j < n {
             let (p, q) = (waist[i % m], back[(j + turn) % n]);

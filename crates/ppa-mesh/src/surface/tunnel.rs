@@ -70,7 +70,11 @@ fn surface_labels(configuration: &Configuration, decisions: usize, values: &[f64
     for (bit, &face) in configuration.ambiguous.iter().enumerate() {
         let [a, b, c, d] = face_corners(face);
         let joined_inside = decisions >> bit & 1 == 1;
-        let (p, q) = if inside(a) == joined_inside { (a, c) } else { (b, d) };
+        let (p, q) = if inside(a) == joined_inside {
+            (a, c)
+        } else {
+            (b, d)
+        };
         labels.join(p as usize, q as usize);
     }
     labels
@@ -143,7 +147,9 @@ pub fn tube_triangles(first: &[u8], second: &[u8]) -> Option<Vec<[u8; 3]>> {
         best: None,
     };
     for shift in 0..back.len() {
-        zipper.q = (0..back.len()).map(|i| back[(i + shift) % back.len()]).collect();
+        zipper.q = (0..back.len())
+            .map(|i| back[(i + shift) % back.len()])
+            .collect();
         zipper.advance([0, 0], diagonal_cost(first[0], zipper.q[0]));
     }
     zipper.best.map(|(_, triangles)| triangles)

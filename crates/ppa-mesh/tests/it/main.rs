@@ -1,5 +1,8 @@
 //! Tests through the public interface.
 
+mod clusters;
 mod fields;
+mod limb;
+mod ply;
 mod reference;
 mod surface;

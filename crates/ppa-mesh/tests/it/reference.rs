@@ -19,8 +19,15 @@ fn best(peers: &Value, key: &str) -> f64 {
 
 /// Vertices that differ after rounding to 0.1 µm, as the peers were counted.
 fn unique_vertices(mesh: &Mesh) -> usize {
-    let rounded = |v: &Point3<f32>| v.coords.map(|c| (f64::from(c) * 1e4).round_ties_even() as i64);
-    mesh.vertices.iter().map(rounded).collect::<HashSet<_>>().len()
+    let rounded = |v: &Point3<f32>| {
+        v.coords
+            .map(|c| (f64::from(c) * 1e4).round_ties_even() as i64)
+    };
+    mesh.vertices
+        .iter()
+        .map(rounded)
+        .collect::<HashSet<_>>()
+        .len()
 }
 
 fn percentile_99(mut values: Vec<f64>) -> f64 {
@@ -36,13 +43,20 @@ fn analytic_solids_are_as_exact_as_with_the_best_peer() {
         let size = numbers::<3>(&case["dims_xyz"]).map(|n| n as usize);
         let ramp = case["field"] == "ramp16";
         let hu = |p: &Point3<f64>| match ramp {
-            true => (-500.0 - 200.0 * solid.distance(p)).clamp(-1000.0, 100.0).round_ties_even(),
+            true => (-500.0 - 200.0 * solid.distance(p))
+                .clamp(-1000.0, 100.0)
+                .round_ties_even(),
             false => -500.0 - 100.0 * solid.distance(p),
         };
-        let field = volume(size, numbers::<3>(&case["spacing_xyz_mm"]), |p| hu(p) as f32);
+        let field = volume(size, numbers::<3>(&case["spacing_xyz_mm"]), |p| {
+            hu(p) as f32
+        });
         let mesh = iso_surface(&field, -500.0, Border::Open).expect("surface");
         let (peers, exact) = (&case["peers"], &case["exact"]);
-        let at = format!("{} {} {}", case["name"], case["spacing_xyz_mm"], case["field"]);
+        let at = format!(
+            "{} {} {}",
+            case["name"], case["spacing_xyz_mm"], case["field"]
+        );
 
         let topology = mesh.topology();
         assert_eq!(topology.boundary_edges, 0, "{at}");
@@ -58,18 +72,34 @@ fn analytic_solids_are_as_exact_as_with_the_best_peer() {
         };
         check(rel(mesh.area_mm2(), "area_mm2"), "area_rel_err");
         check(rel(mesh.volume_mm3(), "volume_mm3"), "volume_rel_err");
-        let distances: Vec<f64> =
-            mesh.vertices.iter().map(|v| solid.distance(&v.cast()).abs()).collect();
-        check(distances.iter().copied().fold(0.0, f64::max), "vertex_dist_max_mm");
-        check(distances.iter().sum::<f64>() / distances.len() as f64, "vertex_dist_mean_mm");
+        let distances: Vec<f64> = mesh
+            .vertices
+            .iter()
+            .map(|v| solid.distance(&v.cast()).abs())
+            .collect();
+        check(
+            distances.iter().copied().fold(0.0, f64::max),
+            "vertex_dist_max_mm",
+        );
+        check(
+            distances.iter().sum::<f64>() / distances.len() as f64,
+            "vertex_dist_mean_mm",
+        );
         if case["shape"]["kind"] != "cylinder" {
             let angles: Vec<f64> = mesh
                 .vertices
                 .iter()
                 .zip(&mesh.normals)
-                .map(|(v, n)| n.cast::<f64>().angle(&solid.outward(&v.cast())).to_degrees())
+                .map(|(v, n)| {
+                    n.cast::<f64>()
+                        .angle(&solid.outward(&v.cast()))
+                        .to_degrees()
+                })
                 .collect();
-            check(angles.iter().sum::<f64>() / angles.len() as f64, "normal_err_mean_deg");
+            check(
+                angles.iter().sum::<f64>() / angles.len() as f64,
+                "normal_err_mean_deg",
+            );
             check(percentile_99(angles), "normal_err_p99_deg");
         }
     }
@@ -93,7 +123,11 @@ fn random_fields_give_closed_manifolds_of_the_trilinear_topology() {
         let topology = mesh.topology();
         assert_eq!(topology.boundary_edges, 0, "seed {seed}");
         assert_eq!(topology.non_manifold_edges, 0, "seed {seed}");
-        assert_eq!(Some(topology.euler), case["trilinear_euler_exact"].as_i64(), "seed {seed}");
+        assert_eq!(
+            Some(topology.euler),
+            case["trilinear_euler_exact"].as_i64(),
+            "seed {seed}"
+        );
     }
 }
 
@@ -107,14 +141,19 @@ fn clusters_are_those_of_the_reference() {
             let (half, centre) = (numbers::<3>(&blob["half"]), numbers::<3>(&blob["centre"]));
             let count = blob["n"].as_u64().expect("n") as usize;
             let noise = hash_noise(3 * count, blob["seed"].as_u64().expect("seed"));
-            points.extend(noise.chunks(3).map(|n| {
-                Point3::from([0, 1, 2].map(|x| (n[x] * half[x] + centre[x]) as f32))
-            }));
+            points.extend(
+                noise
+                    .chunks(3)
+                    .map(|n| Point3::from([0, 1, 2].map(|x| (n[x] * half[x] + centre[x]) as f32))),
+            );
         }
         let eps_mm = spec["eps"].as_f64().expect("eps");
         let min_points = spec["min_points"].as_u64().expect("min_points") as usize;
         let clusters = dbscan(&points, eps_mm, min_points);
-        assert_eq!(Some(clusters.core_points() as u64), case["core_points"].as_u64());
+        assert_eq!(
+            Some(clusters.core_points() as u64),
+            case["core_points"].as_u64()
+        );
         assert_eq!(Some(clusters.noise as u64), case["noise"].as_u64());
         let mut core_sizes = vec![0_u64; clusters.sizes.len()];
         for (label, core) in clusters.labels.iter().zip(&clusters.core) {
@@ -124,6 +163,12 @@ fn clusters_are_those_of_the_reference() {
         }
         core_sizes.sort_unstable_by(|a, b| b.cmp(a));
         let expected = case["core_cluster_sizes"].as_array().expect("sizes");
-        assert_eq!(core_sizes, expected.iter().filter_map(Value::as_u64).collect::<Vec<_>>());
+        assert_eq!(
+            core_sizes,
+            expected
+                .iter()
+                .filter_map(Value::as_u64)
+                .collect::<Vec<_>>()
+        );
     }
 }

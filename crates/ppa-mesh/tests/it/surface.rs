@@ -1,1 +1,144 @@
 //! The iso-surface against answers that can be derived.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Affine3, Matrix3, Matrix4, Point3, Rotation3, Vector3};
+use ppa_ct::{Grid, Volume};
+use ppa_mesh::{Border, SurfaceError, iso_surface};
+use proptest::prelude::*;
+
+use crate::fields::{hash_noise, on_grid, volume};
+
+fn ball(grid: Grid, centre: Point3<f64>, radius_mm: f64) -> Volume {
+    on_grid(grid, |p| {
+        (-500.0 - 100.0 * ((p - centre).norm() - radius_mm)) as f32
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+    /// Oblique, sheared, anisotropic and left-handed lattices see the same ball with the same
+    /// outward normals; chords err by at most h²/8R, h the largest diagonal of a cell.
+    #[test]
+    fn a_ball_is_a_ball_on_any_lattice(
+        angles in prop::array::uniform3(-1.0..1.0_f64),
+        spacing in prop::array::uniform3(0.8..2.5_f64),
+        shear in -0.4..0.4_f64,
+        mirrored in any::<bool>(),
+    ) {
+        let radius = 15.0;
+        let mut scale = Matrix3::from_diagonal(&Vector3::from(spacing));
+        scale[(1, 2)] = shear;
+        if mirrored {
+            scale.column_mut(0).neg_mut();
+        }
+        let linear = Rotation3::from_euler_angles(angles[0], angles[1], angles[2]) * scale;
+        let size = spacing.map(|s| (44.0 / s) as usize);
+        let middle = linear * Vector3::from(size.map(|n| 0.5 * (n - 1) as f64));
+        let mut matrix = Matrix4::identity();
+        matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&linear);
+        matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&(-middle));
+        let grid = Grid::new(size, Affine3::from_matrix_unchecked(matrix)).unwrap();
+        let mesh = iso_surface(&ball(grid, Point3::origin(), radius), -500.0, Border::Open).unwrap();
+
+        let topology = mesh.topology();
+        prop_assert_eq!((topology.boundary_edges, topology.non_manifold_edges), (0, 0));
+        prop_assert_eq!((topology.components, topology.euler), (1, 2));
+        let sagitta = linear.column_sum().norm_squared().max(12.0) / (8.0 * radius);
+        for (vertex, normal) in mesh.vertices.iter().zip(&mesh.normals) {
+            let p = vertex.coords.cast::<f64>();
+            prop_assert!((p.norm() - radius).abs() < sagitta);
+            prop_assert!(normal.cast::<f64>().dot(&p.normalize()) > 0.995);
+        }
+        let volume = 4.0 / 3.0 * PI * radius.powi(3);
+        prop_assert!((mesh.volume_mm3() / volume - 1.0).abs() < 3.0 * sagitta / radius);
+    }
+
+    /// Noise has every ambiguous case; integers make ties. Neither may open the surface, and the
+    /// border closes flush with the outer faces of the voxels.
+    #[test]
+    fn closed_noise_has_no_boundary(seed in any::<u32>(), ties in any::<bool>()) {
+        let noise = hash_noise(6 * 7 * 21, u64::from(seed));
+        let value = |n: f64| if ties { (2.0 * n).round() } else { n };
+        let field = volume([6, 7, 21], [1.0; 3], |p| {
+            value(noise[p.x as usize + 6 * (p.y as usize + 7 * p.z as usize)]) as f32
+        });
+        let mesh = iso_surface(&field, 0.0, Border::Closed).unwrap();
+        let topology = mesh.topology();
+        prop_assert_eq!(topology.boundary_edges, 0);
+        prop_assert!(ties || topology.non_manifold_edges == 0);
+        prop_assert!(mesh.volume_mm3() > 0.0);
+        for [a, b, c] in &mesh.triangles {
+            let corner = |v: &u32| mesh.vertices[*v as usize].cast::<f64>();
+            let area = (corner(b) - corner(a)).cross(&(corner(c) - corner(a))).norm();
+            prop_assert!(area > 0.0);
+        }
+        for (axis, n) in [6.0, 7.0, 21.0].into_iter().enumerate() {
+            let all = mesh.vertices.iter().map(|v| f64::from(v[axis]));
+            prop_assert!(all.into_iter().all(|c| (-0.5..=n - 0.5).contains(&c)));
+        }
+    }
+}
+
+#[test]
+fn a_voxel_at_the_iso_value_is_one_vertex() {
+    // A ramp in x that meets the iso value exactly at the voxels i = 2.
+    let field = volume([5, 6, 40], [1.0; 3], |p| (1000.0 * (2.0 - p.x)) as f32);
+    let mesh = iso_surface(&field, 0.0, Border::Open).unwrap();
+    assert_eq!(mesh.vertices.len(), 6 * 40);
+    assert!(mesh.vertices.iter().all(|v| v.x == 2.0));
+    assert!((mesh.area_mm2() - 5.0 * 39.0).abs() < 1e-9);
+    assert!(
+        mesh.normals
+            .iter()
+            .all(|n| (n - Vector3::x()).norm() < 1e-6)
+    );
+}
+
+#[test]
+fn a_full_volume_closes_to_its_own_box() {
+    let field = volume([3, 4, 5], [1.0, 2.0, 3.0], |_| 40.0);
+    let mesh = iso_surface(&field, -500.0, Border::Closed).unwrap();
+    // Edges and corners of the box are cut by at most half a voxel.
+    let volume = mesh.volume_mm3() / (3.0 * 8.0 * 15.0);
+    assert!((0.8..1.0).contains(&volume), "{volume}");
+    assert_eq!((mesh.euler(), mesh.boundary_edges()), (2, 0));
+}
+
+#[test]
+fn threads_do_not_change_the_surface() {
+    let noise = hash_noise(20 * 20 * 70, 3);
+    let field = volume([20, 20, 70], [1.0; 3], |p| {
+        noise[p.x as usize + 20 * (p.y as usize + 20 * p.z as usize)] as f32
+    });
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| iso_surface(&field, 0.3, Border::Open).unwrap())
+    };
+    assert_eq!(with(1), with(3));
+}
+
+#[test]
+fn nothing_to_see_is_an_error_that_says_so() {
+    let air = volume([4, 4, 4], [1.0; 3], |_| -1000.0);
+    let error = iso_surface(&air, -500.0, Border::Closed).unwrap_err();
+    assert!(matches!(
+        error,
+        SurfaceError::Empty {
+            max_hu: -1000.0,
+            ..
+        }
+    ));
+    let slice = volume([4, 4, 1], [1.0; 3], |p| p.x as f32);
+    assert_eq!(
+        iso_surface(&slice, 1.0, Border::Open),
+        Err(SurfaceError::TooThin([4, 4, 1]))
+    );
+    assert!(matches!(
+        iso_surface(&air, f32::NAN, Border::Open),
+        Err(SurfaceError::Iso(_))
+    ));
+}

@@ -1,0 +1,210 @@
+//! The limb against the phantom's exact skin and on real scans.
+
+use std::sync::LazyLock;
+
+use ppa_ct::Volume;
+use ppa_ct::phantom::{LowerLeg, TableTop};
+use ppa_mesh::{
+    BumpSite, Limb, LimbError, LimbSettings, Mesh, VoxelBox, add_bumps, extract_limb, offset,
+    seeded_bumps,
+};
+
+use crate::fields::{shared, volume};
+
+const VOXEL_MM: f64 = 1.5;
+
+static PHANTOM: LazyLock<(LowerLeg, Volume, Limb)> = LazyLock::new(|| {
+    let leg = LowerLeg::p01();
+    let scan = leg.voxelise(VOXEL_MM, TableTop::Present).expect("phantom");
+    let limb = extract_limb(&scan, &LimbSettings::default()).expect("limb");
+    (leg, scan, limb)
+});
+
+#[test]
+fn table_goes_and_skin_stays() {
+    let (leg, scan, limb) = &*PHANTOM;
+    let errors = limb
+        .mesh
+        .vertices
+        .iter()
+        .map(|v| leg.skin_distance_mm(&v.cast()).abs());
+    let beyond = errors.clone().filter(|e| *e > 0.5 * VOXEL_MM).count();
+    assert!(
+        beyond * 200 < limb.mesh.vertices.len(),
+        "{beyond} vertices off by half a voxel"
+    );
+    let worst = errors.fold(0.0, f64::max);
+    assert!(worst < VOXEL_MM, "{worst} mm");
+
+    let topology = limb.mesh.topology();
+    assert_eq!((topology.components, topology.non_manifold_edges), (1, 0));
+    assert_eq!(
+        topology.euler, 1,
+        "one surface, open at the proximal cut only"
+    );
+    assert!(limb.report.couch_voxels > 0);
+    let cut: Vec<&str> = limb
+        .report
+        .cut_faces
+        .iter()
+        .map(|cut| cut.face.as_str())
+        .collect();
+    assert_eq!(cut, ["+k"]);
+
+    let grid = scan.grid();
+    let wrong = (0..grid.len()).filter(|&at| {
+        let depth = leg.skin_distance_mm(&grid.centre(grid.voxel(at).map(|v| v as f64)));
+        limb.mask[at] != (depth < 0.0) && depth.abs() > VOXEL_MM
+    });
+    assert_eq!(
+        wrong.count(),
+        0,
+        "voxels more than a voxel from the skin on the wrong side"
+    );
+}
+
+#[test]
+fn a_crop_finds_the_same_skin() {
+    let (_, scan, whole) = &*PHANTOM;
+    let size = scan.grid().size();
+    let crop = VoxelBox {
+        low: [0, 0, 20],
+        high: [size[0], size[1], size[2] - 20],
+    };
+    let settings = LimbSettings {
+        crop: Some(crop),
+        ..LimbSettings::default()
+    };
+    let part = extract_limb(scan, &settings).unwrap();
+    let grid = scan.grid();
+    let within = |at: usize| (22..size[2] - 22).contains(&grid.voxel(at)[2]);
+    let differ = (0..grid.len()).filter(|&at| within(at) && part.mask[at] != whole.mask[at]);
+    assert!(differ.count() * 1000 < whole.report.limb_voxels);
+    assert_eq!(part.report.low[2], 20);
+}
+
+#[test]
+fn body_shapes_move_the_skin_by_what_was_asked() {
+    let (leg, _, limb) = &*PHANTOM;
+    let mean = |mesh: &Mesh| {
+        let sum: f64 = mesh
+            .vertices
+            .iter()
+            .map(|v| leg.skin_distance_mm(&v.cast()))
+            .sum();
+        sum / mesh.vertices.len() as f64
+    };
+    for distance in [4.0, -3.0] {
+        let moved = mean(&offset(&limb.mesh, distance)) - mean(&limb.mesh);
+        assert!(
+            (moved - distance).abs() < 0.1 * distance.abs(),
+            "{moved} for {distance}"
+        );
+    }
+
+    let joint = leg.truth().joint_centre;
+    let sites = [BumpSite {
+        centre: joint,
+        radius_mm: 60.0,
+    }];
+    let bumps = seeded_bumps(&limb.mesh, &sites, 3, 11).unwrap();
+    assert_eq!(bumps, seeded_bumps(&limb.mesh, &sites, 3, 11).unwrap());
+    let bump = bumps[0];
+    let swollen = add_bumps(&limb.mesh, &[bump]);
+    for (before, after) in limb.mesh.vertices.iter().zip(&swollen.vertices) {
+        let away = (before.cast::<f64>() - bump.centre).norm();
+        let lift = f64::from((after - before).norm());
+        // Never more than the Gaussian of the straight distance: paths on the skin are longer.
+        let most = bump.height_mm * (-0.5 * (away / bump.sigma_mm).powi(2)).exp();
+        assert!(lift <= most + 1e-3, "{lift} > {most}");
+        if away < 0.1 {
+            assert!((lift - bump.height_mm).abs() < 0.01 * bump.height_mm);
+        }
+    }
+    assert!(
+        swollen
+            .normals
+            .iter()
+            .all(|n| (n.norm() - 1.0).abs() < 1e-4)
+    );
+}
+
+#[test]
+fn air_and_wild_settings_are_refused() {
+    let air = volume([8; 3], [1.0; 3], |_| -1000.0);
+    let found = extract_limb(&air, &LimbSettings::default());
+    assert!(matches!(found, Err(LimbError::NothingSolid { .. })));
+    let (_, scan, _) = &*PHANTOM;
+    let far = LimbSettings {
+        inside: Some([1e4; 3]),
+        ..LimbSettings::default()
+    };
+    assert_eq!(extract_limb(scan, &far), Err(LimbError::Inside([1e4; 3])));
+    let thin = LimbSettings {
+        core_radius_mm: f64::NAN,
+        ..LimbSettings::default()
+    };
+    assert!(matches!(
+        extract_limb(scan, &thin),
+        Err(LimbError::Setting { .. })
+    ));
+    let crop = VoxelBox {
+        low: [0; 3],
+        high: [9999; 3],
+    };
+    let beyond = LimbSettings {
+        crop: Some(crop),
+        ..LimbSettings::default()
+    };
+    assert!(matches!(
+        extract_limb(scan, &beyond),
+        Err(LimbError::Crop { .. })
+    ));
+}
+
+#[test]
+#[ignore = "needs ../shared/data"]
+fn real_limbs_lose_couch_sheet_and_neighbour() {
+    // Folder, faces that cut the limb (data README), bounds of its volume in litres.
+    let cases: [(&str, &[&str], [f64; 2]); 4] = [
+        (
+            "lower-leg-ankle-sts049/dicom",
+            &["-j", "-k", "+k"],
+            [3.0, 3.2],
+        ),
+        (
+            "knee-calf-sts028/CT_image.nii.gz",
+            &["-j", "-k", "+k"],
+            [2.4, 2.5],
+        ),
+        (
+            "calf-couch-sts025/CT_image.nii.gz",
+            &["-j", "-k", "+k"],
+            [1.0, 1.1],
+        ),
+        (
+            "two-calves-sts032/CT_image.nii.gz",
+            &["-i", "-k", "+k"],
+            [1.5, 1.6],
+        ),
+    ];
+    for (name, faces, litres) in cases {
+        let scan = ppa_ct::read(&shared().join("data").join(name))
+            .expect("scan")
+            .volume;
+        let limb = extract_limb(&scan, &LimbSettings::default()).expect("limb");
+        let cut: Vec<&str> = limb
+            .report
+            .cut_faces
+            .iter()
+            .map(|cut| cut.face.as_str())
+            .collect();
+        assert_eq!(cut, faces, "{name}");
+        let found = limb.report.limb_mm3 * 1e-6;
+        assert!(
+            (litres[0]..litres[1]).contains(&found),
+            "{name}: {found} litres"
+        );
+        assert_eq!(limb.mesh.components(), 1, "{name}");
+    }
+}
