@@ -11,7 +11,7 @@ use ppa_ct::Volume;
 use ppa_ct::phantom::{LowerLeg, TableTop};
 
 /// Edge of a pixel of every picture, mm.
-const PIXEL_MM: f64 = 0.6;
+const PIXEL_MM: f64 = 0.35;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut args = std::env::args().skip(1);
@@ -123,9 +123,10 @@ fn projection(ct: &Volume, joint: &Point3<f64>, internal_rotation_rad: f64) -> G
         let start = corner + across * u - Vector3::z() * v;
         let sum: f64 = (-220..=120)
             .filter_map(|step| ct.sample(&(start + along * f64::from(step))))
-            .map(|hu| 0.02 * (1.0 + hu / 1000.0) * if hu > 150.0 { 1.4 } else { 1.0 })
+            // Water near 60 keV; calcium attenuates more than its density tells.
+            .map(|hu| 0.02 * (1.0 + hu / 1000.0) * (1.0 + 0.4 * (hu / 400.0).clamp(0.0, 1.0)))
             .sum();
-        1.25 * (1.0 - (-sum / 4.0).exp()) - 0.1
+        1.3 * (1.0 - (-sum / 3.6).exp()) - 0.15
     })
 }
 

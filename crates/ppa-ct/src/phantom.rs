@@ -2,7 +2,7 @@
 //!
 //! [`LowerLeg::p01`] is a right lower leg and foot of an average adult male, lying supine on a table
 //! top with the toes up: tibia and fibula, a talus with a real trochlea in its mortise, the other
-//! twenty-four bones of the foot, muscle, fat and skin. Every dimension is that of adult anatomy (means of
+//! twenty-five bones of the foot, muscle, fat and skin. Every dimension is that of adult anatomy (means of
 //! published CT and cadaver studies where there are any), but it is a phantom, not a person.
 //!
 //! Frame: `ct` (LPS, mm): x to the patient's left, which is medial for a right leg; y posterior, towards the table;
