@@ -39,9 +39,8 @@ const MIN_DEPTH_HU: f64 = 30.0;
 /// no gap.
 pub(crate) fn find_ankle(sections: &Sections) -> Option<Ankle> {
     let slices = sections.proximal_to_distal();
-    let (flare, shaft) = flare(sections, &slices)?;
+    let (top_mm, shaft) = flare(sections, &slices)?;
     let line = ShaftLine::through(&shaft)?;
-    let top_mm = sections.level(slices[flare]);
     let column: Vec<(f64, f64)> = slices
         .iter()
         .map(|slice| (sections.level(*slice), *slice))
@@ -79,11 +78,11 @@ struct Level {
     has_fibula: bool,
 }
 
-/// Index (into `slices`) where the flare starts, and the tibia's centres from there 40 mm up.
+/// Level where the flare starts, and the shaft from there 40 mm up.
 ///
 /// A forearm's radius is thinner than any adult tibia, and a femur has only the short kneecap
 /// beside it: neither counts as a tibia.
-fn flare(sections: &Sections, slices: &[usize]) -> Option<(usize, Vec<(f64, Point3<f64>)>)> {
+fn flare(sections: &Sections, slices: &[usize]) -> Option<(f64, Vec<Level>)> {
     const SUSTAINED_MM: f64 = 4.0;
     const SHAFT_MM: f64 = 40.0;
     let mut levels: Vec<Level> = Vec::new();
@@ -113,12 +112,8 @@ fn flare(sections: &Sections, slices: &[usize]) -> Option<(usize, Vec<(f64, Poin
             if !fibula_beside(&levels, top_mm) {
                 return None;
             }
-            let centres = levels
-                .iter()
-                .filter(|l| (top_mm..=top_mm + SHAFT_MM).contains(&l.level_mm))
-                .map(|l| (l.level_mm, l.centre))
-                .collect();
-            return Some((first, centres));
+            levels.retain(|l| (top_mm..=top_mm + SHAFT_MM).contains(&l.level_mm));
+            return Some((top_mm, levels));
         }
     }
     None
@@ -145,17 +140,17 @@ struct ShaftLine {
 
 impl ShaftLine {
     /// Least squares; `None` for fewer than three centres.
-    fn through(centres: &[(f64, Point3<f64>)]) -> Option<Self> {
-        if centres.len() < 3 {
+    fn through(shaft: &[Level]) -> Option<Self> {
+        if shaft.len() < 3 {
             return None;
         }
-        let n = centres.len() as f64;
-        let level_mm = centres.iter().map(|(level, _)| level).sum::<f64>() / n;
-        let centre = centres.iter().map(|(_, c)| c.coords).sum::<Vector3<f64>>() / n;
-        let spread: f64 = centres.iter().map(|(l, _)| (l - level_mm).powi(2)).sum();
-        let moment: Vector3<f64> = centres
+        let n = shaft.len() as f64;
+        let level_mm = shaft.iter().map(|l| l.level_mm).sum::<f64>() / n;
+        let centre = shaft.iter().map(|l| l.centre.coords).sum::<Vector3<f64>>() / n;
+        let spread: f64 = shaft.iter().map(|l| (l.level_mm - level_mm).powi(2)).sum();
+        let moment: Vector3<f64> = shaft
             .iter()
-            .map(|(level, c)| (c.coords - centre) * (level - level_mm))
+            .map(|l| (l.centre.coords - centre) * (l.level_mm - level_mm))
             .sum();
         Some(Self {
             level_mm,

@@ -69,7 +69,7 @@ impl Profile {
                 });
             }
             angle_rad = -f64::atan2(back[1] - front[1], back[0] - front[0]);
-            if !(angle_rad.abs() <= MAX_TILT_RAD) {
+            if angle_rad.abs() > MAX_TILT_RAD {
                 break;
             }
         }

@@ -10,11 +10,13 @@
 //! Source of the method: Laufer et al., MELBA 2026:027, section "Framework", doi:10.59275/j.melba.2026-c874.
 
 mod ankle;
+mod axis_regions;
 mod bump_sites;
 mod contact;
 mod device;
 mod find_landmarks;
 mod frames;
+mod landmark_choices;
 mod landmarks;
 mod limb_sections;
 mod patch;
@@ -22,13 +24,15 @@ mod placement;
 mod plane;
 mod room;
 mod room_parts;
+mod supporting_plane;
 mod sweep;
 mod table_plane;
 
 pub use bump_sites::bump_sites;
 pub use device::XrayDevice;
-pub use find_landmarks::{LandmarkError, LandmarkOverrides, find_landmarks};
+pub use find_landmarks::find_landmarks;
 pub use frames::{Camera, Ct, Device, NotRigid, Patient, Rigid};
+pub use landmark_choices::{LandmarkError, LandmarkOverrides};
 pub use landmarks::{AxisRegion, AxisSource, Landmarks, LimbKind, Side};
 pub use placement::{Contact, PlaceError, Placement, ct_from_device, medial_rotation, place};
 pub use plane::Plane;

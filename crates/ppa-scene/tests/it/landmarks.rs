@@ -169,11 +169,7 @@ fn a_person_overrules_every_choice() {
         calf_region: Some([100.0, 120.0]),
         axis_source: Some(AxisSource::Limb),
         anterior: Some([0.3, -1.0, 0.0]),
-        plane_points: Some([
-            [0.0, 90.0, -40.0],
-            [-20.0, 90.0, 180.0],
-            [20.0, 90.0, 180.0],
-        ]),
+        plane_points: Some(plane_points),
     };
     let got = P01.find(Side::Left, &wish).unwrap();
     assert_eq!(got.side, Side::Left);

@@ -1,0 +1,191 @@
+//! The joint level, and the two regions whose centres give the axis.
+
+use nalgebra::Vector3;
+use ppa_ct::Volume;
+
+use crate::ankle::find_ankle;
+use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
+use crate::landmarks::{AxisRegion, AxisSource, LimbKind};
+use crate::limb_sections::Sections;
+
+/// What region ranges are measured from.
+pub(crate) struct Reference<'a> {
+    pub(crate) kind: LimbKind,
+    pub(crate) sections: Sections<'a>,
+    /// Joint level along the scan's limb direction, mm.
+    pub(crate) level_mm: f64,
+    /// Lowest and highest level with limb in it, from the joint level, mm.
+    extent_mm: [f64; 2],
+}
+
+impl<'a> Reference<'a> {
+    /// Finds the joint level, or takes the middle of the limb.
+    pub(crate) fn find(
+        volume: &'a Volume,
+        mask: &'a [bool],
+        overrides: &LandmarkOverrides,
+        notes: &mut Vec<String>,
+    ) -> Result<Self, LandmarkError> {
+        let mut sections = Sections::along(volume, mask, &Vector3::z());
+        let mut ankle = None;
+        if overrides.limb != Some(LimbKind::Other) {
+            ankle = find_ankle(&sections);
+            if ankle.is_none() {
+                let reversed = Sections::along(volume, mask, &-Vector3::z());
+                ankle = find_ankle(&reversed);
+                if ankle.is_some() {
+                    sections = reversed;
+                    notes.push("the ankle lies superior to the calf: proximal is inferior".into());
+                }
+            }
+        }
+        let slices = sections.proximal_to_distal();
+        let level = |slice: Option<&usize>| slice.map_or(0.0, |s| sections.level(*s));
+        let (high, low) = (level(slices.first()), level(slices.last()));
+        let (kind, level_mm) = match (overrides.joint_centre, ankle, overrides.limb) {
+            (Some(centre), ankle, limb) => {
+                notes.push("joint level: given".into());
+                let guess = ankle.map_or(LimbKind::Other, |_| LimbKind::LowerLeg);
+                let level = sections.direction.dot(&Vector3::from(centre));
+                (limb.unwrap_or(guess), level)
+            }
+            (None, Some(ankle), _) => {
+                notes.push(format!(
+                    "joint level: gap between plafond and talar dome, {:.0} HU darker than the \
+                     bone on either side",
+                    ankle.depth_hu
+                ));
+                (LimbKind::LowerLeg, ankle.level_mm)
+            }
+            (None, None, Some(LimbKind::LowerLeg)) => return Err(LandmarkError::NoAnkle),
+            (None, None, limb) => {
+                let why = if limb.is_none() {
+                    "no ankle found"
+                } else {
+                    "other limb"
+                };
+                notes.push(format!("joint level: middle of the limb ({why})"));
+                (LimbKind::Other, 0.5 * (low + high))
+            }
+        };
+        Ok(Self {
+            kind,
+            sections,
+            level_mm,
+            extent_mm: [low - level_mm, high - level_mm],
+        })
+    }
+
+    /// The joint region, the calf region and what their centres are centres of.
+    pub(crate) fn regions(
+        &self,
+        overrides: &LandmarkOverrides,
+        notes: &mut Vec<String>,
+    ) -> Result<(AxisRegion, AxisRegion, AxisSource), LandmarkError> {
+        let (joint, calf) = self.default_ranges(overrides, notes)?;
+        if calf[0] < joint[1] {
+            return Err(LandmarkError::Region {
+                name: "calf region",
+                from_mm: calf[0],
+                to_mm: calf[1],
+                problem: "does not lie proximal of the joint region",
+            });
+        }
+        let wanted = overrides.axis_source.unwrap_or(match self.kind {
+            LimbKind::LowerLeg => AxisSource::Bone,
+            LimbKind::Other => AxisSource::Limb,
+        });
+        let both = |source| {
+            let joint = self.centre("joint region", joint, source)?;
+            let calf = self.centre("calf region", calf, source)?;
+            Ok((joint, calf, source))
+        };
+        match (both(wanted), overrides.axis_source) {
+            (Err(_), None) if wanted == AxisSource::Bone => {
+                notes.push("axis: no bone in the regions, centres of the limb instead".into());
+                both(AxisSource::Limb)
+            }
+            (found, _) => found,
+        }
+    }
+
+    fn default_ranges(
+        &self,
+        overrides: &LandmarkOverrides,
+        notes: &mut Vec<String>,
+    ) -> Result<([f64; 2], [f64; 2]), LandmarkError> {
+        // Below 50 mm tibia and fibula can touch: the syndesmosis is thinner than two voxels.
+        const JOINT_MM: [f64; 2] = [50.0, 90.0];
+        const CALF_MM: [f64; 2] = [130.0, 200.0];
+        const SHORTEST_MM: f64 = 60.0;
+        let (joint, calf) = match self.kind {
+            LimbKind::LowerLeg => {
+                let reach = self.extent_mm[1];
+                let given = overrides.joint_region.is_some() && overrides.calf_region.is_some();
+                if reach < SHORTEST_MM && !given {
+                    return Err(LandmarkError::TooShort {
+                        found_mm: reach,
+                        expected_mm: SHORTEST_MM,
+                    });
+                }
+                let scale = (reach / CALF_MM[1]).min(1.0);
+                if scale < 1.0 && !given {
+                    notes.push(format!(
+                        "axis regions: drawn closer together, the scan reaches {reach:.0} mm \
+                         proximal of the joint"
+                    ));
+                }
+                (JOINT_MM.map(|d| d * scale), CALF_MM.map(|d| d * scale))
+            }
+            LimbKind::Other => {
+                let [low, high] = self.extent_mm;
+                let at = |share: f64| low + share * (high - low);
+                ([at(0.15), at(0.35)], [at(0.65), at(0.85)])
+            }
+        };
+        Ok((
+            overrides.joint_region.unwrap_or(joint),
+            overrides.calf_region.unwrap_or(calf),
+        ))
+    }
+
+    fn centre(
+        &self,
+        name: &'static str,
+        range_mm: [f64; 2],
+        source: AxisSource,
+    ) -> Result<AxisRegion, LandmarkError> {
+        let [from_mm, to_mm] = range_mm;
+        let (mut sum, mut count) = (Vector3::zeros(), 0_u32);
+        for slice in 0..self.sections.count() {
+            let above = self.sections.level(slice) - self.level_mm;
+            // A level that went through a file and back may have lost its last bit.
+            if !(from_mm - 1e-6..=to_mm + 1e-6).contains(&above) {
+                continue;
+            }
+            let centre = match source {
+                AxisSource::Limb => self.sections.limb_centre(slice),
+                AxisSource::Bone => self.sections.bones(slice).first().map(|b| b.centre),
+            };
+            if let Some(centre) = centre {
+                sum += centre.coords;
+                count += 1;
+            }
+        }
+        if count == 0 {
+            return Err(LandmarkError::Region {
+                name,
+                from_mm,
+                to_mm,
+                problem: match source {
+                    AxisSource::Limb => "holds no part of the limb",
+                    AxisSource::Bone => "holds no bone",
+                },
+            });
+        }
+        Ok(AxisRegion {
+            range_mm,
+            centre_mm: (sum / f64::from(count)).into(),
+        })
+    }
+}

@@ -1,0 +1,146 @@
+//! What a person may decide about a limb, and what can go wrong.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::landmarks::{AxisSource, Landmarks, LimbKind};
+
+/// Choices of a person that replace the automatic ones; what is `None` stays automatic.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LandmarkOverrides {
+    /// What the scan shows; by default a lower leg if an ankle is found.
+    pub limb: Option<LimbKind>,
+    /// The joint centre, `ct` frame, mm; the axis is moved parallel to itself to pass through it.
+    pub joint_centre: Option<[f64; 3]>,
+    /// Distances proximal of the joint level where the joint region begins and ends, mm.
+    pub joint_region: Option<[f64; 2]>,
+    /// The same for the calf region.
+    pub calf_region: Option<[f64; 2]>,
+    /// What the region centres are centres of.
+    pub axis_source: Option<AxisSource>,
+    /// The direction that faces up at angle 0, `ct` frame.
+    pub anterior: Option<[f64; 3]>,
+    /// One distal and two proximal points of Π_P, `ct` frame, mm.
+    pub plane_points: Option<[[f64; 3]; 3]>,
+}
+
+impl Landmarks {
+    /// These landmarks as choices, so that a person finds every decision in one place and edits
+    /// it: found again with the result, the patient frame is the same.
+    ///
+    /// The plane points stay open unless `given` has them, as they follow from axis and front.
+    pub fn as_choices(&self, given: &LandmarkOverrides) -> LandmarkOverrides {
+        LandmarkOverrides {
+            limb: Some(self.limb),
+            joint_centre: Some(self.joint_centre),
+            joint_region: Some(self.joint_region.range_mm),
+            calf_region: Some(self.calf_region.range_mm),
+            axis_source: Some(self.axis_source),
+            anterior: Some(self.anterior),
+            plane_points: given.plane_points,
+        }
+    }
+}
+
+impl LandmarkOverrides {
+    /// Refuses numbers that are not finite and a front without direction.
+    pub(crate) fn check(&self) -> Result<(), LandmarkError> {
+        let [a, b, c] = self.plane_points.unwrap_or_default().map(Some);
+        let points = [
+            ("joint_centre", self.joint_centre),
+            ("anterior", self.anterior),
+            ("plane_points", a),
+            ("plane_points", b),
+            ("plane_points", c),
+        ];
+        for (name, point) in points {
+            if let Some(found) = point.filter(|p| !p.iter().all(|c| c.is_finite())) {
+                return Err(LandmarkError::Override {
+                    name,
+                    found,
+                    expected: "three finite numbers",
+                });
+            }
+        }
+        match self.anterior {
+            Some(found) if Vector3::from(found).norm() < 1e-9 => Err(LandmarkError::Override {
+                name: "anterior",
+                found,
+                expected: "a direction of length above 0",
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Why the landmarks of a limb cannot be told.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LandmarkError {
+    /// The mask is not one value per voxel.
+    #[error("the limb mask has {found} values, expected {expected}, one per voxel")]
+    MaskLength {
+        /// Values given.
+        found: usize,
+        /// Voxels of the volume.
+        expected: usize,
+    },
+    /// There is no limb.
+    #[error("the limb has {voxels} voxels and {vertices} surface points, expected both above 0")]
+    Empty {
+        /// Voxels in the mask.
+        voxels: usize,
+        /// Vertices of the mesh.
+        vertices: usize,
+    },
+    /// A lower leg was asked for but shows no ankle.
+    #[error(
+        "no ankle found: no tibia and fibula that widen to a joint gap; give the joint centre, \
+         or the limb kind \"other\""
+    )]
+    NoAnkle,
+    /// The scan ends too close to the joint.
+    #[error(
+        "the limb reaches {found_mm:.0} mm proximal of the joint, expected at least {expected_mm:.0} mm"
+    )]
+    TooShort {
+        /// Length above the joint level.
+        found_mm: f64,
+        /// Length needed for two separate regions.
+        expected_mm: f64,
+    },
+    /// A region has no limb in it, or the two are in the wrong order.
+    #[error("the {name} from {from_mm:.1} to {to_mm:.1} mm proximal of the joint {problem}")]
+    Region {
+        /// "joint region" or "calf region".
+        name: &'static str,
+        /// Its beginning.
+        from_mm: f64,
+        /// Its end.
+        to_mm: f64,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+    /// A direction or point given by a person cannot be used.
+    #[error("{name} is {found:?}, expected {expected}")]
+    Override {
+        /// Field of [`LandmarkOverrides`].
+        name: &'static str,
+        /// Its value.
+        found: [f64; 3],
+        /// What it should be.
+        expected: &'static str,
+    },
+    /// No plane touches both ends of the limb from below.
+    #[error("no plane under the limb touches both its ends; give three plane points")]
+    NoSupport,
+    /// The plane given by a person has the limb on its back.
+    #[error(
+        "{behind_percent:.0} % of the limb lies behind the plane of the plane points, expected less than half"
+    )]
+    PlaneThroughLimb {
+        /// Share of the surface behind the plane.
+        behind_percent: f64,
+    },
+}
