@@ -136,4 +136,17 @@ mod tests {
             assert!((value - expected).abs() < 1e-9, "{i}: {value} {expected}");
         }
     }
+
+    #[test]
+    fn a_cell_spreads_around_its_own_place() {
+        let mut cells = vec![0.0; 12];
+        cells[4 + 2] = 1.0; // column 2 of 4, row 1 of 3
+        let pixels = upsampling([4, 3], [40, 60]).densities(&cells);
+        let centroid = |of: fn(usize) -> usize| -> f64 {
+            let moment = |(pixel, share): (usize, &f64)| (of(pixel) as f64 + 0.5) * share;
+            pixels.iter().enumerate().map(moment).sum()
+        };
+        assert!((centroid(|pixel| pixel % 40) - 25.0).abs() < 1e-9);
+        assert!((centroid(|pixel| pixel / 40) - 30.0).abs() < 1e-9);
+    }
 }
