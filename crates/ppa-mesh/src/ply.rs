@@ -223,22 +223,14 @@ fn write(
     }
 
     let store = || -> io::Result<()> {
-        let folder = match path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        let mut file = tempfile::NamedTempFile::new_in(folder)?;
-        let mut out = BufWriter::new(file.as_file_mut());
+        let mut out = BufWriter::new(AtomicWriteFile::open(path)?);
         let vertex_writer = Writer::<Vertex>::new();
         vertex_writer.write_header(&mut out, &header)?;
         vertex_writer.write_payload_of_element(&mut out, &vertices, &vertex, &header)?;
         if triangles.is_some() {
             Writer::<Face>::new().write_payload_of_element(&mut out, &faces, &face, &header)?;
         }
-        out.flush()?;
-        drop(out);
-        file.persist(path)?;
-        Ok(())
+        out.into_inner().map_err(|e| e.into_error())?.commit()
     };
     store().map_err(|source| PlyError::Write {
         path: path.to_owned(),

@@ -79,9 +79,9 @@ pub fn bodies(
         let voxel = lattice.voxel(at);
         basin.voxels += 1;
         basin.bone_voxels += usize::from(bone(at));
-        for axis in 0..3 {
-            basin.index_sum[axis] += voxel[axis] as f64;
-            let border = voxel[axis] == 0 || voxel[axis] + 1 == lattice.size[axis];
+        for (axis, &place) in voxel.iter().enumerate() {
+            basin.index_sum[axis] += place as f64;
+            let border = place == 0 || place + 1 == lattice.size[axis];
             if axis != lattice.scan_axis && border {
                 basin.side_cut_mm2 += lattice.voxel_mm3() / lattice.spacing_mm[axis];
             }

@@ -34,7 +34,7 @@ const RELIEF_MM: f64 = 4.0;
 /// A body weighs half as much when the side faces cut it through about half its size.
 const SIDE_CUT_WEIGHT: f64 = 2.0;
 /// At most this many surface points are clustered; more are thinned evenly first.
-const MAX_CLUSTER_POINTS: usize = 60_000;
+const MAX_CLUSTER_POINTS: usize = 20_000;
 
 /// A limb found in a volume.
 #[derive(Debug, Clone, PartialEq)]
