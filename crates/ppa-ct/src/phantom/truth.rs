@@ -11,6 +11,9 @@ pub struct Truth {
     /// Middle of the joint space between trochlea and plafond.
     pub joint_centre: Point3<f64>,
     /// Direction of the tibial shaft towards the knee.
+    ///
+    /// A line through the centres of whole slices of the leg leans about 6° further back, since the calf lies
+    /// behind the tibia.
     pub axis_direction: Unit<Vector3<f64>>,
     /// Axis about which the talus turns in the mortise, towards its medial end.
     pub talocrural_axis: Unit<Vector3<f64>>,
