@@ -44,20 +44,29 @@ fn root() -> PathBuf {
 
 fn manifest(path: &Path) -> toml::Table {
     let text = fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    text.parse().unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+    text.parse()
+        .unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
 fn members() -> BTreeMap<String, toml::Table> {
     let folders = fs::read_dir(root().join("crates")).unwrap();
     folders
         .map(|folder| manifest(&folder.unwrap().path().join("Cargo.toml")))
-        .map(|manifest| (manifest["package"]["name"].as_str().unwrap().to_owned(), manifest))
+        .map(|manifest| {
+            (
+                manifest["package"]["name"].as_str().unwrap().to_owned(),
+                manifest,
+            )
+        })
         .collect()
 }
 
 fn dependencies<'a>(manifest: &'a toml::Table, section: &str) -> Vec<&'a str> {
     let table = manifest.get(section).and_then(toml::Value::as_table);
-    table.into_iter().flat_map(|t| t.keys().map(String::as_str)).collect()
+    table
+        .into_iter()
+        .flat_map(|t| t.keys().map(String::as_str))
+        .collect()
 }
 
 #[test]
@@ -65,7 +74,10 @@ fn crates_depend_only_along_the_arrows() {
     let members = members();
     let listed: Vec<_> = ARROWS.iter().map(|(name, _)| *name).collect();
     for name in members.keys() {
-        assert!(listed.contains(&name.as_str()), "{name} has no entry in ARROWS");
+        assert!(
+            listed.contains(&name.as_str()),
+            "{name} has no entry in ARROWS"
+        );
     }
     for (name, allowed) in ARROWS {
         for dependency in dependencies(&members[*name], "dependencies") {
@@ -82,11 +94,24 @@ fn crates_depend_only_along_the_arrows() {
 fn libraries_used_alone_pull_in_no_reader_network_or_frontend() {
     for (name, forbidden) in FORBIDDEN {
         let tree = std::process::Command::new(env!("CARGO"))
-            .args(["tree", "--locked", "--edges", "normal", "--prefix", "none", "--package", name])
+            .args([
+                "tree",
+                "--locked",
+                "--edges",
+                "normal",
+                "--prefix",
+                "none",
+                "--package",
+                name,
+            ])
             .current_dir(root())
             .output()
             .unwrap();
-        assert!(tree.status.success(), "{}", String::from_utf8_lossy(&tree.stderr));
+        assert!(
+            tree.status.success(),
+            "{}",
+            String::from_utf8_lossy(&tree.stderr)
+        );
         for line in String::from_utf8(tree.stdout).unwrap().lines() {
             for prefix in *forbidden {
                 assert!(!line.starts_with(prefix), "{name} pulls in {line}");
@@ -99,14 +124,28 @@ fn libraries_used_alone_pull_in_no_reader_network_or_frontend() {
 fn every_crate_is_ready_to_publish() {
     for (name, manifest) in members() {
         let package = manifest["package"].as_table().unwrap();
-        for key in ["description", "keywords", "documentation", "readme", "license", "repository"] {
+        for key in [
+            "description",
+            "keywords",
+            "documentation",
+            "readme",
+            "license",
+            "repository",
+        ] {
             assert!(package.contains_key(key), "{name} lacks package.{key}");
         }
         assert!(
-            root().join("crates").join(&name).join("README.md").is_file(),
+            root()
+                .join("crates")
+                .join(&name)
+                .join("README.md")
+                .is_file(),
             "{name} has no README.md"
         );
-        assert!(manifest.contains_key("lints"), "{name} does not take the workspace's lints");
+        assert!(
+            manifest.contains_key("lints"),
+            "{name} does not take the workspace's lints"
+        );
     }
 }
 
@@ -122,7 +161,10 @@ fn versions_stand_only_in_the_root_manifest() {
                     .get("workspace")
                     .and_then(toml::Value::as_bool)
                     .unwrap_or(false);
-                assert!(inherited, "{name}: {section}.{dependency} states its own version");
+                assert!(
+                    inherited,
+                    "{name}: {section}.{dependency} states its own version"
+                );
             }
         }
     }

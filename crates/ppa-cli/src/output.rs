@@ -45,7 +45,9 @@ pub fn working(what: &str) -> ProgressBar {
 pub fn bar(what: &str) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len} {eta} left")
         .expect("the template is a constant");
-    ProgressBar::new(0).with_style(style).with_message(what.to_owned())
+    ProgressBar::new(0)
+        .with_style(style)
+        .with_message(what.to_owned())
 }
 
 /// Wall-clock and processor time of a step.

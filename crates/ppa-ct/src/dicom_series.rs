@@ -18,7 +18,7 @@ use crate::volume::Volume;
 use header::{Found, Series, Slice};
 use stack::Stack;
 
-/// Reads the one series in a folder; subfolders are not searched.
+/// Reads the one series in a folder, or below it when the folder itself has no DICOM file.
 pub(crate) fn read_folder(folder: &Path) -> Result<Scan, ReadError> {
     let files = dicom_files(folder)?;
     let looked_at = files.len();
@@ -31,21 +31,33 @@ pub(crate) fn read_file(file: &Path) -> Result<Scan, ReadError> {
     assemble(file, scan_headers([file.to_owned()])?, 1)
 }
 
-/// All files of a folder in the order of their names, and whether each starts as DICOM.
+/// All files of a folder in the order of their names, and whether each starts as DICOM; where
+/// none does, those of its subfolders too, since series are often handed over in a folder of
+/// their own beside a licence or a viewer.
 fn dicom_files(folder: &Path) -> Result<Vec<(PathBuf, bool)>, ReadError> {
     let io = |path: &Path, source| ReadError::Io {
         path: path.to_owned(),
         source,
     };
     let mut files = Vec::new();
+    let mut subfolders = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|e| io(folder, e))? {
-        let path = entry.map_err(|e| io(folder, e))?.path();
+        let entry = entry.map_err(|e| io(folder, e))?;
+        let path = entry.path();
         if path.is_file() {
             let dicom = starts_as_dicom(&path).map_err(|e| io(&path, e))?;
             files.push((path, dicom));
+        } else if entry.file_type().map_err(|e| io(&path, e))?.is_dir() {
+            subfolders.push(path);
         }
     }
     files.sort();
+    subfolders.sort();
+    if files.iter().all(|(_, dicom)| !dicom) {
+        for subfolder in subfolders {
+            files.extend(dicom_files(&subfolder)?);
+        }
+    }
     Ok(files)
 }
 

@@ -37,7 +37,7 @@ pub enum ReadError {
         feature: &'static str,
     },
     /// A folder without a single DICOM image.
-    #[error("no DICOM image in {} ({files} files looked at; subfolders are not searched)", path.display())]
+    #[error("no DICOM image in {} ({files} files looked at, subfolders included)", path.display())]
     NoDicom {
         /// The folder.
         path: PathBuf,

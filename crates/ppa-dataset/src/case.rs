@@ -89,7 +89,10 @@ impl Case {
                 found: case.version,
             });
         }
-        case.source.path = path.parent().unwrap_or(Path::new("")).join(&case.source.path);
+        case.source.path = path
+            .parent()
+            .unwrap_or(Path::new(""))
+            .join(&case.source.path);
         Ok(case)
     }
 
@@ -133,7 +136,10 @@ fn relative_to(path: &Path, folder: &Path) -> Result<PathBuf, FileError> {
         .count();
     let up = folder.components().skip(shared).map(|_| Path::new(".."));
     let down = path.components().skip(shared);
-    Ok(up.map(PathBuf::from).chain(down.map(|c| PathBuf::from(&c))).collect())
+    Ok(up
+        .map(PathBuf::from)
+        .chain(down.map(|c| PathBuf::from(&c)))
+        .collect())
 }
 
 #[cfg(test)]
@@ -142,7 +148,8 @@ mod tests {
 
     #[test]
     fn scan_paths_are_written_as_seen_from_the_case() {
-        let see = |path: &str, folder: &str| relative_to(Path::new(path), Path::new(folder)).unwrap();
+        let see =
+            |path: &str, folder: &str| relative_to(Path::new(path), Path::new(folder)).unwrap();
         assert_eq!(see("scans/ct", "cases"), Path::new("../scans/ct"));
         assert_eq!(see("scans/ct", "scans"), Path::new("ct"));
         assert_eq!(see("p01.nii.gz", ""), Path::new("p01.nii.gz"));

@@ -76,7 +76,11 @@ pub fn contact_sheet(
             let roi = &rois[&LimbId::depth_name(view, step)];
             Ok(Tile::Depth(crop(&depth, roi)))
         });
-        let caption = format!("{} {}", shape.name(), view.name().trim_start_matches("cam_"));
+        let caption = format!(
+            "{} {}",
+            shape.name(),
+            view.name().trim_start_matches("cam_")
+        );
         rows.push((caption, tiles.collect::<Result<_, ContactSheetError>>()?));
     }
     if of_limb(FileKind::Radiograph).next().is_some() {
@@ -190,7 +194,12 @@ fn fit(image: &Gray16) -> RgbImage {
     let scale = f64::from(TILE) / f64::from(image.width().max(image.height()));
     let side = |pixels: u32| ((f64::from(pixels) * scale).round() as u32).clamp(1, TILE);
     let gray: GrayImage = image::DynamicImage::ImageLuma16(image.clone()).into_luma8();
-    let small = resize(&gray, side(image.width()), side(image.height()), FilterType::Triangle);
+    let small = resize(
+        &gray,
+        side(image.width()),
+        side(image.height()),
+        FilterType::Triangle,
+    );
     let mut tile = RgbImage::new(TILE, TILE);
     let (x, y) = ((TILE - small.width()) / 2, (TILE - small.height()) / 2);
     let colour = image::DynamicImage::ImageLuma8(small).into_rgb8();
@@ -225,7 +234,10 @@ mod tests {
     #[test]
     fn poses_are_chosen_from_end_to_end() {
         assert_eq!(evenly_chosen(&[0, 36, 90, 180], 9), [0, 36, 90, 180]);
-        assert_eq!(evenly_chosen(&(0..=180).collect::<Vec<_>>(), 3), [0, 90, 180]);
+        assert_eq!(
+            evenly_chosen(&(0..=180).collect::<Vec<_>>(), 3),
+            [0, 90, 180]
+        );
         assert_eq!(evenly_chosen(&[4, 5], 1), [4]);
     }
 

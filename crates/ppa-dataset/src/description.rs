@@ -34,9 +34,8 @@ pub(crate) struct Settings {
 
 impl Settings {
     pub fn of(plan: &Plan) -> Result<Self, FileError> {
-        let hash = |path: &Option<std::path::PathBuf>| {
-            path.as_deref().map(sha256_of_file).transpose()
-        };
+        let hash =
+            |path: &Option<std::path::PathBuf>| path.as_deref().map(sha256_of_file).transpose();
         Ok(Self {
             generator: concat!("ppa ", env!("CARGO_PKG_VERSION")),
             seed: plan.seed,
@@ -53,7 +52,13 @@ impl Settings {
 
     /// Hash of everything the images of a limb follow from, but the pose.
     pub fn unit_key(&self, id: LimbId, case: &Case) -> String {
-        let address = (self, id, &case.source.volume_sha256, &case.surface, &case.choices);
+        let address = (
+            self,
+            id,
+            &case.source.volume_sha256,
+            &case.surface,
+            &case.choices,
+        );
         let text = serde_json::to_string(&address).expect("settings hold only JSON values");
         hex(&Sha256::digest(text.as_bytes()))
     }

@@ -128,7 +128,11 @@ pub fn generate(
 ) -> Result<Summary, GenerateError> {
     let limbs = planned_limbs(plan)?;
     let poses = plan.poses();
-    let units = || limbs.iter().flat_map(|limb| poses.iter().map(|pose| (limb.id, *pose)));
+    let units = || {
+        limbs
+            .iter()
+            .flat_map(|limb| poses.iter().map(|pose| (limb.id, *pose)))
+    };
     let stage = Stage::of_plan(plan)?;
     let settings = Settings::of(plan)?;
     let _claim = claim(root, units())?;
@@ -201,11 +205,13 @@ impl PlannedLimb {
             }
         })?;
         poses.par_iter().try_for_each(|&pose| {
-            let (files, rois) = limb.make(pose, root).map_err(|source| GenerateError::Unit {
-                case: self.file.clone(),
-                angle_deg: pose.angle_deg,
-                source,
-            })?;
+            let (files, rois) = limb
+                .make(pose, root)
+                .map_err(|source| GenerateError::Unit {
+                    case: self.file.clone(),
+                    angle_deg: pose.angle_deg,
+                    source,
+                })?;
             let key = key.to_owned();
             Record { key, files, rois }.write(root, self.id, pose)?;
             progress(Progress::Done);

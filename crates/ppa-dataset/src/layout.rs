@@ -88,7 +88,11 @@ impl LimbId {
 
 /// The angle of a step as it stands in file names: `step / 2` degrees with one decimal.
 pub fn angle_text(step: u32) -> String {
-    format!("{}.{}", step / 2, if step.is_multiple_of(2) { 0 } else { 5 })
+    format!(
+        "{}.{}",
+        step / 2,
+        if step.is_multiple_of(2) { 0 } else { 5 }
+    )
 }
 
 #[cfg(test)]
@@ -106,8 +110,14 @@ mod tests {
             limb.depth(BodyShape::Orig, View::Left, 180),
             "patient_0/depth/r/orig/depth_cam_left_90.0.png"
         );
-        assert_eq!(LimbId::depth_name(View::Right, 91), "depth_cam_right_45.5.png");
-        assert_eq!(limb.radiograph_png(180), "patient_0/xray/r/xray_image_180.png");
+        assert_eq!(
+            LimbId::depth_name(View::Right, 91),
+            "depth_cam_right_45.5.png"
+        );
+        assert_eq!(
+            limb.radiograph_png(180),
+            "patient_0/xray/r/xray_image_180.png"
+        );
         assert_eq!(limb.roi_file(), "patient_0/labels/r/roi_depth.json");
     }
 }

@@ -94,7 +94,10 @@ impl Manifest {
     pub fn read(root: &Path) -> Result<Self, FileError> {
         let path = root.join(MANIFEST_FILE);
         let text = read_text(&path)?;
-        let rows = text.lines().map(serde_json::from_str).collect::<Result<_, _>>();
+        let rows = text
+            .lines()
+            .map(serde_json::from_str)
+            .collect::<Result<_, _>>();
         Ok(Self {
             root: root.to_owned(),
             files: rows.map_err(|e| FileError::at("parse", &path)(e.into()))?,

@@ -199,7 +199,10 @@ impl Plan {
         for case in &mut plan.cases {
             case.file = folder.join(&case.file);
         }
-        for file in [&mut plan.room.ply, &mut plan.depth.rig].into_iter().flatten() {
+        for file in [&mut plan.room.ply, &mut plan.depth.rig]
+            .into_iter()
+            .flatten()
+        {
             *file = folder.join(&*file);
         }
         Ok(plan)
@@ -210,7 +213,9 @@ impl Plan {
     /// # Panics
     /// When `rotation` was changed to an invalid one after reading.
     pub fn poses(&self) -> Vec<PoseAngle> {
-        self.rotation.poses().expect("the rotation of a plan is checked when it is read")
+        self.rotation
+            .poses()
+            .expect("the rotation of a plan is checked when it is read")
     }
 
     /// The plan as TOML.
@@ -240,7 +245,9 @@ impl Plan {
                 return Err(format!("{name} is {value}, expected a length above 0 mm"));
             }
         }
-        self.rotation.poses().map_err(|error| format!("rotation: {error}"))?;
+        self.rotation
+            .poses()
+            .map_err(|error| format!("rotation: {error}"))?;
         Ok(())
     }
 }

@@ -60,7 +60,11 @@ pub fn joint_phantom(
         })
         .collect();
     let calibration = &settings.calibration;
-    Ok(VoxelPhantom::from_volume(&joint_volume, calibration, Some(&in_limb))?)
+    Ok(VoxelPhantom::from_volume(
+        &joint_volume,
+        calibration,
+        Some(&in_limb),
+    )?)
 }
 
 /// The exposure of a placed limb: the device moves into the scan, the voxels stay.

@@ -52,7 +52,12 @@ impl Record {
 }
 
 fn name(limb: LimbId, pose: PoseAngle) -> String {
-    format!("patient_{}_{}_{:03}.json", limb.patient, limb.side_letter(), pose.step)
+    format!(
+        "patient_{}_{}_{:03}.json",
+        limb.patient,
+        limb.side_letter(),
+        pose.step
+    )
 }
 
 fn path(root: &Path, limb: LimbId, pose: PoseAngle) -> PathBuf {
@@ -103,13 +108,31 @@ pub(crate) fn claim(
     Ok(Claim(lock))
 }
 
-/// Removes temporary files that a killed run left behind.
-fn remove_unfinished(folder: &Path) -> io::Result<()> {
+/// Removes temporary files (`.name.random`) that a killed run left behind.
+fn remove_unfinished(root: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(root)? {
+        let entry = entry?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if entry.file_type()?.is_dir() {
+            if name == FOLDER || name.starts_with("patient_") {
+                remove_hidden(&entry.path())?;
+            }
+        } else if [".manifest.jsonl.", ".dataset.json."]
+            .iter()
+            .any(|p| name.starts_with(p))
+        {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
+}
+
+fn remove_hidden(folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         if entry.file_type()?.is_dir() {
-            remove_unfinished(&entry.path())?;
-        } else if entry.file_name().to_string_lossy().starts_with(".tmp") {
+            remove_hidden(&entry.path())?;
+        } else if entry.file_name().to_string_lossy().starts_with('.') {
             fs::remove_file(entry.path())?;
         }
     }

@@ -114,7 +114,10 @@ impl Stage {
                 background,
             })
         };
-        let cameras = vec![place(View::Left, &rig.left)?, place(View::Right, &rig.right)?];
+        let cameras = vec![
+            place(View::Left, &rig.left)?,
+            place(View::Right, &rig.right)?,
+        ];
         Ok(Self {
             table,
             cameras,

@@ -89,7 +89,12 @@ impl<'a> PosableLimb<'a> {
             stage,
             prepared,
             skin,
-            shapes: plan.shapes.variants.iter().map(shaped).collect::<Result<_, _>>()?,
+            shapes: plan
+                .shapes
+                .variants
+                .iter()
+                .map(shaped)
+                .collect::<Result<_, _>>()?,
             phantom: joint_phantom(prepared, &plan.xray)?,
         })
     }
@@ -120,7 +125,11 @@ impl<'a> PosableLimb<'a> {
             }
         }
         files.extend(self.radiograph(pose, &placement, root)?);
-        let rois = self.stage.cameras.iter().map(|camera| self.roi(camera, &placement, pose));
+        let rois = self
+            .stage
+            .cameras
+            .iter()
+            .map(|camera| self.roi(camera, &placement, pose));
         Ok((files, rois.collect::<Result<_, _>>()?))
     }
 
@@ -148,7 +157,13 @@ impl<'a> PosableLimb<'a> {
         placement: &Placement,
     ) -> Result<DepthImage, UnitError> {
         let camera_from_body = self.camera_from_ct(camera, placement);
-        let limb = ppa_depth::render(&camera.camera, &[PlacedBody { body, camera_from_body }]);
+        let limb = ppa_depth::render(
+            &camera.camera,
+            &[PlacedBody {
+                body,
+                camera_from_body,
+            }],
+        );
         limb.require_visible()?;
         Ok(DepthImage::nearer_of(&camera.background, &limb)?)
     }
@@ -180,14 +195,18 @@ impl<'a> PosableLimb<'a> {
     ) -> Result<[FileRow; 2], UnitError> {
         let settings = &self.plan.xray;
         let device = &self.stage.table.room.device;
-        let projection = projection(placement, &self.prepared.landmarks, device, settings.detector);
+        let projection = projection(
+            placement,
+            &self.prepared.landmarks,
+            device,
+            settings.detector,
+        );
         let seed = item_seed(self.plan.seed, Purpose::Radiograph, self.id, pose.step);
         let engine = FastSettings {
             seed,
             ..settings.engine.clone()
         };
-        let radiograph =
-            ppa_xray::fast(&self.phantom, &self.stage.spectrum, &projection, &engine)?;
+        let radiograph = ppa_xray::fast(&self.phantom, &self.stage.spectrum, &projection, &engine)?;
         let png = self.id.radiograph_png(pose.step);
         radiograph.write_png(&prepare_folder(root, &png)?, &settings.presentation)?;
         let exr = self.id.radiograph_exr(pose.step);
@@ -199,7 +218,10 @@ impl<'a> PosableLimb<'a> {
                 ..self.row(root, file, kind, pose, placement)?
             })
         };
-        Ok([row(png, FileKind::Radiograph)?, row(exr, FileKind::RadiographTallies)?])
+        Ok([
+            row(png, FileKind::Radiograph)?,
+            row(exr, FileKind::RadiographTallies)?,
+        ])
     }
 
     fn row(

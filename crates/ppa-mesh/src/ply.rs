@@ -1,9 +1,10 @@
 //! PLY files: meshes and clouds out, ascii and both binary orders in.
 
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Write};
+use std::io::{self, BufReader, BufWriter};
 use std::path::{Path, PathBuf};
 
+use atomic_write_file::AtomicWriteFile;
 use nalgebra::{Point3, Vector3};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{

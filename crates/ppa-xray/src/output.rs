@@ -6,6 +6,7 @@ use std::{
 };
 
 use ::exr::prelude::{self as exr, WritableImage};
+use atomic_write_file::AtomicWriteFile;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use crate::presentation::{Presentation, PresentationError};
@@ -132,25 +133,15 @@ impl Radiograph {
     }
 }
 
-/// Writes beside the target and renames, so that no reader ever meets half a file.
+/// Writes beside the target, syncs and renames, so that no reader ever meets half a file.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    let failed = |source| OutputError::Write {
+    let write = || {
+        let mut file = AtomicWriteFile::open(path)?;
+        file.write_all(bytes)?;
+        file.commit()
+    };
+    write().map_err(|source| OutputError::Write {
         path: path.into(),
         source,
-    };
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    let builder = {
-        use std::os::unix::fs::PermissionsExt;
-        // Temporary files are private by default; a result is as readable as any new file.
-        builder.permissions(std::fs::Permissions::from_mode(0o666))
-    };
-    let mut file = builder.tempfile_in(folder).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
-    file.persist(path).map_err(|error| failed(error.error))?;
-    Ok(())
+    })
 }

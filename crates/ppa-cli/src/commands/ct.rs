@@ -83,13 +83,18 @@ fn describe(info: &Info) -> String {
         format!("origin     {ox:.3} {oy:.3} {oz:.3} mm (LPS)"),
     ];
     for (row, name) in info.direction.iter().zip(["direction", "", ""]) {
-        lines.push(format!("{name:<10} {:>9.6} {:>9.6} {:>9.6}", row[0], row[1], row[2]));
+        lines.push(format!(
+            "{name:<10} {:>9.6} {:>9.6} {:>9.6}",
+            row[0], row[1], row[2]
+        ));
     }
     lines.push(format!("HU         {} to {}", info.hu_min, info.hu_max));
     let modality = info.modality.as_deref().unwrap_or("not stated");
     lines.push(format!("modality   {modality}"));
     for series in &info.series {
-        let number = series.number.map_or("without number".to_owned(), |n| n.to_string());
+        let number = series
+            .number
+            .map_or("without number".to_owned(), |n| n.to_string());
         lines.push(format!("series     {number}: {} slices", series.slices));
     }
     for warning in &info.warnings {

@@ -105,7 +105,13 @@ fn render_meshes(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
         seconds,
     };
     output.print(&rendered, |r| {
-        format!("{}: {} of {} x {} pixels see a surface", args.out.display(), r.valid_pixels, r.width, r.height)
+        format!(
+            "{}: {} of {} x {} pixels see a surface",
+            args.out.display(),
+            r.valid_pixels,
+            r.width,
+            r.height
+        )
     })
 }
 
@@ -119,13 +125,22 @@ fn project(args: &ProjectArgs, output: Output) -> anyhow::Result<()> {
     let points: Vec<[f64; 3]> = super::read_csv(&args.points)?;
     let pixels = points
         .iter()
-        .map(|point| camera.project(&Point3::from(*point)).map(|pixel| [pixel.x, pixel.y]))
+        .map(|point| {
+            camera
+                .project(&Point3::from(*point))
+                .map(|pixel| [pixel.x, pixel.y])
+        })
         .collect();
     output.print(&Projected { pixels }, |projected| {
         let line = |pixel: &Option<[f64; 2]>| match pixel {
             Some([u, v]) => format!("{u:.6} {v:.6}"),
             None => "not seen".to_owned(),
         };
-        projected.pixels.iter().map(line).collect::<Vec<_>>().join("\n")
+        projected
+            .pixels
+            .iter()
+            .map(line)
+            .collect::<Vec<_>>()
+            .join("\n")
     })
 }

@@ -26,7 +26,11 @@ pub fn run(args: &GenerateArgs, output: Output) -> anyhow::Result<()> {
         Some(out) => out.clone(),
         None => args.plan.with_extension(""),
     };
-    anyhow::ensure!(out != args.plan, "{} has no extension: name a folder with --out", out.display());
+    anyhow::ensure!(
+        out != args.plan,
+        "{} has no extension: name a folder with --out",
+        out.display()
+    );
     let summary = with_progress(&plan, &out)?;
     output.print(&summary, |s| describe(s, &out))
 }

@@ -54,7 +54,9 @@ pub struct AugmentArgs {
 }
 
 fn body_shape_named(name: &str) -> Result<BodyShape, String> {
-    let known = BodyShape::ALL.into_iter().find(|shape| shape.name() == name);
+    let known = BodyShape::ALL
+        .into_iter()
+        .find(|shape| shape.name() == name);
     known.ok_or_else(|| {
         let names = BodyShape::ALL.map(BodyShape::name).join(", ");
         format!("expected one of {names}")
@@ -174,16 +176,22 @@ fn cluster(args: &ClusterArgs, output: Output) -> anyhow::Result<()> {
         "--eps-mm is {}, expected a length above 0",
         args.eps_mm
     );
-    anyhow::ensure!(args.min_points > 0, "--min-points is 0, expected at least 1");
+    anyhow::ensure!(
+        args.min_points > 0,
+        "--min-points is 0, expected at least 1"
+    );
     let cloud = read_ply(&args.cloud)?.cloud;
     let clusters = dbscan(&cloud.points, args.eps_mm, args.min_points);
     let clustering = Clustering {
-        clusters: clusters.sizes().len(),
-        noise: clusters.noise(),
+        clusters: clusters.sizes.len(),
+        noise: clusters.noise,
         core_points: clusters.core_points(),
-        sizes: clusters.sizes(),
+        sizes: clusters.sizes,
     };
     output.print(&clustering, |c| {
-        format!("{} clusters of {:?} points, {} noise", c.clusters, c.sizes, c.noise)
+        format!(
+            "{} clusters of {:?} points, {} noise",
+            c.clusters, c.sizes, c.noise
+        )
     })
 }

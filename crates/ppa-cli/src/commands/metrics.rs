@@ -25,8 +25,7 @@ pub fn run(args: &MetricsArgs, output: Output) -> anyhow::Result<()> {
     let rows: Vec<Row> = super::read_csv(&args.csv)?;
     let labels: Vec<f64> = rows.iter().map(|row| row.label).collect();
     let predictions: Vec<f64> = rows.iter().map(|row| row.prediction).collect();
-    let report =
-        evaluate(&labels, &predictions).with_context(|| args.csv.display().to_string())?;
+    let report = evaluate(&labels, &predictions).with_context(|| args.csv.display().to_string())?;
     output.print(&report, describe)
 }
 
@@ -37,7 +36,10 @@ fn describe(report: &Report) -> String {
         format!("MAE                  {:.4}", report.mae),
         format!("Spearman             {:.4}", report.spearman),
         format!("Accuracy             {:.2} %", 100.0 * report.accuracy),
-        format!("Diagnostic Accuracy  {:.2} %", 100.0 * report.diagnostic_accuracy),
+        format!(
+            "Diagnostic Accuracy  {:.2} %",
+            100.0 * report.diagnostic_accuracy
+        ),
         format!("Sensitivity          {:.2} %", 100.0 * report.sensitivity),
         format!("Specificity          {:.2} %", 100.0 * report.specificity),
     ]

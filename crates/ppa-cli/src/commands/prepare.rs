@@ -60,7 +60,10 @@ pub struct PrepareArgs {
 }
 
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let numbers: Option<Vec<f64>> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok())
+        .collect();
     let numbers = numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok());
     let finite = numbers.filter(|numbers| numbers.iter().all(|n| n.is_finite()));
     finite.ok_or_else(|| format!("expected {N} numbers separated by commas"))
@@ -78,7 +81,10 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
     let plane_points = match args.plane_points[..] {
         [] => None,
         [a, b, c] => Some([a, b, c]),
-        _ => anyhow::bail!("--plane-point was given {} times, expected 3", args.plane_points.len()),
+        _ => anyhow::bail!(
+            "--plane-point was given {} times, expected 3",
+            args.plane_points.len()
+        ),
     };
     let surface = LimbSettings {
         inside: args.inside,
@@ -122,6 +128,11 @@ fn describe(case: &Case, args: &PrepareArgs) -> String {
     for [x, y, z] in landmarks.plane_points {
         lines.push(format!("plane      {x:.1} {y:.1} {z:.1} mm"));
     }
-    lines.extend(landmarks.notes.iter().map(|note| format!("note       {note}")));
+    lines.extend(
+        landmarks
+            .notes
+            .iter()
+            .map(|note| format!("note       {note}")),
+    );
     lines.join("\n")
 }

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
-use ppa_dataset::{Case, Plan, PreparedLimb, Table, XraySettings, joint_phantom, projection, spectrum};
+use ppa_dataset::{
+    Case, Plan, PreparedLimb, Table, XraySettings, joint_phantom, projection, spectrum,
+};
 use ppa_scene::{Contact, place};
 use ppa_xray::{AnalogSettings, CategorySums, Engine, FastSettings, Material, analog, fast};
 use serde::Serialize;

@@ -3,6 +3,7 @@
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
+use atomic_write_file::AtomicWriteFile;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use nifti::NiftiHeader;
@@ -52,27 +53,14 @@ pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     })
 }
 
-/// Fills a temporary file beside `path` and renames it when it is complete.
+/// Fills a temporary file beside `path`, synced and renamed when it is complete.
 fn write_whole(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> std::io::Result<()> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // As any new file, instead of readable by its owner only; the umask still applies.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut file = BufWriter::new(builder.tempfile_in(folder)?);
+    let mut file = BufWriter::new(AtomicWriteFile::open(path)?);
     fill(&mut file)?;
-    let file = file.into_inner().map_err(|e| e.into_error())?;
-    file.persist(path)?;
-    Ok(())
+    file.into_inner().map_err(|e| e.into_error())?.commit()
 }
 
 fn write_stream(out: &mut dyn Write, volume: &Volume) -> std::io::Result<()> {

@@ -191,6 +191,16 @@ fn localizers_reports_and_strangers_are_left_out_but_a_second_series_is_not() {
 }
 
 #[test]
+fn a_series_in_a_subfolder_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let below = folder.path().join("exam/series");
+    std::fs::create_dir_all(&below).unwrap();
+    std::fs::write(folder.path().join("LICENSE"), "free").unwrap();
+    write_series(&below, &axial_stack(&[0.0, 1.0, 2.0]));
+    assert_eq!(read(folder.path()).unwrap(), read(&below).unwrap());
+}
+
+#[test]
 fn other_modalities_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let mut slices = axial_stack(&[0.0, 1.0]);

@@ -1,0 +1,196 @@
+//! Bad input: one clear sentence, a non-zero exit code, nothing half-written.
+
+use std::fs;
+use std::path::Path;
+
+use crate::{fail, names, phantom, shared, write_plan};
+
+fn contains(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "{part:?} is missing in: {text}");
+    }
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for command in [
+        "ct info nowhere.nii.gz",
+        "prepare nowhere.nii.gz --side r --out case.toml",
+        "generate nowhere.toml",
+        "depth render nowhere.ply --out depth.png",
+        "xray simulate nowhere.toml --out x.png",
+        "scene plane nowhere.ply",
+        "metrics nowhere.csv",
+    ] {
+        contains(&fail(folder.path(), command), &["nowhere"]);
+    }
+    assert!(names(folder.path()).is_empty());
+}
+
+#[test]
+fn an_empty_surface_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid = ppa_ct::Grid::axis_aligned(
+        [8; 3],
+        nalgebra::Vector3::repeat(2.0),
+        nalgebra::Point3::origin(),
+    );
+    let air = ppa_ct::Volume::new(grid.unwrap(), vec![-1000.0; 512]).unwrap();
+    ppa_ct::write_nifti(&folder.path().join("air.nii"), &air).unwrap();
+    let said = fail(
+        folder.path(),
+        "prepare air.nii --side r --out case.toml --ply skin.ply",
+    );
+    contains(&said, &["no limb"]);
+    fail(folder.path(), "mesh extract air.nii --out skin.ply");
+    assert_eq!(names(folder.path()), ["air.nii"]);
+}
+
+#[test]
+fn a_room_without_a_table_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    // A lattice of scattered points: nothing flat in it.
+    let mut ply = "ply\nformat ascii 1.0\nelement vertex 500\nproperty float x\n\
+                   property float y\nproperty float z\nend_header\n"
+        .to_owned();
+    for i in 0..500_u32 {
+        let scatter = |step: u32| f64::from(i * step % 997) * 2.0 - 1000.0;
+        ply += &format!("{} {} {}\n", scatter(379), scatter(613), scatter(811));
+    }
+    fs::write(folder.path().join("room.ply"), ply).unwrap();
+    write_plan(folder.path(), "[room]\nply = \"room.ply\"\n");
+    contains(
+        &fail(folder.path(), "generate plan.toml --out data"),
+        &["no plane"],
+    );
+    assert_eq!(names(folder.path()), ["plan.toml", "room.ply"]);
+}
+
+#[test]
+fn a_camera_that_sees_nothing_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rig = serde_json::to_value(ppa_depth::RigSpec::default()).unwrap();
+    // Turned about its x axis by 180 degrees: the camera looks at the ceiling.
+    rig["right"]["device_from_camera"] = serde_json::json!([
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, -1.0, 0.0, 0.0],
+        [0.0, 0.0, -1.0, 0.0],
+        [0.0, 0.0, 0.0, 1.0]
+    ]);
+    fs::write(folder.path().join("rig.json"), rig.to_string()).unwrap();
+    write_plan(folder.path(), "[depth]\nrig = \"rig.json\"\n");
+    let said = fail(folder.path(), "generate plan.toml --out data");
+    contains(&said, &["camera"]);
+    assert!(!folder.path().join("data/manifest.jsonl").exists());
+}
+
+#[test]
+fn settings_that_cannot_work_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for (more, parts) in [
+        (
+            "[shapes]\noffset_mm = -1.0\n",
+            ["shapes.offset_mm", "plan.toml"],
+        ),
+        ("[shapes]\nvariants = []\n", ["variants", "plan.toml"]),
+        ("[shapes]\nvariant = [\"orig\"]\n", ["variant", "plan.toml"]),
+        (
+            "[room.parametric]\ntable_width_mm = -3.0\n",
+            ["table_width_mm", "-3"],
+        ),
+    ] {
+        write_plan(folder.path(), more);
+        let output = crate::ppa(folder.path(), "generate plan.toml --out data")
+            .output()
+            .unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success(), "{more} was accepted");
+        contains(&said, &parts);
+        assert_eq!(names(folder.path()), ["plan.toml"]);
+    }
+}
+
+#[test]
+fn a_scan_that_changed_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::copy(phantom().join("p01.toml"), folder.path().join("p01.toml")).unwrap();
+    crate::succeed(folder.path(), "ct phantom --out p01.nii --spacing-mm 3");
+    let said = fail(folder.path(), "scene place p01.toml");
+    contains(&said, &["p01.nii", "not the scan"]);
+}
+
+#[test]
+#[ignore = "needs ../shared/data"]
+fn real_scans_that_are_no_ct_volume_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = shared().join("data");
+    let series = |path: &str| data.join(path).display().to_string();
+    let mr = fs::read_dir(data.join("mr-not-ct")).unwrap();
+    let mr = mr
+        .map(|entry| entry.unwrap().path())
+        .find(|path| path.is_dir())
+        .unwrap();
+    for (path, part) in [
+        (mr.display().to_string(), "MR"),
+        (series("geometry-only-noise/same-position"), "4"),
+        (series("geometry-only-noise/missing-slice"), "mm"),
+    ] {
+        for command in [
+            format!("ct info {path}"),
+            format!("ct convert {path} out.nii"),
+            format!("prepare {path} --side r --out case.toml"),
+        ] {
+            contains(&fail(folder.path(), &command), &[part]);
+        }
+    }
+    assert!(names(folder.path()).is_empty());
+}
+
+/// Mounts a file system of 4 MB in a mount namespace of its own.
+#[test]
+#[ignore = "needs the right to mount a file system"]
+fn a_full_disk_leaves_only_whole_files() {
+    let folder = tempfile::tempdir().unwrap();
+    write_plan(folder.path(), "");
+    let disk = folder.path().join("disk");
+    fs::create_dir(&disk).unwrap();
+    let ppa = Path::new(env!("CARGO_BIN_EXE_ppa"));
+    let script = format!(
+        "mount -t tmpfs -o size=400k tmpfs disk || exit 90; {} generate plan.toml --out disk/data; \
+         code=$?; cp -r disk/data copy; exit $code",
+        ppa.display()
+    );
+    let output = std::process::Command::new("unshare")
+        .args(["--mount", "--map-root-user", "sh", "-c", &script])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    contains(&said, &["cannot write", "space"]);
+    assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+    let mut folders = vec![folder.path().join("copy")];
+    let mut images = 0;
+    while let Some(next) = folders.pop() {
+        for entry in fs::read_dir(next).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            assert!(
+                name == ".ppa" || !name.starts_with('.'),
+                "{} was left behind",
+                path.display()
+            );
+            if path.is_dir() {
+                folders.push(path);
+            } else if name.starts_with("depth_") {
+                ppa_depth::DepthImage::read_png(&path).unwrap();
+                images += 1;
+            }
+        }
+    }
+    assert!(
+        images > 0,
+        "some images were whole before the disk was full"
+    );
+}

@@ -1,0 +1,137 @@
+//! `--json`: one object on stdout, with the keys that scripts rely on.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::{phantom, succeed};
+
+/// Runs with `--json` and checks the keys; returns the object.
+fn object(arguments: &str, keys: &[&str]) -> Value {
+    let said = succeed(phantom(), &format!("{arguments} --json"));
+    assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+    let object: Value = serde_json::from_str(&said).unwrap();
+    for key in keys {
+        assert!(
+            object.get(key).is_some(),
+            "ppa {arguments}: {key} is missing in {object}"
+        );
+    }
+    object
+}
+
+#[test]
+fn every_command_keeps_its_keys() {
+    let folder = phantom();
+    fs::write(folder.join("points.csv"), "x,y,z\n0,0,1000\n0,0,-1\n").unwrap();
+    fs::write(folder.join("pairs.csv"), "a,b\n3,1\n4,2\n5,1\n").unwrap();
+    let predictions = "id,label,prediction\na,1,1.2\nb,2,2.1\nc,3,2.9\nd,2.5,2.4\n";
+    fs::write(folder.join("predictions.csv"), predictions).unwrap();
+    // The camera a metre above the phantom, looking down (towards posterior).
+    let pose = "[[1, 0, 0, 90], [0, 0, -1, -250], [0, 1, 0, 1000], [0, 0, 0, 1]]";
+    fs::write(folder.join("pose.json"), pose).unwrap();
+
+    let info = [
+        "size",
+        "spacing_mm",
+        "origin_mm",
+        "direction",
+        "hu_min",
+        "hu_max",
+        "hu_sum",
+        "modality",
+        "series",
+        "warnings",
+    ];
+    object("ct info p01.nii", &info);
+    object("ct convert p01.nii copy.nii.gz", &info);
+    object(
+        "mesh extract p01.nii --iso -500 --out iso.ply --close",
+        &[
+            "vertices",
+            "triangles",
+            "area_mm2",
+            "volume_mm3",
+            "components",
+            "boundary_edges",
+            "euler",
+            "wall_s",
+            "cpu_s",
+        ],
+    );
+    object(
+        "mesh cluster p01.ply --eps-mm 6 --min-points 5",
+        &["clusters", "noise", "core_points", "sizes"],
+    );
+    object(
+        "scene place p01.toml --angle 18",
+        &["gap_mm", "penetration_mm", "room_from_patient"],
+    );
+    let render = "depth render p01.ply --camera-from-mesh pose.json --out depth.png";
+    object(
+        render,
+        &[
+            "width",
+            "height",
+            "valid_pixels",
+            "min_mm",
+            "max_mm",
+            "wall_s",
+            "cpu_s",
+        ],
+    );
+    let projected = object("depth project points.csv", &["pixels"]);
+    assert!(projected["pixels"][0].is_array() && projected["pixels"][1].is_null());
+    object(
+        "xray spectrum --kvp 60 --filter Al:2.5 --filter Cu:0.1",
+        &[
+            "mean_energy_kev",
+            "hvl1_mm_al",
+            "hvl2_mm_al",
+            "fluence_per_mas_cm2_at_1m",
+            "kerma_ugy_per_mas_at_1m",
+        ],
+    );
+    let attenuation = [
+        "photoelectric_cm2_g",
+        "rayleigh_cm2_g",
+        "compton_cm2_g",
+        "total_cm2_g",
+    ];
+    object(
+        "xray materials --material water --energy-kev 60",
+        &attenuation,
+    );
+    object(
+        "xray materials --composition H:0.112,O:0.888 --density 1 --energy-kev 60",
+        &attenuation,
+    );
+    let simulated = object(
+        "xray simulate p01.toml --angle 18 --engine analog --histories 20000 --out x.png --exr x.exr",
+        &["projections", "histories", "engine", "wall_s", "cpu_s"],
+    );
+    for category in ["primary", "compton", "rayleigh", "multiple"] {
+        for suffix in ["", "_se"] {
+            let key = format!("{category}_ev_per_history{suffix}");
+            assert!(simulated["projections"][0][&key].is_f64(), "{key}");
+        }
+    }
+    object(
+        "metrics predictions.csv",
+        &[
+            "n",
+            "mse",
+            "mae",
+            "spearman",
+            "accuracy",
+            "diagnostic_accuracy",
+            "sensitivity",
+            "specificity",
+        ],
+    );
+    let test = object(
+        "stats permutation pairs.csv",
+        &["mean_difference", "p_one_sided", "p_two_sided", "patterns"],
+    );
+    assert_eq!(test["patterns"], 8);
+}

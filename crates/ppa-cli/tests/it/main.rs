@@ -1,0 +1,88 @@
+//! The program as a user meets it.
+
+mod bad_input;
+mod json;
+mod resume;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// `ppa` with arguments, in a folder.
+fn ppa(folder: &Path, arguments: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_ppa"));
+    command
+        .current_dir(folder)
+        .args(arguments.split_whitespace());
+    command
+}
+
+/// Runs `ppa`, expects success, and returns stdout.
+fn succeed(folder: &Path, arguments: &str) -> String {
+    let output = ppa(folder, arguments).output().unwrap();
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "ppa {arguments}: {stderr}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Runs `ppa`, expects a failure told in one sentence, and returns the sentence.
+fn fail(folder: &Path, arguments: &str) -> String {
+    let output = ppa(folder, arguments).output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success(), "ppa {arguments} succeeded");
+    assert!(output.stdout.is_empty(), "ppa {arguments} printed a result");
+    assert!(!stderr.contains("panicked"), "{stderr}");
+    assert_eq!(stderr.trim_end().lines().count(), 1, "{stderr}");
+    stderr
+}
+
+/// Names of the files in a folder.
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<_> = entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// A folder with a coarse phantom `p01.nii` and its case `p01.toml`, made by the program itself.
+fn phantom() -> &'static Path {
+    static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        succeed(
+            folder.path(),
+            "ct phantom --out p01.nii --spacing-mm 2.5 --table",
+        );
+        succeed(
+            folder.path(),
+            "prepare p01.nii --side r --out p01.toml --ply p01.ply",
+        );
+        folder
+    });
+    folder.path()
+}
+
+/// Writes a small plan on the phantom's case and returns its path.
+fn write_plan(folder: &Path, more: &str) -> PathBuf {
+    let case = phantom().join("p01.toml");
+    let plan = format!(
+        "version = 1\n[[case]]\nfile = {case:?}\npatient = 3\n\
+         [rotation]\nfrom_deg = 0.0\nto_deg = 10.0\nstep_deg = 2.5\n\
+         [xray]\ndetector = {{ columns = 50, rows = 50, pixel_mm = 4.0 }}\n\
+         engine = {{ scatter_histories = 20000 }}\n{more}"
+    );
+    let path = folder.join("plan.toml");
+    fs::write(&path, plan).unwrap();
+    path
+}
+
+/// The folder of shared test data beside the project.
+fn shared() -> PathBuf {
+    match std::env::var_os("PPA_SHARED") {
+        Some(folder) => folder.into(),
+        None => Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
+    }
+}

@@ -1,0 +1,66 @@
+//! A killed run goes on where it stopped, to the same bytes.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use crate::{ppa, succeed, write_plan};
+
+fn contents(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![root.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(root).unwrap().to_owned();
+                files.insert(name, fs::read(&path).unwrap());
+            }
+        }
+    }
+    files
+}
+
+/// Finished poses so far.
+fn records(root: &Path) -> usize {
+    fs::read_dir(root.join(".ppa")).map_or(0, |entries| {
+        let names = entries.map(|entry| entry.unwrap().file_name());
+        names
+            .filter(|name| name.to_string_lossy().starts_with("patient"))
+            .count()
+    })
+}
+
+#[test]
+fn a_killed_run_goes_on_to_the_same_dataset() {
+    let folder = tempfile::tempdir().unwrap();
+    write_plan(folder.path(), "");
+    succeed(folder.path(), "generate plan.toml --out whole --threads 2");
+
+    let killed = folder.path().join("killed");
+    let mut run = ppa(folder.path(), "generate plan.toml --out killed --threads 1");
+    let mut run = run.stderr(std::process::Stdio::null()).spawn().unwrap();
+    while records(&killed) == 0 {
+        assert!(
+            run.try_wait().unwrap().is_none(),
+            "the run ended before its first pose"
+        );
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    run.kill().unwrap(); // SIGKILL: the program gets no chance to tidy up
+    run.wait().unwrap();
+    let before = records(&killed);
+    assert!(!killed.join("manifest.jsonl").exists());
+
+    let said = succeed(
+        folder.path(),
+        "generate plan.toml --out killed --threads 2 --json",
+    );
+    let summary: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(summary["units"], 5);
+    assert_eq!(summary["made"], 5 - before);
+    assert!(contents(&killed) == contents(&folder.path().join("whole")));
+}
