@@ -29,6 +29,7 @@ mod info;
 #[cfg(feature = "nifti")]
 mod nifti_file;
 pub mod phantom;
+mod refine;
 mod scan;
 mod volume;
 

@@ -19,6 +19,9 @@ pub enum VolumeError {
         /// Voxels of the grid.
         expected: usize,
     },
+    /// A spacing to resample to is not a length.
+    #[error("a spacing of {0} mm, expected a length above 0")]
+    Spacing(f64),
     /// A value is NaN or infinite.
     #[error("voxel {0:?} holds a value that is not a number")]
     NotFinite([usize; 3]),

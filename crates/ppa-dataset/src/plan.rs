@@ -100,6 +100,9 @@ pub struct XraySettings {
     pub detector: Detector,
     /// Length of limb kept on either side of the joint, mm.
     pub half_length_mm: f64,
+    /// Largest voxel that photons travel through, mm: thicker slices are interpolated, so that
+    /// bone edges do not come out as stairs.
+    pub max_voxel_mm: f64,
     /// HU to material and density.
     pub calibration: HuCalibration,
     /// The engine.
@@ -120,6 +123,7 @@ impl Default for XraySettings {
                 pixel_mm: 0.5,
             },
             half_length_mm: 120.0,
+            max_voxel_mm: 1.0,
             calibration: HuCalibration::default(),
             engine: FastSettings::default(),
             presentation: Presentation::default(),
@@ -240,6 +244,7 @@ impl Plan {
             ("shapes.offset_mm", self.shapes.offset_mm),
             ("depth.roi_mm", self.depth.roi_mm),
             ("xray.half_length_mm", self.xray.half_length_mm),
+            ("xray.max_voxel_mm", self.xray.max_voxel_mm),
         ] {
             if !(value.is_finite() && value > 0.0) {
                 return Err(format!("{name} is {value}, expected a length above 0 mm"));

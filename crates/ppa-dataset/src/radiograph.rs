@@ -1,11 +1,14 @@
 //! The exposure of a posed limb: its voxels around the joint, and the device as the scan sees it.
 
 use nalgebra::{Point3, Unit, Vector3};
+use ppa_ct::Volume;
 use ppa_scene::{Landmarks, Placement, XrayDevice, ct_from_device};
 use ppa_xray::{Detector, Projection, VoxelPhantom};
 
 use crate::plan::XraySettings;
 use crate::prepare::PreparedLimb;
+
+const AIR_HU: f32 = -1000.0;
 
 /// Why the joint cannot be turned into voxels of material and density.
 #[derive(Debug, thiserror::Error)]
@@ -52,18 +55,18 @@ pub fn joint_phantom(
     if high == [0; 3] {
         return Err(JointError::NoLimb { half_length_mm });
     }
-    let joint_volume = volume.crop(low, high)?;
-    let in_limb: Vec<bool> = (0..joint_volume.grid().len())
-        .map(|index| {
-            let [i, j, k] = joint_volume.grid().voxel(index);
-            mask[grid.index([i + low[0], j + low[1], k + low[2]])]
-        })
-        .collect();
-    let calibration = &settings.calibration;
+    let cropped = volume.crop(low, high)?;
+    let hu = cropped.hu().iter().enumerate().map(|(index, &hu)| {
+        let [i, j, k] = cropped.grid().voxel(index);
+        let in_limb = mask[grid.index([i + low[0], j + low[1], k + low[2]])];
+        if in_limb { hu } else { AIR_HU }
+    });
+    let limb = Volume::new(cropped.grid().clone(), hu.collect())?;
+    let fine = limb.refined(settings.max_voxel_mm)?;
     Ok(VoxelPhantom::from_volume(
-        &joint_volume,
-        calibration,
-        Some(&in_limb),
+        &fine,
+        &settings.calibration,
+        None,
     )?)
 }
 
