@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use ppa_dataset::{Case, prepare};
-use ppa_mesh::{LimbSettings, write_ply};
-use ppa_scene::{LandmarkOverrides, LimbKind, Side};
+use ppa_mesh::{LimbSettings, VoxelBox, write_ply};
+use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
 
 use crate::output::{Output, working};
 
@@ -21,6 +21,14 @@ enum LimbName {
     LowerLeg,
     /// Anything else: turned about its axis at the middle of its length
     Other,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum AxisName {
+    /// The tibia, so that a swelling does not move the axis off the joint
+    Bone,
+    /// The whole cross-section inside the skin
+    Limb,
 }
 
 #[derive(Debug, Args)]
@@ -39,12 +47,21 @@ pub struct PrepareArgs {
     /// Kind of limb
     #[arg(long, value_enum)]
     limb: Option<LimbName>,
+    /// Hounsfield units of the skin [default: -500]
+    #[arg(long, value_name = "HU", allow_negative_numbers = true)]
+    iso_hu: Option<f64>,
+    /// Keep only this box of voxels: first and one past the last index along i, j and k
+    #[arg(long, value_name = "I,I,J,J,K,K", value_parser = voxel_box)]
+    crop: Option<VoxelBox>,
     /// A point inside the wanted limb when the scan shows several, ct frame
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     inside: Option<[f64; 3]>,
     /// Centre of the joint, ct frame
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     joint: Option<[f64; 3]>,
+    /// What the regions' centres are centres of: bone or the whole limb
+    #[arg(long, value_enum)]
+    axis_source: Option<AxisName>,
     /// Region just proximal to the joint, mm from the joint towards proximal
     #[arg(long, value_name = "FROM,TO", value_parser = range, allow_hyphen_values = true)]
     joint_region: Option<[f64; 2]>,
@@ -77,6 +94,20 @@ fn range(text: &str) -> Result<[f64; 2], String> {
     numbers(text)
 }
 
+fn voxel_box(text: &str) -> Result<VoxelBox, String> {
+    let numbers: Option<Vec<usize>> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok())
+        .collect();
+    match numbers.as_deref() {
+        Some(&[i0, i1, j0, j1, k0, k1]) => Ok(VoxelBox {
+            low: [i0, j0, k0],
+            high: [i1, j1, k1],
+        }),
+        _ => Err("expected 6 voxel indices separated by commas".to_owned()),
+    }
+}
+
 pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
     let plane_points = match args.plane_points[..] {
         [] => None,
@@ -86,10 +117,12 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
             args.plane_points.len()
         ),
     };
-    let surface = LimbSettings {
+    let mut surface = LimbSettings {
         inside: args.inside,
+        crop: args.crop,
         ..LimbSettings::default()
     };
+    surface.iso_hu = args.iso_hu.unwrap_or(surface.iso_hu);
     let choices = LandmarkOverrides {
         limb: args.limb.map(|limb| match limb {
             LimbName::LowerLeg => LimbKind::LowerLeg,
@@ -100,7 +133,10 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
         calf_region: args.calf_region,
         anterior: args.anterior,
         plane_points,
-        ..LandmarkOverrides::default()
+        axis_source: args.axis_source.map(|source| match source {
+            AxisName::Bone => AxisSource::Bone,
+            AxisName::Limb => AxisSource::Limb,
+        }),
     };
     let side = match args.side {
         SideName::L => Side::Left,

@@ -1,0 +1,106 @@
+//! Real scans from `../shared/data`, through the whole chain.
+
+use std::path::{Path, PathBuf};
+
+use ppa_ct::read;
+use ppa_dataset::layout::{LimbId, View};
+use ppa_dataset::{
+    BodyShape, Case, FileKind, Manifest, Plan, PlanCase, PreparedLimb, generate, prepare,
+};
+use ppa_depth::DepthImage;
+use ppa_mesh::LimbSettings;
+use ppa_scene::{LandmarkOverrides, LimbKind, Side, Sweep};
+
+fn data(name: &str) -> PathBuf {
+    let shared = match std::env::var_os("PPA_SHARED") {
+        Some(folder) => PathBuf::from(folder),
+        None => Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared"),
+    };
+    shared.join("data").join(name)
+}
+
+fn prepared(scan: &Path, side: Side) -> (Case, PreparedLimb) {
+    let (surface, choices) = (LimbSettings::default(), LandmarkOverrides::default());
+    prepare(scan, side, &surface, &choices).unwrap()
+}
+
+/// Two poses of a case with coarse radiographs, in a folder of its own.
+fn dataset(case: &Case) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("case.toml");
+    case.write(&file).unwrap();
+    let mut plan = Plan::new(vec![PlanCase { file, patient: 0 }]);
+    plan.rotation = Sweep {
+        from_deg: 0.0,
+        to_deg: 20.0,
+        step_deg: 20.0,
+    };
+    plan.xray.detector.columns = 112;
+    plan.xray.detector.rows = 112;
+    plan.xray.detector.pixel_mm = 2.0;
+    plan.xray.engine.scatter_histories = 50_000;
+    generate(&plan, &folder.path().join("data"), &|_| {}).unwrap();
+    folder
+}
+
+/// The couch is the lowest solid thing in the scan; the ankle sits where a person sees it (slice
+/// 20, z = 201 mm), and the other leg, beyond x = 20 mm, is gone.
+#[test]
+#[ignore = "needs ../shared/data"]
+fn the_right_leg_of_sts049_is_freed_from_couch_and_other_leg() {
+    let scan = data("lower-leg-ankle-sts049");
+    let (case, limb) = prepared(&scan, Side::Right);
+    let [x, _, z] = case.found.landmarks.joint_centre;
+    assert_eq!(case.found.landmarks.limb, LimbKind::LowerLeg);
+    assert!((z - 201.3).abs() < 5.0, "joint at z = {z} mm");
+    assert!((x + 44.0).abs() < 8.0, "joint at x = {x} mm");
+    assert!(
+        case.found.surface.couch_voxels > 10_000,
+        "a couch was found"
+    );
+    let right_end = limb
+        .limb
+        .mesh
+        .vertices
+        .iter()
+        .map(|v| v.x)
+        .fold(f32::MIN, f32::max);
+    assert!(right_end < 40.0, "the limb reaches to x = {right_end} mm");
+
+    let made = dataset(&case);
+    let manifest = Manifest::read(&made.path().join("data")).unwrap();
+    let kinds = [(FileKind::Depth, 20), (FileKind::Radiograph, 2)];
+    for (kind, expected) in kinds {
+        let found = manifest.files.iter().filter(|row| row.kind == kind).count();
+        assert_eq!(found, expected, "{kind:?}");
+    }
+}
+
+/// DICOM and NIfTI of one knee give the same voxels, the same case and the same depth images.
+#[test]
+#[ignore = "needs ../shared/data"]
+fn both_containers_of_sts028_give_the_same_images() {
+    let scans = [
+        data("knee-calf-sts028/dicom"),
+        data("knee-calf-sts028/CT_image.nii.gz"),
+    ];
+    let volumes = scans.each_ref().map(|scan| read(scan).unwrap().volume);
+    assert!(volumes[0].hu() == volumes[1].hu());
+    let made = scans
+        .each_ref()
+        .map(|scan| dataset(&prepared(scan, Side::Left).0));
+    let limb = LimbId {
+        patient: 0,
+        side: Side::Left,
+    };
+    for view in View::ALL {
+        let file = limb.depth(BodyShape::Orig, view, 40);
+        let [dicom, nifti] = made
+            .each_ref()
+            .map(|folder| DepthImage::read_png(&folder.path().join("data").join(&file)).unwrap());
+        // The affines differ by rounding: a silhouette may move by a pixel, a depth by 1 mm.
+        let pairs = dicom.z_mm.iter().zip(&nifti.z_mm);
+        let differ = pairs.filter(|(a, b)| (**a - **b).abs() > 1.0).count();
+        assert!(differ < 50, "{differ} pixels differ in {file}");
+    }
+}
