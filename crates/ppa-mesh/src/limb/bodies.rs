@@ -1,6 +1,7 @@
 //! Solid bodies in a volume, told apart where they only touch.
 
-use super::lattice::Lattice;
+use super::distance::squared_distances;
+use super::tissue::{BONE, CORE, Tissue};
 
 /// Depths that differ by less than this are treated alike, mm.
 const DEPTH_STEP_MM: f64 = 0.1;
@@ -14,11 +15,14 @@ pub struct Basin {
     pub bone_voxels: usize,
     /// Area in the side faces of the volume, mm².
     pub side_cut_mm2: f64,
-    /// Sum of voxel indices, for the centre.
+    /// Sum of voxel indices within the box, for the centre.
     pub index_sum: [f64; 3],
 }
 
-/// Bodies and the body of each voxel (`u32::MAX`: not deep enough).
+/// Not deep enough to be of a body.
+pub const NO_BODY: u32 = u32::MAX;
+
+/// Bodies and the body of each voxel of the box ([`NO_BODY`] for none).
 pub struct Bodies {
     pub labels: Vec<u32>,
     pub basins: Vec<Basin>,
@@ -29,42 +33,45 @@ pub struct Bodies {
 /// Two basins that meet become one body unless the place where they meet is a neck: less than
 /// `neck_ratio` as deep as the shallower of both. A calf and its foot become one, two
 /// calves that touch stay two.
-pub fn bodies(
-    lattice: &Lattice,
-    depth_sq: &[f32],
-    bone: &dyn Fn(usize) -> bool,
-    least_depth_mm: f64,
-    neck_ratio: f64,
-) -> Bodies {
-    let depth = |at: usize| f64::from(depth_sq[at]).sqrt();
+pub fn bodies(tissue: &Tissue, least_depth_mm: f64, neck_ratio: f64) -> Bodies {
+    let lattice = &tissue.lattice;
+    let hollow = |at: usize| !tissue.is(at, CORE);
+    let depth_sq = squared_distances(lattice.size, lattice.spacing_mm, hollow);
+    let strides = lattice.strides();
     let mut parent: Vec<u32> = Vec::new();
     let mut basins: Vec<Basin> = Vec::new();
-    let mut labels = vec![u32::MAX; depth_sq.len()];
-    for at in deepest_first(depth_sq, least_depth_mm) {
-        let here = depth(at);
+    let mut labels = vec![NO_BODY; depth_sq.len()];
+    for at in deepest_first(&depth_sq, least_depth_mm) {
+        let at = at as usize;
+        let voxel = lattice.voxel(at);
+        let here = f64::from(depth_sq[at]).sqrt();
         let mut main: Option<u32> = None;
-        for neighbour in lattice.neighbours(at) {
-            if labels[neighbour] == u32::MAX {
-                continue;
-            }
-            let other = crate::topology::root(&mut parent, labels[neighbour]);
-            main = Some(match main {
-                None => other,
-                Some(main) if main == other => main,
-                Some(main) => {
-                    let peak = |b: u32| basins[b as usize].peak_mm;
-                    let (higher, lower) = if peak(main) >= peak(other) {
-                        (main, other)
-                    } else {
-                        (other, main)
-                    };
-                    if here >= neck_ratio * peak(lower) {
-                        merge(&mut parent, &mut basins, higher, lower)
-                    } else {
-                        higher
-                    }
+        for axis in 0..3 {
+            let below = (voxel[axis] > 0).then(|| labels[at - strides[axis]]);
+            let above = (voxel[axis] + 1 < lattice.size[axis]).then(|| labels[at + strides[axis]]);
+            for label in below.into_iter().chain(above) {
+                if label == NO_BODY || Some(label) == main {
+                    continue;
                 }
-            });
+                let other = crate::topology::root(&mut parent, label);
+                main = Some(match main {
+                    None => other,
+                    Some(main) if main == other => main,
+                    Some(main) => {
+                        let peak = |b: u32| basins[b as usize].peak_mm;
+                        let (higher, lower) = if peak(main) >= peak(other) {
+                            (main, other)
+                        } else {
+                            (other, main)
+                        };
+                        if here >= neck_ratio * peak(lower) {
+                            merge(&mut parent, &mut basins, higher, lower)
+                        } else {
+                            higher
+                        }
+                    }
+                });
+            }
         }
         let label = main.unwrap_or_else(|| {
             basins.push(Basin {
@@ -76,13 +83,11 @@ pub fn bodies(
         });
         labels[at] = label;
         let basin = &mut basins[label as usize];
-        let voxel = lattice.voxel(at);
         basin.voxels += 1;
-        basin.bone_voxels += usize::from(bone(at));
+        basin.bone_voxels += usize::from(tissue.is(at, BONE));
         for (axis, &place) in voxel.iter().enumerate() {
             basin.index_sum[axis] += place as f64;
-            let border = place == 0 || place + 1 == lattice.size[axis];
-            if axis != lattice.scan_axis && border {
+            if axis != lattice.scan_axis && lattice.at_walls(voxel, axis).contains(&true) {
                 basin.side_cut_mm2 += lattice.voxel_mm3() / lattice.spacing_mm[axis];
             }
         }
@@ -106,27 +111,30 @@ fn merge(parent: &mut [u32], basins: &mut [Basin], higher: u32, lower: u32) -> u
 }
 
 /// Voxels at least that deep, deepest first, equal ones in memory order (counting sort).
-fn deepest_first(depth_sq: &[f32], least_depth_mm: f64) -> Vec<usize> {
+fn deepest_first(depth_sq: &[f32], least_depth_mm: f64) -> Vec<u32> {
     let step = |squared: f32| (f64::from(squared).sqrt() / DEPTH_STEP_MM).min(1e5) as usize;
     let least_sq = (least_depth_mm * least_depth_mm) as f32;
-    let deep = |at: &usize| depth_sq[*at] >= least_sq;
-    let steps: Vec<u32> = depth_sq
-        .iter()
-        .map(|&squared| step(squared) as u32)
-        .collect();
-    let last = steps.iter().copied().max().unwrap_or(0);
-    let mut starts = vec![0_usize; last as usize + 2];
-    for at in (0..depth_sq.len()).filter(deep) {
-        starts[(last - steps[at]) as usize + 1] += 1;
+    let deep = || {
+        let voxels = depth_sq.iter().enumerate();
+        voxels
+            .filter(|(_, squared)| **squared >= least_sq)
+            .map(|(at, &squared)| (at as u32, step(squared)))
+    };
+    let mut counts = Vec::new();
+    for (_, step) in deep() {
+        if step >= counts.len() {
+            counts.resize(step + 1, 0);
+        }
+        counts[step] += 1;
     }
-    for bin in 1..starts.len() {
-        starts[bin] += starts[bin - 1];
+    let mut total = 0;
+    for slot in counts.iter_mut().rev() {
+        total += std::mem::replace(slot, total);
     }
-    let mut order = vec![0; starts[last as usize + 1]];
-    for at in (0..depth_sq.len()).filter(deep) {
-        let slot = &mut starts[(last - steps[at]) as usize];
-        order[*slot] = at;
-        *slot += 1;
+    let mut order = vec![0; total];
+    for (at, step) in deep() {
+        order[counts[step]] = at;
+        counts[step] += 1;
     }
     order
 }
@@ -140,7 +148,7 @@ fn compact(mut labels: Vec<u32>, parent: &mut [u32], basins: &[Basin]) -> Bodies
             kept.push(basins[basin].clone());
         }
     }
-    for label in labels.iter_mut().filter(|label| **label != u32::MAX) {
+    for label in labels.iter_mut().filter(|label| **label != NO_BODY) {
         *label = numbers[crate::topology::root(parent, *label) as usize];
     }
     Bodies {

@@ -1,7 +1,8 @@
-//! The volume with nothing but the limb in it, as the surface sees it.
+//! The limb with nothing else around it, as the surface sees it.
 
-use ppa_ct::Volume;
 use rayon::prelude::*;
+
+use super::lattice::Lattice;
 
 /// HU put where something was removed, away from the limb.
 const AIR_HU: f32 = -1000.0;
@@ -19,43 +20,54 @@ const SHARE_RANGE: f32 = 0.2;
 /// surface half-way between voxels would have steps. A removed voxel gets a value that puts the
 /// surface half-way on a flat contact, nearer to it where limb surrounds it (the foot of a step) and
 /// farther where it does not (the top of a step).
-pub fn cleaned(volume: &Volume, mask: &[bool], iso: f32) -> Volume {
-    let (hu, size) = (volume.hu(), volume.grid().size());
-    let values = (0..hu.len())
-        .into_par_iter()
-        .map(|at| match (mask[at], hu[at] >= iso) {
-            (true, true) | (false, false) => hu[at],
-            (true, false) => FILL_HU.max(iso),
-            (false, true) => match share_around(size, mask, at) {
-                0.0 => AIR_HU.min(iso - 1.0),
-                share => {
-                    let bend = (share - FLAT_SHARE).clamp(-SHARE_RANGE, SHARE_RANGE);
-                    let along = 0.5 + bend;
-                    iso - FLESH_HU * (1.0 - along) / along
+///
+/// `hu` and `mask` are of the whole volume, what is returned of the box.
+pub fn cleaned(part: &Lattice, hu: &[f32], mask: &[bool], iso: f32) -> Vec<f32> {
+    let mut values = vec![0.0; part.len()];
+    let rows = values.par_chunks_mut(part.size[0]).enumerate();
+    rows.for_each(|(row, values)| {
+        let (line, inside) = (part.row_of(row, hu), part.row_of(row, mask));
+        for i in 0..values.len() {
+            values[i] = match (inside[i], line[i] >= iso) {
+                (true, true) | (false, false) => line[i],
+                (true, false) => FILL_HU.max(iso),
+                (false, true) => {
+                    let voxel = part.voxel(row * part.size[0] + i);
+                    let voxel = [0, 1, 2].map(|axis| voxel[axis] + part.low[axis]);
+                    removed(share_around(part.whole, mask, voxel), iso)
                 }
-            },
-        })
-        .collect();
-    Volume::new(volume.grid().clone(), values).expect("same grid, finite values")
+            };
+        }
+    });
+    values
+}
+
+/// HU of a removed voxel with that share of limb around it.
+fn removed(share: f32, iso: f32) -> f32 {
+    if share == 0.0 {
+        return AIR_HU.min(iso - 1.0);
+    }
+    let bend = (share - FLAT_SHARE).clamp(-SHARE_RANGE, SHARE_RANGE);
+    let along = 0.5 + bend;
+    iso - FLESH_HU * (1.0 - along) / along
 }
 
 /// Share of limb around a voxel, weights 1-2-1 along each axis; the border repeats.
-fn share_around(size: [usize; 3], mask: &[bool], at: usize) -> f32 {
-    let strides = [1, size[0], size[0] * size[1]];
+fn share_around(size: [usize; 3], mask: &[bool], voxel: [usize; 3]) -> f32 {
+    let nearby = |axis: usize| {
+        let place = voxel[axis];
+        let last = size[axis] - 1;
+        let around = [place.saturating_sub(1), place, (place + 1).min(last)];
+        around.into_iter().zip([0.25, 0.5, 0.25])
+    };
     let mut share = 0.0;
-    for step in 0..27_usize {
-        let (mut there, mut weight) = (at, 1.0 / 64.0);
-        for axis in 0..3 {
-            let place = at / strides[axis] % size[axis];
-            match step / 3_usize.pow(axis as u32) % 3 {
-                0 if place > 0 => there -= strides[axis],
-                2 if place + 1 < size[axis] => there += strides[axis],
-                1 => weight *= 2.0,
-                _ => {}
+    for (k, along_z) in nearby(2) {
+        for (j, along_y) in nearby(1) {
+            for (i, along_x) in nearby(0) {
+                if mask[i + size[0] * (j + size[1] * k)] {
+                    share += along_x * along_y * along_z;
+                }
             }
-        }
-        if mask[there] {
-            share += weight;
         }
     }
     share

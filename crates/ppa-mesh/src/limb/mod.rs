@@ -10,27 +10,29 @@ mod bodies;
 mod cleaned;
 mod couch;
 mod distance;
+mod growth;
 mod lattice;
+mod pieces;
 mod report;
 mod settings;
+mod tissue;
 
 use nalgebra::Point3;
 use ppa_ct::{Volume, VolumeError};
 
 use crate::dbscan::dbscan;
 use crate::mesh::Mesh;
-use crate::surface::{Border, SurfaceError, iso_surface};
-use bodies::{Bodies, bodies};
+use crate::surface::{SurfaceError, surface_of_part};
+use bodies::{Bodies, NO_BODY, bodies};
 use cleaned::cleaned;
 use couch::couch_columns;
-use distance::nearest;
+use distance::{FAR_MM2, spread};
+use growth::{farthest_sq, fill_enclosed, grown_back, keep_largest};
 use lattice::Lattice;
 pub use report::{Body, CutFace, LimbReport};
 pub use settings::{LimbSettings, VoxelBox};
+use tissue::{TISSUE, Tissue};
 
-/// Tissue beyond the grown-back core is skin relief up to this far, and something that touches the
-/// limb where it goes on, mm.
-const RELIEF_MM: f64 = 4.0;
 /// A body weighs half as much when the side faces cut it through about half its size.
 const SIDE_CUT_WEIGHT: f64 = 2.0;
 /// At most this many surface points are clustered; more are thinned evenly first.
@@ -150,83 +152,71 @@ fn check(settings: &LimbSettings) -> Result<(), LimbError> {
 }
 
 fn within(volume: &Volume, settings: &LimbSettings) -> Result<Limb, LimbError> {
-    let lattice = Lattice::of(volume.grid());
-    let hu = volume.hu();
-    let (iso, core_hu) = (settings.iso_hu as f32, settings.core_hu as f32);
+    let (grid, hu) = (volume.grid(), volume.hu());
+    let (whole, iso) = (Lattice::of(grid), settings.iso_hu as f32);
     let mut report = LimbReport::default();
-    let mut tissue: Vec<bool> = hu.iter().map(|&v| v >= iso).collect();
-    let tissue_voxels = count(&tissue);
-
-    let couch = couch_columns(
-        &lattice,
-        &tissue,
-        settings.couch_persistence,
-        settings.couch_thickness_mm,
-    );
-    report.couch_columns = count(&couch);
-    if report.couch_columns > 0 {
-        for at in 0..tissue.len() {
-            if tissue[at] && couch[lattice.column(at)] {
-                tissue[at] = false;
-                report.couch_voxels += 1;
-            }
-        }
-    }
-
-    let hollow: Vec<bool> = (0..hu.len())
-        .map(|at| !(tissue[at] && hu[at] >= core_hu))
-        .collect();
-    let (depth_sq, _) = nearest(lattice.size, lattice.spacing_mm, &hollow);
-    drop(hollow);
-    let found = bodies(
-        &lattice,
-        &depth_sq,
-        &|at| hu[at] >= settings.bone_hu as f32,
-        settings.core_radius_mm,
-        settings.neck_ratio,
-    );
-    drop(depth_sq);
-    if found.basins.is_empty() {
-        return Err(LimbError::NothingSolid {
-            core_hu: settings.core_hu,
-            thickness_mm: 2.0 * settings.core_radius_mm,
-            max_hu: hu.iter().copied().fold(f32::MIN, f32::max),
-        });
-    }
-    let solid: Vec<bool> = found
-        .labels
-        .iter()
-        .map(|&label| label != u32::MAX)
-        .collect();
-    let (reach_sq, source) = nearest(lattice.size, lattice.spacing_mm, &solid);
-    let chosen = match settings.inside {
-        Some(point) => body_at(volume, &tissue, &found, &source, point)?,
-        None => best_body(&lattice, &found),
+    let nothing_solid = || LimbError::NothingSolid {
+        core_hu: settings.core_hu,
+        thickness_mm: 2.0 * settings.core_radius_mm,
+        max_hu: hu.iter().copied().fold(f32::MIN, f32::max),
     };
-    describe_bodies(volume, &lattice, &found, chosen, &mut report);
+    let (persistence, thickness_mm) = (settings.couch_persistence, settings.couch_thickness_mm);
+    let columns = couch_columns(&whole, hu, iso, persistence, thickness_mm);
+    report.couch_columns = count(&columns.couch);
+    report.couch_voxels = columns.couch_voxels();
+    let tissue = Tissue::find(&whole, hu, &columns, settings).ok_or_else(nothing_solid)?;
+    let lattice = &tissue.lattice;
 
-    let mut mask = grown_back(&lattice, &tissue, &reach_sq, settings.core_radius_mm);
+    let mut found = bodies(&tissue, settings.core_radius_mm, settings.neck_ratio);
+    if found.basins.is_empty() {
+        return Err(nothing_solid());
+    }
+    // From here on the labels say to which body each voxel is nearest. How far tissue lies from the
+    // bodies matters only near them, but a point given may be anywhere.
+    let mut reach_sq: Vec<f32> = found.labels.iter().map(from_body).collect();
+    let farthest_sq = farthest_sq(settings.core_radius_mm);
+    let limit_sq = settings.inside.is_none().then_some(farthest_sq);
+    let (size, spacing_mm) = (lattice.size, lattice.spacing_mm);
+    spread(size, spacing_mm, &mut reach_sq, &mut found.labels, limit_sq);
+    let chosen = match settings.inside {
+        Some(point) => body_at(volume, &tissue, &found, point)?,
+        None => best_body(lattice, &found),
+    };
+    report.describe_bodies(grid, lattice, &found, chosen);
+
+    let mut inside = grown_back(&tissue, &reach_sq, settings.core_radius_mm);
     drop(reach_sq);
-    for at in 0..mask.len() {
-        mask[at] &= found.labels[source[at] as usize] == chosen;
+    for (inside, body) in inside.iter_mut().zip(&found.labels) {
+        *inside &= *body == chosen;
     }
-    drop((source, found));
-    report.island_voxels = keep_largest(&lattice, &mut mask);
-    report.other_voxels = tissue_voxels - report.couch_voxels - count(&mask);
-    let enclosed = lattice.enclosed(&mask);
-    for at in 0..mask.len() {
-        mask[at] |= enclosed[at];
-    }
-    report.interior_voxels = count(&enclosed);
-    describe_limb(&lattice, &mask, &mut report);
+    drop(found);
+    report.island_voxels = keep_largest(lattice, &mut inside);
+    let tissue_voxels = columns.tissue.iter().map(|&n| n as usize).sum::<usize>();
+    report.other_voxels = tissue_voxels - report.couch_voxels - count(&inside);
+    report.interior_voxels = fill_enclosed(lattice, &mut inside);
+    report.describe_limb(lattice, &inside);
 
-    let surface = iso_surface(&cleaned(volume, &mask, iso), iso, Border::Open)?;
+    let mut mask = vec![false; whole.len()];
+    for (row, inside) in inside.chunks(size[0]).enumerate() {
+        let [_, j, k] = lattice.voxel(row * size[0]);
+        let start = grid.index([0, lattice.low[1] + j, lattice.low[2] + k]) + lattice.low[0];
+        mask[start..start + size[0]].copy_from_slice(inside);
+    }
+    drop((inside, tissue));
+    // One voxel beyond the limb for the surface, another one for its normals.
+    let part = whole.window_around(report.low, report.high, 2);
+    let values = cleaned(&part, hu, &mask, iso);
+    let surface = surface_of_part(grid, part.low, part.size, values, iso)?;
     let mesh = one_piece(&surface, settings, &mut report);
     Ok(Limb { mesh, mask, report })
 }
 
 fn count(mask: &[bool]) -> usize {
     mask.iter().filter(|m| **m).count()
+}
+
+fn from_body(label: &u32) -> f32 {
+    if *label == NO_BODY { FAR_MM2 } else { 0.0 }
 }
 
 /// The body with the most bone, those cut by side faces counting less; without bone the largest.
@@ -248,72 +238,22 @@ fn best_body(lattice: &Lattice, found: &Bodies) -> u32 {
 
 fn body_at(
     volume: &Volume,
-    tissue: &[bool],
+    tissue: &Tissue,
     found: &Bodies,
-    source: &[u32],
     point: [f64; 3],
 ) -> Result<u32, LimbError> {
-    let grid = volume.grid();
-    let voxel = grid.voxel_from_ct() * Point3::from(point);
-    let nearest = voxel.coords.map(f64::round);
-    let inside = (0..3).all(|x| (0.0..grid.size()[x] as f64).contains(&nearest[x]));
-    if !inside {
+    let lattice = &tissue.lattice;
+    let voxel = volume.grid().voxel_from_ct() * Point3::from(point);
+    let place = [0, 1, 2].map(|x| voxel[x].round() - lattice.low[x] as f64);
+    if !(0..3).all(|x| (0.0..lattice.size[x] as f64).contains(&place[x])) {
         return Err(LimbError::Inside(point));
     }
-    let at = grid.index([0, 1, 2].map(|x| nearest[x] as usize));
-    if !tissue[at] {
+    let strides = lattice.strides();
+    let at = (0..3).map(|x| place[x] as usize * strides[x]).sum();
+    if !tissue.is(at, TISSUE) {
         return Err(LimbError::Inside(point));
     }
-    Ok(found.labels[source[at] as usize])
-}
-
-/// Tissue within the erosion radius of the core, and the skin relief on top of it.
-///
-/// What lies farther out hangs together in pieces; a piece that stays near is relief that the
-/// erosion wore off, one that reaches far (a sheet, an electrode) only touches the limb.
-fn grown_back(lattice: &Lattice, tissue: &[bool], reach_sq: &[f32], radius_mm: f64) -> Vec<bool> {
-    // The core is counted from voxel centre to voxel centre; its border lies half a voxel out.
-    let half_voxel = 0.5
-        * lattice
-            .spacing_mm
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min);
-    let near_sq = (radius_mm + half_voxel).powi(2) as f32;
-    let far_sq = (radius_mm + RELIEF_MM).powi(2) as f32;
-    let beyond: Vec<bool> = (0..tissue.len())
-        .map(|at| tissue[at] && reach_sq[at] > near_sq)
-        .collect();
-    let pieces = lattice.components(&beyond);
-    let mut farthest_sq = vec![0.0_f32; pieces.count];
-    for (at, &label) in pieces.labels.iter().enumerate() {
-        if let Some(far) = farthest_sq.get_mut(label as usize) {
-            *far = far.max(reach_sq[at]);
-        }
-    }
-    (0..tissue.len())
-        .map(|at| match pieces.labels[at] {
-            u32::MAX => tissue[at] && reach_sq[at] <= near_sq,
-            label => farthest_sq[label as usize] <= far_sq,
-        })
-        .collect()
-}
-
-fn keep_largest(lattice: &Lattice, mask: &mut [bool]) -> usize {
-    let pieces = lattice.components(mask);
-    let mut sizes = vec![0_usize; pieces.count];
-    for &label in pieces.labels.iter().filter(|l| **l != u32::MAX) {
-        sizes[label as usize] += 1;
-    }
-    let largest = (0..sizes.len()).max_by_key(|&at| (sizes[at], usize::MAX - at));
-    let mut removed = 0;
-    for (at, &label) in pieces.labels.iter().enumerate() {
-        if label != u32::MAX && Some(label as usize) != largest {
-            mask[at] = false;
-            removed += 1;
-        }
-    }
-    removed
+    Ok(found.labels[at])
 }
 
 /// The largest connected piece of the main cluster of surface points.
@@ -339,64 +279,4 @@ fn one_piece(surface: &Mesh, settings: &LimbSettings, report: &mut LimbReport) -
     report.points = mesh.vertices.len();
     report.points_removed = surface.vertices.len() - mesh.vertices.len();
     mesh
-}
-
-fn describe_bodies(
-    volume: &Volume,
-    lattice: &Lattice,
-    found: &Bodies,
-    chosen: u32,
-    report: &mut LimbReport,
-) {
-    report.bodies = found
-        .basins
-        .iter()
-        .enumerate()
-        .map(|(at, basin)| Body {
-            chosen: at as u32 == chosen,
-            core_mm3: basin.voxels as f64 * lattice.voxel_mm3(),
-            bone_mm3: basin.bone_voxels as f64 * lattice.voxel_mm3(),
-            side_cut_mm2: basin.side_cut_mm2,
-            centre_mm: volume
-                .grid()
-                .centre(basin.index_sum.map(|sum| sum / basin.voxels as f64))
-                .into(),
-        })
-        .collect();
-    report.bodies.sort_by(|a, b| {
-        b.bone_mm3
-            .total_cmp(&a.bone_mm3)
-            .then(b.core_mm3.total_cmp(&a.core_mm3))
-    });
-}
-
-fn describe_limb(lattice: &Lattice, mask: &[bool], report: &mut LimbReport) {
-    let mut cut = [0.0; 6];
-    let (mut low, mut high) = (lattice.size, [0; 3]);
-    for (at, _) in mask.iter().enumerate().filter(|(_, m)| **m) {
-        let voxel = lattice.voxel(at);
-        for axis in 0..3 {
-            low[axis] = low[axis].min(voxel[axis]);
-            high[axis] = high[axis].max(voxel[axis] + 1);
-            let area = lattice.voxel_mm3() / lattice.spacing_mm[axis];
-            if voxel[axis] == 0 {
-                cut[2 * axis] += area;
-            }
-            if voxel[axis] + 1 == lattice.size[axis] {
-                cut[2 * axis + 1] += area;
-            }
-        }
-    }
-    report.limb_voxels = count(mask);
-    report.limb_mm3 = report.limb_voxels as f64 * lattice.voxel_mm3();
-    (report.low, report.high) = (low, high);
-    report.cut_faces = ["-i", "+i", "-j", "+j", "-k", "+k"]
-        .iter()
-        .zip(cut)
-        .filter(|(_, area)| *area > 0.0)
-        .map(|(face, area_mm2)| CutFace {
-            face: (*face).to_owned(),
-            area_mm2,
-        })
-        .collect();
 }

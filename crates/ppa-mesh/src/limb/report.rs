@@ -1,6 +1,10 @@
 //! What was found and what was cut away.
 
+use ppa_ct::Grid;
 use serde::{Deserialize, Serialize};
+
+use super::bodies::Bodies;
+use super::lattice::Lattice;
 
 /// A body found in the volume, before one was chosen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -57,4 +61,79 @@ pub struct LimbReport {
     pub high: [usize; 3],
     /// Faces of the volume (or crop) that cut the limb; the mesh is open there.
     pub cut_faces: Vec<CutFace>,
+}
+
+impl LimbReport {
+    pub(super) fn describe_bodies(
+        &mut self,
+        grid: &Grid,
+        lattice: &Lattice,
+        found: &Bodies,
+        chosen: u32,
+    ) {
+        let basins = found.basins.iter().enumerate();
+        self.bodies = basins
+            .map(|(at, basin)| {
+                let mean = |axis: usize| basin.index_sum[axis] / basin.voxels as f64;
+                let middle = [0, 1, 2].map(|axis| lattice.low[axis] as f64 + mean(axis));
+                Body {
+                    chosen: at as u32 == chosen,
+                    core_mm3: basin.voxels as f64 * lattice.voxel_mm3(),
+                    bone_mm3: basin.bone_voxels as f64 * lattice.voxel_mm3(),
+                    side_cut_mm2: basin.side_cut_mm2,
+                    centre_mm: grid.centre(middle).into(),
+                }
+            })
+            .collect();
+        self.bodies.sort_by(|a, b| {
+            b.bone_mm3
+                .total_cmp(&a.bone_mm3)
+                .then(b.core_mm3.total_cmp(&a.core_mm3))
+        });
+    }
+
+    /// Size and extent of the limb, and where the volume cuts it.
+    pub(super) fn describe_limb(&mut self, lattice: &Lattice, mask: &[bool]) {
+        let (mut low, mut high) = (lattice.whole, [0; 3]);
+        let mut at_walls = [0_usize; 6];
+        let nx = lattice.size[0];
+        for (row, line) in mask.chunks(nx).enumerate() {
+            let inside = line.iter().filter(|inside| **inside).count();
+            let ends = [
+                line.iter().position(|inside| *inside),
+                line.iter().rposition(|inside| *inside),
+            ];
+            let [Some(first), Some(last)] = ends else {
+                continue;
+            };
+            self.limb_voxels += inside;
+            for (end, i) in [first, last].into_iter().enumerate() {
+                let voxel = lattice.voxel(row * nx + i);
+                for axis in 0..3 {
+                    let place = voxel[axis] + lattice.low[axis];
+                    low[axis] = low[axis].min(place);
+                    high[axis] = high[axis].max(place + 1);
+                }
+                at_walls[end] += usize::from(lattice.at_walls(voxel, 0)[end]);
+            }
+            for axis in 1..3 {
+                let walls = lattice.at_walls(lattice.voxel(row * nx), axis);
+                for (end, wall) in walls.into_iter().enumerate() {
+                    at_walls[2 * axis + end] += if wall { inside } else { 0 };
+                }
+            }
+        }
+        self.limb_mm3 = self.limb_voxels as f64 * lattice.voxel_mm3();
+        (self.low, self.high) = (low, high);
+        self.cut_faces = ["-i", "+i", "-j", "+j", "-k", "+k"]
+            .into_iter()
+            .zip(at_walls)
+            .enumerate()
+            .filter(|(_, (_, voxels))| *voxels > 0)
+            .map(|(at, (face, voxels))| CutFace {
+                face: face.to_owned(),
+                area_mm2: voxels as f64 * lattice.voxel_mm3() / lattice.spacing_mm[at / 2],
+            })
+            .collect();
+    }
 }

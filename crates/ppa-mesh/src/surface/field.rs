@@ -16,7 +16,7 @@ pub struct Field<'a> {
     hu: Cow<'a, [f32]>,
     size: [usize; 3],
     iso: f32,
-    padding: usize,
+    origin: [f64; 3],
 }
 
 impl<'a> Field<'a> {
@@ -27,15 +27,30 @@ impl<'a> Field<'a> {
                 hu: Cow::Borrowed(volume.hu()),
                 size,
                 iso,
-                padding: 0,
+                origin: [0.0; 3],
             },
             Border::Closed => Self {
                 hu: Cow::Owned(padded(volume, iso)),
                 size: size.map(|n| n + 2),
                 iso,
-                padding: 1,
+                origin: [-1.0; 3],
             },
         }
+    }
+
+    /// Values of a box of a volume whose first voxel is `low`.
+    pub fn part(hu: Vec<f32>, low: [usize; 3], size: [usize; 3], iso: f32) -> Self {
+        Self {
+            hu: Cow::Owned(hu),
+            size,
+            iso,
+            origin: low.map(|first| first as f64),
+        }
+    }
+
+    /// All values, padding included.
+    pub fn values(&self) -> &[f32] {
+        &self.hu
     }
 
     pub fn size(&self) -> [usize; 3] {
@@ -44,7 +59,7 @@ impl<'a> Field<'a> {
 
     /// Voxel index of the first lattice point.
     pub fn origin(&self) -> Vector3<f64> {
-        Vector3::repeat(-(self.padding as f64))
+        Vector3::from(self.origin)
     }
 
     pub fn index(&self, [i, j, k]: [usize; 3]) -> usize {

@@ -6,7 +6,7 @@ mod slab;
 mod tunnel;
 
 use nalgebra::{Matrix3, Point3, Vector3};
-use ppa_ct::Volume;
+use ppa_ct::{Grid, Volume};
 use rayon::prelude::*;
 
 use crate::mesh::Mesh;
@@ -90,23 +90,38 @@ pub fn iso_surface(volume: &Volume, iso_hu: f32, border: Border) -> Result<Mesh,
     if !iso_hu.is_finite() {
         return Err(SurfaceError::Iso(iso_hu));
     }
-    let field = Field::new(volume, iso_hu, border);
+    surface(&Field::new(volume, iso_hu, border), volume.grid())
+}
+
+/// [`iso_surface`] of a box of `size` voxels from `low` on of a volume with that grid; normals at
+/// the faces of the box are one-sided.
+pub(crate) fn surface_of_part(
+    grid: &Grid,
+    low: [usize; 3],
+    size: [usize; 3],
+    hu: Vec<f32>,
+    iso_hu: f32,
+) -> Result<Mesh, SurfaceError> {
+    surface(&Field::part(hu, low, size, iso_hu), grid)
+}
+
+fn surface(field: &Field, grid: &Grid) -> Result<Mesh, SurfaceError> {
     if field.size().iter().any(|&n| n < 2) {
-        return Err(SurfaceError::TooThin(volume.grid().size()));
+        return Err(SurfaceError::TooThin(grid.size()));
     }
     let layers = field.size()[2] - 1;
     let slabs: Vec<Slab> = (0..layers.div_ceil(SLAB_CELLS))
         .into_par_iter()
         .map(|slab| {
             let first = slab * SLAB_CELLS;
-            slab::march(&field, first..(first + SLAB_CELLS).min(layers))
+            slab::march(field, first..(first + SLAB_CELLS).min(layers))
         })
         .collect();
-    let mesh = join(&slabs, volume, &field)?;
+    let mesh = join(&slabs, grid, field)?;
     if mesh.triangles.is_empty() {
-        let fold = |pick: fn(f32, f32) -> f32| volume.hu().iter().copied().reduce(pick);
+        let fold = |pick: fn(f32, f32) -> f32| field.values().iter().copied().reduce(pick);
         return Err(SurfaceError::Empty {
-            iso_hu,
+            iso_hu: field.iso(),
             min_hu: fold(f32::min).unwrap_or_default(),
             max_hu: fold(f32::max).unwrap_or_default(),
         });
@@ -114,7 +129,7 @@ pub fn iso_surface(volume: &Volume, iso_hu: f32, border: Border) -> Result<Mesh,
     Ok(mesh)
 }
 
-fn join(slabs: &[Slab], volume: &Volume, field: &Field) -> Result<Mesh, SurfaceError> {
+fn join(slabs: &[Slab], grid: &Grid, field: &Field) -> Result<Mesh, SurfaceError> {
     let mut offsets = vec![0_usize];
     for slab in slabs {
         offsets.push(offsets[offsets.len() - 1] + slab.positions.len());
@@ -123,7 +138,7 @@ fn join(slabs: &[Slab], volume: &Volume, field: &Field) -> Result<Mesh, SurfaceE
     if count >= NEXT_SLAB as usize {
         return Err(SurfaceError::TooLarge);
     }
-    let affine = volume.grid().ct_from_voxel();
+    let affine = grid.ct_from_voxel();
     let linear: Matrix3<f64> = affine.matrix().fixed_view::<3, 3>(0, 0).into_owned();
     let left_handed = linear.determinant() < 0.0;
     // A gradient is a covector: it maps with the inverse transpose. Outward is down the gradient.

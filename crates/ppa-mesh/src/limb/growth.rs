@@ -1,0 +1,77 @@
+//! From the core of a body back to its skin.
+
+use super::lattice::Lattice;
+use super::pieces::Pieces;
+use super::tissue::{TISSUE, Tissue};
+
+/// Tissue beyond the grown-back core is skin relief up to this far, and something that touches the
+/// limb where it goes on, mm.
+const RELIEF_MM: f64 = 4.0;
+
+/// Squared distance from the core beyond which nothing belongs to a body, mm².
+pub fn farthest_sq(radius_mm: f64) -> f32 {
+    (radius_mm + RELIEF_MM).powi(2) as f32
+}
+
+/// Tissue within the erosion radius of the core, and the skin relief on top of it.
+///
+/// What lies farther out hangs together in pieces; a piece that stays near is relief that the
+/// erosion wore off, one that reaches far (a sheet, an electrode) only touches the limb.
+pub fn grown_back(tissue: &Tissue, reach_sq: &[f32], radius_mm: f64) -> Vec<bool> {
+    let lattice = &tissue.lattice;
+    // The core is counted from voxel centre to voxel centre; its border lies half a voxel out.
+    let least = |a: f64, b: &f64| a.min(*b);
+    let half_voxel = 0.5 * lattice.spacing_mm.iter().fold(f64::INFINITY, least);
+    let near_sq = (radius_mm + half_voxel).powi(2) as f32;
+    let pieces = Pieces::of(lattice, |at| {
+        tissue.is(at, TISSUE) && reach_sq[at] > near_sq
+    });
+    let mut piece_sq = vec![0.0_f32; pieces.count];
+    for (piece, run) in pieces.runs() {
+        piece_sq[piece] = reach_sq[run]
+            .iter()
+            .copied()
+            .fold(piece_sq[piece], f32::max);
+    }
+    let mut mask: Vec<bool> = (0..lattice.len())
+        .map(|at| tissue.is(at, TISSUE) && reach_sq[at] <= near_sq)
+        .collect();
+    for (piece, run) in pieces.runs() {
+        mask[run].fill(piece_sq[piece] <= farthest_sq(radius_mm));
+    }
+    mask
+}
+
+/// Removes all but the largest piece and returns how many voxels that were.
+pub fn keep_largest(lattice: &Lattice, mask: &mut [bool]) -> usize {
+    let pieces = Pieces::of(lattice, |at| mask[at]);
+    let sizes = pieces.sizes();
+    let largest = (0..sizes.len()).max_by_key(|&at| (sizes[at], usize::MAX - at));
+    let mut removed = 0;
+    for (piece, run) in pieces.runs() {
+        if Some(piece) != largest {
+            removed += run.len();
+            mask[run].fill(false);
+        }
+    }
+    removed
+}
+
+/// Adds the voxels that no path outside the mask joins with the border of the box, and returns how
+/// many those were.
+pub fn fill_enclosed(lattice: &Lattice, mask: &mut [bool]) -> usize {
+    let pieces = Pieces::of(lattice, |at| !mask[at]);
+    let mut open = vec![false; pieces.count];
+    for (piece, run) in pieces.runs() {
+        let [first, last] = [run.start, run.end - 1].map(|at| lattice.voxel(at));
+        open[piece] |= (0..3).any(|x| first[x] == 0 || last[x] + 1 == lattice.size[x]);
+    }
+    let mut added = 0;
+    for (piece, run) in pieces.runs() {
+        if !open[piece] {
+            added += run.len();
+            mask[run].fill(true);
+        }
+    }
+    added
+}
