@@ -136,6 +136,10 @@ impl Radiograph {
 /// Writes beside the target, syncs and renames, so that no reader ever meets half a file.
 fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let write = || {
+        // Checked here, since a failed rename would leave the temporary file behind.
+        if path.is_dir() {
+            return Err(std::io::ErrorKind::IsADirectory.into());
+        }
         let mut file = AtomicWriteFile::open(path)?;
         file.write_all(bytes)?;
         file.commit()

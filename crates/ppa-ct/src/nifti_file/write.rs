@@ -58,6 +58,10 @@ fn write_whole(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
 ) -> std::io::Result<()> {
+    // Checked here, since a failed rename would leave the temporary file behind.
+    if path.is_dir() {
+        return Err(std::io::ErrorKind::IsADirectory.into());
+    }
     let mut file = BufWriter::new(AtomicWriteFile::open(path)?);
     fill(&mut file)?;
     file.into_inner().map_err(|e| e.into_error())?.commit()
