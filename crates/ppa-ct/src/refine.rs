@@ -6,6 +6,9 @@ use rayon::prelude::*;
 use crate::grid::Grid;
 use crate::volume::{Volume, VolumeError};
 
+/// Voxels of a refined volume: 16 GiB of values.
+const MOST_VOXELS: f64 = 4_294_967_296.0;
+
 impl Volume {
     /// The volume with axes coarser than `max_spacing_mm` resampled to at most that spacing.
     ///
@@ -14,7 +17,8 @@ impl Volume {
     /// information, but spares thick slices their stairs.
     ///
     /// # Errors
-    /// [`VolumeError::Spacing`] unless `max_spacing_mm` is above 0.
+    /// [`VolumeError::Spacing`] unless `max_spacing_mm` is above 0, [`VolumeError::TooFine`] if it
+    /// makes more than 2^32 voxels.
     pub fn refined(&self, max_spacing_mm: f64) -> Result<Self, VolumeError> {
         if max_spacing_mm.is_nan() || max_spacing_mm <= 0.0 {
             return Err(VolumeError::Spacing(max_spacing_mm));
@@ -25,10 +29,18 @@ impl Volume {
             let steps = (size[axis] - 1) as f64;
             // A hair of tolerance keeps an axis that is exactly fine enough.
             let needed = (steps * spacing[axis] / max_spacing_mm - 1e-9).ceil();
-            (needed.max(steps) as usize) + 1
+            (needed.max(steps) as usize).saturating_add(1)
         });
         if fine == size {
             return Ok(self.clone());
+        }
+        let voxels = fine.map(|n| n as f64).iter().product();
+        if voxels > MOST_VOXELS {
+            return Err(VolumeError::TooFine {
+                spacing_mm: max_spacing_mm,
+                voxels,
+                most: MOST_VOXELS,
+            });
         }
         let scale = [0, 1, 2].map(|axis| match fine[axis] {
             1 => 1.0,
@@ -96,10 +108,8 @@ mod tests {
             let field = |p: Point3<f64>| Vector3::from(slope).dot(&p.coords);
             let fine = volume(size, spacing, field).refined(max_mm).unwrap();
             let grid = fine.grid();
-            for axis in 0..3 {
-                if grid.size()[axis] > 1 {
-                    prop_assert!(grid.spacing_mm()[axis] <= max_mm.max(spacing[axis].min(max_mm)) + 1e-6);
-                }
+            for (count, spacing) in grid.size().into_iter().zip(&grid.spacing_mm()) {
+                prop_assert!(count == 1 || *spacing <= max_mm + 1e-6);
             }
             for (index, &hu) in fine.hu().iter().enumerate() {
                 let expected = field(grid.centre(grid.voxel(index).map(|v| v as f64)));
@@ -119,5 +129,9 @@ mod tests {
         assert_eq!(fine.at([3, 2, 14]), coarse.at([3, 2, 4]));
         assert_eq!(coarse.refined(5.0).unwrap(), coarse);
         assert!(matches!(coarse.refined(0.0), Err(VolumeError::Spacing(_))));
+        for hopeless in [1e-3, 1e-300] {
+            let refused = coarse.refined(hopeless);
+            assert!(matches!(refused, Err(VolumeError::TooFine { .. })));
+        }
     }
 }

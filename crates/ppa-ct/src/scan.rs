@@ -66,7 +66,8 @@ pub enum WarningCode {
 /// Reads a CT: a folder with one DICOM series, a single DICOM slice, `.nii` or `.nii.gz`.
 ///
 /// DICOM slices are sorted by their position along the slice normal; names and instance numbers
-/// are ignored. Subfolders are searched when the folder itself has no DICOM file. A tilted gantry gives a sheared affine, exactly as acquired.
+/// are ignored. Subfolders are searched when the folder itself has no DICOM file. A tilted gantry
+/// gives a sheared affine, exactly as acquired.
 ///
 /// # Errors
 /// [`ReadError`]: other formats, modalities other than CT, several series, missing slices,

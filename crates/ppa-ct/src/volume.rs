@@ -22,6 +22,16 @@ pub enum VolumeError {
     /// A spacing to resample to is not a length.
     #[error("a spacing of {0} mm, expected a length above 0")]
     Spacing(f64),
+    /// A spacing to resample to makes more voxels than can be worked with.
+    #[error("a spacing of {spacing_mm} mm makes {voxels:.1e} voxels, expected at most {most:.1e}")]
+    TooFine {
+        /// Spacing asked for, mm.
+        spacing_mm: f64,
+        /// Voxels that it makes.
+        voxels: f64,
+        /// Most voxels.
+        most: f64,
+    },
     /// A value is NaN or infinite.
     #[error("voxel {0:?} holds a value that is not a number")]
     NotFinite([usize; 3]),
