@@ -6,7 +6,7 @@ use ppa_mesh::{LimbReport, LimbSettings};
 use ppa_scene::{LandmarkOverrides, Landmarks, Side};
 use serde::{Deserialize, Serialize};
 
-use crate::files::{FileError, read_text, write_whole};
+use crate::files::{FileError, read_text, to_toml, write_whole};
 
 /// One limb of one CT. `ppa prepare` proposes it; a person changes `side`, `surface` and
 /// `choices`, and everything else is computed again when the case is used.
@@ -101,11 +101,11 @@ impl Case {
     /// A relative scan path is rewritten to start at the case file's folder.
     ///
     /// # Errors
-    /// [`CaseError::File`].
+    /// [`CaseError::File`], also for a scan path that is not UTF-8, which TOML cannot hold.
     pub fn write(&self, path: &Path) -> Result<(), CaseError> {
         let mut case = self.clone();
         case.source.path = relative_to(&case.source.path, path.parent().unwrap_or(Path::new("")))?;
-        let text = toml::to_string(&case).expect("a case holds only values that TOML can write");
+        let text = to_toml(&case, path)?;
         Ok(write_whole(path, format!("{HEADER}{text}").as_bytes())?)
     }
 }

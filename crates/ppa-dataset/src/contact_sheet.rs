@@ -30,6 +30,14 @@ pub enum ContactSheetError {
         /// What is wrong with it.
         source: image::ImageError,
     },
+    /// A depth image has no region of interest.
+    #[error("{} has no region of interest for {image}", path.display())]
+    NoRoi {
+        /// The `roi_depth.json` of the limb.
+        path: PathBuf,
+        /// The depth image.
+        image: String,
+    },
     /// The dataset shows no poses of this limb.
     #[error("{} holds no depth images of {limb:?}", root.display())]
     Empty {
@@ -73,7 +81,11 @@ pub fn contact_sheet(
     for (shape, view) in depth_rows(of_limb(FileKind::Depth)) {
         let tiles = steps.iter().map(|&step| {
             let depth = read_gray16(&root.join(limb.depth(shape, view, step)))?;
-            let roi = &rois[&LimbId::depth_name(view, step)];
+            let name = LimbId::depth_name(view, step);
+            let roi = rois.get(&name).ok_or_else(|| ContactSheetError::NoRoi {
+                path: root.join(limb.roi_file()),
+                image: name,
+            })?;
             Ok(Tile::Depth(crop(&depth, roi)))
         });
         let caption = format!(
@@ -156,7 +168,8 @@ fn false_colour(z_mm: u16, (near, far): (f64, f64)) -> Rgb<u8> {
         return Rgb([0; 3]);
     }
     let t = ((far - f64::from(z_mm)) / (far - near)).clamp(0.0, 1.0);
-    let colour = colorous::TURBO.eval_continuous(t);
+    // The low end of the scale is nearly black, which means invalid here.
+    let colour = colorous::TURBO.eval_continuous(0.1 + 0.9 * t);
     Rgb([colour.r, colour.g, colour.b])
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ppa_depth::CameraSpec;
+use ppa_depth::{CameraSpec, rows_from_isometry};
 use ppa_mesh::LimbSettings;
 use ppa_scene::{LandmarkOverrides, PlaneSettings, RoomSpec};
 use serde::Serialize;
@@ -15,7 +15,6 @@ use crate::layout::{LimbId, View};
 use crate::manifest::Rows;
 use crate::plan::{Plan, XraySettings};
 use crate::stage::Stage;
-use crate::unit::rows;
 
 /// The settings of a plan that decide the bytes of its images; files stand by their hashes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -41,7 +40,7 @@ impl Settings {
             seed: plan.seed,
             shapes: plan.shapes.clone(),
             room_ply_sha256: hash(&plan.room.ply)?,
-            room: plan.room.parametric.clone(),
+            room: plan.room.parametric,
             table: plan.room.table.clone(),
             room_from_device: plan.room.room_from_device,
             rig_sha256: hash(&plan.depth.rig)?,
@@ -108,7 +107,7 @@ impl<'a> Description<'a> {
         let cameras = stage.cameras.iter().map(|camera| CameraRow {
             view: camera.view,
             intrinsics: camera.camera.spec().clone(),
-            room_from_camera: rows(&camera.camera_from_room.inverse()),
+            room_from_camera: rows_from_isometry(&camera.camera_from_room.inverse()),
         });
         let limbs = cases.map(|(limb, case)| LimbRow {
             limb,
@@ -121,7 +120,12 @@ impl<'a> Description<'a> {
             units: "mm; depth images: Z in mm, 0 invalid; tallies: eV/cm2 per history; \
                     transforms: row-major target_from_source; ct frame: LPS",
             settings,
-            room_from_device: rows(stage.table.room.device.room_from_device.isometry()),
+            room_from_device: stage
+                .table
+                .room
+                .device
+                .room_from_device
+                .to_homogeneous_rows(),
             source_detector_mm: stage.table.room.device.source_detector_mm,
             table: Table {
                 normal: stage.table.plane.plane.normal.into_inner().into(),

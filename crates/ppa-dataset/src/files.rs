@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use atomic_write_file::AtomicWriteFile;
+use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 /// A file could not be read or written.
@@ -43,11 +44,20 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     };
     fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
     let write = || {
+        // Checked here, since a failed rename would leave the temporary file behind.
+        if path.is_dir() {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
         let mut file = AtomicWriteFile::open(path)?;
         file.write_all(bytes)?;
         file.commit()
     };
     write().map_err(FileError::at("write", path))
+}
+
+/// What a file at `path` is to hold, as TOML; refuses paths that are not UTF-8 and integers beyond i64.
+pub(crate) fn to_toml<T: Serialize>(value: &T, path: &Path) -> Result<String, FileError> {
+    toml::to_string(value).map_err(|e| FileError::at("write", path)(io::Error::other(e)))
 }
 
 /// Reads a text file.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ppa_scene::PoseAngle;
+use ppa_scene::{PoseAngle, SweepError};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -21,6 +21,9 @@ use crate::unit::{PosableLimb, UnitError};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GenerateError {
+    /// The rotations of the plan.
+    #[error(transparent)]
+    Rotation(#[from] SweepError),
     /// A case file.
     #[error(transparent)]
     Case(#[from] CaseError),
@@ -33,7 +36,7 @@ pub enum GenerateError {
         /// Its case file.
         case: PathBuf,
         /// What went wrong.
-        source: PrepareError,
+        source: Box<PrepareError>,
     },
     /// A limb of the plan cannot be shaped or turned into voxels for the radiograph.
     #[error("cannot pose the limb of {}", case.display())]
@@ -127,7 +130,7 @@ pub fn generate(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Summary, GenerateError> {
     let limbs = planned_limbs(plan)?;
-    let poses = plan.poses();
+    let poses = plan.rotation.poses()?;
     let units = || {
         limbs
             .iter()
@@ -194,9 +197,9 @@ impl PlannedLimb {
         root: &Path,
         progress: &(dyn Fn(Progress) + Sync),
     ) -> Result<(), GenerateError> {
-        let prepared = PreparedLimb::of_case(&self.case).map_err(|source| GenerateError::Limb {
+        let prepared = PreparedLimb::of_case(&self.case).map_err(|error| GenerateError::Limb {
             case: self.file.clone(),
-            source,
+            source: Box::new(error),
         })?;
         let limb = PosableLimb::new(self.id, plan, stage, &prepared).map_err(|source| {
             GenerateError::Posable {

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use ppa_scene::{PlaneSettings, PoseAngle, RoomSpec, Sweep};
+use ppa_scene::{PlaneSettings, RoomSpec, Sweep};
 use ppa_xray::{Detector, FastSettings, HuCalibration, Presentation};
 use serde::{Deserialize, Serialize};
 
 use crate::body_shape::ShapeSettings;
-use crate::files::{FileError, read_text};
+use crate::files::{FileError, read_text, to_toml, write_whole};
 use crate::manifest::Rows;
 
 /// Everything a dataset is made of; unknown keys are refused.
@@ -135,7 +135,7 @@ impl Default for XraySettings {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// The file cannot be read.
+    /// The file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
     /// The file is not a plan.
@@ -212,19 +212,12 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The poses of every limb.
+    /// Writes the plan as it stands, whole or not at all.
     ///
-    /// # Panics
-    /// When `rotation` was changed to an invalid one after reading.
-    pub fn poses(&self) -> Vec<PoseAngle> {
-        self.rotation
-            .poses()
-            .expect("the rotation of a plan is checked when it is read")
-    }
-
-    /// The plan as TOML.
-    pub fn to_toml(&self) -> String {
-        toml::to_string(self).expect("a plan holds only values that TOML can write")
+    /// # Errors
+    /// [`PlanError::File`], also for a seed beyond 2^63 − 1 or a path that is not UTF-8, which TOML cannot hold.
+    pub fn write(&self, path: &Path) -> Result<(), PlanError> {
+        Ok(write_whole(path, to_toml(self, path)?.as_bytes())?)
     }
 
     fn check(&self) -> Result<(), String> {

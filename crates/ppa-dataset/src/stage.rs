@@ -1,7 +1,9 @@
 //! What all limbs of a plan share: room, table, x-ray device, cameras, x-ray beam.
 
 use nalgebra::Isometry3;
-use ppa_depth::{Body, Camera, DepthImage, MeshBody, PlacedBody, RigSpec, SurfelBody};
+use ppa_depth::{
+    Body, Camera, DepthImage, MeshBody, MountedCamera, PlacedBody, RigError, RigSpec, SurfelBody,
+};
 use ppa_mesh::{CloudError, estimate_normals, mean_spacing_mm};
 use ppa_scene::{PlaneSettings, Rigid, Room, RoomError, TablePlane, XrayDevice, table_plane};
 use ppa_xray::{Spectrum, TubeSpec};
@@ -28,7 +30,7 @@ pub enum StageError {
     Table(#[from] ppa_scene::PlaneError),
     /// The camera rig.
     #[error(transparent)]
-    Rig(#[from] ppa_depth::RigError),
+    Rig(#[from] RigError),
     /// Furniture that cannot be rendered.
     #[error(transparent)]
     Body(#[from] ppa_depth::BodyError),
@@ -95,12 +97,13 @@ impl Stage {
         };
         let furniture = furniture(&table.room)?;
         let device = &table.room.device;
-        let place = |view, mounted: &ppa_depth::MountedCamera| {
-            let camera = Camera::try_from(mounted.camera.clone()).map_err(|source| {
-                let side = if view == View::Left { "left" } else { "right" };
-                ppa_depth::RigError::Camera { side, source }
-            })?;
-            let room_from_camera = device.room_from_device.isometry() * mounted.pose()?;
+        let place = |view, side, mounted: &MountedCamera| {
+            let camera = Camera::try_from(mounted.camera.clone())
+                .map_err(|source| RigError::Camera { side, source })?;
+            let device_from_camera = mounted
+                .pose()
+                .map_err(|source| RigError::Pose { side, source })?;
+            let room_from_camera = device.room_from_device.isometry() * device_from_camera;
             let camera_from_room = room_from_camera.inverse();
             let empty_room = PlacedBody {
                 body: &furniture,
@@ -115,8 +118,8 @@ impl Stage {
             })
         };
         let cameras = vec![
-            place(View::Left, &rig.left)?,
-            place(View::Right, &rig.right)?,
+            place(View::Left, "left", &rig.left)?,
+            place(View::Right, "right", &rig.right)?,
         ];
         Ok(Self {
             table,

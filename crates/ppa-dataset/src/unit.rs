@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Point3};
-use ppa_depth::{Body, DepthImage, MeshBody, PlacedBody, roi_around};
+use ppa_depth::{Body, DepthImage, MeshBody, PlacedBody, roi_around, rows_from_isometry};
 use ppa_mesh::Mesh;
 use ppa_scene::{Placement, PoseAngle, place};
 use ppa_xray::{FastSettings, VoxelPhantom};
@@ -11,7 +11,7 @@ use ppa_xray::{FastSettings, VoxelPhantom};
 use crate::body_shape::{BodyShape, body_shape};
 use crate::files::{FileError, sha256_of_file};
 use crate::layout::LimbId;
-use crate::manifest::{FileKind, FileRow, RoiFile, RoiRow, Rows};
+use crate::manifest::{FileKind, FileRow, RoiFile, RoiRow};
 use crate::plan::Plan;
 use crate::prepare::PreparedLimb;
 use crate::radiograph::{JointError, joint_phantom, projection};
@@ -109,7 +109,7 @@ impl<'a> PosableLimb<'a> {
         let placement = self.place(self.skin, pose)?;
         for shaped in &self.shapes {
             let placement = match shaped.shape {
-                BodyShape::Orig => placement.clone(),
+                BodyShape::Orig => placement,
                 _ => self.place(&shaped.mesh, pose)?,
             };
             for camera in &self.stage.cameras {
@@ -204,7 +204,7 @@ impl<'a> PosableLimb<'a> {
         let seed = item_seed(self.plan.seed, Purpose::Radiograph, self.id, pose.step);
         let engine = FastSettings {
             seed,
-            ..settings.engine.clone()
+            ..settings.engine
         };
         let radiograph = ppa_xray::fast(&self.phantom, &self.stage.spectrum, &projection, &engine)?;
         let png = self.id.radiograph_png(pose.step);
@@ -213,7 +213,7 @@ impl<'a> PosableLimb<'a> {
         radiograph.write_exr(&root.join(&exr))?;
         let row = |file, kind| {
             Ok::<_, UnitError>(FileRow {
-                ct_from_device: Some(rows(&projection.ct_from_device)),
+                ct_from_device: Some(rows_from_isometry(&projection.ct_from_device)),
                 seed: Some(seed),
                 ..self.row(root, file, kind, pose, placement)?
             })
@@ -241,8 +241,12 @@ impl<'a> PosableLimb<'a> {
             angle_deg: pose.angle_deg,
             camera: None,
             shape: BodyShape::Orig,
-            patient_from_ct: rows(self.prepared.landmarks.patient_from_ct().isometry()),
-            room_from_patient: rows(placement.room_from_patient.isometry()),
+            patient_from_ct: self
+                .prepared
+                .landmarks
+                .patient_from_ct()
+                .to_homogeneous_rows(),
+            room_from_patient: placement.room_from_patient.to_homogeneous_rows(),
             ct_from_device: None,
             seed: None,
         })
@@ -254,10 +258,4 @@ fn prepare_folder(root: &Path, file: &str) -> Result<std::path::PathBuf, FileErr
     let folder = path.parent().expect("files lie in folders of the dataset");
     std::fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
     Ok(path)
-}
-
-/// Four rows of the homogeneous matrix.
-pub(crate) fn rows(motion: &Isometry3<f64>) -> Rows {
-    let matrix = motion.to_homogeneous();
-    std::array::from_fn(|r| std::array::from_fn(|c| matrix[(r, c)]))
 }

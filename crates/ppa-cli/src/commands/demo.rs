@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::Context;
 use clap::Args;
 use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_ct::write_nifti;
@@ -47,7 +48,7 @@ pub fn run(args: &DemoArgs, output: Output) -> anyhow::Result<()> {
     let watch = Stopwatch::start();
     let out = &args.out;
     std::fs::create_dir_all(out)
-        .map_err(|e| anyhow::anyhow!("cannot create folder {}: {e}", out.display()))?;
+        .with_context(|| format!("cannot create folder {}", out.display()))?;
     let plan = write_inputs(out, args.seed)?;
     let dataset = with_progress(&plan, &out.join("dataset"))?;
     let limb = LimbId {
@@ -94,7 +95,7 @@ fn write_inputs(out: &Path, seed: u64) -> anyhow::Result<Plan> {
     plan.seed = seed;
     plan.rotation = POSES;
     let file = out.join("dataset.toml");
-    write_whole(&file, plan.to_toml().as_bytes())?;
+    plan.write(&file)?;
     working.finish_and_clear();
     Ok(Plan::read(&file)?)
 }
