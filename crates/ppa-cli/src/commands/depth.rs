@@ -1,13 +1,13 @@
 //! `ppa depth`: depth images of meshes, and the camera model by itself.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use nalgebra::{Isometry3, Point3};
 use ppa_depth::{Body, Camera, CameraSpec, MeshBody, PlacedBody, isometry_from_rows, render};
 use ppa_mesh::read_ply;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::output::{Output, Seconds, Stopwatch};
 
@@ -37,7 +37,7 @@ pub struct RenderArgs {
 
 #[derive(Debug, Args)]
 pub struct ProjectArgs {
-    /// CSV of points x, y, z in mm with a header line
+    /// CSV of points x, y, z in mm, with or without a header line
     points: PathBuf,
     /// Camera JSON [default: an Azure Kinect, 640 x 576]
     #[arg(long)]
@@ -59,6 +59,14 @@ fn camera(path: Option<&PathBuf>) -> anyhow::Result<Camera> {
     Ok(Camera::try_from(spec)?)
 }
 
+/// A row-major 4x4 matrix, as four rows or as 16 numbers.
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+enum Pose {
+    Rows([[f64; 4]; 4]),
+    Flat([f64; 16]),
+}
+
 #[derive(Debug, Serialize)]
 struct Rendered {
     width: u32,
@@ -73,8 +81,15 @@ struct Rendered {
 fn render_meshes(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
     let camera = camera(args.camera.as_ref())?;
     let camera_from_body = match &args.camera_from_mesh {
-        Some(path) => isometry_from_rows(&super::read_json(path)?)
-            .with_context(|| path.display().to_string())?,
+        Some(path) => {
+            let rows = match super::read_json(path)? {
+                Pose::Rows(rows) => rows,
+                Pose::Flat(flat) => {
+                    std::array::from_fn(|r| std::array::from_fn(|c| flat[4 * r + c]))
+                }
+            };
+            isometry_from_rows(&rows).with_context(|| path.display().to_string())?
+        }
         None => Isometry3::identity(),
     };
     let mut bodies = Vec::new();
@@ -115,6 +130,29 @@ fn render_meshes(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
     })
 }
 
+/// Reads rows of x, y, z; a first row that is not numbers is a header.
+fn read_points(path: &Path) -> anyhow::Result<Vec<[f64; 3]>> {
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .trim(csv::Trim::All)
+        .from_path(path)
+        .with_context(|| format!("cannot read {}", path.display()))?;
+    let mut points = Vec::new();
+    for (row, record) in reader.records().enumerate() {
+        let record = record.with_context(|| format!("cannot read {}", path.display()))?;
+        match record.deserialize(None) {
+            Ok(point) => points.push(point),
+            Err(_) if row == 0 => {}
+            Err(_) => anyhow::bail!(
+                "row {} of {} is not three numbers x, y, z",
+                row + 1,
+                path.display()
+            ),
+        }
+    }
+    Ok(points)
+}
+
 #[derive(Debug, Serialize)]
 struct Projected {
     pixels: Vec<Option<[f64; 2]>>,
@@ -122,7 +160,7 @@ struct Projected {
 
 fn project(args: &ProjectArgs, output: Output) -> anyhow::Result<()> {
     let camera = camera(args.camera.as_ref())?;
-    let points: Vec<[f64; 3]> = super::read_csv(&args.points)?;
+    let points = read_points(&args.points)?;
     let pixels = points
         .iter()
         .map(|point| {

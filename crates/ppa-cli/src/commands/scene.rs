@@ -33,7 +33,7 @@ pub struct PlaceArgs {
     /// Case written by `ppa prepare`
     case: PathBuf,
     /// Medial rotation in degrees
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     angle: f64,
     /// Take the room from this plan
     #[arg(long)]

@@ -59,7 +59,7 @@ pub struct SimulateArgs {
     /// Case written by `ppa prepare`
     case: PathBuf,
     /// Medial rotation in degrees
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     angle: f64,
     /// Take room, device and x-ray settings from this plan
     #[arg(long)]
@@ -153,7 +153,7 @@ fn simulate(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
             let settings = FastSettings {
                 dose_histories: args.histories.unwrap_or(plan.xray.engine.dose_histories),
                 seed: args.seed,
-                ..plan.xray.engine.clone()
+                ..plan.xray.engine
             };
             fast(&phantom, &spectrum, &projection, &settings)?
         }
@@ -247,13 +247,20 @@ struct Attenuation {
     total_cm2_g: f64,
 }
 
+#[derive(Debug, Serialize)]
+struct Known {
+    materials: Vec<&'static str>,
+}
+
 fn materials(args: &MaterialsArgs, output: Output) -> anyhow::Result<()> {
     let material = match (&args.material, &args.composition) {
         (Some(name), _) => Material::named(name)?,
         (None, Some(text)) => Material::parse_composition("composition", args.density, text)?,
         (None, None) => {
-            let names: Vec<_> = Material::names().collect();
-            return output.print(&names, |names| names.join("\n"));
+            let known = Known {
+                materials: Material::names().collect(),
+            };
+            return output.print(&known, |known| known.materials.join("\n"));
         }
     };
     let energy_kev = args.energy_kev;

@@ -147,7 +147,7 @@ fn real_scans_that_are_no_ct_volume_are_refused() {
     assert!(names(folder.path()).is_empty());
 }
 
-/// Mounts a file system of 4 MB in a mount namespace of its own.
+/// Mounts a file system of 400 kB in a mount namespace of its own.
 #[test]
 #[ignore = "needs the right to mount a file system"]
 fn a_full_disk_leaves_only_whole_files() {
