@@ -19,8 +19,6 @@
 //! # Ok::<(), ppa_metrics::MetricError>(())
 //! ```
 
-#![warn(missing_docs)]
-
 mod error;
 
 mod diagnostic;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Unit, Vector3};
 
-use crate::plane::Plane;
+use crate::plane::{Plane, across};
 use crate::table_plane::PlaneSettings;
 
 /// A cell of the lattice drawn on a plane.
@@ -21,17 +21,11 @@ struct Lattice {
 
 impl Lattice {
     fn on(plane: &Plane, cell_mm: f64) -> Self {
-        let n = plane.normal.into_inner();
-        let helper = if n.x.abs() < 0.9 {
-            Vector3::x()
-        } else {
-            Vector3::y()
-        };
-        let e1 = n.cross(&helper).normalize();
+        let (e1, e2) = across(&plane.normal);
         Self {
             origin: plane.project(&Point3::origin()),
             e1,
-            e2: n.cross(&e1),
+            e2,
             cell_mm,
         }
     }

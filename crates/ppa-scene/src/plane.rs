@@ -55,3 +55,15 @@ impl Plane {
         (s.is_finite() && s >= 0.0).then(|| origin + direction * s)
     }
 }
+
+/// Two unit vectors that make a right-handed triad with `axis`.
+pub(crate) fn across(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    let axis = axis.normalize();
+    let helper = if axis.x.abs() < 0.9 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
+    let e1 = axis.cross(&helper).normalize();
+    (e1, axis.cross(&e1))
+}

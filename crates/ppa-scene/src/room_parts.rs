@@ -5,6 +5,8 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, Vector3};
 use ppa_mesh::{Mesh, PointCloud};
 
+use crate::plane::across;
+
 /// A patch with unit parameters (u, v) in 0..=1 whose normal is ∂u × ∂v.
 #[derive(Debug, Clone, Copy)]
 enum Patch {
@@ -115,18 +117,6 @@ impl Parts {
         }
         cloud
     }
-}
-
-/// Two unit vectors that make a right-handed triad with `axis`.
-fn across(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let axis = axis.normalize();
-    let helper = if axis.x.abs() < 0.9 {
-        Vector3::x()
-    } else {
-        Vector3::y()
-    };
-    let e1 = axis.cross(&helper).normalize();
-    (e1, axis.cross(&e1))
 }
 
 impl Patch {

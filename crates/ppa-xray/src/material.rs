@@ -1,6 +1,7 @@
 //! Materials: elements by weight, and what a gram of them does to a photon.
 
 use crate::{
+    compton::energy_ratio,
     cross_sections::{
         CrossSections, ELECTRON_REST_KEV, HC_KEV_ANGSTROM, MAX_ENERGY_KEV, MIN_ENERGY_KEV, elements,
     },
@@ -217,7 +218,7 @@ impl Material {
             };
             let s = i as f64 / INTERVALS as f64;
             let cos = 1.0 - 2.0 * s * s;
-            let ratio = 1.0 / (1.0 + alpha * (1.0 - cos));
+            let ratio = energy_ratio(alpha, cos);
             let klein_nishina = ratio * ratio * (ratio + 1.0 / ratio - 1.0 + cos * cos);
             let weight = simpson
                 * s
