@@ -67,6 +67,14 @@ fn every_command_keeps_its_keys() {
         "scene place p01.toml --angle 18",
         &["gap_mm", "penetration_mm", "room_from_patient"],
     );
+    object(
+        "scene room --out room.ply",
+        &["points", "table", "room_from_device"],
+    );
+    object(
+        "scene plane room.ply --seed 3",
+        &["normal", "offset_mm", "inliers"],
+    );
     let render = "depth render p01.ply --camera-from-mesh pose.json --out depth.png";
     object(
         render,
