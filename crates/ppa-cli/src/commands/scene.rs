@@ -5,18 +5,30 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use ppa_dataset::{Case, Plan, PreparedLimb, Table};
-use ppa_mesh::{read_ply, write_ply};
-use ppa_scene::{Contact, PlaneSettings, place, table_plane};
+use ppa_mesh::{read_ply, write_ply, write_ply_cloud};
+use ppa_scene::{Contact, PlaneSettings, TablePlane, place, table_plane};
 use serde::Serialize;
 
 use crate::output::{Output, working};
 
 #[derive(Debug, Subcommand)]
 pub enum SceneCommand {
+    /// Point cloud of the x-ray room
+    Room(RoomArgs),
     /// Table plane of a point cloud
     Plane(PlaneArgs),
     /// Lay the limb of a case on the table
     Place(PlaceArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct RoomArgs {
+    /// PLY file to write, mm
+    #[arg(long)]
+    out: PathBuf,
+    /// Take the room from this plan instead of the built-in one
+    #[arg(long)]
+    plan: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -45,9 +57,17 @@ pub struct PlaceArgs {
 
 pub fn run(command: &SceneCommand, output: Output) -> anyhow::Result<()> {
     match command {
+        SceneCommand::Room(args) => room(args, output),
         SceneCommand::Plane(args) => plane(args, output),
         SceneCommand::Place(args) => place_limb(args, output),
     }
+}
+
+fn plan(path: Option<&PathBuf>) -> anyhow::Result<Plan> {
+    Ok(match path {
+        Some(path) => Plan::read(path)?,
+        None => Plan::new(Vec::new()),
+    })
 }
 
 #[derive(Debug, Serialize)]
@@ -58,23 +78,57 @@ struct FoundPlane {
     rms_mm: f64,
 }
 
+impl FoundPlane {
+    fn describe(&self) -> String {
+        let [x, y, z] = self.normal;
+        format!(
+            "normal ({x:.6}, {y:.6}, {z:.6}), offset {:.3} mm, {} inliers, rms {:.3} mm",
+            self.offset_mm, self.inliers, self.rms_mm
+        )
+    }
+}
+
+impl From<&TablePlane> for FoundPlane {
+    fn from(found: &TablePlane) -> Self {
+        Self {
+            normal: found.plane.normal.into_inner().into(),
+            offset_mm: found.plane.offset_mm,
+            inliers: found.inliers,
+            rms_mm: found.rms_mm,
+        }
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct RoomFacts {
+    points: usize,
+    table: FoundPlane,
+    room_from_device: [[f64; 4]; 4],
+}
+
+fn room(args: &RoomArgs, output: Output) -> anyhow::Result<()> {
+    let Table { room, plane } = Table::of_plan(&plan(args.plan.as_ref())?)?;
+    write_ply_cloud(&args.out, &room.cloud)?;
+    let facts = RoomFacts {
+        points: room.cloud.points.len(),
+        table: FoundPlane::from(&plane),
+        room_from_device: room.device.room_from_device.to_homogeneous_rows(),
+    };
+    output.print(&facts, |facts| {
+        let table = facts.table.describe();
+        format!(
+            "{}: {} points; table {table}",
+            args.out.display(),
+            facts.points
+        )
+    })
+}
+
 fn plane(args: &PlaneArgs, output: Output) -> anyhow::Result<()> {
     let cloud = read_ply(&args.cloud)?.cloud;
     let found = table_plane(&cloud, &PlaneSettings::default(), args.seed)
         .with_context(|| args.cloud.display().to_string())?;
-    let plane = FoundPlane {
-        normal: found.plane.normal.into_inner().into(),
-        offset_mm: found.plane.offset_mm,
-        inliers: found.inliers,
-        rms_mm: found.rms_mm,
-    };
-    output.print(&plane, |p| {
-        let [x, y, z] = p.normal;
-        format!(
-            "normal ({x:.6}, {y:.6}, {z:.6}), offset {:.3} mm, {} inliers, rms {:.3} mm",
-            p.offset_mm, p.inliers, p.rms_mm
-        )
-    })
+    output.print(&FoundPlane::from(&found), FoundPlane::describe)
 }
 
 #[derive(Debug, Serialize)]
@@ -86,10 +140,7 @@ struct Placed {
 }
 
 fn place_limb(args: &PlaceArgs, output: Output) -> anyhow::Result<()> {
-    let plan = match &args.plan {
-        Some(path) => Plan::read(path)?,
-        None => Plan::new(Vec::new()),
-    };
+    let plan = plan(args.plan.as_ref())?;
     let case = Case::read(&args.case)?;
     let working = working("preparing the limb");
     let prepared = PreparedLimb::of_case(&case)
