@@ -41,6 +41,8 @@ pub struct Source {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Found {
+    /// What was odd about the scan, but did not stop its reading.
+    pub warnings: Vec<String>,
     /// Axis, joint and plane in the ct frame, mm.
     pub landmarks: Landmarks,
     /// What was cut away to free the skin.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ppa_ct::Volume;
+use ppa_ct::{Scan, Volume};
 use ppa_mesh::{Limb, LimbSettings, extract_limb};
 use ppa_scene::{LandmarkOverrides, Landmarks, Side, find_landmarks};
 use sha2::{Digest, Sha256};
@@ -94,7 +94,9 @@ pub fn prepare(
     surface: &LimbSettings,
     choices: &LandmarkOverrides,
 ) -> Result<(Case, PreparedLimb), PrepareError> {
-    let volume = ppa_ct::read(path)?.volume;
+    let Scan {
+        volume, warnings, ..
+    } = ppa_ct::read(path)?;
     let volume_sha256 = volume_sha256(&volume);
     let prepared = PreparedLimb::new(volume, side, surface, choices)?;
     let case = Case {
@@ -107,6 +109,7 @@ pub fn prepare(
         surface: surface.clone(),
         choices: prepared.landmarks.as_choices(choices),
         found: Found {
+            warnings: warnings.into_iter().map(|warning| warning.text).collect(),
             landmarks: prepared.landmarks.clone(),
             surface: prepared.limb.report.clone(),
         },

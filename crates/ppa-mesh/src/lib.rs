@@ -13,8 +13,10 @@
 mod body_shape;
 mod dbscan;
 mod estimate_normals;
+mod inward_limit;
 mod limb;
 mod mesh;
+mod neighbours;
 mod ply;
 mod surface;
 mod topology;

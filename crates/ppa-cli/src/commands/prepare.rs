@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use ppa_dataset::{Case, prepare};
+use ppa_dataset::{Case, Found, prepare};
 use ppa_mesh::{LimbSettings, VoxelBox, write_ply};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
 
@@ -153,7 +153,11 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
 }
 
 fn describe(case: &Case, args: &PrepareArgs) -> String {
-    let landmarks = &case.found.landmarks;
+    let Found {
+        warnings,
+        landmarks,
+        ..
+    } = &case.found;
     let [x, y, z] = landmarks.joint_centre;
     let [dx, dy, dz] = landmarks.axis_direction;
     let mut lines = vec![
@@ -169,6 +173,11 @@ fn describe(case: &Case, args: &PrepareArgs) -> String {
             .notes
             .iter()
             .map(|note| format!("note       {note}")),
+    );
+    lines.extend(
+        warnings
+            .iter()
+            .map(|warning| format!("warning    {warning}")),
     );
     lines.join("\n")
 }
