@@ -67,9 +67,9 @@ pub enum BumpError {
 ///
 /// Normals are averaged over a few rings of neighbours first, so that creases and noise do not
 /// make spikes. The distance is exact nearly everywhere. Only where the skin is curved more tightly
-/// than an inward distance (the tips of toes) would it turn inside out; there it moves less, and
-/// by at most 0.2 mm more per millimetre of skin around. Opposite sides of a part
-/// thinner than twice the distance still pass through each other.
+/// than an inward distance (the tips of toes) would it turn inside out: there it moves less, and the
+/// distance grows back by 0.2 mm per millimetre of skin around. Opposite sides of a part thinner
+/// than twice the distance still pass through each other.
 pub fn offset(mesh: &Mesh, distance_mm: f64) -> Mesh {
     let neighbours = Neighbours::of(mesh);
     let normals = smooth_normals(mesh, &neighbours);
