@@ -10,11 +10,11 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_dataset::layout::{LimbId, View};
 use ppa_dataset::{
-    BodyShape, FileKind, GenerateError, Manifest, Plan, PlanCase, Rows, Stage, Summary, generate,
-    prepare,
+    BodyShape, Case, FileKind, GenerateError, Manifest, Plan, PlanCase, PreparedLimb, Rows, Stage,
+    Summary, generate, prepare,
 };
 use ppa_depth::{DepthImage, isometry_from_rows};
-use ppa_scene::{Side, Sweep};
+use ppa_scene::{Landmarks, Side, Sweep};
 
 const SPACING_MM: f64 = 2.0;
 
@@ -288,4 +288,25 @@ fn the_beam_passes_through_the_joint() {
         (turned - 18.0).abs() < 1.5,
         "the device turned by {turned} degrees"
     );
+}
+
+/// What `ppa prepare` wrote down leads to the same limb again, and an edited choice to another.
+#[test]
+fn choices_of_a_case_are_carried_out() {
+    let case = Case::read(&inputs().join("p01.toml")).unwrap();
+    let again = PreparedLimb::of_case(&case).unwrap();
+    let frame = |landmarks: &Landmarks| *landmarks.patient_from_ct().isometry();
+    let moved = frame(&again.landmarks) * frame(&case.found.landmarks).inverse();
+    assert!(moved.translation.vector.norm() < 1e-9 && moved.rotation.angle() < 1e-9);
+
+    let mut edited = case.clone();
+    let joint = edited.choices.joint_centre.as_mut().unwrap();
+    joint[2] += 10.0;
+    let higher = PreparedLimb::of_case(&edited).unwrap().landmarks;
+    assert_eq!(Some(higher.joint_centre), edited.choices.joint_centre);
+
+    let mut open = case.clone();
+    open.choices = Default::default();
+    let found = PreparedLimb::of_case(&open).unwrap().landmarks;
+    assert_eq!(found, case.found.landmarks);
 }

@@ -1,6 +1,7 @@
 //! Iso-surface of a volume by marching cubes over slabs of slices.
 
 mod cell;
+mod extra;
 mod field;
 mod slab;
 mod tunnel;
