@@ -36,6 +36,7 @@ struct Slice {
     along: [Vec<u32>; 2],
 }
 
+/// The march with what it has made so far.
 pub struct March<'a> {
     pub field: &'a Field<'a>,
     words: usize,
