@@ -18,7 +18,13 @@ pub enum CalibrationError {
         /// Lowest HU of titanium.
         titanium: f32,
     },
-    /// The density curve needs two knots or more, rising in HU and never falling in density.
+    /// The density curve is too short.
+    #[error("the density curve has {found} knots (HU, g/cm³), expected at least 2")]
+    Knots {
+        /// Knots given.
+        found: usize,
+    },
+    /// The density curve must rise in HU and never fall in density.
     #[error("knot {knot} of the density curve does not continue it upwards (HU, g/cm³): {found:?}")]
     Curve {
         /// Index of the knot at fault.
@@ -110,21 +116,23 @@ impl HuCalibration {
                 titanium,
             });
         }
+        let [first, _, ..] = self.density_curve[..] else {
+            return Err(CalibrationError::Knots {
+                found: self.density_curve.len(),
+            });
+        };
         for (what, found) in [
             ("air", self.air_g_cm3),
             ("titanium", self.titanium_g_cm3),
-            (
-                "the first knot",
-                self.density_curve.first().map_or(f32::NAN, |k| k[1]),
-            ),
+            ("the first knot", first[1]),
         ] {
             if !(found.is_finite() && found > 0.0) {
                 return Err(CalibrationError::Density { what, found });
             }
         }
         for (knot, pair) in self.density_curve.windows(2).enumerate() {
-            let continues =
-                pair[0][0] < pair[1][0] && pair[0][1] <= pair[1][1] && pair[1][1].is_finite();
+            let finite = pair.as_flattened().iter().all(|value| value.is_finite());
+            let continues = finite && pair[0][0] < pair[1][0] && pair[0][1] <= pair[1][1];
             if !continues {
                 return Err(CalibrationError::Curve {
                     knot: knot + 1,

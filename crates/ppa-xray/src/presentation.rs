@@ -144,7 +144,7 @@ impl Radiograph {
 /// Separable Gaussian of standard deviation `sigma_px`, renormalised at the edges.
 fn gaussian_blur(image: &[f64], columns: usize, sigma_px: f64) -> Vec<f64> {
     let rows = image.len() / columns;
-    let reach = (3.0 * sigma_px).ceil() as usize;
+    let reach = ((3.0 * sigma_px).ceil() as usize).min(rows.max(columns));
     let kernel: Vec<f64> = (0..=reach)
         .map(|d| (-0.5 * (d as f64 / sigma_px).powi(2)).exp())
         .collect();

@@ -20,13 +20,23 @@ pub enum ProjectionError {
         /// Pixels along device y.
         rows: u32,
     },
-    /// Pixel side or source-detector distance is not a positive length.
-    #[error("{what} is {found_mm} mm, expected a positive length")]
+    /// Pixel side or source-detector distance is not a length that makes sense.
+    #[error("{what} is {found_mm} mm, expected 0.001 mm to 1 km")]
     Length {
         /// Which length.
         what: &'static str,
         /// What it was.
         found_mm: f64,
+    },
+    /// The field is nearly a half-space.
+    #[error(
+        "the detector reaches {half_mm} mm from the central beam at {source_detector_mm} mm from the source, expected at most ten times that distance"
+    )]
+    FieldTooWide {
+        /// Half the longer side of the detector.
+        half_mm: f64,
+        /// Distance from the source to the detector plane.
+        source_detector_mm: f64,
     },
     /// The device pose holds NaN or infinity.
     #[error("the device pose is not finite")]
@@ -126,9 +136,17 @@ impl Projection {
             ("the pixel side", pixel_mm),
             ("the source-detector distance", self.source_detector_mm),
         ] {
-            if !(found_mm.is_finite() && found_mm > 0.0) {
+            if !(1e-3..=1e6).contains(&found_mm) {
                 return Err(ProjectionError::Length { what, found_mm });
             }
+        }
+        let [half_x, half_y] = self.detector.half_mm();
+        let half_mm = half_x.max(half_y);
+        if half_mm > 10.0 * self.source_detector_mm {
+            return Err(ProjectionError::FieldTooWide {
+                half_mm,
+                source_detector_mm: self.source_detector_mm,
+            });
         }
         if !self
             .ct_from_device
