@@ -55,7 +55,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     write().map_err(FileError::at("write", path))
 }
 
-/// What a file at `path` is to hold, as TOML; refuses paths that are not UTF-8 and integers beyond i64.
+/// What a file at `path` is to hold, as TOML; refuses paths that are not UTF-8.
 pub(crate) fn to_toml<T: Serialize>(value: &T, path: &Path) -> Result<String, FileError> {
     toml::to_string(value).map_err(|e| FileError::at("write", path)(io::Error::other(e)))
 }

@@ -215,7 +215,7 @@ impl Plan {
     /// Writes the plan as it stands, whole or not at all.
     ///
     /// # Errors
-    /// [`PlanError::File`], also for a seed beyond 2^63 − 1 or a path that is not UTF-8, which TOML cannot hold.
+    /// [`PlanError::File`], also for a path that is not UTF-8, which TOML cannot hold.
     pub fn write(&self, path: &Path) -> Result<(), PlanError> {
         Ok(write_whole(path, to_toml(self, path)?.as_bytes())?)
     }
@@ -242,6 +242,12 @@ impl Plan {
             if !(value.is_finite() && value > 0.0) {
                 return Err(format!("{name} is {value}, expected a length above 0 mm"));
             }
+        }
+        if self.room.ply.is_none() && self.room.room_from_device.is_some() {
+            return Err(
+                "room.room_from_device is given without room.ply: the built-in room has its device"
+                    .to_owned(),
+            );
         }
         self.rotation
             .poses()

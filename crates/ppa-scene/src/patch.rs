@@ -32,7 +32,8 @@ impl Lattice {
 
     fn cell(&self, p: &Point3<f64>) -> Cell {
         let v = p - self.origin;
-        let index = |e: &Vector3<f64>| (v.dot(e) / self.cell_mm).floor() as i64;
+        // Clamped, so that neighbours of the outermost cell can still be numbered.
+        let index = |e: &Vector3<f64>| (v.dot(e) / self.cell_mm).floor().clamp(-1e15, 1e15) as i64;
         (index(&self.e1), index(&self.e2))
     }
 }

@@ -144,6 +144,11 @@ fn augment(args: &AugmentArgs, output: Output) -> anyhow::Result<()> {
     let prepared = PreparedLimb::of_case(&case)?;
     let mut settings = ShapeSettings::default();
     settings.offset_mm = args.offset_mm.unwrap_or(settings.offset_mm);
+    anyhow::ensure!(
+        settings.offset_mm > 0.0 && settings.offset_mm < 100.0,
+        "--offset-mm is {}, expected a length above 0 and below 100 mm",
+        settings.offset_mm
+    );
     let limb = LimbId {
         patient: 0,
         side: case.side,
