@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 
 use ppa_mesh::{LimbReport, LimbSettings};
 use ppa_scene::{LandmarkOverrides, Landmarks, Side};
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use crate::files::{FileError, read_text, to_toml, write_whole};
 
 /// One limb of one CT. `ppa prepare` proposes it; a person changes `side`, `surface` and
 /// `choices`, and everything else is computed again when the case is used.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Case {
     /// Format of this file; 1.
     pub version: u32,
@@ -23,8 +23,23 @@ pub struct Case {
     pub surface: LimbSettings,
     /// Landmark decisions, filled in with what was found; edit them to overrule it.
     pub choices: LandmarkOverrides,
-    /// What followed from them when the case was written; for reading only.
-    pub found: Found,
+    /// What followed from them when the case was written; `None` for a case that was read,
+    /// since a person may have edited it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub found: Option<Found>,
+}
+
+/// A case as it stands in a file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CaseFile {
+    version: u32,
+    side: Side,
+    source: Source,
+    surface: LimbSettings,
+    choices: LandmarkOverrides,
+    #[serde(default, rename = "found")]
+    _found: IgnoredAny,
 }
 
 /// The scan a case was made from.
@@ -38,8 +53,7 @@ pub struct Source {
 }
 
 /// Results of the preparation, recorded for a person to read.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Found {
     /// What was odd about the scan, but did not stop its reading.
     pub warnings: Vec<String>,
@@ -81,7 +95,7 @@ impl Case {
     /// [`CaseError`] naming the file and the line or key at fault.
     pub fn read(path: &Path) -> Result<Self, CaseError> {
         let text = read_text(path)?;
-        let mut case: Self = toml::from_str(&text).map_err(|error| CaseError::Parse {
+        let case: CaseFile = toml::from_str(&text).map_err(|error| CaseError::Parse {
             path: path.to_owned(),
             message: error.to_string().trim_end().to_owned(),
         })?;
@@ -91,11 +105,18 @@ impl Case {
                 found: case.version,
             });
         }
-        case.source.path = path
-            .parent()
-            .unwrap_or(Path::new(""))
-            .join(&case.source.path);
-        Ok(case)
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Ok(Self {
+            version: case.version,
+            side: case.side,
+            source: Source {
+                path: folder.join(&case.source.path),
+                ..case.source
+            },
+            surface: case.surface,
+            choices: case.choices,
+            found: None,
+        })
     }
 
     /// Writes the case, whole or not at all.

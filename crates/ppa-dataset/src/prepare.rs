@@ -108,11 +108,11 @@ pub fn prepare(
         },
         surface: surface.clone(),
         choices: prepared.landmarks.as_choices(choices),
-        found: Found {
+        found: Some(Found {
             warnings: warnings.into_iter().map(|warning| warning.text).collect(),
             landmarks: prepared.landmarks.clone(),
             surface: prepared.limb.report.clone(),
-        },
+        }),
     };
     Ok((case, prepared))
 }

@@ -224,6 +224,9 @@ fn write(
     }
 
     let store = || -> io::Result<()> {
+        if path.is_dir() {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
         let mut out = BufWriter::new(AtomicWriteFile::open(path)?);
         let vertex_writer = Writer::<Vertex>::new();
         vertex_writer.write_header(&mut out, &header)?;
@@ -250,9 +253,10 @@ pub fn read_ply(path: &Path) -> Result<PlyContents, PlyError> {
         path: path.to_owned(),
         source,
     })?;
+    // The parser appends its state on further lines.
     let broken = |reason: String| PlyError::Format {
         path: path.to_owned(),
-        reason,
+        reason: reason.lines().next().unwrap_or_default().to_owned(),
     };
     let mut reader = Reader::new(BufReader::new(file));
     let header = Parser::<Vertex>::new()

@@ -153,15 +153,16 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
 }
 
 fn describe(case: &Case, args: &PrepareArgs) -> String {
-    let Found {
-        warnings,
-        landmarks,
-        ..
-    } = &case.found;
+    let mut lines = vec![format!("case       {}", args.out.display())];
+    lines.extend(case.found.iter().flat_map(describe_found));
+    lines.join("\n")
+}
+
+fn describe_found(found: &Found) -> Vec<String> {
+    let landmarks = &found.landmarks;
     let [x, y, z] = landmarks.joint_centre;
     let [dx, dy, dz] = landmarks.axis_direction;
     let mut lines = vec![
-        format!("case       {}", args.out.display()),
         format!("joint      {x:.1} {y:.1} {z:.1} mm (LPS)"),
         format!("axis       {dx:.4} {dy:.4} {dz:.4}"),
     ];
@@ -175,9 +176,10 @@ fn describe(case: &Case, args: &PrepareArgs) -> String {
             .map(|note| format!("note       {note}")),
     );
     lines.extend(
-        warnings
+        found
+            .warnings
             .iter()
             .map(|warning| format!("warning    {warning}")),
     );
-    lines.join("\n")
+    lines
 }

@@ -141,6 +141,20 @@ fn check(settings: &LimbSettings) -> Result<(), LimbError> {
             });
         }
     }
+    let hu = [
+        ("iso_hu", settings.iso_hu),
+        ("bone_hu", settings.bone_hu),
+        ("core_hu", settings.core_hu),
+    ];
+    for (name, value) in hu {
+        if !(-1024.0..=32_768.0).contains(&value) {
+            return Err(LimbError::Setting {
+                name,
+                value,
+                expected: "a CT number between -1024 and 32768 HU",
+            });
+        }
+    }
     if settings.core_hu < settings.iso_hu {
         return Err(LimbError::Setting {
             name: "core_hu",
