@@ -134,8 +134,12 @@ impl Majorants {
             let largest = &mut densest[block * materials + usize::from(material)];
             *largest = largest.max(density);
         }
-        let (class, members) = classify(&densest, materials);
         let rows = (CEILING_KEV - CUTOFF_KEV) as usize;
+        let opacity = relative_opacity(attenuation, rows);
+        for row in densest.chunks_exact_mut(materials) {
+            drop_dominated(row, &opacity);
+        }
+        let (class, members) = classify(&densest, materials);
         let mut table = Vec::with_capacity(rows * members.len());
         for row in 0..rows {
             let largest: Vec<f32> = (0..materials)
@@ -169,6 +173,32 @@ impl Majorants {
     #[inline]
     pub fn bound(&self, row: &[f32], block: usize) -> f64 {
         f64::from(row[usize::from(self.class[block])])
+    }
+}
+
+/// For materials (a, b) at a · materials + b: the largest ratio of their coefficients at any energy.
+fn relative_opacity(attenuation: &Attenuation, rows: usize) -> Vec<f32> {
+    let materials = attenuation.materials();
+    let largest = |material, row| attenuation.largest_in_row(material, row);
+    (0..materials * materials)
+        .map(|pair| {
+            let (a, b) = (pair / materials, pair % materials);
+            let ratio = |row| largest(a, row) / largest(b, row);
+            // A hair more, so that rounding never lets a struck-out material pass its bound.
+            (0..rows).map(ratio).fold(0.0, f32::max) * 1.000_001
+        })
+        .collect()
+}
+
+/// Strikes out materials that another one of the block outweighs at every energy: they cannot be its bound,
+/// and blocks that differ only in them share a class.
+fn drop_dominated(densest: &mut [f32], opacity: &[f32]) {
+    let materials = densest.len();
+    for a in 0..materials {
+        let outweighs = |b: usize| a != b && densest[a] * opacity[a * materials + b] <= densest[b];
+        if densest[a] > 0.0 && (0..materials).any(outweighs) {
+            densest[a] = 0.0;
+        }
     }
 }
 

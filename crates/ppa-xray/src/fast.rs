@@ -38,7 +38,7 @@ impl Default for FastSettings {
             dose_histories: 2e10,
             scatter_histories: 4_000_000,
             scatter_pixel_mm: 20.0,
-            samples_per_side: 3,
+            samples_per_side: 2,
             seed: 0,
         }
     }

@@ -49,7 +49,7 @@ pub enum Tissue {
     Air,
     /// Everything between air and bone.
     SoftTissue,
-    /// Mineralised bone.
+    /// Bone, from spongy to compact: soft tissue and cortical bone mixed by density.
     Bone,
     /// Metal, taken for a titanium implant.
     Titanium,
@@ -67,7 +67,7 @@ pub enum Tissue {
 pub struct HuCalibration {
     /// Lowest HU taken for soft tissue; below is air.
     pub soft_tissue_from_hu: f32,
-    /// Lowest HU taken for bone.
+    /// Lowest HU taken for bone, which begins as soft tissue and ends as cortical bone.
     pub bone_from_hu: f32,
     /// Lowest HU taken for titanium.
     pub titanium_from_hu: f32,
@@ -83,7 +83,7 @@ impl Default for HuCalibration {
     fn default() -> Self {
         Self {
             soft_tissue_from_hu: -800.0,
-            bone_from_hu: 200.0,
+            bone_from_hu: 100.0,
             titanium_from_hu: 2_800.0,
             air_g_cm3: 0.001_205,
             density_curve: vec![

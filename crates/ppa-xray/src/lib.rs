@@ -58,6 +58,7 @@ mod tube;
 mod analog;
 mod attenuation;
 mod fast;
+mod graded_bone;
 mod hu;
 mod lattice;
 mod noise;

@@ -107,6 +107,25 @@ impl Material {
         Self::from_composition(name, density_g_cm3, &mass_fractions)
     }
 
+    /// Materials mixed by mass fraction.
+    ///
+    /// # Errors
+    /// Everything [`Material::from_composition`] refuses.
+    pub fn mixture(
+        name: impl Into<String>,
+        density_g_cm3: f64,
+        parts: &[(&Self, f64)],
+    ) -> Result<Self, MaterialError> {
+        let mut mass = std::collections::BTreeMap::<u8, f64>::new();
+        for (part, share) in parts {
+            for (z, fraction) in part.mass_fractions() {
+                *mass.entry(*z).or_default() += share * fraction;
+            }
+        }
+        let mass: Vec<_> = mass.into_iter().collect();
+        Self::from_composition(name, density_g_cm3, &mass)
+    }
+
     /// Material of the library, such as `water`, `bone_cortical` or `titanium`, or a pure element by symbol, such as `Al`.
     ///
     /// # Errors

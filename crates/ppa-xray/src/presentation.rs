@@ -41,8 +41,8 @@ impl Default for Presentation {
     /// A limb at 50 to 70 kVp.
     fn default() -> Self {
         Self {
-            centre: 2.4,
-            width: 4.2,
+            centre: 2.2,
+            width: 3.0,
             gamma: 1.0,
             detail: 0.9,
             detail_radius_mm: 12.0,

@@ -3,6 +3,7 @@
 use nalgebra::Point3;
 use ppa_ct::{Grid, Volume};
 
+use crate::graded_bone::GradedBone;
 use crate::hu::{CalibrationError, HuCalibration, Tissue};
 use crate::material::Material;
 use crate::material_error::MaterialError;
@@ -133,23 +134,27 @@ impl VoxelPhantom {
                 expected: hu.len(),
             });
         }
-        let materials = ["air", "soft_tissue", "bone_cortical", "titanium"]
+        let mut materials = ["air", "titanium", "soft_tissue"]
             .into_iter()
             .map(Material::named)
-            .collect::<Result<_, _>>()?;
+            .collect::<Result<Vec<_>, _>>()?;
+        let bone = GradedBone::new(calibration)?;
+        let first_bone = materials.len() as u8;
+        materials.extend(bone.materials(&materials[2])?);
         let kept = |voxel: usize| mask.is_none_or(|mask| mask[voxel]);
         let (material, density) = hu
             .iter()
             .enumerate()
             .map(|(voxel, &hu)| {
                 let hu = if kept(voxel) { hu } else { f32::NEG_INFINITY };
+                let density_g_cm3 = calibration.density_g_cm3(hu);
                 let index = match calibration.tissue(hu) {
                     Tissue::Air => 0,
-                    Tissue::SoftTissue => 1,
-                    Tissue::Bone => 2,
-                    Tissue::Titanium => 3,
+                    Tissue::Titanium => 1,
+                    Tissue::SoftTissue => 2,
+                    Tissue::Bone => first_bone + bone.level(density_g_cm3) as u8,
                 };
-                (index, calibration.density_g_cm3(hu))
+                (index, density_g_cm3)
             })
             .unzip();
         Self::new(volume.grid().clone(), material, density, materials)
