@@ -43,8 +43,8 @@ fn dataset(case: &Case) -> tempfile::TempDir {
     folder
 }
 
-/// The couch is the lowest solid thing in the scan; the ankle sits where a person sees it (slice
-/// 20, z = 201 mm), and the other leg, beyond x = 20 mm, is gone.
+/// The ankle sits where a person sees it (slice 20, z = 201 mm), a couch was cut away, and the
+/// other leg, whose bones lie around x = 52 mm, is gone.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn the_right_leg_of_sts049_is_freed_from_couch_and_other_leg() {
