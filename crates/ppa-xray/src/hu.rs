@@ -61,7 +61,7 @@ pub enum Tissue {
 /// Med. Biol. 45 (2000) 459: fat-to-muscle 1.018 + 0.893e-3 HU and bone 1.017 + 0.592e-3 HU. Their
 /// step down at 100 HU is replaced by the straight line between both branches, so the
 /// density never falls as HU rises. Air has one density whatever the noise in it: the positive mean of clipped
-/// noise would add up over a long path. Above 3071 HU, where 12-bit scanners clip, only metal remains.
+/// noise would add up over a long path. Above 2800 HU, beyond the densest bone, only metal remains.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct HuCalibration {
