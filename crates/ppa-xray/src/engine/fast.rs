@@ -3,17 +3,17 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::analog::{AnalogSettings, Stream, run};
-use crate::noise;
+use crate::beam::projection::{Detector, Projection};
+use crate::beam::spectrum::Spectrum;
+use crate::engine::analog::{AnalogSettings, Stream, run};
+use crate::engine::noise;
+use crate::engine::raytrace::primary_moments;
+use crate::engine::upsample::Upsampling;
+use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph, open_field_ev_cm2};
+use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
-use crate::projection::{Detector, Projection};
-use crate::radiograph::{CategorySums, Engine, Layer, Radiograph, open_field_ev_cm2};
-use crate::raytrace::primary_moments;
-use crate::spectrum::Spectrum;
-use crate::tally::{Category, Moments, Raster, Tally};
-use crate::tracking::{Transport, TransportError};
-use crate::upsample::Upsampling;
-use crate::voxels::VoxelPhantom;
+use crate::transport::tally::{Category, Moments, Raster, Tally};
+use crate::transport::tracking::{Transport, TransportError};
 
 /// What the fast engine spends, and the exposure its image stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -46,7 +46,7 @@ impl Default for FastSettings {
 
 /// Simulates a radiograph of [`FastSettings::dose_histories`] photons at a fraction of the work.
 ///
-/// Geometry, physics and units are those of [`crate::analog`]. Primary: line integrals averaged over each pixel.
+/// Geometry, physics and units are those of [`crate::engine::analog`]. Primary: line integrals averaged over each pixel.
 /// Scatter, which varies slowly: [`FastSettings::scatter_histories`] analog histories on coarse cells, carried to the
 /// pixels by quadratic B-splines that keep its sum. Then every layer gets the noise of an energy-integrating
 /// detector. The standard errors hold both that noise and the error of the scatter estimate, which

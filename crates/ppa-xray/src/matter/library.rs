@@ -4,8 +4,8 @@
 //! Alloys: the middle of the ranges of their standards. Elements: by symbol, or by the names in [`ELEMENT_NAMES`].
 
 use crate::{
-    element::{atomic_number, density_g_cm3, symbol},
-    material::Material,
+    matter::element::{atomic_number, density_g_cm3, symbol},
+    matter::material::Material,
 };
 
 struct Entry {

@@ -3,13 +3,13 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::beam::projection::Projection;
+use crate::beam::spectrum::Spectrum;
+use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph, open_field_ev_cm2};
+use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
-use crate::projection::Projection;
-use crate::radiograph::{CategorySums, Engine, Layer, Radiograph, open_field_ev_cm2};
-use crate::spectrum::Spectrum;
-use crate::tally::{Category, Raster, Tally};
-use crate::tracking::{Transport, TransportError};
-use crate::voxels::VoxelPhantom;
+use crate::transport::tally::{Category, Raster, Tally};
+use crate::transport::tracking::{Transport, TransportError};
 
 /// Streams of random numbers. Part of the reproducibility contract: append, never renumber.
 #[repr(u32)]

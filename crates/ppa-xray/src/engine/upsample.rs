@@ -1,7 +1,7 @@
 //! From coarse cells to pixels by smooth interpolation that keeps the sum.
 
-use crate::projection::Detector;
-use crate::tally::Raster;
+use crate::beam::projection::Detector;
+use crate::transport::tally::Raster;
 
 /// Quadratic B-spline interpolation from a coarse raster to the pixels of the same rectangle.
 ///

@@ -6,7 +6,8 @@
 use std::sync::OnceLock;
 
 use crate::{
-    cross_sections::Unpacked, material::Material, spectrum::Spectrum, spectrum_error::SpectrumError,
+    beam::spectrum::Spectrum, beam::spectrum_error::SpectrumError,
+    matter::cross_sections::Unpacked, matter::material::Material,
 };
 
 /// A line grows as (U − 1)^1.63, U = kVp over its edge (Green & Cosslett 1968, doi:10.1088/0022-3727/1/4/302).
@@ -186,7 +187,7 @@ fn bracket(nodes: &[f64], x: f64) -> (usize, f64) {
 fn table() -> &'static Table {
     static TABLE: OnceLock<Table> = OnceLock::new();
     TABLE.get_or_init(|| {
-        let mut data = Unpacked::new(include_bytes!("../data/tungsten.bin.deflate"));
+        let mut data = Unpacked::new(include_bytes!("../../data/tungsten.bin.deflate"));
         let [n_voltages, n_angles, n_bins, n_lines] = std::array::from_fn(|_| data.count());
         let grid = data.doubles(2);
         let (voltages, angles) = (data.doubles(n_voltages), data.doubles(n_angles));

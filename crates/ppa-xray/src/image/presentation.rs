@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::radiograph::Radiograph;
+use crate::image::radiograph::Radiograph;
 
 /// Why a presentation cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -2,14 +2,16 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::attenuation::{Attenuation, CEILING_KEV, CUTOFF_KEV, Coefficients, Majorants};
-use crate::lattice::{Lattice, Walk};
+use crate::beam::projection::{Projection, ProjectionError, scattered};
+use crate::beam::spectrum::Spectrum;
+use crate::matter::sampler::MaterialTables;
+use crate::phantom::lattice::{Lattice, Walk};
+use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
-use crate::projection::{Projection, ProjectionError, scattered};
-use crate::sampler::MaterialTables;
-use crate::spectrum::Spectrum;
-use crate::tally::Category;
-use crate::voxels::VoxelPhantom;
+use crate::transport::attenuation::{
+    Attenuation, CEILING_KEV, CUTOFF_KEV, Coefficients, Majorants,
+};
+use crate::transport::tally::Category;
 
 /// Why a simulation cannot run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,12 +1,12 @@
 //! One material prepared for transport: cross sections without logarithms, and the scattering samplers.
 
 use crate::{
-    compton::Compton,
-    cross_sections::{CrossSections, HC_KEV_ANGSTROM, MAX_ENERGY_KEV, MIN_ENERGY_KEV},
-    material::Material,
+    matter::compton::Compton,
+    matter::cross_sections::{CrossSections, HC_KEV_ANGSTROM, MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::material::Material,
+    matter::rayleigh::Rayleigh,
     octaves::Octaves,
     philox::Philox,
-    rayleigh::Rayleigh,
 };
 
 /// Bins per octave of energy, as a power of two: straight lines in E are then within 1e-4 of E⁻³ laws.
@@ -145,7 +145,7 @@ mod tests {
     use std::{fs, path::PathBuf};
 
     use super::*;
-    use crate::cross_sections::ELECTRON_REST_KEV;
+    use crate::matter::cross_sections::ELECTRON_REST_KEV;
 
     const SAMPLES: u64 = 200_000;
 

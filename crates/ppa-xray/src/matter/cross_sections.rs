@@ -156,7 +156,7 @@ impl Elements {
 pub(crate) fn elements() -> &'static Elements {
     static ELEMENTS: OnceLock<Elements> = OnceLock::new();
     ELEMENTS.get_or_init(|| {
-        let mut data = Unpacked::new(include_bytes!("../data/elements.bin.deflate"));
+        let mut data = Unpacked::new(include_bytes!("../../data/elements.bin.deflate"));
         let [n_elements, n_energy, n_q] = std::array::from_fn(|_| data.count());
         let energies = data.floats(n_energy);
         let q = data.doubles(n_q);

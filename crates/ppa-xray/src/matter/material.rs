@@ -1,13 +1,13 @@
 //! Materials: elements by weight, and what a gram of them does to a photon.
 
 use crate::{
-    compton::energy_ratio,
-    cross_sections::{
+    matter::compton::energy_ratio,
+    matter::cross_sections::{
         CrossSections, ELECTRON_REST_KEV, HC_KEV_ANGSTROM, MAX_ENERGY_KEV, MIN_ENERGY_KEV, elements,
     },
-    element::{atomic_number, symbol},
-    library,
-    material_error::MaterialError,
+    matter::element::{atomic_number, symbol},
+    matter::library,
+    matter::material_error::MaterialError,
 };
 
 /// A homogeneous material: elements by mass fraction and a nominal density.
@@ -270,7 +270,9 @@ impl Material {
         self.elements().flat_map(|(element, _)| element.edges_kev())
     }
 
-    fn elements(&self) -> impl Iterator<Item = (&'static crate::cross_sections::Element, f64)> {
+    fn elements(
+        &self,
+    ) -> impl Iterator<Item = (&'static crate::matter::cross_sections::Element, f64)> {
         self.mass_fractions.iter().map(|&(z, fraction)| {
             (
                 elements().get(z).expect("Z checked on the way in"),

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use crate::{spectrum::Spectrum, spectrum_error::SpectrumError};
+use crate::{beam::spectrum::Spectrum, beam::spectrum_error::SpectrumError};
 
 impl Spectrum {
     /// Reads `energy in keV, weight` lines, the energy being the centre of a bin; edges lie half-way between centres.

@@ -9,9 +9,9 @@ use ::exr::prelude::{self as exr, WritableImage};
 use atomic_write_file::AtomicWriteFile;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
-use crate::presentation::{Presentation, PresentationError};
-use crate::radiograph::{Engine, Radiograph};
-use crate::tally::Category;
+use crate::image::presentation::{Presentation, PresentationError};
+use crate::image::radiograph::{Engine, Radiograph};
+use crate::transport::tally::Category;
 
 /// Why an image file could not be written.
 #[derive(Debug, thiserror::Error)]

@@ -3,8 +3,8 @@
 //! The scattered energy is that of a free electron at rest; Doppler broadening by the electron's motion is not modelled yet.
 
 use crate::{
-    cross_sections::{ELECTRON_REST_KEV, HC_KEV_ANGSTROM},
-    material::Material,
+    matter::cross_sections::{ELECTRON_REST_KEV, HC_KEV_ANGSTROM},
+    matter::material::Material,
     octaves::Octaves,
     philox::Philox,
 };

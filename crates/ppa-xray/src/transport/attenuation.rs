@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use crate::sampler::MaterialTables;
-use crate::voxels::VoxelPhantom;
+use crate::matter::sampler::MaterialTables;
+use crate::phantom::voxels::VoxelPhantom;
 
 /// Photons below this energy are absorbed on the spot: 5 keV x-rays die within 0.25 mm of tissue.
 pub(crate) const CUTOFF_KEV: f64 = 5.0;
@@ -255,7 +255,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::material::Material;
+    use crate::matter::material::Material;
 
     /// Woodcock tracking is right only if no voxel exceeds the bound of its block.
     #[test]

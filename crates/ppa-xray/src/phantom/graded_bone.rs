@@ -4,9 +4,9 @@
 //! make it far too opaque at diagnostic energies, where the calcium absorbs most, and would draw a hard edge where
 //! the HU threshold cuts through a gradual transition.
 
-use crate::hu::HuCalibration;
-use crate::material::Material;
-use crate::material_error::MaterialError;
+use crate::matter::material::Material;
+use crate::matter::material_error::MaterialError;
+use crate::phantom::hu::HuCalibration;
 
 /// Mixtures from soft tissue to cortical bone.
 const LEVELS: usize = 24;

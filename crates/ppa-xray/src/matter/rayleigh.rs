@@ -1,7 +1,8 @@
 //! Rayleigh scattering: Thomson's law times the squared form factor of independent atoms.
 
 use crate::{
-    cross_sections::HC_KEV_ANGSTROM, material::Material, octaves::Octaves, philox::Philox,
+    matter::cross_sections::HC_KEV_ANGSTROM, matter::material::Material, octaves::Octaves,
+    philox::Philox,
 };
 
 /// Entries of the table that says where in the cumulative distribution to start looking.

@@ -1,9 +1,9 @@
 //! Energy distribution of the photons that leave the source.
 
 use crate::{
-    cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
-    material::Material,
-    spectrum_error::SpectrumError,
+    beam::spectrum_error::SpectrumError,
+    matter::cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::material::Material,
 };
 
 /// Dose of one keV in one gram, in Gy.

@@ -3,9 +3,9 @@
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
-use crate::projection::{Detector, Projection};
-use crate::spectrum::Spectrum;
-use crate::tally::Category;
+use crate::beam::projection::{Detector, Projection};
+use crate::beam::spectrum::Spectrum;
+use crate::transport::tally::Category;
 
 /// How a radiograph was computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -3,10 +3,10 @@
 use nalgebra::Point3;
 use ppa_ct::{Grid, Volume};
 
-use crate::graded_bone::GradedBone;
-use crate::hu::{CalibrationError, HuCalibration, Tissue};
-use crate::material::Material;
-use crate::material_error::MaterialError;
+use crate::matter::material::Material;
+use crate::matter::material_error::MaterialError;
+use crate::phantom::graded_bone::GradedBone;
+use crate::phantom::hu::{CalibrationError, HuCalibration, Tissue};
 
 /// Why a voxel phantom cannot be made.
 #[derive(Debug, thiserror::Error)]

@@ -3,12 +3,12 @@
 use nalgebra::{Point2, Point3, Vector3};
 use rayon::prelude::*;
 
-use crate::lattice::Walk;
-use crate::projection::Projection;
-use crate::spectrum::Spectrum;
-use crate::tally::Moments;
-use crate::tracking::{Transport, TransportError};
-use crate::voxels::VoxelPhantom;
+use crate::beam::projection::Projection;
+use crate::beam::spectrum::Spectrum;
+use crate::phantom::lattice::Walk;
+use crate::phantom::voxels::VoxelPhantom;
+use crate::transport::tally::Moments;
+use crate::transport::tracking::{Transport, TransportError};
 
 /// Energy of unscattered photons per pixel, row-major, eV/cm² per history.
 ///
@@ -16,7 +16,7 @@ use crate::voxels::VoxelPhantom;
 /// off by up to 13 % at sharp edges. Voxels are homogeneous, as in the transport.
 ///
 /// # Errors
-/// As [`crate::analog`]; also when `samples_per_side` is not 1 to 64.
+/// As [`crate::engine::analog`]; also when `samples_per_side` is not 1 to 64.
 pub fn primary(
     phantom: &VoxelPhantom,
     spectrum: &Spectrum,
@@ -185,7 +185,8 @@ fn spectral_lines(spectrum: &Spectrum) -> Vec<(f64, f64)> {
         .bins()
         .filter(|&(energy_kev, probability)| {
             probability > 1e-9
-                && (crate::attenuation::CUTOFF_KEV..=crate::attenuation::CEILING_KEV)
+                && (crate::transport::attenuation::CUTOFF_KEV
+                    ..=crate::transport::attenuation::CEILING_KEV)
                     .contains(&energy_kev)
         })
         .collect()

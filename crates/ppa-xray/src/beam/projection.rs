@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::philox::Philox;
-use crate::tally::Raster;
+use crate::transport::tally::Raster;
 
 /// Why a projection cannot be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

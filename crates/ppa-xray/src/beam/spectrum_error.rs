@@ -1,8 +1,8 @@
 //! What can be wrong with a spectrum.
 
 use crate::{
-    cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
-    material_error::MaterialError,
+    matter::cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::material_error::MaterialError,
 };
 
 /// Why something is not a spectrum.

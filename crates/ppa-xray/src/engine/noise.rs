@@ -1,7 +1,7 @@
 //! Quantum noise of an energy-integrating detector.
 
 use crate::philox::Philox;
-use crate::tally::Moments;
+use crate::transport::tally::Moments;
 
 /// A draw of the mean energy per history, keV, that `histories` photons would have left.
 ///

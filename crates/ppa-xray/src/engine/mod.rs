@@ -1,0 +1,7 @@
+//! From an exposure to a radiograph: followed photon by photon, or fast.
+
+pub(crate) mod analog;
+pub(crate) mod fast;
+pub(crate) mod noise;
+pub(crate) mod raytrace;
+pub(crate) mod upsample;

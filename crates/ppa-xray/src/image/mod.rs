@@ -1,0 +1,5 @@
+//! The radiograph, its presentation and its files.
+
+pub(crate) mod output;
+pub(crate) mod presentation;
+pub(crate) mod radiograph;

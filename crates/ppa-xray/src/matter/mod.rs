@@ -1,0 +1,10 @@
+//! What a gram of matter does to photons: cross sections, materials and scattering.
+
+pub(crate) mod compton;
+pub(crate) mod cross_sections;
+pub(crate) mod element;
+pub(crate) mod library;
+pub(crate) mod material;
+pub(crate) mod material_error;
+pub(crate) mod rayleigh;
+pub(crate) mod sampler;
