@@ -8,15 +8,9 @@ use crate::beam::spectrum::Spectrum;
 use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph, open_field_ev_cm2};
 use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
+use crate::transport::score::{Arrival, Score};
 use crate::transport::tally::{Category, Raster, Tally};
 use crate::transport::tracking::{Transport, TransportError};
-
-/// Streams of random numbers. Part of the reproducibility contract: append, never renumber.
-#[repr(u32)]
-pub(crate) enum Stream {
-    History = 0,
-    QuantumNoise = 1,
-}
 
 /// How long the analog engine runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -90,12 +84,20 @@ pub(crate) fn run(transport: &Transport, raster: Raster, settings: &AnalogSettin
     let batches = settings.histories.div_ceil(BATCH);
     (0..batches).into_par_iter().for_each(|batch| {
         let first = batch * BATCH;
-        for history in first..(first + BATCH).min(settings.histories) {
-            let mut rng = Philox::new(settings.seed, Stream::History as u32, history);
-            if let Some(photon) = transport.history(&mut rng) {
-                tally.score(photon.x_mm, photon.y_mm, photon.category, photon.energy_kev);
-            }
-        }
+        let last = (first + BATCH).min(settings.histories);
+        transport.follow(settings.seed, first..last, &mut DetectorScore(&tally));
     });
     tally
+}
+
+/// Counts what reaches the detector, nothing else.
+struct DetectorScore<'a>(&'a Tally);
+
+impl Score for DetectorScore<'_> {
+    #[inline]
+    fn arrive(&mut self, _slot: usize, arrival: &Arrival, _rng: &mut Philox) {
+        let Arrival { x_mm, y_mm, .. } = *arrival;
+        self.0
+            .score(x_mm, y_mm, arrival.category, arrival.energy_kev);
+    }
 }

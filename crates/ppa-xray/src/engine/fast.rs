@@ -5,13 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::beam::projection::{Detector, Projection};
 use crate::beam::spectrum::Spectrum;
-use crate::engine::analog::{AnalogSettings, Stream, run};
+use crate::engine::analog::{AnalogSettings, run};
 use crate::engine::noise;
 use crate::engine::raytrace::primary_moments;
 use crate::engine::upsample::Upsampling;
 use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph, open_field_ev_cm2};
 use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
+use crate::transport::stream::Stream;
 use crate::transport::tally::{Category, Moments, Raster, Tally};
 use crate::transport::tracking::{Transport, TransportError};
 

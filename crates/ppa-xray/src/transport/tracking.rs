@@ -1,5 +1,7 @@
 //! One photon history: source, Woodcock flight, interactions, detector plane.
 
+use std::ops::Range;
+
 use nalgebra::{Point3, Vector3};
 
 use crate::beam::projection::{Projection, ProjectionError, scattered};
@@ -11,6 +13,8 @@ use crate::philox::Philox;
 use crate::transport::attenuation::{
     Attenuation, CEILING_KEV, CUTOFF_KEV, Coefficients, Majorants,
 };
+use crate::transport::score::{Arrival, Score};
+use crate::transport::stream::Stream;
 use crate::transport::tally::Category;
 
 /// Why a simulation cannot run.
@@ -54,15 +58,6 @@ pub(crate) struct Transport<'a> {
     majorants: Majorants,
 }
 
-/// A photon at the detector plane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Arrival {
-    pub x_mm: f64,
-    pub y_mm: f64,
-    pub energy_kev: f64,
-    pub category: Category,
-}
-
 /// A photon under way, in the device frame.
 struct Photon {
     position_mm: Point3<f64>,
@@ -76,6 +71,8 @@ enum Flight {
     Escape,
     Collision {
         distance_mm: f64,
+        /// Index of the voxel in the phantom.
+        voxel: usize,
         material: u8,
         coefficients: Coefficients,
         /// Uniform in [0, `coefficients.total`).
@@ -118,29 +115,41 @@ impl<'a> Transport<'a> {
         })
     }
 
-    /// Follows one photon from the focal spot; `None` when it never reaches the detector plane.
-    pub fn history(&self, rng: &mut Philox) -> Option<Arrival> {
+    /// Follows the `histories` of a seed, one after the other, and tells `score` what they leave.
+    pub fn follow(&self, seed: u64, histories: Range<u64>, score: &mut impl Score) {
+        for history in histories {
+            let mut rng = Philox::new(seed, Stream::History as u32, history);
+            self.history(&mut rng, score);
+            score.finish(0);
+        }
+    }
+
+    fn history(&self, rng: &mut Philox, score: &mut impl Score) {
         let mut photon = Photon {
             position_mm: Point3::origin(),
             direction: self.projection.sample_direction(rng),
             energy_kev: self.spectrum.sample(rng.unit()),
             category: Category::Primary,
         };
+        score.emit(0, photon.energy_kev);
         while photon.energy_kev >= CUTOFF_KEV {
             let to_plane_mm = self.distance_to_plane_mm(&photon);
             match self.fly(&photon, to_plane_mm, rng) {
                 Flight::Escape if to_plane_mm.is_finite() => {
                     let at = photon.position_mm + photon.direction * to_plane_mm;
-                    return Some(Arrival {
+                    let arrival = Arrival {
                         x_mm: at.x,
                         y_mm: at.y,
+                        direction: photon.direction,
                         energy_kev: photon.energy_kev,
                         category: photon.category,
-                    });
+                    };
+                    return score.arrive(0, &arrival, rng);
                 }
-                Flight::Escape => return None,
+                Flight::Escape => return score.escape(0, photon.energy_kev),
                 Flight::Collision {
                     distance_mm,
+                    voxel,
                     material,
                     coefficients,
                     lot,
@@ -148,10 +157,14 @@ impl<'a> Transport<'a> {
                     photon.position_mm += photon.direction * distance_mm;
                     let tables = &self.samplers[usize::from(material)];
                     if lot < coefficients.photoelectric {
-                        return None;
+                        return score.deposit(0, voxel, photon.energy_kev);
                     } else if lot < coefficients.with_compton {
                         let (cos_theta, energy_kev) = tables.sample_compton(photon.energy_kev, rng);
                         photon.scatter(cos_theta, Category::Compton, rng);
+                        // Below the cutoff the rest of the photon stays here too.
+                        let leaves = energy_kev >= CUTOFF_KEV;
+                        let carried_kev = if leaves { energy_kev } else { 0.0 };
+                        score.deposit(0, voxel, photon.energy_kev - carried_kev);
                         photon.energy_kev = energy_kev;
                     } else {
                         let cos_theta = tables.sample_rayleigh(photon.energy_kev, rng);
@@ -160,7 +173,6 @@ impl<'a> Transport<'a> {
                 }
             }
         }
-        None
     }
 
     /// Infinite for a photon that flies away from the plane.
@@ -221,6 +233,7 @@ impl<'a> Transport<'a> {
                 if lot < f64::from(density * coefficients.total) {
                     return Flight::Collision {
                         distance_mm: at,
+                        voxel: index,
                         material,
                         coefficients,
                         lot: lot as f32 / density,

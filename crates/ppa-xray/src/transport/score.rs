@@ -1,0 +1,35 @@
+//! What photon histories leave behind, on its way to the tallies.
+
+use nalgebra::Vector3;
+
+use crate::philox::Philox;
+use crate::transport::tally::Category;
+
+/// A photon at the detector plane, in the device frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Arrival {
+    pub x_mm: f64,
+    pub y_mm: f64,
+    /// Unit vector; z is positive.
+    pub direction: Vector3<f64>,
+    pub energy_kev: f64,
+    pub category: Category,
+}
+
+/// Takes what histories leave. Several histories may be under way at once, each in a slot of its own.
+pub(crate) trait Score {
+    /// A photon leaves the source in `slot`.
+    fn emit(&mut self, _slot: usize, _energy_kev: f64) {}
+
+    /// The history in `slot` leaves energy in a voxel of the phantom.
+    fn deposit(&mut self, _slot: usize, _voxel: usize, _energy_kev: f64) {}
+
+    /// The photon in `slot` crosses the detector plane; `rng` is that of its history.
+    fn arrive(&mut self, slot: usize, arrival: &Arrival, rng: &mut Philox);
+
+    /// The photon in `slot` flies off without meeting the detector plane.
+    fn escape(&mut self, _slot: usize, _energy_kev: f64) {}
+
+    /// The history in `slot` has ended; the next one takes its place.
+    fn finish(&mut self, _slot: usize) {}
+}

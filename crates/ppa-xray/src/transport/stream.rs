@@ -1,0 +1,8 @@
+//! Purposes of random numbers.
+
+/// Streams of random numbers. Part of the reproducibility contract: append, never renumber.
+#[repr(u32)]
+pub(crate) enum Stream {
+    History = 0,
+    QuantumNoise = 1,
+}
