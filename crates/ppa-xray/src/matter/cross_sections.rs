@@ -54,21 +54,24 @@ impl Add for CrossSections {
 }
 
 /// Straight lines in log-log between nodes; a doubled abscissa is an edge, where the upper side counts.
-struct LogLog {
+#[derive(Debug, PartialEq)]
+pub(crate) struct LogLog {
     ln_x: Vec<f64>,
     ln_y: Vec<f64>,
 }
 
 impl LogLog {
-    fn new(x: &[f32], y: &[f32]) -> Self {
-        let ln = |values: &[f32]| values.iter().map(|&v| f64::from(v).ln()).collect();
+    /// Stands for zero, which has no logarithm.
+    const NOTHING: f64 = 1e-99;
+
+    pub(crate) fn new(x: &[f64], y: &[f64]) -> Self {
         Self {
-            ln_x: ln(x),
-            ln_y: ln(y),
+            ln_x: x.iter().map(|x| x.ln()).collect(),
+            ln_y: y.iter().map(|y| y.max(Self::NOTHING).ln()).collect(),
         }
     }
 
-    fn at(&self, ln_x: f64) -> f64 {
+    pub(crate) fn at(&self, ln_x: f64) -> f64 {
         let upper = self
             .ln_x
             .partition_point(|&node| node <= ln_x)
@@ -79,7 +82,7 @@ impl LogLog {
     }
 
     /// Abscissae that stand twice.
-    fn edges(&self) -> impl Iterator<Item = f64> {
+    pub(crate) fn edges(&self) -> impl Iterator<Item = f64> {
         self.ln_x
             .windows(2)
             .filter(|pair| pair[0] == pair[1])
@@ -158,18 +161,18 @@ pub(crate) fn elements() -> &'static Elements {
     ELEMENTS.get_or_init(|| {
         let mut data = Unpacked::new(include_bytes!("../../data/elements.bin.deflate"));
         let [n_elements, n_energy, n_q] = std::array::from_fn(|_| data.count());
-        let energies = data.floats(n_energy);
+        let energies = data.doubles(n_energy);
         let q = data.doubles(n_q);
         let by_z = (0..n_elements)
             .map(|_| {
                 let atomic_weight = f64::from(data.floats(1)[0]);
                 let n_photo = data.count();
-                let photo_energies = data.floats(n_photo);
+                let photo_energies = data.doubles(n_photo);
                 Element {
                     atomic_weight,
-                    photoelectric: LogLog::new(&photo_energies, &data.floats(n_photo)),
-                    rayleigh: LogLog::new(&energies, &data.floats(n_energy)),
-                    compton: LogLog::new(&energies, &data.floats(n_energy)),
+                    photoelectric: LogLog::new(&photo_energies, &data.doubles(n_photo)),
+                    rayleigh: LogLog::new(&energies, &data.doubles(n_energy)),
+                    compton: LogLog::new(&energies, &data.doubles(n_energy)),
                     form_factor: data.doubles(n_q),
                     incoherent: data.doubles(n_q),
                 }

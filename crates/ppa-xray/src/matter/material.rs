@@ -1,16 +1,20 @@
-//! Materials: elements by weight, and what a gram of them does to a photon.
+//! Materials: elements by weight or tables, and what a gram of them does to a photon.
+
+use std::sync::Arc;
 
 use crate::{
     matter::compton::energy_ratio,
     matter::cross_sections::{
-        CrossSections, ELECTRON_REST_KEV, HC_KEV_ANGSTROM, MAX_ENERGY_KEV, MIN_ENERGY_KEV, elements,
+        CrossSections, ELECTRON_REST_KEV, Element, HC_KEV_ANGSTROM, MAX_ENERGY_KEV, MIN_ENERGY_KEV,
+        elements,
     },
     matter::element::{atomic_number, symbol},
     matter::library,
     matter::material_error::MaterialError,
+    matter::photon_tables::{PhotonTables, TabulatedMatter},
 };
 
-/// A homogeneous material: elements by mass fraction and a nominal density.
+/// A homogeneous material: elements by mass fraction, or tables of its own, and a nominal density.
 ///
 /// ```
 /// use ppa_xray::Material;
@@ -24,7 +28,15 @@ use crate::{
 pub struct Material {
     name: String,
     density_g_cm3: f64,
-    mass_fractions: Vec<(u8, f64)>,
+    matter: Matter,
+}
+
+/// Where the photon data comes from.
+#[derive(Clone, Debug, PartialEq)]
+enum Matter {
+    /// The embedded data of the elements, by mass fraction.
+    Elements(Vec<(u8, f64)>),
+    Tables(Arc<TabulatedMatter>),
 }
 
 impl Material {
@@ -41,12 +53,7 @@ impl Material {
         mass_fractions: &[(u8, f64)],
     ) -> Result<Self, MaterialError> {
         let name = name.into();
-        if !(density_g_cm3.is_finite() && density_g_cm3 > 0.0) {
-            return Err(MaterialError::Density {
-                name,
-                found: density_g_cm3,
-            });
-        }
+        check_density(&name, density_g_cm3)?;
         let mut sorted = Vec::with_capacity(mass_fractions.len());
         for &(z, found) in mass_fractions {
             let Some(symbol) = symbol(z) else {
@@ -80,7 +87,26 @@ impl Material {
         Ok(Self {
             name,
             density_g_cm3,
-            mass_fractions: sorted,
+            matter: Matter::Elements(sorted),
+        })
+    }
+
+    /// Material from photon data of its own.
+    ///
+    /// # Errors
+    /// A density that is not positive; tables that are empty, of unlike lengths, not ascending, negative or not
+    /// finite, or outside 1 to 150 keV.
+    pub fn from_tables(
+        name: impl Into<String>,
+        tables: &PhotonTables,
+    ) -> Result<Self, MaterialError> {
+        let name = name.into();
+        check_density(&name, tables.density_g_cm3)?;
+        let matter = Matter::Tables(Arc::new(TabulatedMatter::new(&name, tables)?));
+        Ok(Self {
+            name,
+            density_g_cm3: tables.density_g_cm3,
+            matter,
         })
     }
 
@@ -110,7 +136,7 @@ impl Material {
     /// Materials mixed by mass fraction.
     ///
     /// # Errors
-    /// Everything [`Material::from_composition`] refuses.
+    /// Everything [`Material::from_composition`] refuses, and a part made from tables, whose elements are not known.
     pub fn mixture(
         name: impl Into<String>,
         density_g_cm3: f64,
@@ -118,6 +144,11 @@ impl Material {
     ) -> Result<Self, MaterialError> {
         let mut mass = std::collections::BTreeMap::<u8, f64>::new();
         for (part, share) in parts {
+            if part.mass_fractions().is_empty() {
+                return Err(MaterialError::NoComposition {
+                    name: part.name.clone(),
+                });
+            }
             for (z, fraction) in part.mass_fractions() {
                 *mass.entry(*z).or_default() += share * fraction;
             }
@@ -154,10 +185,24 @@ impl Material {
         self.density_g_cm3
     }
 
-    /// Atomic numbers and mass fractions, ascending in Z; the fractions add up to 1.
+    /// Atomic numbers and mass fractions, ascending in Z; the fractions add up to 1. Empty if made from tables.
     #[must_use]
     pub fn mass_fractions(&self) -> &[(u8, f64)] {
-        &self.mass_fractions
+        match &self.matter {
+            Matter::Elements(mass_fractions) => mass_fractions,
+            Matter::Tables(_) => &[],
+        }
+    }
+
+    /// Energies in keV between which the material has data: 1 to 150, or what its own tables hold of that.
+    ///
+    /// Transport takes the values at the lower end for photons that scatter to below it.
+    #[must_use]
+    pub fn energy_range_kev(&self) -> [f64; 2] {
+        match &self.matter {
+            Matter::Elements(_) => [MIN_ENERGY_KEV, MAX_ENERGY_KEV],
+            Matter::Tables(tables) => tables.range_kev(),
+        }
     }
 
     /// Mass attenuation by interaction at 1 to 150 keV.
@@ -165,19 +210,27 @@ impl Material {
     /// # Errors
     /// An energy outside the tables.
     pub fn cross_sections(&self, energy_kev: f64) -> Result<CrossSections, MaterialError> {
-        if !(MIN_ENERGY_KEV..=MAX_ENERGY_KEV).contains(&energy_kev) {
+        let [low_kev, high_kev] = self.energy_range_kev();
+        if !(low_kev..=high_kev).contains(&energy_kev) {
             return Err(MaterialError::Energy {
                 found_kev: energy_kev,
+                low_kev,
+                high_kev,
             });
         }
         Ok(self.cross_sections_unchecked(energy_kev))
     }
 
+    /// As [`Material::cross_sections`] at an energy known to be inside 1 to 150 keV; beyond tables of its own, the values
+    /// at their nearer end.
     pub(crate) fn cross_sections_unchecked(&self, energy_kev: f64) -> CrossSections {
-        self.elements()
-            .fold(CrossSections::default(), |sum, (element, fraction)| {
-                sum + element.cross_sections(energy_kev).scaled(fraction)
-            })
+        match &self.matter {
+            Matter::Elements(mass_fractions) => of_elements(mass_fractions)
+                .fold(CrossSections::default(), |sum, (element, w)| {
+                    sum + element.cross_sections(energy_kev).scaled(w)
+                }),
+            Matter::Tables(tables) => tables.cross_sections(energy_kev),
+        }
     }
 
     /// Photoelectric absorption in cm²/g.
@@ -251,33 +304,51 @@ impl Material {
 
     /// Σ w/A · S(q): scattering electrons per unit mass, up to a constant.
     pub(crate) fn incoherent_per_gram(&self, q: f64) -> f64 {
-        self.elements()
-            .map(|(element, fraction)| fraction / element.atomic_weight * element.incoherent(q))
-            .sum()
+        match &self.matter {
+            Matter::Elements(mass_fractions) => of_elements(mass_fractions)
+                .map(|(element, w)| w / element.atomic_weight * element.incoherent(q))
+                .sum(),
+            Matter::Tables(tables) => tables.incoherent(q),
+        }
     }
 
-    /// Σ w/A · F²(q), independent atoms.
+    /// Σ w/A · F²(q), independent atoms, up to a constant.
     pub(crate) fn form_factor_squared_per_gram(&self, q: f64) -> f64 {
-        self.elements()
-            .map(|(element, fraction)| {
-                fraction / element.atomic_weight * element.form_factor(q).powi(2)
-            })
-            .sum()
+        match &self.matter {
+            Matter::Elements(mass_fractions) => of_elements(mass_fractions)
+                .map(|(element, w)| w / element.atomic_weight * element.form_factor(q).powi(2))
+                .sum(),
+            Matter::Tables(tables) => tables.form_factor_squared(q),
+        }
     }
 
-    /// Absorption edges of all elements in keV.
-    pub(crate) fn edges_kev(&self) -> impl Iterator<Item = f64> {
-        self.elements().flat_map(|(element, _)| element.edges_kev())
+    /// Absorption edges in keV.
+    pub(crate) fn edges_kev(&self) -> Vec<f64> {
+        match &self.matter {
+            Matter::Elements(mass_fractions) => of_elements(mass_fractions)
+                .flat_map(|(element, _)| element.edges_kev())
+                .collect(),
+            Matter::Tables(tables) => tables.edges_kev().collect(),
+        }
     }
+}
 
-    fn elements(
-        &self,
-    ) -> impl Iterator<Item = (&'static crate::matter::cross_sections::Element, f64)> {
-        self.mass_fractions.iter().map(|&(z, fraction)| {
-            (
-                elements().get(z).expect("Z checked on the way in"),
-                fraction,
-            )
+fn of_elements(mass_fractions: &[(u8, f64)]) -> impl Iterator<Item = (&'static Element, f64)> {
+    mass_fractions.iter().map(|&(z, fraction)| {
+        (
+            elements().get(z).expect("Z checked on the way in"),
+            fraction,
+        )
+    })
+}
+
+fn check_density(name: &str, density_g_cm3: f64) -> Result<(), MaterialError> {
+    if density_g_cm3.is_finite() && density_g_cm3 > 0.0 {
+        Ok(())
+    } else {
+        Err(MaterialError::Density {
+            name: name.to_owned(),
+            found: density_g_cm3,
         })
     }
 }
@@ -287,6 +358,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::matter::electron_shell::Shell;
 
     proptest! {
         /// A mixture attenuates as its elements do, by weight.
@@ -401,5 +473,130 @@ mod tests {
         }
         let parsed = Material::parse_composition("water", 1.0, "H:0.112, O:0.889").unwrap();
         assert!((parsed.mass_fractions()[0].1 - 0.112 / 1.001).abs() < 1e-15);
+    }
+
+    /// Water as its tables, on the nodes of a file.
+    fn water_tables() -> PhotonTables {
+        let water = Material::named("water").unwrap();
+        let energies_kev: Vec<f64> = (0..=2300).map(|i| 5.0 + 0.05 * f64::from(i)).collect();
+        let of = |part: fn(&CrossSections) -> f64| {
+            let value = |&e: &f64| part(&water.cross_sections(e).unwrap());
+            energies_kev.iter().map(value).collect()
+        };
+        let squared = |i: u32| {
+            let q = 0.01 * f64::from(i);
+            [q * q, 7.0 * water.form_factor_squared_per_gram(q)]
+        };
+        let shell = |electrons, binding_kev, profile_at_zero| Shell {
+            electrons,
+            binding_kev,
+            profile_at_zero,
+        };
+        PhotonTables {
+            density_g_cm3: 1.0,
+            photoelectric_cm2_g: of(|s| s.photoelectric),
+            compton_cm2_g: of(|s| s.compton),
+            rayleigh_cm2_g: of(|s| s.rayleigh),
+            energies_kev,
+            form_factor_squared: (0..=1000).map(squared).collect(),
+            shells: vec![
+                shell(2.0, 0.0136, 0.849),
+                shell(4.0, 0.0071, 0.35),
+                shell(2.0, 0.0285, 0.579),
+                shell(2.0, 0.532, 0.113),
+            ],
+        }
+    }
+
+    #[test]
+    fn tables_give_their_material_back() {
+        let water = Material::named("water").unwrap();
+        let tables = Material::from_tables("file", &water_tables()).unwrap();
+        assert_eq!(tables.energy_range_kev(), [5.0, 120.0]);
+        for energy_kev in [5.0, 12.34, 59.99, 120.0] {
+            let (ours, theirs) = (
+                tables.cross_sections(energy_kev).unwrap(),
+                water.cross_sections(energy_kev).unwrap(),
+            );
+            assert!((ours.total() / theirs.total() - 1.0).abs() < 1e-4);
+            assert!((ours.compton / theirs.compton - 1.0).abs() < 1e-4);
+        }
+        for q in [0.0, 0.004, 0.123, 1.0, 9.9] {
+            let ratio = tables.form_factor_squared_per_gram(q)
+                / water.form_factor_squared_per_gram(q)
+                / 7.0;
+            assert!((ratio - 1.0).abs() < 2e-3, "{q}: {ratio}");
+        }
+        // Every electron scatters far out; the profiles' S(q) is that of the atoms within a tenth.
+        for (q, tolerance) in [(0.3, 0.12), (1.0, 0.05), (8.0, 0.01)] {
+            let ours = tables.incoherent_per_gram(q) / 10.0;
+            let theirs = water.incoherent_per_gram(q) * 18.015 / 10.0;
+            assert!(
+                (ours / theirs - 1.0).abs() < tolerance,
+                "{q}: {ours} {theirs}"
+            );
+        }
+        assert!(matches!(
+            tables.total_cm2_g(4.9),
+            Err(MaterialError::Energy { .. })
+        ));
+        assert!(matches!(
+            Material::mixture("mixture", 1.0, &[(&tables, 0.5), (&water, 0.5)]),
+            Err(MaterialError::NoComposition { .. })
+        ));
+    }
+
+    #[test]
+    fn tables_that_make_no_sense_are_refused() {
+        let broken = |change: fn(&mut PhotonTables)| {
+            let mut tables = water_tables();
+            change(&mut tables);
+            Material::from_tables("file", &tables).unwrap_err()
+        };
+        type Change = fn(&mut PhotonTables);
+        let values: [Change; 7] = [
+            |t| t.energies_kev[3] = f64::NAN,
+            |t| t.compton_cm2_g[7] = -1.0,
+            |t| t.photoelectric_cm2_g[0] = f64::INFINITY,
+            |t| t.form_factor_squared[0][1] = 0.0,
+            |t| t.shells[1].electrons = 0.0,
+            |t| t.shells[1].binding_kev = -0.1,
+            |t| t.shells[1].profile_at_zero = f64::NAN,
+        ];
+        for change in values {
+            let error = broken(change);
+            assert!(matches!(error, MaterialError::TableValue { .. }), "{error}");
+        }
+        let lengths: [Change; 5] = [
+            |t| t.energies_kev.clear(),
+            |t| t.energies_kev.truncate(1),
+            |t| t.rayleigh_cm2_g.truncate(9),
+            |t| t.form_factor_squared.clear(),
+            |t| t.shells.clear(),
+        ];
+        for change in lengths {
+            let error = broken(change);
+            assert!(
+                matches!(error, MaterialError::TableLength { .. }),
+                "{error}"
+            );
+        }
+        let orders: [Change; 3] = [
+            |t| t.energies_kev.swap(4, 5),
+            |t| t.energies_kev[4..7].fill(5.3),
+            |t| t.form_factor_squared[4][0] = 0.0,
+        ];
+        for change in orders {
+            let error = broken(change);
+            assert!(matches!(error, MaterialError::TableOrder { .. }), "{error}");
+        }
+        assert!(matches!(
+            broken(|t| t.density_g_cm3 = 0.0),
+            MaterialError::Density { .. }
+        ));
+        assert!(matches!(
+            broken(|t| t.energies_kev.iter_mut().for_each(|e| *e *= 1e3)),
+            MaterialError::TableRange { .. }
+        ));
     }
 }

@@ -69,11 +69,71 @@ pub enum MaterialError {
         found: String,
     },
     /// An energy outside the tables.
-    #[error(
-        "{found_kev} keV is outside the tables, which go from {MIN_ENERGY_KEV} to {MAX_ENERGY_KEV} keV"
-    )]
+    #[error("{found_kev} keV is outside the tables, which go from {low_kev} to {high_kev} keV")]
     Energy {
         /// Energy asked for, keV.
         found_kev: f64,
+        /// Lowest energy of the tables, keV.
+        low_kev: f64,
+        /// Highest energy of the tables, keV.
+        high_kev: f64,
+    },
+    /// A mixture with a material of unknown elements.
+    #[error("material {name:?} is made from tables, a mixture needs its elements")]
+    NoComposition {
+        /// Material at fault.
+        name: String,
+    },
+    /// A table that is too short, or not as long as the others.
+    #[error("material {name:?} has {found} {what}, expected {expected}{}", if *expected > 2 { "" } else { " or more" })]
+    TableLength {
+        /// Material at fault.
+        name: String,
+        /// What is counted.
+        what: &'static str,
+        /// Values given.
+        found: usize,
+        /// Values needed.
+        expected: usize,
+    },
+    /// A value that is negative or not finite, or zero where that cannot be.
+    #[error("material {name:?}: number {index} of the {what}, counted from 0, is {found}")]
+    TableValue {
+        /// Material at fault.
+        name: String,
+        /// Which table.
+        what: &'static str,
+        /// Place in the table, from 0.
+        index: usize,
+        /// Value given.
+        found: f64,
+    },
+    /// Values that do not ascend.
+    #[error(
+        "material {name:?}: number {index} of the {what}, counted from 0, is {found} after {before}, expected more"
+    )]
+    TableOrder {
+        /// Material at fault.
+        name: String,
+        /// Which table.
+        what: &'static str,
+        /// Place in the table, from 0.
+        index: usize,
+        /// Value given.
+        found: f64,
+        /// The value before it.
+        before: f64,
+    },
+    /// Tables that have no energies in common with the transport.
+    #[error(
+        "material {name:?} has data from {low_kev} to {high_kev} keV, nothing between {MIN_ENERGY_KEV} and {MAX_ENERGY_KEV} keV"
+    )]
+    TableRange {
+        /// Material at fault.
+        name: String,
+        /// First energy, keV.
+        low_kev: f64,
+        /// Last energy, keV.
+        high_kev: f64,
     },
 }

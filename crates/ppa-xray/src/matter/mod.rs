@@ -2,9 +2,11 @@
 
 pub(crate) mod compton;
 pub(crate) mod cross_sections;
+pub(crate) mod electron_shell;
 pub(crate) mod element;
 pub(crate) mod library;
 pub(crate) mod material;
 pub(crate) mod material_error;
+pub(crate) mod photon_tables;
 pub(crate) mod rayleigh;
 pub(crate) mod sampler;

@@ -32,6 +32,20 @@ pub enum TransportError {
         /// Share of the photons outside the range.
         percent: f64,
     },
+    /// A material has no data where the spectrum has photons.
+    #[error(
+        "{percent:.3} % of the spectrum lies outside {low_kev} to {high_kev} keV, where material {material:?} has data"
+    )]
+    MaterialRange {
+        /// The material.
+        material: String,
+        /// Its lowest energy.
+        low_kev: f64,
+        /// Its highest energy.
+        high_kev: f64,
+        /// Share of the photons outside the range.
+        percent: f64,
+    },
     /// A number in the settings is out of range.
     #[error("{what} is {found}, expected {expected}")]
     Setting {
@@ -88,15 +102,28 @@ impl<'a> Transport<'a> {
     ) -> Result<Self, TransportError> {
         projection.validate()?;
         check_placement(phantom, projection)?;
-        let outside: f64 = spectrum
-            .bins()
-            .filter(|(energy_kev, _)| !(CUTOFF_KEV..=CEILING_KEV).contains(energy_kev))
-            .map(|(_, probability)| probability)
-            .sum();
-        if outside > 1e-4 {
-            return Err(TransportError::Spectrum {
-                percent: 100.0 * outside,
-            });
+        let outside = |[low_kev, high_kev]: [f64; 2]| -> f64 {
+            spectrum
+                .bins()
+                .filter(|(energy_kev, _)| !(low_kev..=high_kev).contains(energy_kev))
+                .map(|(_, probability)| probability)
+                .sum()
+        };
+        let percent = 100.0 * outside([CUTOFF_KEV, CEILING_KEV]);
+        if percent > 1e-2 {
+            return Err(TransportError::Spectrum { percent });
+        }
+        for material in phantom.materials() {
+            let [low_kev, high_kev] = material.energy_range_kev();
+            let percent = 100.0 * outside([low_kev, high_kev]);
+            if percent > 1e-2 {
+                return Err(TransportError::MaterialRange {
+                    material: material.name().to_owned(),
+                    low_kev,
+                    high_kev,
+                    percent,
+                });
+            }
         }
         let samplers: Vec<_> = phantom
             .materials()
