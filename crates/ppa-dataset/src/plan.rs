@@ -103,8 +103,11 @@ pub struct XraySettings {
     /// Largest voxel that photons travel through, mm: thicker slices are interpolated, so that
     /// bone edges do not come out as stairs.
     pub max_voxel_mm: f64,
-    /// HU to material and density.
+    /// HU to material and density, written out as `[[xray.calibration.segment]]`.
     pub calibration: HuCalibration,
+    /// HU to material and density from a file instead; reading the plan puts its contents in place of the path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration_file: Option<PathBuf>,
     /// The engine.
     pub engine: FastSettings,
     /// The mapping to a radiograph for viewing.
@@ -125,6 +128,7 @@ impl Default for XraySettings {
             half_length_mm: 120.0,
             max_voxel_mm: 1.0,
             calibration: HuCalibration::default(),
+            calibration_file: None,
             engine: FastSettings::default(),
             presentation: Presentation::default(),
         }
@@ -154,6 +158,9 @@ pub enum PlanError {
         /// Its version.
         found: u32,
     },
+    /// The HU calibration it names.
+    #[error(transparent)]
+    Calibration(#[from] ppa_xray::CalibrationError),
     /// Something in it cannot work.
     #[error("{}: {message}", path.display())]
     Invalid {
@@ -208,6 +215,15 @@ impl Plan {
             .flatten()
         {
             *file = folder.join(&*file);
+        }
+        if let Some(file) = plan.xray.calibration_file.take() {
+            if plan.xray.calibration != HuCalibration::default() {
+                return Err(PlanError::Invalid {
+                    path: path.to_owned(),
+                    message: "xray.calibration and xray.calibration_file are both given".to_owned(),
+                });
+            }
+            plan.xray.calibration = HuCalibration::read(&folder.join(file))?;
         }
         Ok(plan)
     }

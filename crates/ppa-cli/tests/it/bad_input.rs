@@ -20,6 +20,7 @@ fn a_missing_file_is_named() {
         "generate nowhere.toml",
         "depth render nowhere.ply --out depth.png",
         "xray simulate nowhere.toml --out x.png",
+        "xray audit nowhere.nii",
         "scene plane nowhere.ply",
         "metrics nowhere.csv",
     ] {
@@ -83,6 +84,26 @@ fn a_camera_that_sees_nothing_is_refused() {
     let said = fail(folder.path(), "generate plan.toml --out data");
     contains(&said, &["camera"]);
     assert!(!folder.path().join("data/manifest.jsonl").exists());
+}
+
+#[test]
+fn a_broken_calibration_is_told_with_file_and_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("scanner.toml");
+    let segment = "[[segment]]\nname = \"all\"\nmaterial = \"water\"\n";
+    fs::write(&file, format!("{segment}density = [[0, 1], [-5, 2]]\n")).unwrap();
+    write_plan(folder.path(), "calibration_file = \"scanner.toml\"\n");
+    let scan = phantom().join("p01.nii");
+    let audit = format!("xray audit {} --calibration scanner.toml", scan.display());
+    for command in [audit.as_str(), "generate plan.toml --out data"] {
+        let said = fail(folder.path(), command);
+        contains(&said, &["scanner.toml", "segment \"all\"", "knot 2"]);
+    }
+    fs::write(&file, format!("{segment}dense = 3\n")).unwrap();
+    contains(&fail(folder.path(), &audit), &["scanner.toml", "line 4"]);
+    fs::remove_file(&file).unwrap();
+    let said = fail(folder.path(), "generate plan.toml --out data");
+    contains(&said, &["scanner.toml", "cannot be read"]);
 }
 
 #[test]

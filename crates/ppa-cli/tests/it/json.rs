@@ -114,6 +114,17 @@ fn every_command_keeps_its_keys() {
         "xray materials --composition H:0.112,O:0.888 --density 1 --energy-kev 60",
         &attenuation,
     );
+    let audit = [
+        "voxels",
+        "outside_mask",
+        "voxel_mm3",
+        "metal_cm3",
+        "mass_g",
+        "segments",
+    ];
+    let whole = object("xray audit p01.nii", &audit);
+    let limb = object("xray audit p01.toml", &audit);
+    assert!(limb["outside_mask"].as_u64() > whole["outside_mask"].as_u64());
     let simulated = object(
         "xray simulate p01.toml --angle 18 --engine analog --histories 20000 --out x.png --exr x.exr",
         &["projections", "histories", "engine", "wall_s", "cpu_s"],

@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
 use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph, open_field_ev_cm2};
-use crate::matter::compton::ComptonModel;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
 use crate::transport::score::{Arrival, Score};
@@ -15,25 +14,12 @@ use crate::transport::tracking::{Transport, TransportError};
 
 /// How long the analog engine runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(deny_unknown_fields)]
 pub struct AnalogSettings {
     /// Photons emitted into the field.
     pub histories: u64,
     /// Seed of the image: history n of a seed is the same whatever runs beside it.
     pub seed: u64,
-    /// How photons scatter off electrons.
-    pub compton_model: ComptonModel,
-}
-
-impl Default for AnalogSettings {
-    /// A minute or less: scatter to a few percent in a square centimetre.
-    fn default() -> Self {
-        Self {
-            histories: 20_000_000,
-            seed: 0,
-            compton_model: ComptonModel::default(),
-        }
-    }
 }
 
 /// Histories that one task follows: long enough to hide the hand-over.
@@ -54,11 +40,7 @@ pub fn analog(
     projection: &Projection,
     settings: &AnalogSettings,
 ) -> Result<Radiograph, TransportError> {
-    let AnalogSettings {
-        histories,
-        seed,
-        compton_model,
-    } = *settings;
+    let AnalogSettings { histories, seed } = *settings;
     if histories == 0 {
         return Err(TransportError::Setting {
             what: "the number of histories",
@@ -66,7 +48,7 @@ pub fn analog(
             expected: "1 or more",
         });
     }
-    let transport = Transport::new(phantom, spectrum, projection, compton_model)?;
+    let transport = Transport::new(phantom, spectrum, projection)?;
     let tally = run(&transport, projection.detector.raster(), settings);
     let ev_cm2 = 1e3 / tally.raster.cell_cm2();
     let layers = Category::ALL.map(|category| {

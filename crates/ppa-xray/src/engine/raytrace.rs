@@ -5,7 +5,6 @@ use rayon::prelude::*;
 
 use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
-use crate::matter::compton::ComptonModel;
 use crate::phantom::lattice::Walk;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::tally::Moments;
@@ -24,7 +23,7 @@ pub fn primary(
     projection: &Projection,
     samples_per_side: u32,
 ) -> Result<Vec<f64>, TransportError> {
-    let transport = Transport::new(phantom, spectrum, projection, ComptonModel::default())?;
+    let transport = Transport::new(phantom, spectrum, projection)?;
     let ev_cm2 = 1e3 / projection.detector.pixel_cm2();
     let moments = primary_moments(&transport, samples_per_side)?;
     Ok(moments.iter().map(|m| m.mean_kev * ev_cm2).collect())

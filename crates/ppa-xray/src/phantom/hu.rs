@@ -1,178 +1,297 @@
-//! From Hounsfield units to material and mass density.
+//! From Hounsfield units to material and mass density: a table per scanner.
+
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-/// Why a calibration cannot be used.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CalibrationError {
-    /// The material thresholds are not increasing.
-    #[error(
-        "material thresholds must increase: soft tissue {soft_tissue} HU, bone {bone} HU, titanium {titanium} HU"
-    )]
-    Thresholds {
-        /// Lowest HU of soft tissue.
-        soft_tissue: f32,
-        /// Lowest HU of bone.
-        bone: f32,
-        /// Lowest HU of titanium.
-        titanium: f32,
-    },
-    /// The density curve is too short.
-    #[error("the density curve has {found} knots (HU, g/cm³), expected at least 2")]
-    Knots {
-        /// Knots given.
-        found: usize,
-    },
-    /// The density curve must rise in HU and never fall in density.
-    #[error("knot {knot} of the density curve does not continue it upwards (HU, g/cm³): {found:?}")]
-    Curve {
-        /// Index of the knot at fault.
-        knot: usize,
-        /// The knot.
-        found: [f32; 2],
-    },
-    /// A density is not a positive number.
-    #[error("the density of {what} is {found} g/cm³, expected a positive number")]
-    Density {
-        /// Of what.
-        what: &'static str,
-        /// What it was.
-        found: f32,
-    },
-}
+use crate::matter::material::Material;
+use crate::matter::material_error::MaterialError;
+use crate::phantom::calibration_error::CalibrationError;
 
-/// What a voxel is made of, as told from its Hounsfield value alone.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Tissue {
-    /// Air, inside or outside the patient.
-    Air,
-    /// Everything between air and bone.
-    SoftTissue,
-    /// Bone, from spongy to compact: soft tissue and cortical bone mixed by density.
-    Bone,
-    /// Metal, taken for a titanium implant.
-    Titanium,
-}
+/// The built-in table, which is also an example of the file format.
+const BUILT_IN: &str = include_str!("../../data/hu_calibration.toml");
 
-/// Thresholds and density curve that turn HU into material and density.
+/// A table that turns HU into material and density, after Schneider, Bortfeld and Schlegel, Phys. Med. Biol. 45 (2000) 459.
 ///
-/// The defaults follow the stoichiometric calibration of Schneider, Bortfeld and Schlegel, Phys.
-/// Med. Biol. 45 (2000) 459: fat-to-muscle 1.018 + 0.893e-3 HU and bone 1.017 + 0.592e-3 HU. Their
-/// step down at 100 HU is replaced by the straight line between both branches, so the
-/// density never falls as HU rises. Air has one density whatever the noise in it: the positive mean of clipped
-/// noise would add up over a long path. Above 2800 HU, beyond the densest bone, only metal remains.
+/// The Hounsfield scale is cut into segments. Each has one material, or a mixture of two that changes gradually, and a
+/// density curve, so that the density is continuous within a segment. Which HU stands for which density depends on
+/// scanner, tube voltage and kernel: a table can be read from a TOML file ([`HuCalibration::read`]); the default is
+/// `data/hu_calibration.toml` of this crate.
+///
+/// ```
+/// # use ppa_xray::HuCalibration;
+/// let table = r#"
+///     [[segment]]
+///     name = "air"
+///     material = "air"
+///     density = [[-1000, 0.001205]]         # knots [HU, g/cm³]; a single one is a constant
+///
+///     [[segment]]
+///     name = "soft tissue and bone"
+///     from_hu = -800
+///     mixture = [                           # pure below and above these densities, mixed by volume in between
+///         { material = "muscle", density_g_cm3 = 1.06 },
+///         { material = "bone_cortical", density_g_cm3 = 1.85 },
+///     ]
+///     density = [[-1000, 0.001205], [60, 1.06], [1524, 1.92]]
+///
+///     [[segment]]
+///     name = "nail"
+///     from_hu = 2500
+///     material = "Co:0.65,Cr:0.28,Mo:0.07"  # a name of the library or mass fractions
+///     density = [[2500, 8.3]]
+/// "#;
+/// let calibration = HuCalibration::parse(table)?;
+/// assert_eq!(calibration.segment(3000.0).name, "nail");
+/// assert!((calibration.density_g_cm3(60.0) - 1.06).abs() < 1e-6);
+/// # Ok::<(), ppa_xray::CalibrationError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(deny_unknown_fields)]
 pub struct HuCalibration {
-    /// Lowest HU taken for soft tissue; below is air.
-    pub soft_tissue_from_hu: f32,
-    /// Lowest HU taken for bone, which begins as soft tissue and ends as cortical bone.
-    pub bone_from_hu: f32,
-    /// Lowest HU taken for titanium.
-    pub titanium_from_hu: f32,
-    /// Density of air, g/cm³.
-    pub air_g_cm3: f32,
-    /// Knots [HU, g/cm³] of the density of soft tissue and bone, straight in between, constant outside.
-    pub density_curve: Vec<[f32; 2]>,
-    /// Density of titanium, g/cm³.
-    pub titanium_g_cm3: f32,
+    /// The segments, from low to high HU.
+    #[serde(rename = "segment")]
+    pub segments: Vec<Segment>,
+}
+
+/// A part of the Hounsfield scale with one material or one gradual mixture.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "SegmentTable", into = "SegmentTable")]
+pub struct Segment {
+    /// What a reader calls it; errors and the audit name it.
+    pub name: String,
+    /// Lowest HU that belongs to it. `None` only in the first segment, which has no lower end.
+    pub from_hu: Option<f32>,
+    /// What it is made of.
+    pub composition: Composition,
+    /// Knots [HU, g/cm³] of the density: straight in between, constant outside.
+    pub density: Vec<[f32; 2]>,
+}
+
+/// What a segment is made of.
+///
+/// A material is given by a name of the library ([`Material::named`]) or by mass fractions
+/// ([`Material::parse_composition`]), which are told apart by the colon.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Composition {
+    /// One material.
+    Pure(String),
+    /// From one material to another as the density goes from that of the first to that of the second.
+    Mixture([Constituent; 2]),
+}
+
+/// One end of a gradual mixture.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Constituent {
+    /// The material.
+    pub material: String,
+    /// Density of a voxel that holds nothing else, g/cm³.
+    pub density_g_cm3: f32,
+}
+
+/// A segment as it stands in a file.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SegmentTable {
+    name: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    from_hu: Option<f32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    material: Option<String>,
+    density: Vec<[f32; 2]>,
+    // Last, since TOML wants tables after plain values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    mixture: Option<[Constituent; 2]>,
+}
+
+impl TryFrom<SegmentTable> for Segment {
+    type Error = String;
+
+    fn try_from(table: SegmentTable) -> Result<Self, String> {
+        let composition = match (table.material, table.mixture) {
+            (Some(material), None) => Composition::Pure(material),
+            (None, Some(mixture)) => Composition::Mixture(mixture),
+            _ => {
+                return Err(format!(
+                    "segment {:?} needs either `material` or `mixture`",
+                    table.name
+                ));
+            }
+        };
+        Ok(Self {
+            name: table.name,
+            from_hu: table.from_hu,
+            composition,
+            density: table.density,
+        })
+    }
+}
+
+impl From<Segment> for SegmentTable {
+    fn from(segment: Segment) -> Self {
+        let (material, mixture) = match segment.composition {
+            Composition::Pure(material) => (Some(material), None),
+            Composition::Mixture(mixture) => (None, Some(mixture)),
+        };
+        Self {
+            name: segment.name,
+            from_hu: segment.from_hu,
+            material,
+            density: segment.density,
+            mixture,
+        }
+    }
 }
 
 impl Default for HuCalibration {
     fn default() -> Self {
-        Self {
-            soft_tissue_from_hu: -800.0,
-            bone_from_hu: 100.0,
-            titanium_from_hu: 2_800.0,
-            air_g_cm3: 0.001_205,
-            density_curve: vec![
-                [-1_000.0, 0.001_205],
-                [-98.0, 0.930_5],
-                [14.0, 1.030_5],
-                [100.0, 1.076_2],
-                [3_071.0, 2.835],
-            ],
-            titanium_g_cm3: 4.54,
-        }
+        Self::parse(BUILT_IN).expect("the built-in table is checked by a test")
     }
 }
 
 impl HuCalibration {
-    /// Checks that thresholds rise, and that the curve rises in HU and never falls in density.
+    /// Reads a table from a TOML file.
     ///
     /// # Errors
-    /// [`CalibrationError`] naming the number at fault.
-    pub fn validate(&self) -> Result<(), CalibrationError> {
-        let (soft_tissue, bone, titanium) = (
-            self.soft_tissue_from_hu,
-            self.bone_from_hu,
-            self.titanium_from_hu,
-        );
-        if !(soft_tissue < bone && bone < titanium) {
-            return Err(CalibrationError::Thresholds {
-                soft_tissue,
-                bone,
-                titanium,
-            });
-        }
-        let [first, _, ..] = self.density_curve[..] else {
-            return Err(CalibrationError::Knots {
-                found: self.density_curve.len(),
-            });
+    /// [`CalibrationError`] naming the file, and the line or the segment at fault.
+    pub fn read(path: &Path) -> Result<Self, CalibrationError> {
+        let in_file = |source| CalibrationError::File {
+            path: path.into(),
+            source: Box::new(source),
         };
-        for (what, found) in [
-            ("air", self.air_g_cm3),
-            ("titanium", self.titanium_g_cm3),
-            ("the first knot", first[1]),
-        ] {
-            if !(found.is_finite() && found > 0.0) {
-                return Err(CalibrationError::Density { what, found });
-            }
+        std::fs::read_to_string(path)
+            .map_err(CalibrationError::Read)
+            .and_then(|text| Self::parse(&text))
+            .map_err(in_file)
+    }
+
+    /// A table from the text of a TOML file.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] naming the line or the segment at fault.
+    pub fn parse(text: &str) -> Result<Self, CalibrationError> {
+        let table: Self = toml::from_str(text).map_err(|error| CalibrationError::Syntax {
+            line: error
+                .span()
+                .map_or(1, |span| 1 + text[..span.start].matches('\n').count()),
+            message: error.message().to_owned(),
+        })?;
+        table.validate()?;
+        Ok(table)
+    }
+
+    /// Checks that segments and knots rise, that no density falls and that every material exists.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] naming the segment at fault.
+    pub fn validate(&self) -> Result<(), CalibrationError> {
+        if self.segments.is_empty() {
+            return Err(CalibrationError::Empty);
         }
-        for (knot, pair) in self.density_curve.windows(2).enumerate() {
-            let finite = pair.as_flattened().iter().all(|value| value.is_finite());
-            let continues = finite && pair[0][0] < pair[1][0] && pair[0][1] <= pair[1][1];
-            if !continues {
-                return Err(CalibrationError::Curve {
-                    knot: knot + 1,
-                    found: pair[1],
-                });
+        let mut lowest = f32::NEG_INFINITY;
+        for (index, segment) in self.segments.iter().enumerate() {
+            match segment.from_hu {
+                None if index == 0 => {}
+                Some(from) if from.is_finite() && from > lowest => lowest = from,
+                found => {
+                    return Err(CalibrationError::Start {
+                        segment: segment.name.clone(),
+                        found,
+                        previous: lowest,
+                    });
+                }
             }
+            segment.validate()?;
         }
         Ok(())
     }
 
-    /// The material a Hounsfield value stands for.
-    pub fn tissue(&self, hu: f32) -> Tissue {
-        if hu < self.soft_tissue_from_hu {
-            Tissue::Air
-        } else if hu < self.bone_from_hu {
-            Tissue::SoftTissue
-        } else if hu < self.titanium_from_hu {
-            Tissue::Bone
-        } else {
-            Tissue::Titanium
-        }
+    /// The segment a Hounsfield value belongs to; values below the first belong to it as well.
+    pub fn segment(&self, hu: f32) -> &Segment {
+        &self.segments[self.segment_index(hu)]
+    }
+
+    pub(crate) fn segment_index(&self, hu: f32) -> usize {
+        self.segments[1..].partition_point(|segment| segment.from_hu.is_some_and(|from| from <= hu))
     }
 
     /// Mass density in g/cm³ of a Hounsfield value.
     pub fn density_g_cm3(&self, hu: f32) -> f32 {
-        match self.tissue(hu) {
-            Tissue::Air => self.air_g_cm3,
-            Tissue::Titanium => self.titanium_g_cm3,
-            Tissue::SoftTissue | Tissue::Bone => self.curve(hu),
+        self.segment(hu).density_g_cm3(hu)
+    }
+}
+
+impl Segment {
+    fn validate(&self) -> Result<(), CalibrationError> {
+        let segment = || self.name.clone();
+        let [first, ..] = self.density[..] else {
+            return Err(CalibrationError::Knots { segment: segment() });
+        };
+        let positive = |density: f32| density.is_finite() && density > 0.0;
+        if !(first[0].is_finite() && positive(first[1])) {
+            return Err(CalibrationError::Curve {
+                segment: segment(),
+                knot: 1,
+                found: first,
+            });
         }
+        for (index, pair) in self.density.windows(2).enumerate() {
+            let finite = pair.as_flattened().iter().all(|value| value.is_finite());
+            if !(finite && pair[0][0] < pair[1][0] && pair[0][1] <= pair[1][1]) {
+                return Err(CalibrationError::Curve {
+                    segment: segment(),
+                    knot: index + 2,
+                    found: pair[1],
+                });
+            }
+        }
+        if let Composition::Mixture([first, second]) = &self.composition {
+            let [low, high] = [first.density_g_cm3, second.density_g_cm3];
+            if !(positive(low) && positive(high) && low < high) {
+                return Err(CalibrationError::Mixture {
+                    segment: segment(),
+                    found: [low, high],
+                });
+            }
+        }
+        self.constituents().map(|_| ())
     }
 
-    fn curve(&self, hu: f32) -> f32 {
-        let knots = &self.density_curve;
+    /// Mass density in g/cm³ of a Hounsfield value of this segment.
+    pub fn density_g_cm3(&self, hu: f32) -> f32 {
+        let knots = &self.density;
         let after = knots.partition_point(|knot| knot[0] <= hu);
         if after == 0 || after == knots.len() {
             return knots[after.saturating_sub(1)][1];
         }
         let ([h0, d0], [h1, d1]) = (knots[after - 1], knots[after]);
         d0 + (d1 - d0) * (hu - h0) / (h1 - h0)
+    }
+
+    /// Its one or two materials, at the density they have in it.
+    pub(crate) fn constituents(&self) -> Result<Vec<Material>, CalibrationError> {
+        let made = |text: &str, density_g_cm3: f32| -> Result<Material, MaterialError> {
+            if text.contains(':') {
+                Material::parse_composition(&self.name, f64::from(density_g_cm3), text)
+            } else {
+                Material::named(text)
+            }
+        };
+        let materials: Result<Vec<_>, _> = match &self.composition {
+            Composition::Pure(material) => {
+                let densest = self.density[self.density.len() - 1][1];
+                [made(material, densest)].into_iter().collect()
+            }
+            Composition::Mixture(parts) => parts
+                .iter()
+                .map(|part| made(&part.material, part.density_g_cm3))
+                .collect(),
+        };
+        materials.map_err(|source| CalibrationError::Material {
+            segment: self.name.clone(),
+            source,
+        })
     }
 }
 
@@ -183,29 +302,34 @@ mod tests {
     use super::*;
 
     #[test]
-    fn landmarks_of_the_scale_get_their_density() {
+    fn landmarks_of_the_scale_get_their_density_and_segment() {
         let calibration = HuCalibration::default();
-        calibration.validate().unwrap();
-        // Water 1.0, muscle 1.05 and dense cortical bone 1.92 g/cm³ (ICRU 44).
-        for (hu, density, within) in [(0.0, 1.0, 0.02), (50.0, 1.05, 0.01), (1_524.0, 1.92, 0.01)] {
+        // Water 1.0, adipose 0.95, muscle 1.05 and dense cortical bone 1.92 g/cm³ (ICRU 44).
+        for (hu, density, within, name) in [
+            (-70.0, 0.95, 0.01, "fat to muscle"),
+            (0.0, 1.0, 0.02, "fat to muscle"),
+            (50.0, 1.05, 0.01, "muscle"),
+            (1_524.0, 1.92, 0.01, "bone"),
+            (-1_000.0, 0.001_2, 1e-4, "air"),
+            (8_000.0, 4.54, 1e-4, "metal"),
+        ] {
             let found = calibration.density_g_cm3(hu);
             assert!((found - density).abs() < within, "{hu} HU: {found}");
+            assert_eq!(calibration.segment(hu).name, name);
         }
-        assert_eq!(calibration.tissue(-1_000.0), Tissue::Air);
-        assert_eq!(calibration.tissue(8_000.0), Tissue::Titanium);
     }
 
     proptest! {
         #[test]
-        fn material_and_density_never_fall_as_hu_rises(a in -1_100.0..9_000.0_f32, step in 0.0..500.0_f32) {
+        fn segment_and_density_never_fall_as_hu_rises(a in -1_100.0..9_000.0_f32, step in 0.0..500.0_f32) {
             let calibration = HuCalibration::default();
-            prop_assert!(calibration.tissue(a) <= calibration.tissue(a + step));
+            prop_assert!(calibration.segment_index(a) <= calibration.segment_index(a + step));
             prop_assert!(calibration.density_g_cm3(a) <= calibration.density_g_cm3(a + step));
         }
 
         /// The steepest branch of the default curve is 1.03e-3 g/cm³ per HU.
         #[test]
-        fn density_is_continuous_within_tissue(a in -799.0..2_798.0_f32) {
+        fn density_is_continuous_from_skin_to_bone(a in -799.0..2_798.0_f32) {
             let calibration = HuCalibration::default();
             let jump = calibration.density_g_cm3(a + 1.0) - calibration.density_g_cm3(a);
             prop_assert!(jump < 1.1e-3, "{jump}");
@@ -213,12 +337,80 @@ mod tests {
     }
 
     #[test]
-    fn a_falling_curve_is_refused_with_the_knot() {
-        let mut calibration = HuCalibration::default();
-        calibration.density_curve[2][1] = 0.5;
+    fn a_table_survives_its_file() {
+        let calibration = HuCalibration::default();
+        let text = toml::to_string(&calibration).unwrap();
+        assert_eq!(HuCalibration::parse(&text).unwrap(), calibration);
+    }
+
+    /// Every kind of mistake is told with the segment or the line it is in.
+    #[test]
+    fn mistakes_are_told_with_their_place() {
+        let broken = |from: &str, to: &str| {
+            assert!(BUILT_IN.contains(from), "{from}");
+            let error = HuCalibration::parse(&BUILT_IN.replacen(from, to, 1)).unwrap_err();
+            let source = std::error::Error::source(&error).map(ToString::to_string);
+            format!("{error} {}", source.unwrap_or_default())
+        };
+        for (from, to, told) in [
+            (
+                "[14, 1.0305], [100, 1.0762]]",
+                "[14, 1.0305], [14, 1.0762]]",
+                "segment \"muscle\": knot 2",
+            ),
+            (
+                "from_hu = 100",
+                "from_hu = 10",
+                "segment \"bone\" begins at 10 HU",
+            ),
+            (
+                "from_hu = 100",
+                "from_hu = nan",
+                "segment \"bone\" begins at NaN HU",
+            ),
+            ("from_hu = 100", "", "segment \"bone\" has no `from_hu`"),
+            (
+                "density = [[2800, 4.54]]",
+                "density = []",
+                "segment \"metal\" has no density",
+            ),
+            (
+                "[[2800, 4.54]]",
+                "[[2800, -4.54]]",
+                "segment \"metal\": knot 1",
+            ),
+            (
+                "\"titanium\"",
+                "\"unobtainium\"",
+                "segment \"metal\" no material is named",
+            ),
+            (
+                "\"titanium\"",
+                "\"Ti:0.5\"",
+                "segment \"metal\" the mass fractions",
+            ),
+            (
+                "density_g_cm3 = 1.85",
+                "density_g_cm3 = 1.05",
+                "segment \"bone\" mixes",
+            ),
+            (
+                "from_hu = 100",
+                "from_hu = 100\nhu = 3",
+                "line 42: unknown field `hu`",
+            ),
+            (
+                "material = \"titanium\"",
+                "",
+                "needs either `material` or `mixture`",
+            ),
+        ] {
+            let message = broken(from, to);
+            assert!(message.contains(told), "{to:?}: {message}");
+        }
         assert!(matches!(
-            calibration.validate(),
-            Err(CalibrationError::Curve { knot: 2, .. })
+            HuCalibration::parse("segment = []"),
+            Err(CalibrationError::Empty)
         ));
     }
 }

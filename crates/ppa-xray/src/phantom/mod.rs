@@ -1,6 +1,9 @@
 //! The patient: materials and densities on a lattice of voxels.
 
-pub(crate) mod graded_bone;
+pub(crate) mod audit;
+pub(crate) mod calibration_error;
+pub(crate) mod graded_mixture;
 pub(crate) mod hu;
 pub(crate) mod lattice;
+pub(crate) mod segmentation;
 pub(crate) mod voxels;

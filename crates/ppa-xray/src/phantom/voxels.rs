@@ -2,11 +2,12 @@
 
 use nalgebra::Point3;
 use ppa_ct::{Grid, Volume};
+use rayon::prelude::*;
 
 use crate::matter::material::Material;
-use crate::matter::material_error::MaterialError;
-use crate::phantom::graded_bone::GradedBone;
-use crate::phantom::hu::{CalibrationError, HuCalibration, Tissue};
+use crate::phantom::calibration_error::CalibrationError;
+use crate::phantom::hu::HuCalibration;
+use crate::phantom::segmentation::Segmentation;
 
 /// Why a voxel phantom cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -43,12 +44,12 @@ pub enum PhantomError {
         /// Its density.
         found: f32,
     },
+    /// A mask without a voxel.
+    #[error("the mask holds none of the scan's voxels")]
+    EmptyMask,
     /// The HU calibration makes no sense.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    /// A material of the calibration cannot be made.
-    #[error(transparent)]
-    Material(#[from] MaterialError),
 }
 
 /// Materials and densities on the lattice of a CT; vacuum outside it.
@@ -116,7 +117,8 @@ impl VoxelPhantom {
         })
     }
 
-    /// A phantom from Hounsfield units; voxels outside `mask` (one flag per voxel) become air.
+    /// A phantom from Hounsfield units; voxels outside `mask` (one flag per voxel) become what the lowest HU stand for,
+    /// air. [`HuCalibration::audit`] tells what became of the voxels.
     ///
     /// # Errors
     /// [`PhantomError`] when the calibration is not usable or the mask has the wrong length.
@@ -125,7 +127,7 @@ impl VoxelPhantom {
         calibration: &HuCalibration,
         mask: Option<&[bool]>,
     ) -> Result<Self, PhantomError> {
-        calibration.validate()?;
+        let segmentation = Segmentation::new(calibration)?;
         let hu = volume.hu();
         if let Some(mask) = mask.filter(|mask| mask.len() != hu.len()) {
             return Err(PhantomError::Length {
@@ -134,27 +136,34 @@ impl VoxelPhantom {
                 expected: hu.len(),
             });
         }
-        let mut materials = ["air", "titanium", "soft_tissue"]
-            .into_iter()
-            .map(Material::named)
-            .collect::<Result<Vec<_>, _>>()?;
-        let bone = GradedBone::new(calibration)?;
-        let first_bone = materials.len() as u8;
-        materials.extend(bone.materials(&materials[2])?);
-        let kept = |voxel: usize| mask.is_none_or(|mask| mask[voxel]);
-        let (material, density) = hu
+        let voxel = |index: usize| {
+            let kept = mask.is_none_or(|mask| mask[index]);
+            segmentation.voxel(if kept { hu[index] } else { f32::NEG_INFINITY })
+        };
+        // Only materials that occur are kept: each costs sampling tables.
+        let mut occurs = vec![false; segmentation.materials().len()];
+        for index in 0..hu.len() {
+            occurs[voxel(index).material] = true;
+        }
+        let (kept, materials): (Vec<usize>, Vec<Material>) = segmentation
+            .materials()
             .iter()
             .enumerate()
-            .map(|(voxel, &hu)| {
-                let hu = if kept(voxel) { hu } else { f32::NEG_INFINITY };
-                let density_g_cm3 = calibration.density_g_cm3(hu);
-                let index = match calibration.tissue(hu) {
-                    Tissue::Air => 0,
-                    Tissue::Titanium => 1,
-                    Tissue::SoftTissue => 2,
-                    Tissue::Bone => first_bone + bone.level(density_g_cm3) as u8,
-                };
-                (index, density_g_cm3)
+            .filter(|(material, _)| occurs[*material])
+            .map(|(material, made)| (material, made.clone()))
+            .unzip();
+        if !(1..=256).contains(&materials.len()) {
+            return Err(PhantomError::MaterialCount(materials.len()));
+        }
+        let mut renumbered = vec![0; occurs.len()];
+        for (new, old) in kept.into_iter().enumerate() {
+            renumbered[old] = new as u8;
+        }
+        let (material, density) = (0..hu.len())
+            .into_par_iter()
+            .map(|index| {
+                let voxel = voxel(index);
+                (renumbered[voxel.material], voxel.density_g_cm3)
             })
             .unzip();
         Self::new(volume.grid().clone(), material, density, materials)

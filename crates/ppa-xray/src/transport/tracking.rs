@@ -6,7 +6,6 @@ use nalgebra::{Point3, Vector3};
 
 use crate::beam::projection::{Projection, ProjectionError, scattered};
 use crate::beam::spectrum::Spectrum;
-use crate::matter::compton::ComptonModel;
 use crate::matter::sampler::MaterialTables;
 use crate::phantom::lattice::{Lattice, Walk};
 use crate::phantom::voxels::VoxelPhantom;
@@ -100,7 +99,6 @@ impl<'a> Transport<'a> {
         phantom: &'a VoxelPhantom,
         spectrum: &'a Spectrum,
         projection: &'a Projection,
-        compton_model: ComptonModel,
     ) -> Result<Self, TransportError> {
         projection.validate()?;
         check_placement(phantom, projection)?;
@@ -130,7 +128,7 @@ impl<'a> Transport<'a> {
         let samplers: Vec<_> = phantom
             .materials()
             .iter()
-            .map(|material| MaterialTables::new(material, compton_model))
+            .map(MaterialTables::new)
             .collect();
         let attenuation = Attenuation::new(&samplers);
         Ok(Self {

@@ -1,5 +1,6 @@
 //! `ppa xray`: radiographs, spectra and materials.
 
+mod audit;
 mod materials;
 mod simulate;
 mod spectrum;
@@ -17,6 +18,8 @@ pub enum XrayCommand {
     Spectrum(spectrum::SpectrumArgs),
     /// Mass attenuation of a material
     Materials(materials::MaterialsArgs),
+    /// What a HU calibration makes of a CT or a limb: material, volume, mass, clipped voxels
+    Audit(audit::AuditArgs),
 }
 
 #[derive(Debug, Args)]
@@ -47,5 +50,6 @@ pub fn run(command: &XrayCommand, output: Output) -> anyhow::Result<()> {
         XrayCommand::Simulate(args) => simulate::run(args, output),
         XrayCommand::Spectrum(args) => spectrum::run(args, output),
         XrayCommand::Materials(args) => materials::run(args, output),
+        XrayCommand::Audit(args) => audit::run(args, output),
     }
 }
