@@ -120,11 +120,7 @@ impl Default for XraySettings {
             kvp: 60.0,
             anode_angle_deg: 12.0,
             filters: vec!["Al:2.5".to_owned()],
-            detector: Detector {
-                columns: 448,
-                rows: 448,
-                pixel_mm: 0.5,
-            },
+            detector: Detector::centred(448, 448, 0.5),
             half_length_mm: 120.0,
             max_voxel_mm: 1.0,
             calibration: HuCalibration::default(),

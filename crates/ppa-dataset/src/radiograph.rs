@@ -77,9 +77,9 @@ pub fn projection(
     device: &XrayDevice,
     detector: Detector,
 ) -> Projection {
-    Projection {
-        ct_from_device: *ct_from_device(placement, landmarks, device).isometry(),
-        source_detector_mm: device.source_detector_mm,
+    Projection::new(
+        *ct_from_device(placement, landmarks, device).isometry(),
+        device.source_detector_mm,
         detector,
-    }
+    )
 }

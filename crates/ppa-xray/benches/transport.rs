@@ -30,15 +30,11 @@ fn cube(screw: bool) -> VoxelPhantom {
 }
 
 fn projection(pixels: u32) -> Projection {
-    Projection {
-        ct_from_device: Isometry3::translation(0.0, 0.0, -950.0),
-        source_detector_mm: 1_100.0,
-        detector: Detector {
-            columns: pixels,
-            rows: pixels,
-            pixel_mm: 300.0 / f64::from(pixels),
-        },
-    }
+    Projection::new(
+        Isometry3::translation(0.0, 0.0, -950.0),
+        1_100.0,
+        Detector::centred(pixels, pixels, 300.0 / f64::from(pixels)),
+    )
 }
 
 fn spectrum() -> Spectrum {

@@ -30,17 +30,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), -angle_deg.to_radians());
     let rotation = turn * Rotation3::from_matrix_unchecked(from_front);
     let joint = Translation3::from(limb.truth().joint_centre);
-    let projection = Projection {
-        ct_from_device: joint
+    let projection = Projection::new(
+        joint
             * UnitQuaternion::from_rotation_matrix(&rotation)
             * Isometry3::translation(0.0, 0.0, -1_000.0),
-        source_detector_mm: 1_100.0,
-        detector: Detector {
-            columns: 600,
-            rows: 600,
-            pixel_mm: 0.4,
-        },
-    };
+        1_100.0,
+        Detector::centred(600, 600, 0.4),
+    );
 
     let radiograph = fast(&phantom, &spectrum, &projection, &FastSettings::default())?;
     for category in Category::ALL {

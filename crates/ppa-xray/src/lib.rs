@@ -27,11 +27,8 @@
 //! let hu = (0..grid.len()).map(|n| if rod(grid.voxel(n)) { 1200.0 } else { 50.0 }).collect();
 //! let phantom = VoxelPhantom::from_volume(&Volume::new(grid, hu)?, &HuCalibration::default(), None)?;
 //! let tube = TubeSpec { kvp: 60.0, anode_angle_deg: 12.0, filters: vec!["Al:2.5".parse()?] };
-//! let exposure = Projection {
-//!     ct_from_device: Isometry3::translation(0.0, 0.0, -1000.0),
-//!     source_detector_mm: 1100.0,
-//!     detector: Detector { columns: 50, rows: 50, pixel_mm: 2.0 },
-//! };
+//! let ct_from_device = Isometry3::translation(0.0, 0.0, -1000.0);
+//! let exposure = Projection::new(ct_from_device, 1100.0, Detector::centred(50, 50, 2.0));
 //! let settings = FastSettings { scatter_histories: 20_000, ..FastSettings::default() };
 //! let radiograph = fast(&phantom, &Spectrum::tungsten(&tube)?, &exposure, &settings)?;
 //! let reading = radiograph.total();
@@ -50,6 +47,7 @@ mod philox;
 mod transport;
 
 pub use beam::projection::{Detector, Projection, ProjectionError};
+pub use beam::source::{Collimation, FocalSpot, HeelEffect, Source, SpotShape};
 pub use beam::spectrum::Spectrum;
 pub use beam::spectrum_error::SpectrumError;
 pub use beam::tube::{Filter, TubeSpec};

@@ -1,6 +1,10 @@
 //! What leaves the focal spot, and towards where.
 
+pub(crate) mod emitter;
+pub(crate) mod field;
+pub(crate) mod heel;
 pub(crate) mod projection;
+pub(crate) mod source;
 pub(crate) mod spectrum;
 pub(crate) mod spectrum_error;
 pub(crate) mod spectrum_file;

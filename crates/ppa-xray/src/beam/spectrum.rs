@@ -2,6 +2,7 @@
 
 use crate::{
     beam::spectrum_error::SpectrumError,
+    beam::tube::TubeSpec,
     matter::cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
     matter::material::Material,
 };
@@ -19,7 +20,8 @@ pub struct Spectrum {
     cumulative: Vec<f64>,
     /// First bin whose cumulative probability exceeds k/len.
     guide: Vec<u32>,
-    fluence_per_mas_cm2_at_1m: Option<f64>,
+    /// The tube it came from, and its photons per mAs and cm² at 1 m.
+    tube: Option<(TubeSpec, f64)>,
 }
 
 impl Spectrum {
@@ -105,13 +107,19 @@ impl Spectrum {
             probabilities,
             cumulative,
             guide,
-            fluence_per_mas_cm2_at_1m: None,
+            tube: None,
         })
     }
 
-    pub(crate) fn with_fluence(mut self, per_mas_cm2_at_1m: f64) -> Self {
-        self.fluence_per_mas_cm2_at_1m = Some(per_mas_cm2_at_1m);
+    pub(crate) fn of_tube(mut self, tube: &TubeSpec, fluence_per_mas_cm2_at_1m: f64) -> Self {
+        self.tube = Some((tube.clone(), fluence_per_mas_cm2_at_1m));
         self
+    }
+
+    /// The tube that the spectrum came from, if it came from the tube model.
+    #[must_use]
+    pub fn tube(&self) -> Option<&TubeSpec> {
+        self.tube.as_ref().map(|(tube, _)| tube)
     }
 
     /// Bin centre in keV and probability of each bin.
@@ -159,7 +167,7 @@ impl Spectrum {
     /// Photons per mAs and cm² at 1 m from the source, if the spectrum came from the tube model.
     #[must_use]
     pub fn fluence_per_mas_cm2_at_1m(&self) -> Option<f64> {
-        self.fluence_per_mas_cm2_at_1m
+        self.tube.as_ref().map(|&(_, fluence)| fluence)
     }
 
     /// Air kerma of one photon per cm² in Gy.
@@ -174,7 +182,7 @@ impl Spectrum {
     /// Air kerma in µGy per mAs at 1 m from the source, if the spectrum came from the tube model.
     #[must_use]
     pub fn kerma_ugy_per_mas_at_1m(&self) -> Option<f64> {
-        Some(1e6 * self.kerma_gy_cm2() * self.fluence_per_mas_cm2_at_1m?)
+        Some(1e6 * self.kerma_gy_cm2() * self.fluence_per_mas_cm2_at_1m()?)
     }
 
     /// Aluminium that halves the air kerma, mm (narrow beam).

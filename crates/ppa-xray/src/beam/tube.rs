@@ -102,7 +102,7 @@ impl Spectrum {
                     emitted * transmission(line.energy_kev)?;
             }
         }
-        Ok(Self::from_bins(&edges, &photons)?.with_fluence(photons.iter().sum()))
+        Ok(Self::from_bins(&edges, &photons)?.of_tube(tube, photons.iter().sum()))
     }
 }
 
@@ -166,6 +166,11 @@ impl Table {
             (t * s, row(v + 1, a + 1)),
         ]))
     }
+}
+
+/// Anode angles of the tube model, lowest and highest, degrees.
+pub(crate) fn anode_angles_deg() -> [f64; 2] {
+    ends(&table().angles)
 }
 
 fn ends(nodes: &[f64]) -> [f64; 2] {

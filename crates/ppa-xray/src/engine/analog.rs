@@ -72,7 +72,7 @@ pub fn analog(
         histories: histories as f64,
         seed,
         source_detector_mm: projection.source_detector_mm,
-        open_field_ev_cm2: open_field_ev_cm2(projection, spectrum),
+        open_field_ev_cm2: open_field_ev_cm2(&transport),
         layers,
         sums,
     })

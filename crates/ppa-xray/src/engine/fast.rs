@@ -93,7 +93,7 @@ pub fn fast(
         histories: settings.dose_histories,
         seed: settings.seed,
         source_detector_mm: projection.source_detector_mm,
-        open_field_ev_cm2: open_field_ev_cm2(projection, spectrum),
+        open_field_ev_cm2: open_field_ev_cm2(&transport),
         layers: with_noise(&expected, settings, &projection.detector),
         sums,
     })
@@ -172,7 +172,7 @@ fn scatter_raster(detector: &Detector, cell_mm: f64) -> Raster {
     Raster {
         columns: cells(fine.extent_mm[0], fine.columns),
         rows: cells(fine.extent_mm[1], fine.rows),
-        extent_mm: fine.extent_mm,
+        ..fine
     }
 }
 

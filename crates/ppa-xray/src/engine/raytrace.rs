@@ -1,8 +1,10 @@
 //! The primary image without randomness: line integrals through the voxels, averaged over each pixel.
 
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Point2, Point3, Unit, Vector3};
 use rayon::prelude::*;
 
+use crate::beam::emitter::SpectralLines;
+use crate::beam::field::Field;
 use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
 use crate::phantom::lattice::Walk;
@@ -42,10 +44,10 @@ pub(crate) fn primary_moments(
         });
     }
     let detector = transport.projection.detector;
+    let emitter = &transport.emitter;
     let beam = Beam::new(transport);
-    let [half_x, half_y] = detector.half_mm();
-    let step_mm = detector.pixel_mm / f64::from(samples_per_side);
-    let share_cm2 = detector.pixel_cm2() / f64::from(samples_per_side).powi(2);
+    let spots = emitter.spot_points(SPOT_RAYS);
+    let rays = f64::from(samples_per_side).powi(2);
     let columns = detector.columns as usize;
     Ok((0..detector.pixels())
         .into_par_iter()
@@ -53,19 +55,28 @@ pub(crate) fn primary_moments(
         .map_init(
             || beam.scratch(),
             |scratch, pixel| {
-                let left = (pixel % columns) as f64 * detector.pixel_mm - half_x;
-                let top = (pixel / columns) as f64 * detector.pixel_mm - half_y;
                 let mut sum = Moments::default();
+                let centre = detector.pixel_centre_mm(pixel);
+                let pixel = Field::centred([centre.x, centre.y], [detector.pixel_mm; 2]);
+                // Rays fill the part of the pixel that lies in the field, so that its edges are sharp.
+                let Some(lit) = pixel.overlap(emitter.field()) else {
+                    return sum;
+                };
+                let size = lit.size_mm();
+                let share_cm2 = size[0] * size[1] / 100.0 / rays;
                 for sample in 0..samples_per_side * samples_per_side {
                     let (i, j) = (sample % samples_per_side, sample / samples_per_side);
+                    let along = |i: u32| (f64::from(i) + 0.5) / f64::from(samples_per_side);
                     let at = Point2::new(
-                        left + (f64::from(i) + 0.5) * step_mm,
-                        top + (f64::from(j) + 0.5) * step_mm,
+                        lit.low_mm[0] + along(i) * size[0],
+                        lit.low_mm[1] + along(j) * size[1],
                     );
-                    let photons = transport.projection.open_fluence_cm2(at) * share_cm2;
-                    let behind = beam.behind(at, scratch);
-                    sum.mean_kev += photons * behind.mean_kev;
-                    sum.square_kev2 += photons * behind.square_kev2;
+                    for (spot, weight) in &spots {
+                        let photons = weight * share_cm2 * emitter.open_fluence_cm2(spot, at);
+                        let behind = beam.behind(spot, at, scratch);
+                        sum.mean_kev += photons * behind.mean_kev;
+                        sum.square_kev2 += photons * behind.square_kev2;
+                    }
                 }
                 sum
             },
@@ -73,11 +84,13 @@ pub(crate) fn primary_moments(
         .collect())
 }
 
+/// Points per side of a focal spot that is not a point.
+const SPOT_RAYS: u32 = 4;
+
 /// The spectrum with the attenuation of every material at every energy.
 struct Beam<'a> {
     transport: &'a Transport<'a>,
-    energy_kev: Vec<f64>,
-    weight: Vec<f64>,
+    lines: SpectralLines,
     /// Material by material, mm⁻¹ per g/cm³.
     attenuation: Vec<f64>,
 }
@@ -91,11 +104,10 @@ struct Scratch {
 
 impl<'a> Beam<'a> {
     fn new(transport: &'a Transport<'a>) -> Self {
-        let lines = spectral_lines(transport.spectrum);
-        let (energy_kev, weight): (Vec<f64>, Vec<f64>) = lines.into_iter().unzip();
+        let lines = transport.emitter.lines();
         let attenuation = (0..transport.phantom.materials().len())
             .flat_map(|material| {
-                let energy_kev = &energy_kev;
+                let energy_kev = &lines.energy_kev;
                 energy_kev.iter().map(move |&energy_kev| {
                     let energy = transport.attenuation.locate(energy_kev);
                     f64::from(transport.attenuation.at(material as u8, energy).total)
@@ -104,8 +116,7 @@ impl<'a> Beam<'a> {
             .collect();
         Self {
             transport,
-            energy_kev,
-            weight,
+            lines,
             attenuation,
         }
     }
@@ -113,19 +124,21 @@ impl<'a> Beam<'a> {
     fn scratch(&self) -> Scratch {
         Scratch {
             mass: vec![0.0; self.transport.phantom.materials().len()],
-            exponent: vec![0.0; self.energy_kev.len()],
+            exponent: vec![0.0; self.lines.energy_kev.len()],
         }
     }
 
-    /// Moments of the energy that one photon towards `at` brings to the detector plane.
-    fn behind(&self, at: Point2<f64>, scratch: &mut Scratch) -> Moments {
-        self.integrate(at, &mut scratch.mass);
+    /// Moments of the energy that one photon from `spot` to `at` brings to the detector plane.
+    fn behind(&self, spot: &Point3<f64>, at: Point2<f64>, scratch: &mut Scratch) -> Moments {
+        let target = Point3::new(at.x, at.y, self.transport.projection.source_detector_mm);
+        let (direction, length_mm) = Unit::new_and_get(target - spot);
+        self.integrate(spot, &direction, length_mm, &mut scratch.mass);
         scratch.exponent.fill(0.0);
-        let lines = self.energy_kev.len();
+        let energy_kev = &self.lines.energy_kev;
         for (&mass, attenuation) in scratch
             .mass
             .iter()
-            .zip(self.attenuation.chunks_exact(lines))
+            .zip(self.attenuation.chunks_exact(energy_kev.len()))
         {
             if mass > 0.0 {
                 for (exponent, mu) in scratch.exponent.iter_mut().zip(attenuation) {
@@ -133,29 +146,37 @@ impl<'a> Beam<'a> {
                 }
             }
         }
+        for (exponent, &energy_kev) in scratch.exponent.iter_mut().zip(energy_kev) {
+            *exponent = (-*exponent).exp() * energy_kev;
+        }
+        let mixture = self.transport.emitter.mixture(&direction);
         let mut sum = Moments::default();
-        for ((&exponent, &weight), &energy_kev) in scratch
-            .exponent
-            .iter()
-            .zip(&self.weight)
-            .zip(&self.energy_kev)
-        {
-            let energy = weight * (-exponent).exp() * energy_kev;
-            sum.mean_kev += energy;
-            sum.square_kev2 += energy * energy_kev;
+        for (spectrum, share) in mixture.parts() {
+            let weights = &self.lines.weights[spectrum];
+            for ((&energy, &weight), &energy_kev) in
+                scratch.exponent.iter().zip(weights).zip(energy_kev)
+            {
+                let energy = share * weight * energy;
+                sum.mean_kev += energy;
+                sum.square_kev2 += energy * energy_kev;
+            }
         }
         sum
     }
 
     /// Density times length of every material between the source and the detector plane.
-    fn integrate(&self, at: Point2<f64>, mass: &mut [f64]) {
+    fn integrate(
+        &self,
+        from: &Point3<f64>,
+        direction: &Vector3<f64>,
+        length_mm: f64,
+        mass: &mut [f64],
+    ) {
         mass.fill(0.0);
         let Transport {
             phantom, lattice, ..
         } = self.transport;
-        let target = Vector3::new(at.x, at.y, self.transport.projection.source_detector_mm);
-        let length_mm = target.norm();
-        let ray = lattice.ray(&Point3::origin(), &(target / length_mm));
+        let ray = lattice.ray(from, direction);
         let Some((enter, leave)) = lattice.clip(&ray) else {
             return;
         };
@@ -177,17 +198,4 @@ impl<'a> Beam<'a> {
             }
         }
     }
-}
-
-/// Energies and probabilities to integrate over; what carries less than 1e-9 of the photons is left out.
-fn spectral_lines(spectrum: &Spectrum) -> Vec<(f64, f64)> {
-    spectrum
-        .bins()
-        .filter(|&(energy_kev, probability)| {
-            probability > 1e-9
-                && (crate::transport::attenuation::CUTOFF_KEV
-                    ..=crate::transport::attenuation::CEILING_KEV)
-                    .contains(&energy_kev)
-        })
-        .collect()
 }

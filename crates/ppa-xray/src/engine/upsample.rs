@@ -106,11 +106,7 @@ mod tests {
     use super::*;
 
     fn upsampling(coarse: [usize; 2], fine: [u32; 2]) -> Upsampling {
-        let detector = Detector {
-            columns: fine[0],
-            rows: fine[1],
-            pixel_mm: 1.0,
-        };
+        let detector = Detector::centred(fine[0], fine[1], 1.0);
         let raster = Raster {
             columns: coarse[0],
             rows: coarse[1],

@@ -1,11 +1,11 @@
 //! The result of both engines: energy per pixel by category, with standard errors.
 
-use nalgebra::Point2;
+use nalgebra::{Point2, Point3};
 use serde::{Deserialize, Serialize};
 
-use crate::beam::projection::{Detector, Projection};
-use crate::beam::spectrum::Spectrum;
+use crate::beam::projection::Detector;
 use crate::transport::tally::Category;
+use crate::transport::tracking::Transport;
 
 /// How a radiograph was computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -157,7 +157,7 @@ impl Radiograph {
 
     /// Reading of a pixel with nothing in the beam, eV/cm² per history: falls off as cos³θ.
     pub fn open_field_at(&self, pixel: usize) -> f64 {
-        let at = pixel_centre_mm(&self.detector, pixel);
+        let at = self.detector.pixel_centre_mm(pixel);
         let d = self.source_detector_mm;
         let cos = d / (d * d + at.coords.norm_squared()).sqrt();
         self.open_field_ev_cm2 * cos.powi(3)
@@ -170,17 +170,10 @@ impl Radiograph {
     }
 }
 
-/// Centre of a pixel in device x, y.
-fn pixel_centre_mm(detector: &Detector, pixel: usize) -> Point2<f64> {
-    let [half_x, half_y] = detector.half_mm();
-    let columns = detector.columns as usize;
-    Point2::new(
-        ((pixel % columns) as f64 + 0.5) * detector.pixel_mm - half_x,
-        ((pixel / columns) as f64 + 0.5) * detector.pixel_mm - half_y,
-    )
-}
-
-/// Reading at the centre of the bare field, eV/cm² per history.
-pub(crate) fn open_field_ev_cm2(projection: &Projection, spectrum: &Spectrum) -> f64 {
-    1e3 * spectrum.mean_energy_kev() * projection.open_fluence_cm2(Point2::origin())
+/// Reading at the foot of the source in the bare field, eV/cm² per history.
+pub(crate) fn open_field_ev_cm2(transport: &Transport) -> f64 {
+    let fluence_cm2 = transport
+        .emitter
+        .open_fluence_cm2(&Point3::origin(), Point2::origin());
+    1e3 * transport.spectrum.mean_energy_kev() * fluence_cm2
 }

@@ -36,11 +36,13 @@ const STEPS_PER_KEV: f64 = 64_000.0;
 /// Quantum of the squared energy, 2⁻¹⁰ keV²: room for 8e11 photons of 150 keV in one cell.
 const STEPS_PER_KEV2: f64 = 1_024.0;
 
-/// A rectangle centred on the central beam in the detector plane, cut into equal cells.
+/// A rectangle in the detector plane, cut into equal cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Raster {
     pub columns: usize,
     pub rows: usize,
+    /// Centre in device x and y.
+    pub centre_mm: [f64; 2],
     /// Extent along device x and y.
     pub extent_mm: [f64; 2],
 }
@@ -57,8 +59,8 @@ impl Raster {
     /// Row-major cell under a point of the plane (device x, y in mm).
     #[inline]
     pub fn cell_at(&self, x_mm: f64, y_mm: f64) -> Option<usize> {
-        let column = (x_mm / self.extent_mm[0] + 0.5) * self.columns as f64;
-        let row = (y_mm / self.extent_mm[1] + 0.5) * self.rows as f64;
+        let column = ((x_mm - self.centre_mm[0]) / self.extent_mm[0] + 0.5) * self.columns as f64;
+        let row = ((y_mm - self.centre_mm[1]) / self.extent_mm[1] + 0.5) * self.rows as f64;
         let inside =
             column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
         inside.then(|| row as usize * self.columns + column as usize)

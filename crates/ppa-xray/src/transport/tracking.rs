@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{Point3, Vector3};
 
+use crate::beam::emitter::{Emission, Emitter};
 use crate::beam::projection::{Projection, ProjectionError, scattered};
 use crate::beam::spectrum::Spectrum;
 use crate::matter::sampler::MaterialTables;
@@ -66,6 +67,7 @@ pub(crate) struct Transport<'a> {
     pub phantom: &'a VoxelPhantom,
     pub spectrum: &'a Spectrum,
     pub projection: &'a Projection,
+    pub emitter: Emitter,
     pub lattice: Lattice,
     pub attenuation: Attenuation,
     samplers: Vec<MaterialTables>,
@@ -100,7 +102,7 @@ impl<'a> Transport<'a> {
         spectrum: &'a Spectrum,
         projection: &'a Projection,
     ) -> Result<Self, TransportError> {
-        projection.validate()?;
+        let emitter = Emitter::new(projection, spectrum)?;
         check_placement(phantom, projection)?;
         let outside = |[low_kev, high_kev]: [f64; 2]| -> f64 {
             spectrum
@@ -135,6 +137,7 @@ impl<'a> Transport<'a> {
             phantom,
             spectrum,
             projection,
+            emitter,
             lattice: Lattice::new(phantom.grid(), &projection.ct_from_device),
             majorants: Majorants::new(phantom, &attenuation),
             attenuation,
@@ -152,10 +155,15 @@ impl<'a> Transport<'a> {
     }
 
     fn history(&self, rng: &mut Philox, score: &mut impl Score) {
+        let Emission {
+            origin_mm,
+            direction,
+            energy_kev,
+        } = self.emitter.emit(rng);
         let mut photon = Photon {
-            position_mm: Point3::origin(),
-            direction: self.projection.sample_direction(rng),
-            energy_kev: self.spectrum.sample(rng.unit()),
+            position_mm: origin_mm,
+            direction,
+            energy_kev,
             category: Category::Primary,
         };
         score.emit(0, photon.energy_kev);

@@ -44,15 +44,11 @@ fn phantom() -> VoxelPhantom {
 fn projection() -> Projection {
     let axes = Matrix3::from_columns(&[Vector3::x(), -Vector3::z(), Vector3::y()]);
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
-    Projection {
-        ct_from_device: Isometry3::from_parts(Translation3::new(100.0, -850.0, 100.0), rotation),
-        source_detector_mm: 1_100.0,
-        detector: Detector {
-            columns: 300,
-            rows: 300,
-            pixel_mm: 1.0,
-        },
-    }
+    Projection::new(
+        Isometry3::from_parts(Translation3::new(100.0, -850.0, 100.0), rotation),
+        1_100.0,
+        Detector::centred(300, 300, 1.0),
+    )
 }
 
 fn spectrum() -> Spectrum {

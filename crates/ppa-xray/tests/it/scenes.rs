@@ -6,15 +6,11 @@ use ppa_xray::{Detector, Material, Projection, VoxelPhantom};
 
 /// Device axes along ct axes, source 1 m before the ct origin.
 pub fn frontal(pixels: u32, pixel_mm: f64) -> Projection {
-    Projection {
-        ct_from_device: Isometry3::translation(0.0, 0.0, -1_000.0),
-        source_detector_mm: 1_100.0,
-        detector: Detector {
-            columns: pixels,
-            rows: pixels,
-            pixel_mm,
-        },
-    }
+    Projection::new(
+        Isometry3::translation(0.0, 0.0, -1_000.0),
+        1_100.0,
+        Detector::centred(pixels, pixels, pixel_mm),
+    )
 }
 
 /// A water slab across the beam, centred on the ct origin.

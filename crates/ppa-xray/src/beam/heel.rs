@@ -1,0 +1,146 @@
+//! Anode heel effect: spectra by the angle at which photons leave the anode.
+
+use nalgebra::{Point2, Point3, Unit, Vector3};
+
+use crate::beam::projection::ProjectionError;
+use crate::beam::source::{HeelEffect, SpotPlane};
+use crate::beam::spectrum::Spectrum;
+use crate::beam::tube::{TubeSpec, anode_angles_deg};
+
+/// Largest step between the take-off angles whose spectra are kept, degrees.
+const STEP_DEG: f64 = 0.5;
+
+/// Points per side of the field at which take-off angles are looked for.
+const LOOK: u32 = 33;
+
+/// Spectra of one tube by take-off angle; between two of them photons are mixed in proportion.
+///
+/// The angle between a photon and the face of the anode is what the tube model calls the anode angle: it sets how much
+/// tungsten lies in the way. Towards the anode it shrinks. Below 6° and above 20° the model ends and its
+/// last spectrum is used.
+#[derive(Debug, Clone)]
+pub(crate) struct Heel {
+    /// Outward normal of the anode's face in the device frame.
+    normal: Vector3<f64>,
+    /// Take-off angles of the spectra, radians, evenly spaced.
+    first: f64,
+    step: f64,
+    pub spectra: Vec<Spectrum>,
+    /// Photons per solid angle of each spectrum over those of the central ray.
+    intensity: Vec<f64>,
+    pub largest: f64,
+}
+
+/// Which spectra a direction draws from, and how many photons it gets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Mixture {
+    /// The lower of the two spectra.
+    pub lower: usize,
+    /// Share of the photons that come from the upper one.
+    pub upper_share: f64,
+    /// Photons per solid angle over those of the central ray.
+    pub intensity: f64,
+}
+
+impl Mixture {
+    /// Spectra that take part, with their shares, which sum to 1.
+    pub fn parts(self) -> impl Iterator<Item = (usize, f64)> {
+        let parts = [
+            (self.lower, 1.0 - self.upper_share),
+            (self.lower + 1, self.upper_share),
+        ];
+        parts.into_iter().filter(|(_, share)| *share > 0.0)
+    }
+}
+
+impl Heel {
+    /// Spectra for all directions from `spots` to `targets`.
+    pub fn new(
+        heel: &HeelEffect,
+        spectrum: &Spectrum,
+        central_ray: &Unit<Vector3<f64>>,
+        spots: &[Point3<f64>],
+        targets: &[Point3<f64>],
+    ) -> Result<Self, ProjectionError> {
+        if !heel.anode_towards_deg.is_finite() {
+            return Err(ProjectionError::Anode {
+                found_deg: heel.anode_towards_deg,
+            });
+        }
+        let tube = spectrum.tube().ok_or(ProjectionError::HeelWithoutTube)?;
+        let (sin, cos) = heel.anode_towards_deg.to_radians().sin_cos();
+        let plane = SpotPlane::square_to(central_ray);
+        let anode = plane.axes[0] * cos + plane.axes[1] * sin;
+        let (sin, cos) = tube.anode_angle_deg.to_radians().sin_cos();
+        let normal = central_ray.into_inner() * sin - anode * cos;
+        let [model_low, model_high] = anode_angles_deg().map(f64::to_radians);
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for spot in spots {
+            for target in targets {
+                let angle = normal.dot(&(target - spot).normalize()).asin();
+                low = low.min(angle.clamp(model_low, model_high));
+                high = high.max(angle.clamp(model_low, model_high));
+            }
+        }
+        let steps = ((high - low).to_degrees() / STEP_DEG).ceil().max(1.0);
+        let step = (high - low) / steps;
+        let at_angle = |angle: f64| {
+            // Rounding of the angle may not leave the model.
+            let [lowest, highest] = anode_angles_deg();
+            let anode_angle_deg = angle.to_degrees().clamp(lowest, highest);
+            Spectrum::tungsten(&TubeSpec {
+                anode_angle_deg,
+                ..tube.clone()
+            })
+            .map_err(|error| ProjectionError::Heel {
+                anode_angle_deg,
+                message: error.to_string(),
+            })
+        };
+        let spectra = (0..=steps as usize)
+            .map(|node| at_angle(low + step * node as f64))
+            .collect::<Result<Vec<_>, _>>()?;
+        let fluence = |of: &Spectrum| of.fluence_per_mas_cm2_at_1m().unwrap_or(0.0);
+        let central = fluence(spectrum);
+        let intensity: Vec<f64> = spectra.iter().map(|of| fluence(of) / central).collect();
+        Ok(Self {
+            normal,
+            first: low,
+            step,
+            largest: intensity.iter().copied().fold(0.0, f64::max),
+            spectra,
+            intensity,
+        })
+    }
+
+    /// What leaves in a direction (unit vector, device frame).
+    #[inline]
+    pub fn mixture(&self, direction: &Vector3<f64>) -> Mixture {
+        let angle = self.normal.dot(direction).asin();
+        let at = if self.step > 0.0 {
+            ((angle - self.first) / self.step).clamp(0.0, (self.spectra.len() - 1) as f64)
+        } else {
+            0.0
+        };
+        let lower = (at as usize).min(self.spectra.len() - 2);
+        let t = at - lower as f64;
+        let upper = t * self.intensity[lower + 1];
+        let intensity = (1.0 - t) * self.intensity[lower] + upper;
+        Mixture {
+            lower,
+            upper_share: upper / intensity,
+            intensity,
+        }
+    }
+}
+
+/// Points all over a rectangle of the plane at `distance_mm`, its edges among them.
+pub(crate) fn lattice_on(low: [f64; 2], high: [f64; 2], distance_mm: f64) -> Vec<Point3<f64>> {
+    let along = |axis: usize, i: u32| {
+        low[axis] + (high[axis] - low[axis]) * f64::from(i) / f64::from(LOOK - 1)
+    };
+    (0..LOOK * LOOK)
+        .map(|n| Point2::new(along(0, n % LOOK), along(1, n / LOOK)))
+        .map(|at| Point3::new(at.x, at.y, distance_mm))
+        .collect()
+}
