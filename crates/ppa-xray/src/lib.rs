@@ -38,12 +38,14 @@
 //! ```
 
 mod beam;
+mod dose;
 mod engine;
 mod image;
 mod matter;
 mod octaves;
 mod phantom;
 mod philox;
+mod run;
 mod transport;
 
 pub use beam::projection::{Detector, Projection, ProjectionError};
@@ -51,6 +53,8 @@ pub use beam::source::{Collimation, FocalSpot, HeelEffect, Source, SpotShape};
 pub use beam::spectrum::Spectrum;
 pub use beam::spectrum_error::SpectrumError;
 pub use beam::tube::{Filter, TubeSpec};
+pub use dose::report::{Dose, Estimate, Imparted, VoxelDose};
+pub use dose::settings::{DoseError, DoseSettings, VoxelBox};
 pub use engine::analog::{AnalogSettings, analog};
 pub use engine::fast::{FastSettings, fast};
 pub use engine::raytrace::primary;
@@ -67,5 +71,10 @@ pub use phantom::audit::{Audit, MaterialCount, SegmentAudit};
 pub use phantom::calibration_error::CalibrationError;
 pub use phantom::hu::{Composition, Constituent, HuCalibration, Segment};
 pub use phantom::voxels::{PhantomError, VoxelPhantom};
+pub use run::analog_run::AnalogRun;
+pub use run::analog_tally::AnalogTally;
+pub use run::part::{Part, PartError};
+pub use run::progress::{Progress, Stop, Stopped};
+pub use run::tally_error::TallyError;
 pub use transport::tally::Category;
 pub use transport::tracking::TransportError;

@@ -23,6 +23,10 @@ impl Field {
         [0, 1].map(|axis| self.high_mm[axis] - self.low_mm[axis])
     }
 
+    pub fn contains(&self, at: &Point2<f64>) -> bool {
+        (0..2).all(|axis| (self.low_mm[axis]..=self.high_mm[axis]).contains(&at[axis]))
+    }
+
     /// What both rectangles share; nothing when they do not overlap.
     pub fn overlap(&self, other: &Self) -> Option<Self> {
         let low_mm = [0, 1].map(|axis| self.low_mm[axis].max(other.low_mm[axis]));

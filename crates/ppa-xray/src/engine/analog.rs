@@ -1,15 +1,19 @@
 //! The analog engine: every history as nature plays it.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
-use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph, open_field_ev_cm2};
+use crate::dose::score::{DoseScore, DoseTarget};
+use crate::image::radiograph::Radiograph;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
+use crate::run::analog_tally::ImageSetup;
 use crate::transport::score::{Arrival, Score};
-use crate::transport::tally::{Category, Raster, Tally};
+use crate::transport::tally::{MOST_HISTORIES, Raster, Tally};
 use crate::transport::tracking::{Transport, TransportError};
 
 /// How long the analog engine runs.
@@ -40,54 +44,61 @@ pub fn analog(
     projection: &Projection,
     settings: &AnalogSettings,
 ) -> Result<Radiograph, TransportError> {
-    let AnalogSettings { histories, seed } = *settings;
-    if histories == 0 {
-        return Err(TransportError::Setting {
-            what: "the number of histories",
-            found: 0.0,
-            expected: "1 or more",
-        });
-    }
+    settings.validate()?;
     let transport = Transport::new(phantom, spectrum, projection)?;
     let tally = run(&transport, projection.detector.raster(), settings);
-    let ev_cm2 = 1e3 / tally.raster.cell_cm2();
-    let layers = Category::ALL.map(|category| {
-        let (value, sigma) = tally
-            .moments(category, histories)
-            .iter()
-            .map(|pixel| {
-                let sigma = pixel.standard_error_kev(histories as f64);
-                ((pixel.mean_kev * ev_cm2) as f32, (sigma * ev_cm2) as f32)
-            })
-            .unzip();
-        Layer { value, sigma }
-    });
-    let sums = CategorySums::from_kev(|category| {
-        let total = tally.total(category, histories);
-        (total.mean_kev, total.standard_error_kev(histories as f64))
-    });
-    Ok(Radiograph {
-        detector: projection.detector,
-        engine: Engine::Analog,
-        histories: histories as f64,
-        seed,
-        source_detector_mm: projection.source_detector_mm,
-        open_field_ev_cm2: open_field_ev_cm2(&transport),
-        layers,
-        sums,
-    })
+    Ok(ImageSetup::new(&transport).radiograph(&tally, settings.histories, settings.seed))
+}
+
+impl AnalogSettings {
+    pub(crate) fn validate(&self) -> Result<(), TransportError> {
+        if !(1..=MOST_HISTORIES).contains(&self.histories) {
+            return Err(TransportError::Setting {
+                what: "the number of histories",
+                found: self.histories as f64,
+                expected: "1 to 5e11",
+            });
+        }
+        Ok(())
+    }
 }
 
 /// Follows all histories and counts what arrives on `raster`.
 pub(crate) fn run(transport: &Transport, raster: Raster, settings: &AnalogSettings) -> Tally {
     let tally = Tally::new(raster);
-    let batches = settings.histories.div_ceil(BATCH);
-    (0..batches).into_par_iter().for_each(|batch| {
-        let first = batch * BATCH;
-        let last = (first + BATCH).min(settings.histories);
-        transport.follow(settings.seed, first..last, &mut DetectorScore(&tally));
-    });
+    count(transport, settings.seed, 0..settings.histories, &tally);
     tally
+}
+
+/// Follows `histories` and counts what arrives.
+pub(crate) fn count(transport: &Transport, seed: u64, histories: Range<u64>, tally: &Tally) {
+    in_batches(histories, |batch| {
+        transport.follow(seed, batch, &mut DetectorScore(tally));
+    });
+}
+
+/// Follows `histories` and counts what arrives and what stays.
+pub(crate) fn count_with_dose(
+    transport: &Transport,
+    seed: u64,
+    histories: Range<u64>,
+    tally: &Tally,
+    target: &DoseTarget,
+) {
+    in_batches(histories, |batch| {
+        let mut score = DoseScore::new(DetectorScore(tally), target);
+        transport.follow(seed, batch, &mut score);
+        score.hand_in();
+    });
+}
+
+/// Deals `histories` out to the threads.
+fn in_batches(histories: Range<u64>, follow: impl Fn(Range<u64>) + Sync) {
+    let batches = (histories.end - histories.start).div_ceil(BATCH);
+    (0..batches).into_par_iter().for_each(|batch| {
+        let first = histories.start + batch * BATCH;
+        follow(first..(first + BATCH).min(histories.end));
+    });
 }
 
 /// Counts what reaches the detector, nothing else.

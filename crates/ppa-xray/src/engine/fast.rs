@@ -91,6 +91,7 @@ pub fn fast(
         detector: projection.detector,
         engine: Engine::Fast,
         histories: settings.dose_histories,
+        histories_per_mas: transport.emitter.photons_per_mas(),
         seed: settings.seed,
         source_detector_mm: projection.source_detector_mm,
         open_field_ev_cm2: open_field_ev_cm2(&transport),

@@ -105,6 +105,9 @@ pub struct Radiograph {
     pub engine: Engine,
     /// Histories that the noise of the image stands for; infinite for the expected image.
     pub histories: f64,
+    /// Photons that the tube emits into the field per mAs, if the spectrum knows its fluence: everything that is per
+    /// history becomes per mAs when multiplied by it.
+    pub histories_per_mas: Option<f64>,
     /// Seed it was made from.
     pub seed: u64,
     /// Source-detector distance, mm.
@@ -153,6 +156,23 @@ impl Radiograph {
                 .sum::<f64>()
                 .sqrt()
         })
+    }
+
+    /// Tube load whose quantum noise the image carries, mAs.
+    pub fn mas(&self) -> Option<f64> {
+        Some(self.histories / self.histories_per_mas?)
+    }
+
+    /// All energy per pixel, eV/cm² per mAs.
+    pub fn total_per_mas(&self) -> Option<Vec<f32>> {
+        let factor = self.histories_per_mas?;
+        let total = self.total();
+        Some(
+            total
+                .iter()
+                .map(|&value| (f64::from(value) * factor) as f32)
+                .collect(),
+        )
     }
 
     /// Reading of a pixel with nothing in the beam, eV/cm² per history: falls off as cos³θ.

@@ -30,6 +30,9 @@ impl Category {
     }
 }
 
+/// Most histories of a run: then no sum overflows, even if all photons of 150 keV meet in one cell.
+pub(crate) const MOST_HISTORIES: u64 = 500_000_000_000;
+
 /// Energy quantum 1/64 eV: a cell holds 1.9e12 photons of 150 keV before it overflows.
 const STEPS_PER_KEV: f64 = 64_000.0;
 
@@ -112,6 +115,35 @@ impl Tally {
             (energy_kev * energy_kev * STEPS_PER_KEV2).round() as u64,
             Relaxed,
         );
+    }
+
+    /// Bytes of [`Tally::to_bytes`] for a raster, unless they are beyond all memory.
+    pub fn byte_len_of(raster: &Raster) -> Option<usize> {
+        raster.columns.checked_mul(raster.rows)?.checked_mul(64)
+    }
+
+    /// Bytes of [`Tally::to_bytes`].
+    pub fn byte_len(&self) -> usize {
+        64 * self.sums.len()
+    }
+
+    /// All sums, cell by cell, little-endian.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let words = self.sums.iter().flatten().flatten();
+        words
+            .flat_map(|sum| sum.load(Relaxed).to_le_bytes())
+            .collect()
+    }
+
+    /// Adds the sums of [`Tally::to_bytes`] of a tally of the same raster; `None` on overflow.
+    pub fn add_bytes(&mut self, bytes: &[u8]) -> Option<()> {
+        assert_eq!(bytes.len(), self.byte_len(), "tallies of one raster");
+        let sums = self.sums.iter_mut().flatten().flatten();
+        for (sum, bytes) in sums.zip(bytes.chunks_exact(8)) {
+            let word = u64::from_le_bytes(bytes.try_into().expect("8 bytes"));
+            *sum.get_mut() = sum.get_mut().checked_add(word)?;
+        }
+        Some(())
     }
 
     /// Moments per history of every cell, row-major.

@@ -60,7 +60,7 @@ pub enum TransportError {
 }
 
 /// Tissue denser than this (lung, foam) may lie neither behind the detector nor on the source.
-const SOLID_G_CM3: f32 = 0.3;
+pub(crate) const SOLID_G_CM3: f32 = 0.3;
 
 /// Everything the histories of one projection share.
 pub(crate) struct Transport<'a> {

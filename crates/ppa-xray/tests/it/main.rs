@@ -4,6 +4,7 @@ mod attenuation;
 mod case_a;
 mod files;
 mod placement;
+mod runs;
 mod scenes;
 mod shared;
 mod spectra;

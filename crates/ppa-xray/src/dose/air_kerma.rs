@@ -1,0 +1,105 @@
+//! Air kerma: where the beam enters the patient, and of what reaches the detector.
+
+use nalgebra::Point3;
+
+use crate::dose::report::GRAY_PER_KEV_G;
+use crate::matter::material::Material;
+use crate::phantom::lattice::Walk;
+use crate::transport::attenuation::{CEILING_KEV, CUTOFF_KEV};
+use crate::transport::tracking::{SOLID_G_CM3, Transport};
+
+/// Nodes per keV: linear interpolation then errs by less than 0.05 % at 5 keV, 1e-5 at 30 keV.
+const NODES_PER_KEV: usize = 8;
+
+/// Energy times mass energy-transfer coefficient of air, by energy.
+///
+/// Electrons of these energies lose next to nothing as bremsstrahlung in air (0.03 % at 150 keV), so this is also the
+/// absorption coefficient.
+#[derive(Debug)]
+pub(crate) struct AirKerma {
+    /// keV cm²/g.
+    table: Vec<f64>,
+}
+
+impl AirKerma {
+    pub fn new() -> Self {
+        let air = air();
+        let nodes = (CEILING_KEV - CUTOFF_KEV) as usize * NODES_PER_KEV;
+        let table = (0..=nodes)
+            .map(|node| kerma_kev_cm2_g(&air, CUTOFF_KEV + node as f64 / NODES_PER_KEV as f64))
+            .collect();
+        Self { table }
+    }
+
+    /// Kerma of one photon per cm², keV/g.
+    #[inline]
+    pub fn kev_cm2_g(&self, energy_kev: f64) -> f64 {
+        let at = (energy_kev - CUTOFF_KEV).max(0.0) * NODES_PER_KEV as f64;
+        let node = (at as usize).min(self.table.len() - 2);
+        let (low, high) = (self.table[node], self.table[node + 1]);
+        low + (high - low) * (at - node as f64)
+    }
+}
+
+fn air() -> Material {
+    Material::named("air").expect("in the library")
+}
+
+/// Kerma of one photon per cm², keV/g.
+fn kerma_kev_cm2_g(air: &Material, energy_kev: f64) -> f64 {
+    let transfer = air.energy_transfer_cm2_g(energy_kev);
+    energy_kev * transfer.expect("photons lie inside the tables")
+}
+
+/// Air kerma free in air (no backscatter) where the central ray enters the patient, Gy per history.
+///
+/// The patient begins at the first voxel on the central ray of more than 0.3 g/cm³; voxels before it attenuate. `None`
+/// when the central ray meets no such voxel before the detector plane, or is blocked by the collimator.
+pub(crate) fn entrance_gy_per_history(transport: &Transport) -> Option<f64> {
+    let phantom = transport.phantom;
+    let (lattice, projection) = (&transport.lattice, transport.projection);
+    let central = projection.central_ray;
+    let foot_mm = projection.source_detector_mm / central.z;
+    let foot = (central.xy() * foot_mm).into();
+    if !transport.emitter.field().contains(&foot) {
+        return None;
+    }
+    let ray = lattice.ray(&Point3::origin(), &central);
+    let (enter, leave) = lattice.clip(&ray)?;
+    let end = leave.min(foot_mm);
+    let mut walk = Walk::new(&ray, enter, lattice.size.map(|n| n as u32), 1.0);
+    let mut path = vec![0.0; phantom.materials().len()];
+    let mut at = enter;
+    let skin_mm = loop {
+        let density = phantom.density_g_cm3()[walk.index];
+        if density > SOLID_G_CM3 {
+            break at;
+        }
+        let (axis, next) = walk.exit();
+        path[usize::from(phantom.material()[walk.index])] += (next - at) * f64::from(density);
+        if next >= end || !walk.advance(axis) {
+            return None;
+        }
+        at = next;
+    };
+    let air = air();
+    let kerma_kev_cm2_g: f64 = transport
+        .spectrum
+        .bins()
+        .map(|(energy_kev, probability)| {
+            let depth: f64 = phantom
+                .materials()
+                .iter()
+                .zip(&path)
+                .map(|(material, mm_g_cm3)| {
+                    material.cross_sections_unchecked(energy_kev).total() * mm_g_cm3 / 10.0
+                })
+                .sum();
+            probability * kerma_kev_cm2_g(&air, energy_kev) * (-depth).exp()
+        })
+        .sum();
+    // Across the ray, and nearer to the focus.
+    let foot_cm2 = transport.emitter.open_fluence_cm2(&Point3::origin(), foot) / central.z;
+    let skin_cm2 = foot_cm2 * (foot_mm / skin_mm).powi(2);
+    Some(kerma_kev_cm2_g * GRAY_PER_KEV_G * skin_cm2)
+}

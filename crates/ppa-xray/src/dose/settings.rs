@@ -1,0 +1,101 @@
+//! Which doses are counted.
+
+use nalgebra::Vector3;
+use ppa_ct::Grid;
+use serde::{Deserialize, Serialize};
+
+/// What is counted besides the energy imparted to every material and to the whole phantom.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DoseSettings {
+    /// Boxes of voxels, each counted as a whole. They may overlap.
+    pub regions: Vec<VoxelBox>,
+    /// Box whose voxels are counted one by one; 16 bytes per voxel.
+    pub voxels: Option<VoxelBox>,
+}
+
+/// Voxels `low..high`, half-open on every axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VoxelBox {
+    /// First voxel (i, j, k).
+    pub low: [usize; 3],
+    /// One beyond the last voxel.
+    pub high: [usize; 3],
+}
+
+/// Why doses cannot be counted.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DoseError {
+    /// A box is empty or leaves the phantom.
+    #[error(
+        "the dose region of voxels {low:?} to {high:?} (exclusive) is empty or leaves the phantom of {size:?} voxels"
+    )]
+    Box {
+        /// First voxel.
+        low: [usize; 3],
+        /// One beyond the last voxel.
+        high: [usize; 3],
+        /// Voxels of the phantom.
+        size: [usize; 3],
+    },
+}
+
+impl VoxelBox {
+    /// All voxels of a lattice.
+    pub fn whole(grid: &Grid) -> Self {
+        Self {
+            low: [0; 3],
+            high: grid.size(),
+        }
+    }
+
+    /// Voxels along each axis.
+    pub fn size(&self) -> [usize; 3] {
+        [0, 1, 2].map(|axis| self.high[axis] - self.low[axis])
+    }
+
+    /// Number of voxels, unless it is beyond all memory.
+    pub(crate) fn count(&self) -> Option<usize> {
+        let [i, j, k] = self.size();
+        i.checked_mul(j)?.checked_mul(k)
+    }
+
+    /// Place of a voxel in the box, first axis fastest.
+    #[inline]
+    pub(crate) fn index(&self, voxel: [usize; 3]) -> Option<usize> {
+        let inside =
+            (0..3).all(|axis| self.low[axis] <= voxel[axis] && voxel[axis] < self.high[axis]);
+        let [i, j, k] = [0, 1, 2].map(|axis| voxel[axis].wrapping_sub(self.low[axis]));
+        let [ni, nj, _] = self.size();
+        inside.then(|| i + ni * (j + nj * k))
+    }
+
+    /// The voxels of a box inside `grid`, first axis fastest.
+    pub(crate) fn voxels(&self) -> impl Iterator<Item = [usize; 3]> {
+        let Self { low, high } = *self;
+        (low[2]..high[2]).flat_map(move |k| {
+            (low[1]..high[1]).flat_map(move |j| (low[0]..high[0]).map(move |i| [i, j, k]))
+        })
+    }
+}
+
+impl DoseSettings {
+    pub(crate) fn validate(&self, grid: &Grid) -> Result<(), DoseError> {
+        let size = grid.size();
+        for &VoxelBox { low, high } in self.regions.iter().chain(&self.voxels) {
+            if (0..3).any(|axis| low[axis] >= high[axis] || high[axis] > size[axis]) {
+                return Err(DoseError::Box { low, high, size });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Volume of a voxel, cm³; voxels may be sheared.
+pub(crate) fn voxel_cm3(grid: &Grid) -> f64 {
+    let matrix = grid.ct_from_voxel().matrix();
+    let edge = |axis| -> Vector3<f64> { matrix.fixed_view::<3, 1>(0, axis).into_owned() };
+    edge(0).cross(&edge(1)).dot(&edge(2)).abs() / 1e3
+}

@@ -1,0 +1,278 @@
+//! A run of the analog engine in sittings.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+use crate::beam::projection::Projection;
+use crate::beam::spectrum::Spectrum;
+use crate::dose::air_kerma::AirKerma;
+use crate::dose::score::DoseTarget;
+use crate::dose::settings::{DoseError, DoseSettings};
+use crate::dose::setup::DoseSetup;
+use crate::engine::analog::{AnalogSettings, count, count_with_dose};
+use crate::phantom::voxels::VoxelPhantom;
+use crate::run::analog_tally::{AnalogTally, ImageSetup, RunSetup};
+use crate::run::key::key;
+use crate::run::part::Part;
+use crate::run::progress::{Progress, Stop, Stopped, is_check, next_check};
+use crate::run::tally_error::TallyError;
+use crate::transport::tracking::{Transport, TransportError};
+
+/// How long the observer waits for news at most, about.
+const SITTING: Duration = Duration::from_millis(250);
+
+/// Histories of the first sitting, before the rate is known.
+const FIRST_SITTING: u64 = 16_384;
+
+/// Fewest histories worth handing to the threads.
+const LEAST_SITTING: u64 = 1_024;
+
+/// An exposure that is simulated photon by photon, as far and in as many parts as its user wants.
+///
+/// What comes out depends on the settings and on which histories are counted, on nothing else: not on the number of
+/// threads, not on interruptions, not on how the run was split.
+///
+/// ```
+/// # use nalgebra::{Isometry3, Point3, Vector3};
+/// # use ppa_ct::Grid;
+/// # use ppa_xray::*;
+/// # let grid = Grid::axis_aligned([10; 3], Vector3::repeat(10.0), Point3::new(-45.0, -45.0, -45.0))?;
+/// # let voxels = grid.len();
+/// # let phantom = VoxelPhantom::new(grid, vec![0; voxels], vec![1.0; voxels], vec![Material::named("water")?])?;
+/// # let spectrum = Spectrum::monoenergetic(60.0)?;
+/// # let pose = Isometry3::translation(0.0, 0.0, -1000.0);
+/// # let projection = Projection::new(pose, 1100.0, Detector::centred(10, 10, 10.0));
+/// let settings = AnalogSettings { histories: 1_000_000, seed: 7 };
+/// let run = AnalogRun::new(&phantom, &spectrum, &projection, &settings)?.with_dose(&DoseSettings::default())?;
+/// let mut tally = run.tally(Part::WHOLE);
+/// let stop = Stop { relative_error: Some(0.05), ..Stop::default() };
+/// run.follow(&mut tally, &stop, |_, progress| {
+///     eprintln!("{} histories, {:?} left", progress.histories, progress.remaining);
+///     std::ops::ControlFlow::Continue(())
+/// });
+/// let (radiograph, dose) = (tally.radiograph(), tally.dose().unwrap());
+/// assert!(dose.phantom.ev_per_history.value > radiograph.sums.total_ev_per_history());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct AnalogRun<'a> {
+    transport: Transport<'a>,
+    settings: AnalogSettings,
+    dose: Option<DoseCounting>,
+    key: OnceLock<String>,
+}
+
+/// What counting doses takes.
+struct DoseCounting {
+    settings: DoseSettings,
+    setup: DoseSetup,
+    air: AirKerma,
+}
+
+impl<'a> AnalogRun<'a> {
+    /// Prepares a run of [`AnalogSettings::histories`] at most.
+    ///
+    /// # Errors
+    /// [`TransportError`] when the geometry, the spectrum or the number of histories makes no sense.
+    pub fn new(
+        phantom: &'a VoxelPhantom,
+        spectrum: &'a Spectrum,
+        projection: &'a Projection,
+        settings: &AnalogSettings,
+    ) -> Result<Self, TransportError> {
+        settings.validate()?;
+        Ok(Self {
+            transport: Transport::new(phantom, spectrum, projection)?,
+            settings: *settings,
+            dose: None,
+            key: OnceLock::new(),
+        })
+    }
+
+    /// Counts doses as well, which takes a little longer.
+    ///
+    /// # Errors
+    /// [`DoseError`] for a region outside the phantom.
+    pub fn with_dose(self, settings: &DoseSettings) -> Result<Self, DoseError> {
+        let setup = DoseSetup::new(&self.transport, settings)?;
+        Ok(Self {
+            dose: Some(DoseCounting {
+                settings: settings.clone(),
+                setup,
+                air: AirKerma::new(),
+            }),
+            key: OnceLock::new(),
+            ..self
+        })
+    }
+
+    /// An empty tally for a part of the histories.
+    pub fn tally(&self, part: Part) -> AnalogTally {
+        let setup = RunSetup {
+            key: self.key().to_owned(),
+            seed: self.settings.seed,
+            histories: self.settings.histories,
+            image: ImageSetup::new(&self.transport),
+            dose: self.dose.as_ref().map(|dose| dose.setup.clone()),
+        };
+        AnalogTally::empty(setup, part.share(self.settings.histories))
+    }
+
+    /// The tally of an earlier sitting, to go on with. A tally of a whole run may go on to another number of histories.
+    ///
+    /// # Errors
+    /// [`TallyError`] when the file cannot be read, is damaged, or is of another simulation or part.
+    pub fn read(&self, path: &Path, part: Part) -> Result<AnalogTally, TallyError> {
+        let mut tally = AnalogTally::read(path)?;
+        if tally.setup.key != self.key() {
+            return Err(TallyError::Key {
+                path: path.into(),
+                found: tally.setup.key,
+                expected: self.key().to_owned(),
+            });
+        }
+        let (histories, share) = (self.settings.histories, part.share(self.settings.histories));
+        if tally.is_whole_run() && part == Part::WHOLE && tally.done.end <= histories {
+            tally.setup.histories = histories;
+            tally.part = share;
+            return Ok(tally);
+        }
+        if tally.setup.histories != histories {
+            return Err(TallyError::Histories {
+                path: path.into(),
+                found: tally.setup.histories,
+                expected: histories,
+            });
+        }
+        if tally.part != share {
+            return Err(TallyError::Part {
+                path: path.into(),
+                found: tally.part,
+                expected: share,
+            });
+        }
+        Ok(tally)
+    }
+
+    /// SHA-256 of everything that decides what a history leaves.
+    pub(crate) fn key(&self) -> &str {
+        self.key.get_or_init(|| {
+            let Transport {
+                phantom,
+                spectrum,
+                projection,
+                ..
+            } = self.transport;
+            let dose = self.dose.as_ref().map(|dose| &dose.settings);
+            key(phantom, spectrum, projection, &self.settings, dose)
+        })
+    }
+
+    /// Follows the histories that `tally` still lacks, until `stop` or the observer says so.
+    ///
+    /// `observe` hears of the progress a few times per second and ends the sitting by [`ControlFlow::Break`]; whenever it
+    /// is called and at the end, the tally is whole and may be written. When [`Stop`] ends a run that is not in
+    /// parts, the run is complete at the histories counted until then.
+    ///
+    /// # Panics
+    /// If `tally` is of another run.
+    pub fn follow(
+        &self,
+        tally: &mut AnalogTally,
+        stop: &Stop,
+        mut observe: impl FnMut(&AnalogTally, &Progress) -> ControlFlow<()>,
+    ) -> Stopped {
+        assert_eq!(tally.setup.key, self.key(), "the tally is of another run");
+        let start = Instant::now();
+        let first = tally.done.end;
+        let mut sitting = FIRST_SITTING;
+        let mut relative_error = None;
+        loop {
+            let counted = tally.done.end - tally.done.start;
+            if let Some(target) = stop.relative_error
+                && is_check(counted)
+            {
+                let error = tally.relative_error();
+                relative_error = Some(error);
+                if error <= target {
+                    tally.end_here();
+                    return Stopped::Precise;
+                }
+            }
+            let left = tally.part.end - tally.done.end;
+            if left == 0 {
+                return Stopped::Complete;
+            }
+            let elapsed = start.elapsed();
+            let rate = (tally.done.end - first) as f64 / elapsed.as_secs_f64();
+            if tally.done.end > first {
+                let progress = foresee(tally, stop, relative_error, elapsed, rate);
+                if observe(tally, &progress).is_break() {
+                    return Stopped::Interrupted;
+                }
+                if stop.time.is_some_and(|time| elapsed >= time) {
+                    tally.end_here();
+                    return Stopped::Time;
+                }
+                let until = stop
+                    .time
+                    .map_or(SITTING, |time| SITTING.min(time - elapsed));
+                // The rate of the first moments says little: no jumps.
+                sitting = ((rate * until.as_secs_f64()) as u64).clamp(LEAST_SITTING, 2 * sitting);
+            }
+            let mut end = tally.done.end + left.min(sitting);
+            if stop.relative_error.is_some() {
+                end = end.min(tally.done.start.saturating_add(next_check(counted)));
+            }
+            self.count(tally, end);
+        }
+    }
+
+    /// Counts on to the history `end`.
+    fn count(&self, tally: &mut AnalogTally, end: u64) {
+        let histories = tally.done.end..end;
+        let (transport, seed) = (&self.transport, self.settings.seed);
+        match (&self.dose, &tally.dose) {
+            (Some(DoseCounting { setup, air, .. }), Some(dose)) => {
+                let target = DoseTarget {
+                    phantom: transport.phantom,
+                    regions: &setup.regions(),
+                    tally: dose,
+                    air,
+                    raster: tally.image.raster,
+                };
+                count_with_dose(transport, seed, histories, &tally.image, &target);
+            }
+            _ => count(transport, seed, histories, &tally.image),
+        }
+        tally.done.end = end;
+    }
+}
+
+/// What a run will still take: until the first of all that may end it.
+fn foresee(
+    tally: &AnalogTally,
+    stop: &Stop,
+    relative_error: Option<f64>,
+    elapsed: Duration,
+    rate: f64,
+) -> Progress {
+    let counted = (tally.done.end - tally.done.start) as f64;
+    let mut expected = (tally.part.end - tally.part.start) as f64;
+    if let Some(time) = stop.time {
+        expected = expected.min(counted + rate * time.saturating_sub(elapsed).as_secs_f64());
+    }
+    if let (Some(target), Some(error)) = (stop.relative_error, relative_error) {
+        // The error falls as one over the root of the histories.
+        expected = expected.min(counted * (error / target).powi(2));
+    }
+    let remaining_s = (expected - counted).max(0.0) / rate;
+    Progress {
+        histories: counted as u64,
+        expected_histories: expected.max(counted) as u64,
+        elapsed,
+        remaining: Duration::try_from_secs_f64(remaining_s).ok(),
+        relative_error,
+    }
+}

@@ -1,0 +1,188 @@
+//! What a run has counted so far.
+
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+use crate::beam::projection::Detector;
+use crate::dose::report::Dose;
+use crate::dose::setup::DoseSetup;
+use crate::dose::tally::DoseTally;
+use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph, open_field_ev_cm2};
+use crate::transport::tally::{Category, Moments, Tally};
+use crate::transport::tracking::Transport;
+
+/// Integer sums over a range of the histories of one run.
+///
+/// Sums of the same histories are the same bytes, however they were counted and merged.
+#[derive(Debug)]
+pub struct AnalogTally {
+    pub(crate) setup: RunSetup,
+    /// Histories that this tally is for.
+    pub(crate) part: Range<u64>,
+    /// Histories counted, from the start of the part on.
+    pub(crate) done: Range<u64>,
+    pub(crate) image: Tally,
+    pub(crate) dose: Option<DoseTally>,
+}
+
+/// What all parts of a run share.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RunSetup {
+    pub key: String,
+    pub seed: u64,
+    /// Histories of the whole run.
+    pub histories: u64,
+    pub image: ImageSetup,
+    pub dose: Option<DoseSetup>,
+}
+
+/// What turns the sums of the image into a radiograph.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ImageSetup {
+    pub detector: Detector,
+    source_detector_mm: f64,
+    open_field_ev_cm2: f64,
+    histories_per_mas: Option<f64>,
+}
+
+impl AnalogTally {
+    pub(crate) fn empty(setup: RunSetup, part: Range<u64>) -> Self {
+        Self {
+            image: Tally::new(setup.image.detector.raster()),
+            dose: setup.dose.as_ref().map(DoseSetup::tally),
+            done: part.start..part.start,
+            part,
+            setup,
+        }
+    }
+
+    /// Histories counted.
+    pub fn done(&self) -> Range<u64> {
+        self.done.clone()
+    }
+
+    /// Histories that this tally is for.
+    pub fn part(&self) -> Range<u64> {
+        self.part.clone()
+    }
+
+    /// Histories of the whole run.
+    pub fn histories(&self) -> u64 {
+        self.setup.histories
+    }
+
+    /// Whether the tally is for all histories of its run.
+    pub(crate) fn is_whole_run(&self) -> bool {
+        self.part == (0..self.setup.histories)
+    }
+
+    /// A run that is not in parts becomes one of the histories counted so far.
+    pub(crate) fn end_here(&mut self) {
+        if self.is_whole_run() {
+            self.part = self.done.clone();
+            self.setup.histories = self.done.end;
+        }
+    }
+
+    /// Median over the pixels of the relative standard error of the total reading; infinite for pixels that nothing has
+    /// reached.
+    pub fn relative_error(&self) -> f64 {
+        let counted = self.counted();
+        let mut pixels = vec![Moments::default(); self.image.raster.cells()];
+        for category in Category::ALL {
+            // A history arrives once at most, so the moments of the categories add.
+            for (pixel, moments) in pixels.iter_mut().zip(self.image.moments(category, counted)) {
+                pixel.mean_kev += moments.mean_kev;
+                pixel.square_kev2 += moments.square_kev2;
+            }
+        }
+        let mut errors: Vec<f64> = pixels
+            .iter()
+            .map(|pixel| {
+                if pixel.mean_kev > 0.0 {
+                    pixel.standard_error_kev(counted as f64) / pixel.mean_kev
+                } else {
+                    f64::INFINITY
+                }
+            })
+            .collect();
+        let middle = errors.len() / 2;
+        *errors.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+
+    /// The radiograph of the histories counted so far.
+    pub fn radiograph(&self) -> Radiograph {
+        self.setup
+            .image
+            .radiograph(&self.image, self.counted(), self.setup.seed)
+    }
+
+    /// The doses of the histories counted so far, if they were asked for.
+    pub fn dose(&self) -> Option<Dose> {
+        let (setup, tally) = (self.setup.dose.as_ref()?, self.dose.as_ref()?);
+        Some(setup.report(tally, self.counted(), self.setup.image.histories_per_mas))
+    }
+
+    /// Number of histories counted; 1 for none, so that means are zeros.
+    fn counted(&self) -> u64 {
+        (self.done.end - self.done.start).max(1)
+    }
+}
+
+impl RunSetup {
+    /// Bytes of the sums and masses of a tally, unless they are beyond all memory or the sizes make no sense.
+    pub fn sums_len(&self) -> Option<u64> {
+        let image = Tally::byte_len_of(&self.image.detector.raster())? as u64;
+        match &self.dose {
+            Some(dose) => image.checked_add(dose.byte_len()?),
+            None => Some(image),
+        }
+    }
+}
+
+impl ImageSetup {
+    pub fn new(transport: &Transport) -> Self {
+        let projection = transport.projection;
+        Self {
+            detector: projection.detector,
+            source_detector_mm: projection.source_detector_mm,
+            open_field_ev_cm2: open_field_ev_cm2(transport),
+            histories_per_mas: transport.emitter.photons_per_mas(),
+        }
+    }
+
+    /// The radiograph of `histories` counted in `tally`.
+    pub fn radiograph(&self, tally: &Tally, histories: u64, seed: u64) -> Radiograph {
+        let n = histories as f64;
+        let ev_cm2 = 1e3 / tally.raster.cell_cm2();
+        let layers = Category::ALL.map(|category| {
+            let (value, sigma) = tally
+                .moments(category, histories)
+                .iter()
+                .map(|pixel| {
+                    let sigma = pixel.standard_error_kev(n);
+                    ((pixel.mean_kev * ev_cm2) as f32, (sigma * ev_cm2) as f32)
+                })
+                .unzip();
+            Layer { value, sigma }
+        });
+        let sums = CategorySums::from_kev(|category| {
+            let total = tally.total(category, histories);
+            (total.mean_kev, total.standard_error_kev(n))
+        });
+        Radiograph {
+            detector: self.detector,
+            engine: Engine::Analog,
+            histories: n,
+            histories_per_mas: self.histories_per_mas,
+            seed,
+            source_detector_mm: self.source_detector_mm,
+            open_field_ev_cm2: self.open_field_ev_cm2,
+            layers,
+            sums,
+        }
+    }
+}

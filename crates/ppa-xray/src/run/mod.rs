@@ -1,0 +1,10 @@
+//! Long runs of the analog engine: until when, in which parts, and their tallies in files.
+
+pub(crate) mod analog_run;
+pub(crate) mod analog_tally;
+pub(crate) mod key;
+pub(crate) mod merge;
+pub(crate) mod part;
+pub(crate) mod progress;
+pub(crate) mod tally_error;
+pub(crate) mod tally_file;

@@ -1,0 +1,133 @@
+//! Why tallies cannot be read, written, continued or merged.
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+/// Why a tally cannot be read, written, continued or merged.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TallyError {
+    /// The file system said no.
+    #[error("cannot read the tally {}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file system said no.
+    #[error("cannot write the tally {}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file does not begin as a tally does.
+    #[error("{} is no tally of ppa-xray", path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The layout is of another version.
+    #[error("{} has tally format {found}, expected {expected}", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// Version of the file.
+        found: u32,
+        /// Version of this program.
+        expected: u32,
+    },
+    /// The file ends early or goes on.
+    #[error("{} is {found} bytes long, expected {expected}: it was cut off or appended to", path.display())]
+    Size {
+        /// The file.
+        path: PathBuf,
+        /// Bytes of the file.
+        found: u64,
+        /// Bytes that its header announces.
+        expected: u64,
+    },
+    /// Bytes were changed.
+    #[error("{} is damaged: {what}", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What does not fit.
+        what: String,
+    },
+    /// Phantom, spectrum, exposure, models, seed or code differ.
+    #[error(
+        "{} is of another simulation: phantom, spectrum, exposure, models, doses, seed or version differ (key {found}, expected {expected})",
+        path.display()
+    )]
+    Key {
+        /// The file.
+        path: PathBuf,
+        /// Key of the file.
+        found: String,
+        /// Key of the simulation, or of the first file.
+        expected: String,
+    },
+    /// The histories of the whole run differ.
+    #[error("{} belongs to a run of {found} histories, expected {expected}", path.display())]
+    Histories {
+        /// The file.
+        path: PathBuf,
+        /// Histories of the run that the file is part of.
+        found: u64,
+        /// Histories of the run, or of the first file.
+        expected: u64,
+    },
+    /// A part was not finished.
+    #[error(
+        "{} holds the histories {done:?} of its part {part:?}: resume it first",
+        path.display()
+    )]
+    Unfinished {
+        /// The file.
+        path: PathBuf,
+        /// Histories counted.
+        done: Range<u64>,
+        /// Histories of the part.
+        part: Range<u64>,
+    },
+    /// A part is another one than asked for.
+    #[error("{} is the part {found:?} of its run, expected {expected:?}", path.display())]
+    Part {
+        /// The file.
+        path: PathBuf,
+        /// Histories of the part in the file.
+        found: Range<u64>,
+        /// Histories of the part asked for.
+        expected: Range<u64>,
+    },
+    /// Two parts hold the same histories.
+    #[error(
+        "{} (histories {first:?}) and {} (histories {second:?}) overlap",
+        first_path.display(),
+        second_path.display()
+    )]
+    Overlap {
+        /// The part that begins first.
+        first_path: PathBuf,
+        /// Its histories.
+        first: Range<u64>,
+        /// The other part.
+        second_path: PathBuf,
+        /// Its histories.
+        second: Range<u64>,
+    },
+    /// Histories are missing.
+    #[error("the histories {missing:?} of {histories} are in none of the tallies")]
+    Hole {
+        /// Histories that no part holds.
+        missing: Range<u64>,
+        /// Histories of the whole run.
+        histories: u64,
+    },
+    /// There is nothing to merge.
+    #[error("no tally to merge")]
+    Nothing,
+}
