@@ -255,6 +255,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::matter::compton::ComptonModel;
     use crate::matter::material::Material;
 
     /// Woodcock tracking is right only if no voxel exceeds the bound of its block.
@@ -276,7 +277,7 @@ mod tests {
         let tables: Vec<_> = phantom
             .materials()
             .iter()
-            .map(MaterialTables::new)
+            .map(|material| MaterialTables::new(material, ComptonModel::default()))
             .collect();
         let attenuation = Attenuation::new(&tables);
         let majorants = Majorants::new(&phantom, &attenuation);

@@ -7,6 +7,7 @@ use nalgebra::{Point3, Vector3};
 use crate::beam::emitter::{Emission, Emitter};
 use crate::beam::projection::{Projection, ProjectionError, scattered};
 use crate::beam::spectrum::Spectrum;
+use crate::matter::compton::ComptonModel;
 use crate::matter::sampler::MaterialTables;
 use crate::phantom::lattice::{Lattice, Walk};
 use crate::phantom::voxels::VoxelPhantom;
@@ -101,6 +102,7 @@ impl<'a> Transport<'a> {
         phantom: &'a VoxelPhantom,
         spectrum: &'a Spectrum,
         projection: &'a Projection,
+        compton_model: ComptonModel,
     ) -> Result<Self, TransportError> {
         let emitter = Emitter::new(projection, spectrum)?;
         check_placement(phantom, projection)?;
@@ -130,7 +132,7 @@ impl<'a> Transport<'a> {
         let samplers: Vec<_> = phantom
             .materials()
             .iter()
-            .map(MaterialTables::new)
+            .map(|material| MaterialTables::new(material, compton_model))
             .collect();
         let attenuation = Attenuation::new(&samplers);
         Ok(Self {
