@@ -70,6 +70,7 @@ pub use matter::material::Material;
 pub use matter::material_error::MaterialError;
 pub use matter::photon_tables::PhotonTables;
 pub use matter::sampler::MaterialTables;
+pub use matter::scatter_density::ScatterDensities;
 pub use phantom::audit::{Audit, MaterialCount, SegmentAudit};
 pub use phantom::calibration_error::CalibrationError;
 pub use phantom::hu::{Composition, Constituent, HuCalibration, Segment};

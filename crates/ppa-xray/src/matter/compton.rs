@@ -3,8 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    matter::impulse_approximation::ImpulseApproximation,
-    matter::incoherent_function::IncoherentFunction, matter::material::Material, octaves::Octaves,
+    matter::impulse_approximation::{ImpulseApproximation, off_resting},
+    matter::incoherent_function::IncoherentFunction,
+    matter::material::Material,
+    octaves::Octaves,
 };
 
 /// How photons scatter off electrons. Both take the total cross section of the data.
@@ -34,6 +36,20 @@ impl Compton {
             ComptonModel::IncoherentFunction => {
                 Self::IncoherentFunction(IncoherentFunction::new(material, q_squared))
             }
+        }
+    }
+
+    /// Energy in keV of a photon scattered by sin²(θ/2) = `half`.
+    #[inline]
+    pub(crate) fn sample_energy(
+        &self,
+        energy_kev: f32,
+        half: f32,
+        uniform: impl FnMut() -> f32,
+    ) -> f32 {
+        match self {
+            Self::ImpulseApproximation(impulse) => impulse.sample_energy(energy_kev, half, uniform),
+            Self::IncoherentFunction(_) => off_resting(energy_kev, half),
         }
     }
 

@@ -9,8 +9,11 @@ use crate::matter::{
     cross_sections::ELECTRON_REST_KEV,
     electron_shell::{ATOMIC_MOMENTA_PER_MC, Shell},
     klein_nishina::KleinNishina,
-    natural_log::ln,
+    natural_log::{exp, ln},
 };
+
+/// Rejections in a row after which the shells are weighed one by one at a given angle.
+const TRIALS: u32 = 8;
 
 /// Rejections in a row after which the electron counts as free and at rest: tables of a user may hold shells that let
 /// almost nothing through, and no photon may hang. The embedded elements need a few.
@@ -20,7 +23,7 @@ const PATIENCE: u32 = 1000;
 const LARGEST_CORRECTED: f32 = 0.2;
 
 /// Smallest share of the electrons that is told apart in the tail of a profile.
-const SMALLEST_TAIL: f32 = 1.0 / 4_294_967_296.0;
+const SMALLEST_TAIL: f32 = 1e-30;
 
 /// Sampler of Compton scattering in one material.
 #[derive(Clone, Debug)]
@@ -28,6 +31,8 @@ pub(crate) struct ImpulseApproximation {
     angles: &'static KleinNishina,
     /// Walker's alias table over the shells by electron number: of entry i, `keep` stays with shell i.
     entries: Vec<Entry>,
+    /// Share of the electrons in each shell.
+    shells: Vec<(f32, BoundElectron)>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -83,6 +88,10 @@ impl ImpulseApproximation {
         Self {
             angles: KleinNishina::table(),
             entries,
+            shells: shells
+                .iter()
+                .map(|shell| ((shell.electrons / electrons) as f32, bound(shell)))
+                .collect(),
         }
     }
 
@@ -111,15 +120,36 @@ impl ImpulseApproximation {
         half: f32,
         mut uniform: impl FnMut() -> f32,
     ) -> f32 {
-        for _ in 0..PATIENCE {
-            let scattered = self
-                .strike(energy_kev, half, uniform(), uniform())
-                .and_then(|struck| recoil(energy_kev, half, struck, uniform()));
+        for trial in 0..PATIENCE {
+            let struck = if trial < TRIALS {
+                self.strike(energy_kev, half, uniform(), uniform())
+            } else {
+                self.strike_weighed(energy_kev, half, uniform(), uniform())
+            };
+            let scattered = struck.and_then(|struck| recoil(energy_kev, half, struck, uniform()));
             if let Some(scattered) = scattered {
                 return scattered;
             }
         }
         off_resting(energy_kev, half)
+    }
+
+    /// An electron by the weights f n(p_max) of the shells, for angles so small that hardly one can be freed.
+    fn strike_weighed(
+        &self,
+        energy_kev: f32,
+        half: f32,
+        u_shell: f32,
+        u_momentum: f32,
+    ) -> Option<Struck> {
+        let freed = |electron: &BoundElectron| electron.share_freed(energy_kev, half);
+        let all: f32 = self.shells.iter().map(|(f, e)| f * freed(e)).sum();
+        let mut left = u_shell * all;
+        let (_, electron) = self.shells.iter().find(|(f, electron)| {
+            left -= f * freed(electron);
+            left < 0.0
+        })?;
+        electron.struck(energy_kev, half, u_momentum * freed(electron))
     }
 
     /// An electron, if the photon can free it.
@@ -133,24 +163,45 @@ impl ImpulseApproximation {
         } else {
             entry.other
         };
-        // Tail of the profile: t = exp(½ (1 − (1 + 2 J₀|p|)²)).
-        let against = u_momentum < 0.5;
-        let tail = 2.0
-            * if against {
-                u_momentum
-            } else {
-                1.0 - u_momentum
-            };
-        let reach = (1.0 - 2.0 * ln(tail.max(SMALLEST_TAIL))).sqrt();
-        let momentum = electron.momentum * (reach - 1.0);
-        // p ≤ p_max = (E (E − U)(1 − cos θ)/mc² − U) / √(2 E (E − U)(1 − cos θ) + U²).
-        let binding = electron.binding_kev;
+        electron.struck(energy_kev, half, u_momentum)
+    }
+}
+
+impl BoundElectron {
+    /// Numerator and denominator of p_max = (E (E − U)(1 − cos θ)/mc² − U) / √(2 E (E − U)(1 − cos θ) + U²).
+    #[inline(always)]
+    fn limit(&self, energy_kev: f32, half: f32) -> (f32, f32) {
+        let binding = self.binding_kev;
         let transfer = 4.0 * energy_kev * (energy_kev - binding) * half;
-        let limit = transfer * (0.5 / ELECTRON_REST_KEV) as f32 - binding;
-        let scaled = momentum * (transfer + binding * binding).sqrt();
-        let either_way = scaled <= limit;
-        let freed = either_way || (against && -scaled <= limit);
-        (freed && momentum < 1.0 && binding < energy_kev).then_some(Struck {
+        (
+            transfer * (0.5 / ELECTRON_REST_KEV) as f32 - binding,
+            (transfer + binding * binding).sqrt(),
+        )
+    }
+
+    /// n(p_max): share of such electrons that the photon can free.
+    fn share_freed(&self, energy_kev: f32, half: f32) -> f32 {
+        let (limit, size) = self.limit(energy_kev, half);
+        if self.binding_kev >= energy_kev || size == 0.0 {
+            return 0.0;
+        }
+        let reach = 1.0 + (limit / size).abs() / self.momentum;
+        let beyond = 0.5 * exp(0.5 - 0.5 * reach * reach);
+        if limit < 0.0 { beyond } else { 1.0 - beyond }
+    }
+
+    /// This electron with momentum p at the cumulative probability `u` of its profile, if p ≤ p_max.
+    #[inline(always)]
+    fn struck(&self, energy_kev: f32, half: f32, u: f32) -> Option<Struck> {
+        // Share of the profile beyond ±p: t = exp(½ (1 − (1 + 2 J₀|p|)²)).
+        let against = u < 0.5;
+        let tail = 2.0 * if against { u } else { 1.0 - u };
+        let reach = (1.0 - 2.0 * ln(tail.max(SMALLEST_TAIL))).sqrt();
+        let momentum = self.momentum * (reach - 1.0);
+        let (limit, size) = self.limit(energy_kev, half);
+        let either_way = momentum * size <= limit;
+        let freed = either_way || (against && -momentum * size <= limit);
+        (freed && momentum < 1.0 && self.binding_kev < energy_kev).then_some(Struck {
             momentum,
             either_way,
         })
@@ -159,7 +210,7 @@ impl ImpulseApproximation {
 
 /// E′ of an electron at rest.
 #[inline(always)]
-fn off_resting(energy_kev: f32, half: f32) -> f32 {
+pub(crate) fn off_resting(energy_kev: f32, half: f32) -> f32 {
     energy_kev / (1.0 + energy_kev * half * (2.0 / ELECTRON_REST_KEV) as f32)
 }
 
@@ -194,7 +245,6 @@ fn recoil(energy_kev: f32, half: f32, struck: Struck, u: f32) -> Option<f32> {
 }
 
 /// Σ f Θ(E − U) n(p_max), the electrons that take part at an angle.
-#[cfg(test)]
 pub(crate) fn electrons_freed(shells: &[Shell], energy_kev: f64, half: f64) -> f64 {
     shells
         .iter()

@@ -15,3 +15,4 @@ pub(crate) mod natural_log;
 pub(crate) mod photon_tables;
 pub(crate) mod rayleigh;
 pub(crate) mod sampler;
+pub(crate) mod scatter_density;

@@ -7,7 +7,7 @@ use crate::{
 };
 
 /// Quantile bins per octave of the probability that lies beyond, as a power of two.
-const TAIL_BITS: u32 = 5;
+const TAIL_BITS: u32 = 6;
 /// Energy bins per octave, as a power of two.
 const ENERGY_BITS: u32 = 5;
 /// Integration steps per octave of q², as a power of two.

@@ -146,6 +146,21 @@ impl MaterialTables {
         (f64::from(half), f64::from(scattered_kev).min(energy_kev))
     }
 
+    /// Energy in keV of a photon that Compton scattering turned by θ, with numbers of `uniform` in [0, 1).
+    #[inline]
+    pub fn compton_energy_at(
+        &self,
+        energy_kev: f64,
+        cos_theta: f64,
+        mut uniform: impl FnMut() -> f64,
+    ) -> f64 {
+        let half = (0.5 * (1.0 - cos_theta)) as f32;
+        let sampled = self
+            .compton
+            .sample_energy(energy_kev as f32, half, || uniform() as f32);
+        f64::from(sampled).min(energy_kev)
+    }
+
     /// Cosine of a Rayleigh scattering angle.
     #[inline]
     pub(crate) fn sample_rayleigh(&self, energy_kev: f64, random: &mut Philox) -> f64 {
@@ -216,7 +231,7 @@ mod tests {
     ///
     /// E′ from its defining equation, p = (E E′(1 − cos θ) − mc²(E − E′)) / (c q), by bisection instead of the sampler's
     /// closed form; F as in the sampler.
-    fn mean_shift(shells: &[Shell], energy_kev: f64, half: f64) -> f64 {
+    fn mean_shift(shells: &[Shell], energy_kev: f64, half: f64, steps: u32) -> f64 {
         let (m, cos) = (ELECTRON_REST_KEV, 1.0 - 2.0 * half);
         let tau = 1.0 / (1.0 + 2.0 * energy_kev / m * half);
         let momentum = |e: f64| {
@@ -230,7 +245,6 @@ mod tests {
             let highest = momentum(energy_kev - shell.binding_kev);
             let reach = 3.5 / shell.profile_at_zero / ATOMIC_MOMENTA_PER_MC;
             let (low, high) = ((-reach).max(-0.999), reach.min(highest));
-            let steps = 24;
             for i in 0..steps {
                 if high <= low {
                     break;
@@ -287,7 +301,7 @@ mod tests {
                 }
                 ComptonModel::ImpulseApproximation => (
                     electrons_freed(&shells, energy_kev, s * s),
-                    mean_shift(&shells, energy_kev, s * s),
+                    mean_shift(&shells, energy_kev, s * s, 24),
                 ),
             };
             for (sum, value) in
@@ -327,6 +341,31 @@ mod tests {
                     z.iter().all(|z| z.abs() < 4.5),
                     "{name} at {energy_kev} keV, {model:?}: {z:.1?} standard errors"
                 );
+            }
+        }
+    }
+
+    /// The energy at a given angle, also where hardly an electron can be freed. 18 comparisons at 4.5 standard errors: 1e-4 per
+    /// seed.
+    #[test]
+    fn energies_at_an_angle_have_the_mean_of_the_profiles() {
+        for name in ["water", "bone_cortical", "lead"] {
+            let material = Material::named(name).unwrap();
+            let tables = MaterialTables::new(&material, ComptonModel::default());
+            for (energy_kev, half) in [10.0, 60.0]
+                .into_iter()
+                .flat_map(|energy_kev| [2e-4, 0.02, 0.5].map(|half| (energy_kev, half)))
+            {
+                let mut shift = Moment::default();
+                let resting = energy_kev / (1.0 + 2.0 * energy_kev / ELECTRON_REST_KEV * half);
+                for index in 0..SAMPLES {
+                    let mut random = Philox::new(3, 0, index);
+                    let cos = 1.0 - 2.0 * half;
+                    let sampled = tables.compton_energy_at(energy_kev, cos, || random.unit());
+                    shift.add(sampled / resting);
+                }
+                let z = shift.z(mean_shift(&material.shells(), energy_kev, half, 1000));
+                assert!(z.abs() < 4.5, "{name}, {energy_kev} keV, {half}: {z:.1}");
             }
         }
     }
