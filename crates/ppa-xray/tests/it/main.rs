@@ -2,10 +2,12 @@
 
 mod attenuation;
 mod case_a;
+mod dose;
 mod files;
 mod placement;
 mod runs;
 mod scenes;
 mod shared;
 mod spectra;
+mod tg195;
 mod transport;
