@@ -53,7 +53,6 @@ fn transport(criterion: &mut Criterion) {
     let settings = AnalogSettings {
         histories: 200_000,
         seed: 1,
-        ..AnalogSettings::default()
     };
     group.throughput(Throughput::Elements(settings.histories));
     group.sample_size(10);

@@ -1,5 +1,7 @@
 //! Source, field and rectangular detector of one exposure, and where they stand in the CT.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Isometry3, Point2, Point3, Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -7,6 +9,8 @@ use crate::beam::emitter::Emitter;
 use crate::beam::field::Field;
 use crate::beam::source::{Collimation, Source};
 use crate::beam::spectrum::Spectrum;
+use crate::detector::receptor::{Receptor, ReceptorError};
+use crate::philox::Philox;
 use crate::transport::tally::Raster;
 
 /// Most pixels of a detector: 2²⁸, whose planes take 8 GiB.
@@ -110,6 +114,9 @@ pub enum ProjectionError {
     /// The device pose holds NaN or infinity.
     #[error("the device pose is not finite")]
     Pose,
+    /// The image receptor.
+    #[error(transparent)]
+    Receptor(#[from] ReceptorError),
     /// Not one ray of the field can meet the voxel box.
     #[error("the x-ray field misses the voxel box altogether")]
     FieldMissesPhantom,
@@ -217,10 +224,12 @@ pub struct Projection {
     pub central_ray: Unit<Vector3<f64>>,
     /// Focal spot, heel effect and collimation.
     pub source: Source,
+    /// Grid and converter in the detector plane.
+    pub receptor: Receptor,
 }
 
 impl Projection {
-    /// A point source that sends photons evenly in solid angle, all to the detector.
+    /// A point source that sends photons evenly in solid angle, all to the detector, which takes all their energy.
     pub fn new(
         ct_from_device: Isometry3<f64>,
         source_detector_mm: f64,
@@ -232,6 +241,7 @@ impl Projection {
             detector,
             central_ray: Vector3::z_axis(),
             source: Source::default(),
+            receptor: Receptor::default(),
         }
     }
 
@@ -365,4 +375,23 @@ impl Projection {
                 .any(|corner| normal.dot(&corner.coords) <= *offset)
         })
     }
+}
+
+/// The unit vector at polar angle arccos(`cos_theta`) and a random azimuth from `direction`.
+pub(crate) fn scattered(
+    direction: &Vector3<f64>,
+    cos_theta: f64,
+    rng: &mut Philox,
+) -> Vector3<f64> {
+    let (sin_phi, cos_phi) = (TAU * rng.unit()).sin_cos();
+    let sin_theta = (1.0 - cos_theta * cos_theta).max(0.0).sqrt();
+    // Orthonormal basis without a branch near the pole (Duff et al., JCGT 6(1), 2017).
+    let [x, y, z] = (*direction).into();
+    let sign = 1.0_f64.copysign(z);
+    let a = -1.0 / (sign + z);
+    let b = x * y * a;
+    let first = Vector3::new(1.0 + sign * x * x * a, sign * b, -sign * x);
+    let second = Vector3::new(b, sign + y * y * a, -y);
+    (first * (sin_theta * cos_phi) + second * (sin_theta * sin_phi) + direction * cos_theta)
+        .normalize()
 }

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
+use crate::detector::response::Response;
 use crate::dose::score::{DoseScore, DoseTarget};
 use crate::image::radiograph::Radiograph;
-use crate::matter::compton::ComptonModel;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
 use crate::run::analog_tally::ImageSetup;
@@ -19,25 +19,12 @@ use crate::transport::tracking::{Transport, TransportError};
 
 /// How long the analog engine runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(deny_unknown_fields)]
 pub struct AnalogSettings {
     /// Photons emitted into the field.
     pub histories: u64,
     /// Seed of the image: history n of a seed is the same whatever runs beside it.
     pub seed: u64,
-    /// How photons scatter off electrons.
-    pub compton_model: ComptonModel,
-}
-
-impl Default for AnalogSettings {
-    /// A minute or less: scatter to a few percent in a square centimetre.
-    fn default() -> Self {
-        Self {
-            histories: 20_000_000,
-            seed: 0,
-            compton_model: ComptonModel::default(),
-        }
-    }
 }
 
 /// Histories that one task follows: long enough to hide the hand-over.
@@ -45,10 +32,9 @@ const BATCH: u64 = 4_096;
 
 /// Simulates a radiograph photon by photon.
 ///
-/// Photons leave the focal spot evenly in solid angle inside the detector rectangle, with energies from
-/// `spectrum`, and are followed through the voxels (vacuum outside) until they are absorbed, fall below
-/// 5 keV, or cross the detector plane. The ideal detector takes the whole energy of photons that cross its
-/// rectangle; nothing comes back from behind the plane.
+/// Photons leave the focal spot into the field, with energies from `spectrum`, and are followed through the voxels
+/// (vacuum outside) until they are absorbed, fall below 5 keV, or cross the detector plane. There grid and converter
+/// decide how much energy stays; nothing comes back from behind the plane.
 ///
 /// # Errors
 /// [`TransportError`] when the geometry, the spectrum or the number of histories makes no sense.
@@ -59,7 +45,7 @@ pub fn analog(
     settings: &AnalogSettings,
 ) -> Result<Radiograph, TransportError> {
     settings.validate()?;
-    let transport = Transport::new(phantom, spectrum, projection, settings.compton_model)?;
+    let transport = Transport::new(phantom, spectrum, projection)?;
     let tally = run(&transport, projection.detector.raster(), settings);
     Ok(ImageSetup::new(&transport).radiograph(&tally, settings.histories, settings.seed))
 }
@@ -87,7 +73,7 @@ pub(crate) fn run(transport: &Transport, raster: Raster, settings: &AnalogSettin
 /// Follows `histories` and counts what arrives.
 pub(crate) fn count(transport: &Transport, seed: u64, histories: Range<u64>, tally: &Tally) {
     in_batches(histories, |batch| {
-        transport.follow(seed, batch, &mut DetectorScore(tally));
+        transport.follow(seed, batch, &mut DetectorScore::new(transport, tally));
     });
 }
 
@@ -100,7 +86,7 @@ pub(crate) fn count_with_dose(
     target: &DoseTarget,
 ) {
     in_batches(histories, |batch| {
-        let mut score = DoseScore::new(DetectorScore(tally), target);
+        let mut score = DoseScore::new(DetectorScore::new(transport, tally), target);
         transport.follow(seed, batch, &mut score);
         score.hand_in();
     });
@@ -115,14 +101,26 @@ fn in_batches(histories: Range<u64>, follow: impl Fn(Range<u64>) + Sync) {
     });
 }
 
-/// Counts what reaches the detector, nothing else.
-struct DetectorScore<'a>(&'a Tally);
+/// Counts what photons leave in the detector, nothing else.
+struct DetectorScore<'a> {
+    response: &'a Response,
+    tally: &'a Tally,
+}
+
+impl<'a> DetectorScore<'a> {
+    fn new(transport: &'a Transport, tally: &'a Tally) -> Self {
+        Self {
+            response: &transport.response,
+            tally,
+        }
+    }
+}
 
 impl Score for DetectorScore<'_> {
     #[inline]
-    fn arrive(&mut self, _slot: usize, arrival: &Arrival, _rng: &mut Philox) {
+    fn arrive(&mut self, _slot: usize, arrival: &Arrival, rng: &mut Philox) {
         let Arrival { x_mm, y_mm, .. } = *arrival;
-        self.0
-            .score(x_mm, y_mm, arrival.category, arrival.energy_kev);
+        let energy_kev = self.response.detect(arrival, rng);
+        self.tally.score(x_mm, y_mm, arrival.category, energy_kev);
     }
 }

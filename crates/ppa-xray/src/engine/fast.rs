@@ -5,12 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::beam::projection::{Detector, Projection};
 use crate::beam::spectrum::Spectrum;
+use crate::detector::open_field::OpenField;
 use crate::engine::analog::{AnalogSettings, run};
 use crate::engine::noise;
 use crate::engine::raytrace::primary_moments;
 use crate::engine::upsample::Upsampling;
-use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph, open_field_ev_cm2};
-use crate::matter::compton::ComptonModel;
+use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph};
 use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
 use crate::transport::stream::Stream;
@@ -29,8 +29,6 @@ pub struct FastSettings {
     pub scatter_pixel_mm: f64,
     /// Rays per pixel side of the primary.
     pub samples_per_side: u32,
-    /// How photons scatter off electrons.
-    pub compton_model: ComptonModel,
     /// Seed of the image.
     pub seed: u64,
 }
@@ -43,7 +41,6 @@ impl Default for FastSettings {
             scatter_histories: 4_000_000,
             scatter_pixel_mm: 20.0,
             samples_per_side: 2,
-            compton_model: ComptonModel::default(),
             seed: 0,
         }
     }
@@ -66,13 +63,12 @@ pub fn fast(
     settings: &FastSettings,
 ) -> Result<Radiograph, TransportError> {
     settings.validate()?;
-    let transport = Transport::new(phantom, spectrum, projection, settings.compton_model)?;
+    let transport = Transport::new(phantom, spectrum, projection)?;
     let histories = settings.scatter_histories;
     let raster = scatter_raster(&projection.detector, settings.scatter_pixel_mm);
     let analog = AnalogSettings {
         histories,
         seed: settings.seed,
-        compton_model: settings.compton_model,
     };
     let tally = run(&transport, raster, &analog);
     let primary = primary_moments(&transport, settings.samples_per_side)?;
@@ -92,6 +88,7 @@ pub fn fast(
         },
         _ => Expected::scatter(&tally, category, histories, &upsampling),
     });
+    let (open_field, open_field_ev_cm2) = OpenField::of(&transport);
     Ok(Radiograph {
         detector: projection.detector,
         engine: Engine::Fast,
@@ -99,7 +96,8 @@ pub fn fast(
         histories_per_mas: transport.emitter.photons_per_mas(),
         seed: settings.seed,
         source_detector_mm: projection.source_detector_mm,
-        open_field_ev_cm2: open_field_ev_cm2(&transport),
+        open_field_ev_cm2,
+        open_field,
         layers: with_noise(&expected, settings, &projection.detector),
         sums,
     })

@@ -7,7 +7,7 @@ use crate::beam::emitter::SpectralLines;
 use crate::beam::field::Field;
 use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
-use crate::matter::compton::ComptonModel;
+use crate::detector::response::LineResponse;
 use crate::phantom::lattice::Walk;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::tally::Moments;
@@ -26,7 +26,7 @@ pub fn primary(
     projection: &Projection,
     samples_per_side: u32,
 ) -> Result<Vec<f64>, TransportError> {
-    let transport = Transport::new(phantom, spectrum, projection, ComptonModel::default())?;
+    let transport = Transport::new(phantom, spectrum, projection)?;
     let ev_cm2 = 1e3 / projection.detector.pixel_cm2();
     let moments = primary_moments(&transport, samples_per_side)?;
     Ok(moments.iter().map(|m| m.mean_kev * ev_cm2).collect())
@@ -92,6 +92,7 @@ const SPOT_RAYS: u32 = 4;
 struct Beam<'a> {
     transport: &'a Transport<'a>,
     lines: SpectralLines,
+    response: LineResponse<'a>,
     /// Material by material, mm⁻¹ per g/cm³.
     attenuation: Vec<f64>,
 }
@@ -101,6 +102,7 @@ struct Scratch {
     /// Density times length per material, mm·g/cm³.
     mass: Vec<f64>,
     exponent: Vec<f64>,
+    photons: Vec<f64>,
 }
 
 impl<'a> Beam<'a> {
@@ -117,6 +119,7 @@ impl<'a> Beam<'a> {
             .collect();
         Self {
             transport,
+            response: transport.response.at_lines(&lines.energy_kev),
             lines,
             attenuation,
         }
@@ -126,10 +129,11 @@ impl<'a> Beam<'a> {
         Scratch {
             mass: vec![0.0; self.transport.phantom.materials().len()],
             exponent: vec![0.0; self.lines.energy_kev.len()],
+            photons: vec![0.0; self.lines.energy_kev.len()],
         }
     }
 
-    /// Moments of the energy that one photon from `spot` to `at` brings to the detector plane.
+    /// Moments of the energy that one photon from `spot` to `at` leaves in the detector.
     fn behind(&self, spot: &Point3<f64>, at: Point2<f64>, scratch: &mut Scratch) -> Moments {
         let target = Point3::new(at.x, at.y, self.transport.projection.source_detector_mm);
         let (direction, length_mm) = Unit::new_and_get(target - spot);
@@ -147,22 +151,19 @@ impl<'a> Beam<'a> {
                 }
             }
         }
-        for (exponent, &energy_kev) in scratch.exponent.iter_mut().zip(energy_kev) {
-            *exponent = (-*exponent).exp() * energy_kev;
-        }
+        scratch.photons.fill(0.0);
         let mixture = self.transport.emitter.mixture(&direction);
-        let mut sum = Moments::default();
         for (spectrum, share) in mixture.parts() {
             let weights = &self.lines.weights[spectrum];
-            for ((&energy, &weight), &energy_kev) in
-                scratch.exponent.iter().zip(weights).zip(energy_kev)
-            {
-                let energy = share * weight * energy;
-                sum.mean_kev += energy;
-                sum.square_kev2 += energy * energy_kev;
+            for (photons, weight) in scratch.photons.iter_mut().zip(weights) {
+                *photons += share * weight;
             }
         }
-        sum
+        for (photons, exponent) in scratch.photons.iter_mut().zip(&scratch.exponent) {
+            *photons *= (-exponent).exp();
+        }
+        self.response
+            .signal(&mut scratch.photons, at.into(), &direction)
     }
 
     /// Density times length of every material between the source and the detector plane.

@@ -1,11 +1,10 @@
 //! The result of both engines: energy per pixel by category, with standard errors.
 
-use nalgebra::{Point2, Point3};
 use serde::{Deserialize, Serialize};
 
 use crate::beam::projection::Detector;
+use crate::detector::open_field::OpenField;
 use crate::transport::tally::Category;
-use crate::transport::tracking::Transport;
 
 /// How a radiograph was computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -92,7 +91,7 @@ impl CategorySums {
     }
 }
 
-/// Energy on an ideal detector, split by what happened to the photons.
+/// Energy that photons leave in the detector, split by what happened to them on their way.
 ///
 /// Pixel (column, row) stands at `row * columns + column`; columns run along device x, rows along
 /// device y. Values are eV/cm² per history, the unit of MC-GPU: summed over the pixels and
@@ -112,8 +111,10 @@ pub struct Radiograph {
     pub seed: u64,
     /// Source-detector distance, mm.
     pub source_detector_mm: f64,
-    /// What the pixels would read with nothing in the beam, at its centre, eV/cm² per history.
+    /// What the centre of the detector would read with nothing in the beam, eV/cm² per history.
     pub open_field_ev_cm2: f64,
+    /// That reading over the detector.
+    pub(crate) open_field: OpenField,
     /// The layers, in the order of [`Category::ALL`].
     pub layers: [Layer; 4],
     /// Energy on the whole detector. For the fast engine: before quantum noise is added, so that
@@ -175,12 +176,10 @@ impl Radiograph {
         )
     }
 
-    /// Reading of a pixel with nothing in the beam, eV/cm² per history: falls off as cos³θ.
+    /// Reading of a pixel with nothing in the beam and the collimator wide open, eV/cm² per history.
     pub fn open_field_at(&self, pixel: usize) -> f64 {
         let at = self.detector.pixel_centre_mm(pixel);
-        let d = self.source_detector_mm;
-        let cos = d / (d * d + at.coords.norm_squared()).sqrt();
-        self.open_field_ev_cm2 * cos.powi(3)
+        self.open_field_ev_cm2 * self.open_field.at(at)
     }
 
     fn per_pixel(&self, value: impl Fn(usize) -> f64) -> Vec<f32> {
@@ -188,12 +187,4 @@ impl Radiograph {
             .map(|pixel| value(pixel) as f32)
             .collect()
     }
-}
-
-/// Reading at the foot of the source in the bare field, eV/cm² per history.
-pub(crate) fn open_field_ev_cm2(transport: &Transport) -> f64 {
-    let fluence_cm2 = transport
-        .emitter
-        .open_fluence_cm2(&Point3::origin(), Point2::origin());
-    1e3 * transport.spectrum.mean_energy_kev() * fluence_cm2
 }

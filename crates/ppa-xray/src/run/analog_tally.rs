@@ -5,10 +5,11 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::beam::projection::Detector;
+use crate::detector::open_field::OpenField;
 use crate::dose::report::Dose;
 use crate::dose::setup::DoseSetup;
 use crate::dose::tally::DoseTally;
-use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph, open_field_ev_cm2};
+use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph};
 use crate::transport::tally::{Category, Moments, Tally};
 use crate::transport::tracking::Transport;
 
@@ -45,6 +46,7 @@ pub(crate) struct ImageSetup {
     pub detector: Detector,
     source_detector_mm: f64,
     open_field_ev_cm2: f64,
+    open_field: OpenField,
     histories_per_mas: Option<f64>,
 }
 
@@ -146,10 +148,12 @@ impl RunSetup {
 impl ImageSetup {
     pub fn new(transport: &Transport) -> Self {
         let projection = transport.projection;
+        let (open_field, open_field_ev_cm2) = OpenField::of(transport);
         Self {
             detector: projection.detector,
             source_detector_mm: projection.source_detector_mm,
-            open_field_ev_cm2: open_field_ev_cm2(transport),
+            open_field_ev_cm2,
+            open_field,
             histories_per_mas: transport.emitter.photons_per_mas(),
         }
     }
@@ -181,6 +185,7 @@ impl ImageSetup {
             seed,
             source_detector_mm: self.source_detector_mm,
             open_field_ev_cm2: self.open_field_ev_cm2,
+            open_field: self.open_field.clone(),
             layers,
             sums,
         }

@@ -2,12 +2,11 @@
 
 mod attenuation;
 mod case_a;
-mod dose;
+mod exposure;
 mod files;
 mod placement;
 mod runs;
 mod scenes;
 mod shared;
 mod spectra;
-mod tg195;
 mod transport;

@@ -61,11 +61,7 @@ impl Scene {
 }
 
 fn settings(histories: u64, seed: u64) -> AnalogSettings {
-    AnalogSettings {
-        histories,
-        seed,
-        ..AnalogSettings::default()
-    }
+    AnalogSettings { histories, seed }
 }
 
 fn go_on() -> ControlFlow<()> {

@@ -18,11 +18,7 @@ fn sixty_kvp() -> Spectrum {
 }
 
 fn settings(histories: u64, seed: u64) -> AnalogSettings {
-    AnalogSettings {
-        histories,
-        seed,
-        ..AnalogSettings::default()
-    }
+    AnalogSettings { histories, seed }
 }
 
 fn in_pool<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {

@@ -1,0 +1,90 @@
+//! What the pixels would read with nothing in the beam.
+
+use nalgebra::{Point2, Point3};
+use serde::{Deserialize, Serialize};
+
+use crate::beam::field::Field;
+use crate::transport::tracking::Transport;
+
+/// Nodes per side of the detector, when intensity or response vary over it.
+const NODES: usize = 33;
+
+/// Reading over the detector plane without phantom and with the collimator wide open, over that at the detector's centre.
+///
+/// An even beam on a detector that takes everything falls off as cos³θ; heel effect, grid and incidence on the
+/// converter change slowly, so their ratio to cos³θ is interpolated between a few nodes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct OpenField {
+    low_mm: [f64; 2],
+    high_mm: [f64; 2],
+    source_detector_mm: f64,
+    side: usize,
+    /// Row by row over the detector's rectangle.
+    ratio: Vec<f64>,
+}
+
+impl OpenField {
+    /// The shape, and the reading at the centre in eV/cm² per history.
+    pub fn of(transport: &Transport) -> (Self, f64) {
+        let emitter = &transport.emitter;
+        let source_detector_mm = transport.projection.source_detector_mm;
+        let lines = emitter.lines();
+        let response = transport.response.at_lines(&lines.energy_kev);
+        let reading = |at: Point2<f64>| {
+            let direction = Point3::new(at.x, at.y, source_detector_mm)
+                .coords
+                .normalize();
+            let mut photons = vec![0.0; lines.energy_kev.len()];
+            for (spectrum, share) in emitter.mixture(&direction).parts() {
+                for (photons, weight) in photons.iter_mut().zip(&lines.weights[spectrum]) {
+                    *photons += share * weight;
+                }
+            }
+            let signal = response.signal(&mut photons, at.into(), &direction);
+            1e3 * signal.mean_kev * emitter.open_fluence_cm2(&Point3::origin(), at)
+        };
+        let detector = transport.projection.detector;
+        let Field { low_mm, high_mm } = detector.field();
+        let centre = Point2::from(detector.centre_mm);
+        let central = reading(centre);
+        let even = transport.response.is_ideal() && emitter.spectra().len() == 1;
+        let side = if even { 2 } else { NODES };
+        let mut shape = Self {
+            low_mm,
+            high_mm,
+            source_detector_mm,
+            side,
+            ratio: vec![1.0; side * side],
+        };
+        for node in 0..side * side {
+            let share = [node % side, node / side].map(|i| i as f64 / (side - 1) as f64);
+            let at = [0, 1].map(|axis| low_mm[axis] + share[axis] * (high_mm[axis] - low_mm[axis]));
+            let at = Point2::from(at);
+            shape.ratio[node] = reading(at) / central * shape.cos3(centre) / shape.cos3(at);
+        }
+        (shape, central)
+    }
+
+    /// At device (x, y) of the detector's rectangle.
+    pub fn at(&self, at: Point2<f64>) -> f64 {
+        let [(i, s), (j, t)] = [0, 1].map(|axis| {
+            let share = (at[axis] - self.low_mm[axis]) / (self.high_mm[axis] - self.low_mm[axis]);
+            let place = share.clamp(0.0, 1.0) * (self.side - 1) as f64;
+            let node = (place as usize).min(self.side - 2);
+            (node, place - node as f64)
+        });
+        let row = |j: usize| {
+            let row = &self.ratio[j * self.side + i..][..2];
+            row[0] + s * (row[1] - row[0])
+        };
+        let centre = [0, 1].map(|axis| 0.5 * (self.low_mm[axis] + self.high_mm[axis]));
+        let ratio = row(j) + t * (row(j + 1) - row(j));
+        ratio * self.cos3(at) / self.cos3(Point2::from(centre))
+    }
+
+    fn cos3(&self, at: Point2<f64>) -> f64 {
+        let d = self.source_detector_mm;
+        (d / (d * d + at.coords.norm_squared()).sqrt()).powi(3)
+    }
+}

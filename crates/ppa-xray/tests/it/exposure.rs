@@ -1,0 +1,264 @@
+//! Source and detector as both engines see them.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use ppa_ct::Grid;
+use ppa_xray::{
+    AnalogSettings, AntiScatterGrid, Category, Collimation, Detector, DetectorModel, FastSettings,
+    FocalSpot, HeelEffect, Material, Projection, Receptor, Source, Spectrum, SpotShape, TubeSpec,
+    VoxelPhantom, analog, fast, primary,
+};
+
+use crate::scenes::{frontal, slab};
+
+fn spectrum() -> Spectrum {
+    Spectrum::tungsten(&TubeSpec {
+        kvp: 75.0,
+        anode_angle_deg: 12.0,
+        filters: vec!["Al:3".parse().unwrap()],
+    })
+    .unwrap()
+}
+
+fn grid() -> AntiScatterGrid {
+    AntiScatterGrid {
+        ratio: 8.0,
+        lines_per_cm: 40.0,
+        strip_mm: 0.05,
+        strip: "lead".to_owned(),
+        interspace: "aluminium".to_owned(),
+        focus_mm: Some(900.0),
+        lines_along: Default::default(),
+    }
+}
+
+/// Everything at once: focal spot, heel effect, field off the detector's edges, detector off the axis and turned,
+/// grid at the wrong distance, scintillator.
+fn demanding() -> Projection {
+    let mut projection = frontal(12, 20.0);
+    projection.detector.centre_mm = [15.0, -10.0];
+    projection = projection.with_detector_turned(0.1, -0.05);
+    let [x, y] = projection.detector.centre_mm;
+    projection.source = Source {
+        focal_spot: FocalSpot {
+            size_mm: 3.0,
+            shape: SpotShape::Uniform,
+        },
+        collimation: Collimation::Rectangle {
+            size_mm: [210.0, 330.0],
+            centre_mm: [x + 25.0, y],
+        },
+        heel_effect: Some(HeelEffect {
+            anode_towards_deg: 90.0,
+        }),
+    };
+    projection.receptor = Receptor {
+        model: DetectorModel::Csi {
+            thickness_um: 500.0,
+            packing: 0.8,
+        },
+        grid: Some(grid()),
+    };
+    projection
+}
+
+/// Analog against fast, every category over the quadrants of the detector: 16 differences, each within 4.2 standard
+/// errors (4e-4 for all). Both engines must see the same source and detector.
+#[test]
+fn engines_agree_on_source_and_detector() {
+    let (phantom, spectrum, projection) = (slab(80.0, 1.0), spectrum(), demanding());
+    let histories = 300_000;
+    let tallied = analog(
+        &phantom,
+        &spectrum,
+        &projection,
+        &AnalogSettings { histories, seed: 5 },
+    );
+    let settings = FastSettings {
+        dose_histories: f64::INFINITY,
+        scatter_histories: 300_000,
+        seed: 6,
+        samples_per_side: 4,
+        ..FastSettings::default()
+    };
+    let expected = fast(&phantom, &spectrum, &projection, &settings).unwrap();
+    let tallied = tallied.unwrap();
+    for category in Category::ALL {
+        for quadrant in 0..4 {
+            let pixels = (0..144)
+                .filter(|pixel| pixel % 12 / 6 == quadrant % 2 && pixel / 12 / 6 == quadrant / 2);
+            let (mut difference, mut variance, mut sum) = (0.0, 0.0, 0.0);
+            for pixel in pixels {
+                let (a, b) = (tallied.layer(category), expected.layer(category));
+                difference += f64::from(a.value[pixel]) - f64::from(b.value[pixel]);
+                variance += f64::from(a.sigma[pixel]).powi(2);
+                sum += f64::from(b.value[pixel]);
+            }
+            // The scatter of the fast engine has the same number of histories, spread over the quadrants.
+            let both = if category == Category::Primary {
+                1.0
+            } else {
+                2.0
+            };
+            let error = (both * variance).sqrt() + 5e-3 * sum;
+            println!("{} {quadrant}: {:.2}", category.name(), difference / error);
+            assert!(
+                difference.abs() < 4.2 * error,
+                "{} in quadrant {quadrant}: {difference} of {sum}",
+                category.name()
+            );
+        }
+    }
+}
+
+/// The shadow of an edge is blurred by the focal spot: standard deviation s/√12 · b/a for a square of side s, a from the
+/// source to the edge and b from there to the detector.
+#[test]
+fn the_penumbra_is_as_wide_as_geometry_says() {
+    let grid = Grid::axis_aligned(
+        [2, 1, 1],
+        Vector3::new(200.0, 400.0, 0.5),
+        Point3::new(-100.0, 0.0, 0.0),
+    );
+    let lead = Material::named("lead").unwrap();
+    let phantom =
+        VoxelPhantom::new(grid.unwrap(), vec![0; 2], vec![0.0, 11.35], vec![lead]).unwrap();
+    let spectrum = Spectrum::monoenergetic(40.0).unwrap();
+    let pixel_mm = 0.05;
+    let mut projection = Projection::new(
+        Isometry3::translation(0.0, 0.0, -600.0),
+        1_000.0,
+        Detector::centred(120, 1, pixel_mm),
+    );
+    let spread_mm = |projection: &Projection| {
+        let image = primary(&phantom, &spectrum, projection, 4).unwrap();
+        // The bare field is not quite even: what falls by less than 1e-3 of the edge is no part of it.
+        let edge = image[0] - image[119];
+        let steps = image.windows(2).map(|pair| pair[0] - pair[1]);
+        let steps: Vec<f64> = steps
+            .map(|step| if step > 1e-3 * edge { step } else { 0.0 })
+            .collect();
+        let sum: f64 = steps.iter().sum();
+        let moment = |power: i32| -> f64 {
+            let terms = steps.iter().enumerate();
+            terms
+                .map(|(i, step)| step / sum * (i as f64 * pixel_mm).powi(power))
+                .sum()
+        };
+        (moment(2) - moment(1).powi(2)).sqrt()
+    };
+    assert!(spread_mm(&projection) < 0.05);
+    projection.source.focal_spot.size_mm = 1.2;
+    let expected = 1.2 / 12.0_f64.sqrt() * 400.0 / 600.0;
+    let found = spread_mm(&projection);
+    assert!(
+        (found / expected - 1.0).abs() < 0.06,
+        "{found} mm, expected {expected} mm"
+    );
+}
+
+/// Outside the field nothing arrives but scatter; the pixel that the edge cuts reads its share; photons that miss the
+/// detector are counted as histories.
+#[test]
+fn the_field_has_sharp_edges() {
+    let vacuum = slab(10.0, 1e-9);
+    let spectrum = Spectrum::monoenergetic(50.0).unwrap();
+    let mut projection = frontal(10, 10.0);
+    let open = primary(&vacuum, &spectrum, &projection, 2).unwrap();
+    projection.source.collimation = Collimation::Rectangle {
+        size_mm: [45.0, 400.0],
+        centre_mm: [0.0, 0.0],
+    };
+    let image = primary(&vacuum, &spectrum, &projection, 2).unwrap();
+    let row = &image[50..60];
+    assert!(row[..2].iter().all(|&value| value == 0.0));
+    assert!((row[2] / row[3] - 0.25).abs() < 0.01, "{row:?}");
+    // 45 x 400 mm instead of 100 x 100 mm take the same photons: 1.8 times the area, less obliquity.
+    let share = row[5] / open[55];
+    assert!((share - 1.0 / 1.8).abs() < 0.01, "{share}");
+    let settings = AnalogSettings {
+        histories: 40_000,
+        seed: 1,
+    };
+    let tallied = analog(&vacuum, &spectrum, &projection, &settings).unwrap();
+    let on_detector = tallied.sums.primary_ev_per_history / 50e3;
+    let expected: f64 = image.iter().sum::<f64>() / 50e3;
+    let error = (expected * (1.0 - expected) / 40_000.0).sqrt();
+    assert!((on_detector - expected).abs() < 4.0 * error); // 6e-5
+}
+
+/// Air kerma and fluence per mAs fall with the square of the distance; the field of a fan grows with it.
+#[test]
+fn readings_per_mas_follow_the_inverse_square() {
+    let spectrum = spectrum();
+    let at = |distance_mm: f64| {
+        let mut projection = frontal(10, 10.0);
+        projection.source_detector_mm = distance_mm;
+        projection.source.collimation = Collimation::Fan {
+            angles_deg: [8.0, 6.0],
+        };
+        let settings = FastSettings {
+            scatter_histories: 1,
+            ..FastSettings::default()
+        };
+        let image = fast(&slab(10.0, 1e-9), &spectrum, &projection, &settings).unwrap();
+        (
+            image.open_field_ev_cm2 * image.histories_per_mas.unwrap(),
+            image.histories_per_mas,
+        )
+    };
+    let (near, far) = (at(1_100.0), at(2_200.0));
+    assert!(
+        (near.0 / far.0 / 4.0 - 1.0).abs() < 1e-9,
+        "{near:?}, {far:?}"
+    );
+    assert_eq!(
+        near.1, far.1,
+        "a fan takes the same photons at any distance"
+    );
+}
+
+/// Quantum noise of a scintillator: variance over mean of the readings of many pixels is ⟨ε²⟩/⟨ε⟩, above that of
+/// the ideal detector by the Swank factor; analog against the moments of the table through the fast engine.
+#[test]
+fn noise_of_a_scintillator_is_compound_poisson() {
+    let vacuum = slab(10.0, 1e-9);
+    let spectrum = Spectrum::monoenergetic(60.0).unwrap();
+    let mut projection = frontal(40, 1.0);
+    projection.receptor.model = DetectorModel::Csi {
+        thickness_um: 400.0,
+        packing: 0.8,
+    };
+    let histories = 400_000;
+    let tallied = analog(
+        &vacuum,
+        &spectrum,
+        &projection,
+        &AnalogSettings { histories, seed: 3 },
+    );
+    let settings = FastSettings {
+        dose_histories: histories as f64,
+        scatter_histories: 1,
+        ..FastSettings::default()
+    };
+    let drawn = fast(&vacuum, &spectrum, &projection, &settings).unwrap();
+    let of = |values: &[f32]| {
+        let n = values.len() as f64;
+        let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / n;
+        let variance = values
+            .iter()
+            .map(|&v| (f64::from(v) - mean).powi(2))
+            .sum::<f64>()
+            / n;
+        (mean, variance)
+    };
+    let a = of(&tallied.unwrap().layer(Category::Primary).value);
+    let b = of(&drawn.layer(Category::Primary).value);
+    // 1600 pixels of 250 photons: variance to 3.5 % each, mean to 0.17 %; 4 sigma of the difference.
+    assert!((a.0 / b.0 - 1.0).abs() < 0.010, "means {} and {}", a.0, b.0);
+    assert!(
+        (a.1 / b.1 - 1.0).abs() < 0.20,
+        "variances {} and {}",
+        a.1,
+        b.1
+    );
+}
