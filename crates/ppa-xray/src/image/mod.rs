@@ -1,5 +1,7 @@
 //! The radiograph, its presentation and its files.
 
+pub(crate) mod enhancement;
 pub(crate) mod output;
 pub(crate) mod presentation;
+pub(crate) mod pyramid;
 pub(crate) mod radiograph;

@@ -2,93 +2,214 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::image::enhancement::{Lift, lifted};
+use crate::image::pyramid::Plane;
 use crate::image::radiograph::Radiograph;
 
 /// Why a presentation cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("the presentation's {what} is {found}, expected {expected}")]
-pub struct PresentationError {
-    /// Which parameter.
-    pub what: &'static str,
-    /// What it was.
-    pub found: f64,
-    /// What it may be.
-    pub expected: &'static str,
+#[non_exhaustive]
+pub enum PresentationError {
+    /// A parameter is out of range.
+    #[error("the presentation's {what} is {found}, expected {expected}")]
+    Parameter {
+        /// Which parameter.
+        what: &'static str,
+        /// What it was.
+        found: f64,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// No protocol has that name.
+    #[error("no presentation is named {found:?}; known are {}", known.join(", "))]
+    Protocol {
+        /// The name given.
+        found: String,
+        /// The names there are.
+        known: Vec<&'static str>,
+    },
 }
 
 /// Fixed mapping of a radiograph to grey values; never adapted to the single image.
 ///
 /// A pixel's log exposure is compared with the bare field, a = ln(open / reading), which for the primary alone is
-/// the line integral of the attenuation. Detail is lifted by an unsharp mask on a, as clinical processing
-/// does, and a sigmoid window (DICOM PS3.3 C.11.2.1.3.1) turns a into grey: 1 / (1 + exp(−4 (a − centre) / width)),
-/// stretched so that the bare field is black.
+/// the line integral of the attenuation. Faint detail that stands out of the noise is lifted band by band of a Laplacian
+/// pyramid, in the manner of clinical multi-scale processing (Vuylsteke and Schoeters, Proc. SPIE 2167 (1994) 551); the noise is known from
+/// the standard errors of the radiograph. Then a sigmoid window (DICOM PS3.3 C.11.2.1.3.1) turns a into grey:
+/// 1 / (1 + exp(−4 (a − centre) / width)), stretched so that the bare field is black. Pixels outside the field are black.
+///
+/// In a file it is a table of these numbers, or a name and what differs from it: `{ protocol = "ankle_lateral", width = 3.0 }`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(try_from = "PresentationTable")]
 pub struct Presentation {
     /// Log exposure shown as middle grey.
     pub centre: f64,
     /// Width of the window in log exposure.
     pub width: f64,
-    /// Power applied to the grey value after the window; above 1 darkens soft tissue.
-    pub gamma: f64,
-    /// Share of the local contrast that is added; 0 leaves the image as it is.
+    /// Share of the contrast of faint detail that is added; 0 leaves the image as it is.
     pub detail: f64,
-    /// Radius (standard deviation) of the Gaussian that local contrast is measured against, mm.
-    pub detail_radius_mm: f64,
+    /// Size from which detail gets less than half of that, mm.
+    pub detail_mm: f64,
+    /// Local contrast (root mean square) in log exposure from which detail gets less than half of that, so that strong edges
+    /// get no halo.
+    pub edge: f64,
+}
+
+/// A limb at 50 to 70 kVp.
+const LIMB: Presentation = Presentation {
+    centre: 2.4,
+    width: 4.0,
+    detail: 2.0,
+    detail_mm: 8.0,
+    edge: 0.12,
+};
+
+/// Fixed presentations by name. From the front the hindfoot is thicker than from the side.
+const PROTOCOLS: &[(&str, Presentation)] = &[
+    ("limb", LIMB),
+    (
+        "ankle_ap",
+        Presentation {
+            centre: 2.5,
+            width: 4.2,
+            ..LIMB
+        },
+    ),
+    (
+        "ankle_mortise",
+        Presentation {
+            centre: 2.5,
+            width: 4.2,
+            ..LIMB
+        },
+    ),
+    (
+        "ankle_lateral",
+        Presentation {
+            centre: 2.1,
+            width: 3.6,
+            ..LIMB
+        },
+    ),
+];
+
+/// A presentation as it stands in a file: a protocol, and what differs from it.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PresentationTable {
+    protocol: Option<String>,
+    centre: Option<f64>,
+    width: Option<f64>,
+    detail: Option<f64>,
+    detail_mm: Option<f64>,
+    edge: Option<f64>,
+}
+
+impl TryFrom<PresentationTable> for Presentation {
+    type Error = PresentationError;
+
+    fn try_from(table: PresentationTable) -> Result<Self, PresentationError> {
+        let base = table
+            .protocol
+            .map_or(Ok(LIMB), |name| Self::protocol(&name))?;
+        Ok(Self {
+            centre: table.centre.unwrap_or(base.centre),
+            width: table.width.unwrap_or(base.width),
+            detail: table.detail.unwrap_or(base.detail),
+            detail_mm: table.detail_mm.unwrap_or(base.detail_mm),
+            edge: table.edge.unwrap_or(base.edge),
+        })
+    }
 }
 
 impl Default for Presentation {
-    /// A limb at 50 to 70 kVp.
+    /// The protocol `limb`.
     fn default() -> Self {
-        Self {
-            centre: 2.2,
-            width: 3.0,
-            gamma: 1.0,
-            detail: 0.9,
-            detail_radius_mm: 12.0,
-        }
+        LIMB
     }
 }
 
 /// Readings below this share of the bare field count as this share, so that empty pixels stay finite.
 const DARKEST: f64 = 1e-5;
 
+/// Log exposure from which a pixel counts as covered when a window is fitted.
+const COVERED: f32 = 0.1;
+
+/// Share of the covered pixels that a fitted window leaves at either end.
+const TAIL: f64 = 0.02;
+
+/// Standard error of the log exposure of a pixel that nothing reached.
+const EMPTY_SIGMA: f64 = 1.0;
+
 impl Presentation {
+    /// Names of the fixed presentations.
+    pub fn protocols() -> impl Iterator<Item = &'static str> {
+        PROTOCOLS.iter().map(|(name, _)| *name)
+    }
+
+    /// A fixed presentation by name.
+    ///
+    /// # Errors
+    /// [`PresentationError::Protocol`] with the names there are.
+    pub fn protocol(name: &str) -> Result<Self, PresentationError> {
+        let found = PROTOCOLS.iter().find(|(known, _)| *known == name);
+        found
+            .map(|(_, presentation)| *presentation)
+            .ok_or_else(|| PresentationError::Protocol {
+                found: name.to_owned(),
+                known: Self::protocols().collect(),
+            })
+    }
+
+    /// The same presentation with a window that fits one image, for a look at something unknown: images that are to be
+    /// compared, or learnt from, want a fixed one. From the 2nd to the 98th percentile of what is not bare field.
+    ///
+    /// # Errors
+    /// [`PresentationError`] when a parameter is out of range, or when the image is bare or even, so that no window fits it.
+    pub fn fitted(&self, radiograph: &Radiograph) -> Result<Self, PresentationError> {
+        let mut covered = radiograph.enhanced_log_exposure(self)?;
+        covered.retain(|a| *a > COVERED);
+        covered.sort_unstable_by(f32::total_cmp);
+        let percentile = |share: f64| -> f64 {
+            let index = (share * covered.len().saturating_sub(1) as f64).round() as usize;
+            covered.get(index).copied().map_or(0.0, f64::from)
+        };
+        let (low, high) = (percentile(TAIL), percentile(1.0 - TAIL));
+        let fitted = Self {
+            centre: 0.5 * (low + high),
+            width: high - low,
+            ..*self
+        };
+        fitted.validate()?;
+        Ok(fitted)
+    }
+
     /// Checks that every parameter is in range.
     ///
     /// # Errors
-    /// [`PresentationError`] naming the parameter.
+    /// [`PresentationError::Parameter`] naming the parameter.
     pub fn validate(&self) -> Result<(), PresentationError> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
+        let positive_number = "a positive number";
         for (what, found, fine, expected) in [
             ("centre", self.centre, self.centre.is_finite(), "a number"),
-            (
-                "width",
-                self.width,
-                positive(self.width),
-                "a positive number",
-            ),
-            (
-                "gamma",
-                self.gamma,
-                positive(self.gamma),
-                "a positive number",
-            ),
+            ("width", self.width, positive(self.width), positive_number),
             (
                 "detail",
                 self.detail,
-                self.detail == 0.0 || positive(self.detail),
-                "0 or a positive number",
+                (0.0..=10.0).contains(&self.detail),
+                "0 to 10",
             ),
             (
-                "detail radius in mm",
-                self.detail_radius_mm,
-                positive(self.detail_radius_mm),
+                "detail size in mm",
+                self.detail_mm,
+                positive(self.detail_mm),
                 "a positive length",
             ),
+            ("edge", self.edge, positive(self.edge), positive_number),
         ] {
             if !fine {
-                return Err(PresentationError {
+                return Err(PresentationError::Parameter {
                     what,
                     found,
                     expected,
@@ -101,9 +222,7 @@ impl Presentation {
     fn grey(&self, log_exposure: f64) -> f64 {
         let sigmoid = |a: f64| 1.0 / (1.0 + (-4.0 * (a - self.centre) / self.width).exp());
         let open = sigmoid(0.0);
-        ((sigmoid(log_exposure) - open) / (1.0 - open))
-            .clamp(0.0, 1.0)
-            .powf(self.gamma)
+        ((sigmoid(log_exposure) - open) / (1.0 - open)).clamp(0.0, 1.0)
     }
 }
 
@@ -113,58 +232,130 @@ impl Radiograph {
     /// # Errors
     /// [`PresentationError`] when a parameter is out of range.
     pub fn present(&self, presentation: &Presentation) -> Result<Vec<u16>, PresentationError> {
+        let enhanced = self.enhanced_log_exposure(presentation)?;
+        Ok(enhanced
+            .iter()
+            .map(|&a| (65_535.0 * presentation.grey(f64::from(a))).round() as u16)
+            .collect())
+    }
+
+    /// Log exposure with its detail lifted, before the window; that of the bare field outside the field.
+    pub(crate) fn enhanced_log_exposure(
+        &self,
+        presentation: &Presentation,
+    ) -> Result<Vec<f32>, PresentationError> {
         presentation.validate()?;
-        let log_exposure: Vec<f64> = self
+        let (image, sigma): (Vec<f32>, Vec<f32>) = self
             .total()
             .iter()
+            .zip(self.sigma())
             .enumerate()
-            .map(|(pixel, &reading)| {
-                -(f64::from(reading) / self.open_field_at(pixel))
-                    .max(DARKEST)
-                    .ln()
+            .map(|(pixel, (&reading, sigma))| {
+                log_exposure(
+                    f64::from(reading),
+                    f64::from(sigma),
+                    self.open_field_at(pixel),
+                )
             })
-            .collect();
-        let radius_px = presentation.detail_radius_mm / self.detector.pixel_mm;
-        let blurred = if presentation.detail > 0.0 {
-            gaussian_blur(&log_exposure, self.columns(), radius_px)
-        } else {
-            log_exposure.clone()
+            .unzip();
+        if presentation.detail == 0.0 {
+            return Ok(image);
+        }
+        let image = Plane {
+            columns: self.columns(),
+            rows: self.rows(),
+            values: image,
         };
-        Ok(log_exposure
-            .iter()
-            .zip(&blurred)
-            .map(|(&a, &base)| {
-                let lifted = a + presentation.detail * (a - base);
-                (65_535.0 * presentation.grey(lifted)).round() as u16
-            })
-            .collect())
+        let lift = Lift {
+            detail: presentation.detail,
+            size_px: presentation.detail_mm / self.detector.pixel_mm,
+            edge: presentation.edge,
+        };
+        Ok(lifted(&image, &sigma, &lift))
     }
 }
 
-/// Separable Gaussian of standard deviation `sigma_px`, renormalised at the edges.
-fn gaussian_blur(image: &[f64], columns: usize, sigma_px: f64) -> Vec<f64> {
-    let rows = image.len() / columns;
-    let reach = ((3.0 * sigma_px).ceil() as usize).min(rows.max(columns));
-    let kernel: Vec<f64> = (0..=reach)
-        .map(|d| (-0.5 * (d as f64 / sigma_px).powi(2)).exp())
-        .collect();
-    let along = |source: &[f64], length: usize, start: usize, stride: usize, target: &mut [f64]| {
-        for i in 0..length {
-            let (mut sum, mut weight) = (0.0, 0.0);
-            for j in i.saturating_sub(reach)..(i + reach + 1).min(length) {
-                let share = kernel[i.abs_diff(j)];
-                sum += share * source[start + j * stride];
-                weight += share;
+/// ln(open / reading) and its standard error.
+fn log_exposure(reading: f64, sigma: f64, open: f64) -> (f32, f32) {
+    if open <= 0.0 {
+        return (0.0, 0.0);
+    }
+    let (share, sigma) = (reading / open, sigma / open);
+    if share <= DARKEST {
+        return (-DARKEST.ln() as f32, EMPTY_SIGMA as f32);
+    }
+    (-share.ln() as f32, (sigma / share) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_names_a_protocol_and_what_differs() {
+        let read = toml::from_str::<Presentation>;
+        assert_eq!(read("").unwrap(), Presentation::default());
+        let lateral = Presentation::protocol("ankle_lateral").unwrap();
+        let read_lateral = read("protocol = \"ankle_lateral\"\nwidth = 3.0").unwrap();
+        assert_eq!(
+            read_lateral,
+            Presentation {
+                width: 3.0,
+                ..lateral
             }
-            target[start + i * stride] = sum / weight;
+        );
+        let text = toml::to_string(&lateral).unwrap();
+        assert_eq!(read(&text).unwrap(), lateral);
+        let error = read("protocol = \"knee\"").unwrap_err();
+        assert!(error.message().contains("ankle_mortise"), "{error}");
+        assert!(read("gamma = 1.0").is_err());
+        for name in Presentation::protocols() {
+            Presentation::protocol(name).unwrap().validate().unwrap();
         }
-    };
-    let (mut across, mut both) = (vec![0.0; image.len()], vec![0.0; image.len()]);
-    for row in 0..rows {
-        along(image, columns, row * columns, 1, &mut across);
     }
-    for column in 0..columns {
-        along(&across, rows, column, columns, &mut both);
+
+    #[test]
+    fn parameters_out_of_range_are_refused() {
+        for (what, broken) in [
+            (
+                "centre",
+                Presentation {
+                    centre: f64::NAN,
+                    ..LIMB
+                },
+            ),
+            ("width", Presentation { width: 0.0, ..LIMB }),
+            (
+                "detail",
+                Presentation {
+                    detail: -1.0,
+                    ..LIMB
+                },
+            ),
+            (
+                "detail",
+                Presentation {
+                    detail: 11.0,
+                    ..LIMB
+                },
+            ),
+            (
+                "size",
+                Presentation {
+                    detail_mm: 0.0,
+                    ..LIMB
+                },
+            ),
+            (
+                "edge",
+                Presentation {
+                    edge: f64::INFINITY,
+                    ..LIMB
+                },
+            ),
+        ] {
+            let message = broken.validate().unwrap_err().to_string();
+            assert!(message.contains(what), "{message}");
+        }
     }
-    both
 }
