@@ -43,6 +43,7 @@ mod dose;
 mod engine;
 mod image;
 mod matter;
+pub mod mcgpu;
 mod octaves;
 mod phantom;
 mod philox;

@@ -1,0 +1,179 @@
+//! What can be wrong with the files of MC-GPU.
+
+use std::path::PathBuf;
+
+use crate::beam::spectrum_error::SpectrumError;
+use crate::matter::material_error::MaterialError;
+use crate::phantom::voxels::PhantomError;
+
+/// Why an MC-GPU input file, or a file it names, cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum McgpuError {
+    /// The file cannot be read, or its gzip stream is broken.
+    #[error("cannot read {}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file that the input file names is not there.
+    #[error(
+        "{}, line {line}: {what} {} is not a file{hint}", input.display(), file.display()
+    )]
+    Missing {
+        /// The input file.
+        input: PathBuf,
+        /// Line that names the file.
+        line: u64,
+        /// What the file is for, such as `material file 3`.
+        what: String,
+        /// The file, resolved against the input file.
+        file: PathBuf,
+        /// What could stand there instead; empty or a sub-clause.
+        hint: &'static str,
+    },
+    /// A line does not hold what it should.
+    #[error("{}, line {line}: found {found:?}, expected {expected}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: u64,
+        /// What stands there, shortened.
+        found: String,
+        /// What should stand there.
+        expected: String,
+    },
+    /// The file is shorter than it should be.
+    #[error("{} ends after line {line}, expected {expected}", path.display())]
+    Ends {
+        /// The file.
+        path: PathBuf,
+        /// The last line.
+        line: u64,
+        /// What should follow.
+        expected: String,
+    },
+    /// A section of another version of MC-GPU.
+    #[error(
+        "{}, line {line}: section {section} of another version ({found:?}), expected {expected} as in MC-GPU v1.3",
+        path.display()
+    )]
+    Version {
+        /// The input file.
+        path: PathBuf,
+        /// The line of the headline.
+        line: u64,
+        /// Name of the section.
+        section: &'static str,
+        /// The headline.
+        found: String,
+        /// Its version in MC-GPU v1.3.
+        expected: &'static str,
+    },
+    /// The header promises more voxels than the file can hold.
+    #[error(
+        "{}: the header names {size:?} voxels, but {bytes} bytes hold {most} at most",
+        path.display()
+    )]
+    VoxelsMissing {
+        /// The voxel file.
+        path: PathBuf,
+        /// Voxels along x, y, z.
+        size: [u64; 3],
+        /// Length of the file.
+        bytes: u64,
+        /// Voxels that a file of that length can hold.
+        most: u64,
+    },
+    /// The voxels do not fit into the memory.
+    #[error(
+        "{}: {size:?} voxels need at least {needed_mb} MB of memory, and {available_mb} MB are to be had",
+        path.display()
+    )]
+    Memory {
+        /// The voxel file.
+        path: PathBuf,
+        /// Voxels along x, y, z.
+        size: [u64; 3],
+        /// Memory that they need, 10⁶ bytes.
+        needed_mb: u64,
+        /// Memory that there is, 10⁶ bytes.
+        available_mb: u64,
+    },
+    /// A voxel names a material that the input file does not list.
+    #[error("{} names material {found}, but {} lists {listed}", path.display(), input.display())]
+    MaterialNumber {
+        /// The voxel file.
+        path: PathBuf,
+        /// The input file.
+        input: PathBuf,
+        /// Highest material number of the voxels, counted from 1.
+        found: u8,
+        /// Materials listed.
+        listed: usize,
+    },
+    /// Photons at energies that the tables of a material do not cover.
+    #[error(
+        "the spectrum {} reaches from {low_kev} to {high_kev} keV, but {} only covers {table_low_kev} to {table_high_kev} keV",
+        spectrum.display(), material.display()
+    )]
+    Energies {
+        /// The spectrum file.
+        spectrum: PathBuf,
+        /// Lowest photon energy, keV.
+        low_kev: f64,
+        /// Highest photon energy, keV.
+        high_kev: f64,
+        /// The material file.
+        material: PathBuf,
+        /// Lowest energy of the tables, keV.
+        table_low_kev: f64,
+        /// Highest energy of the tables, keV.
+        table_high_kev: f64,
+    },
+    /// The numbers of a material file make no material.
+    #[error("{} is no usable material", path.display())]
+    Material {
+        /// The material file.
+        path: PathBuf,
+        /// Why.
+        source: MaterialError,
+    },
+    /// A `ppa:NAME` line names no material of the library.
+    #[error("{}, line {line}", input.display())]
+    Named {
+        /// The input file.
+        input: PathBuf,
+        /// Line that names the material.
+        line: u64,
+        /// Why.
+        source: MaterialError,
+    },
+    /// The spectrum is not usable.
+    #[error("{} is no usable spectrum", path.display())]
+    Spectrum {
+        /// The spectrum file.
+        path: PathBuf,
+        /// Why.
+        source: SpectrumError,
+    },
+    /// The voxels make no phantom.
+    #[error("{} is no usable geometry", path.display())]
+    Phantom {
+        /// The voxel file.
+        path: PathBuf,
+        /// Why.
+        source: PhantomError,
+    },
+    /// An image or dose file cannot be written.
+    #[error("cannot write {}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}

@@ -1,0 +1,569 @@
+//! The input file (`.in`) of MC-GPU v1.3.
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Point3, Unit, Vector3};
+
+use crate::mcgpu::error::McgpuError;
+use crate::mcgpu::lines::{Lines, columns, holds, numbers};
+
+/// Numbers below this are seconds, not histories.
+const SECONDS_BELOW: f64 = 1e5;
+
+/// Most materials that one byte per voxel can name.
+const MATERIALS: usize = 255;
+
+/// Most projections; a helical scan of ten turns with one per degree needs fewer.
+const PROJECTIONS: u32 = 10_000;
+
+/// How long each projection runs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RunLength {
+    /// Photons emitted into the field.
+    Histories(u64),
+    /// Wall-clock time.
+    Seconds(f64),
+}
+
+/// The path of source and detector around an axis along z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trajectory {
+    /// Projections of the whole scan; with 1 the other fields mean nothing.
+    pub projections: u32,
+    /// Turn from one projection to the next, degrees, from x towards y.
+    pub step_deg: f64,
+    /// Projections at other angles are left out; the angle of the source as seen from the axis, 0 along x.
+    pub angles_of_interest_deg: [f64; 2],
+    /// Distance of the source from the axis, which the first central beam meets, cm.
+    pub source_axis_cm: f64,
+    /// Rise along z from one projection to the next, cm.
+    pub rise_cm: f64,
+}
+
+/// The box of voxels whose dose is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VoxelDose {
+    /// Name of the file to write.
+    pub file: String,
+    /// First voxel along x, y, z, counted from 0.
+    pub first: [usize; 3],
+    /// Last voxel along x, y, z, counted from 0; it belongs to the box.
+    pub last: [usize; 3],
+}
+
+/// Where the data of a material come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum MaterialSource {
+    /// An MC-GPU material file, `.mcgpu` or `.mcgpu.gz`.
+    File(PathBuf),
+    /// A material of this library, written as `ppa:NAME`.
+    Library(String),
+}
+
+/// A line of the material list.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MaterialLine {
+    /// Line of the input file, counted from 1.
+    pub line: u64,
+    /// What it names.
+    pub source: MaterialSource,
+}
+
+/// A file that the input file names.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedFile {
+    /// Line of the input file, counted from 1.
+    pub line: u64,
+    /// The file, resolved against the folder of the input file.
+    pub path: PathBuf,
+}
+
+/// What an input file says. Lengths in cm, in the frame of the voxel box: its corner with the lowest coordinates is the
+/// origin.
+///
+/// The numbers of the graphics card, its threads, and the histories per thread are read over.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Input {
+    /// The input file.
+    pub path: PathBuf,
+    /// How long each projection runs.
+    pub run_length: RunLength,
+    /// Seed of the random numbers.
+    pub seed: u64,
+    /// The energy spectrum, `.spc`.
+    pub spectrum: NamedFile,
+    /// Focal spot of the first projection.
+    pub source_cm: Point3<f64>,
+    /// Central beam of the first projection.
+    pub direction: Unit<Vector3<f64>>,
+    /// Full apertures of the fan along the columns and along the rows of the detector, degrees; `None` when the field
+    /// is exactly the detector.
+    ///
+    /// The columns come first, as in the code of MC-GPU; its comment in the file ("polar and azimuthal") says otherwise.
+    pub apertures_deg: Option<[f64; 2]>,
+    /// Name of the image file to write.
+    pub image_file: String,
+    /// Pixels along the columns (across the beam in the xy plane) and the rows (along z).
+    pub pixels: [u32; 2],
+    /// Extent of the detector, columns and rows.
+    pub detector_cm: [f64; 2],
+    /// From the source to the centre of the detector, along the central beam.
+    pub source_detector_cm: f64,
+    /// The scan.
+    pub trajectory: Trajectory,
+    /// Whether the energy in every material is asked for.
+    pub material_dose: bool,
+    /// Voxels whose dose is asked for.
+    pub voxel_dose: Option<VoxelDose>,
+    /// The geometry, penEasy `.vox` or `.vox.gz`.
+    pub voxels: NamedFile,
+    /// Materials; the voxels count them from 1.
+    pub materials: Vec<MaterialLine>,
+}
+
+impl Input {
+    /// Reads an input file; the files that it names are looked at later.
+    ///
+    /// Text after `#` and lines without anything else say nothing. Sections stand in the order of MC-GPU.
+    ///
+    /// # Errors
+    /// [`McgpuError`] naming file, line, what was found and what expected.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, McgpuError> {
+        let path = path.as_ref();
+        let mut values = Values {
+            lines: Lines::open(path)?,
+            headline: None,
+        };
+        let folder = path.parent().unwrap_or(Path::new(""));
+
+        values.section("SIMULATION CONFIG", Some("v.2009-05-12"))?;
+        let run_length = values.run_length()?;
+        let [seed] = values.number("a seed, an integer of 0 or more", |[seed]| {
+            (0.0..=9e15).contains(&seed) && seed.fract() == 0.0
+        })?;
+        for what in [
+            "the number of the graphics card",
+            "threads per block",
+            "histories per thread",
+        ] {
+            values.number(what, |[_]: [f64; 1]| true)?;
+        }
+
+        values.section("SOURCE", Some("v.2011-07-12"))?;
+        let spectrum = values.file("an energy spectrum file", folder)?;
+        let source_cm = values.number("the source position x y z in cm", all_lengths)?;
+        let direction = values.number(
+            "the direction u v w of the beam, not the null vector",
+            |direction: [f64; 3]| all_lengths(direction) && Vector3::from(direction).norm() > 1e-9,
+        )?;
+        let apertures = values.number(
+            "two apertures below 180 degrees, or negative ones for the whole detector",
+            |apertures: [f64; 2]| apertures.iter().all(|a| *a < 180.0 && a.is_finite()),
+        )?;
+
+        values.section("IMAGE DETECTOR", Some("v.2009-12-02"))?;
+        let image_file = values.output_name("an image file name")?;
+        let pixels = values.number("the number of pixels Nx Nz, 1 to 65536", |n: [f64; 2]| {
+            n.iter()
+                .all(|n| (1.0..=65_536.0).contains(n) && n.fract() == 0.0)
+        })?;
+        let detector_cm = values.number("the image size Dx Dz in cm", all_positive)?;
+        let [source_detector_cm] =
+            values.number("the source-detector distance in cm", all_positive)?;
+
+        values.section("CT SCAN TRAJECTORY", Some("v.2011-10-25"))?;
+        let trajectory = values.trajectory(direction, source_detector_cm)?;
+
+        values.section("DOSE DEPOSITION", Some("v.2012-12-12"))?;
+        let material_dose = values.yes()?;
+        let voxel_dose = values.yes()?.then(|| values.voxel_dose()).transpose()?;
+
+        values.section("VOXELIZED GEOMETRY FILE", Some("v.2009-11-30"))?;
+        let voxels = values.file("a voxel geometry file", folder)?;
+
+        values.section("MATERIAL", None)?;
+        let materials = values.materials(folder)?;
+        Ok(Self {
+            path: path.into(),
+            run_length,
+            seed: seed as u64,
+            spectrum,
+            source_cm: Point3::from(source_cm),
+            direction: Unit::new_normalize(Vector3::from(direction)),
+            apertures_deg: (apertures[0] > -1e-7 && apertures[1] > -1e-7)
+                .then_some(apertures.map(|aperture| aperture.max(0.0))),
+            image_file,
+            pixels: pixels.map(|n| n as u32),
+            detector_cm,
+            source_detector_cm,
+            trajectory,
+            material_dose,
+            voxel_dose,
+            voxels,
+            materials,
+        })
+    }
+}
+
+/// The headline of a section, shortened.
+fn headline(line: &[u8]) -> Option<String> {
+    let shown = || {
+        String::from_utf8_lossy(&line[..line.len().min(80)])
+            .trim()
+            .to_owned()
+    };
+    holds(line, "SECTION ").then(shown)
+}
+
+/// A length of at most a kilometre in either direction.
+fn all_lengths<const N: usize>(lengths_cm: [f64; N]) -> bool {
+    lengths_cm.iter().all(|length| length.abs() <= 1e5)
+}
+
+fn all_positive<const N: usize>(lengths_cm: [f64; N]) -> bool {
+    lengths_cm
+        .iter()
+        .all(|length| (1e-4..=1e5).contains(length))
+}
+
+/// The lines of an input file that hold values.
+struct Values {
+    lines: Lines,
+    /// The headline that ended the section, until the next section is looked for.
+    headline: Option<String>,
+}
+
+impl Values {
+    /// Goes on to the headline of a section.
+    fn section(
+        &mut self,
+        section: &'static str,
+        version: Option<&'static str>,
+    ) -> Result<(), McgpuError> {
+        let name = format!("SECTION {section}");
+        loop {
+            let found = match self.headline.take() {
+                Some(headline) => headline,
+                None => match self.lines.next()? {
+                    Some(line) => headline(line).unwrap_or_default(),
+                    None => {
+                        let version = version.unwrap_or_default();
+                        return Err(self.lines.ends(format!("[{name} {version}]")));
+                    }
+                },
+            };
+            if !found.contains(&name) {
+                continue;
+            }
+            return match version {
+                Some(expected) if !found.contains(&format!("{name} {expected}")) => {
+                    Err(McgpuError::Version {
+                        path: self.lines.path().into(),
+                        line: self.lines.number(),
+                        section,
+                        found,
+                        expected,
+                    })
+                }
+                _ => Ok(()),
+            };
+        }
+    }
+
+    /// The next line that says something, without comment and outer blanks; `None` at a headline or the end.
+    fn next(&mut self) -> Result<Option<String>, McgpuError> {
+        while let Some(line) = self.lines.next()? {
+            self.headline = headline(line);
+            if self.headline.is_some() {
+                return Ok(None);
+            }
+            let value = line.split(|&byte| byte == b'#').next().unwrap_or_default();
+            let value = value.trim_ascii();
+            if !value.is_empty() {
+                return Ok(Some(String::from_utf8_lossy(value).into_owned()));
+            }
+        }
+        Ok(None)
+    }
+
+    fn value(&mut self, expected: &str) -> Result<String, McgpuError> {
+        match (self.next()?, &self.headline) {
+            (Some(value), _) => Ok(value),
+            (None, Some(headline)) => Err(self.lines.unexpected(headline.as_bytes(), expected)),
+            (None, None) => Err(self.lines.ends(expected)),
+        }
+    }
+
+    /// The first numbers of the next line, which `fits` must accept.
+    fn number<const N: usize>(
+        &mut self,
+        expected: &str,
+        fits: impl FnOnce([f64; N]) -> bool,
+    ) -> Result<[f64; N], McgpuError> {
+        let value = self.value(expected)?;
+        match numbers(value.as_bytes()) {
+            Some(found) if found.iter().all(|n| n.is_finite()) && fits(found) => Ok(found),
+            _ => Err(self.lines.unexpected(value.as_bytes(), expected)),
+        }
+    }
+
+    fn run_length(&mut self) -> Result<RunLength, McgpuError> {
+        let expected = "the number of histories, or a time in seconds below 100000";
+        let [found] = self.number(expected, |[n]| (1e-3..=1e18).contains(&n))?;
+        Ok(if found < SECONDS_BELOW {
+            RunLength::Seconds(found)
+        } else {
+            RunLength::Histories(found as u64)
+        })
+    }
+
+    /// The first word of the next line.
+    fn word(&mut self, expected: &str) -> Result<String, McgpuError> {
+        let value = self.value(expected)?;
+        Ok(columns(value.as_bytes()).next().unwrap_or_default().into())
+    }
+
+    fn file(&mut self, expected: &str, folder: &Path) -> Result<NamedFile, McgpuError> {
+        let path = folder.join(self.word(expected)?);
+        let line = self.lines.number();
+        Ok(NamedFile { line, path })
+    }
+
+    /// The name of a file to write, without its folder: results go where the caller wants them.
+    fn output_name(&mut self, expected: &str) -> Result<String, McgpuError> {
+        let word = self.word(expected)?;
+        match Path::new(&word).file_name() {
+            Some(name) => Ok(name.to_string_lossy().into_owned()),
+            None => Err(self.lines.unexpected(word.as_bytes(), expected)),
+        }
+    }
+
+    fn trajectory(
+        &mut self,
+        [u, v, w]: [f64; 3],
+        source_detector_cm: f64,
+    ) -> Result<Trajectory, McgpuError> {
+        let expected = format!("the number of projections, 0 to {PROJECTIONS}");
+        let [projections] = self.number(&expected, |[n]| {
+            (0.0..=f64::from(PROJECTIONS)).contains(&n) && n.fract() == 0.0
+        })?;
+        // MC-GPU takes none for one.
+        let projections = projections.max(1.0) as u32;
+        if projections == 1 {
+            return Ok(Trajectory {
+                projections,
+                step_deg: 0.0,
+                angles_of_interest_deg: [0.0, 360.0],
+                source_axis_cm: 0.0,
+                rise_cm: 0.0,
+            });
+        }
+        if w.abs() > 1e-5 * Vector3::new(u, v, w).norm() {
+            return Err(self.lines.unexpected(
+                projections.to_string().as_bytes(),
+                "1 projection, since the beam is not perpendicular to the axis z",
+            ));
+        }
+        let angle = |angle: &f64| angle.abs() <= 1e6;
+        let [step_deg] = self.number("the angle between projections in degrees", |[step]| {
+            angle(&step)
+        })?;
+        let angles_of_interest_deg = self.number(
+            "the first and the last angle of interest",
+            |angles: [f64; 2]| angles.iter().all(angle) && angles[0] <= angles[1],
+        )?;
+        let expected = "the distance from the source to the axis in cm, 0 to that of the detector";
+        let [source_axis_cm] = self.number(expected, |[distance]| {
+            (0.0..=source_detector_cm).contains(&distance)
+        })?;
+        let [rise_cm] = self.number(
+            "the vertical translation between projections in cm",
+            all_lengths,
+        )?;
+        Ok(Trajectory {
+            projections,
+            step_deg,
+            angles_of_interest_deg,
+            source_axis_cm,
+            rise_cm,
+        })
+    }
+
+    fn yes(&mut self) -> Result<bool, McgpuError> {
+        let expected = "YES or NO";
+        let value = self.value(expected)?;
+        match value.as_bytes() {
+            [b'Y' | b'y', b'E' | b'e', ..] => Ok(true),
+            [b'N' | b'n', b'O' | b'o', ..] => Ok(false),
+            _ => Err(self.lines.unexpected(value.as_bytes(), expected)),
+        }
+    }
+
+    fn voxel_dose(&mut self) -> Result<VoxelDose, McgpuError> {
+        let file = self.output_name("a dose file name")?;
+        let (mut first, mut last) = ([0; 3], [0; 3]);
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let expected = format!("the first and the last voxel along {name}, counted from 1");
+            let [low, high] = self.number(&expected, |[low, high]: [f64; 2]| {
+                low.fract() == 0.0 && high.fract() == 0.0 && 1.0 <= low && low <= high && high < 1e9
+            })?;
+            (first[axis], last[axis]) = (low as usize - 1, high as usize - 1);
+        }
+        Ok(VoxelDose { file, first, last })
+    }
+
+    fn materials(&mut self, folder: &Path) -> Result<Vec<MaterialLine>, McgpuError> {
+        let mut materials = Vec::new();
+        while let Some(value) = self.next()? {
+            if materials.len() == MATERIALS {
+                return Err(self
+                    .lines
+                    .unexpected(value.as_bytes(), "at most 255 materials"));
+            }
+            let word = columns(value.as_bytes()).next().unwrap_or_default();
+            materials.push(MaterialLine {
+                line: self.lines.number(),
+                source: match word.strip_prefix("ppa:") {
+                    Some(name) => MaterialSource::Library(name.into()),
+                    None => MaterialSource::File(folder.join(word)),
+                },
+            });
+        }
+        if materials.is_empty() {
+            return Err(self.lines.ends("at least one material file"));
+        }
+        Ok(materials)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mcgpu::mangled;
+
+    const SAMPLE: &str = include_str!("sample.in");
+
+    fn read(text: &[u8]) -> Result<Input, McgpuError> {
+        mangled::read(text, |path| Input::read(path))
+    }
+
+    #[test]
+    fn every_value_of_a_scan_is_read() {
+        let file = tempfile::tempdir().unwrap();
+        let path = file.path().join("scan.in");
+        std::fs::write(&path, SAMPLE).unwrap();
+        let input = Input::read(&path).unwrap();
+        let here = |name: &str| file.path().join(name);
+        assert_eq!(input.run_length, RunLength::Histories(250_000));
+        assert_eq!(input.seed, 1_234_567_890);
+        assert_eq!(input.spectrum.path, here("../beam.spc"));
+        assert_eq!(input.spectrum.line, 11);
+        assert_eq!(input.source_cm, Point3::new(2.5, -37.0, 1.5));
+        assert_eq!(input.direction.into_inner(), Vector3::y());
+        assert_eq!(input.apertures_deg, None);
+        assert_eq!(input.image_file, "image.dat");
+        assert_eq!(input.pixels, [35, 25]);
+        assert_eq!(input.detector_cm, [7.0, 5.0]);
+        assert_eq!(input.source_detector_cm, 90.0);
+        let trajectory = Trajectory {
+            projections: 3,
+            step_deg: 45.0,
+            angles_of_interest_deg: [0.0, 5000.0],
+            source_axis_cm: 60.0,
+            rise_cm: 0.5,
+        };
+        assert_eq!(input.trajectory, trajectory);
+        assert!(input.material_dose);
+        let dose = VoxelDose {
+            file: "dose.dat".into(),
+            first: [0, 1, 2],
+            last: [9, 10, 11],
+        };
+        assert_eq!(input.voxel_dose, Some(dose));
+        assert_eq!(input.voxels.path, here("head.vox.gz"));
+        let materials: Vec<_> = input.materials.iter().map(|m| m.source.clone()).collect();
+        let air = MaterialSource::File(here("../materials/air.mcgpu.gz"));
+        assert_eq!(materials, [air, MaterialSource::Library("water".into())]);
+    }
+
+    #[test]
+    fn a_small_number_is_a_time_and_one_projection_needs_no_scan() {
+        let text = SAMPLE
+            .replace("2.5e5 ", "90 ")
+            .replace("-15.0 -15.0", "10.0 0.0")
+            .replacen("\n3 ", "\n0 ", 1)
+            .replace('\n', "\r\n");
+        let input = read(text.as_bytes()).unwrap();
+        assert_eq!(input.run_length, RunLength::Seconds(90.0));
+        assert_eq!(input.apertures_deg, Some([10.0, 0.0]));
+        assert_eq!(input.trajectory.projections, 1);
+        assert_eq!(input.trajectory.source_axis_cm, 0.0);
+    }
+
+    #[test]
+    fn mistakes_are_told_with_their_line() {
+        let wrong = |from: &str, to: &str| {
+            assert!(SAMPLE.contains(from), "{from}");
+            read(SAMPLE.replacen(from, to, 1).as_bytes())
+                .unwrap_err()
+                .to_string()
+        };
+        for (from, to, told) in [
+            (
+                "2.5e5 ",
+                "-1 ",
+                "line 4: found \"-1\", expected the number of histories",
+            ),
+            ("2.5 -37.0", "2.5 nan", "line 12: found \"2.5 nan 1.5\""),
+            ("0.0 1.0 0.0", "0 0 0", "line 13"),
+            ("-15.0 -15.0", "200 5", "line 14"),
+            (
+                "35 25",
+                "35",
+                "line 18: found \"35\", expected the number of pixels",
+            ),
+            ("7.0 5.0", "7.0 0", "line 19"),
+            ("\n3 ", "\n-3 ", "line 23"),
+            (
+                "0.0 1.0 0.0",
+                "0.0 1.0 0.1",
+                "line 23: found \"3\", expected 1 projection",
+            ),
+            ("60.0 ", "91.0 ", "line 26"),
+            (
+                "YES",
+                "MAYBE",
+                "line 30: found \"MAYBE\", expected YES or NO",
+            ),
+            ("2 11", "12 11", "line 34"),
+            (
+                "v.2012-12-12",
+                "v.2011-02-18",
+                "line 29: section DOSE DEPOSITION of another version",
+            ),
+            (
+                "#[SECTION VOXELIZED",
+                "#[",
+                "expected [SECTION VOXELIZED GEOMETRY FILE",
+            ),
+            ("90.0 ", "# ", "line 22: found \"#[SECTION CT SCAN"),
+        ] {
+            let found = wrong(from, to);
+            assert!(found.contains(told), "{from} → {to}: {found}");
+        }
+        let (before, _) = SAMPLE.split_once("../materials").unwrap();
+        let found = read(before.as_bytes()).unwrap_err().to_string();
+        assert!(
+            found.contains("expected at least one material file"),
+            "{found}"
+        );
+    }
+
+    proptest::proptest! {
+        /// Whatever a damaged file holds, reading ends in an input or an error.
+        #[test]
+        fn a_damaged_file_is_read_or_refused(damage in mangled::damage()) {
+            let _ = read(&mangled::damaged(SAMPLE.as_bytes(), &damage));
+        }
+    }
+}

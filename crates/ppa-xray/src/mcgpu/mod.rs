@@ -1,0 +1,12 @@
+//! Input files of MC-GPU v1.3 (Badal and Badano, Med. Phys. 36:4878, 2009, doi:10.1118/1.3231824) as they are.
+
+mod error;
+mod input;
+mod lines;
+#[cfg(test)]
+mod mangled;
+mod voxel_file;
+
+pub use error::McgpuError;
+pub use input::{Input, MaterialLine, MaterialSource, NamedFile, RunLength, Trajectory, VoxelDose};
+pub use voxel_file::VoxelFile;

@@ -1,0 +1,381 @@
+//! Voxel geometries in the text layout of penEasy 2008 (`.vox`, `.vox.gz`).
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Point3, Vector3};
+use ppa_ct::Grid;
+
+use crate::matter::material::Material;
+use crate::mcgpu::error::McgpuError;
+use crate::mcgpu::lines::{Lines, columns, holds, numbers};
+use crate::phantom::voxels::{PhantomError, VoxelPhantom};
+
+/// Fewest bytes that a voxel takes in the file: two digits, the blank between them, and a line feed.
+const BYTES_PER_LINE: u64 = 4;
+
+/// Bytes that a voxel takes in memory: material, density, and what the transport makes of them.
+const BYTES_PER_VOXEL: u64 = 10;
+
+/// Last column that material and density may stand in.
+const LAST_COLUMN: usize = 16;
+
+/// Material number and density of every voxel of a box whose corner with the lowest coordinates is the origin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VoxelFile {
+    /// The file.
+    pub path: PathBuf,
+    /// Voxels along x, y, z.
+    pub size: [usize; 3],
+    /// Sides of a voxel, cm.
+    pub side_cm: [f64; 3],
+    /// Material number, counted from 1; x runs fastest, then y, then z.
+    pub material: Vec<u8>,
+    /// Density, g/cm³, in the same order.
+    pub density_g_cm3: Vec<f32>,
+}
+
+impl VoxelFile {
+    /// Reads a voxel file, one line per voxel. Empty lines and lines that begin with `#` are read over.
+    ///
+    /// The header names the columns of material and density; MC-GPU takes the first two, whatever it says.
+    ///
+    /// # Errors
+    /// [`McgpuError`] for a header or a voxel that makes no sense, for more or fewer voxels than the header names, and
+    /// for a volume that the memory cannot hold. No memory is asked for before the length of the file allows it.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, McgpuError> {
+        Self::read_into(path.as_ref(), available_bytes())
+    }
+
+    fn read_into(path: &Path, available: u64) -> Result<Self, McgpuError> {
+        let mut lines = Lines::open(path)?;
+        let header = Header::read(&mut lines)?;
+        let voxels = header.voxels(&lines, available)?;
+        let mut material = Vec::with_capacity(voxels);
+        let mut density_g_cm3 = Vec::with_capacity(voxels);
+        while let Some(line) = lines.next()? {
+            if says_nothing(line) {
+                continue;
+            }
+            if material.len() == voxels {
+                let line = line.to_vec();
+                let expected = format!("nothing after the {voxels} voxels of the header");
+                return Err(lines.unexpected(&line, expected));
+            }
+            let Some((number, density)) = header.voxel(line) else {
+                let line = line.to_vec();
+                return Err(lines.unexpected(&line, header.expected_line()));
+            };
+            material.push(number);
+            density_g_cm3.push(density);
+        }
+        if material.len() < voxels {
+            let found = material.len();
+            return Err(lines.ends(format!("{voxels} voxels, found {found}")));
+        }
+        Ok(Self {
+            path: path.into(),
+            size: header.size.map(|n| n as usize),
+            side_cm: header.side_cm,
+            material,
+            density_g_cm3,
+        })
+    }
+
+    /// Highest material number.
+    pub fn highest_material(&self) -> u8 {
+        self.material.iter().copied().max().unwrap_or(0)
+    }
+
+    /// The geometry with its materials, number 1 first. The axes are kept; lengths become mm.
+    ///
+    /// # Errors
+    /// [`PhantomError`] when a voxel names a material that is not there.
+    pub fn into_phantom(self, materials: Vec<Material>) -> Result<VoxelPhantom, PhantomError> {
+        let side_mm = Vector3::from(self.side_cm) * 10.0;
+        let first_centre = Point3::from(side_mm * 0.5);
+        let grid = Grid::axis_aligned(self.size, side_mm, first_centre)
+            .expect("the sides are positive and no axis is empty");
+        let mut material = self.material;
+        for number in &mut material {
+            *number -= 1;
+        }
+        VoxelPhantom::new(grid, material, self.density_g_cm3, materials)
+    }
+}
+
+/// What stands above the voxels.
+struct Header {
+    size: [u64; 3],
+    side_cm: [f64; 3],
+    /// Columns of material and density, from 0.
+    columns: [usize; 2],
+}
+
+impl Header {
+    fn read(lines: &mut Lines) -> Result<Self, McgpuError> {
+        while !expect(lines, "[SECTION VOXELS HEADER")?
+            .windows(15)
+            .any(|part| part == b"[SECTION VOXELS")
+        {}
+        let expected = "the number of voxels along x, y, z";
+        let line = expect(lines, expected)?;
+        let size = numbers::<3>(&line)
+            .filter(|size| {
+                size.iter()
+                    .all(|n| n.fract() == 0.0 && (1.0..=1e9).contains(n))
+            })
+            .ok_or_else(|| lines.unexpected(&line, expected))?
+            .map(|n| n as u64);
+        let expected = "the sides of a voxel in cm, 0.0001 to 1000";
+        let line = expect(lines, expected)?;
+        let side_cm = numbers::<3>(&line)
+            .filter(|side| side.iter().all(|side| (1e-4..=1e3).contains(side)))
+            .ok_or_else(|| lines.unexpected(&line, expected))?;
+        let mut column = [0, 1];
+        let mut index = 0;
+        loop {
+            let line = expect(lines, "[END OF VXH SECTION]")?;
+            if holds(&line, "[END OF VXH SECTION") {
+                break;
+            }
+            if let Some(column) = column.get_mut(index) {
+                let expected = format!("a column number from 1 to {LAST_COLUMN}");
+                *column = columns(&line)
+                    .next()
+                    .and_then(|number| number.parse().ok())
+                    .filter(|number| (1..=LAST_COLUMN).contains(number))
+                    .ok_or_else(|| lines.unexpected(&line, expected))?
+                    - 1;
+            }
+            index += 1;
+        }
+        if column[0] == column[1] {
+            let expected = "material and density in different columns";
+            return Err(lines.unexpected(b"the same column for both", expected));
+        }
+        Ok(Self {
+            size,
+            side_cm,
+            columns: column,
+        })
+    }
+
+    /// Number of voxels, if file and memory can hold them.
+    fn voxels(&self, lines: &Lines, available: u64) -> Result<usize, McgpuError> {
+        // At most 10²⁷: no overflow in 128 bits.
+        let voxels: u128 = self.size.iter().map(|&n| u128::from(n)).product();
+        // The last line may lack its line feed.
+        let most = lines.most_text_bytes().saturating_add(1) / BYTES_PER_LINE;
+        if voxels > u128::from(most) {
+            return Err(McgpuError::VoxelsMissing {
+                path: lines.path().into(),
+                size: self.size,
+                bytes: lines.file_bytes(),
+                most,
+            });
+        }
+        let needed = voxels * u128::from(BYTES_PER_VOXEL);
+        if needed > u128::from(available) || usize::try_from(needed).is_err() {
+            return Err(McgpuError::Memory {
+                path: lines.path().into(),
+                size: self.size,
+                needed_mb: (needed / 1_000_000) as u64,
+                available_mb: available / 1_000_000,
+            });
+        }
+        Ok(voxels as usize)
+    }
+
+    /// Material number and density in a line.
+    #[inline]
+    fn voxel(&self, line: &[u8]) -> Option<(u8, f32)> {
+        let (number, density) = if self.columns == [0, 1] {
+            let mut columns = columns(line);
+            (columns.next()?, columns.next()?)
+        } else {
+            let column = |index| columns(line).nth(index);
+            (column(self.columns[0])?, column(self.columns[1])?)
+        };
+        let number = number.parse().ok().filter(|&number: &u8| number >= 1)?;
+        let density = density.parse().ok()?;
+        (1e-9..=1e3).contains(&density).then_some((number, density))
+    }
+
+    fn expected_line(&self) -> String {
+        let [material, density] = self.columns.map(|column| column + 1);
+        format!(
+            "a material number from 1 to 255 in column {material} and a density from 1e-9 to 1000 g/cm³ in column {density}"
+        )
+    }
+}
+
+/// The next line, which must be there.
+fn expect(lines: &mut Lines, expected: &str) -> Result<Vec<u8>, McgpuError> {
+    let line = lines.next()?.map(<[u8]>::to_vec);
+    line.ok_or_else(|| lines.ends(expected))
+}
+
+#[inline]
+fn says_nothing(line: &[u8]) -> bool {
+    match line.iter().find(|byte| !byte.is_ascii_whitespace()) {
+        Some(first) => *first == b'#',
+        None => true,
+    }
+}
+
+/// Memory that can be had without swapping, as the system says; without an answer, 16 GB.
+fn available_bytes() -> u64 {
+    let said = std::fs::read_to_string("/proc/meminfo")
+        .ok()
+        .and_then(|text| {
+            let line = text
+                .lines()
+                .find_map(|line| line.strip_prefix("MemAvailable:"))?;
+            let kilobytes: u64 = line.split_whitespace().next()?.parse().ok()?;
+            kilobytes.checked_mul(1_024)
+        });
+    said.unwrap_or(16_000_000_000)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+    use crate::mcgpu::mangled;
+
+    const SAMPLE: &str = "a box\n[SECTION VOXELS HEADER v.2008-04-13]\n3 2 2   No. OF VOXELS IN X,Y,Z\n\
+        0.1 0.2 0.4   VOXEL SIZE (cm) ALONG X,Y,Z\n 1   COLUMN NUMBER WHERE MATERIAL ID IS LOCATED\n\
+        2   COLUMN NUMBER WHERE THE MASS DENSITY IS LOCATED\n 1   BLANK LINES AT END OF X,Y-CYCLES (1=YES,0=NO)\n\
+        [END OF VXH SECTION]\n1 0.0012\n1 1.2E-3\n 2 1.06 left over\n\n1 0.0012\n2\t1.\n2 1\n\n# z\n\n1 .001\n\
+        1 1\n1 1\n\n1 1\n3 4.5\n255 1";
+
+    fn read(text: &[u8]) -> Result<VoxelFile, McgpuError> {
+        mangled::read(text, |path| VoxelFile::read_into(path, 1_000_000))
+    }
+
+    #[test]
+    fn voxels_are_read_x_first_with_blank_lines_and_comments_between() {
+        let file = read(SAMPLE.as_bytes()).unwrap();
+        assert_eq!(file.size, [3, 2, 2]);
+        assert_eq!(file.side_cm, [0.1, 0.2, 0.4]);
+        assert_eq!(file.material, [1, 1, 2, 1, 2, 2, 1, 1, 1, 1, 3, 255]);
+        let densities = [
+            0.0012, 0.0012, 1.06, 0.0012, 1.0, 1.0, 0.001, 1.0, 1.0, 1.0, 4.5, 1.0,
+        ];
+        assert_eq!(file.density_g_cm3, densities);
+        assert_eq!(file.highest_material(), 255);
+        assert_eq!(
+            read(SAMPLE.replace('\n', "\r\n").as_bytes())
+                .unwrap()
+                .material,
+            file.material
+        );
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        gzip.write_all(SAMPLE.as_bytes()).unwrap();
+        assert_eq!(
+            read(&gzip.finish().unwrap()).unwrap().material,
+            file.material
+        );
+    }
+
+    #[test]
+    fn the_box_begins_at_the_origin_and_keeps_its_axes() {
+        let mut file = read(SAMPLE.as_bytes()).unwrap();
+        file.material.fill(1);
+        let water = Material::named("water").unwrap();
+        let phantom = file.into_phantom(vec![water]).unwrap();
+        let corners = phantom.corners_ct();
+        assert!(corners[0].coords.norm() < 1e-12);
+        assert!((corners[7] - Point3::new(3.0, 4.0, 8.0)).norm() < 1e-12);
+        assert_eq!(phantom.density_g_cm3()[2], 1.06);
+    }
+
+    #[test]
+    fn columns_are_those_of_the_header() {
+        let text = SAMPLE
+            .replace(" 1   COLUMN", "3 C")
+            .replace("2   COLUMN", "1 C");
+        let (header, _) = text.split_once("1 0.0012").unwrap();
+        let text = format!("{header}{}", "1.5 x 7\n".repeat(12));
+        let file = read(text.as_bytes()).unwrap();
+        assert_eq!((file.material[0], file.density_g_cm3[11]), (7, 1.5));
+    }
+
+    #[test]
+    fn mistakes_are_told_with_their_line() {
+        let told = |from: &str, to: &str| {
+            assert!(SAMPLE.contains(from), "{from}");
+            let text = SAMPLE.replacen(from, to, 1);
+            read(text.as_bytes()).unwrap_err().to_string()
+        };
+        for (from, to, expected) in [
+            ("3 2 2", "3 2 0", "line 3: found \"3 2 0"),
+            (
+                "3 2 2",
+                "3 2 3",
+                "ends after line 25, expected 18 voxels, found 12",
+            ),
+            (
+                "3 2 2",
+                "3 2 1",
+                "line 19: found \"1 .001\", expected nothing after the 6 voxels",
+            ),
+            ("3 2 2", "1e9 1e9 1e9", "voxels, but"),
+            ("0.2", "-0.2", "line 4"),
+            ("0.2", "NaN", "line 4"),
+            ("2   COLUMN", "0 COLUMN", "line 6"),
+            (
+                "2   COLUMN",
+                "1 COLUMN",
+                "expected material and density in different columns",
+            ),
+            (
+                "1.06",
+                "nan",
+                "line 11: found \"2 nan left over\", expected a material number",
+            ),
+            ("1.06", "0", "line 11"),
+            ("3 4.5", "0 4.5", "line 24"),
+            ("3 4.5", "256 4.5", "line 24"),
+            ("3 4.5", "3", "line 24: found \"3\""),
+            ("[END", "", "expected [END OF VXH SECTION]"),
+            ("[SECTION", "", "expected [SECTION VOXELS HEADER"),
+        ] {
+            let found = told(from, to);
+            assert!(found.contains(expected), "{from} → {to}: {found}");
+        }
+    }
+
+    #[test]
+    fn a_volume_beyond_file_or_memory_is_refused_before_it_is_read() {
+        let (header, _) = SAMPLE.split_once("1 0.0012").unwrap();
+        let huge = header.replacen("3 2 2", "2000 2000 2500", 1);
+        let found = read(huge.as_bytes()).unwrap_err().to_string();
+        assert!(found.contains("[2000, 2000, 2500] voxels, but "), "{found}");
+        let text = header.replacen("3 2 2", "50 50 50", 1) + &"1 1\n".repeat(125_000);
+        assert!(mangled::read(text.as_bytes(), |path| VoxelFile::read_into(path, 1 << 30)).is_ok());
+        let found = read(text.as_bytes()).unwrap_err().to_string();
+        let expected = "[50, 50, 50] voxels need at least 1 MB of memory, and 1 MB are to be had";
+        assert!(found.contains(expected), "{found}");
+    }
+
+    #[test]
+    fn a_broken_gzip_stream_is_refused() {
+        let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        gzip.write_all(SAMPLE.as_bytes()).unwrap();
+        let whole = gzip.finish().unwrap();
+        let cut = &whole[..whole.len() - 12];
+        assert!(matches!(read(cut).unwrap_err(), McgpuError::Read { .. }));
+        let missing = VoxelFile::read("/nowhere/head.vox").unwrap_err();
+        assert_eq!(missing.to_string(), "cannot read /nowhere/head.vox");
+    }
+
+    proptest::proptest! {
+        /// Whatever a damaged file holds, reading ends in voxels or an error.
+        #[test]
+        fn a_damaged_file_is_read_or_refused(damage in mangled::damage()) {
+            let _ = read(&mangled::damaged(SAMPLE.as_bytes(), &damage));
+        }
+    }
+}
