@@ -3,10 +3,15 @@
 mod error;
 mod input;
 mod lines;
+
 #[cfg(test)]
 mod mangled;
+mod material_file;
+mod trajectory;
 mod voxel_file;
 
 pub use error::McgpuError;
 pub use input::{Input, MaterialLine, MaterialSource, NamedFile, RunLength, Trajectory, VoxelDose};
+pub use material_file::read_material;
+pub use trajectory::Station;
 pub use voxel_file::VoxelFile;
