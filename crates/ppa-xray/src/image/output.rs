@@ -134,7 +134,7 @@ impl Radiograph {
 }
 
 /// Writes beside the target, syncs and renames, so that no reader ever meets half a file.
-fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let write = || {
         // Checked here, since a failed rename would leave the temporary file behind.
         if path.is_dir() {

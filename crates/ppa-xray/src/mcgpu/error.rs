@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::beam::spectrum_error::SpectrumError;
+use crate::image::output::OutputError;
 use crate::matter::material_error::MaterialError;
 use crate::phantom::voxels::PhantomError;
 
@@ -168,12 +169,20 @@ pub enum McgpuError {
         /// Why.
         source: PhantomError,
     },
-    /// An image or dose file cannot be written.
-    #[error("cannot write {}", path.display())]
-    Write {
-        /// The file.
+    /// Oblong pixels that no small number of square ones makes up.
+    #[error(
+        "{}: pixels of {width_cm} cm by {height_cm} cm, expected sides in a ratio of two integers of at most 32",
+        path.display()
+    )]
+    PixelShape {
+        /// The input file.
         path: PathBuf,
-        /// Why.
-        source: std::io::Error,
+        /// Width of a pixel, cm.
+        width_cm: f64,
+        /// Height of a pixel, cm.
+        height_cm: f64,
     },
+    /// An image or dose file cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
 }

@@ -1,17 +1,21 @@
 //! Input files of MC-GPU v1.3 (Badal and Badano, Med. Phys. 36:4878, 2009, doi:10.1118/1.3231824) as they are.
 
 mod error;
+mod image_file;
 mod input;
 mod lines;
 
 #[cfg(test)]
 mod mangled;
 mod material_file;
+mod simulation;
 mod trajectory;
 mod voxel_file;
 
 pub use error::McgpuError;
+pub use image_file::McgpuImage;
 pub use input::{Input, MaterialLine, MaterialSource, NamedFile, RunLength, Trajectory, VoxelDose};
 pub use material_file::read_material;
+pub use simulation::Simulation;
 pub use trajectory::Station;
 pub use voxel_file::VoxelFile;

@@ -81,23 +81,35 @@ impl VoxelFile {
         })
     }
 
-    /// Highest material number.
-    pub fn highest_material(&self) -> u8 {
-        self.material.iter().copied().max().unwrap_or(0)
+    /// Materials that occur, counted from 0, in ascending order.
+    pub fn materials(&self) -> Vec<u8> {
+        let mut occurs = [false; 256];
+        for &number in &self.material {
+            occurs[usize::from(number)] = true;
+        }
+        (1..=255)
+            .filter(|&number| occurs[usize::from(number)])
+            .map(|number| number - 1)
+            .collect()
     }
 
-    /// The geometry with its materials, number 1 first. The axes are kept; lengths become mm.
+    /// The geometry with the materials of [`VoxelFile::materials`], in that order. Axes and origin are kept; lengths
+    /// become mm.
     ///
     /// # Errors
-    /// [`PhantomError`] when a voxel names a material that is not there.
+    /// [`PhantomError`] when materials are missing.
     pub fn into_phantom(self, materials: Vec<Material>) -> Result<VoxelPhantom, PhantomError> {
+        let mut place = [0; 256];
+        for (index, &number) in self.materials().iter().enumerate() {
+            place[usize::from(number) + 1] = index as u8;
+        }
         let side_mm = Vector3::from(self.side_cm) * 10.0;
         let first_centre = Point3::from(side_mm * 0.5);
         let grid = Grid::axis_aligned(self.size, side_mm, first_centre)
             .expect("the sides are positive and no axis is empty");
         let mut material = self.material;
         for number in &mut material {
-            *number -= 1;
+            *number = place[usize::from(*number)];
         }
         VoxelPhantom::new(grid, material, self.density_g_cm3, materials)
     }
@@ -264,7 +276,7 @@ mod tests {
             0.0012, 0.0012, 1.06, 0.0012, 1.0, 1.0, 0.001, 1.0, 1.0, 1.0, 4.5, 1.0,
         ];
         assert_eq!(file.density_g_cm3, densities);
-        assert_eq!(file.highest_material(), 255);
+        assert_eq!(file.materials(), [0, 1, 2, 254]);
         assert_eq!(
             read(SAMPLE.replace('\n', "\r\n").as_bytes())
                 .unwrap()
@@ -281,10 +293,11 @@ mod tests {
 
     #[test]
     fn the_box_begins_at_the_origin_and_keeps_its_axes() {
-        let mut file = read(SAMPLE.as_bytes()).unwrap();
-        file.material.fill(1);
-        let water = Material::named("water").unwrap();
-        let phantom = file.into_phantom(vec![water]).unwrap();
+        let file = read(SAMPLE.as_bytes()).unwrap();
+        let materials =
+            ["air", "water", "titanium", "pmma"].map(|name| Material::named(name).unwrap());
+        let phantom = file.into_phantom(materials.to_vec()).unwrap();
+        assert_eq!(phantom.material(), [0, 0, 1, 0, 1, 1, 0, 0, 0, 0, 2, 3]);
         let corners = phantom.corners_ct();
         assert!(corners[0].coords.norm() < 1e-12);
         assert!((corners[7] - Point3::new(3.0, 4.0, 8.0)).norm() < 1e-12);

@@ -5,4 +5,5 @@
 pub(crate) enum Stream {
     History = 0,
     QuantumNoise = 1,
+    Projection = 2,
 }
