@@ -147,6 +147,11 @@ impl Simulation {
         }
     }
 
+    /// Takes another seed than that of the file.
+    pub fn set_seed(&mut self, seed: u64) {
+        self.input.seed = seed;
+    }
+
     /// Seed of a projection: that of the file for the first one, and unrelated ones for the others.
     pub fn seed(&self, station: &Station) -> u64 {
         if station.number == 0 {

@@ -2,6 +2,7 @@
 
 mod audit;
 mod materials;
+mod mcgpu;
 mod simulate;
 mod spectrum;
 
@@ -20,6 +21,8 @@ pub enum XrayCommand {
     Materials(materials::MaterialsArgs),
     /// What a HU calibration makes of a CT or a limb: material, volume, mass, clipped voxels
     Audit(audit::AuditArgs),
+    /// Run an input file of MC-GPU v1.3
+    Mcgpu(mcgpu::McgpuArgs),
 }
 
 #[derive(Debug, Args)]
@@ -51,5 +54,6 @@ pub fn run(command: &XrayCommand, output: Output) -> anyhow::Result<()> {
         XrayCommand::Spectrum(args) => spectrum::run(args, output),
         XrayCommand::Materials(args) => materials::run(args, output),
         XrayCommand::Audit(args) => audit::run(args, output),
+        XrayCommand::Mcgpu(args) => mcgpu::run(args, output),
     }
 }

@@ -13,7 +13,7 @@ use super::BeamArgs;
 use crate::output::{Output, Seconds, Stopwatch, working};
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum EngineName {
+pub(super) enum EngineName {
     /// Ray-traced primary, Monte Carlo scatter, added quantum noise
     Fast,
     /// Every history as nature plays it
