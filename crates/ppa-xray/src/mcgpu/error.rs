@@ -116,6 +116,19 @@ pub enum McgpuError {
         /// Materials listed.
         listed: usize,
     },
+    /// The voxels whose dose is asked for are not there.
+    #[error(
+        "{}: the dose region begins at voxel {first:?}, outside the geometry of {size:?} voxels",
+        path.display()
+    )]
+    DoseRegion {
+        /// The input file.
+        path: PathBuf,
+        /// First voxel, counted from 1.
+        first: [usize; 3],
+        /// Voxels of the geometry.
+        size: [usize; 3],
+    },
     /// Photons at energies that the tables of a material do not cover.
     #[error(
         "the spectrum {} reaches from {low_kev} to {high_kev} keV, but {} only covers {table_low_kev} to {table_high_kev} keV",

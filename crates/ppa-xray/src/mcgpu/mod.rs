@@ -1,5 +1,7 @@
 //! Input files of MC-GPU v1.3 (Badal and Badano, Med. Phys. 36:4878, 2009, doi:10.1118/1.3231824) as they are.
 
+mod analog;
+mod dose_file;
 mod error;
 mod image_file;
 mod input;
@@ -12,6 +14,7 @@ mod simulation;
 mod trajectory;
 mod voxel_file;
 
+pub use dose_file::ScanDose;
 pub use error::McgpuError;
 pub use image_file::McgpuImage;
 pub use input::{Input, MaterialLine, MaterialSource, NamedFile, RunLength, Trajectory, VoxelDose};

@@ -26,18 +26,24 @@ const NARROWEST_MM: f64 = 1e-3;
 /// An input file of MC-GPU v1.3 with its geometry, materials and spectrum, ready to run.
 ///
 /// ```no_run
-/// use ppa_xray::{AnalogSettings, analog, mcgpu::Simulation};
+/// use ppa_xray::mcgpu::{ScanDose, Simulation};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let simulation = Simulation::read("scan.in")?;
+/// let mut scan_dose = ScanDose::new(&simulation);
 /// for station in simulation.input().stations() {
-///     let projection = simulation.projection(&station);
-///     let settings = AnalogSettings { histories: 10_000_000, seed: simulation.seed(&station) };
-///     let radiograph = analog(simulation.phantom(), simulation.spectrum(), &projection, &settings)?;
+///     let length = simulation.input().run_length;
+///     let (radiograph, dose) = simulation.analog(&station, length, |_| {})?;
 ///     simulation.write_image("results".as_ref(), &station, &radiograph)?;
+///     if let Some(dose) = dose {
+///         scan_dose.add(&simulation, &dose);
+///     }
 /// }
+/// scan_dose.write("results".as_ref(), &simulation)?;
 /// # Ok(())
 /// # }
 /// ```
+///
+/// [`Simulation::projection`] gives the exposure for the fast engine.
 #[derive(Debug)]
 pub struct Simulation {
     input: Input,
@@ -72,6 +78,15 @@ impl Simulation {
                 source,
             })?;
         let voxels = VoxelFile::read(&input.voxels.path)?;
+        if let Some(dose) = &input.voxel_dose
+            && (0..3).any(|axis| dose.first[axis] >= voxels.size[axis])
+        {
+            return Err(McgpuError::DoseRegion {
+                path: input.path,
+                first: dose.first.map(|voxel| voxel + 1),
+                size: voxels.size,
+            });
+        }
         let listed = voxels.materials();
         if let Some(&highest) = listed
             .last()
@@ -161,6 +176,11 @@ impl Simulation {
         let mut rng = Philox::new(self.input.seed, Stream::Projection as u32, index);
         let mut word = || (rng.unit() * 4_294_967_296.0) as u64;
         word() << 32 | word()
+    }
+
+    /// Line of the material list, from 0, of each material of the phantom.
+    pub(crate) fn listed(&self) -> &[u8] {
+        &self.listed
     }
 
     /// Square pixels that make up a pixel of the image, along columns and rows.

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use ppa_xray::mcgpu::{RunLength, Simulation};
-use ppa_xray::{AnalogSettings, CategorySums, Engine, FastSettings, analog, fast};
+use ppa_xray::mcgpu::{RunLength, ScanDose, Simulation, Station};
+use ppa_xray::{CategorySums, Dose, Engine, FastSettings, Imparted, Radiograph, fast};
 use serde::Serialize;
 
 use super::simulate::EngineName;
@@ -14,18 +14,18 @@ use crate::output::{Output, Seconds, Stopwatch, working};
 
 #[derive(Debug, Args)]
 pub struct McgpuArgs {
-    /// Input file of MC-GPU v1.3
+    /// Input file of MC-GPU v1.3; a material line `ppa:NAME` takes a built-in material
     input: PathBuf,
-    /// Engine
+    /// Engine; doses need the analog one
     #[arg(long, value_enum, default_value = "analog")]
     engine: EngineName,
-    /// Histories of each projection: followed (analog) or whose noise the image carries (fast) [default: those of the file]
+    /// Histories of each projection: followed (analog) or whose noise the image carries (fast) [default: as the file says]
     #[arg(long)]
     histories: Option<f64>,
     /// Seed of histories and noise [default: that of the file]
     #[arg(long)]
     seed: Option<u64>,
-    /// Folder for the images and doses, which get the names that the file gives them
+    /// Folder for images and doses; they get the names that the file gives them
     #[arg(long)]
     out: PathBuf,
 }
@@ -33,20 +33,32 @@ pub struct McgpuArgs {
 #[derive(Debug, Serialize)]
 struct Simulated {
     projections: Vec<Projected>,
-    /// Of each projection.
+    /// Of each projection; the fewest, if a time limits them.
     histories: f64,
     engine: Engine,
+    #[serde(flatten)]
+    dose: Option<MaterialDose>,
     #[serde(flatten)]
     seconds: Seconds,
 }
 
 #[derive(Debug, Serialize)]
 struct Projected {
+    /// In the whole scan, from 0.
     number: u32,
     angle_deg: f64,
     #[serde(flatten)]
     sums: CategorySums,
+    histories: f64,
     image: PathBuf,
+}
+
+/// By line of the material list, per history of all projections.
+#[derive(Debug, Serialize)]
+struct MaterialDose {
+    material_dose_ev_per_history: Vec<f64>,
+    material_dose_ev_per_history_se: Vec<f64>,
+    material_mass_g: Vec<f64>,
 }
 
 pub fn run(args: &McgpuArgs, output: Output) -> anyhow::Result<()> {
@@ -55,18 +67,7 @@ pub fn run(args: &McgpuArgs, output: Output) -> anyhow::Result<()> {
     if let Some(seed) = args.seed {
         simulation.set_seed(seed);
     }
-    let histories = match (args.histories, simulation.input().run_length) {
-        (Some(histories), _) => histories,
-        (None, RunLength::Histories(histories)) => histories as f64,
-        (None, RunLength::Seconds(seconds)) => anyhow::bail!(
-            "{} asks for a run of {seconds} s; give the number of histories with --histories",
-            args.input.display()
-        ),
-    };
-    anyhow::ensure!(
-        (1.0..=1e15).contains(&histories),
-        "--histories is {histories}, expected 1 to 1e15"
-    );
+    let length = args.length(simulation.input().run_length)?;
     let stations = simulation.input().stations();
     anyhow::ensure!(
         !stations.is_empty(),
@@ -75,64 +76,130 @@ pub fn run(args: &McgpuArgs, output: Output) -> anyhow::Result<()> {
     );
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
+
     let watch = Stopwatch::start();
+    let mut dose = simulation
+        .dose_settings()
+        .map(|_| ScanDose::new(&simulation));
     let mut projections = Vec::new();
-    let mut engine = Engine::Analog;
     for (done, station) in stations.iter().enumerate() {
-        working.set_message(format!("projection {} of {}", done + 1, stations.len()));
-        let projection = simulation.projection(station);
-        let seed = simulation.seed(station);
-        let (phantom, spectrum) = (simulation.phantom(), simulation.spectrum());
-        let radiograph = match args.engine {
-            EngineName::Analog => {
-                let settings = AnalogSettings {
-                    histories: histories as u64,
-                    seed,
-                };
-                analog(phantom, spectrum, &projection, &settings)?
-            }
-            EngineName::Fast => {
-                let settings = FastSettings {
-                    dose_histories: histories,
-                    seed,
-                    ..FastSettings::default()
-                };
-                fast(phantom, spectrum, &projection, &settings)?
-            }
+        let which = format!("projection {} of {}", done + 1, stations.len());
+        working.set_message(which.clone());
+        let (radiograph, left) = match args.engine {
+            EngineName::Analog => simulation.analog(station, length, |progress| {
+                let seconds = progress
+                    .remaining
+                    .map_or(f64::NAN, |left| left.as_secs_f64());
+                working.set_message(format!("{which}, {seconds:.0} s left"));
+            })?,
+            EngineName::Fast => args.fast(&simulation, station, length)?,
         };
+        if let (Some(dose), Some(left)) = (&mut dose, &left) {
+            dose.add(&simulation, left);
+        }
         simulation.write_image(&args.out, station, &radiograph)?;
-        engine = radiograph.engine;
         projections.push(Projected {
             number: station.number,
             angle_deg: station.angle_deg,
             sums: radiograph.sums,
+            histories: radiograph.histories,
             image: args.out.join(simulation.image_name(station)),
         });
     }
+    if let Some(dose) = &dose {
+        dose.write(&args.out, &simulation)?;
+    }
     working.finish_and_clear();
+    let fewest = |fewest: f64, projected: &Projected| fewest.min(projected.histories);
     let result = Simulated {
+        histories: projections.iter().fold(f64::INFINITY, fewest),
         projections,
-        histories,
-        engine,
+        engine: match args.engine {
+            EngineName::Analog => Engine::Analog,
+            EngineName::Fast => Engine::Fast,
+        },
+        dose: dose.map(|dose| MaterialDose::new(&dose.materials())),
         seconds: watch.read(),
     };
-    output.print(&result, |result| {
-        let mut text = "eV per history on the detector\n".to_owned();
-        for projected in &result.projections {
-            text += &format!(
-                "{} ({:.2}°):",
-                projected.image.display(),
-                projected.angle_deg
-            );
-            for category in ppa_xray::Category::ALL {
-                let (value, se) = projected.sums.of(category);
-                text += &format!(" {} {value:.3} ± {se:.3}", category.name());
-            }
-            text.push('\n');
+    output.print(&result, text)
+}
+
+impl McgpuArgs {
+    fn length(&self, in_file: RunLength) -> anyhow::Result<RunLength> {
+        let Some(histories) = self.histories else {
+            return Ok(in_file);
+        };
+        anyhow::ensure!(
+            (1.0..=1e15).contains(&histories),
+            "--histories is {histories}, expected 1 to 1e15"
+        );
+        Ok(RunLength::Histories(histories as u64))
+    }
+
+    fn fast(
+        &self,
+        simulation: &Simulation,
+        station: &Station,
+        length: RunLength,
+    ) -> anyhow::Result<(Radiograph, Option<Dose>)> {
+        let file = self.input.display();
+        anyhow::ensure!(
+            simulation.dose_settings().is_none(),
+            "{file} asks for doses, which --engine analog counts; for --engine fast answer NO in its section DOSE DEPOSITION"
+        );
+        let RunLength::Histories(histories) = length else {
+            anyhow::bail!("{file} limits the time of a run; --engine fast needs --histories");
+        };
+        let settings = FastSettings {
+            dose_histories: histories as f64,
+            seed: simulation.seed(station),
+            ..FastSettings::default()
+        };
+        let projection = simulation.projection(station);
+        let radiograph = fast(
+            simulation.phantom(),
+            simulation.spectrum(),
+            &projection,
+            &settings,
+        )?;
+        Ok((radiograph, None))
+    }
+}
+
+impl MaterialDose {
+    fn new(materials: &[Imparted]) -> Self {
+        let all = |of: fn(&Imparted) -> f64| materials.iter().map(of).collect();
+        Self {
+            material_dose_ev_per_history: all(|imparted| imparted.ev_per_history.value),
+            material_dose_ev_per_history_se: all(|imparted| imparted.ev_per_history.se),
+            material_mass_g: all(|imparted| imparted.mass_g),
         }
-        text + &format!(
-            "{:.3e} histories each, {:.1} s, {:.1} CPU s",
-            result.histories, result.seconds.wall_s, result.seconds.cpu_s,
-        )
-    })
+    }
+}
+
+fn text(result: &Simulated) -> String {
+    let mut text = "eV per history on the detector\n".to_owned();
+    for projected in &result.projections {
+        let image = projected.image.display();
+        text += &format!("{image} ({:.2}°):", projected.angle_deg);
+        for category in ppa_xray::Category::ALL {
+            let (value, se) = projected.sums.of(category);
+            text += &format!(" {} {value:.3} ± {se:.3}", category.name());
+        }
+        text.push('\n');
+    }
+    if let Some(dose) = &result.dose {
+        text += "eV per history in the materials\n";
+        let estimates = dose
+            .material_dose_ev_per_history
+            .iter()
+            .zip(&dose.material_dose_ev_per_history_se);
+        for (index, (value, se)) in estimates.enumerate() {
+            text += &format!("{:>3} {value:.3} ± {se:.3}\n", index + 1);
+        }
+    }
+    text + &format!(
+        "{:.3e} histories each, {:.1} s, {:.1} CPU s",
+        result.histories, result.seconds.wall_s, result.seconds.cpu_s,
+    )
 }

@@ -1,0 +1,215 @@
+//! Doses of a whole scan, and the files that MC-GPU writes them to.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use crate::dose::report::{Dose, Estimate, Imparted};
+use crate::dose::settings::{DoseSettings, VoxelBox};
+use crate::image::output::write_whole;
+use crate::mcgpu::error::McgpuError;
+use crate::mcgpu::simulation::Simulation;
+
+/// Energy imparted by all projections of a scan, per history of all of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScanDose {
+    histories: u64,
+    /// By line of the material list.
+    materials: Vec<Sum>,
+    materials_mass_g: Vec<f64>,
+    voxels: Vec<Sum>,
+}
+
+/// Energy of all histories, eV, and the square of its standard error.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Sum {
+    ev: f64,
+    se_ev2: f64,
+}
+
+impl Sum {
+    fn add(&mut self, ev: f64, se_ev: f64, histories: f64) {
+        self.ev += ev * histories;
+        self.se_ev2 += (se_ev * histories).powi(2);
+    }
+
+    fn per_history(&self, histories: f64) -> Estimate {
+        Estimate {
+            value: self.ev / histories,
+            se: self.se_ev2.sqrt() / histories,
+        }
+    }
+}
+
+impl Simulation {
+    /// The doses that the input file asks for; `None` if it asks for none.
+    pub fn dose_settings(&self) -> Option<DoseSettings> {
+        let voxels = self.dose_box();
+        (self.input().material_dose || voxels.is_some()).then(|| DoseSettings {
+            voxels,
+            ..DoseSettings::default()
+        })
+    }
+
+    /// The voxels whose dose is asked for, cut at the border of the geometry as MC-GPU does.
+    pub(crate) fn dose_box(&self) -> Option<VoxelBox> {
+        let size = self.phantom().grid().size();
+        self.input().voxel_dose.as_ref().map(|dose| VoxelBox {
+            low: dose.first,
+            high: [0, 1, 2].map(|axis| (dose.last[axis] + 1).min(size[axis])),
+        })
+    }
+}
+
+impl ScanDose {
+    /// No dose yet.
+    pub fn new(simulation: &Simulation) -> Self {
+        let listed = simulation.input().materials.len();
+        let voxels = simulation
+            .dose_box()
+            .map_or(0, |voxels| voxels.size().iter().product());
+        Self {
+            histories: 0,
+            materials: vec![Sum::default(); listed],
+            materials_mass_g: vec![0.0; listed],
+            voxels: vec![Sum::default(); voxels],
+        }
+    }
+
+    /// Adds what one projection left.
+    ///
+    /// # Panics
+    /// If `dose` was not counted with [`Simulation::dose_settings`] of the same simulation.
+    pub fn add(&mut self, simulation: &Simulation, dose: &Dose) {
+        let histories = dose.histories as f64;
+        self.histories += dose.histories;
+        for (&listed, (_, imparted)) in simulation.listed().iter().zip(&dose.materials) {
+            let listed = usize::from(listed);
+            let Estimate { value, se } = imparted.ev_per_history;
+            self.materials[listed].add(value, se, histories);
+            self.materials_mass_g[listed] = imparted.mass_g;
+        }
+        if let Some(dose) = &dose.voxels {
+            assert_eq!(dose.ev_per_history.len(), self.voxels.len());
+            let estimates = dose.ev_per_history.iter().zip(&dose.ev_per_history_se);
+            for (sum, (&ev, &se)) in self.voxels.iter_mut().zip(estimates) {
+                sum.add(f64::from(ev), f64::from(se), histories);
+            }
+        }
+    }
+
+    /// Histories of all projections.
+    pub fn histories(&self) -> u64 {
+        self.histories
+    }
+
+    /// Energy and mass by line of the material list; zero for materials that no voxel has.
+    pub fn materials(&self) -> Vec<Imparted> {
+        let masses = self.materials_mass_g.iter();
+        masses
+            .zip(&self.materials)
+            .map(|(&mass_g, sum)| Imparted {
+                mass_g,
+                ev_per_history: sum.per_history(self.histories as f64),
+            })
+            .collect()
+    }
+
+    /// Writes the voxel doses into `folder`, if the input file asks for them, under the name that it gives: the
+    /// plane at the height of the source as text, with `.raw` behind the name all voxels as 32-bit floats in eV/g per
+    /// history, and with `_PercentRelError2sigma.raw` twice their relative standard errors in percent. x runs fastest.
+    ///
+    /// MC-GPU divides by the histories of all projections, those outside the angles of interest included; these doses are
+    /// per history that was followed.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, folder: &Path, simulation: &Simulation) -> Result<(), McgpuError> {
+        let (Some(asked), Some(voxels)) = (&simulation.input().voxel_dose, simulation.dose_box())
+        else {
+            return Ok(());
+        };
+        let grid = simulation.phantom().grid();
+        let densities = simulation.phantom().density_g_cm3();
+        let voxel_cm3 = grid.spacing_mm().product() / 1_000.0;
+        let doses: Vec<Estimate> = voxels
+            .voxels()
+            .zip(&self.voxels)
+            .map(|(voxel, sum)| {
+                let mass_g = f64::from(densities[grid.index(voxel)]) * voxel_cm3;
+                sum.per_history(self.histories as f64).scaled(1.0 / mass_g)
+            })
+            .collect();
+        let floats = |of: fn(&Estimate) -> f64| -> Vec<u8> {
+            let values = doses.iter().map(|dose| of(dose) as f32);
+            values.flat_map(f32::to_le_bytes).collect()
+        };
+        let relative = |dose: &Estimate| {
+            if dose.value > 0.0 {
+                200.0 * dose.se / dose.value
+            } else {
+                0.0
+            }
+        };
+        let name = &asked.file;
+        let text = self.text(simulation, &voxels, &doses);
+        write_whole(&folder.join(name), text.as_bytes())?;
+        write_whole(
+            &folder.join(format!("{name}.raw")),
+            &floats(|dose| dose.value),
+        )?;
+        let errors = format!("{name}_PercentRelError2sigma.raw");
+        write_whole(&folder.join(errors), &floats(relative))?;
+        Ok(())
+    }
+
+    fn text(&self, simulation: &Simulation, voxels: &VoxelBox, doses: &[Estimate]) -> String {
+        let grid = simulation.phantom().grid();
+        let side_cm = grid.spacing_mm() / 10.0;
+        let [columns, rows, planes] = voxels.size();
+        let height = simulation.input().source_cm.z / side_cm.z + 1e-5;
+        let within = (voxels.low[2] as f64..voxels.high[2] as f64).contains(&height);
+        let plane = if within {
+            height as usize
+        } else {
+            (voxels.low[2] + voxels.high[2] - 1) / 2
+        };
+        let bounds = |axis: usize| format!("[{},{}]", voxels.low[axis] + 1, voxels.high[axis]);
+        let mut text = format!(
+            "# \n#  Dose in the layout of MC-GPU v1.3, by the analog engine of ppa-xray\n#\n\
+             #  Energy imparted by photons to each voxel; electrons deposit where they are born.\n\
+             #  All voxels are in the .raw file (32-bit floats); here is the plane at the level\n\
+             #  of the source focal spot: z_coord = {plane} (z_coord in ROI = {})\n#\n\
+             #  Voxel size:  {:.6} x {:.6} x {:.6} = {:.6} cm^3\n\
+             #  Number of voxels in the reported region of interest (ROI) X, Y and Z:\n\
+             #      {columns}  {rows}  {planes}\n\
+             #  Coordinates of the ROI inside the voxel volume = X{}, Y{}, Z{}\n#\n\
+             #  Voxel dose units: eV/g per history\n\
+             #  X rows given first, then Y. One blank line separates the different Y.\n# \n\
+             #    [DOSE]   [2*standard_deviation]\n# =====================================\n",
+            plane - voxels.low[2],
+            side_cm.x,
+            side_cm.y,
+            side_cm.z,
+            side_cm.product(),
+            bounds(0),
+            bounds(1),
+            bounds(2),
+        );
+        let first = (plane - voxels.low[2]) * columns * rows;
+        for row in doses[first..first + columns * rows].chunks(columns) {
+            for dose in row {
+                writeln!(text, "{:.6} {:.6}", dose.value, 2.0 * dose.se)
+                    .expect("strings take everything");
+            }
+            text.push('\n');
+        }
+        let ev: f64 = self.voxels.iter().map(|sum| sum.ev).sum();
+        let kev = 1e-3 * ev / self.histories as f64;
+        text + &format!(
+            "\n#   ****** DOSE REPORT ******\n\
+             #       Total number of simulated x rays: {}\n\
+             \n#       Total energy absorved inside the dose ROI: {kev:.5} keV/hist\n\n",
+            self.histories,
+        )
+    }
+}
