@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod json;
+mod mcgpu;
 mod resume;
 
 use std::fs;

@@ -4,6 +4,7 @@ mod attenuation;
 mod case_a;
 mod exposure;
 mod files;
+mod mcgpu;
 mod placement;
 mod runs;
 mod scenes;

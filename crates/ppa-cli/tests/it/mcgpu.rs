@@ -1,0 +1,146 @@
+//! `ppa xray mcgpu`: keys, files and mistakes.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::{fail, names, succeed};
+
+/// A water box before a small detector, two projections, doses.
+fn write_input(folder: &Path) {
+    let header =
+        "[SECTION VOXELS HEADER v.2008-04-13]\n4 4 4\n1 1 1\n1\n2\n0\n[END OF VXH SECTION]\n";
+    fs::write(
+        folder.join("box.vox"),
+        header.to_owned() + &"1 1.0\n".repeat(64),
+    )
+    .unwrap();
+    fs::write(folder.join("beam.spc"), "40000 1\n60000 -1\n").unwrap();
+    let input = "#[SECTION SIMULATION CONFIG v.2009-05-12]\n2e5\n1\n0\n128\n150\n\
+        #[SECTION SOURCE v.2011-07-12]\nbeam.spc\n2 -50 2\n0 1 0\n-1 -1\n\
+        #[SECTION IMAGE DETECTOR v.2009-12-02]\nimage.dat\n10 10\n10 10\n60\n\
+        #[SECTION CT SCAN TRAJECTORY v.2011-10-25]\n2\n90\n0 720\n52\n0\n\
+        #[SECTION DOSE DEPOSITION v.2012-12-12]\nYES\nYES\ndose.dat\n1 4\n1 4\n1 4\n\
+        #[SECTION VOXELIZED GEOMETRY FILE v.2009-11-30]\nbox.vox\n\
+        #[SECTION MATERIAL FILE LIST v.2009-11-30]\nppa:water\n";
+    fs::write(folder.join("box.in"), input).unwrap();
+}
+
+#[test]
+fn the_result_has_its_keys_and_the_same_seed_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    write_input(folder.path());
+    // Paths resolve against the input file, not against the folder of the call.
+    let elsewhere = tempfile::tempdir().unwrap();
+    let run = |out: &str, more: &str| -> Value {
+        let input = folder.path().join("box.in");
+        let arguments = format!("xray mcgpu {} --out {out} --json {more}", input.display());
+        serde_json::from_str(&succeed(elsewhere.path(), &arguments)).unwrap()
+    };
+    let first = run("first", "--histories 20000");
+    for key in ["histories", "engine", "wall_s", "cpu_s"] {
+        assert!(first.get(key).is_some(), "{key}: {first}");
+    }
+    assert_eq!(first["histories"], 20_000.0);
+    assert_eq!(first["engine"], "analog");
+    let projections = first["projections"].as_array().unwrap();
+    assert_eq!(projections.len(), 2);
+    for projection in projections {
+        for name in ["primary", "compton", "rayleigh", "multiple"] {
+            let value = projection[format!("{name}_ev_per_history")]
+                .as_f64()
+                .unwrap();
+            let se = projection[format!("{name}_ev_per_history_se")]
+                .as_f64()
+                .unwrap();
+            assert!(0.0 < se && se < value, "{projection}");
+        }
+    }
+    let dose = first["material_dose_ev_per_history"].as_array().unwrap();
+    assert!(dose.len() == 1 && dose[0].as_f64().unwrap() > 1_000.0);
+    let files = [
+        "dose.dat",
+        "dose.dat.raw",
+        "dose.dat_PercentRelError2sigma.raw",
+        "image.dat_0000",
+        "image.dat_0000.raw",
+        "image.dat_0001",
+        "image.dat_0001.raw",
+    ];
+    assert_eq!(names(&elsewhere.path().join("first")), files);
+    run("again", "--histories 20000 --seed 1");
+    run("other", "--histories 20000 --seed 2");
+    let bytes = |run: &str, file: &str| fs::read(elsewhere.path().join(run).join(file)).unwrap();
+    for file in files {
+        assert_eq!(bytes("first", file), bytes("again", file), "{file}");
+        assert_ne!(bytes("first", file), bytes("other", file), "{file}");
+    }
+}
+
+#[test]
+fn mistakes_are_told_and_leave_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    write_input(folder.path());
+    let text = fs::read_to_string(folder.path().join("box.in")).unwrap();
+    for (from, to, more, told) in [
+        (
+            "ppa:water",
+            "water.mcgpu.gz",
+            "",
+            "material file 1 water.mcgpu.gz is not a file",
+        ),
+        (
+            "0 720",
+            "0 90",
+            "",
+            "no projection has an angle of interest",
+        ),
+        ("2e5", "none", "", "expected the number of histories"),
+        ("", "", "--histories 0", "--histories is 0"),
+        ("", "", "--engine fast", "asks for doses"),
+        (
+            "YES\nYES",
+            "NO\nNO",
+            "--engine fast --histories nan",
+            "--histories is NaN",
+        ),
+        ("2 -50 2", "2 -50 90", "", "misses"),
+    ] {
+        fs::write(folder.path().join("bad.in"), text.replacen(from, to, 1)).unwrap();
+        let said = fail(
+            folder.path(),
+            &format!("xray mcgpu bad.in --out results {more}"),
+        );
+        assert!(said.contains(told), "{told:?} is missing in: {said}");
+        let left = folder.path().join("results");
+        assert!(!left.exists() || names(&left).is_empty());
+    }
+    assert!(fail(folder.path(), "xray mcgpu nowhere.in --out results").contains("nowhere.in"));
+}
+
+#[test]
+fn a_time_limits_the_run_and_the_fast_engine_makes_an_image_without_dose() {
+    let folder = tempfile::tempdir().unwrap();
+    write_input(folder.path());
+    let text = fs::read_to_string(folder.path().join("box.in")).unwrap();
+    let text = text.replace("YES\nYES", "NO\nNO").replace("2e5", "0.2");
+    fs::write(folder.path().join("short.in"), text).unwrap();
+    let run = |more: &str| -> Value {
+        let arguments = format!("xray mcgpu short.in --out results --json {more}");
+        serde_json::from_str(&succeed(folder.path(), &arguments)).unwrap()
+    };
+    let analog = run("");
+    assert!(analog["histories"].as_f64().unwrap() > 1_000.0, "{analog}");
+    assert!(analog.get("material_dose_ev_per_history").is_none());
+    let fast = run("--engine fast --histories 1e9");
+    assert_eq!(fast["engine"], "fast");
+    assert_eq!(fast["histories"], 1e9);
+    let primary = |run: &Value| {
+        run["projections"][0]["primary_ev_per_history"]
+            .as_f64()
+            .unwrap()
+    };
+    let ratio = primary(&analog) / primary(&fast);
+    assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
+}
