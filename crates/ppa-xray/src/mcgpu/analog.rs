@@ -6,7 +6,6 @@ use std::time::Duration;
 use crate::dose::report::Dose;
 use crate::engine::analog::AnalogSettings;
 use crate::image::radiograph::Radiograph;
-use crate::matter::compton::ComptonModel;
 use crate::mcgpu::input::RunLength;
 use crate::mcgpu::simulation::Simulation;
 use crate::mcgpu::trajectory::Station;
@@ -46,8 +45,6 @@ impl Simulation {
         let settings = AnalogSettings {
             histories,
             seed: self.seed(station),
-            // That of MC-GPU.
-            compton_model: ComptonModel::ImpulseApproximation,
         };
         let projection = self.projection(station);
         let mut run = AnalogRun::new(self.phantom(), self.spectrum(), &projection, &settings)?;
