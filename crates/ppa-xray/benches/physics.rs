@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use ppa_xray::{Material, MaterialTables, Spectrum, TubeSpec};
+use ppa_xray::{ComptonModel, Material, MaterialTables, Spectrum, TubeSpec};
 
 /// Look-ups per iteration, at energies that jump about as those of histories do.
 const LOOKUPS: u64 = 1000;
@@ -22,7 +22,7 @@ fn tube() -> TubeSpec {
 
 fn look_ups(criterion: &mut Criterion) {
     let bone = Material::named("bone_cortical").expect("in the library");
-    let tables = MaterialTables::new(&bone);
+    let tables = MaterialTables::new(&bone, ComptonModel::default());
     let spectrum = Spectrum::tungsten(&tube()).expect("inside the tube model");
     let golden = |i: u64| (i as f64 * 0.618_033_988_749_895).fract();
     let energies: Vec<f64> = (0..LOOKUPS).map(|i| spectrum.sample(golden(i))).collect();
@@ -63,7 +63,7 @@ fn preparation(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("prepare");
     group.throughput(Throughput::Elements(1));
     group.bench_function("material_tables", |b| {
-        b.iter(|| MaterialTables::new(black_box(&bone)))
+        b.iter(|| MaterialTables::new(black_box(&bone), ComptonModel::default()))
     });
     group.bench_function("tungsten_spectrum", |b| {
         b.iter(|| Spectrum::tungsten(black_box(&tube)))

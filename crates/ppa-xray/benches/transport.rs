@@ -53,6 +53,7 @@ fn transport(criterion: &mut Criterion) {
     let settings = AnalogSettings {
         histories: 200_000,
         seed: 1,
+        ..AnalogSettings::default()
     };
     group.throughput(Throughput::Elements(settings.histories));
     group.sample_size(10);

@@ -5,7 +5,10 @@
     venv/bin/python crates/ppa-xray/scripts/make_cross_sections.py
 
 Source: xraylib 4.3.0 (BSD 3-clause), whose photoelectric, Rayleigh and Compton
-cross sections, form factors F(q) and scattering functions S(q) come from EPDL97.
+cross sections, form factors F(q) and scattering functions S(q) come from EPDL97,
+whose Compton profiles are those of Biggs, Mendelsohn and Mann (1975), and whose
+fluorescence yields, jump factors, line energies and radiative rates are those
+listed in its documentation (Schoonjans et al. 2011, doi:10.1016/j.sab.2011.09.011).
 Writes data/elements.bin.deflate (layout below) and prints its SHA-256.
 
 Layout, little endian, before raw DEFLATE:
@@ -18,6 +21,10 @@ Layout, little endian, before raw DEFLATE:
         f32[n_photo] photoelectric, cm2/g
         f32[n_energy] Rayleigh, cm2/g;  f32[n_energy] Compton, cm2/g
         f32[n_q] F(q);  f32[n_q] S(q)
+        u32 n_shells, per shell: f32 electrons, f32 binding energy in keV, f32 J(0) in atomic units
+        f32 K edge in keV, f32 K fluorescence yield, f32 share of the K shell in photoelectric absorption
+        per line K-alpha1, K-alpha2, K-beta1 (from M), K-beta2 (from N and beyond): f32 keV, f32 share
+        (all zero for an element without K fluorescence above 1 keV)
 All tables are meant for straight lines in log-log, except that F and S are
 linear in q below the first positive q.
 """
@@ -94,6 +101,69 @@ def photoelectric(z):
     return np.array(out, dtype=np.float64)
 
 
+SHELLS = [
+    f"{letter}{i}" if count > 1 else letter
+    for letter, count in zip("KLMNOPQ", (1, 3, 5, 7, 7, 5, 3))
+    for i in range(1, count + 1)
+]
+LINES = [
+    ["KL3"],
+    ["KL2"],
+    [f"KM{i}" for i in range(1, 6)],
+    [f"KN{i}" for i in range(1, 8)] + ["KO", "KP"],
+]
+
+
+def known(function, z, name, otherwise):
+    """What xraylib knows, or `otherwise` where it has no value."""
+    try:
+        return function(z, getattr(xraylib, name))
+    except (ValueError, AttributeError):
+        return otherwise
+
+
+def subshell_partner(name):
+    """The other spin-orbit half of a subshell, which has nearly the same profile: L2 and L3, M4 and M5."""
+    if len(name) == 1 or name[1] == "1":
+        return name
+    return name[0] + str(int(name[1]) ^ 1)
+
+
+def shells(z):
+    """(electrons, binding energy in keV, J(0)) of every occupied shell; no binding energy is 0."""
+    found = []
+    for name in SHELLS:
+        macro = name + "_SHELL"
+        electrons = known(xraylib.ElectronConfig, z, macro, 0.0)
+        if electrons > 0:
+            profiles = [
+                known(lambda z, shell: xraylib.ComptonProfile_Partial(z, shell, 0.0), z, half, None)
+                for half in (macro, subshell_partner(name) + "_SHELL")
+            ]
+            profile = next((value for value in profiles if value is not None), None)
+            found.append([electrons, known(xraylib.EdgeEnergy, z, macro, 0.0), profile])
+    assert abs(sum(electrons for electrons, _, _ in found) - z) < 1e-3, z
+    assert all(profile is not None for _, _, profile in found), z
+    return found
+
+
+def k_fluorescence(z):
+    edge = known(xraylib.EdgeEnergy, z, "K_SHELL", 0.0)
+    emitted = known(xraylib.FluorYield, z, "K_SHELL", 0.0)
+    jump = known(xraylib.JumpFactor, z, "K_SHELL", 1.0)
+    lines = []
+    for group in LINES:
+        rates = [known(xraylib.RadRate, z, name + "_LINE", 0.0) for name in group]
+        energies = [known(xraylib.LineEnergy, z, name + "_LINE", 0.0) for name in group]
+        rate = sum(rates)
+        lines.append((np.dot(rates, energies) / rate if rate > 0 else 0.0, rate))
+    total = sum(rate for _, rate in lines)
+    if edge < E_MIN or emitted == 0 or total == 0:
+        return [0.0] * 11
+    assert abs(total - 1) < 2e-3, (z, total)
+    return [edge, emitted, 1 - 1 / jump] + [v for energy, rate in lines for v in (energy, rate / total)]
+
+
 def main():
     energy = np.exp(np.linspace(np.log(E_MIN), np.log(E_MAX), 121))
     energy[0], energy[-1] = E_MIN, E_MAX
@@ -109,6 +179,8 @@ def main():
         blob += f32([xraylib.CS_Compt(z, float(e)) for e in energy])
         blob += f32([xraylib.FF_Rayl(z, float(x)) for x in q])
         blob += f32([xraylib.SF_Compt(z, float(x)) if x > 0 else 0.0 for x in q])
+        occupied = shells(z)
+        blob += struct.pack("<I", len(occupied)) + f32(occupied) + f32(k_fluorescence(z))
         print(z, len(photo), "nodes, edges at", np.round([a for a, _ in edges(z)], 4), flush=True)
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
     packed = packer.compress(blob) + packer.flush()

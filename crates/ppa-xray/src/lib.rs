@@ -1,7 +1,8 @@
 //! Monte Carlo transport of diagnostic x-rays (5–150 keV) through voxel phantoms, and the radiograph it makes.
 //!
 //! A [`Spectrum`] says which photons leave the source, a [`Material`] what a gram of matter does to them:
-//! photoelectric absorption, Rayleigh scattering with form factors, Compton scattering with Klein–Nishina × S(q).
+//! photoelectric absorption, Rayleigh scattering with form factors, Compton scattering off bound and moving electrons
+//! (or, by [`ComptonModel`], Klein–Nishina × S(q)).
 //! A [`VoxelPhantom`] is the patient, a [`Projection`] the exposure. Two engines make a [`Radiograph`] of them:
 //! [`analog`] follows every photon, [`fast`] ray-traces the primary, estimates the scatter, and adds the noise of the
 //! exposure asked for.
@@ -10,7 +11,7 @@
 //! `ct` (DICOM LPS); `device` has the source at the origin and z towards the detector. The device is moved, never the
 //! voxels.
 //! Left out: electrons deposit where they are born, since at 150 keV they travel about 0.3 mm in water, less than a voxel;
-//! fluorescence counts as absorbed; a Compton-scattered photon has the energy that a free electron at rest would leave it;
+//! fluorescence counts as absorbed;
 //! photons below 5 keV are absorbed on the spot. Cross sections and spectra reach down to 1 keV. The detector is ideal and
 //! has no grid; the focal spot is a point.
 //! Repeatable: random numbers are addressed by seed and history and tallies are integers, so the number of threads
@@ -64,12 +65,15 @@ pub use engine::raytrace::primary;
 pub use image::output::{EXR_ATTRIBUTE, OutputError};
 pub use image::presentation::{Presentation, PresentationError};
 pub use image::radiograph::{CategorySums, Engine, Layer, Radiograph};
+pub use matter::compton::ComptonModel;
 pub use matter::cross_sections::{CrossSections, MAX_ENERGY_KEV, MIN_ENERGY_KEV};
 pub use matter::electron_shell::Shell;
+pub use matter::fluorescence::FluorescenceLine;
 pub use matter::material::Material;
 pub use matter::material_error::MaterialError;
 pub use matter::photon_tables::PhotonTables;
 pub use matter::sampler::MaterialTables;
+pub use matter::scatter_density::ScatterDensities;
 pub use phantom::audit::{Audit, MaterialCount, SegmentAudit};
 pub use phantom::calibration_error::CalibrationError;
 pub use phantom::hu::{Composition, Constituent, HuCalibration, Segment};

@@ -21,12 +21,40 @@ impl Philox {
     /// Generator for item `index` of `stream`; nothing is computed before the first draw.
     #[inline]
     pub(crate) fn new(seed: u64, stream: u32, index: u64) -> Self {
+        Self::at(seed, stream, index, 0)
+    }
+
+    /// The same generator after `step` blocks of four numbers.
+    #[inline]
+    pub(crate) fn at(seed: u64, stream: u32, index: u64, step: u32) -> Self {
         Self {
-            key: [seed as u32, (seed >> 32) as u32],
-            counter: [index as u32, (index >> 32) as u32, 0, stream],
+            key: Self::key(seed),
+            counter: [index as u32, (index >> 32) as u32, step, stream],
             block: [0; 4],
             used: 4,
         }
+    }
+
+    /// The same generator with the block before the next, computed elsewhere, still to be drawn from.
+    #[inline]
+    pub(crate) fn after(self, block: [u32; 4]) -> Self {
+        Self {
+            block,
+            used: 0,
+            ..self
+        }
+    }
+
+    /// The key that stands for a seed.
+    #[inline]
+    pub(crate) fn key(seed: u64) -> [u32; 2] {
+        [seed as u32, (seed >> 32) as u32]
+    }
+
+    /// Number of the block that follows those used or begun.
+    #[inline]
+    pub(crate) fn step(&self) -> u32 {
+        self.counter[2]
     }
 
     /// Uniform in [0, 1) in steps of 2⁻³²; fine enough for free paths up to 22 mean free paths per step.
@@ -43,8 +71,9 @@ impl Philox {
     }
 }
 
-#[inline]
-fn rounds(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
+/// The bijection itself: four random words for a counter and a key.
+#[inline(always)]
+pub(crate) fn rounds(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     for _ in 0..ROUNDS {
         let product_0 = u64::from(MULTIPLIERS[0]) * u64::from(counter[0]);
         let product_1 = u64::from(MULTIPLIERS[1]) * u64::from(counter[2]);

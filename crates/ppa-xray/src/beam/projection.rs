@@ -1,7 +1,5 @@
 //! Source, field and rectangular detector of one exposure, and where they stand in the CT.
 
-use std::f64::consts::TAU;
-
 use nalgebra::{Isometry3, Point2, Point3, Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +8,6 @@ use crate::beam::field::Field;
 use crate::beam::source::{Collimation, Source};
 use crate::beam::spectrum::Spectrum;
 use crate::detector::receptor::{Receptor, ReceptorError};
-use crate::philox::Philox;
 use crate::transport::tally::Raster;
 
 /// Most pixels of a detector: 2²⁸, whose planes take 8 GiB.
@@ -375,23 +372,4 @@ impl Projection {
                 .any(|corner| normal.dot(&corner.coords) <= *offset)
         })
     }
-}
-
-/// The unit vector at polar angle arccos(`cos_theta`) and a random azimuth from `direction`.
-pub(crate) fn scattered(
-    direction: &Vector3<f64>,
-    cos_theta: f64,
-    rng: &mut Philox,
-) -> Vector3<f64> {
-    let (sin_phi, cos_phi) = (TAU * rng.unit()).sin_cos();
-    let sin_theta = (1.0 - cos_theta * cos_theta).max(0.0).sqrt();
-    // Orthonormal basis without a branch near the pole (Duff et al., JCGT 6(1), 2017).
-    let [x, y, z] = (*direction).into();
-    let sign = 1.0_f64.copysign(z);
-    let a = -1.0 / (sign + z);
-    let b = x * y * a;
-    let first = Vector3::new(1.0 + sign * x * x * a, sign * b, -sign * x);
-    let second = Vector3::new(b, sign + y * y * a, -y);
-    (first * (sin_theta * cos_phi) + second * (sin_theta * sin_phi) + direction * cos_theta)
-        .normalize()
 }

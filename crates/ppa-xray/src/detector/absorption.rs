@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use crate::detector::energy_nodes::EnergyNodes;
 use crate::detector::fluorescence::{K_SHELLS, KShell};
 use crate::detector::receptor::{DetectorModel, ReceptorError, require};
-use crate::matter::compton::energy_ratio;
 use crate::matter::cross_sections::elements;
+use crate::matter::klein_nishina::energy_ratio;
 use crate::transport::tally::Moments;
 
 /// Electron rest energy, keV.

@@ -10,6 +10,7 @@ use crate::beam::spectrum::Spectrum;
 use crate::detector::response::Response;
 use crate::dose::score::{DoseScore, DoseTarget};
 use crate::image::radiograph::Radiograph;
+use crate::matter::compton::ComptonModel;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
 use crate::run::analog_tally::ImageSetup;
@@ -19,12 +20,25 @@ use crate::transport::tracking::{Transport, TransportError};
 
 /// How long the analog engine runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct AnalogSettings {
     /// Photons emitted into the field.
     pub histories: u64,
     /// Seed of the image: history n of a seed is the same whatever runs beside it.
     pub seed: u64,
+    /// How photons scatter off electrons.
+    pub compton_model: ComptonModel,
+}
+
+impl Default for AnalogSettings {
+    /// A minute or less: scatter to a few percent in a square centimetre.
+    fn default() -> Self {
+        Self {
+            histories: 20_000_000,
+            seed: 0,
+            compton_model: ComptonModel::default(),
+        }
+    }
 }
 
 /// Histories that one task follows: long enough to hide the hand-over.
@@ -45,7 +59,7 @@ pub fn analog(
     settings: &AnalogSettings,
 ) -> Result<Radiograph, TransportError> {
     settings.validate()?;
-    let transport = Transport::new(phantom, spectrum, projection)?;
+    let transport = Transport::new(phantom, spectrum, projection, settings.compton_model)?;
     let tally = run(&transport, projection.detector.raster(), settings);
     Ok(ImageSetup::new(&transport).radiograph(&tally, settings.histories, settings.seed))
 }

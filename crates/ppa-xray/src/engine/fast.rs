@@ -11,6 +11,7 @@ use crate::engine::noise;
 use crate::engine::raytrace::primary_moments;
 use crate::engine::upsample::Upsampling;
 use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph};
+use crate::matter::compton::ComptonModel;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
 use crate::transport::stream::Stream;
@@ -29,6 +30,8 @@ pub struct FastSettings {
     pub scatter_pixel_mm: f64,
     /// Rays per pixel side of the primary.
     pub samples_per_side: u32,
+    /// How photons scatter off electrons.
+    pub compton_model: ComptonModel,
     /// Seed of the image.
     pub seed: u64,
 }
@@ -41,6 +44,7 @@ impl Default for FastSettings {
             scatter_histories: 4_000_000,
             scatter_pixel_mm: 20.0,
             samples_per_side: 2,
+            compton_model: ComptonModel::default(),
             seed: 0,
         }
     }
@@ -63,12 +67,13 @@ pub fn fast(
     settings: &FastSettings,
 ) -> Result<Radiograph, TransportError> {
     settings.validate()?;
-    let transport = Transport::new(phantom, spectrum, projection)?;
+    let transport = Transport::new(phantom, spectrum, projection, settings.compton_model)?;
     let histories = settings.scatter_histories;
     let raster = scatter_raster(&projection.detector, settings.scatter_pixel_mm);
     let analog = AnalogSettings {
         histories,
         seed: settings.seed,
+        compton_model: settings.compton_model,
     };
     let tally = run(&transport, raster, &analog);
     let primary = primary_moments(&transport, settings.samples_per_side)?;

@@ -8,6 +8,7 @@ use crate::beam::field::Field;
 use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
 use crate::detector::response::LineResponse;
+use crate::matter::compton::ComptonModel;
 use crate::phantom::lattice::Walk;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::tally::Moments;
@@ -26,7 +27,7 @@ pub fn primary(
     projection: &Projection,
     samples_per_side: u32,
 ) -> Result<Vec<f64>, TransportError> {
-    let transport = Transport::new(phantom, spectrum, projection)?;
+    let transport = Transport::new(phantom, spectrum, projection, ComptonModel::default())?;
     let ev_cm2 = 1e3 / projection.detector.pixel_cm2();
     let moments = primary_moments(&transport, samples_per_side)?;
     Ok(moments.iter().map(|m| m.mean_kev * ev_cm2).collect())

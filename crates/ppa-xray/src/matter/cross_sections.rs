@@ -1,8 +1,10 @@
-//! Cross sections of the elements, embedded: photoelectric, Rayleigh and Compton, F(q) and S(q).
+//! Cross sections of the elements, embedded: photoelectric, Rayleigh and Compton, F(q) and S(q), and their electron shells.
 //!
 //! Made by `scripts/make_cross_sections.py` from xraylib 4.3.0 (EPDL97); see `data/README.md`.
 
 use std::{io::Read, ops::Add, sync::OnceLock};
+
+use crate::matter::{electron_shell::Shell, fluorescence::KFluorescence};
 
 /// Planck's constant times the speed of light in keV Å: q = sin(θ/2) E / hc in 1/Å.
 pub(crate) const HC_KEV_ANGSTROM: f64 = 12.398_419_843_320_026;
@@ -99,6 +101,8 @@ pub(crate) struct Element {
     compton: LogLog,
     form_factor: Vec<f64>,
     incoherent: Vec<f64>,
+    shells: Vec<Shell>,
+    k_fluorescence: Option<KFluorescence>,
 }
 
 impl Element {
@@ -115,6 +119,16 @@ impl Element {
     /// Absorption edges inside the tables, keV, ascending.
     pub(crate) fn edges_kev(&self) -> impl Iterator<Item = f64> {
         self.photoelectric.edges()
+    }
+
+    /// Electrons, binding energies and Compton profiles; the electrons add up to Z.
+    pub(crate) fn shells(&self) -> &[Shell] {
+        &self.shells
+    }
+
+    /// K fluorescence, if the K edge lies above 1 keV.
+    pub(crate) fn k_fluorescence(&self) -> Option<&KFluorescence> {
+        self.k_fluorescence.as_ref()
     }
 
     /// Form factor F(q), F(0) = Z; q = sin(θ/2)/λ in 1/Å.
@@ -175,6 +189,17 @@ pub(crate) fn elements() -> &'static Elements {
                     compton: LogLog::new(&energies, &data.doubles(n_energy)),
                     form_factor: data.doubles(n_q),
                     incoherent: data.doubles(n_q),
+                    shells: {
+                        let n_shells = data.count();
+                        let numbers = data.doubles(3 * n_shells);
+                        let shells = numbers.chunks_exact(3).map(|shell| Shell {
+                            electrons: shell[0],
+                            binding_kev: shell[1],
+                            profile_at_zero: shell[2],
+                        });
+                        shells.collect()
+                    },
+                    k_fluorescence: KFluorescence::from_table(&data.doubles(11)),
                 }
             })
             .collect();

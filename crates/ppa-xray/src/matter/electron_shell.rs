@@ -1,5 +1,8 @@
 //! Electron shells and the momentum distribution of their electrons.
 
+/// mₑc in atomic units of momentum: the inverse fine-structure constant (CODATA 2018).
+pub(crate) const ATOMIC_MOMENTA_PER_MC: f64 = 137.035_999_084;
+
 /// Electrons that share a binding energy and a Compton profile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shell {

@@ -3,12 +3,14 @@
 use std::sync::Arc;
 
 use crate::{
-    matter::compton::energy_ratio,
     matter::cross_sections::{
         CrossSections, ELECTRON_REST_KEV, Element, HC_KEV_ANGSTROM, MAX_ENERGY_KEV, MIN_ENERGY_KEV,
         elements,
     },
+    matter::electron_shell::Shell,
     matter::element::{atomic_number, symbol},
+    matter::fluorescence::FluorescenceLine,
+    matter::klein_nishina::energy_ratio,
     matter::library,
     matter::material_error::MaterialError,
     matter::photon_tables::{PhotonTables, TabulatedMatter},
@@ -322,6 +324,34 @@ impl Material {
         }
     }
 
+    /// Electron shells, their electrons per unit mass up to a constant.
+    pub(crate) fn shells(&self) -> Vec<Shell> {
+        match &self.matter {
+            Matter::Elements(mass_fractions) => of_elements(mass_fractions)
+                .flat_map(|(element, w)| {
+                    element.shells().iter().map(move |shell| Shell {
+                        electrons: shell.electrons * w / element.atomic_weight,
+                        ..*shell
+                    })
+                })
+                .collect(),
+            Matter::Tables(tables) => tables.shells().to_vec(),
+        }
+    }
+
+    /// K photons that may follow photoelectric absorption at an energy; none of a material made from tables.
+    #[must_use]
+    pub fn k_fluorescence(&self, energy_kev: f64) -> Vec<FluorescenceLine> {
+        let whole = self.cross_sections_unchecked(energy_kev).photoelectric;
+        of_elements(self.mass_fractions())
+            .filter_map(|(element, w)| Some((element, w, element.k_fluorescence()?)))
+            .filter(|(_, _, k)| energy_kev > k.edge_kev)
+            .flat_map(|(element, w, k)| {
+                k.lines(w * element.cross_sections(energy_kev).photoelectric / whole)
+            })
+            .collect()
+    }
+
     /// Absorption edges in keV.
     pub(crate) fn edges_kev(&self) -> Vec<f64> {
         match &self.matter {
@@ -358,7 +388,6 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::matter::electron_shell::Shell;
 
     proptest! {
         /// A mixture attenuates as its elements do, by weight.

@@ -129,6 +129,10 @@ impl TabulatedMatter {
         self.range_kev
     }
 
+    pub(crate) fn shells(&self) -> &[Shell] {
+        &self.shells
+    }
+
     pub(crate) fn cross_sections(&self, energy_kev: f64) -> CrossSections {
         let ln_e = energy_kev.clamp(self.range_kev[0], self.range_kev[1]).ln();
         CrossSections {

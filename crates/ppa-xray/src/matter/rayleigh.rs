@@ -1,99 +1,150 @@
 //! Rayleigh scattering: Thomson's law times the squared form factor of independent atoms.
 
 use crate::{
-    matter::cross_sections::HC_KEV_ANGSTROM, matter::material::Material, octaves::Octaves,
-    philox::Philox,
+    matter::cross_sections::{HC_KEV_ANGSTROM, MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::material::Material,
+    octaves::Octaves,
 };
 
-/// Entries of the table that says where in the cumulative distribution to start looking.
-const GUIDE: usize = 1024;
+/// Quantile bins per octave of the probability that lies beyond, as a power of two.
+const TAIL_BITS: u32 = 6;
+/// Energy bins per octave, as a power of two.
+const ENERGY_BITS: u32 = 5;
+/// Integration steps per octave of q², as a power of two.
+const Q_SQUARED_BITS: u32 = 5;
+/// Smallest q² of the integration in 1/Å²: F² is constant below.
+const MIN_Q_SQUARED: f64 = 1e-5;
 
 /// Sampler of Rayleigh scattering in one material.
 ///
 /// With x = q², q = sin(θ/2) E/hc, the distribution is F²(x) dx · (1 + cos²θ)/2: x from the inverse of the
 /// cumulative ∫F² dx up to its backward value, then rejection (Baró et al. 1994, doi:10.1016/0969-806X(94)90083-3).
+/// One inverse serves all energies: x by the share of ∫F² dx that lies beyond it, on a grid of octaves, since F² ends in a power law.
 #[derive(Clone, Debug)]
 pub(crate) struct Rayleigh {
-    grid: Octaves,
-    /// Node positions: 0, then the grid.
-    x: Vec<f64>,
-    /// F² at the nodes, linear in x between.
-    squared: Vec<f64>,
-    /// ∫F² dx from 0 to each node.
-    cumulative: Vec<f64>,
-    /// Last node whose cumulative value does not exceed k/GUIDE of the whole.
-    guide: Vec<u16>,
-    guide_per_unit: f64,
+    /// x in 1/Å² by the share beyond it, linear between the nodes.
+    quantiles: Vec<f32>,
+    /// Bits of the first tail share, shifted.
+    first_tail: u32,
+    /// Share of ∫F² dx beyond backward scattering, by energy.
+    beyond_backward: Vec<f32>,
+    energies: Octaves,
 }
 
 impl Rayleigh {
-    pub(crate) fn new(material: &Material, grid: Octaves) -> Self {
+    pub(crate) fn new(material: &Material) -> Self {
+        let largest = (MAX_ENERGY_KEV / HC_KEV_ANGSTROM).powi(2);
+        let grid = Octaves::covering(MIN_Q_SQUARED, 2.0 * largest, Q_SQUARED_BITS);
         let x: Vec<f64> = std::iter::once(0.0).chain(grid.nodes()).collect();
         let squared: Vec<f64> = x
             .iter()
             .map(|x| material.form_factor_squared_per_gram(x.sqrt()))
             .collect();
-        let mut cumulative = vec![0.0];
-        for i in 1..x.len() {
-            cumulative
-                .push(cumulative[i - 1] + 0.5 * (squared[i - 1] + squared[i]) * (x[i] - x[i - 1]));
+        // Tail beyond each node, from the far end inwards.
+        let mut tail = vec![0.0; x.len()];
+        for i in (0..x.len() - 1).rev() {
+            tail[i] = tail[i + 1] + 0.5 * (squared[i] + squared[i + 1]) * (x[i + 1] - x[i]);
         }
-        let whole = cumulative[x.len() - 1];
-        let guide = (0..=GUIDE)
-            .map(|k| {
-                let target = whole * k as f64 / GUIDE as f64;
-                (cumulative
-                    .partition_point(|&c| c <= target)
-                    .clamp(1, x.len() - 1)
-                    - 1) as u16
-            })
-            .collect();
-        Self {
-            grid,
+        let whole = tail[0];
+        for tail in &mut tail {
+            *tail /= whole;
+        }
+        let cumulative = Cumulative {
             x,
             squared,
-            cumulative,
-            guide,
-            guide_per_unit: GUIDE as f64 / whole,
-        }
-    }
-
-    /// ∫F² dx from 0 to `x`.
-    #[inline]
-    fn integral(&self, x: f64) -> f64 {
-        let bin = if x < self.grid.first() {
-            0
-        } else {
-            self.grid.locate(x).0 + 1
+            tail,
+            whole,
         };
-        let (d, width) = (x - self.x[bin], self.x[bin + 1] - self.x[bin]);
-        let slope = (self.squared[bin + 1] - self.squared[bin]) / width;
-        self.cumulative[bin] + d * (self.squared[bin] + 0.5 * slope * d)
+        let energies = Octaves::covering(MIN_ENERGY_KEV, MAX_ENERGY_KEV, ENERGY_BITS);
+        let backward = |energy: f64| (energy / HC_KEV_ANGSTROM).powi(2);
+        let beyond_backward: Vec<f32> = energies
+            .nodes()
+            .map(|energy| cumulative.tail_at(backward(energy)) as f32)
+            .collect();
+        let smallest = f64::from(beyond_backward[beyond_backward.len() - 1]);
+        let shares = Octaves::covering(smallest, 1.0, TAIL_BITS);
+        let quantiles: Vec<f32> = shares
+            .nodes()
+            .map(|share| cumulative.x_at(share.min(1.0)) as f32)
+            .collect();
+        Self {
+            quantiles,
+            first_tail: key(shares.first() as f32),
+            beyond_backward,
+            energies,
+        }
     }
 
-    /// Cosine of the scattering angle.
+    /// sin²(θ/2) of a scattered photon.
     #[inline]
-    pub(crate) fn sample(&self, energy_kev: f64, random: &mut Philox) -> f64 {
-        let x_backwards = (energy_kev * (1.0 / HC_KEV_ANGSTROM)).powi(2);
-        let whole = self.integral(x_backwards);
+    pub(crate) fn sample(&self, energy_kev: f32, mut uniform: impl FnMut() -> f32) -> f32 {
+        let (bin, fraction) = self.energies.locate(f64::from(energy_kev));
+        let [low, high] = [bin, bin + 1].map(|i| self.beyond_backward[i]);
+        let within = 1.0 - (low + fraction as f32 * (high - low));
+        let wavelength = HC_KEV_ANGSTROM as f32 / energy_kev;
+        let per_x = wavelength * wavelength;
         loop {
-            let target = random.unit() * whole;
-            let mut bin = usize::from(self.guide[(target * self.guide_per_unit) as usize]);
-            while self.cumulative[bin + 1] < target {
-                bin += 1;
-            }
-            let rest = target - self.cumulative[bin];
-            let slope =
-                (self.squared[bin + 1] - self.squared[bin]) / (self.x[bin + 1] - self.x[bin]);
-            // Root of F² d + ½ slope d² = rest that does not cancel.
-            let root = (self.squared[bin] * self.squared[bin] + 2.0 * slope * rest)
-                .max(0.0)
-                .sqrt();
-            let x = self.x[bin] + 2.0 * rest / (self.squared[bin] + root);
-            let cos = (1.0 - 2.0 * x / x_backwards).max(-1.0);
-            if 2.0 * random.unit() < 1.0 + cos * cos {
-                return cos;
+            let half = (self.x(1.0 - uniform() * within) * per_x).min(1.0);
+            let cos = 1.0 - 2.0 * half;
+            if 2.0 * uniform() < 1.0 + cos * cos {
+                return half;
             }
         }
+    }
+
+    /// x beyond which the share `tail` of ∫F² dx lies.
+    #[inline(always)]
+    fn x(&self, tail: f32) -> f32 {
+        const FRACTION: u32 = (1 << TAIL_SHIFT) - 1;
+        let bin = (key(tail).wrapping_sub(self.first_tail) as usize).min(self.quantiles.len() - 2);
+        let into = (tail.to_bits() & FRACTION) as f32 * (1.0 / (FRACTION + 1) as f32);
+        let [low, high] = [bin, bin + 1].map(|i| self.quantiles[i]);
+        low + into * (high - low)
+    }
+}
+
+const TAIL_SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - TAIL_BITS;
+
+#[inline(always)]
+fn key(tail: f32) -> u32 {
+    tail.to_bits() >> TAIL_SHIFT
+}
+
+/// F² linear in x between nodes, and the share of its integral beyond each.
+struct Cumulative {
+    x: Vec<f64>,
+    squared: Vec<f64>,
+    tail: Vec<f64>,
+    whole: f64,
+}
+
+impl Cumulative {
+    fn tail_at(&self, x: f64) -> f64 {
+        let upper = self
+            .x
+            .partition_point(|&node| node <= x)
+            .clamp(1, self.x.len() - 1);
+        let (d, width) = (self.x[upper] - x, self.x[upper] - self.x[upper - 1]);
+        let slope = (self.squared[upper - 1] - self.squared[upper]) / width;
+        self.tail[upper] + d * (self.squared[upper] + 0.5 * slope * d) / self.whole
+    }
+
+    fn x_at(&self, tail: f64) -> f64 {
+        let upper = self
+            .tail
+            .partition_point(|&node| node > tail)
+            .clamp(1, self.x.len() - 1);
+        let rest = (tail - self.tail[upper]) * self.whole;
+        let width = self.x[upper] - self.x[upper - 1];
+        let slope = (self.squared[upper - 1] - self.squared[upper]) / width;
+        let last = self.squared[upper];
+        // Root of F² d + ½ slope d² = rest that does not cancel.
+        let root = (last * last + 2.0 * slope * rest).max(0.0).sqrt();
+        self.x[upper]
+            - if rest > 0.0 {
+                2.0 * rest / (last + root)
+            } else {
+                0.0
+            }
     }
 }

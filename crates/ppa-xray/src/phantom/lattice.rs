@@ -1,6 +1,6 @@
 //! Straight rays through a regular lattice of cells.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix4, Point3, Vector3};
 use ppa_ct::Grid;
 
 /// The voxel box of a phantom seen from the device.
@@ -30,6 +30,20 @@ impl Lattice {
             linear: cell_from_device.fixed_view::<3, 3>(0, 0).into_owned(),
             offset: cell_from_device.fixed_view::<3, 1>(0, 3).add_scalar(0.5),
         }
+    }
+
+    /// Cells from mm in the device frame.
+    pub fn cell_from_device(&self) -> Matrix4<f64> {
+        let mut matrix = self.linear.to_homogeneous();
+        matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&self.offset);
+        matrix
+    }
+
+    /// mm in the device frame from cells.
+    pub fn device_from_cell(&self) -> Matrix4<f64> {
+        self.cell_from_device()
+            .try_inverse()
+            .expect("the grid of a volume is invertible")
     }
 
     #[inline]
@@ -138,7 +152,7 @@ impl Walk {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Affine3, Matrix4};
+    use nalgebra::Affine3;
     use proptest::prelude::*;
 
     use super::*;

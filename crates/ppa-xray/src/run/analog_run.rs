@@ -44,7 +44,7 @@ const LEAST_SITTING: u64 = 1_024;
 /// # let spectrum = Spectrum::monoenergetic(60.0)?;
 /// # let pose = Isometry3::translation(0.0, 0.0, -1000.0);
 /// # let projection = Projection::new(pose, 1100.0, Detector::centred(10, 10, 10.0));
-/// let settings = AnalogSettings { histories: 1_000_000, seed: 7 };
+/// let settings = AnalogSettings { histories: 1_000_000, seed: 7, ..AnalogSettings::default() };
 /// let run = AnalogRun::new(&phantom, &spectrum, &projection, &settings)?.with_dose(&DoseSettings::default())?;
 /// let mut tally = run.tally(Part::WHOLE);
 /// let stop = Stop { relative_error: Some(0.05), ..Stop::default() };
@@ -83,7 +83,7 @@ impl<'a> AnalogRun<'a> {
     ) -> Result<Self, TransportError> {
         settings.validate()?;
         Ok(Self {
-            transport: Transport::new(phantom, spectrum, projection)?,
+            transport: Transport::new(phantom, spectrum, projection, settings.compton_model)?,
             settings: *settings,
             dose: None,
             key: OnceLock::new(),

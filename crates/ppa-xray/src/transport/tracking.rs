@@ -1,23 +1,23 @@
-//! One photon history: source, Woodcock flight, interactions, detector plane.
+//! What all histories of a projection share, checked before the first of them starts.
 
 use std::ops::Range;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
+use rayon::prelude::*;
 
-use crate::beam::emitter::{Emission, Emitter};
-use crate::beam::projection::{Projection, ProjectionError, scattered};
+use crate::beam::emitter::Emitter;
+use crate::beam::projection::{Projection, ProjectionError};
 use crate::beam::spectrum::Spectrum;
 use crate::detector::response::Response;
+use crate::matter::compton::ComptonModel;
 use crate::matter::sampler::MaterialTables;
-use crate::phantom::lattice::{Lattice, Walk};
+use crate::phantom::lattice::Lattice;
 use crate::phantom::voxels::VoxelPhantom;
-use crate::philox::Philox;
-use crate::transport::attenuation::{
-    Attenuation, CEILING_KEV, CUTOFF_KEV, Coefficients, Majorants,
-};
-use crate::transport::score::{Arrival, Score};
-use crate::transport::stream::Stream;
-use crate::transport::tally::Category;
+use crate::transport::attenuation::{Attenuation, CEILING_KEV, CUTOFF_KEV};
+use crate::transport::lanes;
+use crate::transport::majorants::Majorants;
+use crate::transport::score::Score;
+use crate::transport::voxel_codes::{VoxelCode, voxel_codes};
 
 /// Why a simulation cannot run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -72,30 +72,9 @@ pub(crate) struct Transport<'a> {
     pub response: Response,
     pub lattice: Lattice,
     pub attenuation: Attenuation,
-    samplers: Vec<MaterialTables>,
-    majorants: Majorants,
-}
-
-/// A photon under way, in the device frame.
-struct Photon {
-    position_mm: Point3<f64>,
-    direction: Vector3<f64>,
-    energy_kev: f64,
-    category: Category,
-}
-
-/// How a straight flight ends.
-enum Flight {
-    Escape,
-    Collision {
-        distance_mm: f64,
-        /// Index of the voxel in the phantom.
-        voxel: usize,
-        material: u8,
-        coefficients: Coefficients,
-        /// Uniform in [0, `coefficients.total`).
-        lot: f32,
-    },
+    pub(super) samplers: Vec<MaterialTables>,
+    pub(super) majorants: Majorants,
+    pub(super) codes: Vec<VoxelCode>,
 }
 
 impl<'a> Transport<'a> {
@@ -103,6 +82,7 @@ impl<'a> Transport<'a> {
         phantom: &'a VoxelPhantom,
         spectrum: &'a Spectrum,
         projection: &'a Projection,
+        compton_model: ComptonModel,
     ) -> Result<Self, TransportError> {
         let emitter = Emitter::new(projection, spectrum)?;
         let response = Response::new(&projection.receptor, projection.detector.centre_mm)
@@ -133,10 +113,18 @@ impl<'a> Transport<'a> {
         }
         let samplers: Vec<_> = phantom
             .materials()
-            .iter()
-            .map(MaterialTables::new)
+            .par_iter()
+            .map(|material| MaterialTables::new(material, compton_model))
             .collect();
         let attenuation = Attenuation::new(&samplers);
+        let codes = voxel_codes(phantom);
+        let voxels_per_mm3 = phantom
+            .grid()
+            .voxel_from_ct()
+            .to_homogeneous()
+            .determinant()
+            .abs();
+        let voxel_mm = voxels_per_mm3.cbrt().recip();
         Ok(Self {
             phantom,
             spectrum,
@@ -144,166 +132,19 @@ impl<'a> Transport<'a> {
             emitter,
             response,
             lattice: Lattice::new(phantom.grid(), &projection.ct_from_device),
-            majorants: Majorants::new(phantom, &attenuation),
+            majorants: Majorants::new(&codes, phantom.grid().size(), voxel_mm, &attenuation),
+            codes,
             attenuation,
             samplers,
         })
     }
 
-    /// Follows the `histories` of a seed, one after the other, and tells `score` what they leave.
+    /// Follows the `histories` of a seed and tells `score` what they leave; slots are below [`lanes::LANES`].
+    ///
+    /// Each history is the same whatever runs beside it: any split of a range leaves the same events, in another order.
     pub fn follow(&self, seed: u64, histories: Range<u64>, score: &mut impl Score) {
-        for history in histories {
-            let mut rng = Philox::new(seed, Stream::History as u32, history);
-            self.history(&mut rng, score);
-            score.finish(0);
-        }
+        lanes::follow(self, seed, histories, score);
     }
-
-    fn history(&self, rng: &mut Philox, score: &mut impl Score) {
-        let Emission {
-            origin_mm,
-            direction,
-            energy_kev,
-        } = self.emitter.emit(rng);
-        let mut photon = Photon {
-            position_mm: origin_mm,
-            direction,
-            energy_kev,
-            category: Category::Primary,
-        };
-        score.emit(0, photon.energy_kev);
-        while photon.energy_kev >= CUTOFF_KEV {
-            let to_plane_mm = self.distance_to_plane_mm(&photon);
-            match self.fly(&photon, to_plane_mm, rng) {
-                Flight::Escape if to_plane_mm.is_finite() => {
-                    let at = photon.position_mm + photon.direction * to_plane_mm;
-                    let arrival = Arrival {
-                        x_mm: at.x,
-                        y_mm: at.y,
-                        direction: photon.direction,
-                        energy_kev: photon.energy_kev,
-                        category: photon.category,
-                    };
-                    return score.arrive(0, &arrival, rng);
-                }
-                Flight::Escape => return score.escape(0, photon.energy_kev),
-                Flight::Collision {
-                    distance_mm,
-                    voxel,
-                    material,
-                    coefficients,
-                    lot,
-                } => {
-                    photon.position_mm += photon.direction * distance_mm;
-                    let tables = &self.samplers[usize::from(material)];
-                    if lot < coefficients.photoelectric {
-                        return score.deposit(0, voxel, photon.energy_kev);
-                    } else if lot < coefficients.with_compton {
-                        let (cos_theta, energy_kev) = tables.sample_compton(photon.energy_kev, rng);
-                        photon.scatter(cos_theta, Category::Compton, rng);
-                        // Below the cutoff the rest of the photon stays here too.
-                        let leaves = energy_kev >= CUTOFF_KEV;
-                        let carried_kev = if leaves { energy_kev } else { 0.0 };
-                        score.deposit(0, voxel, photon.energy_kev - carried_kev);
-                        photon.energy_kev = energy_kev;
-                    } else {
-                        let cos_theta = tables.sample_rayleigh(photon.energy_kev, rng);
-                        photon.scatter(cos_theta, Category::Rayleigh, rng);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Infinite for a photon that flies away from the plane.
-    #[inline]
-    fn distance_to_plane_mm(&self, photon: &Photon) -> f64 {
-        if photon.direction.z > 0.0 {
-            (self.projection.source_detector_mm - photon.position_mm.z) / photon.direction.z
-        } else {
-            f64::INFINITY
-        }
-    }
-
-    /// Woodcock tracking with a majorant per block: the optical depth to the next tentative
-    /// collision is spent block by block, a real collision is accepted with probability μ/μ_max.
-    fn fly(&self, photon: &Photon, to_plane_mm: f64, rng: &mut Philox) -> Flight {
-        const EDGE: f64 = Majorants::EDGE as f64;
-        let ray = self.lattice.ray(&photon.position_mm, &photon.direction);
-        let Some((enter, leave)) = self.lattice.clip(&ray) else {
-            return Flight::Escape;
-        };
-        let end = leave.min(to_plane_mm);
-        if enter >= end {
-            return Flight::Escape;
-        }
-        let energy = self.attenuation.locate(photon.energy_kev);
-        let bounds = self.majorants.row(photon.energy_kev);
-        let size = self.lattice.size;
-        let mut walk = Walk::new(&ray, enter, self.majorants.blocks, EDGE);
-        let mut at = enter;
-        let mut depth = exponential(rng);
-        loop {
-            let bound = self.majorants.bound(bounds, walk.index);
-            let (axis, next) = walk.exit();
-            let block_end = next.min(end);
-            loop {
-                let tentative = at + depth / bound;
-                if !matches!(
-                    tentative.partial_cmp(&block_end),
-                    Some(std::cmp::Ordering::Less)
-                ) {
-                    depth -= (block_end - at).max(0.0) * bound;
-                    at = block_end;
-                    break;
-                }
-                at = tentative;
-                let cell = ray.origin + ray.slope * at;
-                // Rounding may place the point just outside the block, where the bound does not hold.
-                let voxel = |axis: usize| {
-                    let low = walk.cell[axis] as usize * Majorants::EDGE as usize;
-                    let high = (low + Majorants::EDGE as usize).min(size[axis]) - 1;
-                    (cell[axis] as usize).clamp(low, high)
-                };
-                let index = voxel(0) + size[0] * (voxel(1) + size[1] * voxel(2));
-                let material = self.phantom.material()[index];
-                let density = self.phantom.density_g_cm3()[index];
-                let coefficients = self.attenuation.at(material, energy);
-                let lot = rng.unit() * bound;
-                if lot < f64::from(density * coefficients.total) {
-                    return Flight::Collision {
-                        distance_mm: at,
-                        voxel: index,
-                        material,
-                        coefficients,
-                        lot: lot as f32 / density,
-                    };
-                }
-                depth = exponential(rng);
-            }
-            if next >= end || !walk.advance(axis) {
-                return Flight::Escape;
-            }
-        }
-    }
-}
-
-impl Photon {
-    #[inline]
-    fn scatter(&mut self, cos_theta: f64, by: Category, rng: &mut Philox) {
-        self.direction = scattered(&self.direction, cos_theta, rng);
-        self.category = match self.category {
-            Category::Primary => by,
-            _ => Category::Multiple,
-        };
-    }
-}
-
-/// Exponentially distributed with mean 1.
-#[inline]
-fn exponential(rng: &mut Philox) -> f64 {
-    // 1 − u lies in (0, 1], so the logarithm stays finite.
-    -(1.0 - rng.unit()).ln()
 }
 
 fn check_placement(phantom: &VoxelPhantom, projection: &Projection) -> Result<(), ProjectionError> {

@@ -2,7 +2,7 @@
 
 use std::{collections::HashMap, fs};
 
-use ppa_xray::{Material, MaterialTables};
+use ppa_xray::{ComptonModel, Material, MaterialTables};
 use serde_json::Value;
 
 use crate::shared;
@@ -49,7 +49,7 @@ fn tables_for_transport_follow_the_material() {
         "uranium",
     ] {
         let material = Material::named(if name == "uranium" { "U" } else { name }).unwrap();
-        let tables = MaterialTables::new(&material);
+        let tables = MaterialTables::new(&material, ComptonModel::default());
         // K edges of Ti, I, Cs, Gd, Pb and U as xraylib's cross sections have them.
         let edges = [4.96600, 33.16996, 35.98653, 50.23664, 88.00069, 115.60101];
         let beside = edges

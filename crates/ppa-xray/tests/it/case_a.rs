@@ -121,6 +121,7 @@ fn analog_agrees_with_mcgpu() {
     let settings = AnalogSettings {
         histories: 10_000_000,
         seed: 1,
+        ..AnalogSettings::default()
     };
     let image = analog(&phantom(), &spectrum(), &projection(), &settings).unwrap();
     assert_agrees(&image, &reference(), None);

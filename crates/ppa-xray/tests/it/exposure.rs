@@ -71,7 +71,11 @@ fn engines_agree_on_source_and_detector() {
         &phantom,
         &spectrum,
         &projection,
-        &AnalogSettings { histories, seed: 5 },
+        &AnalogSettings {
+            histories,
+            seed: 5,
+            ..AnalogSettings::default()
+        },
     );
     let settings = FastSettings {
         dose_histories: f64::INFINITY,
@@ -178,6 +182,7 @@ fn the_field_has_sharp_edges() {
     let settings = AnalogSettings {
         histories: 40_000,
         seed: 1,
+        ..AnalogSettings::default()
     };
     let tallied = analog(&vacuum, &spectrum, &projection, &settings).unwrap();
     let on_detector = tallied.sums.primary_ev_per_history / 50e3;
@@ -233,7 +238,11 @@ fn noise_of_a_scintillator_is_compound_poisson() {
         &vacuum,
         &spectrum,
         &projection,
-        &AnalogSettings { histories, seed: 3 },
+        &AnalogSettings {
+            histories,
+            seed: 3,
+            ..AnalogSettings::default()
+        },
     );
     let settings = FastSettings {
         dose_histories: histories as f64,

@@ -2,6 +2,7 @@
 
 mod attenuation;
 mod case_a;
+mod dose;
 mod exposure;
 mod files;
 mod mcgpu;
@@ -10,4 +11,5 @@ mod runs;
 mod scenes;
 mod shared;
 mod spectra;
+mod tg195;
 mod transport;

@@ -14,6 +14,7 @@ fn refused(change: impl FnOnce(&mut ppa_xray::Projection)) -> ProjectionError {
     let settings = AnalogSettings {
         histories: 10,
         seed: 0,
+        ..AnalogSettings::default()
     };
     match analog(&slab(100.0, 1.0), &spectrum, &projection, &settings) {
         Err(TransportError::Projection(error)) => error,
@@ -91,6 +92,7 @@ fn settings_out_of_range_are_named() {
     let one = AnalogSettings {
         histories: 1,
         seed: 0,
+        ..AnalogSettings::default()
     };
     assert!(matches!(
         analog(&phantom, &soft, &projection, &one),

@@ -61,7 +61,11 @@ impl Scene {
 }
 
 fn settings(histories: u64, seed: u64) -> AnalogSettings {
-    AnalogSettings { histories, seed }
+    AnalogSettings {
+        histories,
+        seed,
+        ..AnalogSettings::default()
+    }
 }
 
 fn go_on() -> ControlFlow<()> {

@@ -18,7 +18,11 @@ fn sixty_kvp() -> Spectrum {
 }
 
 fn settings(histories: u64, seed: u64) -> AnalogSettings {
-    AnalogSettings { histories, seed }
+    AnalogSettings {
+        histories,
+        seed,
+        ..AnalogSettings::default()
+    }
 }
 
 fn in_pool<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {

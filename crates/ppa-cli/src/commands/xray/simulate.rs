@@ -102,6 +102,7 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
             let settings = AnalogSettings {
                 histories: histories as u64,
                 seed: args.seed,
+                ..AnalogSettings::default()
             };
             analog(&phantom, &spectrum, &projection, &settings)?
         }

@@ -1,0 +1,277 @@
+//! How likely a photon scatters into a given direction: for estimators that look at the detector instead of sampling.
+
+use std::f64::consts::PI;
+
+use crate::{
+    matter::compton::ComptonModel,
+    matter::cross_sections::{HC_KEV_ANGSTROM, MAX_ENERGY_KEV},
+    matter::impulse_approximation::electrons_freed,
+    matter::klein_nishina::differential,
+    matter::material::Material,
+    octaves::Octaves,
+};
+
+/// Lowest energy of the tables in keV, just below that of the transport; the values there hold below it.
+const LOWEST_KEV: f64 = 4.0;
+/// Bins per octave of energy of the normalising integrals, as a power of two.
+const ENERGY_BITS: u32 = 6;
+/// Bins per octave of energy of the electrons that take part, which hardly change with it, as a power of two.
+const ROW_BITS: u32 = 2;
+/// Bins per octave of q² and smallest q² in 1/Å², of F² and of the electrons that take part.
+const FORM_FACTOR: (u32, f64) = (5, 1e-5);
+const ELECTRONS: (u32, f64) = (3, 1e-4);
+/// Intervals of the normalising integrals over sin(θ/2).
+const INTERVALS: usize = 256;
+
+/// Densities of both scatterings of one material over the sphere of directions, from 4 to 150 keV.
+///
+/// They are the laws that [`crate::MaterialTables`] samples: each integrates to 1.
+#[derive(Clone, Debug)]
+pub struct ScatterDensities {
+    energies: Octaves,
+    form_factor: Curve,
+    rayleigh_integral: Vec<f32>,
+    rows: Octaves,
+    /// Electrons that take part by q², for each energy of `rows`; a single one if they do not depend on the energy.
+    electrons: Vec<Curve>,
+    compton_integral: Vec<f32>,
+}
+
+impl ScatterDensities {
+    /// Prepares the densities of a material.
+    #[must_use]
+    pub fn new(material: &Material, model: ComptonModel) -> Self {
+        let form_factor = Curve::new(FORM_FACTOR, |q| material.form_factor_squared_per_gram(q));
+        let rows = Octaves::covering(LOWEST_KEV, MAX_ENERGY_KEV, ROW_BITS);
+        let electrons = match model {
+            ComptonModel::IncoherentFunction => {
+                vec![Curve::new(ELECTRONS, |q| material.incoherent_per_gram(q))]
+            }
+            ComptonModel::ImpulseApproximation => {
+                let shells = material.shells();
+                let at = |energy: f64| {
+                    let per_q = HC_KEV_ANGSTROM / energy;
+                    Curve::new(ELECTRONS, |q| {
+                        electrons_freed(&shells, energy, (q * per_q).powi(2))
+                    })
+                };
+                rows.nodes().map(at).collect()
+            }
+        };
+        let mut densities = Self {
+            energies: Octaves::covering(LOWEST_KEV, MAX_ENERGY_KEV, ENERGY_BITS),
+            form_factor,
+            rayleigh_integral: Vec::new(),
+            rows,
+            electrons,
+            compton_integral: Vec::new(),
+        };
+        let integrals = |relative: &dyn Fn(f64, f64) -> f64| -> Vec<f32> {
+            let nodes = densities.energies.nodes();
+            nodes
+                .map(|energy| over_the_sphere(|half| relative(energy, half)) as f32)
+                .collect()
+        };
+        let rayleigh_integral = integrals(&|energy, half| densities.rayleigh(energy, half));
+        let compton_integral = integrals(&|energy, half| densities.compton(energy, half));
+        densities.rayleigh_integral = rayleigh_integral;
+        densities.compton_integral = compton_integral;
+        densities
+    }
+
+    /// Density of Rayleigh scattering by θ, per steradian.
+    #[inline]
+    #[must_use]
+    pub fn rayleigh_density(&self, energy_kev: f64, cos_theta: f64) -> f64 {
+        self.rayleigh(energy_kev, 0.5 * (1.0 - cos_theta))
+            / self.integral(&self.rayleigh_integral, energy_kev)
+    }
+
+    /// Density of Compton scattering by θ, whatever energy the photon keeps, per steradian.
+    #[inline]
+    #[must_use]
+    pub fn compton_density(&self, energy_kev: f64, cos_theta: f64) -> f64 {
+        self.compton(energy_kev, 0.5 * (1.0 - cos_theta))
+            / self.integral(&self.compton_integral, energy_kev)
+    }
+
+    #[inline]
+    fn integral(&self, integrals: &[f32], energy_kev: f64) -> f64 {
+        let (bin, fraction) = self.energies.locate(energy_kev);
+        let [low, high] = [bin, bin + 1].map(|i| f64::from(integrals[i]));
+        low + fraction * (high - low)
+    }
+
+    /// F² (1 + cos²θ) at sin²(θ/2) = `half`.
+    #[inline]
+    fn rayleigh(&self, energy_kev: f64, half: f64) -> f64 {
+        let cos = 1.0 - 2.0 * half;
+        self.form_factor.at(q_squared(energy_kev, half)) * (1.0 + cos * cos)
+    }
+
+    /// Klein–Nishina times the electrons that take part.
+    #[inline]
+    fn compton(&self, energy_kev: f64, half: f64) -> f64 {
+        let x = q_squared(energy_kev, half);
+        let electrons = if let [only] = self.electrons.as_slice() {
+            only.at(x)
+        } else {
+            let (row, fraction) = self.rows.locate(energy_kev);
+            let [low, high] = [row, row + 1].map(|row| self.electrons[row].at(x));
+            low + fraction * (high - low)
+        };
+        differential(energy_kev, 1.0 - 2.0 * half) * electrons
+    }
+}
+
+#[inline]
+fn q_squared(energy_kev: f64, half: f64) -> f64 {
+    half * (energy_kev * (1.0 / HC_KEV_ANGSTROM)).powi(2)
+}
+
+/// Integral over all directions by Simpson's rule in s = sin(θ/2), in which forward peaks are wide; dΩ = 8π s ds.
+fn over_the_sphere(relative: impl Fn(f64) -> f64) -> f64 {
+    let simpson = |i: usize| match i {
+        0 | INTERVALS => 1.0,
+        _ => 2.0 + 2.0 * (i % 2) as f64,
+    };
+    let sum: f64 = (0..=INTERVALS)
+        .map(|i| {
+            let s = i as f64 / INTERVALS as f64;
+            simpson(i) * s * relative(s * s)
+        })
+        .sum();
+    sum / (3.0 * INTERVALS as f64) * 8.0 * PI
+}
+
+/// A function of q over x = q², linear between the nodes and down to its value at q = 0.
+#[derive(Clone, Debug)]
+struct Curve {
+    grid: Octaves,
+    at_zero: f32,
+    values: Vec<f32>,
+}
+
+impl Curve {
+    fn new((bits, smallest): (u32, f64), of_q: impl Fn(f64) -> f64) -> Self {
+        let grid = Octaves::covering(smallest, (MAX_ENERGY_KEV / HC_KEV_ANGSTROM).powi(2), bits);
+        Self {
+            grid,
+            at_zero: of_q(0.0) as f32,
+            values: grid.nodes().map(|x| of_q(x.sqrt()) as f32).collect(),
+        }
+    }
+
+    #[inline]
+    fn at(&self, x: f64) -> f64 {
+        let first = self.grid.first();
+        let (low, high, fraction) = if x < first {
+            (self.at_zero, self.values[0], x / first)
+        } else {
+            let (bin, fraction) = self.grid.locate(x);
+            (self.values[bin], self.values[bin + 1], fraction)
+        };
+        f64::from(low) + fraction * f64::from(high - low)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{matter::sampler::MaterialTables, philox::Philox};
+
+    const MODELS: [ComptonModel; 2] = [
+        ComptonModel::ImpulseApproximation,
+        ComptonModel::IncoherentFunction,
+    ];
+
+    /// Integral of a density over a shell of directions between two values of sin(θ/2).
+    fn probability(density: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
+        let steps = 16;
+        (0..steps)
+            .map(|i| {
+                let s = low + (high - low) * (f64::from(i) + 0.5) / f64::from(steps);
+                8.0 * PI * s * density(1.0 - 2.0 * s * s) * (high - low) / f64::from(steps)
+            })
+            .sum()
+    }
+
+    #[test]
+    fn densities_integrate_to_one() {
+        for (name, model) in ["water", "bone_cortical", "csi", "lead"]
+            .into_iter()
+            .flat_map(|name| MODELS.map(|model| (name, model)))
+        {
+            let densities = ScatterDensities::new(&Material::named(name).unwrap(), model);
+            for energy_kev in [5.0, 7.3, 20.0, 34.5, 61.0, 119.0, 150.0] {
+                let whole = |density: &dyn Fn(f64) -> f64| -> f64 {
+                    (0..200)
+                        .map(|i| {
+                            let low = f64::from(i) / 200.0;
+                            probability(density, low, low + 0.005)
+                        })
+                        .sum()
+                };
+                let rayleigh = whole(&|cos| densities.rayleigh_density(energy_kev, cos));
+                let compton = whole(&|cos| densities.compton_density(energy_kev, cos));
+                for (kind, whole) in [("Rayleigh", rayleigh), ("Compton", compton)] {
+                    assert!(
+                        (whole - 1.0).abs() < 1e-3,
+                        "{kind}, {name}, {energy_kev} keV, {model:?}: {whole}"
+                    );
+                }
+            }
+        }
+    }
+
+    /// χ² of 40 bins of sin(θ/2) against 100 000 samples. Above 39 + 6 √78 = 92 by chance: 4e-6 each, 1e-4 for the
+    /// 27 comparisons.
+    #[test]
+    fn samples_follow_the_densities() {
+        const BINS: usize = 40;
+        const SAMPLES: u64 = 100_000;
+        for (name, energy_kev) in ["water", "bone_cortical", "lead"]
+            .into_iter()
+            .flat_map(|name| [7.0, 30.0, 90.0].map(|energy_kev| (name, energy_kev)))
+        {
+            let material = Material::named(name).unwrap();
+            for (model, with_rayleigh) in MODELS.into_iter().zip([true, false]) {
+                let tables = MaterialTables::new(&material, model);
+                let densities = ScatterDensities::new(&material, model);
+                let mut counts = [[0_u32; BINS]; 2];
+                for index in 0..SAMPLES {
+                    let mut random = Philox::new(17, 0, index);
+                    let bin = |half: f64| ((half.sqrt() * BINS as f64) as usize).min(BINS - 1);
+                    let rayleigh = tables.rayleigh_scattering(energy_kev, || random.unit());
+                    counts[0][bin(rayleigh)] += 1;
+                    let (compton, _) = tables.compton_scattering(energy_kev, || random.unit());
+                    counts[1][bin(compton)] += 1;
+                }
+                for (kind, counts) in counts.iter().enumerate() {
+                    if kind == 0 && !with_rayleigh {
+                        continue; // the model does not change it
+                    }
+                    let density = |cos: f64| match kind {
+                        0 => densities.rayleigh_density(energy_kev, cos),
+                        _ => densities.compton_density(energy_kev, cos),
+                    };
+                    let mut chi_squared = 0.0;
+                    for (bin, &count) in counts.iter().enumerate() {
+                        let [low, high] = [bin, bin + 1].map(|b| b as f64 / BINS as f64);
+                        let expected = SAMPLES as f64 * probability(density, low, high);
+                        if expected < 5.0 {
+                            // Too few for the normal law: an allowance of a few counts.
+                            assert!(f64::from(count) < expected + 6.0 * expected.sqrt() + 6.0);
+                        } else {
+                            chi_squared += (f64::from(count) - expected).powi(2) / expected;
+                        }
+                    }
+                    assert!(
+                        chi_squared < 92.0,
+                        "{name}, {energy_kev} keV, {model:?}, kind {kind}: χ² {chi_squared:.0}"
+                    );
+                }
+            }
+        }
+    }
+}

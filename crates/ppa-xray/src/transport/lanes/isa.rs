@@ -1,0 +1,80 @@
+//! Copies of one kernel for the vector instructions of the machine, and the choice among them.
+#![allow(unsafe_code)]
+
+/// A set of vector instructions that this machine has.
+///
+/// Every kernel rounds each operation on its own (no fused multiply-add), so all sets give the same bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Isa(Set);
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Set {
+    Baseline,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+}
+
+impl Isa {
+    /// All sets of this machine, the widest last.
+    fn available() -> impl DoubleEndedIterator<Item = Self> {
+        #[cfg(target_arch = "x86_64")]
+        let sets = [
+            (Set::Baseline, true),
+            (Set::Avx2, is_x86_feature_detected!("avx2")),
+            (
+                Set::Avx512,
+                is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512bw")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512vl"),
+            ),
+        ];
+        #[cfg(not(target_arch = "x86_64"))]
+        let sets = [(Set::Baseline, true)];
+        sets.into_iter()
+            .filter(|(_, present)| *present)
+            .map(|(set, _)| Self(set))
+    }
+
+    /// The widest set of this machine.
+    pub fn widest() -> Self {
+        Self::available().next_back().unwrap_or(Self(Set::Baseline))
+    }
+
+    #[cfg(test)]
+    pub fn all() -> Vec<Self> {
+        Self::available().collect()
+    }
+
+    #[inline(always)]
+    pub(super) fn run(self, kernel: impl Kernel) {
+        match self.0 {
+            Set::Baseline => kernel.run(),
+            // SAFETY: `available` alone makes this value, and only where the instructions were detected.
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx2 => unsafe { with_avx2(kernel) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Set::Avx512 => unsafe { with_avx512(kernel) },
+        }
+    }
+}
+
+/// Straight-line work on many photons at once. `run` is `#[inline(always)]`, so that it is compiled into each copy.
+pub(super) trait Kernel {
+    fn run(self);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn with_avx2(kernel: impl Kernel) {
+    kernel.run();
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vl")]
+fn with_avx512(kernel: impl Kernel) {
+    kernel.run();
+}

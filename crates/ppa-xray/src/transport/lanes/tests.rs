@@ -1,0 +1,293 @@
+//! The lanes against one history at a time without any bound, and against themselves in other company.
+
+use nalgebra::{Isometry3, Point3, Rotation3, Vector3};
+use ppa_ct::Grid;
+
+use super::*;
+use crate::beam::projection::{Detector, Projection};
+use crate::beam::spectrum::Spectrum;
+use crate::matter::compton::ComptonModel;
+use crate::matter::material::Material;
+use crate::phantom::lattice::Walk;
+use crate::phantom::voxels::VoxelPhantom;
+
+/// A tilted block of air, tissue of uneven density, bone and a titanium pin; voxels of unequal sides.
+fn phantom() -> VoxelPhantom {
+    let tilt = Rotation3::from_euler_angles(0.3, -0.2, 0.5).into_inner();
+    let spacing = Vector3::new(2.0, 2.5, 1.7);
+    let origin = Point3::from(-(tilt * Vector3::new(35.0, 36.25, 33.15)));
+    let grid = Grid::from_parts([36, 30, 40], tilt, spacing, origin).unwrap();
+    let (material, density) = (0..grid.len())
+        .map(|index| {
+            let [i, j, k] = grid.voxel(index);
+            let (x, y) = (i as f64 * 2.0 - 35.0, j as f64 * 2.5 - 36.25);
+            if x.hypot(y) > 33.0 {
+                (0, 0.001_2)
+            } else if (18..20).contains(&i) && (14..16).contains(&j) && (10..25).contains(&k) {
+                (3, 4.5)
+            } else if (x - 8.0).hypot(y) < 12.0 {
+                (2, 1.2 + 0.05 * (k % 12) as f32)
+            } else {
+                (1, 0.95 + 0.01 * (k % 12) as f32)
+            }
+        })
+        .unzip();
+    let materials = ["air", "soft_tissue", "bone_cortical", "titanium"]
+        .map(|name| Material::named(name).unwrap());
+    VoxelPhantom::new(grid, material, density, materials.to_vec()).unwrap()
+}
+
+/// The detector plane cuts through the air of the box.
+fn projection() -> Projection {
+    Projection::new(
+        Isometry3::translation(0.0, 0.0, -1_000.0),
+        1_043.0,
+        Detector::centred(60, 60, 2.0),
+    )
+}
+
+/// What one history left, as bits.
+type Events = Vec<[u64; 4]>;
+
+/// Keeps the events of every history.
+#[derive(Default)]
+struct Recorder {
+    under_way: Vec<Events>,
+    finished: Vec<Events>,
+    /// Emitted less deposited, arrived and escaped, keV.
+    balance_kev: Vec<f64>,
+    unbalanced: usize,
+}
+
+impl Recorder {
+    fn note(&mut self, slot: usize, event: [u64; 4], energy_kev: f64) {
+        self.under_way[slot].push(event);
+        self.balance_kev[slot] -= energy_kev;
+    }
+
+    fn sorted(mut self) -> Vec<Events> {
+        self.finished.sort_unstable();
+        self.finished
+    }
+}
+
+impl Score for Recorder {
+    fn emit(&mut self, slot: usize, energy_kev: f64) {
+        assert!(slot < LANES);
+        self.under_way.resize(LANES, Events::new());
+        self.balance_kev.resize(LANES, 0.0);
+        assert!(self.under_way[slot].is_empty(), "slot {slot} is taken");
+        self.balance_kev[slot] = energy_kev;
+        self.note(slot, [0, energy_kev.to_bits(), 0, 0], 0.0);
+    }
+
+    fn deposit(&mut self, slot: usize, voxel: usize, energy_kev: f64) {
+        self.note(slot, [1, voxel as u64, energy_kev.to_bits(), 0], energy_kev);
+    }
+
+    fn arrive(&mut self, slot: usize, arrival: &Arrival, rng: &mut Philox) {
+        let place = [arrival.x_mm.to_bits(), arrival.y_mm.to_bits()];
+        let event = [
+            2 + arrival.category as u64,
+            place[0],
+            place[1],
+            rng.unit().to_bits(),
+        ];
+        self.note(slot, event, arrival.energy_kev);
+    }
+
+    fn escape(&mut self, slot: usize, energy_kev: f64) {
+        self.note(slot, [9, energy_kev.to_bits(), 0, 0], energy_kev);
+    }
+
+    fn finish(&mut self, slot: usize) {
+        self.finished
+            .push(std::mem::take(&mut self.under_way[slot]));
+        self.unbalanced += usize::from(self.balance_kev[slot].abs() > 1e-9);
+    }
+}
+
+fn record(transport: &Transport, isa: Isa, ranges: &[Range<u64>]) -> Vec<Events> {
+    let mut recorder = Recorder::default();
+    for range in ranges {
+        Lanes::new(transport, isa, 5, range.clone()).run(&mut recorder);
+    }
+    assert_eq!(recorder.unbalanced, 0, "energy appears or vanishes");
+    recorder.sorted()
+}
+
+#[test]
+fn company_and_vector_width_change_no_bit() {
+    let (phantom, projection) = (phantom(), projection());
+    let spectrum = Spectrum::monoenergetic(60.0).unwrap();
+    let transport =
+        Transport::new(&phantom, &spectrum, &projection, ComptonModel::default()).unwrap();
+    let whole = record(&transport, Isa::widest(), std::slice::from_ref(&(0..6_000)));
+    assert_eq!(whole.len(), 6_000);
+    let parts = [0..1, 1..65, 65..65, 65..200, 200..3_000, 3_000..6_000];
+    assert_eq!(record(&transport, Isa::widest(), &parts), whole, "parts");
+    for isa in Isa::all() {
+        assert_eq!(
+            record(&transport, isa, std::slice::from_ref(&(0..6_000))),
+            whole,
+            "{isa:?}"
+        );
+    }
+}
+
+/// Counts and energies by the way a history ends: absorbed, escaped, or at the plane per category.
+#[derive(Default)]
+struct Ends {
+    counts: [f64; 6],
+    energies: [f64; 6],
+    squares: [f64; 6],
+}
+
+impl Ends {
+    fn add(&mut self, end: usize, energy_kev: f64) {
+        self.counts[end] += 1.0;
+        self.energies[end] += energy_kev;
+        self.squares[end] += energy_kev * energy_kev;
+    }
+}
+
+impl Score for Ends {
+    fn deposit(&mut self, _: usize, _: usize, energy_kev: f64) {
+        self.add(0, energy_kev);
+    }
+
+    fn arrive(&mut self, _: usize, arrival: &Arrival, _: &mut Philox) {
+        self.add(2 + arrival.category as usize, arrival.energy_kev);
+    }
+
+    fn escape(&mut self, _: usize, energy_kev: f64) {
+        self.add(1, energy_kev);
+    }
+}
+
+/// One history in double precision: the optical depth is spent voxel by voxel, with no bound and no rejection.
+fn plain_history(transport: &Transport, rng: &mut Philox, ends: &mut Ends) {
+    let Emission {
+        origin_mm: mut position,
+        mut direction,
+        mut energy_kev,
+    } = transport.emitter.emit(rng);
+    let mut order = 0;
+    let mut category = Category::Primary;
+    loop {
+        let to_plane = if direction.z > 0.0 {
+            (transport.projection.source_detector_mm - position.z) / direction.z
+        } else {
+            f64::INFINITY
+        };
+        let collision = plain_flight(transport, &position, &direction, energy_kev, to_plane, rng);
+        let Some((distance_mm, material)) = collision else {
+            return if to_plane.is_finite() {
+                ends.add(2 + category as usize, energy_kev);
+            } else {
+                ends.add(1, energy_kev);
+            };
+        };
+        position += direction * distance_mm;
+        let sums = transport
+            .attenuation
+            .at(material, transport.attenuation.locate(energy_kev));
+        let tables = &transport.samplers[usize::from(material)];
+        let lot = rng.unit() as f32 * sums.total;
+        let cos_theta = if lot < sums.photoelectric {
+            return ends.add(0, energy_kev);
+        } else if lot < sums.with_compton {
+            let (cos_theta, left_kev) = tables.sample_compton(energy_kev, rng);
+            if left_kev < CUTOFF_KEV {
+                return ends.add(0, energy_kev);
+            }
+            ends.add(0, energy_kev - left_kev);
+            energy_kev = left_kev;
+            category = Category::Compton;
+            cos_theta
+        } else {
+            category = Category::Rayleigh;
+            tables.sample_rayleigh(energy_kev, rng)
+        };
+        order += 1;
+        if order > 1 {
+            category = Category::Multiple;
+        }
+        let across = direction.cross(&Vector3::x()).normalize();
+        let azimuth = Rotation3::from_scaled_axis(direction * (std::f64::consts::TAU * rng.unit()));
+        let (along, sideways) = (cos_theta, (1.0 - cos_theta * cos_theta).max(0.0).sqrt());
+        direction = (direction * along + azimuth * across * sideways).normalize();
+    }
+}
+
+/// Distance to the next collision and the material there.
+fn plain_flight(
+    transport: &Transport,
+    position: &Point3<f64>,
+    direction: &Vector3<f64>,
+    energy_kev: f64,
+    to_plane_mm: f64,
+    rng: &mut Philox,
+) -> Option<(f64, u8)> {
+    let lattice = &transport.lattice;
+    let ray = lattice.ray(position, direction);
+    let (enter, leave) = lattice.clip(&ray)?;
+    let end = leave.min(to_plane_mm);
+    let mut walk = Walk::new(&ray, enter, lattice.size.map(|n| n as u32), 1.0);
+    let energy = transport.attenuation.locate(energy_kev);
+    let mut depth = -(1.0 - rng.unit()).ln();
+    let mut at = enter;
+    while at < end {
+        let material = transport.phantom.material()[walk.index];
+        let density = transport.phantom.density_g_cm3()[walk.index];
+        let mu = f64::from(density * transport.attenuation.at(material, energy).total);
+        let (axis, next) = walk.exit();
+        let next = next.min(end);
+        if depth < mu * (next - at) {
+            return Some((at + depth / mu, material));
+        }
+        depth -= mu * (next - at);
+        at = next;
+        if !walk.advance(axis) {
+            break;
+        }
+    }
+    None
+}
+
+/// Bounds, rejection, single precision and the order of random numbers leave every mean where it is.
+#[test]
+fn lanes_and_plain_histories_agree() {
+    let (phantom, projection) = (phantom(), projection());
+    let spectrum = Spectrum::from_bins(&[20.0, 40.0, 70.0], &[1.0, 1.0]).unwrap();
+    let transport =
+        Transport::new(&phantom, &spectrum, &projection, ComptonModel::default()).unwrap();
+    let histories = 400_000;
+    let (mut lanes, mut plain) = (Ends::default(), Ends::default());
+    transport.follow(1, 0..histories, &mut lanes);
+    for history in 0..histories / 2 {
+        plain_history(&transport, &mut Philox::new(2, 0, history), &mut plain);
+    }
+    for end in 0..6 {
+        // Sums of independent terms; a history may deposit several times, which counts as independent here: a little
+        // too strict, since its deposits exclude each other.
+        for (what, sums, squares) in [
+            (
+                "count",
+                [lanes.counts, plain.counts],
+                [lanes.counts, plain.counts],
+            ),
+            (
+                "energy",
+                [lanes.energies, plain.energies],
+                [lanes.squares, plain.squares],
+            ),
+        ] {
+            let difference = sums[0][end] - 2.0 * sums[1][end];
+            let sigma = (squares[0][end] + 4.0 * squares[1][end]).sqrt();
+            let z = difference / sigma;
+            assert!(z.abs() < 4.0, "{what} of end {end}: {z:.1} sigma"); // 12 looks: 8e-4
+        }
+        assert!(plain.counts[end] > 1_000.0, "end {end} is rare");
+    }
+}
