@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use ppa_xray::{ComptonModel, Material, MaterialTables, Spectrum, TubeSpec};
+use ppa_xray::{ComptonModel, Material, MaterialTables, ScatterDensities, Spectrum, TubeSpec};
 
 /// Look-ups per iteration, at energies that jump about as those of histories do.
 const LOOKUPS: u64 = 1000;
@@ -55,6 +55,64 @@ fn look_ups(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// Scatterings per iteration, at the energies of the spectrum, with uniforms of a generator that costs about 1 ns.
+fn scattering(criterion: &mut Criterion) {
+    let spectrum = Spectrum::tungsten(&tube()).expect("inside the tube model");
+    let golden = |i: u64| (i as f64 * 0.618_033_988_749_895).fract();
+    let energies: Vec<f64> = (0..LOOKUPS).map(|i| spectrum.sample(golden(i))).collect();
+    let mut state = 1_u64;
+    let mut uniform = move || {
+        // SplitMix64 (Steele, Lea, Flood 2014).
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mixed = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((mixed ^ (mixed >> 31)) >> 32) as f64 * (1.0 / 4_294_967_296.0)
+    };
+
+    let mut group = criterion.benchmark_group("scatter");
+    group.throughput(Throughput::Elements(LOOKUPS));
+    for name in ["water", "bone_cortical"] {
+        let material = Material::named(name).expect("in the library");
+        for (model, label) in [
+            (ComptonModel::ImpulseApproximation, "compton_impulse"),
+            (ComptonModel::IncoherentFunction, "compton_incoherent"),
+        ] {
+            let tables = MaterialTables::new(&material, model);
+            group.bench_function(format!("{label}/{name}"), |b| {
+                b.iter(|| {
+                    let one = |&e: &f64| tables.compton_scattering(black_box(e), &mut uniform);
+                    energies
+                        .iter()
+                        .map(one)
+                        .map(|(half, e)| half * e)
+                        .sum::<f64>()
+                })
+            });
+        }
+        let tables = MaterialTables::new(&material, ComptonModel::default());
+        group.bench_function(format!("rayleigh/{name}"), |b| {
+            b.iter(|| {
+                let one = |&e: &f64| tables.rayleigh_scattering(black_box(e), &mut uniform);
+                energies.iter().map(one).sum::<f64>()
+            })
+        });
+        let densities = ScatterDensities::new(&material, ComptonModel::default());
+        group.bench_function(format!("densities/{name}"), |b| {
+            b.iter(|| {
+                energies
+                    .iter()
+                    .enumerate()
+                    .map(|(i, &e)| {
+                        let cos = 2.0 * golden(i as u64) - 1.0;
+                        densities.compton_density(e, cos) + densities.rayleigh_density(e, cos)
+                    })
+                    .sum::<f64>()
+            })
+        });
+    }
+    group.finish();
+}
+
 fn preparation(criterion: &mut Criterion) {
     let bone = Material::named("bone_cortical").expect("in the library");
     let tube = tube();
@@ -65,6 +123,9 @@ fn preparation(criterion: &mut Criterion) {
     group.bench_function("material_tables", |b| {
         b.iter(|| MaterialTables::new(black_box(&bone), ComptonModel::default()))
     });
+    group.bench_function("scatter_densities", |b| {
+        b.iter(|| ScatterDensities::new(black_box(&bone), ComptonModel::default()))
+    });
     group.bench_function("tungsten_spectrum", |b| {
         b.iter(|| Spectrum::tungsten(black_box(&tube)))
     });
@@ -74,5 +135,5 @@ fn preparation(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, look_ups, preparation);
+criterion_group!(benches, look_ups, scattering, preparation);
 criterion_main!(benches);

@@ -38,25 +38,23 @@ pub(crate) struct ImpulseApproximation {
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     keep: f32,
-    here: BoundElectron,
-    other: BoundElectron,
+    /// The shell of this entry, and the one that fills it up.
+    shells: [BoundElectron; 2],
 }
 
+/// An electron of a shell.
 #[derive(Clone, Copy, Debug)]
-struct BoundElectron {
-    binding_kev: f32,
+pub(crate) struct BoundElectron {
+    pub(crate) binding_kev: f32,
     /// 1/(2 J₀).
-    momentum: f32,
+    pub(crate) momentum: f32,
 }
 
-/// An electron that a photon can free at its angle.
-#[derive(Clone, Copy, Debug)]
-struct Struck {
-    /// |p| along the scattering vector.
-    momentum: f32,
-    /// Whether it could be freed moving either way; otherwise only with −p.
-    either_way: bool,
-}
+/// What [`BoundElectron::outcome`] says instead of an energy: the electron cannot be freed.
+const NOT_FREED: f32 = -1.0;
+
+/// The electron could be freed, but the correction factor of the cross section turns its momentum down.
+const TURNED_DOWN: f32 = 0.0;
 
 impl ImpulseApproximation {
     pub(crate) fn new(shells: &[Shell]) -> Self {
@@ -71,15 +69,14 @@ impl ImpulseApproximation {
             .iter()
             .map(|shell| Entry {
                 keep: 1.0,
-                here: bound(shell),
-                other: bound(shell),
+                shells: [bound(shell); 2],
             })
             .collect();
         let (mut small, mut large): (Vec<usize>, Vec<usize>) =
             (0..shells.len()).partition(|&i| shares[i] < 1.0);
         while let (Some(poor), Some(&rich)) = (small.pop(), large.last()) {
             entries[poor].keep = shares[poor] as f32;
-            entries[poor].other = bound(&shells[rich]);
+            entries[poor].shells[1] = bound(&shells[rich]);
             shares[rich] -= 1.0 - shares[poor];
             if shares[rich] < 1.0 {
                 small.extend(large.pop());
@@ -102,15 +99,29 @@ impl ImpulseApproximation {
     #[inline]
     pub(crate) fn sample(&self, energy_kev: f32, mut uniform: impl FnMut() -> f32) -> (f32, f32) {
         for _ in 0..PATIENCE {
-            let half = self.angles.half_angle_squared(energy_kev, uniform());
-            if let Some(struck) = self.strike(energy_kev, half, uniform(), uniform()) {
-                let scattered = recoil(energy_kev, half, struck, uniform())
-                    .unwrap_or_else(|| self.sample_energy(energy_kev, half, uniform));
+            let (half, electron) = self.attempt(energy_kev, uniform(), uniform());
+            let scattered = electron.outcome(energy_kev, half, uniform(), uniform());
+            if scattered > TURNED_DOWN {
                 return (half, scattered);
+            }
+            if scattered == TURNED_DOWN {
+                return (half, self.sample_energy(energy_kev, half, uniform));
             }
         }
         let half = self.angles.half_angle_squared(energy_kev, uniform());
         (half, off_resting(energy_kev, half))
+    }
+
+    /// sin²(θ/2) of Klein–Nishina and an electron, whether or not the photon can free it at that angle.
+    #[inline(always)]
+    pub(crate) fn attempt(
+        &self,
+        energy_kev: f32,
+        u_angle: f32,
+        u_shell: f32,
+    ) -> (f32, BoundElectron) {
+        let half = self.angles.half_angle_squared(energy_kev, u_angle);
+        (half, self.electron(u_shell))
     }
 
     /// Energy of a photon scattered by a given angle.
@@ -121,90 +132,109 @@ impl ImpulseApproximation {
         mut uniform: impl FnMut() -> f32,
     ) -> f32 {
         for trial in 0..PATIENCE {
-            let struck = if trial < TRIALS {
-                self.strike(energy_kev, half, uniform(), uniform())
+            let scattered = if trial < TRIALS {
+                let electron = self.electron(uniform());
+                electron.outcome(energy_kev, half, uniform(), uniform())
             } else {
-                self.strike_weighed(energy_kev, half, uniform(), uniform())
+                let Some((electron, share)) = self.electron_freed(energy_kev, half, uniform())
+                else {
+                    break;
+                };
+                electron.outcome(energy_kev, half, uniform() * share, uniform())
             };
-            let scattered = struck.and_then(|struck| recoil(energy_kev, half, struck, uniform()));
-            if let Some(scattered) = scattered {
+            if scattered > TURNED_DOWN {
                 return scattered;
             }
         }
         off_resting(energy_kev, half)
     }
 
-    /// An electron by the weights f n(p_max) of the shells, for angles so small that hardly one can be freed.
-    fn strike_weighed(
-        &self,
-        energy_kev: f32,
-        half: f32,
-        u_shell: f32,
-        u_momentum: f32,
-    ) -> Option<Struck> {
+    /// An electron of a shell by f n(p_max), and n(p_max): for angles so small that hardly one can be freed.
+    fn electron_freed(&self, energy_kev: f32, half: f32, u: f32) -> Option<(BoundElectron, f32)> {
         let freed = |electron: &BoundElectron| electron.share_freed(energy_kev, half);
         let all: f32 = self.shells.iter().map(|(f, e)| f * freed(e)).sum();
-        let mut left = u_shell * all;
-        let (_, electron) = self.shells.iter().find(|(f, electron)| {
-            left -= f * freed(electron);
-            left < 0.0
-        })?;
-        electron.struck(energy_kev, half, u_momentum * freed(electron))
+        let mut left = u * all;
+        self.shells.iter().find_map(|(f, electron)| {
+            let share = freed(electron);
+            left -= f * share;
+            (left < 0.0).then_some((*electron, share))
+        })
     }
 
-    /// An electron, if the photon can free it.
+    /// An electron of a shell by its number of electrons.
     #[inline(always)]
-    fn strike(&self, energy_kev: f32, half: f32, u_shell: f32, u_momentum: f32) -> Option<Struck> {
-        let at = u_shell * self.entries.len() as f32;
+    fn electron(&self, u: f32) -> BoundElectron {
+        let at = u * self.entries.len() as f32;
         let index = (at as usize).min(self.entries.len() - 1);
         let entry = &self.entries[index];
-        let electron = if at - index as f32 <= entry.keep {
-            entry.here
-        } else {
-            entry.other
-        };
-        electron.struck(energy_kev, half, u_momentum)
+        entry.shells[usize::from(at - index as f32 > entry.keep)]
     }
 }
 
 impl BoundElectron {
-    /// Numerator and denominator of p_max = (E (E − U)(1 − cos θ)/mc² − U) / √(2 E (E − U)(1 − cos θ) + U²).
+    /// p_max = a/√b: a = E (E − U)(1 − cos θ)/mc² − U and b = 2 E (E − U)(1 − cos θ) + U².
     #[inline(always)]
     fn limit(&self, energy_kev: f32, half: f32) -> (f32, f32) {
         let binding = self.binding_kev;
         let transfer = 4.0 * energy_kev * (energy_kev - binding) * half;
         (
             transfer * (0.5 / ELECTRON_REST_KEV) as f32 - binding,
-            (transfer + binding * binding).sqrt(),
+            transfer + binding * binding,
         )
     }
 
     /// n(p_max): share of such electrons that the photon can free.
     fn share_freed(&self, energy_kev: f32, half: f32) -> f32 {
-        let (limit, size) = self.limit(energy_kev, half);
-        if self.binding_kev >= energy_kev || size == 0.0 {
+        let (limit, squared) = self.limit(energy_kev, half);
+        if self.binding_kev >= energy_kev || squared == 0.0 {
             return 0.0;
         }
-        let reach = 1.0 + (limit / size).abs() / self.momentum;
+        let reach = 1.0 + limit.abs() / squared.sqrt() / self.momentum;
         let beyond = 0.5 * exp(0.5 - 0.5 * reach * reach);
         if limit < 0.0 { beyond } else { 1.0 - beyond }
     }
 
-    /// This electron with momentum p at the cumulative probability `u` of its profile, if p ≤ p_max.
+    /// Energy of the photon after it met this electron at the cumulative probability `u_momentum` of its profile; or
+    /// [`NOT_FREED`] if p > p_max, or [`TURNED_DOWN`] by the factor F(p) = 1 + a p. All in all straight-line arithmetic.
+    ///
+    /// Where the electron could be freed moving either way, F chooses the way instead of rejecting: the two F add up to 2.
     #[inline(always)]
-    fn struck(&self, energy_kev: f32, half: f32, u: f32) -> Option<Struck> {
-        // Share of the profile beyond ±p: t = exp(½ (1 − (1 + 2 J₀|p|)²)).
-        let against = u < 0.5;
-        let tail = 2.0 * if against { u } else { 1.0 - u };
+    pub(crate) fn outcome(&self, energy_kev: f32, half: f32, u_momentum: f32, u_way: f32) -> f32 {
+        // Share of the profile beyond ±p: exp(½ (1 − (1 + 2 J₀|p|)²)).
+        let tail = 2.0 * u_momentum.min(1.0 - u_momentum);
         let reach = (1.0 - 2.0 * ln(tail.max(SMALLEST_TAIL))).sqrt();
-        let momentum = self.momentum * (reach - 1.0);
-        let (limit, size) = self.limit(energy_kev, half);
-        let either_way = momentum * size <= limit;
-        let freed = either_way || (against && -momentum * size <= limit);
-        (freed && momentum < 1.0 && self.binding_kev < energy_kev).then_some(Struck {
-            momentum,
-            either_way,
-        })
+        let size = self.momentum * (reach - 1.0);
+        let t = size * size;
+        // −|p| ≤ p_max or |p| ≤ p_max, without the roots.
+        let (limit, squared) = self.limit(energy_kev, half);
+        let (beyond, below) = (t * squared >= limit * limit, t * squared <= limit * limit);
+        let either_way = (limit >= 0.0) & below;
+        let backwards = (u_momentum < 0.5) & ((limit >= 0.0) | beyond);
+        let freed = (either_way | backwards) & (size < 1.0) & (self.binding_kev < energy_kev);
+        // With D = E/E_C and κ = E/mc²: (D q_C/E)² = (D − 1)² + 4 D s, s = sin²(θ/2), and
+        // a = (q_C/E)(1 + τ (τ − cos θ) E²/q_C²) = ((D q_C/E)² + 2 s (D − κ)) / (D² q_C/E) ≥ 0.
+        let kappa = energy_kev * (1.0 / ELECTRON_REST_KEV) as f32;
+        let d = 1.0 + 2.0 * kappa * half;
+        let vector = (d - 1.0) * (d - 1.0) + 4.0 * d * half;
+        let slope = (vector + 2.0 * half * (d - kappa)) * size.min(LARGEST_CORRECTED);
+        let lot = if either_way { 2.0 * u_way - 1.0 } else { u_way };
+        let below_slope = lot * d * vector.sqrt() < slope;
+        let p = if either_way & below_slope {
+            size
+        } else {
+            -size
+        };
+        // Root of the quadratic for E′ at given p, its cancelling terms collected.
+        let sin_squared = 4.0 * half * (1.0 - half);
+        let shift = p * (vector - t * sin_squared).max(0.0).sqrt();
+        let scattered = energy_kev * (d - t * (1.0 - 2.0 * half) + shift) / (d * d - t);
+        if !freed {
+            NOT_FREED
+        } else if below_slope & !either_way {
+            TURNED_DOWN
+        } else {
+            scattered
+        }
     }
 }
 
@@ -212,36 +242,6 @@ impl BoundElectron {
 #[inline(always)]
 pub(crate) fn off_resting(energy_kev: f32, half: f32) -> f32 {
     energy_kev / (1.0 + energy_kev * half * (2.0 / ELECTRON_REST_KEV) as f32)
-}
-
-/// Energy of the photon after it met `struck`, or nothing if the correction factor F(p) = 1 + a p turns it down.
-///
-/// Where both directions of motion are possible, F chooses between them instead of rejecting: their F add up to 2.
-#[inline(always)]
-fn recoil(energy_kev: f32, half: f32, struck: Struck, u: f32) -> Option<f32> {
-    let tau = 1.0 / (1.0 + energy_kev * half * (2.0 / ELECTRON_REST_KEV) as f32);
-    let cos = 1.0 - 2.0 * half;
-    // q_C²/E² = 1 + τ² − 2τ cos θ, a = (q_C/E)(1 + τ(τ − cos θ) E²/q_C²) ≥ 0.
-    let vector = ((1.0 - tau) * (1.0 - tau) + 4.0 * tau * half).max(f32::MIN_POSITIVE);
-    let root = vector.sqrt();
-    let a = root + tau * (tau - cos) / root;
-    let slope = a * struck.momentum.min(LARGEST_CORRECTED);
-    let p = if struck.either_way {
-        if 2.0 * u < 1.0 + slope {
-            struck.momentum
-        } else {
-            -struck.momentum
-        }
-    } else if u < slope {
-        return None;
-    } else {
-        -struck.momentum
-    };
-    // Root of the quadratic for E′ at given p, its cancelling terms collected.
-    let t = p * p;
-    let sin_squared = 4.0 * half * (1.0 - half);
-    let shift = p * (vector - t * tau * tau * sin_squared).max(0.0).sqrt();
-    Some(energy_kev * tau * (1.0 - t * tau * cos + shift) / (1.0 - t * tau * tau))
 }
 
 /// Σ f Θ(E − U) n(p_max), the electrons that take part at an angle.

@@ -21,9 +21,12 @@ pub(crate) fn ln(x: f32) -> f32 {
     let above = x.to_bits().wrapping_sub(SQRT_HALF);
     let exponent = (above as i32 >> 23) as f32;
     let f = f32::from_bits((above & 0x007f_ffff) + SQRT_HALF) - 1.0;
-    let p = P.iter().rev().fold(0.0, |sum, &c| sum * f + c);
+    // Pairs first (Estrin): a shorter chain of dependent steps than Horner's.
+    let square = f * f;
+    let pair = |i: usize| P[i] + P[i + 1] * f;
+    let p = (pair(0) + pair(2) * square) + (pair(4) + pair(6) * square) * (square * square);
     // ln 2 in two parts, the first exact in few bits, keeps the product with k exact.
-    exponent * 0.693_359_4 + (f + (f * f * p + exponent * -2.121_944_4e-4))
+    exponent * 0.693_359_4 + (f + (square * p + exponent * -2.121_944_4e-4))
 }
 
 /// eˣ for x up to 88, within 6e-6 of the value; 0 below −87.
