@@ -45,6 +45,7 @@ impl Simulation {
         let settings = AnalogSettings {
             histories,
             seed: self.seed(station),
+            ..AnalogSettings::default()
         };
         let projection = self.projection(station);
         let mut run = AnalogRun::new(self.phantom(), self.spectrum(), &projection, &settings)?;
