@@ -30,7 +30,7 @@ import spekpy
 
 OUT = pathlib.Path(__file__).resolve().parent.parent / "data" / "tungsten.bin.deflate"
 VOLTAGES = np.arange(40.0, 151.0, 5.0)
-ANGLES = np.array([6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 17.0, 20.0])
+ANGLES = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0, 30.0])
 LOW, WIDTH, HIGH = 1.0, 0.5, 150.0
 SOFTEST_LINE = 5.0
 K_EDGE, L3_EDGE = 69.5, 10.2

@@ -396,7 +396,7 @@ mod tests {
 
     /// 70 kV, 14° anode, 2.5 mm Al: photons per solid angle and mean energy beside the central ray over those on it,
     /// against SpekPy 2.5.4 off its axis, `Spek(kvp=70, th=14, x=x, z=100).filter("Al", 2.5)`, times its squared
-    /// distance. SpekPy's beam passes the filter at a slant, which is 0.5 % at 10.5 cm; ours does not.
+    /// distance. SpekPy's beam passes the filter at a slant, which costs it up to 0.9 % at 17.6 cm; ours does not.
     #[test]
     fn heel_effect_agrees_with_spekpy_off_the_axis() {
         let source = Source {
@@ -407,12 +407,14 @@ mod tests {
         };
         let emitter = Emitter::new(&projection(source), &spectrum()).unwrap();
         for (x_cm, intensity, mean_kev) in [
+            (-17.6, 0.799_61, 41.370),
             (-10.5, 0.932_30, 40.017),
             (-7.0, 0.964_17, 39.665),
             (-3.5, 0.985_59, 39.405),
             (3.5, 1.009_37, 39.055),
             (7.0, 1.014_92, 38.935),
             (10.5, 1.017_48, 38.842),
+            (17.6, 1.015_70, 38.716),
         ] {
             let mixture = emitter.mixture(&Vector3::new(x_cm, 0.0, 100.0).normalize());
             let parts = mixture.parts();
@@ -420,7 +422,7 @@ mod tests {
                 .map(|(s, share)| share * emitter.spectra()[s].mean_energy_kev())
                 .sum();
             let ratio = mixture.intensity / intensity;
-            assert!((ratio - 1.0).abs() < 0.006, "{x_cm} cm: {ratio}");
+            assert!((ratio - 1.0).abs() < 0.012, "{x_cm} cm: {ratio}");
             assert!(
                 (mean / mean_kev - 1.0).abs() < 0.004,
                 "{x_cm} cm: {mean} keV"

@@ -16,7 +16,7 @@ const LOOK: u32 = 33;
 /// Spectra of one tube by take-off angle; between two of them photons are mixed in proportion.
 ///
 /// The angle between a photon and the face of the anode is what the tube model calls the anode angle: it sets how much
-/// tungsten lies in the way. Towards the anode it shrinks. Below 6° and above 20° the model ends and its
+/// tungsten lies in the way. Towards the anode it shrinks. Below 1° and above 30° the model ends and its
 /// last spectrum is used.
 #[derive(Debug, Clone)]
 pub(crate) struct Heel {

@@ -66,7 +66,7 @@ impl Spectrum {
     /// The fluence is that at 1 m; only an air filter makes it weaker by the air on the way.
     ///
     /// # Errors
-    /// A voltage outside 40 to 150 kV, an angle outside 6° to 20°, a filter whose thickness is negative or not finite,
+    /// A voltage outside 40 to 150 kV, an angle outside 1° to 30°, a filter whose thickness is negative or not finite,
     /// filters that let nothing through.
     pub fn tungsten(tube: &TubeSpec) -> Result<Self, SpectrumError> {
         for filter in &tube.filters {
