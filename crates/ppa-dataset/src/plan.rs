@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use ppa_scene::{PlaneSettings, RoomSpec, Sweep};
-use ppa_xray::{Detector, FastSettings, HuCalibration, Presentation};
+use ppa_xray::{Detector, FastSettings, HuCalibration, Presentation, Receptor, Source};
 use serde::{Deserialize, Serialize};
 
 use crate::body_shape::ShapeSettings;
@@ -96,8 +96,12 @@ pub struct XraySettings {
     pub anode_angle_deg: f64,
     /// Filters as `MATERIAL:mm`.
     pub filters: Vec<String>,
-    /// Image receptor.
+    /// Focal spot, heel effect and collimation; a point that fills the detector when left out.
+    pub source: Source,
+    /// Pixels of the image.
     pub detector: Detector,
+    /// Anti-scatter grid and converter; none and an ideal one when left out.
+    pub receptor: Receptor,
     /// Length of limb kept on either side of the joint, mm.
     pub half_length_mm: f64,
     /// Largest voxel that photons travel through, mm: thicker slices are interpolated, so that
@@ -120,7 +124,9 @@ impl Default for XraySettings {
             kvp: 60.0,
             anode_angle_deg: 12.0,
             filters: vec!["Al:2.5".to_owned()],
+            source: Source::default(),
             detector: Detector::centred(448, 448, 0.5),
+            receptor: Receptor::default(),
             half_length_mm: 120.0,
             max_voxel_mm: 1.0,
             calibration: HuCalibration::default(),

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Unit, Vector3};
 use ppa_ct::Volume;
 use ppa_scene::{Landmarks, Placement, XrayDevice, ct_from_device};
-use ppa_xray::{Detector, Projection, VoxelPhantom};
+use ppa_xray::{Projection, VoxelPhantom};
 
 use crate::plan::XraySettings;
 use crate::prepare::PreparedLimb;
@@ -75,11 +75,15 @@ pub fn projection(
     placement: &Placement,
     landmarks: &Landmarks,
     device: &XrayDevice,
-    detector: Detector,
+    settings: &XraySettings,
 ) -> Projection {
-    Projection::new(
-        *ct_from_device(placement, landmarks, device).isometry(),
-        device.source_detector_mm,
-        detector,
-    )
+    Projection {
+        source: settings.source,
+        receptor: settings.receptor.clone(),
+        ..Projection::new(
+            *ct_from_device(placement, landmarks, device).isometry(),
+            device.source_detector_mm,
+            settings.detector,
+        )
+    }
 }

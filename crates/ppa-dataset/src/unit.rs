@@ -195,12 +195,7 @@ impl<'a> PosableLimb<'a> {
     ) -> Result<[FileRow; 2], UnitError> {
         let settings = &self.plan.xray;
         let device = &self.stage.table.room.device;
-        let projection = projection(
-            placement,
-            &self.prepared.landmarks,
-            device,
-            settings.detector,
-        );
+        let projection = projection(placement, &self.prepared.landmarks, device, settings);
         let seed = item_seed(self.plan.seed, Purpose::Radiograph, self.id, pose.step);
         let engine = FastSettings {
             seed,

@@ -11,9 +11,10 @@
 //! `ct` (DICOM LPS); `device` has the source at the origin and z towards the detector. The device is moved, never the
 //! voxels.
 //! Left out: electrons deposit where they are born, since at 150 keV they travel about 0.3 mm in water, less than a voxel;
-//! fluorescence counts as absorbed;
-//! photons below 5 keV are absorbed on the spot. Cross sections and spectra reach down to 1 keV. The detector is ideal and
-//! has no grid; the focal spot is a point.
+//! fluorescence in the phantom counts as absorbed; photons below 5 keV are absorbed on the spot. Cross sections and
+//! spectra reach down to 1 keV.
+//! A [`Projection`] begins with a point source and a detector that takes everything; its [`Source`] adds focal spot, heel
+//! effect and collimation, its [`Receptor`] grid, CsI or selenium, blur and electronic noise.
 //! Repeatable: random numbers are addressed by seed and history and tallies are integers, so the number of threads
 //! changes no bit.
 //!
@@ -56,7 +57,9 @@ pub use beam::source::{Collimation, FocalSpot, HeelEffect, Source, SpotShape};
 pub use beam::spectrum::Spectrum;
 pub use beam::spectrum_error::SpectrumError;
 pub use beam::tube::{Filter, TubeSpec};
-pub use detector::receptor::{AntiScatterGrid, DetectorModel, LinesAlong, Receptor, ReceptorError};
+pub use detector::receptor::{
+    AntiScatterGrid, Blur, DetectorModel, LinesAlong, Receptor, ReceptorError,
+};
 pub use dose::report::{Dose, Estimate, Imparted, VoxelDose};
 pub use dose::settings::{DoseError, DoseSettings, VoxelBox};
 pub use engine::analog::{AnalogSettings, analog};

@@ -187,6 +187,7 @@ mod tests {
                 focus_mm: Some(1_000.0),
                 lines_along: LinesAlong::X,
             }),
+            ..Receptor::default()
         }
     }
 

@@ -94,7 +94,7 @@ pub fn fast(
         _ => Expected::scatter(&tally, category, histories, &upsampling),
     });
     let (open_field, open_field_ev_cm2) = OpenField::of(&transport);
-    Ok(Radiograph {
+    Ok(transport.readout.read(Radiograph {
         detector: projection.detector,
         engine: Engine::Fast,
         histories: settings.dose_histories,
@@ -104,8 +104,9 @@ pub fn fast(
         open_field_ev_cm2,
         open_field,
         layers: with_noise(&expected, settings, &projection.detector),
+        electronic: None,
         sums,
-    })
+    }))
 }
 
 impl FastSettings {

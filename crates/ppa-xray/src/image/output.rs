@@ -76,7 +76,8 @@ impl Radiograph {
 
     /// Writes all layers as 32-bit EXR; the file appears whole or not at all.
     ///
-    /// Channels: `Y`, the total, and per [`Category`] `<name>.value` and `<name>.sigma`, eV/cm² per history.
+    /// Channels: `Y`, the total, and per [`Category`] `<name>.value` and `<name>.sigma`, eV/cm² per history; with electronic
+    /// noise `electronic.value` and `electronic.sigma`.
     /// The attribute [`EXR_ATTRIBUTE`] holds seed, histories, units and geometry. The bytes depend on
     /// nothing but the radiograph.
     ///
@@ -92,6 +93,10 @@ impl Radiograph {
             let layer = self.layer(category);
             add(&format!("{}.value", category.name()), layer.value.clone());
             add(&format!("{}.sigma", category.name()), layer.sigma.clone());
+        }
+        if let Some(layer) = &self.electronic {
+            add("electronic.value", layer.value.clone());
+            add("electronic.sigma", layer.sigma.clone());
         }
         let mut attributes = exr::LayerAttributes::default();
         attributes.other.insert(

@@ -117,6 +117,8 @@ pub struct Radiograph {
     pub(crate) open_field: OpenField,
     /// The layers, in the order of [`Category::ALL`].
     pub layers: [Layer; 4],
+    /// Electronic noise of the detector, if it has any: mean 0, the same standard deviation in every pixel.
+    pub electronic: Option<Layer>,
     /// Energy on the whole detector. For the fast engine: before quantum noise is added, so that
     /// the primary has no standard error.
     pub sums: CategorySums,
@@ -138,11 +140,15 @@ impl Radiograph {
         &self.layers[category as usize]
     }
 
-    /// All energy per pixel, eV/cm² per history.
+    /// All layers, electronic noise among them.
+    fn planes(&self) -> impl Iterator<Item = &Layer> {
+        self.layers.iter().chain(&self.electronic)
+    }
+
+    /// The reading of every pixel: all layers together, eV/cm² per history.
     pub fn total(&self) -> Vec<f32> {
         self.per_pixel(|pixel| {
-            self.layers
-                .iter()
+            self.planes()
                 .map(|layer| f64::from(layer.value[pixel]))
                 .sum()
         })
@@ -151,8 +157,7 @@ impl Radiograph {
     /// Standard error of [`Radiograph::total`]; the categories are independent to first order.
     pub fn sigma(&self) -> Vec<f32> {
         self.per_pixel(|pixel| {
-            self.layers
-                .iter()
+            self.planes()
                 .map(|layer| f64::from(layer.sigma[pixel]).powi(2))
                 .sum::<f64>()
                 .sqrt()

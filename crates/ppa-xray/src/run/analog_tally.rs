@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::beam::projection::Detector;
 use crate::detector::open_field::OpenField;
+use crate::detector::readout::Readout;
 use crate::dose::report::Dose;
 use crate::dose::setup::DoseSetup;
 use crate::dose::tally::DoseTally;
@@ -47,6 +48,7 @@ pub(crate) struct ImageSetup {
     source_detector_mm: f64,
     open_field_ev_cm2: f64,
     open_field: OpenField,
+    readout: Readout,
     histories_per_mas: Option<f64>,
 }
 
@@ -154,6 +156,7 @@ impl ImageSetup {
             source_detector_mm: projection.source_detector_mm,
             open_field_ev_cm2,
             open_field,
+            readout: transport.readout.clone(),
             histories_per_mas: transport.emitter.photons_per_mas(),
         }
     }
@@ -177,7 +180,7 @@ impl ImageSetup {
             let total = tally.total(category, histories);
             (total.mean_kev, total.standard_error_kev(n))
         });
-        Radiograph {
+        self.readout.read(Radiograph {
             detector: self.detector,
             engine: Engine::Analog,
             histories: n,
@@ -187,7 +190,8 @@ impl ImageSetup {
             open_field_ev_cm2: self.open_field_ev_cm2,
             open_field: self.open_field.clone(),
             layers,
+            electronic: None,
             sums,
-        }
+        })
     }
 }

@@ -6,4 +6,5 @@ pub(crate) enum Stream {
     History = 0,
     QuantumNoise = 1,
     Projection = 2,
+    ElectronicNoise = 3,
 }

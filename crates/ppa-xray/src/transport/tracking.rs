@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::beam::emitter::Emitter;
 use crate::beam::projection::{Projection, ProjectionError};
 use crate::beam::spectrum::Spectrum;
+use crate::detector::readout::Readout;
 use crate::detector::response::Response;
 use crate::matter::compton::ComptonModel;
 use crate::matter::sampler::MaterialTables;
@@ -70,6 +71,7 @@ pub(crate) struct Transport<'a> {
     pub projection: &'a Projection,
     pub emitter: Emitter,
     pub response: Response,
+    pub readout: Readout,
     pub lattice: Lattice,
     pub attenuation: Attenuation,
     pub(super) samplers: Vec<MaterialTables>,
@@ -86,6 +88,8 @@ impl<'a> Transport<'a> {
     ) -> Result<Self, TransportError> {
         let emitter = Emitter::new(projection, spectrum)?;
         let response = Response::new(&projection.receptor, projection.detector.centre_mm)
+            .map_err(ProjectionError::from)?;
+        let readout = Readout::new(&projection.receptor, &projection.detector)
             .map_err(ProjectionError::from)?;
         check_placement(phantom, projection)?;
         let outside = |[low_kev, high_kev]: [f64; 2]| -> f64 {
@@ -131,6 +135,7 @@ impl<'a> Transport<'a> {
             projection,
             emitter,
             response,
+            readout,
             lattice: Lattice::new(phantom.grid(), &projection.ct_from_device),
             majorants: Majorants::new(&codes, phantom.grid().size(), voxel_mm, &attenuation),
             codes,

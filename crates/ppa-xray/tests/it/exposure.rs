@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;
 use ppa_xray::{
-    AnalogSettings, AntiScatterGrid, Category, Collimation, Detector, DetectorModel, FastSettings,
-    FocalSpot, HeelEffect, Material, Projection, Receptor, Source, Spectrum, SpotShape, TubeSpec,
-    VoxelPhantom, analog, fast, primary,
+    AnalogSettings, AntiScatterGrid, Blur, Category, Collimation, Detector, DetectorModel,
+    FastSettings, FocalSpot, HeelEffect, Material, Projection, Receptor, Source, Spectrum,
+    SpotShape, TubeSpec, VoxelPhantom, analog, fast, primary,
 };
 
 use crate::scenes::{frontal, slab};
@@ -57,6 +57,7 @@ fn demanding() -> Projection {
             packing: 0.8,
         },
         grid: Some(grid()),
+        ..Receptor::default()
     };
     projection
 }
@@ -269,5 +270,61 @@ fn noise_of_a_scintillator_is_compound_poisson() {
         "variances {} and {}",
         a.1,
         b.1
+    );
+}
+
+/// Blur and electronic noise of the read-out: readings scatter as the standard errors say, and both engines keep their
+/// sums. The noise of a blurred image is correlated, so that the 10 000 pixels count as fewer.
+#[test]
+fn readings_scatter_as_their_standard_errors_say() {
+    let vacuum = slab(10.0, 1e-9);
+    let spectrum = Spectrum::monoenergetic(60.0).unwrap();
+    let mut projection = frontal(100, 0.3);
+    let histories = 400_000;
+    let settings = AnalogSettings {
+        histories,
+        seed: 3,
+        ..AnalogSettings::default()
+    };
+    let sharp = analog(&vacuum, &spectrum, &projection, &settings).unwrap();
+    projection.receptor.blur = Some(Blur::Lorentzian { h_mm2: 0.45 });
+    projection.receptor.electronic_noise_kev = 200.0;
+    let followed = analog(&vacuum, &spectrum, &projection, &settings).unwrap();
+    assert_eq!(followed.sums, sharp.sums);
+    let dose = FastSettings {
+        dose_histories: histories as f64,
+        scatter_histories: 1,
+        ..FastSettings::default()
+    };
+    let drawn = fast(&vacuum, &spectrum, &projection, &dose).unwrap();
+    for image in [followed, drawn] {
+        let (total, sigma) = (image.total(), image.sigma());
+        let n = total.len() as f64;
+        let mean = total.iter().map(|&v| f64::from(v)).sum::<f64>() / n;
+        let variance = total
+            .iter()
+            .map(|&v| (f64::from(v) - mean).powi(2))
+            .sum::<f64>()
+            / n;
+        let expected = sigma.iter().map(|&s| f64::from(s).powi(2)).sum::<f64>() / n;
+        // 2.5 % for the number of pixels; 4 sigma.
+        assert!(
+            (variance / expected - 1.0).abs() < 0.10,
+            "{variance}, {expected}"
+        );
+        let electronic = image.electronic.unwrap();
+        let share = (f64::from(electronic.sigma[0])).powi(2) / expected;
+        assert!((0.3..0.95).contains(&share), "electronic share {share}");
+        let sum: f64 = electronic.value.iter().map(|&v| f64::from(v)).sum();
+        assert!(sum.abs() < 4.0 * n.sqrt() * f64::from(electronic.sigma[0]));
+    }
+    let expected = FastSettings {
+        dose_histories: f64::INFINITY,
+        ..dose
+    };
+    let clean = fast(&vacuum, &spectrum, &projection, &expected).unwrap();
+    assert!(
+        clean.electronic.is_none(),
+        "the expected image has no noise"
     );
 }

@@ -80,7 +80,7 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
     let phantom = joint_phantom(&prepared, &plan.xray)?;
     let spectrum = spectrum(&plan.xray)?;
     let device = &table.room.device;
-    let projection = projection(&placement, &prepared.landmarks, device, plan.xray.detector);
+    let projection = projection(&placement, &prepared.landmarks, device, &plan.xray);
 
     working.set_message("following photons");
     let watch = Stopwatch::start();
