@@ -4,6 +4,7 @@ mod bad_input;
 mod json;
 mod mcgpu;
 mod resume;
+mod tallies;
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -65,6 +65,9 @@ pub fn analog(
 }
 
 impl AnalogSettings {
+    /// Most histories of a run; no sum overflows, even if all of them meet in one pixel.
+    pub const MOST_HISTORIES: u64 = MOST_HISTORIES;
+
     pub(crate) fn validate(&self) -> Result<(), TransportError> {
         if !(1..=MOST_HISTORIES).contains(&self.histories) {
             return Err(TransportError::Setting {

@@ -1,8 +1,11 @@
 //! `ppa xray`: radiographs, spectra and materials.
 
 mod audit;
+mod follow;
 mod materials;
 mod mcgpu;
+mod merge;
+mod report;
 mod simulate;
 mod spectrum;
 
@@ -15,6 +18,8 @@ use crate::output::Output;
 pub enum XrayCommand {
     /// One radiograph of a posed limb
     Simulate(simulate::SimulateArgs),
+    /// One radiograph from the tallies of all parts of an analog run
+    Merge(merge::MergeArgs),
     /// The beam of a tungsten tube behind filters
     Spectrum(spectrum::SpectrumArgs),
     /// Mass attenuation of a material
@@ -51,6 +56,7 @@ impl BeamArgs {
 pub fn run(command: &XrayCommand, output: Output) -> anyhow::Result<()> {
     match command {
         XrayCommand::Simulate(args) => simulate::run(args, output),
+        XrayCommand::Merge(args) => merge::run(args, output),
         XrayCommand::Spectrum(args) => spectrum::run(args, output),
         XrayCommand::Materials(args) => materials::run(args, output),
         XrayCommand::Audit(args) => audit::run(args, output),

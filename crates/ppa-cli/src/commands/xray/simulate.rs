@@ -1,16 +1,19 @@
 //! `ppa xray simulate`: one radiograph of a posed limb.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
+use ppa_ct::{Volume, write_nifti};
 use ppa_dataset::{Case, Plan, PreparedLimb, Table, joint_phantom, projection, spectrum};
 use ppa_scene::{Contact, place};
-use ppa_xray::{AnalogSettings, CategorySums, Engine, FastSettings, analog, fast};
+use ppa_xray::{Dose, FastSettings, VoxelPhantom, fast};
 use serde::Serialize;
 
 use super::BeamArgs;
-use crate::output::{Output, Seconds, Stopwatch, working};
+use super::follow::AnalogArgs;
+use super::report::Report;
+use crate::output::{Output, Stopwatch, working};
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(super) enum EngineName {
@@ -41,25 +44,29 @@ pub struct SimulateArgs {
     /// Seed of histories and noise
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Radiograph to write: 16-bit PNG
-    #[arg(long)]
-    out: PathBuf,
+    /// Radiograph to write: 16-bit PNG; a run that keeps a tally may do without
+    #[arg(long, required_unless_present = "tally")]
+    out: Option<PathBuf>,
     /// Tallies to write: OpenEXR with one layer per category
     #[arg(long)]
     exr: Option<PathBuf>,
+    #[command(flatten)]
+    analog: AnalogArgs,
 }
 
 #[derive(Debug, Serialize)]
 struct Simulated {
-    projections: [CategorySums; 1],
-    histories: f64,
-    engine: Engine,
-    contact: Contact,
     #[serde(flatten)]
-    seconds: Seconds,
+    report: Report,
+    contact: Contact,
 }
 
 pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
+    if matches!(args.engine, EngineName::Fast)
+        && let Some(option) = args.analog.given()
+    {
+        anyhow::bail!("{option} needs --engine analog");
+    }
     let mut plan = match &args.plan {
         Some(path) => Plan::read(path)?,
         None => Plan::new(Vec::new()),
@@ -84,57 +91,58 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
 
     working.set_message("following photons");
     let watch = Stopwatch::start();
-    let radiograph = match args.engine {
+    let (radiograph, dose) = match args.engine {
         EngineName::Fast => {
             let settings = FastSettings {
                 dose_histories: args.histories.unwrap_or(plan.xray.engine.dose_histories),
                 seed: args.seed,
                 ..plan.xray.engine
             };
-            fast(&phantom, &spectrum, &projection, &settings)?
+            (fast(&phantom, &spectrum, &projection, &settings)?, None)
         }
         EngineName::Analog => {
-            let histories = args.histories.unwrap_or(2e7);
-            anyhow::ensure!(
-                (1.0..=1e15).contains(&histories),
-                "--histories is {histories}, expected 1 to 1e15 for the analog engine"
-            );
-            let settings = AnalogSettings {
-                histories: histories as u64,
-                seed: args.seed,
-                ..AnalogSettings::default()
-            };
-            analog(&phantom, &spectrum, &projection, &settings)?
+            working.finish_and_clear();
+            let (histories, seed) = (args.histories, args.seed);
+            let tally = args
+                .analog
+                .follow(&phantom, &spectrum, &projection, histories, seed)?;
+            (tally.radiograph(), tally.dose())
         }
     };
     let seconds = watch.read();
-    radiograph.write_png(&args.out, &plan.xray.presentation)?;
+    let mut written: Vec<&Path> = args.analog.tally.iter().map(PathBuf::as_path).collect();
+    if let Some(out) = &args.out {
+        radiograph.write_png(out, &plan.xray.presentation)?;
+        written.push(out);
+    }
     if let Some(exr) = &args.exr {
         radiograph.write_exr(exr)?;
+        written.push(exr);
+    }
+    if let (Some(path), Some(dose)) = (&args.analog.dose_map, &dose) {
+        write_nifti(path, &dose_map(&phantom, dose)?)?;
+        written.push(path);
     }
     working.finish_and_clear();
     let result = Simulated {
-        projections: [radiograph.sums],
-        histories: radiograph.histories,
-        engine: radiograph.engine,
+        report: Report::new(&radiograph, dose.as_ref(), seconds),
         contact: placement.contact,
-        seconds,
     };
-    output.print(&result, |result| {
-        let sums = &result.projections[0];
-        let line = |name: &str, value: f64, se: f64| format!("{name:<10}{value:>12.3} ± {se:.3}\n");
-        let mut text = "eV per history on the detector\n".to_owned();
-        for category in ppa_xray::Category::ALL {
-            let (value, se) = sums.of(category);
-            text += &line(category.name(), value, se);
-        }
-        text += &format!(
-            "{:.3e} histories, {:.1} s, {:.1} CPU s; {}",
-            result.histories,
-            seconds.wall_s,
-            seconds.cpu_s,
-            args.out.display()
-        );
-        text
-    })
+    output.print(&result, |result| result.report.describe(&written))
+}
+
+/// µGy per mAs in every voxel.
+fn dose_map(phantom: &VoxelPhantom, dose: &Dose) -> anyhow::Result<Volume> {
+    let per_mas = dose
+        .histories_per_mas
+        .context("the spectrum does not know its fluence")?;
+    let voxels = dose
+        .voxels
+        .as_ref()
+        .context("no voxel doses were counted")?;
+    let gray = voxels.gy_per_history();
+    let micro = gray
+        .iter()
+        .map(|&gray| (1e6 * per_mas * f64::from(gray)) as f32);
+    Ok(Volume::new(phantom.grid().clone(), micro.collect())?)
 }

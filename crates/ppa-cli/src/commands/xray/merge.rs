@@ -1,0 +1,53 @@
+//! `ppa xray merge`: the parts of a run as one radiograph.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use ppa_dataset::Plan;
+use ppa_xray::AnalogTally;
+
+use super::report::Report;
+use crate::output::{Output, Stopwatch, working};
+
+#[derive(Debug, Args)]
+pub struct MergeArgs {
+    /// Tallies of all parts of one run, in any order
+    #[arg(required = true)]
+    tallies: Vec<PathBuf>,
+    /// Radiograph to write: 16-bit PNG
+    #[arg(long)]
+    out: PathBuf,
+    /// Tallies to write: OpenEXR with one layer per category
+    #[arg(long)]
+    exr: Option<PathBuf>,
+    /// Tally of the whole run to write, as one run would have left it
+    #[arg(long)]
+    tally: Option<PathBuf>,
+    /// Take the presentation from this plan
+    #[arg(long)]
+    plan: Option<PathBuf>,
+}
+
+pub fn run(args: &MergeArgs, output: Output) -> anyhow::Result<()> {
+    let watch = Stopwatch::start();
+    let plan = match &args.plan {
+        Some(path) => Plan::read(path)?,
+        None => Plan::new(Vec::new()),
+    };
+    let working = working("merging");
+    let tally = AnalogTally::merge(&args.tallies)?;
+    let radiograph = tally.radiograph();
+    radiograph.write_png(&args.out, &plan.xray.presentation)?;
+    let mut written: Vec<&Path> = vec![&args.out];
+    if let Some(exr) = &args.exr {
+        radiograph.write_exr(exr)?;
+        written.push(exr);
+    }
+    if let Some(path) = &args.tally {
+        tally.write(path)?;
+        written.push(path);
+    }
+    working.finish_and_clear();
+    let report = Report::new(&radiograph, tally.dose().as_ref(), watch.read());
+    output.print(&report, |report| report.describe(&written))
+}

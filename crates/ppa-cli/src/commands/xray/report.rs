@@ -1,0 +1,134 @@
+//! What `simulate` and `merge` say about a radiograph and its doses.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use ppa_xray::{Category, CategorySums, Dose, Engine, Radiograph};
+use serde::Serialize;
+
+use crate::output::Seconds;
+
+/// One simulated exposure.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    projections: [Projected; 1],
+    histories: f64,
+    engine: Engine,
+    #[serde(flatten)]
+    dose: Option<DoseReport>,
+    #[serde(flatten)]
+    seconds: Seconds,
+}
+
+/// Energy on the detector.
+#[derive(Debug, Serialize)]
+struct Projected {
+    #[serde(flatten)]
+    sums: CategorySums,
+    /// Photons into the field per mAs; null when the spectrum does not know its fluence, as what follows.
+    histories_per_mas: Option<f64>,
+    /// Tube load that the noise stands for.
+    mas: Option<f64>,
+    ev_per_mas: Option<BTreeMap<&'static str, f64>>,
+    open_field_ev_cm2_per_mas: Option<f64>,
+}
+
+/// Material by material, in one order.
+#[derive(Debug, Serialize)]
+struct DoseReport {
+    materials: Vec<String>,
+    material_mass_g: Vec<f64>,
+    material_dose_ev_per_history: Vec<f64>,
+    material_dose_ev_per_history_se: Vec<f64>,
+    material_dose_gy_per_history: Vec<f64>,
+    entrance_air_kerma_gy_per_history: Option<f64>,
+    detector_air_kerma_gy_per_history: f64,
+    detector_air_kerma_gy_per_history_se: f64,
+    entrance_air_kerma_ugy_per_mas: Option<f64>,
+    detector_air_kerma_ugy_per_mas: Option<f64>,
+}
+
+impl Report {
+    pub fn new(radiograph: &Radiograph, dose: Option<&Dose>, seconds: Seconds) -> Self {
+        let sums = radiograph.sums;
+        let per_mas = radiograph.histories_per_mas;
+        let projected = Projected {
+            sums,
+            histories_per_mas: per_mas,
+            mas: radiograph.mas(),
+            ev_per_mas: per_mas.map(|factor| {
+                let of = |category: Category| (category.name(), sums.of(category).0 * factor);
+                Category::ALL.map(of).into()
+            }),
+            open_field_ev_cm2_per_mas: per_mas.map(|factor| radiograph.open_field_ev_cm2 * factor),
+        };
+        Self {
+            projections: [projected],
+            histories: radiograph.histories,
+            engine: radiograph.engine,
+            dose: dose.map(DoseReport::new),
+            seconds,
+        }
+    }
+
+    /// In words; `written` names the files.
+    pub fn describe(&self, written: &[&Path]) -> String {
+        let projected = &self.projections[0];
+        let mut text = "eV per history on the detector\n".to_owned();
+        for category in Category::ALL {
+            let (value, se) = projected.sums.of(category);
+            text += &format!("{:<10}{value:>12.3} ± {se:.3}\n", category.name());
+        }
+        if let Some(dose) = &self.dose {
+            text += "eV per history imparted to the phantom\n";
+            let values = dose.material_dose_ev_per_history.iter();
+            let values = values.zip(&dose.material_dose_ev_per_history_se);
+            for (name, (value, se)) in dose.materials.iter().zip(values) {
+                text += &format!("{name:<24}{value:>12.3} ± {se:.3}\n");
+            }
+            if let Some(kerma) = dose.entrance_air_kerma_ugy_per_mas {
+                text += &format!("air kerma at the skin {kerma:.4e} µGy/mAs");
+            }
+            if let Some(kerma) = dose.detector_air_kerma_ugy_per_mas {
+                text += &format!(", at the detector {kerma:.4e} µGy/mAs\n");
+            }
+        }
+        text += &format!("{:.3e} histories", self.histories);
+        if let Some(mas) = projected.mas.filter(|mas| mas.is_finite()) {
+            text += &format!(" ({mas:.3e} mAs)");
+        }
+        text += &format!(
+            ", {:.1} s, {:.1} CPU s",
+            self.seconds.wall_s, self.seconds.cpu_s
+        );
+        for path in written {
+            text += &format!("; {}", path.display());
+        }
+        text
+    }
+}
+
+impl DoseReport {
+    fn new(dose: &Dose) -> Self {
+        let imparted = || dose.materials.iter().map(|(_, imparted)| imparted);
+        let per_mas = |gray: f64| Some(1e6 * gray * dose.histories_per_mas?);
+        let detector = dose.detector_air_kerma_gy_per_history;
+        let entrance = dose.entrance_air_kerma_gy_per_history;
+        Self {
+            materials: dose
+                .materials
+                .iter()
+                .map(|(name, _)| name.clone())
+                .collect(),
+            material_mass_g: imparted().map(|matter| matter.mass_g).collect(),
+            material_dose_ev_per_history: imparted().map(|m| m.ev_per_history.value).collect(),
+            material_dose_ev_per_history_se: imparted().map(|m| m.ev_per_history.se).collect(),
+            material_dose_gy_per_history: imparted().map(|m| m.gy_per_history().value).collect(),
+            entrance_air_kerma_gy_per_history: entrance,
+            detector_air_kerma_gy_per_history: detector.value,
+            detector_air_kerma_gy_per_history_se: detector.se,
+            entrance_air_kerma_ugy_per_mas: entrance.and_then(per_mas),
+            detector_air_kerma_ugy_per_mas: per_mas(detector.value),
+        }
+    }
+}

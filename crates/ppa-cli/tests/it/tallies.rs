@@ -1,0 +1,140 @@
+//! Analog runs in parts and sittings.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::{fail, names, phantom, succeed, write_plan};
+
+/// An analog run of 20000 histories on the phantom with a small detector, and what it prints.
+fn simulate(folder: &Path, more: &str) -> Value {
+    serde_json::from_str(&succeed(folder, &command(more))).unwrap()
+}
+
+fn command(more: &str) -> String {
+    let case = phantom().join("p01.toml");
+    let case = case.display();
+    format!("xray simulate {case} --plan plan.toml --engine analog --seed 5 --json {more}")
+}
+
+fn read(folder: &Path, name: &str) -> Vec<u8> {
+    fs::read(folder.join(name)).unwrap()
+}
+
+#[test]
+fn parts_and_sittings_end_in_the_bytes_of_one_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_plan(folder, "");
+    let told = simulate(
+        folder,
+        "--histories 20000 --dose --out one.png --tally one.tally",
+    );
+    assert_eq!(told["histories"], 20_000.0);
+    let absolute = &told["projections"][0];
+    let factor = absolute["histories_per_mas"].as_f64().unwrap();
+    let primary = absolute["primary_ev_per_history"].as_f64().unwrap();
+    let per_mas = absolute["ev_per_mas"]["primary"].as_f64().unwrap();
+    assert!((per_mas / (primary * factor) - 1.0).abs() < 1e-12);
+    let materials = told["materials"].as_array().unwrap().len();
+    for key in [
+        "material_dose_ev_per_history",
+        "material_dose_ev_per_history_se",
+        "material_mass_g",
+    ] {
+        assert_eq!(told[key].as_array().unwrap().len(), materials, "{key}");
+    }
+    assert!(
+        told["entrance_air_kerma_ugy_per_mas"].as_f64()
+            > told["detector_air_kerma_ugy_per_mas"].as_f64()
+    );
+
+    for part in ["2/3", "1/3", "3/3"] {
+        let name = part.replace('/', "of");
+        simulate(
+            folder,
+            &format!("--histories 20000 --dose --part {part} --tally {name}.tally"),
+        );
+    }
+    succeed(
+        folder,
+        "xray merge 1of3.tally 2of3.tally 3of3.tally --plan plan.toml --out merged.png --tally merged.tally",
+    );
+    assert!(read(folder, "merged.tally") == read(folder, "one.tally"));
+    assert!(read(folder, "merged.png") == read(folder, "one.png"));
+
+    let said = fail(folder, "xray merge 1of3.tally 3of3.tally --out hole.png");
+    assert!(
+        said.contains("6666..13333") && said.contains("none of the tallies"),
+        "{said}"
+    );
+    let said = fail(folder, "xray merge one.tally 3of3.tally --out overlap.png");
+    assert!(
+        said.contains("overlap") && said.contains("13333..20000"),
+        "{said}"
+    );
+
+    // Five thousand histories, then the rest.
+    simulate(folder, "--histories 5000 --dose --tally go_on.tally");
+    let said = fail(
+        folder,
+        &command("--histories 20000 --dose --tally go_on.tally"),
+    );
+    assert!(
+        said.contains("go_on.tally") && said.contains("--resume"),
+        "{said}"
+    );
+    simulate(
+        folder,
+        "--histories 20000 --dose --tally go_on.tally --resume",
+    );
+    assert!(read(folder, "go_on.tally") == read(folder, "one.tally"));
+    let said = fail(
+        folder,
+        &command("--histories 20000 --kvp 70 --dose --tally go_on.tally --resume"),
+    );
+    assert!(said.contains("another simulation"), "{said}");
+    assert!(
+        !names(folder)
+            .iter()
+            .any(|name| name == "hole.png" || name == "overlap.png")
+    );
+}
+
+#[test]
+fn a_dose_map_lies_on_the_phantom() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_plan(folder, "");
+    simulate(
+        folder,
+        "--target-error 60 --dose-map dose.nii.gz --out x.png",
+    );
+    let info: Value = serde_json::from_str(&succeed(folder, "ct info dose.nii.gz --json")).unwrap();
+    assert!(info["hu_min"].as_f64() == Some(0.0) && info["hu_max"].as_f64() > Some(0.0));
+}
+
+#[test]
+fn options_that_make_no_sense_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_plan(folder, "");
+    let case = phantom().join("p01.toml");
+    let fast = format!(
+        "xray simulate {} --plan plan.toml --out x.png --time 3",
+        case.display()
+    );
+    assert!(fail(folder, &fast).contains("--time needs --engine analog"));
+    for (options, word) in [
+        ("--out x.png --time 0", "--time"),
+        ("--out x.png --target-error 100", "--target-error"),
+        ("--out x.png --histories 0", "--histories"),
+        ("--out x.png --histories 1e12", "5e11"),
+        ("--tally nowhere/x.tally --histories 1000", "nowhere"),
+    ] {
+        let said = fail(folder, &command(options));
+        assert!(said.contains(word), "{options}: {said}");
+    }
+    assert_eq!(names(folder), ["plan.toml"]);
+}
