@@ -6,4 +6,6 @@ mod energy_balance;
 pub(crate) mod fast;
 pub(crate) mod noise;
 pub(crate) mod raytrace;
+#[cfg(test)]
+mod scatter_of_a_sphere;
 pub(crate) mod upsample;
