@@ -596,11 +596,12 @@ mod tests {
             let error = broken(change);
             assert!(matches!(error, MaterialError::TableValue { .. }), "{error}");
         }
-        let lengths: [Change; 5] = [
+        let lengths: [Change; 6] = [
             |t| t.energies_kev.clear(),
             |t| t.energies_kev.truncate(1),
             |t| t.rayleigh_cm2_g.truncate(9),
             |t| t.form_factor_squared.clear(),
+            |t| t.form_factor_squared.truncate(2),
             |t| t.shells.clear(),
         ];
         for change in lengths {

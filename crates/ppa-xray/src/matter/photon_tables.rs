@@ -84,6 +84,16 @@ impl TabulatedMatter {
             .map(|&[x, y]| (x, y))
             .unzip();
         ascending(name, "squared momentum transfers", &q_squared, false)?;
+        // A node at q = 0 has no logarithm: the value there only says what lies below the next node.
+        let positive = usize::from(q_squared[0] == 0.0);
+        if q_squared.len() - positive < 2 {
+            return Err(MaterialError::TableLength {
+                name: name.to_owned(),
+                what: "positive squared momentum transfers",
+                found: q_squared.len() - positive,
+                expected: 2,
+            });
+        }
         not_negative(name, "squared form factors", &squared)?;
         if squared[0] == 0.0 {
             return Err(table_value(name, "squared form factors", 0, 0.0));
@@ -112,8 +122,6 @@ impl TabulatedMatter {
             }
         }
         let section = |values| LogLog::new(energies, values);
-        // A node at q = 0 has no logarithm: the value there only says what lies below the next node.
-        let positive = usize::from(q_squared[0] == 0.0);
         Ok(Self {
             range_kev,
             photoelectric: section(sections[0].1),

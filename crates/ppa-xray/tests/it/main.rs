@@ -8,6 +8,7 @@ mod files;
 mod mcgpu;
 mod placement;
 mod runs;
+mod scattering;
 mod scenes;
 mod shared;
 mod spectra;
