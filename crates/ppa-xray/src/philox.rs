@@ -4,7 +4,6 @@
 
 const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
-const ROUNDS: usize = 10;
 
 /// The random numbers of one history: the key is the seed, the counter (history, step, stream).
 ///
@@ -72,20 +71,33 @@ impl Philox {
 }
 
 /// The bijection itself: four random words for a counter and a key.
+///
+/// Without a loop, so that a loop around it can become vector code.
 #[inline(always)]
-pub(crate) fn rounds(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
-    for _ in 0..ROUNDS {
-        let product_0 = u64::from(MULTIPLIERS[0]) * u64::from(counter[0]);
-        let product_1 = u64::from(MULTIPLIERS[1]) * u64::from(counter[2]);
-        counter = [
-            (product_1 >> 32) as u32 ^ counter[1] ^ key[0],
-            product_1 as u32,
-            (product_0 >> 32) as u32 ^ counter[3] ^ key[1],
-            product_0 as u32,
-        ];
-        key = [key[0].wrapping_add(WEYL[0]), key[1].wrapping_add(WEYL[1])];
-    }
-    counter
+pub(crate) fn rounds(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
+    let bump = |n: u32| {
+        [
+            key[0].wrapping_add(n.wrapping_mul(WEYL[0])),
+            key[1].wrapping_add(n.wrapping_mul(WEYL[1])),
+        ]
+    };
+    let once = round(round(counter, bump(0)), bump(1));
+    let once = round(round(once, bump(2)), bump(3));
+    let once = round(round(once, bump(4)), bump(5));
+    let once = round(round(once, bump(6)), bump(7));
+    round(round(once, bump(8)), bump(9))
+}
+
+#[inline(always)]
+fn round(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
+    let product_0 = u64::from(MULTIPLIERS[0]) * u64::from(counter[0]);
+    let product_1 = u64::from(MULTIPLIERS[1]) * u64::from(counter[2]);
+    [
+        (product_1 >> 32) as u32 ^ counter[1] ^ key[0],
+        product_1 as u32,
+        (product_0 >> 32) as u32 ^ counter[3] ^ key[1],
+        product_0 as u32,
+    ]
 }
 
 #[cfg(test)]

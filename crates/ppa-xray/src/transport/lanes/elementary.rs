@@ -28,8 +28,9 @@ pub(super) fn ln(x: f32) -> f32 {
 #[inline(always)]
 pub(super) fn sin_cos_turn(turn: f32) -> (f32, f32) {
     let quarters = turn * 4.0;
-    let nearest = (quarters + 0.5) as i32;
-    let r = quarters - nearest as f32; // in [−½, ½] quarter turns
+    let rounded = quarters + 8_388_608.0; // + 2²³: the whole number is in the low bits
+    let nearest = rounded.to_bits();
+    let r = quarters - (rounded - 8_388_608.0); // in [−½, ½] quarter turns
     let s = r * r;
     let sin = r
         * (std::f32::consts::FRAC_PI_2

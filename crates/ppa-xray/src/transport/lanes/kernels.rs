@@ -72,7 +72,7 @@ pub(super) struct Box32 {
     pub source_detector_mm: f32,
     /// Cells along each axis.
     pub size: [f32; 3],
-    pub blocks: [i32; 3],
+    pub blocks: [u32; 3],
 }
 
 /// Where the flights stand in the lattice of blocks.
@@ -140,8 +140,15 @@ impl Draws {
 
     #[inline(always)]
     pub fn block(&self, photon: usize) -> [u32; 4] {
-        [0, 1, 2, 3].map(|word| self.block[word][photon])
+        let [a, b, c, d] = &self.block;
+        [a[photon], b[photon], c[photon], d[photon]]
     }
+}
+
+/// The three components of one photon.
+#[inline(always)]
+pub(super) fn each<T: Copy>(vectors: &[Each<T>; 3], photon: usize) -> [T; 3] {
+    [vectors[0][photon], vectors[1][photon], vectors[2][photon]]
 }
 
 #[inline(always)]
@@ -152,6 +159,17 @@ fn least(a: f32, b: f32) -> f32 {
 #[inline(always)]
 fn greatest(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
+}
+
+/// Largest whole number not above `x`, for 0 ≤ x < 2²²; as a number and as an index.
+///
+/// Adding 2²³ rounds in the last place, and leaves the integer in the low bits: casts and libraries would not vectorise.
+#[inline(always)]
+fn floor(x: f32) -> (f32, u32) {
+    const MAGIC: f32 = 8_388_608.0;
+    let rounded = (x + MAGIC) - MAGIC;
+    let floor = rounded - if rounded > x { 1.0 } else { 0.0 };
+    (floor, (floor + MAGIC).to_bits() & 0x007F_FFFF)
 }
 
 /// Uniform in (0, 1]: fine near zero, so that free paths reach 22 mean free paths.
@@ -179,11 +197,16 @@ impl Kernel for Draw<'_> {
     #[inline(always)]
     fn run(self) {
         let Draws { counter, block } = self.draws;
+        let key = self.key;
         for i in 0..self.count.min(LANES) {
-            let words = philox::rounds([0, 1, 2, 3].map(|word| counter[word][i]), self.key);
-            for word in 0..4 {
-                block[word][i] = words[word];
-            }
+            let [a, b, c, d] = philox::rounds(
+                [counter[0][i], counter[1][i], counter[2][i], counter[3][i]],
+                key,
+            );
+            block[0][i] = a;
+            block[1][i] = b;
+            block[2][i] = c;
+            block[3][i] = d;
         }
     }
 }
@@ -223,12 +246,13 @@ impl Kernel for Locate<'_> {
 fn locate(space: &Box32, flights: &Flights, blocks: &mut Blocks, count: usize) {
     let [nx, ny, _] = space.blocks;
     for i in 0..count {
-        let [x, y, z] =
-            [0, 1, 2].map(|axis| (flights.position[axis][i] * (1.0 / EDGE as f32)) as i32);
-        blocks.at[0][i] = x as f32;
-        blocks.at[1][i] = y as f32;
-        blocks.at[2][i] = z as f32;
-        blocks.index[i] = (x + nx * (y + ny * z)) as u32;
+        let (x, x_index) = floor(flights.position[0][i] * (1.0 / EDGE as f32));
+        let (y, y_index) = floor(flights.position[1][i] * (1.0 / EDGE as f32));
+        let (z, z_index) = floor(flights.position[2][i] * (1.0 / EDGE as f32));
+        blocks.at[0][i] = x;
+        blocks.at[1][i] = y;
+        blocks.at[2][i] = z;
+        blocks.index[i] = x_index + nx * (y_index + ny * z_index);
     }
 }
 
@@ -283,7 +307,7 @@ fn advance(space: &Box32, flights: &mut Flights, blocks: &Blocks, steps: &mut St
             let place = if exit[axis] <= way { wall[axis] } else { kept };
             inside &= (place >= 0.0) & (place < size[axis]);
             flights.position[axis][i] = place;
-            steps.voxel[axis][i] = least(kept, high[axis] - 1.0) as i32 as u32;
+            steps.voxel[axis][i] = floor(least(kept, high[axis] - 1.0)).1;
         }
         let tentative = (collide < leave) & (collide < plane);
         let out = (plane <= way) | !inside;
@@ -336,7 +360,7 @@ fn turn(turns: &mut Turns, count: usize) {
         let cos_theta = turns.cos_theta[i];
         let sin_theta = greatest((1.0 - cos_theta) * (1.0 + cos_theta), 0.0).sqrt();
         // Orthonormal basis without a branch near the pole (Duff et al., JCGT 6(1), 2017).
-        let [x, y, z] = [0, 1, 2].map(|axis| turns.direction[axis][i]);
+        let [x, y, z] = each(&turns.direction, i);
         let sign = 1.0_f32.copysign(z);
         let a = -1.0 / (sign + z);
         let b = x * y * a;
@@ -374,8 +398,8 @@ fn aim(space: &Box32, flights: &mut Flights, count: usize) {
     let (m, row) = (space.cell_from_device, space.device_z);
     let plane = space.source_detector_mm;
     for i in 0..count {
-        let [u, v, w] = [0, 1, 2].map(|axis| flights.direction[axis][i]);
-        let [x, y, z] = [0, 1, 2].map(|axis| flights.position[axis][i]);
+        let [u, v, w] = each(&flights.direction, i);
+        let [x, y, z] = each(&flights.position, i);
         for axis in 0..3 {
             let slope = m[axis][0] * u + m[axis][1] * v + m[axis][2] * w;
             // A flight along a wall still has a reciprocal.

@@ -18,7 +18,7 @@ use crate::transport::attenuation::{CUTOFF_KEV, EnergyNode};
 use crate::transport::lanes::isa::Isa;
 use crate::transport::lanes::kernels::{
     Advance, Aim, Blocks, Box32, Depths, Draw, Draws, Each, Enter, Flights, Locate, Steps, Turn,
-    Turns, unit,
+    Turns, each, unit,
 };
 use crate::transport::majorants::Region;
 use crate::transport::score::{Arrival, Score};
@@ -131,7 +131,7 @@ impl<'a, 'p> Lanes<'a, 'p> {
                 device_z: row(&mm_from_cell, 2),
                 source_detector_mm: transport.projection.source_detector_mm as f32,
                 size: transport.lattice.size.map(|n| n as f32),
-                blocks: blocks.map(|n| n as i32),
+                blocks,
             },
             mm_from_cell,
             transport,
@@ -257,8 +257,8 @@ impl<'a, 'p> Lanes<'a, 'p> {
         let size = self.transport.lattice.size;
         for (i, lane) in tentative.iter().enumerate() {
             let photon = &self.photons[lane];
-            let [x, y, z] = [0, 1, 2].map(|axis| steps.voxel[axis][lane] as usize);
-            let voxel = x + size[0] * (y + size[1] * z);
+            let [x, y, z] = each(&steps.voxel, lane);
+            let voxel = x as usize + size[0] * (y as usize + size[1] * z as usize);
             let code = self.transport.codes[voxel];
             let sums = self
                 .transport
@@ -303,8 +303,8 @@ impl<'a, 'p> Lanes<'a, 'p> {
         let size = self.transport.lattice.size;
         for (i, lane) in scattered.iter().enumerate() {
             let photon = &mut self.photons[lane];
-            let [x, y, z] = [0, 1, 2].map(|axis| steps.voxel[axis][lane] as usize);
-            let voxel = x + size[0] * (y + size[1] * z);
+            let [x, y, z] = each(&steps.voxel, lane);
+            let voxel = x as usize + size[0] * (y as usize + size[1] * z as usize);
             let material = self.transport.codes[voxel].material();
             let tables = &self.transport.samplers[usize::from(material)];
             let mut rng = Philox::at(
@@ -368,8 +368,8 @@ impl<'a, 'p> Lanes<'a, 'p> {
 
     /// The flight in `lane` has left the box or met the detector plane.
     fn leave(&mut self, lane: usize, score: &mut impl Score) {
-        let position = [0, 1, 2].map(|axis| self.flights.position[axis][lane]);
-        let direction = [0, 1, 2].map(|axis| self.flights.direction[axis][lane]);
+        let position = each(&self.flights.position, lane);
+        let direction = each(&self.flights.direction, lane);
         self.exit(
             &self.photons[lane],
             position,
@@ -454,8 +454,8 @@ impl<'a, 'p> Lanes<'a, 'p> {
                 score.escape(usize::from(slot), f64::from(photon.energy_kev));
                 score.finish(usize::from(slot));
             } else if self.waiting.meets[next] == 0 {
-                let position = [0, 1, 2].map(|axis| flights.position[axis][next]);
-                let direction = [0, 1, 2].map(|axis| flights.direction[axis][next]);
+                let position = each(&flights.position, next);
+                let direction = each(&flights.direction, next);
                 let way = flights.to_plane_mm[next];
                 self.exit(&photon, position, direction, way, score);
             } else {
