@@ -3,6 +3,7 @@
 use crate::{
     matter::compton::{Compton, ComptonModel},
     matter::cross_sections::{CrossSections, HC_KEV_ANGSTROM, MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::impulse_approximation::BoundElectron,
     matter::material::Material,
     matter::rayleigh::Rayleigh,
     octaves::Octaves,
@@ -159,6 +160,37 @@ impl MaterialTables {
             .compton
             .sample_energy(energy_kev as f32, half, || uniform() as f32);
         f64::from(sampled).min(energy_kev)
+    }
+
+    /// sin²(θ/2) and the electron of one attempt at Compton scattering, of the impulse approximation; `None` for
+    /// other models.
+    #[inline(always)]
+    pub(crate) fn attempt_compton(
+        &self,
+        energy_kev: f32,
+        u_angle: f32,
+        u_shell: f32,
+    ) -> Option<(f32, BoundElectron)> {
+        match &self.compton {
+            Compton::ImpulseApproximation(impulse) => {
+                Some(impulse.attempt(energy_kev, u_angle, u_shell))
+            }
+            Compton::IncoherentFunction(_) => None,
+        }
+    }
+
+    /// sin²(θ/2) and the energy in keV after Compton scattering, at a given angle or at any.
+    pub(crate) fn finish_compton(
+        &self,
+        energy_kev: f32,
+        half: Option<f32>,
+        uniform: impl FnMut() -> f32,
+    ) -> (f32, f32) {
+        let (half, scattered_kev) = match half {
+            Some(half) => (half, self.compton.sample_energy(energy_kev, half, uniform)),
+            None => self.compton.sample(energy_kev, uniform),
+        };
+        (half, scattered_kev.min(energy_kev))
     }
 
     /// Cosine of a Rayleigh scattering angle.

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::phantom::voxels::VoxelPhantom;
 
 /// The upper 24 bits of the density as `f32`, within 1.6e-5 of it, and the material index below them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct VoxelCode(u32);
 
 impl VoxelCode {

@@ -8,6 +8,7 @@
     reason = "one index runs through all arrays of a photon"
 )]
 
+use crate::matter::impulse_approximation::BoundElectron;
 use crate::philox;
 use crate::transport::lanes::elementary::{ln, sin_cos_turn};
 use crate::transport::lanes::isa::Kernel;
@@ -379,6 +380,67 @@ fn turn(turns: &mut Turns, count: usize) {
     }
 }
 
+/// Attempts at Compton scattering in the impulse approximation.
+#[derive(Debug)]
+pub(super) struct Attempts {
+    pub energy_kev: Each<f32>,
+    /// sin²(θ/2).
+    pub half: Each<f32>,
+    /// Of the struck electron, as `momentum`.
+    pub binding_kev: Each<f32>,
+    pub momentum: Each<f32>,
+    /// Energy of the scattered photon, or what [`BoundElectron::outcome`] says instead.
+    pub scattered_kev: Each<f32>,
+}
+
+impl Attempts {
+    pub fn new() -> Self {
+        Self {
+            energy_kev: [0.0; LANES],
+            half: [0.0; LANES],
+            binding_kev: [0.0; LANES],
+            momentum: [0.0; LANES],
+            scattered_kev: [0.0; LANES],
+        }
+    }
+}
+
+/// Finds the energies of scattered photons.
+pub(super) struct Attempt<'a> {
+    pub attempts: &'a mut Attempts,
+    /// Random words.
+    pub momentum: &'a Each<u32>,
+    pub way: &'a Each<u32>,
+    pub count: usize,
+}
+
+impl Kernel for Attempt<'_> {
+    #[inline(always)]
+    fn run(self) {
+        attempt(
+            self.attempts,
+            self.momentum,
+            self.way,
+            self.count.min(LANES),
+        );
+    }
+}
+
+#[inline(always)]
+fn attempt(attempts: &mut Attempts, momentum: &Each<u32>, way: &Each<u32>, count: usize) {
+    for i in 0..count {
+        let electron = BoundElectron {
+            binding_kev: attempts.binding_kev[i],
+            momentum: attempts.momentum[i],
+        };
+        let (energy_kev, half) = (attempts.energy_kev[i], attempts.half[i]);
+        // In the middle of steps of 2⁻²³: neither 0 nor 1, whose momentum would be infinite.
+        let u = ((momentum[i] >> 9) as i32 as f32 + 0.5) * (1.0 / 8_388_608.0);
+        let scattered = electron.outcome(energy_kev, half, u, unit(way[i]));
+        attempts.scattered_kev[i] = least(scattered, energy_kev);
+    }
+}
+
 /// Finds slopes and the way to the detector plane from positions and directions.
 pub(super) struct Aim<'a> {
     pub space: &'a Box32,
@@ -414,6 +476,27 @@ fn aim(space: &Box32, flights: &mut Flights, count: usize) {
         } else {
             f32::INFINITY
         };
+    }
+}
+
+/// Turns positions from mm in the device frame into cells.
+pub(super) struct Place<'a> {
+    pub space: &'a Box32,
+    pub flights: &'a mut Flights,
+    pub count: usize,
+}
+
+impl Kernel for Place<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let m = self.space.cell_from_device;
+        for i in 0..self.count.min(LANES) {
+            let [x, y, z] = each(&self.flights.position, i);
+            for axis in 0..3 {
+                self.flights.position[axis][i] =
+                    m[axis][0] * x + m[axis][1] * y + m[axis][2] * z + m[axis][3];
+            }
+        }
     }
 }
 

@@ -17,14 +17,15 @@ use crate::philox::Philox;
 use crate::transport::attenuation::{CUTOFF_KEV, EnergyNode};
 use crate::transport::lanes::isa::Isa;
 use crate::transport::lanes::kernels::{
-    Advance, Aim, Blocks, Box32, Depths, Draw, Draws, Each, Enter, Flights, Locate, Steps, Turn,
-    Turns, each, unit,
+    Advance, Aim, Attempt, Attempts, Blocks, Box32, Depths, Draw, Draws, Each, Enter, Flights,
+    Locate, Place, Steps, Turn, Turns, each, unit,
 };
 use crate::transport::majorants::Region;
 use crate::transport::score::{Arrival, Score};
 use crate::transport::stream::Stream;
 use crate::transport::tally::Category;
 use crate::transport::tracking::Transport;
+use crate::transport::voxel_codes::VoxelCode;
 
 pub(crate) use kernels::LANES;
 
@@ -67,6 +68,31 @@ struct Lanes<'a, 'p> {
     /// Lanes in use; they come first.
     count: usize,
     draws: Draws,
+}
+
+/// Where a tentative collision takes place.
+#[derive(Debug, Clone, Copy, Default)]
+struct Site {
+    lane: u8,
+    voxel: usize,
+    code: VoxelCode,
+}
+
+impl Site {
+    #[inline(always)]
+    fn lane(&self) -> usize {
+        usize::from(self.lane) % LANES
+    }
+}
+
+impl Photon {
+    #[inline(always)]
+    fn scatter(&mut self, by: Category) {
+        self.category = match self.category {
+            Category::Primary => by,
+            _ => Category::Multiple,
+        };
+    }
 }
 
 /// A list of lanes.
@@ -244,6 +270,17 @@ impl<'a, 'p> Lanes<'a, 'p> {
         steps: &Steps,
         score: &mut impl Score,
     ) {
+        let mut site = [Site::default(); LANES];
+        let size = self.transport.lattice.size;
+        for (site, lane) in site.iter_mut().zip(tentative.iter()) {
+            let [x, y, z] = each(&steps.voxel, lane);
+            let voxel = x as usize + size[0] * (y as usize + size[1] * z as usize);
+            *site = Site {
+                lane: lane as u8,
+                voxel,
+                code: self.transport.codes[voxel],
+            };
+        }
         self.draw(tentative);
         let mut depths = [0.0; LANES];
         self.isa.run(Depths {
@@ -251,15 +288,10 @@ impl<'a, 'p> Lanes<'a, 'p> {
             depth: &mut depths,
             count: tentative.count.next_multiple_of(16),
         });
-        let mut scattered = Picked::new();
-        let mut turns = Turns::new();
-        let mut by = [Coupling::Rayleigh; LANES];
-        let size = self.transport.lattice.size;
+        let (mut compton, mut rayleigh) = (Picked::new(), Picked::new());
         for (i, lane) in tentative.iter().enumerate() {
             let photon = &self.photons[lane];
-            let [x, y, z] = each(&steps.voxel, lane);
-            let voxel = x as usize + size[0] * (y as usize + size[1] * z as usize);
-            let code = self.transport.codes[voxel];
+            let code = site[i].code;
             let sums = self
                 .transport
                 .attenuation
@@ -267,103 +299,145 @@ impl<'a, 'p> Lanes<'a, 'p> {
             let density = code.density_g_cm3();
             let lot = unit(self.draws.block[0][i]) * blocks.bound[lane];
             self.flights.depth[lane] = depths[i];
-            if lot >= density * sums.total {
-                continue;
-            }
-            if lot < density * sums.photoelectric {
-                let energy_kev = f64::from(photon.energy_kev);
-                score.deposit(usize::from(photon.slot), voxel, energy_kev);
-                score.finish(usize::from(photon.slot));
+            let absorbed = lot < density * sums.photoelectric;
+            let not_rayleigh = lot < density * sums.with_compton;
+            compton.push_if(i, not_rayleigh & !absorbed);
+            rayleigh.push_if(i, (lot < density * sums.total) & !not_rayleigh);
+            if absorbed {
+                let slot = usize::from(photon.slot);
+                score.deposit(slot, site[i].voxel, f64::from(photon.energy_kev));
+                score.finish(slot);
                 ended.push_if(lane, true);
-                continue;
             }
-            by[scattered.count] = if lot < density * sums.with_compton {
-                Coupling::Compton
-            } else {
-                Coupling::Rayleigh
-            };
-            turns.azimuth[scattered.count] = self.draws.block[2][i];
-            scattered.push_if(lane, true);
         }
-        if scattered.count > 0 {
-            self.scatter(&scattered, &by, &mut turns, ended, steps, score);
+        let sites = compton.iter().chain(rayleigh.iter());
+        let mut turns = Turns::new();
+        let mut scattered = [Site::default(); LANES];
+        for (n, i) in sites.enumerate() {
+            scattered[n] = site[i];
+            turns.azimuth[n] = self.draws.block[2][i];
+        }
+        let scattered = &scattered[..compton.count + rayleigh.count];
+        if !scattered.is_empty() {
+            self.scatter(scattered, compton.count, &mut turns, ended, score);
         }
     }
 
+    /// Scatters photons: the first `compton` of them off electrons, the others off whole atoms.
     fn scatter(
         &mut self,
-        scattered: &Picked,
-        by: &Each<Coupling>,
+        scattered: &[Site],
+        compton: usize,
         turns: &mut Turns,
         ended: &mut Picked,
-        steps: &Steps,
         score: &mut impl Score,
     ) {
-        self.draw(scattered);
-        let size = self.transport.lattice.size;
-        for (i, lane) in scattered.iter().enumerate() {
-            let photon = &mut self.photons[lane];
-            let [x, y, z] = each(&steps.voxel, lane);
-            let voxel = x as usize + size[0] * (y as usize + size[1] * z as usize);
-            let material = self.transport.codes[voxel].material();
-            let tables = &self.transport.samplers[usize::from(material)];
-            let mut rng = Philox::at(
-                self.seed,
-                Stream::History as u32,
-                photon.history,
-                photon.step,
-            )
-            .after(self.draws.block(i));
-            let before_kev = f64::from(photon.energy_kev);
-            turns.cos_theta[i] = match by[i] {
-                Coupling::Compton => {
-                    let (cos_theta, energy_kev) = tables.sample_compton(before_kev, &mut rng);
-                    photon.energy_kev = energy_kev as f32;
-                    cos_theta as f32
-                }
-                Coupling::Rayleigh => tables.sample_rayleigh(before_kev, &mut rng) as f32,
-            };
-            photon.step = rng.step();
-            photon.category = match photon.category {
-                Category::Primary => by[i].category(),
-                _ => Category::Multiple,
-            };
-            for axis in 0..3 {
-                turns.direction[axis][i] = self.flights.direction[axis][lane];
+        let mut lanes = Picked::new();
+        for (n, site) in scattered.iter().enumerate() {
+            let lane = site.lane();
+            lanes.push_if(lane, true);
+            let direction = each(&self.flights.direction, lane);
+            for (to, from) in turns.direction.iter_mut().zip(direction) {
+                to[n] = from;
             }
-            if by[i] == Coupling::Rayleigh {
-                continue;
-            }
+        }
+        self.draw(&lanes);
+        let attempts = self.attempt_compton(&scattered[..compton]);
+        for (n, site) in scattered[..compton].iter().enumerate() {
+            let (half, scattered_kev) = self.compton(site, &attempts, n);
+            turns.cos_theta[n] = 1.0 - 2.0 * half;
+            let photon = &mut self.photons[site.lane()];
             let slot = usize::from(photon.slot);
-            if f64::from(photon.energy_kev) < CUTOFF_KEV {
+            let before_kev = f64::from(photon.energy_kev);
+            photon.energy_kev = scattered_kev;
+            photon.scatter(Category::Compton);
+            if f64::from(scattered_kev) < CUTOFF_KEV {
                 // What is left of the photon stays here too.
-                score.deposit(slot, voxel, before_kev);
+                score.deposit(slot, site.voxel, before_kev);
                 score.finish(slot);
-                ended.push_if(lane, true);
+                ended.push_if(site.lane(), true);
             } else {
-                score.deposit(slot, voxel, before_kev - f64::from(photon.energy_kev));
-                photon.energy = self.transport.attenuation.locate(photon.energy_kev.into());
+                score.deposit(slot, site.voxel, before_kev - f64::from(scattered_kev));
+                photon.energy = self.transport.attenuation.locate(scattered_kev.into());
                 photon.row = self.transport.majorants.row(photon.energy);
             }
         }
-        let count = scattered.count.next_multiple_of(16);
+        for (n, site) in scattered.iter().enumerate().skip(compton) {
+            let photon = &self.photons[site.lane()];
+            let mut rng = self.generator(photon).after(self.draws.block(n));
+            let tables = &self.transport.samplers[usize::from(site.code.material())];
+            let cos_theta = tables.sample_rayleigh(photon.energy_kev.into(), &mut rng);
+            turns.cos_theta[n] = cos_theta as f32;
+            let photon = &mut self.photons[site.lane()];
+            photon.step = rng.step();
+            photon.scatter(Category::Rayleigh);
+        }
+        let count = scattered.len().next_multiple_of(16);
         self.isa.run(Turn { turns, count });
         let mut flights = Flights::new();
-        for (i, lane) in scattered.iter().enumerate() {
-            for axis in 0..3 {
-                flights.direction[axis][i] = turns.direction[axis][i];
-                flights.position[axis][i] = self.flights.position[axis][lane];
+        flights.direction = turns.direction;
+        for (n, site) in scattered.iter().enumerate() {
+            let position = each(&self.flights.position, site.lane());
+            for (to, from) in flights.position.iter_mut().zip(position) {
+                to[n] = from;
             }
-            flights.depth[i] = self.flights.depth[lane];
+            flights.depth[n] = self.flights.depth[site.lane()];
         }
         self.isa.run(Aim {
             space: &self.space,
             flights: &mut flights,
             count,
         });
-        for (i, lane) in scattered.iter().enumerate() {
-            self.flights.copy(lane, &flights, i);
+        for (n, site) in scattered.iter().enumerate() {
+            self.flights.copy(site.lane(), &flights, n);
         }
+    }
+
+    /// One attempt at each Compton scattering, if the tables of its material let attempts be made together.
+    fn attempt_compton(&self, sites: &[Site]) -> Attempts {
+        let mut attempts = Attempts::new();
+        for (n, site) in sites.iter().enumerate() {
+            let energy_kev = self.photons[site.lane()].energy_kev;
+            let tables = &self.transport.samplers[usize::from(site.code.material())];
+            let [angle, shell, ..] = self.draws.block(n);
+            if let Some((half, electron)) =
+                tables.attempt_compton(energy_kev, unit(angle), unit(shell))
+            {
+                attempts.energy_kev[n] = energy_kev;
+                attempts.half[n] = half;
+                attempts.binding_kev[n] = electron.binding_kev;
+                attempts.momentum[n] = electron.momentum;
+            }
+        }
+        self.isa.run(Attempt {
+            attempts: &mut attempts,
+            momentum: &self.draws.block[2],
+            way: &self.draws.block[3],
+            count: sites.len().next_multiple_of(16),
+        });
+        attempts
+    }
+
+    /// sin²(θ/2) and the energy in keV after Compton scattering; what an attempt leaves open is drawn anew.
+    #[inline(always)]
+    fn compton(&mut self, site: &Site, attempts: &Attempts, n: usize) -> (f32, f32) {
+        let half = attempts.half[n];
+        let scattered_kev = attempts.scattered_kev[n];
+        if scattered_kev > 0.0 {
+            return (half, scattered_kev);
+        }
+        self.compton_anew(site, (scattered_kev == 0.0).then_some(half))
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn compton_anew(&mut self, site: &Site, half: Option<f32>) -> (f32, f32) {
+        let photon = &self.photons[site.lane()];
+        let mut rng = self.generator(photon);
+        let tables = &self.transport.samplers[usize::from(site.code.material())];
+        let drawn = tables.finish_compton(photon.energy_kev, half, || rng.unit() as f32);
+        self.photons[site.lane()].step = rng.step();
+        drawn
     }
 
     /// The flight in `lane` has left the box or met the detector plane.
@@ -482,7 +556,6 @@ impl<'a, 'p> Lanes<'a, 'p> {
         }
         self.philox(count);
         let emitter = &self.transport.emitter;
-        let cell_from_mm = self.transport.lattice.cell_from_device();
         for i in 0..count {
             let history = first + i as u64;
             let mut rng = Philox::at(self.seed, Stream::History as u32, history, 1)
@@ -492,10 +565,9 @@ impl<'a, 'p> Lanes<'a, 'p> {
                 direction,
                 energy_kev,
             } = emitter.emit(&mut rng);
-            let origin = cell_from_mm.transform_point(&origin_mm);
             for axis in 0..3 {
                 self.waiting.flights.direction[axis][i] = direction[axis] as f32;
-                self.waiting.flights.position[axis][i] = origin[axis] as f32;
+                self.waiting.flights.position[axis][i] = origin_mm[axis] as f32;
             }
             let energy = self.transport.attenuation.locate(energy_kev);
             self.waiting.photons[i] = Photon {
@@ -514,6 +586,11 @@ impl<'a, 'p> Lanes<'a, 'p> {
         }
         self.philox(count);
         let padded = count.next_multiple_of(16);
+        self.isa.run(Place {
+            space: &self.space,
+            flights: &mut self.waiting.flights,
+            count: padded,
+        });
         self.isa.run(Aim {
             space: &self.space,
             flights: &mut self.waiting.flights,
@@ -532,22 +609,6 @@ impl<'a, 'p> Lanes<'a, 'p> {
         });
         (self.waiting.next, self.waiting.count) = (0, count);
         true
-    }
-}
-
-/// The two ways to scatter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Coupling {
-    Compton,
-    Rayleigh,
-}
-
-impl Coupling {
-    fn category(self) -> Category {
-        match self {
-            Self::Compton => Category::Compton,
-            Self::Rayleigh => Category::Rayleigh,
-        }
     }
 }
 
