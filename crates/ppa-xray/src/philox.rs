@@ -57,16 +57,22 @@ impl Philox {
     }
 
     /// Uniform in [0, 1) in steps of 2⁻³²; fine enough for free paths up to 22 mean free paths per step.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn unit(&mut self) -> f64 {
         if self.used == 4 {
-            self.block = rounds(self.counter, self.key);
-            self.counter[2] = self.counter[2].wrapping_add(1);
-            self.used = 0;
+            self.refill();
         }
         let word = self.block[self.used];
         self.used += 1;
         f64::from(word) * (1.0 / 4_294_967_296.0)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn refill(&mut self) {
+        self.block = rounds(self.counter, self.key);
+        self.counter[2] = self.counter[2].wrapping_add(1);
+        self.used = 0;
     }
 }
 

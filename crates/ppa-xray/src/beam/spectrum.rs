@@ -10,6 +10,9 @@ use crate::{
 /// Dose of one keV in one gram, in Gy.
 const GRAY_PER_KEV_G: f64 = 1.602_176_634e-13;
 
+/// Entries per bin of the table that says in which bin to start looking: the first is nearly always right.
+const GUIDE_PER_BIN: usize = 16;
+
 /// Photon energies in bins, uniform within each, as a probability distribution.
 ///
 /// May know the absolute fluence: photons per mAs and cm² at 1 m from the source.
@@ -98,7 +101,7 @@ impl Spectrum {
             })
             .collect();
         *cumulative.last_mut().expect("at least one bin") = 1.0;
-        let n = cumulative.len();
+        let n = GUIDE_PER_BIN * cumulative.len();
         let guide = (0..n)
             .map(|k| cumulative.partition_point(|&c| c <= k as f64 / n as f64) as u32)
             .collect();

@@ -15,7 +15,7 @@ use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
 use crate::run::analog_tally::ImageSetup;
 use crate::transport::score::{Arrival, Score};
-use crate::transport::tally::{MOST_HISTORIES, Raster, Tally};
+use crate::transport::tally::{Inbox, MOST_HISTORIES, Raster, Tally};
 use crate::transport::tracking::{Transport, TransportError};
 
 /// How long the analog engine runs.
@@ -121,14 +121,14 @@ fn in_batches(histories: Range<u64>, follow: impl Fn(Range<u64>) + Sync) {
 /// Counts what photons leave in the detector, nothing else.
 struct DetectorScore<'a> {
     response: &'a Response,
-    tally: &'a Tally,
+    inbox: Inbox<'a>,
 }
 
 impl<'a> DetectorScore<'a> {
     fn new(transport: &'a Transport, tally: &'a Tally) -> Self {
         Self {
             response: &transport.response,
-            tally,
+            inbox: Inbox::new(tally),
         }
     }
 }
@@ -138,6 +138,6 @@ impl Score for DetectorScore<'_> {
     fn arrive(&mut self, _slot: usize, arrival: &Arrival, rng: &mut Philox) {
         let Arrival { x_mm, y_mm, .. } = *arrival;
         let energy_kev = self.response.detect(arrival, rng);
-        self.tally.score(x_mm, y_mm, arrival.category, energy_kev);
+        self.inbox.score(x_mm, y_mm, arrival.category, energy_kev);
     }
 }

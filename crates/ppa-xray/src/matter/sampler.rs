@@ -179,20 +179,6 @@ impl MaterialTables {
         }
     }
 
-    /// sin²(θ/2) and the energy in keV after Compton scattering, at a given angle or at any.
-    pub(crate) fn finish_compton(
-        &self,
-        energy_kev: f32,
-        half: Option<f32>,
-        uniform: impl FnMut() -> f32,
-    ) -> (f32, f32) {
-        let (half, scattered_kev) = match half {
-            Some(half) => (half, self.compton.sample_energy(energy_kev, half, uniform)),
-            None => self.compton.sample(energy_kev, uniform),
-        };
-        (half, scattered_kev.min(energy_kev))
-    }
-
     /// Cosine of a Rayleigh scattering angle.
     #[inline]
     pub(crate) fn sample_rayleigh(&self, energy_kev: f64, random: &mut Philox) -> f64 {

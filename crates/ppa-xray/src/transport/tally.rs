@@ -95,6 +95,68 @@ impl Moments {
     }
 }
 
+/// One photon for one cell.
+#[derive(Debug, Clone, Copy)]
+struct Hit {
+    cell: usize,
+    category: Category,
+    energy_kev: f64,
+}
+
+/// Collects photons for a [`Tally`] and hands them over many at a time, at the latest when dropped.
+///
+/// Cells are hit all over the detector, mostly out of cache: reading the cells of all hits first lets these waits overlap,
+/// which the additions, each a locked instruction, would not.
+#[derive(Debug)]
+pub(crate) struct Inbox<'a> {
+    tally: &'a Tally,
+    hits: Vec<Hit>,
+}
+
+impl<'a> Inbox<'a> {
+    const ROOM: usize = 128;
+
+    pub fn new(tally: &'a Tally) -> Self {
+        Self {
+            tally,
+            hits: Vec::with_capacity(Self::ROOM),
+        }
+    }
+
+    /// Counts a photon that crosses the plane at device (x, y); outside the raster nothing happens.
+    #[inline]
+    pub fn score(&mut self, x_mm: f64, y_mm: f64, category: Category, energy_kev: f64) {
+        if let Some(cell) = self.tally.raster.cell_at(x_mm, y_mm) {
+            self.hits.push(Hit {
+                cell,
+                category,
+                energy_kev,
+            });
+            if self.hits.len() == Self::ROOM {
+                self.hand_over();
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn hand_over(&mut self) {
+        let sums = &self.tally.sums;
+        let touched = self.hits.iter().fold(0, |touched, hit| {
+            touched ^ sums[hit.cell][hit.category as usize][0].load(Relaxed)
+        });
+        std::hint::black_box(touched);
+        for hit in self.hits.drain(..) {
+            self.tally.add(&hit);
+        }
+    }
+}
+
+impl Drop for Inbox<'_> {
+    fn drop(&mut self) {
+        self.hand_over();
+    }
+}
+
 impl Tally {
     pub fn new(raster: Raster) -> Self {
         Self {
@@ -103,16 +165,13 @@ impl Tally {
         }
     }
 
-    /// Counts a photon that crosses the plane at device (x, y); outside the raster nothing happens.
     #[inline]
-    pub fn score(&self, x_mm: f64, y_mm: f64, category: Category, energy_kev: f64) {
-        let Some(cell) = self.raster.cell_at(x_mm, y_mm) else {
-            return;
-        };
-        let [energy, square] = &self.sums[cell][category as usize];
-        energy.fetch_add((energy_kev * STEPS_PER_KEV).round() as u64, Relaxed);
+    fn add(&self, hit: &Hit) {
+        let [energy, square] = &self.sums[hit.cell][hit.category as usize];
+        let steps = |value: f64| (value + 0.5) as i64 as u64; // value ≥ 0
+        energy.fetch_add(steps(hit.energy_kev * STEPS_PER_KEV), Relaxed);
         square.fetch_add(
-            (energy_kev * energy_kev * STEPS_PER_KEV2).round() as u64,
+            steps(hit.energy_kev * hit.energy_kev * STEPS_PER_KEV2),
             Relaxed,
         );
     }

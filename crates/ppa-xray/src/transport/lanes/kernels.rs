@@ -61,6 +61,18 @@ impl Flights {
         self.depth[to] = other.depth[from];
         self.to_plane_mm[to] = other.to_plane_mm[from];
     }
+
+    /// Overwrites photon `to` with photon `from`.
+    pub fn move_within(&mut self, to: usize, from: usize) {
+        for axis in 0..3 {
+            self.position[axis][to] = self.position[axis][from];
+            self.direction[axis][to] = self.direction[axis][from];
+            self.slope[axis][to] = self.slope[axis][from];
+            self.inverse[axis][to] = self.inverse[axis][from];
+        }
+        self.depth[to] = self.depth[from];
+        self.to_plane_mm[to] = self.to_plane_mm[from];
+    }
 }
 
 /// The voxel box seen from the device, in `f32`.

@@ -200,7 +200,7 @@ impl<'a, 'p> Lanes<'a, 'p> {
             if tentative.count > 0 {
                 self.collide(&tentative, &mut ended, &blocks, &steps, score);
             }
-            self.replace(&mut ended, score);
+            self.replace(&ended, score);
         }
     }
 
@@ -433,11 +433,19 @@ impl<'a, 'p> Lanes<'a, 'p> {
     #[inline(never)]
     fn compton_anew(&mut self, site: &Site, half: Option<f32>) -> (f32, f32) {
         let photon = &self.photons[site.lane()];
+        let energy_kev = f64::from(photon.energy_kev);
         let mut rng = self.generator(photon);
         let tables = &self.transport.samplers[usize::from(site.code.material())];
-        let drawn = tables.finish_compton(photon.energy_kev, half, || rng.unit() as f32);
+        let (cos_theta, scattered_kev) = match half {
+            Some(half) => {
+                let cos_theta = 1.0 - 2.0 * f64::from(half);
+                let scattered_kev = tables.compton_energy_at(energy_kev, cos_theta, || rng.unit());
+                (cos_theta, scattered_kev)
+            }
+            None => tables.sample_compton(energy_kev, &mut rng),
+        };
         self.photons[site.lane()].step = rng.step();
-        drawn
+        ((0.5 * (1.0 - cos_theta)) as f32, scattered_kev as f32)
     }
 
     /// The flight in `lane` has left the box or met the detector plane.
@@ -486,26 +494,28 @@ impl<'a, 'p> Lanes<'a, 'p> {
     }
 
     /// Fills the lanes of ended histories; at the end of the range, closes up.
-    fn replace(&mut self, ended: &mut Picked, score: &mut impl Score) {
-        let count = ended.count;
-        ended.lanes[..count].sort_unstable();
-        for lane in ended.iter().rev() {
-            if !self.board(lane, score) {
-                self.count -= 1;
-                let last = self.count;
-                let slot = self.photons[lane].slot;
-                let flights = &mut self.flights;
-                for axis in 0..3 {
-                    flights.position[axis][lane] = flights.position[axis][last];
-                    flights.direction[axis][lane] = flights.direction[axis][last];
-                    flights.slope[axis][lane] = flights.slope[axis][last];
-                    flights.inverse[axis][lane] = flights.inverse[axis][last];
-                }
-                flights.depth[lane] = flights.depth[last];
-                flights.to_plane_mm[lane] = flights.to_plane_mm[last];
-                self.photons[lane] = self.photons[last];
-                self.photons[last].slot = slot;
-            }
+    fn replace(&mut self, ended: &Picked, score: &mut impl Score) {
+        let mut empty = Picked::new();
+        for lane in ended.iter() {
+            let filled = self.board(lane, score);
+            empty.push_if(lane, !filled);
+        }
+        if empty.count > 0 {
+            self.close_up(&mut empty);
+        }
+    }
+
+    /// Moves the last photons into the `empty` lanes.
+    #[cold]
+    fn close_up(&mut self, empty: &mut Picked) {
+        empty.lanes[..empty.count].sort_unstable();
+        for lane in empty.iter().rev() {
+            self.count -= 1;
+            let last = self.count;
+            let slot = self.photons[lane].slot;
+            self.flights.move_within(lane, last);
+            self.photons[lane] = self.photons[last];
+            self.photons[last].slot = slot;
         }
     }
 
