@@ -315,8 +315,8 @@ fn advance(space: &Box32, flights: &mut Flights, blocks: &Blocks, steps: &mut St
         let mut inside = true;
         for axis in 0..3 {
             let moved = flights.position[axis][i] + flights.slope[axis][i] * way;
-            // Rounding must neither leave the cube early nor fail to leave it.
-            let kept = least(greatest(moved, low[axis]), high[axis]);
+            // Rounding must neither leave the cube early, not even onto its far wall, nor fail to leave it.
+            let kept = least(greatest(moved, low[axis]), high[axis] * (1.0 - 1.2e-7));
             let place = if exit[axis] <= way { wall[axis] } else { kept };
             inside &= (place >= 0.0) & (place < size[axis]);
             flights.position[axis][i] = place;

@@ -291,3 +291,44 @@ fn lanes_and_plain_histories_agree() {
         assert!(plain.counts[end] > 1_000.0, "end {end} is rare");
     }
 }
+
+/// A tentative collision a hair before the far wall of the box: the next block is that of the last voxel still.
+#[test]
+fn rounding_takes_no_photon_onto_the_far_wall() {
+    let space = Box32 {
+        cell_from_device: [[0.0; 4]; 3],
+        device_z: [0.0; 4],
+        source_detector_mm: 100.0,
+        size: [40.0; 3],
+        blocks: [5; 3],
+    };
+    let (mut flights, mut blocks, mut steps) = (Flights::new(), Blocks::new(), Steps::new());
+    let count = LANES;
+    flights.position = [[39.0; LANES]; 3];
+    flights.to_plane_mm = [100.0; LANES];
+    // 39 + 0.99999994 rounds to 40.
+    flights.depth = [1.0_f32.next_down(); LANES];
+    let isa = Isa::widest();
+    isa.run(Locate {
+        space: &space,
+        flights: &flights,
+        blocks: &mut blocks,
+        count,
+    });
+    blocks.bound = [1.0; LANES];
+    isa.run(Advance {
+        space: &space,
+        flights: &mut flights,
+        blocks: &blocks,
+        steps: &mut steps,
+        count,
+    });
+    assert!(steps.outcome.iter().all(|&o| o == Steps::TENTATIVE));
+    isa.run(Locate {
+        space: &space,
+        flights: &flights,
+        blocks: &mut blocks,
+        count,
+    });
+    assert!(blocks.index.iter().all(|&block| block == 124));
+}
