@@ -65,6 +65,11 @@ pub use dose::settings::{DoseError, DoseSettings, VoxelBox};
 pub use engine::analog::{AnalogSettings, analog};
 pub use engine::fast::{FastSettings, fast};
 pub use engine::raytrace::primary;
+#[cfg(feature = "dicom")]
+pub use image::dx::{
+    DxExposure, DxIntent,
+    examination::{Examination, Laterality, Region, View},
+};
 pub use image::output::{EXR_ATTRIBUTE, OutputError};
 pub use image::presentation::{Presentation, PresentationError};
 pub use image::radiograph::{CategorySums, Engine, Layer, Radiograph};

@@ -1,9 +1,11 @@
 //! A rectangle of the detector plane.
 
 use nalgebra::Point2;
+use serde::{Deserialize, Serialize};
 
 /// Sides along device x and y.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(crate) struct Field {
     /// Lowest x and y, mm.
     pub low_mm: [f64; 2],

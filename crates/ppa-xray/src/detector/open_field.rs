@@ -19,6 +19,8 @@ pub(crate) struct OpenField {
     low_mm: [f64; 2],
     high_mm: [f64; 2],
     source_detector_mm: f64,
+    /// What the collimator leaves open.
+    field: Field,
     side: usize,
     /// Row by row over the detector's rectangle.
     ratio: Vec<f64>,
@@ -54,6 +56,7 @@ impl OpenField {
             low_mm,
             high_mm,
             source_detector_mm,
+            field: *emitter.field(),
             side,
             ratio: vec![1.0; side * side],
         };
@@ -81,6 +84,16 @@ impl OpenField {
         let centre = [0, 1].map(|axis| 0.5 * (self.low_mm[axis] + self.high_mm[axis]));
         let ratio = row(j) + t * (row(j + 1) - row(j));
         ratio * self.cos3(at) / self.cos3(Point2::from(centre))
+    }
+
+    /// Whether the whole square of side `side_mm` around `at` lies in the collimated field, but for rounding.
+    pub fn exposes(&self, at: Point2<f64>, side_mm: f64) -> bool {
+        const ROUNDING_MM: f64 = 1e-6;
+        let reach_mm = 0.5 * side_mm - ROUNDING_MM;
+        (0..2).all(|axis| {
+            self.field.low_mm[axis] <= at[axis] - reach_mm
+                && at[axis] + reach_mm <= self.field.high_mm[axis]
+        })
     }
 
     fn cos3(&self, at: Point2<f64>) -> f64 {

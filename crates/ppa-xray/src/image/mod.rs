@@ -1,5 +1,7 @@
 //! The radiograph, its presentation and its files.
 
+#[cfg(feature = "dicom")]
+pub(crate) mod dx;
 pub(crate) mod enhancement;
 pub(crate) mod output;
 pub(crate) mod presentation;

@@ -41,6 +41,24 @@ pub enum OutputError {
         /// Why.
         source: exr::Error,
     },
+    /// The DICOM encoder failed.
+    #[cfg(feature = "dicom")]
+    #[error("cannot encode {} as DICOM", path.display())]
+    Dicom {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// More pixels than DICOM can say.
+    #[cfg(feature = "dicom")]
+    #[error("a DICOM image has at most 65535 columns and rows, this one has {columns} x {rows}")]
+    DicomSize {
+        /// Columns of the image.
+        columns: u32,
+        /// Rows of the image.
+        rows: u32,
+    },
     /// The presentation is not usable.
     #[error(transparent)]
     Presentation(#[from] PresentationError),
@@ -78,7 +96,7 @@ impl Radiograph {
     ///
     /// Channels: `Y`, the total, and per [`Category`] `<name>.value` and `<name>.sigma`, eV/cm² per history; with electronic
     /// noise `electronic.value` and `electronic.sigma`.
-    /// The attribute [`EXR_ATTRIBUTE`] holds seed, histories, units and geometry. The bytes depend on
+    /// The attribute [`EXR_ATTRIBUTE`] holds seed, histories, units, geometry and exposure. The bytes depend on
     /// nothing but the radiograph.
     ///
     /// # Errors
@@ -126,15 +144,24 @@ impl Radiograph {
             Engine::Analog => "analog",
             Engine::Fast => "fast",
         };
-        format!(
+        let [x_mm, y_mm] = self.detector.centre_mm;
+        let mut text = format!(
             "engine = \"{engine}\"\nseed = {}\nhistories = {:e}\nunit = \"eV/cm2 per history\"\n\
-             pixel_mm = {}\nsource_detector_mm = {}\nopen_field_ev_cm2 = {}\n",
+             pixel_mm = {}\ndetector_centre_mm = [{x_mm:?}, {y_mm:?}]\nsource_detector_mm = {}\n\
+             open_field_ev_cm2 = {}\n",
             self.seed,
             self.histories,
             self.detector.pixel_mm,
             self.source_detector_mm,
             self.open_field_ev_cm2,
-        )
+        );
+        if let Some(per_mas) = self.histories_per_mas {
+            text += &format!("histories_per_mas = {per_mas:e}\n");
+        }
+        if let Some(mas) = self.mas().filter(|mas| mas.is_finite()) {
+            text += &format!("mas = {mas:e}\n");
+        }
+        text
     }
 }
 

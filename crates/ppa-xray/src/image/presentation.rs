@@ -235,7 +235,14 @@ impl Radiograph {
         let enhanced = self.enhanced_log_exposure(presentation)?;
         Ok(enhanced
             .iter()
-            .map(|&a| (65_535.0 * presentation.grey(f64::from(a))).round() as u16)
+            .enumerate()
+            .map(|(pixel, &a)| {
+                if self.in_field(pixel) {
+                    (65_535.0 * presentation.grey(f64::from(a))).round() as u16
+                } else {
+                    0
+                }
+            })
             .collect())
     }
 
@@ -251,11 +258,12 @@ impl Radiograph {
             .zip(self.sigma())
             .enumerate()
             .map(|(pixel, (&reading, sigma))| {
-                log_exposure(
-                    f64::from(reading),
-                    f64::from(sigma),
-                    self.open_field_at(pixel),
-                )
+                if self.in_field(pixel) {
+                    let open = self.open_field_at(pixel);
+                    log_exposure(f64::from(reading), f64::from(sigma), open)
+                } else {
+                    (0.0, 0.0)
+                }
             })
             .unzip();
         if presentation.detail == 0.0 {
@@ -277,9 +285,6 @@ impl Radiograph {
 
 /// ln(open / reading) and its standard error.
 fn log_exposure(reading: f64, sigma: f64, open: f64) -> (f32, f32) {
-    if open <= 0.0 {
-        return (0.0, 0.0);
-    }
     let (share, sigma) = (reading / open, sigma / open);
     if share <= DARKEST {
         return (-DARKEST.ln() as f32, EMPTY_SIGMA as f32);

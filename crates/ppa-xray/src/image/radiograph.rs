@@ -187,6 +187,12 @@ impl Radiograph {
         self.open_field_ev_cm2 * self.open_field.at(at)
     }
 
+    /// Whether the whole pixel lies in the field that the collimator leaves open.
+    pub fn in_field(&self, pixel: usize) -> bool {
+        let at = self.detector.pixel_centre_mm(pixel);
+        self.open_field.exposes(at, self.detector.pixel_mm)
+    }
+
     fn per_pixel(&self, value: impl Fn(usize) -> f64) -> Vec<f32> {
         (0..self.detector.pixels())
             .map(|pixel| value(pixel) as f32)

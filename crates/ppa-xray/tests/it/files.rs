@@ -1,6 +1,6 @@
 //! Pictures and files.
 
-use exr::prelude::{ReadChannels, ReadLayers, read};
+use exr::prelude::{AttributeValue, ReadChannels, ReadLayers, read};
 use nalgebra::Isometry3;
 use ppa_xray::{Category, EXR_ATTRIBUTE, FastSettings, Presentation, Radiograph, Spectrum, fast};
 
@@ -50,12 +50,17 @@ fn exr_returns_every_layer_and_the_same_bytes_each_time() {
             assert_eq!(&found, expected, "{name}");
         }
     }
-    let (_, text) = file.layer_data.attributes.other.iter().next().unwrap();
-    let text = format!("{text:?}");
-    assert!(
-        text.contains("seed = 77") && text.contains("eV/cm2"),
-        "{EXR_ATTRIBUTE}: {text}"
-    );
+    let (name, text) = file.layer_data.attributes.other.iter().next().unwrap();
+    assert_eq!(name.to_string(), EXR_ATTRIBUTE);
+    let AttributeValue::Text(text) = text else {
+        panic!("{text:?}");
+    };
+    let table: toml::Table = text.to_string().parse().unwrap();
+    assert_eq!(table["seed"].as_integer(), Some(77));
+    assert_eq!(table["source_detector_mm"].as_integer(), Some(1_100));
+    assert_eq!(table["unit"].as_str(), Some("eV/cm2 per history"));
+    // A line without a tube: nobody knows its output.
+    assert!(!table.contains_key("mas"));
 }
 
 #[test]

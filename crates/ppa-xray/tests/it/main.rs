@@ -3,6 +3,8 @@
 mod attenuation;
 mod case_a;
 mod dose;
+#[cfg(feature = "dicom")]
+mod dx;
 mod exposure;
 mod files;
 mod mcgpu;

@@ -1,0 +1,150 @@
+//! Radiographs as DICOM Digital X-Ray images (PS3.3 A.26), For Processing and For Presentation.
+
+mod elements;
+pub(crate) mod examination;
+mod modules;
+mod uid;
+
+use std::path::Path;
+
+use dicom_dictionary_std::{tags, uids};
+use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
+
+use crate::beam::projection::Projection;
+use crate::beam::tube::TubeSpec;
+use crate::image::dx::elements::Elements;
+use crate::image::dx::examination::Examination;
+use crate::image::output::{OutputError, write_whole};
+use crate::image::presentation::Presentation;
+use crate::image::radiograph::Radiograph;
+
+/// Stored value of the bare field in a For Processing image; scatter can add to it.
+const OPEN_STORED: f64 = 40_000.0;
+
+/// Stored values per unit of log exposure in a For Presentation image, and the log exposure that is stored as 0.
+const STORED_PER_LOG: f64 = 6_000.0;
+const LOG_OF_ZERO: f64 = -1.0;
+
+/// What is not in the radiograph but belongs into its DICOM header.
+#[derive(Debug, Clone, Copy)]
+pub struct DxExposure<'a> {
+    /// The exposure the radiograph was made with.
+    pub projection: &'a Projection,
+    /// The tube its spectrum comes from.
+    pub tube: &'a TubeSpec,
+    /// What is shown and how.
+    pub examination: Examination,
+    /// Distance from the source to the table or the skin, mm, if it is known.
+    pub source_patient_mm: Option<f64>,
+    /// Images with the same words here share a study, such as the hash of a scan. Nothing of it can be read from the file.
+    pub study: &'a str,
+}
+
+/// What a DICOM image is for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DxIntent {
+    /// Detector signal over that of the bare field, linear: what a workstation would process.
+    Processing,
+    /// Enhanced log exposure with the window as a sigmoid VOI LUT: what a reader would see.
+    Presentation(Presentation),
+}
+
+impl Radiograph {
+    /// Writes a DICOM Digital X-Ray image; the file appears whole or not at all. Needs the feature `dicom`.
+    ///
+    /// The image is flagged as synthetic, derived and free of identity; dates and names are empty. Its UIDs follow from its
+    /// contents (2.25.‹hash›), so that the same radiograph gives the same bytes.
+    ///
+    /// * [`DxIntent::Processing`]: stored value = 40 000 × reading / bare field, clipped at 65 535 (LIN, sign +1).
+    /// * [`DxIntent::Presentation`]: stored value = 6 000 × (a + 1) with the enhanced log exposure a (LOG, sign −1), the window as
+    ///   a sigmoid. [`Radiograph::write_png`] shows the same but stretches it so that the bare field is black.
+    ///
+    /// Pixels outside the collimated field are stored as the bare field and covered by a display shutter.
+    ///
+    /// # Errors
+    /// [`OutputError`] naming the file, or an image with sides of more than 65 535 pixels, which DICOM cannot say.
+    pub fn write_dicom(
+        &self,
+        path: &Path,
+        exposure: &DxExposure,
+        intent: DxIntent,
+    ) -> Result<(), OutputError> {
+        let failed = |source: Box<dyn std::error::Error + Send + Sync>| OutputError::Dicom {
+            path: path.into(),
+            source,
+        };
+        let [columns, rows] = [self.detector.columns, self.detector.rows].map(u16::try_from);
+        let (Ok(columns), Ok(rows)) = (columns, rows) else {
+            return Err(OutputError::DicomSize {
+                columns: self.detector.columns,
+                rows: self.detector.rows,
+            });
+        };
+        let pixels = match intent {
+            DxIntent::Processing => self.linear_pixels(),
+            DxIntent::Presentation(presentation) => self.logarithmic_pixels(&presentation)?,
+        };
+        let mut elements = Elements::new();
+        self.put_modules(&mut elements, exposure, intent, [columns, rows]);
+        elements.pixels(tags::PIXEL_DATA, pixels);
+        let study = uid::of(&[b"study", exposure.study.as_bytes()]);
+        let kind: &[u8] = match intent {
+            DxIntent::Processing => b"processing",
+            DxIntent::Presentation(_) => b"presentation",
+        };
+        let series = uid::of(&[b"series", exposure.study.as_bytes(), kind]);
+        let instance = uid::of(&[
+            b"instance",
+            study.as_bytes(),
+            &elements.bytes().map_err(failed)?,
+        ]);
+        elements.text(tags::STUDY_INSTANCE_UID, &study);
+        elements.text(tags::SERIES_INSTANCE_UID, &series);
+        elements.text(tags::SOP_INSTANCE_UID, &instance);
+        let encode = |object: InMemDicomObject| -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
+            let meta = FileMetaTableBuilder::new()
+                .transfer_syntax(uids::EXPLICIT_VR_LITTLE_ENDIAN)
+                .media_storage_sop_class_uid(intent.sop_class())
+                .media_storage_sop_instance_uid(&instance);
+            let mut encoded = Vec::new();
+            object.with_meta(meta)?.write_all(&mut encoded)?;
+            Ok(encoded)
+        };
+        write_whole(path, &encode(elements.into_object()).map_err(failed)?)
+    }
+
+    fn linear_pixels(&self) -> Vec<u16> {
+        let stored = |(pixel, &reading): (usize, &f32)| {
+            let share = if self.in_field(pixel) {
+                f64::from(reading) / self.open_field_at(pixel)
+            } else {
+                1.0
+            };
+            // Casts saturate, so that negative and NaN become 0.
+            (OPEN_STORED * share).round() as u16
+        };
+        self.total().iter().enumerate().map(stored).collect()
+    }
+
+    fn logarithmic_pixels(&self, presentation: &Presentation) -> Result<Vec<u16>, OutputError> {
+        let stored = |(pixel, &a): (usize, &f32)| {
+            let a = if self.in_field(pixel) {
+                f64::from(a)
+            } else {
+                0.0
+            };
+            (STORED_PER_LOG * (a - LOG_OF_ZERO)).round() as u16
+        };
+        let enhanced = self.enhanced_log_exposure(presentation)?;
+        Ok(enhanced.iter().enumerate().map(stored).collect())
+    }
+}
+
+impl DxIntent {
+    fn sop_class(self) -> &'static str {
+        match self {
+            Self::Processing => uids::DIGITAL_X_RAY_IMAGE_STORAGE_FOR_PROCESSING,
+            Self::Presentation(_) => uids::DIGITAL_X_RAY_IMAGE_STORAGE_FOR_PRESENTATION,
+        }
+    }
+}
