@@ -2,11 +2,11 @@
 
 use crate::dose::air_kerma::AirKerma;
 use crate::dose::settings::VoxelBox;
-use crate::dose::tally::{DoseSums, DoseTally, STEPS_PER_KEV};
+use crate::dose::tally::{DoseSums, DoseTally, STEPS_PER_KEV, Sum};
 use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
 use crate::transport::score::{Arrival, Score};
-use crate::transport::tally::Raster;
+use crate::transport::tally::{Raster, nearest};
 
 /// Cosine below which a photon counts as one of half of it, so that grazing ones do not ruin the variance: the mean of
 /// 1/cos over an even angular flux (Clark, Nucl. Sci. Eng. 27 (1967) 235).
@@ -66,7 +66,7 @@ impl<I: Score> Score for DoseScore<'_, I> {
 
     #[inline]
     fn deposit(&mut self, slot: usize, voxel: usize, energy_kev: f64) {
-        let steps = (energy_kev * STEPS_PER_KEV).round() as u64;
+        let steps = nearest(energy_kev * STEPS_PER_KEV);
         let deposits = &mut self.slots[slot];
         match deposits.iter_mut().find(|(other, _)| *other == voxel) {
             Some((_, sum)) => *sum += steps,
@@ -88,7 +88,7 @@ impl<I: Score> Score for DoseScore<'_, I> {
             let kerma = self.target.air.kev_cm2_g(arrival.energy_kev) / cos;
             self.sums
                 .detector_kerma
-                .count((kerma * STEPS_PER_KEV).round() as u64);
+                .count(nearest(kerma * STEPS_PER_KEV));
         }
         self.image.arrive(slot, arrival, rng);
     }
@@ -131,7 +131,7 @@ impl<I: Score> Score for DoseScore<'_, I> {
 }
 
 /// Counts what one history left and clears it.
-fn take_into(sums: &mut [crate::dose::tally::Sum], steps: &mut [u64]) {
+fn take_into(sums: &mut [Sum], steps: &mut [u64]) {
     for (sum, steps) in sums.iter_mut().zip(steps) {
         if *steps > 0 {
             sum.count(std::mem::take(steps));

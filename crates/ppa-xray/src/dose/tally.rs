@@ -4,6 +4,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use crate::dose::settings::VoxelBox;
+use crate::transport::tally::nearest;
 
 /// Energy quantum 1/64 eV, as in the image.
 pub(crate) const STEPS_PER_KEV: f64 = 64_000.0;
@@ -39,7 +40,7 @@ impl Sum {
 #[inline]
 pub(crate) fn square_steps(steps: u64) -> u64 {
     let kev = steps as f64 / STEPS_PER_KEV;
-    (kev * kev * STEPS_PER_KEV2).round() as u64
+    nearest(kev * kev * STEPS_PER_KEV2)
 }
 
 /// What all histories left in the phantom, and what passed the detector plane.

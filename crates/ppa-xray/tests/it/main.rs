@@ -1,6 +1,7 @@
 //! Checks of the public interface, some against reference data that is not part of the repository.
 
 mod attenuation;
+mod beer_lambert;
 mod case_a;
 mod dose;
 #[cfg(feature = "dicom")]
@@ -14,5 +15,6 @@ mod scattering;
 mod scenes;
 mod shared;
 mod spectra;
+mod statistics;
 mod tg195;
 mod transport;
