@@ -9,7 +9,7 @@ use crate::{
     },
     matter::electron_shell::Shell,
     matter::element::{atomic_number, symbol},
-    matter::fluorescence::FluorescenceLine,
+    matter::fluorescence::{FluorescenceLine, KFluorescence},
     matter::klein_nishina::energy_ratio,
     matter::library,
     matter::material_error::MaterialError,
@@ -172,7 +172,15 @@ impl Material {
 
     /// Names of the library's materials.
     pub fn names() -> impl Iterator<Item = &'static str> {
-        library::names()
+        library::names_and_sources().map(|(name, _)| name)
+    }
+
+    /// Where the composition of a named material comes from; nothing for names that are not in the library.
+    #[must_use]
+    pub fn source_of(name: &str) -> Option<&'static str> {
+        library::names_and_sources()
+            .find(|(known, _)| known.eq_ignore_ascii_case(name))
+            .map(|(_, source)| source)
     }
 
     /// Name.
@@ -194,6 +202,16 @@ impl Material {
             Matter::Elements(mass_fractions) => mass_fractions,
             Matter::Tables(_) => &[],
         }
+    }
+
+    /// The mass fractions as [`Material::parse_composition`] reads them. Empty if made from tables.
+    #[must_use]
+    pub fn composition(&self) -> String {
+        let parts = self.mass_fractions().iter().map(|&(z, fraction)| {
+            let symbol = symbol(z).expect("Z checked on the way in");
+            format!("{symbol}:{}", (fraction * 1e7).round() / 1e7)
+        });
+        parts.collect::<Vec<_>>().join(",")
     }
 
     /// Energies in keV between which the material has data: 1 to 150, or what its own tables hold of that.
@@ -342,14 +360,31 @@ impl Material {
     /// K photons that may follow photoelectric absorption at an energy; none of a material made from tables.
     #[must_use]
     pub fn k_fluorescence(&self, energy_kev: f64) -> Vec<FluorescenceLine> {
-        let whole = self.cross_sections_unchecked(energy_kev).photoelectric;
-        of_elements(self.mass_fractions())
-            .filter_map(|(element, w)| Some((element, w, element.k_fluorescence()?)))
-            .filter(|(_, _, k)| energy_kev > k.edge_kev)
-            .flat_map(|(element, w, k)| {
-                k.lines(w * element.cross_sections(energy_kev).photoelectric / whole)
-            })
+        self.k_emitters()
+            .filter(|(_, k)| energy_kev > k.edge_kev)
+            .flat_map(|(z, k)| k.lines(self.photoelectric_share(z, energy_kev)))
             .collect()
+    }
+
+    /// Elements with K fluorescence inside the tables, by atomic number.
+    pub(crate) fn k_emitters(&self) -> impl Iterator<Item = (u8, &'static KFluorescence)> {
+        self.mass_fractions()
+            .iter()
+            .zip(of_elements(self.mass_fractions()))
+            .filter_map(|(&(z, _), (element, _))| Some((z, element.k_fluorescence()?)))
+    }
+
+    /// Share of an element in the photoelectric absorption.
+    pub(crate) fn photoelectric_share(&self, z: u8, energy_kev: f64) -> f64 {
+        let whole = self.cross_sections_unchecked(energy_kev).photoelectric;
+        let part: f64 = self
+            .mass_fractions()
+            .iter()
+            .zip(of_elements(self.mass_fractions()))
+            .filter(|((other, _), _)| *other == z)
+            .map(|(_, (element, w))| w * element.cross_sections(energy_kev).photoelectric)
+            .sum();
+        part / whole
     }
 
     /// Absorption edges in keV.
@@ -500,6 +535,8 @@ mod tests {
                 Err(MaterialError::Energy { .. })
             ));
         }
+        let again = Material::parse_composition("water", 1.0, &water.composition()).unwrap();
+        assert!((again.mass_fractions()[1].1 - water.mass_fractions()[1].1).abs() < 1e-7);
         let parsed = Material::parse_composition("water", 1.0, "H:0.112, O:0.889").unwrap();
         assert!((parsed.mass_fractions()[0].1 - 0.112 / 1.001).abs() < 1e-15);
     }

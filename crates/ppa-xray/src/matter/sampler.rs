@@ -3,11 +3,13 @@
 use crate::{
     matter::compton::{Compton, ComptonModel},
     matter::cross_sections::{CrossSections, HC_KEV_ANGSTROM, MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::fluorescence::Fluorescence,
     matter::impulse_approximation::BoundElectron,
     matter::material::Material,
     matter::rayleigh::Rayleigh,
     octaves::Octaves,
     philox::Philox,
+    transport::attenuation::CUTOFF_KEV,
 };
 
 /// Bins per octave of energy, as a power of two: straight lines in E are then within 1e-4 of E⁻³ laws.
@@ -27,6 +29,7 @@ pub struct MaterialTables {
     bins: Vec<Bin>,
     rayleigh: Rayleigh,
     compton: Compton,
+    fluorescence: Fluorescence,
 }
 
 /// Cross sections at the lower end of an energy bin and their change across it, cm²/g.
@@ -98,6 +101,7 @@ impl MaterialTables {
             bins,
             rayleigh: Rayleigh::new(material),
             compton: Compton::new(material, model, q_squared),
+            fluorescence: Fluorescence::new(material, CUTOFF_KEV),
             material: material.clone(),
         }
     }
@@ -145,6 +149,14 @@ impl MaterialTables {
     ) -> (f64, f64) {
         let (half, scattered_kev) = self.compton.sample(energy_kev as f32, || uniform() as f32);
         (f64::from(half), f64::from(scattered_kev).min(energy_kev))
+    }
+
+    /// Energy in keV of the K photon that follows photoelectric absorption, if one does above 5 keV; it leaves in any
+    /// direction alike. `u` uniform in [0, 1). Materials made from tables emit none.
+    #[inline]
+    #[must_use]
+    pub fn k_fluorescence(&self, energy_kev: f64, u: f64) -> Option<f64> {
+        self.fluorescence.sample(energy_kev, u)
     }
 
     /// Energy in keV of a photon that Compton scattering turned by θ, with numbers of `uniform` in [0, 1).

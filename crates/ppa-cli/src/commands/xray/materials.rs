@@ -8,7 +8,7 @@ use crate::output::Output;
 
 #[derive(Debug, Args)]
 pub struct MaterialsArgs {
-    /// A named material; without one, all names are listed
+    /// A named material; without one, all are listed
     #[arg(long, conflicts_with = "composition")]
     material: Option<String>,
     /// Mass fractions by element, as "Ca:0.4,C:0.12,O:0.48"
@@ -36,6 +36,27 @@ struct Attenuation {
 #[derive(Debug, Serialize)]
 struct Known {
     materials: Vec<&'static str>,
+    library: Vec<Described>,
+}
+
+#[derive(Debug, Serialize)]
+struct Described {
+    name: &'static str,
+    density_g_cm3: f64,
+    composition: String,
+    source: Option<&'static str>,
+}
+
+impl Described {
+    fn new(name: &'static str) -> anyhow::Result<Self> {
+        let material = Material::named(name)?;
+        Ok(Self {
+            name,
+            density_g_cm3: material.density_g_cm3(),
+            composition: material.composition(),
+            source: Material::source_of(name),
+        })
+    }
 }
 
 pub fn run(args: &MaterialsArgs, output: Output) -> anyhow::Result<()> {
@@ -45,8 +66,24 @@ pub fn run(args: &MaterialsArgs, output: Output) -> anyhow::Result<()> {
         (None, None) => {
             let known = Known {
                 materials: Material::names().collect(),
+                library: Material::names()
+                    .map(Described::new)
+                    .collect::<anyhow::Result<_>>()?,
             };
-            return output.print(&known, |known| known.materials.join("\n"));
+            return output.print(&known, |known| {
+                let line = |m: &Described| {
+                    format!(
+                        "{:<22}{:>10} g/cm³  {}",
+                        m.name, m.density_g_cm3, m.composition
+                    )
+                };
+                known
+                    .library
+                    .iter()
+                    .map(line)
+                    .collect::<Vec<_>>()
+                    .join("\n")
+            });
         }
     };
     let energy_kev = args.energy_kev;
