@@ -56,6 +56,7 @@ impl Spectrum {
     }
 
     /// Reads an MC-GPU spectrum: `lower bin edge in eV, weight` lines, ended by the upper edge with a negative weight.
+    /// One bin without width is a line.
     ///
     /// # Errors
     /// A file that cannot be read, a line that does not begin with two numbers, no end, and everything that
@@ -72,7 +73,13 @@ impl Spectrum {
             };
             edges.push(energy_ev / 1000.0);
             if weight < 0.0 {
-                return Self::from_bins(&edges, &weights);
+                return match (&edges[..], &weights[..]) {
+                    // How a line is written: a bin without width.
+                    ([low, high], [weight]) if low == high && *weight > 0.0 => {
+                        Self::monoenergetic(*low)
+                    }
+                    _ => Self::from_bins(&edges, &weights),
+                };
             }
             weights.push(weight);
         }
@@ -136,6 +143,8 @@ mod tests {
         assert_eq!(csv, spc);
         assert_eq!(csv.edges_kev(), [20.0, 21.0, 22.0]);
         assert_eq!(csv.bins().collect::<Vec<_>>(), [(20.5, 0.25), (21.5, 0.75)]);
+        let line = Spectrum::from_spc(file("56400 1\n56400 -1\n").path()).unwrap();
+        assert_eq!(line, Spectrum::monoenergetic(56.4).unwrap());
     }
 
     #[test]
