@@ -273,3 +273,79 @@ impl Plan {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use ppa_xray::{Blur, Collimation, DetectorModel, SpotShape};
+
+    use super::*;
+
+    fn read(xray: &str) -> Result<Plan, PlanError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("plan.toml");
+        let case = "version = 1\n[[case]]\nfile = \"a.toml\"\npatient = 0\n";
+        std::fs::write(&path, format!("{case}{xray}")).unwrap();
+        Plan::read(&path)
+    }
+
+    /// Source and receptor as a user writes them; what is written by a program reads back the same.
+    #[test]
+    fn source_and_receptor_are_read_from_the_plan() {
+        let plan = read(
+            r#"
+            [xray.source]
+            focal_spot = { size_mm = 0.6, shape = "gaussian" }
+            heel_effect = { anode_towards_deg = 90 }
+            collimation = { rectangle = { size_mm = [180.0, 240.0] } }
+            [xray.receptor]
+            model = { csi = { thickness_um = 500 } }
+            grid = { ratio = 8, lines_per_cm = 40, focus_mm = 1100 }
+            blur = { lorentzian = { h_mm2 = 0.45 } }
+            electronic_noise_kev = 90
+            "#,
+        )
+        .unwrap();
+        let (source, receptor) = (&plan.xray.source, &plan.xray.receptor);
+        assert_eq!(source.focal_spot.shape, SpotShape::Gaussian);
+        assert!(matches!(
+            source.collimation,
+            Collimation::Rectangle {
+                size_mm: [180.0, 240.0],
+                centre_mm: [0.0, 0.0]
+            }
+        ));
+        assert!(matches!(
+            receptor.model,
+            DetectorModel::Csi { packing: 0.8, .. }
+        ));
+        assert_eq!(receptor.blur, Some(Blur::Lorentzian { h_mm2: 0.45 }));
+        assert_eq!(receptor.grid.as_ref().unwrap().strip, "lead");
+        let folder = tempfile::tempdir().unwrap();
+        let copy = folder.path().join("copy.toml");
+        plan.write(&copy).unwrap();
+        let again = Plan::read(&copy).unwrap();
+        assert_eq!(
+            (&again.xray.source, &again.xray.receptor),
+            (source, receptor)
+        );
+    }
+
+    #[test]
+    fn left_out_they_are_a_point_and_an_ideal_detector() {
+        let plan = read("").unwrap();
+        assert_eq!(plan.xray.source, Source::default());
+        assert_eq!(plan.xray.receptor, Receptor::default());
+    }
+
+    #[test]
+    fn unknown_keys_are_named() {
+        for (xray, word) in [
+            ("[xray.source]\nfocal_spot_mm = 0.6\n", "focal_spot_mm"),
+            ("[xray.receptor]\nmodel = \"film\"\n", "film"),
+            ("[xray.receptor]\ngrid = { ratio = 8 }\n", "lines_per_cm"),
+        ] {
+            let error = read(xray).unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
+        }
+    }
+}

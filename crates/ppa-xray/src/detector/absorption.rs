@@ -3,10 +3,9 @@
 use std::f64::consts::TAU;
 
 use crate::detector::energy_nodes::EnergyNodes;
-use crate::detector::fluorescence::{K_SHELLS, KShell};
 use crate::detector::receptor::{DetectorModel, ReceptorError, require};
-use crate::matter::cross_sections::elements;
 use crate::matter::klein_nishina::energy_ratio;
+use crate::matter::material::Material;
 use crate::transport::tally::Moments;
 
 /// Electron rest energy, keV.
@@ -37,15 +36,15 @@ pub(crate) struct Absorption {
     shares: Vec<[[f64; 2]; COSINES + 1]>,
 }
 
-/// Elements of the layer with their mass, g/cm².
+/// A homogeneous layer.
 struct Layer {
-    elements: Vec<(u8, f64)>,
+    material: Material,
+    g_cm2: f64,
 }
 
 /// Optical thickness of the layer at one energy, normal incidence.
 struct Thickness {
-    /// Photoelectric, element by element.
-    photoelectric: Vec<f64>,
+    photoelectric: f64,
     compton: f64,
 }
 
@@ -69,23 +68,18 @@ impl Absorption {
                     1e-3..=1.0,
                     expected,
                 )?;
-                let g_cm2 = CSI_G_CM3 * packing * thickness_um * 1e-4;
-                Layer {
-                    elements: vec![(53, 0.488_451 * g_cm2), (55, 0.511_549 * g_cm2)],
-                }
+                Layer::new("csi", CSI_G_CM3 * packing * thickness_um)
             }
             DetectorModel::Selenium { thickness_um } => {
                 check_thickness(thickness_um)?;
-                Layer {
-                    elements: vec![(34, SELENIUM_G_CM3 * thickness_um * 1e-4)],
-                }
+                Layer::new("selenium", SELENIUM_G_CM3 * thickness_um)
             }
         };
         Ok(Some(Self::of_layer(&layer)))
     }
 
     fn of_layer(layer: &Layer) -> Self {
-        let nodes = EnergyNodes::with_edges(K_SHELLS.iter().map(|shell| shell.edge_kev));
+        let nodes = EnergyNodes::with_edges(layer.material.edges_kev());
         let depths = gauss_legendre::<DEPTHS>();
         let shares = nodes
             .kev()
@@ -136,29 +130,26 @@ fn check_thickness(thickness_um: f64) -> Result<(), ReceptorError> {
 }
 
 impl Layer {
+    /// A layer of a material of the library, by density in g/cm³ times thickness in µm.
+    fn new(material: &str, g_cm3_um: f64) -> Self {
+        Self {
+            material: Material::named(material).expect("in the library"),
+            g_cm2: 1e-4 * g_cm3_um,
+        }
+    }
+
     fn thickness(&self, energy_kev: f64) -> Thickness {
-        let library = elements();
-        let mut compton = 0.0;
-        let photoelectric = self
-            .elements
-            .iter()
-            .map(|&(z, g_cm2)| {
-                let element = library.get(z).expect("the library holds Z = 1 to 92");
-                let sections = element.cross_sections(energy_kev.max(1.0));
-                compton += sections.compton * g_cm2;
-                sections.photoelectric * g_cm2
-            })
-            .collect();
+        let sections = self.material.cross_sections_unchecked(energy_kev);
         Thickness {
-            photoelectric,
-            compton,
+            photoelectric: sections.photoelectric * self.g_cm2,
+            compton: sections.compton * self.g_cm2,
         }
     }
 }
 
 impl Thickness {
     fn total(&self) -> f64 {
-        self.photoelectric.iter().sum::<f64>() + self.compton
+        self.photoelectric + self.compton
     }
 }
 
@@ -197,20 +188,15 @@ impl KRay {
     /// K x-rays per interaction of photons of one energy.
     fn of_photons(layer: &Layer, energy_kev: f64) -> Vec<Self> {
         let at = layer.thickness(energy_kev);
-        let mut rays = Vec::new();
-        for (&(z, _), photoelectric) in layer.elements.iter().zip(&at.photoelectric) {
-            let Some(shell) = KShell::of(z).filter(|shell| energy_kev > shell.edge_kev) else {
-                continue;
-            };
-            let emitted = photoelectric / at.total() * shell.share * shell.fluorescence_yield;
-            rays.extend(shell.lines.map(|(energy_kev, share)| Self {
-                probability: emitted * share,
-                energy_kev,
-                thickness: layer.thickness(energy_kev).total(),
-                next: Self::of_photons(layer, energy_kev),
-            }));
-        }
-        rays
+        let lines = layer.material.k_fluorescence(energy_kev).into_iter();
+        lines
+            .map(|line| Self {
+                probability: at.photoelectric / at.total() * line.probability,
+                energy_kev: line.energy_kev,
+                thickness: layer.thickness(line.energy_kev).total(),
+                next: Self::of_photons(layer, line.energy_kev),
+            })
+            .collect()
     }
 
     /// Probability to get out from a depth (share of the layer).
@@ -423,12 +409,7 @@ mod tests {
     #[test]
     fn below_the_edge_a_layer_absorbs_as_beer_and_lambert_say() {
         let layer = csi(200.0);
-        let thickness = Layer {
-            elements: vec![
-                (53, 0.488_451 * 4.51 * 0.8 * 0.02),
-                (55, 0.511_549 * 4.51 * 0.8 * 0.02),
-            ],
-        };
+        let thickness = Layer::new("csi", 4.51 * 0.8 * 200.0);
         for (energy_kev, cos) in [(20.0, 1.0), (33.0, 1.0), (30.0, 0.5)] {
             let expected = 1.0 - (-thickness.thickness(energy_kev).total() / cos).exp();
             let found = layer.moments(energy_kev, cos).mean_kev / energy_kev;
@@ -440,23 +421,13 @@ mod tests {
     /// sampled anew (Klein–Nishina by rejection, Rayleigh left out as in the table), secondaries followed to the end.
     #[test]
     fn a_layer_leaves_what_photons_followed_one_by_one_leave() {
-        for (energy_kev, cos, elements, absorption) in [
-            (
-                60.0,
-                0.9,
-                vec![(53, 0.488_451 * 0.216_48), (55, 0.511_549 * 0.216_48)],
-                csi(600.0),
-            ),
-            (
-                110.0,
-                1.0,
-                vec![(53, 0.488_451 * 0.216_48), (55, 0.511_549 * 0.216_48)],
-                csi(600.0),
-            ),
-            (25.0, 0.6, vec![(34, 0.0854)], selenium(200.0)),
-            (70.0, 1.0, vec![(34, 0.427)], selenium(1_000.0)),
+        for (energy_kev, cos, material, g_cm3_um, absorption) in [
+            (60.0, 0.9, "csi", 4.51 * 0.8 * 600.0, csi(600.0)),
+            (110.0, 1.0, "csi", 4.51 * 0.8 * 600.0, csi(600.0)),
+            (25.0, 0.6, "selenium", 4.27 * 200.0, selenium(200.0)),
+            (70.0, 1.0, "selenium", 4.27 * 1_000.0, selenium(1_000.0)),
         ] {
-            let layer = Layer { elements };
+            let layer = Layer::new(material, g_cm3_um);
             let photons = 30_000;
             let (mut sum, mut square, mut fourth) = (0.0, 0.0, 0.0);
             for i in 0..photons {
@@ -493,8 +464,7 @@ mod tests {
             if !(0.0..1.0).contains(&depth) {
                 continue;
             }
-            let mut lot = rng.unit() * at.total();
-            if lot < at.compton {
+            if rng.unit() * at.total() < at.compton {
                 let alpha = energy_kev / ELECTRON_KEV;
                 let (theta, ratio) = loop {
                     let theta = 2.0 * rng.unit() - 1.0;
@@ -511,21 +481,15 @@ mod tests {
                 flying.push((depth, out, energy_kev * ratio));
                 continue;
             }
-            lot -= at.compton;
             left += energy_kev;
-            for (&(z, _), photoelectric) in layer.elements.iter().zip(&at.photoelectric) {
-                if lot < *photoelectric {
-                    let shell = KShell::of(z).unwrap();
-                    let emits = shell.share * shell.fluorescence_yield;
-                    if energy_kev > shell.edge_kev && rng.unit() < emits {
-                        let line = usize::from(rng.unit() >= shell.lines[0].1);
-                        let line_kev = shell.lines[line].0;
-                        left -= line_kev;
-                        flying.push((depth, 2.0 * rng.unit() - 1.0, line_kev));
-                    }
+            let mut lot = rng.unit();
+            for line in layer.material.k_fluorescence(energy_kev) {
+                if lot < line.probability {
+                    left -= line.energy_kev;
+                    flying.push((depth, 2.0 * rng.unit() - 1.0, line.energy_kev));
                     break;
                 }
-                lot -= photoelectric;
+                lot -= line.probability;
             }
         }
         left
@@ -554,6 +518,7 @@ mod tests {
         }
         let dqe = mean * mean / square;
         println!("DQE(0) {dqe:.3}");
+        let (thin, thick) = (selenium(500.0), selenium(1_000.0));
         for energy_kev in [20.0, 30.0, 40.0, 60.0, 80.0, 100.0] {
             let of = |a: &Absorption| {
                 let m = a.moments(energy_kev, 1.0);
@@ -563,8 +528,8 @@ mod tests {
             println!(
                 "{energy_kev} keV: CsI {:.3?}, Se 500 {:.3?}, Se 1000 {:.3?}",
                 of(&layer),
-                of(&selenium(500.0)),
-                of(&selenium(1000.0))
+                of(&thin),
+                of(&thick)
             );
         }
         assert!((0.78..0.78 / 0.9).contains(&dqe), "{dqe}");

@@ -6,8 +6,8 @@ const RANGE_KEV: [f64; 2] = [1.0, 150.0];
 /// Ratio of neighbouring nodes: linear interpolation of E⁻³ is right to 6e-4 in between.
 const RATIO: f64 = 1.02;
 
-/// Distance of the two nodes that stand for an edge from it, relative.
-const EDGE_GAP: f64 = 1e-9;
+/// Distance of the two nodes that stand for an edge from it, relative: more than tables of different origin differ by.
+const EDGE_GAP: f64 = 2e-5;
 
 /// Cells per keV of the guide.
 const CELLS_PER_KEV: f64 = 2.0;

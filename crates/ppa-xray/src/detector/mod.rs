@@ -3,7 +3,6 @@
 pub(crate) mod absorption;
 pub(crate) mod blur;
 pub(crate) mod energy_nodes;
-pub(crate) mod fluorescence;
 pub(crate) mod grid;
 pub(crate) mod open_field;
 pub(crate) mod readout;

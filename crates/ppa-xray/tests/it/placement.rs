@@ -2,7 +2,8 @@
 
 use nalgebra::Isometry3;
 use ppa_xray::{
-    AnalogSettings, FastSettings, ProjectionError, Spectrum, TransportError, analog, fast,
+    AnalogSettings, Blur, Collimation, Detector, FastSettings, HeelEffect, ProjectionError,
+    Spectrum, TransportError, analog, fast,
 };
 
 use crate::scenes::{frontal, slab};
@@ -48,6 +49,55 @@ fn impossible_placements_are_named() {
         refused(|p| p.detector.pixel_mm = -1.0),
         ProjectionError::Length { .. }
     ));
+}
+
+/// Each in one clear sentence that names the number.
+#[test]
+fn impossible_sources_and_receptors_are_named() {
+    let field = |size_mm, centre_mm| Collimation::Rectangle { size_mm, centre_mm };
+    let sentence = |change: fn(&mut ppa_xray::Projection)| refused(change).to_string();
+    assert!(sentence(|p| p.source.focal_spot.size_mm = -1.0).contains("focal spot is -1 mm"));
+    assert!(sentence(|p| p.source.focal_spot.size_mm = f64::NAN).contains("NaN"));
+    assert!(sentence(|p| p.source.focal_spot.size_mm = 100.0).contains("focal spot"));
+    let heel = sentence(|p| {
+        p.source.heel_effect = Some(HeelEffect {
+            anode_towards_deg: 0.0,
+        });
+    });
+    assert!(heel.contains("tube model"), "{heel}"); // the spectrum is a line
+    for (collimation, word) in [
+        (field([0.0, 100.0], [0.0; 2]), "measures"),
+        (field([-10.0, 100.0], [0.0; 2]), "measures"),
+        (field([f64::NAN, 100.0], [0.0; 2]), "measures"),
+        (field([100.0, 100.0], [1e6, 0.0]), "x-ray field reaches"),
+        (
+            Collimation::Fan {
+                angles_deg: [0.0, 5.0],
+            },
+            "opens by",
+        ),
+        (
+            Collimation::Fan {
+                angles_deg: [5.0, 180.0],
+            },
+            "opens by",
+        ),
+    ] {
+        let error = refused(|p| p.source.collimation = collimation).to_string();
+        assert!(error.contains(word), "{error}");
+    }
+    let beside = refused(|p| p.source.collimation = field([100.0, 100.0], [900.0, 0.0]));
+    assert_eq!(beside, ProjectionError::FieldMissesPhantom);
+    assert!(sentence(|p| p.detector.centre_mm[0] = f64::NAN).contains("expected"));
+    let large = refused(|p| p.detector = Detector::centred(30_000, 30_000, 0.01));
+    assert!(
+        matches!(large, ProjectionError::TooManyPixels { .. }),
+        "{large}"
+    );
+    assert!(sentence(|p| *p = p.with_detector_turned(1.5, 0.0)).contains("central ray"));
+    assert!(sentence(|p| p.receptor.electronic_noise_kev = -1.0).contains("electronic noise"));
+    let blur = sentence(|p| p.receptor.blur = Some(Blur::Lorentzian { h_mm2: f64::NAN }));
+    assert!(blur.contains("NaN"), "{blur}");
 }
 
 #[test]
