@@ -1,6 +1,6 @@
 //! Geometry and settings that make no sense are refused with the reason.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Unit, Vector3};
 use ppa_xray::{
     AnalogSettings, Blur, Collimation, Detector, FastSettings, HeelEffect, ProjectionError,
     Spectrum, TransportError, analog, fast,
@@ -94,7 +94,10 @@ fn impossible_sources_and_receptors_are_named() {
         matches!(large, ProjectionError::TooManyPixels { .. }),
         "{large}"
     );
-    assert!(sentence(|p| *p = p.with_detector_turned(1.5, 0.0)).contains("central ray"));
+    assert!(
+        sentence(|p| p.central_ray = Unit::new_normalize(Vector3::new(0.0, 20.0, 1.0)))
+            .contains("central ray")
+    );
     assert!(sentence(|p| p.receptor.electronic_noise_kev = -1.0).contains("electronic noise"));
     let blur = sentence(|p| p.receptor.blur = Some(Blur::Lorentzian { h_mm2: f64::NAN }));
     assert!(blur.contains("NaN"), "{blur}");
