@@ -5,7 +5,8 @@
 //! (or, by [`ComptonModel`], Klein–Nishina × S(q)).
 //! A [`VoxelPhantom`] is the patient, a [`Projection`] the exposure. Two engines make a [`Radiograph`] of them:
 //! [`analog`] follows every photon, [`fast`] ray-traces the primary, estimates the scatter, and adds the noise of the
-//! exposure asked for.
+//! exposure asked for. An [`AnalogRun`] follows photons in sittings and parts, until they are precise enough, and counts
+//! the [`Dose`].
 //!
 //! Units: mm, radians, keV, g/cm³, mass attenuation in cm²/g, images in eV/cm² per history. Frames: the phantom stands in
 //! `ct` (DICOM LPS); `device` has the source at the origin and z towards the detector. The device is moved, never the

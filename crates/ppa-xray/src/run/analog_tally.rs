@@ -140,6 +140,9 @@ impl RunSetup {
     /// Bytes of the sums and masses of a tally, unless they are beyond all memory or the sizes make no sense.
     pub fn sums_len(&self) -> Option<u64> {
         let image = Tally::byte_len_of(&self.image.detector.raster())? as u64;
+        if image == 0 {
+            return None;
+        }
         match &self.dose {
             Some(dose) => image.checked_add(dose.byte_len()?),
             None => Some(image),

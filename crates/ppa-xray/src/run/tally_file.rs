@@ -122,7 +122,7 @@ impl AnalogTally {
         let expected = run
             .sums_len()
             .and_then(|sums| sums.checked_add(16 + header_len + HASH_LEN as u64))
-            .ok_or_else(|| damaged("its header announces sums beyond all memory"))?;
+            .ok_or_else(|| damaged("its header announces sums of a size that makes no sense"))?;
         if found != expected {
             return Err(TallyError::Size {
                 path: path.into(),

@@ -143,7 +143,7 @@ fn case_2(name: &str) {
         high: box_high,
     }];
     regions.extend(centres_cm.map(cube));
-    let dose = dose(&phantom, &spectrum(name), &projection, 14_000_000, regions);
+    let dose = dose(&phantom, &spectrum(name), &projection, 28_000_000, regions);
     let imparted = |region: usize| dose.regions[region].1.ev_per_history;
     let box_ev = expected["box_eV_per_history"].as_f64().unwrap();
     assert_close("box", imparted(0), box_ev, 0.005);
