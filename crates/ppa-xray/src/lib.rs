@@ -8,6 +8,8 @@
 //! exposure asked for. An [`AnalogRun`] follows photons in sittings and parts, until they are precise enough, and counts
 //! the [`Dose`].
 //!
+//! [`mcgpu`] runs input files of MC-GPU v1.3.
+//!
 //! Units: mm, radians, keV, g/cm³, mass attenuation in cm²/g, images in eV/cm² per history. Frames: the phantom stands in
 //! `ct` (DICOM LPS); `device` has the source at the origin and z towards the detector. The device is moved, never the
 //! voxels.

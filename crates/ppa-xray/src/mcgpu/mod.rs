@@ -1,4 +1,10 @@
 //! Input files of MC-GPU v1.3 (Badal and Badano, Med. Phys. 36:4878, 2009, doi:10.1118/1.3231824) as they are.
+//!
+//! [`Simulation::read`] takes an input file and all that it names: penEasy geometry (`.vox`), materials (`.mcgpu`), spectrum (`.spc`),
+//! detector, scan, doses; text or gzip. Paths resolve against the folder of the input file. A material line `ppa:NAME` stands
+//! for a material of this library ([`Material::named`](crate::Material::named)). Results have the layout of MC-GPU's.
+//!
+//! What is told apart from MC-GPU on purpose stands in `docs/physics.md`, section "Agreement with other codes".
 
 mod analog;
 mod dose_file;
@@ -6,7 +12,6 @@ mod error;
 mod image_file;
 mod input;
 mod lines;
-
 #[cfg(test)]
 mod mangled;
 mod material_file;
