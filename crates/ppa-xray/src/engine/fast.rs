@@ -1,4 +1,4 @@
-//! The fast engine: ray-traced primary, Monte Carlo scatter on a coarse raster, quantum noise on top.
+//! The fast engine: ray-traced primary, forced detection of scatter, quantum noise on top.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -6,16 +6,22 @@ use serde::{Deserialize, Serialize};
 use crate::beam::projection::{Detector, Projection};
 use crate::beam::spectrum::Spectrum;
 use crate::detector::open_field::OpenField;
-use crate::engine::analog::{AnalogSettings, run};
+use crate::engine::collision_map::CollisionMap;
+use crate::engine::multiple_scatter::MultipleScatter;
+use crate::engine::node_grid::NodeGrid;
 use crate::engine::noise;
-use crate::engine::raytrace::primary_moments;
-use crate::engine::upsample::Upsampling;
+use crate::engine::paths::Paths;
+use crate::engine::raytrace::{check_samples, primary_moments};
+use crate::engine::scatter_field::{PrimarySignal, ScatterField, single_scatter_field};
+use crate::engine::single_scatter::FirstCollisions;
+use crate::engine::spectral_quadrature::SpectralQuadrature;
 use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph};
 use crate::matter::compton::ComptonModel;
+use crate::matter::scatter_density::ScatterDensities;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
 use crate::transport::stream::Stream;
-use crate::transport::tally::{Category, Moments, Raster, Tally};
+use crate::transport::tally::{Category, Moments};
 use crate::transport::tracking::{Transport, TransportError};
 
 /// What the fast engine spends, and the exposure its image stands for.
@@ -24,11 +30,12 @@ use crate::transport::tracking::{Transport, TransportError};
 pub struct FastSettings {
     /// Histories whose quantum noise the image carries; infinite gives the expected image.
     pub dose_histories: f64,
-    /// Histories that are followed to find the scatter.
+    /// Histories that are followed to find multiple scatter; single scatter gets a sixteenth as many first collisions
+    /// for each point of the detector at which it is computed. The scatter's error falls with the root of it.
     pub scatter_histories: u64,
-    /// Largest side of the cells in which the scatter is counted, mm.
+    /// Largest distance of the points at which scatter is computed, mm.
     pub scatter_pixel_mm: f64,
-    /// Rays per pixel side of the primary.
+    /// Most rays per pixel side of the primary, where the image has edges.
     pub samples_per_side: u32,
     /// How photons scatter off electrons.
     pub compton_model: ComptonModel,
@@ -41,22 +48,32 @@ impl Default for FastSettings {
     fn default() -> Self {
         Self {
             dose_histories: 2e10,
-            scatter_histories: 4_000_000,
+            scatter_histories: 160_000,
             scatter_pixel_mm: 20.0,
-            samples_per_side: 2,
+            samples_per_side: 16,
             compton_model: ComptonModel::default(),
             seed: 0,
         }
     }
 }
 
+/// Energies between two absorption edges that stand for the spectrum: the primary is then right to 3e-5 behind any
+/// thickness, the scatter to 1e-3.
+const PRIMARY_ENERGIES: usize = 12;
+const SCATTER_ENERGIES: usize = 8;
+
+/// How much farther apart than for single scatter the points for multiple scatter are.
+const SMOOTHER: f64 = 2.0;
+
+/// Histories of multiple scatter for each first collision of single scatter at a point.
+const HISTORIES_PER_COLLISION: u64 = 16;
+
 /// Simulates a radiograph of [`FastSettings::dose_histories`] photons at a fraction of the work.
 ///
 /// Geometry, physics and units are those of [`crate::engine::analog`]. Primary: line integrals averaged over each pixel.
-/// Scatter, which varies slowly: [`FastSettings::scatter_histories`] analog histories on coarse cells, carried to the
-/// pixels by quadratic B-splines that keep its sum. Then every layer gets the noise of an energy-integrating
-/// detector. The standard errors hold both that noise and the error of the scatter estimate, which
-/// neighbouring pixels share.
+/// Scatter, which varies slowly: forced detection at points of the detector, close together where it bends, and cubic
+/// interpolation to the pixels. Then every layer gets the noise of an energy-integrating detector. The standard errors
+/// hold both that noise and the error of the scatter estimate, which neighbouring pixels share.
 ///
 /// # Errors
 /// [`TransportError`] when the geometry, the spectrum or a setting makes no sense.
@@ -68,32 +85,31 @@ pub fn fast(
 ) -> Result<Radiograph, TransportError> {
     settings.validate()?;
     let transport = Transport::new(phantom, spectrum, projection, settings.compton_model)?;
-    let histories = settings.scatter_histories;
-    let raster = scatter_raster(&projection.detector, settings.scatter_pixel_mm);
-    let analog = AnalogSettings {
-        histories,
-        seed: settings.seed,
-        compton_model: settings.compton_model,
+    let detector = &projection.detector;
+    let paths = Paths::new(&transport);
+    let quadratures = SpectralQuadrature::compressed(&transport, PRIMARY_ENERGIES);
+    let primary = primary_moments(&transport, &paths, &quadratures, settings.samples_per_side);
+    let (open_field, open_field_ev_cm2) = OpenField::of(&transport);
+    let signal = PrimarySignal {
+        detector,
+        moments: &primary,
+        open_kev: open_field_ev_cm2 * detector.pixel_cm2() / 1e3,
     };
-    let tally = run(&transport, raster, &analog);
-    let primary = primary_moments(&transport, settings.samples_per_side)?;
+    let scatter = Scatter::new(&transport, &paths, &signal, settings);
+    let scattered = scatter.fields.map(|field| field.on_pixels(detector));
     let primary_kev = primary.iter().map(|pixel| pixel.mean_kev).sum::<f64>();
     let sums = CategorySums::from_kev(|category| match category {
         Category::Primary => (primary_kev, 0.0),
-        _ => {
-            let total = tally.total(category, histories);
-            (total.mean_kev, total.standard_error_kev(histories as f64))
-        }
+        _ => scattered[category as usize - 1].sum_kev,
     });
-    let upsampling = Upsampling::new(&raster, &projection.detector);
-    let expected = Category::ALL.map(|category| match category {
-        Category::Primary => Expected {
-            variance_kev2: vec![0.0; primary.len()],
-            moments: primary.clone(),
-        },
-        _ => Expected::scatter(&tally, category, histories, &upsampling),
+    let [compton, rayleigh, multiple] = scattered.map(|scatter| Expected {
+        moments: scatter.moments,
+        variance_kev2: scatter.variance_kev2,
     });
-    let (open_field, open_field_ev_cm2) = OpenField::of(&transport);
+    let primary = Expected {
+        variance_kev2: vec![0.0; primary.len()],
+        moments: primary,
+    };
     Ok(transport.readout.read(Radiograph {
         detector: projection.detector,
         engine: Engine::Fast,
@@ -103,10 +119,63 @@ pub fn fast(
         source_detector_mm: projection.source_detector_mm,
         open_field_ev_cm2,
         open_field,
-        layers: with_noise(&expected, settings, &projection.detector),
+        layers: with_noise(&[primary, compton, rayleigh, multiple], settings, detector),
         electronic: None,
         sums,
+        largest_score_share: Some(scatter.largest_share),
     }))
+}
+
+/// Scatter of an exposure, before interpolation.
+pub(crate) struct Scatter {
+    /// Compton, Rayleigh, multiple.
+    pub fields: [ScatterField; 3],
+    pub largest_share: f64,
+}
+
+impl Scatter {
+    pub fn new(
+        transport: &Transport,
+        paths: &Paths,
+        primary: &PrimarySignal,
+        settings: &FastSettings,
+    ) -> Self {
+        let detector = primary.detector;
+        let densities: Vec<ScatterDensities> = transport
+            .phantom
+            .materials()
+            .par_iter()
+            .map(|material| ScatterDensities::new(material, settings.compton_model))
+            .collect();
+        let map = CollisionMap::new(transport, paths, &densities);
+        let quadratures = SpectralQuadrature::compressed(transport, SCATTER_ENERGIES);
+        let first = FirstCollisions::new(transport, paths, &densities, &map, &quadratures);
+        let collisions = settings.scatter_histories.div_ceil(HISTORIES_PER_COLLISION);
+        let ([compton, rayleigh], single_share) = single_scatter_field(
+            &first,
+            detector,
+            settings.scatter_pixel_mm,
+            (settings.seed, collisions.min(u64::from(u32::MAX)) as u32),
+            primary,
+        );
+        let nodes = NodeGrid::new(detector, SMOOTHER * settings.scatter_pixel_mm);
+        let multiple = MultipleScatter {
+            transport,
+            paths,
+            densities: &densities,
+            map: &map,
+            nodes,
+        };
+        let seen = multiple.seen(settings.seed, settings.scatter_histories);
+        let multiple = ScatterField {
+            grid: nodes,
+            estimates: seen.fluence,
+        };
+        Self {
+            fields: [compton, rayleigh, multiple],
+            largest_share: single_share.max(seen.largest_share),
+        }
+    }
 }
 
 impl FastSettings {
@@ -126,7 +195,7 @@ impl FastSettings {
                 positive,
             ),
             (
-                "the side of the scatter cells in mm",
+                "the distance of the scatter points in mm",
                 self.scatter_pixel_mm,
                 self.scatter_pixel_mm > 0.0 && self.scatter_pixel_mm.is_finite(),
                 "a positive length",
@@ -140,7 +209,7 @@ impl FastSettings {
                 });
             }
         }
-        Ok(())
+        check_samples(self.samples_per_side)
     }
 }
 
@@ -149,41 +218,6 @@ struct Expected {
     moments: Vec<Moments>,
     /// Squared standard error of the mean energy, keV² per history.
     variance_kev2: Vec<f64>,
-}
-
-impl Expected {
-    fn scatter(tally: &Tally, category: Category, histories: u64, upsampling: &Upsampling) -> Self {
-        let cells = tally.moments(category, histories);
-        let plane = |of: fn(&Moments) -> f64| -> Vec<f64> { cells.iter().map(of).collect() };
-        let mean = upsampling.densities(&plane(|cell| cell.mean_kev));
-        let square = upsampling.densities(&plane(|cell| cell.square_kev2));
-        let variances: Vec<f64> = cells
-            .iter()
-            .map(|cell| cell.standard_error_kev(histories as f64).powi(2))
-            .collect();
-        Self {
-            moments: mean
-                .into_iter()
-                .zip(square)
-                .map(|(mean_kev, square_kev2)| Moments {
-                    mean_kev,
-                    square_kev2,
-                })
-                .collect(),
-            variance_kev2: upsampling.variances(&variances),
-        }
-    }
-}
-
-fn scatter_raster(detector: &Detector, cell_mm: f64) -> Raster {
-    let fine = detector.raster();
-    let cells =
-        |extent_mm: f64, most: usize| ((extent_mm / cell_mm).ceil() as usize).clamp(1, most);
-    Raster {
-        columns: cells(fine.extent_mm[0], fine.columns),
-        rows: cells(fine.extent_mm[1], fine.rows),
-        ..fine
-    }
 }
 
 fn with_noise(

@@ -1,11 +1,22 @@
 //! From an exposure to a radiograph: followed photon by photon, or fast.
 
 pub(crate) mod analog;
+mod attenuation_basis;
+mod collision_map;
 #[cfg(test)]
 mod energy_balance;
+mod energy_sampler;
 pub(crate) mod fast;
+mod multiple_scatter;
+mod node_grid;
 pub(crate) mod noise;
+mod paths;
+mod quasi_random;
 pub(crate) mod raytrace;
+mod scatter_field;
 #[cfg(test)]
 mod scatter_of_a_sphere;
-pub(crate) mod upsample;
+mod scatter_table;
+mod single_scatter;
+mod spectral_quadrature;
+mod turn;

@@ -122,6 +122,9 @@ pub struct Radiograph {
     /// Energy on the whole detector. For the fast engine: before quantum noise is added, so that
     /// the primary has no standard error.
     pub sums: CategorySums,
+    /// Fast engine: the largest share that a single path of a photon has in the scatter of a point of the detector.
+    /// Small is good: many paths agree. None for the analog engine, whose photons all count the same.
+    pub largest_score_share: Option<f64>,
 }
 
 impl Radiograph {

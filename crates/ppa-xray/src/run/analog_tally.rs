@@ -195,6 +195,7 @@ impl ImageSetup {
             layers,
             electronic: None,
             sums,
+            largest_score_share: None,
         })
     }
 }

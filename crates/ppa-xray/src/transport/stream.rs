@@ -7,4 +7,7 @@ pub(crate) enum Stream {
     QuantumNoise = 1,
     Projection = 2,
     ElectronicNoise = 3,
+    SingleScatter = 4,
+    MultipleScatter = 5,
+    MultipleScatterStarts = 6,
 }

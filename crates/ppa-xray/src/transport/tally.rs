@@ -95,7 +95,24 @@ pub(crate) struct Moments {
     pub square_kev2: f64,
 }
 
+impl std::iter::Sum for Moments {
+    fn sum<I: Iterator<Item = Self>>(moments: I) -> Self {
+        moments.fold(Self::default(), |sum, more| Self {
+            mean_kev: sum.mean_kev + more.mean_kev,
+            square_kev2: sum.square_kev2 + more.square_kev2,
+        })
+    }
+}
+
 impl Moments {
+    /// Both moments times `factor`.
+    pub fn scaled(self, factor: f64) -> Self {
+        Self {
+            mean_kev: self.mean_kev * factor,
+            square_kev2: self.square_kev2 * factor,
+        }
+    }
+
     /// Standard error of the mean over `histories`, each of which scores at most once.
     pub fn standard_error_kev(&self, histories: f64) -> f64 {
         ((self.square_kev2 - self.mean_kev * self.mean_kev).max(0.0) / histories).sqrt()

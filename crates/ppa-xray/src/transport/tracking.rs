@@ -74,7 +74,7 @@ pub(crate) struct Transport<'a> {
     pub readout: Readout,
     pub lattice: Lattice,
     pub attenuation: Attenuation,
-    pub(super) samplers: Vec<MaterialTables>,
+    pub samplers: Vec<MaterialTables>,
     pub(super) majorants: Majorants,
     pub(super) codes: Vec<VoxelCode>,
 }

@@ -131,7 +131,7 @@ fn analog_agrees_with_mcgpu() {
 #[ignore = "needs ../shared/reference/xray"]
 fn fast_agrees_with_mcgpu() {
     let settings = FastSettings {
-        scatter_histories: 10_000_000,
+        scatter_histories: 320_000,
         dose_histories: f64::INFINITY,
         seed: 2,
         ..FastSettings::default()

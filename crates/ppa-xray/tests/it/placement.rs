@@ -127,7 +127,7 @@ fn settings_out_of_range_are_named() {
                 scatter_pixel_mm: f64::NAN,
                 ..FastSettings::default()
             },
-            "cells",
+            "points",
         ),
         (
             FastSettings {

@@ -2,8 +2,7 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use ppa_xray::{
-    AnalogSettings, Category, FastSettings, Material, Radiograph, Spectrum, TubeSpec, analog, fast,
-    primary,
+    AnalogSettings, Category, FastSettings, Material, Spectrum, TubeSpec, analog, fast, primary,
 };
 
 use crate::scenes::{frontal, limb, slab};
@@ -161,61 +160,6 @@ fn threads_change_no_bit() {
         })
     };
     assert_eq!(both(1), both(3));
-}
-
-/// Energy per history in 4 x 4 blocks of the detector, and the variance if the pixels are independent.
-fn blocks(image: &Radiograph, category: Category) -> Vec<(f64, f64)> {
-    let side = image.columns() / 4;
-    let layer = image.layer(category);
-    let mut blocks = vec![(0.0, 0.0); 16];
-    for pixel in 0..layer.value.len() {
-        let (column, row) = (pixel % image.columns(), pixel / image.columns());
-        let block = &mut blocks[row / side * 4 + column / side];
-        block.0 += f64::from(layer.value[pixel]);
-        block.1 += f64::from(layer.sigma[pixel]).powi(2);
-    }
-    blocks
-}
-
-/// Blocks of 40 mm against cells of 10 mm: what the interpolation smears stays below the errors.
-#[test]
-fn fast_scatter_is_that_of_analog() {
-    let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
-    let projection = frontal(32, 5.0);
-    let histories = 1_000_000;
-    let expected = analog(&phantom, &spectrum, &projection, &settings(histories, 11)).unwrap();
-    let image = fast(
-        &phantom,
-        &spectrum,
-        &projection,
-        &FastSettings {
-            dose_histories: f64::INFINITY,
-            scatter_histories: histories,
-            scatter_pixel_mm: 10.0,
-            seed: 12,
-            ..FastSettings::default()
-        },
-    )
-    .unwrap();
-    let mut chi2 = 0.0;
-    for category in [Category::Compton, Category::Rayleigh, Category::Multiple] {
-        let (a, se_a) = image.sums.of(category);
-        let (b, se_b) = expected.sums.of(category);
-        assert!(
-            (a - b).abs() < 4.0 * se_a.hypot(se_b),
-            "{category:?}: {a} {b}"
-        );
-        let blocks = blocks(&image, category)
-            .into_iter()
-            .zip(blocks(&expected, category));
-        chi2 += blocks
-            .map(|((found, _), (expected, variance))| (found - expected).powi(2) / (2.0 * variance))
-            .sum::<f64>();
-    }
-    assert!(
-        (20.0..97.0).contains(&chi2),
-        "χ² = {chi2} with 48 degrees of freedom"
-    ); // 4e-5
 }
 
 #[test]

@@ -1,0 +1,232 @@
+//! The attenuation of all materials as mixtures of a few of them.
+//!
+//! Bone between spongy and compact is a mixture of soft tissue and cortical bone, and so is its attenuation; all
+//! tissues differ by little more than how much of two or three smooth functions of the energy they hold (Alvarez and
+//! Macovski, Phys. Med. Biol. 21 (1976) 733). So a ray need not keep the mass of 27 materials apart, but that of four.
+
+use crate::transport::attenuation::{Attenuation, CEILING_KEV, CUTOFF_KEV};
+
+/// Basis materials are counted in groups of this many, one SIMD register of numbers.
+pub(crate) const LANES: usize = 4;
+
+/// Nodes per keV of the table of the basis.
+const NODES_PER_KEV: usize = 8;
+
+/// Largest relative error of a material's attenuation at any energy. Rounding of the tables is about 1e-6.
+const TOLERANCE: f64 = 2e-5;
+
+/// Every material as a sum of basis materials.
+#[derive(Debug)]
+pub(crate) struct AttenuationBasis {
+    /// Groups of [`LANES`] basis materials.
+    pub groups: usize,
+    /// How much of each basis material a gram of a material counts as; material by material.
+    shares: Vec<[f32; LANES]>,
+    /// Attenuation of the basis materials, mm⁻¹ per g/cm³; node by node.
+    table: Vec<[f32; LANES]>,
+}
+
+impl AttenuationBasis {
+    /// The basis of `materials` materials for photons up to `highest_kev`.
+    ///
+    /// Takes the material that is worst represented into the basis until all are represented.
+    pub fn new(attenuation: &Attenuation, materials: usize, highest_kev: f64) -> Self {
+        let nodes = ((highest_kev.min(CEILING_KEV) - CUTOFF_KEV) * NODES_PER_KEV as f64).ceil()
+            as usize
+            + 1;
+        let energy = |node: usize| CUTOFF_KEV + node as f64 / NODES_PER_KEV as f64;
+        let total = |material: usize, node: usize| {
+            let at = attenuation.locate(energy(node).min(CEILING_KEV));
+            f64::from(attenuation.at(material as u8, at).total)
+        };
+        let curves: Vec<Vec<f64>> = (0..materials)
+            .map(|material| (0..nodes).map(|node| total(material, node)).collect())
+            .collect();
+        let (members, shares) = represent(&curves);
+        let groups = members.len().div_ceil(LANES);
+        let padded = |values: &[f64]| -> Vec<[f32; LANES]> {
+            (0..groups)
+                .map(|group| {
+                    std::array::from_fn(|lane| {
+                        values.get(group * LANES + lane).map_or(0.0, |&v| v as f32)
+                    })
+                })
+                .collect()
+        };
+        Self {
+            groups,
+            shares: shares.iter().flat_map(|row| padded(row)).collect(),
+            table: (0..nodes)
+                .flat_map(|node| {
+                    let row: Vec<f64> = members.iter().map(|&m| curves[m][node]).collect();
+                    padded(&row)
+                })
+                .collect(),
+        }
+    }
+
+    /// Shares of the basis materials in a gram of `material`.
+    #[inline]
+    pub fn shares(&self, material: u8) -> &[[f32; LANES]] {
+        let first = usize::from(material) * self.groups;
+        &self.shares[first..first + self.groups]
+    }
+
+    /// Attenuation of the basis materials at an energy, mm⁻¹ per g/cm³.
+    pub fn at(&self, energy_kev: f64) -> Vec<[f32; LANES]> {
+        (0..self.groups)
+            .map(|group| {
+                std::array::from_fn(|lane| {
+                    let mut mass = vec![[0.0; LANES]; self.groups];
+                    mass[group][lane] = 1.0;
+                    self.exponent(&mass, energy_kev)
+                })
+            })
+            .collect()
+    }
+
+    /// Attenuation exponent of basis masses, mm g/cm³, at an energy within the table.
+    #[inline]
+    pub fn exponent(&self, mass: &[[f32; LANES]], energy_kev: f64) -> f32 {
+        let at = (energy_kev - CUTOFF_KEV) * NODES_PER_KEV as f64;
+        let node = (at.max(0.0) as usize).min(self.table.len() / self.groups - 2);
+        let fraction = (at - node as f64) as f32;
+        let low = &self.table[node * self.groups..][..self.groups];
+        let high = &self.table[(node + 1) * self.groups..][..self.groups];
+        let mut sum = [0.0_f32; LANES];
+        for ((mass, low), high) in mass.iter().zip(low).zip(high) {
+            for lane in 0..LANES {
+                sum[lane] += mass[lane] * (low[lane] + fraction * (high[lane] - low[lane]));
+            }
+        }
+        (sum[0] + sum[1]) + (sum[2] + sum[3])
+    }
+}
+
+/// Attenuation exponent of basis masses under attenuations of the basis materials.
+#[inline(always)]
+pub(crate) fn dot(mass: &[[f32; LANES]], attenuation: &[[f32; LANES]]) -> f32 {
+    mass.iter()
+        .zip(attenuation)
+        .map(|(m, mu)| (m[0] * mu[0] + m[1] * mu[1]) + (m[2] * mu[2] + m[3] * mu[3]))
+        .sum()
+}
+
+/// Members of the basis, and every curve as a sum of them.
+///
+/// Gram–Schmidt with the worst curve next; curves are weighted by their own inverse, so that errors are relative.
+fn represent(curves: &[Vec<f64>]) -> (Vec<usize>, Vec<Vec<f64>>) {
+    let mut members = Vec::new();
+    loop {
+        let shares: Vec<Vec<f64>> = curves
+            .iter()
+            .enumerate()
+            .map(|(index, curve)| {
+                members
+                    .iter()
+                    .position(|&member| member == index)
+                    .map_or_else(
+                        || fit(curves, &members, curve),
+                        |place| unit(place, members.len()),
+                    )
+            })
+            .collect();
+        let error = |index: usize| -> f64 {
+            let curve = &curves[index];
+            (0..curve.len())
+                .map(|node| {
+                    let sum: f64 = members
+                        .iter()
+                        .zip(&shares[index])
+                        .map(|(&member, share): (&usize, _)| share * curves[member][node])
+                        .sum();
+                    (sum / curve[node] - 1.0).abs()
+                })
+                .fold(0.0, f64::max)
+        };
+        let worst = (0..curves.len())
+            .filter(|index| !members.contains(index))
+            .map(|index| (index, error(index)))
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        match worst {
+            Some((index, error)) if error > TOLERANCE => members.push(index),
+            _ => return (members, shares),
+        }
+    }
+}
+
+fn unit(place: usize, length: usize) -> Vec<f64> {
+    (0..length)
+        .map(|i| if i == place { 1.0 } else { 0.0 })
+        .collect()
+}
+
+/// Least squares of relative errors.
+fn fit(curves: &[Vec<f64>], members: &[usize], curve: &[f64]) -> Vec<f64> {
+    if members.is_empty() {
+        return Vec::new();
+    }
+    let rows = curve.len();
+    let matrix = nalgebra::DMatrix::from_fn(rows, members.len(), |node, member| {
+        curves[members[member]][node] / curve[node]
+    });
+    let target = nalgebra::DVector::from_element(rows, 1.0);
+    matrix
+        .svd(true, true)
+        .solve(&target, 1e-14)
+        .expect("both factors were computed")
+        .iter()
+        .copied()
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::matter::compton::ComptonModel;
+    use crate::matter::material::Material;
+    use crate::matter::sampler::MaterialTables;
+
+    /// Mixtures need no basis materials of their own, and every exponent is that of the masses themselves.
+    #[test]
+    fn a_few_materials_stand_for_all_their_mixtures() {
+        let named = |name: &str| Material::named(name).unwrap();
+        let mut materials: Vec<Material> = ["air", "soft_tissue", "bone_cortical", "titanium"]
+            .map(named)
+            .to_vec();
+        for share in [0.1, 0.35, 0.8] {
+            let parts = [(&materials[1], 1.0 - share), (&materials[2], share)];
+            materials.push(Material::mixture("mixture", 1.4, &parts).unwrap());
+        }
+        materials.push(named("lead"));
+        materials.push(named("water"));
+        let tables: Vec<_> = materials
+            .iter()
+            .map(|material| MaterialTables::new(material, ComptonModel::default()))
+            .collect();
+        let attenuation = Attenuation::new(&tables);
+        let basis = AttenuationBasis::new(&attenuation, materials.len(), 120.0);
+        assert!(basis.groups <= 2, "{} groups", basis.groups);
+        let masses: Vec<f32> = (0..materials.len()).map(|m| 3.0 + m as f32).collect();
+        for energy_kev in [5.0, 17.3, 60.0, 119.9] {
+            for (material, &mass) in masses.iter().enumerate() {
+                let projected: Vec<[f32; LANES]> = basis
+                    .shares(material as u8)
+                    .iter()
+                    .map(|share| share.map(|share| share * mass))
+                    .collect();
+                let node = attenuation.locate(energy_kev);
+                let exact = mass * attenuation.at(material as u8, node).total;
+                let found = basis.exponent(&projected, energy_kev);
+                // Lead has edges between the nodes of the basis.
+                let tolerance = if material == 7 { 2e-3 } else { 3e-4 };
+                assert!(
+                    (found / exact - 1.0).abs() < tolerance,
+                    "material {material} at {energy_kev} keV: {found} {exact}"
+                );
+                let dotted = dot(&projected, &basis.at(energy_kev));
+                assert!((dotted / found - 1.0).abs() < 1e-4);
+            }
+        }
+    }
+}

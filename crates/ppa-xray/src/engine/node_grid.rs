@@ -1,0 +1,232 @@
+//! Scatter at nodes of the detector plane, and smooth values in between.
+
+use nalgebra::Point2;
+
+use crate::beam::projection::Detector;
+
+/// Nodes in even steps over the whole detector, its edges included.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct NodeGrid {
+    pub columns: usize,
+    pub rows: usize,
+    low_mm: [f64; 2],
+    step_mm: [f64; 2],
+}
+
+impl NodeGrid {
+    /// The fewest nodes whose neighbours are at most `step_mm` apart.
+    pub fn new(detector: &Detector, step_mm: f64) -> Self {
+        let field = detector.field();
+        let size = field.size_mm();
+        let count = size.map(|size| (size / step_mm).ceil().max(1.0) as usize + 1);
+        Self {
+            columns: count[0],
+            rows: count[1],
+            low_mm: field.low_mm,
+            step_mm: [0, 1].map(|axis| size[axis] / (count[axis] - 1) as f64),
+        }
+    }
+
+    /// The grid with a node between every two neighbours.
+    pub fn refined(&self) -> Self {
+        Self {
+            columns: 2 * self.columns - 1,
+            rows: 2 * self.rows - 1,
+            low_mm: self.low_mm,
+            step_mm: self.step_mm.map(|step| 0.5 * step),
+        }
+    }
+
+    pub fn nodes(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    pub fn place(&self, node: usize) -> Point2<f64> {
+        let at = [node % self.columns, node / self.columns];
+        Point2::from([0, 1].map(|axis| self.low_mm[axis] + at[axis] as f64 * self.step_mm[axis]))
+    }
+
+    /// Interpolation to the pixels of a detector.
+    pub fn to_pixels(self, detector: &Detector) -> Interpolation {
+        let low_mm = detector.field().low_mm;
+        let axis = |axis: usize, nodes: usize, pixels: u32| {
+            (0..pixels)
+                .map(|pixel| {
+                    let at_mm = low_mm[axis] + (f64::from(pixel) + 0.5) * detector.pixel_mm;
+                    Stencil::at((at_mm - self.low_mm[axis]) / self.step_mm[axis], nodes)
+                })
+                .collect()
+        };
+        Interpolation {
+            columns: axis(0, self.columns, detector.columns),
+            rows: axis(1, self.rows, detector.rows),
+            nodes: self.columns,
+        }
+    }
+
+    /// Interpolation to the nodes of [`NodeGrid::refined`].
+    pub fn to_refined(self) -> Interpolation {
+        let axis = |nodes: usize| {
+            (0..2 * nodes - 1)
+                .map(|node| Stencil::at(0.5 * node as f64, nodes))
+                .collect()
+        };
+        Interpolation {
+            columns: axis(self.columns),
+            rows: axis(self.rows),
+            nodes: self.columns,
+        }
+    }
+}
+
+/// Cubic interpolation along both axes: exact for polynomials of third degree, from four nodes each.
+#[derive(Debug)]
+pub(crate) struct Interpolation {
+    columns: Vec<Stencil>,
+    rows: Vec<Stencil>,
+    nodes: usize,
+}
+
+/// Neighbouring nodes and their weights.
+#[derive(Debug, Clone, Copy)]
+struct Stencil {
+    first: usize,
+    length: usize,
+    weights: [f64; 4],
+}
+
+impl Stencil {
+    /// Lagrange's polynomial through the (up to) four nodes around `at`; at the rim, through the last four.
+    fn at(at: f64, nodes: usize) -> Self {
+        let length = nodes.min(4);
+        let first = (at.floor() - 1.0).max(0.0) as usize;
+        let first = first.min(nodes - length);
+        let mut weights = [0.0; 4];
+        for (i, weight) in weights.iter_mut().enumerate().take(length) {
+            *weight = (0..length)
+                .filter(|&j| j != i)
+                .map(|j| (at - (first + j) as f64) / (i as f64 - j as f64))
+                .product();
+        }
+        Self {
+            first,
+            length,
+            weights,
+        }
+    }
+
+    fn apply(&self, value: impl Fn(usize) -> f64, power: i32) -> f64 {
+        (0..self.length)
+            .map(|i| self.weights[i].powi(power) * value(self.first + i))
+            .sum()
+    }
+}
+
+impl Interpolation {
+    /// Values in between.
+    pub fn values(&self, nodes: &[f64]) -> Vec<f64> {
+        self.apply(nodes, 1)
+    }
+
+    /// Variances in between, from those of independent nodes.
+    pub fn variances(&self, nodes: &[f64]) -> Vec<f64> {
+        self.apply(nodes, 2)
+    }
+
+    /// How much each node adds to the sum of all values in between.
+    pub fn shares(&self) -> Vec<f64> {
+        let along = |stencils: &[Stencil]| {
+            let nodes = stencils
+                .iter()
+                .map(|s| s.first + s.length)
+                .max()
+                .unwrap_or(0);
+            let mut sums = vec![0.0; nodes];
+            for stencil in stencils {
+                for i in 0..stencil.length {
+                    sums[stencil.first + i] += stencil.weights[i];
+                }
+            }
+            sums
+        };
+        let (columns, rows) = (along(&self.columns), along(&self.rows));
+        rows.iter()
+            .flat_map(|row| columns.iter().map(move |column| row * column))
+            .collect()
+    }
+
+    fn apply(&self, nodes: &[f64], power: i32) -> Vec<f64> {
+        let across: Vec<f64> = nodes
+            .chunks_exact(self.nodes)
+            .flat_map(|row| {
+                self.columns
+                    .iter()
+                    .map(move |stencil| stencil.apply(|node| row[node], power))
+            })
+            .collect();
+        let width = self.columns.len();
+        self.rows
+            .iter()
+            .flat_map(|stencil| {
+                let across = &across;
+                (0..width)
+                    .map(move |column| stencil.apply(|node| across[node * width + column], power))
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn detector() -> Detector {
+        Detector::centred(37, 22, 3.0)
+    }
+
+    fn cubic(at: Point2<f64>) -> f64 {
+        1.0 + 0.1 * at.x - 0.02 * at.x * at.y + 1e-3 * at.y.powi(3) - 2e-4 * at.x.powi(2) * at.y
+    }
+
+    #[test]
+    fn cubic_polynomials_are_met_exactly_up_to_the_rim() {
+        let detector = detector();
+        let grid = NodeGrid::new(&detector, 17.0);
+        let nodes: Vec<f64> = (0..grid.nodes())
+            .map(|node| cubic(grid.place(node)))
+            .collect();
+        for (pixel, value) in grid.to_pixels(&detector).values(&nodes).iter().enumerate() {
+            let at = detector.pixel_centre_mm(pixel);
+            assert!((value - cubic(at)).abs() < 1e-9, "{value} at {at}");
+        }
+        let fine = grid.refined();
+        for (node, value) in grid.to_refined().values(&nodes).iter().enumerate() {
+            assert!((value - cubic(fine.place(node))).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn shares_sum_up_what_the_pixels_get() {
+        let detector = detector();
+        let grid = NodeGrid::new(&detector, 17.0);
+        let nodes: Vec<f64> = (0..grid.nodes()).map(|n| ((n * 7) % 11) as f64).collect();
+        let interpolation = grid.to_pixels(&detector);
+        let sum: f64 = interpolation.values(&nodes).iter().sum();
+        let shared: f64 = interpolation
+            .shares()
+            .iter()
+            .zip(&nodes)
+            .map(|(a, b)| a * b)
+            .sum();
+        assert!((sum / shared - 1.0).abs() < 1e-12);
+    }
+
+    /// A detector of one pixel, or one that is smaller than a step, has two nodes a side.
+    #[test]
+    fn the_smallest_detector_has_four_nodes() {
+        let one = Detector::centred(1, 1, 0.5);
+        let grid = NodeGrid::new(&one, 20.0);
+        assert_eq!(grid.nodes(), 4);
+        assert_eq!(grid.to_pixels(&one).values(&[1.0, 2.0, 3.0, 4.0]), [2.5]);
+    }
+}

@@ -1,0 +1,316 @@
+//! Mass along straight paths through the voxels, and through coarser cells that fit into the cache.
+
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+
+use crate::beam::spectrum::Spectrum;
+use crate::engine::attenuation_basis::{AttenuationBasis, LANES};
+use crate::phantom::lattice::{Lattice, Ray};
+use crate::phantom::voxels::VoxelPhantom;
+use crate::transport::tracking::Transport;
+
+/// Masses of the basis materials along a path, mm g/cm³, in groups of [`LANES`].
+pub(crate) type BasisMass = [[f32; LANES]];
+
+/// Whether a walk goes on.
+pub(crate) type Step = std::ops::ControlFlow<()>;
+
+/// Lengths along a path are counted in integers of this many mm: they add and compare faster than floating-point numbers.
+const MM: f64 = 1.0 / (1_u64 << 32) as f64;
+
+/// Cells of the coarse lattice: 2 MB, which the second cache of a core holds.
+const COARSE_CELLS: usize = 128 * 1024;
+
+/// Paths through a phantom, in the device frame.
+pub(crate) struct Paths<'a> {
+    phantom: &'a VoxelPhantom,
+    lattice: &'a Lattice,
+    pub basis: AttenuationBasis,
+    coarse: Coarse,
+}
+
+/// Cubes of voxels, each with its mean density of every basis material.
+struct Coarse {
+    edge: usize,
+    size: [usize; 3],
+    density: Vec<[f32; LANES]>,
+}
+
+impl<'a> Paths<'a> {
+    pub fn new(transport: &'a Transport<'a>) -> Self {
+        let basis = AttenuationBasis::new(
+            &transport.attenuation,
+            transport.phantom.materials().len(),
+            transport
+                .emitter
+                .spectra()
+                .iter()
+                .map(Spectrum::max_energy_kev)
+                .fold(0.0, f64::max),
+        );
+        Self {
+            phantom: transport.phantom,
+            lattice: &transport.lattice,
+            coarse: Coarse::new(transport.phantom, &basis),
+            basis,
+        }
+    }
+
+    /// Whether the coarse cells are single voxels.
+    pub fn coarse_is_exact(&self) -> bool {
+        self.coarse.edge == 1
+    }
+
+    /// The voxel at a point, if it lies in the box.
+    #[inline]
+    pub fn voxel_at(&self, point: &Point3<f64>) -> Option<usize> {
+        let cell = self.lattice.ray(point, &Vector3::zeros()).origin;
+        let size = self.lattice.size;
+        let inside = (0..3).all(|axis| cell[axis] >= 0.0 && cell[axis] < size[axis] as f64);
+        inside.then(|| {
+            let [i, j, k] = [0, 1, 2].map(|axis| cell[axis] as usize);
+            i + size[0] * (j + size[1] * k)
+        })
+    }
+
+    /// Where a path of `length_mm` is inside the box; nowhere is an empty stretch.
+    pub fn inside(
+        &self,
+        from: &Point3<f64>,
+        direction: &Vector3<f64>,
+        length_mm: f64,
+    ) -> (f64, f64) {
+        let ray = self.lattice.ray(from, direction);
+        self.lattice
+            .clip(&ray)
+            .map_or((0.0, 0.0), |(enter, leave)| {
+                (enter.min(length_mm), leave.min(length_mm))
+            })
+    }
+
+    /// Calls `visit(voxel, from_mm, to_mm)` for each piece of a path of `length_mm` along a unit vector, until told to stop.
+    #[inline]
+    pub fn pieces(
+        &self,
+        from: &Point3<f64>,
+        direction: &Vector3<f64>,
+        length_mm: f64,
+        visit: impl FnMut(usize, f64, f64) -> Step,
+    ) {
+        let ray = self.lattice.ray(from, direction);
+        if let Some((enter, leave)) = self.lattice.clip(&ray) {
+            walk(&ray, self.lattice.size, enter, leave.min(length_mm), visit);
+        }
+    }
+
+    /// As [`Paths::pieces`] with the coarse cells for voxels.
+    #[inline]
+    pub fn coarse_pieces(
+        &self,
+        from: &Point3<f64>,
+        direction: &Vector3<f64>,
+        length_mm: f64,
+        visit: impl FnMut(usize, f64, f64) -> Step,
+    ) {
+        let mut ray = self.lattice.ray(from, direction);
+        if let Some((enter, leave)) = self.lattice.clip(&ray) {
+            let shrink = 1.0 / self.coarse.edge as f64;
+            ray.origin *= shrink;
+            ray.slope *= shrink;
+            walk(&ray, self.coarse.size, enter, leave.min(length_mm), visit);
+        }
+    }
+
+    /// Adds a piece through a voxel to the masses.
+    #[inline(always)]
+    pub fn add(&self, mass: &mut BasisMass, voxel: usize, length_mm: f64) {
+        let amount = self.phantom.density_g_cm3()[voxel] * length_mm as f32;
+        add(
+            mass,
+            self.basis.shares(self.phantom.material()[voxel]),
+            amount,
+        );
+    }
+
+    /// Adds a piece through a coarse cell to the masses.
+    #[inline(always)]
+    pub fn add_coarse(&self, mass: &mut BasisMass, cell: usize, length_mm: f64) {
+        add(mass, self.coarse_density(cell), length_mm as f32);
+    }
+
+    /// Density of every basis material in a coarse cell, g/cm³.
+    #[inline(always)]
+    pub fn coarse_density(&self, cell: usize) -> &BasisMass {
+        let groups = self.basis.groups;
+        &self.coarse.density[cell * groups..(cell + 1) * groups]
+    }
+
+    /// Masses from one point to another.
+    #[inline]
+    pub fn between(&self, from: &Point3<f64>, to: &Point3<f64>, mass: &mut BasisMass) {
+        let (direction, length_mm) = towards(from, to);
+        self.gather(mass, |mass| {
+            self.pieces(from, &direction, length_mm, |voxel, from_mm, to_mm| {
+                self.add(mass, voxel, to_mm - from_mm);
+                Step::Continue(())
+            });
+        });
+    }
+
+    /// Masses from one point to another through the coarse cells.
+    #[inline]
+    pub fn coarse_between(&self, from: &Point3<f64>, to: &Point3<f64>, mass: &mut BasisMass) {
+        let (direction, length_mm) = towards(from, to);
+        self.gather(mass, |mass| {
+            self.coarse_pieces(from, &direction, length_mm, |cell, from_mm, to_mm| {
+                self.add_coarse(mass, cell, to_mm - from_mm);
+                Step::Continue(())
+            });
+        });
+    }
+
+    /// Sums into registers if there is one group.
+    #[inline(always)]
+    fn gather(&self, mass: &mut BasisMass, sum: impl Fn(&mut BasisMass)) {
+        if let [mass] = mass {
+            let mut single = [[0.0; LANES]];
+            sum(&mut single);
+            *mass = single[0];
+        } else {
+            mass.fill([0.0; LANES]);
+            sum(mass);
+        }
+    }
+}
+
+#[inline(always)]
+fn towards(from: &Point3<f64>, to: &Point3<f64>) -> (Vector3<f64>, f64) {
+    let along = to - from;
+    let length_mm = along.norm();
+    (along / length_mm, length_mm)
+}
+
+#[inline(always)]
+fn add(mass: &mut BasisMass, shares: &BasisMass, amount: f32) {
+    // One group is the common case: no loop.
+    if let ([mass], [share]) = (&mut *mass, shares) {
+        for lane in 0..LANES {
+            mass[lane] += share[lane] * amount;
+        }
+        return;
+    }
+    for (mass, share) in mass.iter_mut().zip(shares) {
+        for lane in 0..LANES {
+            mass[lane] += share[lane] * amount;
+        }
+    }
+}
+
+impl Coarse {
+    fn new(phantom: &VoxelPhantom, basis: &AttenuationBasis) -> Self {
+        let voxels = phantom.grid().size();
+        let mut edge = 1;
+        while voxels.iter().map(|n| n.div_ceil(edge)).product::<usize>() > COARSE_CELLS {
+            edge += 1;
+        }
+        let size = voxels.map(|n| n.div_ceil(edge));
+        let groups = basis.groups;
+        let mut density = vec![[0.0_f32; LANES]; groups * size.iter().product::<usize>()];
+        let layer = groups * size[0] * size[1];
+        density
+            .par_chunks_mut(layer)
+            .enumerate()
+            .for_each(|(k, layer)| {
+                let range =
+                    |cell: usize, axis: usize| cell * edge..((cell + 1) * edge).min(voxels[axis]);
+                for (cell, density) in layer.chunks_exact_mut(groups).enumerate() {
+                    let (i, j) = (cell % size[0], cell / size[0]);
+                    let mut count = 0.0;
+                    for z in range(k, 2) {
+                        for y in range(j, 1) {
+                            for x in range(i, 0) {
+                                let voxel = x + voxels[0] * (y + voxels[1] * z);
+                                let shares = basis.shares(phantom.material()[voxel]);
+                                add(density, shares, phantom.density_g_cm3()[voxel]);
+                                count += 1.0;
+                            }
+                        }
+                    }
+                    for lane in density.iter_mut().flatten() {
+                        *lane /= count;
+                    }
+                }
+            });
+        Self {
+            edge,
+            size,
+            density,
+        }
+    }
+}
+
+/// Walks from cell to cell of a lattice between two lengths on a ray (Amanatides and Woo, Eurographics 1987).
+#[inline(always)]
+fn walk(
+    ray: &Ray,
+    size: [usize; 3],
+    enter: f64,
+    end: f64,
+    mut visit: impl FnMut(usize, f64, f64) -> Step,
+) {
+    if enter >= end {
+        return;
+    }
+    let mut cross = [i64::MAX; 3];
+    let mut pitch = [0_i64; 3];
+    let mut stride = [0_isize; 3];
+    let (mut index, mut layer) = (0_isize, 1_isize);
+    for axis in 0..3 {
+        let (origin, slope) = (ray.origin[axis], ray.slope[axis]);
+        let cells = size[axis];
+        let cell = ((origin + slope * enter).max(0.0) as usize).min(cells - 1);
+        index += cell as isize * layer;
+        if slope != 0.0 {
+            let inverse = 1.0 / slope;
+            let face = (cell + usize::from(slope > 0.0)) as f64;
+            cross[axis] = fixed((face - origin) * inverse);
+            pitch[axis] = fixed(inverse.abs());
+            stride[axis] = if slope > 0.0 { layer } else { -layer };
+        }
+        layer *= cells as isize;
+    }
+    let [mut x, mut y, mut z] = cross;
+    let end = fixed(end);
+    let mut at = fixed(enter);
+    loop {
+        let (first_x, first_y) = (x <= y && x <= z, y < x && y <= z);
+        let next = x.min(y).min(z);
+        let to = next.min(end).max(at);
+        // Rounding may lead a hair out of the lattice at its far side.
+        if index < 0 || index >= layer {
+            return;
+        }
+        let step = visit(index as usize, at as f64 * MM, to as f64 * MM);
+        if next >= end || step.is_break() {
+            return;
+        }
+        at = to;
+        let first_z = !(first_x | first_y);
+        x += if first_x { pitch[0] } else { 0 };
+        y += if first_y { pitch[1] } else { 0 };
+        z += if first_z { pitch[2] } else { 0 };
+        index += if first_x {
+            stride[0]
+        } else if first_y {
+            stride[1]
+        } else {
+            stride[2]
+        };
+    }
+}
+
+/// A length in counts; what is beyond any phantom stays so without overflow.
+#[inline(always)]
+fn fixed(mm: f64) -> i64 {
+    ((mm * (1.0 / MM)) as i64).min(i64::MAX / 4)
+}

@@ -1,0 +1,85 @@
+//! Scattering of one material at one energy, by angle.
+
+use crate::matter::sampler::MaterialTables;
+use crate::matter::scatter_density::ScatterDensities;
+use crate::philox::Philox;
+use crate::transport::attenuation::Coefficients;
+
+/// Steps of sin(θ/2), in which forward peaks are wide: at 150 keV the Rayleigh peak of heavy elements covers 10 of them.
+const STEPS: usize = 512;
+
+/// Every so many steps the mean energy after Compton scattering is found anew, from this many draws.
+const ENERGY_STEPS: usize = 8;
+const DRAWS: u32 = 32;
+
+/// Scattering of a gram, mm⁻¹ per g/cm³ and sr, and the mean energy that Compton scattering leaves.
+#[derive(Debug)]
+pub(crate) struct ScatterTable {
+    rows: Vec<[f32; 3]>,
+}
+
+/// Values of a [`ScatterTable`] at one angle.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Scattering {
+    pub compton: f64,
+    pub rayleigh: f64,
+    pub compton_kev: f64,
+}
+
+impl ScatterTable {
+    pub fn new(
+        densities: &ScatterDensities,
+        tables: &MaterialTables,
+        energy_kev: f64,
+        c: &Coefficients,
+    ) -> Self {
+        let cos = |step: usize| 1.0 - 2.0 * (step as f64 / STEPS as f64).powi(2);
+        let compton = f64::from(c.with_compton - c.photoelectric);
+        let rayleigh = f64::from(c.total - c.with_compton);
+        let mean_kev: Vec<f64> = (0..=STEPS / ENERGY_STEPS)
+            .map(|node| {
+                // The draws are part of the table: the same for every image.
+                let mut rng = Philox::new(0, 0, node as u64);
+                let draw = |_| {
+                    tables.compton_energy_at(energy_kev, cos(node * ENERGY_STEPS), || rng.unit())
+                };
+                (0..DRAWS).map(draw).sum::<f64>() / f64::from(DRAWS)
+            })
+            .collect();
+        Self {
+            rows: (0..=STEPS)
+                .map(|step| {
+                    let node = (step / ENERGY_STEPS).min(mean_kev.len() - 2);
+                    let fraction = (step - node * ENERGY_STEPS) as f64 / ENERGY_STEPS as f64;
+                    let scattered_kev =
+                        mean_kev[node] + fraction * (mean_kev[node + 1] - mean_kev[node]);
+                    [
+                        compton * densities.compton_density(energy_kev, cos(step)),
+                        rayleigh * densities.rayleigh_density(energy_kev, cos(step)),
+                        scattered_kev,
+                    ]
+                    .map(|value| value as f32)
+                })
+                .collect(),
+        }
+    }
+
+    /// Where an angle lies between two steps.
+    #[inline]
+    pub fn locate(cos_theta: f64) -> (usize, f32) {
+        let at = (0.5 * (1.0 - cos_theta)).max(0.0).sqrt() * STEPS as f64;
+        let step = (at as usize).min(STEPS - 1);
+        (step, (at - step as f64) as f32)
+    }
+
+    #[inline]
+    pub fn at(&self, (step, fraction): (usize, f32)) -> Scattering {
+        let (low, high) = (&self.rows[step], &self.rows[step + 1]);
+        let mix = |i: usize| f64::from(low[i] + fraction * (high[i] - low[i]));
+        Scattering {
+            compton: mix(0),
+            rayleigh: mix(1),
+            compton_kev: mix(2),
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! The fast engine gives what the analog engine gives, in the mean and in its errors.
+
+use nalgebra::Isometry3;
+use ppa_xray::{
+    AnalogSettings, Category, FastSettings, FocalSpot, HeelEffect, Projection, Radiograph, Source,
+    Spectrum, SpotShape, TubeSpec, VoxelPhantom, analog, fast, primary,
+};
+
+use crate::scenes::{frontal, limb};
+
+const SCATTER: [Category; 3] = [Category::Compton, Category::Rayleigh, Category::Multiple];
+
+fn sixty_kvp() -> Spectrum {
+    Spectrum::tungsten(&TubeSpec {
+        kvp: 60.0,
+        anode_angle_deg: 12.0,
+        filters: vec!["Al:2.5".parse().unwrap()],
+    })
+    .unwrap()
+}
+
+/// The expected image, without quantum noise.
+fn expected_image(scatter_histories: u64, seed: u64) -> FastSettings {
+    FastSettings {
+        dose_histories: f64::INFINITY,
+        scatter_histories,
+        seed,
+        ..FastSettings::default()
+    }
+}
+
+fn analog_settings(histories: u64, seed: u64) -> AnalogSettings {
+    AnalogSettings {
+        histories,
+        seed,
+        ..AnalogSettings::default()
+    }
+}
+
+/// Energy per history in `side`² blocks of the detector, and its variance if the pixels are independent.
+fn blocks(image: &Radiograph, category: Category, side: usize) -> Vec<(f64, f64)> {
+    let pixels = image.columns() / side;
+    let layer = image.layer(category);
+    let mut blocks = vec![(0.0, 0.0); side * side];
+    for pixel in 0..layer.value.len() {
+        let (column, row) = (pixel % image.columns(), pixel / image.columns());
+        let block = &mut blocks[row / pixels * side + column / pixels];
+        block.0 += f64::from(layer.value[pixel]);
+        block.1 += f64::from(layer.sigma[pixel]).powi(2);
+    }
+    blocks
+}
+
+/// 4 x 4 blocks of three kinds of scatter: χ² with 48 degrees of freedom, and the three sums.
+fn assert_scatter_agrees(image: &Radiograph, expected: &Radiograph) {
+    let mut chi2 = 0.0;
+    for category in SCATTER {
+        let (a, se_a) = image.sums.of(category);
+        let (b, se_b) = expected.sums.of(category);
+        let z = (a - b) / se_a.hypot(se_b);
+        println!("{category:?}: {a:.3} ± {se_a:.3}, {b:.3} ± {se_b:.3}: z = {z:.1}");
+        assert!(z.abs() < 4.5, "{category:?}: {a} {b}, z = {z:.1}"); // 7e-6; heavier tails of 8 estimates: 1e-3
+        for ((found, shared), (expected, variance)) in blocks(image, category, 4)
+            .into_iter()
+            .zip(blocks(expected, category, 4))
+        {
+            // The pixels of a block share the error of the fast engine: up to 64 times the variance.
+            let fast = 16.0 * shared;
+            chi2 += (found - expected).powi(2) / (variance + fast);
+        }
+    }
+    println!("χ² {chi2:.1}");
+    assert!(chi2 < 97.0, "χ² = {chi2:.1} with 48 degrees of freedom"); // 4e-5
+}
+
+#[test]
+fn scatter_is_that_of_analog() {
+    let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
+    let projection = frontal(32, 5.0);
+    let expected = analog(
+        &phantom,
+        &spectrum,
+        &projection,
+        &analog_settings(1_000_000, 11),
+    );
+    let image = fast(
+        &phantom,
+        &spectrum,
+        &projection,
+        &expected_image(20_000, 12),
+    )
+    .unwrap();
+    assert_scatter_agrees(&image, &expected.unwrap());
+    let share = image.largest_score_share.unwrap();
+    assert!(share > 0.0 && share < 0.5, "largest share {share}");
+}
+
+/// A focal spot of 8 mm, heel effect and a collimated field.
+#[test]
+fn scatter_of_a_demanding_source_is_that_of_analog() {
+    let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
+    let source = Source {
+        focal_spot: FocalSpot {
+            size_mm: 8.0,
+            shape: SpotShape::Gaussian,
+        },
+        heel_effect: Some(HeelEffect {
+            anode_towards_deg: 30.0,
+        }),
+        ..Source::default()
+    };
+    let projection = Projection {
+        source,
+        ..frontal(24, 6.0)
+    };
+    let expected = analog(
+        &phantom,
+        &spectrum,
+        &projection,
+        &analog_settings(600_000, 13),
+    );
+    let image = fast(
+        &phantom,
+        &spectrum,
+        &projection,
+        &expected_image(10_000, 14),
+    )
+    .unwrap();
+    let expected = expected.unwrap();
+    assert_scatter_agrees(&image, &expected);
+    let (a, (b, se)) = (
+        image.sums.of(Category::Primary).0,
+        expected.sums.of(Category::Primary),
+    );
+    assert!((a - b).abs() < 4.5 * se, "primary {a}, {b} ± {se}"); // 7e-6
+}
+
+/// Rays that are added where they are needed, and few energies for the spectrum, against 64 x 64 rays per pixel and all energies.
+#[test]
+fn primary_is_that_of_many_rays() {
+    let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
+    for (pixels, pixel_mm, usual, worst) in [(20, 5.0, 3e-3, 6e-3), (24, 0.5, 3e-3, 1.5e-2)] {
+        let projection = frontal(pixels, pixel_mm);
+        let exact = primary(&phantom, &spectrum, &projection, 64).unwrap();
+        let settings = FastSettings {
+            samples_per_side: 64,
+            ..expected_image(320, 1)
+        };
+        let image = fast(&phantom, &spectrum, &projection, &settings).unwrap();
+        let mut errors: Vec<f64> = exact
+            .iter()
+            .zip(&image.layer(Category::Primary).value)
+            .map(|(exact, &value)| (f64::from(value) / exact - 1.0).abs())
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        let (most, largest) = (errors[errors.len() * 98 / 100], errors[errors.len() - 1]);
+        println!("{pixel_mm} mm: 98 % below {most:.1e}, all below {largest:.1e}");
+        assert!(most < usual && largest < worst, "{most} {largest}");
+    }
+}
+
+fn mean_and_variance(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares = values.iter().map(|value| (value - mean).powi(2));
+    (mean, squares.sum::<f64>() / (n - 1.0))
+}
+
+/// Twenty seeds: the sums of each kind scatter as their standard errors say, a fourfold effort halves them, and the means
+/// do not depend on the effort nor on the distance of the points.
+#[test]
+#[ignore = "takes 20 s"]
+fn errors_are_what_twenty_seeds_show() {
+    let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
+    let projection = frontal(32, 5.0);
+    let sums = |scatter_histories: u64, scatter_pixel_mm: f64, seed: u64| {
+        let settings = FastSettings {
+            scatter_pixel_mm,
+            ..expected_image(scatter_histories, seed)
+        };
+        let image = fast(&phantom, &spectrum, &projection, &settings).unwrap();
+        SCATTER.map(|category| image.sums.of(category))
+    };
+    let of = |histories, pixel_mm| -> Vec<[(f64, f64); 3]> {
+        (0..20)
+            .map(|seed| sums(histories, pixel_mm, 100 + seed))
+            .collect()
+    };
+    let expected = analog(
+        &phantom,
+        &spectrum,
+        &projection,
+        &analog_settings(8_000_000, 15),
+    )
+    .unwrap();
+    let (few, many, close) = (of(4_000, 20.0), of(16_000, 20.0), of(4_000, 11.0));
+    for (kind, category) in SCATTER.into_iter().enumerate() {
+        let (truth, truth_se) = expected.sums.of(category);
+        for (name, runs) in [("few", &few), ("many", &many), ("close", &close)] {
+            let values: Vec<f64> = runs.iter().map(|run| run[kind].0).collect();
+            let (mean, variance) = mean_and_variance(&values);
+            let stated = runs.iter().map(|run| run[kind].1.powi(2)).sum::<f64>() / 20.0;
+            let z = (mean - truth) / (variance / 20.0 + truth_se * truth_se).sqrt();
+            println!(
+                "{category:?} {name}: {mean:.3}, analog {truth:.3} ± {truth_se:.3}: z = {z:.1}; variance over stated {:.2}",
+                variance / stated
+            );
+            // 9 comparisons of 4.5 standard errors each: 2e-4 with Student's t of 19 degrees of freedom.
+            assert!(z.abs() < 4.5, "{category:?} {name}: z = {z:.1}");
+            // χ² of 19 degrees of freedom over 19, and the estimate of the stated variance: 1e-3 for all.
+            assert!((0.25..2.9).contains(&(variance / stated)));
+        }
+        let stated = |runs: &[[(f64, f64); 3]]| {
+            runs.iter().map(|run| run[kind].1.powi(2)).sum::<f64>() / 20.0
+        };
+        let gain = stated(&few) / stated(&many);
+        println!("{category:?}: variance falls by {gain:.2} for four times the histories");
+        assert!((2.0..9.0).contains(&gain), "{category:?}: {gain}");
+    }
+}
+
+/// Covariance of neighbouring pixels over variance: white noise has none. χ² of all pixels for the variance.
+#[test]
+fn noise_is_white_and_as_large_as_that_of_analog() {
+    let phantom: VoxelPhantom = limb(&Isometry3::identity());
+    let (spectrum, projection) = (sixty_kvp(), frontal(48, 2.0));
+    let histories = 4e6;
+    let image = |dose_histories: f64, seed: u64| {
+        let settings = FastSettings {
+            dose_histories,
+            samples_per_side: 2,
+            ..expected_image(320, seed)
+        };
+        fast(&phantom, &spectrum, &projection, &settings).unwrap()
+    };
+    let (noisy, smooth) = (image(histories, 5), image(f64::INFINITY, 5));
+    let counted = analog(
+        &phantom,
+        &spectrum,
+        &projection,
+        &analog_settings(histories as u64 / 4, 6),
+    )
+    .unwrap();
+    let difference: Vec<f64> = noisy
+        .total()
+        .iter()
+        .zip(smooth.total())
+        .map(|(noisy, smooth)| f64::from(noisy - smooth))
+        .collect();
+    // Analog pixels state the variance that their photons had: four times as many have a quarter.
+    let variance: Vec<f64> = counted
+        .sigma()
+        .iter()
+        .map(|sigma| f64::from(*sigma).powi(2) / 4.0)
+        .collect();
+    let ratio = difference.iter().map(|d| d * d).sum::<f64>() / variance.iter().sum::<f64>();
+    // Bright pixels count most: about 1500 of them, √(2/1500) = 3.7 %.
+    assert!(
+        (ratio - 1.0).abs() < 0.17,
+        "variance over that of analog: {ratio}"
+    ); // 5e-6
+    for (name, step) in [("right", 1), ("below", 48)] {
+        let pairs = difference.iter().zip(&difference[step..]);
+        let product: f64 = pairs.map(|(a, b)| a * b).sum();
+        let correlation = product / difference.iter().map(|d| d * d).sum::<f64>();
+        assert!(
+            correlation.abs() < 0.12,
+            "{name}: correlation {correlation}"
+        ); // 4.5 of 1/√1500
+    }
+}
