@@ -36,5 +36,5 @@ pub use manifest::{FileKind, FileRow, Manifest, RoiFile, RoiRow, Rows};
 pub use plan::{DepthSettings, Plan, PlanCase, PlanError, PlanRoom, XraySettings};
 pub use prepare::{PrepareError, PreparedLimb, prepare, volume_sha256};
 pub use radiograph::{JointError, joint_phantom, projection};
-pub use stage::{PlacedCamera, Stage, StageError, Table, spectrum};
+pub use stage::{PlacedCamera, Stage, StageError, Table, spectrum, tube};
 pub use unit::UnitError;

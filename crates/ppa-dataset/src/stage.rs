@@ -129,18 +129,25 @@ impl Stage {
     }
 }
 
+/// The tube of a plan and its filters.
+///
+/// # Errors
+/// [`StageError::Spectrum`] for a filter that cannot be read.
+pub fn tube(settings: &XraySettings) -> Result<TubeSpec, StageError> {
+    let filters = settings.filters.iter().map(|filter| filter.parse());
+    Ok(TubeSpec {
+        kvp: settings.kvp,
+        anode_angle_deg: settings.anode_angle_deg,
+        filters: filters.collect::<Result<_, ppa_xray::SpectrumError>>()?,
+    })
+}
+
 /// The beam of a plan.
 ///
 /// # Errors
 /// [`StageError::Spectrum`] for a voltage, anode or filter out of range.
 pub fn spectrum(settings: &XraySettings) -> Result<Spectrum, StageError> {
-    let filters = settings.filters.iter().map(|filter| filter.parse());
-    let tube = TubeSpec {
-        kvp: settings.kvp,
-        anode_angle_deg: settings.anode_angle_deg,
-        filters: filters.collect::<Result<_, ppa_xray::SpectrumError>>()?,
-    };
-    Ok(Spectrum::tungsten(&tube)?)
+    Ok(Spectrum::tungsten(&tube(settings)?)?)
 }
 
 fn load_room(plan: &PlanRoom) -> Result<Room, StageError> {

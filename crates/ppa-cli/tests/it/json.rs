@@ -126,7 +126,7 @@ fn every_command_keeps_its_keys() {
     let limb = object("xray audit p01.toml", &audit);
     assert!(limb["outside_mask"].as_u64() > whole["outside_mask"].as_u64());
     let simulated = object(
-        "xray simulate p01.toml --angle 18 --engine analog --histories 20000 --out x.png --exr x.exr",
+        "xray simulate p01.toml --angle 18 --engine analog --histories 20000 --out x.png --exr x.exr --dicom x.dcm --protocol ankle_mortise",
         &["projections", "histories", "engine", "wall_s", "cpu_s"],
     );
     for category in ["primary", "compton", "rayleigh", "multiple"] {

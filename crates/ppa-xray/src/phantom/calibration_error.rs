@@ -78,6 +78,6 @@ pub enum CalibrationError {
         /// The segment.
         segment: String,
         /// What is wrong with its material.
-        source: MaterialError,
+        source: Box<MaterialError>,
     },
 }

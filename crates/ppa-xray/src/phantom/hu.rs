@@ -290,7 +290,7 @@ impl Segment {
         };
         materials.map_err(|source| CalibrationError::Material {
             segment: self.name.clone(),
-            source,
+            source: Box::new(source),
         })
     }
 }

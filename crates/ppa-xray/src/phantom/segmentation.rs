@@ -77,7 +77,7 @@ fn made(segment: &Segment) -> Result<(Option<GradedMixture>, Vec<Material>), Cal
         GradedMixture::new(&segment.name, [first, second], densities).map_err(|source| {
             CalibrationError::Material {
                 segment: segment.name.clone(),
-                source,
+                source: Box::new(source),
             }
         })?;
     let levels = mixture.levels.clone();

@@ -5,6 +5,7 @@ mod follow;
 mod materials;
 mod mcgpu;
 mod merge;
+mod pictures;
 mod report;
 mod simulate;
 mod spectrum;
@@ -17,7 +18,7 @@ use crate::output::Output;
 #[derive(Debug, Subcommand)]
 pub enum XrayCommand {
     /// One radiograph of a posed limb
-    Simulate(simulate::SimulateArgs),
+    Simulate(Box<simulate::SimulateArgs>),
     /// One radiograph from the tallies of all parts of an analog run
     Merge(merge::MergeArgs),
     /// The beam of a tungsten tube behind filters

@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::BeamArgs;
 use super::follow::AnalogArgs;
+use super::pictures::{Exposure, PictureArgs};
 use super::report::Report;
 use crate::output::{Output, Stopwatch, working};
 
@@ -50,6 +51,8 @@ pub struct SimulateArgs {
     /// Tallies to write: OpenEXR with one layer per category
     #[arg(long)]
     exr: Option<PathBuf>,
+    #[command(flatten)]
+    pictures: PictureArgs,
     #[command(flatten)]
     analog: AnalogArgs,
 }
@@ -111,10 +114,22 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
     };
     let seconds = watch.read();
     let mut written: Vec<&Path> = args.analog.tally.iter().map(PathBuf::as_path).collect();
+    let presentation = args.pictures.presentation(&plan.xray, &radiograph)?;
     if let Some(out) = &args.out {
-        radiograph.write_png(out, &plan.xray.presentation)?;
+        radiograph.write_png(out, &presentation)?;
         written.push(out);
     }
+    let exposure = Exposure {
+        case: &case,
+        prepared: &prepared,
+        table: &table,
+        settings: &plan.xray,
+        projection: &projection,
+        angle_deg: args.angle,
+    };
+    args.pictures
+        .write_dicom(&radiograph, presentation, &exposure)?;
+    written.extend(args.pictures.dicom.as_deref());
     if let Some(exr) = &args.exr {
         radiograph.write_exr(exr)?;
         written.push(exr);

@@ -153,18 +153,12 @@ impl Radiograph {
                 &[magnification],
             );
         }
-        if tube.filters.is_empty() {
-            to.text(tags::FILTER_TYPE, "NONE");
-            return;
+        match tube.filters.len() {
+            0 => return to.text(tags::FILTER_TYPE, "NONE"),
+            // The terms for a single layer are shapes that it does not have.
+            1 => {}
+            _ => to.text(tags::FILTER_TYPE, "MULTIPLE"),
         }
-        to.text(
-            tags::FILTER_TYPE,
-            if tube.filters.len() == 1 {
-                "FLAT"
-            } else {
-                "MULTIPLE"
-            },
-        );
         let materials: Vec<String> = tube
             .filters
             .iter()

@@ -1,0 +1,116 @@
+//! How a radiograph is shown, and its DICOM image.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use ppa_dataset::{Case, PreparedLimb, Table, XraySettings, tube};
+use ppa_scene::{LimbKind, Side};
+use ppa_xray::{
+    DxExposure, DxIntent, Examination, Laterality, Presentation, Projection, Radiograph, Region,
+    View,
+};
+
+#[derive(Debug, Args)]
+pub struct PictureArgs {
+    /// Fixed window and contrast by name, in place of the plan's: limb, ankle_ap, ankle_mortise or ankle_lateral
+    #[arg(long, value_name = "NAME", value_parser = protocol)]
+    protocol: Option<Presentation>,
+    /// Fit the window to this one image; images to be compared or learnt from want a fixed one
+    #[arg(long)]
+    autoscale: bool,
+    /// Radiograph to write: DICOM Digital X-Ray image, flagged as synthetic
+    #[arg(long, value_name = "FILE")]
+    pub dicom: Option<PathBuf>,
+    /// Make the DICOM image one For Processing: detector signal instead of the picture
+    #[arg(long, requires = "dicom")]
+    for_processing: bool,
+}
+
+fn protocol(name: &str) -> Result<Presentation, String> {
+    Presentation::protocol(name).map_err(|error| error.to_string())
+}
+
+/// Beyond this medial rotation a frontal view is an oblique one, and from there on a lateral one, degrees.
+const OBLIQUE_FROM_DEG: f64 = 7.5;
+const LATERAL_FROM_DEG: f64 = 67.5;
+
+impl PictureArgs {
+    pub fn presentation(
+        &self,
+        settings: &XraySettings,
+        radiograph: &Radiograph,
+    ) -> anyhow::Result<Presentation> {
+        let fixed = self.protocol.unwrap_or(settings.presentation);
+        Ok(if self.autoscale {
+            fixed.fitted(radiograph)?
+        } else {
+            fixed
+        })
+    }
+
+    /// Writes the DICOM image if one was asked for.
+    pub fn write_dicom(
+        &self,
+        radiograph: &Radiograph,
+        presentation: Presentation,
+        exposure: &Exposure,
+    ) -> anyhow::Result<()> {
+        let Some(path) = &self.dicom else {
+            return Ok(());
+        };
+        let intent = if self.for_processing {
+            DxIntent::Processing
+        } else {
+            DxIntent::Presentation(presentation)
+        };
+        let exposure = DxExposure {
+            projection: exposure.projection,
+            tube: &tube(exposure.settings)?,
+            examination: exposure.examination(),
+            source_patient_mm: Some(exposure.source_table_mm()),
+            study: &exposure.case.source.volume_sha256,
+        };
+        Ok(radiograph.write_dicom(path, &exposure, intent)?)
+    }
+}
+
+/// What a DICOM header wants to know.
+pub struct Exposure<'a> {
+    pub case: &'a Case,
+    pub prepared: &'a PreparedLimb,
+    pub table: &'a Table,
+    pub settings: &'a XraySettings,
+    pub projection: &'a Projection,
+    /// Medial rotation of the limb.
+    pub angle_deg: f64,
+}
+
+impl Exposure<'_> {
+    /// The beam comes from above: from the front at rest, and from the side that medial rotation turns up.
+    fn examination(&self) -> Examination {
+        let view = match self.angle_deg {
+            angle if angle >= LATERAL_FROM_DEG => View::LateroMedial,
+            angle if angle <= -LATERAL_FROM_DEG => View::MedioLateral,
+            angle if angle.abs() >= OBLIQUE_FROM_DEG => View::AnteroPosteriorOblique,
+            _ => View::AnteroPosterior,
+        };
+        Examination {
+            region: match self.prepared.landmarks.limb {
+                LimbKind::LowerLeg => Region::Ankle,
+                LimbKind::Other => Region::Extremity,
+            },
+            side: match self.case.side {
+                Side::Left => Laterality::Left,
+                Side::Right => Laterality::Right,
+            },
+            view,
+        }
+    }
+
+    /// From the source to the table top along the central beam.
+    fn source_table_mm(&self) -> f64 {
+        let (device, plane) = (&self.table.room.device, &self.table.plane.plane);
+        let above_mm = plane.normal.dot(&device.source().coords) - plane.offset_mm;
+        -above_mm / plane.normal.dot(&device.beam_direction())
+    }
+}
