@@ -296,7 +296,7 @@ mod tests {
             [xray.source]
             focal_spot = { size_mm = 0.6, shape = "gaussian" }
             heel_effect = { anode_towards_deg = 90 }
-            collimation = { rectangle = { size_mm = [180.0, 240.0] } }
+            collimation = { rectangle = { size_mm = [180, 240] } }
             [xray.receptor]
             model = { csi = { thickness_um = 500 } }
             grid = { ratio = 8, lines_per_cm = 40, focus_mm = 1100 }

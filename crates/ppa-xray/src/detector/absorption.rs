@@ -11,7 +11,7 @@ use crate::transport::tally::Moments;
 /// Electron rest energy, keV.
 const ELECTRON_KEV: f64 = 510.998_95;
 
-/// Density of a CsI crystal and of amorphous selenium (Kasap, Rowlands, Proc. IEEE 90 (2002) 591), g/cm³.
+/// Density of a CsI crystal and of amorphous selenium, g/cm³.
 const CSI_G_CM3: f64 = 4.51;
 const SELENIUM_G_CM3: f64 = 4.27;
 
