@@ -11,7 +11,8 @@ pub(crate) struct VoxelCode(u32);
 impl VoxelCode {
     #[inline]
     pub fn new(material: u8, density_g_cm3: f32) -> Self {
-        let rounded = density_g_cm3.to_bits() + 0x80; // densities are finite and not negative
+        // Densities are finite and not negative; beyond 1e30, attenuation might overflow, and no photon gets in anyway.
+        let rounded = density_g_cm3.min(1e30).to_bits() + 0x80;
         Self(rounded & 0xFFFF_FF00 | u32::from(material))
     }
 
@@ -53,7 +54,8 @@ mod tests {
     }
 
     #[test]
-    fn vacuum_stays_vacuum() {
+    fn extremes_stay_usable() {
         assert_eq!(VoxelCode::new(3, 0.0).density_g_cm3(), 0.0);
+        assert!(VoxelCode::new(3, f32::MAX).density_g_cm3() < 1.1e30);
     }
 }
