@@ -11,7 +11,7 @@ use crate::matter::material::Material;
 /// In a frame sheared along its strips the grid is upright. A photon that crosses it moves sideways by Δ, evenly over the
 /// strips' phase. Of Δ it spends n whole periods, each with one strip thickness d in lead, and a rest δ whose overlap o
 /// with the strips is a trapezoid of the phase; the mean of exp(−κ o) over it has a closed form. The idea of averaging
-/// over the phase is that of Day and Dance, Phys. Med. Biol. 28 (1983) 1429, doi:10.1088/0031-9155/28/12/007.
+/// over the phase is that of Day and Dance, Phys. Med. Biol. 28 (1983) 1429.
 #[derive(Debug, Clone)]
 pub(crate) struct Grid {
     height_mm: f64,

@@ -21,7 +21,7 @@ use crate::transport::tracking::{Transport, TransportError};
 /// off by up to 13 % at sharp edges. Voxels are homogeneous, as in the transport.
 ///
 /// # Errors
-/// As [`crate::engine::analog`]; also when `samples_per_side` is not 1 to 64.
+/// As [`crate::analog`]; also when `samples_per_side` is not 1 to 64.
 pub fn primary(
     phantom: &VoxelPhantom,
     spectrum: &Spectrum,
