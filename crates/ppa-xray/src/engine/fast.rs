@@ -48,9 +48,9 @@ impl Default for FastSettings {
     fn default() -> Self {
         Self {
             dose_histories: 2e10,
-            scatter_histories: 160_000,
+            scatter_histories: 80_000,
             scatter_pixel_mm: 20.0,
-            samples_per_side: 16,
+            samples_per_side: 8,
             compton_model: ComptonModel::default(),
             seed: 0,
         }

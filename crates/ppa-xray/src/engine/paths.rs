@@ -8,6 +8,7 @@ use crate::engine::attenuation_basis::{AttenuationBasis, LANES};
 use crate::phantom::lattice::{Lattice, Ray};
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::tracking::Transport;
+use crate::transport::voxel_codes::VoxelCode;
 
 /// Masses of the basis materials along a path, mm g/cm³, in groups of [`LANES`].
 pub(crate) type BasisMass = [[f32; LANES]];
@@ -23,7 +24,7 @@ const COARSE_CELLS: usize = 128 * 1024;
 
 /// Paths through a phantom, in the device frame.
 pub(crate) struct Paths<'a> {
-    phantom: &'a VoxelPhantom,
+    codes: &'a [VoxelCode],
     lattice: &'a Lattice,
     pub basis: AttenuationBasis,
     coarse: Coarse,
@@ -49,7 +50,7 @@ impl<'a> Paths<'a> {
                 .fold(0.0, f64::max),
         );
         Self {
-            phantom: transport.phantom,
+            codes: &transport.codes,
             lattice: &transport.lattice,
             coarse: Coarse::new(transport.phantom, &basis),
             basis,
@@ -124,12 +125,9 @@ impl<'a> Paths<'a> {
     /// Adds a piece through a voxel to the masses.
     #[inline(always)]
     pub fn add(&self, mass: &mut BasisMass, voxel: usize, length_mm: f64) {
-        let amount = self.phantom.density_g_cm3()[voxel] * length_mm as f32;
-        add(
-            mass,
-            self.basis.shares(self.phantom.material()[voxel]),
-            amount,
-        );
+        let code = self.codes[voxel];
+        let amount = code.density_g_cm3() * length_mm as f32;
+        add(mass, self.basis.shares(code.material()), amount);
     }
 
     /// Adds a piece through a coarse cell to the masses.

@@ -111,7 +111,7 @@ const EVEN: f64 = 4e-3;
 const EDGE: f64 = 2e-2;
 
 /// A rectangle is cut as long as opposite quarters differ from its centre by more than this share of the pixel.
-const TOLERANCE: f64 = 1e-3;
+const TOLERANCE: f64 = 3e-3;
 
 /// Points per side of a focal spot that is not a point.
 const SPOT_RAYS: u32 = 4;

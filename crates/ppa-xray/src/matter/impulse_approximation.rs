@@ -131,6 +131,9 @@ impl ImpulseApproximation {
         half: f32,
         mut uniform: impl FnMut() -> f32,
     ) -> f32 {
+        if half == 0.0 {
+            return energy_kev; // straight on no electron can be freed
+        }
         for trial in 0..PATIENCE {
             let scattered = if trial < TRIALS {
                 let electron = self.electron(uniform());

@@ -7,4 +7,4 @@ pub(crate) mod score;
 pub(crate) mod stream;
 pub(crate) mod tally;
 pub(crate) mod tracking;
-mod voxel_codes;
+pub(crate) mod voxel_codes;

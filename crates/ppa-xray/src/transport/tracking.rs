@@ -76,7 +76,7 @@ pub(crate) struct Transport<'a> {
     pub attenuation: Attenuation,
     pub samplers: Vec<MaterialTables>,
     pub(super) majorants: Majorants,
-    pub(super) codes: Vec<VoxelCode>,
+    pub codes: Vec<VoxelCode>,
 }
 
 impl<'a> Transport<'a> {
