@@ -1,12 +1,18 @@
 //! Photon histories, rays and whole radiographs per second.
 
+use std::time::Duration;
+
+use cpu_time::ProcessTime;
+use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use ppa_ct::Grid;
+use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_xray::{
-    AnalogSettings, Detector, FastSettings, Material, Projection, Spectrum, TubeSpec, VoxelPhantom,
-    analog, fast, primary,
+    AnalogSettings, Detector, FastSettings, HuCalibration, Material, Projection, Spectrum,
+    TubeSpec, VoxelPhantom, analog, fast, primary,
 };
+use rayon::ThreadPoolBuilder;
 
 /// A 20 cm water cube in 2 mm voxels with a 3 cm bone cylinder, as in case a of the reference data;
 /// optionally with a titanium screw of 4 mm x 40 mm.
@@ -47,48 +53,127 @@ fn spectrum() -> Spectrum {
     Spectrum::tungsten(&tube).unwrap()
 }
 
-fn transport(criterion: &mut Criterion) {
-    let (spectrum, projection) = (spectrum(), projection(300));
+/// The built-in leg in 1 mm voxels, all its mixtures of tissues, or 15 cm of it around the joint; the joint is in the
+/// beam.
+fn ankle(whole: bool, detector: Detector) -> (VoxelPhantom, Projection) {
+    let limb = LowerLeg::p01();
+    let joint = limb.truth().joint_centre;
+    let mut volume = limb.voxelise(1.0, TableTop::Absent).unwrap();
+    if !whole {
+        let half = Vector3::repeat(75.0);
+        volume = volume.crop_world(&(joint - half), &(joint + half)).unwrap();
+    }
+    let phantom = VoxelPhantom::from_volume(&volume, &HuCalibration::default(), None).unwrap();
+    let from_front = Matrix3::from_columns(&[Vector3::x(), -Vector3::z(), Vector3::y()]);
+    let rotation = Rotation3::from_matrix_unchecked(from_front);
+    let pose = Translation3::from(joint)
+        * UnitQuaternion::from_rotation_matrix(&rotation)
+        * Isometry3::translation(0.0, 0.0, -1_000.0);
+    (phantom, Projection::new(pose, 1_100.0, detector))
+}
+
+/// Time of the processor over all threads, so that other work on the machine does not count.
+struct CpuTime;
+
+impl Measurement for CpuTime {
+    type Intermediate = ProcessTime;
+    type Value = Duration;
+
+    fn start(&self) -> ProcessTime {
+        ProcessTime::now()
+    }
+
+    fn end(&self, start: ProcessTime) -> Duration {
+        start.elapsed()
+    }
+
+    fn add(&self, a: &Duration, b: &Duration) -> Duration {
+        *a + *b
+    }
+
+    fn zero(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    fn to_f64(&self, value: &Duration) -> f64 {
+        value.as_nanos() as f64
+    }
+
+    fn formatter(&self) -> &dyn ValueFormatter {
+        WALL.formatter()
+    }
+}
+
+const WALL: WallTime = WallTime;
+
+/// Histories per second of processor time: in one thread, and over two.
+fn histories(criterion: &mut Criterion<CpuTime>) {
+    let spectrum = spectrum();
+    let (leg, before_leg) = ankle(true, Detector::centred(300, 300, 0.8));
     let mut group = criterion.benchmark_group("analog");
     let settings = AnalogSettings {
-        histories: 200_000,
+        histories: 2_000_000,
         seed: 1,
         ..AnalogSettings::default()
     };
     group.throughput(Throughput::Elements(settings.histories));
     group.sample_size(10);
-    for (name, screw) in [("water_bone", false), ("titanium_screw", true)] {
-        let phantom = cube(screw);
-        group.bench_with_input(BenchmarkId::from_parameter(name), &phantom, |b, phantom| {
-            b.iter(|| analog(phantom, &spectrum, &projection, &settings).unwrap())
+    let scenes = [
+        ("water_bone", cube(false), projection(300)),
+        ("titanium_screw", cube(true), projection(300)),
+        ("ankle", leg, before_leg),
+    ];
+    for (name, phantom, projection) in &scenes {
+        for threads in [1, 2] {
+            let pool = ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            group.bench_with_input(BenchmarkId::new(*name, threads), phantom, |b, phantom| {
+                b.iter(|| pool.install(|| analog(phantom, &spectrum, projection, &settings)))
+            });
+        }
+    }
+}
+
+/// What a projection costs before its first history.
+fn preparation(criterion: &mut Criterion<CpuTime>) {
+    let spectrum = spectrum();
+    let (leg, before_leg) = ankle(true, Detector::centred(300, 300, 0.8));
+    let mut group = criterion.benchmark_group("preparation");
+    let settings = AnalogSettings {
+        histories: 1,
+        seed: 1,
+        ..AnalogSettings::default()
+    };
+    group.throughput(Throughput::Elements(leg.grid().len() as u64));
+    group.sample_size(10);
+    group.bench_function("ankle", |b| {
+        b.iter(|| analog(&leg, &spectrum, &before_leg, &settings).unwrap())
+    });
+}
+
+/// Pixels per second of processor time: the primary alone, and whole radiographs worth 2e10 histories.
+fn images(criterion: &mut Criterion<CpuTime>) {
+    let spectrum = spectrum();
+    let mut group = criterion.benchmark_group("image");
+    group.sample_size(10);
+    for (pixels, pixel_mm) in [(300, 1.0), (1_500, 0.2)] {
+        let (phantom, exposure) = ankle(false, Detector::centred(pixels, pixels, pixel_mm));
+        group.throughput(Throughput::Elements(u64::from(pixels * pixels)));
+        group.bench_with_input(BenchmarkId::new("primary", pixels), &exposure, |b, at| {
+            b.iter(|| primary(&phantom, &spectrum, at, 2).unwrap())
+        });
+        let settings = FastSettings::default();
+        group.bench_with_input(BenchmarkId::new("fast", pixels), &exposure, |b, at| {
+            b.iter(|| fast(&phantom, &spectrum, at, &settings).unwrap())
         });
     }
 }
 
-fn images(criterion: &mut Criterion) {
-    let (phantom, spectrum) = (cube(true), spectrum());
-    let mut group = criterion.benchmark_group("image");
-    group.sample_size(10);
-    for pixels in [150, 300] {
-        let projection = projection(pixels);
-        group.throughput(Throughput::Elements(u64::from(pixels * pixels)));
-        group.bench_with_input(
-            BenchmarkId::new("primary", pixels),
-            &projection,
-            |b, projection| b.iter(|| primary(&phantom, &spectrum, projection, 2).unwrap()),
-        );
-        let settings = FastSettings {
-            scatter_histories: 100_000,
-            samples_per_side: 2,
-            ..FastSettings::default()
-        };
-        group.bench_with_input(
-            BenchmarkId::new("fast", pixels),
-            &projection,
-            |b, projection| b.iter(|| fast(&phantom, &spectrum, projection, &settings).unwrap()),
-        );
-    }
+criterion_group! {
+    name = transport;
+    config = Criterion::default().with_measurement(CpuTime);
+    targets = histories, preparation, images
 }
-
-criterion_group!(benches, transport, images);
-criterion_main!(benches);
+criterion_main!(transport);

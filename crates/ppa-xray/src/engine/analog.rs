@@ -42,7 +42,7 @@ impl Default for AnalogSettings {
 }
 
 /// Histories that one task follows: long enough to hide the hand-over.
-const BATCH: u64 = 4_096;
+const BATCH: u64 = 16_384;
 
 /// Simulates a radiograph photon by photon.
 ///

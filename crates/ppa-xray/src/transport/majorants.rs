@@ -1,7 +1,5 @@
 //! Upper bounds of the attenuation around every block of voxels, for Woodcock tracking.
 
-use std::collections::HashMap;
-
 use rayon::prelude::*;
 
 use crate::transport::attenuation::{Attenuation, EnergyNode, NODES};
@@ -15,17 +13,20 @@ const NODES_PER_ROW: usize = 8;
 
 const ROWS: usize = NODES.div_ceil(NODES_PER_ROW);
 
-/// Classes of blocks at most: a row of bounds stays within four cache lines.
+/// Classes of blocks at most.
 const MOST_CLASSES: usize = 64;
+
+/// Energy at which blocks are compared, keV: the middle of a radiograph's spectrum.
+const TYPICAL_KEV: f64 = 40.0;
 
 /// A bound below this would let the free path overflow; mm⁻¹.
 const VACUUM: f32 = 1e-12;
 
 /// Upper bounds of the attenuation in cubes of blocks.
 ///
-/// A local bound keeps a small dense implant from slowing down the whole box. Blocks with the same largest density per
-/// material share a class, so that the table stays small enough for the cache. Every block knows how many blocks around
-/// it its bound, or that of a denser neighbour, may serve: photons cross a large even region in one step.
+/// A local bound keeps a small dense implant from slowing down the whole box. Blocks that are about as opaque as each other
+/// share a class; classes are ordered, and a class bounds all below it too. Every block knows how many blocks around it may
+/// share its bound, or that of a more opaque neighbour: photons cross a large even region in one step.
 #[derive(Debug)]
 pub(crate) struct Majorants {
     /// Blocks along i, j, k.
@@ -54,16 +55,14 @@ impl Majorants {
     ) -> Self {
         let blocks = size.map(|n| n.div_ceil(EDGE as usize));
         let materials = attenuation.materials();
-        let mut densest = densest_per_block(codes, size, blocks, materials);
-        let opacity = relative_opacity(attenuation);
-        densest
-            .par_chunks_exact_mut(materials)
-            .with_min_len(1024)
-            .for_each(|row| drop_dominated(row, &opacity));
-        let (class, members) = classify(&densest, materials);
+        let densest = densest_per_block(codes, size, blocks, materials);
+        let row_of = |energy: EnergyNode| energy.node as usize / NODES_PER_ROW;
+        let typical = row_of(attenuation.locate(TYPICAL_KEV));
+        let (class, members) = classify(&densest, &largest_in_row(attenuation, typical));
         let table = bounds(&members, attenuation);
-        let classes = members.len();
-        let regions = regions(&class, blocks, &table, classes, voxel_mm);
+        let classes = members.len() / materials;
+        let typical_mm = &table[typical * classes..][..classes];
+        let regions = regions(&class, blocks, typical_mm, voxel_mm);
         Self {
             blocks: blocks.map(|n| n as u32),
             regions,
@@ -117,163 +116,108 @@ fn densest_per_block(
     densest
 }
 
-/// For materials (a, b) at a · materials + b: the largest ratio of their coefficients at any energy.
-fn relative_opacity(attenuation: &Attenuation) -> Vec<f32> {
-    let materials = attenuation.materials();
-    let largest: Vec<Vec<f32>> = (0..materials)
-        .map(|material| {
-            (0..ROWS)
-                .map(|row| largest_in_row(attenuation, material, row))
-                .collect()
-        })
-        .collect();
-    (0..materials * materials)
-        .map(|pair| {
-            let (a, b) = (&largest[pair / materials], &largest[pair % materials]);
-            // A hair more, so that rounding never lets a struck-out material pass its bound.
-            a.iter().zip(b).map(|(a, b)| a / b).fold(0.0, f32::max) * 1.000_001
-        })
+/// Largest total coefficient of every material in a row of energies.
+fn largest_in_row(attenuation: &Attenuation, row: usize) -> Vec<f32> {
+    let first = row * NODES_PER_ROW;
+    let nodes = first..=(first + NODES_PER_ROW).min(NODES - 1);
+    (0..attenuation.materials())
+        .map(|material| attenuation.largest(material, nodes.clone()))
         .collect()
 }
 
-fn largest_in_row(attenuation: &Attenuation, material: usize, row: usize) -> f32 {
-    let first = row * NODES_PER_ROW;
-    attenuation.largest(material, first..=(first + NODES_PER_ROW).min(NODES - 1))
-}
-
-/// Strikes out materials that another one of the block outweighs at every energy: they cannot be its bound,
-/// and blocks that differ only in them share a class.
-fn drop_dominated(densest: &mut [f32], opacity: &[f32]) {
-    let materials = densest.len();
-    for a in 0..materials {
-        let outweighs = |b: usize| a != b && densest[a] * opacity[a * materials + b] <= densest[b];
-        if densest[a] > 0.0 && (0..materials).any(outweighs) {
-            densest[a] = 0.0;
-        }
+/// Class of every block, and the largest density per material of every class and those below it.
+///
+/// Classes follow the attenuation at the typical energy, `mu` per density and material. If there are too many different ones,
+/// they are told apart by fewer digits.
+fn classify(densest: &[f32], mu: &[f32]) -> (Vec<u16>, Vec<f32>) {
+    let materials = mu.len();
+    let opacity: Vec<u32> = densest
+        .par_chunks_exact(materials)
+        .with_min_len(1024)
+        .map(|densities| strongest(densities, mu).to_bits()) // ordered as the numbers are
+        .collect();
+    let mut known = opacity.clone();
+    known.sort_unstable();
+    known.dedup();
+    let mut digits_off = 0;
+    while known.len() > MOST_CLASSES {
+        digits_off += 1;
+        known.iter_mut().for_each(|bits| *bits >>= 1);
+        known.dedup();
     }
-}
-
-/// Groups rows of `densest` (one density per material); densities are rounded up, as little as the
-/// largest number of classes allows.
-fn classify(densest: &[f32], materials: usize) -> (Vec<u16>, Vec<Vec<f32>>) {
-    let mut ratio = 1.0_f32;
-    while ratio < 4.0 {
-        let mut known: HashMap<Vec<u32>, u16> = HashMap::new();
-        let mut members: Vec<Vec<f32>> = Vec::new();
-        let mut class = Vec::with_capacity(densest.len() / materials);
-        for row in densest.chunks_exact(materials) {
-            let rounded: Vec<f32> = row.iter().map(|&d| round_up(d, ratio)).collect();
-            let next = members.len() as u16;
-            let index = *known
-                .entry(rounded.iter().map(|d| d.to_bits()).collect())
-                .or_insert(next);
-            if index == next {
-                members.push(rounded);
-            }
-            class.push(index);
-            if members.len() > MOST_CLASSES {
-                break;
-            }
-        }
-        if members.len() <= MOST_CLASSES {
-            return (class, members);
-        }
-        ratio = 1.0 + (ratio - 1.0).max(0.01) * 2.0;
-    }
-    // Too many combinations of materials: one bound for all blocks.
-    let mut largest = vec![0.0_f32; materials];
-    for row in densest.chunks_exact(materials) {
-        for (largest, &density) in largest.iter_mut().zip(row) {
+    let class: Vec<u16> = opacity
+        .iter()
+        .map(|bits| known.partition_point(|&other| other < bits >> digits_off) as u16)
+        .collect();
+    let mut members = vec![0.0_f32; known.len() * materials];
+    for (&class, densities) in class.iter().zip(densest.chunks_exact(materials)) {
+        let row = &mut members[usize::from(class) * materials..][..materials];
+        for (largest, &density) in row.iter_mut().zip(densities) {
             *largest = largest.max(density);
         }
     }
-    (vec![0; densest.len() / materials], vec![largest])
+    for at in materials..members.len() {
+        members[at] = members[at].max(members[at - materials]);
+    }
+    (class, members)
 }
 
-/// The smallest power of `ratio` that is not below `density`.
-fn round_up(density: f32, ratio: f32) -> f32 {
-    if density == 0.0 || ratio == 1.0 {
-        return density;
-    }
-    let exponent = (density.ln() / ratio.ln()).ceil();
-    ratio.powf(exponent).max(density)
+/// Largest attenuation among materials of the given densities, mm⁻¹.
+fn strongest(densities: &[f32], mu: &[f32]) -> f32 {
+    densities
+        .iter()
+        .zip(mu)
+        .map(|(density, mu)| density * mu)
+        .fold(VACUUM, f32::max)
 }
 
 /// mm⁻¹ per row and class.
-fn bounds(members: &[Vec<f32>], attenuation: &Attenuation) -> Vec<f32> {
+fn bounds(members: &[f32], attenuation: &Attenuation) -> Vec<f32> {
     (0..ROWS)
-        .flat_map(|row| {
-            let largest: Vec<f32> = (0..attenuation.materials())
-                .map(|material| largest_in_row(attenuation, material, row))
-                .collect();
-            members.iter().map(move |densities| {
-                densities
-                    .iter()
-                    .zip(&largest)
-                    .map(|(density, mu)| density * mu)
-                    .fold(VACUUM, f32::max)
-            })
+        .into_par_iter()
+        .flat_map_iter(|row| {
+            let mu = largest_in_row(attenuation, row);
+            let classes = members.chunks_exact(mu.len());
+            classes
+                .map(|densities| strongest(densities, &mu))
+                .collect::<Vec<_>>()
         })
         .collect()
 }
 
 /// For every block the cube around it that costs a photon the fewest steps.
-fn regions(
-    class: &[u16],
-    blocks: [usize; 3],
-    table: &[f32],
-    classes: usize,
-    voxel_mm: f64,
-) -> Vec<Region> {
-    /// Mark of a cube in which no class bounds all others.
-    const NONE: u16 = u16::MAX;
+fn regions(class: &[u16], blocks: [usize; 3], typical_mm: &[f32], voxel_mm: f64) -> Vec<Region> {
     const FARTHEST: u16 = 15;
-    let bounds_all: Vec<bool> = (0..classes * classes)
-        .map(|pair| {
-            let (a, b) = (pair / classes, pair % classes);
-            table.chunks_exact(classes).all(|row| row[a] >= row[b])
-        })
-        .collect();
-    let join = |a: u16, b: u16| {
-        if a == NONE || b == NONE {
-            NONE
-        } else if bounds_all[usize::from(a) * classes + usize::from(b)] {
-            a
-        } else if bounds_all[usize::from(b) * classes + usize::from(a)] {
-            b
-        } else {
-            NONE
-        }
-    };
-    // Steps per mm at about 40 keV: a tentative collision costs about twice the crossing of a wall.
-    let typical = &table[ROWS * 3 / 5 * classes..][..classes];
-    let steps_per_mm = |class: u16, reach: u16| {
-        let side_mm = f64::from((2 * u32::from(reach) + 1) * EDGE) * voxel_mm;
-        2.0 * f64::from(typical[usize::from(class)]) + 2.0 / side_mm
+    // A tentative collision costs about twice the crossing of a wall.
+    let cost_per_mm = |region: &Region| {
+        let side_mm = f64::from((2 * u32::from(region.reach) + 1) * EDGE) * voxel_mm;
+        2.0 * f64::from(typical_mm[usize::from(region.class)]) + 2.0 / side_mm
     };
     let mut best: Vec<Region> = class
         .iter()
         .map(|&class| Region { class, reach: 0 })
         .collect();
-    let mut joined = class.to_vec();
+    // The highest class in the cube of every block, grown by one block on all sides each time.
+    let mut highest = class.to_vec();
     for reach in 1..=FARTHEST {
         let mut stride = 1;
         for count in blocks {
-            let before = joined.clone();
-            for (block, joined) in joined.iter_mut().enumerate() {
+            let before = highest.clone();
+            for (block, highest) in highest.iter_mut().enumerate() {
                 let at = block / stride % count;
                 if at > 0 {
-                    *joined = join(*joined, before[block - stride]);
+                    *highest = before[block - stride].max(*highest);
                 }
                 if at + 1 < count {
-                    *joined = join(*joined, before[block + stride]);
+                    *highest = before[block + stride].max(*highest);
                 }
             }
             stride *= count;
         }
-        for (best, &class) in best.iter_mut().zip(&joined) {
-            if class != NONE && steps_per_mm(class, reach) < steps_per_mm(best.class, best.reach) {
-                *best = Region { class, reach };
+        for (best, &class) in best.iter_mut().zip(&highest) {
+            let wider = Region { class, reach };
+            if cost_per_mm(&wider) < cost_per_mm(best) {
+                *best = wider;
             }
         }
     }
@@ -282,8 +226,6 @@ fn regions(
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
     use crate::matter::compton::ComptonModel;
     use crate::matter::material::Material;
@@ -317,7 +259,7 @@ mod tests {
             })
             .collect();
         let majorants = Majorants::new(&codes, size, 1.0, &attenuation);
-        assert!((2..=MOST_CLASSES).contains(&majorants.classes));
+        assert!((20..=MOST_CLASSES).contains(&majorants.classes));
         let blocks = majorants.blocks.map(|n| n as usize);
         let mut far_reaching = 0;
         for energy_kev in [5.0, 5.03, 33.17, 59.999, 149.99, 150.0] {
@@ -347,13 +289,5 @@ mod tests {
             }
         }
         assert!(far_reaching > 0, "no cube of more than one block");
-    }
-
-    proptest! {
-        #[test]
-        fn rounding_up_never_rounds_down(density in 1e-6..20.0_f32, ratio in 1.02..3.0_f32) {
-            let rounded = round_up(density, ratio);
-            prop_assert!(rounded >= density && rounded <= density * ratio * 1.001);
-        }
     }
 }
