@@ -4,12 +4,10 @@ use std::f64::consts::TAU;
 
 use crate::detector::energy_nodes::EnergyNodes;
 use crate::detector::receptor::{DetectorModel, ReceptorError, require};
+use crate::matter::cross_sections::ELECTRON_REST_KEV;
 use crate::matter::klein_nishina::energy_ratio;
 use crate::matter::material::Material;
 use crate::transport::tally::Moments;
-
-/// Electron rest energy, keV.
-const ELECTRON_KEV: f64 = 510.998_95;
 
 /// Density of a CsI crystal and of amorphous selenium, g/cm³.
 const CSI_G_CM3: f64 = 4.51;
@@ -234,7 +232,7 @@ impl Loss {
 impl LayerResponse {
     fn new(layer: &Layer, energy_kev: f64) -> Self {
         let at = layer.thickness(energy_kev);
-        let alpha = energy_kev / ELECTRON_KEV;
+        let alpha = energy_kev / ELECTRON_REST_KEV;
         // Klein and Nishina per solid angle.
         let angles = gauss_legendre::<POLAR>().map(|(x, weight)| {
             let cos = 2.0 * x - 1.0;
@@ -465,7 +463,7 @@ mod tests {
                 continue;
             }
             if rng.unit() * at.total() < at.compton {
-                let alpha = energy_kev / ELECTRON_KEV;
+                let alpha = energy_kev / ELECTRON_REST_KEV;
                 let (theta, ratio) = loop {
                     let theta = 2.0 * rng.unit() - 1.0;
                     let ratio = energy_ratio(alpha, theta);

@@ -3,21 +3,12 @@
 use nalgebra::Isometry3;
 use ppa_xray::{
     AnalogSettings, Category, FastSettings, FocalSpot, HeelEffect, Projection, Radiograph, Source,
-    Spectrum, SpotShape, TubeSpec, VoxelPhantom, analog, fast, primary,
+    SpotShape, VoxelPhantom, analog, fast, primary,
 };
 
-use crate::scenes::{frontal, limb};
+use crate::scenes::{frontal, limb, sixty_kvp};
 
 const SCATTER: [Category; 3] = [Category::Compton, Category::Rayleigh, Category::Multiple];
-
-fn sixty_kvp() -> Spectrum {
-    Spectrum::tungsten(&TubeSpec {
-        kvp: 60.0,
-        anode_angle_deg: 12.0,
-        filters: vec!["Al:2.5".parse().unwrap()],
-    })
-    .unwrap()
-}
 
 /// The expected image, without quantum noise.
 fn expected_image(scatter_histories: u64, seed: u64) -> FastSettings {

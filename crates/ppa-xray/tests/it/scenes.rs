@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use ppa_ct::Grid;
-use ppa_xray::{Detector, Material, Projection, VoxelPhantom};
+use ppa_xray::{Detector, Material, Projection, Spectrum, TubeSpec, VoxelPhantom};
 
 /// Device axes along ct axes, source 1 m before the ct origin.
 pub fn frontal(pixels: u32, pixel_mm: f64) -> Projection {
@@ -63,4 +63,14 @@ pub fn limb(pose: &Isometry3<f64>) -> VoxelPhantom {
         .map(|name| Material::named(name).unwrap())
         .to_vec();
     VoxelPhantom::new(grid, material, density, materials).unwrap()
+}
+
+/// A tungsten tube at 60 kVp behind 2.5 mm of aluminium.
+pub fn sixty_kvp() -> Spectrum {
+    Spectrum::tungsten(&TubeSpec {
+        kvp: 60.0,
+        anode_angle_deg: 12.0,
+        filters: vec!["Al:2.5".parse().unwrap()],
+    })
+    .unwrap()
 }

@@ -1,20 +1,9 @@
 //! Transport against answers that can be derived.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use ppa_xray::{
-    AnalogSettings, Category, FastSettings, Material, Spectrum, TubeSpec, analog, fast, primary,
-};
+use ppa_xray::{AnalogSettings, Category, FastSettings, Material, Spectrum, analog, fast, primary};
 
-use crate::scenes::{frontal, limb, slab};
-
-fn sixty_kvp() -> Spectrum {
-    Spectrum::tungsten(&TubeSpec {
-        kvp: 60.0,
-        anode_angle_deg: 12.0,
-        filters: vec!["Al:2.5".parse().unwrap()],
-    })
-    .unwrap()
-}
+use crate::scenes::{frontal, limb, sixty_kvp, slab};
 
 fn settings(histories: u64, seed: u64) -> AnalogSettings {
     AnalogSettings {
