@@ -5,6 +5,7 @@ mod open;
 mod pixels;
 mod rle;
 mod stack;
+mod stated;
 mod syntax;
 
 use std::collections::BTreeMap;
@@ -12,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
+use crate::acquisition::Acquisition;
 use crate::error::ReadError;
 use crate::scan::{Scan, SeriesSummary, Warning, WarningCode, hu_plausibility, starts_as_dicom};
 use crate::volume::Volume;
@@ -118,6 +120,7 @@ fn assemble(source: &Path, found: Vec<Found>, looked_at: usize) -> Result<Scan, 
         volume,
         modality: summary.modality.clone(),
         series: vec![summary],
+        acquisition: Acquisition::of_slices(slices.iter().map(|s| &s.stated)),
         warnings,
     })
 }

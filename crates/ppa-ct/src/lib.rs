@@ -21,6 +21,7 @@
 //! # Ok::<(), ppa_ct::VolumeError>(())
 //! ```
 
+mod acquisition;
 #[cfg(feature = "dicom")]
 mod dicom_series;
 mod error;
@@ -33,6 +34,7 @@ mod refine;
 mod scan;
 mod volume;
 
+pub use acquisition::Acquisition;
 pub use error::{Gap, ReadError, WriteError};
 pub use grid::{Grid, GridError};
 pub use info::Info;

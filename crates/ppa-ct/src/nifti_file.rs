@@ -7,6 +7,7 @@ mod affine;
 mod values;
 mod write;
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::Path;
@@ -14,6 +15,7 @@ use std::path::Path;
 use flate2::bufread::MultiGzDecoder;
 use nifti::NiftiHeader;
 
+use crate::acquisition::Acquisition;
 use crate::error::ReadError;
 use crate::grid::Grid;
 use crate::scan::{Scan, Warning, WarningCode, hu_plausibility};
@@ -90,8 +92,26 @@ fn read_stream(context: &Context, mut stream: impl Read) -> Result<Scan, ReadErr
         volume,
         modality: None,
         series: Vec::new(),
+        acquisition: Acquisition {
+            representable_hu: stored.representable_hu(),
+            identifiers: free_text(&header),
+            ..Acquisition::default()
+        },
         warnings,
     })
+}
+
+/// Names of the header's free-text fields that hold something.
+fn free_text(header: &NiftiHeader) -> BTreeSet<&'static str> {
+    let fields: [(&'static str, &[u8]); 4] = [
+        ("descrip", &header.descrip),
+        ("aux_file", &header.aux_file),
+        ("db_name", &header.db_name),
+        ("intent_name", &header.intent_name),
+    ];
+    let filled = |text: &[u8]| text.iter().any(|c| !matches!(c, 0 | b' '));
+    let named = fields.into_iter().filter(|(_, text)| filled(text));
+    named.map(|(name, _)| name).collect()
 }
 
 fn read_header(context: &Context, stream: &mut impl Read) -> Result<NiftiHeader, ReadError> {

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use crate::acquisition::Acquisition;
 use crate::error::ReadError;
 use crate::volume::Volume;
 
@@ -18,6 +19,8 @@ pub struct Scan {
     pub modality: Option<String>,
     /// The DICOM series read; empty for NIfTI.
     pub series: Vec<SeriesSummary>,
+    /// What the source says about its own making.
+    pub acquisition: Acquisition,
     /// What was odd, but did not stop the reading.
     pub warnings: Vec<Warning>,
 }

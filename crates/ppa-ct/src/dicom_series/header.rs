@@ -8,6 +8,8 @@ use dicom_object::DefaultDicomObject;
 use nalgebra::{Point3, Vector3};
 
 use super::open::{Extent, open};
+use super::stated::acquisition;
+use crate::acquisition::Acquisition;
 use crate::error::ReadError;
 
 /// What a DICOM file turned out to be.
@@ -50,6 +52,8 @@ pub(super) struct Slice {
     /// Rescale Type, where it is neither HU nor unspecified.
     pub foreign_unit: Option<String>,
     pub pixel: PixelFormat,
+    /// What the header says about the acquisition.
+    pub stated: Acquisition,
 }
 
 /// How a stored value sits in its container (DICOM PS3.5, section 8.1.1).
@@ -154,6 +158,7 @@ impl Header<'_> {
         if samples != 1 {
             return Err(self.bad("SamplesPerPixel", samples.to_string(), "1 (grey)"));
         }
+        let (rescale, pixel) = (self.rescale()?, self.pixel_format()?);
         Ok(Slice {
             path: self.path.to_owned(),
             rows: rows as usize,
@@ -165,11 +170,12 @@ impl Header<'_> {
             thickness_mm: self
                 .optional(tags::SLICE_THICKNESS, "SliceThickness")?
                 .filter(|t| *t > 0.0),
-            rescale: self.rescale()?,
+            rescale,
             foreign_unit: self
                 .text(tags::RESCALE_TYPE)
                 .filter(|t| is_code(t) && !matches!(t.as_str(), "HU" | "US")),
-            pixel: self.pixel_format()?,
+            pixel,
+            stated: acquisition(self.object, pixel, rescale.unwrap_or([1.0, 0.0])),
         })
     }
 

@@ -72,6 +72,23 @@ impl Stored {
         })
     }
 
+    /// Smallest and largest HU that whole numbers of this type can express; `None` for real ones.
+    pub(super) fn representable_hu(&self) -> Option<[f64; 2]> {
+        let [low, high] = match self.kind {
+            Kind::U8 => [0.0, f64::from(u8::MAX)],
+            Kind::I8 => [f64::from(i8::MIN), f64::from(i8::MAX)],
+            Kind::I16 => [f64::from(i16::MIN), f64::from(i16::MAX)],
+            Kind::U16 => [0.0, f64::from(u16::MAX)],
+            Kind::I32 => [f64::from(i32::MIN), f64::from(i32::MAX)],
+            Kind::U32 => [0.0, f64::from(u32::MAX)],
+            Kind::I64 => [i64::MIN as f64, i64::MAX as f64],
+            Kind::U64 => [0.0, u64::MAX as f64],
+            Kind::F32 | Kind::F64 => return None,
+        }
+        .map(|stored| self.slope * stored + self.intercept);
+        Some([low.min(high), low.max(high)])
+    }
+
     /// Bytes that a volume of `size` voxels takes.
     pub(super) fn bytes_for(&self, size: [usize; 3]) -> u64 {
         size.iter().map(|&n| n as u64).product::<u64>() * self.kind.bytes() as u64

@@ -273,3 +273,25 @@ fn what_is_no_scan_is_named() {
         "{error}"
     );
 }
+
+/// Facts pass on; of identifying attributes the names alone.
+#[test]
+fn the_acquisition_is_told_without_a_value_that_identifies() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut slices = axial_stack(&[0.0, 2.0]);
+    slices[1].bits_stored = 12;
+    write_series(folder.path(), &slices);
+    let stated = read(folder.path()).unwrap().acquisition;
+    assert_eq!(stated.slice_thickness_mm, Some(9.5));
+    assert_eq!(stated.representable_hu, Some([-2048.0, 2047.0]));
+    let expected = [
+        "PatientID",
+        "PatientName",
+        "SeriesDescription",
+        "SeriesInstanceUID",
+    ];
+    let found = stated.identifiers.iter().copied().collect::<Vec<_>>();
+    assert_eq!(found, expected);
+    let text = serde_json::to_string(&stated).unwrap().to_lowercase();
+    assert!(!text.contains("planted"), "{text}");
+}
