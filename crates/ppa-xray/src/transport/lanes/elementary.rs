@@ -1,4 +1,4 @@
-//! Logarithm, sine and cosine in `f32` that compilers turn into vector code and that give the same bits on every machine.
+//! Logarithm, sine, cosine and rounding in `f32` that compilers turn into vector code and that give the same bits on every machine.
 //!
 //! Polynomials of our own (minimax, by iteratively reweighted least squares): no library whose last digit depends on
 //! the platform, and no fused multiply-add.
@@ -43,6 +43,27 @@ pub(super) fn sin_cos_turn(turn: f32) -> (f32, f32) {
         a * sign(nearest & 2 != 0),
         b * sign(nearest.wrapping_add(1) & 2 != 0),
     )
+}
+
+#[inline(always)]
+pub(super) fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+pub(super) fn greatest(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// Largest whole number not above `x`, for 0 ≤ x < 2²²; as a number and as an index.
+///
+/// Adding 2²³ rounds in the last place, and leaves the integer in the low bits: casts and libraries would not vectorise.
+#[inline(always)]
+pub(super) fn floor(x: f32) -> (f32, u32) {
+    const MAGIC: f32 = 8_388_608.0;
+    let rounded = (x + MAGIC) - MAGIC;
+    let floor = rounded - if rounded > x { 1.0 } else { 0.0 };
+    (floor, (floor + MAGIC).to_bits() & 0x007F_FFFF)
 }
 
 #[cfg(test)]

@@ -4,12 +4,15 @@ use nalgebra::{Isometry3, Point3, Rotation3, Vector3};
 use ppa_ct::Grid;
 
 use super::*;
+use crate::beam::emitter::Emission;
 use crate::beam::projection::{Detector, Projection};
 use crate::beam::spectrum::Spectrum;
 use crate::matter::compton::ComptonModel;
 use crate::matter::material::Material;
 use crate::phantom::lattice::Walk;
 use crate::phantom::voxels::VoxelPhantom;
+use crate::transport::attenuation::CUTOFF_KEV;
+use crate::transport::score::Arrival;
 
 /// A tilted block of air, tissue of uneven density, bone and a titanium pin; voxels of unequal sides.
 fn phantom() -> VoxelPhantom {

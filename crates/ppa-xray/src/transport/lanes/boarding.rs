@@ -1,0 +1,153 @@
+//! Photons from the source into the lanes that ended histories leave.
+
+use crate::beam::emitter::Emission;
+use crate::philox::Philox;
+use crate::transport::attenuation::CUTOFF_KEV;
+use crate::transport::lanes::draws::Depths;
+use crate::transport::lanes::entry::{Aim, Enter, Place};
+use crate::transport::lanes::flights::{Each, Flights, LANES, each};
+use crate::transport::lanes::picked::Picked;
+use crate::transport::lanes::{Lanes, Photon};
+use crate::transport::score::Score;
+use crate::transport::stream::Stream;
+use crate::transport::tally::Category;
+
+/// Photons that have left the source and wait for a lane.
+pub(super) struct Waiting {
+    pub flights: Flights,
+    pub photons: Each<Photon>,
+    /// Whether the photon meets the box.
+    pub meets: Each<u32>,
+    pub next: usize,
+    pub count: usize,
+}
+
+impl Lanes<'_, '_> {
+    /// Fills the lanes of ended histories; at the end of the range, closes up.
+    pub(super) fn replace(&mut self, ended: &Picked, score: &mut impl Score) {
+        let mut empty = Picked::new();
+        for lane in ended.iter() {
+            let filled = self.board(lane, score);
+            empty.push_if(lane, !filled);
+        }
+        if empty.count > 0 {
+            self.close_up(&mut empty);
+        }
+    }
+
+    /// Moves the last photons into the `empty` lanes.
+    #[cold]
+    fn close_up(&mut self, empty: &mut Picked) {
+        empty.lanes[..empty.count].sort_unstable();
+        for lane in empty.iter().rev() {
+            self.count -= 1;
+            let last = self.count;
+            let slot = self.photons[lane].slot;
+            self.flights.move_within(lane, last);
+            self.photons[lane] = self.photons[last];
+            self.photons[last].slot = slot;
+        }
+    }
+
+    /// Puts the next photon that meets the box into `lane`; false once the range is used up.
+    pub(super) fn board(&mut self, lane: usize, score: &mut impl Score) -> bool {
+        let slot = self.photons[lane].slot;
+        loop {
+            if self.waiting.next == self.waiting.count && !self.emit() {
+                return false;
+            }
+            let next = self.waiting.next;
+            self.waiting.next += 1;
+            let photon = Photon {
+                slot,
+                ..self.waiting.photons[next]
+            };
+            score.emit(usize::from(slot), f64::from(photon.energy_kev));
+            let flights = &self.waiting.flights;
+            if f64::from(photon.energy_kev) < CUTOFF_KEV {
+                score.escape(usize::from(slot), f64::from(photon.energy_kev));
+                score.finish(usize::from(slot));
+            } else if self.waiting.meets[next] == 0 {
+                let position = each(&flights.position, next);
+                let direction = each(&flights.direction, next);
+                let way = flights.to_plane_mm[next];
+                self.exit(&photon, position, direction, way, score);
+            } else {
+                self.photons[lane] = photon;
+                self.flights.copy(lane, flights, next);
+                return true;
+            }
+        }
+    }
+
+    /// Emits the next photons of the range; false once it is used up.
+    fn emit(&mut self) -> bool {
+        let first = self.remaining.start;
+        let count = (self.remaining.end - first).min(LANES as u64) as usize;
+        if count == 0 {
+            return false;
+        }
+        self.remaining.start += count as u64;
+        for i in 0..count {
+            let history = first + i as u64;
+            self.draws.counter[0][i] = history as u32;
+            self.draws.counter[1][i] = (history >> 32) as u32;
+            self.draws.counter[2][i] = 0;
+        }
+        self.philox(count);
+        let emitter = &self.transport.emitter;
+        for i in 0..count {
+            let history = first + i as u64;
+            let mut rng = Philox::at(self.seed, Stream::History as u32, history, 1)
+                .after(self.draws.block(i));
+            let Emission {
+                origin_mm,
+                direction,
+                energy_kev,
+            } = emitter.emit(&mut rng);
+            for axis in 0..3 {
+                self.waiting.flights.direction[axis][i] = direction[axis] as f32;
+                self.waiting.flights.position[axis][i] = origin_mm[axis] as f32;
+            }
+            let energy = self.transport.attenuation.locate(energy_kev);
+            self.waiting.photons[i] = Photon {
+                history,
+                step: rng.step(),
+                row: self.transport.majorants.row(energy),
+                energy_kev: energy_kev as f32,
+                energy,
+                category: Category::Primary,
+                slot: 0,
+            };
+        }
+        for i in 0..count {
+            self.draws.counter[2][i] = self.waiting.photons[i].step;
+            self.waiting.photons[i].step += 1;
+        }
+        self.philox(count);
+        let padded = count.next_multiple_of(16);
+        self.isa.run(Place {
+            space: &self.space,
+            flights: &mut self.waiting.flights,
+            count: padded,
+        });
+        self.isa.run(Aim {
+            space: &self.space,
+            flights: &mut self.waiting.flights,
+            count: padded,
+        });
+        self.isa.run(Enter {
+            space: &self.space,
+            flights: &mut self.waiting.flights,
+            meets: &mut self.waiting.meets,
+            count: padded,
+        });
+        self.isa.run(Depths {
+            word: &self.draws.block[0],
+            depth: &mut self.waiting.flights.depth,
+            count: padded,
+        });
+        (self.waiting.next, self.waiting.count) = (0, count);
+        true
+    }
+}

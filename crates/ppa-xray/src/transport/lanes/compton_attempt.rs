@@ -1,0 +1,68 @@
+//! Compton scattering of many photons off bound electrons, one attempt each.
+
+use crate::matter::impulse_approximation::BoundElectron;
+use crate::transport::lanes::draws::unit;
+use crate::transport::lanes::elementary::least;
+use crate::transport::lanes::flights::{Each, LANES};
+use crate::transport::lanes::isa::Kernel;
+
+/// Attempts at Compton scattering in the impulse approximation.
+#[derive(Debug)]
+pub(super) struct Attempts {
+    pub energy_kev: Each<f32>,
+    /// sin²(θ/2).
+    pub half: Each<f32>,
+    /// Of the struck electron, as `momentum`.
+    pub binding_kev: Each<f32>,
+    pub momentum: Each<f32>,
+    /// Energy of the scattered photon, or what [`BoundElectron::outcome`] says instead.
+    pub scattered_kev: Each<f32>,
+}
+
+impl Attempts {
+    pub fn new() -> Self {
+        Self {
+            energy_kev: [0.0; LANES],
+            half: [0.0; LANES],
+            binding_kev: [0.0; LANES],
+            momentum: [0.0; LANES],
+            scattered_kev: [0.0; LANES],
+        }
+    }
+}
+
+/// Finds the energies of scattered photons.
+pub(super) struct Attempt<'a> {
+    pub attempts: &'a mut Attempts,
+    /// Random words.
+    pub momentum: &'a Each<u32>,
+    pub way: &'a Each<u32>,
+    pub count: usize,
+}
+
+impl Kernel for Attempt<'_> {
+    #[inline(always)]
+    fn run(self) {
+        attempt(
+            self.attempts,
+            self.momentum,
+            self.way,
+            self.count.min(LANES),
+        );
+    }
+}
+
+#[inline(always)]
+fn attempt(attempts: &mut Attempts, momentum: &Each<u32>, way: &Each<u32>, count: usize) {
+    for i in 0..count {
+        let electron = BoundElectron {
+            binding_kev: attempts.binding_kev[i],
+            momentum: attempts.momentum[i],
+        };
+        let (energy_kev, half) = (attempts.energy_kev[i], attempts.half[i]);
+        // In the middle of steps of 2⁻²³: neither 0 nor 1, whose momentum would be infinite.
+        let u = ((momentum[i] >> 9) as i32 as f32 + 0.5) * (1.0 / 8_388_608.0);
+        let scattered = electron.outcome(energy_kev, half, u, unit(way[i]));
+        attempts.scattered_kev[i] = least(scattered, energy_kev);
+    }
+}
