@@ -3,8 +3,12 @@
 pub(crate) mod absorption;
 pub(crate) mod blur;
 pub(crate) mod energy_nodes;
+mod escape;
 pub(crate) mod grid;
+mod layer;
+mod layer_response;
 pub(crate) mod open_field;
+mod quadrature;
 pub(crate) mod readout;
 pub(crate) mod receptor;
 pub(crate) mod response;
