@@ -74,6 +74,11 @@ impl Absorption {
         Self { nodes, shares }
     }
 
+    /// Absorption edges of the layer.
+    pub fn edges_kev(&self) -> &[f64] {
+        self.nodes.edges_kev()
+    }
+
     /// Incidence cosines of the table, ascending.
     pub fn cosines() -> impl Iterator<Item = f64> {
         (0..=COSINES).map(|i| i as f64 / COSINES as f64)

@@ -16,6 +16,7 @@ const CELLS_PER_KEV: f64 = 2.0;
 #[derive(Debug, Clone)]
 pub(crate) struct EnergyNodes {
     kev: Vec<f64>,
+    edges_kev: Vec<f64>,
     /// Interval of nodes that holds the lower end of every cell of the guide.
     guide: Vec<u16>,
 }
@@ -27,10 +28,12 @@ impl EnergyNodes {
         let mut kev: Vec<f64> = (0..=steps as u32)
             .map(|i| low * (high / low).powf(f64::from(i) / steps))
             .collect();
-        for edge in edges_kev {
-            if edge > low && edge < high {
-                kev.extend([edge * (1.0 - EDGE_GAP), edge * (1.0 + EDGE_GAP)]);
-            }
+        let edges_kev: Vec<f64> = edges_kev
+            .into_iter()
+            .filter(|&edge| edge > low && edge < high)
+            .collect();
+        for edge in &edges_kev {
+            kev.extend([edge * (1.0 - EDGE_GAP), edge * (1.0 + EDGE_GAP)]);
         }
         kev.sort_by(f64::total_cmp);
         kev.dedup();
@@ -41,11 +44,20 @@ impl EnergyNodes {
                 (kev.partition_point(|&node| node <= start).max(1) - 1).min(kev.len() - 2) as u16
             })
             .collect();
-        Self { kev, guide }
+        Self {
+            kev,
+            edges_kev,
+            guide,
+        }
     }
 
     pub fn kev(&self) -> &[f64] {
         &self.kev
+    }
+
+    /// Energies at which the quantity jumps.
+    pub fn edges_kev(&self) -> &[f64] {
+        &self.edges_kev
     }
 
     /// Interval that holds an energy and how far into it the energy lies; energies outside go to the ends.

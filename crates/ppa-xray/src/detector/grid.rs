@@ -87,6 +87,11 @@ impl Grid {
         })
     }
 
+    /// Absorption edges of strips and spaces.
+    pub fn edges_kev(&self) -> &[f64] {
+        self.nodes.edges_kev()
+    }
+
     /// Attenuation of strips and interspace, 1/mm.
     #[inline]
     pub fn attenuation(&self, energy_kev: f64) -> [f64; 2] {

@@ -37,6 +37,14 @@ impl Response {
         self.absorption.is_none() && self.grid.is_none()
     }
 
+    /// Energies at which a photon leaves abruptly more or less.
+    pub fn edges_kev(&self) -> impl Iterator<Item = f64> {
+        let absorption = self.absorption.iter().flat_map(Absorption::edges_kev);
+        absorption
+            .chain(self.grid.iter().flat_map(Grid::edges_kev))
+            .copied()
+    }
+
     /// Mean and mean square of the energy that a photon leaves which crosses the plane at device (x, y).
     ///
     /// `direction` is a unit vector in the device frame with z > 0.

@@ -21,13 +21,15 @@ impl SpectralQuadrature {
         Self::of_spectra(transport, Self::of_lines)
     }
 
-    /// At most `nodes` energies between two absorption edges of the phantom, for every spectrum that the source has.
+    /// At most `nodes` energies between two absorption edges of phantom or detector, for every spectrum that the source
+    /// has.
     pub fn compressed(transport: &Transport, nodes: usize) -> Vec<Self> {
         let mut edges: Vec<f64> = transport
             .phantom
             .materials()
             .iter()
             .flat_map(|material| material.edges_kev())
+            .chain(transport.response.edges_kev())
             .collect();
         edges.sort_by(f64::total_cmp);
         edges.dedup();

@@ -62,6 +62,33 @@ fn demanding() -> Projection {
     projection
 }
 
+/// The few energies of the fast engine against all of the spectrum: the K edges of CsI (33.2 and 36.0 keV) and of the
+/// grid's strips (69.5 keV) are jumps of the detector's response.
+#[test]
+fn a_few_energies_know_the_edges_of_the_detector() {
+    let phantom = slab(80.0, 1.0);
+    let mut projection = frontal(60, 4.0);
+    projection.receptor.model = DetectorModel::Csi {
+        thickness_um: 600.0,
+        packing: 0.8,
+    };
+    projection.receptor.grid = Some(AntiScatterGrid {
+        strip: "tungsten".to_owned(),
+        ..grid()
+    });
+    let settings = FastSettings {
+        dose_histories: f64::INFINITY,
+        scatter_histories: 1,
+        ..FastSettings::default()
+    };
+    let all = primary(&phantom, &spectrum(), &projection, 2).unwrap();
+    let few = fast(&phantom, &spectrum(), &projection, &settings).unwrap();
+    let few = &few.layer(Category::Primary).value;
+    let sum: f64 = few.iter().map(|&v| f64::from(v)).sum();
+    let error = sum / all.iter().sum::<f64>() - 1.0;
+    assert!(error.abs() < 3e-4, "{error:e}");
+}
+
 /// Analog against fast, every category over the quadrants of the detector: 16 differences, each within 4.2 standard
 /// errors (4e-4 for all). Both engines must see the same source and detector.
 #[test]
