@@ -1,9 +1,11 @@
 //! What a gram of matter does to photons: cross sections, materials and scattering.
 
+mod composition;
 pub(crate) mod compton;
 pub(crate) mod cross_sections;
 pub(crate) mod electron_shell;
 pub(crate) mod element;
+mod energy_transfer;
 pub(crate) mod fluorescence;
 pub(crate) mod impulse_approximation;
 pub(crate) mod incoherent_function;
@@ -16,3 +18,4 @@ pub(crate) mod photon_tables;
 pub(crate) mod rayleigh;
 pub(crate) mod sampler;
 pub(crate) mod scatter_density;
+mod tabulated_matter;

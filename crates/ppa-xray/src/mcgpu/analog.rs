@@ -6,7 +6,7 @@ use std::time::Duration;
 use crate::dose::report::Dose;
 use crate::engine::analog::AnalogSettings;
 use crate::image::radiograph::Radiograph;
-use crate::mcgpu::input::RunLength;
+use crate::mcgpu::sections::RunLength;
 use crate::mcgpu::simulation::Simulation;
 use crate::mcgpu::trajectory::Station;
 use crate::run::analog_run::AnalogRun;

@@ -5,69 +5,8 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::mcgpu::error::McgpuError;
-use crate::mcgpu::lines::{Lines, columns, holds, numbers};
-
-/// Numbers below this are seconds, not histories.
-const SECONDS_BELOW: f64 = 1e5;
-
-/// Most materials that one byte per voxel can name.
-const MATERIALS: usize = 255;
-
-/// Most projections; a helical scan of ten turns with one per degree needs fewer.
-const PROJECTIONS: u32 = 10_000;
-
-/// How long each projection runs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum RunLength {
-    /// Photons emitted into the field.
-    Histories(u64),
-    /// Wall-clock time.
-    Seconds(f64),
-}
-
-/// The path of source and detector around an axis along z.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Trajectory {
-    /// Projections of the whole scan; with 1 the other fields mean nothing.
-    pub projections: u32,
-    /// Turn from one projection to the next, degrees, from x towards y.
-    pub step_deg: f64,
-    /// Projections at other angles are left out; the angle of the source as seen from the axis, 0 along x.
-    pub angles_of_interest_deg: [f64; 2],
-    /// Distance of the source from the axis, which the first central beam meets, cm.
-    pub source_axis_cm: f64,
-    /// Rise along z from one projection to the next, cm.
-    pub rise_cm: f64,
-}
-
-/// The box of voxels whose dose is asked for.
-#[derive(Debug, Clone, PartialEq)]
-pub struct VoxelDose {
-    /// Name of the file to write.
-    pub file: String,
-    /// First voxel along x, y, z, counted from 0.
-    pub first: [usize; 3],
-    /// Last voxel along x, y, z, counted from 0; it belongs to the box.
-    pub last: [usize; 3],
-}
-
-/// Where the data of a material come from.
-#[derive(Debug, Clone, PartialEq)]
-pub enum MaterialSource {
-    /// An MC-GPU material file, `.mcgpu` or `.mcgpu.gz`.
-    File(PathBuf),
-    /// A material of this library, written as `ppa:NAME`.
-    Library(String),
-}
-
-/// A line of the material list.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MaterialLine {
-    /// Line of the input file, counted from 1.
-    pub line: u64,
-    /// What it names.
-    pub source: MaterialSource,
-}
+use crate::mcgpu::sections::{MaterialLine, RunLength, Trajectory, VoxelDose, all_lengths};
+use crate::mcgpu::values::Values;
 
 /// A file that the input file names.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,10 +69,7 @@ impl Input {
     /// [`McgpuError`] naming file, line, what was found and what expected.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, McgpuError> {
         let path = path.as_ref();
-        let mut values = Values {
-            lines: Lines::open(path)?,
-            headline: None,
-        };
+        let mut values = Values::open(path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
 
         values.section("SIMULATION CONFIG", Some("v.2009-05-12"))?;
@@ -205,241 +141,17 @@ impl Input {
     }
 }
 
-/// The headline of a section, shortened.
-fn headline(line: &[u8]) -> Option<String> {
-    let shown = || {
-        String::from_utf8_lossy(&line[..line.len().min(80)])
-            .trim()
-            .to_owned()
-    };
-    holds(line, "SECTION ").then(shown)
-}
-
-/// A length of at most a kilometre in either direction.
-fn all_lengths<const N: usize>(lengths_cm: [f64; N]) -> bool {
-    lengths_cm.iter().all(|length| length.abs() <= 1e5)
-}
-
 fn all_positive<const N: usize>(lengths_cm: [f64; N]) -> bool {
     lengths_cm
         .iter()
         .all(|length| (1e-4..=1e5).contains(length))
 }
 
-/// The lines of an input file that hold values.
-struct Values {
-    lines: Lines,
-    /// The headline that ended the section, until the next section is looked for.
-    headline: Option<String>,
-}
-
-impl Values {
-    /// Goes on to the headline of a section.
-    fn section(
-        &mut self,
-        section: &'static str,
-        version: Option<&'static str>,
-    ) -> Result<(), McgpuError> {
-        let name = format!("SECTION {section}");
-        loop {
-            let found = match self.headline.take() {
-                Some(headline) => headline,
-                None => match self.lines.next()? {
-                    Some(line) => headline(line).unwrap_or_default(),
-                    None => {
-                        let version = version.unwrap_or_default();
-                        return Err(self.lines.ends(format!("[{name} {version}]")));
-                    }
-                },
-            };
-            if !found.contains(&name) {
-                continue;
-            }
-            return match version {
-                Some(expected) if !found.contains(&format!("{name} {expected}")) => {
-                    Err(McgpuError::Version {
-                        path: self.lines.path().into(),
-                        line: self.lines.number(),
-                        section,
-                        found,
-                        expected,
-                    })
-                }
-                _ => Ok(()),
-            };
-        }
-    }
-
-    /// The next line that says something, without comment and outer blanks; `None` at a headline or the end.
-    fn next(&mut self) -> Result<Option<String>, McgpuError> {
-        while let Some(line) = self.lines.next()? {
-            self.headline = headline(line);
-            if self.headline.is_some() {
-                return Ok(None);
-            }
-            let value = line.split(|&byte| byte == b'#').next().unwrap_or_default();
-            let value = value.trim_ascii();
-            if !value.is_empty() {
-                return Ok(Some(String::from_utf8_lossy(value).into_owned()));
-            }
-        }
-        Ok(None)
-    }
-
-    fn value(&mut self, expected: &str) -> Result<String, McgpuError> {
-        match (self.next()?, &self.headline) {
-            (Some(value), _) => Ok(value),
-            (None, Some(headline)) => Err(self.lines.unexpected(headline.as_bytes(), expected)),
-            (None, None) => Err(self.lines.ends(expected)),
-        }
-    }
-
-    /// The first numbers of the next line, which `fits` must accept.
-    fn number<const N: usize>(
-        &mut self,
-        expected: &str,
-        fits: impl FnOnce([f64; N]) -> bool,
-    ) -> Result<[f64; N], McgpuError> {
-        let value = self.value(expected)?;
-        match numbers(value.as_bytes()) {
-            Some(found) if found.iter().all(|n| n.is_finite()) && fits(found) => Ok(found),
-            _ => Err(self.lines.unexpected(value.as_bytes(), expected)),
-        }
-    }
-
-    fn run_length(&mut self) -> Result<RunLength, McgpuError> {
-        let expected = "the number of histories, or a time in seconds below 100000";
-        let [found] = self.number(expected, |[n]| (1e-3..=1e18).contains(&n))?;
-        Ok(if found < SECONDS_BELOW {
-            RunLength::Seconds(found)
-        } else {
-            RunLength::Histories(found as u64)
-        })
-    }
-
-    /// The first word of the next line.
-    fn word(&mut self, expected: &str) -> Result<String, McgpuError> {
-        let value = self.value(expected)?;
-        Ok(columns(value.as_bytes()).next().unwrap_or_default().into())
-    }
-
-    fn file(&mut self, expected: &str, folder: &Path) -> Result<NamedFile, McgpuError> {
-        let path = folder.join(self.word(expected)?);
-        let line = self.lines.number();
-        Ok(NamedFile { line, path })
-    }
-
-    /// The name of a file to write, without its folder: results go where the caller wants them.
-    fn output_name(&mut self, expected: &str) -> Result<String, McgpuError> {
-        let word = self.word(expected)?;
-        match Path::new(&word).file_name() {
-            Some(name) => Ok(name.to_string_lossy().into_owned()),
-            None => Err(self.lines.unexpected(word.as_bytes(), expected)),
-        }
-    }
-
-    fn trajectory(
-        &mut self,
-        [u, v, w]: [f64; 3],
-        source_detector_cm: f64,
-    ) -> Result<Trajectory, McgpuError> {
-        let expected = format!("the number of projections, 0 to {PROJECTIONS}");
-        let [projections] = self.number(&expected, |[n]| {
-            (0.0..=f64::from(PROJECTIONS)).contains(&n) && n.fract() == 0.0
-        })?;
-        // MC-GPU takes none for one.
-        let projections = projections.max(1.0) as u32;
-        if projections == 1 {
-            return Ok(Trajectory {
-                projections,
-                step_deg: 0.0,
-                angles_of_interest_deg: [0.0, 360.0],
-                source_axis_cm: 0.0,
-                rise_cm: 0.0,
-            });
-        }
-        if w.abs() > 1e-5 * Vector3::new(u, v, w).norm() {
-            return Err(self.lines.unexpected(
-                projections.to_string().as_bytes(),
-                "1 projection, since the beam is not perpendicular to the axis z",
-            ));
-        }
-        let angle = |angle: &f64| angle.abs() <= 1e6;
-        let [step_deg] = self.number("the angle between projections in degrees", |[step]| {
-            angle(&step)
-        })?;
-        let angles_of_interest_deg = self.number(
-            "the first and the last angle of interest",
-            |angles: [f64; 2]| angles.iter().all(angle) && angles[0] <= angles[1],
-        )?;
-        let expected = "the distance from the source to the axis in cm, 0 to that of the detector";
-        let [source_axis_cm] = self.number(expected, |[distance]| {
-            (0.0..=source_detector_cm).contains(&distance)
-        })?;
-        let [rise_cm] = self.number(
-            "the vertical translation between projections in cm",
-            all_lengths,
-        )?;
-        Ok(Trajectory {
-            projections,
-            step_deg,
-            angles_of_interest_deg,
-            source_axis_cm,
-            rise_cm,
-        })
-    }
-
-    fn yes(&mut self) -> Result<bool, McgpuError> {
-        let expected = "YES or NO";
-        let value = self.value(expected)?;
-        match value.as_bytes() {
-            [b'Y' | b'y', b'E' | b'e', ..] => Ok(true),
-            [b'N' | b'n', b'O' | b'o', ..] => Ok(false),
-            _ => Err(self.lines.unexpected(value.as_bytes(), expected)),
-        }
-    }
-
-    fn voxel_dose(&mut self) -> Result<VoxelDose, McgpuError> {
-        let file = self.output_name("a dose file name")?;
-        let (mut first, mut last) = ([0; 3], [0; 3]);
-        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-            let expected = format!("the first and the last voxel along {name}, counted from 1");
-            let [low, high] = self.number(&expected, |[low, high]: [f64; 2]| {
-                low.fract() == 0.0 && high.fract() == 0.0 && 1.0 <= low && low <= high && high < 1e9
-            })?;
-            (first[axis], last[axis]) = (low as usize - 1, high as usize - 1);
-        }
-        Ok(VoxelDose { file, first, last })
-    }
-
-    fn materials(&mut self, folder: &Path) -> Result<Vec<MaterialLine>, McgpuError> {
-        let mut materials = Vec::new();
-        while let Some(value) = self.next()? {
-            if materials.len() == MATERIALS {
-                return Err(self
-                    .lines
-                    .unexpected(value.as_bytes(), "at most 255 materials"));
-            }
-            let word = columns(value.as_bytes()).next().unwrap_or_default();
-            materials.push(MaterialLine {
-                line: self.lines.number(),
-                source: match word.strip_prefix("ppa:") {
-                    Some(name) => MaterialSource::Library(name.into()),
-                    None => MaterialSource::File(folder.join(word)),
-                },
-            });
-        }
-        if materials.is_empty() {
-            return Err(self.lines.ends("at least one material file"));
-        }
-        Ok(materials)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::mcgpu::mangled;
+    use crate::mcgpu::sections::MaterialSource;
 
     const SAMPLE: &str = include_str!("sample.in");
 

@@ -15,15 +15,18 @@ mod lines;
 #[cfg(test)]
 mod mangled;
 mod material_file;
+mod sections;
 mod simulation;
 mod trajectory;
+mod values;
 mod voxel_file;
 
 pub use dose_file::ScanDose;
 pub use error::McgpuError;
 pub use image_file::McgpuImage;
-pub use input::{Input, MaterialLine, MaterialSource, NamedFile, RunLength, Trajectory, VoxelDose};
+pub use input::{Input, NamedFile};
 pub use material_file::read_material;
+pub use sections::{MaterialLine, MaterialSource, RunLength, Trajectory, VoxelDose};
 pub use simulation::Simulation;
 pub use trajectory::Station;
 pub use voxel_file::VoxelFile;

@@ -1,0 +1,137 @@
+//! Values and headlines of an input file, line by line.
+
+use std::path::Path;
+
+use crate::mcgpu::error::McgpuError;
+use crate::mcgpu::input::NamedFile;
+use crate::mcgpu::lines::{Lines, columns, holds, numbers};
+
+/// The headline of a section, shortened.
+fn headline(line: &[u8]) -> Option<String> {
+    let shown = || {
+        String::from_utf8_lossy(&line[..line.len().min(80)])
+            .trim()
+            .to_owned()
+    };
+    holds(line, "SECTION ").then(shown)
+}
+
+/// The lines of an input file that hold values.
+pub(super) struct Values {
+    pub lines: Lines,
+    /// The headline that ended the section, until the next section is looked for.
+    headline: Option<String>,
+}
+
+impl Values {
+    pub fn open(path: &Path) -> Result<Self, McgpuError> {
+        Ok(Self {
+            lines: Lines::open(path)?,
+            headline: None,
+        })
+    }
+
+    /// Goes on to the headline of a section.
+    pub fn section(
+        &mut self,
+        section: &'static str,
+        version: Option<&'static str>,
+    ) -> Result<(), McgpuError> {
+        let name = format!("SECTION {section}");
+        loop {
+            let found = match self.headline.take() {
+                Some(headline) => headline,
+                None => match self.lines.next()? {
+                    Some(line) => headline(line).unwrap_or_default(),
+                    None => {
+                        let version = version.unwrap_or_default();
+                        return Err(self.lines.ends(format!("[{name} {version}]")));
+                    }
+                },
+            };
+            if !found.contains(&name) {
+                continue;
+            }
+            return match version {
+                Some(expected) if !found.contains(&format!("{name} {expected}")) => {
+                    Err(McgpuError::Version {
+                        path: self.lines.path().into(),
+                        line: self.lines.number(),
+                        section,
+                        found,
+                        expected,
+                    })
+                }
+                _ => Ok(()),
+            };
+        }
+    }
+
+    /// The next line that says something, without comment and outer blanks; `None` at a headline or the end.
+    pub fn next(&mut self) -> Result<Option<String>, McgpuError> {
+        while let Some(line) = self.lines.next()? {
+            self.headline = headline(line);
+            if self.headline.is_some() {
+                return Ok(None);
+            }
+            let value = line.split(|&byte| byte == b'#').next().unwrap_or_default();
+            let value = value.trim_ascii();
+            if !value.is_empty() {
+                return Ok(Some(String::from_utf8_lossy(value).into_owned()));
+            }
+        }
+        Ok(None)
+    }
+
+    fn value(&mut self, expected: &str) -> Result<String, McgpuError> {
+        match (self.next()?, &self.headline) {
+            (Some(value), _) => Ok(value),
+            (None, Some(headline)) => Err(self.lines.unexpected(headline.as_bytes(), expected)),
+            (None, None) => Err(self.lines.ends(expected)),
+        }
+    }
+
+    /// The first numbers of the next line, which `fits` must accept.
+    pub fn number<const N: usize>(
+        &mut self,
+        expected: &str,
+        fits: impl FnOnce([f64; N]) -> bool,
+    ) -> Result<[f64; N], McgpuError> {
+        let value = self.value(expected)?;
+        match numbers(value.as_bytes()) {
+            Some(found) if found.iter().all(|n| n.is_finite()) && fits(found) => Ok(found),
+            _ => Err(self.lines.unexpected(value.as_bytes(), expected)),
+        }
+    }
+
+    /// The first word of the next line.
+    fn word(&mut self, expected: &str) -> Result<String, McgpuError> {
+        let value = self.value(expected)?;
+        Ok(columns(value.as_bytes()).next().unwrap_or_default().into())
+    }
+
+    pub fn file(&mut self, expected: &str, folder: &Path) -> Result<NamedFile, McgpuError> {
+        let path = folder.join(self.word(expected)?);
+        let line = self.lines.number();
+        Ok(NamedFile { line, path })
+    }
+
+    /// The name of a file to write, without its folder: results go where the caller wants them.
+    pub fn output_name(&mut self, expected: &str) -> Result<String, McgpuError> {
+        let word = self.word(expected)?;
+        match Path::new(&word).file_name() {
+            Some(name) => Ok(name.to_string_lossy().into_owned()),
+            None => Err(self.lines.unexpected(word.as_bytes(), expected)),
+        }
+    }
+
+    pub fn yes(&mut self) -> Result<bool, McgpuError> {
+        let expected = "YES or NO";
+        let value = self.value(expected)?;
+        match value.as_bytes() {
+            [b'Y' | b'y', b'E' | b'e', ..] => Ok(true),
+            [b'N' | b'n', b'O' | b'o', ..] => Ok(false),
+            _ => Err(self.lines.unexpected(value.as_bytes(), expected)),
+        }
+    }
+}
