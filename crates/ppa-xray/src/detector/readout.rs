@@ -3,18 +3,30 @@
 use serde::{Deserialize, Serialize};
 
 use crate::beam::projection::Detector;
-use crate::detector::blur::GaussianSum;
+use crate::detector::blur::Spread;
 use crate::detector::receptor::{Receptor, ReceptorError, require};
 use crate::image::radiograph::{Layer, Radiograph};
 use crate::philox::Philox;
 use crate::transport::stream::Stream;
 
 /// Blur and electronic noise, ready to be applied.
+///
+/// Blur acts on every layer and its quantum noise alike, as [`Spread`] tells. Electronic noise comes on top.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Readout {
-    blur: Option<GaussianSum>,
+    blur: Option<Spread>,
     electronic_noise_kev: f64,
+}
+
+/// A layer whose noise was drawn pixel by pixel, before blur; eV/cm² per history.
+pub(crate) struct DrawnLayer {
+    /// The expected signal.
+    pub expected: Vec<f32>,
+    /// Its standard error, which neighbouring pixels share.
+    pub shared_sigma: Vec<f32>,
+    /// Quantum noise and its variance, independent from pixel to pixel; none for the expected image.
+    pub noise: Option<[Vec<f32>; 2]>,
 }
 
 impl Readout {
@@ -27,31 +39,82 @@ impl Readout {
         let blur = receptor.blur.as_ref();
         Ok(Self {
             blur: blur
-                .map(|blur| GaussianSum::of(blur, detector.pixel_mm))
+                .map(|blur| Spread::of(blur, detector.pixel_mm))
                 .transpose()?,
             electronic_noise_kev,
         })
     }
 
-    /// The image that is read out of a detector in which photons have left `image`.
-    ///
-    /// Blur spreads what a photon leaves over the pixels, so it acts on every layer and its quantum noise alike; the standard
-    /// errors become those of the blurred pixels, taken as independent before and even over the reach of the blur.
-    /// Electronic noise comes on top, in a layer of its own; it does not depend on the exposure, so per history it
-    /// falls with the histories that the image stands for.
-    pub fn read(&self, mut image: Radiograph) -> Radiograph {
-        let columns = image.columns();
-        if let Some(blur) = &self.blur {
-            let gain = blur.noise_gain() as f32;
-            for layer in &mut image.layers {
-                layer.value = blur.apply(&layer.value, columns);
-                let variance: Vec<f32> = layer.sigma.iter().map(|sigma| sigma * sigma).collect();
-                layer.sigma = blur.apply(&variance, columns);
-                for sigma in &mut layer.sigma {
-                    *sigma = (gain * *sigma).max(0.0).sqrt();
-                }
+    /// Side in pixels of the square over which photons are to be spread when they are counted; 0 without blur.
+    pub fn spot_pixels(&self) -> f64 {
+        self.blur.as_ref().map_or(0.0, Spread::spot_pixels)
+    }
+
+    /// What is read out of pixels that have counted photons one by one, with standard errors from the squares they counted.
+    pub fn counted(&self, layers: [Layer; 4], columns: usize) -> [Layer; 4] {
+        let Some(blur) = &self.blur else {
+            return layers;
+        };
+        let [kernel, squares] = blur.of_counts();
+        layers.map(|layer| {
+            let variance: Vec<f32> = layer.sigma.iter().map(|sigma| sigma * sigma).collect();
+            Layer {
+                value: kernel.apply(&layer.value, columns),
+                sigma: roots(squares.apply(&variance, columns)),
             }
-        }
+        })
+    }
+
+    /// What is read out of pixels whose noise was drawn.
+    ///
+    /// The error of the expected signal goes on over farther than the blur, so it is blurred as the signal is.
+    pub fn drawn(&self, layers: [DrawnLayer; 4], columns: usize) -> [Layer; 4] {
+        let kernels = self.blur.as_ref().map(|blur| {
+            let noise = blur.of_white_noise();
+            let variance = noise.squared(noise.noise_gain());
+            (blur.of_signal(), noise, variance)
+        });
+        layers.map(|layer| {
+            let DrawnLayer {
+                mut expected,
+                mut shared_sigma,
+                mut noise,
+            } = layer;
+            if let Some((of_signal, of_noise, of_variance)) = &kernels {
+                expected = of_signal.apply(&expected, columns);
+                shared_sigma = of_signal.apply(&shared_sigma, columns);
+                noise = noise.map(|[deviation, variance]| {
+                    [
+                        of_noise.apply(&deviation, columns),
+                        of_variance.apply(&variance, columns),
+                    ]
+                });
+            }
+            let Some([deviation, mut variance]) = noise else {
+                return Layer {
+                    value: expected,
+                    sigma: shared_sigma,
+                };
+            };
+            for ((value, deviation), (variance, sigma)) in expected
+                .iter_mut()
+                .zip(deviation)
+                .zip(variance.iter_mut().zip(shared_sigma))
+            {
+                *value += deviation;
+                *variance += sigma * sigma;
+            }
+            Layer {
+                value: expected,
+                sigma: roots(variance),
+            }
+        })
+    }
+
+    /// Adds the electronic noise, in a layer of its own.
+    ///
+    /// It does not depend on the exposure, so per history it falls with the histories that the image stands for.
+    pub fn with_electronic_noise(&self, mut image: Radiograph) -> Radiograph {
         if self.electronic_noise_kev > 0.0 && image.histories.is_finite() {
             let ev_cm2 = 1e3 / image.detector.pixel_cm2() / image.histories;
             let sigma = self.electronic_noise_kev * ev_cm2;
@@ -69,4 +132,12 @@ impl Readout {
         }
         image
     }
+}
+
+/// Standard deviations; rounding may leave a variance a hair below 0.
+fn roots(mut variance: Vec<f32>) -> Vec<f32> {
+    for value in &mut variance {
+        *value = value.max(0.0).sqrt();
+    }
+    variance
 }

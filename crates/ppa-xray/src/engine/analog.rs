@@ -121,6 +121,8 @@ fn in_batches(histories: Range<u64>, follow: impl Fn(Range<u64>) + Sync) {
 /// Counts what photons leave in the detector, nothing else.
 struct DetectorScore<'a> {
     response: &'a Response,
+    /// Side of the square over which a photon's energy is spread, in pixels.
+    spot_pixels: f64,
     inbox: Inbox<'a>,
 }
 
@@ -128,6 +130,7 @@ impl<'a> DetectorScore<'a> {
     fn new(transport: &'a Transport, tally: &'a Tally) -> Self {
         Self {
             response: &transport.response,
+            spot_pixels: transport.readout.spot_pixels(),
             inbox: Inbox::new(tally),
         }
     }
@@ -138,6 +141,12 @@ impl Score for DetectorScore<'_> {
     fn arrive(&mut self, _slot: usize, arrival: &Arrival, rng: &mut Philox) {
         let Arrival { x_mm, y_mm, .. } = *arrival;
         let energy_kev = self.response.detect(arrival, rng);
-        self.inbox.score(x_mm, y_mm, arrival.category, energy_kev);
+        if self.spot_pixels == 0.0 {
+            self.inbox.score(x_mm, y_mm, arrival.category, energy_kev);
+        } else {
+            let spot = self.spot_pixels;
+            self.inbox
+                .spread(x_mm, y_mm, spot, arrival.category, energy_kev);
+        }
     }
 }

@@ -3,25 +3,23 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::beam::projection::{Detector, Projection};
+use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
 use crate::detector::open_field::OpenField;
 use crate::engine::collision_map::CollisionMap;
 use crate::engine::multiple_scatter::MultipleScatter;
 use crate::engine::node_grid::NodeGrid;
-use crate::engine::noise;
+use crate::engine::noise::{self, ExpectedLayer};
 use crate::engine::paths::Paths;
 use crate::engine::raytrace::{check_samples, primary_moments};
 use crate::engine::scatter_field::{PrimarySignal, ScatterField, single_scatter_field};
 use crate::engine::single_scatter::FirstCollisions;
 use crate::engine::spectral_quadrature::SpectralQuadrature;
-use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph};
+use crate::image::radiograph::{CategorySums, Engine, Radiograph};
 use crate::matter::compton::ComptonModel;
 use crate::matter::scatter_density::ScatterDensities;
 use crate::phantom::voxels::VoxelPhantom;
-use crate::philox::Philox;
-use crate::transport::stream::Stream;
-use crate::transport::tally::{Category, Moments};
+use crate::transport::tally::Category;
 use crate::transport::tracking::{Transport, TransportError};
 
 /// What the fast engine spends, and the exposure its image stands for.
@@ -102,15 +100,19 @@ pub fn fast(
         Category::Primary => (primary_kev, 0.0),
         _ => scattered[category as usize - 1].sum_kev,
     });
-    let [compton, rayleigh, multiple] = scattered.map(|scatter| Expected {
+    let [compton, rayleigh, multiple] = scattered.map(|scatter| ExpectedLayer {
         moments: scatter.moments,
         variance_kev2: scatter.variance_kev2,
     });
-    let primary = Expected {
+    let primary = ExpectedLayer {
         variance_kev2: vec![0.0; primary.len()],
         moments: primary,
     };
-    Ok(transport.readout.read(Radiograph {
+    let expected = [primary, compton, rayleigh, multiple];
+    let ev_cm2 = 1e3 / detector.pixel_cm2();
+    let drawn = noise::drawn(&expected, ev_cm2, settings.dose_histories, settings.seed);
+    let readout = &transport.readout;
+    Ok(readout.with_electronic_noise(Radiograph {
         detector: projection.detector,
         engine: Engine::Fast,
         histories: settings.dose_histories,
@@ -119,7 +121,7 @@ pub fn fast(
         source_detector_mm: projection.source_detector_mm,
         open_field_ev_cm2,
         open_field,
-        layers: with_noise(&[primary, compton, rayleigh, multiple], settings, detector),
+        layers: readout.drawn(drawn, detector.columns as usize),
         electronic: None,
         sums,
         largest_score_share: Some(scatter.largest_share),
@@ -211,41 +213,4 @@ impl FastSettings {
         }
         check_samples(self.samples_per_side)
     }
-}
-
-/// What a layer holds in the mean.
-struct Expected {
-    moments: Vec<Moments>,
-    /// Squared standard error of the mean energy, keV² per history.
-    variance_kev2: Vec<f64>,
-}
-
-fn with_noise(
-    expected: &[Expected; 4],
-    settings: &FastSettings,
-    detector: &Detector,
-) -> [Layer; 4] {
-    let ev_cm2 = 1e3 / detector.pixel_cm2();
-    let noisy = settings.dose_histories.is_finite();
-    let pixels: Vec<[(f32, f32); 4]> = (0..detector.pixels())
-        .into_par_iter()
-        .map(|pixel| {
-            let mut rng = Philox::new(settings.seed, Stream::QuantumNoise as u32, pixel as u64);
-            expected.each_ref().map(|layer| {
-                let moments = &layer.moments[pixel];
-                let (value, quantum) = if noisy {
-                    let value = noise::draw(moments, settings.dose_histories, &mut rng);
-                    (value, moments.square_kev2 / settings.dose_histories)
-                } else {
-                    (moments.mean_kev, 0.0)
-                };
-                let sigma = (quantum + layer.variance_kev2[pixel]).sqrt();
-                ((value * ev_cm2) as f32, (sigma * ev_cm2) as f32)
-            })
-        })
-        .collect();
-    [0, 1, 2, 3].map(|layer| {
-        let (value, sigma) = pixels.iter().map(|pixel| pixel[layer]).unzip();
-        Layer { value, sigma }
-    })
 }

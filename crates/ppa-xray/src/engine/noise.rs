@@ -1,7 +1,64 @@
 //! Quantum noise of an energy-integrating detector.
 
+use rayon::prelude::*;
+
+use crate::detector::readout::DrawnLayer;
 use crate::philox::Philox;
+use crate::transport::stream::Stream;
 use crate::transport::tally::Moments;
+
+/// What the pixels of a layer hold in the mean.
+pub(crate) struct ExpectedLayer {
+    pub moments: Vec<Moments>,
+    /// Squared standard error of the mean energy, keV² per history.
+    pub variance_kev2: Vec<f64>,
+}
+
+/// The layers in eV/cm² per history, `ev_cm2` to the keV, with the noise of `histories`; infinite for none.
+pub(crate) fn drawn(
+    expected: &[ExpectedLayer; 4],
+    ev_cm2: f64,
+    histories: f64,
+    seed: u64,
+) -> [DrawnLayer; 4] {
+    let noise = histories.is_finite().then(|| {
+        let pixels = 0..expected[0].moments.len();
+        let noise: Vec<[(f32, f32); 4]> = pixels
+            .into_par_iter()
+            .map(|pixel| {
+                let mut rng = Philox::new(seed, Stream::QuantumNoise as u32, pixel as u64);
+                expected.each_ref().map(|layer| {
+                    let moments = &layer.moments[pixel];
+                    let deviation = draw(moments, histories, &mut rng) - moments.mean_kev;
+                    let variance = moments.square_kev2 / histories;
+                    (
+                        (deviation * ev_cm2) as f32,
+                        (variance * ev_cm2 * ev_cm2) as f32,
+                    )
+                })
+            })
+            .collect();
+        noise
+    });
+    [0, 1, 2, 3].map(|layer| {
+        let ExpectedLayer {
+            moments,
+            variance_kev2,
+        } = &expected[layer];
+        let sigmas = variance_kev2.iter().map(|variance| variance.sqrt());
+        DrawnLayer {
+            expected: moments
+                .iter()
+                .map(|m| (m.mean_kev * ev_cm2) as f32)
+                .collect(),
+            shared_sigma: sigmas.map(|sigma| (sigma * ev_cm2) as f32).collect(),
+            noise: noise.as_ref().map(|noise| {
+                let (deviation, variance) = noise.iter().map(|pixel| pixel[layer]).unzip();
+                [deviation, variance]
+            }),
+        }
+    })
+}
 
 /// A draw of the mean energy per history, keV, that `histories` photons would have left.
 ///

@@ -183,7 +183,8 @@ impl ImageSetup {
             let total = tally.total(category, histories);
             (total.mean_kev, total.standard_error_kev(n))
         });
-        self.readout.read(Radiograph {
+        let layers = self.readout.counted(layers, tally.raster.columns);
+        self.readout.with_electronic_noise(Radiograph {
             detector: self.detector,
             engine: Engine::Analog,
             histories: n,

@@ -75,6 +75,33 @@ impl Raster {
             column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
         inside.then(|| row as usize * self.columns + column as usize)
     }
+
+    /// Cells under a square about a point of the raster, and their shares; its side is `spot` cells, at most 1.
+    ///
+    /// What lies beyond the raster is folded back, as if it went on as its mirror image. None if the point lies outside.
+    #[inline]
+    fn cells_about(&self, x_mm: f64, y_mm: f64, spot: f64) -> Option<[(usize, f64); 4]> {
+        self.cell_at(x_mm, y_mm)?;
+        let column = ((x_mm - self.centre_mm[0]) / self.extent_mm[0] + 0.5) * self.columns as f64;
+        let row = ((y_mm - self.centre_mm[1]) / self.extent_mm[1] + 0.5) * self.rows as f64;
+        let along = |at: f64, cells: usize| {
+            let end = at + 0.5 * spot;
+            let wall = end.floor();
+            let beyond = ((end - wall) / spot).min(1.0);
+            let last = (cells - 1) as f64;
+            [(wall - 1.0, 1.0 - beyond), (wall, beyond)]
+                .map(|(cell, share)| (cell.clamp(0.0, last) as usize, share))
+        };
+        let [(left, a), (right, b)] = along(column, self.columns);
+        let [(above, c), (below, d)] = along(row, self.rows);
+        let cell = |row: usize, column: usize| row * self.columns + column;
+        Some([
+            (cell(above, left), a * c),
+            (cell(above, right), b * c),
+            (cell(below, left), a * d),
+            (cell(below, right), b * d),
+        ])
+    }
 }
 
 /// Sums of energy and squared energy per cell and category.
@@ -125,6 +152,8 @@ struct Hit {
     cell: usize,
     category: Category,
     energy_kev: f64,
+    /// Share of the photon that is the cell's.
+    share: f64,
 }
 
 /// Collects photons for a [`Tally`] and hands them over many at a time, at the latest when dropped.
@@ -151,14 +180,38 @@ impl<'a> Inbox<'a> {
     #[inline]
     pub fn score(&mut self, x_mm: f64, y_mm: f64, category: Category, energy_kev: f64) {
         if let Some(cell) = self.tally.raster.cell_at(x_mm, y_mm) {
-            self.hits.push(Hit {
+            self.push(Hit {
                 cell,
                 category,
                 energy_kev,
+                share: 1.0,
             });
-            if self.hits.len() == Self::ROOM {
-                self.hand_over();
+        }
+    }
+
+    /// Counts a photon whose energy is spread over a square of `spot` cells, at most 1.
+    ///
+    /// Its squared energy is shared out as its energy is: cells then tell how many photons came with which energy,
+    /// and sums over cells are those of whole photons.
+    pub fn spread(&mut self, x_mm: f64, y_mm: f64, spot: f64, category: Category, energy_kev: f64) {
+        let shares = self.tally.raster.cells_about(x_mm, y_mm, spot);
+        for (cell, share) in shares.into_iter().flatten() {
+            if share > 0.0 {
+                self.push(Hit {
+                    cell,
+                    category,
+                    energy_kev,
+                    share,
+                });
             }
+        }
+    }
+
+    #[inline]
+    fn push(&mut self, hit: Hit) {
+        self.hits.push(hit);
+        if self.hits.len() == Self::ROOM {
+            self.hand_over();
         }
     }
 
@@ -192,9 +245,10 @@ impl Tally {
     #[inline]
     fn add(&self, hit: &Hit) {
         let [energy, square] = &self.sums[hit.cell][hit.category as usize];
-        energy.fetch_add(nearest(hit.energy_kev * STEPS_PER_KEV), Relaxed);
+        let energy_kev = hit.share * hit.energy_kev;
+        energy.fetch_add(nearest(energy_kev * STEPS_PER_KEV), Relaxed);
         square.fetch_add(
-            nearest(hit.energy_kev * hit.energy_kev * STEPS_PER_KEV2),
+            nearest(energy_kev * hit.energy_kev * STEPS_PER_KEV2),
             Relaxed,
         );
     }
@@ -259,5 +313,59 @@ fn moments(energy: u128, square: u128, histories: u64) -> Moments {
     Moments {
         mean_kev: energy as f64 / STEPS_PER_KEV / histories,
         square_kev2: square as f64 / STEPS_PER_KEV2 / histories,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Shares of a spread photon sum to 1, balance about it, and are those of the squares' overlap; beside an edge
+        /// they fold back.
+        #[test]
+        fn a_spread_photon_is_shared_by_overlap(x in 0.0..6.0_f64, y in 0.0..4.0_f64, spot in 0.01..=1.0_f64) {
+            let raster = Raster { columns: 6, rows: 4, centre_mm: [3.0, 2.0], extent_mm: [6.0, 4.0] };
+            let shares = raster.cells_about(x, y, spot).unwrap();
+            let mut found = [0.0; 24];
+            for (cell, share) in shares {
+                found[cell] += share;
+            }
+            let overlap = |at: f64, cell: usize, cells: usize| {
+                let part = |low: f64, high: f64| (high.min(at + 0.5 * spot) - low.max(at - 0.5 * spot)).max(0.0);
+                let low = if cell == 0 { -1.0 } else { cell as f64 };
+                let high = if cell + 1 == cells { cells as f64 + 1.0 } else { cell as f64 + 1.0 };
+                part(low, high) / spot
+            };
+            for (cell, found) in found.into_iter().enumerate() {
+                let expected = overlap(x, cell % 6, 6) * overlap(y, cell / 6, 4);
+                prop_assert!((found - expected).abs() < 1e-9, "cell {cell}: {found}, {expected}");
+            }
+        }
+    }
+
+    /// Sums over cells are those of whole photons.
+    #[test]
+    fn spread_photons_keep_energy_and_square() {
+        let raster = Raster {
+            columns: 3,
+            rows: 3,
+            centre_mm: [0.0; 2],
+            extent_mm: [3.0; 2],
+        };
+        let tally = Tally::new(raster);
+        let mut inbox = Inbox::new(&tally);
+        inbox.spread(0.4, -0.3, 0.9, Category::Rayleigh, 60.0);
+        inbox.spread(1.49, 1.49, 0.9, Category::Rayleigh, 40.0);
+        inbox.spread(1.6, 0.0, 0.9, Category::Rayleigh, 30.0);
+        drop(inbox);
+        let total = tally.total(Category::Rayleigh, 1);
+        assert!((total.mean_kev - 100.0).abs() < 1e-4, "{}", total.mean_kev);
+        assert!(
+            (total.square_kev2 - 5_200.0).abs() < 1e-2,
+            "{}",
+            total.square_kev2
+        );
     }
 }

@@ -10,6 +10,7 @@ mod exposure;
 mod fast_engine;
 mod files;
 mod mcgpu;
+mod noise_power;
 mod placement;
 mod runs;
 mod scattering;

@@ -1,0 +1,150 @@
+//! Power spectrum of the noise of even exposures: both engines against the formula, with and without blur.
+//!
+//! Blur takes the image beyond its edges for its mirror image, so cosine waves of the whole image keep apart: their
+//! coefficients are independent, with the noise power at their frequency for variance.
+
+use std::f64::consts::PI;
+
+use ppa_xray::{
+    AnalogSettings, Blur, FastSettings, Projection, Radiograph, Spectrum, analog, fast,
+};
+
+use crate::scenes::{frontal, slab};
+
+const SIDE: usize = 64;
+const PIXEL_MM: f64 = 0.3;
+const H_MM2: f64 = 0.45;
+const BANDS: usize = 8;
+const HISTORIES: u64 = 200_000;
+
+/// Noise power over that of white noise at a frequency in cycles per pixel.
+fn expected_power(blurred: bool, fx: f64, fy: f64) -> f64 {
+    if !blurred {
+        return 1.0;
+    }
+    let sinc = |f: f64| {
+        if f == 0.0 {
+            1.0
+        } else {
+            (PI * f).sin() / (PI * f)
+        }
+    };
+    let aliases = || (-6..=6).map(f64::from);
+    aliases()
+        .flat_map(|x| aliases().map(move |y| (fx + x, fy + y)))
+        .map(|(x, y)| {
+            let mtf = 1.0 / (1.0 + H_MM2 * (x * x + y * y) / (PIXEL_MM * PIXEL_MM));
+            (mtf * sinc(x) * sinc(y)).powi(2)
+        })
+        .sum()
+}
+
+/// Squared coefficients of an image of [`SIDE`]² pixels in orthonormal cosine waves.
+fn spectrum(image: &[f32]) -> Vec<f64> {
+    let wave = |k: usize, at: usize| {
+        let scale = if k == 0 { 1.0_f64 } else { 2.0 };
+        (scale / SIDE as f64).sqrt() * (PI * k as f64 * (at as f64 + 0.5) / SIDE as f64).cos()
+    };
+    // Waves along rows, then along the columns of what that leaves.
+    let along = |plane: &[f64]| -> Vec<f64> {
+        let pixels = (0..SIDE * SIDE).map(|i| (i / SIDE, i % SIDE));
+        pixels
+            .map(|(k, row)| (0..SIDE).map(|x| wave(k, x) * plane[row * SIDE + x]).sum())
+            .collect()
+    };
+    let plane: Vec<f64> = image.iter().map(|&v| f64::from(v)).collect();
+    along(&along(&plane)).iter().map(|c| c * c).collect()
+}
+
+/// Noise power over the expected one and number of coefficients, in rings of frequency; and the variance of a pixel,
+/// as it is and as the standard errors say, over that of white noise.
+fn measured(images: &[Radiograph], blurred: bool) -> ([(f64, f64); BANDS], [f64; 2]) {
+    let mut bands = [(0.0, 0.0); BANDS];
+    let [mut variance, mut stated] = [0.0; 2];
+    for image in images {
+        let cm2 = PIXEL_MM * PIXEL_MM / 100.0;
+        let white = image.open_field_ev_cm2 * 60e3 / cm2 / image.histories;
+        for (i, power) in spectrum(&image.total()).into_iter().enumerate().skip(1) {
+            let [fx, fy] = [i % SIDE, i / SIDE].map(|k| 0.5 * k as f64 / SIDE as f64);
+            let ring = (fx.hypot(fy) / 0.5_f64.sqrt() * BANDS as f64) as usize;
+            bands[ring].0 += power / white / expected_power(blurred, fx, fy);
+            bands[ring].1 += 1.0;
+            variance += power / white;
+        }
+        let squares = image.sigma().into_iter().map(|s| f64::from(s).powi(2));
+        stated += squares.sum::<f64>() / white;
+    }
+    let pixels = (images.len() * SIDE * SIDE) as f64;
+    let bands = bands.map(|(sum, count)| (sum / count, count));
+    (bands, [variance / pixels, stated / pixels])
+}
+
+fn exposure(blurred: bool) -> Projection {
+    let mut projection = frontal(SIDE as u32, PIXEL_MM);
+    projection.receptor.blur = blurred.then_some(Blur::Lorentzian { h_mm2: H_MM2 });
+    projection
+}
+
+/// Squares of normal numbers have a variance of 2: every ring within 4.5 standard errors (7e-6 each, 16 rings per engine:
+/// 1e-4), and `slack` for what the engine simplifies; so have the variance and what the standard errors say of it.
+fn assert_power(name: &str, images: &[Radiograph], blurred: bool, slack: f64) {
+    let (bands, [variance, stated]) = measured(images, blurred);
+    for (ring, (ratio, count)) in bands.into_iter().enumerate() {
+        let error = (2.0 / count).sqrt();
+        println!("{name}, ring {ring}: {ratio:.3} ± {error:.3}");
+        assert!(
+            (ratio - 1.0).abs() < 4.5 * error + slack,
+            "{name}: noise power in ring {ring} is {ratio:.3} ± {error:.3} of what it should be"
+        );
+    }
+    // The coefficients do not weigh alike: those that count hold at least a quarter of the pixels.
+    let error = (8.0 / (images.len() * SIDE * SIDE) as f64).sqrt();
+    println!("{name}: variance {variance:.3}, stated {stated:.3}, ± {error:.3}");
+    assert!(
+        (variance / stated - 1.0).abs() < 4.5 * error + slack,
+        "{name}: {variance} {stated}"
+    );
+}
+
+fn drawn(blurred: bool, seeds: u64) -> Vec<Radiograph> {
+    let (vacuum, projection) = (slab(10.0, 1e-9), exposure(blurred));
+    let spectrum = Spectrum::monoenergetic(60.0).unwrap();
+    let image = |seed| {
+        let settings = FastSettings {
+            dose_histories: HISTORIES as f64,
+            scatter_histories: 1,
+            samples_per_side: 1,
+            seed,
+            ..FastSettings::default()
+        };
+        fast(&vacuum, &spectrum, &projection, &settings).unwrap()
+    };
+    (0..seeds).map(image).collect()
+}
+
+fn counted(blurred: bool, seeds: u64) -> Vec<Radiograph> {
+    let (vacuum, projection) = (slab(10.0, 1e-9), exposure(blurred));
+    let spectrum = Spectrum::monoenergetic(60.0).unwrap();
+    let image = |seed| {
+        let settings = AnalogSettings {
+            histories: HISTORIES,
+            seed,
+            ..AnalogSettings::default()
+        };
+        analog(&vacuum, &spectrum, &projection, &settings).unwrap()
+    };
+    (0..seeds).map(image).collect()
+}
+
+#[test]
+fn noise_of_sharp_pixels_is_white() {
+    assert_power("fast", &drawn(false, 16), false, 0.0);
+    assert_power("analog", &counted(false, 16), false, 0.0);
+}
+
+/// 2 % for the fit of the curve; 2 % more for photons that are spread over a square before they are counted.
+#[test]
+fn noise_behind_blur_has_the_power_of_the_detector() {
+    assert_power("fast", &drawn(true, 16), true, 0.02);
+    assert_power("analog", &counted(true, 16), true, 0.04);
+}
