@@ -2,7 +2,9 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::sdf::{Bounds, Shape, smooth_max, smooth_step};
+use super::bounds::Bounds;
+use super::placement::Placement;
+use super::sdf::{Shape, smooth_max, smooth_step};
 
 /// How sharply a joint surface meets the rest of the bone, mm.
 const EDGE_MM: f64 = 0.8;
@@ -70,6 +72,22 @@ impl Filling {
         }
     }
 
+    /// The profile of a bone at another place, size and orientation.
+    fn placed(&self, to: &Placement) -> Self {
+        let size = to.scaling();
+        let knots = self.knots.iter().map(|knot| Knot {
+            station_mm: knot.station_mm * size,
+            cortex_mm: knot.cortex_mm * size,
+            marrow: knot.marrow,
+        });
+        Self {
+            origin: to * self.origin,
+            direction: to.isometry.rotation * self.direction,
+            knots: knots.collect(),
+            trabecular_hu: self.trabecular_hu,
+        }
+    }
+
     /// Filling at a point.
     pub(super) fn at(&self, p: &Point3<f64>) -> Knot {
         let station_mm = (p - self.origin).dot(&self.direction);
@@ -89,6 +107,37 @@ impl Filling {
     }
 }
 
+/// Joint space that a bone keeps from a neighbour; it may grow along one direction.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Gap {
+    /// At the origin of the limb, mm.
+    pub at_origin_mm: f64,
+    /// Growth per mm.
+    pub slope: Vector3<f64>,
+}
+
+impl Gap {
+    pub(super) fn even(mm: f64) -> Self {
+        Self {
+            at_origin_mm: mm,
+            slope: Vector3::zeros(),
+        }
+    }
+
+    fn placed(&self, to: &Placement) -> Self {
+        let slope = to.isometry.rotation * self.slope;
+        Self {
+            at_origin_mm: self.at_origin_mm * to.scaling()
+                - slope.dot(&to.isometry.translation.vector),
+            slope,
+        }
+    }
+
+    fn at(&self, p: &Point3<f64>) -> f64 {
+        self.at_origin_mm + self.slope.dot(&p.coords)
+    }
+}
+
 /// One bone.
 #[derive(Debug, Clone)]
 pub(super) struct Bone {
@@ -97,9 +146,26 @@ pub(super) struct Bone {
     pub solid: Shape,
     /// Joint spaces cut out of the solid.
     pub hollows: Vec<Shape>,
-    /// Neighbours that are there first, and the joint space they keep, mm.
-    pub yields_to: Vec<(usize, f64)>,
+    /// Neighbours that are there first, and the joint space they keep.
+    pub yields_to: Vec<(usize, Gap)>,
     pub filling: Filling,
+}
+
+impl Bone {
+    /// The bone at another place, size and orientation.
+    pub(super) fn placed(&self, to: &Placement) -> Self {
+        Self {
+            name: self.name,
+            solid: self.solid.placed(to),
+            hollows: self.hollows.iter().map(|h| h.placed(to)).collect(),
+            yields_to: self
+                .yields_to
+                .iter()
+                .map(|(other, gap)| (*other, gap.placed(to)))
+                .collect(),
+            filling: self.filling.placed(to),
+        }
+    }
 }
 
 /// All bones; a bone yields only to bones before it.
@@ -119,11 +185,11 @@ impl Skeleton {
         &self.bones
     }
 
-    /// The bone that holds a point, and the signed distance to its surface.
-    pub(super) fn bone_at(&self, p: &Point3<f64>) -> Option<(&Bone, f64)> {
+    /// The index of the bone that holds a point, and the signed distance to its surface.
+    pub(super) fn bone_at(&self, p: &Point3<f64>) -> Option<(usize, f64)> {
         (0..self.bones.len())
             .filter(|&bone| self.box_distance(bone, p) == 0.0)
-            .map(|bone| (&self.bones[bone], self.distance(bone, p)))
+            .map(|bone| (bone, self.distance(bone, p)))
             .find(|(_, distance)| *distance < 0.0)
     }
 
@@ -144,7 +210,8 @@ impl Skeleton {
         for hollow in hollows {
             distance = smooth_max(distance, -hollow.distance(p), EDGE_MM);
         }
-        for &(other, gap_mm) in yields_to {
+        for (other, gap) in yields_to {
+            let (other, gap_mm) = (*other, gap.at(p));
             if self.box_distance(other, p) > gap_mm - distance + EDGE_MM {
                 continue; // too far to matter
             }

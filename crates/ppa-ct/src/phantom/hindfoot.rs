@@ -2,9 +2,10 @@
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use super::bone::{Bone, Filling};
+use super::bone::{Bone, Filling, Gap};
 use super::parameters::Parameters;
-use super::sdf::{Cone, Shape};
+use super::placement::Placement;
+use super::sdf::{Cone, Plane, Shape};
 
 /// The ankle mortise: medial, posterior and proximal axes turned out from the limb by the mortise angle,
 /// origin in the middle of the superior gutter.
@@ -15,10 +16,14 @@ pub(super) struct Mortise {
     pub axis_z: f64,
     half_width: f64,
     half_wedge: f64,
+    /// Height at which the width of the trochlea is meant.
+    width_level: f64,
 }
 
-/// Height at which the width of the trochlea is meant, below the joint centre.
+/// The same in P01, from the joint centre.
 const WIDTH_LEVEL_MM: f64 = -4.0;
+/// From the joint centre of P01 down to the sole.
+pub(super) const SOLE_DEPTH_MM: f64 = 83.0;
 
 impl Mortise {
     pub(super) fn new(p: &Parameters) -> Self {
@@ -29,6 +34,7 @@ impl Mortise {
                 - p.trochlea_radius_mm * p.axis_inclination_rad.cos(),
             half_width: 0.5 * p.trochlea_width_mm,
             half_wedge: 0.5 * p.trochlea_wedge_rad,
+            width_level: WIDTH_LEVEL_MM * p.size,
         }
     }
 
@@ -55,6 +61,12 @@ impl Mortise {
         self.limb_from_mortise * Unit::new_unchecked(Vector3::new(cosine, 0.0, sine))
     }
 
+    /// The motion of the foot that brings its toes down.
+    pub(super) fn flexion(&self, p: &Parameters) -> Placement {
+        let turn = UnitQuaternion::from_axis_angle(&self.axis(p), p.plantarflexion_rad);
+        Placement::rotation_wrt_point(turn, self.point(0.0, 0.0, self.axis_z).into(), 1.0)
+    }
+
     /// The cone of the trochlea.
     pub(super) fn cone(&self, p: &Parameters) -> Shape {
         Shape::Cone(Cone {
@@ -67,38 +79,38 @@ impl Mortise {
         })
     }
 
-    /// Half-space behind a facet; `side` is 1 for the medial and -1 for the lateral one.
-    fn facet(&self, side: f64, slope_rad: f64) -> Shape {
+    /// Plane of a facet; `side` is 1 for the medial and -1 for the lateral one.
+    fn facet(&self, side: f64, slope_rad: f64) -> Plane {
         let (wedge, slope) = (self.half_wedge.sin_cos(), slope_rad.sin_cos());
         let normal = Unit::new_normalize(Vector3::new(
             side * wedge.1 * slope.1,
             wedge.0 * slope.1,
             slope.0,
         ));
-        let on_facet = Vector3::new(side * self.half_width, 0.0, WIDTH_LEVEL_MM);
-        Shape::HalfSpace {
+        let on_facet = Vector3::new(side * self.half_width, 0.0, self.width_level);
+        Plane {
             normal: self.limb_from_mortise * normal,
             offset: normal.dot(&on_facet),
         }
     }
 
-    /// Half-space on the talar side of the medial facet.
-    pub(super) fn medial_facet(&self, p: &Parameters) -> Shape {
+    /// Plane of the medial facet, normal away from the talus.
+    pub(super) fn medial_facet(&self, p: &Parameters) -> Plane {
         self.facet(1.0, p.medial_facet_slope_rad)
     }
 
-    /// Half-space on the talar side of the lateral facet.
-    pub(super) fn lateral_facet(&self, p: &Parameters) -> Shape {
+    /// Plane of the lateral facet, normal away from the talus.
+    pub(super) fn lateral_facet(&self, p: &Parameters) -> Plane {
         self.facet(-1.0, p.lateral_facet_slope_rad)
     }
 
     /// Half-space behind a plane through a point; both given along the mortise axes.
     pub(super) fn wall(&self, outwards: [f64; 3], through: [f64; 3]) -> Shape {
         let normal = Unit::new_normalize(Vector3::from(outwards));
-        Shape::HalfSpace {
+        Shape::HalfSpace(Plane {
             normal: self.limb_from_mortise * normal,
             offset: normal.dot(&Vector3::from(through)),
-        }
+        })
     }
 }
 
@@ -112,7 +124,7 @@ pub(super) fn talus(p: &Parameters, mortise: &Mortise) -> Bone {
             mortise.wall([0.0, 1.0, 0.0], [0.0, 16.5, 0.0]),
             mortise.wall([0.0, 0.0, -1.0], [0.0, 0.0, -27.0]),
             // Below the comma of the medial facet the body recedes.
-            mortise.wall([0.8, 0.0, -0.6], [17.5, 0.0, -15.0]),
+            mortise.wall([0.8, 0.0, -0.6], [17.5 + p.side_shift_mm(), 0.0, -15.0]),
         ],
     );
     let at = |m, b, z| mortise.point(m, b, z);
@@ -126,7 +138,11 @@ pub(super) fn talus(p: &Parameters, mortise: &Mortise) -> Bone {
     );
     let body = Shape::common(
         2.0,
-        vec![body, mortise.medial_facet(p), mortise.lateral_facet(p)],
+        vec![
+            body,
+            Shape::HalfSpace(mortise.medial_facet(p)),
+            Shape::HalfSpace(mortise.lateral_facet(p)),
+        ],
     );
     let head = [7.5, -29.0, -25.0];
     let solid = Shape::union(
@@ -146,13 +162,13 @@ pub(super) fn talus(p: &Parameters, mortise: &Mortise) -> Bone {
         solid,
         hollows: vec![],
         yields_to: vec![],
-        filling: Filling::spongy(1.1, 380.0),
+        filling: Filling::spongy(1.1, p.spongy_hu(380.0)),
     }
 }
 
 /// Tuberosity, body, sustentaculum and anterior process.
 pub(super) fn calcaneus(p: &Parameters, talus: usize) -> Bone {
-    let floor = 18.0 - p.sole_depth_mm; // the heel pad is 18 mm
+    let floor = 18.0 - SOLE_DEPTH_MM; // the heel pad is 18 mm
     let solid = Shape::union(
         8.0,
         vec![
@@ -168,11 +184,19 @@ pub(super) fn calcaneus(p: &Parameters, talus: usize) -> Bone {
             Shape::ellipsoid([9.0, -4.0, floor + 26.0], [11.0, 10.0, 5.5]),
         ],
     );
-    Bone {
+    let bone = Bone {
         name: "calcaneus",
         solid,
         hollows: vec![],
-        yields_to: vec![(talus, p.small_joint_mm)],
-        filling: Filling::spongy(1.0, 230.0),
-    }
+        yields_to: vec![(talus, Gap::even(p.small_joint_mm))],
+        filling: Filling::spongy(1.0, p.spongy_hu(230.0)),
+    };
+    bone.placed(&heel_valgus(p))
+}
+
+/// The turn of the heel about the line along which it carries the talus.
+pub(super) fn heel_valgus(p: &Parameters) -> Placement {
+    let pivot = Point3::new(-4.0, 10.0, 38.0 - SOLE_DEPTH_MM);
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), p.heel_valgus_rad);
+    Placement::rotation_wrt_point(turn, pivot, 1.0)
 }

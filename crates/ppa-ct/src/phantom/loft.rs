@@ -2,115 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Isometry3, Point2, Point3, Vector2, Vector3};
+use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 
-use super::sdf::{Bounds, smooth_max};
-
-/// Radii per section; 7.5° apart.
-const ANGLES: usize = 48;
-
-/// One cross-section: radii around a centre, counted from the first local axis towards the second.
-#[derive(Debug, Clone)]
-pub(super) struct Section {
-    station: f64,
-    centre: Vector2<f64>,
-    radii: [f64; ANGLES],
-}
-
-impl Section {
-    /// Section at `station` with radii at equal steps of angle, joined by a periodic cubic.
-    pub(super) fn polar(station: f64, centre: [f64; 2], coarse: &[f64]) -> Self {
-        let n = coarse.len();
-        let radii = std::array::from_fn(|i| {
-            let x = i as f64 * n as f64 / ANGLES as f64;
-            let (weights, _) = catmull_rom(x.fract());
-            (0..4)
-                .map(|j| weights[j] * coarse[(x as usize + n + j - 1) % n])
-                .sum()
-        });
-        Self {
-            station,
-            centre: centre.into(),
-            radii,
-        }
-    }
-
-    /// Elliptic section.
-    pub(super) fn ellipse(station: f64, centre: [f64; 2], semi: [f64; 2]) -> Self {
-        let radii = std::array::from_fn(|i| {
-            let (sine, cosine) = (i as f64 * TAU / ANGLES as f64).sin_cos();
-            (cosine / semi[0]).hypot(sine / semi[1]).recip()
-        });
-        Self {
-            station,
-            centre: centre.into(),
-            radii,
-        }
-    }
-
-    /// Polygon grown by `round`; star-shaped around the mean of its corners.
-    pub(super) fn polygon(station: f64, corners: &[[f64; 2]], round: f64) -> Self {
-        let corners: Vec<Point2<f64>> = corners.iter().map(|&c| c.into()).collect();
-        let mut centre = Vector2::zeros();
-        for corner in &corners {
-            centre += corner.coords / corners.len() as f64;
-        }
-        let radii = std::array::from_fn(|i| {
-            let (sine, cosine) = (i as f64 * TAU / ANGLES as f64).sin_cos();
-            let (mut inside, mut outside) = (0.0, 500.0);
-            for _ in 0..40 {
-                let middle = 0.5 * (inside + outside);
-                let p = Point2::from(centre + Vector2::new(cosine, sine) * middle);
-                if polygon_distance(&corners, &p) < round {
-                    inside = middle;
-                } else {
-                    outside = middle;
-                }
-            }
-            inside
-        });
-        Self {
-            station,
-            centre,
-            radii,
-        }
-    }
-}
-
-/// Exact signed distance to a simple polygon.
-fn polygon_distance(corners: &[Point2<f64>], p: &Point2<f64>) -> f64 {
-    let mut nearest = f64::INFINITY;
-    let mut inside = false;
-    for (i, b) in corners.iter().enumerate() {
-        let a = &corners[(i + corners.len() - 1) % corners.len()];
-        let (edge, q) = (b - a, p - a);
-        let t = (q.dot(&edge) / edge.norm_squared()).clamp(0.0, 1.0);
-        nearest = nearest.min((q - edge * t).norm());
-        if (a.y > p.y) != (b.y > p.y) && q.x < edge.x * q.y / edge.y {
-            inside = !inside;
-        }
-    }
-    if inside { -nearest } else { nearest }
-}
-
-/// Weights of the four neighbours and their derivatives at fraction `t` of a uniform interval.
-fn catmull_rom(t: f64) -> ([f64; 4], [f64; 4]) {
-    let (t2, t3) = (t * t, t * t * t);
-    (
-        [
-            0.5 * (-t + 2.0 * t2 - t3),
-            0.5 * (2.0 - 5.0 * t2 + 3.0 * t3),
-            0.5 * (t + 4.0 * t2 - 3.0 * t3),
-            0.5 * (t3 - t2),
-        ],
-        [
-            0.5 * (-1.0 + 4.0 * t - 3.0 * t2),
-            0.5 * (-10.0 * t + 9.0 * t2),
-            0.5 * (1.0 + 8.0 * t - 9.0 * t2),
-            0.5 * (3.0 * t2 - 2.0 * t),
-        ],
-    )
-}
+use super::bounds::Bounds;
+use super::placement::Placement;
+use super::sdf::smooth_max;
+pub(super) use super::section::Section;
+use super::section::{ANGLES, catmull_rom};
 
 /// Where a loft ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -148,6 +46,25 @@ impl Loft {
             sections,
             first,
             last,
+        }
+    }
+
+    /// The loft at another place, size and orientation.
+    pub(super) fn placed(&self, to: &Placement) -> Self {
+        let size = to.scaling();
+        let mut local_from_limb = self.local_from_limb;
+        local_from_limb.translation.vector *= size;
+        let end = |end| match end {
+            End::Open => End::Open,
+            End::Capped { blend } => End::Capped {
+                blend: blend * size,
+            },
+        };
+        Self {
+            local_from_limb: local_from_limb * to.isometry.inverse(),
+            sections: self.sections.iter().map(|s| s.resized(size)).collect(),
+            first: end(self.first),
+            last: end(self.last),
         }
     }
 
@@ -262,62 +179,5 @@ impl Loft {
             }
         }
         bounds
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    /// A loft whose circles grow by `slope` per mm is a cone.
-    fn cone(slope: f64) -> Loft {
-        let sections = (0..6)
-            .map(|n| 20.0 * f64::from(n))
-            .map(|s| Section::polar(s, [1.0, -2.0], &[10.0 + slope * s; 12]))
-            .collect();
-        Loft::new(
-            Isometry3::translation(3.0, 0.0, 0.0),
-            sections,
-            End::Open,
-            End::Open,
-        )
-    }
-
-    proptest! {
-        #[test]
-        fn a_loft_of_growing_circles_is_a_cone(
-            slope in -0.05..0.4_f64, angle in 0.0..TAU, s in 25.0..75.0_f64, offset in -3.0..3.0_f64,
-        ) {
-            let radius = 10.0 + slope * s;
-            let steepness = slope.hypot(1.0);
-            // Off the surface along its normal; the loft is moved by -3 in x.
-            let (rho, z) = (radius + offset / steepness, s - offset * slope / steepness);
-            let p = Point3::new(-2.0 + rho * angle.cos(), -2.0 + rho * angle.sin(), z);
-            let distance = cone(slope).distance(&p);
-            prop_assert!((distance - offset).abs() < 1e-6, "{distance} for {offset}");
-        }
-
-        #[test]
-        fn polygon_sections_pass_through_the_grown_edges(t in 0.1..0.9_f64, offset in -2.0..2.0_f64) {
-            let corners = [[-20.0, -10.0], [20.0, -10.0], [20.0, 10.0], [-20.0, 10.0]];
-            let sections = [0.0, 50.0].map(|s| Section::polygon(s, &corners, 4.0)).to_vec();
-            let slab = Loft::new(Isometry3::identity(), sections, End::Open, End::Open);
-            let p = Point3::new(-20.0 + 40.0 * t, 14.0 + offset, 25.0);
-            let distance = slab.distance(&p);
-            prop_assert!((distance - offset).abs() < 0.25, "{distance} for {offset}");
-        }
-    }
-
-    #[test]
-    fn a_capped_end_is_where_its_section_lies() {
-        let sections = [0.0, 30.0]
-            .map(|s| Section::ellipse(s, [0.0; 2], [12.0, 8.0]))
-            .to_vec();
-        let end = End::Capped { blend: 4.0 };
-        let loft = Loft::new(Isometry3::identity(), sections, end, End::Open);
-        assert!((loft.distance(&Point3::new(0.0, 0.0, -5.0)) - 5.0).abs() < 1e-9);
-        assert!(loft.distance(&Point3::new(0.0, 0.0, 500.0)) < -7.0);
-        assert!((loft.distance(&Point3::new(12.0, 0.0, 15.0))).abs() < 1e-9);
     }
 }

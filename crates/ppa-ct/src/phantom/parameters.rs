@@ -1,11 +1,23 @@
 //! The numbers that make one phantom.
 
+/// Whose average a phantom is drawn around.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Sex {
+    /// Adult women.
+    Female,
+    /// Adult men.
+    Male,
+}
+
 /// Dimensions of a right lower leg and foot; mm and radians.
 ///
 /// Sources: talus, mortise, malleoli and syndesmosis from the CT and cadaver studies named at the fields
 /// (mean ± SD); dimensions without a name are chosen within the range of adult anatomy.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Parameters {
+    pub sex: Sex,
+    /// All lengths that no other field tells, relative to P01.
+    pub size: f64,
     /// Internal rotation that turns both malleoli parallel to the detector: 19.1° ± 5.0°, n = 128 feet.
     pub mortise_angle_rad: f64,
     /// Bony gap between trochlea and plafond: 2.89 ± 0.56 (Zhang 2014).
@@ -14,8 +26,11 @@ pub(super) struct Parameters {
     pub medial_gutter_mm: f64,
     /// Bony gap between talus and lateral malleolus: 2.45 ± 0.55 (Goker 2009).
     pub lateral_gutter_mm: f64,
-    /// Bony gap between tibia and fibula in the incisura: 2.7 ± 0.8 (PMC7937306).
-    pub syndesmosis_mm: f64,
+    /// Bony gap between tibia and fibula at the front and at the back of the incisura: 2.2 ± 0.9 and 3.5 ± 0.9
+    /// (n = 203); over both 2.7 ± 0.8 (PMC7937306).
+    pub syndesmosis_mm: [f64; 2],
+    /// Depth of the incisura below the tubercles that flank it, at the plafond: 3.3 ± 1.2 (n = 203).
+    pub incisura_depth_mm: f64,
     /// Sagittal radius of the trochlea: 20.7 ± 2.6 (PMC1888582).
     pub trochlea_radius_mm: f64,
     /// Width of the trochlea half-way along it: 27.9 ± 3.0 (PMC1888582).
@@ -25,7 +40,8 @@ pub(super) struct Parameters {
     pub trochlea_wedge_rad: f64,
     /// Depth of the groove between its crests: 1.3 in front, 0.6 behind (Thai J Surg).
     pub trochlea_groove_mm: f64,
-    /// How far the lateral end of the talocrural axis lies below the level of the medial end.
+    /// How far the lateral end of the talocrural axis lies below the level of the medial end; dome
+    /// inclination 9.9° ± 3.3° (BioMed Res Int 2019:8634159).
     pub axis_inclination_rad: f64,
     /// Slope of the medial facet away from the vertical; tibia and medial malleolus enclose 114° (PMC3117279).
     pub medial_facet_slope_rad: f64,
@@ -35,47 +51,109 @@ pub(super) struct Parameters {
     pub medial_malleolus_mm: f64,
     /// Reach of the lateral malleolus below the joint line: 27.4 ± 3.8 (Patil 2012).
     pub lateral_malleolus_mm: f64,
+    /// How far the heads of metatarsals I, III, IV and V lie in front of that of II: 0.9 ± 2.7, -4.4 ± 1.6,
+    /// -11.2 ± 2.2, -20.2 ± 3.8 (PMC3932714).
+    pub metatarsal_heads_mm: [f64; 4],
+    /// Cortex of the tibia 25, 100 and 200 mm above the joint of a leg of P01's size: 0.5–1.5, 2–4 and 4–6, growing
+    /// towards mid-shaft (PMC2849524 for the trend).
+    pub tibia_cortex_mm: [f64; 3],
+    /// HU of spongy bone in the distal tibia; 290 mg/cm³ (PubMed 23103330). Other bones in proportion.
+    pub trabecular_hu: f64,
+    /// Standard deviation of spongy bone from place to place, HU.
+    pub trabecular_texture_hu: f64,
+    /// Girth of the leg just above the malleoli, relative to P01's at the same size.
+    pub ankle_girth: f64,
+    /// Girth of the calf, relative to P01's at the same size.
+    pub calf_girth: f64,
+    /// Toes down from a right angle between foot and leg.
+    pub plantarflexion_rad: f64,
+    /// Turn of the heel's lower end away from the midline.
+    pub heel_valgus_rad: f64,
     /// Gap between the bones of the other joints.
     pub small_joint_mm: f64,
-    /// From the joint centre down to the sole.
-    pub sole_depth_mm: f64,
     /// Thickness of the skin; finite-element models use 2.0, measured values are 0.5 to 2.
     pub skin_mm: f64,
-    /// Rise of the tibial axis from the table towards the knee.
-    pub leg_rise_rad: f64,
-    /// From the joint centre back to the table top, across the table.
-    pub table_depth_mm: f64,
     /// Length of lower leg inside the scan, from the joint centre proximally.
     pub leg_length_mm: f64,
     /// Place of the joint centre in the scanner.
     pub joint_centre_ct_mm: [f64; 3],
 }
 
+/// Phantom P01: an average adult male.
+pub(super) const P01: Parameters = Parameters {
+    sex: Sex::Male,
+    size: 1.0,
+    mortise_angle_rad: 18.0_f64.to_radians(),
+    superior_gutter_mm: 2.8,
+    medial_gutter_mm: 2.5,
+    lateral_gutter_mm: 2.5,
+    syndesmosis_mm: [2.7, 2.7],
+    incisura_depth_mm: 4.8,
+    trochlea_radius_mm: 20.7,
+    trochlea_width_mm: 27.9,
+    trochlea_wedge_rad: 6.0_f64.to_radians(),
+    trochlea_groove_mm: 1.0,
+    axis_inclination_rad: 8.0_f64.to_radians(),
+    medial_facet_slope_rad: 20.0_f64.to_radians(),
+    lateral_facet_slope_rad: 10.0_f64.to_radians(),
+    medial_malleolus_mm: 15.3,
+    lateral_malleolus_mm: 26.5,
+    metatarsal_heads_mm: [-0.5, -4.5, -11.0, -19.5],
+    tibia_cortex_mm: [1.2, 3.6, 4.8],
+    trabecular_hu: 280.0,
+    trabecular_texture_hu: 0.0,
+    ankle_girth: 1.0,
+    calf_girth: 1.0,
+    plantarflexion_rad: 0.0,
+    heel_valgus_rad: 0.0,
+    small_joint_mm: 1.8,
+    skin_mm: 1.5,
+    leg_length_mm: 250.0,
+    joint_centre_ct_mm: [-92.0, 14.0, -310.0],
+};
+
 impl Parameters {
-    /// Phantom P01: an average adult male.
-    pub(super) fn p01() -> Self {
+    /// The foot as it is drawn before it is resized: every length over `size`.
+    pub(super) fn drawn(&self) -> Self {
+        let mm = |length: f64| length / self.size;
         Self {
-            mortise_angle_rad: 18.0_f64.to_radians(),
-            superior_gutter_mm: 2.8,
-            medial_gutter_mm: 2.5,
-            lateral_gutter_mm: 2.5,
-            syndesmosis_mm: 2.7,
-            trochlea_radius_mm: 20.7,
-            trochlea_width_mm: 27.9,
-            trochlea_wedge_rad: 6.0_f64.to_radians(),
-            trochlea_groove_mm: 1.0,
-            axis_inclination_rad: 8.0_f64.to_radians(),
-            medial_facet_slope_rad: 20.0_f64.to_radians(),
-            lateral_facet_slope_rad: 10.0_f64.to_radians(),
-            medial_malleolus_mm: 15.3,
-            lateral_malleolus_mm: 26.5,
-            small_joint_mm: 1.8,
-            sole_depth_mm: 83.0,
-            skin_mm: 1.5,
-            leg_rise_rad: 3.0_f64.to_radians(),
-            table_depth_mm: 58.0,
-            leg_length_mm: 250.0,
-            joint_centre_ct_mm: [-92.0, 14.0, -310.0],
+            size: 1.0,
+            superior_gutter_mm: mm(self.superior_gutter_mm),
+            medial_gutter_mm: mm(self.medial_gutter_mm),
+            lateral_gutter_mm: mm(self.lateral_gutter_mm),
+            syndesmosis_mm: self.syndesmosis_mm.map(mm),
+            incisura_depth_mm: mm(self.incisura_depth_mm),
+            trochlea_radius_mm: mm(self.trochlea_radius_mm),
+            trochlea_width_mm: mm(self.trochlea_width_mm),
+            trochlea_groove_mm: mm(self.trochlea_groove_mm),
+            medial_malleolus_mm: mm(self.medial_malleolus_mm),
+            lateral_malleolus_mm: mm(self.lateral_malleolus_mm),
+            metatarsal_heads_mm: self.metatarsal_heads_mm.map(mm),
+            tibia_cortex_mm: self.tibia_cortex_mm.map(mm),
+            small_joint_mm: mm(self.small_joint_mm),
+            skin_mm: mm(self.skin_mm),
+            leg_length_mm: mm(self.leg_length_mm),
+            ..*self
         }
+    }
+
+    /// HU of spongy bone that has `p01_hu` in P01.
+    pub(super) fn spongy_hu(&self, p01_hu: f64) -> f64 {
+        p01_hu * (self.trabecular_hu / P01.trabecular_hu)
+    }
+
+    /// How far the lateral malleolus and all that goes with it lies further out than in P01.
+    pub(super) fn lateral_shift_mm(&self) -> f64 {
+        self.side_shift_mm() + self.lateral_gutter_mm - P01.lateral_gutter_mm
+    }
+
+    /// The same for the medial malleolus.
+    pub(super) fn medial_shift_mm(&self) -> f64 {
+        self.side_shift_mm() + self.medial_gutter_mm - P01.medial_gutter_mm
+    }
+
+    /// How far each facet of the trochlea lies further out than in P01.
+    pub(super) fn side_shift_mm(&self) -> f64 {
+        0.5 * (self.trochlea_width_mm - P01.trochlea_width_mm)
     }
 }

@@ -7,6 +7,7 @@
 
 use nalgebra::{Point3, Rotation3, Unit, Vector3};
 
+use super::bounds::Bounds;
 use super::loft::Loft;
 
 /// Smooth minimum of two distances; the blend is `k` mm wide and at most `k / 4` deep.
@@ -24,65 +25,6 @@ pub(super) fn smooth_max(a: f64, b: f64, k: f64) -> f64 {
 pub(super) fn smooth_step(low: f64, high: f64, x: f64) -> f64 {
     let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
-}
-
-/// An axis-aligned box in limb coordinates, mm.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Bounds {
-    pub low: Point3<f64>,
-    pub high: Point3<f64>,
-}
-
-impl Bounds {
-    /// The box of a ball.
-    pub(super) fn ball(centre: &Point3<f64>, radius: f64) -> Self {
-        let reach = Vector3::repeat(radius);
-        Self {
-            low: centre - reach,
-            high: centre + reach,
-        }
-    }
-
-    pub(super) fn everything() -> Self {
-        Self {
-            low: Point3::from(Vector3::repeat(f64::NEG_INFINITY)),
-            high: Point3::from(Vector3::repeat(f64::INFINITY)),
-        }
-    }
-
-    pub(super) fn join(&self, other: &Self) -> Self {
-        Self {
-            low: self.low.inf(&other.low),
-            high: self.high.sup(&other.high),
-        }
-    }
-
-    pub(super) fn meet(&self, other: &Self) -> Self {
-        Self {
-            low: self.low.sup(&other.low),
-            high: self.high.inf(&other.high),
-        }
-    }
-
-    pub(super) fn grown(&self, margin: f64) -> Self {
-        let reach = Vector3::repeat(margin);
-        Self {
-            low: self.low - reach,
-            high: self.high + reach,
-        }
-    }
-
-    /// Distance from `p` to the box, 0 inside.
-    pub(super) fn distance(&self, p: &Point3<f64>) -> f64 {
-        let mut sum = 0.0;
-        for axis in 0..3 {
-            let out = (self.low[axis] - p[axis])
-                .max(p[axis] - self.high[axis])
-                .max(0.0);
-            sum += out * out;
-        }
-        sum.sqrt()
-    }
 }
 
 /// A signed-distance shape in limb coordinates.
@@ -108,11 +50,8 @@ pub(super) enum Shape {
         from_radius: f64,
         to_radius: f64,
     },
-    /// All points with `normal · p < offset`.
-    HalfSpace {
-        normal: Unit<Vector3<f64>>,
-        offset: f64,
-    },
+    /// All points behind a plane.
+    HalfSpace(Plane),
     /// Grooved cone about an axis, see [`Cone`].
     Cone(Cone),
     /// Polar sections along an axis.
@@ -123,6 +62,20 @@ pub(super) enum Shape {
     Common { blend: f64, parts: Vec<Shape> },
     /// The shape grown by a margin.
     Grown { margin: f64, shape: Box<Shape> },
+}
+
+/// All points with `normal · p = offset`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Plane {
+    pub normal: Unit<Vector3<f64>>,
+    pub offset: f64,
+}
+
+impl Plane {
+    /// Signed distance, positive on the side of the normal.
+    pub(super) fn distance(&self, p: &Point3<f64>) -> f64 {
+        self.normal.dot(&p.coords) - self.offset
+    }
 }
 
 /// A cone about an axis whose upper generator is level when the axis is tilted by the half-angle: Inman's
@@ -238,7 +191,7 @@ impl Shape {
                 from_radius,
                 to_radius,
             } => round_cone_distance(p, from, to, *from_radius, *to_radius),
-            Self::HalfSpace { normal, offset } => normal.dot(&p.coords) - offset,
+            Self::HalfSpace(plane) => plane.distance(p),
             Self::Cone(cone) => cone.distance(p),
             Self::Loft(loft) => loft.distance(p),
             Self::Union { blend, parts } => parts
@@ -266,7 +219,7 @@ impl Shape {
                 from_radius,
                 to_radius,
             } => Bounds::ball(from, *from_radius).join(&Bounds::ball(to, *to_radius)),
-            Self::HalfSpace { .. } | Self::Cone(_) => Bounds::everything(),
+            Self::HalfSpace(_) | Self::Cone(_) => Bounds::everything(),
             Self::Loft(loft) => loft.bounds(),
             Self::Union { blend, parts } => parts
                 .iter()
@@ -314,52 +267,5 @@ fn round_cone_distance(p: &Point3<f64>, a: &Point3<f64>, b: &Point3<f64>, ra: f6
         (p - b).norm() - rb
     } else {
         across * cosine + along * sine - ra
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn point(reach: f64) -> impl Strategy<Value = Point3<f64>> {
-        [-reach..reach, -reach..reach, -reach..reach].prop_map(Point3::from)
-    }
-
-    proptest! {
-        /// A round cone is the union of the balls between its ends.
-        #[test]
-        fn round_cone_is_the_nearest_of_its_balls(p in point(30.0), to in point(15.0), ra in 1.0..6.0_f64, rb in 1.0..6.0_f64) {
-            let cone = Shape::round_cone([0.0; 3], ra, to.coords.into(), rb);
-            let steps = 4000;
-            let nearest = (0..=steps)
-                .map(|n| f64::from(n) / f64::from(steps))
-                .map(|t| (p.coords - to.coords * t).norm() - (ra + t * (rb - ra)))
-                .fold(f64::INFINITY, f64::min);
-            let distance = cone.distance(&p);
-            prop_assert!(if nearest > 0.0 { (distance - nearest).abs() < 0.02 } else { distance < 0.02 },
-                "{distance} against {nearest}");
-        }
-
-        /// A blend adds material, at most a quarter of its width, and nothing away from the seam.
-        #[test]
-        fn smooth_min_stays_within_a_quarter_of_the_blend(a in -20.0..20.0_f64, b in -20.0..20.0_f64, k in 0.1..10.0_f64) {
-            let (sharp, smooth) = (a.min(b), smooth_min(a, b, k));
-            prop_assert!(smooth <= sharp && smooth >= sharp - k / 4.0 - 1e-12);
-            prop_assert!((a - b).abs() < k || smooth == sharp);
-        }
-
-        /// The surface of an ellipsoid is where the formula of an ellipsoid puts it, with slope 1.
-        #[test]
-        fn ellipsoid_is_exact_to_first_order(direction in point(1.0), offset in -0.5..0.5_f64) {
-            prop_assume!(direction.coords.norm() > 0.1);
-            let semi = Vector3::new(16.0, 9.0, 12.0);
-            let unit = direction.coords.normalize();
-            let on_surface = unit.component_mul(&semi);
-            let normal = unit.component_div(&semi).normalize();
-            let ellipsoid = Shape::ellipsoid([0.0; 3], semi.into());
-            let distance = ellipsoid.distance(&Point3::from(on_surface + normal * offset));
-            prop_assert!((distance - offset).abs() < 0.05 * offset.abs() + 1e-9, "{distance} for {offset}");
-        }
     }
 }

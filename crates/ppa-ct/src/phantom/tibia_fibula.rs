@@ -2,139 +2,21 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::bone::{Bone, Filling, Knot};
+use super::bone::{Bone, Filling, Gap, Knot};
 use super::hindfoot::Mortise;
 use super::loft::{End, Loft, Section};
-use super::parameters::Parameters;
-use super::sdf::Shape;
+use super::parameters::{P01, Parameters};
+use super::placement::Placement;
+use super::sdf::{Shape, smooth_step};
+use super::tibia_fibula_table::{FIBULA, TIBIA, TibiaSection};
 
-/// Corners of a tibial section as (medial, posterior) in the mortise frame, to be grown by a radius: anterolateral
-/// (Chaput) tubercle, front, anteromedial, posteromedial, back, posterolateral (Volkmann) tubercle,
-/// floor of the fibular incisura.
-type TibiaSection = (f64, [[f64; 2]; 7], f64);
-
-/// From the joint line proximally, station in mm above the joint centre.
-const TIBIA: [TibiaSection; 8] = [
-    (
-        -6.0,
-        [
-            [-18.7, -11.5],
-            [1.0, -15.5],
-            [20.0, -9.5],
-            [18.5, 9.5],
-            [1.0, 17.0],
-            [-15.0, 11.5],
-            [-11.5, -0.5],
-        ],
-        3.5,
-    ),
-    (
-        4.0,
-        [
-            [-18.7, -11.5],
-            [1.0, -15.5],
-            [20.0, -9.0],
-            [18.5, 9.5],
-            [1.0, 16.5],
-            [-15.5, 11.0],
-            [-11.5, -0.5],
-        ],
-        3.5,
-    ),
-    (
-        15.0,
-        [
-            [-18.0, -10.5],
-            [1.0, -14.5],
-            [17.0, -8.5],
-            [16.0, 9.0],
-            [1.0, 15.0],
-            [-15.0, 10.0],
-            [-11.5, -0.5],
-        ],
-        3.5,
-    ),
-    (
-        28.0,
-        [
-            [-14.0, -8.0],
-            [2.0, -13.0],
-            [13.5, -7.5],
-            [13.0, 8.5],
-            [1.0, 13.0],
-            [-12.0, 8.5],
-            [-11.0, -0.5],
-        ],
-        4.0,
-    ),
-    (
-        48.0,
-        [
-            [-9.5, -6.0],
-            [2.5, -11.5],
-            [10.5, -6.0],
-            [10.0, 7.5],
-            [0.5, 10.5],
-            [-9.0, 7.5],
-            [-9.5, 0.5],
-        ],
-        4.0,
-    ),
-    (
-        90.0,
-        [
-            [-8.0, -4.0],
-            [4.0, -11.5],
-            [9.0, -4.5],
-            [8.0, 7.0],
-            [0.0, 9.0],
-            [-8.0, 6.5],
-            [-8.5, 1.5],
-        ],
-        4.0,
-    ),
-    (
-        160.0,
-        [
-            [-8.0, -2.5],
-            [5.5, -13.0],
-            [8.5, -4.0],
-            [7.5, 8.0],
-            [0.0, 9.0],
-            [-8.0, 6.0],
-            [-9.0, 2.0],
-        ],
-        4.0,
-    ),
-    (
-        260.0,
-        [
-            [-9.0, -2.0],
-            [6.0, -14.5],
-            [9.5, -4.0],
-            [8.5, 9.0],
-            [0.0, 10.0],
-            [-9.5, 6.5],
-            [-10.5, 2.0],
-        ],
-        4.5,
-    ),
-];
-
-/// Station, centre (medial, posterior) and semi-axes of the fibula in the mortise frame.
-const FIBULA: [(f64, [f64; 2], [f64; 2]); 8] = [
-    (-14.0, [-24.6, 3.0], [9.0, 10.5]),
-    (-4.0, [-23.4, 2.5], [9.0, 10.8]),
-    (8.0, [-24.0, 3.0], [8.3, 10.0]),
-    (22.0, [-23.5, 3.0], [7.3, 8.2]),
-    (45.0, [-22.5, 3.5], [6.0, 6.8]),
-    (90.0, [-24.0, 4.5], [5.5, 6.2]),
-    (160.0, [-28.5, 6.0], [5.8, 6.5]),
-    (260.0, [-34.0, 7.0], [6.2, 7.0]),
-];
+/// Half the distance between the places where the front and the back of the syndesmosis are measured.
+const SYNDESMOSIS_REACH_MM: f64 = 6.0;
+/// The corner at the floor of the incisura moves by so much per mm of depth, since the grown polygon rounds it.
+const INCISURA_FLOOR: f64 = 1.0;
 
 /// Profile of cortex and marrow along the leg.
-fn shaft(knots: &[(f64, f64, f64)]) -> Filling {
+fn shaft(p: &Parameters, knots: &[(f64, f64, f64)]) -> Filling {
     Filling {
         origin: Point3::origin(),
         direction: Vector3::z_axis(),
@@ -146,15 +28,68 @@ fn shaft(knots: &[(f64, f64, f64)]) -> Filling {
                 marrow,
             })
             .collect(),
-        trabecular_hu: 280.0,
+        trabecular_hu: p.spongy_hu(280.0),
+    }
+}
+
+/// Heights in P01 at which the thickness of the cortex of the tibia is meant.
+pub(super) const CORTEX_LEVELS_MM: [f64; 3] = [25.0, 100.0, 200.0];
+
+/// Thickness of the cortex over P01's: metaphysis, distal third, middle of the shaft.
+fn cortex_shares(p: &Parameters) -> [f64; 3] {
+    std::array::from_fn(|level| p.tibia_cortex_mm[level] / P01.tibia_cortex_mm[level])
+}
+
+/// How much of a shift at the joint is left at a station.
+fn share_of_shift(station: f64) -> f64 {
+    smooth_step(50.0, 8.0, station)
+}
+
+/// Corners of a section of a tibia as wide as the trochlea asks for, with its incisura.
+fn tibia_section(p: &Parameters, (station, corners, round): &TibiaSection) -> Section {
+    let share = share_of_shift(*station);
+    let mut corners = *corners;
+    for (n, [medial, _]) in corners.iter_mut().enumerate() {
+        match n {
+            0 | 5 => *medial -= share * p.lateral_shift_mm(),
+            6 => *medial -= share * (p.lateral_shift_mm() + INCISURA_FLOOR * shallower_mm(p)),
+            2 | 3 => *medial += share * p.medial_shift_mm(),
+            _ => {}
+        }
+    }
+    Section::polygon(*station, &corners, *round)
+}
+
+/// How much shallower the incisura is than in P01.
+fn shallower_mm(p: &Parameters) -> f64 {
+    P01.incisura_depth_mm - p.incisura_depth_mm
+}
+
+/// Where the fibula lies further out than in P01: all of it with the trochlea's width, and
+/// above the malleolus with the space of the syndesmosis.
+fn fibula_shift_mm(p: &Parameters, station: f64) -> f64 {
+    let mean = |[front, back]: [f64; 2]| 0.5 * (front + back);
+    let wider = mean(p.syndesmosis_mm) - mean(P01.syndesmosis_mm);
+    share_of_shift(station) * p.lateral_shift_mm() + smooth_step(-4.0, 8.0, station) * wider
+}
+
+/// The space that the fibula keeps from the tibia, measured [`SYNDESMOSIS_REACH_MM`] in front of and behind the shaft.
+fn syndesmosis(p: &Parameters, mortise: &Mortise) -> Gap {
+    let [front, back] = p.syndesmosis_mm;
+    let posterior = mortise.limb_from_mortise * Vector3::y();
+    Gap {
+        at_origin_mm: 0.5 * (front + back),
+        slope: posterior * ((back - front) / (2.0 * SYNDESMOSIS_REACH_MM)),
     }
 }
 
 /// Shaft, flare, plafond and medial malleolus.
-pub(super) fn tibia(p: &Parameters, mortise: &Mortise, talus: usize) -> Bone {
+///
+/// `flexion` is the motion of the talus, to whose facets the malleoli are cut.
+pub(super) fn tibia(p: &Parameters, mortise: &Mortise, flexion: &Placement, talus: usize) -> Bone {
     let sections = TIBIA
         .iter()
-        .map(|(station, corners, round)| Section::polygon(*station, corners, *round))
+        .map(|section| tibia_section(p, section))
         .collect();
     let shaft_and_flare = Loft::new(
         mortise.limb_from_mortise.inverse(),
@@ -163,45 +98,73 @@ pub(super) fn tibia(p: &Parameters, mortise: &Mortise, talus: usize) -> Bone {
         End::Open,
     );
     let at = |m, b, z| mortise.point(m, b, z);
-    let tip = -p.medial_malleolus_mm;
+    let (tip, shift) = (-p.medial_malleolus_mm, p.medial_shift_mm());
     let solid = Shape::union(
         5.0,
         vec![
             Shape::Loft(Box::new(shaft_and_flare)),
             // Anterior and, higher, posterior colliculus.
-            Shape::round_cone(at(17.5, -4.0, 8.0), 8.0, at(22.0, -4.5, tip + 5.5), 5.5),
-            Shape::round_cone(at(17.0, 4.0, 8.0), 8.0, at(21.0, 5.5, tip + 9.5), 5.5),
+            Shape::round_cone(
+                at(17.5 + shift, -4.0, 8.0),
+                8.0,
+                at(22.0 + shift, -4.5, tip + 5.5),
+                5.5,
+            ),
+            Shape::round_cone(
+                at(17.0 + shift, 4.0, 8.0),
+                8.0,
+                at(21.0 + shift, 5.5, tip + 9.5),
+                5.5,
+            ),
         ],
     );
     let mortise_space = Shape::common(
         1.5,
         vec![
             grown(p.superior_gutter_mm, mortise.cone(p)),
-            grown(p.medial_gutter_mm, mortise.medial_facet(p)),
+            grown(
+                p.medial_gutter_mm,
+                Shape::HalfSpace(mortise.medial_facet(p).placed(flexion)),
+            ),
         ],
     );
     // The tubercles beside the fibula end at the joint line, while the lips in front and behind reach lower.
-    let below_tubercles = mortise.wall([-0.45, 0.0, -0.89], [-14.0, 0.0, -3.0]);
+    let below_tubercles = mortise.wall(
+        [-0.45, 0.0, -0.89],
+        [-14.0 - p.lateral_shift_mm(), 0.0, -3.0],
+    );
+    let [thin, distal, middle] = cortex_shares(p);
     Bone {
         name: "tibia",
         solid: Shape::common(2.0, vec![solid, below_tubercles]),
         hollows: vec![mortise_space],
-        yields_to: vec![(talus, 0.8 * p.medial_gutter_mm)],
-        filling: shaft(&[
-            (5.0, 1.0, 0.0),
-            (25.0, 1.2, 0.0),
-            (60.0, 2.5, 0.7),
-            (100.0, 3.6, 1.0),
-            (200.0, 4.8, 1.0),
-        ]),
+        yields_to: vec![(talus, Gap::even(0.8 * p.medial_gutter_mm))],
+        filling: shaft(
+            p,
+            &[
+                (5.0, 1.0 * thin, 0.0),
+                (CORTEX_LEVELS_MM[0], 1.2 * thin, 0.0),
+                (60.0, 2.5 * distal, 0.7),
+                (CORTEX_LEVELS_MM[1], 3.6 * distal, 1.0),
+                (CORTEX_LEVELS_MM[2], 4.8 * middle, 1.0),
+            ],
+        ),
     }
 }
 
-/// Shaft and lateral malleolus.
-pub(super) fn fibula(p: &Parameters, mortise: &Mortise, tibia: usize, talus: usize) -> Bone {
+/// Shaft and lateral malleolus; `flexion` as for the tibia.
+pub(super) fn fibula(
+    p: &Parameters,
+    mortise: &Mortise,
+    flexion: &Placement,
+    [talus, calcaneus, tibia]: [usize; 3],
+) -> Bone {
     let sections = FIBULA
         .iter()
-        .map(|&(station, centre, semi)| Section::ellipse(station, centre, semi))
+        .map(|&(station, [medial, posterior], semi)| {
+            let medial = medial - fibula_shift_mm(p, station);
+            Section::ellipse(station, [medial, posterior], semi)
+        })
         .collect();
     let shaft_to_malleolus = Loft::new(
         mortise.limb_from_mortise.inverse(),
@@ -209,33 +172,41 @@ pub(super) fn fibula(p: &Parameters, mortise: &Mortise, tibia: usize, talus: usi
         End::Capped { blend: 5.0 },
         End::Open,
     );
-    let tip = -p.lateral_malleolus_mm;
+    let (tip, shift) = (-p.lateral_malleolus_mm, p.lateral_shift_mm());
     let solid = Shape::union(
         4.0,
         vec![
             Shape::Loft(Box::new(shaft_to_malleolus)),
             Shape::round_cone(
-                mortise.point(-25.0, 2.5, -6.0),
+                mortise.point(-25.0 - shift, 2.5, -6.0),
                 8.0,
-                mortise.point(-26.0, 4.5, tip + 5.5),
+                mortise.point(-26.0 - shift, 4.5, tip + 5.5),
                 5.5,
             ),
         ],
     );
+    let [thin, distal, _] = cortex_shares(p);
     Bone {
         name: "fibula",
         solid,
-        hollows: vec![grown(p.lateral_gutter_mm, mortise.lateral_facet(p))],
+        hollows: vec![grown(
+            p.lateral_gutter_mm,
+            Shape::HalfSpace(mortise.lateral_facet(p).placed(flexion)),
+        )],
         yields_to: vec![
-            (talus, 0.8 * p.lateral_gutter_mm),
-            (tibia, p.syndesmosis_mm),
+            (talus, Gap::even(0.8 * p.lateral_gutter_mm)),
+            (tibia, syndesmosis(p, mortise)),
+            (calcaneus, Gap::even(p.small_joint_mm)),
         ],
-        filling: shaft(&[
-            (0.0, 0.9, 0.0),
-            (20.0, 1.2, 0.0),
-            (50.0, 1.8, 0.6),
-            (100.0, 2.4, 1.0),
-        ]),
+        filling: shaft(
+            p,
+            &[
+                (0.0, 0.9 * thin, 0.0),
+                (20.0, 1.2 * thin, 0.0),
+                (50.0, 1.8 * distal, 0.6),
+                (100.0, 2.4 * distal, 1.0),
+            ],
+        ),
     }
 }
 

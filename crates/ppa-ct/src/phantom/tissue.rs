@@ -2,8 +2,9 @@
 
 use nalgebra::Point3;
 
-use super::LowerLeg;
 use super::bone::Knot;
+use super::limb::Limb;
+use super::texture::texture;
 
 /// What a point of the phantom consists of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -25,6 +26,8 @@ pub enum Tissue {
     Trabecular,
     /// Fatty marrow of a shaft.
     Marrow,
+    /// Plate and screws.
+    Titanium,
 }
 
 const AIR_HU: f64 = -1000.0;
@@ -33,6 +36,8 @@ const FAT_HU: f64 = -100.0;
 const SOFT_HU: f64 = 50.0;
 const TENDON_HU: f64 = 85.0;
 const MARROW_HU: f64 = -40.0;
+/// Titanium is denser; scanners that store 12 bits clip it here.
+const TITANIUM_HU: f64 = 3071.0;
 /// Thin shells of the joints and thick walls of the shafts.
 const CORTICAL_HU: [f64; 2] = [1200.0, 1600.0];
 const CORTICAL_AT_MM: [f64; 2] = [1.0, 4.0];
@@ -60,16 +65,19 @@ pub(super) struct Local {
     pub bones: Vec<(usize, f64)>,
 }
 
-impl LowerLeg {
+impl Limb {
     pub(super) fn tissue_in_limb(&self, p: &Point3<f64>) -> Tissue {
         let skin = self.envelope.skin_distance(p);
         if skin >= 0.0 {
             return Tissue::Air;
         }
+        if self.plate.as_ref().is_some_and(|m| m.distance(p) < 0.0) {
+            return Tissue::Titanium;
+        }
         if let Some((bone, distance)) = self.skeleton.bone_at(p) {
             let Knot {
                 cortex_mm, marrow, ..
-            } = bone.filling.at(p);
+            } = self.skeleton.bones()[bone].filling.at(p);
             return if distance > -cortex_mm {
                 Tissue::Cortical
             } else if marrow > 0.5 {
@@ -117,13 +125,18 @@ impl LowerLeg {
             }
             None => false,
         };
-        soft || local.bones.iter().any(|&(bone, distance)| {
-            distance.abs() < reach_mm
-                || (distance < 0.0 && {
-                    let cortex_mm = self.skeleton.bones()[bone].filling.at(p).cortex_mm;
-                    (distance + cortex_mm).abs() < reach_mm
-                })
-        })
+        let metal = || {
+            let plate = self.plate.as_ref();
+            plate.is_some_and(|plate| plate.distance(p).abs() < reach_mm)
+        };
+        soft || metal()
+            || local.bones.iter().any(|&(bone, distance)| {
+                distance.abs() < reach_mm
+                    || (distance < 0.0 && {
+                        let cortex_mm = self.skeleton.bones()[bone].filling.at(p).cortex_mm;
+                        (distance + cortex_mm).abs() < reach_mm
+                    })
+            })
     }
 
     /// Mean Hounsfield unit of a ball of diameter `width_mm`, and the share of it that lies in the limb.
@@ -144,7 +157,11 @@ impl LowerLeg {
             } = filling.at(p);
             let core = share_inside(distance + cortex_mm, width_mm);
             let depth = (-distance - cortex_mm).max(0.0);
-            let spongy = filling.trabecular_hu + SUBCHONDRAL_HU * (-depth / SUBCHONDRAL_MM).exp();
+            let mut spongy =
+                filling.trabecular_hu + SUBCHONDRAL_HU * (-depth / SUBCHONDRAL_MM).exp();
+            if self.texture_hu > 0.0 && core > 0.0 && marrow < 1.0 {
+                spongy += self.texture_hu * texture(p);
+            }
             let core_hu = spongy + marrow * (MARROW_HU - spongy);
             bone_share += share;
             bone_hu += (share - core) * cortical_hu(cortex_mm) + core * core_hu;
@@ -153,6 +170,10 @@ impl LowerLeg {
         let mut hu = bone_hu + (1.0 - inside) * AIR_HU;
         if soft_share > 0.0 {
             hu += soft_share * self.soft_hu(p, local.skin_mm, inside, width_mm);
+        }
+        if let Some(plate) = &self.plate {
+            let metal = share_inside(plate.distance(p), width_mm);
+            hu += metal * (TITANIUM_HU - hu);
         }
         (hu, inside)
     }

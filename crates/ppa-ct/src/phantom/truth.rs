@@ -2,7 +2,13 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::LowerLeg;
+use super::lower_leg::LowerLeg;
+use super::lower_leg_skin::toe_tip;
+use super::sdf::Plane;
+use super::tibia_fibula::CORTEX_LEVELS_MM;
+
+/// Heights in P01 at which the girths of ankle and calf are meant.
+const GIRTH_LEVELS_MM: [f64; 2] = [75.0, 220.0];
 
 /// Numbers that a measurement on the voxelised phantom should find; `ct` frame, mm and radians.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,60 +53,99 @@ pub struct Truth {
     pub sole_depth_mm: f64,
     /// Thickness of the skin.
     pub skin_mm: f64,
+    /// Radius of the trochlea about the talocrural axis at its middle, without the groove.
+    pub trochlea_radius_mm: f64,
+    /// Gap between tibia and fibula 1 cm above the joint, 6 mm in front of and 6 mm behind the middle of the shaft.
+    pub syndesmosis_mm: [f64; 2],
+    /// Depth of the fibular incisura of the tibia 1 cm above the joint.
+    pub incisura_depth_mm: f64,
+    /// Thickness of the cortex of the tibia: height above the joint along the shaft, thickness.
+    pub tibia_cortex_mm: [[f64; 2]; 3],
+    /// Hounsfield units of spongy bone in the distal tibia, away from its surface.
+    pub trabecular_hu: f64,
+    /// How far the heads of metatarsals I, III, IV and V lie in front of that of II, along the foot.
+    pub metatarsal_heads_mm: [f64; 4],
+    /// Turn of the foot about the talocrural axis from a right angle with the leg, toes down.
+    pub plantarflexion_rad: f64,
+    /// Lean of the heel's lower end away from the midline.
+    pub heel_valgus_rad: f64,
+    /// Girths of ankle and calf: height above the joint along the shaft, girth across the shaft.
+    pub girths_mm: [[f64; 2]; 2],
 }
 
 impl Truth {
-    pub(super) fn of(limb: &LowerLeg) -> Self {
-        let p = &limb.parameters;
-        let ct = &limb.ct_from_limb;
-        let toe_tip = limb.envelope.toe_tip(ct);
-        let half_wedge = 0.5 * p.trochlea_wedge_rad;
+    pub(super) fn of(leg: &LowerLeg) -> Self {
+        let p = &leg.parameters;
+        let ct = &leg.ct_from_limb;
+        let point = |limb: [f64; 3]| leg.on_right(ct * Point3::from(limb));
+        let direction = |limb: Unit<Vector3<f64>>| {
+            Unit::new_unchecked(leg.direction_on_right((ct * limb).into_inner()))
+        };
+        let toe_tip = leg.on_right(toe_tip(&p.drawn(), &leg.foot_placement, ct));
         Self {
-            joint_centre: ct * Point3::origin(),
-            axis_direction: ct * Vector3::z_axis(),
-            talocrural_axis: ct * limb.mortise.axis(p),
-            talocrural_centre: ct * Point3::from(limb.mortise.point(0.0, 0.0, limb.mortise.axis_z)),
+            joint_centre: point([0.0; 3]),
+            axis_direction: direction(Vector3::z_axis()),
+            talocrural_axis: direction(leg.mortise.axis(p)),
+            talocrural_centre: point(leg.mortise.point(0.0, 0.0, leg.mortise.axis_z)),
             mortise_angle_rad: p.mortise_angle_rad,
-            medial_gutter_angle_rad: p.mortise_angle_rad - half_wedge,
-            lateral_gutter_angle_rad: p.mortise_angle_rad + half_wedge,
+            medial_gutter_angle_rad: gutter_angle_rad(&leg.medial_facet(), 1.0),
+            lateral_gutter_angle_rad: gutter_angle_rad(&leg.lateral_facet(), -1.0),
             superior_gutter_mm: p.superior_gutter_mm,
             medial_gutter_mm: p.medial_gutter_mm,
             lateral_gutter_mm: p.lateral_gutter_mm,
             trochlea_width_mm: p.trochlea_width_mm,
             medial_malleolus_mm: p.medial_malleolus_mm,
             lateral_malleolus_mm: p.lateral_malleolus_mm,
-            back_plane_y_mm: limb.table_top_y(),
-            foot_length_mm: limb.table_top_y() - toe_tip.y,
+            back_plane_y_mm: leg.table_top_y,
+            foot_length_mm: leg.table_top_y - toe_tip.y,
             toe_tip,
-            sole_depth_mm: p.sole_depth_mm,
+            sole_depth_mm: leg.sole_depth_mm(),
             skin_mm: p.skin_mm,
+            trochlea_radius_mm: p.trochlea_radius_mm,
+            syndesmosis_mm: p.syndesmosis_mm,
+            incisura_depth_mm: p.incisura_depth_mm,
+            tibia_cortex_mm: [0, 1, 2]
+                .map(|level| [CORTEX_LEVELS_MM[level] * p.size, p.tibia_cortex_mm[level]]),
+            trabecular_hu: p.trabecular_hu,
+            metatarsal_heads_mm: p.metatarsal_heads_mm,
+            plantarflexion_rad: p.plantarflexion_rad,
+            heel_valgus_rad: p.heel_valgus_rad,
+            girths_mm: GIRTH_LEVELS_MM.map(|level| {
+                let height = level * p.size;
+                [height, girth_mm(leg, height)]
+            }),
         }
     }
 }
 
-impl LowerLeg {
-    /// A box in the `ct` frame around the skin, from the toes to the proximal end of the scan.
-    ///
-    /// Found on a coarse lattice, so up to one step of it too large.
-    pub(super) fn skin_box(&self) -> (Point3<f64>, Point3<f64>) {
-        const STEP_MM: f64 = 5.0;
-        let centre = self.ct_from_limb * Point3::origin();
-        let top = self.parameters.leg_length_mm;
-        let reach = [(-20, 20), (-50, 20), (-22, (top / STEP_MM) as i32)];
-        let mut low = Point3::from(Vector3::repeat(f64::INFINITY));
-        let mut high = -low;
-        for k in reach[2].0..=reach[2].1 {
-            for j in reach[1].0..=reach[1].1 {
-                for i in reach[0].0..=reach[0].1 {
-                    let p = centre + Vector3::new(i.into(), j.into(), k.into()) * STEP_MM;
-                    if self.skin_distance_mm(&p) < STEP_MM {
-                        low = low.inf(&p);
-                        high = high.sup(&p);
-                    }
+/// Internal rotation at which rays run along a facet; `side` is 1 for the medial and -1 for the lateral one.
+fn gutter_angle_rad(facet: &Plane, side: f64) -> f64 {
+    -(side * facet.normal.y).atan2(side * facet.normal.x)
+}
+
+/// Perimeter of the skin in the plane across the shaft at a height.
+fn girth_mm(leg: &LowerLeg, height_mm: f64) -> f64 {
+    const STEPS: usize = 240;
+    let size = leg.parameters.size;
+    // Inside every leg, between tibia and calf.
+    let centre = Point3::new(-3.0 * size, 15.0 * size, height_mm);
+    let outline: Vec<Vector3<f64>> = (0..STEPS)
+        .map(|n| {
+            let (sine, cosine) = (n as f64 / STEPS as f64 * std::f64::consts::TAU).sin_cos();
+            let outwards = Vector3::new(cosine, sine, 0.0);
+            let (mut inside, mut outside) = (0.0, 150.0);
+            for _ in 0..30 {
+                let middle = 0.5 * (inside + outside);
+                if leg.envelope.skin_distance(&(centre + outwards * middle)) < 0.0 {
+                    inside = middle;
+                } else {
+                    outside = middle;
                 }
             }
-        }
-        high.z = centre.z + top;
-        (low, high)
-    }
+            outwards * inside
+        })
+        .collect();
+    (0..STEPS)
+        .map(|n| (outline[n] - outline[(n + 1) % STEPS]).norm())
+        .sum()
 }

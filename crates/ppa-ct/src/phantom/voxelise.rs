@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::grid::Grid;
 use crate::volume::{Volume, VolumeError};
 
-use super::LowerLeg;
+use super::limb::{Limb, Side};
 use super::tissue::Local;
 
 /// Why a phantom cannot be voxelised.
@@ -18,6 +18,16 @@ pub enum PhantomError {
     Spacing {
         /// Spacing asked for, mm.
         found_mm: f64,
+    },
+    /// Blur or noise of a scanner make no sense.
+    #[error("{what} of {found}, expected 0 to {most}")]
+    Scanner {
+        /// Which of both.
+        what: &'static str,
+        /// Asked for.
+        found: f64,
+        /// Largest that makes sense.
+        most: f64,
     },
     /// The lattice or its values were refused.
     #[error(transparent)]
@@ -70,10 +80,10 @@ fn background_hu(y_mm: f64, half_mm: f64, table_top_mm: Option<f64>) -> f64 {
     AIR_HU + foam * (TABLE_FOAM_HU - AIR_HU) + (table - foam) * (TABLE_SHEET_HU - AIR_HU)
 }
 
-impl LowerLeg {
+impl Limb {
     /// The phantom as a CT with isotropic voxels, axes along LPS.
     ///
-    /// The field of view holds toes, heel and the lower leg up to mid-calf, where it cuts the leg.
+    /// The field of view holds the limb with some air around it, and cuts a leg at mid-calf.
     /// Every tissue counts with its share of a voxel. The share follows from the distance to the boundary, taken as
     /// flat; voxels above 1 mm that a boundary may cross are divided into parts first. The result does not
     /// depend on the number of threads.
@@ -81,23 +91,76 @@ impl LowerLeg {
     /// # Errors
     /// [`PhantomError::Spacing`] when `spacing_mm` is not between 0.25 and 8.
     pub fn voxelise(&self, spacing_mm: f64, table: TableTop) -> Result<Volume, PhantomError> {
+        let (mut low, mut high) = self.skin_box();
+        low -= Vector3::repeat(MARGIN_MM);
+        high += Vector3::new(MARGIN_MM, MARGIN_MM, 0.0);
+        if let Some(distal) = self.scan.cut[0] {
+            low.z = self.ct_from_limb.translation.z + distal;
+        }
+        if table == TableTop::Present {
+            high.y = self.table_top_y + TABLE_MM + MARGIN_MM;
+        }
+        self.voxelise_right([low, high], spacing_mm, table)
+    }
+
+    /// The part of the phantom in a world box (`ct`, mm), as [`Limb::voxelise`] makes it: the first voxel is centred
+    /// on the lowest corner; on a left limb on the corner that is highest in x and lowest in y and z.
+    ///
+    /// # Errors
+    /// [`PhantomError`] when `spacing_mm` is not between 0.25 and 8, or the box is empty.
+    pub fn voxelise_box(
+        &self,
+        [low, high]: [Point3<f64>; 2],
+        spacing_mm: f64,
+        table: TableTop,
+    ) -> Result<Volume, PhantomError> {
+        let (a, b) = (self.on_right(low), self.on_right(high));
+        let (low, high) = if self.side == Side::Left {
+            (Point3::new(b.x, a.y, a.z), Point3::new(a.x, b.y, b.z))
+        } else {
+            (a, b)
+        };
+        self.voxelise_right([low, high], spacing_mm, table)
+    }
+
+    /// Voxels in a box of the right limb's `ct`, mirrored if this is the left one.
+    fn voxelise_right(
+        &self,
+        [low, high]: [Point3<f64>; 2],
+        spacing_mm: f64,
+        table: TableTop,
+    ) -> Result<Volume, PhantomError> {
         if !(SPACING_MM[0]..=SPACING_MM[1]).contains(&spacing_mm) {
             return Err(PhantomError::Spacing {
                 found_mm: spacing_mm,
             });
         }
+        let size = [0, 1, 2].map(|a| (((high[a] - low[a]) / spacing_mm).floor() + 1.0) as usize);
+        let spacing = Vector3::repeat(spacing_mm);
+        let grid = Grid::axis_aligned(size, spacing, low).map_err(VolumeError::from)?;
+        let mut hu = self.hu_on(&grid, spacing_mm, table);
+        if self.side == Side::Right {
+            return Ok(Volume::new(grid, hu)?);
+        }
+        hu.chunks_mut(size[0]).for_each(<[f32]>::reverse);
+        let last = grid.centre([(size[0] - 1) as f64, 0.0, 0.0]);
+        let mirrored = Grid::axis_aligned(size, spacing, self.on_right(last));
+        Ok(Volume::new(mirrored.map_err(VolumeError::from)?, hu)?)
+    }
+
+    /// One value per voxel of a lattice in the right limb's `ct`.
+    fn hu_on(&self, grid: &Grid, spacing_mm: f64, table: TableTop) -> Vec<f32> {
         let table_top_mm = match table {
             TableTop::Absent => None,
-            TableTop::Present => Some(self.table_top_y()),
+            TableTop::Present => Some(self.table_top_y),
         };
-        let grid = self.field_of_view(spacing_mm, table_top_mm)?;
         let [nx, ny, nz] = grid.size();
         let mut hu = vec![AIR_HU as f32; grid.len()];
         let slab = nx * ny * BLOCK;
         hu.par_chunks_mut(slab).enumerate().for_each(|(n, hu)| {
             let painter = Painter {
                 limb: self,
-                grid: &grid,
+                grid,
                 spacing_mm,
                 table_top_mm,
                 first_slice: n * BLOCK,
@@ -114,33 +177,13 @@ impl LowerLeg {
                 }
             }
         });
-        Ok(Volume::new(grid, hu)?)
-    }
-
-    /// Height of the table top, `ct` y in mm.
-    pub(super) fn table_top_y(&self) -> f64 {
-        self.ct_from_limb.translation.y + self.parameters.table_depth_mm
-    }
-
-    fn field_of_view(
-        &self,
-        spacing_mm: f64,
-        table_top_mm: Option<f64>,
-    ) -> Result<Grid, VolumeError> {
-        let (mut low, mut high) = self.skin_box();
-        low -= Vector3::repeat(MARGIN_MM);
-        high += Vector3::new(MARGIN_MM, MARGIN_MM, 0.0);
-        if let Some(top) = table_top_mm {
-            high.y = top + TABLE_MM + MARGIN_MM;
-        }
-        let size = [0, 1, 2].map(|a| ((high[a] - low[a]) / spacing_mm).floor() as usize + 1);
-        Ok(Grid::axis_aligned(size, Vector3::repeat(spacing_mm), low)?)
+        hu
     }
 }
 
 /// Fills blocks of voxels of one slab.
 struct Painter<'a> {
-    limb: &'a LowerLeg,
+    limb: &'a Limb,
     grid: &'a Grid,
     spacing_mm: f64,
     table_top_mm: Option<f64>,
@@ -159,7 +202,7 @@ impl Painter<'_> {
         let extent = Vector3::from_fn(|a, _| (high[a] - low[a]) as f64 * half);
         let radius_mm = extent.norm();
         let centre_ct = self.centre(low, high);
-        let centre = limb.limb_point(&centre_ct);
+        let centre = limb.limb_from_right(&centre_ct);
         let skin_mm = limb.envelope.skin_distance(&centre);
         let [nx, ny, _] = self.grid.size();
         let slot = |[i, j, k]: [usize; 3]| i + nx * (j + ny * (k - self.first_slice));
@@ -198,7 +241,7 @@ impl Painter<'_> {
         [local, part]: [&mut Local; 2],
     ) -> f64 {
         let limb = self.limb;
-        let p = limb.limb_point(centre);
+        let p = limb.limb_from_right(centre);
         limb.measure(&p, near_skin, bones.iter().copied(), local);
         let half = 0.5 * self.spacing_mm;
         let background = background_hu(centre.y, half, self.table_top_mm);
@@ -222,7 +265,7 @@ impl Painter<'_> {
                 offset(n / parts % parts),
                 offset(n / parts.pow(2)),
             );
-            let q = limb.limb_point(&(centre + shift));
+            let q = limb.limb_from_right(&(centre + shift));
             limb.measure(&q, near_skin, local.bones.iter().map(|b| b.0), part);
             sum += blend(limb.mixture(&q, part, width_mm));
         }

@@ -1,0 +1,195 @@
+//! Skin, fat pads and Achilles tendon of a lower leg and foot.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+use super::envelope::{Bounded, Cover, Envelope};
+use super::hindfoot::{Mortise, SOLE_DEPTH_MM, heel_valgus};
+use super::loft::{End, Loft, Section};
+use super::lower_leg_skin_table::{FOOT, SHANK, ShankSection, TOES};
+use super::midfoot_forefoot::ray_shifts_mm;
+use super::parameters::{P01, Parameters};
+use super::placement::Placement;
+use super::sdf::{Plane, Shape, smooth_step};
+
+/// Centre and semi-axes of the heel.
+const HEEL: ([f64; 3], [f64; 3]) = ([-3.0, 27.0, 30.0 - SOLE_DEPTH_MM], [31.0, 34.5, 34.0]);
+
+/// Where the table has pressed the skin flat, the edge of the flat patch is rounded over so many mm; heel and calf would
+/// sink at least as deep, so that their middle touches the table.
+const TABLE_EDGE_MM: f64 = 3.0;
+
+/// Pose of the limb on the table.
+pub(super) struct Rest {
+    /// Rise of the tibial axis from the table towards the knee.
+    pub rise_rad: f64,
+    /// From the joint centre back to the table top, across the table.
+    pub depth_mm: f64,
+}
+
+impl Rest {
+    /// Heel and calf sink into the table as deep as those of P01 do, which lies 58 mm above it and rises by 3°.
+    pub(super) fn new(p: &Parameters, foot_placement: &Placement) -> Self {
+        const P01_RISE_RAD: f64 = 3.0_f64.to_radians();
+        const CALF_MM: f64 = 250.0;
+        const CALF_RADIUS_MM: f64 = 53.0;
+        let back =
+            UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -P01_RISE_RAD) * Vector3::y();
+        let heel = Point3::from(HEEL.0);
+        let heel_back = back.dot(&(foot_placement * (heel_valgus(p) * heel) / p.size - heel));
+        let calf_back = 2.0 * CALF_RADIUS_MM * (p.calf_girth - 1.0);
+        Self {
+            rise_rad: P01_RISE_RAD + (calf_back - heel_back) / CALF_MM,
+            depth_mm: (58.0 + heel_back) * p.size,
+        }
+    }
+}
+
+/// How much wider than in P01 a section of the shank is behind; in front the shin lies below the skin in every leg.
+fn wider_behind(p: &Parameters, station: f64) -> f64 {
+    let calf = smooth_step(75.0, 200.0, station);
+    // Towards the malleoli bone lies below the skin all around.
+    let ankle = smooth_step(-20.0, 60.0, station) * (1.0 - calf);
+    ankle * (p.ankle_girth - 1.0) + calf * (p.calf_girth - 1.0)
+}
+
+/// A section of the shank with the girth of the leg, turned with the bones of the leg.
+fn shank_section(p: &Parameters, (station, centre, radii): &ShankSection) -> Section {
+    let wider = wider_behind(p, *station);
+    let radii: [f64; 12] = std::array::from_fn(|n| {
+        // From nothing in front to twice the mean behind.
+        let behind = 1.0 + (n as f64 / 12.0 * TAU).sin();
+        radii[n] * (1.0 + wider * behind)
+    });
+    let turn = smooth_step(10.0, 90.0, *station) * (P01.mortise_angle_rad - p.mortise_angle_rad);
+    Section::polar(*station, *centre, &radii).turned(turn)
+}
+
+fn shank(p: &Parameters, mortise: &Mortise) -> Shape {
+    let sections = SHANK.iter().map(|section| shank_section(p, section));
+    let loft = Loft::new(
+        Isometry3::identity(),
+        sections.collect(),
+        End::Capped { blend: 12.0 },
+        End::Open,
+    );
+    let (medial, lateral) = (p.medial_shift_mm(), p.lateral_shift_mm());
+    let tip = P01.lateral_malleolus_mm - p.lateral_malleolus_mm;
+    Shape::union(
+        10.0,
+        vec![
+            Shape::Loft(Box::new(loft)),
+            mortise.ellipsoid([22.0 + medial, -1.0, -3.0], [10.0, 15.0, 19.0]),
+            mortise.ellipsoid(
+                [-26.5 - lateral, 3.0, -10.0 + tip.min(0.0)],
+                [10.5, 14.0, 22.0],
+            ),
+        ],
+    )
+}
+
+fn foot(p: &Parameters) -> Shape {
+    // Local axes of the foot: x medial, up, and forward.
+    let axes = Matrix3::from_rows(&[
+        Vector3::x().transpose(),
+        Vector3::z().transpose(),
+        -Vector3::y().transpose(),
+    ]);
+    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
+    let foot_from_limb = Isometry3::from_parts(Translation3::new(0.0, SOLE_DEPTH_MM, 0.0), turn);
+    let loft = Loft::new(
+        foot_from_limb,
+        FOOT.iter()
+            .map(|(station, corners, round)| Section::polygon(*station, corners, *round))
+            .collect(),
+        End::Capped { blend: 12.0 },
+        End::Capped { blend: 10.0 },
+    );
+    let heel = Shape::ellipsoid(HEEL.0, HEEL.1).placed(&heel_valgus(p));
+    Shape::union(14.0, vec![Shape::Loft(Box::new(loft)), heel])
+}
+
+/// Balls of the toes and their tips.
+fn toes(p: &Parameters) -> impl Iterator<Item = (Point3<f64>, f64, Point3<f64>, f64)> {
+    TOES.iter()
+        .zip(ray_shifts_mm(p))
+        .map(|(&(ball, ball_radius, tip, tip_radius), forward)| {
+            let place =
+                |[x, y, height]: [f64; 3]| Point3::new(x, y - forward, height - SOLE_DEPTH_MM);
+            (place(ball), ball_radius, place(tip), tip_radius)
+        })
+}
+
+/// The plane on which one stands, normal downwards.
+pub(super) fn sole() -> Plane {
+    Plane {
+        normal: -Vector3::z_axis(),
+        offset: SOLE_DEPTH_MM,
+    }
+}
+
+/// The skin as drawn in P01's size goes to its place with `leg`, and that of the foot with `foot_placement`.
+pub(super) fn envelope(
+    p: &Parameters,
+    mortise: &Mortise,
+    [leg_placement, foot_placement]: [&Placement; 2],
+    table: Shape,
+) -> Envelope {
+    let toes = toes(p)
+        .map(|(ball, ball_radius, tip, tip_radius)| {
+            Shape::round_cone(ball.into(), ball_radius, tip.into(), tip_radius)
+        })
+        .collect();
+    let heel = foot_placement * heel_valgus(p);
+    let from_leg = leg_placement.inverse();
+    let insertion = from_leg * (heel * Point3::new(-3.0, 44.0, -42.0));
+    let achilles = Shape::union(
+        8.0,
+        vec![
+            Shape::round_cone(insertion.into(), 6.0, [-3.0, 45.0, 20.0], 4.5),
+            Shape::round_cone([-3.0, 45.0, 20.0], 4.5, [-4.0, 52.0, 110.0], 6.0),
+        ],
+    );
+    let kager = Shape::ellipsoid([-2.0, 31.0, 18.0], [13.0, 12.0, 38.0]);
+    let heel_pad = Shape::ellipsoid([-3.0, 27.0, 6.0 - SOLE_DEPTH_MM], [26.0, 30.0, 16.0]);
+    let size = leg_placement.scaling();
+    let sole = sole().placed(foot_placement);
+    Envelope {
+        first: foot(p).placed(foot_placement),
+        parts: vec![
+            (
+                Bounded::new(Shape::union(3.0, toes).placed(foot_placement)),
+                8.0 * size,
+            ),
+            (
+                Bounded::new(shank(p, mortise).placed(leg_placement)),
+                22.0 * size,
+            ),
+        ],
+        cuts: vec![(Shape::HalfSpace(sole), 8.0 * size), (table, TABLE_EDGE_MM)],
+        skin_mm: p.skin_mm * size,
+        cover: Cover {
+            even_mm: size,
+            calf: Some(size),
+            sole: Some(sole),
+        },
+        tendon: Some(achilles.placed(leg_placement)),
+        fat: vec![kager.placed(leg_placement), heel_pad.placed(&heel)],
+    }
+}
+
+/// The skin of the most forward toe, given the transform to the frame in which -y is forward.
+pub(super) fn toe_tip(
+    p: &Parameters,
+    foot_placement: &Placement,
+    ct_from_limb: &Isometry3<f64>,
+) -> Point3<f64> {
+    toes(p)
+        .map(|(_, _, tip, radius)| {
+            ct_from_limb * (foot_placement * tip) - radius * foot_placement.scaling() * Vector3::y()
+        })
+        .fold(Point3::from(Vector3::repeat(f64::INFINITY)), |best, tip| {
+            if tip.y < best.y { tip } else { best }
+        })
+}

@@ -1,0 +1,93 @@
+//! What a scanner makes of a phantom: blur and noise.
+
+use rayon::prelude::*;
+
+use super::draw::{Purpose, normal};
+use super::voxelise::PhantomError;
+use crate::volume::Volume;
+
+/// A scanner with a Gaussian point spread and white noise, which stores whole Hounsfield units of 12 bits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scanner {
+    /// Full width at half maximum of the point spread along every axis, mm; 0 for none.
+    pub blur_fwhm_mm: f64,
+    /// Standard deviation of the noise of a voxel, HU.
+    pub noise_hu: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+/// Values of 12 bits.
+const RANGE_HU: [f64; 2] = [-1024.0, 3071.0];
+
+impl Scanner {
+    /// The volume as this scanner would store it; the same for any number of threads.
+    ///
+    /// Voxels beyond the field of view count as those on its faces.
+    ///
+    /// # Errors
+    /// [`PhantomError::Scanner`] unless blur and noise lie between 0 and 20 mm, 0 and 1000 HU.
+    pub fn scan(&self, phantom: &Volume) -> Result<Volume, PhantomError> {
+        for (what, found, most) in [
+            ("a blur in mm", self.blur_fwhm_mm, 20.0),
+            ("a noise in HU", self.noise_hu, 1000.0),
+        ] {
+            if !(0.0..=most).contains(&found) {
+                return Err(PhantomError::Scanner { what, found, most });
+            }
+        }
+        let grid = phantom.grid();
+        let mut hu = phantom.hu().to_vec();
+        let sigma_mm = self.blur_fwhm_mm / (8.0 * 2.0_f64.ln()).sqrt();
+        let mut stride = 1;
+        for (count, spacing_mm) in grid.size().into_iter().zip(&grid.spacing_mm()) {
+            hu = blurred(&hu, count, stride, &kernel(sigma_mm / spacing_mm));
+            stride *= count;
+        }
+        hu.par_iter_mut().enumerate().for_each(|(index, hu)| {
+            let noise = self.noise_hu * normal(self.seed, Purpose::ScannerNoise, index as u64);
+            let value = (f64::from(*hu) + noise).round();
+            *hu = value.clamp(RANGE_HU[0], RANGE_HU[1]) as f32;
+        });
+        Ok(Volume::new(grid.clone(), hu)?)
+    }
+}
+
+/// A Gaussian in voxels, from the middle outwards to 4 standard deviations, with sum 1.
+fn kernel(sigma: f64) -> Vec<f64> {
+    let half: Vec<f64> = (0..=(4.0 * sigma).ceil() as usize)
+        .map(|n| n as f64)
+        .map(|n| {
+            if n == 0.0 {
+                1.0
+            } else {
+                (-0.5 * (n / sigma).powi(2)).exp()
+            }
+        })
+        .collect();
+    let sum = half[0] + 2.0 * half[1..].iter().sum::<f64>();
+    half.iter().map(|weight| weight / sum).collect()
+}
+
+/// Values convolved along the axis with this many voxels and this distance in memory.
+fn blurred(hu: &[f32], count: usize, stride: usize, kernel: &[f64]) -> Vec<f32> {
+    if kernel.len() == 1 {
+        return hu.to_vec();
+    }
+    (0..hu.len())
+        .into_par_iter()
+        .with_min_len(1 << 14)
+        .map(|index| {
+            let place = index / stride % count;
+            let first = index - place * stride;
+            let value = |n: usize| f64::from(hu[first + n * stride]);
+            let mut sum = kernel[0] * value(place);
+            for (reach, weight) in kernel.iter().enumerate().skip(1) {
+                let before = place.saturating_sub(reach);
+                let after = (place + reach).min(count - 1);
+                sum += weight * (value(before) + value(after));
+            }
+            sum as f32
+        })
+        .collect()
+}

@@ -1,0 +1,162 @@
+//! Left and right, plate, labels, scanner, seeds, and the knee.
+
+use nalgebra::{Point3, Unit, Vector3};
+
+use super::{LIMB, family};
+use crate::phantom::parameters::P01;
+use crate::phantom::*;
+use crate::volume::Volume;
+
+/// P01 to P17 span what they should, and the fixed table holds P01 as it is.
+#[test]
+fn the_family_has_nine_men_eight_women_and_mortise_angles_from_10_to_29_degrees() {
+    let legs: Vec<LowerLeg> = family().map(|(_, leg)| leg).collect();
+    let men = legs.iter().filter(|leg| leg.sex() == Sex::Male).count();
+    assert_eq!((men, legs.len()), (9, 17));
+    let mut angles: Vec<f64> = legs
+        .iter()
+        .map(|leg| leg.truth().mortise_angle_rad.to_degrees())
+        .collect();
+    let mean = angles.iter().sum::<f64>() / 17.0;
+    angles.sort_by(f64::total_cmp);
+    assert!((angles[0] - 10.0).abs() < 1e-9 && (angles[16] - 29.0).abs() < 1e-9);
+    assert!(angles.windows(2).all(|w| w[1] - w[0] > 0.4), "{angles:?}");
+    assert!((mean - 19.1).abs() < 1.3, "{mean}"); // 19.1 ± 5.0 of 128 feet, standard error of 17
+    assert_eq!(legs[0].parameters, P01);
+    let row = LowerLeg::family("p01", Side::Left).unwrap().parameters;
+    assert!((row.trochlea_width_mm / P01.trochlea_width_mm - 1.0).abs() < 0.021);
+}
+
+#[test]
+fn other_names_are_refused() {
+    for name in ["", "P0", "P1", "P00", "P18", "Q01", "P001", "P+1", "P-1"] {
+        let refusal = LowerLeg::family(name, Side::Right)
+            .map(drop)
+            .expect_err(name);
+        assert!(refusal.to_string().contains("P01 to P17"), "{refusal}");
+    }
+}
+
+/// Means over 400 seeds within 4 standard errors, 1e-4 false alarms each; none beyond two standard deviations.
+#[test]
+fn seeds_draw_dimensions_around_the_published_means() {
+    let legs: Vec<LowerLeg> = (0..400)
+        .map(|seed| LowerLeg::from_seed(seed, Side::Right))
+        .collect();
+    for (sex, size, mortise_deg) in [
+        (Sex::Male, [1.0, 0.046], [21.2, 4.6]),
+        (Sex::Female, [0.893, 0.041], [16.4, 4.1]),
+    ] {
+        let of_sex: Vec<&LowerLeg> = legs.iter().filter(|leg| leg.sex() == sex).collect();
+        let n = of_sex.len() as f64;
+        assert!((n - 200.0).abs() < 4.0 * 10.0, "{n} of {sex:?}");
+        let sizes: Vec<f64> = of_sex.iter().map(|leg| leg.parameters.size).collect();
+        let angle = |leg: &&LowerLeg| leg.truth().mortise_angle_rad.to_degrees();
+        let angles: Vec<f64> = of_sex.iter().map(angle).collect();
+        for (values, [mean, deviation]) in [(sizes, size), (angles, mortise_deg)] {
+            let found = values.iter().sum::<f64>() / n;
+            assert!(
+                (found - mean).abs() < 4.0 * 0.88 * deviation / n.sqrt(),
+                "{found}"
+            );
+            let reach = |v: &f64| (v - mean).abs() <= 2.0 * deviation + 1e-9;
+            assert!(values.iter().all(reach));
+        }
+    }
+    let again = LowerLeg::from_seed(7, Side::Right);
+    assert_eq!(again.parameters, legs[7].parameters);
+}
+
+/// Voxels, tissues, rays and truth of the mirror image of P01, which no jitter changes.
+#[test]
+fn a_left_limb_is_the_mirror_image() {
+    let left = LowerLeg::new(P01, Side::Left);
+    let mirror = |p: Point3<f64>| Point3::new(-p.x, p.y, p.z);
+    let (a, b) = (
+        LIMB.voxelise(3.0, TableTop::Present).unwrap(),
+        left.voxelise(3.0, TableTop::Present).unwrap(),
+    );
+    let [nx, ny, nz] = a.grid().size();
+    assert_eq!(b.grid().size(), [nx, ny, nz]);
+    for voxel in [
+        [0, 0, 0],
+        [nx / 2, ny / 2, nz / 2],
+        [nx / 3, ny / 2, nz / 4],
+    ] {
+        let [i, j, k] = voxel;
+        let other = [nx - 1 - i, j, k];
+        let [p, q] = [(&a, voxel), (&b, other)]
+            .map(|(ct, voxel): (&Volume, _)| ct.grid().centre(voxel.map(|v| v as f64)));
+        assert!((mirror(p) - q).norm() < 1e-9, "{p} and {q}");
+        assert_eq!(LIMB.tissue(&p), left.tissue(&q));
+    }
+    for (index, hu) in a.hu().iter().enumerate() {
+        let [i, j, k] = a.grid().voxel(index);
+        assert_eq!(*hu, b.at([nx - 1 - i, j, k]));
+    }
+    let (right, truth) = (LIMB.truth(), left.truth());
+    assert_eq!(mirror(right.joint_centre), truth.joint_centre);
+    assert_eq!(mirror(right.toe_tip), truth.toe_tip);
+    assert_eq!(right.girths_mm, truth.girths_mm);
+    let origin = right.joint_centre - Vector3::new(-12.0, 300.0, 3.0);
+    let along = Unit::new_normalize(Vector3::new(-0.05, 1.0, 0.02));
+    let mirrored = Unit::new_unchecked(mirror(along.into_inner().into()).coords);
+    let chords = LIMB.chords(&origin, &along, 600.0);
+    assert!(chords.len() > 5);
+    assert_eq!(chords, left.chords(&mirror(origin), &mirrored, 600.0));
+    // A box around the left joint shows the same values as the whole.
+    let centre = truth.joint_centre;
+    let half = Vector3::repeat(15.0);
+    let part = left
+        .voxelise_box([centre - half, centre + half], 1.0, TableTop::Absent)
+        .unwrap();
+    let p = part.grid().centre([15.0; 3]);
+    assert!((p - centre).norm() < 1e-9 && part.grid().size() == [31; 3]);
+    assert!(part.voxels_match(&left));
+}
+
+impl Volume {
+    /// Whether bone voxels lie in bone, by their centres.
+    fn voxels_match(&self, leg: &LowerLeg) -> bool {
+        (0..self.grid().len()).step_by(7).all(|index| {
+            let p = self
+                .grid()
+                .centre(self.grid().voxel(index).map(|v| v as f64));
+            self.hu()[index] < 1000.0 || leg.tissue(&p) == Tissue::Cortical
+        })
+    }
+}
+
+#[test]
+fn the_left_limb_of_a_phantom_differs_by_about_a_percent() {
+    for name in ["P01", "P08", "P17"] {
+        let [r, l] =
+            [Side::Right, Side::Left].map(|side| LowerLeg::family(name, side).unwrap().parameters);
+        for (right, left) in [
+            (r.size, l.size),
+            (r.trochlea_radius_mm, l.trochlea_radius_mm),
+            (r.mortise_angle_rad, l.mortise_angle_rad),
+        ] {
+            let off = (left / right - 1.0).abs();
+            assert!(0.0 < off && off < 0.021, "{name}: {right} and {left}");
+        }
+    }
+}
+
+#[test]
+fn labels_name_the_bone_at_every_voxel() {
+    let ct = LIMB.voxelise(4.0, TableTop::Absent).unwrap();
+    let (labels, names) = (LIMB.bone_labels(ct.grid()), LIMB.bone_names());
+    assert_eq!((labels.len(), names.len()), (ct.hu().len(), 28));
+    for (index, label) in labels.iter().enumerate() {
+        let p = ct.grid().centre(ct.grid().voxel(index).map(|v| v as f64));
+        let name = label.checked_sub(1).map(|n| names[usize::from(n)]);
+        assert_eq!(name, LIMB.bone(&p));
+    }
+    let labelled = names
+        .iter()
+        .zip(1..)
+        .filter(|(_, n)| labels.contains(n))
+        .count();
+    assert!(labelled > 20, "{labelled} bones at 4 mm");
+}
