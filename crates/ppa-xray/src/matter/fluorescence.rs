@@ -62,13 +62,17 @@ impl KFluorescence {
 pub(crate) struct Fluorescence {
     energies: Octaves,
     emitters: Vec<Emitter>,
+    /// No absorption emits with a larger probability.
+    most: f64,
 }
 
-/// An element with a K edge inside the tables.
+/// An element with K lines above the cutoff.
 #[derive(Clone, Debug)]
 struct Emitter {
-    k: KFluorescence,
-    /// Its share of the photoelectric absorption, by energy.
+    edge_kev: f64,
+    /// Energy in keV of each line, and photons of it per absorption by this element.
+    lines: Vec<(f64, f64)>,
+    /// Share of the element in the photoelectric absorption, by energy.
     share: Vec<f32>,
 }
 
@@ -79,35 +83,54 @@ impl Fluorescence {
     /// Lines below `cutoff_kev` count as absorbed.
     pub(crate) fn new(material: &Material, cutoff_kev: f64) -> Self {
         let energies = Octaves::covering(MIN_ENERGY_KEV, MAX_ENERGY_KEV, ENERGY_BITS);
-        let emitters = material
+        let emitters: Vec<Emitter> = material
             .k_emitters()
-            .filter(|(_, k)| k.lines.iter().any(|&(line_kev, _)| line_kev >= cutoff_kev))
-            .map(|(z, k)| Emitter {
-                k: *k,
-                share: energies
-                    .nodes()
-                    .map(|energy| {
-                        let energy = energy.min(MAX_ENERGY_KEV);
-                        material.photoelectric_share(z, energy) as f32
-                    })
-                    .collect(),
+            .map(|(z, k)| {
+                let lines = k.lines(1.0).filter(|line| line.energy_kev >= cutoff_kev);
+                let share = |energy: f64| {
+                    material.photoelectric_share(z, energy.min(MAX_ENERGY_KEV)) as f32
+                };
+                Emitter {
+                    edge_kev: k.edge_kev,
+                    lines: lines
+                        .map(|line| (line.energy_kev, line.probability))
+                        .collect(),
+                    share: energies.nodes().map(share).collect(),
+                }
             })
+            .filter(|emitter| !emitter.lines.is_empty())
             .collect();
-        Self { energies, emitters }
+        let most = emitters.iter().map(|Emitter { lines, share, .. }| {
+            let share = share.iter().copied().fold(0.0, f32::max);
+            f64::from(share) * lines.iter().map(|line| line.1).sum::<f64>()
+        });
+        Self {
+            most: most.sum(),
+            energies,
+            emitters,
+        }
     }
 
     /// Energy of the photon that follows an absorption at `energy_kev`, if one does; `u` uniform in [0, 1).
     #[inline]
-    pub(crate) fn sample(&self, energy_kev: f64, mut u: f64) -> Option<f64> {
-        for Emitter { k, share } in &self.emitters {
-            if energy_kev <= k.edge_kev {
+    pub(crate) fn sample(&self, energy_kev: f64, u: f64) -> Option<f64> {
+        if u < self.most {
+            self.line(energy_kev, u)
+        } else {
+            None
+        }
+    }
+
+    fn line(&self, energy_kev: f64, mut u: f64) -> Option<f64> {
+        for emitter in &self.emitters {
+            if energy_kev <= emitter.edge_kev {
                 continue;
             }
             let (bin, fraction) = self.energies.locate(energy_kev);
-            let [low, high] = [bin, bin + 1].map(|i| f64::from(share[i]));
-            let emission = (low + fraction * (high - low)) * k.k_share * k.fluorescence_yield;
-            for &(line_kev, line_share) in &k.lines {
-                let probability = emission * line_share;
+            let [low, high] = [bin, bin + 1].map(|i| f64::from(emitter.share[i]));
+            let share = low + fraction * (high - low);
+            for &(line_kev, per_absorption) in &emitter.lines {
+                let probability = share * per_absorption;
                 if u < probability {
                     return Some(line_kev);
                 }

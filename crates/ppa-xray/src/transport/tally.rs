@@ -11,7 +11,7 @@ pub enum Category {
     Compton,
     /// One Rayleigh scattering, nothing else.
     Rayleigh,
-    /// Two scatterings or more.
+    /// Two scatterings or more, or a K x-ray of the phantom.
     Multiple,
 }
 

@@ -1,4 +1,4 @@
-//! What comes of tentative collisions: nothing, absorption, or scattering.
+//! What comes of tentative collisions: nothing, absorption, with or without a K x-ray, or scattering.
 
 use crate::transport::attenuation::CUTOFF_KEV;
 use crate::transport::lanes::advance::{Blocks, Steps};
@@ -66,7 +66,7 @@ impl Lanes<'_, '_> {
             depth: &mut depths,
             count: tentative.count.next_multiple_of(16),
         });
-        let (mut compton, mut rayleigh) = (Picked::new(), Picked::new());
+        let (mut compton, mut rayleigh, mut k_rays) = (Picked::new(), Picked::new(), Picked::new());
         for (i, lane) in tentative.iter().enumerate() {
             let photon = &self.photons[lane];
             let code = site[i].code;
@@ -83,29 +83,52 @@ impl Lanes<'_, '_> {
             rayleigh.push_if(i, (lot < density * sums.total) & !not_rayleigh);
             if absorbed {
                 let slot = usize::from(photon.slot);
-                score.deposit(slot, site[i].voxel, f64::from(photon.energy_kev));
-                score.finish(slot);
-                ended.push_if(lane, true);
+                let energy_kev = f64::from(photon.energy_kev);
+                let lot = unit(self.draws.block[3][i]);
+                let tables = &self.transport.samplers[usize::from(code.material())];
+                if let Some(line_kev) = tables.k_fluorescence(energy_kev, lot.into()) {
+                    let left_kev = self.emit_k_ray(lane, line_kev);
+                    score.deposit(slot, site[i].voxel, left_kev);
+                    k_rays.push_if(i, true);
+                } else {
+                    score.deposit(slot, site[i].voxel, energy_kev);
+                    score.finish(slot);
+                    ended.push_if(lane, true);
+                }
             }
         }
-        let sites = compton.iter().chain(rayleigh.iter());
+        let sites = compton.iter().chain(rayleigh.iter()).chain(k_rays.iter());
         let mut turns = Turns::new();
         let mut scattered = [Site::default(); LANES];
         for (n, i) in sites.enumerate() {
             scattered[n] = site[i];
             turns.azimuth[n] = self.draws.block[2][i];
         }
-        let scattered = &scattered[..compton.count + rayleigh.count];
+        let kinds = [compton.count, rayleigh.count];
+        let scattered = &scattered[..compton.count + rayleigh.count + k_rays.count];
         if !scattered.is_empty() {
-            self.scatter(scattered, compton.count, &mut turns, ended, score);
+            self.scatter(scattered, kinds, &mut turns, ended, score);
         }
     }
 
-    /// Scatters photons: the first `compton` of them off electrons, the others off whole atoms.
+    /// A K x-ray takes the place of the photon that was absorbed; what is left of that one's energy, keV.
+    #[cold]
+    fn emit_k_ray(&mut self, lane: usize, line_kev: f64) -> f64 {
+        let photon = &mut self.photons[lane];
+        let absorbed_kev = f64::from(photon.energy_kev);
+        photon.energy_kev = line_kev as f32;
+        photon.category = Category::Multiple;
+        photon.energy = self.transport.attenuation.locate(line_kev);
+        photon.row = self.transport.majorants.row(photon.energy);
+        absorbed_kev - f64::from(photon.energy_kev)
+    }
+
+    /// Scatters photons: the first `compton` of them off electrons, then `rayleigh` off whole atoms. The others are K x-rays,
+    /// which leave in any direction alike.
     fn scatter(
         &mut self,
         scattered: &[Site],
-        compton: usize,
+        [compton, rayleigh]: [usize; 2],
         turns: &mut Turns,
         ended: &mut Picked,
         score: &mut impl Score,
@@ -140,7 +163,8 @@ impl Lanes<'_, '_> {
                 photon.row = self.transport.majorants.row(photon.energy);
             }
         }
-        for (n, site) in scattered.iter().enumerate().skip(compton) {
+        let coherent = scattered.iter().enumerate().skip(compton).take(rayleigh);
+        for (n, site) in coherent {
             let photon = &self.photons[site.lane()];
             let mut rng = self.generator(photon).after(self.draws.block(n));
             let tables = &self.transport.samplers[usize::from(site.code.material())];
@@ -149,6 +173,9 @@ impl Lanes<'_, '_> {
             let photon = &mut self.photons[site.lane()];
             photon.step = rng.step();
             photon.scatter(Category::Rayleigh);
+        }
+        for n in compton + rayleigh..scattered.len() {
+            turns.cos_theta[n] = 1.0 - 2.0 * unit(self.draws.block[0][n]);
         }
         let count = scattered.len().next_multiple_of(16);
         self.isa.run(Turn { turns, count });
