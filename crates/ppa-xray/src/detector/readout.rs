@@ -67,7 +67,7 @@ impl Readout {
 
     /// What is read out of pixels whose noise was drawn.
     ///
-    /// The error of the expected signal goes on over farther than the blur, so it is blurred as the signal is.
+    /// The error of the expected signal goes on over farther than the blur, which leaves it as it is.
     pub fn drawn(&self, layers: [DrawnLayer; 4], columns: usize) -> [Layer; 4] {
         let kernels = self.blur.as_ref().map(|blur| {
             let noise = blur.of_white_noise();
@@ -77,12 +77,11 @@ impl Readout {
         layers.map(|layer| {
             let DrawnLayer {
                 mut expected,
-                mut shared_sigma,
+                shared_sigma,
                 mut noise,
             } = layer;
             if let Some((of_signal, of_noise, of_variance)) = &kernels {
                 expected = of_signal.apply(&expected, columns);
-                shared_sigma = of_signal.apply(&shared_sigma, columns);
                 noise = noise.map(|[deviation, variance]| {
                     [
                         of_noise.apply(&deviation, columns),
