@@ -1,36 +1,42 @@
-//! A folder of DICOM slices, or a single one, becomes a scan.
+//! A folder of DICOM slices, or a single file, becomes a scan.
 
+mod attributes;
+mod codec;
+mod element;
+mod file;
+mod fragments;
+mod frame;
 mod header;
-mod open;
 mod pixels;
-mod rle;
+mod series;
 mod stack;
 mod stated;
+mod stored;
 mod syntax;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
 use crate::acquisition::Acquisition;
 use crate::error::ReadError;
-use crate::scan::{Scan, SeriesSummary, Warning, WarningCode, hu_plausibility, starts_as_dicom};
+use crate::scan::{ReadOptions, Scan, Warning, WarningCode, hu_plausibility, starts_as_dicom};
 use crate::volume::Volume;
-use header::{Found, Series, Slice};
-use stack::Stack;
+use header::{Found, Slice};
+use series::Sorted;
+use stack::{Between, Stack};
 
-/// Reads the one series in a folder, or below it when the folder itself has no DICOM file.
-pub(crate) fn read_folder(folder: &Path) -> Result<Scan, ReadError> {
+/// Reads one series in a folder, or below it when the folder itself has no DICOM file.
+pub(crate) fn read_folder(folder: &Path, options: &ReadOptions) -> Result<Scan, ReadError> {
     let files = dicom_files(folder)?;
     let looked_at = files.len();
-    let found = scan_headers(files.into_iter().filter(|(_, dicom)| *dicom).map(|f| f.0))?;
-    assemble(folder, found, looked_at)
+    let dicom = files.into_iter().filter(|(_, dicom)| *dicom).map(|f| f.0);
+    assemble(folder, scan_headers(dicom, options)?, looked_at, options)
 }
 
-/// Reads a single slice.
-pub(crate) fn read_file(file: &Path) -> Result<Scan, ReadError> {
-    assemble(file, scan_headers([file.to_owned()])?, 1)
+/// Reads a single file of one or more slices.
+pub(crate) fn read_file(file: &Path, options: &ReadOptions) -> Result<Scan, ReadError> {
+    assemble(file, scan_headers([file.to_owned()], options)?, 1, options)
 }
 
 /// All files of a folder in the order of their names, and whether each starts as DICOM; where
@@ -64,134 +70,63 @@ fn dicom_files(folder: &Path) -> Result<Vec<(PathBuf, bool)>, ReadError> {
 }
 
 /// Reads all headers in parallel; of several errors, the first file's is reported.
-fn scan_headers(files: impl IntoIterator<Item = PathBuf>) -> Result<Vec<Found>, ReadError> {
+fn scan_headers(
+    files: impl IntoIterator<Item = PathBuf>,
+    options: &ReadOptions,
+) -> Result<Vec<Found>, ReadError> {
     let files = files.into_iter().collect::<Vec<_>>();
-    let found = files.par_iter().map(|file| header::scan(file));
+    let found = files
+        .par_iter()
+        .map(|file| header::scan(file, options.force));
     // Collected before the errors are looked at: which one is first must not depend on threads.
     found.collect::<Vec<_>>().into_iter().collect()
 }
 
-fn assemble(source: &Path, found: Vec<Found>, looked_at: usize) -> Result<Scan, ReadError> {
-    let Sorted {
-        mut series,
-        mut warnings,
-        localizers,
-    } = sort_out(found);
-    let (summary, slices) = match series.len() {
-        0 if localizers > 0 => {
-            return Err(ReadError::OnlyLocalizers {
-                path: source.to_owned(),
-                localizers,
-            });
-        }
-        0 => {
-            return Err(ReadError::NoDicom {
-                path: source.to_owned(),
-                files: looked_at,
-            });
-        }
-        1 => series.remove(0),
-        _ => {
-            return Err(ReadError::SeveralSeries {
-                path: source.to_owned(),
-                series: series.into_iter().map(|(summary, _)| summary).collect(),
-            });
-        }
-    };
-    if summary.modality.as_deref() != Some("CT") {
-        return Err(ReadError::NotCt {
-            modality: summary.modality.unwrap_or_else(|| "unknown".to_owned()),
-            path: source.to_owned(),
-        });
-    }
-
-    let stack = Stack::of(source, &slices)?;
+fn assemble(
+    source: &Path,
+    found: Vec<Found>,
+    looked_at: usize,
+    options: &ReadOptions,
+) -> Result<Scan, ReadError> {
+    let sorted = Sorted::of(found);
+    let mut warnings = sorted.warnings();
+    let chosen = sorted.choose(source, looked_at, options)?;
+    let slices = chosen.slices;
+    warnings.extend(meaning_warnings(&slices, options.force)?);
+    slices.iter().try_for_each(pixels::check_size)?;
+    let stack = Stack::of(source, &slices, options.fill_gaps)?;
     warnings.extend(stack.warnings());
-    warnings.extend(rescale_warnings(&slices));
-    let hu = decode(&slices, &stack)?;
+    let (mut hu, padded) = decode(&slices, &stack)?;
+    warnings.extend(padding_warning(padded, hu.len()));
+    if let Some(between) = stack.between() {
+        hu = interpolate(&hu, slices[0].image.pixels(), between);
+    }
+    let acquisition = Acquisition {
+        padded_voxels: padded,
+        interpolated_slices: stack.made_up(),
+        ..Acquisition::of_slices(slices.iter().map(|s| &*s.stated))
+    };
     let unusable = |source_error| ReadError::Volume {
         path: source.to_owned(),
         source: source_error,
     };
     let grid = stack.grid().map_err(|e| unusable(e.into()))?;
     let volume = Volume::new(grid, hu).map_err(unusable)?;
+    warnings.extend(chosen.modality_warning);
     warnings.extend(hu_plausibility(&volume));
     Ok(Scan {
         volume,
-        modality: summary.modality.clone(),
-        series: vec![summary],
-        acquisition: Acquisition::of_slices(slices.iter().map(|s| &s.stated)),
+        modality: chosen.modality,
+        series: chosen.all,
+        acquisition,
         warnings,
     })
 }
 
-/// What the files of a folder turned out to be.
-struct Sorted {
-    /// By series number, then by first file; slices are empty for modalities other than CT.
-    series: Vec<(SeriesSummary, Vec<Slice>)>,
-    warnings: Vec<Warning>,
-    localizers: usize,
-}
-
-fn sort_out(found: Vec<Found>) -> Sorted {
-    let mut by_uid = BTreeMap::<String, (usize, Series, usize, Vec<Slice>)>::new();
-    let (mut localizers, mut others) = (0, 0);
-    for (order, item) in found.into_iter().enumerate() {
-        let (series, slice) = match item {
-            Found::Localizer => {
-                localizers += 1;
-                continue;
-            }
-            Found::NotAnImage => {
-                others += 1;
-                continue;
-            }
-            Found::OtherModality(series) => (series, None),
-            Found::Slice(series, slice) => (series, Some(slice)),
-        };
-        let (_, _, images, slices) = by_uid
-            .entry(series.uid.clone())
-            .or_insert_with(|| (order, series, 0, Vec::new()));
-        *images += 1;
-        slices.extend(slice.map(|slice| *slice));
-    }
-    let mut series = by_uid.into_values().collect::<Vec<_>>();
-    series.sort_by_key(|(order, series, ..)| (series.number, *order));
-
+/// What the headers say about the meaning of the values; other units than HU are refused unless forced.
+fn meaning_warnings(slices: &[Slice], force: bool) -> Result<Vec<Warning>, ReadError> {
     let mut warnings = Vec::new();
-    if localizers > 0 {
-        warnings.push(Warning {
-            code: WarningCode::LocalizersDropped,
-            text: format!("{localizers} localizer images (scout views) were left out"),
-        });
-    }
-    if others > 0 {
-        warnings.push(Warning {
-            code: WarningCode::NonImagesDropped,
-            text: format!("{others} DICOM objects that are no images were left out"),
-        });
-    }
-    let series = series
-        .into_iter()
-        .map(|(_, series, images, slices)| {
-            let summary = SeriesSummary {
-                number: series.number,
-                modality: series.modality,
-                slices: images,
-            };
-            (summary, slices)
-        })
-        .collect();
-    Sorted {
-        series,
-        warnings,
-        localizers,
-    }
-}
-
-fn rescale_warnings(slices: &[Slice]) -> Vec<Warning> {
-    let mut warnings = Vec::new();
-    let bare = slices.iter().filter(|s| s.rescale.is_none()).count();
+    let bare = slices.iter().filter(|s| s.frame.rescale.is_none()).count();
     if bare > 0 {
         warnings.push(Warning {
             code: WarningCode::NoRescale,
@@ -201,25 +136,52 @@ fn rescale_warnings(slices: &[Slice]) -> Vec<Warning> {
             ),
         });
     }
-    if let Some(other) = slices.iter().find_map(|s| s.foreign_unit.as_ref()) {
-        warnings.push(Warning {
+    let foreign = |s: &Slice| Some((s.file.path.clone(), s.frame.foreign_unit.clone()?));
+    match slices.iter().find_map(foreign) {
+        Some((path, unit)) if !force => return Err(ReadError::NotHu { path, unit }),
+        Some((_, unit)) => warnings.push(Warning {
             code: WarningCode::NotHu,
-            text: format!("the rescale type is {other}, not HU"),
-        });
+            text: format!("the values are in {unit}, not in HU"),
+        }),
+        None => {}
     }
-    warnings
+    Ok(warnings)
 }
 
-/// Decodes all slices in parallel, each into its place; the first slice's error is reported.
-fn decode(slices: &[Slice], stack: &Stack) -> Result<Vec<f32>, ReadError> {
-    let pixels = slices[0].rows * slices[0].columns;
+fn padding_warning(padded: usize, pixels: usize) -> Option<Warning> {
+    (padded > 0).then(|| Warning {
+        code: WarningCode::PixelPadding,
+        text: format!(
+            "{padded} pixels ({:.1} %) pad the images and hold no measurement; they were taken for air, -1000 HU",
+            100.0 * padded as f64 / pixels as f64
+        ),
+    })
+}
+
+/// Decodes all slices in parallel, each into its place, and counts padding; the first slice's error is reported.
+fn decode(slices: &[Slice], stack: &Stack) -> Result<(Vec<f32>, usize), ReadError> {
+    let pixels = slices[0].image.pixels();
     let mut hu = vec![0.0; pixels * slices.len()];
     let done = hu
         .par_chunks_mut(pixels)
         .zip(stack.order())
-        .map(|(place, &index)| pixels::decode(&slices[index], place));
-    done.collect::<Vec<_>>()
-        .into_iter()
-        .collect::<Result<(), _>>()?;
-    Ok(hu)
+        .map_init(Vec::new, |buffer, (place, &index)| {
+            pixels::decode(&slices[index], buffer, place)
+        });
+    let padded = done.collect::<Vec<_>>();
+    let padded = padded.into_iter().sum::<Result<usize, _>>()?;
+    Ok((hu, padded))
+}
+
+/// Slices between those of a stack, mixed linearly.
+fn interpolate(hu: &[f32], pixels: usize, between: &[Between]) -> Vec<f32> {
+    let mut filled = vec![0.0; pixels * between.len()];
+    let places = filled.par_chunks_mut(pixels).zip(between);
+    places.for_each(|(place, &Between { below, weight })| {
+        let [low, high] = [below, below + 1].map(|n| &hu[n * pixels..][..pixels]);
+        for ((place, low), high) in place.iter_mut().zip(low).zip(high) {
+            *place = low * (1.0 - weight) + high * weight;
+        }
+    });
+    filled
 }

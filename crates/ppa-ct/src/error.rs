@@ -73,19 +73,35 @@ pub enum ReadError {
         expected: &'static str,
     },
     /// Another modality than CT: its values are not Hounsfield units.
-    #[error("{} holds modality {modality}, not CT; its values are not Hounsfield units", path.display())]
+    #[error("{} holds modality {modality}, not CT; its values are not Hounsfield units and are read only when forced", path.display())]
     NotCt {
         /// The modality found.
         modality: String,
         /// The file or folder.
         path: PathBuf,
     },
-    /// More than one series in a folder.
-    #[error("{} holds {} series, expected one: {}", path.display(), series.len(), list_series(series))]
+    /// A CT whose header gives its values another unit than HU, as in maps of blood flow.
+    #[error("{} holds values in {unit}, not in Hounsfield units; they are read only when forced", path.display())]
+    NotHu {
+        /// The file.
+        path: PathBuf,
+        /// Code of the unit.
+        unit: String,
+    },
+    /// More than one series to choose from.
+    #[error("{} holds {} series, expected one or a choice by number or UID: {}", path.display(), series.len(), list_series(series))]
     SeveralSeries {
         /// The folder.
         path: PathBuf,
         /// Each series, by number.
+        series: Vec<SeriesSummary>,
+    },
+    /// The series that was chosen is not there.
+    #[error("{} does not hold the chosen series, but {}", path.display(), list_series(series))]
+    NoSuchSeries {
+        /// The folder or file.
+        path: PathBuf,
+        /// Each series that is there, by number.
         series: Vec<SeriesSummary>,
     },
     /// Nothing but localizers (scout views).
@@ -96,13 +112,15 @@ pub enum ReadError {
         /// Localizers found.
         localizers: usize,
     },
-    /// A multi-frame (enhanced) object.
-    #[error("{} is a multi-frame DICOM object ({frames} frames); only one slice per file is read", path.display())]
+    /// A multi-frame object that does not tell where its frames lie.
+    #[error("{} holds {frames} frames and places for {described} of them", path.display())]
     MultiFrame {
         /// The file.
         path: PathBuf,
         /// Frames in it.
-        frames: u32,
+        frames: usize,
+        /// Frames with functional groups of their own.
+        described: usize,
     },
     /// No decoder for the way the pixels are packed.
     #[error("cannot unpack the pixels of {}: transfer syntax {name} ({uid})", path.display())]
@@ -116,14 +134,14 @@ pub enum ReadError {
         /// What the decoder says.
         source: Cause,
     },
-    /// The pixel data do not have the size that the header promises.
-    #[error("{} holds {found} bytes of pixels, expected {expected}", path.display())]
+    /// The pixel data do not have the size that the header promises, or are compressed beyond belief.
+    #[error("{} holds {found} bytes of pixels, from which its header expects {expected}", path.display())]
     PixelCount {
         /// The file.
         path: PathBuf,
-        /// Bytes found.
+        /// Bytes found, compressed or not.
         found: u64,
-        /// Bytes promised.
+        /// Bytes promised, not compressed.
         expected: u64,
     },
     /// Slices of one series that do not fit on one lattice.
@@ -156,7 +174,7 @@ pub enum ReadError {
         positions: usize,
     },
     /// Slices are missing, or their steps vary.
-    #[error("the slices in {} are not evenly spaced: expected steps of {expected_mm:.3} mm, found {}", path.display(), list_gaps(gaps))]
+    #[error("the slices in {} are not evenly spaced: expected steps of {expected_mm:.3} mm, found {}; gaps are filled only when asked for", path.display(), list_gaps(gaps))]
     UnevenSteps {
         /// The folder.
         path: PathBuf,
@@ -196,9 +214,16 @@ fn list_series(series: &[SeriesSummary]) -> String {
     let names = series.iter().map(|s| {
         let number = s.number.map_or("?".to_owned(), |n| n.to_string());
         let modality = s.modality.as_deref().unwrap_or("no modality");
-        format!("number {number} ({modality}, {} images)", s.slices)
+        let [columns, rows] = s.size;
+        format!(
+            "number {number} ({modality}, {} images of {columns} x {rows})",
+            s.slices
+        )
     });
-    names.collect::<Vec<_>>().join("; ")
+    match series {
+        [] => "no series at all".to_owned(),
+        _ => names.collect::<Vec<_>>().join("; "),
+    }
 }
 
 fn list_gaps(gaps: &[Gap]) -> String {

@@ -40,5 +40,7 @@ pub use grid::{Grid, GridError};
 pub use info::Info;
 #[cfg(feature = "nifti")]
 pub use nifti_file::write as write_nifti;
-pub use scan::{Scan, SeriesSummary, Warning, WarningCode, read};
+pub use scan::{
+    ReadOptions, Scan, SeriesChoice, SeriesSummary, Warning, WarningCode, read, read_with,
+};
 pub use volume::{Volume, VolumeError};

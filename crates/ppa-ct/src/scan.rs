@@ -17,7 +17,7 @@ pub struct Scan {
     pub volume: Volume,
     /// Modality the source declares (`CT`); `None` for NIfTI, which cannot say.
     pub modality: Option<String>,
-    /// The DICOM series read; empty for NIfTI.
+    /// All DICOM series found, of which one was read; empty for NIfTI.
     pub series: Vec<SeriesSummary>,
     /// What the source says about its own making.
     pub acquisition: Acquisition,
@@ -34,6 +34,44 @@ pub struct SeriesSummary {
     pub modality: Option<String>,
     /// Images of the series.
     pub slices: usize,
+    /// Columns and rows of its first image.
+    pub size: [usize; 2],
+    /// Whether this is the series that was read.
+    pub read: bool,
+}
+
+/// What to read, and what to let pass.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct ReadOptions {
+    /// Which DICOM series, where there are several.
+    pub series: Option<SeriesChoice>,
+    /// Fills gaps between DICOM slices by linear interpolation, and says so, instead of refusing the series.
+    pub fill_gaps: bool,
+    /// Reads modalities other than CT and values in other units than HU, instead of refusing them.
+    pub force: bool,
+}
+
+/// One series of several.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SeriesChoice {
+    /// By Series Number.
+    Number(i32),
+    /// By Series Instance UID.
+    Uid(String),
+}
+
+impl std::str::FromStr for SeriesChoice {
+    type Err = &'static str;
+
+    /// A whole number is a Series Number, anything of digits and points a UID.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let is_uid = !text.is_empty() && text.chars().all(|c| c.is_ascii_digit() || c == '.');
+        match text.parse() {
+            Ok(number) => Ok(Self::Number(number)),
+            Err(_) if is_uid => Ok(Self::Uid(text.to_owned())),
+            Err(_) => Err("expected a series number or a series instance UID"),
+        }
+    }
 }
 
 /// Something about a scan that a user should know.
@@ -60,35 +98,58 @@ pub enum WarningCode {
     NonImagesDropped,
     /// No rescale slope and intercept: stored values are taken as HU.
     NoRescale,
-    /// The values do not look like Hounsfield units.
+    /// The values do not look like Hounsfield units, or were said to be none.
     NotHu,
+    /// Another modality than CT was read as asked for.
+    NotCt,
+    /// Pixels that hold no measurement became air.
+    PixelPadding,
+    /// Slices were interpolated, as asked for.
+    GapsFilled,
     /// The NIfTI header gives no orientation; the axes are assumed to be right, anterior, superior.
     NiftiNoOrientation,
 }
 
-/// Reads a CT: a folder with one DICOM series, a single DICOM slice, `.nii` or `.nii.gz`.
+/// Reads a CT: a folder with one DICOM series, a single DICOM file, `.nii` or `.nii.gz`.
+///
+/// As [`read_with`] without any option.
+///
+/// # Errors
+/// As [`read_with`].
+pub fn read(path: &Path) -> Result<Scan, ReadError> {
+    read_with(path, &ReadOptions::default())
+}
+
+/// Reads a CT as told.
 ///
 /// DICOM slices are sorted by their position along the slice normal; names and instance numbers
 /// are ignored. Subfolders are searched when the folder itself has no DICOM file. A tilted gantry
-/// gives a sheared affine, exactly as acquired.
+/// gives a sheared affine, exactly as acquired. Padding becomes air.
 ///
 /// # Errors
 /// [`ReadError`]: other formats, modalities other than CT, several series, missing slices,
 /// slices in the same place, mixed geometry, damaged files, pixel encodings without a decoder.
-pub fn read(path: &Path) -> Result<Scan, ReadError> {
+pub fn read_with(path: &Path, options: &ReadOptions) -> Result<Scan, ReadError> {
     let io = |source| ReadError::Io {
         path: path.to_owned(),
         source,
     };
     if std::fs::metadata(path).map_err(io)?.is_dir() {
-        return read_dicom_folder(path);
+        return read_dicom_folder(path, options);
     }
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let name = name.to_ascii_lowercase();
+    if name.ends_with(".dcm") || starts_as_dicom(path).map_err(io)? {
+        return read_dicom_file(path, options);
+    }
+    if options.series.is_some() {
+        return Err(ReadError::NoSuchSeries {
+            path: path.to_owned(),
+            series: Vec::new(),
+        });
+    }
     if name.ends_with(".nii") || name.ends_with(".nii.gz") {
         read_nifti(path)
-    } else if name.ends_with(".dcm") || starts_as_dicom(path).map_err(io)? {
-        read_dicom_file(path)
     } else {
         Err(ReadError::Unsupported {
             path: path.to_owned(),
@@ -132,12 +193,12 @@ use crate::dicom_series::{read_file as read_dicom_file, read_folder as read_dico
 use crate::nifti_file::read as read_nifti;
 
 #[cfg(not(feature = "dicom"))]
-fn read_dicom_folder(path: &Path) -> Result<Scan, ReadError> {
+fn read_dicom_folder(path: &Path, _: &ReadOptions) -> Result<Scan, ReadError> {
     feature_off(path, "dicom")
 }
 
 #[cfg(not(feature = "dicom"))]
-fn read_dicom_file(path: &Path) -> Result<Scan, ReadError> {
+fn read_dicom_file(path: &Path, _: &ReadOptions) -> Result<Scan, ReadError> {
     feature_off(path, "dicom")
 }
 

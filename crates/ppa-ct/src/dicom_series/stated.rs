@@ -3,29 +3,32 @@
 use std::collections::BTreeSet;
 
 use dicom_core::dictionary::DataDictionary;
-use dicom_core::header::Header;
 use dicom_core::{Tag, VR};
 use dicom_dictionary_std::{StandardDataDictionary, tags};
-use dicom_object::InMemDicomObject;
 
-use super::header::PixelFormat;
+use super::attributes::Attributes;
+use super::element::{DEEPEST, DataSet};
+use super::file;
+use super::frame::Frame;
+use super::header::Image;
+use super::stored::StoredFormat;
 use crate::acquisition::Acquisition;
 
-/// Reads the facts of one slice; `rescale` is slope and intercept from stored values to HU.
-pub(super) fn acquisition(
-    object: &InMemDicomObject,
-    pixel: PixelFormat,
-    rescale: [f64; 2],
-) -> Acquisition {
-    let number = |tag| object.get(tag)?.to_float64().ok().filter(|v| v.is_finite());
-    let text = |tag| Some(object.get(tag)?.to_str().ok()?.trim().to_owned());
+/// Reads the facts of one file, whose frames are taken to be made alike.
+pub(super) fn stated(top: &Attributes, image: &Image, first: Option<&Frame>) -> Acquisition {
+    let text = |tag| top.data_set.get(tag).map(file::text);
+    let number = |tag| text(tag)?.parse::<f64>().ok().filter(|v| v.is_finite());
+    let rescale = first.and_then(|frame| frame.rescale);
     let mut identifiers = BTreeSet::new();
-    collect_identifiers(object, &mut identifiers);
+    collect_identifiers(top.data_set, DEEPEST, &mut identifiers);
     Acquisition {
-        slice_thickness_mm: number(tags::SLICE_THICKNESS).filter(|t| *t > 0.0),
+        slice_thickness_mm: first.and_then(|frame| frame.thickness_mm),
         patient_position: text(tags::PATIENT_POSITION).filter(|p| POSITIONS.contains(&p.as_str())),
         table_height_mm: number(tags::TABLE_HEIGHT),
-        representable_hu: Some(representable_hu(pixel, rescale)),
+        representable_hu: Some(representable_hu(
+            image.stored,
+            rescale.unwrap_or([1.0, 0.0]),
+        )),
         lossy: text(tags::LOSSY_IMAGE_COMPRESSION).as_deref() == Some("01"),
         identifiers,
         ..Acquisition::default()
@@ -38,7 +41,7 @@ const POSITIONS: [&str; 16] = [
     "AFS", "AFDR", "AFDL",
 ];
 
-fn representable_hu(pixel: PixelFormat, [slope, intercept]: [f64; 2]) -> [f64; 2] {
+fn representable_hu(pixel: StoredFormat, [slope, intercept]: [f64; 2]) -> [f64; 2] {
     let span = 2_f64.powi(pixel.bits_stored as i32);
     let lowest = if pixel.signed { -span / 2.0 } else { 0.0 };
     let ends = [lowest, lowest + span - 1.0].map(|stored| slope * stored + intercept);
@@ -102,26 +105,28 @@ const KINDS: [Tag; 3] = [
     tags::TRANSFER_SYNTAX_UID,
 ];
 
-fn collect_identifiers(object: &InMemDicomObject, found: &mut BTreeSet<&'static str>) {
-    for element in object {
-        let tag = element.tag();
-        if let Some(items) = element.items() {
-            items
-                .iter()
-                .for_each(|item| collect_identifiers(item, found));
+fn collect_identifiers(data_set: &DataSet, depth: usize, found: &mut BTreeSet<&'static str>) {
+    for (tag, vr, value) in data_set.elements() {
+        let vr = vr.unwrap_or_else(|| {
+            let known = StandardDataDictionary.by_tag(tag);
+            known.map_or(VR::UN, |entry| entry.vr.relaxed())
+        });
+        if vr == VR::SQ {
+            // A damaged sequence that nothing else needs does not stop the reading.
+            let items = data_set.items(tag).unwrap_or_default();
+            for item in items.iter().filter(|_| depth > 0) {
+                collect_identifiers(item, depth - 1, found);
+            }
             continue;
         }
-        let filled = element
-            .to_str()
-            .is_ok_and(|text| !text.trim_matches(['\0', ' ']).is_empty());
-        if !filled {
+        if file::text(value).is_empty() {
             continue;
         }
         if tag.group() % 2 == 1 {
             found.insert("private attributes");
             continue;
         }
-        let by_type = match element.vr() {
+        let by_type = match vr {
             VR::PN | VR::DA | VR::DT => true,
             VR::UI => !KINDS.contains(&tag),
             _ => false,

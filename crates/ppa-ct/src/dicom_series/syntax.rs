@@ -1,8 +1,40 @@
-//! Transfer syntaxes: their names, and the error that gives them.
+//! Transfer syntaxes: their names, and which of them ppa reads.
 
 use std::path::Path;
 
+use super::codec::Codec;
+use super::element::Encoding;
 use crate::error::ReadError;
+
+/// How the elements of a file with this transfer syntax are written.
+///
+/// # Errors
+/// For encodings that are not known: their elements may be written in any way.
+pub(super) fn encoding(path: &Path, uid: &str) -> Result<Encoding, ReadError> {
+    match uid {
+        "1.2.840.10008.1.2" => Ok(Encoding::ImplicitLittle),
+        "1.2.840.10008.1.2.2" => Ok(Encoding::ExplicitBig),
+        // All others are explicit and little-endian (PS3.5, annex A).
+        _ if name(uid).is_some() => Ok(Encoding::ExplicitLittle),
+        _ => Err(unsupported(path, uid, "ppa does not know this encoding")),
+    }
+}
+
+/// The decoder for compressed pixels.
+pub(super) fn codec(path: &Path, uid: &str) -> Result<Codec, ReadError> {
+    match uid.strip_prefix("1.2.840.10008.1.2.") {
+        Some("5") => Ok(Codec::Rle),
+        Some("4.50" | "4.51" | "4.57" | "4.70") => Ok(Codec::Jpeg),
+        Some("4.80" | "4.81") => Ok(Codec::JpegLs),
+        Some("4.90" | "4.91") => Ok(Codec::Jpeg2000),
+        Some("4.53" | "4.55") => Err(unsupported(
+            path,
+            uid,
+            "the standard has retired it and no maintained decoder reads it; convert it first",
+        )),
+        _ => Err(unsupported(path, uid, "ppa has no decoder for it")),
+    }
+}
 
 /// Error for pixels that cannot be unpacked.
 pub(super) fn unsupported(
@@ -10,18 +42,17 @@ pub(super) fn unsupported(
     uid: &str,
     source: impl Into<Box<dyn std::error::Error + Send + Sync>>,
 ) -> ReadError {
-    let uid = uid.trim_end_matches(['\0', ' ']);
     ReadError::TransferSyntax {
         path: path.to_owned(),
         uid: uid.to_owned(),
-        name: name(uid),
+        name: name(uid).unwrap_or("an encoding unknown to ppa"),
         source: source.into(),
     }
 }
 
 /// Names of the encodings that CT archives use, retired ones included (DICOM PS3.6, table A-1).
-fn name(uid: &str) -> &'static str {
-    match uid {
+fn name(uid: &str) -> Option<&'static str> {
+    Some(match uid {
         "1.2.840.10008.1.2" => "implicit VR little endian",
         "1.2.840.10008.1.2.1" => "explicit VR little endian",
         "1.2.840.10008.1.2.1.99" => "deflated explicit VR little endian",
@@ -43,6 +74,6 @@ fn name(uid: &str) -> &'static str {
         "1.2.840.10008.1.2.4.202" => "high-throughput JPEG 2000 lossless, RPCL",
         "1.2.840.10008.1.2.4.203" => "high-throughput JPEG 2000",
         "1.2.840.10008.1.2.5" => "RLE lossless",
-        _ => "an encoding unknown to ppa",
-    }
+        _ => return None,
+    })
 }

@@ -1,0 +1,129 @@
+//! The attributes of one frame, wherever its object keeps them.
+
+use std::path::Path;
+
+use dicom_core::Tag;
+use dicom_dictionary_std::tags;
+
+use super::element::DataSet;
+use super::file::{damaged, text};
+use crate::error::ReadError;
+
+/// The data set of a file, and for multi-frame objects the groups that hold for one frame.
+pub(super) struct Attributes<'a> {
+    pub path: &'a Path,
+    pub data_set: &'a DataSet<'a>,
+    /// Per-frame, then shared functional groups (PS3.3, section C.7.6.16); empty for plain objects.
+    pub groups: Vec<&'a DataSet<'a>>,
+}
+
+impl<'a> Attributes<'a> {
+    /// Those of an object without functional groups.
+    pub fn of(path: &'a Path, data_set: &'a DataSet<'a>) -> Self {
+        Self {
+            path,
+            data_set,
+            groups: Vec::new(),
+        }
+    }
+
+    fn value(&self, tag: Tag) -> Result<Option<&'a [u8]>, ReadError> {
+        let Some(sequence) = group_of(tag) else {
+            return Ok(self.data_set.get(tag));
+        };
+        for group in &self.groups {
+            let items = group.items(sequence).map_err(|f| damaged(self.path, f))?;
+            if let Some(value) = items.first().and_then(|item| item.get(tag)) {
+                return Ok(Some(value));
+            }
+        }
+        Ok(self.data_set.get(tag))
+    }
+
+    /// An attribute as text without padding; `None` when it is absent or empty.
+    pub fn text(&self, tag: Tag) -> Result<Option<String>, ReadError> {
+        Ok(self.value(tag)?.map(text).filter(|text| !text.is_empty()))
+    }
+
+    /// A binary number of 16 bits, which all frames share.
+    pub fn word(&self, tag: Tag) -> Option<u16> {
+        let bytes = self.data_set.get(tag)?.first_chunk::<2>()?;
+        Some(self.data_set.encoding().u16(*bytes))
+    }
+
+    /// A binary number of 16 bits that must be there.
+    pub fn needed_word(&self, tag: Tag, name: &'static str) -> Result<u16, ReadError> {
+        self.word(tag).ok_or_else(|| self.missing(name))
+    }
+
+    /// Numbers written as text that must be there.
+    pub fn numbers<const N: usize>(
+        &self,
+        tag: Tag,
+        name: &'static str,
+    ) -> Result<[f64; N], ReadError> {
+        let text = self.text(tag)?.ok_or_else(|| self.missing(name))?;
+        let values = text.split('\\').map(|part| part.trim().parse::<f64>().ok());
+        let values = values.collect::<Option<Vec<_>>>();
+        values
+            .and_then(|values| <[f64; N]>::try_from(values).ok())
+            .filter(|values| values.iter().all(|v| v.is_finite()))
+            .ok_or_else(|| self.bad(name, text, "finite numbers of the standard's count"))
+    }
+
+    /// A number written as text; `None` when it is absent or empty.
+    pub fn optional(&self, tag: Tag, name: &'static str) -> Result<Option<f64>, ReadError> {
+        match self.text(tag)? {
+            None => Ok(None),
+            Some(_) => self.numbers::<1>(tag, name).map(|[value]| Some(value)),
+        }
+    }
+
+    /// The code of the unit that the frame's real-world values are in.
+    pub fn real_world_unit(&self) -> Result<Option<String>, ReadError> {
+        let fault = |f| damaged(self.path, f);
+        for group in self.groups.iter().copied().chain([self.data_set]) {
+            for mapping in group
+                .items(tags::REAL_WORLD_VALUE_MAPPING_SEQUENCE)
+                .map_err(fault)?
+            {
+                let units = mapping
+                    .items(tags::MEASUREMENT_UNITS_CODE_SEQUENCE)
+                    .map_err(fault)?;
+                if let Some(code) = units.first().and_then(|unit| unit.get(tags::CODE_VALUE)) {
+                    return Ok(Some(text(code)));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    pub fn missing(&self, tag: &'static str) -> ReadError {
+        ReadError::MissingTag {
+            path: self.path.to_owned(),
+            tag,
+        }
+    }
+
+    pub fn bad(&self, tag: &'static str, found: String, expected: &'static str) -> ReadError {
+        ReadError::BadTag {
+            path: self.path.to_owned(),
+            tag,
+            found,
+            expected,
+        }
+    }
+}
+
+/// The functional group that holds an attribute in multi-frame objects.
+fn group_of(tag: Tag) -> Option<Tag> {
+    match tag {
+        tags::IMAGE_POSITION_PATIENT => Some(tags::PLANE_POSITION_SEQUENCE),
+        tags::IMAGE_ORIENTATION_PATIENT => Some(tags::PLANE_ORIENTATION_SEQUENCE),
+        tags::PIXEL_SPACING | tags::SLICE_THICKNESS => Some(tags::PIXEL_MEASURES_SEQUENCE),
+        tags::RESCALE_SLOPE | tags::RESCALE_INTERCEPT | tags::RESCALE_TYPE => {
+            Some(tags::PIXEL_VALUE_TRANSFORMATION_SEQUENCE)
+        }
+        _ => None,
+    }
+}

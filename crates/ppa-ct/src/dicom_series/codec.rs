@@ -1,0 +1,98 @@
+//! Compressed frames become containers as the header describes them, little-endian.
+//!
+//! Decoders: RLE and JPEG-LS are ours (no maintained crate of Rust alone holds the latter), JPEG is libjpeg-turbo-rs,
+//! JPEG 2000 hayro-jpeg2000. All are Rust; sizes are compared with the header before any of them reserves memory.
+
+mod jpeg;
+mod jpeg_2000;
+mod jpeg_ls;
+mod rle;
+
+use super::header::Image;
+
+/// A family of encodings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Codec {
+    Rle,
+    Jpeg,
+    JpegLs,
+    Jpeg2000,
+}
+
+/// Why a frame cannot be decompressed.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum CodecError {
+    #[error("the compressed stream is damaged ({0})")]
+    Damaged(String),
+    #[error("the compressed stream holds {found}, expected {expected}")]
+    Unexpected { found: String, expected: String },
+}
+
+impl Codec {
+    /// Unpacks one frame into `image.native_bytes()` bytes.
+    pub fn unpack(self, packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError> {
+        match self {
+            Self::Rle => rle::unpack(packed, image.pixels(), image.stored.bytes())
+                .ok_or_else(|| CodecError::Damaged("run lengths".to_owned())),
+            Self::Jpeg => jpeg::unpack(packed, image),
+            Self::JpegLs => jpeg_ls::unpack(packed, image),
+            Self::Jpeg2000 => jpeg_2000::unpack(packed, image),
+        }
+    }
+
+    /// Most bytes that come out of one byte of a right stream: constant frames pack best.
+    ///
+    /// RLE makes 128 bytes of 2; a JPEG pixel takes at least a bit, a block of 8 x 8 pixels two; JPEG-LS
+    /// puts up to 2^15 equal pixels into one bit, whole lines of a frame into a few bits each; a JPEG 2000 frame may be empty.
+    pub fn expands_at_most(self) -> u64 {
+        match self {
+            Self::Rle => 64,
+            Self::Jpeg => 1 << 10,
+            Self::JpegLs | Self::Jpeg2000 => 1 << 14,
+        }
+    }
+}
+
+/// Refuses a stream whose frame is not of the size that the header tells.
+fn expect_size(found: [usize; 2], image: &Image) -> Result<(), CodecError> {
+    let expected = [image.columns, image.rows];
+    if found == expected {
+        return Ok(());
+    }
+    let text = |[columns, rows]: [usize; 2]| format!("{columns} x {rows} pixels");
+    Err(CodecError::Unexpected {
+        found: text(found),
+        expected: text(expected),
+    })
+}
+
+/// Decoded samples in the containers of the header.
+fn contain(
+    samples: impl ExactSizeIterator<Item = u32>,
+    image: &Image,
+) -> Result<Vec<u8>, CodecError> {
+    if samples.len() != image.pixels() {
+        return Err(CodecError::Unexpected {
+            found: format!("{} samples", samples.len()),
+            expected: format!("{} (one per pixel)", image.pixels()),
+        });
+    }
+    let mut bytes = Vec::with_capacity(image.native_bytes());
+    match image.stored.bytes() {
+        1 => bytes.extend(samples.map(|v| v as u8)),
+        2 => bytes.extend(samples.flat_map(|v| (v as u16).to_le_bytes())),
+        _ => bytes.extend(samples.flat_map(u32::to_le_bytes)),
+    }
+    Ok(bytes)
+}
+
+/// Refuses samples of more bits than a container has.
+fn expect_depth(bits: u32, image: &Image) -> Result<(), CodecError> {
+    if bits <= image.stored.bits_allocated {
+        return Ok(());
+    }
+    Err(CodecError::Unexpected {
+        found: format!("samples of {bits} bits"),
+        expected: format!("at most {}", image.stored.bits_allocated),
+    })
+}

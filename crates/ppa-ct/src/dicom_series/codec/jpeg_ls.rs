@@ -1,0 +1,82 @@
+//! JPEG-LS, lossless and near-lossless, of one component (ISO/IEC 14495-1, the same as ITU-T T.87).
+
+mod bits;
+mod context;
+mod scan;
+
+use super::{CodecError, contain, expect_depth, expect_size};
+use crate::dicom_series::header::Image;
+use scan::{Coding, Thresholds};
+
+pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError> {
+    let damaged = |what: &str| CodecError::Damaged(what.to_owned());
+    let mut rest = packed
+        .strip_prefix(&[0xff, 0xd8])
+        .ok_or_else(|| damaged("no start of an image"))?;
+    let mut bits = None;
+    let mut thresholds = None;
+    loop {
+        let [0xff, marker, high, low, tail @ ..] = rest else {
+            return Err(damaged("a marker is missing"));
+        };
+        let length = usize::from(u16::from_be_bytes([*high, *low]));
+        let segment = length.checked_sub(2).and_then(|length| tail.get(..length));
+        let segment = segment.ok_or_else(|| damaged("a segment is cut"))?;
+        rest = &tail[segment.len()..];
+        match (marker, segment) {
+            // Start of a frame (section C.2.2).
+            (0xf7, [depth, y1, y0, x1, x0, components, ..]) => {
+                let size = [[*x1, *x0], [*y1, *y0]].map(|v| u16::from_be_bytes(v).into());
+                expect_size(size, image)?;
+                expect_depth(u32::from(*depth), image)?;
+                if *components != 1 || !(2..=16).contains(depth) {
+                    return Err(CodecError::Unexpected {
+                        found: format!("{components} components of {depth} bits"),
+                        expected: "1 (grey) of 2 to 16".to_owned(),
+                    });
+                }
+                bits = Some(u32::from(*depth));
+            }
+            // Coding parameters (section C.2.4.1.1); zeros stand for the defaults.
+            (0xf8, [1, parameters @ ..]) if parameters.len() == 10 => {
+                let (numbers, _) = parameters.as_chunks::<2>();
+                let number = |n: usize| i32::from(u16::from_be_bytes(numbers[n]));
+                thresholds = Some(Thresholds {
+                    largest: number(0),
+                    t: [number(1), number(2), number(3)],
+                    reset: number(4),
+                });
+            }
+            (0xf8, [kind, ..]) => {
+                return Err(CodecError::Unexpected {
+                    found: format!("parameters of type {kind}"),
+                    expected: "type 1".to_owned(),
+                });
+            }
+            (0xdd, interval) if interval.iter().any(|b| *b > 0) => {
+                return Err(CodecError::Unexpected {
+                    found: "restart markers".to_owned(),
+                    expected: "none".to_owned(),
+                });
+            }
+            // Start of the scan (section C.2.3).
+            (0xda, [1, _, mapping, near, _, transform]) => {
+                let bits = bits.ok_or_else(|| damaged("a scan without a frame"))?;
+                if *mapping != 0 || *transform != 0 {
+                    return Err(CodecError::Unexpected {
+                        found: "a mapping table or a point transform".to_owned(),
+                        expected: "neither".to_owned(),
+                    });
+                }
+                let coding = Coding::new(bits, i32::from(*near), thresholds)
+                    .ok_or_else(|| damaged("impossible coding parameters"))?;
+                let samples = coding
+                    .decode(rest, image.columns, image.rows)
+                    .ok_or_else(|| damaged("it ends early or holds an impossible code"))?;
+                return contain(samples.iter().map(|&v| v.into()), image);
+            }
+            (0xe0..=0xef | 0xfe | 0xdd, _) => {}
+            _ => return Err(damaged("an unknown marker")),
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! The bits of a scan, most significant first.
+
+/// Hands out bits; behind the end come zeros, and the reader remembers that they did.
+pub(super) struct Bits<'a> {
+    bytes: &'a [u8],
+    /// Unread bits, in the upper end.
+    cache: u64,
+    cached: u32,
+    /// Zeros that were made up.
+    missing: u32,
+    /// Whether the byte taken last was 0xff: the next one holds only seven bits (section A.1).
+    stuffed: bool,
+}
+
+impl<'a> Bits<'a> {
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self {
+            bytes,
+            cache: 0,
+            cached: 0,
+            missing: 0,
+            stuffed: false,
+        }
+    }
+
+    /// Makes at least 48 bits available.
+    fn fill(&mut self) {
+        while self.cached <= 48 {
+            match self.bytes {
+                // A byte above 0x7f behind 0xff makes a marker: the scan is over.
+                [byte, rest @ ..] if !(self.stuffed && *byte > 0x7f) => {
+                    let width = if self.stuffed { 7 } else { 8 };
+                    self.cache |= u64::from(*byte) << (64 - width - self.cached);
+                    self.cached += width;
+                    self.stuffed = *byte == 0xff;
+                    self.bytes = rest;
+                }
+                _ => {
+                    self.cached += 8;
+                    self.missing += 8;
+                }
+            }
+        }
+    }
+
+    /// The next `count` bits, at most 32, as a number.
+    #[inline]
+    pub fn take(&mut self, count: u32) -> u32 {
+        if self.cached < count {
+            self.fill();
+        }
+        // Two shifts: a shift by all 64 bits is none.
+        let bits = (self.cache >> 1 >> (63 - count)) as u32;
+        self.cache <<= count;
+        self.cached -= count;
+        bits
+    }
+
+    /// Counts the zeros in front of the next one and takes all of them; `None` for more than `most`.
+    #[inline]
+    pub fn zeros(&mut self, most: u32) -> Option<u32> {
+        if self.cached <= most {
+            self.fill();
+        }
+        let zeros = self.cache.leading_zeros();
+        if zeros > most {
+            return None;
+        }
+        self.cache = self.cache << zeros << 1;
+        self.cached -= zeros + 1;
+        Some(zeros)
+    }
+
+    /// Whether more bits were taken than there are.
+    pub fn overdrawn(&self) -> bool {
+        self.missing > self.cached
+    }
+}

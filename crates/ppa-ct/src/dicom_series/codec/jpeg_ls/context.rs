@@ -1,0 +1,125 @@
+//! What a context has learnt about prediction errors (sections A.4 to A.6).
+
+/// Statistics of one context of the regular mode.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Context {
+    /// Sum of magnitudes, `A`.
+    magnitude: i64,
+    /// Sum of errors, `B`.
+    bias: i64,
+    /// Correction of the prediction, `C`.
+    pub correction: i32,
+    /// Errors counted, `N`.
+    count: i64,
+}
+
+impl Context {
+    pub fn new(range: i32) -> Self {
+        Self {
+            magnitude: first_magnitude(range),
+            bias: 0,
+            correction: 0,
+            count: 1,
+        }
+    }
+
+    /// The Golomb parameter `k`.
+    #[inline]
+    pub fn golomb(&self) -> u32 {
+        golomb(self.count, self.magnitude)
+    }
+
+    /// Whether codes stand for errors mirrored about -1/2 (section A.5.2).
+    #[inline]
+    pub fn is_inverted(&self) -> bool {
+        2 * self.bias <= -self.count
+    }
+
+    /// Learns a quantised error.
+    #[inline]
+    pub fn learn(&mut self, error: i32, step: i32, reset: i64) {
+        self.bias += i64::from(error * step);
+        self.magnitude += i64::from(error.abs());
+        if self.count == reset {
+            self.magnitude >>= 1;
+            self.bias >>= 1;
+            self.count >>= 1;
+        }
+        self.count += 1;
+        if self.bias <= -self.count {
+            self.bias = (self.bias + self.count).max(1 - self.count);
+            self.correction = (self.correction - 1).max(-128);
+        } else if self.bias > 0 {
+            self.bias = (self.bias - self.count).min(0);
+            self.correction = (self.correction + 1).min(127);
+        }
+    }
+}
+
+/// Statistics of the samples that end runs; one context where the neighbours agree, one where not.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RunContext {
+    magnitude: i64,
+    count: i64,
+    /// Negative errors, `Nn`.
+    negative: i64,
+    /// 1 where the neighbours agree.
+    kind: i32,
+}
+
+impl RunContext {
+    pub fn new(range: i32, kind: i32) -> Self {
+        Self {
+            magnitude: first_magnitude(range),
+            count: 1,
+            negative: 0,
+            kind,
+        }
+    }
+
+    pub fn golomb(&self) -> u32 {
+        golomb(
+            self.count,
+            self.magnitude + i64::from(self.kind) * (self.count >> 1),
+        )
+    }
+
+    /// The error that a code stands for (section A.7.2.2).
+    pub fn error(&self, code: i32, k: u32) -> i32 {
+        let doubled = code + self.kind;
+        let mapped = doubled & 1;
+        let magnitude = (doubled + mapped) / 2;
+        let negative_if_mapped = k != 0 || 2 * self.negative >= self.count;
+        if negative_if_mapped == (mapped == 1) {
+            -magnitude
+        } else {
+            magnitude
+        }
+    }
+
+    pub fn learn(&mut self, error: i32, code: i32, reset: i64) {
+        self.negative += i64::from(error < 0);
+        self.magnitude += i64::from((code + 1 - self.kind) >> 1);
+        if self.count == reset {
+            self.magnitude >>= 1;
+            self.count >>= 1;
+            self.negative >>= 1;
+        }
+        self.count += 1;
+    }
+}
+
+fn first_magnitude(range: i32) -> i64 {
+    i64::from((range + 32) >> 6).max(2)
+}
+
+/// Smallest `k` with `count · 2^k ≥ magnitude`; `count` is at least 1.
+#[inline]
+fn golomb(count: i64, magnitude: i64) -> u32 {
+    let mut k = 0;
+    // Errors are below 2^17, so this ends.
+    while (count << k) < magnitude {
+        k += 1;
+    }
+    k
+}

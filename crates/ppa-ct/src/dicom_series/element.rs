@@ -1,0 +1,359 @@
+//! Where the elements of a DICOM data set lie in its bytes (PS3.5, section 7).
+//!
+//! Lengths are followed only as far as the bytes reach and nothing is copied. So a damaged length costs an error and no
+//! memory (dicom-object reserves whatever length a file claims, up to 4 GiB), and pixels are read from where they lie.
+
+use std::ops::Range;
+
+use dicom_core::{Tag, VR};
+
+/// How elements are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Encoding {
+    ImplicitLittle,
+    ExplicitLittle,
+    ExplicitBig,
+}
+
+/// Why bytes are no data set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(super) enum Fault {
+    /// An element goes on behind the last byte.
+    #[error("an element ends behind the end of the data")]
+    Short,
+    /// No element, or sequences in sequences beyond all measure.
+    #[error("byte {0} of the data set starts no element")]
+    Damaged(usize),
+}
+
+/// Sequences in sequences; real ones go five deep.
+pub(super) const DEEPEST: usize = 16;
+const ITEM: Tag = Tag(0xfffe, 0xe000);
+const ITEM_END: Tag = Tag(0xfffe, 0xe00d);
+const SEQUENCE_END: Tag = Tag(0xfffe, 0xe0dd);
+
+impl Encoding {
+    pub fn u16(self, bytes: [u8; 2]) -> u16 {
+        match self {
+            Self::ExplicitBig => u16::from_be_bytes(bytes),
+            _ => u16::from_le_bytes(bytes),
+        }
+    }
+
+    pub fn u32(self, bytes: [u8; 4]) -> u32 {
+        match self {
+            Self::ExplicitBig => u32::from_be_bytes(bytes),
+            _ => u32::from_le_bytes(bytes),
+        }
+    }
+}
+
+/// The start of an element.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct ElementHeader {
+    pub tag: Tag,
+    /// Value representation; `None` where it is not written.
+    pub vr: Option<[u8; 2]>,
+    /// First byte of the value.
+    pub value_at: usize,
+    /// Bytes of the value; `None` for a sequence that is ended by a delimiter.
+    pub length: Option<usize>,
+}
+
+/// An element that lies whole in its bytes.
+#[derive(Debug)]
+struct Element {
+    tag: Tag,
+    vr: Option<[u8; 2]>,
+    value: Range<usize>,
+}
+
+/// The elements of one data set or item.
+#[derive(Debug)]
+pub(super) struct DataSet<'a> {
+    bytes: &'a [u8],
+    elements: Vec<Element>,
+    encoding: Encoding,
+}
+
+impl<'a> DataSet<'a> {
+    /// Finds the elements from byte `at` on, up to the first that `stop` tells or to the end;
+    /// also returns where that is.
+    pub fn parse(
+        bytes: &'a [u8],
+        mut at: usize,
+        encoding: Encoding,
+        stop: impl Fn(Tag) -> bool,
+    ) -> Result<(Self, usize), Fault> {
+        let mut elements = Vec::new();
+        while at < bytes.len() {
+            if stop(tag(bytes, at, encoding)?) {
+                break;
+            }
+            let header = header(bytes, at, encoding)?;
+            let end = end_of(bytes, &header, encoding, 0)?;
+            elements.push(Element {
+                tag: header.tag,
+                vr: header.vr,
+                value: header.value_at..end,
+            });
+            at = end;
+        }
+        let found = Self {
+            bytes,
+            elements,
+            encoding,
+        };
+        Ok((found, at))
+    }
+
+    /// The value of an element; `None` when it is absent.
+    pub fn get(&self, tag: Tag) -> Option<&'a [u8]> {
+        self.find(tag)
+            .map(|element| &self.bytes[element.value.clone()])
+    }
+
+    fn find(&self, tag: Tag) -> Option<&Element> {
+        self.elements.iter().find(|element| element.tag == tag)
+    }
+
+    /// All elements: tag, value representation where it is written, value.
+    pub fn elements(&self) -> impl Iterator<Item = (Tag, Option<VR>, &'a [u8])> {
+        self.elements.iter().map(|element| {
+            let vr = element.vr.and_then(VR::from_binary);
+            (element.tag, vr, &self.bytes[element.value.clone()])
+        })
+    }
+
+    /// How the numbers in it are written.
+    pub fn encoding(&self) -> Encoding {
+        self.encoding
+    }
+
+    /// The items of a sequence; none when it is absent.
+    pub fn items(&self, sequence: Tag) -> Result<Vec<DataSet<'a>>, Fault> {
+        let Some(element) = self.find(sequence) else {
+            return Ok(Vec::new());
+        };
+        let encoding = inside(element.vr, self.encoding);
+        let bytes = &self.bytes[..element.value.end];
+        let (mut items, mut at) = (Vec::new(), element.value.start);
+        while at < bytes.len() {
+            let item = header(bytes, at, encoding)?;
+            match item.tag {
+                ITEM => {
+                    let end = end_of(bytes, &item, encoding, 0)?;
+                    let stop = |tag| tag == ITEM_END;
+                    items.push(Self::parse(&bytes[..end], item.value_at, encoding, stop)?.0);
+                    at = end;
+                }
+                SEQUENCE_END => break,
+                _ => return Err(Fault::Damaged(at)),
+            }
+        }
+        Ok(items)
+    }
+}
+
+/// Reads the start of the element at byte `at`.
+pub(super) fn header(bytes: &[u8], at: usize, encoding: Encoding) -> Result<ElementHeader, Fault> {
+    let tag = tag(bytes, at, encoding)?;
+    let short = |from: usize| Ok(usize::from(encoding.u16(array(bytes, from)?)));
+    let long = |from: usize| -> Result<_, Fault> {
+        let length = encoding.u32(array(bytes, from)?);
+        Ok((length != u32::MAX).then_some(length as usize))
+    };
+    let (vr, value_at, length) = if tag.0 == 0xfffe || encoding == Encoding::ImplicitLittle {
+        (None, at + 8, long(at + 4)?)
+    } else {
+        let vr = array::<2>(bytes, at + 4)?;
+        if !vr.iter().all(u8::is_ascii_uppercase) {
+            return Err(Fault::Damaged(at));
+        }
+        if has_short_length(&vr) {
+            (Some(vr), at + 8, Some(short(at + 6)?))
+        } else {
+            (Some(vr), at + 12, long(at + 8)?)
+        }
+    };
+    Ok(ElementHeader {
+        tag,
+        vr,
+        value_at,
+        length,
+    })
+}
+
+fn has_short_length(vr: &[u8; 2]) -> bool {
+    #[rustfmt::skip]
+    const SHORT: [&[u8; 2]; 20] = [
+        b"AE", b"AS", b"AT", b"CS", b"DA", b"DS", b"DT", b"FL", b"FD", b"IS",
+        b"LO", b"LT", b"PN", b"SH", b"SL", b"SS", b"ST", b"TM", b"UI", b"UL",
+    ];
+    vr == b"US" || SHORT.contains(&vr)
+}
+
+fn tag(bytes: &[u8], at: usize, encoding: Encoding) -> Result<Tag, Fault> {
+    let half = |at| Ok(encoding.u16(array(bytes, at)?));
+    Ok(Tag(half(at)?, half(at + 2)?))
+}
+
+fn array<const N: usize>(bytes: &[u8], at: usize) -> Result<[u8; N], Fault> {
+    let found = bytes.get(at..).and_then(|rest| rest.first_chunk::<N>());
+    found.copied().ok_or(Fault::Short)
+}
+
+/// Items of a sequence of unknown representation are written implicitly (PS3.5, section 6.2.2).
+fn inside(vr: Option<[u8; 2]>, encoding: Encoding) -> Encoding {
+    match vr {
+        Some([b'U', b'N']) => Encoding::ImplicitLittle,
+        _ => encoding,
+    }
+}
+
+/// First byte behind an element or item, its delimiter included.
+fn end_of(
+    bytes: &[u8],
+    start: &ElementHeader,
+    encoding: Encoding,
+    depth: usize,
+) -> Result<usize, Fault> {
+    let mut at = start.value_at;
+    if let Some(length) = start.length {
+        let end = at.checked_add(length).filter(|end| *end <= bytes.len());
+        return end.ok_or(Fault::Short);
+    }
+    if depth == DEEPEST {
+        return Err(Fault::Damaged(at));
+    }
+    let encoding = inside(start.vr, encoding);
+    let last = if start.tag == ITEM {
+        ITEM_END
+    } else {
+        SEQUENCE_END
+    };
+    loop {
+        let inner = header(bytes, at, encoding)?;
+        if inner.tag == last {
+            return Ok(inner.value_at);
+        }
+        // Items hold elements, sequences hold items.
+        if (inner.tag.0 == 0xfffe) != (last == SEQUENCE_END) {
+            return Err(Fault::Damaged(at));
+        }
+        at = end_of(bytes, &inner, encoding, depth + 1)?;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const SEQUENCE: Tag = Tag(0x0040, 0x0100);
+    const TEXT: Tag = Tag(0x0008, 0x0060);
+
+    /// An explicit little-endian element.
+    fn element(tag: Tag, vr: &[u8; 2], value: &[u8], delimited: bool) -> Vec<u8> {
+        let mut bytes = [tag.0.to_le_bytes(), tag.1.to_le_bytes(), *vr].concat();
+        if has_short_length(vr) {
+            bytes.extend((value.len() as u16).to_le_bytes());
+        } else {
+            bytes.extend([0, 0]);
+            let length = if delimited {
+                u32::MAX
+            } else {
+                value.len() as u32
+            };
+            bytes.extend(length.to_le_bytes());
+        }
+        bytes.extend(value);
+        if delimited {
+            bytes.extend(b"\xfe\xff\xdd\xe0\0\0\0\0");
+        }
+        bytes
+    }
+
+    fn item(value: &[u8], delimited: bool) -> Vec<u8> {
+        let length = if delimited {
+            u32::MAX
+        } else {
+            value.len() as u32
+        };
+        let mut bytes = [b"\xfe\xff\x00\xe0".as_slice(), &length.to_le_bytes(), value].concat();
+        if delimited {
+            bytes.extend(b"\xfe\xff\x0d\xe0\0\0\0\0");
+        }
+        bytes
+    }
+
+    fn nested(delimited: [bool; 2], texts: &[String]) -> Vec<u8> {
+        let items = texts
+            .iter()
+            .map(|t| item(&element(TEXT, b"CS", t.as_bytes(), false), delimited[1]));
+        let sequence = element(
+            SEQUENCE,
+            b"SQ",
+            &items.collect::<Vec<_>>().concat(),
+            delimited[0],
+        );
+        [
+            element(TEXT, b"CS", b"CT", false),
+            sequence,
+            element(Tag(0x7fe0, 0x10), b"OW", b"1234", false),
+        ]
+        .concat()
+    }
+
+    proptest! {
+        /// Both ways to end sequences and items give the same elements, and nothing short is taken.
+        #[test]
+        fn items_are_found_and_cut_bytes_are_not_read(
+            delimited in any::<[bool; 2]>(),
+            texts in prop::collection::vec("[A-Z]{0,9}", 0..4),
+            cut in any::<prop::sample::Index>(),
+        ) {
+            let bytes = nested(delimited, &texts);
+            let pixels = |tag: Tag| tag.0 == 0x7fe0;
+            let (set, end) = DataSet::parse(&bytes, 0, Encoding::ExplicitLittle, pixels).unwrap();
+            prop_assert_eq!(end, bytes.len() - 16);
+            prop_assert_eq!(set.get(TEXT), Some(b"CT".as_slice()));
+            let found = set.items(SEQUENCE).unwrap();
+            let found = found.iter().map(|i| i.get(TEXT).unwrap().to_vec()).collect::<Vec<_>>();
+            prop_assert_eq!(found, texts.iter().map(|t| t.clone().into_bytes()).collect::<Vec<_>>());
+
+            let cut = cut.index(end);
+            let parsed = DataSet::parse(&bytes[..cut], 0, Encoding::ExplicitLittle, pixels);
+            // Whole elements may remain; a cut one is short.
+            prop_assert!(cut == 0 || cut == 10 || parsed.unwrap_err() == Fault::Short);
+        }
+
+        #[test]
+        fn damage_never_panics(
+            texts in prop::collection::vec("[A-Z]{0,9}", 0..4),
+            damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+            encoding in prop::sample::select(vec![Encoding::ExplicitLittle, Encoding::ImplicitLittle, Encoding::ExplicitBig]),
+        ) {
+            let mut bytes = nested([true, true], &texts);
+            for (at, byte) in damage {
+                let at = at.index(bytes.len());
+                bytes[at] = byte;
+            }
+            if let Ok((set, _)) = DataSet::parse(&bytes, 0, encoding, |_| false) {
+                let _ = set.items(SEQUENCE);
+            }
+        }
+    }
+
+    #[test]
+    fn endless_nesting_is_refused() {
+        let opened = [element(SEQUENCE, b"UN", b"", true), item(b"", true)].concat();
+        // Without the delimiter of the sequence, before and behind which the item is.
+        let mut bytes = [&opened[..12], &opened[20..28]].concat();
+        for _ in 0..100_000 {
+            bytes.extend(b"\x40\0\0\x01\xff\xff\xff\xff\xfe\xff\x00\xe0\xff\xff\xff\xff");
+        }
+        let parsed = DataSet::parse(&bytes, 0, Encoding::ExplicitLittle, |_| false);
+        assert!(matches!(parsed.unwrap_err(), Fault::Damaged(_)));
+    }
+}

@@ -1,0 +1,102 @@
+//! Where one slice lies in space, and what its values mean.
+
+use dicom_dictionary_std::tags;
+use nalgebra::{Point3, Vector3};
+
+use super::attributes::Attributes;
+use crate::error::ReadError;
+
+/// Geometry and units of one slice.
+#[derive(Debug)]
+pub(super) struct Frame {
+    /// Centre of the first pixel, LPS mm.
+    pub position: Point3<f64>,
+    /// Unit direction of increasing column index (along a row).
+    pub along_row: Vector3<f64>,
+    /// Unit direction of increasing row index (down a column).
+    pub down_column: Vector3<f64>,
+    /// Distance between neighbouring columns and between neighbouring rows, mm.
+    pub spacing_mm: [f64; 2],
+    /// Slice Thickness; only used where there is no second slice to measure the step with.
+    pub thickness_mm: Option<f64>,
+    /// Slope and intercept from stored values to HU.
+    pub rescale: Option<[f64; 2]>,
+    /// What the values are, where the header says that they are no HU.
+    pub foreign_unit: Option<String>,
+}
+
+impl Frame {
+    pub fn of(attributes: &Attributes) -> Result<Self, ReadError> {
+        let [x, y, z] = attributes.numbers(tags::IMAGE_POSITION_PATIENT, "ImagePositionPatient")?;
+        let cosines: [f64; 6] =
+            attributes.numbers(tags::IMAGE_ORIENTATION_PATIENT, "ImageOrientationPatient")?;
+        let [along_row, down_column] =
+            [0, 3].map(|at| Vector3::from_column_slice(&cosines[at..at + 3]));
+        // Written with up to 16 digits, but some writers round to 3.
+        let unit = |v: Vector3<f64>| (v.norm() - 1.0).abs() < 5e-3;
+        if !(unit(along_row) && unit(down_column) && along_row.dot(&down_column).abs() < 5e-3) {
+            return Err(attributes.bad(
+                "ImageOrientationPatient",
+                format!("{cosines:?}"),
+                "two perpendicular unit vectors",
+            ));
+        }
+        // Pixel Spacing gives the distance between rows first (PS3.3, section 10.7.1.3).
+        let [between_rows, between_columns] =
+            attributes.numbers(tags::PIXEL_SPACING, "PixelSpacing")?;
+        if !(between_rows > 0.0 && between_columns > 0.0) {
+            return Err(attributes.bad(
+                "PixelSpacing",
+                format!("{between_rows}\\{between_columns}"),
+                "two positive distances",
+            ));
+        }
+        Ok(Self {
+            position: Point3::new(x, y, z),
+            along_row: along_row.normalize(),
+            down_column: down_column.normalize(),
+            spacing_mm: [between_columns, between_rows],
+            thickness_mm: attributes
+                .optional(tags::SLICE_THICKNESS, "SliceThickness")?
+                .filter(|t| *t > 0.0),
+            rescale: rescale(attributes)?,
+            foreign_unit: foreign_unit(attributes)?,
+        })
+    }
+}
+
+fn rescale(attributes: &Attributes) -> Result<Option<[f64; 2]>, ReadError> {
+    let slope = attributes.optional(tags::RESCALE_SLOPE, "RescaleSlope")?;
+    let intercept = attributes.optional(tags::RESCALE_INTERCEPT, "RescaleIntercept")?;
+    match (slope, intercept) {
+        (None, None) => Ok(None),
+        (Some(0.0), _) => Err(attributes.bad("RescaleSlope", "0".to_owned(), "another number")),
+        (Some(slope), Some(intercept)) => Ok(Some([slope, intercept])),
+        (None, _) => Err(attributes.missing("RescaleSlope")),
+        (_, None) => Err(attributes.missing("RescaleIntercept")),
+    }
+}
+
+/// A rescale type or real-world unit other than HU.
+fn foreign_unit(attributes: &Attributes) -> Result<Option<String>, ReadError> {
+    let rescale_type = attributes.text(tags::RESCALE_TYPE)?;
+    // US: unspecified (PS3.3, section C.11.1.1.2).
+    let foreign = rescale_type.filter(|t| is_code(t) && !matches!(t.as_str(), "HU" | "US"));
+    if foreign.is_some() {
+        return Ok(foreign);
+    }
+    // Hounsfield units in UCUM.
+    let unit = attributes.real_world_unit()?;
+    Ok(unit.filter(|u| is_unit(u) && !matches!(u.as_str(), "[hnsf'U]" | "hnsf'U" | "HU")))
+}
+
+/// Whether a text is a DICOM code string, so that no free text passes on as one (PS3.5, table 6.2-1).
+pub(super) fn is_code(text: &str) -> bool {
+    let allowed = |c: char| c.is_ascii_uppercase() || c.is_ascii_digit() || matches!(c, '_' | ' ');
+    text.len() <= 16 && text.chars().all(allowed)
+}
+
+/// The same for UCUM units, which know no blanks.
+fn is_unit(text: &str) -> bool {
+    text.len() <= 16 && text.chars().all(|c| c.is_ascii_graphic() && c != '^')
+}

@@ -1,0 +1,164 @@
+//! Which series lie in a folder, and which one to read.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::header::{Found, Series, Slice};
+use crate::error::ReadError;
+use crate::scan::{ReadOptions, SeriesChoice, SeriesSummary, Warning, WarningCode};
+
+/// What the files of a folder turned out to be.
+pub(super) struct Sorted {
+    /// By series number, then by first file.
+    series: Vec<Member>,
+    localizers: usize,
+    others: usize,
+}
+
+struct Member {
+    uid: String,
+    summary: SeriesSummary,
+    /// Empty for modalities that are not read.
+    slices: Vec<Slice>,
+}
+
+/// The series to read.
+pub(super) struct Chosen {
+    pub slices: Vec<Slice>,
+    pub modality: Option<String>,
+    /// Where it is not CT.
+    pub modality_warning: Option<Warning>,
+    /// This one and those that were left.
+    pub all: Vec<SeriesSummary>,
+}
+
+impl Sorted {
+    /// Groups files by series.
+    pub fn of(found: Vec<Found>) -> Self {
+        let mut by_uid = BTreeMap::<String, (usize, Series, usize, Vec<Slice>)>::new();
+        let (mut localizers, mut others) = (0, 0);
+        for (order, item) in found.into_iter().enumerate() {
+            let (series, slices) = match item {
+                Found::Localizer => {
+                    localizers += 1;
+                    continue;
+                }
+                Found::NotAnImage => {
+                    others += 1;
+                    continue;
+                }
+                Found::OtherModality(series) => (series, Vec::new()),
+                Found::Slices(series, slices) => (series, slices),
+            };
+            let (_, _, images, members) = by_uid
+                .entry(series.uid.clone())
+                .or_insert_with(|| (order, series, 0, Vec::new()));
+            *images += slices.len().max(1);
+            members.extend(slices);
+        }
+        let mut series = by_uid.into_values().collect::<Vec<_>>();
+        series.sort_by_key(|(order, series, ..)| (series.number, *order));
+        let series = series
+            .into_iter()
+            .map(|(_, series, images, slices)| Member {
+                summary: SeriesSummary {
+                    number: series.number,
+                    modality: series.modality,
+                    slices: images,
+                    size: series.size,
+                    read: false,
+                },
+                uid: series.uid,
+                slices,
+            });
+        Self {
+            series: series.collect(),
+            localizers,
+            others,
+        }
+    }
+
+    /// What was left out of every series.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        if self.localizers > 0 {
+            warnings.push(Warning {
+                code: WarningCode::LocalizersDropped,
+                text: format!(
+                    "{} localizer images (scout views) were left out",
+                    self.localizers
+                ),
+            });
+        }
+        if self.others > 0 {
+            warnings.push(Warning {
+                code: WarningCode::NonImagesDropped,
+                text: format!(
+                    "{} DICOM objects that are no images were left out",
+                    self.others
+                ),
+            });
+        }
+        warnings
+    }
+
+    /// The series asked for, or the only one there is.
+    pub fn choose(
+        mut self,
+        source: &Path,
+        looked_at: usize,
+        options: &ReadOptions,
+    ) -> Result<Chosen, ReadError> {
+        let path = source.to_owned();
+        if self.series.is_empty() {
+            return Err(match self.localizers {
+                0 => ReadError::NoDicom {
+                    path,
+                    files: looked_at,
+                },
+                localizers => ReadError::OnlyLocalizers { path, localizers },
+            });
+        }
+        let fits = |member: &Member| match &options.series {
+            None => true,
+            Some(SeriesChoice::Number(number)) => member.summary.number == Some(*number),
+            Some(SeriesChoice::Uid(uid)) => member.uid == *uid,
+        };
+        let fitting = (0..self.series.len()).filter(|&n| fits(&self.series[n]));
+        let summaries = |of: &[usize]| {
+            let of = of.iter().map(|&n| self.series[n].summary.clone());
+            of.collect::<Vec<_>>()
+        };
+        let chosen = match &fitting.collect::<Vec<_>>()[..] {
+            [chosen] => *chosen,
+            [] => {
+                let series = self.series.into_iter().map(|m| m.summary).collect();
+                return Err(ReadError::NoSuchSeries { path, series });
+            }
+            several => {
+                let series = summaries(several);
+                return Err(ReadError::SeveralSeries { path, series });
+            }
+        };
+        let member = &mut self.series[chosen];
+        member.summary.read = true;
+        let slices = std::mem::take(&mut member.slices);
+        let modality = member.summary.modality.clone();
+        let other = modality.clone().filter(|m| m != "CT");
+        if let Some(modality) = &other
+            && !options.force
+        {
+            let modality = modality.clone();
+            return Err(ReadError::NotCt { modality, path });
+        }
+        Ok(Chosen {
+            slices,
+            modality_warning: other.map(|modality| Warning {
+                code: WarningCode::NotCt,
+                text: format!("modality {modality} is read as if it were CT"),
+            }),
+            modality,
+            all: self.series.into_iter().map(|m| m.summary).collect(),
+        })
+    }
+}
