@@ -15,7 +15,14 @@ fn write_inputs(folder: &Path) -> Plan {
         .voxelise(SPACING_MM, TableTop::Present)
         .unwrap();
     ppa_ct::write_nifti(&scan, &volume).unwrap();
-    let (case, _) = prepare(&scan, Side::Right, &Default::default(), &Default::default()).unwrap();
+    let (case, _) = prepare(
+        &scan,
+        &Default::default(),
+        Side::Right,
+        &Default::default(),
+        &Default::default(),
+    )
+    .unwrap();
     let file = folder.join("p01.toml");
     case.write(&file).unwrap();
     Plan::new(vec![PlanCase { file, patient: 0 }])
@@ -29,7 +36,16 @@ fn chain(c: &mut Criterion) {
     let mut group = c.benchmark_group("chain");
     group.sample_size(10);
     group.bench_function("prepare", |b| {
-        b.iter(|| prepare(&scan, Side::Right, &Default::default(), &Default::default()).unwrap());
+        b.iter(|| {
+            prepare(
+                &scan,
+                &Default::default(),
+                Side::Right,
+                &Default::default(),
+                &Default::default(),
+            )
+            .unwrap()
+        });
     });
     // Ten depth images and a radiograph per pose; loading the case and the room is included.
     plan.rotation = Sweep {

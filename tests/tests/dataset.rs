@@ -33,8 +33,14 @@ fn inputs() -> &'static Path {
             .voxelise(SPACING_MM, TableTop::Present)
             .unwrap();
         ppa_ct::write_nifti(&scan, &volume).unwrap();
-        let (case, _) =
-            prepare(&scan, Side::Right, &Default::default(), &Default::default()).unwrap();
+        let (case, _) = prepare(
+            &scan,
+            &Default::default(),
+            Side::Right,
+            &Default::default(),
+            &Default::default(),
+        )
+        .unwrap();
         case.write(&folder.path().join("p01.toml")).unwrap();
         folder
     });
@@ -296,7 +302,14 @@ fn choices_of_a_case_are_carried_out() {
     let case = Case::read(&inputs().join("p01.toml")).unwrap();
     let again = PreparedLimb::of_case(&case).unwrap();
     let (surface, choices) = (Default::default(), Default::default());
-    let (_, first) = prepare(&case.source.path, Side::Right, &surface, &choices).unwrap();
+    let (_, first) = prepare(
+        &case.source.path,
+        &Default::default(),
+        Side::Right,
+        &surface,
+        &choices,
+    )
+    .unwrap();
     let frame = |landmarks: &Landmarks| *landmarks.patient_from_ct().isometry();
     let moved = frame(&again.landmarks) * frame(&first.landmarks).inverse();
     assert!(moved.translation.vector.norm() < 1e-9 && moved.rotation.angle() < 1e-9);

@@ -21,7 +21,7 @@ fn data(name: &str) -> PathBuf {
 
 fn prepared(scan: &Path, side: Side) -> (Case, PreparedLimb) {
     let (surface, choices) = (LimbSettings::default(), LandmarkOverrides::default());
-    prepare(scan, side, &surface, &choices).unwrap()
+    prepare(scan, &Default::default(), side, &surface, &choices).unwrap()
 }
 
 /// Two poses of a case with coarse radiographs, in a folder of its own.

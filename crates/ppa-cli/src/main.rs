@@ -4,6 +4,7 @@
 
 mod commands;
 mod output;
+mod scan_args;
 
 use std::process::ExitCode;
 
@@ -36,7 +37,7 @@ enum Command {
     #[command(subcommand)]
     Ct(commands::ct::CtCommand),
     /// Find skin, axis and plane of a limb and write them down as a case
-    Prepare(commands::prepare::PrepareArgs),
+    Prepare(Box<commands::prepare::PrepareArgs>),
     /// Surfaces of a CT
     #[command(subcommand)]
     Mesh(commands::mesh::MeshCommand),

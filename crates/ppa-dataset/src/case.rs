@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use ppa_ct::{ReadOptions, SeriesChoice};
 use ppa_mesh::{LimbReport, LimbSettings};
 use ppa_scene::{LandmarkOverrides, Landmarks, Side};
 use serde::de::IgnoredAny;
@@ -50,6 +51,26 @@ pub struct Source {
     pub path: PathBuf,
     /// SHA-256 over size, affine and Hounsfield units of the volume: the scan's identity.
     pub volume_sha256: String,
+    /// Number of the DICOM series, where the folder holds several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub series: Option<i32>,
+    /// Whether gaps between slices are interpolated.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub fill_gaps: bool,
+    /// Whether another modality or values that are no HU are read.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub force: bool,
+}
+
+impl Source {
+    /// How to read the scan.
+    pub fn reading(&self) -> ReadOptions {
+        ReadOptions {
+            series: self.series.map(SeriesChoice::Number),
+            fill_gaps: self.fill_gaps,
+            force: self.force,
+        }
+    }
 }
 
 /// Results of the preparation, recorded for a person to read.

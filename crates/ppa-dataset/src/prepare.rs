@@ -1,8 +1,8 @@
 //! From a CT to a case: every decision proposed automatically, every one open to change.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use ppa_ct::{Scan, Volume};
+use ppa_ct::{ReadOptions, Scan, Volume};
 use ppa_mesh::{Limb, LimbSettings, extract_limb};
 use ppa_scene::{LandmarkOverrides, Landmarks, Side, find_landmarks};
 use sha2::{Digest, Sha256};
@@ -17,6 +17,9 @@ pub enum PrepareError {
     /// The scan cannot be read.
     #[error(transparent)]
     Read(#[from] ppa_ct::ReadError),
+    /// A chosen series that a case cannot name: cases hold no UID.
+    #[error("the chosen series in {} has no number of its own; put its files into a folder of their own", .0.display())]
+    SeriesWithoutNumber(PathBuf),
     /// No limb was found in it.
     #[error(transparent)]
     Limb(#[from] ppa_mesh::LimbError),
@@ -30,7 +33,7 @@ pub enum PrepareError {
     )]
     OtherScan {
         /// The scan.
-        path: std::path::PathBuf,
+        path: PathBuf,
         /// Its hash.
         found: String,
         /// The hash in the case.
@@ -69,7 +72,7 @@ impl PreparedLimb {
     /// # Errors
     /// [`PrepareError`]; a scan other than the one the case was made from is refused.
     pub fn of_case(case: &Case) -> Result<Self, PrepareError> {
-        let scan = ppa_ct::read(&case.source.path)?;
+        let scan = ppa_ct::read_with(&case.source.path, &case.source.reading())?;
         let found = volume_sha256(&scan.volume);
         if found != case.source.volume_sha256 {
             return Err(PrepareError::OtherScan {
@@ -82,7 +85,7 @@ impl PreparedLimb {
     }
 }
 
-/// Proposes a case for one limb of the scan at `path`.
+/// Proposes a case for one limb of the scan at `path`, read as `reading` tells.
 ///
 /// Given `surface` and `choices` are kept; what they leave open is found.
 ///
@@ -90,13 +93,22 @@ impl PreparedLimb {
 /// [`PrepareError`] when the scan is unreadable, holds no limb, or shows no landmarks.
 pub fn prepare(
     path: &Path,
+    reading: &ReadOptions,
     side: Side,
     surface: &LimbSettings,
     choices: &LandmarkOverrides,
 ) -> Result<(Case, PreparedLimb), PrepareError> {
+    let scan = ppa_ct::read_with(path, reading)?;
+    let series = match reading.series {
+        None => None,
+        Some(_) => Some(
+            number_of_its_own(&scan)
+                .ok_or_else(|| PrepareError::SeriesWithoutNumber(path.to_owned()))?,
+        ),
+    };
     let Scan {
         volume, warnings, ..
-    } = ppa_ct::read(path)?;
+    } = scan;
     let volume_sha256 = volume_sha256(&volume);
     let prepared = PreparedLimb::new(volume, side, surface, choices)?;
     let case = Case {
@@ -105,6 +117,9 @@ pub fn prepare(
         source: Source {
             path: path.to_owned(),
             volume_sha256,
+            series,
+            fill_gaps: reading.fill_gaps,
+            force: reading.force,
         },
         surface: surface.clone(),
         choices: prepared.landmarks.as_choices(choices),
@@ -115,6 +130,13 @@ pub fn prepare(
         }),
     };
     Ok((case, prepared))
+}
+
+/// The number of the series that was read, unless it has none or shares it; its UID stays out of the case.
+fn number_of_its_own(scan: &Scan) -> Option<i32> {
+    let number = scan.series.iter().find(|series| series.read)?.number?;
+    let sharing = scan.series.iter().filter(|s| s.number == Some(number));
+    (sharing.count() == 1).then_some(number)
 }
 
 /// SHA-256 over size, affine and values as read: the identity of a scan.

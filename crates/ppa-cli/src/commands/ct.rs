@@ -8,6 +8,7 @@ use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_ct::{Info, read, write_nifti};
 
 use crate::output::{Output, working};
+use crate::scan_args::ScanArgs;
 
 #[derive(Debug, Subcommand)]
 pub enum CtCommand {
@@ -21,14 +22,14 @@ pub enum CtCommand {
 
 #[derive(Debug, Args)]
 pub struct InfoArgs {
-    /// DICOM folder or file, .nii or .nii.gz
-    path: PathBuf,
+    #[command(flatten)]
+    scan: ScanArgs,
 }
 
 #[derive(Debug, Args)]
 pub struct ConvertArgs {
-    /// DICOM folder or file, .nii or .nii.gz
-    input: PathBuf,
+    #[command(flatten)]
+    input: ScanArgs,
     /// File to write: .nii or .nii.gz
     output: PathBuf,
 }
@@ -49,11 +50,11 @@ pub struct PhantomArgs {
 pub fn run(command: &CtCommand, output: Output) -> anyhow::Result<()> {
     match command {
         CtCommand::Info(args) => {
-            let scan = read(&args.path)?;
+            let scan = args.scan.read()?;
             output.print(&Info::of(&scan), describe)
         }
         CtCommand::Convert(args) => {
-            let scan = read(&args.input)?;
+            let scan = args.input.read()?;
             write_nifti(&args.output, &scan.volume)?;
             output.print(&Info::of(&read(&args.output)?), describe)
         }
@@ -95,7 +96,11 @@ fn describe(info: &Info) -> String {
         let number = series
             .number
             .map_or("without number".to_owned(), |n| n.to_string());
-        lines.push(format!("series     {number}: {} slices", series.slices));
+        let left = if series.read { "" } else { ", not read" };
+        lines.push(format!(
+            "series     {number}: {} slices{left}",
+            series.slices
+        ));
     }
     for warning in &info.warnings {
         lines.push(format!("warning    {}", warning.text));

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Args;
 use ppa_ct::phantom::{LowerLeg, TableTop};
-use ppa_ct::write_nifti;
+use ppa_ct::{ReadOptions, write_nifti};
 use ppa_dataset::layout::LimbId;
 use ppa_dataset::{Plan, PlanCase, Summary, contact_sheet, prepare, write_whole};
 use ppa_mesh::LimbSettings;
@@ -86,7 +86,13 @@ fn write_inputs(out: &Path, seed: u64) -> anyhow::Result<Plan> {
     write_nifti(&scan, &volume)?;
     working.set_message("finding the limb");
     let (surface, choices) = (LimbSettings::default(), LandmarkOverrides::default());
-    let (case, _) = prepare(&scan, Side::Right, &surface, &choices)?;
+    let (case, _) = prepare(
+        &scan,
+        &ReadOptions::default(),
+        Side::Right,
+        &surface,
+        &choices,
+    )?;
     case.write(&out.join("p01.case.toml"))?;
     let mut plan = Plan::new(vec![PlanCase {
         file: PathBuf::from("p01.case.toml"),

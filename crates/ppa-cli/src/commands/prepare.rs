@@ -8,6 +8,7 @@ use ppa_mesh::{LimbSettings, VoxelBox, write_ply};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
 
 use crate::output::{Output, working};
+use crate::scan_args::ScanArgs;
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum SideName {
@@ -33,8 +34,8 @@ enum AxisName {
 
 #[derive(Debug, Args)]
 pub struct PrepareArgs {
-    /// DICOM folder or file, .nii or .nii.gz
-    ct: PathBuf,
+    #[command(flatten)]
+    scan: ScanArgs,
     /// Which limb it is
     #[arg(long, value_enum)]
     side: SideName,
@@ -143,7 +144,13 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
         SideName::R => Side::Right,
     };
     let working = working("finding the limb");
-    let (case, prepared) = prepare(&args.ct, side, &surface, &choices)?;
+    let (case, prepared) = prepare(
+        &args.scan.path,
+        &args.scan.options(),
+        side,
+        &surface,
+        &choices,
+    )?;
     if let Some(ply) = &args.ply {
         write_ply(ply, &prepared.limb.mesh)?;
     }

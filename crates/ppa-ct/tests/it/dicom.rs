@@ -5,7 +5,7 @@ use std::path::Path;
 use approx::assert_relative_eq;
 use dicom_dictionary_std::uids;
 use nalgebra::{Point3, Rotation3, Vector3};
-use ppa_ct::{Info, ReadError, WarningCode, read};
+use ppa_ct::{Info, ReadError, ReadOptions, SeriesChoice, WarningCode, read, read_with};
 use proptest::prelude::*;
 
 use crate::series::{SliceSpec, write_series};
@@ -182,6 +182,33 @@ fn localizers_reports_and_strangers_are_left_out_but_a_second_series_is_not() {
 
     slices[3].image_type = "DERIVED\\SECONDARY";
     write_series(folder.path(), &slices);
+    let choose = |text: &str| {
+        let series = Some(text.parse().unwrap());
+        let options = ReadOptions {
+            series,
+            ..ReadOptions::default()
+        };
+        read_with(folder.path(), &options)
+    };
+    let chosen = choose("3").unwrap();
+    assert_eq!(chosen, choose("2.25.3").unwrap());
+    assert_eq!(chosen.volume, scan.volume);
+    let listed = chosen.series.iter().map(|s| (s.number, s.slices, s.read));
+    assert_eq!(
+        listed.collect::<Vec<_>>(),
+        [(Some(1), 1, false), (Some(3), 3, true)]
+    );
+    assert!(!format!("{chosen:?}").contains("2.25"));
+    assert_eq!(choose("1").unwrap().volume.grid().size(), [4, 3, 1]);
+    for missing in ["2", "2.25.33"] {
+        let error = choose(missing).unwrap_err();
+        assert!(
+            matches!(&error, ReadError::NoSuchSeries { series, .. } if series.len() == 2),
+            "{error}"
+        );
+    }
+    assert!("Planted^Name".parse::<SeriesChoice>().is_err());
+
     let error = read(folder.path()).unwrap_err();
     let text = error.to_string();
     assert!(
@@ -201,7 +228,7 @@ fn a_series_in_a_subfolder_is_found() {
 }
 
 #[test]
-fn other_modalities_are_refused() {
+fn other_modalities_are_refused_unless_forced() {
     let folder = tempfile::tempdir().unwrap();
     let mut slices = axial_stack(&[0.0, 1.0]);
     slices.iter_mut().for_each(|s| s.modality = "MR");
@@ -210,6 +237,13 @@ fn other_modalities_are_refused() {
         ReadError::NotCt { modality, .. } => assert_eq!(modality, "MR"),
         error => panic!("{error}"),
     }
+    let force = ReadOptions {
+        force: true,
+        ..ReadOptions::default()
+    };
+    let forced = read_with(folder.path(), &force).unwrap();
+    assert_eq!(forced.modality.as_deref(), Some("MR"));
+    assert_eq!(forced.warnings[0].code, WarningCode::NotCt);
 }
 
 #[test]
