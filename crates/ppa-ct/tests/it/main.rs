@@ -1,5 +1,6 @@
 //! Reading and writing scans through the public API.
 
+mod damage;
 mod dicom;
 mod nifti;
 mod real;

@@ -7,7 +7,7 @@ use nalgebra::{Matrix4, Point3};
 use ppa_ct::{Info, ReadError, ReadOptions, Scan, WarningCode, read, read_with};
 use serde_json::Value;
 
-fn data(path: &str) -> PathBuf {
+pub fn data(path: &str) -> PathBuf {
     let shared = std::env::var_os("PPA_SHARED").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
         PathBuf::from,
