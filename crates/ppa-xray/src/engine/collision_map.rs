@@ -1,15 +1,15 @@
-//! Where in the body first collisions happen, and from where they are seen.
+//! Where in the body first collisions happen.
 
 use nalgebra::{Point2, Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::beam::field::Field;
-use crate::engine::attenuation_basis::LANES;
-use crate::engine::energy_sampler::EnergySampler;
+use crate::engine::attenuation_basis::{LANES, dot};
+use crate::engine::lines::{Line, Lines};
+use crate::engine::outlook::Site;
 use crate::engine::paths::Paths;
-use crate::engine::scatter_table::ScatterTable;
-use crate::matter::scatter_density::ScatterDensities;
 use crate::philox::Philox;
+use crate::transport::attenuation::{CEILING_KEV, CUTOFF_KEV};
 use crate::transport::tracking::Transport;
 
 /// Cells along device x and y of the field, and along the rays through the voxel box.
@@ -18,41 +18,29 @@ const CELLS: [usize; 3] = [40, 40, 16];
 /// Points per side of a cell at which the body is looked at.
 const POINTS: usize = 2;
 
-/// Share of the collisions that is drawn without looking at the detector point, so that no weight grows beyond bounds.
-const DEFENSIVE: f64 = 0.1;
+/// Share of the collisions that are drawn where most happen, whether they are important or not.
+const STRONG: f64 = 0.3;
 
-/// Share of the strength of a neighbour that a cell has at least.
+/// Share of what a neighbour has that a cell has at least.
 const LENT: f64 = 0.1;
 
-/// Share of the mean strength that a cell has at least: a corner of the body may lie between the points.
+/// Share of the mean that a cell has at least: a corner of the body may lie between the points.
 const LEAST: f64 = 1e-3;
 
-/// The irradiated part of the box in cells, each with the photons that can be expected to scatter in it.
+/// The irradiated part of the box in cells.
 #[derive(Debug)]
 pub(crate) struct CollisionMap {
-    cells: Vec<Cell>,
-    strength: f64,
-    /// Running sums of the strengths.
+    /// Running sums of how often collisions are drawn in the cells.
     sums: Vec<f64>,
     field: Field,
     /// Points of the focal spot and the running sums of their weights.
     spots: Vec<(Point3<f64>, f64)>,
-    /// For each spectrum of the emitter.
-    pub energies: Vec<EnergySampler>,
-    /// Mean energy of the spectrum.
-    typical_kev: f64,
-    /// What the typical material does to photons of that energy.
-    typical: ScatterTable,
-}
-
-/// Collisions in a cell, at the typical energy.
-#[derive(Debug, Clone, Copy)]
-struct Cell {
-    middle: Point3<f64>,
-    direction: Vector3<f64>,
-    strength: f64,
-    /// Share of the photons that get here.
-    arriving: f64,
+    /// Mean mass on the way in and out.
+    pub mass: Vec<[f32; LANES]>,
+    /// Mean energy of the photons that get through that mass, keV.
+    pub typical_kev: f64,
+    /// The cells as single collisions, with the photons that can be expected to scatter in each.
+    pub cells: Vec<Site>,
 }
 
 /// Points per side of a focal spot that is not a point.
@@ -69,23 +57,13 @@ pub(crate) struct Collision {
     pub position: Point3<f64>,
     /// Inverse of its probability per mm² of the detector plane and mm of the ray.
     pub mm3: f64,
-    /// The cell it lies in.
+    /// The cell it lies in; neighbours mostly have neighbouring numbers.
     pub cell: usize,
 }
 
 impl CollisionMap {
-    pub fn new(transport: &Transport, paths: &Paths, densities: &[ScatterDensities]) -> Self {
-        let typical_kev = transport.spectrum.mean_energy_kev();
-        let node = transport.attenuation.locate(typical_kev);
-        let scattering: Vec<f64> = (0..densities.len())
-            .map(|material| {
-                let c = transport.attenuation.at(material as u8, node);
-                f64::from(c.total - c.photoelectric)
-            })
-            .collect();
+    pub fn new(transport: &Transport, paths: &Paths, lines: &Lines) -> Self {
         let mut map = Self {
-            cells: Vec::new(),
-            strength: 0.0,
             sums: Vec::new(),
             field: *transport.emitter.field(),
             spots: transport
@@ -97,114 +75,108 @@ impl CollisionMap {
                     Some((spot, *sum))
                 })
                 .collect(),
-            energies: Vec::new(),
-            typical_kev,
-            typical: typical_scattering(transport, densities, typical_kev),
+            mass: vec![[0.0; LANES]; paths.basis.groups],
+            typical_kev: 0.0,
+            cells: Vec::new(),
         };
         let looked: Vec<Look> = (0..CELLS.iter().product::<usize>())
             .into_par_iter()
-            .map(|cell| map.look(cell, transport, paths, &scattering))
+            .map(|cell| map.look(cell, transport, paths, lines.usual()))
             .collect();
-        let mut mass = vec![[0.0_f32; LANES]; paths.basis.groups];
         let mut strength = 0.0;
         for look in &looked {
-            for (sum, before) in mass.iter_mut().flatten().zip(look.mass.iter().flatten()) {
+            let before = look.mass.iter().flatten();
+            for (sum, before) in map.mass.iter_mut().flatten().zip(before) {
                 *sum += before;
             }
-            strength += look.cell.strength;
+            strength += look.site.strength;
         }
         // The way out is taken to be as long as the way in.
-        let twice = 2.0 / strength.max(f64::MIN_POSITIVE) as f32;
-        for mean in mass.iter_mut().flatten() {
+        let twice = 2.0 / strength.max(f32::MIN_POSITIVE);
+        for mean in map.mass.iter_mut().flatten() {
             *mean *= twice;
         }
-        map.energies = transport
-            .emitter
-            .spectra()
-            .iter()
-            .map(|spectrum| EnergySampler::new(spectrum, paths, &mass))
-            .collect();
-        map.cells = looked.into_iter().map(|look| look.cell).collect();
-        map.lend();
-        let mean = map.cells.iter().map(|cell| cell.strength).sum::<f64>() / map.cells.len() as f64;
-        for cell in &mut map.cells {
-            cell.strength = cell.strength.max(LEAST * mean).max(f64::MIN_POSITIVE);
-        }
-        map.sums = map
-            .cells
-            .iter()
-            .scan(0.0, |sum, cell| {
-                *sum += cell.strength;
-                Some(*sum)
-            })
-            .collect();
-        map.strength = map.sums[map.sums.len() - 1];
+        map.typical_kev = mean_energy_behind(lines.usual(), &map.mass);
+        map.cells = looked.into_iter().map(|look| look.site).collect();
         map
     }
 
-    /// Gives every cell a share of what its strongest neighbour has: between the points a cell was looked at may lie
-    /// as much.
-    fn lend(&mut self) {
-        let own: Vec<f64> = self.cells.iter().map(|cell| cell.strength).collect();
-        for (index, cell) in self.cells.iter_mut().enumerate() {
-            let [i, j, k] = split(index);
-            let near = |at: usize, axis: usize| at.saturating_sub(1)..(at + 2).min(CELLS[axis]);
-            for row in near(j, 1) {
-                for column in near(i, 0) {
-                    for depth in near(k, 2) {
-                        let neighbour = own[(row * CELLS[0] + column) * CELLS[2] + depth];
-                        cell.strength = cell.strength.max(LENT * neighbour);
-                    }
-                }
-            }
-        }
+    /// Draws collisions in each cell as often as `importance` says, but for the cells that may have been misjudged.
+    pub fn weigh(&mut self, importance: &[f64]) {
+        let mean = |of: &dyn Fn(usize) -> f64| -> f64 {
+            (0..self.cells.len())
+                .map(of)
+                .sum::<f64>()
+                .max(f64::MIN_POSITIVE)
+                / self.cells.len() as f64
+        };
+        let strength = |cell: usize| f64::from(self.cells[cell].strength);
+        let (important, strong) = (mean(&|cell| importance[cell]), mean(&strength));
+        let both: Vec<f64> = (0..self.cells.len())
+            .map(|cell| {
+                (1.0 - STRONG) * importance[cell] / important + STRONG * strength(cell) / strong
+            })
+            .collect();
+        self.sums = lent(&both)
+            .into_iter()
+            .scan(0.0, |sum, often| {
+                *sum += often.max(LEAST);
+                Some(*sum)
+            })
+            .collect();
     }
 
-    /// Strength of a cell.
-    fn look(&self, cell: usize, transport: &Transport, paths: &Paths, scattering: &[f64]) -> Look {
+    /// What a cell holds.
+    fn look(&self, cell: usize, transport: &Transport, paths: &Paths, lines: &[Line]) -> Look {
         let mut mass = vec![[0.0; LANES]; paths.basis.groups];
         let mut sum_of_mass = mass.clone();
-        let (mut strength, mut bare, mut moment) = (0.0, 0.0, Vector3::zeros());
-        let corner = split(cell);
+        let (mut strength, mut strongest) = (0.0, 0.0);
+        let (mut material, mut moment) = (0, Vector3::zeros());
         for point in 0..POINTS.pow(3) {
             let inside = [point, point / POINTS, point / (POINTS * POINTS)]
                 .map(|i| ((i % POINTS) as f64 + 0.5) / POINTS as f64);
-            let collision = self.place(corner, inside, &Point3::origin(), transport, paths);
+            let collision = self.place(split(cell), inside, &Point3::origin(), transport, paths);
             let Some(voxel) = paths.voxel_at(&collision.position) else {
                 continue;
             };
-            let material = usize::from(transport.phantom.material()[voxel]);
+            let found = transport.phantom.material()[voxel];
             let density = f64::from(transport.phantom.density_g_cm3()[voxel]);
-            let mut here = density * scattering[material] * collision.mm3;
-            bare += here;
+            mass.fill([0.0; LANES]);
             if density > 0.05 {
                 paths.coarse_between(&Point3::origin(), &collision.position, &mut mass);
-                here *= f64::from(-paths.basis.exponent(&mass, self.typical_kev)).exp();
-                for (sum, mass) in sum_of_mass.iter_mut().flatten().zip(mass.iter().flatten()) {
-                    *sum += here as f32 * mass;
-                }
+            }
+            let scattered = lines.iter().map(|line| {
+                let through = f64::from(-dot(&mass, &line.attenuation)).exp();
+                line.photons * line.scattered[usize::from(found)] * through
+            });
+            let here = density * collision.mm3 * scattered.sum::<f64>();
+            for (sum, mass) in sum_of_mass.iter_mut().flatten().zip(mass.iter().flatten()) {
+                *sum += here as f32 * mass;
             }
             strength += here;
             moment += here * collision.position.coords;
+            if here > strongest {
+                (strongest, material) = (here, found);
+            }
         }
-        let centre = self.place(corner, [0.5; 3], &Point3::origin(), transport, paths);
+        let share = 1.0 / POINTS.pow(3) as f32;
+        for sum in sum_of_mass.iter_mut().flatten() {
+            *sum *= share;
+        }
+        let centre = self.place(split(cell), [0.5; 3], &Point3::origin(), transport, paths);
         let middle = if strength > 0.0 {
             Point3::from(moment / strength)
         } else {
             centre.position
         };
-        let cell = Cell {
-            middle,
-            direction: centre.direction,
-            strength: strength / POINTS.pow(3) as f64,
-            arriving: if bare > 0.0 { strength / bare } else { 1.0 },
-        };
-        let share = 1.0 / POINTS.pow(3) as f32;
-        for sum in sum_of_mass.iter_mut().flatten() {
-            *sum *= share;
-        }
         Look {
-            cell,
+            site: Site {
+                position: middle.cast(),
+                direction: centre.direction.cast(),
+                strength: (strength / POINTS.pow(3) as f64) as f32,
+                hardness: 1.0,
+                material,
+            },
             mass: sum_of_mass,
         }
     }
@@ -239,62 +211,16 @@ impl CollisionMap {
         }
     }
 
-    /// Running sums over the cells of what each can be expected to send to `target`, for [`CollisionMap::draw`], and the
-    /// share of photons that pass from the source to the cell and from there to `target`.
-    pub fn aim(
-        &self,
-        target: &Point3<f64>,
-        paths: &Paths,
-        mass: &mut [[f32; LANES]],
-        sums: &mut Vec<f64>,
-        passing: &mut Vec<f64>,
-    ) {
-        let negligible = 2.0 * LEAST * self.strength / self.cells.len() as f64;
-        sums.clear();
-        passing.clear();
-        sums.extend(self.cells.iter().map(|cell| {
-            let sight = target - cell.middle;
-            let square = sight.norm_squared();
-            let r = square.sqrt();
-            let cos = (sight.dot(&cell.direction) / r).clamp(-1.0, 1.0);
-            let density = self.typical_density(cos);
-            let through = if cell.strength > negligible {
-                paths.coarse_between(&cell.middle, target, mass);
-                f64::from(-paths.basis.exponent(mass, self.typical_kev)).exp()
-            } else {
-                1.0
-            };
-            passing.push(cell.arriving * through);
-            cell.strength * density * through * sight.z / (r * square)
-        }));
-        let sum: f64 = sums.iter().sum();
-        let mut total = 0.0;
-        for (importance, cell) in sums.iter_mut().zip(&self.cells) {
-            total +=
-                (1.0 - DEFENSIVE) * *importance / sum + DEFENSIVE * cell.strength / self.strength;
-            *importance = total;
-        }
-    }
-
-    /// Scattering of a gram of the typical material by an angle, mm⁻¹ per g/cm³ and sr.
-    #[inline]
-    pub fn typical_density(&self, cos_theta: f64) -> f64 {
-        let scattering = self.typical.at(ScatterTable::locate(cos_theta));
-        scattering.compton + scattering.rayleigh
-    }
-
-    /// A collision drawn by the running sums of [`CollisionMap::aim`], or for no detector point in particular; `point` is
-    /// uniform in the unit cube.
+    /// A collision drawn as [`CollisionMap::weigh`] says; the point is uniform in the unit cube.
     #[inline]
     pub fn draw(
         &self,
         [v, u, w]: [f64; 3],
-        sums: Option<&[f64]>,
         transport: &Transport,
         paths: &Paths,
         rng: &mut Philox,
     ) -> Collision {
-        let sums = sums.unwrap_or(&self.sums);
+        let sums = &self.sums;
         let spot = match self.spots.as_slice() {
             [(only, _)] => only,
             spots => {
@@ -326,28 +252,40 @@ impl CollisionMap {
     }
 }
 
-/// Scattering by the material that there is most of.
-fn typical_scattering(
-    transport: &Transport,
-    densities: &[ScatterDensities],
-    energy_kev: f64,
-) -> ScatterTable {
-    let phantom = transport.phantom;
-    let mut mass_of = vec![0.0; densities.len()];
-    for (&material, &density) in phantom.material().iter().zip(phantom.density_g_cm3()) {
-        mass_of[usize::from(material)] += f64::from(density);
+/// Gives every cell a share of what its strongest neighbour has: between the points a cell was looked at may lie as much.
+fn lent(own: &[f64]) -> Vec<f64> {
+    (0..own.len())
+        .map(|index| {
+            let [i, j, k] = split(index);
+            let near = |at: usize, axis: usize| at.saturating_sub(1)..(at + 2).min(CELLS[axis]);
+            let mut strength = own[index];
+            for row in near(j, 1) {
+                for column in near(i, 0) {
+                    for depth in near(k, 2) {
+                        let neighbour = own[(row * CELLS[0] + column) * CELLS[2] + depth];
+                        strength = strength.max(LENT * neighbour);
+                    }
+                }
+            }
+            strength
+        })
+        .collect()
+}
+
+/// Mean energy of the photons that pass the given masses, keV.
+fn mean_energy_behind(lines: &[Line], mass: &[[f32; LANES]]) -> f64 {
+    let (mut photons, mut energy) = (f64::MIN_POSITIVE, 0.0);
+    for line in lines {
+        let through = line.photons * f64::from(-dot(mass, &line.attenuation)).exp();
+        photons += through;
+        energy += through * line.energy_kev;
     }
-    let most = (0..mass_of.len())
-        .max_by(|&a, &b| mass_of[a].total_cmp(&mass_of[b]))
-        .unwrap_or(0);
-    let node = transport.attenuation.locate(energy_kev);
-    let c = transport.attenuation.at(most as u8, node);
-    ScatterTable::new(&densities[most], &transport.samplers[most], energy_kev, &c)
+    (energy / photons).clamp(CUTOFF_KEV, CEILING_KEV)
 }
 
 /// What a cell holds.
 struct Look {
-    cell: Cell,
+    site: Site,
     /// Mass between source and cell, times the strength.
     mass: Vec<[f32; LANES]>,
 }

@@ -7,13 +7,16 @@ use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
 use crate::detector::open_field::OpenField;
 use crate::engine::collision_map::CollisionMap;
-use crate::engine::multiple_scatter::MultipleScatter;
+use crate::engine::first_collisions::{ESTIMATES, FirstFlights};
+use crate::engine::lines::Lines;
+use crate::engine::multiple_scatter::{MultipleScatter, Tactics};
 use crate::engine::node_grid::NodeGrid;
 use crate::engine::noise::{self, ExpectedLayer};
+use crate::engine::outlook::Outlook;
 use crate::engine::paths::Paths;
 use crate::engine::raytrace::{check_samples, primary_moments};
 use crate::engine::scatter_field::{PrimarySignal, ScatterField, single_scatter_field};
-use crate::engine::single_scatter::FirstCollisions;
+use crate::engine::single_scatter::SingleScatter;
 use crate::engine::spectral_quadrature::SpectralQuadrature;
 use crate::image::radiograph::{CategorySums, Engine, Radiograph};
 use crate::matter::compton::ComptonModel;
@@ -28,8 +31,8 @@ use crate::transport::tracking::{Transport, TransportError};
 pub struct FastSettings {
     /// Histories whose quantum noise the image carries; infinite gives the expected image.
     pub dose_histories: f64,
-    /// Histories that are followed to find multiple scatter; single scatter gets a sixteenth as many first collisions
-    /// for each point of the detector at which it is computed. The scatter's error falls with the root of it.
+    /// Histories that are followed to find multiple scatter; half as many first collisions are listed, which is where they
+    /// start and what single scatter is summed from. The scatter's error falls with the root of it.
     pub scatter_histories: u64,
     /// Largest distance of the points at which scatter is computed, mm.
     pub scatter_pixel_mm: f64,
@@ -46,7 +49,7 @@ impl Default for FastSettings {
     fn default() -> Self {
         Self {
             dose_histories: 2e10,
-            scatter_histories: 80_000,
+            scatter_histories: 320_000,
             scatter_pixel_mm: 20.0,
             samples_per_side: 8,
             compton_model: ComptonModel::default(),
@@ -63,8 +66,8 @@ const SCATTER_ENERGIES: usize = 8;
 /// How much farther apart than for single scatter the points for multiple scatter are.
 const SMOOTHER: f64 = 2.0;
 
-/// Histories of multiple scatter for each first collision of single scatter at a point.
-const HISTORIES_PER_COLLISION: u64 = 16;
+/// First collisions on a list for each that a point of the detector in the dark chooses to see.
+const LISTED_PER_CHOICE: f64 = 32.0;
 
 /// Simulates a radiograph of [`FastSettings::dose_histories`] photons at a fraction of the work.
 ///
@@ -94,7 +97,7 @@ pub fn fast(
         moments: &primary,
         open_kev: open_field_ev_cm2 * detector.pixel_cm2() / 1e3,
     };
-    let scatter = Scatter::new(&transport, &paths, &signal, settings);
+    let scatter = Scatter::new(&transport, &paths, &signal, settings, Tactics::default());
     let scattered = scatter.fields.map(|field| field.on_pixels(detector));
     let primary_kev = primary.iter().map(|pixel| pixel.mean_kev).sum::<f64>();
     let sums = CategorySums::from_kev(|category| match category {
@@ -142,6 +145,7 @@ impl Scatter {
         paths: &Paths,
         primary: &PrimarySignal,
         settings: &FastSettings,
+        tactics: Tactics,
     ) -> Self {
         let detector = primary.detector;
         let densities: Vec<ScatterDensities> = transport
@@ -150,15 +154,32 @@ impl Scatter {
             .par_iter()
             .map(|material| ScatterDensities::new(material, settings.compton_model))
             .collect();
-        let map = CollisionMap::new(transport, paths, &densities);
-        let quadratures = SpectralQuadrature::compressed(transport, SCATTER_ENERGIES);
-        let first = FirstCollisions::new(transport, paths, &densities, &map, &quadratures);
-        let collisions = settings.scatter_histories.div_ceil(HISTORIES_PER_COLLISION);
+        let lines = Lines::new(transport, paths, &densities, SCATTER_ENERGIES);
+        let mut map = CollisionMap::new(transport, paths, &lines);
+        let outlook = Outlook::new(transport, paths, &densities, &map);
+        map.weigh(&outlook.importance(&map.cells, &primary.tolerances(transport)));
+        let first = FirstFlights {
+            transport,
+            paths,
+            lines: &lines,
+            map: &map,
+            outlook: &outlook,
+        };
+        let in_all = ESTIMATES as u64 * u64::from(tactics.splitting);
+        let listed = settings.scatter_histories.div_ceil(in_all);
+        let lists = first.lists(settings.seed, listed);
+        let single = SingleScatter {
+            transport,
+            paths,
+            outlook: &outlook,
+            lines: &lines,
+            lists: &lists,
+        };
         let ([compton, rayleigh], single_share) = single_scatter_field(
-            &first,
+            &single,
             detector,
             settings.scatter_pixel_mm,
-            (settings.seed, collisions.min(u64::from(u32::MAX)) as u32),
+            (settings.seed, listed as f64 / LISTED_PER_CHOICE),
             primary,
         );
         let nodes = NodeGrid::new(detector, SMOOTHER * settings.scatter_pixel_mm);
@@ -166,10 +187,13 @@ impl Scatter {
             transport,
             paths,
             densities: &densities,
-            map: &map,
+            lines: &lines,
+            lists: &lists,
+            outlook: &outlook,
             nodes,
+            tactics,
         };
-        let seen = multiple.seen(settings.seed, settings.scatter_histories);
+        let seen = multiple.seen(settings.seed);
         let multiple = ScatterField {
             grid: nodes,
             estimates: seen.fluence,

@@ -5,11 +5,15 @@ mod attenuation_basis;
 mod collision_map;
 #[cfg(test)]
 mod energy_balance;
-mod energy_sampler;
 pub(crate) mod fast;
+mod first_collisions;
+#[cfg(test)]
+mod invariance;
+mod lines;
 mod multiple_scatter;
 mod node_grid;
 pub(crate) mod noise;
+mod outlook;
 mod paths;
 mod quasi_random;
 pub(crate) mod raytrace;
@@ -18,5 +22,7 @@ mod scatter_field;
 mod scatter_of_a_sphere;
 mod scatter_table;
 mod single_scatter;
+#[cfg(test)]
+pub(crate) mod small_limb;
 mod spectral_quadrature;
 mod turn;

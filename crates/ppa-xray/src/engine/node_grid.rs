@@ -46,14 +46,24 @@ impl NodeGrid {
         Point2::from([0, 1].map(|axis| self.low_mm[axis] + at[axis] as f64 * self.step_mm[axis]))
     }
 
-    /// Interpolation to the pixels of a detector.
+    /// Cubic interpolation to the pixels of a detector.
     pub fn to_pixels(self, detector: &Detector) -> Interpolation {
+        self.to_pixels_through(CUBIC, detector)
+    }
+
+    /// Linear interpolation to the pixels of a detector, which keeps what is positive so.
+    pub fn to_pixels_linear(self, detector: &Detector) -> Interpolation {
+        self.to_pixels_through(LINEAR, detector)
+    }
+
+    fn to_pixels_through(self, neighbours: usize, detector: &Detector) -> Interpolation {
         let low_mm = detector.field().low_mm;
         let axis = |axis: usize, nodes: usize, pixels: u32| {
             (0..pixels)
                 .map(|pixel| {
                     let at_mm = low_mm[axis] + (f64::from(pixel) + 0.5) * detector.pixel_mm;
-                    Stencil::at((at_mm - self.low_mm[axis]) / self.step_mm[axis], nodes)
+                    let at = (at_mm - self.low_mm[axis]) / self.step_mm[axis];
+                    Stencil::at(at, nodes, neighbours)
                 })
                 .collect()
         };
@@ -64,11 +74,11 @@ impl NodeGrid {
         }
     }
 
-    /// Interpolation to the nodes of [`NodeGrid::refined`].
+    /// Cubic interpolation to the nodes of [`NodeGrid::refined`].
     pub fn to_refined(self) -> Interpolation {
         let axis = |nodes: usize| {
             (0..2 * nodes - 1)
-                .map(|node| Stencil::at(0.5 * node as f64, nodes))
+                .map(|node| Stencil::at(0.5 * node as f64, nodes, CUBIC))
                 .collect()
         };
         Interpolation {
@@ -79,7 +89,11 @@ impl NodeGrid {
     }
 }
 
-/// Cubic interpolation along both axes: exact for polynomials of third degree, from four nodes each.
+/// Neighbours along an axis: polynomials of third and of first degree are met exactly.
+const CUBIC: usize = 4;
+const LINEAR: usize = 2;
+
+/// Interpolation along both axes.
 #[derive(Debug)]
 pub(crate) struct Interpolation {
     columns: Vec<Stencil>,
@@ -92,16 +106,16 @@ pub(crate) struct Interpolation {
 struct Stencil {
     first: usize,
     length: usize,
-    weights: [f64; 4],
+    weights: [f64; CUBIC],
 }
 
 impl Stencil {
-    /// Lagrange's polynomial through the (up to) four nodes around `at`; at the rim, through the last four.
-    fn at(at: f64, nodes: usize) -> Self {
-        let length = nodes.min(4);
-        let first = (at.floor() - 1.0).max(0.0) as usize;
+    /// Lagrange's polynomial through the (up to) so many nodes around `at`; at the rim, through the last of them.
+    fn at(at: f64, nodes: usize, neighbours: usize) -> Self {
+        let length = nodes.min(neighbours);
+        let first = (at.floor() - (neighbours / 2 - 1) as f64).max(0.0) as usize;
         let first = first.min(nodes - length);
-        let mut weights = [0.0; 4];
+        let mut weights = [0.0; CUBIC];
         for (i, weight) in weights.iter_mut().enumerate().take(length) {
             *weight = (0..length)
                 .filter(|&j| j != i)
@@ -115,24 +129,14 @@ impl Stencil {
         }
     }
 
-    fn apply(&self, value: impl Fn(usize) -> f64, power: i32) -> f64 {
+    fn apply(&self, value: impl Fn(usize) -> f64) -> f64 {
         (0..self.length)
-            .map(|i| self.weights[i].powi(power) * value(self.first + i))
+            .map(|i| self.weights[i] * value(self.first + i))
             .sum()
     }
 }
 
 impl Interpolation {
-    /// Values in between.
-    pub fn values(&self, nodes: &[f64]) -> Vec<f64> {
-        self.apply(nodes, 1)
-    }
-
-    /// Variances in between, from those of independent nodes.
-    pub fn variances(&self, nodes: &[f64]) -> Vec<f64> {
-        self.apply(nodes, 2)
-    }
-
     /// How much each node adds to the sum of all values in between.
     pub fn shares(&self) -> Vec<f64> {
         let along = |stencils: &[Stencil]| {
@@ -155,13 +159,14 @@ impl Interpolation {
             .collect()
     }
 
-    fn apply(&self, nodes: &[f64], power: i32) -> Vec<f64> {
+    /// Values in between.
+    pub fn values(&self, nodes: &[f64]) -> Vec<f64> {
         let across: Vec<f64> = nodes
             .chunks_exact(self.nodes)
             .flat_map(|row| {
                 self.columns
                     .iter()
-                    .map(move |stencil| stencil.apply(|node| row[node], power))
+                    .map(move |stencil| stencil.apply(|node| row[node]))
             })
             .collect();
         let width = self.columns.len();
@@ -169,8 +174,7 @@ impl Interpolation {
             .iter()
             .flat_map(|stencil| {
                 let across = &across;
-                (0..width)
-                    .map(move |column| stencil.apply(|node| across[node * width + column], power))
+                (0..width).map(move |column| stencil.apply(|node| across[node * width + column]))
             })
             .collect()
     }

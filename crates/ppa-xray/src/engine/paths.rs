@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::beam::spectrum::Spectrum;
-use crate::engine::attenuation_basis::{AttenuationBasis, LANES};
+use crate::engine::attenuation_basis::{AttenuationBasis, LANES, dot};
 use crate::phantom::lattice::{Lattice, Ray};
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::tracking::Transport;
@@ -39,6 +39,11 @@ struct Coarse {
 
 impl<'a> Paths<'a> {
     pub fn new(transport: &'a Transport<'a>) -> Self {
+        Self::with_coarse_cells(transport, COARSE_CELLS)
+    }
+
+    /// As [`Paths::new`], with at most so many coarse cells.
+    pub fn with_coarse_cells(transport: &'a Transport<'a>, cells: usize) -> Self {
         let basis = AttenuationBasis::new(
             &transport.attenuation,
             transport.phantom.materials().len(),
@@ -52,7 +57,7 @@ impl<'a> Paths<'a> {
         Self {
             codes: &transport.codes,
             lattice: &transport.lattice,
-            coarse: Coarse::new(transport.phantom, &basis),
+            coarse: Coarse::new(transport.phantom, &basis, cells),
             basis,
         }
     }
@@ -143,6 +148,13 @@ impl<'a> Paths<'a> {
         &self.coarse.density[cell * groups..(cell + 1) * groups]
     }
 
+    /// Attenuation of the coarse cells at an energy, 1/mm.
+    pub fn coarse_exponents(&self, energy_kev: f64) -> Vec<f32> {
+        let attenuation = self.basis.at(energy_kev);
+        let cells = self.coarse.density.par_chunks(self.basis.groups);
+        cells.map(|cell| dot(cell, &attenuation)).collect()
+    }
+
     /// Masses from one point to another.
     #[inline]
     pub fn between(&self, from: &Point3<f64>, to: &Point3<f64>, mass: &mut BasisMass) {
@@ -205,10 +217,10 @@ fn add(mass: &mut BasisMass, shares: &BasisMass, amount: f32) {
 }
 
 impl Coarse {
-    fn new(phantom: &VoxelPhantom, basis: &AttenuationBasis) -> Self {
+    fn new(phantom: &VoxelPhantom, basis: &AttenuationBasis, most_cells: usize) -> Self {
         let voxels = phantom.grid().size();
         let mut edge = 1;
-        while voxels.iter().map(|n| n.div_ceil(edge)).product::<usize>() > COARSE_CELLS {
+        while voxels.iter().map(|n| n.div_ceil(edge)).product::<usize>() > most_cells {
             edge += 1;
         }
         let size = voxels.map(|n| n.div_ceil(edge));

@@ -1,11 +1,14 @@
 //! Scatter over the whole detector: estimates at nodes, close together where the field bends.
 
+use nalgebra::{Point2, Point3};
 use rayon::prelude::*;
 
 use crate::beam::projection::Detector;
+use crate::engine::first_collisions::ESTIMATES;
 use crate::engine::node_grid::NodeGrid;
-use crate::engine::single_scatter::{ESTIMATES, FirstCollisions, Scratch, SingleScatter};
+use crate::engine::single_scatter::{Scratch, Seen, SingleScatter};
 use crate::transport::tally::Moments;
+use crate::transport::tracking::Transport;
 
 /// How often the distance of the nodes may be halved.
 const HALVINGS: u32 = 1;
@@ -19,6 +22,12 @@ const DARK: f64 = 0.2;
 
 /// Fewest collisions in bright places, as a share of those in dark ones.
 const BRIGHT: f64 = 0.125;
+
+/// Steps along the longer side of the detector at which it is looked at what noise hides.
+const TOLERANCES: f64 = 15.0;
+
+/// Scatter in the dark, relative to the open field, more or less.
+const LEAST_SCATTER: f64 = 0.01;
 
 /// Independent estimates of one category at the nodes of a grid, energy per cm² and history.
 #[derive(Debug)]
@@ -50,12 +59,20 @@ impl ScatterField {
                 .collect()
         };
         let (energy, square) = (mean(|m| m.mean_kev), mean(|m| m.square_kev2));
-        let variance: Vec<f64> = (0..nodes)
-            .map(|node| {
-                let deviations = self
-                    .estimates
-                    .iter()
-                    .map(|e| e[node].mean_kev - energy[node]);
+        // Neighbouring nodes share part of their errors, so the estimates are interpolated before they are compared; half
+        // way between the nodes is close enough.
+        let between = self.grid.to_refined();
+        let fine: Vec<Vec<f64>> = self
+            .estimates
+            .iter()
+            .map(|e| between.values(&e.iter().map(|m| m.mean_kev).collect::<Vec<_>>()))
+            .collect();
+        let variance: Vec<f64> = between
+            .values(&energy)
+            .into_iter()
+            .enumerate()
+            .map(|(node, mean)| {
+                let deviations = fine.iter().map(|values| values[node] - mean);
                 deviations.map(|d| d * d).sum::<f64>() / (count * (count - 1.0))
             })
             .collect();
@@ -86,8 +103,11 @@ impl ScatterField {
                     moments.scaled(if is_light { cm2 } else { 0.0 })
                 })
                 .collect(),
-            variance_kev2: interpolation
-                .variances(&variance)
+            variance_kev2: self
+                .grid
+                .refined()
+                .to_pixels_linear(detector)
+                .values(&variance)
                 .into_iter()
                 .map(|v| v * cm2 * cm2)
                 .collect(),
@@ -101,22 +121,23 @@ impl ScatterField {
 /// `signal` is the primary at a pixel relative to the open field. Nodes `step_mm` apart, and closer where four
 /// neighbours at twice the distance do not foretell the one between them.
 pub(crate) fn single_scatter_field(
-    first: &FirstCollisions,
+    scatter: &SingleScatter,
     detector: &Detector,
     step_mm: f64,
-    (seed, collisions): (u64, u32),
+    (seed, collisions): (u64, f64),
     primary: &PrimarySignal,
 ) -> ([ScatterField; 2], f64) {
     let mut grid = NodeGrid::new(detector, step_mm);
     let mut level = 0_u64;
-    let see = |grid: &NodeGrid, level: u64, nodes: &[usize]| -> Vec<SingleScatter> {
+    let see = |grid: &NodeGrid, level: u64, nodes: &[usize]| -> Vec<Seen> {
         nodes
             .par_iter()
             .map_init(Scratch::default, |scratch, &node| {
                 let at = grid.place(node);
                 let share = (DARK / primary.relative_at(at).max(1e-9)).clamp(BRIGHT, 1.0);
-                let each = (share * f64::from(collisions) / ESTIMATES as f64).ceil();
-                first.at(at, (seed, level << 40 | node as u64), each as u32, scratch)
+                let every = (1.0 / share) as usize;
+                let choices = (share * collisions, every);
+                scatter.at(at, (seed, level << 40 | node as u64), choices, scratch)
             })
             .collect()
     };
@@ -172,7 +193,7 @@ pub(crate) struct PrimarySignal<'a> {
 
 impl PrimarySignal<'_> {
     /// Energy in the nearest pixel, keV per history.
-    fn at(&self, at: nalgebra::Point2<f64>) -> f64 {
+    fn at(&self, at: Point2<f64>) -> f64 {
         let low = self.detector.field().low_mm;
         let count = [self.detector.columns, self.detector.rows];
         let [column, row] = [0, 1].map(|axis| {
@@ -182,19 +203,33 @@ impl PrimarySignal<'_> {
         self.moments[row * self.detector.columns as usize + column].mean_kev
     }
 
-    fn relative_at(&self, at: nalgebra::Point2<f64>) -> f64 {
+    /// Points of the detector plane, and the errors of scatter there that the noise of an exposure hides, relative to each
+    /// other: the roots of the signal.
+    pub fn tolerances(&self, transport: &Transport) -> Vec<(Point3<f64>, f64)> {
+        let [width, height] = self.detector.field().size_mm();
+        let grid = NodeGrid::new(self.detector, width.max(height) / TOLERANCES);
+        (0..grid.nodes())
+            .map(|node| grid.place(node))
+            .map(|at| {
+                let target = Point3::new(at.x, at.y, transport.projection.source_detector_mm);
+                (target, (self.relative_at(at) + LEAST_SCATTER).sqrt())
+            })
+            .collect()
+    }
+
+    fn relative_at(&self, at: Point2<f64>) -> f64 {
         self.at(at) / self.open_kev
     }
 }
 
-fn largest(nodes: &[SingleScatter]) -> f64 {
+fn largest(nodes: &[Seen]) -> f64 {
     nodes
         .iter()
         .map(|node| node.largest_share)
         .fold(0.0, f64::max)
 }
 
-fn mean_kev(node: &SingleScatter) -> f64 {
+fn mean_kev(node: &Seen) -> f64 {
     let both = |kinds: &[Moments; 2]| kinds[0].mean_kev + kinds[1].mean_kev;
     node.estimates.iter().map(both).sum::<f64>() / ESTIMATES as f64
 }
@@ -203,7 +238,7 @@ fn mean_kev(node: &SingleScatter) -> f64 {
 ///
 /// The middle of four nodes in a row, at -3, -1, 1, 3 steps, is (-1, 9, 9, -1)/16 of them up to an error that falls with
 /// the fourth power of the step; at kinks with the first. A quarter of it is what half the distance is taken to leave.
-fn bent_nodes(grid: &NodeGrid, nodes: &[SingleScatter], primary: &PrimarySignal) -> Vec<bool> {
+fn bent_nodes(grid: &NodeGrid, nodes: &[Seen], primary: &PrimarySignal) -> Vec<bool> {
     let values: Vec<f64> = nodes.iter().map(mean_kev).collect();
     let cm2 = primary.detector.pixel_cm2();
     let foretold = |at: usize, count: usize, value: &dyn Fn(usize) -> f64| {
@@ -225,9 +260,9 @@ fn bent_nodes(grid: &NodeGrid, nodes: &[SingleScatter], primary: &PrimarySignal)
 }
 
 /// Every estimate between the nodes.
-fn interpolated(grid: &NodeGrid, nodes: &[SingleScatter]) -> Vec<SingleScatter> {
+fn interpolated(grid: &NodeGrid, nodes: &[Seen]) -> Vec<Seen> {
     let interpolation = grid.to_refined();
-    let mut fine = vec![SingleScatter::default(); grid.refined().nodes()];
+    let mut fine = vec![Seen::default(); grid.refined().nodes()];
     for estimate in 0..ESTIMATES {
         for kind in 0..2 {
             let plane = |of: fn(&Moments) -> f64| -> Vec<f64> {

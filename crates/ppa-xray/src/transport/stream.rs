@@ -10,4 +10,6 @@ pub(crate) enum Stream {
     SingleScatter = 4,
     MultipleScatter = 5,
     MultipleScatterStarts = 6,
+    SingleScatterSights = 7,
+    MultipleScatterSights = 8,
 }

@@ -3,7 +3,6 @@
 use crate::transport::lanes::elementary::{floor, greatest, least};
 use crate::transport::lanes::flights::{Box32, Each, Flights, LANES};
 use crate::transport::lanes::isa::Kernel;
-use crate::transport::majorants::EDGE;
 
 /// Where the flights stand in the lattice of blocks.
 #[derive(Debug)]
@@ -71,14 +70,17 @@ impl Kernel for Locate<'_> {
 #[inline(always)]
 fn locate(space: &Box32, flights: &Flights, blocks: &mut Blocks, count: usize) {
     let [nx, ny, _] = space.blocks;
+    let per_voxel = 1.0 / space.edge;
     for i in 0..count {
-        let (x, x_index) = floor(flights.position[0][i] * (1.0 / EDGE as f32));
-        let (y, y_index) = floor(flights.position[1][i] * (1.0 / EDGE as f32));
-        let (z, z_index) = floor(flights.position[2][i] * (1.0 / EDGE as f32));
+        let (x, x_index) = floor(flights.position[0][i] * per_voxel);
+        let (y, y_index) = floor(flights.position[1][i] * per_voxel);
+        let (z, z_index) = floor(flights.position[2][i] * per_voxel);
         blocks.at[0][i] = x;
         blocks.at[1][i] = y;
         blocks.at[2][i] = z;
-        blocks.index[i] = x_index + nx * (y_index + ny * z_index);
+        // Idle lanes hold anything.
+        let row = y_index.wrapping_add(ny.wrapping_mul(z_index));
+        blocks.index[i] = x_index.wrapping_add(nx.wrapping_mul(row));
     }
 }
 
@@ -110,8 +112,8 @@ fn advance(space: &Box32, flights: &mut Flights, blocks: &Blocks, steps: &mut St
         let mut exit = [0.0_f32; 3];
         for axis in 0..3 {
             let at = blocks.at[axis][i];
-            low[axis] = greatest((at - reach) * EDGE as f32, 0.0);
-            high[axis] = least((at + reach + 1.0) * EDGE as f32, size[axis]);
+            low[axis] = greatest((at - reach) * space.edge, 0.0);
+            high[axis] = least((at + reach + 1.0) * space.edge, size[axis]);
             // Leaving backwards means the first number below the wall.
             let below = low[axis] - (low[axis] * 2.5e-7 + 1e-6);
             let forward = flights.slope[axis][i] > 0.0;

@@ -74,6 +74,8 @@ pub(super) struct Box32 {
     /// Cells along each axis.
     pub size: [f32; 3],
     pub blocks: [u32; 3],
+    /// Cells along the edge of a block.
+    pub edge: f32,
 }
 
 /// The three components of one photon.

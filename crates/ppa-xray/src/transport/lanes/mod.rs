@@ -102,6 +102,7 @@ impl<'a, 'p> Lanes<'a, 'p> {
                 source_detector_mm: transport.projection.source_detector_mm as f32,
                 size: transport.lattice.size.map(|n| n as f32),
                 blocks,
+                edge: transport.majorants.edge as f32,
             },
             mm_from_cell,
             transport,

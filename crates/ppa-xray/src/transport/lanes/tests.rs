@@ -418,6 +418,7 @@ fn rounding_takes_no_photon_onto_the_far_wall() {
         source_detector_mm: 100.0,
         size: [40.0; 3],
         blocks: [5; 3],
+        edge: 8.0,
     };
     let (mut flights, mut blocks, mut steps) = (Flights::new(), Blocks::new(), Steps::new());
     let count = LANES;

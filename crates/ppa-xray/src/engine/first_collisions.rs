@@ -1,0 +1,193 @@
+//! Lists of first collisions, with which all scatter starts.
+
+use rayon::prelude::*;
+
+use crate::engine::attenuation_basis::{LANES, dot};
+use crate::engine::collision_map::{Collision, CollisionMap};
+use crate::engine::lines::{Line, Lines};
+use crate::engine::outlook::{Outlook, Site};
+use crate::engine::paths::{BasisMass, Paths};
+use crate::engine::quasi_random::QuasiRandom;
+use crate::philox::Philox;
+use crate::transport::stream::Stream;
+use crate::transport::tracking::Transport;
+
+/// Independent lists, from whose spread the error is told.
+pub(crate) const ESTIMATES: usize = 16;
+
+/// Share of the histories that go on from all sites alike.
+const ALIKE: f64 = 0.5;
+
+/// First collisions, evenly spread over the irradiated body: for single scatter each point of the detector chooses from
+/// them, histories of multiple scatter go on from them.
+#[derive(Default)]
+pub(crate) struct FirstCollisions {
+    pub sites: Vec<Site>,
+    /// The first of the up to two neighbouring spectra that the photons of a site have.
+    spectrum: Vec<usize>,
+    /// Photons of every line of those spectra that get to a site, times the mass that it stands for; so many for each
+    /// site. Their sum over a list is an integral over all sites: mm g/cm³ per history.
+    photons: Vec<f32>,
+    lines: usize,
+    /// Photons that scatter at the sites, and running sums of how often histories go on from them.
+    scattered: Vec<f64>,
+    often: Vec<f64>,
+}
+
+/// What is needed to draw first collisions.
+pub(crate) struct FirstFlights<'a> {
+    pub transport: &'a Transport<'a>,
+    pub paths: &'a Paths<'a>,
+    pub lines: &'a Lines,
+    pub map: &'a CollisionMap,
+    pub outlook: &'a Outlook<'a>,
+}
+
+impl FirstFlights<'_> {
+    /// [`ESTIMATES`] lists of `collisions` each.
+    pub fn lists(&self, seed: u64, collisions: u64) -> Vec<FirstCollisions> {
+        (0..ESTIMATES as u64)
+            .into_par_iter()
+            .map(|list| {
+                let mut rng = Philox::new(seed, Stream::SingleScatter as u32, list);
+                self.list(collisions, &mut rng)
+            })
+            .collect()
+    }
+
+    fn list(&self, collisions: u64, rng: &mut Philox) -> FirstCollisions {
+        let mut points = QuasiRandom::<3>::new(rng);
+        let mut drawn: Vec<Collision> = (0..collisions)
+            .map(|_| {
+                self.map
+                    .draw(points.next(), self.transport, self.paths, rng)
+            })
+            .collect();
+        // Neighbours beside each other: even steps through the list are then even in space too.
+        drawn.sort_by_key(|collision| collision.cell);
+        let mut list = FirstCollisions {
+            lines: self.lines.most(),
+            ..FirstCollisions::default()
+        };
+        let mut mass = vec![[0.0; LANES]; self.paths.basis.groups];
+        for collision in &drawn {
+            self.enter(collision, 1.0 / collisions as f64, &mut mass, &mut list);
+        }
+        list.share_out();
+        list
+    }
+
+    /// Puts a collision on a list.
+    fn enter(
+        &self,
+        collision: &Collision,
+        weight: f64,
+        mass: &mut BasisMass,
+        list: &mut FirstCollisions,
+    ) {
+        let Some(voxel) = self.paths.voxel_at(&collision.position) else {
+            return; // on the surface of the box, but for rounding
+        };
+        let Transport {
+            phantom, emitter, ..
+        } = self.transport;
+        let emitted_per_mm2 = emitter.open_fluence_cm2(&collision.spot, collision.aim) / 100.0;
+        let density = f64::from(phantom.density_g_cm3()[voxel]);
+        let weight = weight * emitted_per_mm2 * collision.mm3 * density;
+        if weight == 0.0 {
+            return; // vacuum
+        }
+        self.paths
+            .between(&collision.spot, &collision.position, mass);
+        let material = phantom.material()[voxel];
+        let mixture = emitter.mixture(&collision.direction);
+        let own = self.lines.of(mixture.lower).len();
+        let start = list.photons.len();
+        let (mut arriving, mut energy, mut scattered) = (0.0, 0.0, 0.0);
+        for (index, line) in self.lines.of_mixture(mixture.lower).enumerate() {
+            let share = if index < own {
+                1.0 - mixture.upper_share
+            } else {
+                mixture.upper_share
+            };
+            let through = f64::from(-dot(mass, &line.attenuation)).exp();
+            let photons = (weight * share * line.photons * through) as f32;
+            list.photons.push(photons);
+            arriving += f64::from(photons);
+            energy += f64::from(photons) * line.energy_kev;
+            scattered += f64::from(photons) * line.scattered[usize::from(material)];
+        }
+        list.photons.resize(start + list.lines, 0.0);
+        list.spectrum.push(mixture.lower);
+        list.scattered.push(scattered);
+        list.sites.push(Site {
+            position: collision.position.cast(),
+            direction: collision.direction.cast(),
+            strength: arriving as f32,
+            hardness: self
+                .outlook
+                .hardness(energy / arriving.max(f64::MIN_POSITIVE)),
+            material,
+        });
+    }
+}
+
+impl FirstCollisions {
+    /// The lines that the photons of a site have, with how many of them get there.
+    #[inline]
+    pub fn photons<'a>(
+        &'a self,
+        site: usize,
+        lines: &'a Lines,
+    ) -> impl Iterator<Item = (&'a Line, f64)> {
+        let photons = &self.photons[site * self.lines..][..self.lines];
+        lines
+            .of_mixture(self.spectrum[site])
+            .zip(photons.iter().map(|&photons| f64::from(photons)))
+    }
+
+    /// Many histories go on from where scatter matters, which is where the sites are, the others by the photons that
+    /// scatter, so that no weight grows beyond bounds.
+    fn share_out(&mut self) {
+        let whole: f64 = self.scattered.iter().sum();
+        let mut sum = 0.0;
+        self.often = self
+            .scattered
+            .iter()
+            .map(|scattered| {
+                sum += ALIKE / self.sites.len() as f64
+                    + (1.0 - ALIKE) * scattered / whole.max(f64::MIN_POSITIVE);
+                sum
+            })
+            .collect();
+    }
+
+    /// The history at `share` of the way through all that go on: its site, energy, and photons that it stands for if it
+    /// were the only one.
+    pub fn scattering(&self, share: f64, lines: &Lines) -> (&Site, f64, f64) {
+        let target = share * self.often[self.often.len() - 1];
+        let after = self.often.partition_point(|&sum| sum <= target);
+        let index = after.min(self.sites.len() - 1);
+        let site = &self.sites[index];
+        let before = if index == 0 {
+            0.0
+        } else {
+            self.often[index - 1]
+        };
+        let often = self.often[index] - before;
+        let inside = (target - before) / often * self.scattered[index];
+        let (mut energy_kev, mut sum) = (0.0, 0.0);
+        for (line, photons) in self.photons(index, lines) {
+            let here = photons * line.scattered[usize::from(site.material)];
+            if here > 0.0 {
+                energy_kev = line.energy_kev;
+            }
+            sum += here;
+            if sum > inside {
+                break;
+            }
+        }
+        let weight = self.scattered[index] * self.often[self.often.len() - 1] / often;
+        (site, energy_kev, weight)
+    }
+}
