@@ -45,8 +45,8 @@ pub struct SimulateArgs {
     /// Seed of histories and noise
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Radiograph to write: 16-bit PNG; a run that keeps a tally may do without
-    #[arg(long, required_unless_present = "tally")]
+    /// Radiograph to write: 16-bit PNG; may be left out if something else is written
+    #[arg(long, required_unless_present_any = ["tally", "exr", "dicom", "dose_map"])]
     out: Option<PathBuf>,
     /// Tallies to write: OpenEXR with one layer per category
     #[arg(long)]
