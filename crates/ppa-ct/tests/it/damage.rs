@@ -149,7 +149,7 @@ fn mutated(bytes: &[u8], rng: &mut TestRng) -> Vec<u8> {
     let header = bytes.windows(4).rposition(|w| w == [0xe0, 0x7f, 0x10, 0]);
     let header = header.map_or(bytes.len(), |at| at + 1024).min(bytes.len());
     for _ in 0..1 + rng.next_u32() % 4 {
-        let reach = if rng.next_u32() % 2 == 0 {
+        let reach = if rng.next_u32().is_multiple_of(2) {
             header
         } else {
             bytes.len()
