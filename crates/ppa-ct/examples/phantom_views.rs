@@ -1,14 +1,14 @@
-//! Pictures of phantom P01: slices, parallel projections under internal rotation, and its skin.
+//! Pictures of a phantom: slices, parallel projections under internal rotation, and its skin.
 //!
-//! `cargo run --release -p ppa-ct --example phantom_views -- OUT_DIR [SPACING_MM]`
+//! `cargo run --release -p ppa-ct --example phantom_views -- OUT_DIR [SPACING_MM] [NAME]`
 
 use std::error::Error;
 use std::path::PathBuf;
 
 use image::{GrayImage, Luma};
-use nalgebra::{Point3, Rotation3, Vector3};
+use nalgebra::{Point3, Rotation3, Unit, Vector3};
 use ppa_ct::Volume;
-use ppa_ct::phantom::{LowerLeg, TableTop};
+use ppa_ct::phantom::{LowerLeg, Side, TableTop};
 
 /// Edge of a pixel of every picture, mm.
 const PIXEL_MM: f64 = 0.35;
@@ -19,7 +19,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let spacing_mm = args.next().map_or(Ok(0.8), |s| s.parse())?;
     std::fs::create_dir_all(&out)?;
 
-    let limb = LowerLeg::p01();
+    let name = args.next().unwrap_or("P01".to_owned());
+    let limb = LowerLeg::family(&name, Side::Right)?;
     let ct = limb.voxelise(spacing_mm, TableTop::Present)?;
     let joint = limb.truth().joint_centre;
     for (name, across, down, centre, size) in [
@@ -130,7 +131,7 @@ fn projection(ct: &Volume, joint: &Point3<f64>, internal_rotation_rad: f64) -> G
     })
 }
 
-/// The skin under a light from the viewer, by sphere tracing.
+/// The skin under a light beside the viewer.
 fn skin(limb: &LowerLeg, towards_limb: Vector3<f64>) -> GrayImage {
     let truth = limb.truth();
     let up = if towards_limb.z.abs() > 0.8 {
@@ -142,23 +143,14 @@ fn skin(limb: &LowerLeg, towards_limb: Vector3<f64>) -> GrayImage {
     let down = towards_limb.cross(&across);
     let middle = truth.joint_centre + Vector3::new(0.0, -40.0, 60.0);
     let corner = middle - across * 170.0 - down * 200.0 - towards_limb * 400.0;
+    let light = (-towards_limb + 0.6 * up - 0.5 * across).normalize();
+    let along = Unit::new_normalize(towards_limb);
     picture([340.0, 400.0], |u, v| {
-        let mut p = corner + across * u + down * v;
-        for _ in 0..300 {
-            let d = limb.skin_distance_mm(&p);
-            if d < 0.02 {
-                let slope = Vector3::from_fn(|a, _| {
-                    let step = Vector3::ith(a, 0.2);
-                    limb.skin_distance_mm(&(p + step)) - limb.skin_distance_mm(&(p - step))
-                });
-                let light = (-towards_limb + 0.6 * up - 0.5 * across).normalize();
-                return 0.15 + 0.8 * slope.normalize().dot(&light).max(0.0);
+        match limb.skin_hit(&(corner + across * u + down * v), &along, 900.0) {
+            Some(hit) if hit.point.z < truth.joint_centre.z + 255.0 => {
+                0.15 + 0.8 * hit.normal.dot(&light).max(0.0)
             }
-            if (p - corner).norm() > 900.0 || p.z > truth.joint_centre.z + 255.0 {
-                break;
-            }
-            p += towards_limb * (0.7 * d);
+            _ => 0.0,
         }
-        0.0
     })
 }

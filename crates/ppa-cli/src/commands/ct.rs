@@ -1,13 +1,13 @@
 //! `ppa ct`: look at, convert or make a CT.
 
+mod phantom;
+
 use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::{Args, Subcommand};
-use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_ct::{Info, read, write_nifti};
 
-use crate::output::{Output, working};
+use crate::output::Output;
 use crate::scan_args::ScanArgs;
 
 #[derive(Debug, Subcommand)]
@@ -16,8 +16,8 @@ pub enum CtCommand {
     Info(InfoArgs),
     /// Write a CT as NIfTI
     Convert(ConvertArgs),
-    /// Make the built-in phantom P01: a right lower leg and foot
-    Phantom(PhantomArgs),
+    /// Make the CT of a phantom: a lower leg of P01 to P17 or by seed, or a knee
+    Phantom(phantom::PhantomArgs),
 }
 
 #[derive(Debug, Args)]
@@ -34,19 +34,6 @@ pub struct ConvertArgs {
     output: PathBuf,
 }
 
-#[derive(Debug, Args)]
-pub struct PhantomArgs {
-    /// File to write: .nii or .nii.gz
-    #[arg(long)]
-    out: PathBuf,
-    /// Side of the cubic voxels in mm
-    #[arg(long, default_value_t = 0.8)]
-    spacing_mm: f64,
-    /// Let the leg lie on a table top
-    #[arg(long)]
-    table: bool,
-}
-
 pub fn run(command: &CtCommand, output: Output) -> anyhow::Result<()> {
     match command {
         CtCommand::Info(args) => {
@@ -58,19 +45,7 @@ pub fn run(command: &CtCommand, output: Output) -> anyhow::Result<()> {
             write_nifti(&args.output, &scan.volume)?;
             output.print(&Info::of(&read(&args.output)?), describe)
         }
-        CtCommand::Phantom(args) => {
-            let _working = working("voxelising the phantom");
-            let table = if args.table {
-                TableTop::Present
-            } else {
-                TableTop::Absent
-            };
-            let volume = LowerLeg::p01()
-                .voxelise(args.spacing_mm, table)
-                .context("cannot voxelise the phantom")?;
-            write_nifti(&args.out, &volume)?;
-            output.print(&Info::of_volume(&volume), describe)
-        }
+        CtCommand::Phantom(args) => phantom::run(args, output),
     }
 }
 

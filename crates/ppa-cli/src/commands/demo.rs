@@ -1,10 +1,10 @@
 //! `ppa demo`: from the built-in phantom to a small dataset and a contact sheet.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use ppa_ct::phantom::{LowerLeg, TableTop};
+use ppa_ct::phantom::{self, LowerLeg, TableTop};
 use ppa_ct::{ReadOptions, write_nifti};
 use ppa_dataset::layout::LimbId;
 use ppa_dataset::{Plan, PlanCase, Summary, contact_sheet, prepare, write_whole};
@@ -23,12 +23,15 @@ pub struct DemoArgs {
     /// Seed of the dataset
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Right lower leg to take: P01 to P17
+    #[arg(long, value_name = "NAME", default_value = "P01")]
+    phantom: String,
 }
 
 /// Side of the phantom's voxels, mm: fine enough for open joint gutters in the radiographs.
 const SPACING_MM: f64 = 0.8;
 
-/// Neutral, the phantom's mortise view at 18 degrees, and on to the lateral view.
+/// Neutral, the mortise view of P01 at 18 degrees, and on to the lateral view.
 const POSES: Sweep = Sweep {
     from_deg: 0.0,
     to_deg: 90.0,
@@ -46,10 +49,11 @@ struct Demo {
 
 pub fn run(args: &DemoArgs, output: Output) -> anyhow::Result<()> {
     let watch = Stopwatch::start();
+    let leg = LowerLeg::family(&args.phantom, phantom::Side::Right)?;
     let out = &args.out;
     std::fs::create_dir_all(out)
         .with_context(|| format!("cannot create folder {}", out.display()))?;
-    let plan = write_inputs(out, args.seed)?;
+    let plan = write_inputs(args, &leg)?;
     let dataset = with_progress(&plan, &out.join("dataset"))?;
     let limb = LimbId {
         patient: 0,
@@ -79,10 +83,11 @@ pub fn run(args: &DemoArgs, output: Output) -> anyhow::Result<()> {
 }
 
 /// Phantom, case and plan, as files that the other commands take as well.
-fn write_inputs(out: &Path, seed: u64) -> anyhow::Result<Plan> {
+fn write_inputs(args: &DemoArgs, leg: &LowerLeg) -> anyhow::Result<Plan> {
     let working = working("voxelising the phantom");
-    let volume = LowerLeg::p01().voxelise(SPACING_MM, TableTop::Present)?;
-    let scan = out.join("p01.nii.gz");
+    let volume = leg.voxelise(SPACING_MM, TableTop::Present)?;
+    let (out, name) = (&args.out, args.phantom.to_ascii_lowercase());
+    let scan = out.join(format!("{name}.nii.gz"));
     write_nifti(&scan, &volume)?;
     working.set_message("finding the limb");
     let (surface, choices) = (LimbSettings::default(), LandmarkOverrides::default());
@@ -93,12 +98,13 @@ fn write_inputs(out: &Path, seed: u64) -> anyhow::Result<Plan> {
         &surface,
         &choices,
     )?;
-    case.write(&out.join("p01.case.toml"))?;
+    let case_file = PathBuf::from(format!("{name}.case.toml"));
+    case.write(&out.join(&case_file))?;
     let mut plan = Plan::new(vec![PlanCase {
-        file: PathBuf::from("p01.case.toml"),
+        file: case_file,
         patient: 0,
     }]);
-    plan.seed = seed;
+    plan.seed = args.seed;
     plan.rotation = POSES;
     let file = out.join("dataset.toml");
     plan.write(&file)?;

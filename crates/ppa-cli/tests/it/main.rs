@@ -3,6 +3,7 @@
 mod bad_input;
 mod json;
 mod mcgpu;
+mod phantoms;
 mod resume;
 mod tallies;
 

@@ -129,6 +129,11 @@ impl LowerLeg {
         self
     }
 
+    /// The limb without what is known about its ankle.
+    pub fn into_limb(self) -> Limb {
+        self.limb
+    }
+
     /// Whose average the dimensions are drawn around.
     pub fn sex(&self) -> Sex {
         self.parameters.sex

@@ -1,6 +1,7 @@
 //! What is true about a phantom by construction.
 
 use nalgebra::{Point3, Unit, Vector3};
+use serde::Serialize;
 
 use super::lower_leg::LowerLeg;
 use super::lower_leg_skin::toe_tip;
@@ -11,7 +12,7 @@ use super::tibia_fibula::CORTEX_LEVELS_MM;
 const GIRTH_LEVELS_MM: [f64; 2] = [75.0, 220.0];
 
 /// Numbers that a measurement on the voxelised phantom should find; `ct` frame, mm and radians.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Truth {
     /// Middle of the joint space between trochlea and plafond.
@@ -55,11 +56,13 @@ pub struct Truth {
     pub skin_mm: f64,
     /// Radius of the trochlea about the talocrural axis at its middle, without the groove.
     pub trochlea_radius_mm: f64,
-    /// Gap between tibia and fibula 1 cm above the joint, 6 mm in front of and 6 mm behind the middle of the shaft.
+    /// Gap between tibia and fibula 1 cm above the joint, 6 mm in front of and 6 mm behind the middle of the shaft; these
+    /// distances are P01's and grow with the foot.
     pub syndesmosis_mm: [f64; 2],
     /// Depth of the fibular incisura of the tibia 1 cm above the joint.
     pub incisura_depth_mm: f64,
-    /// Thickness of the cortex of the tibia: height above the joint along the shaft, thickness.
+    /// Thickness of the cortex of the tibia where it faces away from the middle of the shaft: height above the joint
+    /// along the shaft, thickness.
     pub tibia_cortex_mm: [[f64; 2]; 3],
     /// Hounsfield units of spongy bone in the distal tibia, away from its surface.
     pub trabecular_hu: f64,
