@@ -22,8 +22,8 @@ pub enum ReadError {
         /// Why not.
         source: std::io::Error,
     },
-    /// Neither a folder of DICOM files, nor a DICOM file, nor NIfTI.
-    #[error("{} is no scan ppa can read: expected a folder with one DICOM series, a DICOM file, .nii or .nii.gz", path.display())]
+    /// Neither a folder of DICOM files, nor a DICOM file, nor NIfTI, NRRD or MetaImage.
+    #[error("{} is no scan ppa can read: expected a folder with one DICOM series, a DICOM file, .nii, .nii.gz, .nrrd, .nhdr, .mha or .mhd", path.display())]
     Unsupported {
         /// The file.
         path: PathBuf,
@@ -183,9 +183,9 @@ pub enum ReadError {
         /// Steps that differ.
         gaps: Vec<Gap>,
     },
-    /// A NIfTI file whose header cannot be used.
+    /// A NIfTI, NRRD or MetaImage file whose header cannot be used.
     #[error("{}: {problem}", path.display())]
-    Nifti {
+    Header {
         /// The file.
         path: PathBuf,
         /// What was found and what expected.
@@ -245,16 +245,52 @@ fn list_gaps(gaps: &[Gap]) -> String {
 #[non_exhaustive]
 pub enum WriteError {
     /// The name does not say a format that can be written.
-    #[error("cannot write {}: expected a name ending in .nii or .nii.gz", path.display())]
+    #[error("cannot write {}: expected {expected}", path.display())]
     Extension {
         /// The name given.
         path: PathBuf,
+        /// Names that can be written.
+        expected: &'static str,
+    },
+    /// The crate was built without this writer.
+    #[error("{} needs the feature `{feature}` of ppa-ct, which this build lacks", path.display())]
+    FeatureOff {
+        /// The file or folder.
+        path: PathBuf,
+        /// Cargo feature that holds the writer.
+        feature: &'static str,
     },
     /// The format cannot hold so many voxels along one axis.
-    #[error("a volume of {size:?} voxels does not fit NIfTI-1, which holds 32767 along an axis")]
+    #[error("a volume of {size:?} voxels does not fit {format}, which holds {most} along an axis")]
     TooLarge {
         /// Voxels along i, j, k.
         size: [usize; 3],
+        /// The format.
+        format: &'static str,
+        /// Voxels it holds along an axis.
+        most: usize,
+    },
+    /// The axes i and j are not perpendicular: no DICOM slice.
+    #[error(
+        "the axes i and j lean {lean_deg:.3} degrees from perpendicular, which a DICOM slice cannot say"
+    )]
+    SlantedSlices {
+        /// How far from perpendicular.
+        lean_deg: f64,
+    },
+    /// A folder to be written holds something already.
+    #[error("{} exists and is not an empty folder; nothing was written", path.display())]
+    Exists {
+        /// The folder asked for.
+        path: PathBuf,
+    },
+    /// An object could not be encoded.
+    #[error("cannot encode {}", path.display())]
+    Encode {
+        /// The file asked for.
+        path: PathBuf,
+        /// Why not.
+        source: Cause,
     },
     /// The file could not be written; nothing is left behind.
     #[error("cannot write {}", path.display())]

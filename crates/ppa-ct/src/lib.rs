@@ -1,16 +1,16 @@
 //! CT volumes in Hounsfield units with a typed voxel-to-world affine.
 //!
-//! [`read`] turns a DICOM series or a NIfTI file into a [`Scan`] with a [`Volume`], or refuses it
-//! with the reason; [`write_nifti`] writes one; [`Info`] tells the facts; [`phantom`] makes limbs
-//! whose true shape is known.
+//! [`read`] turns a DICOM series or a NIfTI, NRRD or MetaImage file into a [`Scan`] with a
+//! [`Volume`], or refuses it with the reason; [`write()`] writes one; [`Info`] tells the facts;
+//! [`phantom`] makes limbs whose true shape is known.
 //!
 //! Units: mm, Hounsfield units. Frames: `voxel` (i, j, k; the centre of the first voxel is
 //! (0, 0, 0)) and `ct` (DICOM patient axes LPS: x to the left, y posterior, z superior).
 //! A volume may be sheared (gantry tilt) or left-handed: its affine stays as acquired.
 //! Nothing that names a person, a place or a date passes from a file into these types.
 //!
-//! Features: `dicom` and `nifti` (both on by default) hold the readers; without them the crate is
-//! geometry and phantoms only.
+//! Features: `dicom`, `nifti`, `nrrd` and `metaimage` (all on by default) hold the readers and
+//! writers; without them the crate is geometry and phantoms only.
 //!
 //! ```
 //! use nalgebra::{Point3, Vector3};
@@ -24,23 +24,50 @@
 mod acquisition;
 #[cfg(feature = "dicom")]
 mod dicom_series;
+#[cfg(feature = "dicom")]
+mod dicom_write;
 mod error;
 mod grid;
 mod info;
+#[cfg(feature = "metaimage")]
+mod meta_image;
 #[cfg(feature = "nifti")]
 mod nifti_file;
+#[cfg(feature = "nrrd")]
+mod nrrd_file;
 pub mod phantom;
 mod refine;
 mod scan;
+#[cfg(any(feature = "nifti", feature = "nrrd", feature = "metaimage"))]
+mod scan_file;
+#[cfg(any(feature = "nifti", feature = "nrrd", feature = "metaimage"))]
+mod stored;
 mod volume;
+#[cfg(any(feature = "nifti", feature = "nrrd", feature = "metaimage"))]
+mod whole_file;
+#[cfg(any(
+    feature = "dicom",
+    feature = "nifti",
+    feature = "nrrd",
+    feature = "metaimage"
+))]
+mod whole_numbers;
+mod write;
 
 pub use acquisition::Acquisition;
+#[cfg(feature = "dicom")]
+pub use dicom_write::write as write_dicom;
 pub use error::{Gap, ReadError, WriteError};
 pub use grid::{Grid, GridError};
 pub use info::Info;
+#[cfg(feature = "metaimage")]
+pub use meta_image::write as write_meta_image;
 #[cfg(feature = "nifti")]
 pub use nifti_file::write as write_nifti;
+#[cfg(feature = "nrrd")]
+pub use nrrd_file::write as write_nrrd;
 pub use scan::{
     ReadOptions, Scan, SeriesChoice, SeriesSummary, Warning, WarningCode, read, read_with,
 };
 pub use volume::{Volume, VolumeError};
+pub use write::write;

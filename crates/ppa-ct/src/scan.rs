@@ -15,9 +15,9 @@ use crate::volume::Volume;
 pub struct Scan {
     /// Hounsfield units in the `ct` frame.
     pub volume: Volume,
-    /// Modality the source declares (`CT`); `None` for NIfTI, which cannot say.
+    /// Modality the source declares (`CT`); `None` for NIfTI and NRRD, which cannot say.
     pub modality: Option<String>,
-    /// All DICOM series found, of which one was read; empty for NIfTI.
+    /// All DICOM series found, of which one was read; empty for other formats.
     pub series: Vec<SeriesSummary>,
     /// What the source says about its own making.
     pub acquisition: Acquisition,
@@ -106,11 +106,12 @@ pub enum WarningCode {
     PixelPadding,
     /// Slices were interpolated, as asked for.
     GapsFilled,
-    /// The NIfTI header gives no orientation; the axes are assumed to be right, anterior, superior.
-    NiftiNoOrientation,
+    /// The header of a file gives no orientation or no position; the warning says what is assumed.
+    NoOrientation,
 }
 
-/// Reads a CT: a folder with one DICOM series, a single DICOM file, `.nii` or `.nii.gz`.
+/// Reads a CT: a folder with one DICOM series, a single DICOM file, NIfTI (`.nii`, `.nii.gz`),
+/// NRRD (`.nrrd`, `.nhdr`) or MetaImage (`.mha`, `.mhd`).
 ///
 /// As [`read_with`] without any option.
 ///
@@ -150,6 +151,10 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<Scan, ReadError> 
     }
     if name.ends_with(".nii") || name.ends_with(".nii.gz") {
         read_nifti(path)
+    } else if name.ends_with(".nrrd") || name.ends_with(".nhdr") {
+        read_nrrd(path)
+    } else if name.ends_with(".mha") || name.ends_with(".mhd") {
+        read_meta_image(path, options.force)
     } else {
         Err(ReadError::Unsupported {
             path: path.to_owned(),
@@ -168,7 +173,12 @@ pub(crate) fn starts_as_dicom(path: &Path) -> std::io::Result<bool> {
 }
 
 /// Warns when no voxel is near air: every scan of a limb shows some.
-#[cfg(any(feature = "dicom", feature = "nifti"))]
+#[cfg(any(
+    feature = "dicom",
+    feature = "nifti",
+    feature = "nrrd",
+    feature = "metaimage"
+))]
 pub(crate) fn hu_plausibility(volume: &Volume) -> Option<Warning> {
     /// Fat is about −100 HU and lung −850: above this, nothing in the volume is air.
     const NO_AIR_HU: f32 = -200.0;
@@ -192,6 +202,12 @@ use crate::dicom_series::{read_file as read_dicom_file, read_folder as read_dico
 #[cfg(feature = "nifti")]
 use crate::nifti_file::read as read_nifti;
 
+#[cfg(feature = "nrrd")]
+use crate::nrrd_file::read as read_nrrd;
+
+#[cfg(feature = "metaimage")]
+use crate::meta_image::read as read_meta_image;
+
 #[cfg(not(feature = "dicom"))]
 fn read_dicom_folder(path: &Path, _: &ReadOptions) -> Result<Scan, ReadError> {
     feature_off(path, "dicom")
@@ -207,7 +223,22 @@ fn read_nifti(path: &Path) -> Result<Scan, ReadError> {
     feature_off(path, "nifti")
 }
 
-#[cfg(not(all(feature = "dicom", feature = "nifti")))]
+#[cfg(not(feature = "nrrd"))]
+fn read_nrrd(path: &Path) -> Result<Scan, ReadError> {
+    feature_off(path, "nrrd")
+}
+
+#[cfg(not(feature = "metaimage"))]
+fn read_meta_image(path: &Path, _: bool) -> Result<Scan, ReadError> {
+    feature_off(path, "metaimage")
+}
+
+#[cfg(not(all(
+    feature = "dicom",
+    feature = "nifti",
+    feature = "nrrd",
+    feature = "metaimage"
+)))]
 fn feature_off(path: &Path, feature: &'static str) -> Result<Scan, ReadError> {
     Err(ReadError::FeatureOff {
         path: path.to_owned(),

@@ -1,16 +1,18 @@
 //! Writing NIfTI-1.
 
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::Path;
 
-use atomic_write_file::AtomicWriteFile;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use nifti::NiftiHeader;
 
 use super::affine::set_affine;
 use crate::error::WriteError;
+use crate::stored::write_exact;
 use crate::volume::Volume;
+use crate::whole_file::write_whole;
+use crate::whole_numbers::fits_i16;
 
 /// Voxels follow the header and four bytes that announce no extension.
 const VOXELS_AT: f32 = 352.0;
@@ -31,11 +33,17 @@ pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     if !compress && !name.ends_with(".nii") {
         return Err(WriteError::Extension {
             path: path.to_owned(),
+            expected: "a name ending in .nii or .nii.gz",
         });
     }
     let size = volume.grid().size();
-    if size.iter().any(|&n| n > i16::MAX as usize) {
-        return Err(WriteError::TooLarge { size });
+    let most = i16::MAX as usize;
+    if size.iter().any(|&n| n > most) {
+        return Err(WriteError::TooLarge {
+            size,
+            format: "NIfTI-1",
+            most,
+        });
     }
     write_whole(path, |out| {
         if compress {
@@ -53,42 +61,18 @@ pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     })
 }
 
-/// Fills a temporary file beside `path`, synced and renamed when it is complete.
-fn write_whole(
-    path: &Path,
-    fill: impl FnOnce(&mut dyn Write) -> std::io::Result<()>,
-) -> std::io::Result<()> {
-    // Checked here, since a failed rename would leave the temporary file behind.
-    if path.is_dir() {
-        return Err(std::io::ErrorKind::IsADirectory.into());
-    }
-    let mut file = BufWriter::new(AtomicWriteFile::open(path)?);
-    fill(&mut file)?;
-    file.into_inner().map_err(|e| e.into_error())?.commit()
-}
-
 fn write_stream(out: &mut dyn Write, volume: &Volume) -> std::io::Result<()> {
-    let whole = volume
-        .hu()
-        .iter()
-        .all(|&v| v.fract() == 0.0 && (f32::from(i16::MIN)..=f32::from(i16::MAX)).contains(&v));
-    out.write_all(&header_bytes(&header(volume, whole)))?;
-    let mut bytes = Vec::with_capacity(1 << 16);
-    for values in volume.hu().chunks(1 << 14) {
-        bytes.clear();
-        if whole {
-            bytes.extend(values.iter().flat_map(|&v| (v as i16).to_le_bytes()));
-        } else {
-            bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
-        }
-        out.write_all(&bytes)?;
-    }
-    Ok(())
+    out.write_all(&header_bytes(&header(volume)))?;
+    write_exact(out, volume.hu())
 }
 
-fn header(volume: &Volume, whole: bool) -> NiftiHeader {
+fn header(volume: &Volume) -> NiftiHeader {
     let [nx, ny, nz] = volume.grid().size().map(|n| n as u16);
-    let (datatype, bitpix) = if whole { (4, 16) } else { (16, 32) };
+    let (datatype, bitpix) = if fits_i16(volume.hu()) {
+        (4, 16)
+    } else {
+        (16, 32)
+    };
     let mut header = NiftiHeader {
         dim: [3, nx, ny, nz, 1, 1, 1, 1],
         datatype,

@@ -79,6 +79,12 @@ fn one_hand_in_many_containers_is_one_hand() {
         "hand_int16.nii.gz",
         "hand_scl_sformonly.nii.gz",
         "hand_bigendian.nii.gz",
+        "hand_gzip_lps.nrrd",
+        "hand_raw_detached.nhdr",
+        "hand_ras_f32.nrrd",
+        "hand.mhd",
+        "hand_z.mhd",
+        "hand.mha",
     ] {
         let scan = open(&format!("hand-reencoded/{name}"));
         let info = Info::of(&scan);
@@ -116,6 +122,19 @@ fn one_hand_in_many_containers_is_one_hand() {
         }
         assert_eq!(scan.volume.hu(), reference.volume.hu(), "{name}");
     }
+}
+
+/// MetaImage as ITK writes it: size, spacing, origin and range as documented with the data.
+#[test]
+#[ignore = "needs ../shared/data"]
+fn a_lung_written_by_others_reads_as_documented() {
+    let scan = open("lung-mha/3DCT_lung.mha");
+    let info = Info::of(&scan);
+    assert_eq!(info.size, [115, 157, 129]);
+    assert_eq!(info.spacing_mm, [1.366, 1.366, 2.5]);
+    assert_eq!(info.origin_mm, [-153.827, -150.352, -1434.5]);
+    assert_eq!((info.hu_min, info.hu_max), (-1255.0, 1474.0));
+    assert_eq!(codes(&scan), []);
 }
 
 /// Another memory order, and a rigid motion: voxels are found again at their world positions.

@@ -1,0 +1,92 @@
+//! Writing MetaImage.
+
+use std::io;
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+
+use crate::error::WriteError;
+use crate::stored::write_exact;
+use crate::volume::Volume;
+use crate::whole_file::write_whole;
+use crate::whole_numbers::fits_i16;
+
+/// Writes a volume as `.mha`, or as `.mhd` with its voxels in a `.zraw` beside it.
+///
+/// Voxels are deflated; whole numbers that fit are stored as int16, anything else as float32. The
+/// affine may be sheared. Each file appears whole or not at all, the `.mhd` last, and their bytes
+/// depend on the volume and the file name only.
+///
+/// # Errors
+/// [`WriteError`] for another extension and a file system that refuses.
+pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
+    let extension = path.extension().unwrap_or_default();
+    let io = |path: &Path| {
+        let path = path.to_owned();
+        move |source| WriteError::Io { path, source }
+    };
+    // The data file's name goes into the header, which is text.
+    let data = path.with_extension("zraw");
+    let data_name = data.file_name().and_then(|name| name.to_str());
+    match data_name {
+        _ if extension.eq_ignore_ascii_case("mha") => {
+            // The header tells the packed length, so that is known first.
+            let packed = packed(volume).map_err(io(path))?;
+            let header = header(volume, packed.len(), "LOCAL");
+            write_whole(path, |out| {
+                out.write_all(header.as_bytes())?;
+                out.write_all(&packed)
+            })
+            .map_err(io(path))
+        }
+        Some(name) if extension.eq_ignore_ascii_case("mhd") => {
+            let packed = packed(volume).map_err(io(&data))?;
+            let header = header(volume, packed.len(), name);
+            write_whole(&data, |out| out.write_all(&packed)).map_err(io(&data))?;
+            write_whole(path, |out| out.write_all(header.as_bytes())).map_err(|source| {
+                // Voxels without a header are of no use; the first failure is the one to report.
+                let _ = std::fs::remove_file(&data);
+                io(path)(source)
+            })
+        }
+        _ => Err(WriteError::Extension {
+            path: path.to_owned(),
+            expected: "a name ending in .mha or .mhd",
+        }),
+    }
+}
+
+fn packed(volume: &Volume) -> io::Result<Vec<u8>> {
+    // CT noise hardly compresses: higher levels cost time and save a few percent.
+    let mut zlib = ZlibEncoder::new(Vec::new(), Compression::fast());
+    write_exact(&mut zlib, volume.hu())?;
+    zlib.finish()
+}
+
+fn header(volume: &Volume, packed_bytes: usize, data: &str) -> String {
+    let grid = volume.grid();
+    let kind = if fits_i16(volume.hu()) {
+        "MET_SHORT"
+    } else {
+        "MET_FLOAT"
+    };
+    // Rust prints the shortest decimals that come back as the same number.
+    let list = |numbers: &[f64]| {
+        numbers
+            .iter()
+            .map(f64::to_string)
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
+    let [nx, ny, nz] = grid.size();
+    format!(
+        "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n\
+         CompressedData = True\nCompressedDataSize = {packed_bytes}\nTransformMatrix = {}\nOffset = {}\n\
+         CenterOfRotation = 0 0 0\nElementSpacing = {}\nDimSize = {nx} {ny} {nz}\nElementType = {kind}\n\
+         ElementDataFile = {data}\n",
+        list(grid.direction().as_slice()),
+        list(grid.origin_mm().coords.as_slice()),
+        list(grid.spacing_mm().as_slice()),
+    )
+}

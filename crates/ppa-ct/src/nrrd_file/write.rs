@@ -1,0 +1,65 @@
+//! Writing NRRD.
+
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+
+use crate::error::WriteError;
+use crate::stored::write_exact;
+use crate::volume::Volume;
+use crate::whole_file::write_whole;
+use crate::whole_numbers::fits_i16;
+
+/// Writes a volume as `.nrrd`: one file, gzipped voxels, axes in LPS.
+///
+/// Whole numbers that fit are stored as int16, anything else as float32. The affine, sheared or
+/// not, comes back exactly. The file appears whole or not at all, and its bytes depend on the
+/// volume only.
+///
+/// # Errors
+/// [`WriteError`] for another extension and a file system that refuses.
+pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
+    if !path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("nrrd"))
+    {
+        return Err(WriteError::Extension {
+            path: path.to_owned(),
+            expected: "a name ending in .nrrd",
+        });
+    }
+    write_whole(path, |out| {
+        out.write_all(header(volume).as_bytes())?;
+        // CT noise hardly compresses: higher levels cost time and save a few percent.
+        let mut gzip = GzEncoder::new(out, Compression::fast());
+        write_exact(&mut gzip, volume.hu())?;
+        gzip.finish().map(|_| ())
+    })
+    .map_err(|source| WriteError::Io {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+fn header(volume: &Volume) -> String {
+    let [nx, ny, nz] = volume.grid().size();
+    let kind = if fits_i16(volume.hu()) {
+        "int16"
+    } else {
+        "float"
+    };
+    // Rust prints the shortest decimals that come back as the same number.
+    let affine = volume.grid().ct_from_voxel().matrix();
+    let vector = |column: usize| {
+        let [x, y, z] = [0, 1, 2].map(|row| affine[(row, column)]);
+        format!("({x},{y},{z})")
+    };
+    let [i, j, k, origin] = [0, 1, 2, 3].map(vector);
+    format!(
+        "NRRD0004\ntype: {kind}\ndimension: 3\nspace: left-posterior-superior\n\
+         sizes: {nx} {ny} {nz}\nspace directions: {i} {j} {k}\n\
+         kinds: domain domain domain\nendian: little\nencoding: gzip\n\
+         space units: \"mm\" \"mm\" \"mm\"\nspace origin: {origin}\n\n"
+    )
+}

@@ -1,0 +1,228 @@
+//! A file that holds a scan: its bytes from the first to the last, and errors that name it.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read};
+use std::path::{Component, Path, PathBuf};
+
+use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
+use nalgebra::Affine3;
+
+use crate::acquisition::Acquisition;
+use crate::error::ReadError;
+use crate::grid::Grid;
+use crate::scan::{Scan, Warning, WarningCode, hu_plausibility};
+use crate::stored::Stored;
+use crate::volume::{Volume, VolumeError};
+
+/// Most bytes that one byte of a deflate stream can unpack to (zlib's technical notes: 1032:1).
+const DEFLATE_MOST: u64 = 1032;
+
+/// Longest line of a text header.
+const LINE_BYTES: u64 = 1 << 16;
+
+/// How the bytes from here on are packed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Packing {
+    Raw,
+    Gzip,
+    Zlib,
+}
+
+/// A file being read from front to back.
+pub(crate) struct ScanFile {
+    path: PathBuf,
+    stream: Box<dyn BufRead>,
+    /// Bytes still to come; an upper bound where they are packed.
+    most: u64,
+    packed: bool,
+}
+
+impl ScanFile {
+    pub(crate) fn open(path: &Path) -> Result<Self, ReadError> {
+        let opened = || -> io::Result<_> {
+            let file = File::open(path)?;
+            let most = file.metadata()?.len();
+            Ok((file, most))
+        };
+        let (file, most) = opened().map_err(|source| ReadError::Io {
+            path: path.to_owned(),
+            source,
+        })?;
+        Ok(Self {
+            path: path.to_owned(),
+            stream: Box::new(BufReader::new(file)),
+            most,
+            packed: false,
+        })
+    }
+
+    /// The file that a header names as the place of its voxels; it must lie beside the header.
+    pub(crate) fn open_beside(&self, name: &str) -> Result<Self, ReadError> {
+        let path = Path::new(name);
+        let mut parts = path.components();
+        let bare = matches!(
+            (parts.next(), parts.next()),
+            (Some(Component::Normal(part)), None) if part == path.as_os_str()
+        );
+        if !bare || name.contains('\\') {
+            return Err(self.header(
+                "the voxels are said to lie in another folder; expected a file beside the header",
+            ));
+        }
+        Self::open(&self.path.with_file_name(name))
+    }
+
+    /// What is wrong with the header.
+    pub(crate) fn header(&self, problem: impl Into<String>) -> ReadError {
+        ReadError::Header {
+            path: self.path.clone(),
+            problem: problem.into(),
+        }
+    }
+
+    fn io(&self, source: io::Error) -> ReadError {
+        ReadError::Io {
+            path: self.path.clone(),
+            source,
+        }
+    }
+
+    fn unusable(&self, source: impl Into<VolumeError>) -> ReadError {
+        ReadError::Volume {
+            path: self.path.clone(),
+            source: source.into(),
+        }
+    }
+
+    /// The lattice of a header.
+    pub(crate) fn grid(&self, size: [usize; 3], affine: Affine3<f64>) -> Result<Grid, ReadError> {
+        Grid::new(size, affine).map_err(|e| self.unusable(e))
+    }
+
+    /// Whether the next bytes are these; nothing is consumed.
+    pub(crate) fn next_is(&mut self, bytes: &[u8]) -> Result<bool, ReadError> {
+        let Self { path, stream, .. } = self;
+        let next = stream.fill_buf().map_err(|source| ReadError::Io {
+            path: path.clone(),
+            source,
+        })?;
+        Ok(next.starts_with(bytes))
+    }
+
+    /// Up to `count` bytes, fewer where the file ends.
+    pub(crate) fn bytes(&mut self, count: usize) -> Result<Vec<u8>, ReadError> {
+        let mut bytes = Vec::new();
+        (&mut self.stream)
+            .take(count as u64)
+            .read_to_end(&mut bytes)
+            .map_err(|e| self.io(e))?;
+        self.most = self.most.saturating_sub(bytes.len() as u64);
+        Ok(bytes)
+    }
+
+    /// The next line with its line feed, which is missing where the file ends before it.
+    pub(crate) fn line(&mut self) -> Result<String, ReadError> {
+        let mut line = Vec::new();
+        (&mut self.stream)
+            .take(LINE_BYTES)
+            .read_until(b'\n', &mut line)
+            .map_err(|e| self.io(e))?;
+        self.most = self.most.saturating_sub(line.len() as u64);
+        Ok(String::from_utf8_lossy(&line).into_owned())
+    }
+
+    /// Leaves out `count` bytes.
+    pub(crate) fn skip(&mut self, count: u64) -> Result<(), ReadError> {
+        io::copy(&mut (&mut self.stream).take(count), &mut io::sink()).map_err(|e| self.io(e))?;
+        self.most = self.most.saturating_sub(count);
+        Ok(())
+    }
+
+    /// Leaves out all but the last `count` bytes of a file that is not packed.
+    pub(crate) fn skip_to_last(&mut self, count: u64) -> Result<(), ReadError> {
+        self.skip(self.most.saturating_sub(count))
+    }
+
+    /// The bytes from here on, unpacked.
+    pub(crate) fn unpacked(self, packing: Packing) -> Self {
+        let unpacker: Box<dyn Read> = match packing {
+            Packing::Raw => return self,
+            Packing::Gzip => Box::new(MultiGzDecoder::new(self.stream)),
+            Packing::Zlib => Box::new(ZlibDecoder::new(self.stream)),
+        };
+        Self {
+            path: self.path,
+            stream: Box::new(BufReader::new(unpacker)),
+            most: self.most.saturating_mul(DEFLATE_MOST),
+            packed: true,
+        }
+    }
+
+    /// The voxels, which fill the file from here to its end.
+    ///
+    /// Memory: four bytes per voxel, asked for only if the file can hold them all. So one byte of
+    /// a file costs at most four, or 4 x 1032 where it is deflated.
+    pub(crate) fn voxels(
+        mut self,
+        stored: &Stored,
+        size: [usize; 3],
+    ) -> Result<Vec<f32>, ReadError> {
+        let expected = stored.bytes_of(size).unwrap_or(u64::MAX);
+        let wrong = |path: &Path, found| ReadError::PixelCount {
+            path: path.to_owned(),
+            found,
+            expected,
+        };
+        if self.most < expected {
+            return Err(if self.packed {
+                self.header(format!(
+                    "voxels of {expected} bytes, more than this file can be unpacked to"
+                ))
+            } else {
+                wrong(&self.path, self.most)
+            });
+        }
+        let width = stored.number.bytes() as u64;
+        let voxels = (expected / width) as usize;
+        let hu = stored
+            .read(&mut self.stream, voxels)
+            .map_err(|e| self.io(e))?;
+        // To the very end: only there are checksums compared.
+        let surplus = io::copy(&mut self.stream, &mut io::sink()).map_err(|e| self.io(e))?;
+        if hu.len() != voxels || surplus > 0 {
+            return Err(wrong(&self.path, hu.len() as u64 * width + surplus));
+        }
+        Ok(hu)
+    }
+}
+
+/// A scan from the file `path` that a header and its voxels make up.
+pub(crate) fn scan(
+    path: &Path,
+    grid: Grid,
+    hu: Vec<f32>,
+    modality: Option<String>,
+    acquisition: Acquisition,
+    warnings: impl IntoIterator<Item = Warning>,
+) -> Result<Scan, ReadError> {
+    let volume = Volume::new(grid, hu).map_err(|source| ReadError::Volume {
+        path: path.to_owned(),
+        source,
+    })?;
+    let plausible = hu_plausibility(&volume);
+    Ok(Scan {
+        warnings: warnings.into_iter().chain(plausible).collect(),
+        volume,
+        modality,
+        series: Vec::new(),
+        acquisition,
+    })
+}
+
+/// The warning that a header leaves open where its voxels lie.
+pub(crate) fn no_orientation(text: &str) -> Warning {
+    Warning {
+        code: WarningCode::NoOrientation,
+        text: text.to_owned(),
+    }
+}

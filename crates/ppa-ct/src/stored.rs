@@ -1,0 +1,207 @@
+//! How voxels are stored in a file, and how they become Hounsfield units and back.
+
+use std::io::{self, Read, Write};
+
+use crate::whole_numbers::fits_i16;
+
+/// Number types a CT may come in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Number {
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    U64,
+    I64,
+    F32,
+    F64,
+}
+
+impl Number {
+    /// Bytes of one voxel.
+    pub(crate) fn bytes(self) -> usize {
+        match self {
+            Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 => 2,
+            Self::U32 | Self::I32 | Self::F32 => 4,
+            Self::U64 | Self::I64 | Self::F64 => 8,
+        }
+    }
+}
+
+/// Numbers in a file and their way to Hounsfield units: `slope` x number + `intercept`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stored {
+    pub(crate) number: Number,
+    pub(crate) big_endian: bool,
+    pub(crate) slope: f64,
+    pub(crate) intercept: f64,
+}
+
+/// Voxels turned at a time: a buffer of at most half a megabyte.
+const CHUNK: usize = 1 << 16;
+
+impl Stored {
+    /// Bytes that a volume of `size` voxels takes; `None` above what 64 bits count.
+    pub(crate) fn bytes_of(&self, size: [usize; 3]) -> Option<u64> {
+        let width = self.number.bytes() as u64;
+        size.iter()
+            .try_fold(width, |bytes, &n| bytes.checked_mul(n as u64))
+    }
+
+    /// Smallest and largest HU that whole numbers of this type can express; `None` for real ones.
+    pub(crate) fn representable_hu(&self) -> Option<[f64; 2]> {
+        let [low, high] = match self.number {
+            Number::U8 => [0.0, f64::from(u8::MAX)],
+            Number::I8 => [f64::from(i8::MIN), f64::from(i8::MAX)],
+            Number::I16 => [f64::from(i16::MIN), f64::from(i16::MAX)],
+            Number::U16 => [0.0, f64::from(u16::MAX)],
+            Number::I32 => [f64::from(i32::MIN), f64::from(i32::MAX)],
+            Number::U32 => [0.0, f64::from(u32::MAX)],
+            Number::I64 => [i64::MIN as f64, i64::MAX as f64],
+            Number::U64 => [0.0, u64::MAX as f64],
+            Number::F32 | Number::F64 => return None,
+        }
+        .map(|stored| self.slope * stored + self.intercept);
+        Some([low.min(high), low.max(high)])
+    }
+
+    /// Reads `voxels` values; where the stream ends before, those that came whole.
+    pub(crate) fn read(&self, stream: &mut dyn Read, voxels: usize) -> io::Result<Vec<f32>> {
+        let width = self.number.bytes();
+        let mut hu = Vec::with_capacity(voxels);
+        let mut chunk = Vec::with_capacity(voxels.min(CHUNK) * width);
+        while hu.len() < voxels {
+            let wanted = CHUNK.min(voxels - hu.len()) * width;
+            chunk.clear();
+            stream.take(wanted as u64).read_to_end(&mut chunk)?;
+            self.append(&chunk, &mut hu);
+            if chunk.len() < wanted {
+                break;
+            }
+        }
+        Ok(hu)
+    }
+
+    fn append(&self, bytes: &[u8], hu: &mut Vec<f32>) {
+        macro_rules! decode {
+            ($number:ty) => {
+                if self.big_endian {
+                    self.scaled(bytes, hu, |b| <$number>::from_be_bytes(b) as f64)
+                } else {
+                    self.scaled(bytes, hu, |b| <$number>::from_le_bytes(b) as f64)
+                }
+            };
+        }
+        match self.number {
+            Number::U8 => decode!(u8),
+            Number::I8 => decode!(i8),
+            Number::U16 => decode!(u16),
+            Number::I16 => decode!(i16),
+            Number::U32 => decode!(u32),
+            Number::I32 => decode!(i32),
+            Number::U64 => decode!(u64),
+            Number::I64 => decode!(i64),
+            Number::F32 => decode!(f32),
+            Number::F64 => decode!(f64),
+        }
+    }
+
+    fn scaled<const N: usize>(
+        &self,
+        bytes: &[u8],
+        hu: &mut Vec<f32>,
+        number: impl Fn([u8; N]) -> f64,
+    ) {
+        let (slope, intercept) = (self.slope, self.intercept);
+        let (numbers, _) = bytes.as_chunks::<N>();
+        hu.extend(
+            numbers
+                .iter()
+                .map(|b| (slope * number(*b) + intercept) as f32),
+        );
+    }
+}
+
+/// Writes values exactly and little-endian: as int16 where [`fits_i16`], else as float32.
+pub(crate) fn write_exact(out: &mut dyn Write, hu: &[f32]) -> io::Result<()> {
+    let short = fits_i16(hu);
+    let mut bytes = Vec::with_capacity(4 * CHUNK.min(hu.len()));
+    for values in hu.chunks(CHUNK) {
+        bytes.clear();
+        if short {
+            bytes.extend(values.iter().flat_map(|&v| (v as i16).to_le_bytes()));
+        } else {
+            bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+        }
+        out.write_all(&bytes)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Smallest and largest value of every type, in both byte orders.
+    #[test]
+    fn every_number_type_is_understood() {
+        macro_rules! check {
+            ($kind:ident, $number:ty) => {
+                for value in [<$number>::MIN, <$number>::MAX, 1 as $number] {
+                    for big_endian in [false, true] {
+                        let bytes = if big_endian {
+                            value.to_be_bytes().to_vec()
+                        } else {
+                            value.to_le_bytes().to_vec()
+                        };
+                        let stored = Stored {
+                            number: Number::$kind,
+                            big_endian,
+                            slope: 0.5,
+                            intercept: -3.0,
+                        };
+                        assert_eq!(stored.number.bytes(), bytes.len());
+                        let hu = stored.read(&mut bytes.as_slice(), 1).unwrap();
+                        assert_eq!(hu, [(0.5 * value as f64 - 3.0) as f32]);
+                    }
+                }
+            };
+        }
+        check!(U8, u8);
+        check!(I8, i8);
+        check!(U16, u16);
+        check!(I16, i16);
+        check!(U32, u32);
+        check!(I32, i32);
+        check!(U64, u64);
+        check!(I64, i64);
+        check!(F32, f32);
+        check!(F64, f64);
+    }
+
+    proptest! {
+        #[test]
+        fn values_are_written_exactly(
+            whole in any::<bool>(),
+            values in prop::collection::vec(-40_000.0..40_000.0_f32, 0..50),
+        ) {
+            let values = values
+                .into_iter()
+                .map(|v| if whole { v.trunc() } else { v })
+                .collect::<Vec<_>>();
+            let mut bytes = Vec::new();
+            write_exact(&mut bytes, &values).unwrap();
+            let stored = Stored {
+                number: if fits_i16(&values) { Number::I16 } else { Number::F32 },
+                big_endian: false,
+                slope: 1.0,
+                intercept: 0.0,
+            };
+            prop_assert_eq!(stored.read(&mut bytes.as_slice(), values.len()).unwrap(), values);
+        }
+    }
+}

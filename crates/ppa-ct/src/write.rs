@@ -1,0 +1,85 @@
+//! Writing a volume in the format that a name asks for.
+
+use std::path::Path;
+
+use crate::error::WriteError;
+use crate::volume::Volume;
+
+/// Writes a volume: NIfTI (`.nii`, `.nii.gz`), NRRD (`.nrrd`), MetaImage (`.mha`, `.mhd` with a `.zraw`), or a
+/// folder of DICOM slices, which is a name without an extension, one that ends in a slash, or an empty folder.
+///
+/// ```
+/// use nalgebra::{Point3, Vector3};
+/// use ppa_ct::{Grid, Volume, read, write};
+/// let grid = Grid::axis_aligned([4, 3, 2], Vector3::new(0.5, 0.5, 2.0), Point3::new(-80.0, 10.0, 5.0))?;
+/// let volume = Volume::new(grid, (0..24).map(|n| 100.0 * n as f32 - 1000.0).collect())?;
+/// let folder = tempfile::tempdir()?;
+/// for name in ["leg.nii.gz", "leg.nrrd", "leg.mha", "leg.mhd", "leg"] {
+///     let path = folder.path().join(name);
+///     write(&path, &volume)?;
+///     assert_eq!(read(&path)?.volume, volume);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`WriteError`] of the format, and for other extensions.
+pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
+    let extension = path
+        .extension()
+        .map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let slash = path.as_os_str().as_encoded_bytes().ends_with(b"/");
+    match extension.as_deref() {
+        _ if slash || path.is_dir() => write_dicom(path, volume),
+        None => write_dicom(path, volume),
+        Some("nii" | "gz") => write_nifti(path, volume),
+        Some("nrrd") => write_nrrd(path, volume),
+        Some("mha" | "mhd") => write_meta_image(path, volume),
+        Some(_) => Err(WriteError::Extension {
+            path: path.to_owned(),
+            expected: "a name ending in .nii, .nii.gz, .nrrd, .mha or .mhd, or a folder for DICOM slices",
+        }),
+    }
+}
+
+#[cfg(feature = "dicom")]
+use crate::dicom_write::write as write_dicom;
+#[cfg(feature = "metaimage")]
+use crate::meta_image::write as write_meta_image;
+#[cfg(feature = "nifti")]
+use crate::nifti_file::write as write_nifti;
+#[cfg(feature = "nrrd")]
+use crate::nrrd_file::write as write_nrrd;
+
+#[cfg(not(feature = "dicom"))]
+fn write_dicom(path: &Path, _: &Volume) -> Result<(), WriteError> {
+    feature_off(path, "dicom")
+}
+
+#[cfg(not(feature = "nifti"))]
+fn write_nifti(path: &Path, _: &Volume) -> Result<(), WriteError> {
+    feature_off(path, "nifti")
+}
+
+#[cfg(not(feature = "nrrd"))]
+fn write_nrrd(path: &Path, _: &Volume) -> Result<(), WriteError> {
+    feature_off(path, "nrrd")
+}
+
+#[cfg(not(feature = "metaimage"))]
+fn write_meta_image(path: &Path, _: &Volume) -> Result<(), WriteError> {
+    feature_off(path, "metaimage")
+}
+
+#[cfg(not(all(
+    feature = "dicom",
+    feature = "nifti",
+    feature = "nrrd",
+    feature = "metaimage"
+)))]
+fn feature_off(path: &Path, feature: &'static str) -> Result<(), WriteError> {
+    Err(WriteError::FeatureOff {
+        path: path.to_owned(),
+        feature,
+    })
+}

@@ -1,0 +1,324 @@
+//! NRRD: the ways to say the same, and what is refused.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use nalgebra::{Matrix3, Point3, Vector3};
+use ppa_ct::{ReadError, Scan, Volume, WarningCode, WriteError, read, write_nrrd};
+use proptest::prelude::*;
+
+use crate::volumes::{max_abs, small, volumes};
+
+proptest! {
+    /// Values and places come back equal to the last bit.
+    #[test]
+    fn what_is_written_comes_back(volume in volumes()) {
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("v.nrrd");
+        write_nrrd(&path, &volume)?;
+        let back = read(&path).map_err(|e| TestCaseError::fail(e.to_string()))?;
+        prop_assert_eq!(&back.volume, &volume);
+        prop_assert!(back.warnings.iter().all(|w| w.code != WarningCode::NoOrientation));
+        prop_assert_eq!(fs::read_dir(folder.path())?.count(), 1, "temporary files left");
+    }
+}
+
+/// The header of [`small`], as a list of lines.
+const LINES: &[&str] = &[
+    "NRRD0004",
+    "type: short",
+    "dimension: 3",
+    "sizes: 3 2 2",
+    "endian: little",
+    "encoding: raw",
+    "space: left-posterior-superior",
+    "space directions: (1,0,0) (0,2,0) (0,0,3)",
+    "space origin: (-5,6,7)",
+];
+
+/// [`LINES`] with some fields replaced, added, or (an empty text) left out.
+fn header(changes: &[&str]) -> String {
+    let field = |line: &str| line.split(':').next().unwrap().to_owned();
+    let mut lines = LINES.iter().map(|l| (*l).to_owned()).collect::<Vec<_>>();
+    for change in changes {
+        let known = lines.iter().position(|l| field(l) == field(change));
+        match known {
+            Some(n) if change.ends_with(':') => drop(lines.remove(n)),
+            Some(n) => lines[n] = (*change).to_owned(),
+            None => lines.push((*change).to_owned()),
+        }
+    }
+    lines.join("\n") + "\n"
+}
+
+fn voxels() -> Vec<u8> {
+    (-1000..-988_i16).flat_map(i16::to_le_bytes).collect()
+}
+
+fn gzipped(bytes: &[u8]) -> Vec<u8> {
+    let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
+    gzip.write_all(bytes).unwrap();
+    gzip.finish().unwrap()
+}
+
+/// Reads a file of this header and these bytes.
+fn attached(changes: &[&str], data: &[u8]) -> Result<Scan, ReadError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("v.nrrd");
+    fs::write(&path, [header(changes).as_bytes(), b"\n", data].concat()).unwrap();
+    read(&path)
+}
+
+/// Reads this header with these bytes in `v.raw` beside it.
+fn detached(changes: &[&str], data: &[u8]) -> Result<Scan, ReadError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("v.nhdr");
+    fs::write(&path, header(changes)).unwrap();
+    fs::write(folder.path().join("v.raw"), data).unwrap();
+    read(&path)
+}
+
+#[test]
+fn raw_packed_attached_and_detached_are_one() {
+    let gz = gzipped(&voxels());
+    let file = "data file: v.raw";
+    for (way, scan) in [
+        attached(&[], &voxels()),
+        attached(&["encoding: gzip"], &gz),
+        attached(&["encoding: GZ"], &gz),
+        detached(&[file], &voxels()),
+        detached(&["datafile: v.raw"], &voxels()),
+        detached(&[file, "encoding: gzip"], &gz),
+        detached(
+            &[file, "line skip: 2"],
+            &[b"a\nbc\n", &voxels()[..]].concat(),
+        ),
+        detached(&[file, "byte skip: 5"], &[b"?????", &voxels()[..]].concat()),
+        detached(
+            &[file, "line skip: 1", "byteskip: 1"],
+            &[b"a\n?", &voxels()[..]].concat(),
+        ),
+        detached(
+            &[file, "byte skip: -1"],
+            &[b"any length", &voxels()[..]].concat(),
+        ),
+        // Lines of the file, bytes of what it unpacks to.
+        detached(
+            &[file, "encoding: gzip", "lineskip: 1", "byte skip: 3"],
+            &[b"a\n", &gzipped(&[b"???", &voxels()[..]].concat())[..]].concat(),
+        ),
+        attached(
+            &["# comment: x", "key:=value: 1", "centers: cell cell cell"],
+            &voxels(),
+        ),
+        attached(
+            &["kinds: domain space domain", "type: signed  short int"],
+            &voxels(),
+        ),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let scan = scan.unwrap_or_else(|e| panic!("{way}: {e}"));
+        assert_eq!(scan.volume, small(), "{way}");
+        assert_eq!(scan.warnings, [], "{way}");
+    }
+}
+
+#[test]
+fn byte_orders_and_types_are_honoured() {
+    let big = (-1000..-988_i16)
+        .flat_map(i16::to_be_bytes)
+        .collect::<Vec<_>>();
+    let volume = |scan: Result<Scan, ReadError>| scan.unwrap().volume;
+    assert_eq!(volume(attached(&["endian: big"], &big)), small());
+    let doubles = (-1000..-988_i16).flat_map(|v| f64::from(v).to_le_bytes());
+    let doubles = doubles.collect::<Vec<_>>();
+    assert_eq!(volume(attached(&["type: double"], &doubles)), small());
+    // One byte has no order.
+    let scan = attached(&["type: uchar", "endian:"], &[7; 12]).unwrap();
+    assert_eq!(scan.volume.hu(), [7.0; 12]);
+}
+
+/// The same place said in three spaces and in micrometres.
+#[test]
+fn spaces_and_units_lead_to_one_lps() {
+    for (space, signs) in [
+        ("LPS", [1, 1]),
+        ("right-anterior-superior", [-1, -1]),
+        ("LAS", [1, -1]),
+    ] {
+        let [x, y] = signs;
+        let scan = attached(
+            &[
+                &format!("space: {space}"),
+                "space units: \"um\" \"um\" \"um\"",
+                &format!(
+                    "space directions: ( {x}e3 , 0, 0 ) (0,{}, 0) (0,0,3000)",
+                    2000 * y
+                ),
+                &format!("space origin: ({},{},7000)", -5000 * x, 6000 * y),
+            ],
+            &voxels(),
+        )
+        .unwrap();
+        let (found, truth) = (scan.volume.grid(), small());
+        let apart = max_abs(
+            found.ct_from_voxel().matrix(),
+            truth.grid().ct_from_voxel().matrix(),
+        );
+        assert!(apart < 1e-12, "{space}: {apart}");
+    }
+}
+
+#[test]
+fn a_sheared_and_permuted_lattice_stays_as_it_is() {
+    let scan = attached(&["space directions: (0,0,2) (1,0,0.5) (0,-3,0)"], &voxels()).unwrap();
+    let grid = scan.volume.grid();
+    let centre = grid.centre([1.0, 1.0, 1.0]);
+    assert_eq!(centre, Point3::new(-5.0 + 1.0, 6.0 - 3.0, 7.0 + 2.0 + 0.5));
+}
+
+#[test]
+fn what_the_header_leaves_open_is_said() {
+    let codes = |scan: &Scan| scan.warnings.iter().map(|w| w.code).collect::<Vec<_>>();
+    let bare = attached(
+        &[
+            "space:",
+            "space directions:",
+            "space origin:",
+            "spacings: 1 2 3",
+        ],
+        &voxels(),
+    )
+    .unwrap();
+    assert_eq!(codes(&bare), [WarningCode::NoOrientation]);
+    assert_eq!(bare.volume.grid().spacing_mm(), Vector3::new(1.0, 2.0, 3.0));
+    assert_eq!(bare.volume.grid().direction(), Matrix3::identity());
+    let nowhere = attached(&["space origin:"], &voxels()).unwrap();
+    assert_eq!(codes(&nowhere), [WarningCode::NoOrientation]);
+    let unnamed = attached(&["space:", "space dimension: 3"], &voxels()).unwrap();
+    assert_eq!(codes(&unnamed), [WarningCode::NoOrientation]);
+}
+
+#[test]
+fn what_cannot_be_read_right_is_refused_by_name() {
+    for (changes, reason) in [
+        (vec!["encoding: bzip2"], "encoding bzip2"),
+        (vec!["encoding: hex"], "encoding hex"),
+        (vec!["encoding: ascii"], "encoding ascii"),
+        (vec!["type: block"], "type block"),
+        (vec!["dimension: 4", "sizes: 3 2 2 1"], "three axes"),
+        (vec!["sizes: 3 2"], "three axes"),
+        (vec!["sizes: 3 2 0"], "three axes"),
+        (vec!["kinds: RGB-color domain domain"], "RGB-color"),
+        (vec!["endian:"], "lacks `endian`"),
+        (vec!["endian: middle"], "endian middle"),
+        (vec!["space: scanner-xyz"], "space scanner-xyz"),
+        (vec!["space: LPST"], "space LPST"),
+        (
+            vec!["space directions: none (0,2,0) (0,0,3)"],
+            "space directions",
+        ),
+        (
+            vec!["space directions: (1,0,0) (0,2,0)"],
+            "space directions",
+        ),
+        (vec!["space directions:"], "lacks `space directions`"),
+        (vec!["space origin: (1,2)"], "space origin"),
+        (vec!["space units: \"mm\" \"mm\" \"s\""], "space units"),
+        (vec!["spacing: 1 2 3"], "line 10 of the header is no field"),
+        (vec!["byte skip: -2"], "byte skip -2"),
+        (vec!["encoding: gzip", "byte skip: -1"], "expected raw"),
+        (vec!["data file: LIST"], "LIST"),
+        (vec!["data file: v%03d.raw 1 3 1"], "numbered series"),
+        (vec!["data file: ../v.raw"], "beside the header"),
+        (vec!["data file: /etc/passwd"], "beside the header"),
+        (vec!["data file: .\\v.raw"], "beside the header"),
+        (vec!["data file: .."], "beside the header"),
+        (vec!["data file: ./v.raw"], "beside the header"),
+    ] {
+        let error = attached(&changes, &voxels()).unwrap_err().to_string();
+        assert!(error.contains(reason), "{changes:?}: {error}");
+    }
+    let missing = attached(&["data file: nothing.raw"], &[]).unwrap_err();
+    assert!(matches!(missing, ReadError::Io { .. }), "{missing}");
+    let twice = header(&[]) + "sizes: 3 2 2\n\n";
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("v.nrrd");
+    fs::write(&path, [twice.as_bytes(), &voxels()].concat()).unwrap();
+    assert!(read(&path).unwrap_err().to_string().contains("once more"));
+    fs::write(&path, "NIFTI?").unwrap();
+    assert!(read(&path).unwrap_err().to_string().contains("NRRD0001"));
+}
+
+/// A header may hold anything about a person; messages repeat none of it.
+#[test]
+fn a_line_that_is_not_understood_is_not_repeated() {
+    for line in ["Doe John", "Doe John: 1950", "key without end"] {
+        let error = attached(&[line], &voxels()).unwrap_err().to_string();
+        assert!(
+            !error.contains("Doe") && error.contains("line 10"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn too_few_and_too_many_bytes_are_refused() {
+    let (mut fewer, mut more) = (voxels(), voxels());
+    fewer.pop();
+    more.push(0);
+    for (changes, pack) in [(vec![], false), (vec!["encoding: gzip"], true)] {
+        for data in [&fewer, &more] {
+            let data = if pack { gzipped(data) } else { data.clone() };
+            let error = attached(&changes, &data).unwrap_err();
+            let counted = matches!(error, ReadError::PixelCount { expected: 24, .. });
+            assert!(counted, "{error}");
+        }
+    }
+    // A size that no file can hold is refused before memory is asked for.
+    let error = attached(&["sizes: 3 2 4294967296000"], &voxels()).unwrap_err();
+    assert!(
+        matches!(error, ReadError::PixelCount { found: 24, .. }),
+        "{error}"
+    );
+    let sizes = "sizes: 4294967296000 4294967296000 4294967296000";
+    assert!(attached(&[sizes], &voxels()).is_err());
+    let bomb = attached(
+        &["sizes: 3 2 42949672960", "encoding: gzip"],
+        &gzipped(&voxels()),
+    );
+    let error = bomb.unwrap_err().to_string();
+    assert!(
+        error.contains("more than this file can be unpacked to"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_failed_write_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, volume: &Volume| write_nrrd(&folder.path().join(name), volume);
+    assert!(matches!(
+        write("v.nii", &small()),
+        Err(WriteError::Extension { .. })
+    ));
+    assert!(matches!(
+        write("missing/v.nrrd", &small()),
+        Err(WriteError::Io { .. })
+    ));
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    assert!(write_nrrd(Path::new("/dev/null/v.nrrd"), &small()).is_err());
+}
+
+#[test]
+fn free_text_is_reported_by_name_and_the_range_of_the_type() {
+    let scan = attached(&["content: Doe", "patient:=Doe", "type: uchar"], &[7; 12]).unwrap();
+    let names = scan.acquisition.identifiers.iter().copied();
+    assert_eq!(names.collect::<Vec<_>>(), ["content", "key/value pairs"]);
+    assert_eq!(scan.acquisition.representable_hu, Some([0.0, 255.0]));
+}
