@@ -1,10 +1,10 @@
-//! Reading a DICOM series and NIfTI, writing NIfTI: megabytes of stored voxels per second.
+//! Reading and writing each format: megabytes of stored voxels per second.
 
 #[path = "../tests/it/series.rs"]
 mod series;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use ppa_ct::{read, write_nifti};
+use ppa_ct::{read, write};
 use series::{SliceSpec, write_series};
 
 const SIDE: u16 = 256;
@@ -26,21 +26,38 @@ fn reading(c: &mut Criterion) {
     std::fs::create_dir(&series).expect("a writable folder");
     write_series(&series, &(0..SLICES).map(slice).collect::<Vec<_>>());
     let volume = read(&series).expect("the series just written").volume;
-    let plain = folder.path().join("volume.nii");
-    let gzipped = folder.path().join("volume.nii.gz");
-    for path in [&plain, &gzipped] {
-        write_nifti(path, &volume).expect("a writable folder");
+    let names = [
+        "scan.nii",
+        "scan.nii.gz",
+        "scan.nrrd",
+        "scan.mha",
+        "scan.mhd",
+    ];
+    for name in names {
+        write(&folder.path().join(name), &volume).expect("a writable folder");
     }
 
     let mut group = c.benchmark_group("scan");
     group.sample_size(10);
     group.throughput(Throughput::Bytes(2 * volume.hu().len() as u64));
     group.bench_function("read_dicom_64_slices", |b| b.iter(|| read(&series)));
-    group.bench_function("read_nii", |b| b.iter(|| read(&plain)));
-    group.bench_function("read_nii_gz", |b| b.iter(|| read(&gzipped)));
-    group.bench_function("write_nii", |b| b.iter(|| write_nifti(&plain, &volume)));
-    group.bench_function("write_nii_gz", |b| {
-        b.iter(|| write_nifti(&gzipped, &volume))
+    for name in names {
+        let path = folder.path().join(name);
+        group.bench_function(format!("read_{name}"), |b| b.iter(|| read(&path)));
+    }
+    for name in names {
+        let path = folder.path().join(format!("out_{name}"));
+        group.bench_function(format!("write_{name}"), |b| {
+            b.iter(|| write(&path, &volume))
+        });
+    }
+    let slices = folder.path().join("slices");
+    group.bench_function("write_dicom_64_slices", |b| {
+        b.iter(|| {
+            // A folder that holds something is left alone.
+            let _ = std::fs::remove_dir_all(&slices);
+            write(&slices, &volume)
+        })
     });
     group.finish();
 }

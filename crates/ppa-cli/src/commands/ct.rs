@@ -1,11 +1,10 @@
 //! `ppa ct`: look at, convert or make a CT.
 
+mod convert;
 mod phantom;
 
-use std::path::PathBuf;
-
 use clap::{Args, Subcommand};
-use ppa_ct::{Info, read, write_nifti};
+use ppa_ct::Info;
 
 use crate::output::Output;
 use crate::scan_args::ScanArgs;
@@ -14,8 +13,8 @@ use crate::scan_args::ScanArgs;
 pub enum CtCommand {
     /// Size, spacing, orientation, HU range and warnings of a CT
     Info(InfoArgs),
-    /// Write a CT as NIfTI
-    Convert(ConvertArgs),
+    /// Write a CT in another format: NIfTI, NRRD, MetaImage or DICOM
+    Convert(convert::ConvertArgs),
     /// Make the CT of a phantom: a lower leg of P01 to P17 or by seed, or a knee
     Phantom(phantom::PhantomArgs),
 }
@@ -26,25 +25,13 @@ pub struct InfoArgs {
     scan: ScanArgs,
 }
 
-#[derive(Debug, Args)]
-pub struct ConvertArgs {
-    #[command(flatten)]
-    input: ScanArgs,
-    /// File to write: .nii or .nii.gz
-    output: PathBuf,
-}
-
 pub fn run(command: &CtCommand, output: Output) -> anyhow::Result<()> {
     match command {
         CtCommand::Info(args) => {
             let scan = args.scan.read()?;
             output.print(&Info::of(&scan), describe)
         }
-        CtCommand::Convert(args) => {
-            let scan = args.input.read()?;
-            write_nifti(&args.output, &scan.volume)?;
-            output.print(&Info::of(&read(&args.output)?), describe)
-        }
+        CtCommand::Convert(args) => convert::run(args, output),
         CtCommand::Phantom(args) => phantom::run(args, output),
     }
 }

@@ -22,7 +22,7 @@ pub enum MeshCommand {
 
 #[derive(Debug, Args)]
 pub struct ExtractArgs {
-    /// DICOM folder or file, .nii or .nii.gz
+    /// DICOM folder or file, or a volume in one file such as .nii.gz
     volume: PathBuf,
     /// Hounsfield units of the surface
     #[arg(long, default_value_t = -500.0, allow_negative_numbers = true)]

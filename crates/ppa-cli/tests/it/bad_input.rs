@@ -142,6 +142,32 @@ fn a_scan_that_changed_is_refused() {
 }
 
 #[test]
+fn a_conversion_that_cannot_be_done_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = phantom().join("p01.nii").display().to_string();
+    fs::create_dir(folder.path().join("full")).unwrap();
+    fs::write(folder.path().join("full/notes.txt"), "kept").unwrap();
+    fs::write(folder.path().join("bad.mha"), "ObjectType = Image\n").unwrap();
+    for (command, part) in [
+        (
+            format!("ct convert {scan} out.dcm"),
+            "expected a name ending in",
+        ),
+        (format!("ct convert {scan} full"), "not an empty folder"),
+        (
+            format!("ct convert {scan} missing/out.nrrd"),
+            "cannot write",
+        ),
+        ("ct convert bad.mha out.nii".to_owned(), "ElementDataFile"),
+        ("ct convert nothing.nrrd out.nii".to_owned(), "nothing.nrrd"),
+    ] {
+        contains(&fail(folder.path(), &command), &[part]);
+    }
+    assert_eq!(names(folder.path()), ["bad.mha", "full"]);
+    assert_eq!(names(&folder.path().join("full")), ["notes.txt"]);
+}
+
+#[test]
 #[ignore = "needs ../shared/data"]
 fn real_scans_that_are_no_ct_volume_are_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -44,7 +44,23 @@ fn every_command_keeps_its_keys() {
         "warnings",
     ];
     object("ct info p01.nii", &info);
-    object("ct convert p01.nii copy.nii.gz", &info);
+    let original = object("ct info p01.nii", &info);
+    // NIfTI holds places as f32, the chain goes on from there.
+    for copy in ["copy.nii.gz", "copy.nrrd", "copy.mha", "copy.mhd"] {
+        let copied = object(&format!("ct convert p01.nii {copy}"), &info);
+        assert_eq!(copied["modality"], Value::Null);
+        for key in info.iter().filter(|key| **key != "series") {
+            assert_eq!(copied[key], original[key], "{key} of {copy}");
+        }
+    }
+    let dicom = object("ct convert copy.mhd copy", &info);
+    assert_eq!(dicom["modality"], "CT");
+    assert_eq!(dicom["size"], original["size"]);
+    // The phantom's values are no whole numbers: 2.8e3 HU in 65535 levels.
+    for key in ["hu_min", "hu_max"] {
+        let [a, b] = [&dicom, &original].map(|info| info[key].as_f64().unwrap());
+        assert!((a - b).abs() < 0.05, "{key} of DICOM: {a}, {b}");
+    }
     object(
         "mesh extract p01.nii --iso -500 --out iso.ply --close",
         &[

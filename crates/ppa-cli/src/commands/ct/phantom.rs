@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use ppa_ct::phantom::{Limb, LowerLeg, Scanner, Side, TableTop, Truth};
-use ppa_ct::{Info, Volume, write_nifti};
+use ppa_ct::{Info, Volume, write};
 use serde::Serialize;
 
 use super::describe;
@@ -38,7 +38,7 @@ mirror image of the right one with every dimension off by about 1 %.
 
 --json prints what a measurement should find under \"truth\": frame ct (LPS), mm and radians.")]
 pub struct PhantomArgs {
-    /// File to write: .nii or .nii.gz
+    /// What to write: .nii, .nii.gz, .nrrd, .mha, .mhd, or a new folder for DICOM slices
     #[arg(long)]
     out: PathBuf,
     /// Lower leg of the table: P01 to P17 [default: P01]
@@ -56,7 +56,7 @@ pub struct PhantomArgs {
     /// Put a titanium plate with five screws on the fibula
     #[arg(long)]
     plate: bool,
-    /// Also write which bone each voxel belongs to: .nii or .nii.gz, 0 for none
+    /// Also write which bone each voxel belongs to, 0 for none: as --out
     #[arg(long, value_name = "FILE")]
     labels: Option<PathBuf>,
     /// Side of the cubic voxels in mm
@@ -111,10 +111,10 @@ pub fn run(args: &PhantomArgs, output: Output) -> anyhow::Result<()> {
     if let Some(path) = &args.labels {
         let numbers = limb.bone_labels(volume.grid());
         let numbers = numbers.into_iter().map(f32::from).collect();
-        write_nifti(path, &Volume::new(volume.grid().clone(), numbers)?)?;
+        write(path, &Volume::new(volume.grid().clone(), numbers)?)?;
         labels = limb.bone_names();
     }
-    write_nifti(&args.out, &volume)?;
+    write(&args.out, &volume)?;
     working.finish_and_clear();
     let made = Made {
         info: Info::of_volume(&volume),

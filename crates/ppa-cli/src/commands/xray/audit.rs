@@ -12,7 +12,7 @@ use crate::output::{Output, working};
 
 #[derive(Debug, Args)]
 pub struct AuditArgs {
-    /// CT (DICOM folder or file, .nii or .nii.gz), or case written by `ppa prepare` (.toml): its limb alone
+    /// CT (DICOM folder or file, or a volume in one file such as .nii.gz), or case written by `ppa prepare` (.toml): its limb alone
     path: PathBuf,
     /// HU calibration (TOML) in place of the built-in one
     #[arg(long, value_name = "FILE")]
