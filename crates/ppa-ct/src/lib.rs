@@ -39,8 +39,22 @@ pub mod phantom;
 mod refine;
 mod scan;
 #[cfg(any(feature = "nifti", feature = "nrrd", feature = "metaimage"))]
+#[cfg_attr(
+    not(all(feature = "nifti", feature = "nrrd", feature = "metaimage")),
+    allow(
+        dead_code,
+        reason = "shared by three formats, each of which needs a part"
+    )
+)]
 mod scan_file;
 #[cfg(any(feature = "nifti", feature = "nrrd", feature = "metaimage"))]
+#[cfg_attr(
+    not(all(feature = "nifti", feature = "nrrd", feature = "metaimage")),
+    allow(
+        dead_code,
+        reason = "shared by three formats, each of which needs a part"
+    )
+)]
 mod stored;
 mod volume;
 #[cfg(any(feature = "nifti", feature = "nrrd", feature = "metaimage"))]
