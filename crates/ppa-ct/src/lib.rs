@@ -1,8 +1,9 @@
 //! CT volumes in Hounsfield units with a typed voxel-to-world affine.
 //!
 //! [`read`] turns a DICOM series or a NIfTI, NRRD or MetaImage file into a [`Scan`] with a
-//! [`Volume`], or refuses it with the reason; [`write()`] writes one; [`Info`] tells the facts;
-//! [`phantom`] makes limbs whose true shape is known.
+//! [`Volume`], or refuses it with the reason; [`write()`] writes one; [`Info`] tells the facts and
+//! [`audit`] whether the scan is what one thinks; [`phantom`] makes limbs whose true shape is known.
+//! A [`Volume`] is cropped, resampled ([`Volume::resampled`]) and set upright ([`Volume::upright`]).
 //!
 //! Units: mm, Hounsfield units. Frames: `voxel` (i, j, k; the centre of the first voxel is
 //! (0, 0, 0)) and `ct` (DICOM patient axes LPS: x to the left, y posterior, z superior).
@@ -10,7 +11,8 @@
 //! Nothing that names a person, a place or a date passes from a file into these types.
 //!
 //! Features: `dicom`, `nifti`, `nrrd` and `metaimage` (all on by default) hold the readers and
-//! writers; without them the crate is geometry and phantoms only.
+//! writers; `report` writes an audit as a page of HTML. Without them the crate is geometry, audit
+//! and phantoms only.
 //!
 //! ```
 //! use nalgebra::{Point3, Vector3};
@@ -22,6 +24,8 @@
 //! ```
 
 mod acquisition;
+pub mod audit;
+mod derived_grids;
 #[cfg(feature = "dicom")]
 mod dicom_series;
 #[cfg(feature = "dicom")]
@@ -29,6 +33,8 @@ mod dicom_write;
 mod error;
 mod grid;
 mod info;
+mod low_pass;
+mod lps_view;
 #[cfg(feature = "metaimage")]
 mod meta_image;
 #[cfg(feature = "nifti")]
@@ -37,6 +43,7 @@ mod nifti_file;
 mod nrrd_file;
 pub mod phantom;
 mod refine;
+mod resample;
 mod scan;
 #[cfg(any(feature = "nifti", feature = "nrrd", feature = "metaimage"))]
 #[cfg_attr(
@@ -80,6 +87,7 @@ pub use meta_image::write as write_meta_image;
 pub use nifti_file::write as write_nifti;
 #[cfg(feature = "nrrd")]
 pub use nrrd_file::write as write_nrrd;
+pub use resample::Interpolation;
 pub use scan::{
     ReadOptions, Scan, SeriesChoice, SeriesSummary, Warning, WarningCode, read, read_with,
 };

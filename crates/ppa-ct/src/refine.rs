@@ -3,11 +3,9 @@
 use nalgebra::{Affine3, Matrix4, Vector4};
 use rayon::prelude::*;
 
+use crate::derived_grids::MOST_VOXELS;
 use crate::grid::Grid;
 use crate::volume::{Volume, VolumeError};
-
-/// Voxels of a refined volume: 16 GiB of values.
-const MOST_VOXELS: f64 = 4_294_967_296.0;
 
 impl Volume {
     /// The volume with axes coarser than `max_spacing_mm` resampled to at most that spacing.

@@ -1,36 +1,27 @@
 //! `ppa ct`: look at, convert or make a CT.
 
 mod convert;
+mod info;
 mod phantom;
 
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use ppa_ct::Info;
 
 use crate::output::Output;
-use crate::scan_args::ScanArgs;
 
 #[derive(Debug, Subcommand)]
 pub enum CtCommand {
-    /// Size, spacing, orientation, HU range and warnings of a CT
-    Info(InfoArgs),
+    /// What a CT is, what is odd about it, and what that means for the images
+    Info(info::InfoArgs),
     /// Write a CT in another format: NIfTI, NRRD, MetaImage or DICOM
     Convert(convert::ConvertArgs),
     /// Make the CT of a phantom: a lower leg of P01 to P17 or by seed, or a knee
     Phantom(phantom::PhantomArgs),
 }
 
-#[derive(Debug, Args)]
-pub struct InfoArgs {
-    #[command(flatten)]
-    scan: ScanArgs,
-}
-
 pub fn run(command: &CtCommand, output: Output) -> anyhow::Result<()> {
     match command {
-        CtCommand::Info(args) => {
-            let scan = args.scan.read()?;
-            output.print(&Info::of(&scan), describe)
-        }
+        CtCommand::Info(args) => info::run(args, output),
         CtCommand::Convert(args) => convert::run(args, output),
         CtCommand::Phantom(args) => phantom::run(args, output),
     }

@@ -43,7 +43,6 @@ fn every_command_keeps_its_keys() {
         "series",
         "warnings",
     ];
-    object("ct info p01.nii", &info);
     let original = object("ct info p01.nii", &info);
     // NIfTI holds places as f32, the chain goes on from there.
     for copy in ["copy.nii.gz", "copy.nrrd", "copy.mha", "copy.mhd"] {
@@ -61,6 +60,16 @@ fn every_command_keeps_its_keys() {
         let [a, b] = [&dicom, &original].map(|info| info[key].as_f64().unwrap());
         assert!((a - b).abs() < 0.05, "{key} of DICOM: {a}, {b}");
     }
+    let audited = object("ct info p01.nii --report p01.html", &info);
+    for key in ["findings", "measures", "acquisition"] {
+        assert!(audited.get(key).is_some(), "{key} is missing in {audited}");
+    }
+    for key in ["code", "severity", "text", "depth_images", "radiographs"] {
+        assert!(audited["findings"][0][key].is_string(), "{key}");
+    }
+    let page = fs::read_to_string(folder.join("p01.html")).unwrap();
+    assert_eq!(page.matches("data:image/png;base64,").count(), 3);
+    assert!(!page.contains("http") && !page.contains("p01"));
     object(
         "mesh extract p01.nii --iso -500 --out iso.ply --close",
         &[

@@ -1,9 +1,11 @@
 //! The program as a user meets it.
 
 mod bad_input;
+mod identity;
 mod json;
 mod mcgpu;
 mod phantoms;
+mod planted_series;
 mod resume;
 mod tallies;
 

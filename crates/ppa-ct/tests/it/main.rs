@@ -1,5 +1,6 @@
-//! Reading and writing scans through the public API.
+//! Reading, changing and writing scans through the public API.
 
+mod audit;
 mod damage;
 mod damaged_volumes;
 mod dicom;
@@ -8,6 +9,7 @@ mod meta_image;
 mod nifti;
 mod nrrd;
 mod real;
+mod resample;
 mod series;
 mod volumes;
 mod write;

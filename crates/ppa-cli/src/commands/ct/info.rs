@@ -1,0 +1,66 @@
+//! `ppa ct info`: the facts about a CT, and the import audit.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use ppa_ct::audit::{Audit, Severity, html};
+use ppa_ct::{Acquisition, Info};
+use ppa_dataset::write_whole;
+use serde::Serialize;
+
+use crate::output::Output;
+use crate::scan_args::ScanArgs;
+
+#[derive(Debug, Args)]
+pub struct InfoArgs {
+    #[command(flatten)]
+    scan: ScanArgs,
+    /// Write the audit as an HTML page with slices and a histogram
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+}
+
+/// What is printed.
+#[derive(Serialize)]
+struct Audited {
+    #[serde(flatten)]
+    info: Info,
+    acquisition: Acquisition,
+    #[serde(flatten)]
+    audit: Audit,
+}
+
+pub fn run(args: &InfoArgs, output: Output) -> anyhow::Result<()> {
+    let scan = args.scan.read()?;
+    let audited = Audited {
+        info: Info::of(&scan),
+        acquisition: scan.acquisition.clone(),
+        audit: Audit::of(&scan),
+    };
+    if let Some(path) = &args.report {
+        write_whole(path, html(&scan, &audited.audit).as_bytes())?;
+    }
+    output.print(&audited, describe)
+}
+
+fn describe(audited: &Audited) -> String {
+    // The findings repeat the reader's warnings.
+    let facts = Info {
+        warnings: Vec::new(),
+        ..audited.info.clone()
+    };
+    let mut lines = vec![super::describe(&facts)];
+    for finding in &audited.audit.findings {
+        let severity = match finding.severity {
+            Severity::Note => "note",
+            Severity::Caution => "caution",
+            Severity::Serious => "serious",
+        };
+        lines.push(format!("{severity:<10} {}", finding.text));
+        if finding.severity > Severity::Note {
+            lines.push(format!("           depth images: {}", finding.depth_images));
+            lines.push(format!("           radiographs: {}", finding.radiographs));
+        }
+    }
+    lines.join("\n")
+}

@@ -1,0 +1,146 @@
+//! Is there a couch, and is it where the patient's position says?
+
+use super::findings::{Finding, FindingCode, Severity};
+use super::survey::Survey;
+
+/// Denser than air and foam: shells of a couch are thin, so that their blocks are half air.
+const SHELL_HU: f32 = -750.0;
+/// A shell runs through at least this share of the slices.
+const PERSISTS: f64 = 0.9;
+/// Thickest shell, from front to back.
+const THICK_MM: f64 = 20.0;
+/// Columns without shell that do not end it: streaks, joints.
+const HOLE: usize = 3;
+/// Narrowest couch. Skin folds and sheets of real limbs reach 40 mm.
+const LEAST_WIDTH_MM: f64 = 60.0;
+
+/// A thin plate, flat or curved, that runs along the whole scan.
+pub(super) struct Couch {
+    pub width_mm: f64,
+    /// Whether the limb lies in front of it; else behind.
+    pub behind: bool,
+    /// Columns and places along y where it was seen, in blocks, columns rising.
+    path: Vec<(usize, f64)>,
+}
+
+/// Thin places from column to column.
+type Chain = Vec<(usize, f64)>;
+
+/// The widest thin plate, if it is wide enough for a couch; `thick` are the blocks of thick things.
+pub(super) fn find(survey: &Survey, thick: &[bool]) -> Option<Couch> {
+    let [dx, dy, _] = survey.spacing_mm;
+    // A curved couch rises by less than three quarters of its way sideways.
+    let rise = 0.75 * dx / dy + 1.0;
+    let width = |chain: &Chain| chain[chain.len() - 1].0 - chain[0].0 + 1;
+    let mut open = Vec::<Chain>::new();
+    let mut widest = Chain::new();
+    for x in 0..survey.size[0] {
+        let mut here = Vec::new();
+        for y in thin_places(survey, x) {
+            let near = open
+                .iter()
+                .filter(|chain| (chain[chain.len() - 1].1 - y).abs() <= rise);
+            let mut chain = near
+                .max_by_key(|chain| chain.len())
+                .cloned()
+                .unwrap_or_default();
+            chain.push((x, y));
+            if widest.is_empty() || width(&chain) > width(&widest) {
+                widest.clone_from(&chain);
+            }
+            here.push(chain);
+        }
+        open.retain(|chain| x - chain[chain.len() - 1].0 < HOLE);
+        open.extend(here);
+    }
+    if widest.is_empty() || (width(&widest) as f64) * dx < LEAST_WIDTH_MM {
+        return None;
+    }
+    let mean_y = widest.iter().map(|(_, y)| y).sum::<f64>() / widest.len() as f64;
+    Some(Couch {
+        width_mm: width(&widest) as f64 * dx,
+        behind: middle_y(survey, thick).is_none_or(|middle| mean_y > middle),
+        path: widest,
+    })
+}
+
+/// Mean place along y of the blocks of thick things.
+fn middle_y(survey: &Survey, thick: &[bool]) -> Option<f64> {
+    let [nx, ny, _] = survey.size;
+    let places = thick.iter().enumerate().filter(|(_, thick)| **thick);
+    let (sum, count) = places.fold((0, 0), |(sum, count), (index, _)| {
+        (sum + index / nx % ny, count + 1)
+    });
+    (count > 0).then(|| sum as f64 / f64::from(count))
+}
+
+/// Middles of the thin runs along y in column `x` that persist through the slices.
+fn thin_places(survey: &Survey, x: usize) -> Vec<f64> {
+    let [_, ny, nz] = survey.size;
+    let dense = (0..ny).map(|y| {
+        let slices = (0..nz).filter(|&z| survey.hu[survey.index([x, y, z])] > SHELL_HU);
+        slices.count() as f64 >= PERSISTS * nz as f64
+    });
+    let dense = dense.collect::<Vec<_>>();
+    let mut places = Vec::new();
+    let mut start = 0;
+    for y in 0..ny {
+        if dense[y] {
+            continue;
+        }
+        let thickness_mm = (y - start) as f64 * survey.spacing_mm[1];
+        // A run that begins at the face may be the rest of something thick.
+        if 0 < start && start < y && thickness_mm <= THICK_MM {
+            places.push((start + y - 1) as f64 / 2.0);
+        }
+        start = y + 1;
+    }
+    places
+}
+
+impl Couch {
+    /// Takes the couch, and what lies beyond it, out of the blocks of thick things.
+    pub fn clear(&self, survey: &Survey, thick: &mut [bool]) {
+        let [nx, ny, _] = survey.size;
+        for (index, thick) in thick.iter_mut().enumerate() {
+            let (x, y) = (index % nx, (index / nx % ny) as f64);
+            // The nearest column where the couch was seen.
+            let after = self.path.partition_point(|(column, _)| *column < x);
+            let shell = self.path[after.min(self.path.len() - 1)].1;
+            *thick &= if self.behind { y < shell } else { y > shell };
+        }
+    }
+
+    /// What to say of it, given how the patient lay.
+    pub fn finding(&self, position: Option<&str>) -> Finding {
+        let (place, lying) = if self.behind {
+            ("behind", "supine")
+        } else {
+            ("in front of", "prone")
+        };
+        let plate = format!(
+            "a couch-like plate {:.0} mm wide lies {place} the limb",
+            self.width_mm
+        );
+        let stated = match position.and_then(|p| p.get(2..)) {
+            Some("S") => Some("supine"),
+            Some("P") => Some("prone"),
+            _ => None,
+        };
+        match stated {
+            Some(stated) if stated != lying => Finding::new(
+                FindingCode::CouchMisplaced,
+                Severity::Serious,
+                format!(
+                    "{plate}, but the patient is said to lie {stated}: the volume may be flipped"
+                ),
+            ),
+            None if !self.behind => Finding::new(
+                FindingCode::CouchMisplaced,
+                Severity::Caution,
+                format!("{plate}: the patient lay prone, or the volume is flipped"),
+            ),
+            _ => Finding::new(FindingCode::Couch, Severity::Note, plate),
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! Are these Hounsfield units, whole and of a limb?
+
+use super::Measures;
+use super::findings::{Finding, FindingCode, Severity};
+use super::histogram::Histogram;
+use crate::acquisition::Acquisition;
+
+/// Above this lies bone.
+pub(super) const BONE_HU: f32 = 300.0;
+/// Above this lies metal: cortical bone stays below 2200 HU, enamel about 3000 is no limb's.
+pub(super) const METAL_HU: f32 = 2500.0;
+/// Less than this is noise, cm³.
+const LEAST_METAL_CM3: f64 = 0.05;
+/// Farthest that the peak of air may lie from −1000 HU in a calibrated scanner.
+const AIR_SLACK_HU: f64 = 60.0;
+/// Smallest share of the voxels that makes a peak.
+const LEAST_SHARE: f64 = 0.005;
+
+/// Where air and soft tissue are.
+pub(super) struct Peaks {
+    pub air_hu: Option<f64>,
+    pub tissue_hu: Option<f64>,
+    /// Air and tissue of a histogram that is one as a whole, but shifted.
+    shifted: Option<[f64; 2]>,
+}
+
+pub(super) fn peaks(histogram: &Histogram) -> Peaks {
+    let air = histogram.peak(-1150.0, -850.0, LEAST_SHARE);
+    let tissue = histogram.peak(-300.0, 400.0, LEAST_SHARE);
+    Peaks {
+        air_hu: air,
+        tissue_hu: tissue,
+        shifted: if air.is_some() {
+            None
+        } else {
+            shifted(histogram)
+        },
+    }
+}
+
+/// Two peaks as far apart as air and tissue, the lower one the lowest of all.
+fn shifted(histogram: &Histogram) -> Option<[f64; 2]> {
+    let lowest = histogram.quantile(0.02) as f32;
+    let air = histogram.peak(lowest - 50.0, lowest + 150.0, 0.05)?;
+    let expected = air as f32 + 1000.0;
+    let tissue = histogram.peak(expected - 160.0, expected + 150.0, 0.02)?;
+    Some([air, tissue])
+}
+
+/// What else the values tell.
+pub(super) fn check(
+    histogram: &Histogram,
+    peaks: &Peaks,
+    measures: &Measures,
+    acquisition: &Acquisition,
+) -> Vec<Finding> {
+    let mut found = Vec::new();
+    let tissue = histogram.above(-200.0);
+    if peaks.tissue_hu.is_some() && (histogram.above(BONE_HU) as f64) < 0.002 * tissue as f64 {
+        found.push(Finding::new(
+            FindingCode::NoBone,
+            Severity::Caution,
+            format!(
+                "only {:.1} cm³ above {BONE_HU} HU: hardly any bone",
+                measures.bone_cm3
+            ),
+        ));
+    }
+    found.extend(clipping(histogram, acquisition));
+    let below = histogram.between(f32::MIN, -1200.0) as f64 / histogram.total as f64;
+    if below > 0.01 {
+        found.push(Finding::new(
+            FindingCode::BelowAir,
+            Severity::Note,
+            format!(
+                "{:.0} % of the voxels lie below -1200 HU, down to {}: padding around the field of view",
+                100.0 * below,
+                histogram.min
+            ),
+        ));
+    }
+    if measures.metal_cm3 > LEAST_METAL_CM3 {
+        found.push(Finding::new(
+            FindingCode::Metal,
+            Severity::Caution,
+            format!("{:.2} cm³ above {METAL_HU} HU: metal", measures.metal_cm3),
+        ));
+    }
+    found
+}
+
+/// Whether air and tissue are where they belong.
+pub(super) fn scale(peaks: &Peaks) -> Vec<Finding> {
+    use FindingCode::{AirOffScale, NoAir, NoTissue, ShiftedValues, TissueOffScale};
+    if let Some([air, tissue]) = peaks.shifted {
+        let text = format!(
+            "air seems to lie at {air:.0} and tissue at {tissue:.0}: all values are about {:.0} too high",
+            air + 1000.0
+        );
+        return vec![Finding::new(ShiftedValues, Severity::Serious, text)];
+    }
+    let mut found = Vec::new();
+    match peaks.air_hu {
+        None => found.push(Finding::new(
+            NoAir,
+            Severity::Serious,
+            "no air near -1000 HU".to_owned(),
+        )),
+        Some(air) if (air + 1000.0).abs() > AIR_SLACK_HU => found.push(Finding::new(
+            AirOffScale,
+            Severity::Caution,
+            format!("air lies at {air:.0} HU, expected -1000"),
+        )),
+        Some(_) => {}
+    }
+    match peaks.tissue_hu {
+        None => found.push(Finding::new(
+            NoTissue,
+            Severity::Serious,
+            "no soft tissue from -300 to 400 HU".to_owned(),
+        )),
+        // Fat, then water to muscle with contrast agent.
+        Some(hu) if !((-140.0..=-40.0).contains(&hu) || (-20.0..=120.0).contains(&hu)) => found
+            .push(Finding::new(
+                TissueOffScale,
+                Severity::Caution,
+                format!("soft tissue lies at {hu:.0} HU, expected fat near -100 or muscle near 50"),
+            )),
+        Some(_) => {}
+    }
+    found
+}
+
+/// More voxels than chance at the ends of the range.
+fn clipping(histogram: &Histogram, acquisition: &Acquisition) -> Vec<Finding> {
+    let mut found = Vec::new();
+    let (min, max) = (histogram.min, histogram.max);
+    let at_limit = acquisition
+        .representable_hu
+        .is_some_and(|[_, high]| f64::from(max) > high - 0.5);
+    let tail = histogram.between(max - 10.0, max - 1.0) as f64 / 10.0;
+    let piled_up = histogram.at_max >= 20 && histogram.at_max as f64 > 5.0 * tail;
+    // Below bone nothing is lost that a radiograph would show.
+    if max > BONE_HU && (at_limit || piled_up) {
+        found.push(Finding::new(
+            FindingCode::ClippedAbove,
+            Severity::Caution,
+            format!(
+                "{} voxels have exactly the highest value, {max} HU: clipped",
+                histogram.at_max
+            ),
+        ));
+    }
+    let share = histogram.at_min as f64 / histogram.total as f64;
+    if (-940.0..-200.0).contains(&min) && share > 0.01 {
+        found.push(Finding::new(
+            FindingCode::ClippedBelow,
+            Severity::Caution,
+            format!(
+                "{:.0} % of the voxels have exactly the lowest value, {min} HU: clipped",
+                100.0 * share
+            ),
+        ));
+    }
+    found
+}

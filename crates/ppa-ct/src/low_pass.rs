@@ -1,0 +1,91 @@
+//! A Gaussian low-pass along the axes of a volume, so that coarser samples do not alias.
+
+use rayon::prelude::*;
+
+/// Where a Gaussian is cut off, in standard deviations.
+const REACH: f64 = 4.0;
+
+/// Width of the Gaussian, in voxels, for samples `step` voxels apart; 0 where none is needed.
+///
+/// A variance of (step² − 1)/4 leaves 29 % of a wave at the new Nyquist frequency when the step
+/// is large, 6 % at one and a half times and 0.7 % at twice that frequency; the 1 stands for the
+/// blur of the voxels themselves.
+pub(crate) fn sigma_voxels(step: f64) -> f64 {
+    // Rounding of an affine must not blur a volume that is not getting coarser.
+    if step < 1.0 + 1e-6 {
+        return 0.0;
+    }
+    0.5 * (step * step - 1.0).sqrt()
+}
+
+/// Values (i fastest) blurred by `sigma_voxels` along each axis; beyond the faces the volume is
+/// taken to be mirrored, which keeps its sum.
+pub(crate) fn low_pass(hu: &[f32], size: [usize; 3], sigma_voxels: [f64; 3]) -> Vec<f32> {
+    let mut values = hu.to_vec();
+    for (axis, sigma) in sigma_voxels.into_iter().enumerate() {
+        if sigma > 0.0 && size[axis] > 1 {
+            values = along(&values, size, axis, &kernel(sigma));
+        }
+    }
+    values
+}
+
+/// Weights of a Gaussian at −reach..=reach, with sum 1.
+fn kernel(sigma: f64) -> Vec<f64> {
+    let reach = (REACH * sigma).ceil() as i64;
+    let weights = (-reach..=reach).map(|n| (-0.5 * (n as f64 / sigma).powi(2)).exp());
+    let weights = weights.collect::<Vec<_>>();
+    let sum = weights.iter().sum::<f64>();
+    weights.into_iter().map(|w| w / sum).collect()
+}
+
+fn along(values: &[f32], [nx, ny, nz]: [usize; 3], axis: usize, kernel: &[f64]) -> Vec<f32> {
+    let count = [nx, ny, nz][axis];
+    let reach = kernel.len() / 2;
+    // Taps of each place: sources and weights, in fixed order.
+    let taps_of = |at: usize| {
+        let source = |n: usize| mirrored((at + n) as i64 - reach as i64, count);
+        let taps = kernel.iter().enumerate().map(|(n, &w)| (source(n), w));
+        taps.collect::<Vec<_>>()
+    };
+    let taps = (0..count).map(taps_of).collect::<Vec<_>>();
+    let row = |j: usize, k: usize| &values[nx * (j + ny * k)..][..nx];
+    let mut blurred = vec![0.0; values.len()];
+    blurred
+        .par_chunks_mut(nx)
+        .enumerate()
+        .for_each_init(Vec::new, |sums, (index, place)| {
+            let (j, k) = (index % ny, index / ny);
+            sums.clear();
+            if axis == 0 {
+                let source = row(j, k);
+                sums.extend(taps.iter().map(|taps| {
+                    let terms = taps.iter().map(|&(i, w)| w * f64::from(source[i]));
+                    terms.sum::<f64>()
+                }));
+            } else {
+                sums.resize(nx, 0.0);
+                for &(other, weight) in &taps[[0, j, k][axis]] {
+                    let source = if axis == 1 {
+                        row(other, k)
+                    } else {
+                        row(j, other)
+                    };
+                    for (sum, &value) in sums.iter_mut().zip(source) {
+                        *sum += weight * f64::from(value);
+                    }
+                }
+            }
+            for (place, &sum) in place.iter_mut().zip(sums.iter()) {
+                *place = sum as f32;
+            }
+        });
+    blurred
+}
+
+/// The voxel that a place outside falls on when the volume is mirrored at its faces.
+fn mirrored(at: i64, count: usize) -> usize {
+    let count = count as i64;
+    let folded = at.rem_euclid(2 * count);
+    folded.min(2 * count - 1 - folded) as usize
+}

@@ -1,0 +1,39 @@
+//! A volume looked at in the order of the body's axes, without copying it.
+
+use crate::volume::Volume;
+
+/// Voxels addressed by steps towards the left, posterior and superior, as closely as the volume's
+/// own axes run along these; nothing is interpolated.
+pub(crate) struct LpsView<'a> {
+    volume: &'a Volume,
+    axes: [(usize, bool); 3],
+}
+
+impl<'a> LpsView<'a> {
+    pub fn of(volume: &'a Volume) -> Self {
+        Self {
+            volume,
+            axes: volume.grid().lps_axes(),
+        }
+    }
+
+    /// Voxels towards the left, posterior and superior.
+    pub fn size(&self) -> [usize; 3] {
+        self.axes.map(|(axis, _)| self.volume.grid().size()[axis])
+    }
+
+    /// Distances between neighbours along them.
+    pub fn spacing_mm(&self) -> [f64; 3] {
+        let spacing = self.volume.grid().spacing_mm();
+        self.axes.map(|(axis, _)| spacing[axis])
+    }
+
+    pub fn at(&self, place: [usize; 3]) -> f32 {
+        let mut voxel = [0; 3];
+        for ((axis, turned), at) in self.axes.into_iter().zip(place) {
+            let last = self.volume.grid().size()[axis] - 1;
+            voxel[axis] = if turned { last - at } else { at };
+        }
+        self.volume.at(voxel)
+    }
+}
