@@ -71,7 +71,10 @@ impl Stored {
     /// Reads `voxels` values; where the stream ends before, those that came whole.
     pub(crate) fn read(&self, stream: &mut dyn Read, voxels: usize) -> io::Result<Vec<f32>> {
         let width = self.number.bytes();
-        let mut hu = Vec::with_capacity(voxels);
+        let mut hu = Vec::new();
+        // A file may promise more than memory holds: an error, where a failed allocation would end the program.
+        hu.try_reserve_exact(voxels)
+            .map_err(|_| io::ErrorKind::OutOfMemory)?;
         let mut chunk = Vec::with_capacity(voxels.min(CHUNK) * width);
         while hu.len() < voxels {
             let wanted = CHUNK.min(voxels - hu.len()) * width;

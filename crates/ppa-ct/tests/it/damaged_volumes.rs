@@ -8,6 +8,7 @@ use ppa_ct::{Volume, read, write};
 use proptest::prelude::*;
 use proptest::sample::Index;
 use proptest::strategy::ValueTree;
+use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 
 use crate::real::data;
 use crate::volumes::small;
@@ -271,13 +272,16 @@ fn real_files_cut_at_each_percent_are_errors_or_right() {
     }
 }
 
-/// Spoils shared files for as long as `PPA_FUZZ_S` says, a second without it.
+/// Spoils shared files for a second; `PPA_FUZZ_SECONDS` makes it longer, `PPA_FUZZ_SEED` different.
 fn spoil_for_a_while(names: &[&str]) {
-    let seconds = std::env::var("PPA_FUZZ_S").map_or(1.0, |s| s.parse().unwrap());
-    let end = Instant::now() + Duration::from_secs_f64(seconds);
+    let setting = |name: &str| std::env::var(name).map_or(1, |v| v.parse::<u64>().unwrap());
+    let end = Instant::now() + Duration::from_secs(setting("PPA_FUZZ_SECONDS"));
     let folder = tempfile::tempdir().unwrap();
     let samples = samples(folder.path(), names);
-    let mut random = proptest::test_runner::TestRunner::default();
+    let mut seed = [0; 32];
+    seed[..8].copy_from_slice(&setting("PPA_FUZZ_SEED").to_le_bytes());
+    let random = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
+    let mut random = TestRunner::new_with_rng(ProptestConfig::default(), random);
     let spoil = prop::collection::vec(damage(), 1..6);
     let mut rounds = 0;
     while Instant::now() < end {
