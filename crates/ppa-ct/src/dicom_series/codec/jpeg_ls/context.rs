@@ -116,10 +116,9 @@ fn first_magnitude(range: i32) -> i64 {
 /// Smallest `k` with `count · 2^k ≥ magnitude`; `count` is at least 1.
 #[inline]
 fn golomb(count: i64, magnitude: i64) -> u32 {
-    let mut k = 0;
-    // Errors are below 2^17, so this ends.
-    while (count << k) < magnitude {
-        k += 1;
-    }
-    k
+    // Where both have as many bits, or one step further.
+    let k = count
+        .leading_zeros()
+        .saturating_sub(magnitude.leading_zeros());
+    k + u32::from((count << k) < magnitude)
 }
