@@ -55,6 +55,16 @@ mod philox;
 mod run;
 mod transport;
 
+/// Scenes of the public interface's tests, which tests in here look at too; not every scene.
+#[cfg(test)]
+#[path = "../tests/it/scenes.rs"]
+#[expect(dead_code, reason = "some scenes are for the other tests alone")]
+mod scenes;
+
+// The name that `scenes` knows this crate by.
+#[cfg(test)]
+extern crate self as ppa_xray;
+
 pub use beam::projection::{Detector, Projection, ProjectionError};
 pub use beam::source::{Collimation, FocalSpot, HeelEffect, Source, SpotShape};
 pub use beam::spectrum::Spectrum;
@@ -87,6 +97,7 @@ pub use matter::sampler::MaterialTables;
 pub use matter::scatter_density::ScatterDensities;
 pub use phantom::audit::{Audit, MaterialCount, SegmentAudit};
 pub use phantom::calibration_error::CalibrationError;
+pub use phantom::histogram::HuBin;
 pub use phantom::hu::{Composition, Constituent, HuCalibration, Segment};
 pub use phantom::voxels::{PhantomError, VoxelPhantom};
 pub use run::analog_run::AnalogRun;

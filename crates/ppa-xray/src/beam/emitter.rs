@@ -255,8 +255,9 @@ mod tests {
 
     use super::*;
     use crate::beam::projection::Detector;
-    use crate::beam::source::{Collimation, HeelEffect, Source, SpotShape};
+    use crate::beam::source::{Collimation, HeelEffect, Source};
     use crate::beam::tube::TubeSpec;
+    use crate::scenes::demanding_source;
 
     const DISTANCE_MM: f64 = 1_000.0;
 
@@ -279,17 +280,7 @@ mod tests {
     }
 
     fn demanding() -> Projection {
-        let source = Source {
-            focal_spot: FocalSpot {
-                size_mm: 8.0,
-                shape: SpotShape::Gaussian,
-            },
-            heel_effect: Some(HeelEffect {
-                anode_towards_deg: 30.0,
-            }),
-            ..Source::default()
-        };
-        let mut turned = projection(source).with_detector_turned(0.2, -0.3);
+        let mut turned = projection(demanding_source()).with_detector_turned(0.2, -0.3);
         let [x, y] = turned.detector.centre_mm;
         turned.source.collimation = Collimation::Rectangle {
             size_mm: [300.0, 500.0],

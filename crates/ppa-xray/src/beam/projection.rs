@@ -61,7 +61,7 @@ pub enum ProjectionError {
     },
     /// Sides of the field.
     #[error(
-        "the x-ray field measures {size_mm:?} mm on the detector plane, expected 0.001 mm or more"
+        "the x-ray field measures {size_mm:?} mm on the detector plane, expected sides of 0.001 to 10000000 mm"
     )]
     Field {
         /// Sides along device x and y.

@@ -59,20 +59,25 @@ impl Spectrum {
     /// One bin without width is a line.
     ///
     /// # Errors
-    /// A file that cannot be read, a line that does not begin with two numbers, no end, and everything that
-    /// [`Spectrum::from_bins`] refuses.
+    /// A file that cannot be read, a line that does not begin with two numbers, no end, a negative weight after which
+    /// the energies rise further (MC-GPU would leave the rest out), and everything that [`Spectrum::from_bins`] refuses.
     pub fn from_spc(path: impl AsRef<Path>) -> Result<Self, SpectrumError> {
         const EXPECTED: &str = "lower bin edge in eV and weight";
         let path = path.as_ref();
         let text = read(path)?;
         let (mut edges, mut weights) = (Vec::new(), Vec::new());
-        for (index, line) in lines(&text) {
-            let mut columns = columns(line).map(str::parse::<f64>);
-            let (Some(Ok(energy_ev)), Some(Ok(weight))) = (columns.next(), columns.next()) else {
-                return Err(wrong_line(path, index, line, EXPECTED));
-            };
+        let mut lines = lines(&text);
+        while let Some((index, line)) = lines.next() {
+            let (energy_ev, weight) =
+                two_numbers(line).ok_or_else(|| wrong_line(path, index, line, EXPECTED))?;
             edges.push(energy_ev / 1000.0);
             if weight < 0.0 {
+                let mut rest = lines.filter_map(|(_, line)| two_numbers(line));
+                if rest.any(|(further_ev, _)| further_ev > energy_ev) {
+                    let expected =
+                        "a negative weight at the highest energy only, where it ends the spectrum";
+                    return Err(wrong_line(path, index, line, expected));
+                }
                 return match (&edges[..], &weights[..]) {
                     // How a line is written: a bin without width.
                     ([low, high], [weight]) if low == high && *weight > 0.0 => {
@@ -110,6 +115,12 @@ fn columns(line: &str) -> impl Iterator<Item = &str> {
         .filter(|column| !column.is_empty())
 }
 
+/// The first two columns.
+fn two_numbers(line: &str) -> Option<(f64, f64)> {
+    let mut columns = columns(line).map(|column| column.parse().ok());
+    Some((columns.next()??, columns.next()??))
+}
+
 fn wrong_line(path: &Path, index: usize, found: &str, expected: &'static str) -> SpectrumError {
     SpectrumError::Line {
         path: path.to_owned(),
@@ -126,6 +137,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::mcgpu::mangled;
 
     fn file(text: &str) -> tempfile::NamedTempFile {
         let mut file = tempfile::NamedTempFile::new().unwrap();
@@ -179,6 +191,10 @@ mod tests {
         ));
         assert!(matches!(spc("20000 -1\n"), SpectrumError::Dark));
         assert!(matches!(
+            spc("20000 1\n30000 -5\n40000 1\n50000 -1\n"),
+            SpectrumError::Line { line: 2, .. }
+        ));
+        assert!(matches!(
             Spectrum::from_spc("nowhere.spc").unwrap_err(),
             SpectrumError::Read { .. }
         ));
@@ -191,6 +207,15 @@ mod tests {
             let file = file(&text);
             let _ = Spectrum::from_csv(file.path());
             let _ = Spectrum::from_spc(file.path());
+        }
+
+        /// The same of files that were sound once.
+        #[test]
+        fn a_damaged_file_is_read_or_refused(damage in mangled::damage()) {
+            let csv = "keV,weight\n20.5,1\n21.5,3\n22.5,0\n23.5,2\n";
+            let _ = mangled::read(&mangled::damaged(csv.as_bytes(), &damage), |path| Spectrum::from_csv(path));
+            let spc = "# MC-GPU\n20000 2 # low\n21000 6\n22000 0\n23000 -1\n";
+            let _ = mangled::read(&mangled::damaged(spc.as_bytes(), &damage), |path| Spectrum::from_spc(path));
         }
     }
 }

@@ -92,13 +92,30 @@ impl LogLog {
     }
 }
 
+/// Cross sections over energy.
+#[derive(Debug, PartialEq)]
+pub(crate) struct SectionTables {
+    pub photoelectric: LogLog,
+    pub rayleigh: LogLog,
+    pub compton: LogLog,
+}
+
+impl SectionTables {
+    pub fn at(&self, energy_kev: f64) -> CrossSections {
+        let ln_e = energy_kev.ln();
+        CrossSections {
+            photoelectric: self.photoelectric.at(ln_e),
+            rayleigh: self.rayleigh.at(ln_e),
+            compton: self.compton.at(ln_e),
+        }
+    }
+}
+
 /// One element's tables.
 pub(crate) struct Element {
     /// Atomic weight in g/mol.
     pub(crate) atomic_weight: f64,
-    photoelectric: LogLog,
-    rayleigh: LogLog,
-    compton: LogLog,
+    sections: SectionTables,
     form_factor: Vec<f64>,
     incoherent: Vec<f64>,
     shells: Vec<Shell>,
@@ -108,17 +125,12 @@ pub(crate) struct Element {
 impl Element {
     /// Mass attenuation at an energy inside the tables.
     pub(crate) fn cross_sections(&self, energy_kev: f64) -> CrossSections {
-        let ln_e = energy_kev.ln();
-        CrossSections {
-            photoelectric: self.photoelectric.at(ln_e),
-            rayleigh: self.rayleigh.at(ln_e),
-            compton: self.compton.at(ln_e),
-        }
+        self.sections.at(energy_kev)
     }
 
     /// Absorption edges inside the tables, keV, ascending.
     pub(crate) fn edges_kev(&self) -> impl Iterator<Item = f64> {
-        self.photoelectric.edges()
+        self.sections.photoelectric.edges()
     }
 
     /// Electrons, binding energies and Compton profiles; the electrons add up to Z.
@@ -184,9 +196,11 @@ pub(crate) fn elements() -> &'static Elements {
                 let photo_energies = data.doubles(n_photo);
                 Element {
                     atomic_weight,
-                    photoelectric: LogLog::new(&photo_energies, &data.doubles(n_photo)),
-                    rayleigh: LogLog::new(&energies, &data.doubles(n_energy)),
-                    compton: LogLog::new(&energies, &data.doubles(n_energy)),
+                    sections: SectionTables {
+                        photoelectric: LogLog::new(&photo_energies, &data.doubles(n_photo)),
+                        rayleigh: LogLog::new(&energies, &data.doubles(n_energy)),
+                        compton: LogLog::new(&energies, &data.doubles(n_energy)),
+                    },
                     form_factor: data.doubles(n_q),
                     incoherent: data.doubles(n_q),
                     shells: {

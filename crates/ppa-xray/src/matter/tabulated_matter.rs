@@ -1,6 +1,8 @@
 //! Photon data of one material, checked and ready to be asked.
 
-use crate::matter::cross_sections::{CrossSections, LogLog, MAX_ENERGY_KEV, MIN_ENERGY_KEV};
+use crate::matter::cross_sections::{
+    CrossSections, LogLog, MAX_ENERGY_KEV, MIN_ENERGY_KEV, SectionTables,
+};
 use crate::matter::electron_shell::Shell;
 use crate::matter::material_error::MaterialError;
 use crate::matter::photon_tables::PhotonTables;
@@ -13,9 +15,7 @@ const BOHR_ANGSTROM: f64 = 0.529_177_210_903;
 #[derive(Debug, PartialEq)]
 pub(crate) struct TabulatedMatter {
     range_kev: [f64; 2],
-    photoelectric: LogLog,
-    rayleigh: LogLog,
-    compton: LogLog,
+    sections: SectionTables,
     form_factor_squared: LogLog,
     first_form_factor: [f64; 2],
     shells: Vec<Shell>,
@@ -36,12 +36,12 @@ impl TabulatedMatter {
                 high_kev: energies[energies.len() - 1],
             });
         }
-        let sections = [
+        let columns = [
             ("photoelectric cross sections", &tables.photoelectric_cm2_g),
             ("Rayleigh cross sections", &tables.rayleigh_cm2_g),
             ("Compton cross sections", &tables.compton_cm2_g),
         ];
-        for (what, values) in sections {
+        for (what, values) in columns {
             if values.len() != energies.len() {
                 return Err(MaterialError::TableLength {
                     name: name.to_owned(),
@@ -95,12 +95,14 @@ impl TabulatedMatter {
                 }
             }
         }
-        let section = |values| LogLog::new(energies, values);
+        let section = |values: &[f64]| LogLog::new(energies, values);
         Ok(Self {
             range_kev,
-            photoelectric: section(sections[0].1),
-            rayleigh: section(sections[1].1),
-            compton: section(sections[2].1),
+            sections: SectionTables {
+                photoelectric: section(&tables.photoelectric_cm2_g),
+                rayleigh: section(&tables.rayleigh_cm2_g),
+                compton: section(&tables.compton_cm2_g),
+            },
             first_form_factor: [q_squared[positive], squared[0]],
             form_factor_squared: LogLog::new(&q_squared[positive..], &squared[positive..]),
             shells: tables.shells.clone(),
@@ -116,16 +118,12 @@ impl TabulatedMatter {
     }
 
     pub(crate) fn cross_sections(&self, energy_kev: f64) -> CrossSections {
-        let ln_e = energy_kev.clamp(self.range_kev[0], self.range_kev[1]).ln();
-        CrossSections {
-            photoelectric: self.photoelectric.at(ln_e),
-            rayleigh: self.rayleigh.at(ln_e),
-            compton: self.compton.at(ln_e),
-        }
+        self.sections
+            .at(energy_kev.clamp(self.range_kev[0], self.range_kev[1]))
     }
 
     pub(crate) fn edges_kev(&self) -> impl Iterator<Item = f64> {
-        self.photoelectric.edges()
+        self.sections.photoelectric.edges()
     }
 
     pub(crate) fn form_factor_squared(&self, q: f64) -> f64 {

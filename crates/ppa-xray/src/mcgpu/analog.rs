@@ -62,3 +62,66 @@ impl Simulation {
         Ok((tally.radiograph(), tally.dose()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use crate::mcgpu::input::Input;
+    use crate::mcgpu::mangled;
+    use crate::mcgpu::simulation::Simulation;
+
+    use super::*;
+
+    /// A box of 6 x 6 x 6 cm with water in air.
+    fn voxels() -> String {
+        let header =
+            "[SECTION VOXELS HEADER v.2008-04-13]\n6 6 6\n1 1 1\n1\n2\n0\n[END OF VXH SECTION]\n";
+        let line = |i: usize| {
+            if i.is_multiple_of(5) {
+                "1 0.0012\n"
+            } else {
+                "2 1.0\n"
+            }
+        };
+        (0..216)
+            .map(line)
+            .fold(header.to_owned(), |text, line| text + line)
+    }
+
+    proptest::proptest! {
+        /// A damaged scan is refused, or its photons are followed to the end.
+        #[test]
+        fn a_damaged_scan_is_followed_or_refused(damage in mangled::damage(), hurt in 0..3_usize) {
+            let folder = tempfile::tempdir().unwrap();
+            // One or two injuries to one of the files: with more, few files are read.
+            let damage = &damage[..damage.len().min(2)];
+            let write = |index: usize, name: &str, text: &str| {
+                let path = folder.path().join(name);
+                let damage = if index == hurt { damage } else { &[] };
+                fs::write(&path, mangled::damaged(text.as_bytes(), damage)).unwrap();
+                path
+            };
+            let text = include_str!("sample.in")
+                .replace("../beam.spc", "beam.spc")
+                .replace("head.vox.gz", "head.vox")
+                .replace("../materials/air.mcgpu.gz", "ppa:air")
+                .replace("\n1 10 ", "\n1 5 ")
+                .replace("\n2 11 ", "\n2 6 ")
+                .replace("\n3 12 ", "\n3 6 ");
+            let path = write(0, "scan.in", &text);
+            write(1, "head.vox", &voxels());
+            write(2, "beam.spc", "20000 1\n30000 2\n60000 -1\n");
+            let Ok(read) = Input::read(&path) else {
+                return Ok(());
+            };
+            let small = read.pixels.iter().all(|&pixels| pixels < 1_000);
+            let Ok(simulation) = Simulation::with_input(read) else {
+                return Ok(());
+            };
+            if small && let Some(station) = simulation.input().stations().first() {
+                let _ = simulation.analog(station, RunLength::Histories(300), |_| {});
+            }
+        }
+    }
+}

@@ -214,12 +214,6 @@ mod tests {
 
     #[test]
     fn mistakes_are_told_with_their_line() {
-        let wrong = |from: &str, to: &str| {
-            assert!(SAMPLE.contains(from), "{from}");
-            read(SAMPLE.replacen(from, to, 1).as_bytes())
-                .unwrap_err()
-                .to_string()
-        };
         for (from, to, told) in [
             (
                 "2.5e5 ",
@@ -260,7 +254,7 @@ mod tests {
             ),
             ("90.0 ", "# ", "line 22: found \"#[SECTION CT SCAN"),
         ] {
-            let found = wrong(from, to);
+            let found = mangled::told(SAMPLE, [from, to], |path| Input::read(path));
             assert!(found.contains(told), "{from} → {to}: {found}");
         }
         let (before, _) = SAMPLE.split_once("../materials").unwrap();

@@ -101,6 +101,20 @@ pub(crate) fn damaged(text: &[u8], damage: &[Damage]) -> Vec<u8> {
     bytes
 }
 
+/// What a reader says of `sample` with one piece of it changed.
+pub(crate) fn told<T: std::fmt::Debug, E: std::fmt::Display>(
+    sample: &str,
+    [from, to]: [&str; 2],
+    reader: impl FnOnce(&Path) -> Result<T, E>,
+) -> String {
+    assert!(sample.contains(from), "{from}");
+    let text = sample.replacen(from, to, 1);
+    match read(text.as_bytes(), reader) {
+        Ok(read) => panic!("{from} → {to} was read: {read:?}"),
+        Err(error) => error.to_string(),
+    }
+}
+
 /// Reads a file with these bytes.
 pub(crate) fn read<T>(bytes: &[u8], reader: impl FnOnce(&Path) -> T) -> T {
     let mut file = tempfile::NamedTempFile::new().unwrap();

@@ -13,7 +13,7 @@ mod image_file;
 mod input;
 mod lines;
 #[cfg(test)]
-mod mangled;
+pub(crate) mod mangled;
 mod material_file;
 mod sections;
 mod simulation;

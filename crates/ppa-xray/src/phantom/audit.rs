@@ -3,9 +3,11 @@
 use ppa_ct::Volume;
 use serde::Serialize;
 
-use crate::phantom::hu::HuCalibration;
+use crate::matter::material::Material;
+use crate::phantom::histogram::{BIN_HU, Histogram, HuBin};
+use crate::phantom::hu::{HuCalibration, Segment};
 use crate::phantom::segmentation::Segmentation;
-use crate::phantom::voxels::PhantomError;
+use crate::phantom::voxels::{PhantomError, check_mask};
 
 /// Elements from scandium on count as metal.
 const LIGHTEST_METAL: u8 = 21;
@@ -19,15 +21,22 @@ pub struct Audit {
     pub outside_mask: usize,
     /// Volume of one voxel, mm³.
     pub voxel_mm3: f64,
-    /// Lowest HU, and the voxels that have exactly it. Many are a sign that the scan is clipped below.
+    /// Width of the bins of all histograms, HU.
+    pub bin_hu: u16,
+    /// Lowest HU.
     pub lowest_hu: f32,
-    /// See `lowest_hu`.
+    /// Voxels that have exactly the lowest HU.
     pub voxels_at_lowest: usize,
-    /// Highest HU, and the voxels that have exactly it. Many, at 3071 above all, are a sign that the scan is clipped
-    /// above: metals cannot be told apart there, and their density is that of the calibration.
+    /// The same number if it is too large for the end of a tail, otherwise 0: the scan is clipped below, or filled
+    /// with this value outside the field of view.
+    pub clipped_below: usize,
+    /// Highest HU.
     pub highest_hu: f32,
-    /// See `highest_hu`.
+    /// Voxels that have exactly the highest HU.
     pub voxels_at_highest: usize,
+    /// The same number if it is too large for the end of a tail, otherwise 0: the scan is clipped above. Metals cannot
+    /// be told apart there, and their density is that of the calibration.
+    pub clipped_above: usize,
     /// Mass of all voxels, g.
     pub mass_g: f64,
     /// Volume of the segments that are metal: more than half of their mass in elements from scandium (Z = 21) on, cm³.
@@ -55,6 +64,8 @@ pub struct SegmentAudit {
     pub below_curve: usize,
     /// Voxels above the last knot of a density curve of two or more: they get the density of that knot.
     pub above_curve: usize,
+    /// How often which HU occur: bins with voxels, from low to high.
+    pub bins: Vec<HuBin>,
     /// Materials that occur, in order of their attenuation for a mixture.
     pub materials: Vec<MaterialCount>,
 }
@@ -66,34 +77,8 @@ pub struct MaterialCount {
     pub name: String,
     /// Voxels.
     pub voxels: usize,
-}
-
-/// A set of Hounsfield values: how many, and how often the extremes occur.
-struct Range {
-    lowest: f32,
-    at_lowest: usize,
-    highest: f32,
-    at_highest: usize,
-}
-
-impl Range {
-    const EMPTY: Self = Self {
-        lowest: f32::INFINITY,
-        at_lowest: 0,
-        highest: f32::NEG_INFINITY,
-        at_highest: 0,
-    };
-
-    fn add(&mut self, hu: f32) {
-        if hu < self.lowest {
-            (self.lowest, self.at_lowest) = (hu, 0);
-        }
-        if hu > self.highest {
-            (self.highest, self.at_highest) = (hu, 0);
-        }
-        self.at_lowest += usize::from(hu == self.lowest);
-        self.at_highest += usize::from(hu == self.highest);
-    }
+    /// Their HU: bins with voxels, from low to high.
+    pub bins: Vec<HuBin>,
 }
 
 impl HuCalibration {
@@ -105,34 +90,12 @@ impl HuCalibration {
     pub fn audit(&self, volume: &Volume, mask: Option<&[bool]>) -> Result<Audit, PhantomError> {
         let segmentation = Segmentation::new(self)?;
         let hu = volume.hu();
-        if let Some(mask) = mask.filter(|mask| mask.len() != hu.len()) {
-            return Err(PhantomError::Length {
-                what: "mask values",
-                found: mask.len(),
-                expected: hu.len(),
-            });
-        }
-        let spacing = volume.grid().ct_from_voxel().to_homogeneous();
-        let voxel_mm3 = spacing.fixed_view::<3, 3>(0, 0).determinant().abs();
-        let mut all = Range::EMPTY;
-        let mut ranges: Vec<Range> = self.segments.iter().map(|_| Range::EMPTY).collect();
-        let mut segments: Vec<SegmentAudit> = self
-            .segments
-            .iter()
-            .map(|segment| SegmentAudit {
-                name: segment.name.clone(),
-                voxels: 0,
-                volume_cm3: 0.0,
-                mass_g: 0.0,
-                lowest_hu: None,
-                highest_hu: None,
-                below_curve: 0,
-                above_curve: 0,
-                materials: Vec::new(),
-            })
-            .collect();
-        let mut counts = vec![0; segmentation.materials().len()];
-        let mut owner = vec![0; counts.len()];
+        check_mask(mask, hu.len())?;
+        let voxel_from_ct = volume.grid().ct_from_voxel().to_homogeneous();
+        let voxel_mm3 = voxel_from_ct.fixed_view::<3, 3>(0, 0).determinant().abs();
+        let mut segments: Vec<SegmentSums> = self.segments.iter().map(SegmentSums::new).collect();
+        let mut histograms = vec![Histogram::new(); segmentation.materials().len()];
+        let mut owner = vec![0; histograms.len()];
         let mut outside_mask = 0;
         for (index, &hu) in hu.iter().enumerate() {
             if mask.is_some_and(|mask| !mask[index]) {
@@ -140,62 +103,110 @@ impl HuCalibration {
                 continue;
             }
             let voxel = segmentation.voxel(hu);
-            let segment = &mut segments[voxel.segment];
-            segment.voxels += 1;
-            segment.mass_g += f64::from(voxel.density_g_cm3);
-            if let [first, .., last] = self.segments[voxel.segment].density[..] {
-                segment.below_curve += usize::from(hu < first[0]);
-                segment.above_curve += usize::from(hu > last[0]);
-            }
-            counts[voxel.material] += 1;
+            segments[voxel.segment].add(hu, voxel.density_g_cm3);
+            histograms[voxel.material].add(hu);
             owner[voxel.material] = voxel.segment;
-            ranges[voxel.segment].add(hu);
-            all.add(hu);
-        }
-        if outside_mask == hu.len() {
-            return Err(PhantomError::EmptyMask);
         }
         let voxel_cm3 = voxel_mm3 / 1_000.0;
-        for (segment, range) in segments.iter_mut().zip(&ranges) {
-            segment.volume_cm3 = segment.voxels as f64 * voxel_cm3;
-            segment.mass_g *= voxel_cm3;
-            if segment.voxels > 0 {
-                segment.lowest_hu = Some(range.lowest);
-                segment.highest_hu = Some(range.highest);
-            }
-        }
+        let mut all = Histogram::new();
         let mut metal_cm3 = 0.0;
-        for ((material, &voxels), owner) in segmentation.materials().iter().zip(&counts).zip(owner)
+        for ((material, histogram), owner) in
+            segmentation.materials().iter().zip(&histograms).zip(owner)
         {
+            let voxels = histogram.voxels();
             if voxels == 0 {
                 continue;
             }
+            segments[owner].histogram.merge(histogram);
             segments[owner].materials.push(MaterialCount {
                 name: material.name().to_owned(),
                 voxels,
+                bins: histogram.bins(),
             });
-            let metal: f64 = material
-                .mass_fractions()
-                .iter()
-                .filter(|(z, _)| *z >= LIGHTEST_METAL)
-                .map(|(_, fraction)| fraction)
-                .sum();
-            if metal > 0.5 {
+            if is_metal(material) {
                 metal_cm3 += voxels as f64 * voxel_cm3;
             }
         }
+        for segment in &segments {
+            all.merge(&segment.histogram);
+        }
+        let [lowest, highest] = all.extremes().ok_or(PhantomError::EmptyMask)?;
+        let segments: Vec<SegmentAudit> = segments
+            .into_iter()
+            .map(|sums| sums.audit(voxel_cm3))
+            .collect();
         Ok(Audit {
             voxels: hu.len(),
             outside_mask,
             voxel_mm3,
-            lowest_hu: all.lowest,
-            voxels_at_lowest: all.at_lowest,
-            highest_hu: all.highest,
-            voxels_at_highest: all.at_highest,
+            bin_hu: BIN_HU,
+            lowest_hu: lowest.hu,
+            voxels_at_lowest: lowest.voxels,
+            clipped_below: all.pile_below(),
+            highest_hu: highest.hu,
+            voxels_at_highest: highest.voxels,
+            clipped_above: all.pile_above(),
             mass_g: segments.iter().map(|segment| segment.mass_g).sum(),
             metal_cm3,
             segments,
         })
+    }
+}
+
+fn is_metal(material: &Material) -> bool {
+    let elements = material.mass_fractions().iter();
+    let metal: f64 = elements
+        .filter(|(z, _)| *z >= LIGHTEST_METAL)
+        .map(|(_, fraction)| fraction)
+        .sum();
+    metal > 0.5
+}
+
+/// What is added up of one segment.
+struct SegmentSums<'a> {
+    segment: &'a Segment,
+    histogram: Histogram,
+    density_g_cm3: f64,
+    below_curve: usize,
+    above_curve: usize,
+    materials: Vec<MaterialCount>,
+}
+
+impl<'a> SegmentSums<'a> {
+    fn new(segment: &'a Segment) -> Self {
+        Self {
+            segment,
+            histogram: Histogram::new(),
+            density_g_cm3: 0.0,
+            below_curve: 0,
+            above_curve: 0,
+            materials: Vec::new(),
+        }
+    }
+
+    fn add(&mut self, hu: f32, density_g_cm3: f32) {
+        self.density_g_cm3 += f64::from(density_g_cm3);
+        if let [first, .., last] = self.segment.density[..] {
+            self.below_curve += usize::from(hu < first[0]);
+            self.above_curve += usize::from(hu > last[0]);
+        }
+    }
+
+    fn audit(self, voxel_cm3: f64) -> SegmentAudit {
+        let voxels = self.histogram.voxels();
+        let extremes = self.histogram.extremes();
+        SegmentAudit {
+            name: self.segment.name.clone(),
+            voxels,
+            volume_cm3: voxels as f64 * voxel_cm3,
+            mass_g: self.density_g_cm3 * voxel_cm3,
+            lowest_hu: extremes.map(|[lowest, _]| lowest.hu),
+            highest_hu: extremes.map(|[_, highest]| highest.hu),
+            below_curve: self.below_curve,
+            above_curve: self.above_curve,
+            bins: self.histogram.bins(),
+            materials: self.materials,
+        }
     }
 }
 
@@ -222,6 +233,21 @@ mod tests {
         assert_eq!((audit.voxels, audit.outside_mask), (10, 1));
         assert_eq!((audit.lowest_hu, audit.voxels_at_lowest), (-1024.0, 2));
         assert_eq!((audit.highest_hu, audit.voxels_at_highest), (3071.0, 2));
+        let bins: Vec<_> = audit.segments[0]
+            .bins
+            .iter()
+            .map(|b| (b.from_hu, b.voxels))
+            .collect();
+        assert_eq!(bins, [(-1050.0, 3)]);
+        for segment in &audit.segments {
+            let materials = segment.materials.iter().flat_map(|material| &material.bins);
+            for bins in [
+                segment.bins.iter().map(|b| b.voxels).sum(),
+                materials.map(|b| b.voxels).sum::<usize>(),
+            ] {
+                assert_eq!(bins, segment.voxels, "{}", segment.name);
+            }
+        }
         assert!((audit.voxel_mm3 - 10.0).abs() < 1e-9 && (audit.metal_cm3 - 0.02).abs() < 1e-12);
         let counts: Vec<_> = audit.segments.iter().map(|s| s.voxels).collect();
         assert_eq!(counts, [3, 1, 0, 2, 1, 2]);
@@ -243,6 +269,31 @@ mod tests {
             calibration.audit(&volume, Some(&[true; 3])),
             Err(PhantomError::Length { found: 3, .. })
         ));
+    }
+
+    /// Forty voxels of an implant beyond the scanner's scale, in a block of muscle and bone: found, and only there.
+    #[test]
+    fn a_clipped_implant_is_found() {
+        let grid =
+            Grid::axis_aligned([20, 20, 20], Vector3::repeat(1.0), Point3::origin()).unwrap();
+        let mut hu: Vec<f32> = (0..8_000).map(|i| 20.0 + (i % 500) as f32).collect();
+        let audit_of = |hu: &[f32]| {
+            let volume = Volume::new(grid.clone(), hu.to_vec()).unwrap();
+            HuCalibration::default().audit(&volume, None).unwrap()
+        };
+        // A block that holds every HU equally often ends like a tail.
+        let without = audit_of(&hu);
+        assert_eq!((without.clipped_below, without.clipped_above), (0, 0));
+        hu[4_000..4_040].fill(3_071.0);
+        let with = audit_of(&hu);
+        assert_eq!((with.clipped_below, with.clipped_above), (0, 40));
+        assert_eq!(
+            with.segments.last().unwrap().bins,
+            [HuBin {
+                from_hu: 3_050.0,
+                voxels: 40
+            }]
+        );
     }
 
     /// A curve that ends too early is told: its last density would stand for everything above.

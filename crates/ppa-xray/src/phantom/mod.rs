@@ -3,6 +3,7 @@
 pub(crate) mod audit;
 pub(crate) mod calibration_error;
 pub(crate) mod graded_mixture;
+pub(crate) mod histogram;
 pub(crate) mod hu;
 pub(crate) mod lattice;
 pub(crate) mod segmentation;

@@ -52,6 +52,18 @@ pub enum PhantomError {
     Calibration(#[from] CalibrationError),
 }
 
+/// A mask says of every voxel whether it counts.
+pub(super) fn check_mask(mask: Option<&[bool]>, voxels: usize) -> Result<(), PhantomError> {
+    match mask {
+        Some(mask) if mask.len() != voxels => Err(PhantomError::Length {
+            what: "mask values",
+            found: mask.len(),
+            expected: voxels,
+        }),
+        _ => Ok(()),
+    }
+}
+
 /// Materials and densities on the lattice of a CT; vacuum outside it.
 ///
 /// Every voxel is homogeneous. Memory order is that of [`Grid::index`], i fastest.
@@ -129,13 +141,7 @@ impl VoxelPhantom {
     ) -> Result<Self, PhantomError> {
         let segmentation = Segmentation::new(calibration)?;
         let hu = volume.hu();
-        if let Some(mask) = mask.filter(|mask| mask.len() != hu.len()) {
-            return Err(PhantomError::Length {
-                what: "mask values",
-                found: mask.len(),
-                expected: hu.len(),
-            });
-        }
+        check_mask(mask, hu.len())?;
         let voxel = |index: usize| {
             let kept = mask.is_none_or(|mask| mask[index]);
             segmentation.voxel(if kept { hu[index] } else { f32::NEG_INFINITY })

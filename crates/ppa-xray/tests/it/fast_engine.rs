@@ -2,11 +2,11 @@
 
 use nalgebra::Isometry3;
 use ppa_xray::{
-    AnalogSettings, Category, FastSettings, FocalSpot, HeelEffect, Projection, Radiograph, Source,
-    SpotShape, VoxelPhantom, analog, fast, primary,
+    AnalogSettings, Category, FastSettings, Projection, Radiograph, VoxelPhantom, analog, fast,
+    primary,
 };
 
-use crate::scenes::{frontal, limb, sixty_kvp};
+use crate::scenes::{demanding_source, frontal, limb, sixty_kvp};
 
 const SCATTER: [Category; 3] = [Category::Compton, Category::Rayleigh, Category::Multiple];
 
@@ -90,18 +90,8 @@ fn scatter_is_that_of_analog() {
 #[test]
 fn scatter_of_a_demanding_source_is_that_of_analog() {
     let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
-    let source = Source {
-        focal_spot: FocalSpot {
-            size_mm: 8.0,
-            shape: SpotShape::Gaussian,
-        },
-        heel_effect: Some(HeelEffect {
-            anode_towards_deg: 30.0,
-        }),
-        ..Source::default()
-    };
     let projection = Projection {
-        source,
+        source: demanding_source(),
         ..frontal(24, 6.0)
     };
     let expected = analog(

@@ -2,7 +2,10 @@
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use ppa_ct::Grid;
-use ppa_xray::{Detector, Material, Projection, Spectrum, TubeSpec, VoxelPhantom};
+use ppa_xray::{
+    Detector, FocalSpot, HeelEffect, Material, Projection, Source, Spectrum, SpotShape, TubeSpec,
+    VoxelPhantom,
+};
 
 /// Device axes along ct axes, source 1 m before the ct origin.
 pub fn frontal(pixels: u32, pixel_mm: f64) -> Projection {
@@ -63,6 +66,20 @@ pub fn limb(pose: &Isometry3<f64>) -> VoxelPhantom {
         .map(|name| Material::named(name).unwrap())
         .to_vec();
     VoxelPhantom::new(grid, material, density, materials).unwrap()
+}
+
+/// A focal spot of 8 mm and a heel effect.
+pub fn demanding_source() -> Source {
+    Source {
+        focal_spot: FocalSpot {
+            size_mm: 8.0,
+            shape: SpotShape::Gaussian,
+        },
+        heel_effect: Some(HeelEffect {
+            anode_towards_deg: 30.0,
+        }),
+        ..Source::default()
+    }
 }
 
 /// A tungsten tube at 60 kVp behind 2.5 mm of aluminium.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use ppa_dataset::{Case, PreparedLimb};
-use ppa_xray::{Audit, HuCalibration};
+use ppa_xray::{Audit, HuBin, HuCalibration};
 
 use crate::output::{Output, working};
 
@@ -37,10 +37,20 @@ pub fn run(args: &AuditArgs, output: Output) -> anyhow::Result<()> {
     output.print(&audit, describe)
 }
 
+/// Most characters of a row of bars.
+const WIDTH: usize = 40;
+
 fn describe(audit: &Audit) -> String {
+    let bars = Bars::of(audit);
     let mut text = format!(
-        "{:<20}{:>10}{:>13}{:>11}  {:>7} {:>7}\n",
-        "segment", "voxels", "volume cm³", "mass g", "from HU", "to HU"
+        "{:<16}{:>10}{:>12}{:>10}{:>9}{:>8}  {}\n",
+        "segment",
+        "voxels",
+        "volume cm³",
+        "mass g",
+        "from HU",
+        "to HU",
+        bars.caption()
     );
     let mut line = |text_line: std::fmt::Arguments| {
         text.write_fmt(text_line)
@@ -49,13 +59,14 @@ fn describe(audit: &Audit) -> String {
     for segment in &audit.segments {
         let hu = |hu: Option<f32>| hu.map_or("-".to_owned(), |hu| format!("{hu:.0}"));
         line(format_args!(
-            "{:<20}{:>10}{:>13.2}{:>11.2}  {:>7} {:>7}\n",
+            "{:<16}{:>10}{:>12.2}{:>10.2}{:>9}{:>8}  {}\n",
             segment.name,
             segment.voxels,
             segment.volume_cm3,
             segment.mass_g,
             hu(segment.lowest_hu),
-            hu(segment.highest_hu)
+            hu(segment.highest_hu),
+            bars.row(&segment.bins)
         ));
         if segment.below_curve + segment.above_curve > 0 {
             line(format_args!(
@@ -69,11 +80,83 @@ fn describe(audit: &Audit) -> String {
         audit.mass_g, audit.metal_cm3, audit.outside_mask
     ));
     line(format_args!(
-        "lowest {:.0} HU in {} voxels, highest {:.0} HU in {}",
-        audit.lowest_hu, audit.voxels_at_lowest, audit.highest_hu, audit.voxels_at_highest
+        "lowest {:.0} HU in {} voxels{}, highest {:.0} HU in {}{}",
+        audit.lowest_hu,
+        audit.voxels_at_lowest,
+        match audit.clipped_below {
+            0 => "",
+            _ => " (clipped, or filled in outside the field of view)",
+        },
+        audit.highest_hu,
+        audit.voxels_at_highest,
+        match audit.clipped_above {
+            0 => "",
+            _ => " (clipped: metals look alike there)",
+        },
     ));
-    if audit.voxels_at_highest > 1 && audit.highest_hu >= 3_000.0 {
-        line(format_args!(": clipped, metals look alike there"));
-    }
     text
+}
+
+/// Rows of bars, one character for the same number of neighbouring bins everywhere, its height logarithmic.
+struct Bars {
+    bin_hu: f32,
+    hu_per_bar: f32,
+    most: f64,
+}
+
+impl Bars {
+    fn of(audit: &Audit) -> Self {
+        let bin_hu = f32::from(audit.bin_hu);
+        let widths = audit
+            .segments
+            .iter()
+            .map(|segment| match &segment.bins[..] {
+                [] => 0.0,
+                [first, .., last] => last.from_hu - first.from_hu + bin_hu,
+                [_] => bin_hu,
+            });
+        // A row whose first bin does not begin a bar needs one bar more.
+        let bins_per_bar = (widths.fold(0.0, f32::max) / bin_hu / (WIDTH - 1) as f32).ceil();
+        let mut bars = Self {
+            bin_hu,
+            hu_per_bar: bins_per_bar.max(1.0) * bin_hu,
+            most: 1.0,
+        };
+        let rows = audit
+            .segments
+            .iter()
+            .flat_map(|segment| bars.sums(&segment.bins));
+        bars.most = rows.fold(1, usize::max) as f64;
+        bars
+    }
+
+    fn caption(&self) -> String {
+        format!("voxels per {} HU, logarithmic", self.hu_per_bar)
+    }
+
+    /// Voxels of each bar from the first to the last that has any.
+    fn sums(&self, bins: &[HuBin]) -> Vec<usize> {
+        let bar = |bin: &HuBin| ((bin.from_hu + 0.5 * self.bin_hu) / self.hu_per_bar).floor();
+        let Some(first) = bins.first().map(bar) else {
+            return Vec::new();
+        };
+        let mut sums = Vec::new();
+        for bin in bins {
+            let at = (bar(bin) - first) as usize;
+            sums.resize(at + 1, 0);
+            sums[at] += bin.voxels;
+        }
+        sums
+    }
+
+    fn row(&self, bins: &[HuBin]) -> String {
+        let glyph = |voxels: usize| match voxels {
+            0 => ' ',
+            _ => {
+                let share = (voxels as f64).ln_1p() / self.most.ln_1p();
+                ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'][(8.0 * share).ceil() as usize - 1]
+            }
+        };
+        self.sums(bins).into_iter().map(glyph).collect()
+    }
 }

@@ -142,7 +142,7 @@ impl AnalogArgs {
         if let Some(seconds) = self.time {
             anyhow::ensure!(
                 seconds > 0.0 && seconds <= 1e9,
-                "--time is {seconds}, expected seconds above 0"
+                "--time is {seconds}, expected seconds above 0 and up to 1e9"
             );
         }
         if let Some(percent) = self.target_error {

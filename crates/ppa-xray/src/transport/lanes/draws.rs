@@ -1,7 +1,7 @@
 //! Random numbers of many histories, and the optical depths made of them.
 
+use crate::matter::natural_log::ln;
 use crate::philox;
-use crate::transport::lanes::elementary::ln;
 use crate::transport::lanes::flights::{Each, LANES};
 use crate::transport::lanes::isa::Kernel;
 

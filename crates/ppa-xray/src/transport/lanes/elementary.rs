@@ -1,28 +1,7 @@
-//! Logarithm, sine, cosine and rounding in `f32` that compilers turn into vector code and that give the same bits on every machine.
+//! Sine, cosine and rounding in `f32` that compilers turn into vector code and that give the same bits on every machine.
 //!
 //! Polynomials of our own (minimax, by iteratively reweighted least squares): no library whose last digit depends on
 //! the platform, and no fused multiply-add.
-
-/// ln x for positive finite x, within 2e-7 of the value (or of 2e-7 itself near x = 1).
-#[inline(always)]
-pub(super) fn ln(x: f32) -> f32 {
-    // x = 2^k m with m in [1/√2, √2): ln(1 + t) = t − t²/2 + t³ p(t).
-    const SQRT_HALF: u32 = 0x3F35_04F3;
-    let shifted = x.to_bits().wrapping_sub(SQRT_HALF);
-    let k = (shifted as i32) >> 23;
-    let t = f32::from_bits((shifted & 0x007F_FFFF) + SQRT_HALF) - 1.0;
-    let mut p = 8.700_435e-2_f32;
-    p = p * t - 0.142_674_87;
-    p = p * t + 0.149_147_68;
-    p = p * t - 0.165_775_85;
-    p = p * t + 0.199_630_64;
-    p = p * t - 0.250_013_37;
-    p = p * t + 0.333_339_1;
-    let square = t * t;
-    // ln 2 in two parts, so that k ln 2 rounds once.
-    let k = k as f32;
-    k * 1.428_606_8e-6 + (t - 0.5 * square + t * square * p) + k * 0.693_145_75
-}
 
 /// Sine and cosine of `turn` whole turns, `turn` in [0, 1); within 2e-7.
 #[inline(always)]
@@ -69,21 +48,6 @@ pub(super) fn floor(x: f32) -> (f32, u32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn logarithm_is_that_of_the_library_to_2e_7() {
-        let mut x = 2.0_f32.powi(-33);
-        while x < 8.0 {
-            let expected = f64::from(x).ln();
-            let error = f64::from(ln(x)) - expected;
-            assert!(
-                error.abs() <= 2e-7 * expected.abs().max(0.05),
-                "ln {x}: off by {error:e}"
-            );
-            x *= 1.000_37;
-        }
-        assert_eq!(ln(1.0), 0.0);
-    }
 
     #[test]
     fn sine_and_cosine_are_those_of_the_library_to_2e_7() {

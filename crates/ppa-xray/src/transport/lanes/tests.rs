@@ -11,39 +11,30 @@ use crate::matter::compton::ComptonModel;
 use crate::matter::material::Material;
 use crate::phantom::lattice::Walk;
 use crate::phantom::voxels::VoxelPhantom;
+use crate::scenes::limb;
 use crate::transport::attenuation::CUTOFF_KEV;
 use crate::transport::score::Arrival;
 
-/// A tilted block of air, tissue of uneven density, bone, a titanium pin and a vessel with contrast medium; voxels of
-/// unequal sides.
+/// The limb of the public tests, with a vessel full of contrast medium.
 fn phantom() -> VoxelPhantom {
-    let tilt = Rotation3::from_euler_angles(0.3, -0.2, 0.5).into_inner();
-    let spacing = Vector3::new(2.0, 2.5, 1.7);
-    let origin = Point3::from(-(tilt * Vector3::new(35.0, 36.25, 33.15)));
-    let grid = Grid::from_parts([36, 30, 40], tilt, spacing, origin).unwrap();
+    let limb = limb(&Isometry3::identity());
+    let grid = limb.grid();
     let (material, density) = (0..grid.len())
         .map(|index| {
-            let [i, j, k] = grid.voxel(index);
+            let [i, j, _] = grid.voxel(index);
             let (x, y) = (i as f64 * 2.0 - 35.0, j as f64 * 2.5 - 36.25);
-            if x.hypot(y) > 33.0 {
-                (0, 0.001_2)
-            } else if (18..20).contains(&i) && (14..16).contains(&j) && (10..25).contains(&k) {
-                (3, 4.5)
-            } else if (x - 8.0).hypot(y) < 12.0 {
-                (2, 1.2 + 0.05 * (k % 12) as f32)
-            } else if (x + 18.0).hypot(y) < 8.0 {
+            if (x + 18.0).hypot(y) < 8.0 {
                 (4, 1.05)
             } else {
-                (1, 0.95 + 0.01 * (k % 12) as f32)
+                (limb.material()[index], limb.density_g_cm3()[index])
             }
         })
         .unzip();
     let [iodine, water] = ["iodine", "water"].map(|name| Material::named(name).unwrap());
     let contrast = Material::mixture("contrast", 1.05, &[(&iodine, 0.05), (&water, 0.95)]);
-    let materials = ["air", "soft_tissue", "bone_cortical", "titanium"]
-        .map(|name| Material::named(name).unwrap());
-    let materials = materials.into_iter().chain([contrast.unwrap()]);
-    VoxelPhantom::new(grid, material, density, materials.collect()).unwrap()
+    let mut materials = limb.materials().to_vec();
+    materials.push(contrast.unwrap());
+    VoxelPhantom::new(grid.clone(), material, density, materials).unwrap()
 }
 
 /// The detector plane cuts through the air of the box.
