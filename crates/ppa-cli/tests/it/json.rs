@@ -146,10 +146,18 @@ fn every_command_keeps_its_keys() {
         "metal_cm3",
         "mass_g",
         "segments",
+        "bin_hu",
+        "clipped_below",
+        "clipped_above",
     ];
     let whole = object("xray audit p01.nii", &audit);
     let limb = object("xray audit p01.toml", &audit);
     assert!(limb["outside_mask"].as_u64() > whole["outside_mask"].as_u64());
+    for segment in whole["segments"].as_array().unwrap() {
+        let bins = segment["bins"].as_array().unwrap().iter();
+        let binned: u64 = bins.map(|bin| bin["voxels"].as_u64().unwrap()).sum();
+        assert_eq!(Some(binned), segment["voxels"].as_u64(), "{segment}");
+    }
     let simulated = object(
         "xray simulate p01.toml --angle 18 --engine analog --histories 20000 --out x.png --exr x.exr --dicom x.dcm --protocol ankle_mortise",
         &["projections", "histories", "engine", "wall_s", "cpu_s"],

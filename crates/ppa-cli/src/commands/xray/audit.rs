@@ -91,7 +91,7 @@ fn describe(audit: &Audit) -> String {
         audit.voxels_at_highest,
         match audit.clipped_above {
             0 => "",
-            _ => " (clipped: metals look alike there)",
+            _ => " (clipped, or filled in: nothing above can be told apart)",
         },
     ));
     text
@@ -158,5 +158,25 @@ impl Bars {
             }
         };
         self.sums(bins).into_iter().map(glyph).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two neighbouring bins to a bar, an empty bar between, the fullest bar the highest, every voxel seen.
+    #[test]
+    fn bars_stand_for_neighbouring_bins() {
+        let bin = |from_hu, voxels| HuBin { from_hu, voxels };
+        let bins = [bin(-50.0, 1), bin(0.0, 400), bin(50.0, 599), bin(200.0, 30)];
+        let bars = Bars {
+            bin_hu: 50.0,
+            hu_per_bar: 100.0,
+            most: 999.0,
+        };
+        assert_eq!(bars.sums(&bins), [1, 999, 0, 30]);
+        assert_eq!(bars.row(&bins), "▁█ ▄");
+        assert_eq!(bars.row(&[]), "");
     }
 }
