@@ -84,10 +84,7 @@ fn thin_places(survey: &Survey, x: usize) -> Vec<f64> {
     let dense = dense.collect::<Vec<_>>();
     let mut places = Vec::new();
     let mut start = 0;
-    for y in 0..ny {
-        if dense[y] {
-            continue;
-        }
+    for (y, _) in dense.iter().enumerate().filter(|(_, dense)| !**dense) {
         let thickness_mm = (y - start) as f64 * survey.spacing_mm[1];
         // A run that begins at the face may be the rest of something thick.
         if 0 < start && start < y && thickness_mm <= THICK_MM {
