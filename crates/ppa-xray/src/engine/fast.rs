@@ -64,7 +64,7 @@ const PRIMARY_ENERGIES: usize = 12;
 const SCATTER_ENERGIES: usize = 8;
 
 /// How much farther apart than for single scatter the points for multiple scatter are.
-const SMOOTHER: f64 = 2.0;
+const SMOOTHER: f64 = 1.4;
 
 /// First collisions on a list for each that a point of the detector in the dark chooses to see.
 const LISTED_PER_CHOICE: f64 = 32.0;

@@ -16,6 +16,9 @@ const HALVINGS: u32 = 1;
 /// Error of the interpolation, relative to the whole signal, beyond which nodes are set closer.
 const BEND: f64 = 2e-3;
 
+/// The same relative to the scatter alone: in a bright place the signal hides much, but sums of a category do not.
+const OWN_BEND: f64 = 2e-2;
+
 /// Share of the open field from which on fewer collisions will do: the error that the noise of the exposure allows is
 /// proportional to the root of the signal.
 const DARK: f64 = 0.2;
@@ -238,12 +241,25 @@ fn mean_kev(node: &Seen) -> f64 {
 ///
 /// The middle of four nodes in a row, at -3, -1, 1, 3 steps, is (-1, 9, 9, -1)/16 of them up to an error that falls with
 /// the fourth power of the step; at kinks with the first. A quarter of it is what half the distance is taken to leave.
+/// Beside the rim the four are at -1, 1, 2, 3 steps.
 fn bent_nodes(grid: &NodeGrid, nodes: &[Seen], primary: &PrimarySignal) -> Vec<bool> {
     let values: Vec<f64> = nodes.iter().map(mean_kev).collect();
     let cm2 = primary.detector.pixel_cm2();
     let foretold = |at: usize, count: usize, value: &dyn Fn(usize) -> f64| {
-        (at >= 3 && at + 3 < count)
-            .then(|| (9.0 * (value(at - 1) + value(at + 1)) - value(at - 3) - value(at + 3)) / 16.0)
+        let beside_rim = |from: usize, steps: [usize; 3]| {
+            let [near, far, farther] = steps.map(value);
+            0.25 * (value(from) + farther) + 1.5 * near - far
+        };
+        if at >= 3 && at + 3 < count {
+            let [near, far] = [1, 3].map(|step| value(at - step) + value(at + step));
+            Some((9.0 * near - far) / 16.0)
+        } else if at >= 1 && at + 3 < count {
+            Some(beside_rim(at - 1, [at + 1, at + 2, at + 3]))
+        } else if at >= 3 && at + 1 < count {
+            Some(beside_rim(at + 1, [at - 1, at - 2, at - 3]))
+        } else {
+            None
+        }
     };
     (0..grid.nodes())
         .map(|node| {
@@ -251,10 +267,11 @@ fn bent_nodes(grid: &NodeGrid, nodes: &[Seen], primary: &PrimarySignal) -> Vec<b
             let along_x = foretold(i, grid.columns, &|i| values[j * grid.columns + i]);
             let along_y = foretold(j, grid.rows, &|j| values[j * grid.columns + i]);
             let signal = primary.at(grid.place(node)) / cm2 + values[node];
+            let allowed = (BEND * signal).min(OWN_BEND * values[node]);
             [along_x, along_y]
                 .into_iter()
                 .flatten()
-                .any(|foretold| 0.25 * (foretold - values[node]).abs() > BEND * signal)
+                .any(|foretold| 0.25 * (foretold - values[node]).abs() > allowed)
         })
         .collect()
 }
