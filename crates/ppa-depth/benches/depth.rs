@@ -4,7 +4,9 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
-use ppa_depth::{Body, Camera, CameraSpec, DepthImage, MeshBody, PlacedBody, SurfelBody, render};
+use ppa_depth::{
+    Body, Camera, CameraSpec, DepthImage, DepthMode, MeshBody, PlacedBody, SurfelBody, render,
+};
 
 /// A bent, bumpy tube of 400 x 400 quads, about 400 mm long and 100 mm thick: 320 000 triangles.
 fn limb() -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {
@@ -59,7 +61,8 @@ fn room() -> SurfelBody {
 }
 
 fn depth(c: &mut Criterion) {
-    let camera = Camera::try_from(CameraSpec::azure_kinect_nfov()).expect("the default camera");
+    let camera = Camera::try_from(CameraSpec::azure_kinect(DepthMode::NfovUnbinned))
+        .expect("the default camera");
     let pixels = u64::from(camera.width() * camera.height());
     let (vertices, triangles) = limb();
     let limb = Body::from(MeshBody::new(&vertices, &triangles).expect("a valid mesh"));

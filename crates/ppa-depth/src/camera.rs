@@ -79,7 +79,7 @@ impl Camera {
 
     /// Direction (X/Z, Y/Z) that a pixel (u, v) looks along: the inverse of [`project`](Self::project) to about 1e-11.
     ///
-    /// `None` outside the metric radius and where the distortion cannot be inverted.
+    /// `None` outside the metric radius and where the distortion cannot be inverted; the mask plays no role here.
     pub fn unproject(&self, pixel: &Point2<f64>) -> Option<Vector2<f64>> {
         let CameraSpec { fx, fy, cx, cy, .. } = self.spec;
         let distorted = Vector2::new((pixel.x - cx) / fx, (pixel.y - cy) / fy);
@@ -89,7 +89,8 @@ impl Camera {
         self.distortion.undistort(&distorted)
     }
 
-    /// [`unproject`](Self::unproject) of every pixel centre, row-major; computed on first use, then kept.
+    /// [`unproject`](Self::unproject) of every pixel centre, `None` outside the mask; row-major; computed on first use, then
+    /// kept.
     pub fn rays(&self) -> &[Option<Vector2<f64>>] {
         self.rays.get_or_init(|| {
             let width = self.spec.width;
@@ -98,6 +99,7 @@ impl Camera {
                 .map(|index| {
                     let (u, v) = (index % width, index / width);
                     self.unproject(&Point2::new(f64::from(u), f64::from(v)))
+                        .filter(|ray| self.spec.mask.is_none_or(|mask| mask.contains(ray)))
                 })
                 .collect()
         })

@@ -174,6 +174,7 @@ impl Distortion {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::DepthMode;
     use proptest::prelude::*;
 
     proptest! {
@@ -182,7 +183,7 @@ mod tests {
         fn the_derivative_is_that_of_the_distortion(x in -0.8..0.8_f64, y in -0.8..0.8_f64, p1 in -0.01..0.01_f64,
             p2 in -0.01..0.01_f64, early: bool) {
             let model = if early { CameraModel::Rational6Kt } else { CameraModel::BrownConrady };
-            let lens = Distortion::new(&CameraSpec { model, p1, p2, ..CameraSpec::azure_kinect_nfov() });
+            let lens = Distortion::new(&CameraSpec { model, p1, p2, ..CameraSpec::azure_kinect(DepthMode::NfovUnbinned) });
             let at = Vector2::new(x, y);
             let (_, jacobian) = lens.distort(&at).unwrap();
             let h = 1e-5;

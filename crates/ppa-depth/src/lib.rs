@@ -14,18 +14,22 @@
 //!
 //! ```
 //! use nalgebra::{Isometry3, Point3};
-//! use ppa_depth::{Body, Camera, CameraSpec, MeshBody, PlacedBody, render};
+//! use ppa_depth::{Body, Camera, CameraSpec, DepthMode, MeshBody, PlacedBody, render};
 //!
 //! // One triangle, 1 m in front of the camera.
 //! let vertices = [(-200.0, -200.0), (200.0, -200.0), (0.0, 200.0)].map(|(x, y)| Point3::new(x, y, 0.0_f32));
 //! let body = Body::from(MeshBody::new(&vertices, &[[0, 1, 2]])?);
-//! let camera = Camera::try_from(CameraSpec::azure_kinect_nfov())?;
+//! let camera = Camera::try_from(CameraSpec::azure_kinect(DepthMode::NfovUnbinned))?;
 //! let camera_from_body = Isometry3::translation(0.0, 0.0, 1000.0);
 //! let image = render(&camera, &[PlacedBody { body: &body, camera_from_body }]);
 //! assert_eq!(image.max_mm(), Some(1000.0));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod calibration_file;
+mod depth_mode;
+mod field_mask;
+mod opencv_yaml;
 mod spec;
 
 mod camera;
@@ -51,6 +55,8 @@ mod roi;
 
 pub use body::{Body, BodyError, PlacedBody};
 pub use camera::Camera;
+pub use depth_mode::DepthMode;
+pub use field_mask::FieldMask;
 pub use image::{DepthError, DepthImage, DepthU16};
 pub use mesh_body::MeshBody;
 pub use render::render;

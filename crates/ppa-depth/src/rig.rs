@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::depth_mode::DepthMode;
 use crate::rigid::{RigidError, isometry_from_rows, rows_from_isometry};
 use crate::spec::{CameraError, CameraSpec};
 
@@ -81,7 +82,7 @@ impl Default for RigSpec {
     /// y axis so that both look at the isocentre 1040 mm down the beam; image rows run along the device's y.
     fn default() -> Self {
         let mounted = |x_mm: f64| MountedCamera {
-            camera: CameraSpec::azure_kinect_nfov(),
+            camera: CameraSpec::azure_kinect(DepthMode::NfovUnbinned),
             device_from_camera: rows_from_isometry(&looking_at_isocentre(x_mm)),
         };
         Self {

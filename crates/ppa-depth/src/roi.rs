@@ -109,7 +109,7 @@ pub fn roi_around(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{CameraModel, CameraSpec};
+    use crate::{CameraModel, CameraSpec, DepthMode};
     use proptest::prelude::*;
 
     fn pinhole() -> Camera {
@@ -128,7 +128,7 @@ mod tests {
             p1: 0.0,
             p2: 0.0,
             metric_radius: None,
-            ..CameraSpec::azure_kinect_nfov()
+            ..CameraSpec::azure_kinect(DepthMode::NfovUnbinned)
         };
         Camera::try_from(spec).unwrap()
     }
@@ -150,7 +150,7 @@ mod tests {
         #[test]
         fn the_square_lies_in_the_image_and_holds_the_joint(u in 0.0..639.0_f64, v in 0.0..575.0_f64,
             z_mm in 300.0..3000.0_f64, side_mm in 10.0..2000.0_f64) {
-            let camera = Camera::try_from(CameraSpec::azure_kinect_nfov()).unwrap();
+            let camera = Camera::try_from(CameraSpec::azure_kinect(DepthMode::NfovUnbinned)).unwrap();
             let slopes = camera.unproject(&nalgebra::Point2::new(u, v)).unwrap();
             let roi = roi_around(&camera, &Point3::new(slopes.x * z_mm, slopes.y * z_mm, z_mm), side_mm).unwrap();
             prop_assert!(roi.x_start + roi.size <= 640 && roi.y_start + roi.size <= 576);

@@ -4,6 +4,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::depth_mode::DepthMode;
+use crate::field_mask::FieldMask;
+
 /// Which lens model the coefficients belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -68,6 +71,9 @@ pub struct CameraSpec {
     /// Largest √(x² + y²) for which the device gives depth; `None`: wherever the distortion can be inverted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metric_radius: Option<f64>,
+    /// Directions outside this figure have no depth; `None`: the whole image has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mask: Option<FieldMask>,
 }
 
 /// Why a camera could not be read or makes no sense.
@@ -89,6 +95,14 @@ pub enum CameraError {
         path: PathBuf,
         /// What the parser said, with line and column.
         source: serde_json::Error,
+    },
+    /// A calibration file lacks something or holds another kind of lens.
+    #[error("{} cannot be used as a depth camera: {message}", path.display())]
+    Calibration {
+        /// The file.
+        path: PathBuf,
+        /// What was found and what was expected.
+        message: String,
     },
     /// No pixels, or more than the renderer's limit.
     #[error("camera image of {width} x {height} pixels, expected 1 to {max} along each side")]
@@ -119,6 +133,14 @@ pub enum CameraError {
     /// The metric radius is zero, negative or not finite.
     #[error("camera metric_radius is {0}, expected a positive number")]
     MetricRadius(f64),
+    /// The mask has an impossible opening.
+    #[error("camera mask with {name} = {found}, expected an angle between 0 and 180 degrees")]
+    Mask {
+        /// The key.
+        name: &'static str,
+        /// The value.
+        found: f64,
+    },
     /// A pinhole camera with a distortion coefficient.
     #[error("camera model pinhole with {name} = {found}, expected 0 (or another model)")]
     DistortedPinhole {
@@ -133,20 +155,24 @@ impl CameraSpec {
     /// Most columns or rows of an image.
     pub(crate) const MAX_SIDE: u32 = 16_384;
 
-    /// An Azure Kinect in its narrow-field-of-view unbinned mode, 640 x 576.
+    /// An Azure Kinect in one of its depth modes, without the mode's [mask](DepthMode::mask).
     ///
     /// Numbers of the calibration in the unit tests of the public Azure Kinect Sensor SDK
     /// (`ut_calibration_data.h`, github.com/microsoft/Azure-Kinect-Sensor-SDK, MIT), taken from unit scale to pixels of
-    /// this mode: c = c01 · 1024 − crop − 0.5, f = f01 · 1024, crop = (192, 180).
-    pub fn azure_kinect_nfov() -> Self {
+    /// the mode: c = c01 · side − crop − 0.5, f = f01 · side.
+    pub fn azure_kinect(mode: DepthMode) -> Self {
+        let window = mode.window();
+        let [width, height] = window.size;
+        let scale = window.sensor / 1024.0;
+        let centre = |sensor_px: f64, crop: f64| (sensor_px + 0.5) * scale - crop - 0.5;
         Self {
             model: CameraModel::BrownConrady,
-            width: 640,
-            height: 576,
-            fx: 504.647_369_384_765_6,
-            fy: 504.757_385_253_906_25,
-            cx: 321.738_281_25,
-            cy: 333.338_439_941_406_25,
+            width,
+            height,
+            fx: 504.647_369_384_765_6 * scale,
+            fy: 504.757_385_253_906_25 * scale,
+            cx: centre(513.738_281_25, window.crop[0]),
+            cy: centre(513.338_439_941_406_3, window.crop[1]),
             k1: 0.582_516_431_808_471_7,
             k2: 0.006_136_116_571_724_415,
             k3: -0.001_318_680_238_910_019_4,
@@ -156,6 +182,7 @@ impl CameraSpec {
             p1: -0.000_128_779_167_425_818_74,
             p2: -2.083_355_684_590_060_3e-5,
             metric_radius: Some(1.737_323_045_730_591),
+            mask: None,
         }
     }
 
@@ -211,6 +238,9 @@ impl CameraSpec {
             && let Some(&(name, found)) = coefficients.iter().find(|(_, value)| *value != 0.0)
         {
             return Err(CameraError::DistortedPinhole { name, found });
+        }
+        if let Some((name, found)) = self.mask.and_then(|mask| mask.bad_angle()) {
+            return Err(CameraError::Mask { name, found });
         }
         match self.metric_radius {
             Some(radius) if !(radius.is_finite() && 0.0 < radius) => {

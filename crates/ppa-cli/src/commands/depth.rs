@@ -1,11 +1,15 @@
 //! `ppa depth`: depth images of meshes, and the camera model by itself.
 
+mod camera;
+
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use nalgebra::{Isometry3, Point3};
-use ppa_depth::{Body, Camera, CameraSpec, MeshBody, PlacedBody, isometry_from_rows, render};
+use ppa_depth::{
+    Body, Camera, CameraSpec, DepthMode, MeshBody, PlacedBody, isometry_from_rows, render,
+};
 use ppa_mesh::read_ply;
 use serde::{Deserialize, Serialize};
 
@@ -15,6 +19,8 @@ use crate::output::{Output, Seconds, Stopwatch};
 pub enum DepthCommand {
     /// Depth image of triangle meshes
     Render(RenderArgs),
+    /// Camera JSON from the calibration file of a device
+    Camera(camera::CameraArgs),
     /// Pixels of points given in the camera's frame
     Project(ProjectArgs),
 }
@@ -47,14 +53,15 @@ pub struct ProjectArgs {
 pub fn run(command: &DepthCommand, output: Output) -> anyhow::Result<()> {
     match command {
         DepthCommand::Render(args) => render_meshes(args, output),
+        DepthCommand::Camera(args) => camera::run(args, output),
         DepthCommand::Project(args) => project(args, output),
     }
 }
 
-fn camera(path: Option<&PathBuf>) -> anyhow::Result<Camera> {
+fn read_camera(path: Option<&PathBuf>) -> anyhow::Result<Camera> {
     let spec = match path {
         Some(path) => CameraSpec::read(path)?,
-        None => CameraSpec::azure_kinect_nfov(),
+        None => CameraSpec::azure_kinect(DepthMode::NfovUnbinned),
     };
     Ok(Camera::try_from(spec)?)
 }
@@ -79,7 +86,7 @@ struct Rendered {
 }
 
 fn render_meshes(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
-    let camera = camera(args.camera.as_ref())?;
+    let camera = read_camera(args.camera.as_ref())?;
     let camera_from_body = match &args.camera_from_mesh {
         Some(path) => {
             let rows = match super::read_json(path)? {
@@ -159,7 +166,7 @@ struct Projected {
 }
 
 fn project(args: &ProjectArgs, output: Output) -> anyhow::Result<()> {
-    let camera = camera(args.camera.as_ref())?;
+    let camera = read_camera(args.camera.as_ref())?;
     let points = read_points(&args.points)?;
     let pixels = points
         .iter()

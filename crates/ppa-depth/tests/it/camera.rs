@@ -1,22 +1,8 @@
 //! Projection and its inverse.
 
 use nalgebra::{Point2, Point3};
-use ppa_depth::{Camera, CameraError, CameraModel, CameraSpec};
+use ppa_depth::{Camera, CameraError, CameraModel, CameraSpec, DepthMode};
 use proptest::prelude::*;
-
-/// The device of `azure_kinect_nfov` in its wide 2x2 binned mode, 512 x 512: half the focal length, another crop.
-fn azure_kinect_wfov() -> CameraSpec {
-    let nfov = CameraSpec::azure_kinect_nfov();
-    CameraSpec {
-        width: 512,
-        height: 512,
-        fx: nfov.fx / 2.0,
-        fy: nfov.fy / 2.0,
-        cx: (nfov.cx + 192.5) / 2.0 - 0.5,
-        cy: (nfov.cy + 180.5) / 2.0 - 0.5,
-        ..nfov
-    }
-}
 
 /// No distortion, 1000 pixels focal length, principal point (0, 0).
 fn plain() -> CameraSpec {
@@ -27,7 +13,7 @@ fn plain() -> CameraSpec {
         cx: 0.0,
         cy: 0.0,
         metric_radius: None,
-        ..CameraSpec::azure_kinect_nfov()
+        ..CameraSpec::azure_kinect(DepthMode::NfovUnbinned)
     };
     for k in [
         &mut spec.k1,
@@ -51,7 +37,7 @@ fn camera(spec: CameraSpec) -> Camera {
 /// tolerance 1e-3 mm and pixels): pixel (256, 256) of the wide mode at 1000 mm.
 #[test]
 fn the_device_sdk_agrees() {
-    let camera = camera(azure_kinect_wfov());
+    let camera = camera(CameraSpec::azure_kinect(DepthMode::WfovBinned));
     let slopes = camera.unproject(&Point2::new(256.0, 256.0)).unwrap();
     assert!(
         (slopes.x * 1e3 + 2.453_761_34).abs() < 1e-5 && (slopes.y * 1e3 + 1.661_076_9).abs() < 1e-5
@@ -103,7 +89,7 @@ proptest! {
     /// Every pixel that has a ray is the projection of that ray; those without lie outside the metric radius.
     #[test]
     fn pixels_survive_the_way_there_and_back(u in -0.5..511.5_f64, v in -0.5..511.5_f64, wide: bool, z_mm in 1.0..1e4_f64) {
-        let spec = if wide { azure_kinect_wfov() } else { CameraSpec::azure_kinect_nfov() };
+        let spec = if wide { CameraSpec::azure_kinect(DepthMode::WfovBinned) } else { CameraSpec::azure_kinect(DepthMode::NfovUnbinned) };
         let camera = camera(spec);
         match camera.unproject(&Point2::new(u, v)) {
             Some(slopes) => {
@@ -159,7 +145,7 @@ fn a_folding_lens_has_no_pixels_beyond_its_fold() {
 
 #[test]
 fn only_points_in_front_are_seen() {
-    let camera = camera(CameraSpec::azure_kinect_nfov());
+    let camera = camera(CameraSpec::azure_kinect(DepthMode::NfovUnbinned));
     for z in [0.0, -1000.0, f64::NAN] {
         assert_eq!(camera.project(&Point3::new(0.0, 0.0, z)), None);
     }
@@ -169,7 +155,7 @@ fn only_points_in_front_are_seen() {
 
 #[test]
 fn numbers_that_make_no_camera_are_named() {
-    let spec = CameraSpec::azure_kinect_nfov;
+    let spec = || CameraSpec::azure_kinect(DepthMode::NfovUnbinned);
     let refused = |spec: CameraSpec| Camera::try_from(spec).unwrap_err();
     assert!(matches!(
         refused(CameraSpec { width: 0, ..spec() }),

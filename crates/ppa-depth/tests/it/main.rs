@@ -1,5 +1,6 @@
 //! The depth camera against answers that can be derived.
 
+mod calibration;
 mod camera;
 mod reference;
 mod render;

@@ -2,15 +2,15 @@
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use ppa_depth::{
-    Body, BodyError, Camera, CameraModel, CameraSpec, DepthImage, MeshBody, PlacedBody, SurfelBody,
-    render,
+    Body, BodyError, Camera, CameraModel, CameraSpec, DepthImage, DepthMode, MeshBody, PlacedBody,
+    SurfelBody, render,
 };
 
 use crate::shapes::{bumpy, sphere};
 
 /// The default camera at a quarter of its resolution, which is enough for a test.
 fn small_kinect() -> Camera {
-    let full = CameraSpec::azure_kinect_nfov();
+    let full = CameraSpec::azure_kinect(DepthMode::NfovUnbinned);
     let quarter = |pixels: f64| (pixels + 0.5) / 4.0 - 0.5;
     let (cx, cy) = (quarter(full.cx), quarter(full.cy));
     let spec = CameraSpec {
