@@ -74,7 +74,7 @@ impl Audit {
     /// Looks at a scan; takes about as long as reading it.
     pub fn of(scan: &Scan) -> Self {
         let volume = &scan.volume;
-        let histogram = Histogram::of(volume.hu());
+        let histogram = Histogram::of(volume.values());
         let survey = Survey::of(volume);
         let mut thick = tissue::thick(&survey);
         let couch = couch::find(&survey, &thick);

@@ -21,10 +21,12 @@ use rayon::prelude::*;
 use crate::acquisition::Acquisition;
 use crate::error::ReadError;
 use crate::scan::{ReadOptions, Scan, Warning, WarningCode, hu_plausibility, starts_as_dicom};
+use crate::values::Voxels;
 use crate::volume::Volume;
 use header::{Found, Slice};
 use series::Sorted;
 use stack::{Between, Stack};
+use stored::StoredFormat;
 
 /// Reads one series in a folder, or below it when the folder itself has no DICOM file.
 pub(crate) fn read_folder(folder: &Path, options: &ReadOptions) -> Result<Scan, ReadError> {
@@ -96,11 +98,9 @@ fn assemble(
     slices.iter().try_for_each(pixels::check_size)?;
     let stack = Stack::of(source, &slices, options.fill_gaps)?;
     warnings.extend(stack.warnings());
-    let (mut hu, padded) = decode(&slices, &stack)?;
-    warnings.extend(padding_warning(padded, hu.len()));
-    if let Some(between) = stack.between() {
-        hu = interpolate(&hu, slices[0].image.pixels(), between);
-    }
+    let (voxels, padded) = decode(&slices, &stack)?;
+    let pixels = slices[0].image.pixels() * slices.len();
+    warnings.extend(padding_warning(padded, pixels));
     let acquisition = Acquisition {
         padded_voxels: padded,
         interpolated_slices: stack.made_up(),
@@ -111,7 +111,7 @@ fn assemble(
         source: source_error,
     };
     let grid = stack.grid().map_err(|e| unusable(e.into()))?;
-    let volume = Volume::new(grid, hu).map_err(unusable)?;
+    let volume = Volume::of_voxels(grid, voxels).map_err(unusable)?;
     warnings.extend(chosen.modality_warning);
     warnings.extend(hu_plausibility(&volume));
     Ok(Scan {
@@ -158,19 +158,46 @@ fn padding_warning(padded: usize, pixels: usize) -> Option<Warning> {
     })
 }
 
-/// Decodes all slices in parallel, each into its place, and counts padding; the first slice's error is reported.
-fn decode(slices: &[Slice], stack: &Stack) -> Result<(Vec<f32>, usize), ReadError> {
+/// Decodes all slices and counts padding, in 16 bits if these hold all values.
+fn decode(slices: &[Slice], stack: &Stack) -> Result<(Voxels, usize), ReadError> {
+    let whole = |s: &Slice| stored::whole_intercept(s.rescale()).is_some();
+    if stack.between().is_none() && slices.iter().all(whole) {
+        let done = decode_as(slices, stack, StoredFormat::read_whole)?;
+        if let Some((hu, padded)) = done {
+            return Ok((Voxels::I16(hu), padded));
+        }
+    }
+    let done = decode_as(slices, stack, |format, containers, rescale, hu| {
+        Some(format.read_hu(containers, rescale, hu))
+    })?;
+    let (mut hu, padded) = done.expect("any value is a number");
+    if let Some(between) = stack.between() {
+        hu = interpolate(&hu, slices[0].image.pixels(), between);
+    }
+    Ok((Voxels::F32(hu), padded))
+}
+
+/// Decodes all slices in parallel, each into its place; the first slice's error is reported. `None` where `fill`
+/// finds that the type does not hold the values, else the values and how many of them are padding.
+fn decode_as<T: Clone + Default + Send>(
+    slices: &[Slice],
+    stack: &Stack,
+    fill: impl Fn(&StoredFormat, &[u8], [f64; 2], &mut [T]) -> Option<usize> + Sync,
+) -> Result<Option<(Vec<T>, usize)>, ReadError> {
     let pixels = slices[0].image.pixels();
-    let mut hu = vec![0.0; pixels * slices.len()];
-    let done = hu
-        .par_chunks_mut(pixels)
-        .zip(stack.order())
-        .map_init(Vec::new, |buffer, (place, &index)| {
-            pixels::decode(&slices[index], buffer, place)
-        });
-    let padded = done.collect::<Vec<_>>();
-    let padded = padded.into_iter().sum::<Result<usize, _>>()?;
-    Ok((hu, padded))
+    let mut hu = vec![T::default(); pixels * slices.len()];
+    let done = hu.par_chunks_mut(pixels).zip(stack.order()).map_init(
+        Vec::new,
+        |containers, (place, &index)| {
+            let slice = &slices[index];
+            pixels::read(slice, containers)?;
+            let format = &slice.image.stored;
+            Ok(fill(format, containers, slice.rescale(), place))
+        },
+    );
+    let padded = done.collect::<Vec<Result<_, ReadError>>>();
+    let padded = padded.into_iter().collect::<Result<Option<Vec<_>>, _>>()?;
+    Ok(padded.map(|padded| (hu, padded.into_iter().sum())))
 }
 
 /// Slices between those of a stack, mixed linearly.

@@ -46,7 +46,7 @@ impl Info {
     pub fn of_volume(volume: &Volume) -> Self {
         let grid = volume.grid();
         let direction = grid.direction();
-        let (hu_min, hu_max) = range(volume.hu());
+        let (hu_min, hu_max) = volume.values().range();
         Self {
             size: grid.size(),
             spacing_mm: grid.spacing_mm().into(),
@@ -54,18 +54,10 @@ impl Info {
             direction: [0, 1, 2].map(|row| [0, 1, 2].map(|axis| direction[(row, axis)])),
             hu_min,
             hu_max,
-            hu_sum: volume.hu().iter().map(|&v| f64::from(v)).sum(),
+            hu_sum: volume.values().sum(),
             modality: None,
             series: Vec::new(),
             warnings: Vec::new(),
         }
     }
-}
-
-/// Smallest and largest value.
-pub(crate) fn range(hu: &[f32]) -> (f32, f32) {
-    hu.iter()
-        .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &v| {
-            (low.min(v), high.max(v))
-        })
 }

@@ -63,16 +63,10 @@ mod scan_file;
     )
 )]
 mod stored;
+mod values;
 mod volume;
 #[cfg(any(feature = "nifti", feature = "nrrd", feature = "metaimage"))]
 mod whole_file;
-#[cfg(any(
-    feature = "dicom",
-    feature = "nifti",
-    feature = "nrrd",
-    feature = "metaimage"
-))]
-mod whole_numbers;
 mod write;
 
 pub use acquisition::Acquisition;
@@ -91,5 +85,6 @@ pub use resample::Interpolation;
 pub use scan::{
     ReadOptions, Scan, SeriesChoice, SeriesSummary, Warning, WarningCode, read, read_with,
 };
+pub use values::Values;
 pub use volume::{Volume, VolumeError};
 pub use write::write;

@@ -2,6 +2,8 @@
 
 use rayon::prelude::*;
 
+use crate::values::Values;
+
 /// Where a Gaussian is cut off, in standard deviations.
 const REACH: f64 = 4.0;
 
@@ -20,8 +22,8 @@ pub(crate) fn sigma_voxels(step: f64) -> f64 {
 
 /// Values (i fastest) blurred by `sigma_voxels` along each axis; beyond the faces the volume is
 /// taken to be mirrored, which keeps its sum.
-pub(crate) fn low_pass(hu: &[f32], size: [usize; 3], sigma_voxels: [f64; 3]) -> Vec<f32> {
-    let mut values = hu.to_vec();
+pub(crate) fn low_pass(hu: Values, size: [usize; 3], sigma_voxels: [f64; 3]) -> Vec<f32> {
+    let mut values = hu.to_f32().into_owned();
     for (axis, sigma) in sigma_voxels.into_iter().enumerate() {
         if sigma > 0.0 && size[axis] > 1 {
             values = along(&values, size, axis, &kernel(sigma));

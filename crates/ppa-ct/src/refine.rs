@@ -54,10 +54,14 @@ impl Volume {
             .enumerate()
             .for_each(|(row, values)| {
                 let (j, k) = (&axes[1][row % fine[1]], &axes[2][row / fine[1]]);
-                let rows = [(j.0, k.0), (j.1, k.0), (j.0, k.1), (j.1, k.1)]
-                    .map(|(j, k)| &self.hu()[self.grid().index([0, j, k])..][..size[0]]);
+                let rows = [(j.0, k.0), (j.1, k.0), (j.0, k.1), (j.1, k.1)].map(|(j, k)| {
+                    let start = self.grid().index([0, j, k]);
+                    self.values().part(start..start + size[0]).to_f32()
+                });
                 for (value, i) in values.iter_mut().zip(&axes[0]) {
-                    let [a, b, c, d] = rows.map(|row| row[i.0] + (row[i.1] - row[i.0]) * i.2);
+                    let [a, b, c, d] = rows
+                        .each_ref()
+                        .map(|row| row[i.0] + (row[i.1] - row[i.0]) * i.2);
                     let (front, back) = (a + (b - a) * j.2, c + (d - c) * j.2);
                     *value = front + (back - front) * k.2;
                 }

@@ -1,12 +1,11 @@
 //! A volume on another lattice.
 
-use std::borrow::Cow;
-
 use nalgebra::{Matrix4, Vector3};
 use rayon::prelude::*;
 
 use crate::grid::Grid;
 use crate::low_pass::{low_pass, sigma_voxels};
+use crate::values::Values;
 use crate::volume::{Volume, VolumeError};
 
 /// How values between voxel centres follow from those around them.
@@ -62,13 +61,10 @@ impl Volume {
             let step = here_from_there.fixed_view::<1, 3>(axis, 0).norm();
             sigma_voxels(step)
         });
-        let blurred = how != Interpolation::Nearest && sigma != [0.0; 3];
+        let coarser = how != Interpolation::Nearest && sigma != [0.0; 3];
+        let blurred = coarser.then(|| low_pass(self.values(), self.grid().size(), sigma));
         let source = Source {
-            hu: if blurred {
-                Cow::Owned(low_pass(self.hu(), self.grid().size(), sigma))
-            } else {
-                Cow::Borrowed(self.hu())
-            },
+            hu: blurred.as_deref().map_or(self.values(), Values::F32),
             size: self.grid().size(),
             outside_hu,
         };
@@ -96,7 +92,7 @@ impl Volume {
 
 /// The values to look up.
 struct Source<'a> {
-    hu: Cow<'a, [f32]>,
+    hu: Values<'a>,
     size: [usize; 3],
     outside_hu: f32,
 }
@@ -137,7 +133,7 @@ impl Source<'_> {
         match how {
             Interpolation::Nearest => {
                 let [i, j, k] = inside.map(|p| p.round() as usize);
-                self.hu[i + self.size[0] * (j + self.size[1] * k)]
+                self.hu.at(i + self.size[0] * (j + self.size[1] * k))
             }
             Interpolation::Linear => self.sum(axes.map(|a| linear_taps(inside[a], self.size[a]))),
             Interpolation::Cubic => self.sum(axes.map(|a| cubic_taps(inside[a], self.size[a]))),
@@ -148,8 +144,9 @@ impl Source<'_> {
         let mut sum = 0.0;
         for (k, wk) in along_k {
             for (j, wj) in along_j {
-                let row = &self.hu[self.size[0] * (j + self.size[1] * k)..][..self.size[0]];
-                let line = along_i.iter().map(|&(i, wi)| wi * f64::from(row[i]));
+                let start = self.size[0] * (j + self.size[1] * k);
+                let row = self.hu.part(start..start + self.size[0]);
+                let line = along_i.iter().map(|&(i, wi)| wi * f64::from(row.at(i)));
                 sum += wk * wj * line.sum::<f64>();
             }
         }

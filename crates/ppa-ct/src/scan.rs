@@ -182,7 +182,7 @@ pub(crate) fn starts_as_dicom(path: &Path) -> std::io::Result<bool> {
 pub(crate) fn hu_plausibility(volume: &Volume) -> Option<Warning> {
     /// Fat is about −100 HU and lung −850: above this, nothing in the volume is air.
     const NO_AIR_HU: f32 = -200.0;
-    let (min, max) = crate::info::range(volume.hu());
+    let (min, max) = volume.values().range();
     let window = if min >= 0.0 && max <= 255.0 {
         "; this looks like a picture windowed to 8 bits"
     } else {

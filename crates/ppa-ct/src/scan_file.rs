@@ -12,6 +12,7 @@ use crate::error::ReadError;
 use crate::grid::Grid;
 use crate::scan::{Scan, Warning, WarningCode, hu_plausibility};
 use crate::stored::Stored;
+use crate::values::Voxels;
 use crate::volume::{Volume, VolumeError};
 
 /// Most bytes that one byte of a deflate stream can unpack to (zlib's technical notes: 1032:1).
@@ -160,13 +161,9 @@ impl ScanFile {
 
     /// The voxels, which fill the file from here to its end.
     ///
-    /// Memory: four bytes per voxel, asked for only if the file can hold them all. So one byte of
-    /// a file costs at most four, or 4 x 1032 where it is deflated.
-    pub(crate) fn voxels(
-        mut self,
-        stored: &Stored,
-        size: [usize; 3],
-    ) -> Result<Vec<f32>, ReadError> {
+    /// Memory: two bytes per voxel, or four and for a moment six where 16 bits do not hold all, asked for only
+    /// if the file can hold them all. So one byte of a file costs at most six, or 6 x 1032 where it is deflated.
+    pub(crate) fn voxels(mut self, stored: &Stored, size: [usize; 3]) -> Result<Voxels, ReadError> {
         let expected = stored.bytes_of(size).unwrap_or(u64::MAX);
         let wrong = |path: &Path, found| ReadError::PixelCount {
             path: path.to_owned(),
@@ -189,8 +186,9 @@ impl ScanFile {
             .map_err(|e| self.io(e))?;
         // To the very end: only there are checksums compared.
         let surplus = io::copy(&mut self.stream, &mut io::sink()).map_err(|e| self.io(e))?;
-        if hu.len() != voxels || surplus > 0 {
-            return Err(wrong(&self.path, hu.len() as u64 * width + surplus));
+        let found = hu.values().len();
+        if found != voxels || surplus > 0 {
+            return Err(wrong(&self.path, found as u64 * width + surplus));
         }
         Ok(hu)
     }
@@ -200,12 +198,12 @@ impl ScanFile {
 pub(crate) fn scan(
     path: &Path,
     grid: Grid,
-    hu: Vec<f32>,
+    hu: Voxels,
     modality: Option<String>,
     acquisition: Acquisition,
     warnings: impl IntoIterator<Item = Warning>,
 ) -> Result<Scan, ReadError> {
-    let volume = Volume::new(grid, hu).map_err(|source| ReadError::Volume {
+    let volume = Volume::of_voxels(grid, hu).map_err(|source| ReadError::Volume {
         path: path.to_owned(),
         source,
     })?;

@@ -2,7 +2,7 @@
 
 use std::io::{self, Read, Write};
 
-use crate::whole_numbers::fits_i16;
+use crate::values::{Values, Voxels};
 
 /// Number types a CT may come in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,23 +69,35 @@ impl Stored {
     }
 
     /// Reads `voxels` values; where the stream ends before, those that came whole.
-    pub(crate) fn read(&self, stream: &mut dyn Read, voxels: usize) -> io::Result<Vec<f32>> {
+    ///
+    /// They are kept in 16 bits until one comes that these do not hold.
+    pub(crate) fn read(&self, stream: &mut dyn Read, voxels: usize) -> io::Result<Voxels> {
         let width = self.number.bytes();
-        let mut hu = Vec::new();
-        // A file may promise more than memory holds: an error, where a failed allocation would end the program.
-        hu.try_reserve_exact(voxels)
-            .map_err(|_| io::ErrorKind::OutOfMemory)?;
-        let mut chunk = Vec::with_capacity(voxels.min(CHUNK) * width);
-        while hu.len() < voxels {
-            let wanted = CHUNK.min(voxels - hu.len()) * width;
-            chunk.clear();
-            stream.take(wanted as u64).read_to_end(&mut chunk)?;
-            self.append(&chunk, &mut hu);
-            if chunk.len() < wanted {
-                break;
+        let mut read = Voxels::I16(with_room(voxels)?);
+        let mut bytes = Vec::with_capacity(voxels.min(CHUNK) * width);
+        let mut hu = Vec::with_capacity(voxels.min(CHUNK));
+        loop {
+            let left = voxels - read.values().len();
+            let wanted = CHUNK.min(left) * width;
+            bytes.clear();
+            stream.take(wanted as u64).read_to_end(&mut bytes)?;
+            hu.clear();
+            self.append(&bytes, &mut hu);
+            if let Voxels::I16(whole) = &read
+                && !Values::F32(&hu).fit_i16()
+            {
+                let mut all = with_room(voxels)?;
+                all.extend(whole.iter().map(|&v| f32::from(v)));
+                read = Voxels::F32(all);
+            }
+            match &mut read {
+                Voxels::I16(all) => all.extend(hu.iter().map(|&v| v as i16)),
+                Voxels::F32(all) => all.extend_from_slice(&hu),
+            }
+            if left <= CHUNK || bytes.len() < wanted {
+                return Ok(read);
             }
         }
-        Ok(hu)
     }
 
     fn append(&self, bytes: &[u8], hu: &mut Vec<f32>) {
@@ -128,16 +140,27 @@ impl Stored {
     }
 }
 
-/// Writes values exactly and little-endian: as int16 where [`fits_i16`], else as float32.
-pub(crate) fn write_exact(out: &mut dyn Write, hu: &[f32]) -> io::Result<()> {
-    let short = fits_i16(hu);
+/// An empty vector with room for `count` values.
+///
+/// A file may promise more than memory holds: an error, where a failed allocation would end the program.
+fn with_room<T>(count: usize) -> io::Result<Vec<T>> {
+    let mut values = Vec::new();
+    values
+        .try_reserve_exact(count)
+        .map_err(|_| io::ErrorKind::OutOfMemory)?;
+    Ok(values)
+}
+
+/// Writes values exactly and little-endian: as int16 where that holds them, else as float32.
+pub(crate) fn write_exact(out: &mut dyn Write, hu: Values) -> io::Result<()> {
+    let short = hu.fit_i16();
     let mut bytes = Vec::with_capacity(4 * CHUNK.min(hu.len()));
-    for values in hu.chunks(CHUNK) {
+    for values in hu.parts(CHUNK) {
         bytes.clear();
         if short {
-            bytes.extend(values.iter().flat_map(|&v| (v as i16).to_le_bytes()));
+            bytes.extend(values.iter().flat_map(|v| (v as i16).to_le_bytes()));
         } else {
-            bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+            bytes.extend(values.iter().flat_map(f32::to_le_bytes));
         }
         out.write_all(&bytes)?;
     }
@@ -169,7 +192,10 @@ mod tests {
                         };
                         assert_eq!(stored.number.bytes(), bytes.len());
                         let hu = stored.read(&mut bytes.as_slice(), 1).unwrap();
-                        assert_eq!(hu, [(0.5 * value as f64 - 3.0) as f32]);
+                        assert_eq!(
+                            hu.values(),
+                            Values::F32(&[(0.5 * value as f64 - 3.0) as f32])
+                        );
                     }
                 }
             };
@@ -186,6 +212,32 @@ mod tests {
         check!(F64, f64);
     }
 
+    /// Across the borders of the chunks, and where the first value that needs more comes late.
+    #[test]
+    fn sixteen_bits_hold_values_until_one_does_not_fit() {
+        for count in [0, 1, CHUNK, CHUNK + 1, 3 * CHUNK - 1] {
+            let whole = (0..count).map(|n| (n % 3000) as f32 - 1000.0);
+            let mut values = whole.collect::<Vec<_>>();
+            for odd in [None, Some(0.5), Some(40_000.0)] {
+                if let (Some(odd), Some(last)) = (odd, values.last_mut()) {
+                    *last = odd;
+                }
+                let bytes = values.iter().flat_map(|v| v.to_le_bytes());
+                let stored = Stored {
+                    number: Number::F32,
+                    big_endian: false,
+                    slope: 1.0,
+                    intercept: 0.0,
+                };
+                let bytes = bytes.collect::<Vec<_>>();
+                let read = stored.read(&mut bytes.as_slice(), count).unwrap();
+                let short = matches!(read, Voxels::I16(_));
+                assert_eq!(short, count == 0 || odd.is_none(), "{count} {odd:?}");
+                assert_eq!(read.values(), Values::F32(&values), "{count} {odd:?}");
+            }
+        }
+    }
+
     proptest! {
         #[test]
         fn values_are_written_exactly(
@@ -197,14 +249,15 @@ mod tests {
                 .map(|v| if whole { v.trunc() } else { v })
                 .collect::<Vec<_>>();
             let mut bytes = Vec::new();
-            write_exact(&mut bytes, &values).unwrap();
+            write_exact(&mut bytes, Values::F32(&values)).unwrap();
             let stored = Stored {
-                number: if fits_i16(&values) { Number::I16 } else { Number::F32 },
+                number: if Values::F32(&values).fit_i16() { Number::I16 } else { Number::F32 },
                 big_endian: false,
                 slope: 1.0,
                 intercept: 0.0,
             };
-            prop_assert_eq!(stored.read(&mut bytes.as_slice(), values.len()).unwrap(), values);
+            let back = stored.read(&mut bytes.as_slice(), values.len()).unwrap();
+            prop_assert_eq!(back.values(), Values::F32(&values));
         }
     }
 }

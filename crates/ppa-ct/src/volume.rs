@@ -1,9 +1,12 @@
 //! A CT volume: Hounsfield units on a [`Grid`].
 
+use std::borrow::Cow;
+
 use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::grid::{Grid, GridError};
+use crate::values::{Values, Voxels};
 
 /// Why a volume cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -39,10 +42,16 @@ pub enum VolumeError {
 }
 
 /// Hounsfield units on a lattice; i runs fastest in memory.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Volume {
     grid: Grid,
-    hu: Vec<f32>,
+    voxels: Voxels,
+}
+
+impl PartialEq for Volume {
+    fn eq(&self, other: &Self) -> bool {
+        self.grid == other.grid && self.values() == other.values()
+    }
 }
 
 impl Volume {
@@ -51,16 +60,31 @@ impl Volume {
     /// # Errors
     /// [`VolumeError`] when the number of values is wrong or one is not finite.
     pub fn new(grid: Grid, hu: Vec<f32>) -> Result<Self, VolumeError> {
-        if hu.len() != grid.len() {
+        Self::of_voxels(grid, Voxels::F32(hu))
+    }
+
+    /// A volume of whole numbers, which takes half of the memory.
+    ///
+    /// # Errors
+    /// [`VolumeError`] when the number of values is wrong.
+    pub fn from_i16(grid: Grid, hu: Vec<i16>) -> Result<Self, VolumeError> {
+        Self::of_voxels(grid, Voxels::I16(hu))
+    }
+
+    pub(crate) fn of_voxels(grid: Grid, voxels: Voxels) -> Result<Self, VolumeError> {
+        let found = voxels.values().len();
+        if found != grid.len() {
             return Err(VolumeError::Length {
-                found: hu.len(),
+                found,
                 expected: grid.len(),
             });
         }
-        if let Some(bad) = hu.iter().position(|v| !v.is_finite()) {
+        if let Voxels::F32(hu) = &voxels
+            && let Some(bad) = hu.par_iter().position_first(|v| !v.is_finite())
+        {
             return Err(VolumeError::NotFinite(grid.voxel(bad)));
         }
-        Ok(Self { grid, hu })
+        Ok(Self { grid, voxels })
     }
 
     /// The lattice.
@@ -69,8 +93,15 @@ impl Volume {
     }
 
     /// All values, i fastest.
-    pub fn hu(&self) -> &[f32] {
-        &self.hu
+    ///
+    /// A copy, of twice the memory, where the volume keeps whole numbers: [`Volume::values`] spares it.
+    pub fn hu(&self) -> Cow<'_, [f32]> {
+        self.values().to_f32()
+    }
+
+    /// All values, i fastest, as they are kept.
+    pub fn values(&self) -> Values<'_> {
+        self.voxels.values()
     }
 
     /// The value of voxel (i, j, k).
@@ -78,7 +109,7 @@ impl Volume {
     /// # Panics
     /// When the voxel lies outside the grid.
     pub fn at(&self, voxel: [usize; 3]) -> f32 {
-        self.hu[self.grid.index(voxel)]
+        self.values().at(self.grid.index(voxel))
     }
 
     /// Trilinear interpolation at a world point; `None` outside the box of voxel centres.
@@ -118,14 +149,11 @@ impl Volume {
     /// [`VolumeError::Grid`] when the range is empty or leaves the volume.
     pub fn crop(&self, low: [usize; 3], high: [usize; 3]) -> Result<Self, VolumeError> {
         let grid = self.grid.crop(low, high)?;
-        let mut hu = Vec::with_capacity(grid.len());
-        for k in low[2]..high[2] {
-            for j in low[1]..high[1] {
-                let start = self.grid.index([low[0], j, k]);
-                hu.extend_from_slice(&self.hu[start..start + high[0] - low[0]]);
-            }
-        }
-        Ok(Self { grid, hu })
+        let voxels = match &self.voxels {
+            Voxels::I16(hu) => Voxels::I16(cut(hu, &self.grid, low, high)),
+            Voxels::F32(hu) => Voxels::F32(cut(hu, &self.grid, low, high)),
+        };
+        Ok(Self { grid, voxels })
     }
 
     /// The smallest block of voxels that holds every voxel whose centre lies in the world box
@@ -145,10 +173,11 @@ impl Volume {
     /// `threshold_hu`: the bounding box of tissue, for [`Volume::crop`]. `None` when there is none.
     pub fn block_above(&self, threshold_hu: f32) -> Option<([usize; 3], [usize; 3])> {
         let [nx, ny, _] = self.grid.size();
-        let rows = self.hu.par_chunks(nx).enumerate();
+        let rows = self.values().par_parts(nx).enumerate();
         let blocks = rows.filter_map(|(row, values)| {
-            let first = values.iter().position(|v| *v > threshold_hu)?;
-            let last = values.iter().rposition(|v| *v > threshold_hu)?;
+            let above = |i: &usize| values.at(*i) > threshold_hu;
+            let first = (0..nx).find(above)?;
+            let last = (0..nx).rfind(above)?;
             let (j, k) = (row % ny, row / ny);
             Some(([first, j, k], [last + 1, j + 1, k + 1]))
         });
@@ -161,6 +190,19 @@ impl Volume {
             (low, high)
         })
     }
+}
+
+/// The values of the voxels `low..high`.
+fn cut<T: Copy>(values: &[T], grid: &Grid, low: [usize; 3], high: [usize; 3]) -> Vec<T> {
+    let length = high[0] - low[0];
+    let mut cut = Vec::with_capacity(length * (high[1] - low[1]) * (high[2] - low[2]));
+    for k in low[2]..high[2] {
+        for j in low[1]..high[1] {
+            let start = grid.index([low[0], j, k]);
+            cut.extend_from_slice(&values[start..start + length]);
+        }
+    }
+    cut
 }
 
 #[cfg(test)]

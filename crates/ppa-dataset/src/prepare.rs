@@ -148,8 +148,9 @@ pub fn volume_sha256(volume: &Volume) -> String {
     for value in volume.grid().ct_from_voxel().matrix() {
         hasher.update(value.to_le_bytes());
     }
-    for hu in volume.hu() {
-        hasher.update(hu.to_le_bytes());
+    for values in volume.values().parts(1 << 14) {
+        let bytes = values.iter().flat_map(f32::to_le_bytes);
+        hasher.update(bytes.collect::<Vec<_>>());
     }
     hex(&hasher.finalize())
 }

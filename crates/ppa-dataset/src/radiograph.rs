@@ -56,7 +56,7 @@ pub fn joint_phantom(
         return Err(JointError::NoLimb { half_length_mm });
     }
     let cropped = volume.crop(low, high)?;
-    let hu = cropped.hu().iter().enumerate().map(|(index, &hu)| {
+    let hu = cropped.values().iter().enumerate().map(|(index, hu)| {
         let [i, j, k] = cropped.grid().voxel(index);
         let in_limb = mask[grid.index([i + low[0], j + low[1], k + low[2]])];
         if in_limb { hu } else { AIR_HU }

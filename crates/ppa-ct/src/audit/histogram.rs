@@ -2,6 +2,8 @@
 
 use rayon::prelude::*;
 
+use crate::values::Values;
+
 /// Lowest and highest HU with a bin of its own; values beyond fall into the outermost bins.
 const LOW: i32 = -3100;
 const HIGH: i32 = 4100;
@@ -19,13 +21,13 @@ pub(super) struct Histogram {
 }
 
 impl Histogram {
-    pub fn of(hu: &[f32]) -> Self {
-        let (min, max) = crate::info::range(hu);
+    pub fn of(hu: Values) -> Self {
+        let (min, max) = hu.range();
         let bins = (HIGH - LOW + 1) as usize;
         // Whole numbers: the sum is the same in any order.
-        let chunks = hu.par_chunks(1 << 20).map(|values| {
+        let parts = hu.par_parts(1 << 20).map(|values| {
             let mut counts = vec![0_u64; bins + 2];
-            for &value in values {
+            for value in values.iter() {
                 counts[bin(value)] += 1;
                 counts[bins] += u64::from(value == min);
                 counts[bins + 1] += u64::from(value == max);
@@ -36,7 +38,7 @@ impl Histogram {
             a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
             a
         };
-        let mut counts = chunks.reduce(|| vec![0; bins + 2], add);
+        let mut counts = parts.reduce(|| vec![0; bins + 2], add);
         let (at_max, at_min) = (counts[bins + 1], counts[bins]);
         counts.truncate(bins);
         Self {

@@ -197,7 +197,7 @@ fn histogram(volume: &Volume) -> String {
     const RANGE: [i32; 2] = [-1200, 2800];
     const BINS: usize = 400;
     const SIZE: [f64; 2] = [800.0, 220.0];
-    let counts = Histogram::of(volume.hu()).coarse(RANGE[0], RANGE[1], BINS);
+    let counts = Histogram::of(volume.values()).coarse(RANGE[0], RANGE[1], BINS);
     let most = counts.iter().copied().max().unwrap_or(0).max(1) as f64;
     let height = |count: u64| SIZE[1] * (1.0 + count as f64).ln() / (1.0 + most).ln();
     let step = SIZE[0] / BINS as f64;

@@ -56,6 +56,13 @@ pub(super) struct Image {
     pub stored: StoredFormat,
 }
 
+impl Slice {
+    /// Slope and intercept from stored values to HU.
+    pub fn rescale(&self) -> [f64; 2] {
+        self.frame.rescale.unwrap_or([1.0, 0.0])
+    }
+}
+
 impl Image {
     pub fn pixels(&self) -> usize {
         self.columns * self.rows

@@ -1,4 +1,4 @@
-//! Stored pixel values of one slice become Hounsfield units.
+//! Stored pixel values of one slice, unpacked.
 
 use std::path::Path;
 
@@ -29,21 +29,16 @@ pub(super) fn check_size(slice: &Slice) -> Result<(), ReadError> {
     })
 }
 
-/// Fills `hu` (rows x columns, columns fastest) with the slice's pixels; returns how many of them were padding.
-pub(super) fn decode(
-    slice: &Slice,
-    buffer: &mut Vec<u8>,
-    hu: &mut [f32],
-) -> Result<usize, ReadError> {
-    let (file, image) = (&slice.file, &slice.image);
+/// Fills `containers` (rows x columns, columns fastest, little-endian) with the slice's pixels.
+pub(super) fn read(slice: &Slice, containers: &mut Vec<u8>) -> Result<(), ReadError> {
+    let file = &slice.file;
     if file.is_native() {
-        let length = image.native_bytes() as u64;
-        file.native(slice.index as u64 * length, length, buffer)?;
+        let length = slice.image.native_bytes() as u64;
+        file.native(slice.index as u64 * length, length, containers)?;
     } else {
-        *buffer = unpack(slice, &file.path)?;
+        *containers = unpack(slice, &file.path)?;
     }
-    let rescale = slice.frame.rescale.unwrap_or([1.0, 0.0]);
-    Ok(image.stored.read_hu(buffer, rescale, hu))
+    Ok(())
 }
 
 fn unpack(slice: &Slice, path: &Path) -> Result<Vec<u8>, ReadError> {

@@ -69,6 +69,55 @@ impl StoredFormat {
         self.bits_allocated as usize / 8
     }
 
+    /// Fills `hu` from little-endian containers with whole numbers; returns how many pixels were padding and
+    /// became air, or `None` where the values are not whole or 16 bits do not hold them.
+    ///
+    /// `hu` and `containers` hold the same number of pixels.
+    pub fn read_whole(
+        &self,
+        containers: &[u8],
+        rescale: [f64; 2],
+        hu: &mut [i16],
+    ) -> Option<usize> {
+        let intercept = whole_intercept(rescale)?;
+        let word = |b: &[u8; 2]| u16::from_le_bytes(*b).into();
+        match self.bytes() {
+            1 => self.fill_whole(containers.iter().map(|&b| b.into()), intercept, hu),
+            2 => self.fill_whole(containers.as_chunks().0.iter().map(word), intercept, hu),
+            _ => None,
+        }
+    }
+
+    fn fill_whole(
+        &self,
+        containers: impl Iterator<Item = u32>,
+        intercept: i32,
+        hu: &mut [i16],
+    ) -> Option<usize> {
+        let (low, high) = self.padding.unwrap_or((1, 0));
+        let (low, high) = (low as i32, high as i32);
+        let [first_air, last_air] = [READS_AS_AIR.start(), READS_AS_AIR.end()].map(|&v| v as i32);
+        let put = |(hu, stored): (&mut i16, i32)| {
+            let value = stored + intercept;
+            // No branches: this is vector code.
+            let pads =
+                (low <= stored) & (stored <= high) & !((first_air <= value) & (value <= last_air));
+            let value = if pads { AIR_HU as i32 } else { value };
+            *hu = value as i16;
+            (u32::from(pads), i32::from(*hu) ^ value)
+        };
+        let sum = |(padded, lost), (pads, loses)| (padded + pads, lost | loses);
+        let (up, down) = self.shifts();
+        let (padded, lost) = if self.signed {
+            let stored = containers.map(|c| (c << up).cast_signed() >> down);
+            hu.iter_mut().zip(stored).map(put).fold((0, 0), sum)
+        } else {
+            let stored = containers.map(|c| ((c << up) >> down).cast_signed());
+            hu.iter_mut().zip(stored).map(put).fold((0, 0), sum)
+        };
+        (lost == 0).then_some(padded as usize)
+    }
+
     /// Fills `hu` from little-endian containers; returns how many pixels were padding and became air.
     ///
     /// `hu` and `containers` hold the same number of pixels.
@@ -98,17 +147,8 @@ impl StoredFormat {
         hu: &mut [f32],
     ) -> usize {
         let value = |container: &[u8; N]| self.value(number(*container));
-        // f32 holds whole numbers up to 2^24 exactly, and is twice as fast.
-        let whole = |v: f64| v.fract() == 0.0 && v.abs() < 256.0 * 256.0;
-        if N < 4 && whole(intercept) && slope == 1.0 {
-            let intercept = intercept as f32;
-            for (hu, container) in hu.iter_mut().zip(containers) {
-                *hu = value(container) as i32 as f32 + intercept;
-            }
-        } else {
-            for (hu, container) in hu.iter_mut().zip(containers) {
-                *hu = (slope * value(container) as f64 + intercept) as f32;
-            }
+        for (hu, container) in hu.iter_mut().zip(containers) {
+            *hu = (slope * value(container) as f64 + intercept) as f32;
         }
         let Some((low, high)) = self.padding else {
             return 0;
@@ -126,14 +166,24 @@ impl StoredFormat {
     /// The number in a container: bits outside the stored ones are dropped, the sign extended.
     #[inline]
     fn value(&self, container: u32) -> i64 {
-        let dropped_above = 31 - self.high_bit;
-        let unused = 32 - self.bits_stored;
+        let (up, down) = self.shifts();
         if self.signed {
-            i64::from((container << dropped_above).cast_signed() >> unused)
+            i64::from((container << up).cast_signed() >> down)
         } else {
-            i64::from((container << dropped_above) >> unused)
+            i64::from((container << up) >> down)
         }
     }
+
+    /// Shifts of a container of 32 bits, up and then down, that leave the stored ones.
+    fn shifts(&self) -> (u32, u32) {
+        (31 - self.high_bit, 32 - self.bits_stored)
+    }
+}
+
+/// The intercept, where stored numbers and HU differ by a whole number only.
+pub(super) fn whole_intercept([slope, intercept]: [f64; 2]) -> Option<i32> {
+    let small = intercept.abs() < 256.0 * 256.0;
+    (slope == 1.0 && intercept.fract() == 0.0 && small).then_some(intercept as i32)
 }
 
 #[cfg(test)]
@@ -166,6 +216,14 @@ mod tests {
             let mut hu = [0.0];
             format.read_hu(&container.to_le_bytes()[..format.bytes()], rescale, &mut hu);
             prop_assert_eq!(hu[0], (rescale[0] * expected as f64 + rescale[1]) as f32);
+
+            // The same in 16 bits, where these hold it.
+            let mut whole = [0];
+            let containers = &container.to_le_bytes()[..format.bytes()];
+            let read = format.read_whole(containers, rescale, &mut whole);
+            let fits = allocated < 32 && rescale[0] == 1.0 && f32::from(hu[0] as i16) == hu[0];
+            prop_assert_eq!(read, fits.then_some(0));
+            prop_assert!(!fits || f32::from(whole[0]) == hu[0]);
         }
     }
 
@@ -179,11 +237,21 @@ mod tests {
             padding: Some((-2000, -1990)),
         };
         let stored = [-2000_i16, -1990, -1989, 40].map(i16::to_le_bytes).concat();
-        let mut hu = [0.0; 4];
-        assert_eq!(format.read_hu(&stored, [1.0, -1024.0], &mut hu), 2);
-        assert_eq!(hu, [-1000.0, -1000.0, -3013.0, -984.0]);
-        // Air already: what other readers give is kept.
-        assert_eq!(format.read_hu(&stored, [1.0, 976.0], &mut hu), 0);
-        assert_eq!(hu, [-1024.0, -1014.0, -1013.0, 1016.0]);
+        for (intercept, padded, expected) in [
+            (-1024, 2, [-1000, -1000, -3013, -984]),
+            // Air already: what other readers give is kept.
+            (976, 0, [-1024, -1014, -1013, 1016]),
+            // -32770 is padding and needs no place among 16 bits.
+            (-30_770, 2, [-1000, -1000, -32_759, -30_730]),
+        ] {
+            let (mut hu, mut whole) = ([0.0; 4], [0; 4]);
+            let rescale = [1.0, f64::from(intercept)];
+            assert_eq!(format.read_hu(&stored, rescale, &mut hu), padded);
+            assert_eq!(hu, expected.map(|v| v as f32));
+            let fits = expected.iter().all(|v| i16::try_from(*v).is_ok());
+            let read = format.read_whole(&stored, rescale, &mut whole);
+            assert_eq!(read, fits.then_some(padded));
+            assert!(!fits || whole.map(i32::from) == expected);
+        }
     }
 }

@@ -51,7 +51,7 @@ impl<'a> CtSeries<'a> {
             size: [size[0] as u16, size[1] as u16],
             axes,
             thickness_mm: step.dot(&normal).abs(),
-            rescale: Rescale::of(volume.hu()),
+            rescale: Rescale::of(volume.values()),
             fingerprint: Fingerprint::of(volume),
         })
     }
@@ -140,8 +140,12 @@ impl<'a> CtSeries<'a> {
         image.text(tags::RESCALE_INTERCEPT, &self.rescale.intercept);
         image.text(tags::RESCALE_TYPE, "HU");
         let pixels = usize::from(columns) * usize::from(rows);
-        let hu = &self.volume.hu()[k * pixels..(k + 1) * pixels];
-        let stored = self.rescale.stored(hu).into_iter().map(i16::cast_unsigned);
+        let hu = self.volume.values().part(k * pixels..(k + 1) * pixels);
+        let stored = self
+            .rescale
+            .stored(&hu.to_f32())
+            .into_iter()
+            .map(i16::cast_unsigned);
         image.0.put(DataElement::new(
             tags::PIXEL_DATA,
             VR::OW,

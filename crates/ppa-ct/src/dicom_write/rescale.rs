@@ -1,8 +1,7 @@
 //! Hounsfield units as 16-bit stored values with one rescale for all slices.
 
 use super::decimal::decimal;
-use crate::info::range;
-use crate::whole_numbers::fits_i16;
+use crate::values::Values;
 
 /// Largest stored value; the smallest is its negative.
 const MOST: f64 = 32767.0;
@@ -16,10 +15,10 @@ pub(super) struct Rescale {
 
 impl Rescale {
     /// One HU per level where that is exact, else the range spread over all levels.
-    pub(super) fn of(hu: &[f32]) -> Self {
-        let (low, high) = range(hu);
+    pub(super) fn of(hu: Values) -> Self {
+        let (low, high) = hu.range();
         let (low, high) = (f64::from(low), f64::from(high));
-        let (slope, intercept) = if fits_i16(hu) {
+        let (slope, intercept) = if hu.fit_i16() {
             (1.0, 0.0)
         } else if low == high {
             (1.0, low)
@@ -55,8 +54,8 @@ mod tests {
             scale in prop::sample::select(vec![1.0_f32, 1e-6, 1e12]),
         ) {
             let hu = hu.iter().map(|v| v * scale).collect::<Vec<_>>();
-            let (low, high) = range(&hu);
-            let rescale = Rescale::of(&hu);
+            let (low, high) = Values::F32(&hu).range();
+            let rescale = Rescale::of(Values::F32(&hu));
             let [slope, intercept] =
                 [&rescale.slope, &rescale.intercept].map(|t| t.parse::<f64>().unwrap());
             let most = (f64::from(high) - f64::from(low)) / 131_068.0;
@@ -69,7 +68,7 @@ mod tests {
         #[test]
         fn whole_values_are_stored_as_they_are(hu in prop::collection::vec(any::<i16>(), 1..40)) {
             let floats = hu.iter().map(|&v| f32::from(v)).collect::<Vec<_>>();
-            let rescale = Rescale::of(&floats);
+            let rescale = Rescale::of(Values::F32(&floats));
             prop_assert_eq!((rescale.slope.as_str(), rescale.intercept.as_str()), ("1", "0"));
             prop_assert_eq!(rescale.stored(&floats), hu);
         }

@@ -17,8 +17,8 @@ impl Fingerprint {
         for v in volume.grid().ct_from_voxel().matrix() {
             hash.update(v.to_le_bytes());
         }
-        for values in volume.hu().chunks(1 << 14) {
-            let bytes = values.iter().flat_map(|v| v.to_le_bytes());
+        for values in volume.values().parts(1 << 14) {
+            let bytes = values.iter().flat_map(f32::to_le_bytes);
             hash.update(bytes.collect::<Vec<_>>());
         }
         Self(hash.finalize().into())

@@ -10,7 +10,6 @@ use crate::error::WriteError;
 use crate::stored::write_exact;
 use crate::volume::Volume;
 use crate::whole_file::write_whole;
-use crate::whole_numbers::fits_i16;
 
 /// Writes a volume as `.mha`, or as `.mhd` with its voxels in a `.zraw` beside it.
 ///
@@ -60,13 +59,13 @@ pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
 fn packed(volume: &Volume) -> io::Result<Vec<u8>> {
     // CT noise hardly compresses: higher levels cost time and save a few percent.
     let mut zlib = ZlibEncoder::new(Vec::new(), Compression::fast());
-    write_exact(&mut zlib, volume.hu())?;
+    write_exact(&mut zlib, volume.values())?;
     zlib.finish()
 }
 
 fn header(volume: &Volume, packed_bytes: usize, data: &str) -> String {
     let grid = volume.grid();
-    let kind = if fits_i16(volume.hu()) {
+    let kind = if volume.values().fit_i16() {
         "MET_SHORT"
     } else {
         "MET_FLOAT"

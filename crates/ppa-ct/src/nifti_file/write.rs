@@ -12,7 +12,6 @@ use crate::error::WriteError;
 use crate::stored::write_exact;
 use crate::volume::Volume;
 use crate::whole_file::write_whole;
-use crate::whole_numbers::fits_i16;
 
 /// Voxels follow the header and four bytes that announce no extension.
 const VOXELS_AT: f32 = 352.0;
@@ -63,12 +62,12 @@ pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
 
 fn write_stream(out: &mut dyn Write, volume: &Volume) -> std::io::Result<()> {
     out.write_all(&header_bytes(&header(volume)))?;
-    write_exact(out, volume.hu())
+    write_exact(out, volume.values())
 }
 
 fn header(volume: &Volume) -> NiftiHeader {
     let [nx, ny, nz] = volume.grid().size().map(|n| n as u16);
-    let (datatype, bitpix) = if fits_i16(volume.hu()) {
+    let (datatype, bitpix) = if volume.values().fit_i16() {
         (4, 16)
     } else {
         (16, 32)

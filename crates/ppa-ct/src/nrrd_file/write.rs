@@ -9,7 +9,6 @@ use crate::error::WriteError;
 use crate::stored::write_exact;
 use crate::volume::Volume;
 use crate::whole_file::write_whole;
-use crate::whole_numbers::fits_i16;
 
 /// Writes a volume as `.nrrd`: one file, gzipped voxels, axes in LPS.
 ///
@@ -33,7 +32,7 @@ pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
         out.write_all(header(volume).as_bytes())?;
         // CT noise hardly compresses: higher levels cost time and save a few percent.
         let mut gzip = GzEncoder::new(out, Compression::fast());
-        write_exact(&mut gzip, volume.hu())?;
+        write_exact(&mut gzip, volume.values())?;
         gzip.finish().map(|_| ())
     })
     .map_err(|source| WriteError::Io {
@@ -44,7 +43,7 @@ pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
 
 fn header(volume: &Volume) -> String {
     let [nx, ny, nz] = volume.grid().size();
-    let kind = if fits_i16(volume.hu()) {
+    let kind = if volume.values().fit_i16() {
         "int16"
     } else {
         "float"

@@ -5,7 +5,7 @@ use std::path::Path;
 use approx::assert_relative_eq;
 use dicom_dictionary_std::uids;
 use nalgebra::{Point3, Rotation3, Vector3};
-use ppa_ct::{Info, ReadError, ReadOptions, SeriesChoice, WarningCode, read, read_with};
+use ppa_ct::{Info, ReadError, ReadOptions, SeriesChoice, Values, WarningCode, read, read_with};
 use proptest::prelude::*;
 
 use crate::series::{SliceSpec, write_series};
@@ -86,6 +86,34 @@ fn stored_bits_and_rescale_are_honoured_per_slice_in_every_plain_encoding() {
         let volume = read(folder.path()).unwrap().volume;
         assert_eq!(volume.at([1, 1, 0]), 2.0 * 4095.0 - 1024.0, "{syntax}");
         assert_eq!(volume.at([1, 1, 1]), -0.5 - 1000.0, "{syntax}");
+    }
+}
+
+/// Whole numbers take 16 bits as long as all of them fit; where one slice does not, no value is lost.
+#[test]
+fn values_are_kept_in_16_bits_where_these_hold_them() {
+    for (rescale, whole) in [
+        ([1.0, -24.0], true),
+        ([1.0, 32_000.0], false), // 1023 stored is too large
+        ([1.0, 0.5], false),
+        ([0.5, 0.0], false),
+        ([2.0, 0.0], false),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut slices = axial_stack(&[0.0, 2.0]);
+        slices[1].rescale = rescale;
+        slices[1].stored[11] = 1023;
+        write_series(folder.path(), &slices);
+        let volume = read(folder.path()).unwrap().volume;
+        let is_whole = matches!(volume.values(), Values::I16(_));
+        assert_eq!(is_whole, whole, "{rescale:?}");
+        let stored = slices
+            .iter()
+            .flat_map(|s| s.stored.iter().map(move |&v| (s, v)));
+        let expected = stored.map(|(slice, v)| {
+            (slice.rescale[0] * f64::from(v.cast_signed()) + slice.rescale[1]) as f32
+        });
+        assert_eq!(*volume.hu(), expected.collect::<Vec<_>>(), "{rescale:?}");
     }
 }
 

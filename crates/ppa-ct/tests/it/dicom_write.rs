@@ -18,7 +18,8 @@ fn reversed(volume: &Volume) -> Volume {
     let step = -matrix.column(2);
     matrix.set_column(2, &step);
     matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&last.coords);
-    let slices = volume.hu().chunks(nx * ny).rev();
+    let hu = volume.hu();
+    let slices = hu.chunks(nx * ny).rev();
     let grid = Grid::new([nx, ny, nz], Affine3::from_matrix_unchecked(matrix)).unwrap();
     Volume::new(grid, slices.flatten().copied().collect()).unwrap()
 }
@@ -54,7 +55,7 @@ proptest! {
         });
         let whole = upright.hu().iter().all(|v| v.fract() == 0.0);
         let most = if whole { 0.0 } else { (range[1] - range[0]) / 131_068.0 + 1e-3 };
-        for (a, b) in back.volume.hu().iter().zip(upright.hu()) {
+        for (a, b) in back.volume.hu().iter().zip(&*upright.hu()) {
             prop_assert!((a - b).abs() <= most, "{a} {b} {most}");
         }
         let size = upright.grid().size();

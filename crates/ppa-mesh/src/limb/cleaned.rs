@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::Hu;
 use super::lattice::Lattice;
 
 /// HU put where something was removed, away from the limb.
@@ -22,14 +23,15 @@ const SHARE_RANGE: f32 = 0.2;
 /// farther where it does not (the top of a step).
 ///
 /// `hu` and `mask` are of the whole volume, what is returned of the box.
-pub fn cleaned(part: &Lattice, hu: &[f32], mask: &[bool], iso: f32) -> Vec<f32> {
+pub fn cleaned<T: Hu>(part: &Lattice, hu: &[T], mask: &[bool], iso: f32) -> Vec<f32> {
     let mut values = vec![0.0; part.len()];
     let rows = values.par_chunks_mut(part.size[0]).enumerate();
     rows.for_each(|(row, values)| {
         let (line, inside) = (part.row_of(row, hu), part.row_of(row, mask));
         for i in 0..values.len() {
-            values[i] = match (inside[i], line[i] >= iso) {
-                (true, true) | (false, false) => line[i],
+            let hu = line[i].into();
+            values[i] = match (inside[i], hu >= iso) {
+                (true, true) | (false, false) => hu,
                 (true, false) => FILL_HU.max(iso),
                 (false, true) => {
                     let voxel = part.voxel(row * part.size[0] + i);

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::Hu;
 use super::distance::squared_distances;
 use super::lattice::Lattice;
 use super::pieces::Pieces;
@@ -33,9 +34,9 @@ impl Columns {
 /// A couch is solid in nearly all slices at the same place, whatever lies on it. So is the middle
 /// of a limb, but that is thick: what is left when the persistent columns are opened with a disk is
 /// thin and, if long enough, couch.
-pub fn couch_columns(
+pub fn couch_columns<T: Hu>(
     lattice: &Lattice,
-    hu: &[f32],
+    hu: &[T],
     iso: f32,
     persistence: f64,
     thickness_mm: f64,
@@ -95,7 +96,7 @@ pub fn couch_columns(
     }
 }
 
-fn tissue_of_columns(lattice: &Lattice, hu: &[f32], iso: f32) -> Vec<u32> {
+fn tissue_of_columns<T: Hu>(lattice: &Lattice, hu: &[T], iso: f32) -> Vec<u32> {
     let [nx, ny, nz] = lattice.size;
     let [u, v] = lattice.across();
     let empty = || vec![0_u32; lattice.size[u] * lattice.size[v]];
@@ -104,7 +105,7 @@ fn tissue_of_columns(lattice: &Lattice, hu: &[f32], iso: f32) -> Vec<u32> {
         .enumerate()
         .fold(empty, |mut counts, (k, slice)| {
             for (j, row) in slice.chunks(nx).enumerate() {
-                let tissue = row.iter().map(|&value| u32::from(value >= iso));
+                let tissue = row.iter().map(|&value| u32::from(value.into() >= iso));
                 match lattice.scan_axis {
                     0 => counts[j + ny * k] += tissue.sum::<u32>(),
                     axis => {

@@ -18,7 +18,7 @@ mod settings;
 mod tissue;
 
 use nalgebra::Point3;
-use ppa_ct::{Volume, VolumeError};
+use ppa_ct::{Grid, Values, Volume, VolumeError};
 
 use crate::dbscan::dbscan;
 use crate::mesh::Mesh;
@@ -37,6 +37,11 @@ use tissue::{TISSUE, Tissue};
 const SIDE_CUT_WEIGHT: f64 = 2.0;
 /// At most this many surface points are clustered; more are thinned evenly first.
 const MAX_CLUSTER_POINTS: usize = 20_000;
+
+/// Hounsfield units in a type that a volume keeps them in.
+trait Hu: Copy + Into<f32> + Send + Sync {}
+impl Hu for i16 {}
+impl Hu for f32 {}
 
 /// A limb found in a volume.
 #[derive(Debug, Clone, PartialEq)]
@@ -166,13 +171,19 @@ fn check(settings: &LimbSettings) -> Result<(), LimbError> {
 }
 
 fn within(volume: &Volume, settings: &LimbSettings) -> Result<Limb, LimbError> {
-    let (grid, hu) = (volume.grid(), volume.hu());
+    match volume.values() {
+        Values::I16(hu) => within_values(volume.grid(), hu, settings),
+        Values::F32(hu) => within_values(volume.grid(), hu, settings),
+    }
+}
+
+fn within_values<T: Hu>(grid: &Grid, hu: &[T], settings: &LimbSettings) -> Result<Limb, LimbError> {
     let (whole, iso) = (Lattice::of(grid), settings.iso_hu as f32);
     let mut report = LimbReport::default();
     let nothing_solid = || LimbError::NothingSolid {
         core_hu: settings.core_hu,
         thickness_mm: 2.0 * settings.core_radius_mm,
-        max_hu: hu.iter().copied().fold(f32::MIN, f32::max),
+        max_hu: hu.iter().map(|&v| v.into()).fold(f32::MIN, f32::max),
     };
     let (persistence, thickness_mm) = (settings.couch_persistence, settings.couch_thickness_mm);
     let columns = couch_columns(&whole, hu, iso, persistence, thickness_mm);
@@ -193,7 +204,7 @@ fn within(volume: &Volume, settings: &LimbSettings) -> Result<Limb, LimbError> {
     let (size, spacing_mm) = (lattice.size, lattice.spacing_mm);
     spread(size, spacing_mm, &mut reach_sq, &mut found.labels, limit_sq);
     let chosen = match settings.inside {
-        Some(point) => body_at(volume, &tissue, &found, point)?,
+        Some(point) => body_at(grid, &tissue, &found, point)?,
         None => best_body(lattice, &found),
     };
     report.describe_bodies(grid, lattice, &found, chosen);
@@ -220,7 +231,7 @@ fn within(volume: &Volume, settings: &LimbSettings) -> Result<Limb, LimbError> {
     // One voxel beyond the limb for the surface, another one for its normals.
     let part = whole.window_around(report.low, report.high, 2);
     let values = cleaned(&part, hu, &mask, iso);
-    let surface = surface_of_part(grid, part.low, part.size, values, iso)?;
+    let surface = surface_of_part(grid, part.low, part.size, &values, iso)?;
     let mesh = one_piece(&surface, settings, &mut report);
     Ok(Limb { mesh, mask, report })
 }
@@ -251,13 +262,13 @@ fn best_body(lattice: &Lattice, found: &Bodies) -> u32 {
 }
 
 fn body_at(
-    volume: &Volume,
+    grid: &Grid,
     tissue: &Tissue,
     found: &Bodies,
     point: [f64; 3],
 ) -> Result<u32, LimbError> {
     let lattice = &tissue.lattice;
-    let voxel = volume.grid().voxel_from_ct() * Point3::from(point);
+    let voxel = grid.voxel_from_ct() * Point3::from(point);
     let place = [0, 1, 2].map(|x| voxel[x].round() - lattice.low[x] as f64);
     if !(0..3).all(|x| (0.0..lattice.size[x] as f64).contains(&place[x])) {
         return Err(LimbError::Inside(point));

@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::LimbSettings;
 use super::couch::Columns;
 use super::lattice::Lattice;
+use super::{Hu, LimbSettings};
 
 /// Bits of a voxel's kind: above the skin's HU, above that of solid flesh, above that of bone.
 pub const TISSUE: u8 = 1;
@@ -21,9 +21,9 @@ pub struct Tissue {
 
 impl Tissue {
     /// `None` without tissue.
-    pub fn find(
+    pub fn find<T: Hu>(
         whole: &Lattice,
-        hu: &[f32],
+        hu: &[T],
         couch: &Columns,
         choices: &LimbSettings,
     ) -> Option<Self> {
@@ -36,7 +36,9 @@ impl Tissue {
             .filter_map(|row| {
                 let (j, k) = (row % ny, row / ny);
                 let line = whole.row_of(row, hu);
-                let is = |i: &usize| line[*i] >= iso && !(any_couch && couch.is_couch([*i, j, k]));
+                let is = |i: &usize| {
+                    line[*i].into() >= iso && !(any_couch && couch.is_couch([*i, j, k]))
+                };
                 let first = (0..nx).find(is)?;
                 let last = (0..nx).rev().find(is)?;
                 Some(([first, j, k], [last + 1, j + 1, k + 1]))
@@ -58,6 +60,7 @@ impl Tissue {
                 let (j, k) = (row % ny + lattice.low[1], row / ny + lattice.low[2]);
                 let line = lattice.row_of(row, hu);
                 for (kind, &hu) in kinds.iter_mut().zip(line) {
+                    let hu = hu.into();
                     let solid = CORE * u8::from(hu >= core) + BONE * u8::from(hu >= bone);
                     *kind = if hu >= iso { TISSUE + solid } else { 0 };
                 }

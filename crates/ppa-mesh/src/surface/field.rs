@@ -3,9 +3,7 @@
 use std::borrow::Cow;
 
 use nalgebra::Vector3;
-use ppa_ct::Volume;
-
-use super::Border;
+use ppa_ct::{Values, Volume};
 
 /// Least depth below the iso value of the air put around a closed volume, so that a border voxel
 /// close to the iso value still gets a lid of its own.
@@ -13,44 +11,27 @@ const MIN_LID_HU: f32 = 1.0;
 
 /// Values on the (possibly padded) lattice, x fastest.
 pub struct Field<'a> {
-    hu: Cow<'a, [f32]>,
+    hu: Values<'a>,
     size: [usize; 3],
     iso: f32,
     origin: [f64; 3],
 }
 
 impl<'a> Field<'a> {
-    pub fn new(volume: &'a Volume, iso: f32, border: Border) -> Self {
-        let size = volume.grid().size();
-        match border {
-            Border::Open => Self {
-                hu: Cow::Borrowed(volume.hu()),
-                size,
-                iso,
-                origin: [0.0; 3],
-            },
-            Border::Closed => Self {
-                hu: Cow::Owned(padded(volume, iso)),
-                size: size.map(|n| n + 2),
-                iso,
-                origin: [-1.0; 3],
-            },
-        }
-    }
-
-    /// Values of a box of a volume whose first voxel is `low`.
-    pub fn part(hu: Vec<f32>, low: [usize; 3], size: [usize; 3], iso: f32) -> Self {
+    /// Values of `size` voxels, the first of which is the voxel `origin` of the volume.
+    pub fn new(hu: Values<'a>, size: [usize; 3], origin: [f64; 3], iso: f32) -> Self {
         Self {
-            hu: Cow::Owned(hu),
+            hu,
             size,
             iso,
-            origin: low.map(|first| first as f64),
+            origin,
         }
     }
 
-    /// All values, padding included.
-    pub fn values(&self) -> &[f32] {
-        &self.hu
+    /// Smallest and largest value, padding included.
+    pub fn range(&self) -> [f32; 2] {
+        let widest = |[low, high]: [f32; 2], hu: f32| [low.min(hu), high.max(hu)];
+        self.hu.iter().fold([f32::MAX, f32::MIN], widest)
     }
 
     pub fn size(&self) -> [usize; 3] {
@@ -67,9 +48,9 @@ impl<'a> Field<'a> {
     }
 
     /// One row along x.
-    pub fn row(&self, j: usize, k: usize) -> &[f32] {
+    pub fn row(&self, j: usize, k: usize) -> Cow<'a, [f32]> {
         let start = self.index([0, j, k]);
-        &self.hu[start..start + self.size[0]]
+        self.hu.part(start..start + self.size[0]).to_f32()
     }
 
     pub fn iso(&self) -> f32 {
@@ -78,7 +59,7 @@ impl<'a> Field<'a> {
 
     /// HU above iso; exact for the usual HU, so that both cells at a face decide alike.
     pub fn above(&self, at: usize) -> f64 {
-        f64::from(self.hu[at]) - f64::from(self.iso)
+        f64::from(self.hu.at(at)) - f64::from(self.iso)
     }
 
     /// HU per voxel step: central differences, one-sided at the border.
@@ -94,7 +75,7 @@ impl<'a> Field<'a> {
                     0
                 },
             );
-            let rise = f64::from(self.hu[at + high]) - f64::from(self.hu[at - low]);
+            let rise = f64::from(self.hu.at(at + high)) - f64::from(self.hu.at(at - low));
             if low > 0 && high > 0 {
                 0.5 * rise
             } else {
@@ -106,7 +87,7 @@ impl<'a> Field<'a> {
 
 /// The volume with one more voxel on every side, as far below iso as the nearest voxel is above it:
 /// the crossing then lies half-way, on the outer face of the border voxel.
-fn padded(volume: &Volume, iso: f32) -> Vec<f32> {
+pub fn padded(volume: &Volume, iso: f32) -> Vec<f32> {
     let size = volume.grid().size();
     let outer = size.map(|n| n + 2);
     let mut hu = Vec::with_capacity(outer.iter().product());

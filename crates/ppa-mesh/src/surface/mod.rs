@@ -7,11 +7,11 @@ mod slab;
 mod tunnel;
 
 use nalgebra::{Matrix3, Point3, Vector3};
-use ppa_ct::{Grid, Volume};
+use ppa_ct::{Grid, Values, Volume};
 use rayon::prelude::*;
 
 use crate::mesh::Mesh;
-use field::Field;
+use field::{Field, padded};
 use slab::{NEXT_SLAB, Slab};
 
 /// Slices of cells per unit of parallel work; fixed, so that the vertex order never depends on the
@@ -70,7 +70,7 @@ pub enum SurfaceError {
 ///
 /// ```
 /// use nalgebra::{Point3, Vector3};
-/// use ppa_ct::{Grid, Volume};
+/// use ppa_ct::{Grid, Values, Volume};
 /// use ppa_mesh::{Border, iso_surface};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let grid = Grid::axis_aligned([40; 3], Vector3::repeat(1.0), Point3::origin())?;
@@ -91,7 +91,18 @@ pub fn iso_surface(volume: &Volume, iso_hu: f32, border: Border) -> Result<Mesh,
     if !iso_hu.is_finite() {
         return Err(SurfaceError::Iso(iso_hu));
     }
-    surface(&Field::new(volume, iso_hu, border), volume.grid())
+    let (grid, size) = (volume.grid(), volume.grid().size());
+    match border {
+        Border::Open => surface(&Field::new(volume.values(), size, [0.0; 3], iso_hu), grid),
+        Border::Closed => {
+            let hu = padded(volume, iso_hu);
+            let hu = Values::F32(&hu);
+            surface(
+                &Field::new(hu, size.map(|n| n + 2), [-1.0; 3], iso_hu),
+                grid,
+            )
+        }
+    }
 }
 
 /// [`iso_surface`] of a box of `size` voxels from `low` on of a volume with that grid; normals at
@@ -100,10 +111,11 @@ pub(crate) fn surface_of_part(
     grid: &Grid,
     low: [usize; 3],
     size: [usize; 3],
-    hu: Vec<f32>,
+    hu: &[f32],
     iso_hu: f32,
 ) -> Result<Mesh, SurfaceError> {
-    surface(&Field::part(hu, low, size, iso_hu), grid)
+    let origin = low.map(|first| first as f64);
+    surface(&Field::new(Values::F32(hu), size, origin, iso_hu), grid)
 }
 
 fn surface(field: &Field, grid: &Grid) -> Result<Mesh, SurfaceError> {
@@ -120,11 +132,11 @@ fn surface(field: &Field, grid: &Grid) -> Result<Mesh, SurfaceError> {
         .collect();
     let mesh = join(&slabs, grid, field)?;
     if mesh.triangles.is_empty() {
-        let fold = |pick: fn(f32, f32) -> f32| field.values().iter().copied().reduce(pick);
+        let [min_hu, max_hu] = field.range();
         return Err(SurfaceError::Empty {
             iso_hu: field.iso(),
-            min_hu: fold(f32::min).unwrap_or_default(),
-            max_hu: fold(f32::max).unwrap_or_default(),
+            min_hu,
+            max_hu,
         });
     }
     Ok(mesh)

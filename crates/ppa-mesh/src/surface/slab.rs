@@ -75,13 +75,14 @@ impl March<'_> {
 
     fn inside_bits(&self, k: usize) -> Vec<u64> {
         let iso = self.field.iso();
-        let rows = (0..self.field.size()[1]).map(|j| self.field.row(j, k));
-        rows.flat_map(|row| row.chunks(64))
-            .map(|chunk| {
+        let mut words = Vec::with_capacity(self.words * self.field.size()[1]);
+        for j in 0..self.field.size()[1] {
+            words.extend(self.field.row(j, k).chunks(64).map(|chunk| {
                 let bits = chunk.iter().enumerate();
                 bits.fold(0, |word, (bit, &hu)| word | u64::from(hu >= iso) << bit)
-            })
-            .collect()
+            }));
+        }
+        words
     }
 
     /// Numbers the vertices of slice k from `first` on and, when it is `own`, stores them.

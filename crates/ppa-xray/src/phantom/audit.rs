@@ -89,7 +89,7 @@ impl HuCalibration {
     /// [`PhantomError`] when the calibration is not usable, the mask has the wrong length or holds no voxel at all.
     pub fn audit(&self, volume: &Volume, mask: Option<&[bool]>) -> Result<Audit, PhantomError> {
         let segmentation = Segmentation::new(self)?;
-        let hu = volume.hu();
+        let hu = volume.values();
         check_mask(mask, hu.len())?;
         let voxel_from_ct = volume.grid().ct_from_voxel().to_homogeneous();
         let voxel_mm3 = voxel_from_ct.fixed_view::<3, 3>(0, 0).determinant().abs();
@@ -97,7 +97,7 @@ impl HuCalibration {
         let mut histograms = vec![Histogram::new(); segmentation.materials().len()];
         let mut owner = vec![0; histograms.len()];
         let mut outside_mask = 0;
-        for (index, &hu) in hu.iter().enumerate() {
+        for (index, hu) in hu.iter().enumerate() {
             if mask.is_some_and(|mask| !mask[index]) {
                 outside_mask += 1;
                 continue;

@@ -140,11 +140,15 @@ impl VoxelPhantom {
         mask: Option<&[bool]>,
     ) -> Result<Self, PhantomError> {
         let segmentation = Segmentation::new(calibration)?;
-        let hu = volume.hu();
+        let hu = volume.values();
         check_mask(mask, hu.len())?;
         let voxel = |index: usize| {
             let kept = mask.is_none_or(|mask| mask[index]);
-            segmentation.voxel(if kept { hu[index] } else { f32::NEG_INFINITY })
+            segmentation.voxel(if kept {
+                hu.at(index)
+            } else {
+                f32::NEG_INFINITY
+            })
         };
         // Only materials that occur are kept: each costs sampling tables.
         let mut occurs = vec![false; segmentation.materials().len()];
