@@ -80,3 +80,34 @@ pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dicom_series::stored::StoredFormat;
+
+    /// The worked example of the standard: section H.3, figure H.1.
+    #[test]
+    fn the_example_of_the_standard_is_decoded() {
+        const STREAM: &str = "ffd8fff7000b080004000401011100ffda0008010100000000\
+            c000006c80208e01c00000574000006ee6000001bc18000005d800009160ffd9";
+        let byte = |pair: &[u8]| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16).unwrap();
+        let stream = STREAM.as_bytes().chunks(2).map(byte).collect::<Vec<_>>();
+        let image = Image {
+            columns: 4,
+            rows: 4,
+            frames: 1,
+            stored: StoredFormat {
+                bits_allocated: 8,
+                bits_stored: 8,
+                high_bit: 7,
+                signed: false,
+                padding: None,
+            },
+        };
+        let pixels = [
+            0, 0, 90, 74, 68, 50, 43, 205, 64, 145, 145, 145, 100, 145, 145, 145,
+        ];
+        assert_eq!(unpack(&stream, &image).unwrap(), pixels);
+    }
+}

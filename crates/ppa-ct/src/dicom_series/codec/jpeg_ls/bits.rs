@@ -25,6 +25,20 @@ impl<'a> Bits<'a> {
 
     /// Makes at least 48 bits available.
     fn fill(&mut self) {
+        // Whole bytes at once, where none of the next eight announces a stuffed bit.
+        if let (false, Some(next)) = (self.stuffed, self.bytes.first_chunk()) {
+            let next = u64::from_be_bytes(*next);
+            let (low, high) = (u64::MAX / 0xff * 0x7f, u64::MAX / 0xff * 0x80);
+            let has_ff = ((next & low) + u64::MAX / 0xff) & next & high != 0;
+            if !has_ff {
+                let taken = (64 - self.cached) / 8;
+                // What lies behind them is taken again later, and equal.
+                self.cache |= next >> self.cached;
+                self.cached += 8 * taken;
+                self.bytes = &self.bytes[taken as usize..];
+                return;
+            }
+        }
         while self.cached <= 48 {
             match self.bytes {
                 // A byte above 0x7f behind 0xff makes a marker: the scan is over.
@@ -59,10 +73,11 @@ impl<'a> Bits<'a> {
     /// Counts the zeros in front of the next one and takes all of them; `None` for more than `most`.
     #[inline]
     pub fn zeros(&mut self, most: u32) -> Option<u32> {
-        if self.cached <= most {
+        let mut zeros = self.cache.leading_zeros();
+        if zeros >= self.cached && self.cached <= most {
             self.fill();
+            zeros = self.cache.leading_zeros();
         }
-        let zeros = self.cache.leading_zeros();
         if zeros > most {
             return None;
         }

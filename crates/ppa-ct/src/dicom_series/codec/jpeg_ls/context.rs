@@ -11,22 +11,20 @@ pub(super) struct Context {
     pub correction: i32,
     /// Errors counted, `N`.
     count: i64,
+    /// The Golomb parameter `k`, found when learning since decoding waits for it.
+    pub golomb: u32,
 }
 
 impl Context {
     pub fn new(range: i32) -> Self {
+        let magnitude = first_magnitude(range);
         Self {
-            magnitude: first_magnitude(range),
+            magnitude,
             bias: 0,
             correction: 0,
             count: 1,
+            golomb: golomb(1, magnitude),
         }
-    }
-
-    /// The Golomb parameter `k`.
-    #[inline]
-    pub fn golomb(&self) -> u32 {
-        golomb(self.count, self.magnitude)
     }
 
     /// Whether codes stand for errors mirrored about -1/2 (section A.5.2).
@@ -46,13 +44,12 @@ impl Context {
             self.count >>= 1;
         }
         self.count += 1;
-        if self.bias <= -self.count {
-            self.bias = (self.bias + self.count).max(1 - self.count);
-            self.correction = (self.correction - 1).max(-128);
-        } else if self.bias > 0 {
-            self.bias = (self.bias - self.count).min(0);
-            self.correction = (self.correction + 1).min(127);
-        }
+        self.golomb = golomb(self.count, self.magnitude);
+        // Without branches, which noise would make unpredictable. Clamping changes no bias within the bounds.
+        let (low, high) = (self.bias <= -self.count, self.bias > 0);
+        let step = i64::from(low) - i64::from(high);
+        self.bias = (self.bias + step * self.count).clamp(1 - self.count, 0);
+        self.correction = (self.correction - step as i32).clamp(-128, 127);
     }
 }
 

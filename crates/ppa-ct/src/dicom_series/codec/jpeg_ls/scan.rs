@@ -145,10 +145,10 @@ impl State<'_> {
     /// Decodes `line[1..]` up to the last but one; `above` is the line before.
     fn line(&mut self, above: &[i32], line: &mut [i32]) -> Option<()> {
         let columns = line.len() - 2;
+        let coding = self.coding;
         let mut x = 1;
         while x <= columns {
             let [a, b, c, d] = [line[x - 1], above[x], above[x - 1], above[x + 1]];
-            let coding = self.coding;
             let [q1, q2, q3] = [d - b, b - c, c - a].map(|gradient| coding.region(gradient));
             let context = 81 * q1 + 9 * q2 + q3;
             if context == 0 {
@@ -166,21 +166,13 @@ impl State<'_> {
         let coding = self.coding;
         let sign = context.signum();
         let context = &mut self.contexts[context.unsigned_abs() as usize];
-        let edge = if c >= a.max(b) {
-            a.min(b)
-        } else if c <= a.min(b) {
-            a.max(b)
-        } else {
-            a + b - c
-        };
+        // The median of these three, as the edge detector of section A.4.2 comes to.
+        let edge = (a + b - c).clamp(a.min(b), a.max(b));
         let prediction = (edge + sign * context.correction).clamp(0, coding.largest);
-        let k = context.golomb();
+        let k = context.golomb;
         let code = coding.code(&mut self.bits, k, coding.limit)?;
-        let mut error = if code & 1 == 0 {
-            code >> 1
-        } else {
-            -((code + 1) >> 1)
-        };
+        // Odd codes stand for negative errors.
+        let mut error = (code >> 1) ^ -(code & 1);
         if k == 0 && coding.near == 0 && context.is_inverted() {
             error = -(error + 1);
         }
