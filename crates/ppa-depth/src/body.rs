@@ -3,10 +3,9 @@
 use nalgebra::Isometry3;
 
 use crate::mesh_body::MeshBody;
-use crate::nearest::Ray;
 use crate::surfel_body::SurfelBody;
 
-/// A surface in its own frame, indexed once for rays and then placed in many poses.
+/// A surface in its own frame, placed in many poses.
 #[derive(Debug, Clone)]
 pub enum Body {
     /// Triangles.
@@ -76,16 +75,23 @@ pub enum BodyError {
 /// Largest coordinate of a body, mm: a kilometre.
 const MAX_COORDINATE_MM: f32 = 1e6;
 
-/// Whether there is something, and all of it is where a body can be.
-pub(crate) fn check_points(points: &[nalgebra::Point3<f32>]) -> Result<(), BodyError> {
-    let outside = |value: &f32| value.is_nan() || value.abs() > MAX_COORDINATE_MM;
-    match points.iter().position(|point| point.iter().any(outside)) {
-        Some(index) => Err(BodyError::Coordinate {
-            index,
-            found: points[index].into(),
-        }),
-        None => Ok(()),
+/// The largest coordinate, if all points are where a body can be.
+pub(crate) fn check_points(points: &[nalgebra::Point3<f32>]) -> Result<f32, BodyError> {
+    // The bits of |x| are ordered as |x| is, with NaN on top, and their maximum is found in vector code.
+    let bits = |point: &nalgebra::Point3<f32>| point.coords.map(|x| x.abs().to_bits()).max();
+    let reach_mm = f32::from_bits(points.iter().map(bits).max().unwrap_or(0));
+    if reach_mm <= MAX_COORDINATE_MM {
+        return Ok(reach_mm);
     }
+    let outside = |value: &f32| value.is_nan() || value.abs() > MAX_COORDINATE_MM;
+    let index = points
+        .iter()
+        .position(|point| point.iter().any(outside))
+        .unwrap_or_default();
+    Err(BodyError::Coordinate {
+        index,
+        found: points[index].into(),
+    })
 }
 
 /// Whether the number of primitives fits the index.
@@ -106,15 +112,5 @@ impl From<MeshBody> for Body {
 impl From<SurfelBody> for Body {
     fn from(surfels: SurfelBody) -> Self {
         Self::Surfels(surfels)
-    }
-}
-
-impl Body {
-    /// Smallest t in (0, limit) at which the ray meets the surface, from either side.
-    pub(crate) fn nearest(&self, ray: &Ray, limit: f64) -> Option<f64> {
-        match self {
-            Self::Mesh(mesh) => mesh.nearest(ray, limit),
-            Self::Surfels(surfels) => surfels.nearest(ray, limit),
-        }
     }
 }

@@ -6,16 +6,17 @@ use nalgebra::{Matrix2, Point2, Point3, Vector2};
 use rayon::prelude::*;
 
 use crate::distortion::Distortion;
+use crate::optics::Optics;
 use crate::spec::{CameraError, CameraSpec};
 
 /// A checked camera: projection, its exact inverse, and the rays of its pixels.
 ///
-/// `TryFrom<CameraSpec>` is the only way in. Cloning is cheap: clones share the ray table.
+/// `TryFrom<CameraSpec>` is the only way in. Cloning is cheap: clones share the table of rays.
 #[derive(Debug, Clone)]
 pub struct Camera {
     spec: CameraSpec,
     distortion: Distortion,
-    rays: OnceLock<Arc<[Option<Vector2<f64>>]>>,
+    optics: OnceLock<Arc<Optics>>,
 }
 
 impl TryFrom<CameraSpec> for Camera {
@@ -26,7 +27,7 @@ impl TryFrom<CameraSpec> for Camera {
         Ok(Self {
             distortion: Distortion::new(&spec),
             spec,
-            rays: OnceLock::new(),
+            optics: OnceLock::new(),
         })
     }
 }
@@ -92,16 +93,21 @@ impl Camera {
     /// [`unproject`](Self::unproject) of every pixel centre, `None` outside the mask; row-major; computed on first use, then
     /// kept.
     pub fn rays(&self) -> &[Option<Vector2<f64>>] {
-        self.rays.get_or_init(|| {
+        &self.optics().rays
+    }
+
+    pub(crate) fn optics(&self) -> &Optics {
+        self.optics.get_or_init(|| {
             let width = self.spec.width;
-            (0..width * self.spec.height)
+            let rays = (0..width * self.spec.height)
                 .into_par_iter()
                 .map(|index| {
                     let (u, v) = (index % width, index / width);
                     self.unproject(&Point2::new(f64::from(u), f64::from(v)))
                         .filter(|ray| self.spec.mask.is_none_or(|mask| mask.contains(ray)))
                 })
-                .collect()
+                .collect();
+            Arc::new(Optics::new(&self.spec, &self.distortion, rays))
         })
     }
 }

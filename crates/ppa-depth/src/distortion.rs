@@ -46,6 +46,11 @@ impl Distortion {
         lens
     }
 
+    /// Largest ideal radius that the camera uses; infinite if nothing limits it.
+    pub(crate) fn radius(&self) -> f64 {
+        self.radius
+    }
+
     /// Whether the ideal point lies on the disc that the camera uses.
     pub(crate) fn contains(&self, ideal: &Vector2<f64>) -> bool {
         ideal.norm() <= self.radius

@@ -1,7 +1,7 @@
 //! Depth images of meshes and recorded rooms through the camera model of a real Time-of-Flight device.
 //!
 //! A [`CameraSpec`] is what a user writes down (JSON); [`Camera`] is the checked camera, with the exact inverse of its
-//! lens distortion. A [`Body`] is a triangle mesh ([`MeshBody`]) or a cloud of oriented discs ([`SurfelBody`]), indexed
+//! lens distortion. A [`Body`] is a triangle mesh ([`MeshBody`]) or a cloud of oriented discs ([`SurfelBody`]), made
 //! once and then placed in as many poses as needed ([`PlacedBody`]). [`render`] gives a [`DepthImage`]; [`roi_around`]
 //! the square around a joint. A [`RigSpec`] holds the two cameras on an x-ray device.
 //!
@@ -43,7 +43,12 @@ mod mesh_body;
 mod nearest;
 mod surfel_body;
 
+mod depth_buffer;
+mod optics;
+mod raster;
 mod render;
+mod single_lens;
+mod triangle;
 
 mod image;
 

@@ -1,6 +1,9 @@
 //! Depth images of shapes whose depth is known.
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use parry3d::glamx::Vec3;
+use parry3d::query::{Ray, RayCast};
+use parry3d::shape::TriMesh;
 use ppa_depth::{
     Body, BodyError, Camera, CameraModel, CameraSpec, DepthImage, DepthMode, MeshBody, PlacedBody,
     SurfelBody, render,
@@ -381,4 +384,88 @@ fn what_is_no_surface_is_refused() {
         BodyError::Normal { index: 0, .. }
     ));
     assert_eq!(cloud(&[Vector3::z()], 0.0), BodyError::Radius(0.0));
+}
+
+/// Vertices, triangles and pose.
+type Placed<'a> = (&'a [Point3<f32>], &'a [[u32; 3]], Isometry3<f64>);
+
+/// parry3d's own triangle mesh and ray test, in single precision, on the same scene: bumpy bodies before a tilted wall whose
+/// triangles reach far outside the image, through the distortion of a wide camera.
+#[test]
+fn the_image_is_that_of_ray_casting_by_parry() {
+    let camera = {
+        let mut spec = CameraSpec::azure_kinect(DepthMode::WfovBinned);
+        spec.metric_radius = Some(1.2);
+        Camera::try_from(spec).unwrap()
+    };
+    let (ball, ball_triangles) = bumpy(6);
+    // Facets of some 50 pixels, whose edges bow by several.
+    let (coarse, coarse_triangles) = bumpy(1);
+    let wall = [(-9e3, -7e3), (8e3, -9e3), (7e3, 9e3), (-8e3, 8e3)]
+        .map(|(x, y)| Point3::new(x, y, 1500.0 + 0.1 * x - 0.05 * y));
+    let scene: [Placed; 3] = [
+        (&wall, &[[0, 1, 2], [0, 2, 3]], Isometry3::identity()),
+        (
+            &ball,
+            &ball_triangles,
+            Isometry3::new(
+                Vector3::new(-40.0, 10.0, 300.0),
+                Vector3::new(0.3, 0.2, -1.0),
+            ),
+        ),
+        (
+            &coarse,
+            &coarse_triangles,
+            Isometry3::new(
+                Vector3::new(120.0, 80.0, 120.0),
+                Vector3::new(2.0, -0.2, 1.0),
+            ),
+        ),
+    ];
+    let bodies: Vec<Body> = scene
+        .iter()
+        .map(|(vertices, triangles, _)| MeshBody::new(vertices, triangles).unwrap().into())
+        .collect();
+    let placed: Vec<_> = bodies
+        .iter()
+        .zip(&scene)
+        .map(|(body, &(_, _, camera_from_body))| PlacedBody {
+            body,
+            camera_from_body,
+        })
+        .collect();
+    let image = render(&camera, &placed);
+
+    let meshes = scene.map(|(vertices, triangles, camera_from_body)| {
+        let corners = vertices.iter().map(|vertex| {
+            let corner = (camera_from_body * vertex.cast::<f64>()).cast::<f32>();
+            Vec3::new(corner.x, corner.y, corner.z)
+        });
+        TriMesh::new(corners.collect(), triangles.to_vec()).unwrap()
+    });
+    let cast = |slopes: &nalgebra::Vector2<f64>| {
+        let ray = Ray::new(Vec3::ZERO, Vec3::new(slopes.x as f32, slopes.y as f32, 1.0));
+        let hits = meshes
+            .iter()
+            .filter_map(|mesh| mesh.cast_local_ray(&ray, 1e6, false));
+        hits.reduce(f32::min)
+    };
+    let (mut hits, mut jumps, mut worst_mm) = (0, 0, 0.0_f32);
+    for (ray, &z_mm) in camera.rays().iter().zip(&image.z_mm) {
+        let expected = ray.as_ref().and_then(cast).unwrap_or(0.0);
+        assert_eq!(
+            z_mm > 0.0,
+            expected > 0.0,
+            "{ray:?}: {z_mm} and {expected} mm"
+        );
+        hits += usize::from(z_mm > 0.0);
+        // At the rim of a body single precision may see past it.
+        if (z_mm - expected).abs() > 1.0 {
+            jumps += 1;
+        } else {
+            worst_mm = worst_mm.max((z_mm - expected).abs());
+        }
+    }
+    println!("{hits} hits, {jumps} on the other side of a rim, else within {worst_mm} mm");
+    assert!(hits > 140_000 && jumps == 0 && worst_mm < 0.002);
 }
