@@ -1,11 +1,9 @@
 //! Density-based clustering of points.
 
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
-use linfa::prelude::{ParamGuard, Transformer};
-use linfa_clustering::Dbscan;
 use nalgebra::Point3;
-use ndarray16::Array2;
-use rayon::prelude::*;
+
+use crate::point_cells::PointCells;
+use crate::topology::{join, root};
 
 /// Outcome of [`dbscan`].
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -31,38 +29,79 @@ impl Clusters {
 /// within `eps_mm` are core points, core points that near to each other share a cluster, and other
 /// points near a core point join its cluster; the rest is noise.
 ///
-/// The clusters of core points and the noise do not depend on the order of the points; a border point
-/// between two clusters joins the one found first. Time grows with the number of points
-/// times the points within `eps_mm`: 200 000 surface points take about a second. Points that are not
+/// Clusters are numbered by their first core point, and a border point between several joins the
+/// first of them. Memory grows with the number of points, time with that number times the points
+/// within `eps_mm`: 700 000 points of a skin take about 0.15 s of processor time. Points that are not
 /// finite are noise; a radius that is not positive leaves every point alone.
 pub fn dbscan(points: &[Point3<f32>], eps_mm: f64, min_points: usize) -> Clusters {
-    let finite: Vec<usize> = (0..points.len())
-        .filter(|&i| points[i].coords.iter().all(|c| c.is_finite()))
-        .collect();
-    let rows: Vec<[f64; 3]> = finite
-        .iter()
-        .map(|&i| points[i].cast::<f64>().into())
-        .collect();
+    if !(eps_mm > 0.0 && eps_mm.is_finite()) {
+        return alone(points, min_points);
+    }
+    let cells = PointCells::new(points, eps_mm);
+    let core = cells.map(|place, rows| {
+        let mut around = 0;
+        rows.iter().any(|row| {
+            around += row
+                .clone()
+                .filter(|&other| cells.near(place, other))
+                .count();
+            around >= min_points
+        }) || min_points == 0
+    });
+
+    let mut parent: Vec<u32> = (0..core.len() as u32).collect();
+    cells.for_each(|places, rows| {
+        for a in places.filter(|&a| core[a]) {
+            for row in [&(rows[0].start..a)].into_iter().chain(&rows[5..]) {
+                let mut from = row.start;
+                // Those before are joined to each other by now: after the first that is near, parents agree.
+                while let Some(other) = (parent[from..row.end].iter()).position(|&p| p != parent[a])
+                {
+                    let b = from + other;
+                    if core[b] && cells.near(a, b) {
+                        join(&mut parent, a as u32, b as u32);
+                    }
+                    from = b + 1;
+                }
+            }
+        }
+    });
+
     let mut clusters = Clusters {
         labels: vec![None; points.len()],
         core: vec![false; points.len()],
         ..Clusters::default()
     };
-    let labels = cluster_rows(&rows, eps_mm, min_points.max(2));
-    let core = core_rows(&rows, eps_mm, min_points);
-    for (row, &point) in finite.iter().enumerate() {
-        clusters.labels[point] = labels[row];
-        clusters.core[point] = core[row];
+    let mut place_of = vec![u32::MAX; points.len()];
+    for (place, &point) in cells.original().iter().enumerate() {
+        place_of[point as usize] = place as u32;
     }
-    let mut count = labels.iter().flatten().max().map_or(0, |&last| last + 1);
-    if min_points < 2 {
-        // linfa asks for 2 or more; with fewer, a lone point is a cluster of its own.
-        for &point in &finite {
-            clusters.labels[point].get_or_insert_with(|| {
+    let mut number_of_root = vec![u32::MAX; core.len()];
+    let mut count = 0;
+    for (point, &place) in place_of.iter().enumerate() {
+        if core.get(place as usize) == Some(&true) {
+            let number = &mut number_of_root[root(&mut parent, place) as usize];
+            if *number == u32::MAX {
+                *number = count;
                 count += 1;
-                count - 1
-            });
+            }
+            clusters.core[point] = true;
+            clusters.labels[point] = Some(*number);
         }
+    }
+    let original = |place: usize| cells.original()[place] as usize;
+    let joined = cells.map(|place, rows| {
+        let around = rows.iter().cloned().flatten();
+        let core_around = around.filter(|&other| core[other] && cells.near(place, other));
+        match core[place] {
+            true => clusters.labels[original(place)],
+            false => core_around
+                .filter_map(|other| clusters.labels[original(other)])
+                .min(),
+        }
+    });
+    for (place, label) in joined.into_iter().enumerate() {
+        clusters.labels[original(place)] = label;
     }
     clusters.sizes = vec![0; count as usize];
     for &label in clusters.labels.iter().flatten() {
@@ -72,36 +111,22 @@ pub fn dbscan(points: &[Point3<f32>], eps_mm: f64, min_points: usize) -> Cluster
     clusters
 }
 
-fn cluster_rows(rows: &[[f64; 3]], eps_mm: f64, min_points: usize) -> Vec<Option<u32>> {
-    let table = Array2::from_shape_fn((rows.len(), 3), |(row, axis)| rows[row][axis]);
-    match Dbscan::params(min_points).tolerance(eps_mm).check() {
-        Ok(valid) if eps_mm.is_finite() && !rows.is_empty() => valid
-            .transform(&table)
-            .into_iter()
-            .map(|label| label.map(|cluster| cluster as u32))
-            .collect(),
-        _ => vec![None; rows.len()],
+/// Points without neighbours: clusters of their own if that is enough, else noise.
+fn alone(points: &[Point3<f32>], min_points: usize) -> Clusters {
+    let core: Vec<bool> = points
+        .iter()
+        .map(|point| min_points < 2 && point.coords.iter().all(|c| c.is_finite()))
+        .collect();
+    let numbers = core.iter().scan(0, |next, &core| {
+        *next += u32::from(core);
+        Some(core.then(|| *next - 1))
+    });
+    let labels: Vec<Option<u32>> = numbers.collect();
+    let count = labels.iter().flatten().count();
+    Clusters {
+        labels,
+        core,
+        sizes: vec![1; count],
+        noise: points.len() - count,
     }
-}
-
-fn core_rows(rows: &[[f64; 3]], eps_mm: f64, min_points: usize) -> Vec<bool> {
-    if min_points < 2 {
-        return vec![true; rows.len()];
-    }
-    if !(eps_mm > 0.0 && eps_mm.is_finite()) || rows.is_empty() {
-        return vec![false; rows.len()];
-    }
-    let Ok(tree) = ImmutableKdTree::<f64, 3>::new_from_slice(rows) else {
-        return vec![false; rows.len()];
-    };
-    rows.par_iter()
-        .map(|row| {
-            let near = tree
-                .query(row)
-                .within::<SquaredEuclidean<f64>>(eps_mm * eps_mm)
-                .unsorted()
-                .execute();
-            near.len() >= min_points
-        })
-        .collect()
 }

@@ -18,6 +18,7 @@ mod limb;
 mod mesh;
 mod neighbours;
 mod ply;
+mod point_cells;
 mod surface;
 mod topology;
 

@@ -35,8 +35,6 @@ use tissue::{TISSUE, Tissue};
 
 /// A body weighs half as much when the side faces cut it through about half its size.
 const SIDE_CUT_WEIGHT: f64 = 2.0;
-/// At most this many surface points are clustered; more are thinned evenly first.
-const MAX_CLUSTER_POINTS: usize = 20_000;
 
 /// Hounsfield units in a type that a volume keeps them in.
 trait Hu: Copy + Into<f32> + Send + Sync {}
@@ -283,19 +281,18 @@ fn body_at(
 
 /// The largest connected piece of the main cluster of surface points.
 fn one_piece(surface: &Mesh, settings: &LimbSettings, report: &mut LimbReport) -> Mesh {
-    let step = surface.vertices.len().div_ceil(MAX_CLUSTER_POINTS).max(1);
-    let sample: Vec<usize> = (0..surface.vertices.len()).step_by(step).collect();
-    let points: Vec<Point3<f32>> = sample.iter().map(|&v| surface.vertices[v]).collect();
-    // A sample is thinner: the radius grows so that as many points lie around each.
-    let eps_mm = settings.dbscan_eps_mm * (step as f64).sqrt();
-    let clusters = dbscan(&points, eps_mm, settings.dbscan_min_points);
+    let clusters = dbscan(
+        &surface.vertices,
+        settings.dbscan_eps_mm,
+        settings.dbscan_min_points,
+    );
     report.clusters = clusters.sizes.len();
     let pieces = surface.vertex_components();
     let main = (0..clusters.sizes.len()).max_by_key(|&c| (clusters.sizes[c], usize::MAX - c));
     let mut in_main = vec![0_usize; pieces.len()];
-    for (&vertex, label) in sample.iter().zip(&clusters.labels) {
+    for (&piece, label) in pieces.iter().zip(&clusters.labels) {
         if label.map(|c| c as usize) == main {
-            in_main[pieces[vertex] as usize] += 1;
+            in_main[piece as usize] += 1;
         }
     }
     let kept = (0..in_main.len()).max_by_key(|&p| (in_main[p], usize::MAX - p));

@@ -1,6 +1,9 @@
-//! DBSCAN against its definition.
+//! DBSCAN against its definition and against linfa's.
 
+use linfa::prelude::{ParamGuard, Transformer};
+use linfa_clustering::Dbscan;
 use nalgebra::Point3;
+use ndarray16::Array2;
 use ppa_mesh::dbscan;
 use proptest::prelude::*;
 
@@ -42,6 +45,22 @@ proptest! {
         let roots = (0..n).filter(|&a| core[a] && component[a] == a).count();
         prop_assert_eq!(clusters.sizes.len(), roots);
     }
+
+    /// Core partition, border points and noise of a cloud without equal distances, and with the
+    /// numbers that linfa gives them.
+    #[test]
+    fn clusters_are_those_of_linfa(
+        places in prop::collection::vec(prop::array::uniform3(-20.0..20.0_f32), 1..400),
+        min_points in 2..9_usize,
+        eps in 0.5..30.0_f64,
+    ) {
+        let points: Vec<Point3<f32>> = places.iter().map(|&p| p.into()).collect();
+        let table = Array2::from_shape_fn((places.len(), 3), |(row, axis)| f64::from(places[row][axis]));
+        let linfa = Dbscan::params(min_points).tolerance(eps).check().expect("parameters");
+        let expected: Vec<Option<u32>> =
+            linfa.transform(&table).iter().map(|label| label.map(|c| c as u32)).collect();
+        prop_assert_eq!(dbscan(&points, eps, min_points).labels, expected);
+    }
 }
 
 #[test]
@@ -58,4 +77,8 @@ fn odd_input_is_noise() {
     );
     assert_eq!(dbscan(&points, f64::NAN, 2).noise, 3);
     assert_eq!(dbscan(&[], 1.0, 2).sizes, Vec::<usize>::new());
+    // Far more cells apart than a key can tell.
+    let far = [-1e30, 0.0, 1e-30, 1e30, 1e30].map(|x| Point3::new(x, 0.0, -x));
+    let labels = dbscan(&far, 1e-20, 2).labels;
+    assert_eq!(labels, [None, Some(0), Some(0), Some(1), Some(1)]);
 }
