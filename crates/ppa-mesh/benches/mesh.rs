@@ -3,7 +3,10 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use linfa::prelude::{ParamGuard, Transformer};
+use linfa_clustering::Dbscan;
 use nalgebra::{Point3, Vector3};
+use ndarray16::Array2;
 use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_ct::{Grid, Volume};
 use ppa_mesh::{Border, LimbSettings, dbscan, extract_limb, iso_surface};
@@ -41,6 +44,14 @@ fn benches(c: &mut Criterion) {
     group.throughput(Throughput::Elements(skin.vertices.len() as u64));
     group.bench_function("surface_points", |b| {
         b.iter(|| dbscan(black_box(&skin.vertices), 4.0, 8));
+    });
+    // The library that ours stands in for.
+    let table = Array2::from_shape_fn((skin.vertices.len(), 3), |(row, axis)| {
+        f64::from(skin.vertices[row][axis])
+    });
+    group.bench_function("surface_points_linfa", |b| {
+        let parameters = Dbscan::params(8).tolerance(4.0).check().expect("positive");
+        b.iter(|| parameters.transform(black_box(&table)));
     });
     group.finish();
 
