@@ -9,8 +9,11 @@
 //! z forward (OpenCV). Depth is the z coordinate of the surface, not the length of the ray; 0 means that a pixel saw
 //! nothing. Row-major images, first row at the top.
 //!
-//! Left out: the sensor (noise, flying pixels, multipath): these are ideal ranges of the surface at pixel centres.
-//! Repeatable: the image depends on the scene only, whatever the number of threads.
+//! [`render`] gives ideal depths at pixel centres. [`Backdrop`] renders what stands still once, with samples inside the
+//! pixels; a [`Sensor`] makes of it what a Time-of-Flight device might: random and systematic error, mixed pixels, pixels
+//! given up, one bounce of light. Nobody can say how close that is to a device before [`fit_noise`] has seen a recording of it.
+//!
+//! Repeatable: images depend on scene and seeds only, whatever the number of threads.
 //!
 //! ```
 //! use nalgebra::{Isometry3, Point3};
@@ -50,11 +53,23 @@ mod render;
 mod single_lens;
 mod triangle;
 
+mod sampled;
+mod surface;
+
+mod fit_noise;
+mod multipath;
+mod random;
+mod sensor;
+mod sensor_spec;
+mod tremor;
+
 mod image;
 
 mod atomic;
 mod exr_file;
 mod png_file;
+mod points_file;
+mod preview;
 
 mod roi;
 
@@ -62,11 +77,18 @@ pub use body::{Body, BodyError, PlacedBody};
 pub use camera::Camera;
 pub use depth_mode::DepthMode;
 pub use field_mask::FieldMask;
+pub use fit_noise::{FitError, NoiseFit, fit_noise};
 pub use image::{DepthError, DepthImage, DepthU16};
 pub use mesh_body::MeshBody;
 pub use render::render;
 pub use rig::{MountedCamera, RigError, RigSpec};
 pub use rigid::{RigidError, isometry_from_rows, rows_from_isometry};
 pub use roi::{Roi, RoiError, roi_around};
+pub use sampled::{Backdrop, SampledImage};
+pub use sensor::Sensor;
+pub use sensor_spec::{
+    Invalidation, MixedPixels, Multipath, RandomError, SensorError, SensorSpec, SystematicError,
+};
 pub use spec::{CameraError, CameraModel, CameraSpec};
 pub use surfel_body::SurfelBody;
+pub use tremor::Tremor;

@@ -4,13 +4,16 @@
 //! each the exact ray of the pixel is tested in double precision. So distortion is exact, and edges are those of the triangle
 //! although they bow in the image.
 
-use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
+use std::ops::Range;
+
+use nalgebra::{Isometry3, Matrix3, Point3, Vector2, Vector3};
 use rayon::prelude::*;
 
 use crate::camera::Camera;
 use crate::depth_buffer::DepthBuffer;
 use crate::mesh_body::MeshBody;
 use crate::optics::Optics;
+use crate::sampled::{SAMPLES, Sites};
 use crate::single_lens::{Corner, SingleLens};
 use crate::triangle::Triangle;
 
@@ -18,6 +21,24 @@ use crate::triangle::Triangle;
 const ROUNDING: f32 = 1e-5;
 /// Triangles or corners that a thread takes at a time.
 const CHUNK: usize = 1 << 14;
+
+/// How far the rays of samples may lie beside their place in the image, pixels.
+const SAMPLE_SLACK_PX: f32 = 0.005;
+
+/// Where in the image a triangle may be.
+enum Outline {
+    /// Anywhere: it reaches behind the camera or far outside the image.
+    Unknown,
+    /// Within some columns and rows, and `slack` pixels around its straight edges.
+    Within {
+        corners: [Corner; 3],
+        slack: f32,
+        columns: Range<u32>,
+        rows: Range<u32>,
+        /// No part of it is nearer than this, mm.
+        nearest: f32,
+    },
+}
 
 /// A mesh as the camera sees it.
 pub(crate) struct SeenMesh<'a> {
@@ -74,30 +95,61 @@ impl<'a> SeenMesh<'a> {
         });
     }
 
+    /// Offers the depth of every triangle at all samples of the sites it covers.
+    pub(crate) fn draw_samples(&self, sites: &Sites) {
+        self.mesh.triangles.par_chunks(CHUNK).for_each(|triangles| {
+            for triangle in triangles {
+                self.sample_triangle(triangle, sites);
+            }
+        });
+    }
+
+    /// The part of the image that a triangle may cover, each pixel widened by `reach` on all sides.
     #[inline]
-    fn draw_triangle(&self, triangle: &[u32; 3], buffer: &DepthBuffer) {
-        let [a, b, c] = triangle.map(|corner| self.corners[corner as usize]);
+    fn outline(&self, triangle: &[u32; 3], reach: f32) -> Outline {
+        let corners @ [a, b, c] = triangle.map(|corner| self.corners[corner as usize]);
+        if (a[2] + b[2] + c[2]).is_nan() {
+            return Outline::Unknown;
+        }
         let low = [0, 1, 2].map(|i| a[i].min(b[i]).min(c[i]));
         let high = [0, 1].map(|i| a[i].max(b[i]).max(c[i]));
-        if (a[2] + b[2] + c[2]).is_nan() {
-            return self.draw_anywhere(triangle, buffer);
-        }
         let (du, dv) = (high[0] - low[0], high[1] - low[1]);
         let slack = self.rounding_px
             + self.optics.stretch as f32 * self.rounding_mm / low[2]
             + self.optics.bow as f32 * (du * du + dv * dv);
-        let columns = centres(low[0] - slack, high[0] + slack, self.camera.width());
-        let rows = centres(low[1] - slack, high[1] + slack, self.camera.height());
-        if columns.is_empty() || rows.is_empty() {
-            return;
+        let wide = slack + reach;
+        Outline::Within {
+            corners,
+            slack,
+            columns: centres(low[0] - wide, high[0] + wide, self.camera.width()),
+            rows: centres(low[1] - wide, high[1] + wide, self.camera.height()),
+            nearest: low[2] * (1.0 - ROUNDING) - self.rounding_mm,
         }
-        let nearest = low[2] * (1.0 - ROUNDING) - self.rounding_mm;
+    }
+
+    #[inline]
+    fn draw_triangle(&self, triangle: &[u32; 3], buffer: &DepthBuffer) {
+        let Outline::Within {
+            corners,
+            slack,
+            columns,
+            rows,
+            nearest,
+        } = self.outline(triangle, 0.0)
+        else {
+            let rays = self.optics.rays.iter().enumerate();
+            return self.draw_anywhere(
+                triangle,
+                buffer,
+                rays.filter_map(|(i, ray)| Some((i, (*ray)?))),
+            );
+        };
         let mut exact = None;
         for row in rows {
             for column in columns.clone() {
                 let pixel = (row * self.camera.width() + column) as usize;
                 let centre = [column as f32, row as f32];
-                if buffer.nearest(pixel) <= nearest || misses([a, b, c], centre, slack) {
+                if buffer.nearest(pixel) <= nearest || misses(corners, centre, slack) {
                     continue;
                 }
                 let exact = exact.get_or_insert_with(|| self.exact(triangle));
@@ -110,8 +162,54 @@ impl<'a> SeenMesh<'a> {
         }
     }
 
+    #[inline]
+    fn sample_triangle(&self, triangle: &[u32; 3], sites: &Sites) {
+        let Outline::Within {
+            corners,
+            slack,
+            columns,
+            rows,
+            nearest,
+        } = self.outline(triangle, 0.5)
+        else {
+            let all = sites.sites.iter().enumerate();
+            let rays = all.flat_map(|(i, site)| {
+                (0..SAMPLES).map(move |k| (i * SAMPLES + k, site.sample(k).1))
+            });
+            return self.draw_anywhere(triangle, &sites.buffer, rays);
+        };
+        // The rays of samples follow the lens to first order only.
+        let slack = slack + SAMPLE_SLACK_PX;
+        let mut exact = None;
+        for row in rows {
+            for column in columns.clone() {
+                let site = sites.of_pixel[(row * self.camera.width() + column) as usize];
+                let Some(seen) = sites.sites.get(site as usize) else {
+                    continue;
+                };
+                for k in 0..SAMPLES {
+                    let index = site as usize * SAMPLES + k;
+                    let ([du, dv], ray) = seen.sample(k);
+                    let at = [column as f32 + du as f32, row as f32 + dv as f32];
+                    if sites.buffer.nearest(index) <= nearest || misses(corners, at, slack) {
+                        continue;
+                    }
+                    let exact = exact.get_or_insert_with(|| self.exact(triangle));
+                    if let Some(z_mm) = exact.depth(&ray) {
+                        sites.buffer.offer(index, z_mm as f32);
+                    }
+                }
+            }
+        }
+    }
+
     /// A triangle that cannot be projected as a whole, because it is large and reaches behind the camera or far outside.
-    fn draw_anywhere(&self, triangle: &[u32; 3], buffer: &DepthBuffer) {
+    fn draw_anywhere(
+        &self,
+        triangle: &[u32; 3],
+        buffer: &DepthBuffer,
+        rays: impl Iterator<Item = (usize, Vector2<f64>)>,
+    ) {
         let corners = triangle.map(|corner| self.in_camera(corner));
         let [low, high] = self.optics.bounds;
         // How far a corner is beyond each side of the field of view, and behind the camera.
@@ -129,11 +227,9 @@ impl<'a> SeenMesh<'a> {
             return;
         }
         let exact = Triangle::new(corners);
-        for (pixel, ray) in self.optics.rays.iter().enumerate() {
-            if let Some(ray) = ray
-                && let Some(z_mm) = exact.depth(ray)
-            {
-                buffer.offer(pixel, z_mm as f32);
+        for (index, ray) in rays {
+            if let Some(z_mm) = exact.depth(&ray) {
+                buffer.offer(index, z_mm as f32);
             }
         }
     }
@@ -150,7 +246,7 @@ impl<'a> SeenMesh<'a> {
 
 /// Whole numbers in [low, high] that are columns or rows of the image.
 #[inline]
-fn centres(low: f32, high: f32, count: u32) -> std::ops::Range<u32> {
+fn centres(low: f32, high: f32, count: u32) -> Range<u32> {
     // Truncation is a single instruction where ceil and floor are calls.
     let low = low.max(0.0);
     let first = low as u32;

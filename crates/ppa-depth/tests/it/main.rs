@@ -4,4 +4,5 @@ mod calibration;
 mod camera;
 mod reference;
 mod render;
+mod sensor;
 mod shapes;

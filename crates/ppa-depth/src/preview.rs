@@ -1,0 +1,76 @@
+//! A depth image to look at: false colour, 8 bits.
+
+use std::path::Path;
+
+use crate::atomic::write_whole;
+use crate::image::{DepthError, DepthImage};
+
+impl DepthImage {
+    /// Writes a PNG in false colour: near red, far blue, nothing black; from the 1st to the 99th percentile of the depths.
+    ///
+    /// # Errors
+    /// [`DepthError::Write`] names the file; [`DepthError::Length`] for a buffer that does not fit the size;
+    /// [`DepthError::NothingVisible`] for an image without depths.
+    pub fn write_preview(&self, path: &Path) -> Result<(), DepthError> {
+        self.check_length()?;
+        self.require_visible()?;
+        let [near, far] = self.percentiles([0.01, 0.99]);
+        let pixels = self.z_mm.iter().flat_map(|&z_mm| {
+            let t = f64::from((far - z_mm) / (far - near).max(1.0)).clamp(0.0, 1.0);
+            // The dark ends of the scale would look like black.
+            let colour = colorous::TURBO.eval_continuous(0.1 + 0.8 * t);
+            if z_mm > 0.0 {
+                colour.into_array()
+            } else {
+                [0; 3]
+            }
+        });
+        let bytes: Vec<u8> = pixels.collect();
+        write_whole(path, |writer| {
+            let mut encoder = png::Encoder::new(writer, self.width, self.height);
+            encoder.set_color(png::ColorType::Rgb);
+            let mut image = encoder.write_header()?;
+            image.write_image_data(&bytes)?;
+            Ok(image.finish()?)
+        })
+        .map_err(|source| DepthError::Write {
+            path: path.into(),
+            source,
+        })
+    }
+
+    fn percentiles(&self, shares: [f64; 2]) -> [f32; 2] {
+        let mut depths: Vec<f32> = self.z_mm.iter().copied().filter(|z| *z > 0.0).collect();
+        depths.sort_unstable_by(f32::total_cmp);
+        shares.map(|share| depths[(share * (depths.len() - 1) as f64).round() as usize])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn near_is_red_far_is_blue_and_nothing_black() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("preview.png");
+        let image = DepthImage {
+            width: 3,
+            height: 1,
+            z_mm: vec![900.0, 0.0, 1200.0],
+        };
+        image.write_preview(&path).unwrap();
+        let file = std::io::BufReader::new(std::fs::File::open(&path).unwrap());
+        let mut reader = png::Decoder::new(file).read_info().unwrap();
+        let mut rgb = [0; 9];
+        reader.next_frame(&mut rgb).unwrap();
+        let [[r, _, b], nothing, [r_far, _, b_far]] = *rgb.as_chunks::<3>().0 else {
+            unreachable!()
+        };
+        assert!(r > b && b_far > r_far && nothing == [0; 3]);
+        assert!(matches!(
+            DepthImage::empty(2, 2).write_preview(&path),
+            Err(DepthError::NothingVisible { .. })
+        ));
+    }
+}

@@ -1,0 +1,206 @@
+//! Images with samples inside the pixels at edges, where a pixel sees two surfaces at once.
+
+use nalgebra::{Matrix2, Point3, Vector2};
+
+use crate::body::{Body, PlacedBody};
+use crate::camera::Camera;
+use crate::depth_buffer::DepthBuffer;
+use crate::image::{DepthError, DepthImage};
+use crate::raster::SeenMesh;
+use crate::render::{SeenSurfels, render};
+
+/// Samples per pixel at an edge.
+pub(crate) const SAMPLES: usize = 8;
+
+/// Where they lie from the pixel's centre, in pixels: one in each of eight columns and rows.
+const OFFSETS: [[f64; 2]; SAMPLES] = {
+    let rows = [3.0, 6.0, 1.0, 4.0, 7.0, 0.0, 5.0, 2.0];
+    let mut offsets = [[0.0; 2]; SAMPLES];
+    let mut i = 0;
+    while i < SAMPLES {
+        offsets[i] = [(i as f64 + 0.5) / 8.0 - 0.5, (rows[i] + 0.5) / 8.0 - 0.5];
+        i += 1;
+    }
+    offsets
+};
+
+/// Neighbouring depths further apart than this, mm, have an edge between them.
+pub(crate) const EDGE_MM: f32 = 8.0;
+
+/// What stands still: rendered once per camera, then merged with what moves before it.
+#[derive(Debug, Clone)]
+pub struct Backdrop {
+    /// Depth at the centres of the pixels.
+    pub image: DepthImage,
+    /// Depths inside each pixel, 0 for nothing.
+    samples: Vec<[f32; SAMPLES]>,
+}
+
+/// A depth image and, at its edges, depths inside the pixels.
+#[derive(Debug, Clone)]
+pub struct SampledImage {
+    /// Depth at the centres of the pixels.
+    pub image: DepthImage,
+    /// Pixels at edges in rising order, and the depths inside them, 0 for nothing.
+    pub(crate) edges: Vec<(u32, [f32; SAMPLES])>,
+}
+
+/// A pixel that is sampled.
+pub(crate) struct Site {
+    pub pixel: u32,
+    ray: Vector2<f64>,
+    ray_from_pixel: Matrix2<f64>,
+}
+
+impl Site {
+    fn new(camera: &Camera, pixel: u32) -> Option<Self> {
+        let ray = camera.rays()[pixel as usize]?;
+        let at = Point3::new(ray.x, ray.y, 1.0);
+        let (_, slope) = camera.project_with_jacobian(&at)?;
+        let ray_from_pixel = slope.try_inverse()?;
+        Some(Self {
+            pixel,
+            ray,
+            ray_from_pixel,
+        })
+    }
+
+    /// Offset of a sample from the pixel's centre, and its ray; within a pixel the lens is linear to 1e-3 pixels.
+    #[inline]
+    pub(crate) fn sample(&self, index: usize) -> ([f64; 2], Vector2<f64>) {
+        let offset = OFFSETS[index];
+        (
+            offset,
+            self.ray + self.ray_from_pixel * Vector2::from(offset),
+        )
+    }
+}
+
+/// Which pixels are sampled, and what has been seen there.
+pub(crate) struct Sites {
+    pub sites: Vec<Site>,
+    /// Site of each pixel, `u32::MAX` for none.
+    pub of_pixel: Vec<u32>,
+    pub buffer: DepthBuffer,
+}
+
+impl Sites {
+    fn new(camera: &Camera, pixels: impl Iterator<Item = u32>) -> Self {
+        let sites: Vec<Site> = pixels
+            .filter_map(|pixel| Site::new(camera, pixel))
+            .collect();
+        let mut of_pixel = vec![u32::MAX; camera.rays().len()];
+        for (index, site) in sites.iter().enumerate() {
+            of_pixel[site.pixel as usize] = index as u32;
+        }
+        let buffer = DepthBuffer::empty(sites.len() * SAMPLES);
+        Self {
+            sites,
+            of_pixel,
+            buffer,
+        }
+    }
+
+    fn draw(&self, camera: &Camera, bodies: &[PlacedBody]) {
+        for PlacedBody {
+            body,
+            camera_from_body,
+        } in bodies
+        {
+            match body {
+                Body::Mesh(mesh) => {
+                    SeenMesh::new(camera, mesh, camera_from_body).draw_samples(self);
+                }
+                Body::Surfels(surfels) => {
+                    let rays: Vec<_> = self
+                        .sites
+                        .iter()
+                        .flat_map(|site| (0..SAMPLES).map(|k| Some(site.sample(k).1)))
+                        .collect();
+                    SeenSurfels::new(surfels, camera_from_body).cast(&rays, &self.buffer);
+                }
+            }
+        }
+    }
+
+    /// Pixels and the depths inside them.
+    fn into_depths(self) -> impl Iterator<Item = (u32, [f32; SAMPLES])> {
+        let depths = self.buffer.into_depths();
+        let at = move |(index, site): (usize, Site)| {
+            let start = index * SAMPLES;
+            (site.pixel, std::array::from_fn(|k| depths[start + k]))
+        };
+        self.sites.into_iter().enumerate().map(at)
+    }
+}
+
+impl Backdrop {
+    /// Renders what stands still. Takes a while: every pixel is sampled.
+    pub fn new(camera: &Camera, bodies: &[PlacedBody]) -> Self {
+        let pixels = camera.rays().len();
+        let sites = Sites::new(camera, 0..pixels as u32);
+        sites.draw(camera, bodies);
+        let mut samples = vec![[0.0; SAMPLES]; pixels];
+        for (pixel, depths) in sites.into_depths() {
+            samples[pixel as usize] = depths;
+        }
+        Self {
+            image: render(camera, bodies),
+            samples,
+        }
+    }
+
+    /// The bodies before the backdrop, with samples inside the pixels at edges.
+    ///
+    /// # Errors
+    /// [`DepthError::SizeMismatch`] if the backdrop is another camera's, [`DepthError::NothingVisible`] if no pixel sees the
+    /// bodies.
+    pub fn before(
+        &self,
+        camera: &Camera,
+        bodies: &[PlacedBody],
+    ) -> Result<SampledImage, DepthError> {
+        let limb = render(camera, bodies);
+        limb.require_visible()?;
+        let image = DepthImage::nearer_of(&self.image, &limb)?;
+        let sites = Sites::new(camera, edges(&image).into_iter());
+        sites.draw(camera, bodies);
+        let merged = |(pixel, depths): (u32, [f32; SAMPLES])| {
+            let behind = &self.samples[pixel as usize];
+            (pixel, std::array::from_fn(|k| nearer(depths[k], behind[k])))
+        };
+        Ok(SampledImage {
+            image,
+            edges: sites.into_depths().map(merged).collect(),
+        })
+    }
+}
+
+fn nearer(a: f32, b: f32) -> f32 {
+    match (a > 0.0, b > 0.0) {
+        (true, true) => a.min(b),
+        (true, false) => a,
+        _ => b,
+    }
+}
+
+/// Pixels whose right or lower neighbour is much nearer or further, and those neighbours, in rising order.
+fn edges(image: &DepthImage) -> Vec<u32> {
+    let (width, z_mm) = (image.width as usize, &image.z_mm);
+    let mut at_edge = vec![false; z_mm.len()];
+    let apart = |a: f32, b: f32| (a > 0.0) != (b > 0.0) || (a - b).abs() > EDGE_MM;
+    for pixel in 0..z_mm.len() {
+        let right = (pixel % width + 1 < width).then_some(pixel + 1);
+        let below = (pixel + width < z_mm.len()).then_some(pixel + width);
+        for neighbour in [right, below].into_iter().flatten() {
+            if apart(z_mm[pixel], z_mm[neighbour]) {
+                (at_edge[pixel], at_edge[neighbour]) = (true, true);
+            }
+        }
+    }
+    let pixels = at_edge.iter().enumerate();
+    pixels
+        .filter(|(_, at)| **at)
+        .map(|(i, _)| i as u32)
+        .collect()
+}

@@ -1,0 +1,364 @@
+//! What the sensor model makes of scenes whose answer can be derived.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use ppa_depth::{
+    Backdrop, Body, Camera, CameraModel, CameraSpec, DepthImage, DepthMode, FieldMask, FitError,
+    Invalidation, MeshBody, MixedPixels, Multipath, PlacedBody, RandomError, SampledImage, Sensor,
+    SensorError, SensorSpec, SystematicError, Tremor, fit_noise,
+};
+
+use crate::shapes::sphere;
+
+const NONE: SensorSpec = SensorSpec {
+    random: None,
+    systematic: None,
+    mixed: None,
+    invalid: None,
+    multipath: None,
+};
+
+fn pinhole(side: u32, focal: f64) -> CameraSpec {
+    let centre = f64::from(side - 1) / 2.0;
+    CameraSpec {
+        model: CameraModel::Pinhole,
+        width: side,
+        height: side,
+        fx: focal,
+        fy: focal,
+        cx: centre,
+        cy: centre,
+        k1: 0.0,
+        k2: 0.0,
+        k3: 0.0,
+        k4: 0.0,
+        k5: 0.0,
+        k6: 0.0,
+        p1: 0.0,
+        p2: 0.0,
+        metric_radius: None,
+        ..CameraSpec::azure_kinect(DepthMode::NfovBinned)
+    }
+}
+
+/// A rectangle from (x0, −9 m) to (x1, 9 m), square to the axis at depth `z_mm`.
+fn wall(x0: f32, x1: f32, z_mm: f32) -> Body {
+    let corners =
+        [(x0, -9e3), (x1, -9e3), (x1, 9e3), (x0, 9e3)].map(|(x, y)| Point3::new(x, y, z_mm));
+    MeshBody::new(&corners, &[[0, 1, 2], [0, 2, 3]])
+        .unwrap()
+        .into()
+}
+
+fn view(camera: &Camera, behind: &[&Body], before: &Body) -> SampledImage {
+    let placed = |body| PlacedBody {
+        body,
+        camera_from_body: Isometry3::identity(),
+    };
+    let backdrop: Vec<_> = behind.iter().map(|body| placed(body)).collect();
+    Backdrop::new(camera, &backdrop)
+        .before(camera, &[placed(before)])
+        .unwrap()
+}
+
+fn sensor(spec: SensorSpec) -> Sensor {
+    Sensor::new(spec, 5).unwrap()
+}
+
+#[test]
+fn with_all_parts_left_out_the_image_is_the_ideal_one() {
+    let camera = Camera::try_from(CameraSpec::azure_kinect(DepthMode::NfovBinned)).unwrap();
+    let seen = view(
+        &camera,
+        &[&wall(-9e3, 9e3, 1500.0)],
+        &wall(-100.0, 30.0, 1100.0),
+    );
+    let image = sensor(NONE).observe(&camera, &seen, 1, 0);
+    for (a, b) in image.z_mm.iter().zip(&seen.image.z_mm) {
+        assert!((a - b).abs() < 1e-3);
+    }
+}
+
+/// The sum of squares of (measured − true range) / σ is χ² distributed; 4 standard errors.
+#[test]
+fn the_random_error_grows_as_the_signal_falls() {
+    let camera = Camera::try_from(pinhole(200, 200.0)).unwrap();
+    let seen = view(&camera, &[], &wall(-9e3, 9e3, 1500.0));
+    let random = RandomError {
+        floor_mm: 0.5,
+        at_unit_signal_mm: 1.5,
+    };
+    let noisy = sensor(SensorSpec {
+        random: Some(random),
+        ..NONE
+    });
+    let image = noisy.observe(&camera, &seen, 8, 3);
+    let n = image.z_mm.len() as f64;
+    let scaled = |(ray, z): (&Option<nalgebra::Vector2<f64>>, &f32)| {
+        let length = (1.0 + ray.unwrap().norm_squared()).sqrt();
+        let range = 1500.0 * length;
+        // Square to the wall's normal the cosine of incidence is 1 / length.
+        let signal = 1e6 / (range * range * length);
+        let sigma = (0.25 + (1.5 / signal).powi(2)).sqrt();
+        (f64::from(*z) * length - range) / sigma
+    };
+    let scaled: Vec<f64> = camera.rays().iter().zip(&image.z_mm).map(scaled).collect();
+    let mean = scaled.iter().sum::<f64>() / n;
+    let square = scaled.iter().map(|x| x * x).sum::<f64>() / n;
+    assert!(mean.abs() < 4.0 / n.sqrt(), "{mean}");
+    assert!(
+        (square - 1.0).abs() < 4.0 * (2.0 / n).sqrt() + 0.01,
+        "{square}"
+    );
+    // Addressed: the same again for other threads, another frame differs.
+    let one = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .unwrap();
+    assert_eq!(one.install(|| noisy.observe(&camera, &seen, 8, 3)), image);
+    assert_ne!(noisy.observe(&camera, &seen, 8, 4), image);
+    assert_ne!(noisy.observe(&camera, &seen, 9, 3), image);
+}
+
+#[test]
+fn the_systematic_error_stays_with_the_device() {
+    let camera = Camera::try_from(pinhole(8, 200.0)).unwrap();
+    let error_at = |z_mm: f32, seed: u64, frame: u64| {
+        let seen = view(&camera, &[], &wall(-9e3, 9e3, z_mm));
+        let spec = SensorSpec {
+            systematic: Some(SystematicError {
+                offset_mm: 5.0,
+                per_metre_mm: 2.0,
+                fixed_pattern_mm: 0.0,
+            }),
+            ..NONE
+        };
+        let image = Sensor::new(spec, seed)
+            .unwrap()
+            .observe(&camera, &seen, frame, frame);
+        f64::from(image.z_mm[0] - z_mm)
+    };
+    let errors: Vec<f64> = (0..400).map(|seed| error_at(1000.0, seed, 0)).collect();
+    assert_eq!(error_at(1000.0, 7, 0), error_at(1000.0, 7, 9));
+    // Offset and slope are independent: variance 5² + 2² along the ray; its standard error is √(2/400).
+    let variance = errors.iter().map(|e| e * e).sum::<f64>() / 400.0;
+    assert!(
+        (variance / 29.0 - 1.0).abs() < 4.0 * (2.0 / 400.0_f64).sqrt(),
+        "{variance}"
+    );
+    let slopes = (0..400).map(|seed| (error_at(2000.0, seed, 0) - errors[seed as usize]).powi(2));
+    let slopes = slopes.sum::<f64>() / 400.0;
+    assert!(
+        (slopes / 4.0 - 1.0).abs() < 4.0 * (2.0 / 400.0_f64).sqrt(),
+        "{slopes}"
+    );
+}
+
+/// A near wall covers a known share of one column of pixels; the phasors of both walls then give the range.
+#[test]
+fn a_pixel_that_sees_two_walls_has_the_phase_of_their_light() {
+    let camera = Camera::try_from(pinhole(101, 1000.0)).unwrap();
+    let (near, far, megahertz) = (1000.0_f64, 1200.0_f64, 200.0);
+    // The edge lies 1/4 pixel left of the middle of column 60: a quarter of its width (2 of 8 columns of samples) is near.
+    let edge = (60.0 - 50.0 - 0.25) * near / 1000.0;
+    let seen = view(
+        &camera,
+        &[&wall(-9e3, 9e3, far as f32)],
+        &wall(-9e3, edge as f32, near as f32),
+    );
+    let mixing = SensorSpec {
+        mixed: Some(MixedPixels {
+            modulation_mhz: megahertz,
+        }),
+        ..NONE
+    };
+    let image = sensor(mixing.clone()).observe(&camera, &seen, 1, 0);
+    let at = |image: &DepthImage, column: usize| f64::from(image.z_mm[50 * 101 + column]);
+    assert!((at(&image, 58) - near).abs() < 0.05 && (at(&image, 62) - far).abs() < 0.05);
+    let length = (1.0 + (10.0_f64 / 1000.0).powi(2)).sqrt();
+    let phase = 4.0 * std::f64::consts::PI * megahertz / 299_792.458;
+    let (a, b) = (0.25 / near.powi(2), 0.75 / far.powi(2));
+    let turn = phase * (far - near) * length;
+    let range = near * length + (b * turn.sin()).atan2(a + b * turn.cos()) / phase;
+    assert!(
+        (at(&image, 60) - range / length).abs() < 0.1,
+        "{} {}",
+        at(&image, 60),
+        range / length
+    );
+    // Its contrast decides whether it is given up.
+    let contrast = (a + b * turn.cos()).hypot(b * turn.sin()) / (a + b);
+    for (limit, given_up) in [(contrast - 0.005, false), (contrast + 0.005, true)] {
+        let spec = SensorSpec {
+            invalid: Some(Invalidation {
+                min_signal: 0.0,
+                max_angle_deg: 90.0,
+                min_contrast: limit,
+            }),
+            ..mixing.clone()
+        };
+        let image = sensor(spec).observe(&camera, &seen, 1, 0);
+        assert_eq!(at(&image, 60) == 0.0, given_up);
+        assert!(at(&image, 58) > 0.0 && at(&image, 62) > 0.0);
+    }
+}
+
+#[test]
+fn dim_and_oblique_pixels_are_given_up() {
+    let camera = Camera::try_from(pinhole(101, 50.0)).unwrap();
+    let seen = view(&camera, &[], &wall(-9e3, 9e3, 1500.0));
+    let lost = |min_signal: f64, max_angle_deg: f64| {
+        let invalid = Invalidation {
+            min_signal,
+            max_angle_deg,
+            min_contrast: 0.0,
+        };
+        let spec = SensorSpec {
+            invalid: Some(invalid),
+            ..NONE
+        };
+        sensor(spec).observe(&camera, &seen, 1, 0).z_mm
+    };
+    for (ray, (dim, oblique)) in camera
+        .rays()
+        .iter()
+        .zip(lost(0.2, 90.0).iter().zip(lost(0.0, 40.0)))
+    {
+        let length = (1.0 + ray.unwrap().norm_squared()).sqrt();
+        let signal = (1.5 * length).powi(-2) / length;
+        let angle = (1.0 / length).acos().to_degrees();
+        if (signal - 0.2).abs() > 1e-3 {
+            assert_eq!(*dim == 0.0, signal < 0.2);
+        }
+        if (angle - 40.0).abs() > 0.1 {
+            assert_eq!(oblique == 0.0, angle > 40.0, "{angle}");
+        }
+    }
+}
+
+/// Inside a sphere every patch sends every other the same: ρ E A / 4πR². Seen from its centre through a cone of half angle α, the
+/// pixel on the axis is then too far by (2/3) ρ R sin³(α/2) / (1 + ρ (1 − cos α)/2), as long as phases are small.
+#[test]
+fn one_bounce_inside_a_sphere_lengthens_the_range_as_derived() {
+    let mut spec = pinhole(300, 200.0);
+    spec.mask = Some(FieldMask::Circle { diameter_deg: 70.0 });
+    let camera = Camera::try_from(spec).unwrap();
+    let (vertices, triangles, _) = sphere(1000.0, 6);
+    let body = Body::from(MeshBody::new(&vertices, &triangles).unwrap());
+    let seen = view(&camera, &[], &body);
+    let (albedo, half) = (0.8, 35.0_f64.to_radians());
+    let bounced = sensor(SensorSpec {
+        multipath: Some(Multipath {
+            albedo,
+            modulation_mhz: 1.0,
+        }),
+        ..NONE
+    });
+    let image = bounced.observe(&camera, &seen, 1, 0);
+    let middle = 150 * 300 + 150;
+    let longer_mm = f64::from(image.z_mm[middle] - seen.image.z_mm[middle]);
+    let expected_mm = 2.0 / 3.0 * albedo * 1000.0 * (half / 2.0).sin().powi(3)
+        / (1.0 + albedo * (1.0 - half.cos()) / 2.0);
+    assert!(
+        (longer_mm / expected_mm - 1.0).abs() < 0.03,
+        "{longer_mm} instead of {expected_mm} mm"
+    );
+}
+
+/// A tilted wall gives many signals; what is put in comes out, rounding to millimetres included.
+#[test]
+fn the_noise_of_a_recording_is_found_again() {
+    let camera = Camera::try_from(pinhole(160, 120.0)).unwrap();
+    let tilted = [(-2e3, -2e3), (2e3, -2e3), (2e3, 2e3), (-2e3, 2e3)]
+        .map(|(x, y)| Point3::new(x, y, 1200.0 + 0.4 * x));
+    let body = Body::from(MeshBody::new(&tilted, &[[0, 1, 2], [0, 2, 3]]).unwrap());
+    let seen = view(&camera, &[], &body);
+    let (floor_mm, at_unit_signal_mm) = (0.5, 0.5);
+    let noisy = sensor(SensorSpec {
+        random: Some(RandomError {
+            floor_mm,
+            at_unit_signal_mm,
+        }),
+        ..NONE
+    });
+    let frames: Vec<DepthImage> = (0..40)
+        .map(|frame| {
+            let mut image = noisy.observe(&camera, &seen, 3, frame);
+            image.z_mm.iter_mut().for_each(|z| *z = z.round());
+            image
+        })
+        .collect();
+    let fit = fit_noise(&camera, &frames, true).unwrap();
+    // Edges of the classes and normals from rounded depths leave some per cent.
+    assert!(
+        (fit.random.floor_mm / floor_mm - 1.0).abs() < 0.1,
+        "{fit:?}"
+    );
+    assert!(
+        (fit.random.at_unit_signal_mm / at_unit_signal_mm - 1.0).abs() < 0.05,
+        "{fit:?}"
+    );
+    assert!(fit.relative_misfit < 0.03 && fit.min_signal.is_none());
+    assert!(matches!(
+        fit_noise(&camera, &frames[..2], true),
+        Err(FitError::Frames(2))
+    ));
+    let small = vec![DepthImage::empty(3, 3); 3];
+    assert!(matches!(
+        fit_noise(&camera, &small, true),
+        Err(FitError::Size { frame: 0, .. })
+    ));
+    let nothing = vec![DepthImage::empty(160, 160); 3];
+    assert!(matches!(
+        fit_noise(&camera, &nothing, true),
+        Err(FitError::Pixels(0))
+    ));
+}
+
+#[test]
+fn a_tremor_keeps_its_size_and_its_memory() {
+    let tremor = Tremor {
+        shift_mm: 0.7,
+        turn_deg: 0.2,
+        correlation_frames: 6.0,
+    };
+    let pivot = Point3::new(10.0, -20.0, 900.0);
+    let moved = |frame: u64| tremor.motion(&pivot, 11, frame) * pivot - pivot;
+    let n = 6000;
+    let path: Vec<Vector3<f64>> = (0..n).map(moved).collect();
+    let mean = |lag: usize| {
+        let pairs = path.iter().zip(&path[lag..]).map(|(a, b)| a.dot(b) / 3.0);
+        pairs.sum::<f64>() / (path.len() - lag) as f64
+    };
+    // Some 6000 / 15 independent values on three axes: standard error √(2 / 1200) = 4 %.
+    let variance = mean(0);
+    assert!((variance / 0.49 - 1.0).abs() < 0.16, "{variance}");
+    assert!((mean(6) / 0.49 - (-1.0_f64).exp()).abs() < 0.16);
+    assert_eq!(moved(17), path[17]);
+    let turned = tremor.motion(&pivot, 11, 5).rotation.angle().to_degrees();
+    assert!(0.0 < turned && turned < 1.2);
+}
+
+#[test]
+fn numbers_that_make_no_sensor_are_named() {
+    let named = |change: fn(&mut SensorSpec)| {
+        let mut spec = SensorSpec::default();
+        change(&mut spec);
+        let SensorError::Parameter { name, .. } = Sensor::new(spec, 0).unwrap_err() else {
+            unreachable!()
+        };
+        name
+    };
+    assert_eq!(
+        named(|s| s.random.as_mut().unwrap().floor_mm = -1.0),
+        "random.floor_mm"
+    );
+    assert_eq!(
+        named(|s| s.mixed.as_mut().unwrap().modulation_mhz = 0.0),
+        "mixed.modulation_mhz"
+    );
+    assert_eq!(
+        named(|s| s.invalid.as_mut().unwrap().min_contrast = f64::NAN),
+        "invalid.min_contrast"
+    );
+    assert!(Sensor::new(SensorSpec::default(), 0).is_ok());
+}
