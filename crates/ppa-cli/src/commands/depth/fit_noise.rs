@@ -1,0 +1,70 @@
+//! `ppa depth fit-noise`: a sensor that has the noise of a recording.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::Args;
+use ppa_dataset::write_whole;
+use ppa_depth::{DepthImage, Invalidation, SensorSpec, fit_noise};
+
+use crate::output::Output;
+
+#[derive(Debug, Args)]
+pub struct FitNoiseArgs {
+    /// Folder with the frames of a scene that stands still, 16-bit PNG in mm, 0 invalid
+    frames: PathBuf,
+    /// Camera JSON [default: an Azure Kinect, 640 x 576]
+    #[arg(long)]
+    camera: Option<PathBuf>,
+    /// Sensor JSON to write: the random error as fitted, the other parts as in the default sensor
+    #[arg(long)]
+    out: PathBuf,
+}
+
+pub fn run(args: &FitNoiseArgs, output: Output) -> anyhow::Result<()> {
+    let camera = super::read_camera(args.camera.as_ref())?;
+    let frames = read_frames(&args.frames)?;
+    let fit = fit_noise(&camera, &frames, true)
+        .with_context(|| format!("frames in {}", args.frames.display()))?;
+    let default = SensorSpec::default();
+    let sensor = SensorSpec {
+        random: Some(fit.random),
+        invalid: default.invalid.map(|invalid| Invalidation {
+            min_signal: fit.min_signal.unwrap_or(0.0),
+            ..invalid
+        }),
+        ..default
+    };
+    let mut json = serde_json::to_vec_pretty(&sensor)?;
+    json.push(b'\n');
+    write_whole(&args.out, &json)?;
+    output.print(&fit, |fit| {
+        format!(
+            "{}: {} frames, {} pixels: {:.2} mm at unit signal, {:.2} mm floor; misfit {:.0} %; other parts are not \
+             from the recording",
+            args.out.display(),
+            fit.frames,
+            fit.pixels,
+            fit.random.at_unit_signal_mm,
+            fit.random.floor_mm,
+            100.0 * fit.relative_misfit
+        )
+    })
+}
+
+/// All PNGs of a folder, in the order of their names.
+fn read_frames(folder: &Path) -> anyhow::Result<Vec<DepthImage>> {
+    let unreadable = || format!("cannot read {}", folder.display());
+    let mut paths = std::fs::read_dir(folder)
+        .with_context(unreadable)?
+        .map(|entry| entry.map(|entry| entry.path()))
+        .collect::<Result<Vec<_>, _>>()
+        .with_context(unreadable)?;
+    paths.retain(|path| {
+        path.extension()
+            .is_some_and(|ext| ext.eq_ignore_ascii_case("png"))
+    });
+    paths.sort_unstable();
+    let frames = paths.iter().map(|path| DepthImage::read_png(path));
+    Ok(frames.collect::<Result<_, _>>()?)
+}

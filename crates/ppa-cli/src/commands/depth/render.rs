@@ -1,0 +1,210 @@
+//! `ppa depth render`: what a camera sees of meshes, ideally or through a sensor.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::Args;
+use nalgebra::{Isometry3, Point3};
+use ppa_depth::{
+    Backdrop, Body, Camera, DepthImage, MeshBody, PlacedBody, Sensor, SensorSpec, Tremor,
+    isometry_from_rows, render,
+};
+use ppa_mesh::read_ply;
+use serde::{Deserialize, Serialize};
+
+use crate::output::{Output, Seconds, Stopwatch};
+
+#[derive(Debug, Args)]
+pub struct RenderArgs {
+    /// PLY meshes in one frame, mm
+    #[arg(required = true)]
+    meshes: Vec<PathBuf>,
+    /// Camera JSON [default: an Azure Kinect, 640 x 576]
+    #[arg(long)]
+    camera: Option<PathBuf>,
+    /// JSON with the row-major 4x4 motion from the meshes' frame to the camera's, mm [default: identity]
+    #[arg(long)]
+    camera_from_mesh: Option<PathBuf>,
+    /// Image to write: 16-bit PNG, Z in mm, 0 invalid; of several frames name_0000.png, name_0001.png …
+    #[arg(long)]
+    out: PathBuf,
+    /// Also write the depths as floats, OpenEXR
+    #[arg(long)]
+    exr: Option<PathBuf>,
+    /// Also write a picture in false colour, near red, far blue, PNG
+    #[arg(long)]
+    preview: Option<PathBuf>,
+    /// Also write the points that are seen, in the camera's frame, PLY
+    #[arg(long)]
+    points: Option<PathBuf>,
+    /// See through a sensor: JSON as `fit-noise` writes it, or the word default
+    #[arg(long)]
+    sensor: Option<PathBuf>,
+    /// Seed of the sensor's noise and of the tremor
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Frames of a recording
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    frames: u64,
+    /// Size of the meshes' motion between frames along each axis, mm (standard deviation)
+    #[arg(long, default_value_t = 0.0)]
+    tremor_mm: f64,
+    /// Size of their rotation about each axis, degrees (standard deviation)
+    #[arg(long, default_value_t = 0.0)]
+    tremor_deg: f64,
+}
+
+/// Frames over which a tremor remembers: a third of a second at 30 frames per second.
+const TREMOR_FRAMES: f64 = 10.0;
+
+/// A row-major 4x4 matrix, as four rows or as 16 numbers.
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+enum Pose {
+    Rows([[f64; 4]; 4]),
+    Flat([f64; 16]),
+}
+
+#[derive(Debug, Serialize)]
+struct Rendered {
+    width: u32,
+    height: u32,
+    frames: u64,
+    valid_pixels: usize,
+    min_mm: Option<f32>,
+    max_mm: Option<f32>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sensor: Option<SensorSpec>,
+    seed: u64,
+    #[serde(flatten)]
+    seconds: Seconds,
+}
+
+/// The ideal camera or a sensor behind it.
+enum Eye {
+    Ideal,
+    Sensor(Box<Sensor>, Box<Backdrop>),
+}
+
+pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
+    let camera = super::read_camera(args.camera.as_ref())?;
+    let camera_from_body = match &args.camera_from_mesh {
+        Some(path) => read_pose(path)?,
+        None => Isometry3::identity(),
+    };
+    let meshes = args
+        .meshes
+        .iter()
+        .map(|path| read_ply(path).map(ppa_mesh::PlyContents::into_mesh))
+        .collect::<Result<Vec<_>, _>>()?;
+    let eye = eye(args, &camera)?;
+    let tremor = Tremor {
+        shift_mm: args.tremor_mm,
+        turn_deg: args.tremor_deg,
+        correlation_frames: TREMOR_FRAMES,
+    };
+    let corners = meshes.iter().flat_map(|mesh| &mesh.vertices);
+    let (sum, count) = corners.fold((nalgebra::Vector3::zeros(), 0), |(sum, n), corner| {
+        (sum + corner.coords.cast::<f64>(), n + 1)
+    });
+    let pivot = camera_from_body * Point3::from(sum / f64::from(count.max(1)));
+    camera.rays();
+    let watch = Stopwatch::start();
+    let mut bodies = Vec::new();
+    for (path, mesh) in args.meshes.iter().zip(&meshes) {
+        let body = MeshBody::new(&mesh.vertices, &mesh.triangles)
+            .with_context(|| path.display().to_string())?;
+        bodies.push(Body::Mesh(body));
+    }
+    let see = |frame: u64| {
+        let camera_from_body = tremor.motion(&pivot, args.seed, frame) * camera_from_body;
+        let placed = |body| PlacedBody {
+            body,
+            camera_from_body,
+        };
+        let placed: Vec<_> = bodies.iter().map(placed).collect();
+        match &eye {
+            Eye::Ideal => {
+                let image = render(&camera, &placed);
+                image.require_visible().map(|()| image)
+            }
+            Eye::Sensor(sensor, backdrop) => backdrop
+                .before(&camera, &placed)
+                .map(|seen| sensor.observe(&camera, &seen, args.seed, frame)),
+        }
+    };
+    let image = see(0)?;
+    let seconds = watch.read();
+    if args.frames == 1 {
+        image.write_png(&args.out)?;
+    }
+    for frame in (0..args.frames).filter(|_| args.frames > 1) {
+        see(frame)?.write_png(&numbered(&args.out, frame))?;
+    }
+    write_others(args, &camera, &image)?;
+    let rendered = Rendered {
+        width: image.width,
+        height: image.height,
+        frames: args.frames,
+        valid_pixels: image.valid_pixels(),
+        min_mm: image.min_mm(),
+        max_mm: image.max_mm(),
+        sensor: match eye {
+            Eye::Ideal => None,
+            Eye::Sensor(sensor, _) => Some(sensor.spec().clone()),
+        },
+        seed: args.seed,
+        seconds,
+    };
+    output.print(&rendered, |r| {
+        format!(
+            "{}: {} of {} x {} pixels see a surface",
+            args.out.display(),
+            r.valid_pixels,
+            r.width,
+            r.height
+        )
+    })
+}
+
+fn read_pose(path: &Path) -> anyhow::Result<Isometry3<f64>> {
+    let rows = match crate::commands::read_json(path)? {
+        Pose::Rows(rows) => rows,
+        Pose::Flat(flat) => std::array::from_fn(|r| std::array::from_fn(|c| flat[4 * r + c])),
+    };
+    isometry_from_rows(&rows).with_context(|| path.display().to_string())
+}
+
+fn eye(args: &RenderArgs, camera: &Camera) -> anyhow::Result<Eye> {
+    let Some(path) = &args.sensor else {
+        return Ok(Eye::Ideal);
+    };
+    let spec = if path.as_os_str() == "default" {
+        SensorSpec::default()
+    } else {
+        crate::commands::read_json(path)?
+    };
+    let sensor = Sensor::new(spec, args.seed).with_context(|| path.display().to_string())?;
+    Ok(Eye::Sensor(
+        Box::new(sensor),
+        Box::new(Backdrop::new(camera, &[])),
+    ))
+}
+
+fn numbered(path: &Path, frame: u64) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}_{frame:04}.png"))
+}
+
+fn write_others(args: &RenderArgs, camera: &Camera, image: &DepthImage) -> anyhow::Result<()> {
+    if let Some(path) = &args.exr {
+        image.write_exr(path)?;
+    }
+    if let Some(path) = &args.preview {
+        image.write_preview(path)?;
+    }
+    if let Some(path) = &args.points {
+        image.write_points(camera, path)?;
+    }
+    Ok(())
+}
