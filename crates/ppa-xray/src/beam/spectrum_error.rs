@@ -1,5 +1,7 @@
 //! What can be wrong with a spectrum.
 
+use std::path::PathBuf;
+
 use crate::{
     matter::cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
     matter::material_error::MaterialError,
@@ -77,19 +79,20 @@ pub enum SpectrumError {
     /// No photon is left.
     #[error("the spectrum has no photons")]
     Dark,
-    /// A file that cannot be read.
-    #[error("cannot read spectrum {}", path.display())]
-    Read {
-        /// File at fault.
-        path: std::path::PathBuf,
-        /// What the system said.
-        source: std::io::Error,
+    /// A spectrum file cannot be used.
+    #[error("spectrum {}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: Box<SpectrumError>,
     },
+    /// The file cannot be read.
+    #[error("cannot be read")]
+    Read(#[source] std::io::Error),
     /// A line of a file that is not what it should be.
-    #[error("{}, line {line}: found {found:?}, expected {expected}", path.display())]
+    #[error("line {line}: found {found:?}, expected {expected}")]
     Line {
-        /// File at fault.
-        path: std::path::PathBuf,
         /// Line number, from 1.
         line: usize,
         /// Text of the line.

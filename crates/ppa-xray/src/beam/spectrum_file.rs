@@ -14,45 +14,7 @@ impl Spectrum {
     /// A file that cannot be read, a line that is not two numbers, fewer than two lines, and everything that
     /// [`Spectrum::from_bins`] refuses.
     pub fn from_csv(path: impl AsRef<Path>) -> Result<Self, SpectrumError> {
-        let path = path.as_ref();
-        let text = read(path)?;
-        let mut rows = Vec::new();
-        let mut headline_allowed = true;
-        for (index, line) in lines(&text) {
-            let columns: Vec<&str> = columns(line).collect();
-            match columns[..]
-                .iter()
-                .map(|column| column.parse::<f64>())
-                .collect::<Result<Vec<_>, _>>()
-            {
-                Ok(numbers) if numbers.len() == 2 => rows.push((numbers[0], numbers[1])),
-                Err(_) if headline_allowed => {}
-                _ => {
-                    return Err(wrong_line(
-                        path,
-                        index,
-                        line,
-                        "bin centre in keV and weight",
-                    ));
-                }
-            }
-            headline_allowed = false;
-        }
-        if rows.len() < 2 {
-            return Err(wrong_line(
-                path,
-                text.lines().count(),
-                "",
-                "at least two energy bins",
-            ));
-        }
-        let middle = |pair: &[(f64, f64)]| 0.5 * (pair[0].0 + pair[1].0);
-        let inner: Vec<f64> = rows.windows(2).map(middle).collect();
-        let (first, last) = (rows[0].0, rows[rows.len() - 1].0);
-        let mut edges = vec![2.0 * first - inner[0]];
-        edges.extend_from_slice(&inner);
-        edges.push(2.0 * last - inner[inner.len() - 1]);
-        Self::from_bins(&edges, &rows.iter().map(|row| row.1).collect::<Vec<_>>())
+        in_file(path.as_ref(), csv)
     }
 
     /// Reads an MC-GPU spectrum: `lower bin edge in eV, weight` lines, ended by the upper edge with a negative weight.
@@ -62,46 +24,88 @@ impl Spectrum {
     /// A file that cannot be read, a line that does not begin with two numbers, no end, a negative weight after which
     /// the energies rise further (MC-GPU would leave the rest out), and everything that [`Spectrum::from_bins`] refuses.
     pub fn from_spc(path: impl AsRef<Path>) -> Result<Self, SpectrumError> {
-        const EXPECTED: &str = "lower bin edge in eV and weight";
-        let path = path.as_ref();
-        let text = read(path)?;
-        let (mut edges, mut weights) = (Vec::new(), Vec::new());
-        let mut lines = lines(&text);
-        while let Some((index, line)) = lines.next() {
-            let (energy_ev, weight) =
-                two_numbers(line).ok_or_else(|| wrong_line(path, index, line, EXPECTED))?;
-            edges.push(energy_ev / 1000.0);
-            if weight < 0.0 {
-                let mut rest = lines.filter_map(|(_, line)| two_numbers(line));
-                if rest.any(|(further_ev, _)| further_ev > energy_ev) {
-                    let expected =
-                        "a negative weight at the highest energy only, where it ends the spectrum";
-                    return Err(wrong_line(path, index, line, expected));
-                }
-                return match (&edges[..], &weights[..]) {
-                    // How a line is written: a bin without width.
-                    ([low, high], [weight]) if low == high && *weight > 0.0 => {
-                        Self::monoenergetic(*low)
-                    }
-                    _ => Self::from_bins(&edges, &weights),
-                };
-            }
-            weights.push(weight);
-        }
-        Err(wrong_line(
-            path,
-            text.lines().count(),
-            "",
-            "an upper edge with a negative weight at the end",
-        ))
+        in_file(path.as_ref(), spc)
     }
 }
 
-fn read(path: &Path) -> Result<String, SpectrumError> {
-    fs::read_to_string(path).map_err(|source| SpectrumError::Read {
-        path: path.to_owned(),
-        source,
-    })
+/// Reads a file; whatever is wrong with it is told with its name.
+fn in_file(
+    path: &Path,
+    parse: impl FnOnce(&str) -> Result<Spectrum, SpectrumError>,
+) -> Result<Spectrum, SpectrumError> {
+    fs::read_to_string(path)
+        .map_err(SpectrumError::Read)
+        .and_then(|text| parse(&text))
+        .map_err(|source| SpectrumError::File {
+            path: path.to_owned(),
+            source: Box::new(source),
+        })
+}
+
+fn csv(text: &str) -> Result<Spectrum, SpectrumError> {
+    let mut rows = Vec::new();
+    let mut headline_allowed = true;
+    for (index, line) in lines(text) {
+        let columns: Vec<&str> = columns(line).collect();
+        match columns[..]
+            .iter()
+            .map(|column| column.parse::<f64>())
+            .collect::<Result<Vec<_>, _>>()
+        {
+            Ok(numbers) if numbers.len() == 2 => rows.push((numbers[0], numbers[1])),
+            Err(_) if headline_allowed => {}
+            _ => {
+                return Err(wrong_line(index, line, "bin centre in keV and weight"));
+            }
+        }
+        headline_allowed = false;
+    }
+    if rows.len() < 2 {
+        return Err(wrong_line(
+            text.lines().count(),
+            "",
+            "at least two energy bins",
+        ));
+    }
+    let middle = |pair: &[(f64, f64)]| 0.5 * (pair[0].0 + pair[1].0);
+    let inner: Vec<f64> = rows.windows(2).map(middle).collect();
+    let (first, last) = (rows[0].0, rows[rows.len() - 1].0);
+    let mut edges = vec![2.0 * first - inner[0]];
+    edges.extend_from_slice(&inner);
+    edges.push(2.0 * last - inner[inner.len() - 1]);
+    Spectrum::from_bins(&edges, &rows.iter().map(|row| row.1).collect::<Vec<_>>())
+}
+
+fn spc(text: &str) -> Result<Spectrum, SpectrumError> {
+    const EXPECTED: &str = "lower bin edge in eV and weight";
+    let (mut edges, mut weights) = (Vec::new(), Vec::new());
+    let mut lines = lines(text);
+    while let Some((index, line)) = lines.next() {
+        let (energy_ev, weight) =
+            two_numbers(line).ok_or_else(|| wrong_line(index, line, EXPECTED))?;
+        edges.push(energy_ev / 1000.0);
+        if weight < 0.0 {
+            let mut rest = lines.filter_map(|(_, line)| two_numbers(line));
+            if rest.any(|(further_ev, _)| further_ev > energy_ev) {
+                let expected =
+                    "a negative weight at the highest energy only, where it ends the spectrum";
+                return Err(wrong_line(index, line, expected));
+            }
+            return match (&edges[..], &weights[..]) {
+                // How a line is written: a bin without width.
+                ([low, high], [weight]) if low == high && *weight > 0.0 => {
+                    Spectrum::monoenergetic(*low)
+                }
+                _ => Spectrum::from_bins(&edges, &weights),
+            };
+        }
+        weights.push(weight);
+    }
+    Err(wrong_line(
+        text.lines().count(),
+        "",
+        "an upper edge with a negative weight at the end",
+    ))
 }
 
 /// Lines that say something, with their index.
@@ -121,9 +125,8 @@ fn two_numbers(line: &str) -> Option<(f64, f64)> {
     Some((columns.next()??, columns.next()??))
 }
 
-fn wrong_line(path: &Path, index: usize, found: &str, expected: &'static str) -> SpectrumError {
+fn wrong_line(index: usize, found: &str, expected: &'static str) -> SpectrumError {
     SpectrumError::Line {
-        path: path.to_owned(),
         line: index + 1,
         found: found.to_owned(),
         expected,
@@ -161,7 +164,11 @@ mod tests {
 
     #[test]
     fn bad_files_are_refused_with_the_reason() {
-        let csv = |text| Spectrum::from_csv(file(text).path()).unwrap_err();
+        let in_file = |error: SpectrumError| match error {
+            SpectrumError::File { source, .. } => *source,
+            other => other,
+        };
+        let csv = |text| in_file(Spectrum::from_csv(file(text).path()).unwrap_err());
         assert!(matches!(
             csv("20,1\n21,x\n"),
             SpectrumError::Line { line: 2, .. }
@@ -184,7 +191,7 @@ mod tests {
             SpectrumError::Range { .. }
         ));
         assert!(matches!(csv(""), SpectrumError::Line { .. }));
-        let spc = |text| Spectrum::from_spc(file(text).path()).unwrap_err();
+        let spc = |text| in_file(Spectrum::from_spc(file(text).path()).unwrap_err());
         assert!(matches!(
             spc("20000 1\n21000 1\n"),
             SpectrumError::Line { .. }
@@ -195,8 +202,8 @@ mod tests {
             SpectrumError::Line { line: 2, .. }
         ));
         assert!(matches!(
-            Spectrum::from_spc("nowhere.spc").unwrap_err(),
-            SpectrumError::Read { .. }
+            in_file(Spectrum::from_spc("nowhere.spc").unwrap_err()),
+            SpectrumError::Read(_)
         ));
     }
 

@@ -167,13 +167,8 @@ pub enum McgpuError {
         source: MaterialError,
     },
     /// The spectrum is not usable.
-    #[error("{} is no usable spectrum", path.display())]
-    Spectrum {
-        /// The spectrum file.
-        path: PathBuf,
-        /// Why.
-        source: SpectrumError,
-    },
+    #[error(transparent)]
+    Spectrum(#[from] SpectrumError),
     /// The voxels make no phantom.
     #[error("{} is no usable geometry", path.display())]
     Phantom {

@@ -73,11 +73,7 @@ impl Simulation {
     pub fn with_input(input: Input) -> Result<Self, McgpuError> {
         let square_pixels = square_pixels(&input)?;
         check_files(&input)?;
-        let spectrum =
-            Spectrum::from_spc(&input.spectrum.path).map_err(|source| McgpuError::Spectrum {
-                path: input.spectrum.path.clone(),
-                source,
-            })?;
+        let spectrum = Spectrum::from_spc(&input.spectrum.path)?;
         let voxels = VoxelFile::read(&input.voxels.path)?;
         if let Some(dose) = &input.voxel_dose
             && (0..3).any(|axis| dose.first[axis] >= voxels.size[axis])
