@@ -113,10 +113,30 @@ fn mistakes_are_told_and_leave_nothing_behind() {
             &format!("xray mcgpu bad.in --out results {more}"),
         );
         assert!(said.contains(told), "{told:?} is missing in: {said}");
-        let left = folder.path().join("results");
-        assert!(!left.exists() || names(&left).is_empty());
+        assert!(!folder.path().join("results").exists(), "{told}");
     }
-    assert!(fail(folder.path(), "xray mcgpu nowhere.in --out results").contains("nowhere.in"));
+    let nowhere = "xray mcgpu nowhere.in --out results";
+    assert!(fail(folder.path(), nowhere).contains("nowhere.in"));
+    // A folder that was there stays.
+    fs::create_dir(folder.path().join("mine")).unwrap();
+    fail(folder.path(), "xray mcgpu bad.in --out mine");
+    assert!(names(&folder.path().join("mine")).is_empty());
+}
+
+#[test]
+fn a_damaged_spectrum_is_told_with_its_line_and_named_once() {
+    let folder = tempfile::tempdir().unwrap();
+    write_input(folder.path());
+    for (text, told) in [
+        ("40000 1\nsixty -1\n", "line 2: found \"sixty -1\""),
+        ("40000 NaN\n60000 -1\n", "energy bin 0 has weight NaN"),
+        ("40000 1\n999000 -1\n", "between 40 and 999 keV"),
+    ] {
+        fs::write(folder.path().join("beam.spc"), text).unwrap();
+        let said = fail(folder.path(), "xray mcgpu box.in --out results");
+        assert!(said.contains(told), "{told:?} is missing in: {said}");
+        assert_eq!(said.matches("beam.spc").count(), 1, "{said}");
+    }
 }
 
 #[test]

@@ -76,8 +76,14 @@ fn describe(audit: &Audit) -> String {
         }
     }
     line(format_args!(
-        "{:.2} g, {:.2} cm³ of metal, {} voxels outside the limb\n",
-        audit.mass_g, audit.metal_cm3, audit.outside_mask
+        "{:.2} g, {:.2} cm³ of metal{}\n",
+        audit.mass_g,
+        audit.metal_cm3,
+        match audit.outside_mask {
+            0 => String::new(),
+            1 => ", 1 voxel outside the limb".to_owned(),
+            outside => format!(", {outside} voxels outside the limb"),
+        }
     ));
     line(format_args!(
         "lowest {:.0} HU in {} voxels{}, highest {:.0} HU in {}{}",
@@ -163,7 +169,22 @@ impl Bars {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Point3, Vector3};
+    use ppa_ct::{Grid, Volume};
+
     use super::*;
+
+    /// A limb is spoken of where one was cut out, not of a bare scan.
+    #[test]
+    fn voxels_outside_a_limb_are_told_only_of_a_limb() {
+        let grid = Grid::axis_aligned([3, 1, 1], Vector3::repeat(1.0), Point3::origin()).unwrap();
+        let scan = Volume::new(grid, vec![-1_000.0, 40.0, 900.0]).unwrap();
+        let told =
+            |mask: Option<&[bool]>| describe(&HuCalibration::default().audit(&scan, mask).unwrap());
+        assert!(!told(None).contains("limb"), "{}", told(None));
+        let limb = told(Some(&[false, true, true]));
+        assert!(limb.contains(", 1 voxel outside the limb"), "{limb}");
+    }
 
     /// Two neighbouring bins to a bar, an empty bar between, the fullest bar the highest, every voxel seen.
     #[test]

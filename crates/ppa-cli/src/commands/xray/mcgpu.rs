@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
+use indicatif::ProgressBar;
 use ppa_xray::mcgpu::{RunLength, ScanDose, Simulation, Station};
 use ppa_xray::{CategorySums, Dose, Engine, FastSettings, Imparted, Radiograph, fast};
 use serde::Serialize;
@@ -74,41 +75,17 @@ pub fn run(args: &McgpuArgs, output: Output) -> anyhow::Result<()> {
         "{}: no projection has an angle of interest",
         args.input.display()
     );
+    let is_new = !args.out.exists();
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
 
     let watch = Stopwatch::start();
-    let mut dose = simulation
-        .dose_settings()
-        .map(|_| ScanDose::new(&simulation));
-    let mut projections = Vec::new();
-    for (done, station) in stations.iter().enumerate() {
-        let which = format!("projection {} of {}", done + 1, stations.len());
-        working.set_message(which.clone());
-        let (radiograph, left) = match args.engine {
-            EngineName::Analog => simulation.analog(station, length, |progress| {
-                let seconds = progress
-                    .remaining
-                    .map_or(f64::NAN, |left| left.as_secs_f64());
-                working.set_message(format!("{which}, {seconds:.0} s left"));
-            })?,
-            EngineName::Fast => args.fast(&simulation, station, length)?,
-        };
-        if let (Some(dose), Some(left)) = (&mut dose, &left) {
-            dose.add(&simulation, left);
-        }
-        simulation.write_image(&args.out, station, &radiograph)?;
-        projections.push(Projected {
-            number: station.number,
-            angle_deg: station.angle_deg,
-            sums: radiograph.sums,
-            histories: radiograph.histories,
-            image: args.out.join(simulation.image_name(station)),
-        });
+    let scan = args.scan(&simulation, &stations, length, &working);
+    if scan.is_err() && is_new {
+        // Goes only if nothing is in it.
+        let _ = fs::remove_dir(&args.out);
     }
-    if let Some(dose) = &dose {
-        dose.write(&args.out, &simulation)?;
-    }
+    let (projections, dose) = scan?;
     working.finish_and_clear();
     let fewest = |fewest: f64, projected: &Projected| fewest.min(projected.histories);
     let result = Simulated {
@@ -125,6 +102,48 @@ pub fn run(args: &McgpuArgs, output: Output) -> anyhow::Result<()> {
 }
 
 impl McgpuArgs {
+    /// Simulates projection by projection and writes what the file asks for.
+    fn scan(
+        &self,
+        simulation: &Simulation,
+        stations: &[Station],
+        length: RunLength,
+        working: &ProgressBar,
+    ) -> anyhow::Result<(Vec<Projected>, Option<ScanDose>)> {
+        let mut dose = simulation
+            .dose_settings()
+            .map(|_| ScanDose::new(simulation));
+        let mut projections = Vec::new();
+        for (done, station) in stations.iter().enumerate() {
+            let which = format!("projection {} of {}", done + 1, stations.len());
+            working.set_message(which.clone());
+            let (radiograph, left) = match self.engine {
+                EngineName::Analog => simulation.analog(station, length, |progress| {
+                    let seconds = progress
+                        .remaining
+                        .map_or(f64::NAN, |left| left.as_secs_f64());
+                    working.set_message(format!("{which}, {seconds:.0} s left"));
+                })?,
+                EngineName::Fast => self.fast(simulation, station, length)?,
+            };
+            if let (Some(dose), Some(left)) = (&mut dose, &left) {
+                dose.add(simulation, left);
+            }
+            simulation.write_image(&self.out, station, &radiograph)?;
+            projections.push(Projected {
+                number: station.number,
+                angle_deg: station.angle_deg,
+                sums: radiograph.sums,
+                histories: radiograph.histories,
+                image: self.out.join(simulation.image_name(station)),
+            });
+        }
+        if let Some(dose) = &dose {
+            dose.write(&self.out, simulation)?;
+        }
+        Ok((projections, dose))
+    }
+
     fn length(&self, in_file: RunLength) -> anyhow::Result<RunLength> {
         let Some(histories) = self.histories else {
             return Ok(in_file);
