@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::{fail, names, phantom, shared, write_plan};
+use crate::{fail, names, phantom, ppa, shared, write_plan};
 
 fn contains(text: &str, parts: &[&str]) {
     for part in parts {
@@ -27,6 +27,17 @@ fn a_missing_file_is_named() {
         contains(&fail(folder.path(), command), &["nowhere"]);
     }
     assert!(names(folder.path()).is_empty());
+}
+
+/// A named material has its own density.
+#[test]
+fn a_density_goes_with_a_composition() {
+    let folder = tempfile::tempdir().unwrap();
+    let command = "xray materials --material water --density 2";
+    let output = ppa(folder.path(), command).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success() && output.stdout.is_empty());
+    contains(&said, &["--density", "--material", "cannot be used with"]);
 }
 
 #[test]

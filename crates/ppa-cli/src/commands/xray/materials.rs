@@ -15,7 +15,7 @@ pub struct MaterialsArgs {
     #[arg(long)]
     composition: Option<String>,
     /// Density in g/cm³ of a composition
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, conflicts_with = "material")]
     density: f64,
     /// Photon energy in keV
     #[arg(long, default_value_t = 60.0)]

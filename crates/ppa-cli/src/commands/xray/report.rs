@@ -86,11 +86,13 @@ impl Report {
             for (name, (value, se)) in dose.materials.iter().zip(values) {
                 text += &format!("{name:<24}{value:>12.3} ± {se:.3}\n");
             }
-            if let Some(kerma) = dose.entrance_air_kerma_ugy_per_mas {
-                text += &format!("air kerma at the skin {kerma:.4e} µGy/mAs");
-            }
-            if let Some(kerma) = dose.detector_air_kerma_ugy_per_mas {
-                text += &format!(", at the detector {kerma:.4e} µGy/mAs\n");
+            for (place, kerma) in [
+                ("skin", dose.entrance_air_kerma_ugy_per_mas),
+                ("detector", dose.detector_air_kerma_ugy_per_mas),
+            ] {
+                if let Some(kerma) = kerma {
+                    text += &format!("air kerma at the {place} {kerma:.4e} µGy/mAs\n");
+                }
             }
         }
         text += &format!("{:.3e} histories", self.histories);
