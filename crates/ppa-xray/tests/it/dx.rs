@@ -135,6 +135,22 @@ fn a_header_says_what_the_exposure_was_and_that_it_was_none() {
     );
 }
 
+/// A detector that is turned about its centre stays at its distance from the source.
+#[test]
+fn the_detector_is_as_far_as_the_central_ray_says() {
+    let (projection, mut radiograph) = exposed();
+    let turned = projection.with_detector_turned(0.5, -0.2);
+    radiograph.source_detector_mm = turned.source_detector_mm;
+    let object = read(&write(&turned, &radiograph, "scan", DxIntent::Processing));
+    for (tag, expected) in [
+        (tags::DISTANCE_SOURCE_TO_DETECTOR, 1_100.0),
+        (tags::ESTIMATED_RADIOGRAPHIC_MAGNIFICATION_FACTOR, 1.1),
+    ] {
+        let found: f64 = text(&object, tag).parse().unwrap();
+        assert!((found / expected - 1.0).abs() < 1e-9, "{tag}: {found}");
+    }
+}
+
 /// A reader that applies the sigmoid of the header sees what the PNG shows, but for the black level.
 #[test]
 fn the_window_of_the_header_gives_the_grey_of_the_png() {

@@ -34,7 +34,7 @@ pub struct DxExposure<'a> {
     pub tube: &'a TubeSpec,
     /// What is shown and how.
     pub examination: Examination,
-    /// Distance from the source to the table or the skin, mm, if it is known.
+    /// Distance from the source to the table or the skin along the central ray, mm, if it is known.
     pub source_patient_mm: Option<f64>,
     /// Images with the same words here share a study, such as the hash of a scan. Nothing of it can be read from the file.
     pub study: &'a str,

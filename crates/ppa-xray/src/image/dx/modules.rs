@@ -141,13 +141,12 @@ impl Radiograph {
             to.integers(tags::EXPOSURE, &[mas]);
             to.integers(tags::EXPOSURE_INU_AS, &[1e3 * mas]);
         }
-        to.decimals(
-            tags::DISTANCE_SOURCE_TO_DETECTOR,
-            &[self.source_detector_mm],
-        );
+        // Distances are measured along the central ray (PS3.3 C.8.11.5), which need not be square to the detector.
+        let source_detector_mm = self.source_detector_mm / exposure.projection.central_ray.z;
+        to.decimals(tags::DISTANCE_SOURCE_TO_DETECTOR, &[source_detector_mm]);
         if let Some(source_patient_mm) = exposure.source_patient_mm {
             to.decimals(tags::DISTANCE_SOURCE_TO_PATIENT, &[source_patient_mm]);
-            let magnification = self.source_detector_mm / source_patient_mm;
+            let magnification = source_detector_mm / source_patient_mm;
             to.decimals(
                 tags::ESTIMATED_RADIOGRAPHIC_MAGNIFICATION_FACTOR,
                 &[magnification],
