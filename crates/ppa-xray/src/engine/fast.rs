@@ -98,6 +98,8 @@ pub fn fast(
         open_kev: open_field_ev_cm2 * detector.pixel_cm2() / 1e3,
     };
     let scatter = Scatter::new(&transport, &paths, &signal, settings, Tactics::default());
+    let [compton, rayleigh, _] = &scatter.fields;
+    let shared = compton.covariance_kev2(rayleigh, detector);
     let scattered = scatter.fields.map(|field| field.on_pixels(detector));
     let primary_kev = primary.iter().map(|pixel| pixel.mean_kev).sum::<f64>();
     let sums = CategorySums::from_kev(|category| match category {
@@ -126,6 +128,10 @@ pub fn fast(
         open_field_ev_cm2,
         open_field,
         layers: readout.drawn(drawn, detector.columns as usize),
+        single_scatter_covariance: shared
+            .into_iter()
+            .map(|kev2| (kev2 * ev_cm2 * ev_cm2) as f32)
+            .collect(),
         electronic: None,
         sums,
         largest_score_share: Some(scatter.largest_share),

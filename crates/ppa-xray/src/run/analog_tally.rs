@@ -194,6 +194,7 @@ impl ImageSetup {
             open_field_ev_cm2: self.open_field_ev_cm2,
             open_field: self.open_field.clone(),
             layers,
+            single_scatter_covariance: Vec::new(),
             electronic: None,
             sums,
             largest_score_share: None,
