@@ -7,10 +7,6 @@ use crate::detector::quadrature::gauss_legendre;
 use crate::detector::receptor::{DetectorModel, ReceptorError, require};
 use crate::transport::tally::Moments;
 
-/// Density of a CsI crystal and of amorphous selenium, g/cm³.
-const CSI_G_CM3: f64 = 4.51;
-const SELENIUM_G_CM3: f64 = 4.27;
-
 /// Intervals between grazing (cosine 0) and normal (cosine 1) incidence.
 const COSINES: usize = 16;
 
@@ -43,18 +39,13 @@ impl Absorption {
                 packing,
             } => {
                 check_thickness(thickness_um)?;
-                let expected = "above 0, up to 1";
-                require(
-                    "the packing of the CsI layer",
-                    packing,
-                    1e-3..=1.0,
-                    expected,
-                )?;
-                Layer::new("csi", CSI_G_CM3 * packing * thickness_um)
+                let what = "the packing of the CsI layer";
+                require(what, packing, 1e-3..=1.0, "0.001 to 1")?;
+                Layer::new("csi", packing * thickness_um)
             }
             DetectorModel::Selenium { thickness_um } => {
                 check_thickness(thickness_um)?;
-                Layer::new("selenium", SELENIUM_G_CM3 * thickness_um)
+                Layer::new("a_selenium", thickness_um)
             }
         };
         Ok(Some(Self::of_layer(&layer)))
@@ -145,7 +136,7 @@ mod tests {
     #[test]
     fn below_the_edge_a_layer_absorbs_as_beer_and_lambert_say() {
         let layer = csi(200.0);
-        let thickness = Layer::new("csi", 4.51 * 0.8 * 200.0);
+        let thickness = Layer::new("csi", 0.8 * 200.0);
         for (energy_kev, cos) in [(20.0, 1.0), (33.0, 1.0), (30.0, 0.5)] {
             let expected = 1.0 - (-thickness.thickness(energy_kev).total() / cos).exp();
             let found = layer.moments(energy_kev, cos).mean_kev / energy_kev;
@@ -157,13 +148,13 @@ mod tests {
     /// sampled anew (Klein–Nishina by rejection, Rayleigh left out as in the table), secondaries followed to the end.
     #[test]
     fn a_layer_leaves_what_photons_followed_one_by_one_leave() {
-        for (energy_kev, cos, material, g_cm3_um, absorption) in [
-            (60.0, 0.9, "csi", 4.51 * 0.8 * 600.0, csi(600.0)),
-            (110.0, 1.0, "csi", 4.51 * 0.8 * 600.0, csi(600.0)),
-            (25.0, 0.6, "selenium", 4.27 * 200.0, selenium(200.0)),
-            (70.0, 1.0, "selenium", 4.27 * 1_000.0, selenium(1_000.0)),
+        for (energy_kev, cos, material, solid_um, absorption) in [
+            (60.0, 0.9, "csi", 0.8 * 600.0, csi(600.0)),
+            (110.0, 1.0, "csi", 0.8 * 600.0, csi(600.0)),
+            (25.0, 0.6, "a_selenium", 200.0, selenium(200.0)),
+            (70.0, 1.0, "a_selenium", 1_000.0, selenium(1_000.0)),
         ] {
-            let layer = Layer::new(material, g_cm3_um);
+            let layer = Layer::new(material, solid_um);
             let photons = 30_000;
             let (mut sum, mut square, mut fourth) = (0.0, 0.0, 0.0);
             for i in 0..photons {

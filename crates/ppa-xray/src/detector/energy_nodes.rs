@@ -1,7 +1,9 @@
 //! Energies at which a quantity with absorption edges is tabulated.
 
+use crate::matter::cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV};
+
 /// Smallest and largest energy that reach a detector, keV.
-const RANGE_KEV: [f64; 2] = [1.0, 150.0];
+const RANGE_KEV: [f64; 2] = [MIN_ENERGY_KEV, MAX_ENERGY_KEV];
 
 /// Ratio of neighbouring nodes: linear interpolation of E⁻³ is right to 6e-4 in between.
 const RATIO: f64 = 1.02;

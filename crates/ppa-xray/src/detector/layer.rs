@@ -15,11 +15,12 @@ pub(crate) struct Thickness {
 }
 
 impl Layer {
-    /// A layer of a material of the library, by density in g/cm³ times thickness in µm.
-    pub fn new(material: &str, g_cm3_um: f64) -> Self {
+    /// A layer of a material of the library; what its thickness would be without gaps, µm.
+    pub fn new(material: &str, solid_um: f64) -> Self {
+        let material = Material::named(material).expect("in the library");
         Self {
-            material: Material::named(material).expect("in the library"),
-            g_cm2: 1e-4 * g_cm3_um,
+            g_cm2: 1e-4 * material.density_g_cm3() * solid_um,
+            material,
         }
     }
 
