@@ -4,11 +4,9 @@ use crate::{
     beam::spectrum_error::SpectrumError,
     beam::tube::TubeSpec,
     matter::cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::energy_transfer::GRAY_PER_KEV_G,
     matter::material::Material,
 };
-
-/// Dose of one keV in one gram, in Gy.
-const GRAY_PER_KEV_G: f64 = 1.602_176_634e-13;
 
 /// Entries per bin of the table that says in which bin to start looking: the first is nearly always right.
 const GUIDE_PER_BIN: usize = 16;
@@ -204,10 +202,8 @@ impl Spectrum {
     fn kerma_terms(&self, air: &Material) -> Vec<(f64, f64)> {
         self.bins()
             .map(|(energy, probability)| {
-                let transfer = air
-                    .energy_transfer_cm2_g(energy)
-                    .expect("bins lie inside the tables");
-                (energy, probability * energy * transfer * GRAY_PER_KEV_G)
+                let kerma_gy_cm2 = air.kerma_kev_cm2_g(energy) * GRAY_PER_KEV_G;
+                (energy, probability * kerma_gy_cm2)
             })
             .collect()
     }

@@ -4,7 +4,7 @@ use crate::detector::escape::{KRay, Loss, Scattered};
 use crate::detector::layer::Layer;
 use crate::detector::quadrature::gauss_legendre;
 use crate::matter::cross_sections::ELECTRON_REST_KEV;
-use crate::matter::klein_nishina::energy_ratio;
+use crate::matter::klein_nishina::{differential, energy_ratio};
 
 /// Points of the integral over the polar angle of Compton scattering.
 const POLAR: usize = 10;
@@ -26,9 +26,8 @@ impl LayerResponse {
         // Klein and Nishina per solid angle.
         let angles = gauss_legendre::<POLAR>().map(|(x, weight)| {
             let cos = 2.0 * x - 1.0;
-            let ratio = energy_ratio(alpha, cos);
-            let density = ratio * ratio * (ratio + 1.0 / ratio - 1.0 + cos * cos);
-            (weight * density, cos, ratio * energy_kev)
+            let scattered_kev = energy_ratio(alpha, cos) * energy_kev;
+            (weight * differential(energy_kev, cos), cos, scattered_kev)
         });
         let sum: f64 = angles.iter().map(|(weight, ..)| weight).sum();
         let scattered = angles.map(|(weight, cos, energy_kev)| Scattered {

@@ -119,9 +119,7 @@ impl Readout {
             let sigma = self.electronic_noise_kev * ev_cm2;
             let draw = |pixel: usize| {
                 let mut rng = Philox::new(image.seed, Stream::ElectronicNoise as u32, pixel as u64);
-                // Box and Muller; 1 − u lies in (0, 1].
-                let radius = (-2.0 * (1.0 - rng.unit()).ln()).sqrt();
-                (sigma * radius * (std::f64::consts::TAU * rng.unit()).cos()) as f32
+                (sigma * rng.normals()[0]) as f32
             };
             let pixels = image.detector.pixels();
             image.electronic = Some(Layer {

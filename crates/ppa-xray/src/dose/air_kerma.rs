@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::dose::report::GRAY_PER_KEV_G;
+use crate::matter::energy_transfer::GRAY_PER_KEV_G;
 use crate::matter::material::Material;
 use crate::phantom::lattice::Walk;
 use crate::transport::attenuation::{CEILING_KEV, CUTOFF_KEV};
@@ -26,7 +26,7 @@ impl AirKerma {
         let air = air();
         let nodes = (CEILING_KEV - CUTOFF_KEV) as usize * NODES_PER_KEV;
         let table = (0..=nodes)
-            .map(|node| kerma_kev_cm2_g(&air, CUTOFF_KEV + node as f64 / NODES_PER_KEV as f64))
+            .map(|node| air.kerma_kev_cm2_g(CUTOFF_KEV + node as f64 / NODES_PER_KEV as f64))
             .collect();
         Self { table }
     }
@@ -43,12 +43,6 @@ impl AirKerma {
 
 fn air() -> Material {
     Material::named("air").expect("in the library")
-}
-
-/// Kerma of one photon per cm², keV/g.
-fn kerma_kev_cm2_g(air: &Material, energy_kev: f64) -> f64 {
-    let transfer = air.energy_transfer_cm2_g(energy_kev);
-    energy_kev * transfer.expect("photons lie inside the tables")
 }
 
 /// Air kerma free in air (no backscatter) where the central ray enters the patient, Gy per history.
@@ -95,7 +89,7 @@ pub(crate) fn entrance_gy_per_history(transport: &Transport) -> Option<f64> {
                     material.cross_sections_unchecked(energy_kev).total() * mm_g_cm3 / 10.0
                 })
                 .sum();
-            probability * kerma_kev_cm2_g(&air, energy_kev) * (-depth).exp()
+            probability * air.kerma_kev_cm2_g(energy_kev) * (-depth).exp()
         })
         .sum();
     // Across the ray, and nearer to the focus.

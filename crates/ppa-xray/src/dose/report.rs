@@ -4,9 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::dose::settings::VoxelBox;
 use crate::dose::tally::{STEPS_PER_KEV, STEPS_PER_KEV2, Sum};
-
-/// Dose of one keV in one gram, in Gy.
-pub(crate) const GRAY_PER_KEV_G: f64 = 1.602_176_634e-13;
+use crate::matter::energy_transfer::GRAY_PER_KEV_G;
 
 /// A mean and its standard error.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

@@ -1,6 +1,5 @@
 //! Which doses are counted.
 
-use nalgebra::Vector3;
 use ppa_ct::Grid;
 use serde::{Deserialize, Serialize};
 
@@ -91,11 +90,4 @@ impl DoseSettings {
         }
         Ok(())
     }
-}
-
-/// Volume of a voxel, cm³; voxels may be sheared.
-pub(crate) fn voxel_cm3(grid: &Grid) -> f64 {
-    let matrix = grid.ct_from_voxel().matrix();
-    let edge = |axis| -> Vector3<f64> { matrix.fixed_view::<3, 1>(0, axis).into_owned() };
-    edge(0).cross(&edge(1)).dot(&edge(2)).abs() / 1e3
 }

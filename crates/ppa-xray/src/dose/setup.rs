@@ -3,9 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use crate::dose::air_kerma::entrance_gy_per_history;
-use crate::dose::report::{Dose, Estimate, GRAY_PER_KEV_G, Imparted, VoxelDose, mean};
-use crate::dose::settings::{DoseError, DoseSettings, VoxelBox, voxel_cm3};
+use crate::dose::report::{Dose, Estimate, Imparted, VoxelDose, mean};
+use crate::dose::settings::{DoseError, DoseSettings, VoxelBox};
 use crate::dose::tally::{DoseTally, Sum};
+use crate::matter::energy_transfer::GRAY_PER_KEV_G;
+use crate::phantom::voxels::voxel_mm3;
 use crate::transport::tracking::Transport;
 
 /// What does not depend on the histories: names, masses, geometry.
@@ -29,7 +31,7 @@ impl DoseSetup {
         let phantom = transport.phantom;
         let grid = phantom.grid();
         settings.validate(grid)?;
-        let volume_cm3 = voxel_cm3(grid);
+        let volume_cm3 = voxel_mm3(grid) / 1e3;
         let grams = |voxel: usize| f64::from(phantom.density_g_cm3()[voxel]) * volume_cm3;
         let mut materials: Vec<(String, f64)> = phantom
             .materials()

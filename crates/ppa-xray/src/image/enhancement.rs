@@ -118,8 +118,7 @@ mod tests {
             let mut rng = Philox::new(11, 0, 1);
             let mut noisy = image(256, 256, |_, _| 2.0);
             for value in &mut noisy.values {
-                let radius = (-2.0 * (1.0 - rng.unit()).ln()).sqrt();
-                *value += sigma * (radius * (std::f64::consts::TAU * rng.unit()).cos()) as f32;
+                *value += sigma * rng.normals()[0] as f32;
             }
             let width = |values: &[f32]| {
                 let squares = values.iter().map(|v| f64::from(v - 2.0).powi(2));

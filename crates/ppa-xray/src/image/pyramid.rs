@@ -149,10 +149,7 @@ mod tests {
     fn white(columns: usize, rows: usize) -> Plane {
         let mut rng = Philox::new(3, 0, 7);
         let values = (0..columns * rows)
-            .map(|_| {
-                let radius = (-2.0 * (1.0 - rng.unit()).ln()).sqrt();
-                (radius * (std::f64::consts::TAU * rng.unit()).cos()) as f32
-            })
+            .map(|_| rng.normals()[0] as f32)
             .collect();
         Plane {
             columns,

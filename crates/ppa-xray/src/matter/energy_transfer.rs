@@ -1,11 +1,20 @@
 //! What a photon field gives to electrons.
 
 use crate::matter::cross_sections::{ELECTRON_REST_KEV, HC_KEV_ANGSTROM};
-use crate::matter::klein_nishina::energy_ratio;
+use crate::matter::klein_nishina::{differential, energy_ratio};
 use crate::matter::material::Material;
 use crate::matter::material_error::MaterialError;
 
+/// Dose of one keV in one gram, in Gy.
+pub(crate) const GRAY_PER_KEV_G: f64 = 1.602_176_634e-13;
+
 impl Material {
+    /// Kerma of one photon per cm² in keV/g, at an energy inside the tables.
+    pub(crate) fn kerma_kev_cm2_g(&self, energy_kev: f64) -> f64 {
+        let transfer = self.energy_transfer_cm2_g(energy_kev);
+        energy_kev * transfer.expect("photons lie inside the tables")
+    }
+
     /// Mass energy-transfer coefficient in cm²/g: what a photon field gives to electrons.
     ///
     /// Photoelectric part plus the Compton part times the mean fraction of energy that its electron gets
@@ -31,14 +40,12 @@ impl Material {
             };
             let s = i as f64 / INTERVALS as f64;
             let cos = 1.0 - 2.0 * s * s;
-            let ratio = energy_ratio(alpha, cos);
-            let klein_nishina = ratio * ratio * (ratio + 1.0 / ratio - 1.0 + cos * cos);
             let weight = simpson
                 * s
-                * klein_nishina
+                * differential(energy_kev, cos)
                 * self.incoherent_per_gram(s * energy_kev / HC_KEV_ANGSTROM);
             all += weight;
-            transferred += weight * (1.0 - ratio);
+            transferred += weight * (1.0 - energy_ratio(alpha, cos));
         }
         transferred / all
     }

@@ -97,7 +97,9 @@ pub enum MaterialError {
         expected: usize,
     },
     /// A value that is negative or not finite, or zero where that cannot be.
-    #[error("material {name:?}: number {index} of the {what}, counted from 0, is {found}")]
+    #[error(
+        "material {name:?}: number {index} of the {what}, counted from 0, is {found}, expected {expected}"
+    )]
     TableValue {
         /// Material at fault.
         name: String,
@@ -107,6 +109,8 @@ pub enum MaterialError {
         index: usize,
         /// Value given.
         found: f64,
+        /// What it may be.
+        expected: &'static str,
     },
     /// Values that do not ascend.
     #[error(

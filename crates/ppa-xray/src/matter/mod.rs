@@ -2,10 +2,11 @@
 
 mod composition;
 pub(crate) mod compton;
+pub(crate) mod cross_section_table;
 pub(crate) mod cross_sections;
 pub(crate) mod electron_shell;
 pub(crate) mod element;
-mod energy_transfer;
+pub(crate) mod energy_transfer;
 pub(crate) mod fluorescence;
 pub(crate) mod impulse_approximation;
 pub(crate) mod incoherent_function;

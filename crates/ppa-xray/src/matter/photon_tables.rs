@@ -125,6 +125,7 @@ mod tests {
         for change in values {
             let error = broken(change);
             assert!(matches!(error, MaterialError::TableValue { .. }), "{error}");
+            assert!(error.to_string().contains("expected "), "{error}");
         }
         let lengths: [Change; 6] = [
             |t| t.energies_kev.clear(),

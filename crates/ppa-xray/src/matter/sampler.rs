@@ -2,6 +2,7 @@
 
 use crate::{
     matter::compton::{Compton, ComptonModel},
+    matter::cross_section_table::CrossSectionTable,
     matter::cross_sections::{CrossSections, HC_KEV_ANGSTROM, MAX_ENERGY_KEV, MIN_ENERGY_KEV},
     matter::fluorescence::Fluorescence,
     matter::impulse_approximation::BoundElectron,
@@ -12,10 +13,6 @@ use crate::{
     transport::attenuation::CUTOFF_KEV,
 };
 
-/// Bins per octave of energy, as a power of two: straight lines in E are then within 1e-4 of E⁻³ laws.
-const ENERGY_BITS: u32 = 8;
-/// Largest relative departure from a straight line in a bin; beyond it the material itself is asked.
-const STRAIGHT: f64 = 5e-4;
 /// Bins per octave of q², as a power of two.
 const Q_SQUARED_BITS: u32 = 5;
 /// Smallest q² node in 1/Å²: below it F² and S are linear in q².
@@ -25,80 +22,23 @@ const MIN_Q_SQUARED: f64 = 1e-5;
 #[derive(Clone, Debug)]
 pub struct MaterialTables {
     material: Material,
-    grid: Octaves,
-    bins: Vec<Bin>,
+    cross_sections: CrossSectionTable,
     rayleigh: Rayleigh,
     compton: Compton,
     fluorescence: Fluorescence,
-}
-
-/// Cross sections at the lower end of an energy bin and their change across it, cm²/g.
-#[derive(Clone, Copy, Debug)]
-struct Bin {
-    photoelectric: [f32; 2],
-    rayleigh: [f32; 2],
-    compton: [f32; 2],
-}
-
-impl Bin {
-    /// Marks a bin in which the photoelectric part is no straight line, because of an edge or the fine structure
-    /// below one: there the material itself is asked.
-    const CUT: f32 = f32::NAN;
-
-    fn new(low: CrossSections, high: CrossSections) -> Self {
-        let line = |low: f64, high: f64| [low as f32, (high - low) as f32];
-        Self {
-            photoelectric: line(low.photoelectric, high.photoelectric),
-            rayleigh: line(low.rayleigh, high.rayleigh),
-            compton: line(low.compton, high.compton),
-        }
-    }
-
-    #[inline]
-    fn at(&self, fraction: f64) -> CrossSections {
-        let line = |[low, change]: [f32; 2]| f64::from(low) + f64::from(change) * fraction;
-        CrossSections {
-            photoelectric: line(self.photoelectric),
-            rayleigh: line(self.rayleigh),
-            compton: line(self.compton),
-        }
-    }
 }
 
 impl MaterialTables {
     /// Prepares a material for Compton scattering by a model.
     #[must_use]
     pub fn new(material: &Material, model: ComptonModel) -> Self {
-        let grid = Octaves::covering(MIN_ENERGY_KEV, MAX_ENERGY_KEV, ENERGY_BITS);
-        let mut low = material.cross_sections_unchecked(grid.first());
-        let mut bins: Vec<Bin> = (0..grid.bins())
-            .map(|index| {
-                let high = material.cross_sections_unchecked(grid.node(index + 1));
-                let mut bin = Bin::new(low, high);
-                let width = grid.node(index + 1) - grid.node(index);
-                let bent = [0.25, 0.5, 0.75].into_iter().any(|fraction| {
-                    let direct =
-                        material.cross_sections_unchecked(grid.node(index) + fraction * width);
-                    (bin.at(fraction).photoelectric / direct.photoelectric - 1.0).abs() > STRAIGHT
-                });
-                if bent {
-                    bin.photoelectric = [Bin::CUT; 2];
-                }
-                low = high;
-                bin
-            })
-            .collect();
-        for edge in material.edges_kev() {
-            bins[grid.locate(edge).0].photoelectric = [Bin::CUT; 2];
-        }
         let q_squared = Octaves::covering(
             MIN_Q_SQUARED,
             (MAX_ENERGY_KEV / HC_KEV_ANGSTROM).powi(2),
             Q_SQUARED_BITS,
         );
         Self {
-            grid,
-            bins,
+            cross_sections: CrossSectionTable::new(material),
             rayleigh: Rayleigh::new(material),
             compton: Compton::new(material, model, q_squared),
             fluorescence: Fluorescence::new(material, CUTOFF_KEV),
@@ -118,12 +58,9 @@ impl MaterialTables {
     #[inline]
     #[must_use]
     pub fn cross_sections(&self, energy_kev: f64) -> CrossSections {
-        let (index, fraction) = self.grid.locate(energy_kev);
-        let bin = &self.bins[index];
-        if bin.photoelectric[0].is_nan() {
-            return self.asked(energy_kev);
-        }
-        bin.at(fraction)
+        self.cross_sections
+            .at(energy_kev)
+            .unwrap_or_else(|| self.asked(energy_kev))
     }
 
     #[cold]

@@ -70,7 +70,12 @@ impl TabulatedMatter {
         }
         not_negative(name, "squared form factors", &squared)?;
         if squared[0] == 0.0 {
-            return Err(table_value(name, "squared form factors", 0, 0.0));
+            return Err(table_value(
+                name,
+                "squared form factors",
+                (0, 0.0),
+                POSITIVE,
+            ));
         }
         if tables.shells.is_empty() {
             return Err(MaterialError::TableLength {
@@ -81,17 +86,28 @@ impl TabulatedMatter {
             });
         }
         for (index, shell) in tables.shells.iter().enumerate() {
-            for (what, value, least) in [
-                ("electrons of shells", shell.electrons, f64::MIN_POSITIVE),
-                ("binding energies of shells", shell.binding_kev, 0.0),
+            for (what, value, fine, expected) in [
+                (
+                    "electrons of shells",
+                    shell.electrons,
+                    shell.electrons > 0.0,
+                    POSITIVE,
+                ),
+                (
+                    "binding energies of shells",
+                    shell.binding_kev,
+                    shell.binding_kev >= 0.0,
+                    NOT_NEGATIVE,
+                ),
                 (
                     "Compton profiles of shells",
                     shell.profile_at_zero,
-                    f64::MIN_POSITIVE,
+                    shell.profile_at_zero > 0.0,
+                    POSITIVE,
                 ),
             ] {
-                if !(value.is_finite() && value >= least) {
-                    return Err(table_value(name, what, index, value));
+                if !(fine && value.is_finite()) {
+                    return Err(table_value(name, what, (index, value), expected));
                 }
             }
         }
@@ -154,18 +170,27 @@ impl TabulatedMatter {
     }
 }
 
-fn table_value(name: &str, what: &'static str, index: usize, found: f64) -> MaterialError {
+const NOT_NEGATIVE: &str = "zero or more";
+const POSITIVE: &str = "more than zero";
+
+fn table_value(
+    name: &str,
+    what: &'static str,
+    (index, found): (usize, f64),
+    expected: &'static str,
+) -> MaterialError {
     MaterialError::TableValue {
         name: name.to_owned(),
         what,
         index,
         found,
+        expected,
     }
 }
 
 fn not_negative(name: &str, what: &'static str, values: &[f64]) -> Result<(), MaterialError> {
     match values.iter().position(|v| !(v.is_finite() && *v >= 0.0)) {
-        Some(bad) => Err(table_value(name, what, bad, values[bad])),
+        Some(bad) => Err(table_value(name, what, (bad, values[bad]), NOT_NEGATIVE)),
         None => Ok(()),
     }
 }

@@ -5,9 +5,10 @@ use serde::Serialize;
 
 use crate::matter::material::Material;
 use crate::phantom::histogram::{BIN_HU, Histogram, HuBin};
-use crate::phantom::hu::{HuCalibration, Segment};
+use crate::phantom::hu::HuCalibration;
+use crate::phantom::segment::Segment;
 use crate::phantom::segmentation::Segmentation;
-use crate::phantom::voxels::{PhantomError, check_mask};
+use crate::phantom::voxels::{PhantomError, check_mask, voxel_mm3};
 
 /// Elements from scandium on count as metal.
 const LIGHTEST_METAL: u8 = 21;
@@ -91,8 +92,7 @@ impl HuCalibration {
         let segmentation = Segmentation::new(self)?;
         let hu = volume.values();
         check_mask(mask, hu.len())?;
-        let voxel_from_ct = volume.grid().ct_from_voxel().to_homogeneous();
-        let voxel_mm3 = voxel_from_ct.fixed_view::<3, 3>(0, 0).determinant().abs();
+        let voxel_mm3 = voxel_mm3(volume.grid());
         let mut segments: Vec<SegmentSums> = self.segments.iter().map(SegmentSums::new).collect();
         let mut histograms = vec![Histogram::new(); segmentation.materials().len()];
         let mut owner = vec![0; histograms.len()];

@@ -6,5 +6,6 @@ pub(crate) mod graded_mixture;
 pub(crate) mod histogram;
 pub(crate) mod hu;
 pub(crate) mod lattice;
+pub(crate) mod segment;
 pub(crate) mod segmentation;
 pub(crate) mod voxels;

@@ -3,7 +3,8 @@
 use crate::matter::material::Material;
 use crate::phantom::calibration_error::CalibrationError;
 use crate::phantom::graded_mixture::GradedMixture;
-use crate::phantom::hu::{Composition, HuCalibration, Segment};
+use crate::phantom::hu::HuCalibration;
+use crate::phantom::segment::{Composition, Segment};
 
 /// The materials of a calibration, and which of them a Hounsfield value stands for.
 pub(crate) struct Segmentation<'a> {

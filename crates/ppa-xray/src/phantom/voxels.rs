@@ -37,7 +37,7 @@ pub enum PhantomError {
         materials: usize,
     },
     /// A density is NaN, negative or infinite.
-    #[error("voxel {voxel:?} has a density of {found} g/cm³")]
+    #[error("voxel {voxel:?} has a density of {found} g/cm³, expected zero or more")]
     Density {
         /// The voxel (i, j, k).
         voxel: [usize; 3],
@@ -62,6 +62,12 @@ pub(super) fn check_mask(mask: Option<&[bool]>, voxels: usize) -> Result<(), Pha
         }),
         _ => Ok(()),
     }
+}
+
+/// Volume of a voxel, mm³; voxels may be sheared.
+pub(crate) fn voxel_mm3(grid: &Grid) -> f64 {
+    let ct_from_voxel = grid.ct_from_voxel().matrix().fixed_view::<3, 3>(0, 0);
+    ct_from_voxel.determinant().abs()
 }
 
 /// Materials and densities on the lattice of a CT; vacuum outside it.
@@ -151,10 +157,14 @@ impl VoxelPhantom {
             })
         };
         // Only materials that occur are kept: each costs sampling tables.
-        let mut occurs = vec![false; segmentation.materials().len()];
-        for index in 0..hu.len() {
-            occurs[voxel(index).material] = true;
-        }
+        let none = || vec![false; segmentation.materials().len()];
+        let occurs = (0..hu.len())
+            .into_par_iter()
+            .fold(none, |mut occurs, index| {
+                occurs[voxel(index).material] = true;
+                occurs
+            })
+            .reduce(none, |a, b| a.iter().zip(b).map(|(a, b)| a | b).collect());
         let (kept, materials): (Vec<usize>, Vec<Material>) = segmentation
             .materials()
             .iter()
