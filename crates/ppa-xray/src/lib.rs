@@ -65,7 +65,8 @@ mod scenes;
 #[cfg(test)]
 extern crate self as ppa_xray;
 
-pub use beam::projection::{Detector, Projection, ProjectionError};
+pub use beam::projection::{Detector, Projection};
+pub use beam::projection_error::ProjectionError;
 pub use beam::source::{Collimation, FocalSpot, HeelEffect, Source, SpotShape};
 pub use beam::spectrum::Spectrum;
 pub use beam::spectrum_error::SpectrumError;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point2, Point3, Unit, Vector3};
 
-use crate::beam::projection::ProjectionError;
+use crate::beam::projection_error::ProjectionError;
 use crate::beam::source::{HeelEffect, SpotPlane};
 use crate::beam::spectrum::Spectrum;
 use crate::beam::tube::{TubeSpec, anode_angles_deg};
@@ -143,4 +143,63 @@ pub(crate) fn lattice_on(low: [f64; 2], high: [f64; 2], distance_mm: f64) -> Vec
         .map(|n| Point2::new(along(0, n % LOOK), along(1, n / LOOK)))
         .map(|at| Point3::new(at.x, at.y, distance_mm))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+    use crate::beam::emitter::Emitter;
+    use crate::beam::projection::{Detector, Projection};
+    use crate::beam::source::Source;
+
+    /// 70 kV, 14° anode, 2.5 mm Al: photons per solid angle and mean energy beside the central ray over those on it,
+    /// against SpekPy 2.5.4 off its axis, `Spek(kvp=70, th=14, x=x, z=100).filter("Al", 2.5)`, times its squared
+    /// distance. SpekPy's beam passes the filter at a slant, which costs it up to 0.9 % at 17.6 cm; ours does not.
+    #[test]
+    fn heel_effect_agrees_with_spekpy_off_the_axis() {
+        let source = Source {
+            heel_effect: Some(HeelEffect {
+                anode_towards_deg: 180.0,
+            }),
+            ..Source::default()
+        };
+        let spectrum = Spectrum::tungsten(&TubeSpec {
+            kvp: 70.0,
+            anode_angle_deg: 14.0,
+            filters: vec!["Al:2.5".parse().unwrap()],
+        });
+        let projection = Projection {
+            source,
+            ..Projection::new(
+                Isometry3::identity(),
+                1_000.0,
+                Detector::centred(10, 10, 40.0),
+            )
+        };
+        let emitter = Emitter::new(&projection, &spectrum.unwrap()).unwrap();
+        for (x_cm, intensity, mean_kev) in [
+            (-17.6, 0.799_61, 41.370),
+            (-10.5, 0.932_30, 40.017),
+            (-7.0, 0.964_17, 39.665),
+            (-3.5, 0.985_59, 39.405),
+            (3.5, 1.009_37, 39.055),
+            (7.0, 1.014_92, 38.935),
+            (10.5, 1.017_48, 38.842),
+            (17.6, 1.015_70, 38.716),
+        ] {
+            let mixture = emitter.mixture(&Vector3::new(x_cm, 0.0, 100.0).normalize());
+            let parts = mixture.parts();
+            let mean: f64 = parts
+                .map(|(s, share)| share * emitter.spectra()[s].mean_energy_kev())
+                .sum();
+            let ratio = mixture.intensity / intensity;
+            assert!((ratio - 1.0).abs() < 0.012, "{x_cm} cm: {ratio}");
+            assert!(
+                (mean / mean_kev - 1.0).abs() < 0.004,
+                "{x_cm} cm: {mean} keV"
+            );
+        }
+    }
 }

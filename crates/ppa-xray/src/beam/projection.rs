@@ -5,139 +5,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::beam::emitter::Emitter;
 use crate::beam::field::Field;
+use crate::beam::projection_error::ProjectionError;
 use crate::beam::source::{Collimation, Source};
 use crate::beam::spectrum::Spectrum;
-use crate::detector::receptor::{Receptor, ReceptorError};
+use crate::detector::receptor::Receptor;
 use crate::transport::tally::Raster;
 
 /// Most pixels of a detector: 2²⁸, whose planes take 8 GiB.
-const MAX_PIXELS: usize = 1 << 28;
-
-/// Why a projection cannot be simulated.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProjectionError {
-    /// The detector has no pixels, or more than can be addressed.
-    #[error("the detector has {columns} x {rows} pixels; each side needs 1 to 65536")]
-    PixelCount {
-        /// Pixels along device x.
-        columns: u32,
-        /// Pixels along device y.
-        rows: u32,
-    },
-    /// The planes of such an image would not fit into memory.
-    #[error(
-        "the detector has {columns} x {rows} pixels, expected at most {MAX_PIXELS}: each takes 32 bytes in the result"
-    )]
-    TooManyPixels {
-        /// Pixels along device x.
-        columns: u32,
-        /// Pixels along device y.
-        rows: u32,
-    },
-    /// Pixel side or source-detector distance is not a length that makes sense.
-    #[error("{what} is {found_mm} mm, expected 0.001 mm to 1 km")]
-    Length {
-        /// Which length.
-        what: &'static str,
-        /// What it was.
-        found_mm: f64,
-    },
-    /// The focal spot is no size, or out of proportion.
-    #[error(
-        "the focal spot is {size_mm} mm wide at {source_detector_mm} mm from the detector, expected 0 to 2 % of that distance"
-    )]
-    FocalSpot {
-        /// Its side or full width at half maximum.
-        size_mm: f64,
-        /// Distance from the source to the detector plane, mm.
-        source_detector_mm: f64,
-    },
-    /// Opening angles of the fan.
-    #[error("the x-ray field opens by {found_deg:?} degrees, expected above 0 and below 170")]
-    FanAngle {
-        /// Angles along device x and y, degrees.
-        found_deg: [f64; 2],
-    },
-    /// Sides of the field.
-    #[error(
-        "the x-ray field measures {size_mm:?} mm on the detector plane, expected sides of 0.001 to 10000000 mm"
-    )]
-    Field {
-        /// Sides along device x and y.
-        size_mm: [f64; 2],
-    },
-    /// The field or the detector reaches nearly to the horizon.
-    #[error(
-        "the {what} reaches {reach_mm} mm from the foot of the source at {source_detector_mm} mm from it, expected at most ten times that distance"
-    )]
-    FieldTooWide {
-        /// Field or detector.
-        what: &'static str,
-        /// Largest coordinate on the detector plane.
-        reach_mm: f64,
-        /// Distance from the source to the detector plane.
-        source_detector_mm: f64,
-    },
-    /// The tube looks along the detector or away from it.
-    #[error(
-        "the central ray meets the detector plane at {angle_deg:.1}° from its normal, expected below 84°"
-    )]
-    CentralRay {
-        /// Angle between central ray and device z, degrees.
-        angle_deg: f64,
-    },
-    /// Direction of the anode.
-    #[error("the anode lies towards {found_deg} degrees, expected a number")]
-    Anode {
-        /// What it was.
-        found_deg: f64,
-    },
-    /// The heel effect needs the tube model.
-    #[error(
-        "the heel effect needs a spectrum of the tube model; this one does not say from which anode it comes"
-    )]
-    HeelWithoutTube,
-    /// The tube model has no spectrum at a take-off angle of the field.
-    #[error(
-        "no spectrum at a take-off angle of {anode_angle_deg:.1}° for the heel effect: {message}"
-    )]
-    Heel {
-        /// Take-off angle, degrees.
-        anode_angle_deg: f64,
-        /// What the tube model said.
-        message: String,
-    },
-    /// The device pose holds NaN or infinity.
-    #[error("the device pose is not finite")]
-    Pose,
-    /// The image receptor.
-    #[error(transparent)]
-    Receptor(#[from] ReceptorError),
-    /// Not one ray of the field can meet the voxel box.
-    #[error("the x-ray field misses the voxel box altogether")]
-    FieldMissesPhantom,
-    /// Tissue would lie behind the detector plane.
-    #[error(
-        "the detector cuts through the patient: voxel {voxel:?} of {density_g_cm3} g/cm³ lies {depth_mm:.1} mm behind its plane"
-    )]
-    DetectorInsidePhantom {
-        /// The offending voxel (i, j, k).
-        voxel: [usize; 3],
-        /// Its density.
-        density_g_cm3: f32,
-        /// Distance of its centre behind the plane.
-        depth_mm: f64,
-    },
-    /// The focal spot would lie in tissue.
-    #[error("the x-ray source lies inside voxel {voxel:?} of {density_g_cm3} g/cm³")]
-    SourceInsidePhantom {
-        /// The offending voxel (i, j, k).
-        voxel: [usize; 3],
-        /// Its density.
-        density_g_cm3: f32,
-    },
-}
+pub(crate) const MAX_PIXELS: usize = 1 << 28;
 
 /// A flat detector square to device z; columns run along device x, rows along device y.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -274,6 +149,16 @@ impl Projection {
             pixel_mm,
             centre_mm,
         } = self.detector;
+        let pose = self.ct_from_device.to_matrix();
+        for (what, numbers) in [
+            ("device pose", pose.as_slice()),
+            ("central ray", self.central_ray.as_slice()),
+            ("centre of the detector", &centre_mm),
+        ] {
+            if !numbers.iter().all(|number| number.is_finite()) {
+                return Err(ProjectionError::NotFinite { what });
+            }
+        }
         let side = 1..=65_536;
         if !side.contains(&columns) || !side.contains(&rows) {
             return Err(ProjectionError::PixelCount { columns, rows });
@@ -325,11 +210,6 @@ impl Projection {
                 });
             }
         }
-        let pose = self.ct_from_device.to_matrix();
-        let numbers = pose.iter().chain(self.central_ray.iter()).chain(&centre_mm);
-        if !numbers.clone().all(|v| v.is_finite()) {
-            return Err(ProjectionError::Pose);
-        }
         if self.central_ray.z < 0.1 {
             return Err(ProjectionError::CentralRay {
                 angle_deg: self.central_ray.z.acos().to_degrees(),
@@ -371,5 +251,27 @@ impl Projection {
                 .iter()
                 .any(|corner| normal.dot(&corner.coords) <= *offset)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The detector turned about its centre: same solid angle weight, same centre, same tube.
+    #[test]
+    fn a_turned_detector_stays_where_it_is() {
+        let detector = Detector::centred(10, 10, 40.0);
+        let straight = Projection::new(Isometry3::identity(), 1_000.0, detector);
+        let turned = straight.with_detector_turned(0.4, 0.1);
+        let centre = |p: &Projection| {
+            let [x, y] = p.detector.centre_mm;
+            p.ct_from_device * Point3::new(x, y, p.source_detector_mm)
+        };
+        assert!((centre(&straight) - centre(&turned)).norm() < 1e-9);
+        let ray = turned.ct_from_device * turned.central_ray.into_inner();
+        assert!((ray - Vector3::z()).norm() < 1e-12);
+        let d = turned.source_detector_mm;
+        assert!((d - 1_000.0 * 0.4_f64.cos() * 0.1_f64.cos()).abs() < 1e-9);
     }
 }

@@ -74,12 +74,23 @@ pub struct HeelEffect {
 /// A Gaussian of this full width at half maximum has the standard deviation 1: √(8 ln 2).
 const FWHM_PER_SIGMA: f64 = 2.354_820_045_030_949;
 
+/// No standard normal number is farther from 0: random numbers come in steps of 2⁻³², and √(2 ln 2³²) is 6.66.
+const WIDEST: f64 = 6.67;
+
 /// Half-width of the square that stands for a Gaussian in sums over the spot, in standard deviations.
 const GAUSSIAN_REACH: f64 = 3.5;
 
 impl FocalSpot {
     pub(crate) fn is_point(&self) -> bool {
         self.size_mm == 0.0
+    }
+
+    /// Largest offset along an axis of the spot's plane, mm.
+    pub(crate) fn reach_mm(&self) -> f64 {
+        match self.shape {
+            SpotShape::Uniform => 0.5 * self.size_mm,
+            SpotShape::Gaussian => WIDEST * self.size_mm / FWHM_PER_SIGMA,
+        }
     }
 
     /// Offset along two axes of the spot's plane, mm; a point draws nothing.
@@ -90,13 +101,7 @@ impl FocalSpot {
         }
         match self.shape {
             SpotShape::Uniform => [(); 2].map(|()| self.size_mm * (rng.unit() - 0.5)),
-            SpotShape::Gaussian => {
-                // Box and Muller, Ann. Math. Statist. 29 (1958) 610; 1 − u lies in (0, 1].
-                let radius = (-2.0 * (1.0 - rng.unit()).ln()).sqrt();
-                let (sin, cos) = (std::f64::consts::TAU * rng.unit()).sin_cos();
-                let sigma_mm = self.size_mm / FWHM_PER_SIGMA;
-                [sigma_mm * radius * cos, sigma_mm * radius * sin]
-            }
+            SpotShape::Gaussian => rng.normals().map(|z| self.size_mm / FWHM_PER_SIGMA * z),
         }
     }
 

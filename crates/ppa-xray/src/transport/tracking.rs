@@ -6,7 +6,8 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::beam::emitter::Emitter;
-use crate::beam::projection::{Projection, ProjectionError};
+use crate::beam::projection::Projection;
+use crate::beam::projection_error::ProjectionError;
 use crate::beam::spectrum::Spectrum;
 use crate::detector::readout::Readout;
 use crate::detector::response::Response;

@@ -40,7 +40,12 @@ fn impossible_placements_are_named() {
     let behind = refused(|p| p.ct_from_device = Isometry3::translation(0.0, 0.0, 500.0));
     assert_eq!(behind, ProjectionError::FieldMissesPhantom);
     let nan = refused(|p| p.ct_from_device = Isometry3::translation(f64::NAN, 0.0, 0.0));
-    assert_eq!(nan, ProjectionError::Pose);
+    assert_eq!(
+        nan,
+        ProjectionError::NotFinite {
+            what: "device pose"
+        }
+    );
     assert!(matches!(
         refused(|p| p.detector.rows = 0),
         ProjectionError::PixelCount { rows: 0, .. }

@@ -1,0 +1,133 @@
+//! What can be wrong with an exposure.
+
+use crate::beam::projection::MAX_PIXELS;
+use crate::detector::receptor::ReceptorError;
+
+/// Why a projection cannot be simulated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProjectionError {
+    /// The detector has no pixels, or more than can be addressed.
+    #[error("the detector has {columns} x {rows} pixels; each side needs 1 to 65536")]
+    PixelCount {
+        /// Pixels along device x.
+        columns: u32,
+        /// Pixels along device y.
+        rows: u32,
+    },
+    /// The planes of such an image would not fit into memory.
+    #[error(
+        "the detector has {columns} x {rows} pixels, expected at most {MAX_PIXELS}: each takes 32 bytes in the result"
+    )]
+    TooManyPixels {
+        /// Pixels along device x.
+        columns: u32,
+        /// Pixels along device y.
+        rows: u32,
+    },
+    /// Pixel side or source-detector distance is not a length that makes sense.
+    #[error("{what} is {found_mm} mm, expected 0.001 mm to 1 km")]
+    Length {
+        /// Which length.
+        what: &'static str,
+        /// What it was.
+        found_mm: f64,
+    },
+    /// The focal spot is no size, or out of proportion.
+    #[error(
+        "the focal spot is {size_mm} mm wide at {source_detector_mm} mm from the detector, expected 0 to 2 % of that distance"
+    )]
+    FocalSpot {
+        /// Its side or full width at half maximum.
+        size_mm: f64,
+        /// Distance from the source to the detector plane, mm.
+        source_detector_mm: f64,
+    },
+    /// Opening angles of the fan.
+    #[error("the x-ray field opens by {found_deg:?} degrees, expected above 0 and below 170")]
+    FanAngle {
+        /// Angles along device x and y, degrees.
+        found_deg: [f64; 2],
+    },
+    /// Sides of the field.
+    #[error(
+        "the x-ray field measures {size_mm:?} mm on the detector plane, expected sides of 0.001 to 10000000 mm"
+    )]
+    Field {
+        /// Sides along device x and y.
+        size_mm: [f64; 2],
+    },
+    /// The field or the detector reaches nearly to the horizon.
+    #[error(
+        "the {what} reaches {reach_mm} mm from the foot of the source at {source_detector_mm} mm from it, expected at most ten times that distance"
+    )]
+    FieldTooWide {
+        /// Field or detector.
+        what: &'static str,
+        /// Largest coordinate on the detector plane.
+        reach_mm: f64,
+        /// Distance from the source to the detector plane.
+        source_detector_mm: f64,
+    },
+    /// The tube looks along the detector or away from it.
+    #[error(
+        "the central ray meets the detector plane at {angle_deg:.1}° from its normal, expected below 84°"
+    )]
+    CentralRay {
+        /// Angle between central ray and device z, degrees.
+        angle_deg: f64,
+    },
+    /// Direction of the anode.
+    #[error("the anode lies towards {found_deg} degrees, expected a number")]
+    Anode {
+        /// What it was.
+        found_deg: f64,
+    },
+    /// The heel effect needs the tube model.
+    #[error(
+        "the heel effect needs a spectrum of the tube model; this one does not say from which anode it comes"
+    )]
+    HeelWithoutTube,
+    /// The tube model has no spectrum at a take-off angle of the field.
+    #[error(
+        "no spectrum at a take-off angle of {anode_angle_deg:.1}° for the heel effect: {message}"
+    )]
+    Heel {
+        /// Take-off angle, degrees.
+        anode_angle_deg: f64,
+        /// What the tube model said.
+        message: String,
+    },
+    /// A pose, direction or place holds NaN or infinity.
+    #[error("the {what} is not finite, expected numbers")]
+    NotFinite {
+        /// Which one.
+        what: &'static str,
+    },
+    /// The image receptor.
+    #[error(transparent)]
+    Receptor(#[from] ReceptorError),
+    /// Not one ray of the field can meet the voxel box.
+    #[error("the x-ray field misses the voxel box altogether")]
+    FieldMissesPhantom,
+    /// Tissue would lie behind the detector plane.
+    #[error(
+        "the detector cuts through the patient: voxel {voxel:?} of {density_g_cm3} g/cm³ lies {depth_mm:.1} mm behind its plane"
+    )]
+    DetectorInsidePhantom {
+        /// The offending voxel (i, j, k).
+        voxel: [usize; 3],
+        /// Its density.
+        density_g_cm3: f32,
+        /// Distance of its centre behind the plane.
+        depth_mm: f64,
+    },
+    /// The focal spot would lie in tissue.
+    #[error("the x-ray source lies inside voxel {voxel:?} of {density_g_cm3} g/cm³")]
+    SourceInsidePhantom {
+        /// The offending voxel (i, j, k).
+        voxel: [usize; 3],
+        /// Its density.
+        density_g_cm3: f32,
+    },
+}

@@ -1,0 +1,45 @@
+//! Spectra as lines at common energies, to sum over.
+
+use crate::beam::spectrum::Spectrum;
+use crate::transport::attenuation::{CEILING_KEV, CUTOFF_KEV};
+
+/// Spectra as lines at common energies.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SpectralLines {
+    /// Ascending.
+    pub energy_kev: Vec<f64>,
+    /// Probability of every line, spectrum by spectrum.
+    pub weights: Vec<Vec<f64>>,
+}
+
+impl SpectralLines {
+    /// The middles of the energy bins; those that hold less than 1e-9 of the photons, or that no photon is
+    /// followed at, are left out.
+    pub fn of(spectra: &[Spectrum]) -> Self {
+        let followed = |energy_kev: &f64| (CUTOFF_KEV..=CEILING_KEV).contains(energy_kev);
+        let mut energy_kev: Vec<f64> = spectra
+            .iter()
+            .flat_map(Spectrum::bins)
+            .filter(|(energy_kev, probability)| *probability > 1e-9 && followed(energy_kev))
+            .map(|(energy_kev, _)| energy_kev)
+            .collect();
+        energy_kev.sort_by(f64::total_cmp);
+        energy_kev.dedup();
+        let weights = spectra
+            .iter()
+            .map(|spectrum| {
+                let mut weights = vec![0.0; energy_kev.len()];
+                for (energy, probability) in spectrum.bins() {
+                    if let Ok(line) = energy_kev.binary_search_by(|e| e.total_cmp(&energy)) {
+                        weights[line] = probability;
+                    }
+                }
+                weights
+            })
+            .collect();
+        Self {
+            energy_kev,
+            weights,
+        }
+    }
+}
