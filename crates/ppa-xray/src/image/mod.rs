@@ -3,6 +3,7 @@
 #[cfg(feature = "dicom")]
 pub(crate) mod dx;
 pub(crate) mod enhancement;
+mod log_exposure;
 pub(crate) mod output;
 pub(crate) mod presentation;
 pub(crate) mod pyramid;

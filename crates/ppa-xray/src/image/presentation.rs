@@ -2,8 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::image::enhancement::{Lift, lifted};
-use crate::image::pyramid::Plane;
 use crate::image::radiograph::Radiograph;
 
 /// Why a presentation cannot be used.
@@ -129,17 +127,11 @@ impl Default for Presentation {
     }
 }
 
-/// Readings below this share of the bare field count as this share, so that empty pixels stay finite.
-const DARKEST: f64 = 1e-5;
-
 /// Log exposure from which a pixel counts as covered when a window is fitted.
 const COVERED: f32 = 0.1;
 
 /// Share of the covered pixels that a fitted window leaves at either end.
 const TAIL: f64 = 0.02;
-
-/// Standard error of the log exposure of a pixel that nothing reached.
-const EMPTY_SIGMA: f64 = 1.0;
 
 impl Presentation {
     /// Names of the fixed presentations.
@@ -219,77 +211,12 @@ impl Presentation {
         Ok(())
     }
 
-    fn grey(&self, log_exposure: f64) -> f64 {
+    /// 0 (black, bare field) to 1 (white).
+    pub(super) fn grey(&self, log_exposure: f64) -> f64 {
         let sigmoid = |a: f64| 1.0 / (1.0 + (-4.0 * (a - self.centre) / self.width).exp());
         let open = sigmoid(0.0);
         ((sigmoid(log_exposure) - open) / (1.0 - open)).clamp(0.0, 1.0)
     }
-}
-
-impl Radiograph {
-    /// Grey values 0 (black, bare field) to 65535 (white), row-major.
-    ///
-    /// # Errors
-    /// [`PresentationError`] when a parameter is out of range.
-    pub fn present(&self, presentation: &Presentation) -> Result<Vec<u16>, PresentationError> {
-        let enhanced = self.enhanced_log_exposure(presentation)?;
-        Ok(enhanced
-            .iter()
-            .enumerate()
-            .map(|(pixel, &a)| {
-                if self.in_field(pixel) {
-                    (65_535.0 * presentation.grey(f64::from(a))).round() as u16
-                } else {
-                    0
-                }
-            })
-            .collect())
-    }
-
-    /// Log exposure with its detail lifted, before the window; that of the bare field outside the field.
-    pub(crate) fn enhanced_log_exposure(
-        &self,
-        presentation: &Presentation,
-    ) -> Result<Vec<f32>, PresentationError> {
-        presentation.validate()?;
-        let (image, sigma): (Vec<f32>, Vec<f32>) = self
-            .total()
-            .iter()
-            .zip(self.sigma())
-            .enumerate()
-            .map(|(pixel, (&reading, sigma))| {
-                if self.in_field(pixel) {
-                    let open = self.open_field_at(pixel);
-                    log_exposure(f64::from(reading), f64::from(sigma), open)
-                } else {
-                    (0.0, 0.0)
-                }
-            })
-            .unzip();
-        if presentation.detail == 0.0 {
-            return Ok(image);
-        }
-        let image = Plane {
-            columns: self.columns(),
-            rows: self.rows(),
-            values: image,
-        };
-        let lift = Lift {
-            detail: presentation.detail,
-            size_px: presentation.detail_mm / self.detector.pixel_mm,
-            edge: presentation.edge,
-        };
-        Ok(lifted(&image, &sigma, &lift))
-    }
-}
-
-/// ln(open / reading) and its standard error.
-fn log_exposure(reading: f64, sigma: f64, open: f64) -> (f32, f32) {
-    let (share, sigma) = (reading / open, sigma / open);
-    if share <= DARKEST {
-        return (-DARKEST.ln() as f32, EMPTY_SIGMA as f32);
-    }
-    (-share.ln() as f32, (sigma / share) as f32)
 }
 
 #[cfg(test)]
