@@ -1,6 +1,6 @@
 //! Writing MetaImage.
 
-use std::io;
+use std::io::{self, Seek, Write};
 use std::path::Path;
 
 use flate2::Compression;
@@ -29,20 +29,22 @@ pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     let data = path.with_extension("zraw");
     let data_name = data.file_name().and_then(|name| name.to_str());
     match data_name {
-        _ if extension.eq_ignore_ascii_case("mha") => {
-            // The header tells the packed length, so that is known first.
-            let packed = packed(volume).map_err(io(path))?;
-            let header = header(volume, packed.len(), "LOCAL");
-            write_whole(path, |out| {
-                out.write_all(header.as_bytes())?;
-                out.write_all(&packed)
-            })
-            .map_err(io(path))
-        }
+        _ if extension.eq_ignore_ascii_case("mha") => write_whole(path, |out| {
+            // The header tells the packed length, which is known last: it is written again, no longer.
+            out.write_all(header(volume, 0, "LOCAL").as_bytes())?;
+            let packed = write_packed(out, volume)?;
+            out.rewind()?;
+            out.write_all(header(volume, packed, "LOCAL").as_bytes())
+        })
+        .map_err(io(path)),
         Some(name) if extension.eq_ignore_ascii_case("mhd") => {
-            let packed = packed(volume).map_err(io(&data))?;
-            let header = header(volume, packed.len(), name);
-            write_whole(&data, |out| out.write_all(&packed)).map_err(io(&data))?;
+            let mut packed = 0;
+            write_whole(&data, |out| {
+                packed = write_packed(out, volume)?;
+                Ok(())
+            })
+            .map_err(io(&data))?;
+            let header = header(volume, packed, name);
             write_whole(path, |out| out.write_all(header.as_bytes())).map_err(|source| {
                 // Voxels without a header are of no use; the first failure is the one to report.
                 let _ = std::fs::remove_file(&data);
@@ -56,14 +58,17 @@ pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     }
 }
 
-fn packed(volume: &Volume) -> io::Result<Vec<u8>> {
+/// Writes the deflated voxels and tells how many bytes they are.
+fn write_packed(out: &mut dyn Write, volume: &Volume) -> io::Result<u64> {
     // CT noise hardly compresses: higher levels cost time and save a few percent.
-    let mut zlib = ZlibEncoder::new(Vec::new(), Compression::fast());
+    let mut zlib = ZlibEncoder::new(out, Compression::fast());
     write_exact(&mut zlib, volume.values())?;
-    zlib.finish()
+    zlib.try_finish()?;
+    Ok(zlib.total_out())
 }
 
-fn header(volume: &Volume, packed_bytes: usize, data: &str) -> String {
+/// As long for any number of packed bytes.
+fn header(volume: &Volume, packed_bytes: u64, data: &str) -> String {
     let grid = volume.grid();
     let kind = if volume.values().fit_i16() {
         "MET_SHORT"
@@ -81,7 +86,7 @@ fn header(volume: &Volume, packed_bytes: usize, data: &str) -> String {
     let [nx, ny, nz] = grid.size();
     format!(
         "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n\
-         CompressedData = True\nCompressedDataSize = {packed_bytes}\nTransformMatrix = {}\nOffset = {}\n\
+         CompressedData = True\nCompressedDataSize = {packed_bytes:<20}\nTransformMatrix = {}\nOffset = {}\n\
          CenterOfRotation = 0 0 0\nElementSpacing = {}\nDimSize = {nx} {ny} {nz}\nElementType = {kind}\n\
          ElementDataFile = {data}\n",
         list(grid.direction().as_slice()),

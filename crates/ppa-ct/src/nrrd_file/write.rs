@@ -1,5 +1,6 @@
 //! Writing NRRD.
 
+use std::io::Write;
 use std::path::Path;
 
 use flate2::Compression;
