@@ -77,11 +77,20 @@ fn contain(
             expected: format!("{} (one per pixel)", image.pixels()),
         });
     }
-    let mut bytes = Vec::with_capacity(image.native_bytes());
+    let mut bytes = vec![0; image.native_bytes()];
     match image.stored.bytes() {
-        1 => bytes.extend(samples.map(|v| v as u8)),
-        2 => bytes.extend(samples.flat_map(|v| (v as u16).to_le_bytes())),
-        _ => bytes.extend(samples.flat_map(u32::to_le_bytes)),
+        1 => {
+            let places = bytes.iter_mut().zip(samples);
+            places.for_each(|(place, v)| *place = v as u8);
+        }
+        2 => {
+            let places = bytes.as_chunks_mut().0.iter_mut().zip(samples);
+            places.for_each(|(place, v)| *place = (v as u16).to_le_bytes());
+        }
+        _ => {
+            let places = bytes.as_chunks_mut().0.iter_mut().zip(samples);
+            places.for_each(|(place, v)| *place = v.to_le_bytes());
+        }
     }
     Ok(bytes)
 }

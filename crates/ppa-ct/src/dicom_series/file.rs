@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use dicom_core::Tag;
@@ -203,8 +203,8 @@ impl DicomFile {
     /// Reads `length` native bytes from byte `from` of the pixels on, as little-endian numbers.
     pub fn native(&self, from: u64, length: u64, bytes: &mut Vec<u8>) -> Result<(), ReadError> {
         let pixels = self.pixel_data()?;
-        bytes.clear();
         if self.is_deflated() {
+            bytes.clear();
             let rest = self.rest()?;
             let part = rest.get(from as usize..(from + length) as usize);
             bytes.extend_from_slice(part.ok_or_else(|| damaged(&self.path, Fault::Short))?);
@@ -226,13 +226,12 @@ impl DicomFile {
         };
         let mut file = File::open(&self.path).map_err(io)?;
         file.seek(SeekFrom::Start(at)).map_err(io)?;
-        read_up_to(&mut file, length, bytes).map_err(io)?;
         // The length was there when the header was read.
-        if bytes.len() as u64 == length {
-            Ok(())
-        } else {
-            Err(damaged(&self.path, Fault::Short))
-        }
+        bytes.resize(length as usize, 0);
+        file.read_exact(bytes).map_err(|error| match error.kind() {
+            ErrorKind::UnexpectedEof => damaged(&self.path, Fault::Short),
+            _ => io(error),
+        })
     }
 }
 

@@ -91,3 +91,47 @@ impl<'a> Bits<'a> {
         self.missing > self.cached
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Against a list of all bits, whether bytes come one by one or eight at a time.
+        #[test]
+        fn stuffed_bits_are_left_out(
+            bytes in prop::collection::vec(prop_oneof![4 => any::<u8>(), 1 => Just(0xff)], 0..80),
+            counts in prop::collection::vec(0..33_u32, 1..60),
+        ) {
+            let mut all = Vec::new();
+            let mut stuffed = false;
+            for &byte in &bytes {
+                if stuffed && byte > 0x7f {
+                    break;
+                }
+                let width = if stuffed { 7 } else { 8 };
+                all.extend((0..width).rev().map(|bit| u32::from(byte) >> bit & 1));
+                stuffed = byte == 0xff;
+            }
+            let (mut bits, mut at) = (Bits::new(&bytes), 0);
+            for (n, count) in counts.into_iter().enumerate() {
+                let next = |at: usize| all.get(at).copied().unwrap_or(0);
+                if n % 3 == 0 {
+                    let zeros = (0..).take_while(|&n| n <= count && next(at + n as usize) == 0);
+                    let zeros = zeros.count() as u32;
+                    prop_assert_eq!(bits.zeros(count), (zeros <= count).then_some(zeros));
+                    if zeros > count {
+                        break;
+                    }
+                    at += zeros as usize + 1;
+                } else {
+                    let number = (0..count as usize).fold(0, |number, n| number << 1 | next(at + n));
+                    prop_assert_eq!(bits.take(count), number);
+                    at += count as usize;
+                }
+                prop_assert_eq!(bits.overdrawn(), at > all.len());
+            }
+        }
+    }
+}
