@@ -39,7 +39,7 @@ fn reading(c: &mut Criterion) {
 
     let mut group = c.benchmark_group("scan");
     group.sample_size(10);
-    group.throughput(Throughput::Bytes(2 * volume.hu().len() as u64));
+    group.throughput(Throughput::Bytes(2 * volume.values().len() as u64));
     group.bench_function("read_dicom_64_slices", |b| b.iter(|| read(&series)));
     for name in names {
         let path = folder.path().join(name);

@@ -27,10 +27,17 @@ impl Histogram {
         // Whole numbers: the sum is the same in any order.
         let parts = hu.par_parts(1 << 20).map(|values| {
             let mut counts = vec![0_u64; bins + 2];
-            for value in values.iter() {
-                counts[bin(value)] += 1;
+            let mut count = |bin: usize, value: f32| {
+                counts[bin] += 1;
                 counts[bins] += u64::from(value == min);
                 counts[bins + 1] += u64::from(value == max);
+            };
+            match values {
+                Values::I16(values) => {
+                    let values = values.iter().map(|&v| (whole_bin(v.into()), v.into()));
+                    values.for_each(|(bin, value)| count(bin, value));
+                }
+                Values::F32(values) => values.iter().for_each(|&v| count(bin(v), v)),
             }
             counts
         });
@@ -107,5 +114,9 @@ impl Histogram {
 }
 
 fn bin(hu: f32) -> usize {
-    (hu.round() as i32).clamp(LOW, HIGH).abs_diff(LOW) as usize
+    whole_bin(hu.round() as i32)
+}
+
+fn whole_bin(hu: i32) -> usize {
+    hu.clamp(LOW, HIGH).abs_diff(LOW) as usize
 }
