@@ -28,5 +28,5 @@ pub use estimate_normals::{CloudError, estimate_normals, mean_spacing_mm};
 pub use limb::{Body, CutFace, Limb, LimbError, LimbReport, LimbSettings, VoxelBox, extract_limb};
 pub use mesh::{Mesh, PointCloud};
 pub use ply::{PlyContents, PlyError, read_ply, write_ply, write_ply_cloud};
-pub use surface::{Border, SurfaceError, iso_surface};
+pub use surface::{Border, SurfaceError, iso_surface, iso_surfaces};
 pub use topology::Topology;

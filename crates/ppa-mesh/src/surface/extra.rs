@@ -3,31 +3,32 @@
 use nalgebra::Vector3;
 
 use super::cell::edge_corners;
+use super::field::Sample;
 use super::slab::March;
 
-impl March<'_> {
+impl<T: Sample> March<'_, T> {
     /// Where a cell edge is crossed, and the gradient there.
-    fn crossing(&self, voxel: [usize; 3], edge: u8) -> (Vector3<f64>, Vector3<f64>) {
+    fn crossing(&self, voxel: [usize; 3], edge: u8) -> (Vector3<f64>, Vector3<f32>) {
         let [a, b] = edge_corners(edge).map(|corner| {
             let corner = usize::from(corner);
             [0, 1, 2].map(|axis| voxel[axis] + (corner >> axis & 1))
         });
-        let (va, vb) = [a, b].map(|v| self.field.above(self.field.index(v))).into();
+        let (va, vb) = [a, b].map(|v| self.field.above(v)).into();
         let t = va / (va - vb);
         let [p, q] = [a, b].map(|v| Vector3::from(v.map(|c| c as f64)));
-        let gradient = self.field.gradient(a) * (1.0 - t) + self.field.gradient(b) * t;
-        (p + (q - p) * t, gradient)
+        let [near, far] = [a, b].map(|[i, j, k]| self.field.stencil(j, k).gradient(i));
+        (p + (q - p) * t, near + (far - near) * t as f32)
     }
 
     /// Mean crossing and gradient of a ring.
-    pub fn middle(&self, voxel: [usize; 3], ring: &[u8]) -> (Vector3<f64>, Vector3<f64>) {
+    pub fn middle(&self, voxel: [usize; 3], ring: &[u8]) -> (Vector3<f64>, Vector3<f32>) {
         let (mut position, mut gradient) = (Vector3::zeros(), Vector3::zeros());
         for &edge in ring {
             let (p, g) = self.crossing(voxel, edge);
             position += p;
             gradient += g;
         }
-        (position / ring.len() as f64, gradient / ring.len() as f64)
+        (position / ring.len() as f64, gradient / ring.len() as f32)
     }
 
     /// A tube between two rings with a ring of extra vertices half-way, none of which lies in a
@@ -35,11 +36,12 @@ impl March<'_> {
     pub fn waist(&mut self, voxel: [usize; 3], edges: [&[u8]; 2], [first, second]: [Vec<u32>; 2]) {
         let [here, there] = edges.map(|ring| self.middle(voxel, ring).0);
         let shift = 0.5 * (there - here);
+        let narrowed = |position| here + shift + 0.5 * (position - here);
         let waist: Vec<u32> = edges[0]
             .iter()
             .map(|&edge| {
                 let (position, gradient) = self.crossing(voxel, edge);
-                self.push(here + shift + 0.5 * (position - here), gradient)
+                self.push(narrowed(position), gradient)
             })
             .collect();
         let (m, n) = (waist.len(), second.len());
@@ -55,7 +57,7 @@ impl March<'_> {
             .rev()
             .map(|&edge| self.crossing(voxel, edge).0)
             .collect();
-        let start = self.slab.positions[waist[0] as usize];
+        let start = narrowed(self.crossing(voxel, edges[0][0]).0);
         let away = |at: &usize| (positions[*at] - start).norm();
         let turn = (0..n)
             .min_by(|a, b| away(a).total_cmp(&away(b)))

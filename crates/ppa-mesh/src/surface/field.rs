@@ -1,25 +1,42 @@
-//! HU above the iso value on the lattice, with a layer of air around it when lids are wanted.
-
-use std::borrow::Cow;
+//! HU on the lattice, with a layer of air around it when lids are wanted.
 
 use nalgebra::Vector3;
-use ppa_ct::{Values, Volume};
+use ppa_ct::Volume;
 
 /// Least depth below the iso value of the air put around a closed volume, so that a border voxel
 /// close to the iso value still gets a lid of its own.
 const MIN_LID_HU: f32 = 1.0;
 
+/// The types that a volume keeps HU in.
+pub trait Sample: Copy + PartialOrd + Sync + Into<f32> {
+    /// The least sample that is not below `iso`; `None` when all are below.
+    fn first_inside(iso: f32) -> Option<Self>;
+}
+
+impl Sample for f32 {
+    fn first_inside(iso: f32) -> Option<Self> {
+        Some(iso)
+    }
+}
+
+impl Sample for i16 {
+    fn first_inside(iso: f32) -> Option<Self> {
+        let least = iso.ceil().max(Self::MIN.into());
+        (least <= Self::MAX.into()).then_some(least as Self)
+    }
+}
+
 /// Values on the (possibly padded) lattice, x fastest.
-pub struct Field<'a> {
-    hu: Values<'a>,
+pub struct Field<'a, T> {
+    hu: &'a [T],
     size: [usize; 3],
     iso: f32,
     origin: [f64; 3],
 }
 
-impl<'a> Field<'a> {
+impl<'a, T: Sample> Field<'a, T> {
     /// Values of `size` voxels, the first of which is the voxel `origin` of the volume.
-    pub fn new(hu: Values<'a>, size: [usize; 3], origin: [f64; 3], iso: f32) -> Self {
+    pub fn new(hu: &'a [T], size: [usize; 3], origin: [f64; 3], iso: f32) -> Self {
         Self {
             hu,
             size,
@@ -31,7 +48,8 @@ impl<'a> Field<'a> {
     /// Smallest and largest value, padding included.
     pub fn range(&self) -> [f32; 2] {
         let widest = |[low, high]: [f32; 2], hu: f32| [low.min(hu), high.max(hu)];
-        self.hu.iter().fold([f32::MAX, f32::MIN], widest)
+        let values = self.hu.iter().map(|&hu| hu.into());
+        values.fold([f32::MAX, f32::MIN], widest)
     }
 
     pub fn size(&self) -> [usize; 3] {
@@ -43,14 +61,10 @@ impl<'a> Field<'a> {
         Vector3::from(self.origin)
     }
 
-    pub fn index(&self, [i, j, k]: [usize; 3]) -> usize {
-        i + self.size[0] * (j + self.size[1] * k)
-    }
-
     /// One row along x.
-    pub fn row(&self, j: usize, k: usize) -> Cow<'a, [f32]> {
-        let start = self.index([0, j, k]);
-        self.hu.part(start..start + self.size[0]).to_f32()
+    pub fn row(&self, j: usize, k: usize) -> &'a [T] {
+        let start = self.size[0] * (j + self.size[1] * k);
+        &self.hu[start..start + self.size[0]]
     }
 
     pub fn iso(&self) -> f32 {
@@ -58,30 +72,57 @@ impl<'a> Field<'a> {
     }
 
     /// HU above iso; exact for the usual HU, so that both cells at a face decide alike.
-    pub fn above(&self, at: usize) -> f64 {
-        f64::from(self.hu.at(at)) - f64::from(self.iso)
+    pub fn above(&self, [i, j, k]: [usize; 3]) -> f64 {
+        let hu: f32 = self.row(j, k)[i].into();
+        f64::from(hu) - f64::from(self.iso)
+    }
+
+    /// A row with the four beside it.
+    pub fn stencil(&self, j: usize, k: usize) -> Stencil<'a, T> {
+        let [_, ny, nz] = self.size;
+        let (south, north) = (j.saturating_sub(1), (j + 1).min(ny - 1));
+        let (below, above) = (k.saturating_sub(1), (k + 1).min(nz - 1));
+        Stencil {
+            here: self.row(j, k),
+            beside: [
+                [self.row(south, k), self.row(north, k)],
+                [self.row(j, below), self.row(j, above)],
+            ],
+            per_step: [north - south, above - below].map(|steps| 1.0 / steps as f32),
+        }
+    }
+}
+
+/// A row of the lattice with its neighbours in y and z; at the border, itself in place of the missing one.
+pub struct Stencil<'a, T> {
+    here: &'a [T],
+    beside: [[&'a [T]; 2]; 2],
+    per_step: [f32; 2],
+}
+
+impl<T: Sample> Stencil<'_, T> {
+    pub fn hu(&self, i: usize) -> f32 {
+        self.here[i].into()
     }
 
     /// HU per voxel step: central differences, one-sided at the border.
-    pub fn gradient(&self, voxel: [usize; 3]) -> Vector3<f64> {
-        let at = self.index(voxel);
-        let strides = [1, self.size[0], self.size[0] * self.size[1]];
-        Vector3::from_fn(|axis, _| {
-            let (low, high) = (
-                if voxel[axis] > 0 { strides[axis] } else { 0 },
-                if voxel[axis] + 1 < self.size[axis] {
-                    strides[axis]
-                } else {
-                    0
-                },
-            );
-            let rise = f64::from(self.hu.at(at + high)) - f64::from(self.hu.at(at - low));
-            if low > 0 && high > 0 {
-                0.5 * rise
+    pub fn gradient(&self, i: usize) -> Vector3<f32> {
+        let rise = |low: T, high: T| -> f32 { high.into() - low.into() };
+        let (west, east) = (i.saturating_sub(1), (i + 1).min(self.here.len() - 1));
+        let along_x = rise(self.here[west], self.here[east]);
+        let [y, z] = [0, 1].map(|axis| {
+            let [low, high] = self.beside[axis];
+            rise(low[i], high[i]) * self.per_step[axis]
+        });
+        Vector3::new(
+            if east - west == 2 {
+                0.5 * along_x
             } else {
-                rise
-            }
-        })
+                along_x
+            },
+            y,
+            z,
+        )
     }
 }
 
@@ -90,19 +131,22 @@ impl<'a> Field<'a> {
 pub fn padded(volume: &Volume, iso: f32) -> Vec<f32> {
     let size = volume.grid().size();
     let outer = size.map(|n| n + 2);
+    let nearest = |padded: usize, axis: usize| padded.clamp(1, size[axis]) - 1;
+    let lid = |hu: f32| iso - (hu - iso).abs().max(MIN_LID_HU);
     let mut hu = Vec::with_capacity(outer.iter().product());
     for k in 0..outer[2] {
         for j in 0..outer[1] {
-            for i in 0..outer[0] {
-                let padded = [i, j, k];
-                let nearest = [0, 1, 2].map(|a| padded[a].clamp(1, size[a]) - 1);
-                let value = volume.at(nearest);
-                hu.push(if nearest.map(|v| v + 1) == padded {
-                    value
-                } else {
-                    iso - (value - iso).abs().max(MIN_LID_HU)
-                });
+            let (row, slice) = (nearest(j, 1), nearest(k, 2));
+            let start = volume.grid().index([0, row, slice]);
+            let values = volume.values().part(start..start + size[0]);
+            let (first, last) = (lid(values.at(0)), lid(values.at(size[0] - 1)));
+            hu.push(first);
+            if [row + 1, slice + 1] == [j, k] {
+                hu.extend(values.iter());
+            } else {
+                hu.extend(values.iter().map(lid));
             }
+            hu.push(last);
         }
     }
     hu

@@ -1,18 +1,24 @@
 //! Iso-surface of a volume by marching cubes over slabs of slices.
 
 mod cell;
+mod cell_row;
+mod crossings;
 mod extra;
 mod field;
+mod inside;
+mod shortcut;
 mod slab;
 mod tunnel;
+mod world;
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::Vector3;
 use ppa_ct::{Grid, Values, Volume};
 use rayon::prelude::*;
 
 use crate::mesh::Mesh;
-use field::{Field, padded};
+use field::{Field, Sample, padded};
 use slab::{NEXT_SLAB, Slab};
+use world::World;
 
 /// Slices of cells per unit of parallel work; fixed, so that the vertex order never depends on the
 /// number of threads.
@@ -70,7 +76,7 @@ pub enum SurfaceError {
 ///
 /// ```
 /// use nalgebra::{Point3, Vector3};
-/// use ppa_ct::{Grid, Values, Volume};
+/// use ppa_ct::{Grid, Volume};
 /// use ppa_mesh::{Border, iso_surface};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let grid = Grid::axis_aligned([40; 3], Vector3::repeat(1.0), Point3::origin())?;
@@ -88,19 +94,41 @@ pub enum SurfaceError {
 /// # }
 /// ```
 pub fn iso_surface(volume: &Volume, iso_hu: f32, border: Border) -> Result<Mesh, SurfaceError> {
-    if !iso_hu.is_finite() {
-        return Err(SurfaceError::Iso(iso_hu));
+    let mut surfaces = iso_surfaces(volume, &[iso_hu], border)?;
+    Ok(surfaces.swap_remove(0))
+}
+
+/// [`iso_surface`] for several iso values, in their order, in one pass over the volume.
+///
+/// # Errors
+/// As [`iso_surface`], for the first iso value that has no surface.
+pub fn iso_surfaces(
+    volume: &Volume,
+    iso_hu: &[f32],
+    border: Border,
+) -> Result<Vec<Mesh>, SurfaceError> {
+    if let Some(&bad) = iso_hu.iter().find(|iso| !iso.is_finite()) {
+        return Err(SurfaceError::Iso(bad));
     }
     let (grid, size) = (volume.grid(), volume.grid().size());
-    match border {
-        Border::Open => surface(&Field::new(volume.values(), size, [0.0; 3], iso_hu), grid),
-        Border::Closed => {
-            let hu = padded(volume, iso_hu);
-            let hu = Values::F32(&hu);
-            surface(
-                &Field::new(hu, size.map(|n| n + 2), [-1.0; 3], iso_hu),
-                grid,
-            )
+    match (border, volume.values()) {
+        (Border::Open, Values::I16(hu)) => {
+            let field = |&iso| Field::new(hu, size, [0.0; 3], iso);
+            surfaces(&iso_hu.iter().map(field).collect::<Vec<_>>(), grid)
+        }
+        (Border::Open, Values::F32(hu)) => {
+            let field = |&iso| Field::new(hu, size, [0.0; 3], iso);
+            surfaces(&iso_hu.iter().map(field).collect::<Vec<_>>(), grid)
+        }
+        (Border::Closed, _) => {
+            let padded: Vec<_> = iso_hu
+                .iter()
+                .map(|&iso| (iso, padded(volume, iso)))
+                .collect();
+            let size = size.map(|n| n + 2);
+            let field = |(iso, hu)| Field::new(hu, size, [-1.0; 3], iso);
+            let fields = padded.iter().map(|(iso, hu)| field((*iso, hu)));
+            surfaces(&fields.collect::<Vec<_>>(), grid)
         }
     }
 }
@@ -115,71 +143,94 @@ pub(crate) fn surface_of_part(
     iso_hu: f32,
 ) -> Result<Mesh, SurfaceError> {
     let origin = low.map(|first| first as f64);
-    surface(&Field::new(Values::F32(hu), size, origin, iso_hu), grid)
+    let mut surfaces = surfaces(&[Field::new(hu, size, origin, iso_hu)], grid)?;
+    Ok(surfaces.swap_remove(0))
 }
 
-fn surface(field: &Field, grid: &Grid) -> Result<Mesh, SurfaceError> {
+/// The surfaces of fields of one size and origin.
+fn surfaces<T: Sample>(fields: &[Field<T>], grid: &Grid) -> Result<Vec<Mesh>, SurfaceError> {
+    let Some(field) = fields.first() else {
+        return Ok(Vec::new());
+    };
     if field.size().iter().any(|&n| n < 2) {
-        return Err(SurfaceError::TooThin(grid.size()));
+        return Err(SurfaceError::TooThin(field.size()));
     }
+    let first_inside: Vec<T> = fields
+        .iter()
+        .map(|field| T::first_inside(field.iso()).ok_or_else(|| empty(field)))
+        .collect::<Result<_, _>>()?;
+    let world = World::new(grid, field.origin());
     let layers = field.size()[2] - 1;
-    let slabs: Vec<Slab> = (0..layers.div_ceil(SLAB_CELLS))
+    let by_slab: Vec<Vec<Slab>> = (0..layers.div_ceil(SLAB_CELLS))
         .into_par_iter()
         .map(|slab| {
             let first = slab * SLAB_CELLS;
-            slab::march(field, first..(first + SLAB_CELLS).min(layers))
+            let layers = first..(first + SLAB_CELLS).min(layers);
+            let each = fields.iter().zip(&first_inside);
+            each.map(|(field, &inside)| slab::march(field, &world, inside, layers.clone()))
+                .collect()
         })
         .collect();
-    let mesh = join(&slabs, grid, field)?;
-    if mesh.triangles.is_empty() {
-        let [min_hu, max_hu] = field.range();
-        return Err(SurfaceError::Empty {
-            iso_hu: field.iso(),
-            min_hu,
-            max_hu,
-        });
+    let mut slabs: Vec<Vec<Slab>> = fields.iter().map(|_| Vec::new()).collect();
+    for slab in by_slab {
+        for (of_field, slab) in slabs.iter_mut().zip(slab) {
+            of_field.push(slab);
+        }
     }
-    Ok(mesh)
+    let meshes = slabs.into_iter().zip(fields);
+    meshes
+        .map(|(slabs, field)| {
+            let mesh = join(&slabs)?;
+            if mesh.triangles.is_empty() {
+                return Err(empty(field));
+            }
+            Ok(mesh)
+        })
+        .collect()
 }
 
-fn join(slabs: &[Slab], grid: &Grid, field: &Field) -> Result<Mesh, SurfaceError> {
+fn empty<T: Sample>(field: &Field<T>) -> SurfaceError {
+    let [min_hu, max_hu] = field.range();
+    SurfaceError::Empty {
+        iso_hu: field.iso(),
+        min_hu,
+        max_hu,
+    }
+}
+
+fn join(slabs: &[Slab]) -> Result<Mesh, SurfaceError> {
     let mut offsets = vec![0_usize];
     for slab in slabs {
-        offsets.push(offsets[offsets.len() - 1] + slab.positions.len());
+        offsets.push(offsets[offsets.len() - 1] + slab.vertices.len());
     }
-    let count = offsets[slabs.len()];
-    if count >= NEXT_SLAB as usize {
+    if offsets[slabs.len()] >= NEXT_SLAB as usize {
         return Err(SurfaceError::TooLarge);
     }
-    let affine = grid.ct_from_voxel();
-    let linear: Matrix3<f64> = affine.matrix().fixed_view::<3, 3>(0, 0).into_owned();
-    let left_handed = linear.determinant() < 0.0;
-    // A gradient is a covector: it maps with the inverse transpose. Outward is down the gradient.
-    let outward = -linear.try_inverse().unwrap_or_default().transpose();
-
-    let (vertices, normals): (Vec<_>, Vec<_>) = slabs
-        .par_iter()
-        .flat_map_iter(|slab| slab.positions.iter().zip(&slab.gradients))
-        .map(|(voxel, gradient)| {
-            let point = affine * Point3::from(*voxel + field.origin());
-            let normal = (outward * gradient).try_normalize(0.0).unwrap_or_default();
-            (point.cast::<f32>(), normal.cast::<f32>())
-        })
-        .unzip();
-    let triangles = slabs
-        .par_iter()
-        .enumerate()
-        .flat_map_iter(|(at, slab)| {
+    let vertices_and_normals = || {
+        let mut joined = (
+            Vec::with_capacity(offsets[slabs.len()]),
+            Vec::with_capacity(offsets[slabs.len()]),
+        );
+        for slab in slabs {
+            joined.0.extend_from_slice(&slab.vertices);
+            joined.1.extend_from_slice(&slab.normals);
+        }
+        joined
+    };
+    let triangles = || {
+        let mut joined = Vec::with_capacity(slabs.iter().map(|slab| slab.triangles.len()).sum());
+        for (at, slab) in slabs.iter().enumerate() {
             let (own, next) = (offsets[at] as u32, offsets[at + 1] as u32);
-            slab.triangles.iter().map(move |triangle| {
-                let [a, b, c] = triangle.map(|id| match id & NEXT_SLAB {
+            joined.extend(slab.triangles.iter().map(|triangle| {
+                triangle.map(|id| match id & NEXT_SLAB {
                     0 => own + id,
                     _ => next + (id & !NEXT_SLAB),
-                });
-                if left_handed { [a, c, b] } else { [a, b, c] }
-            })
-        })
-        .collect();
+                })
+            }));
+        }
+        joined
+    };
+    let ((vertices, normals), triangles) = rayon::join(vertices_and_normals, triangles);
     let mut mesh = Mesh {
         vertices,
         normals,

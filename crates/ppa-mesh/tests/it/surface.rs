@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{Affine3, Matrix3, Matrix4, Point3, Rotation3, Vector3};
 use ppa_ct::{Grid, Volume};
-use ppa_mesh::{Border, SurfaceError, iso_surface};
+use ppa_mesh::{Border, SurfaceError, iso_surface, iso_surfaces};
 use proptest::prelude::*;
 
 use crate::fields::{hash_noise, on_grid, volume};
@@ -103,6 +103,30 @@ fn a_full_volume_closes_to_its_own_box() {
     let volume = mesh.volume_mm3() / (3.0 * 8.0 * 15.0);
     assert!((0.8..1.0).contains(&volume), "{volume}");
     assert_eq!((mesh.euler(), mesh.boundary_edges()), (2, 0));
+}
+
+/// Whole HU in 16 bits and in floating point, one iso value after the other and all in one pass; iso
+/// values on and between whole numbers.
+#[test]
+fn samples_of_both_types_and_one_pass_for_several_values_give_the_same_surfaces() {
+    let size = [70, 9, 40];
+    let hu: Vec<i16> = hash_noise(size.iter().product(), 5)
+        .iter()
+        .map(|noise| (6.0 * noise) as i16)
+        .collect();
+    let grid = Grid::axis_aligned(size, Vector3::new(0.7, 0.8, 1.5), Point3::origin()).unwrap();
+    let float = Volume::new(grid.clone(), hu.iter().map(|&v| v.into()).collect()).unwrap();
+    let whole = Volume::from_i16(grid, hu).unwrap();
+    let values = [0.0, -1.5, 2.0];
+    for border in [Border::Open, Border::Closed] {
+        let one_pass = iso_surfaces(&whole, &values, border).unwrap();
+        for (surface, &iso) in one_pass.iter().zip(&values) {
+            assert_eq!(surface, &iso_surface(&whole, iso, border).unwrap());
+            assert_eq!(surface, &iso_surface(&float, iso, border).unwrap());
+        }
+    }
+    let too_high = iso_surface(&whole, 40_000.0, Border::Open);
+    assert!(matches!(too_high, Err(SurfaceError::Empty { .. })));
 }
 
 #[test]
