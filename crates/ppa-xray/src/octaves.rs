@@ -4,6 +4,7 @@
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Octaves {
     first_key: u64,
+    /// One less than the nodes.
     bins: usize,
     shift: u32,
 }
@@ -21,9 +22,13 @@ impl Octaves {
         }
     }
 
-    /// Number of bins, one less than the nodes.
-    pub(crate) fn bins(&self) -> usize {
-        self.bins
+    /// The same grid with every bin cut into 2^`bits` equal ones.
+    pub(crate) fn refined(self, bits: u32) -> Self {
+        Self {
+            first_key: self.first_key << bits,
+            bins: self.bins << bits,
+            shift: self.shift - bits,
+        }
     }
 
     /// Position of node `index`.
@@ -77,10 +82,23 @@ mod tests {
     }
 
     #[test]
+    fn a_refined_grid_keeps_the_nodes() {
+        let grid = Octaves::covering(1.0, 150.0, 5);
+        let fine: Vec<f64> = grid.refined(2).nodes().collect();
+        assert_eq!(fine.len(), 4 * grid.bins + 1);
+        for (index, node) in grid.nodes().enumerate() {
+            assert_eq!(fine[4 * index], node);
+            if index < grid.bins {
+                assert_eq!(fine[4 * index + 2], 0.5 * (node + grid.node(index + 1)));
+            }
+        }
+    }
+
+    #[test]
     fn values_outside_go_to_the_ends() {
         let grid = Octaves::covering(1.0, 150.0, 8);
         assert_eq!(grid.locate(0.3), (0, 0.0));
-        assert_eq!(grid.locate(f64::INFINITY), (grid.bins() - 1, 1.0));
-        assert!(grid.node(grid.bins()) >= 150.0 && grid.first() <= 1.0);
+        assert_eq!(grid.locate(f64::INFINITY), (grid.bins - 1, 1.0));
+        assert!(grid.node(grid.bins) >= 150.0 && grid.first() <= 1.0);
     }
 }

@@ -98,6 +98,19 @@ impl Composition {
             })
     }
 
+    /// [`Composition::cross_sections`] at [`energy_nodes`](crate::matter::energy_nodes::energy_nodes).
+    pub fn cross_sections_at_nodes(&self) -> Vec<CrossSections> {
+        let mut sums = Vec::new();
+        for (element, w) in self.elements() {
+            let sections = element.cross_sections_at_nodes();
+            sums.resize(sections.len(), CrossSections::default());
+            for (sum, sections) in sums.iter_mut().zip(sections) {
+                *sum = *sum + sections.scaled(w);
+            }
+        }
+        sums
+    }
+
     /// Σ w/A · S(q).
     pub fn incoherent(&self, q: f64) -> f64 {
         self.elements()

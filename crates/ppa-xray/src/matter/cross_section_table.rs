@@ -1,11 +1,10 @@
 //! Cross sections of one material without logarithms.
 
-use crate::matter::cross_sections::{CrossSections, MAX_ENERGY_KEV, MIN_ENERGY_KEV};
+use crate::matter::cross_sections::CrossSections;
+use crate::matter::energy_nodes::{PARTS, energy_bins};
 use crate::matter::material::Material;
 use crate::octaves::Octaves;
 
-/// Bins per octave of energy, as a power of two: straight lines in E are then within 1e-4 of E⁻³ laws.
-const ENERGY_BITS: u32 = 8;
 /// Largest relative departure from a straight line in a bin; beyond it the material itself is to be asked.
 const STRAIGHT: f64 = 5e-4;
 
@@ -51,22 +50,20 @@ impl Bin {
 
 impl CrossSectionTable {
     pub fn new(material: &Material) -> Self {
-        let grid = Octaves::covering(MIN_ENERGY_KEV, MAX_ENERGY_KEV, ENERGY_BITS);
-        let mut low = material.cross_sections_unchecked(grid.first());
-        let mut bins: Vec<Bin> = (0..grid.bins())
-            .map(|index| {
-                let high = material.cross_sections_unchecked(grid.node(index + 1));
-                let mut bin = Bin::new(low, high);
-                let width = grid.node(index + 1) - grid.node(index);
-                let bent = [0.25, 0.5, 0.75].into_iter().any(|fraction| {
-                    let direct =
-                        material.cross_sections_unchecked(grid.node(index) + fraction * width);
-                    (bin.at(fraction).photoelectric / direct.photoelectric - 1.0).abs() > STRAIGHT
+        let grid = energy_bins();
+        let nodes = material.cross_sections_at_nodes();
+        let mut bins: Vec<Bin> = nodes
+            .windows(PARTS + 1)
+            .step_by(PARTS)
+            .map(|sections| {
+                let mut bin = Bin::new(sections[0], sections[PARTS]);
+                let bent = (1..PARTS).any(|part| {
+                    let line = bin.at(part as f64 / PARTS as f64).photoelectric;
+                    (line / sections[part].photoelectric - 1.0).abs() > STRAIGHT
                 });
                 if bent {
                     bin.photoelectric = [Bin::CUT; 2];
                 }
-                low = high;
                 bin
             })
             .collect();

@@ -4,7 +4,9 @@
 
 use std::{io::Read, ops::Add, sync::OnceLock};
 
-use crate::matter::{electron_shell::Shell, fluorescence::KFluorescence};
+use crate::matter::{
+    electron_shell::Shell, energy_nodes::energy_nodes, fluorescence::KFluorescence,
+};
 
 /// Planck's constant times the speed of light in keV Å: q = sin(θ/2) E / hc in 1/Å.
 pub(crate) const HC_KEV_ANGSTROM: f64 = 12.398_419_843_320_026;
@@ -116,6 +118,8 @@ pub(crate) struct Element {
     /// Atomic weight in g/mol.
     pub(crate) atomic_weight: f64,
     sections: SectionTables,
+    /// `sections` at [`energy_nodes`], once they were asked for.
+    at_nodes: OnceLock<Vec<CrossSections>>,
     form_factor: Vec<f64>,
     incoherent: Vec<f64>,
     shells: Vec<Shell>,
@@ -126,6 +130,12 @@ impl Element {
     /// Mass attenuation at an energy inside the tables.
     pub(crate) fn cross_sections(&self, energy_kev: f64) -> CrossSections {
         self.sections.at(energy_kev)
+    }
+
+    /// [`Element::cross_sections`] at [`energy_nodes`], worked out once: all materials are sums of them.
+    pub(crate) fn cross_sections_at_nodes(&self) -> &[CrossSections] {
+        self.at_nodes
+            .get_or_init(|| energy_nodes().map(|e| self.cross_sections(e)).collect())
     }
 
     /// Absorption edges inside the tables, keV, ascending.
@@ -201,6 +211,7 @@ pub(crate) fn elements() -> &'static Elements {
                         rayleigh: LogLog::new(&energies, &data.doubles(n_energy)),
                         compton: LogLog::new(&energies, &data.doubles(n_energy)),
                     },
+                    at_nodes: OnceLock::new(),
                     form_factor: data.doubles(n_q),
                     incoherent: data.doubles(n_q),
                     shells: {

@@ -85,20 +85,21 @@ impl Fluorescence {
         let energies = Octaves::covering(MIN_ENERGY_KEV, MAX_ENERGY_KEV, ENERGY_BITS);
         let emitters: Vec<Emitter> = material
             .k_emitters()
-            .map(|(z, k)| {
-                let lines = k.lines(1.0).filter(|line| line.energy_kev >= cutoff_kev);
+            .filter_map(|(z, k)| {
+                let lines: Vec<(f64, f64)> = k
+                    .lines(1.0)
+                    .filter(|line| line.energy_kev >= cutoff_kev)
+                    .map(|line| (line.energy_kev, line.probability))
+                    .collect();
                 let share = |energy: f64| {
                     material.photoelectric_share(z, energy.min(MAX_ENERGY_KEV)) as f32
                 };
-                Emitter {
+                (!lines.is_empty()).then(|| Emitter {
                     edge_kev: k.edge_kev,
-                    lines: lines
-                        .map(|line| (line.energy_kev, line.probability))
-                        .collect(),
+                    lines,
                     share: energies.nodes().map(share).collect(),
-                }
+                })
             })
-            .filter(|emitter| !emitter.lines.is_empty())
             .collect();
         let most = emitters.iter().map(|Emitter { lines, share, .. }| {
             let share = share.iter().copied().fold(0.0, f32::max);

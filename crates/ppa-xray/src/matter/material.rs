@@ -6,6 +6,7 @@ use crate::{
     matter::composition::Composition,
     matter::cross_sections::{CrossSections, MAX_ENERGY_KEV, MIN_ENERGY_KEV},
     matter::electron_shell::Shell,
+    matter::energy_nodes::energy_nodes,
     matter::fluorescence::{FluorescenceLine, KFluorescence},
     matter::library,
     matter::material_error::MaterialError,
@@ -214,6 +215,14 @@ impl Material {
         match &self.matter {
             Matter::Elements(composition) => composition.cross_sections(energy_kev),
             Matter::Tables(tables) => tables.cross_sections(energy_kev),
+        }
+    }
+
+    /// [`Material::cross_sections_unchecked`] at [`energy_nodes`].
+    pub(crate) fn cross_sections_at_nodes(&self) -> Vec<CrossSections> {
+        match &self.matter {
+            Matter::Elements(composition) => composition.cross_sections_at_nodes(),
+            Matter::Tables(tables) => energy_nodes().map(|e| tables.cross_sections(e)).collect(),
         }
     }
 
