@@ -152,6 +152,11 @@ impl Emitter {
         }
     }
 
+    /// The spectrum of a plain beam: all photons leave the origin, evenly in solid angle.
+    pub fn plain_beam(&self) -> Option<&Spectrum> {
+        (self.spot.is_point() && self.heel.is_none()).then_some(&self.spectrum)
+    }
+
     /// Field of the beam in the detector plane: no photon is sent outside it.
     pub fn field(&self) -> &Field {
         &self.field

@@ -50,10 +50,11 @@ impl KleinNishina {
             (column as usize).min(COLUMNS - 1),
         );
         let (x, y) = (row - i as f32, column - j as f32);
-        let [low, high] = [i, i + 1].map(|i| {
+        let line = |i: usize| {
             let at = &self.quantiles[i];
             at[j] + y * (at[j + 1] - at[j])
-        });
+        };
+        let (low, high) = (line(i), line(i + 1));
         low + x * (high - low)
     }
 }

@@ -1,12 +1,12 @@
 //! Photons from the source into the lanes that ended histories leave.
 
-use crate::beam::emitter::Emission;
 use crate::philox::Philox;
 use crate::transport::attenuation::CUTOFF_KEV;
 use crate::transport::lanes::draws::Depths;
 use crate::transport::lanes::entry::{Aim, Enter, Place};
 use crate::transport::lanes::flights::{Each, Flights, LANES, each};
 use crate::transport::lanes::picked::Picked;
+use crate::transport::lanes::plain_beam::PlainBeam;
 use crate::transport::lanes::{Lanes, Photon};
 use crate::transport::score::Score;
 use crate::transport::stream::Stream;
@@ -43,7 +43,7 @@ impl Lanes<'_, '_> {
             self.count -= 1;
             let last = self.count;
             let slot = self.photons[lane].slot;
-            self.flights.move_within(lane, last);
+            self.flights.put(lane, self.flights.at(last));
             self.photons[lane] = self.photons[last];
             self.photons[last].slot = slot;
         }
@@ -74,7 +74,7 @@ impl Lanes<'_, '_> {
                 self.exit(&photon, position, direction, way, score);
             } else {
                 self.photons[lane] = photon;
-                self.flights.copy(lane, flights, next);
+                self.flights.put(lane, flights.at(next));
                 return true;
             }
         }
@@ -95,31 +95,7 @@ impl Lanes<'_, '_> {
             self.draws.counter[2][i] = 0;
         }
         self.philox(count);
-        let emitter = &self.transport.emitter;
-        for i in 0..count {
-            let history = first + i as u64;
-            let mut rng = Philox::at(self.seed, Stream::History as u32, history, 1)
-                .after(self.draws.block(i));
-            let Emission {
-                origin_mm,
-                direction,
-                energy_kev,
-            } = emitter.emit(&mut rng);
-            for axis in 0..3 {
-                self.waiting.flights.direction[axis][i] = direction[axis] as f32;
-                self.waiting.flights.position[axis][i] = origin_mm[axis] as f32;
-            }
-            let energy = self.transport.attenuation.locate(energy_kev);
-            self.waiting.photons[i] = Photon {
-                history,
-                step: rng.step(),
-                row: self.transport.majorants.row(energy),
-                energy_kev: energy_kev as f32,
-                energy,
-                category: Category::Primary,
-                slot: 0,
-            };
-        }
+        self.leave_source(first, count);
         for i in 0..count {
             self.draws.counter[2][i] = self.waiting.photons[i].step;
             self.waiting.photons[i].step += 1;
@@ -149,5 +125,60 @@ impl Lanes<'_, '_> {
         });
         (self.waiting.next, self.waiting.count) = (0, count);
         true
+    }
+
+    /// Directions and energies of waiting photons from the first random block of each.
+    fn leave_source(&mut self, first: u64, count: usize) {
+        let transport = self.transport;
+        let emitter = &transport.emitter;
+        let mut kept = [0; LANES];
+        let plain = emitter.plain_beam();
+        if plain.is_some() {
+            let field = emitter.field();
+            self.isa.run(PlainBeam {
+                low_mm: field.low_mm.map(|low| low as f32),
+                size_mm: field.size_mm().map(|size| size as f32),
+                distance_mm: self.space.source_detector_mm,
+                words: &self.draws.block,
+                flights: &mut self.waiting.flights,
+                kept: &mut kept,
+                count: count.next_multiple_of(16),
+            });
+        }
+        for i in 0..count {
+            let history = first + i as u64;
+            let (energy_kev, step) = match plain {
+                Some(spectrum) if kept[i] != 0 => {
+                    let word = self.draws.block[3][i];
+                    (
+                        spectrum.sample(f64::from(word) * (1.0 / 4_294_967_296.0)),
+                        1,
+                    )
+                }
+                _ => {
+                    let mut rng = Philox::at(self.seed, Stream::History as u32, history, 1);
+                    if plain.is_none() {
+                        rng = rng.after(self.draws.block(i));
+                    }
+                    let emission = emitter.emit(&mut rng);
+                    for axis in 0..3 {
+                        let flights = &mut self.waiting.flights;
+                        flights.direction[axis][i] = emission.direction[axis] as f32;
+                        flights.position[axis][i] = emission.origin_mm[axis] as f32;
+                    }
+                    (emission.energy_kev, rng.step())
+                }
+            };
+            let energy = transport.attenuation.locate(energy_kev);
+            self.waiting.photons[i] = Photon {
+                history,
+                step,
+                row: transport.majorants.row(energy),
+                energy_kev: energy_kev as f32,
+                energy,
+                category: Category::Primary,
+                slot: 0,
+            };
+        }
     }
 }

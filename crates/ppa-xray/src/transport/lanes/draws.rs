@@ -4,6 +4,7 @@ use crate::matter::natural_log::ln;
 use crate::philox;
 use crate::transport::lanes::flights::{Each, LANES};
 use crate::transport::lanes::isa::Kernel;
+use crate::transport::stream::Stream;
 
 /// Random numbers of many histories: one Philox block each.
 #[derive(Debug)]
@@ -13,9 +14,10 @@ pub(super) struct Draws {
 }
 
 impl Draws {
-    pub fn new() -> Self {
+    /// Blocks of `stream`: the last word of every counter.
+    pub fn new(stream: Stream) -> Self {
         Self {
-            counter: [[0; LANES]; 4],
+            counter: [[0; LANES], [0; LANES], [0; LANES], [stream as u32; LANES]],
             block: [[0; LANES]; 4],
         }
     }

@@ -9,7 +9,7 @@ pub(crate) const LANES: usize = 64;
 pub(super) type Each<T> = [T; LANES];
 
 /// Straight flights of many photons, one array per quantity.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct Flights {
     /// Cells from the corner of the box.
     pub position: [Each<f32>; 3],
@@ -25,6 +25,17 @@ pub(super) struct Flights {
     pub to_plane_mm: Each<f32>,
 }
 
+/// One of [`Flights`].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Flight {
+    position: [f32; 3],
+    direction: [f32; 3],
+    slope: [f32; 3],
+    inverse: [f32; 3],
+    depth: f32,
+    to_plane_mm: f32,
+}
+
 impl Flights {
     pub fn new() -> Self {
         Self {
@@ -37,29 +48,39 @@ impl Flights {
         }
     }
 
-    /// Overwrites photon `to` with photon `from` of another bundle.
     #[inline(always)]
-    pub fn copy(&mut self, to: usize, other: &Self, from: usize) {
+    pub fn at(&self, photon: usize) -> Flight {
+        Flight {
+            position: each(&self.position, photon),
+            direction: each(&self.direction, photon),
+            slope: each(&self.slope, photon),
+            inverse: each(&self.inverse, photon),
+            depth: self.depth[photon],
+            to_plane_mm: self.to_plane_mm[photon],
+        }
+    }
+
+    #[inline(always)]
+    pub fn put(&mut self, photon: usize, flight: Flight) {
         for axis in 0..3 {
-            self.position[axis][to] = other.position[axis][from];
+            self.position[axis][photon] = flight.position[axis];
+            self.direction[axis][photon] = flight.direction[axis];
+            self.slope[axis][photon] = flight.slope[axis];
+            self.inverse[axis][photon] = flight.inverse[axis];
+        }
+        self.depth[photon] = flight.depth;
+        self.to_plane_mm[photon] = flight.to_plane_mm;
+    }
+
+    /// Sends photon `to` where photon `from` of another bundle flies, from where it stands.
+    #[inline(always)]
+    pub fn turn(&mut self, to: usize, other: &Self, from: usize) {
+        for axis in 0..3 {
             self.direction[axis][to] = other.direction[axis][from];
             self.slope[axis][to] = other.slope[axis][from];
             self.inverse[axis][to] = other.inverse[axis][from];
         }
-        self.depth[to] = other.depth[from];
         self.to_plane_mm[to] = other.to_plane_mm[from];
-    }
-
-    /// Overwrites photon `to` with photon `from`.
-    pub fn move_within(&mut self, to: usize, from: usize) {
-        for axis in 0..3 {
-            self.position[axis][to] = self.position[axis][from];
-            self.direction[axis][to] = self.direction[axis][from];
-            self.slope[axis][to] = self.slope[axis][from];
-            self.inverse[axis][to] = self.inverse[axis][from];
-        }
-        self.depth[to] = self.depth[from];
-        self.to_plane_mm[to] = self.to_plane_mm[from];
     }
 }
 

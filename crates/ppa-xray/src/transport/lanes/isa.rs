@@ -62,6 +62,19 @@ impl Isa {
     }
 }
 
+/// Asks for the memory of an element that will be read soon, without waiting for it.
+#[inline(always)]
+pub(super) fn prefetch<T>(slice: &[T], index: usize) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(element) = slice.get(index) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: the address is that of a reference, and a prefetch changes nothing that a program can see.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(element).cast()) }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (slice, index);
+}
+
 /// Straight-line work on many photons at once. `run` is `#[inline(always)]`, so that it is compiled into each copy.
 pub(super) trait Kernel {
     fn run(self);

@@ -15,6 +15,8 @@ mod exits;
 mod flights;
 mod isa;
 mod picked;
+mod plain_beam;
+mod scattering;
 mod turn;
 
 use std::ops::Range;
@@ -29,6 +31,7 @@ use crate::transport::lanes::draws::{Draw, Draws};
 use crate::transport::lanes::flights::{Box32, Each, Flights};
 use crate::transport::lanes::isa::Isa;
 use crate::transport::lanes::picked::Picked;
+use crate::transport::lanes::scattering::Scattering;
 use crate::transport::majorants::Region;
 use crate::transport::score::Score;
 use crate::transport::stream::Stream;
@@ -66,6 +69,7 @@ struct Lanes<'a, 'p> {
     /// Lanes in use; they come first.
     count: usize,
     draws: Draws,
+    scattering: Scattering,
 }
 
 /// Follows `histories` of `seed` and tells `score` what they leave; slots are below [`LANES`].
@@ -122,7 +126,8 @@ impl<'a, 'p> Lanes<'a, 'p> {
                 ..idle
             }),
             count: 0,
-            draws: Draws::new(),
+            draws: Draws::new(Stream::History),
+            scattering: Scattering::new(),
         }
     }
 
@@ -188,7 +193,6 @@ impl<'a, 'p> Lanes<'a, 'p> {
 
     /// Random blocks of the first `count` counters.
     fn philox(&mut self, count: usize) {
-        self.draws.counter[3] = [Stream::History as u32; LANES];
         self.isa.run(Draw {
             key: Philox::key(self.seed),
             draws: &mut self.draws,

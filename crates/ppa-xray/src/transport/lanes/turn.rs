@@ -10,10 +10,9 @@ use crate::transport::lanes::elementary::{greatest, sin_cos_turn};
 use crate::transport::lanes::flights::{Each, LANES, each};
 use crate::transport::lanes::isa::Kernel;
 
-/// New directions: a polar angle and an azimuth about the old one.
+/// A polar angle and an azimuth about the old direction.
 #[derive(Debug)]
 pub(super) struct Turns {
-    pub direction: [Each<f32>; 3],
     pub cos_theta: Each<f32>,
     /// Random word of the azimuth.
     pub azimuth: Each<u32>,
@@ -22,7 +21,6 @@ pub(super) struct Turns {
 impl Turns {
     pub fn new() -> Self {
         Self {
-            direction: [[0.0; LANES]; 3],
             cos_theta: [0.0; LANES],
             azimuth: [0; LANES],
         }
@@ -31,25 +29,26 @@ impl Turns {
 
 /// Turns directions.
 pub(super) struct Turn<'a> {
-    pub turns: &'a mut Turns,
+    pub turns: &'a Turns,
+    pub direction: &'a mut [Each<f32>; 3],
     pub count: usize,
 }
 
 impl Kernel for Turn<'_> {
     #[inline(always)]
     fn run(self) {
-        turn(self.turns, self.count.min(LANES));
+        turn(self.turns, self.direction, self.count.min(LANES));
     }
 }
 
 #[inline(always)]
-fn turn(turns: &mut Turns, count: usize) {
+fn turn(turns: &Turns, direction: &mut [Each<f32>; 3], count: usize) {
     for i in 0..count {
         let (sin_phi, cos_phi) = sin_cos_turn(unit(turns.azimuth[i]));
         let cos_theta = turns.cos_theta[i];
         let sin_theta = greatest((1.0 - cos_theta) * (1.0 + cos_theta), 0.0).sqrt();
         // Orthonormal basis without a branch near the pole (Duff et al., JCGT 6(1), 2017).
-        let [x, y, z] = each(&turns.direction, i);
+        let [x, y, z] = each(direction, i);
         let sign = 1.0_f32.copysign(z);
         let a = -1.0 / (sign + z);
         let b = x * y * a;
@@ -63,7 +62,7 @@ fn turn(turns: &mut Turns, count: usize) {
         let square = new[0] * new[0] + new[1] * new[1] + new[2] * new[2];
         let length = 1.5 - 0.5 * square;
         for axis in 0..3 {
-            turns.direction[axis][i] = new[axis] * length;
+            direction[axis][i] = new[axis] * length;
         }
     }
 }

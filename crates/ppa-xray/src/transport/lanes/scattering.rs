@@ -1,0 +1,169 @@
+//! Photons that scatter, and the x-rays of K shells: new directions and energies.
+
+use crate::transport::attenuation::CUTOFF_KEV;
+use crate::transport::lanes::collisions::Site;
+use crate::transport::lanes::compton_attempt::{Attempt, Attempts};
+use crate::transport::lanes::draws::unit;
+use crate::transport::lanes::entry::Aim;
+use crate::transport::lanes::flights::Flights;
+use crate::transport::lanes::picked::Picked;
+use crate::transport::lanes::turn::{Turn, Turns};
+use crate::transport::lanes::{Lanes, Photon};
+use crate::transport::score::Score;
+use crate::transport::tally::Category;
+
+/// Room for the photons that scatter in one round, side by side; behind them old, harmless numbers.
+pub(super) struct Scattering {
+    flights: Flights,
+    pub turns: Turns,
+    attempts: Attempts,
+}
+
+impl Scattering {
+    pub fn new() -> Self {
+        Self {
+            flights: Flights::new(),
+            turns: Turns::new(),
+            attempts: Attempts::new(),
+        }
+    }
+}
+
+impl Photon {
+    #[inline(always)]
+    fn scatter(&mut self, by: Category) {
+        self.category = match self.category {
+            Category::Primary => by,
+            _ => Category::Multiple,
+        };
+    }
+}
+
+impl Lanes<'_, '_> {
+    /// Scatters photons: the first `compton` of them off electrons, then `rayleigh` off whole atoms. The others are K x-rays,
+    /// which leave in any direction alike.
+    pub(super) fn scatter(
+        &mut self,
+        scattered: &[Site],
+        [compton, rayleigh]: [usize; 2],
+        ended: &mut Picked,
+        score: &mut impl Score,
+    ) {
+        let mut lanes = Picked::new();
+        for (n, site) in scattered.iter().enumerate() {
+            let lane = site.lane();
+            lanes.push_if(lane, true);
+            let flights = &mut self.scattering.flights;
+            for axis in 0..3 {
+                flights.direction[axis][n] = self.flights.direction[axis][lane];
+                flights.position[axis][n] = self.flights.position[axis][lane];
+            }
+        }
+        self.draw(&lanes);
+        self.attempt_compton(&scattered[..compton]);
+        for (n, site) in scattered[..compton].iter().enumerate() {
+            let (half, scattered_kev) = self.compton(site, n);
+            self.scattering.turns.cos_theta[n] = 1.0 - 2.0 * half;
+            let photon = &mut self.photons[site.lane()];
+            let slot = usize::from(photon.slot);
+            let before_kev = f64::from(photon.energy_kev);
+            photon.energy_kev = scattered_kev;
+            photon.scatter(Category::Compton);
+            if f64::from(scattered_kev) < CUTOFF_KEV {
+                // What is left of the photon stays here too.
+                score.deposit(slot, site.voxel, before_kev);
+                score.finish(slot);
+                ended.push_if(site.lane(), true);
+            } else {
+                score.deposit(slot, site.voxel, before_kev - f64::from(scattered_kev));
+                photon.energy = self.transport.attenuation.locate(scattered_kev.into());
+                photon.row = self.transport.majorants.row(photon.energy);
+            }
+        }
+        let coherent = scattered.iter().enumerate().skip(compton).take(rayleigh);
+        for (n, site) in coherent {
+            let photon = &self.photons[site.lane()];
+            let mut rng = self.generator(photon).after(self.draws.block(n));
+            let tables = &self.transport.samplers[usize::from(site.code.material())];
+            let cos_theta = tables.sample_rayleigh(photon.energy_kev.into(), &mut rng);
+            self.scattering.turns.cos_theta[n] = cos_theta as f32;
+            let photon = &mut self.photons[site.lane()];
+            photon.step = rng.step();
+            photon.scatter(Category::Rayleigh);
+        }
+        for n in compton + rayleigh..scattered.len() {
+            self.scattering.turns.cos_theta[n] = 1.0 - 2.0 * unit(self.draws.block[0][n]);
+        }
+        let count = scattered.len().next_multiple_of(16);
+        let Scattering { flights, turns, .. } = &mut self.scattering;
+        self.isa.run(Turn {
+            turns,
+            direction: &mut flights.direction,
+            count,
+        });
+        self.isa.run(Aim {
+            space: &self.space,
+            flights,
+            count,
+        });
+        for (n, site) in scattered.iter().enumerate() {
+            self.flights.turn(site.lane(), &self.scattering.flights, n);
+        }
+    }
+
+    /// One attempt at each Compton scattering, if the tables of its material let attempts be made together.
+    fn attempt_compton(&mut self, sites: &[Site]) {
+        let attempts = &mut self.scattering.attempts;
+        for (n, site) in sites.iter().enumerate() {
+            let energy_kev = self.photons[site.lane()].energy_kev;
+            let tables = &self.transport.samplers[usize::from(site.code.material())];
+            let [angle, shell, ..] = self.draws.block(n);
+            match tables.attempt_compton(energy_kev, unit(angle), unit(shell)) {
+                Some((half, electron)) => {
+                    attempts.energy_kev[n] = energy_kev;
+                    attempts.half[n] = half;
+                    attempts.binding_kev[n] = electron.binding_kev;
+                    attempts.momentum[n] = electron.momentum;
+                }
+                // No photon without energy frees an electron.
+                None => attempts.energy_kev[n] = 0.0,
+            }
+        }
+        self.isa.run(Attempt {
+            attempts,
+            momentum: &self.draws.block[2],
+            way: &self.draws.block[3],
+            count: sites.len().next_multiple_of(16),
+        });
+    }
+
+    /// sin²(θ/2) and the energy in keV after Compton scattering; what an attempt leaves open is drawn anew.
+    #[inline(always)]
+    fn compton(&mut self, site: &Site, n: usize) -> (f32, f32) {
+        let half = self.scattering.attempts.half[n];
+        let scattered_kev = self.scattering.attempts.scattered_kev[n];
+        if scattered_kev > 0.0 {
+            return (half, scattered_kev);
+        }
+        self.compton_anew(site, (scattered_kev == 0.0).then_some(half))
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn compton_anew(&mut self, site: &Site, half: Option<f32>) -> (f32, f32) {
+        let photon = &self.photons[site.lane()];
+        let energy_kev = f64::from(photon.energy_kev);
+        let mut rng = self.generator(photon);
+        let tables = &self.transport.samplers[usize::from(site.code.material())];
+        let (cos_theta, scattered_kev) = match half {
+            Some(half) => {
+                let cos_theta = 1.0 - 2.0 * f64::from(half);
+                let scattered_kev = tables.compton_energy_at(energy_kev, cos_theta, || rng.unit());
+                (cos_theta, scattered_kev)
+            }
+            None => tables.sample_compton(energy_kev, &mut rng),
+        };
+        self.photons[site.lane()].step = rng.step();
+        ((0.5 * (1.0 - cos_theta)) as f32, scattered_kev as f32)
+    }
+}
