@@ -6,7 +6,8 @@ use crate::matter::electron_shell::Shell;
 use crate::matter::material::Material;
 use crate::matter::photon_tables::PhotonTables;
 use crate::mcgpu::error::McgpuError;
-use crate::mcgpu::lines::{Lines, holds, numbers};
+use crate::mcgpu::material_lines::MaterialFile;
+use crate::mcgpu::rational_inverse::density_in_interval;
 
 /// Most energies that a file may hold; MC-GPU itself stops at 25005.
 const MOST_ENERGIES: usize = 200_000;
@@ -23,14 +24,13 @@ const LARGEST_X: f64 = 146.5;
 /// Reads a material: mean free paths, squared molecular form factor, shells with their Compton profiles.
 ///
 /// The densities of the voxels scale the mean free paths; the one of the file is nominal. The form factor is the
-/// derivative of the rational inverse cumulative distribution ("RITA", PENELOPE-2006 manual, NEA 6222, section 1.2.4)
-/// that MC-GPU samples. The table that helps its search (ITL, ITU) and the largest cumulative probability of each
+/// derivative of the rational inverse cumulative distribution that MC-GPU samples. The table that helps its search (ITL, ITU) and the largest cumulative probability of each
 /// energy follow from the rest and are read over.
 ///
 /// # Errors
 /// [`McgpuError`] naming line, what was found and what expected, and mean free paths that contradict their total.
 pub fn read_material(path: impl AsRef<Path>) -> Result<Material, McgpuError> {
-    let mut file = MaterialFile(Lines::open(path.as_ref())?);
+    let mut file = MaterialFile::open(path.as_ref())?;
     let name = file.name()?;
     let density_g_cm3 = file.nominal_density()?;
     let mut tables = PhotonTables {
@@ -51,71 +51,7 @@ pub fn read_material(path: impl AsRef<Path>) -> Result<Material, McgpuError> {
     })
 }
 
-struct MaterialFile(Lines);
-
 impl MaterialFile {
-    fn line(&mut self, expected: &str) -> Result<Vec<u8>, McgpuError> {
-        let line = self.0.next()?.map(<[u8]>::to_vec);
-        line.ok_or_else(|| self.0.ends(expected))
-    }
-
-    /// Goes on to the line that holds `headline`.
-    fn seek(&mut self, headline: &str) -> Result<(), McgpuError> {
-        loop {
-            match self.0.next()? {
-                Some(line) if holds(line, headline) => return Ok(()),
-                Some(_) => {}
-                None => return Err(self.0.ends(headline)),
-            }
-        }
-    }
-
-    /// A number behind `#`.
-    fn counted(&mut self, expected: &str) -> Result<f64, McgpuError> {
-        let line = self.line(expected)?;
-        let number = line
-            .trim_ascii()
-            .strip_prefix(b"#")
-            .and_then(numbers::<1>)
-            .filter(|[number]| number.is_finite());
-        match number {
-            Some([number]) => Ok(number),
-            None => Err(self.0.unexpected(&line, expected)),
-        }
-    }
-
-    fn count(
-        &mut self,
-        what: &str,
-        range: std::ops::RangeInclusive<usize>,
-    ) -> Result<usize, McgpuError> {
-        let expected = format!("the number of {what}, {} to {}", range.start(), range.end());
-        let found = self.counted(&expected)?;
-        let fits = found.fract() == 0.0 && range.contains(&(found as usize));
-        if fits {
-            Ok(found as usize)
-        } else {
-            Err(self.0.unexpected(found.to_string().as_bytes(), expected))
-        }
-    }
-
-    fn row<const N: usize>(
-        &mut self,
-        expected: &str,
-        fits: impl FnOnce(&[f64; N]) -> bool,
-    ) -> Result<[f64; N], McgpuError> {
-        let Some(line) = self.0.next()? else {
-            return Err(self.0.ends(expected));
-        };
-        match numbers(line).filter(fits) {
-            Some(row) => Ok(row),
-            None => {
-                let line = line.to_vec();
-                Err(self.0.unexpected(&line, expected))
-            }
-        }
-    }
-
     fn name(&mut self) -> Result<String, McgpuError> {
         self.seek("[MATERIAL NAME")?;
         let line = self.line("the name of the material")?;
@@ -145,7 +81,7 @@ impl MaterialFile {
             if (sum / total - 1.0).abs().partial_cmp(&0.01) != Some(std::cmp::Ordering::Less) {
                 let [.., found] = paths_cm;
                 let sum_cm = 1.0 / (sum * tables.density_g_cm3);
-                return Err(self.0.unexpected(
+                return Err(self.unexpected(
                     format!("{found} cm").as_bytes(),
                     format!(
                         "{sum_cm:.6} cm within 1 %, the mean free path of all interactions together"
@@ -161,12 +97,8 @@ impl MaterialFile {
         Ok(())
     }
 
-    /// Squared form factor over q², in 1/Å², four points per interval of the sampling table.
-    ///
-    /// In an interval of width Δx and probability ΔP, x = x₀ + (1 + a + b) η / (1 + aη + bη²) Δx for uniform η, so that
-    /// F² ∝ dP/dx = ΔP/Δx (1 + aη + bη²)² / ((1 + a + b)(1 − bη²)).
+    /// Squared form factor over q², in 1/Å².
     fn form_factor_squared(&mut self) -> Result<Vec<[f64; 2]>, McgpuError> {
-        const POINTS: usize = 4;
         self.seek("[DATA VALUES")?;
         let nodes = self.count("form factor nodes", 3..=MOST_NODES)?;
         self.line("the headline of the form factor")?;
@@ -183,17 +115,8 @@ impl MaterialFile {
                     && 1.0 + a + b > 0.0
                     && b < 1.0
             })?;
-            if let Some([x0, p0, a, b]) = before.filter(|[x0, ..]| *x0 < LARGEST_X) {
-                let (width, probability) = (row[0] - x0, row[1] - p0);
-                let scale = 1.0 + a + b;
-                for point in 0..POINTS {
-                    let eta = point as f64 / POINTS as f64;
-                    let denominator = 1.0 + (a + b * eta) * eta;
-                    let x = x0 + scale * eta / denominator * width;
-                    let squared = probability / width * denominator * denominator
-                        / (scale * (1.0 - b * eta * eta));
-                    points.push([x, squared]);
-                }
+            if let Some(start) = before.filter(|[x, ..]| *x < LARGEST_X) {
+                points.extend(density_in_interval(start, [row[0], row[1]]));
             }
             before = Some(row);
         }
@@ -225,14 +148,14 @@ impl MaterialFile {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use std::fmt::Write;
 
     use super::*;
     use crate::mcgpu::mangled;
 
     /// A file with the cross sections of `material`, F² = 1/(1 + x)² and two shells.
-    pub(crate) fn text(material: &Material, energies_kev: &[f64]) -> String {
+    fn text(material: &Material, energies_kev: &[f64]) -> String {
         let density = material.density_g_cm3();
         let mut text = format!(
             "#[MATERIAL NAME]\n# {}\n#[NOMINAL DENSITY (g/cm^3)]\n#   {density:.8}\n#[NUMBER OF DATA VALUES]\n#  {}\n\

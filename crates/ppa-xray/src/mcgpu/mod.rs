@@ -15,11 +15,14 @@ mod lines;
 #[cfg(test)]
 pub(crate) mod mangled;
 mod material_file;
+mod material_lines;
+mod rational_inverse;
 mod sections;
 mod simulation;
 mod trajectory;
 mod values;
 mod voxel_file;
+mod voxel_header;
 
 pub use dose_file::ScanDose;
 pub use error::McgpuError;

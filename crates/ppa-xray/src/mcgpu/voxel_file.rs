@@ -7,17 +7,9 @@ use ppa_ct::Grid;
 
 use crate::matter::material::Material;
 use crate::mcgpu::error::McgpuError;
-use crate::mcgpu::lines::{Lines, columns, holds, numbers};
+use crate::mcgpu::lines::Lines;
+use crate::mcgpu::voxel_header::VoxelHeader;
 use crate::phantom::voxels::{PhantomError, VoxelPhantom};
-
-/// Fewest bytes that a voxel takes in the file: two digits, the blank between them, and a line feed.
-const BYTES_PER_LINE: u64 = 4;
-
-/// Bytes that a voxel takes in memory: material, density, and what the transport makes of them.
-const BYTES_PER_VOXEL: u64 = 10;
-
-/// Last column that material and density may stand in.
-const LAST_COLUMN: usize = 16;
 
 /// Material number and density of every voxel of a box whose corner with the lowest coordinates is the origin.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,7 +40,7 @@ impl VoxelFile {
 
     fn read_into(path: &Path, available: u64) -> Result<Self, McgpuError> {
         let mut lines = Lines::open(path)?;
-        let header = Header::read(&mut lines)?;
+        let header = VoxelHeader::read(&mut lines)?;
         let voxels = header.voxels(&lines, available)?;
         let mut material = Vec::with_capacity(voxels);
         let mut density_g_cm3 = Vec::with_capacity(voxels);
@@ -113,118 +105,6 @@ impl VoxelFile {
         }
         VoxelPhantom::new(grid, material, self.density_g_cm3, materials)
     }
-}
-
-/// What stands above the voxels.
-struct Header {
-    size: [u64; 3],
-    side_cm: [f64; 3],
-    /// Columns of material and density, from 0.
-    columns: [usize; 2],
-}
-
-impl Header {
-    fn read(lines: &mut Lines) -> Result<Self, McgpuError> {
-        while !expect(lines, "[SECTION VOXELS HEADER")?
-            .windows(15)
-            .any(|part| part == b"[SECTION VOXELS")
-        {}
-        let expected = "the number of voxels along x, y, z";
-        let line = expect(lines, expected)?;
-        let size = numbers::<3>(&line)
-            .filter(|size| {
-                size.iter()
-                    .all(|n| n.fract() == 0.0 && (1.0..=1e9).contains(n))
-            })
-            .ok_or_else(|| lines.unexpected(&line, expected))?
-            .map(|n| n as u64);
-        let expected = "the sides of a voxel in cm, 0.0001 to 1000";
-        let line = expect(lines, expected)?;
-        let side_cm = numbers::<3>(&line)
-            .filter(|side| side.iter().all(|side| (1e-4..=1e3).contains(side)))
-            .ok_or_else(|| lines.unexpected(&line, expected))?;
-        let mut column = [0, 1];
-        let mut index = 0;
-        loop {
-            let line = expect(lines, "[END OF VXH SECTION]")?;
-            if holds(&line, "[END OF VXH SECTION") {
-                break;
-            }
-            if let Some(column) = column.get_mut(index) {
-                let expected = format!("a column number from 1 to {LAST_COLUMN}");
-                *column = columns(&line)
-                    .next()
-                    .and_then(|number| number.parse().ok())
-                    .filter(|number| (1..=LAST_COLUMN).contains(number))
-                    .ok_or_else(|| lines.unexpected(&line, expected))?
-                    - 1;
-            }
-            index += 1;
-        }
-        if column[0] == column[1] {
-            let expected = "material and density in different columns";
-            return Err(lines.unexpected(b"the same column for both", expected));
-        }
-        Ok(Self {
-            size,
-            side_cm,
-            columns: column,
-        })
-    }
-
-    /// Number of voxels, if file and memory can hold them.
-    fn voxels(&self, lines: &Lines, available: u64) -> Result<usize, McgpuError> {
-        // At most 10²⁷: no overflow in 128 bits.
-        let voxels: u128 = self.size.iter().map(|&n| u128::from(n)).product();
-        // The last line may lack its line feed.
-        let most = lines.most_text_bytes().saturating_add(1) / BYTES_PER_LINE;
-        if voxels > u128::from(most) {
-            return Err(McgpuError::VoxelsMissing {
-                path: lines.path().into(),
-                size: self.size,
-                bytes: lines.file_bytes(),
-                most,
-            });
-        }
-        let needed = voxels * u128::from(BYTES_PER_VOXEL);
-        if needed > u128::from(available) || usize::try_from(needed).is_err() {
-            return Err(McgpuError::Memory {
-                path: lines.path().into(),
-                size: self.size,
-                needed_mb: (needed / 1_000_000) as u64,
-                available_mb: available / 1_000_000,
-            });
-        }
-        Ok(voxels as usize)
-    }
-
-    /// Material number and density in a line.
-    #[inline]
-    fn voxel(&self, line: &[u8]) -> Option<(u8, f32)> {
-        let (number, density) = if self.columns == [0, 1] {
-            let mut columns = columns(line);
-            (columns.next()?, columns.next()?)
-        } else {
-            let column = |index| columns(line).nth(index);
-            (column(self.columns[0])?, column(self.columns[1])?)
-        };
-        let number = number.parse().ok().filter(|&number: &u8| number >= 1)?;
-        let density = density.parse().ok()?;
-        (1e-9..=1e3).contains(&density).then_some((number, density))
-    }
-
-    fn expected_line(&self) -> String {
-        let [material, density] = self.columns.map(|column| column + 1);
-        format!(
-            "a material number from 1 to 255 in column {material} and a density from 1e-9 to 1000 g/cm³ in column {density}"
-        )
-    }
-}
-
-/// The next line, which must be there.
-fn expect(lines: &mut Lines, expected: &str) -> Result<Vec<u8>, McgpuError> {
-    let line = lines.next()?.map(<[u8]>::to_vec);
-    line.ok_or_else(|| lines.ends(expected))
 }
 
 #[inline]
