@@ -9,7 +9,7 @@ use crate::beam::projection_error::ProjectionError;
 use crate::beam::source::{Collimation, Source};
 use crate::beam::spectrum::Spectrum;
 use crate::detector::receptor::Receptor;
-use crate::transport::tally::Raster;
+use crate::transport::raster::Raster;
 
 /// Most pixels of a detector: 2²⁸, whose planes take 8 GiB.
 pub(crate) const MAX_PIXELS: usize = 1 << 28;

@@ -5,8 +5,9 @@ use crate::dose::settings::VoxelBox;
 use crate::dose::tally::{DoseSums, DoseTally, STEPS_PER_KEV, Sum};
 use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
+use crate::transport::raster::Raster;
 use crate::transport::score::{Arrival, Score};
-use crate::transport::tally::{Raster, nearest};
+use crate::transport::tally::nearest;
 
 /// Cosine below which a photon counts as one of half of it, so that grazing ones do not ruin the variance: the mean of
 /// 1/cos over an even angular flux (Clark, Nucl. Sci. Eng. 27 (1967) 235).

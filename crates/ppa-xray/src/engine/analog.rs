@@ -14,8 +14,9 @@ use crate::matter::compton::ComptonModel;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::philox::Philox;
 use crate::run::analog_tally::ImageSetup;
+use crate::transport::raster::Raster;
 use crate::transport::score::{Arrival, Score};
-use crate::transport::tally::{Inbox, MOST_HISTORIES, Raster, Tally};
+use crate::transport::tally::{Inbox, MOST_HISTORIES, Tally};
 use crate::transport::tracking::{Transport, TransportError};
 
 /// How long the analog engine runs.

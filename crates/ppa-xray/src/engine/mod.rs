@@ -2,6 +2,7 @@
 
 pub(crate) mod analog;
 mod attenuation_basis;
+mod coarse_cells;
 mod collision_map;
 #[cfg(test)]
 mod energy_balance;

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use crate::beam::spectrum::Spectrum;
 use crate::engine::attenuation_basis::{AttenuationBasis, LANES, dot};
+use crate::engine::coarse_cells::{CoarseCells, add};
 use crate::phantom::lattice::{Lattice, Ray};
-use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::tracking::Transport;
 use crate::transport::voxel_codes::VoxelCode;
 
@@ -27,14 +27,7 @@ pub(crate) struct Paths<'a> {
     codes: &'a [VoxelCode],
     lattice: &'a Lattice,
     pub basis: AttenuationBasis,
-    coarse: Coarse,
-}
-
-/// Cubes of voxels, each with its mean density of every basis material.
-struct Coarse {
-    edge: usize,
-    size: [usize; 3],
-    density: Vec<[f32; LANES]>,
+    coarse: CoarseCells,
 }
 
 impl<'a> Paths<'a> {
@@ -57,7 +50,7 @@ impl<'a> Paths<'a> {
         Self {
             codes: &transport.codes,
             lattice: &transport.lattice,
-            coarse: Coarse::new(transport.phantom, &basis, cells),
+            coarse: CoarseCells::new(transport.phantom, &basis, cells),
             basis,
         }
     }
@@ -198,65 +191,6 @@ fn towards(from: &Point3<f64>, to: &Point3<f64>) -> (Vector3<f64>, f64) {
     let along = to - from;
     let length_mm = along.norm();
     (along / length_mm, length_mm)
-}
-
-#[inline(always)]
-fn add(mass: &mut BasisMass, shares: &BasisMass, amount: f32) {
-    // One group is the common case: no loop.
-    if let ([mass], [share]) = (&mut *mass, shares) {
-        for lane in 0..LANES {
-            mass[lane] += share[lane] * amount;
-        }
-        return;
-    }
-    for (mass, share) in mass.iter_mut().zip(shares) {
-        for lane in 0..LANES {
-            mass[lane] += share[lane] * amount;
-        }
-    }
-}
-
-impl Coarse {
-    fn new(phantom: &VoxelPhantom, basis: &AttenuationBasis, most_cells: usize) -> Self {
-        let voxels = phantom.grid().size();
-        let mut edge = 1;
-        while voxels.iter().map(|n| n.div_ceil(edge)).product::<usize>() > most_cells {
-            edge += 1;
-        }
-        let size = voxels.map(|n| n.div_ceil(edge));
-        let groups = basis.groups;
-        let mut density = vec![[0.0_f32; LANES]; groups * size.iter().product::<usize>()];
-        let layer = groups * size[0] * size[1];
-        density
-            .par_chunks_mut(layer)
-            .enumerate()
-            .for_each(|(k, layer)| {
-                let range =
-                    |cell: usize, axis: usize| cell * edge..((cell + 1) * edge).min(voxels[axis]);
-                for (cell, density) in layer.chunks_exact_mut(groups).enumerate() {
-                    let (i, j) = (cell % size[0], cell / size[0]);
-                    let mut count = 0.0;
-                    for z in range(k, 2) {
-                        for y in range(j, 1) {
-                            for x in range(i, 0) {
-                                let voxel = x + voxels[0] * (y + voxels[1] * z);
-                                let shares = basis.shares(phantom.material()[voxel]);
-                                add(density, shares, phantom.density_g_cm3()[voxel]);
-                                count += 1.0;
-                            }
-                        }
-                    }
-                    for lane in density.iter_mut().flatten() {
-                        *lane /= count;
-                    }
-                }
-            });
-        Self {
-            edge,
-            size,
-            density,
-        }
-    }
 }
 
 /// Walks from cell to cell of a lattice between two lengths on a ray (Amanatides and Woo, Eurographics 1987).

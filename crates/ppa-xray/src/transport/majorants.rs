@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::transport::attenuation::{Attenuation, EnergyNode, NODES};
+use crate::transport::block_classes::{classify, densest_per_block, strongest};
 use crate::transport::voxel_codes::VoxelCode;
 
 /// Voxels along the edge of a block.
@@ -13,14 +14,8 @@ const NODES_PER_ROW: usize = 8;
 
 const ROWS: usize = NODES.div_ceil(NODES_PER_ROW);
 
-/// Classes of blocks at most.
-const MOST_CLASSES: usize = 64;
-
 /// Energy at which blocks are compared, keV: the middle of a radiograph's spectrum.
 const TYPICAL_KEV: f64 = 40.0;
-
-/// A bound below this would let the free path overflow; mm⁻¹.
-const VACUUM: f32 = 1e-12;
 
 /// Upper bounds of the attenuation in cubes of blocks.
 ///
@@ -103,32 +98,6 @@ impl Majorants {
     }
 }
 
-/// Largest density of every material in every block, g/cm³.
-fn densest_per_block(
-    codes: &[VoxelCode],
-    size: [usize; 3],
-    (edge, blocks): (usize, [usize; 3]),
-    materials: usize,
-) -> Vec<f32> {
-    let mut densest = vec![0.0_f32; blocks.iter().product::<usize>() * materials];
-    densest
-        .par_chunks_exact_mut(blocks[0] * blocks[1] * materials)
-        .zip(codes.par_chunks(size[0] * size[1] * edge))
-        .for_each(|(layer, codes)| {
-            for (line, codes) in codes.chunks_exact(size[0]).enumerate() {
-                let row = line % size[1] / edge * blocks[0];
-                for (i, codes) in codes.chunks(edge).enumerate() {
-                    let block = &mut layer[(row + i) * materials..][..materials];
-                    for code in codes {
-                        let largest = &mut block[usize::from(code.material())];
-                        *largest = largest.max(code.density_g_cm3());
-                    }
-                }
-            }
-        });
-    densest
-}
-
 /// Largest total coefficient of every material in a row of energies.
 fn largest_in_row(attenuation: &Attenuation, row: usize) -> Vec<f32> {
     let first = row * NODES_PER_ROW;
@@ -136,52 +105,6 @@ fn largest_in_row(attenuation: &Attenuation, row: usize) -> Vec<f32> {
     (0..attenuation.materials())
         .map(|material| attenuation.largest(material, nodes.clone()))
         .collect()
-}
-
-/// Class of every block, and the largest density per material of every class and those below it.
-///
-/// Classes follow the attenuation at the typical energy, `mu` per density and material. If there are too many different ones,
-/// they are told apart by fewer digits.
-fn classify(densest: &[f32], mu: &[f32]) -> (Vec<u16>, Vec<f32>) {
-    let materials = mu.len();
-    let opacity: Vec<u32> = densest
-        .par_chunks_exact(materials)
-        .with_min_len(1024)
-        .map(|densities| strongest(densities, mu).to_bits()) // ordered as the numbers are
-        .collect();
-    let mut known = opacity.clone();
-    known.sort_unstable();
-    known.dedup();
-    let mut digits_off = 0;
-    while known.len() > MOST_CLASSES {
-        digits_off += 1;
-        known.iter_mut().for_each(|bits| *bits >>= 1);
-        known.dedup();
-    }
-    let class: Vec<u16> = opacity
-        .iter()
-        .map(|bits| known.partition_point(|&other| other < bits >> digits_off) as u16)
-        .collect();
-    let mut members = vec![0.0_f32; known.len() * materials];
-    for (&class, densities) in class.iter().zip(densest.chunks_exact(materials)) {
-        let row = &mut members[usize::from(class) * materials..][..materials];
-        for (largest, &density) in row.iter_mut().zip(densities) {
-            *largest = largest.max(density);
-        }
-    }
-    for at in materials..members.len() {
-        members[at] = members[at].max(members[at - materials]);
-    }
-    (class, members)
-}
-
-/// Largest attenuation among materials of the given densities, mm⁻¹.
-fn strongest(densities: &[f32], mu: &[f32]) -> f32 {
-    densities
-        .iter()
-        .zip(mu)
-        .map(|(density, mu)| density * mu)
-        .fold(VACUUM, f32::max)
 }
 
 /// mm⁻¹ per row and class.
@@ -245,6 +168,7 @@ mod tests {
     use crate::matter::material::Material;
     use crate::matter::sampler::MaterialTables;
     use crate::run::analog_tally::ImageSetup;
+    use crate::transport::block_classes::MOST_CLASSES;
     use crate::transport::tally::Category;
     use crate::transport::tracking::Transport;
 

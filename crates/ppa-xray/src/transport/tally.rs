@@ -2,6 +2,8 @@
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
+use crate::transport::raster::Raster;
+
 /// What happened to a detected photon on its way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Category {
@@ -44,64 +46,6 @@ const STEPS_PER_KEV2: f64 = 1_024.0;
 pub(crate) fn nearest(steps: f64) -> u64 {
     // One instruction by way of i64.
     (steps + 0.5) as i64 as u64
-}
-
-/// A rectangle in the detector plane, cut into equal cells.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Raster {
-    pub columns: usize,
-    pub rows: usize,
-    /// Centre in device x and y.
-    pub centre_mm: [f64; 2],
-    /// Extent along device x and y.
-    pub extent_mm: [f64; 2],
-}
-
-impl Raster {
-    pub fn cells(&self) -> usize {
-        self.columns * self.rows
-    }
-
-    pub fn cell_cm2(&self) -> f64 {
-        self.extent_mm[0] * self.extent_mm[1] / 100.0 / self.cells() as f64
-    }
-
-    /// Row-major cell under a point of the plane (device x, y in mm).
-    #[inline]
-    pub fn cell_at(&self, x_mm: f64, y_mm: f64) -> Option<usize> {
-        let column = ((x_mm - self.centre_mm[0]) / self.extent_mm[0] + 0.5) * self.columns as f64;
-        let row = ((y_mm - self.centre_mm[1]) / self.extent_mm[1] + 0.5) * self.rows as f64;
-        let inside =
-            column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
-        inside.then(|| row as usize * self.columns + column as usize)
-    }
-
-    /// Cells under a square about a point of the raster, and their shares; its side is `spot` cells, at most 1.
-    ///
-    /// What lies beyond the raster is folded back, as if it went on as its mirror image. None if the point lies outside.
-    #[inline]
-    fn cells_about(&self, x_mm: f64, y_mm: f64, spot: f64) -> Option<[(usize, f64); 4]> {
-        self.cell_at(x_mm, y_mm)?;
-        let column = ((x_mm - self.centre_mm[0]) / self.extent_mm[0] + 0.5) * self.columns as f64;
-        let row = ((y_mm - self.centre_mm[1]) / self.extent_mm[1] + 0.5) * self.rows as f64;
-        let along = |at: f64, cells: usize| {
-            let end = at + 0.5 * spot;
-            let wall = end.floor();
-            let beyond = ((end - wall) / spot).min(1.0);
-            let last = (cells - 1) as f64;
-            [(wall - 1.0, 1.0 - beyond), (wall, beyond)]
-                .map(|(cell, share)| (cell.clamp(0.0, last) as usize, share))
-        };
-        let [(left, a), (right, b)] = along(column, self.columns);
-        let [(above, c), (below, d)] = along(row, self.rows);
-        let cell = |row: usize, column: usize| row * self.columns + column;
-        Some([
-            (cell(above, left), a * c),
-            (cell(above, right), b * c),
-            (cell(below, left), a * d),
-            (cell(below, right), b * d),
-        ])
-    }
 }
 
 /// Sums of energy and squared energy per cell and category.
@@ -319,31 +263,6 @@ fn moments(energy: u128, square: u128, histories: u64) -> Moments {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        /// Shares of a spread photon sum to 1, balance about it, and are those of the squares' overlap; beside an edge
-        /// they fold back.
-        #[test]
-        fn a_spread_photon_is_shared_by_overlap(x in 0.0..6.0_f64, y in 0.0..4.0_f64, spot in 0.01..=1.0_f64) {
-            let raster = Raster { columns: 6, rows: 4, centre_mm: [3.0, 2.0], extent_mm: [6.0, 4.0] };
-            let shares = raster.cells_about(x, y, spot).unwrap();
-            let mut found = [0.0; 24];
-            for (cell, share) in shares {
-                found[cell] += share;
-            }
-            let overlap = |at: f64, cell: usize, cells: usize| {
-                let part = |low: f64, high: f64| (high.min(at + 0.5 * spot) - low.max(at - 0.5 * spot)).max(0.0);
-                let low = if cell == 0 { -1.0 } else { cell as f64 };
-                let high = if cell + 1 == cells { cells as f64 + 1.0 } else { cell as f64 + 1.0 };
-                part(low, high) / spot
-            };
-            for (cell, found) in found.into_iter().enumerate() {
-                let expected = overlap(x, cell % 6, 6) * overlap(y, cell / 6, 4);
-                prop_assert!((found - expected).abs() < 1e-9, "cell {cell}: {found}, {expected}");
-            }
-        }
-    }
 
     /// Sums over cells are those of whole photons.
     #[test]
