@@ -6,20 +6,10 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;
 use ppa_xray::{
     AnalogRun, AnalogSettings, Dose, DoseError, DoseSettings, Material, Part, Projection, Spectrum,
-    Stop, TubeSpec, VoxelBox, VoxelPhantom,
+    Stop, VoxelBox, VoxelPhantom,
 };
 
-use crate::scenes::{frontal, limb, slab};
-
-fn sixty_kvp() -> Spectrum {
-    let filters = vec!["Al:2.5".parse().unwrap()];
-    Spectrum::tungsten(&TubeSpec {
-        kvp: 60.0,
-        anode_angle_deg: 12.0,
-        filters,
-    })
-    .unwrap()
-}
+use crate::scenes::{frontal, limb, sixty_kvp, slab};
 
 fn dose(
     phantom: &VoxelPhantom,

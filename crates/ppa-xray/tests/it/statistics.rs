@@ -1,22 +1,16 @@
 //! Standard errors are what they say.
 
 use nalgebra::Isometry3;
-use ppa_xray::{AnalogSettings, Category, Radiograph, Spectrum, TubeSpec, analog};
+use ppa_xray::{AnalogSettings, Category, Radiograph, analog};
 
-use crate::scenes::{frontal, limb};
+use crate::scenes::{frontal, limb, sixty_kvp};
 
 const SEEDS: u64 = 24;
 
 /// The same exposure with other seeds.
 fn images(histories: u64) -> Vec<Radiograph> {
     let phantom = limb(&Isometry3::identity());
-    let filters = vec!["Al:2.5".parse().unwrap()];
-    let tube = TubeSpec {
-        kvp: 60.0,
-        anode_angle_deg: 12.0,
-        filters,
-    };
-    let spectrum = Spectrum::tungsten(&tube).unwrap();
+    let spectrum = sixty_kvp();
     let projection = frontal(8, 13.0);
     (0..SEEDS)
         .map(|seed| {
