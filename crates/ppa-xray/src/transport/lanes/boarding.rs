@@ -145,10 +145,10 @@ impl Lanes<'_, '_> {
                 count: count.next_multiple_of(16),
             });
         }
-        for i in 0..count {
+        for (i, kept) in kept.into_iter().enumerate().take(count) {
             let history = first + i as u64;
             let (energy_kev, step) = match plain {
-                Some(spectrum) if kept[i] != 0 => {
+                Some(spectrum) if kept != 0 => {
                     let word = self.draws.block[3][i];
                     (
                         spectrum.sample(f64::from(word) * (1.0 / 4_294_967_296.0)),

@@ -1,10 +1,5 @@
 //! New directions of many photons.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one index runs through all arrays of a photon"
-)]
-
 use crate::transport::lanes::draws::unit;
 use crate::transport::lanes::elementary::{greatest, sin_cos_turn};
 use crate::transport::lanes::flights::{Each, LANES, each};
