@@ -56,28 +56,25 @@ impl Volume {
         how: Interpolation,
         outside_hu: f32,
     ) -> Result<Self, VolumeError> {
-        let here_from_there = self.grid().voxel_from_ct().matrix() * grid.ct_from_voxel().matrix();
+        let here_from_there = here_from_there(self.grid(), grid);
         let sigma = [0, 1, 2].map(|axis| {
             let step = here_from_there.fixed_view::<1, 3>(axis, 0).norm();
             sigma_voxels(step)
         });
-        let coarser = how != Interpolation::Nearest && sigma != [0.0; 3];
-        let blurred = coarser.then(|| low_pass(self.values(), self.grid().size(), sigma));
-        let source = Source {
-            hu: blurred.as_deref().map_or(self.values(), Values::F32),
-            size: self.grid().size(),
-            outside_hu,
-        };
-        let mut hu = vec![0.0; grid.len()];
-        source.fill(&mut hu, grid.size(), &here_from_there, how);
-        Self::new(grid.clone(), hu)
+        if how == Interpolation::Nearest || sigma == [0.0; 3] {
+            return interpolated(self.values(), self.grid(), grid, how, outside_hu);
+        }
+        let blurred = low_pass(self.values(), self.grid().size(), sigma);
+        interpolated(Values::F32(&blurred), self.grid(), grid, how, outside_hu)
     }
 
     /// The volume on [`Grid::upright`], a lattice with right angles; `outside_hu` in the corners
     /// that the sheared one leaves empty. A volume that is not sheared stays as it is.
     ///
+    /// Slices are only shifted within their planes, not made coarser: nothing is low-passed.
+    ///
     /// # Errors
-    /// As [`Grid::upright`] and [`Volume::resampled_to`].
+    /// As [`Grid::upright`]; [`VolumeError::NotFinite`] when `outside_hu` is needed and no number.
     pub fn upright(&self, how: Interpolation, outside_hu: f32) -> Result<Self, VolumeError> {
         /// Leans below this are rounding in the header: a millimetre in 10 m.
         const RIGHT_ANGLE: f64 = 1e-4;
@@ -86,8 +83,32 @@ impl Volume {
         if lean < RIGHT_ANGLE {
             return Ok(self.clone());
         }
-        self.resampled_to(&self.grid().upright()?, how, outside_hu)
+        let upright = self.grid().upright()?;
+        interpolated(self.values(), self.grid(), &upright, how, outside_hu)
     }
+}
+
+/// Voxel indices of `here` from those of `there`.
+fn here_from_there(here: &Grid, there: &Grid) -> Matrix4<f64> {
+    here.voxel_from_ct().matrix() * there.ct_from_voxel().matrix()
+}
+
+/// Values on a lattice at the centres of another one.
+fn interpolated(
+    hu: Values,
+    here: &Grid,
+    there: &Grid,
+    how: Interpolation,
+    outside_hu: f32,
+) -> Result<Volume, VolumeError> {
+    let source = Source {
+        hu,
+        size: here.size(),
+        outside_hu,
+    };
+    let mut hu = vec![0.0; there.len()];
+    source.fill(&mut hu, there.size(), &here_from_there(here, there), how);
+    Volume::new(there.clone(), hu)
 }
 
 /// The values to look up.

@@ -212,6 +212,26 @@ fn a_tilted_stack_becomes_upright() {
     assert_eq!(square.upright(Linear, 0.0).unwrap(), square);
 }
 
+/// Slices that lie whole voxels apart are only moved: each value arrives as it was.
+#[test]
+fn an_upright_stack_is_as_sharp_as_the_tilted_one() {
+    let mut matrix = Matrix4::from_diagonal(&nalgebra::Vector4::new(0.5, 0.5, 2.0, 1.0));
+    matrix[(1, 2)] = 1.5; // three voxels along j from slice to slice, 37 degrees
+    let grid = Grid::new([6, 9, 5], Affine3::from_matrix_unchecked(matrix)).unwrap();
+    let hu = (0..grid.len()).map(|n| (n * 7919 % 2003) as f32).collect();
+    let tilted = Volume::new(grid.clone(), hu).unwrap();
+    for how in [Nearest, Linear, Cubic] {
+        let upright = tilted.upright(how, -1000.0).unwrap();
+        assert_eq!(upright.grid().size(), [6, 9 + 3 * 4, 5]);
+        for n in 0..grid.len() {
+            let [i, j, k] = grid.voxel(n);
+            assert_eq!(upright.at([i, j + 3 * k, k]), tilted.hu()[n], "{how:?}");
+        }
+        let air = upright.hu().iter().filter(|v| **v == -1000.0).count();
+        assert_eq!(air, upright.grid().len() - grid.len());
+    }
+}
+
 #[test]
 fn labels_stay_labels_and_the_same_lattice_changes_nothing() {
     let grid = upright_grid([7, 6, 5], [0.8, 0.8, 3.0]);
