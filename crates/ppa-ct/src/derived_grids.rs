@@ -22,20 +22,24 @@ impl Grid {
     /// The same box and axes with other spacings along i, j, k.
     ///
     /// The box is that of whole voxels, not of their centres; its middle stays where it is, and
-    /// each side has as many voxels as come closest to filling it, at least one.
+    /// each side has as many voxels as come closest to filling it.
     ///
     /// # Errors
-    /// [`VolumeError::Spacing`] unless each is a length above 0, [`VolumeError::TooFine`] if they
-    /// make more than 2^32 voxels.
+    /// [`VolumeError::Spacing`] unless each is a length above 0, [`VolumeError::TooCoarse`] if none
+    /// fills a side best, [`VolumeError::TooFine`] if they make more than 2^32 voxels.
     pub fn with_spacing(&self, spacing_mm: Vector3<f64>) -> Result<Self, VolumeError> {
         if let Some(bad) = spacing_mm.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
             return Err(VolumeError::Spacing(*bad));
         }
         let old = self.spacing_mm();
-        let counts = [0, 1, 2].map(|axis| {
-            let sides = self.size()[axis] as f64 * old[axis] / spacing_mm[axis];
-            sides.round().max(1.0)
-        });
+        let sides_mm = [0, 1, 2].map(|axis| self.size()[axis] as f64 * old[axis]);
+        let counts = [0, 1, 2].map(|axis| (sides_mm[axis] / spacing_mm[axis]).round());
+        if let Some(axis) = counts.iter().position(|n| *n < 1.0) {
+            return Err(VolumeError::TooCoarse {
+                spacing_mm: spacing_mm[axis],
+                side_mm: sides_mm[axis],
+            });
+        }
         let voxels = counts.iter().product::<f64>();
         if voxels > MOST_VOXELS {
             return Err(VolumeError::TooFine {

@@ -36,6 +36,16 @@ pub enum VolumeError {
         /// Most voxels.
         most: f64,
     },
+    /// A spacing to resample to is more than twice a side of the volume.
+    #[error(
+        "a spacing of {spacing_mm} mm, expected at most about the volume's side of {side_mm} mm"
+    )]
+    TooCoarse {
+        /// Spacing asked for, mm.
+        spacing_mm: f64,
+        /// The volume's side along that axis, mm.
+        side_mm: f64,
+    },
     /// A value is NaN or infinite.
     #[error("voxel {0:?} holds a value that is not a number")]
     NotFinite([usize; 3]),

@@ -7,6 +7,7 @@ use ppa_dataset::{Case, Found, prepare};
 use ppa_mesh::{LimbSettings, VoxelBox, write_ply};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
 
+use crate::number_lists::{point, range, voxel_box};
 use crate::output::{Output, working};
 use crate::scan_args::ScanArgs;
 
@@ -75,38 +76,6 @@ pub struct PrepareArgs {
     /// A point of the plane under the limb, ct frame; give three: one distal, two proximal
     #[arg(long = "plane-point", value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     plane_points: Vec<[f64; 3]>,
-}
-
-fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let numbers: Option<Vec<f64>> = text
-        .split(',')
-        .map(|part| part.trim().parse().ok())
-        .collect();
-    let numbers = numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok());
-    let finite = numbers.filter(|numbers| numbers.iter().all(|n| n.is_finite()));
-    finite.ok_or_else(|| format!("expected {N} numbers separated by commas"))
-}
-
-fn point(text: &str) -> Result<[f64; 3], String> {
-    numbers(text)
-}
-
-fn range(text: &str) -> Result<[f64; 2], String> {
-    numbers(text)
-}
-
-fn voxel_box(text: &str) -> Result<VoxelBox, String> {
-    let numbers: Option<Vec<usize>> = text
-        .split(',')
-        .map(|part| part.trim().parse().ok())
-        .collect();
-    match numbers.as_deref() {
-        Some(&[i0, i1, j0, j1, k0, k1]) => Ok(VoxelBox {
-            low: [i0, j0, k0],
-            high: [i1, j1, k1],
-        }),
-        _ => Err("expected 6 voxel indices separated by commas".to_owned()),
-    }
 }
 
 pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {

@@ -1,6 +1,7 @@
 //! The program as a user meets it.
 
 mod bad_input;
+mod conversion;
 mod identity;
 mod json;
 mod mcgpu;

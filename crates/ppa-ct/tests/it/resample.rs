@@ -279,8 +279,15 @@ fn spacings_that_are_none_are_refused() {
     }
     let refused = volume.resampled(Vector3::repeat(1e-4), Linear);
     assert!(matches!(refused, Err(VolumeError::TooFine { .. })));
-    // A spacing longer than the volume leaves one voxel in its middle.
-    let one = volume.resampled(Vector3::repeat(100.0), Linear).unwrap();
+    for coarse in [8.1, 1e300] {
+        let refused = volume.resampled(Vector3::new(1.0, 1.0, coarse), Linear);
+        assert!(matches!(
+            refused,
+            Err(VolumeError::TooCoarse { side_mm: 4.0, .. })
+        ));
+    }
+    // A spacing somewhat longer than the volume leaves one voxel in its middle.
+    let one = volume.resampled(Vector3::repeat(7.9), Linear).unwrap();
     assert_eq!(one.grid().size(), [1; 3]);
     assert!((one.grid().origin_mm() - volume.grid().centre([1.5; 3])).norm() < 1e-9);
 }

@@ -2,23 +2,84 @@
 
 use std::path::PathBuf;
 
+use anyhow::{Context, anyhow};
 use clap::Args;
-use ppa_ct::{Info, read, write};
+use nalgebra::{Point3, Vector3};
+use ppa_ct::{Info, Interpolation, Volume, WarningCode, read, write};
+use ppa_mesh::VoxelBox;
 
+use crate::number_lists::{along_axes, voxel_box, world_box};
 use crate::output::{Output, working};
 use crate::scan_args::ScanArgs;
 
+/// What lies outside a tilted stack that was set upright.
+const AIR_HU: f32 = -1000.0;
+
 #[derive(Debug, Args)]
+#[command(after_long_help = "\
+Voxels stay as they are unless a change is asked for. Changes are made in the order of the options above; values \
+between voxels are interpolated linearly, after a low-pass along axes that become coarser.
+
+  ppa ct convert scans/leg leg.nrrd                           the same voxels in another format
+  ppa ct convert scans/head head.nii.gz --upright             a tilted gantry set upright
+  ppa ct convert leg.nrrd foot.mha --crop-mm=-60,60,-90,150,-400,-250 --spacing-mm 1")]
 pub struct ConvertArgs {
     #[command(flatten)]
     input: ScanArgs,
     /// What to write: .nii, .nii.gz, .nrrd, .mha, .mhd, or a new folder for DICOM slices
     output: PathBuf,
+    /// Keep only this box of the scan's voxels: first and one past the last index along i, j and k
+    #[arg(long, value_name = "I,I,J,J,K,K", value_parser = voxel_box)]
+    crop: Option<VoxelBox>,
+    /// Shift the slices of a tilted gantry onto a lattice with right angles; corners become air
+    #[arg(long)]
+    upright: bool,
+    /// Keep only the voxels whose centres lie in this box: from and to along x, y and z, LPS
+    #[arg(long, value_name = "X,X,Y,Y,Z,Z", value_parser = world_box, allow_hyphen_values = true)]
+    crop_mm: Option<[[f64; 3]; 2]>,
+    /// Distance of the new voxels' centres: one number, or three for i, j and k
+    #[arg(long, value_name = "MM", value_parser = along_axes, allow_hyphen_values = true)]
+    spacing_mm: Option<[f64; 3]>,
+}
+
+impl ConvertArgs {
+    fn changed(&self, mut volume: Volume) -> anyhow::Result<Volume> {
+        if let Some(VoxelBox { low, high }) = self.crop {
+            let [nx, ny, nz] = volume.grid().size();
+            volume = volume.crop(low, high).map_err(|_| {
+                anyhow!("--crop is no box inside the scan's {nx} x {ny} x {nz} voxels")
+            })?;
+        }
+        if self.upright {
+            volume = volume
+                .upright(Interpolation::Linear, AIR_HU)
+                .context("--upright")?;
+        }
+        if let Some([min, max]) = self.crop_mm {
+            volume = volume
+                .crop_world(&Point3::from(min), &Point3::from(max))
+                .map_err(|_| anyhow!("no voxel centre lies in the box of --crop-mm"))?;
+        }
+        if let Some(spacing) = self.spacing_mm {
+            volume = volume
+                .resampled(Vector3::from(spacing), Interpolation::Linear)
+                .context("--spacing-mm")?;
+        }
+        Ok(volume)
+    }
 }
 
 pub fn run(args: &ConvertArgs, output: Output) -> anyhow::Result<()> {
     let _working = working("converting");
-    write(&args.output, &args.input.read()?.volume)?;
+    let source = args.input.read()?;
+    write(&args.output, &args.changed(source.volume)?)?;
     // Told from the file, so that what is printed is what others will read.
-    output.print(&Info::of(&read(&args.output)?), super::describe)
+    let mut info = Info::of(&read(&args.output)?);
+    // What the file cannot tell about the scan it was made from; a tilt it does.
+    let lost = source.warnings.into_iter().filter(|warning| {
+        let told = info.warnings.iter().any(|w| w.code == warning.code);
+        !told && warning.code != WarningCode::GantryTilt
+    });
+    info.warnings.extend(lost.collect::<Vec<_>>());
+    output.print(&info, super::describe)
 }

@@ -1,0 +1,59 @@
+//! Options that are lists of numbers: points, ranges, boxes.
+
+use ppa_mesh::VoxelBox;
+
+fn finite<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let numbers: Option<Vec<f64>> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok())
+        .collect();
+    let numbers = numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok());
+    numbers.filter(|numbers| numbers.iter().all(|n| n.is_finite()))
+}
+
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    finite(text).ok_or_else(|| format!("expected {N} numbers separated by commas"))
+}
+
+/// `X,Y,Z`.
+pub fn point(text: &str) -> Result<[f64; 3], String> {
+    numbers(text)
+}
+
+/// `FROM,TO`.
+pub fn range(text: &str) -> Result<[f64; 2], String> {
+    numbers(text)
+}
+
+/// One number for three axes, or three.
+pub fn along_axes(text: &str) -> Result<[f64; 3], String> {
+    finite::<1>(text)
+        .map(|[number]| [number; 3])
+        .or_else(|| finite(text))
+        .ok_or_else(|| "expected one number, or three separated by commas".to_owned())
+}
+
+/// `FROM,TO` along x, y and z: the smallest and the largest corner.
+pub fn world_box(text: &str) -> Result<[[f64; 3]; 2], String> {
+    let [x0, x1, y0, y1, z0, z1] = numbers(text)?;
+    let corners = [[x0, y0, z0], [x1, y1, z1]];
+    if (0..3).any(|axis| corners[0][axis] >= corners[1][axis]) {
+        return Err("expected each range to end above its start".to_owned());
+    }
+    Ok(corners)
+}
+
+/// First and one past the last index along i, j and k.
+pub fn voxel_box(text: &str) -> Result<VoxelBox, String> {
+    let numbers: Option<Vec<usize>> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok())
+        .collect();
+    match numbers.as_deref() {
+        Some(&[i0, i1, j0, j1, k0, k1]) => Ok(VoxelBox {
+            low: [i0, j0, k0],
+            high: [i1, j1, k1],
+        }),
+        _ => Err("expected 6 voxel indices separated by commas".to_owned()),
+    }
+}
