@@ -120,14 +120,17 @@ fn flare(sections: &Sections, slices: &[usize]) -> Option<(f64, Vec<Level>)> {
 }
 
 /// Whether a thinner bone runs along most of the shaft above a level.
+///
+/// Only the proximal half counts: in coarse voxels the fibula hangs together with the tibia for some
+/// 40 mm above the flare, and the kneecap lies beside the flare of a femur.
 fn fibula_beside(levels: &[Level], top_mm: f64) -> bool {
     const ALONG_MM: f64 = 80.0;
-    let shaft: Vec<bool> = levels
+    let mut shaft: Vec<&Level> = levels
         .iter()
         .filter(|l| (top_mm..=top_mm + ALONG_MM).contains(&l.level_mm))
-        .map(|l| l.has_fibula)
         .collect();
-    let with_fibula = shaft.iter().filter(|has| **has).count();
+    shaft.truncate(shaft.len().div_ceil(2));
+    let with_fibula = shaft.iter().filter(|l| l.has_fibula).count();
     5 * with_fibula >= 3 * shaft.len()
 }
 

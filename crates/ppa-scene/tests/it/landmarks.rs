@@ -80,6 +80,17 @@ fn ankle_and_axis_of_the_phantom_are_found() {
     assert!(aside < 5.0, "axis passes the joint at {aside:.2} mm");
 }
 
+/// The syndesmosis of this one is thinner than a voxel: tibia and fibula are one outline up to 65 mm above the joint.
+#[test]
+fn the_ankle_is_found_where_coarse_voxels_fuse_the_bones() {
+    let leg = LowerLeg::from_seed(5, ppa_ct::phantom::Side::Right);
+    let scan = Scan::of(leg.voxelise(2.0, TableTop::Absent).unwrap());
+    let landmarks = scan.find(Side::Right, &automatic()).unwrap();
+    assert_eq!(landmarks.limb, LimbKind::LowerLeg);
+    let off = Point3::from(landmarks.joint_centre) - leg.truth().joint_centre;
+    assert!(off.norm() < 4.0, "joint off by {off:?}");
+}
+
 /// Turning the whole scan by 20 degrees about any axis turns the landmarks with it.
 #[test]
 fn landmarks_turn_with_the_scan_and_the_limb_still_rests() {
