@@ -1,6 +1,7 @@
 //! The phantoms measured back: from their shapes and from their voxels.
 
 mod anatomy;
+mod foot_turns;
 mod gauge;
 mod knee;
 mod leg_and_foot;

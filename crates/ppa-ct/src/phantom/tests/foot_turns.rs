@@ -1,0 +1,131 @@
+//! How the foot is turned against the leg, from the voxels of its bones alone.
+
+use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
+
+use super::family;
+use super::gauge::{Check, Gauge, SKIN_HU, within};
+use crate::grid::Grid;
+use crate::phantom::parameters::Parameters;
+use crate::phantom::*;
+
+const VOXEL_MM: f64 = 1.0;
+/// The sole is cut softly over 8 mm, which lifts a flat skin by up to a quarter of that.
+const SOFT_SOLE_MM: f64 = 2.0;
+
+/// Centres of the voxels of a bone, limb frame.
+fn bone_voxels(leg: &LowerLeg, name: &str) -> Vec<Point3<f64>> {
+    let (low, high) = leg.skin_box();
+    let foot = Point3::new(high.x, high.y, leg.truth().joint_centre.z + 20.0);
+    let size = ((foot - low) / VOXEL_MM).map(|n| n as usize).into();
+    let grid = Grid::axis_aligned(size, Vector3::repeat(VOXEL_MM), low).unwrap();
+    let label = leg.bone_names().iter().position(|n| *n == name).unwrap() as u8 + 1;
+    let labels = leg.bone_labels(&grid);
+    let voxels = (0..grid.len()).filter(|n| labels[*n] == label);
+    voxels
+        .map(|n| leg.limb_point(&grid.centre(grid.voxel(n).map(|v| v as f64))))
+        .collect()
+}
+
+/// Direction in which points spread most.
+fn long_axis(points: &[Point3<f64>]) -> Vector3<f64> {
+    let count = points.len() as f64;
+    let mean = points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / count;
+    let spread: Matrix3<f64> = points
+        .iter()
+        .map(|p| (p.coords - mean) * (p.coords - mean).transpose())
+        .sum();
+    let eigen = spread.symmetric_eigen();
+    eigen
+        .eigenvectors
+        .column(eigen.eigenvalues.imax())
+        .into_owned()
+}
+
+fn with(leg: &LowerLeg, change: impl Fn(&mut Parameters)) -> LowerLeg {
+    let mut parameters = leg.parameters;
+    change(&mut parameters);
+    LowerLeg::new(parameters, Side::Right)
+}
+
+/// Turn of the second metatarsal about the talocrural axis, against the same leg with a right angle at the ankle.
+fn plantarflexion_deg(leg: &LowerLeg) -> f64 {
+    let axis = leg.mortise.axis(&leg.parameters);
+    let shaft = |leg: &LowerLeg| {
+        let along = long_axis(&bone_voxels(leg, "second metatarsal"));
+        let forward = along * -along.y.signum();
+        forward - axis.scale(axis.dot(&forward))
+    };
+    let (at_right_angle, found) = (
+        shaft(&with(leg, |p| p.plantarflexion_rad = 0.0)),
+        shaft(leg),
+    );
+    let sine = axis.dot(&at_right_angle.cross(&found));
+    sine.atan2(at_right_angle.dot(&found)).to_degrees()
+}
+
+/// Lean of the heel bone behind the talus, seen along the foot.
+fn heel_lean_deg(leg: &LowerLeg) -> f64 {
+    let truth = leg.truth();
+    let axis = leg.mortise.axis(&leg.parameters);
+    let turn = Rotation3::from_axis_angle(&axis, truth.plantarflexion_rad);
+    let pivot = leg.limb_point(&truth.talocrural_centre);
+    let tuberosity: Vec<Point3<f64>> = bone_voxels(leg, "calcaneus")
+        .into_iter()
+        .map(|p| turn.inverse() * (p - pivot))
+        .filter(|q| q.y > 28.0 * leg.parameters.size)
+        .map(|q| Point3::new(q.x, 0.0, q.z))
+        .collect();
+    let up = long_axis(&tuberosity);
+    (up.x / up.z).atan().to_degrees()
+}
+
+/// From the lowest skin under the heel to the lowest under the ball of the foot, along the leg.
+fn slope_of_the_sole_mm(leg: &LowerLeg) -> f64 {
+    let lowest = |posterior: f64| {
+        let place = Point3::new(0.0, posterior, 0.0) * leg.parameters.size;
+        let sole = place - Vector3::z() * leg.truth().sole_depth_mm;
+        let gauge = Gauge::around(leg, &(leg.ct_from_limb * sole), [40.0, 12.0, 8.0], VOXEL_MM);
+        let grid = gauge.ct.grid();
+        let skin = (0..grid.len()).filter(|n| f64::from(gauge.ct.hu()[*n]) > SKIN_HU);
+        skin.map(|n| {
+            leg.limb_point(&grid.centre(grid.voxel(n).map(|v| v as f64)))
+                .z
+        })
+        .fold(f64::INFINITY, f64::min)
+    };
+    lowest(-110.0) - lowest(36.0)
+}
+
+fn checks(leg: &LowerLeg) -> Vec<Check> {
+    let truth = leg.truth();
+    let upright = with(leg, |p| p.plantarflexion_rad = 0.0);
+    vec![
+        within(
+            "sole at a right angle",
+            slope_of_the_sole_mm(&upright),
+            0.0,
+            SOFT_SOLE_MM + VOXEL_MM,
+        ),
+        within(
+            "plantarflexion",
+            plantarflexion_deg(leg),
+            truth.plantarflexion_rad.to_degrees(),
+            0.5,
+        ),
+        within(
+            "heel valgus",
+            heel_lean_deg(leg),
+            truth.heel_valgus_rad.to_degrees(),
+            0.5,
+        ),
+    ]
+}
+
+#[test]
+fn flexion_and_heel_valgus_are_found_in_the_bones() {
+    for (name, leg) in family().filter(|(name, _)| ["P09", "P13", "P17"].contains(&&**name)) {
+        let failed = checks(&leg).into_iter().filter(|check| !check.holds());
+        let failed: Vec<String> = failed.map(|check| check.to_string()).collect();
+        assert!(failed.is_empty(), "{name}: {failed:#?}");
+    }
+}
