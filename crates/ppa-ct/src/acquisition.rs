@@ -17,6 +17,8 @@ pub struct Acquisition {
     pub table_height_mm: Option<f64>,
     /// Smallest and largest HU that the stored numbers can express in every slice.
     pub representable_hu: Option<[f64; 2]>,
+    /// Unit of the values, where the source says that they are no HU: a term of DICOM or UCUM.
+    pub unit: Option<&'static str>,
     /// The pixels went through a lossy compression.
     pub lossy: bool,
     /// Voxels that carried the padding value instead of a measurement.

@@ -2,6 +2,7 @@
 
 mod attributes;
 mod codec;
+mod defined_terms;
 mod element;
 mod file;
 mod fragments;
@@ -104,6 +105,7 @@ fn assemble(
     let acquisition = Acquisition {
         padded_voxels: padded,
         interpolated_slices: stack.made_up(),
+        unit: slices.iter().find_map(|s| s.frame.foreign_unit),
         ..Acquisition::of_slices(slices.iter().map(|s| &*s.stated))
     };
     let unusable = |source_error| ReadError::Volume {
@@ -136,7 +138,7 @@ fn meaning_warnings(slices: &[Slice], force: bool) -> Result<Vec<Warning>, ReadE
             ),
         });
     }
-    let foreign = |s: &Slice| Some((s.file.path.clone(), s.frame.foreign_unit.clone()?));
+    let foreign = |s: &Slice| Some((s.file.path.clone(), s.frame.foreign_unit?));
     match slices.iter().find_map(foreign) {
         Some((path, unit)) if !force => return Err(ReadError::NotHu { path, unit }),
         Some((_, unit)) => warnings.push(Warning {

@@ -85,8 +85,8 @@ pub enum ReadError {
     NotHu {
         /// The file.
         path: PathBuf,
-        /// Code of the unit.
-        unit: String,
+        /// Rescale Type or UCUM code.
+        unit: &'static str,
     },
     /// More than one series to choose from.
     #[error("{} holds {} series, expected one or a choice by number or UID: {}", path.display(), series.len(), list_series(series))]
@@ -251,6 +251,14 @@ pub enum WriteError {
         path: PathBuf,
         /// Names that can be written.
         expected: &'static str,
+    },
+    /// A DICOM CT was asked for, and the source says that the scan is none.
+    #[error("{} would be a DICOM CT in Hounsfield units, but the scan holds {found}: write NIfTI, NRRD or MetaImage", path.display())]
+    NotCt {
+        /// The folder asked for.
+        path: PathBuf,
+        /// Modality or unit.
+        found: String,
     },
     /// The crate was built without this writer.
     #[error("{} needs the feature `{feature}` of ppa-ct, which this build lacks", path.display())]

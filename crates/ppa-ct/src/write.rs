@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::error::WriteError;
+use crate::scan::Scan;
 use crate::volume::Volume;
 
 /// Writes a volume: NIfTI (`.nii`, `.nii.gz`), NRRD (`.nrrd`), MetaImage (`.mha`, `.mhd` with a `.zraw`), or a
@@ -25,21 +26,47 @@ use crate::volume::Volume;
 /// # Errors
 /// [`WriteError`] of the format, and for other extensions.
 pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
-    let extension = path
-        .extension()
-        .map(|e| e.to_string_lossy().to_ascii_lowercase());
-    let slash = path.as_os_str().as_encoded_bytes().ends_with(b"/");
-    match extension.as_deref() {
-        _ if slash || path.is_dir() => write_dicom(path, volume),
-        None => write_dicom(path, volume),
-        Some("nii" | "gz") => write_nifti(path, volume),
-        Some("nrrd") => write_nrrd(path, volume),
-        Some("mha" | "mhd") => write_meta_image(path, volume),
-        Some(_) => Err(WriteError::Extension {
+    if names_dicom(path) {
+        return write_dicom(path, volume);
+    }
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    match extension.to_ascii_lowercase().as_str() {
+        "nii" | "gz" => write_nifti(path, volume),
+        "nrrd" => write_nrrd(path, volume),
+        "mha" | "mhd" => write_meta_image(path, volume),
+        _ => Err(WriteError::Extension {
             path: path.to_owned(),
             expected: "a name ending in .nii, .nii.gz, .nrrd, .mha or .mhd, or a folder for DICOM slices",
         }),
     }
+}
+
+impl Scan {
+    /// Writes the volume as [`write()`] does, but calls nothing a CT that its source calls something else.
+    ///
+    /// # Errors
+    /// As [`write()`]; [`WriteError::NotCt`] where a DICOM CT is asked for, and the scan is of another modality or
+    /// its values are in another unit than HU.
+    pub fn write(&self, path: &Path) -> Result<(), WriteError> {
+        let modality = self.modality.as_deref().filter(|m| *m != "CT");
+        let found = match (modality, self.acquisition.unit) {
+            (Some(modality), _) => format!("modality {modality}"),
+            (None, Some(unit)) => format!("values in {unit}"),
+            (None, None) => return write(path, &self.volume),
+        };
+        match names_dicom(path) {
+            true => Err(WriteError::NotCt {
+                path: path.to_owned(),
+                found,
+            }),
+            false => write(path, &self.volume),
+        }
+    }
+}
+
+fn names_dicom(path: &Path) -> bool {
+    let slash = path.as_os_str().as_encoded_bytes().ends_with(b"/");
+    slash || path.is_dir() || path.extension().is_none()
 }
 
 #[cfg(feature = "dicom")]

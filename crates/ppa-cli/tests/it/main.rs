@@ -7,6 +7,7 @@ mod json;
 mod mcgpu;
 mod phantoms;
 mod planted_series;
+mod reading;
 mod resume;
 mod tallies;
 

@@ -68,7 +68,15 @@ impl<'a> Attributes<'a> {
         values
             .and_then(|values| <[f64; N]>::try_from(values).ok())
             .filter(|values| values.iter().all(|v| v.is_finite()))
-            .ok_or_else(|| self.bad(name, text, "finite numbers of the standard's count"))
+            .ok_or_else(|| {
+                // Words instead of numbers may be anything, a name too.
+                let numeric = |c: char| c.is_ascii_digit() || "+-.eE\\ ".contains(c);
+                let found = match text.chars().all(numeric) {
+                    true => text,
+                    false => "text".to_owned(),
+                };
+                self.bad(name, found, "finite numbers of the standard's count")
+            })
     }
 
     /// A number written as text; `None` when it is absent or empty.

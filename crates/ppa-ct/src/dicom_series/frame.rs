@@ -4,6 +4,7 @@ use dicom_dictionary_std::tags;
 use nalgebra::{Point3, Vector3};
 
 use super::attributes::Attributes;
+use super::defined_terms;
 use crate::error::ReadError;
 
 /// Geometry and units of one slice.
@@ -22,7 +23,7 @@ pub(super) struct Frame {
     /// Slope and intercept from stored values to HU.
     pub rescale: Option<[f64; 2]>,
     /// What the values are, where the header says that they are no HU.
-    pub foreign_unit: Option<String>,
+    pub foreign_unit: Option<&'static str>,
 }
 
 impl Frame {
@@ -78,25 +79,21 @@ fn rescale(attributes: &Attributes) -> Result<Option<[f64; 2]>, ReadError> {
 }
 
 /// A rescale type or real-world unit other than HU.
-fn foreign_unit(attributes: &Attributes) -> Result<Option<String>, ReadError> {
+fn foreign_unit(attributes: &Attributes) -> Result<Option<&'static str>, ReadError> {
     let rescale_type = attributes.text(tags::RESCALE_TYPE)?;
     // US: unspecified (PS3.3, section C.11.1.1.2).
     let foreign = rescale_type.filter(|t| is_code(t) && !matches!(t.as_str(), "HU" | "US"));
-    if foreign.is_some() {
-        return Ok(foreign);
+    if let Some(term) = foreign {
+        return Ok(Some(defined_terms::unit(&term)));
     }
     // Hounsfield units in UCUM.
     let unit = attributes.real_world_unit()?;
-    Ok(unit.filter(|u| is_unit(u) && !matches!(u.as_str(), "[hnsf'U]" | "hnsf'U" | "HU")))
+    let foreign = unit.filter(|u| !matches!(u.as_str(), "[hnsf'U]" | "hnsf'U" | "HU"));
+    Ok(foreign.map(|unit| defined_terms::unit(&unit)))
 }
 
-/// Whether a text is a DICOM code string, so that no free text passes on as one (PS3.5, table 6.2-1).
-pub(super) fn is_code(text: &str) -> bool {
+/// Whether a text could be a term; some scanners write words for Hounsfield units.
+fn is_code(text: &str) -> bool {
     let allowed = |c: char| c.is_ascii_uppercase() || c.is_ascii_digit() || matches!(c, '_' | ' ');
     text.len() <= 16 && text.chars().all(allowed)
-}
-
-/// The same for UCUM units, which know no blanks.
-fn is_unit(text: &str) -> bool {
-    text.len() <= 16 && text.chars().all(|c| c.is_ascii_graphic() && c != '^')
 }

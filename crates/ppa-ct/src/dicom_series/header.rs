@@ -6,9 +6,10 @@ use std::sync::Arc;
 use dicom_dictionary_std::{tags, uids};
 
 use super::attributes::Attributes;
+use super::defined_terms;
 use super::element::DataSet;
 use super::file::{DicomFile, damaged, open};
-use super::frame::{Frame, is_code};
+use super::frame::Frame;
 use super::stated::stated;
 use super::stored::StoredFormat;
 use crate::acquisition::Acquisition;
@@ -115,7 +116,9 @@ fn kind(top: &Attributes, sop_class: &str, force: bool) -> Result<Kind, ReadErro
     let series = Series {
         uid: top.text(tags::SERIES_INSTANCE_UID)?.unwrap_or_default(),
         number: top.text(tags::SERIES_NUMBER)?.and_then(|n| n.parse().ok()),
-        modality: top.text(tags::MODALITY)?.filter(|m| is_code(m)),
+        modality: top
+            .text(tags::MODALITY)?
+            .map(|m| defined_terms::modality(&m).to_owned()),
         size: [side(tags::COLUMNS), side(tags::ROWS)],
     };
     let Some(modality) = &series.modality else {

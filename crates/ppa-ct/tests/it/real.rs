@@ -215,7 +215,7 @@ fn what_must_be_refused_is_refused() {
     assert_relative_eq!(gaps[1].found_mm, 6.54, epsilon = 1e-6);
     let error = refusal("enhanced-ct-2frames/eCT_Supplemental.dcm");
     assert!(
-        matches!(&error, ReadError::NotHu { unit, .. } if unit == "ml/100ml/s"),
+        matches!(&error, ReadError::NotHu { unit, .. } if *unit == "ml/100ml/s"),
         "{error}"
     );
 }

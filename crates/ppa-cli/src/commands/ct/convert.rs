@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, anyhow};
 use clap::Args;
 use nalgebra::{Point3, Vector3};
-use ppa_ct::{Info, Interpolation, Volume, WarningCode, read, write};
+use ppa_ct::{Info, Interpolation, Volume, WarningCode, read};
 use ppa_mesh::VoxelBox;
 
 use crate::number_lists::{along_axes, voxel_box, world_box};
@@ -71,8 +71,9 @@ impl ConvertArgs {
 
 pub fn run(args: &ConvertArgs, output: Output) -> anyhow::Result<()> {
     let _working = working("converting");
-    let source = args.input.read()?;
-    write(&args.output, &args.changed(source.volume)?)?;
+    let mut source = args.input.read()?;
+    source.volume = args.changed(source.volume)?;
+    source.write(&args.output)?;
     // Told from the file, so that what is printed is what others will read.
     let mut info = Info::of(&read(&args.output)?);
     // What the file cannot tell about the scan it was made from; a tilt it does.
