@@ -25,21 +25,22 @@ impl Kernel for Aim<'_> {
 
 #[inline(always)]
 fn aim(space: &Box32, flights: &mut Flights, count: usize) {
-    let (m, row) = (space.cell_from_device, space.device_z);
+    let row = space.device_z;
     let plane = space.source_detector_mm;
     for i in 0..count {
-        let [u, v, w] = each(&flights.direction, i);
+        let direction = each(&flights.direction, i);
         let [x, y, z] = each(&flights.position, i);
         for axis in 0..3 {
-            let slope = m[axis][0] * u + m[axis][1] * v + m[axis][2] * w;
+            let slope = space.cells(axis, direction);
             // A flight along a wall still has a reciprocal.
             let guarded = if slope.abs() < 1e-12 { 1e-12 } else { slope };
             flights.slope[axis][i] = guarded;
             flights.inverse[axis][i] = 1.0 / guarded;
         }
         let height = row[0] * x + row[1] * y + row[2] * z + row[3];
-        let way = (plane - height) / w;
-        flights.to_plane_mm[i] = if w > 0.0 {
+        let forward = direction[2];
+        let way = (plane - height) / forward;
+        flights.to_plane_mm[i] = if forward > 0.0 {
             greatest(way, 0.0)
         } else {
             f32::INFINITY
@@ -57,12 +58,11 @@ pub(super) struct Place<'a> {
 impl Kernel for Place<'_> {
     #[inline(always)]
     fn run(self) {
-        let m = self.space.cell_from_device;
         for i in 0..self.count.min(LANES) {
-            let [x, y, z] = each(&self.flights.position, i);
+            let position = each(&self.flights.position, i);
             for axis in 0..3 {
-                self.flights.position[axis][i] =
-                    m[axis][0] * x + m[axis][1] * y + m[axis][2] * z + m[axis][3];
+                let corner = self.space.cell_from_device[axis][3];
+                self.flights.position[axis][i] = self.space.cells(axis, position) + corner;
             }
         }
     }

@@ -99,6 +99,15 @@ pub(super) struct Box32 {
     pub edge: f32,
 }
 
+impl Box32 {
+    /// Cells along `axis` that a vector of the device frame spans, mm.
+    #[inline(always)]
+    pub fn cells(&self, axis: usize, [x, y, z]: [f32; 3]) -> f32 {
+        let [a, b, c, _] = self.cell_from_device[axis];
+        a * x + b * y + c * z
+    }
+}
+
 /// The three components of one photon.
 #[inline(always)]
 pub(super) fn each<T: Copy>(vectors: &[Each<T>; 3], photon: usize) -> [T; 3] {
