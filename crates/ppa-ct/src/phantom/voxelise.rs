@@ -57,10 +57,7 @@ const TABLE_FOAM_HU: f64 = -940.0;
 const BLOCK: usize = 4;
 /// Distances are estimates: trust them only within this factor.
 const CAUTION: f64 = 1.3;
-/// A voxel that a boundary may cross is divided into parts, each taken for a ball of its width. Balls do not know how
-/// a boundary slants: undivided voxels show as stripes in radiographs.
-const FEWEST_PARTS: usize = 2;
-/// Largest part that counts as crossed by flat boundaries, mm.
+/// Largest part of a voxel that counts as crossed by flat boundaries, mm; larger voxels are divided.
 const FLAT_MM: f64 = 1.0;
 
 /// How much of `y ± half` lies between `low` and `high`.
@@ -88,7 +85,7 @@ impl Limb {
     ///
     /// The field of view holds the limb with some air around it, and cuts a leg at mid-calf.
     /// Every tissue counts with its share of a voxel. The share follows from the distance to the boundary, taken as
-    /// flat; voxels that a boundary may cross are divided into parts of at most 1 mm first. The result does not
+    /// flat; voxels above 1 mm that a boundary may cross are divided into parts first. The result does not
     /// depend on the number of threads.
     ///
     /// # Errors
@@ -249,11 +246,11 @@ impl Painter<'_> {
         let half = 0.5 * self.spacing_mm;
         let background = background_hu(centre.y, half, self.table_top_mm);
         let blend = |(hu, inside): (f64, f64)| hu + (1.0 - inside) * (background - AIR_HU);
+        let parts = (self.spacing_mm / FLAT_MM).ceil() as usize;
         let reach_mm = half * 3.0_f64.sqrt() * CAUTION;
-        if !limb.boundary_near(&p, local, reach_mm) {
+        if parts == 1 || !limb.boundary_near(&p, local, reach_mm) {
             return blend(limb.mixture(&p, local, self.spacing_mm));
         }
-        let parts = ((self.spacing_mm / FLAT_MM).ceil() as usize).max(FEWEST_PARTS);
         // Only what can change inside the voxel is measured again.
         let near_skin = local
             .skin_mm
