@@ -1,16 +1,18 @@
-//! Pixel rays, indexing, and one limb-like mesh before a recorded room, at the resolution of the device.
+//! One limb-like mesh before a recorded room, ideally and through a sensor, at the resolution of the device.
 //!
-//! Units of work: pixels for images and rays, triangles for the index. The seed is the formula.
+//! Units of work: triangles for meshes, pixels for images and rays. The seed is the formula. With `RAYON_NUM_THREADS=1` the
+//! times are processor seconds.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use ppa_depth::{
-    Body, Camera, CameraSpec, DepthImage, DepthMode, MeshBody, PlacedBody, SurfelBody, render,
+    Backdrop, Body, Camera, CameraSpec, DepthMode, MeshBody, PlacedBody, Sensor, SensorSpec,
+    SurfelBody, render,
 };
 
-/// A bent, bumpy tube of 400 x 400 quads, about 400 mm long and 100 mm thick: 320 000 triangles.
+/// A bent, bumpy tube of 832 x 832 quads, about 400 mm long and 100 mm thick: 1.38 million triangles.
 fn limb() -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {
-    const SIDE: u32 = 400;
+    const SIDE: u32 = 832;
     let point = |i: u32, j: u32| {
         let (angle, along) = (
             i as f32 / SIDE as f32 * std::f32::consts::TAU,
@@ -60,6 +62,16 @@ fn room() -> SurfelBody {
     SurfelBody::new(&points, &vec![Vector3::z(); points.len()], 3.6).expect("a valid cloud")
 }
 
+fn placed(body: &Body) -> PlacedBody<'_> {
+    PlacedBody {
+        body,
+        camera_from_body: Isometry3::new(
+            Vector3::new(0.0, 0.0, 1000.0),
+            Vector3::new(0.0, 0.2, 0.0),
+        ),
+    }
+}
+
 fn depth(c: &mut Criterion) {
     let camera = Camera::try_from(CameraSpec::azure_kinect(DepthMode::NfovUnbinned))
         .expect("the default camera");
@@ -67,19 +79,22 @@ fn depth(c: &mut Criterion) {
     let (vertices, triangles) = limb();
     let limb = Body::from(MeshBody::new(&vertices, &triangles).expect("a valid mesh"));
     let room = Body::from(room());
-    let camera_from_body =
-        Isometry3::new(Vector3::new(0.0, 0.0, 1000.0), Vector3::new(0.0, 0.2, 0.0));
-    let placed = |body| PlacedBody {
-        body,
-        camera_from_body,
-    };
-    let background = render(&camera, &[placed(&room)]);
 
     let mut group = c.benchmark_group("depth");
     group.sample_size(10);
     group.throughput(Throughput::Elements(triangles.len() as u64));
-    group.bench_function("index_320k_triangles", |b| {
-        b.iter(|| MeshBody::new(&vertices, &triangles))
+    group.bench_function("mesh_to_distorted_depth", |b| {
+        b.iter(|| {
+            let body = Body::from(MeshBody::new(&vertices, &triangles).expect("a valid mesh"));
+            render(&camera, &[placed(&body)])
+        })
+    });
+    group.bench_function("pose_to_distorted_depth", |b| {
+        b.iter(|| render(&camera, &[placed(&limb)]))
+    });
+    let backdrop = Backdrop::new(&camera, &[placed(&room)]);
+    group.bench_function("pose_before_backdrop_with_samples", |b| {
+        b.iter(|| backdrop.before(&camera, &[placed(&limb)]))
     });
     group.throughput(Throughput::Elements(pixels));
     let unproject = |index: u64| {
@@ -92,16 +107,17 @@ fn depth(c: &mut Criterion) {
     group.bench_function("unproject_one_thread", |b| {
         b.iter(|| (0..pixels).filter_map(unproject).count())
     });
-    group.bench_function("limb", |b| b.iter(|| render(&camera, &[placed(&limb)])));
-    group.bench_function("limb_and_room", |b| {
-        b.iter(|| render(&camera, &[placed(&limb), placed(&room)]))
-    });
-    group.bench_function("limb_onto_background", |b| {
-        b.iter(|| DepthImage::nearer_of(&render(&camera, &[placed(&limb)]), &background))
+    let seen = backdrop
+        .before(&camera, &[placed(&limb)])
+        .expect("the limb is in view");
+    let sensor = Sensor::new(SensorSpec::default(), 1).expect("the default sensor");
+    group.bench_function("sensor", |b| {
+        b.iter(|| sensor.observe(&camera, &seen, 1, 0))
     });
     let folder = tempfile::tempdir().expect("a temporary folder");
+    let noisy = sensor.observe(&camera, &seen, 1, 0);
     group.bench_function("write_png", |b| {
-        b.iter(|| background.write_png(&folder.path().join("depth.png")))
+        b.iter(|| noisy.write_png(&folder.path().join("depth.png")))
     });
     group.finish();
 }

@@ -67,6 +67,12 @@ pub enum BodyError {
         /// Its components.
         found: [f32; 3],
     },
+    /// A closed mesh surrounds the camera.
+    #[error("the camera stands inside the surface, at {eye:?} mm in its frame (check the pose)")]
+    CameraInside {
+        /// Where, in the frame of the body, mm.
+        eye: [f64; 3],
+    },
     /// The disc radius is zero, negative or not finite.
     #[error("disc radius {0} mm, expected a positive number")]
     Radius(f64),

@@ -28,6 +28,32 @@
 //! assert_eq!(image.max_mm(), Some(1000.0));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! The same triangle before a wall, as three frames of a sensor see it while it trembles:
+//!
+//! ```
+//! use nalgebra::{Isometry3, Point3};
+//! use ppa_depth::*;
+//!
+//! let vertices = [(-200.0, -200.0), (200.0, -200.0), (0.0, 200.0)].map(|(x, y)| Point3::new(x, y, 0.0_f32));
+//! let limb = Body::from(MeshBody::new(&vertices, &[[0, 1, 2]])?);
+//! let wall = Body::from(MeshBody::new(&vertices.map(|p| p * 20.0), &[[0, 1, 2]])?);
+//! let camera = Camera::try_from(CameraSpec::azure_kinect(DepthMode::NfovBinned))?;
+//! let place = |body, motion: Isometry3<f64>, z_mm| PlacedBody {
+//!     body,
+//!     camera_from_body: motion * Isometry3::translation(0.0, 0.0, z_mm),
+//! };
+//! let backdrop = Backdrop::new(&camera, &[place(&wall, Isometry3::identity(), 1500.0)]);
+//! let sensor = Sensor::new(SensorSpec::default(), 17)?;
+//! let tremor = Tremor { shift_mm: 0.5, turn_deg: 0.1, correlation_frames: 10.0 };
+//! for frame in 0..3 {
+//!     let motion = tremor.motion(&Point3::new(0.0, 0.0, 1000.0), 1, frame);
+//!     let seen = backdrop.before(&camera, &[place(&limb, motion, 1000.0)])?;
+//!     let image = sensor.observe(&camera, &seen, 1, frame);
+//!     assert!(image.valid_pixels() > 50_000);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod calibration_file;
 mod depth_mode;
@@ -42,6 +68,7 @@ mod rig;
 mod rigid;
 
 mod body;
+mod inside;
 mod mesh_body;
 mod nearest;
 mod surfel_body;

@@ -11,6 +11,8 @@ pub struct MeshBody {
     pub(crate) triangles: Vec<[u32; 3]>,
     /// Largest coordinate.
     pub(crate) reach_mm: f32,
+    /// Lower and upper corner of the box around all vertices.
+    pub(crate) bounds: [Point3<f32>; 2],
 }
 
 impl MeshBody {
@@ -32,7 +34,10 @@ impl MeshBody {
                 vertices: vertices.len(),
             });
         }
+        let around = |[low, high]: [Point3<f32>; 2], p: &Point3<f32>| [low.inf(p), high.sup(p)];
+        let nothing = [f32::INFINITY, f32::NEG_INFINITY].map(|x| Point3::new(x, x, x));
         Ok(Self {
+            bounds: vertices.iter().fold(nothing, around),
             vertices: vertices.to_vec(),
             triangles: triangles.to_vec(),
             reach_mm,

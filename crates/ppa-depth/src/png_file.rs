@@ -26,6 +26,8 @@ impl DepthImage {
             let mut encoder = png::Encoder::new(writer, self.width, self.height);
             encoder.set_color(png::ColorType::Grayscale);
             encoder.set_depth(png::BitDepth::Sixteen);
+            // Noise does not compress: the best setting takes fourteen times as long for a tenth of the size.
+            encoder.set_compression(png::Compression::Fast);
             let mut image = encoder.write_header()?;
             image.write_image_data(&bytes)?;
             Ok(image.finish()?)

@@ -35,6 +35,8 @@ enum Outline {
         slack: f32,
         columns: Range<u32>,
         rows: Range<u32>,
+        /// Smallest and largest column of its corners.
+        across: [f32; 2],
         /// No part of it is nearer than this, mm.
         nearest: f32,
     },
@@ -105,14 +107,14 @@ impl<'a> SeenMesh<'a> {
     }
 
     /// The part of the image that a triangle may cover, each pixel widened by `reach` on all sides.
-    #[inline]
+    #[inline(always)] // a call per triangle would take as long as the work
     fn outline(&self, triangle: &[u32; 3], reach: f32) -> Outline {
         let corners @ [a, b, c] = triangle.map(|corner| self.corners[corner as usize]);
         if (a[2] + b[2] + c[2]).is_nan() {
             return Outline::Unknown;
         }
-        let low = [0, 1, 2].map(|i| a[i].min(b[i]).min(c[i]));
-        let high = [0, 1].map(|i| a[i].max(b[i]).max(c[i]));
+        let low = [0, 1, 2].map(|i| least(least(a[i], b[i]), c[i]));
+        let high = [0, 1].map(|i| -least(least(-a[i], -b[i]), -c[i]));
         let (du, dv) = (high[0] - low[0], high[1] - low[1]);
         let slack = self.rounding_px
             + self.optics.stretch as f32 * self.rounding_mm / low[2]
@@ -123,6 +125,7 @@ impl<'a> SeenMesh<'a> {
             slack,
             columns: centres(low[0] - wide, high[0] + wide, self.camera.width()),
             rows: centres(low[1] - wide, high[1] + wide, self.camera.height()),
+            across: [low[0], high[0]],
             nearest: low[2] * (1.0 - ROUNDING) - self.rounding_mm,
         }
     }
@@ -135,6 +138,7 @@ impl<'a> SeenMesh<'a> {
             columns,
             rows,
             nearest,
+            ..
         } = self.outline(triangle, 0.0)
         else {
             let rays = self.optics.rays.iter().enumerate();
@@ -169,6 +173,7 @@ impl<'a> SeenMesh<'a> {
             slack,
             columns,
             rows,
+            across: [left, right],
             nearest,
         } = self.outline(triangle, 0.5)
         else {
@@ -187,7 +192,10 @@ impl<'a> SeenMesh<'a> {
                 let Some(seen) = sites.sites.get(site as usize) else {
                     continue;
                 };
-                for k in 0..SAMPLES {
+                // Sample k lies in the k-th of equal columns of the pixel.
+                let place = |u: f32| (u - column as f32 + 0.5) * SAMPLES as f32 - 0.5;
+                let covered = centres(place(left - slack), place(right + slack), SAMPLES as u32);
+                for k in covered.map(|k| k as usize) {
                     let index = site as usize * SAMPLES + k;
                     let ([du, dv], ray) = seen.sample(k);
                     let at = [column as f32 + du as f32, row as f32 + dv as f32];
@@ -242,6 +250,12 @@ impl<'a> SeenMesh<'a> {
         let vertex = self.mesh.vertices[corner as usize].coords.cast::<f64>();
         Point3::from(self.rotation * vertex + self.translation)
     }
+}
+
+/// The smaller of two numbers that are not NaN: one instruction, unlike `f32::min`.
+#[inline(always)]
+fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 /// Whole numbers in [low, high] that are columns or rows of the image.

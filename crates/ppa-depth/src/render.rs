@@ -17,23 +17,39 @@ use crate::surfel_body::SurfelBody;
 /// Rays follow the exact inverse of the lens distortion ([`Camera::rays`]); pixels without a ray stay 0. Bodies occlude
 /// each other and themselves. An image of nothing is all 0: see [`DepthImage::require_visible`].
 pub fn render(camera: &Camera, bodies: &[PlacedBody]) -> DepthImage {
-    let (width, height) = (camera.width(), camera.height());
-    let buffer = DepthBuffer::empty(camera.rays().len());
-    for PlacedBody {
-        body,
-        camera_from_body,
-    } in bodies
-    {
-        match body {
-            Body::Mesh(mesh) => SeenMesh::new(camera, mesh, camera_from_body).draw(&buffer),
+    draw(camera, &SeenBody::all(camera, bodies))
+}
+
+/// A body from the camera's place.
+pub(crate) enum SeenBody<'a> {
+    Mesh(SeenMesh<'a>),
+    Surfels(SeenSurfels<'a>),
+}
+
+impl<'a> SeenBody<'a> {
+    pub(crate) fn all(camera: &'a Camera, bodies: &[PlacedBody<'a>]) -> Vec<Self> {
+        let seen = |placed: &PlacedBody<'a>| match placed.body {
+            Body::Mesh(mesh) => Self::Mesh(SeenMesh::new(camera, mesh, &placed.camera_from_body)),
             Body::Surfels(surfels) => {
-                SeenSurfels::new(surfels, camera_from_body).cast(camera.rays(), &buffer);
+                Self::Surfels(SeenSurfels::new(surfels, &placed.camera_from_body))
             }
+        };
+        bodies.iter().map(seen).collect()
+    }
+}
+
+/// Depths at the centres of the pixels.
+pub(crate) fn draw(camera: &Camera, bodies: &[SeenBody]) -> DepthImage {
+    let buffer = DepthBuffer::empty(camera.rays().len());
+    for body in bodies {
+        match body {
+            SeenBody::Mesh(mesh) => mesh.draw(&buffer),
+            SeenBody::Surfels(surfels) => surfels.cast(camera.rays(), &buffer),
         }
     }
     DepthImage {
-        width,
-        height,
+        width: camera.width(),
+        height: camera.height(),
         z_mm: buffer.into_depths(),
     }
 }

@@ -2,12 +2,11 @@
 
 use nalgebra::{Matrix2, Point3, Vector2};
 
-use crate::body::{Body, PlacedBody};
+use crate::body::PlacedBody;
 use crate::camera::Camera;
 use crate::depth_buffer::DepthBuffer;
 use crate::image::{DepthError, DepthImage};
-use crate::raster::SeenMesh;
-use crate::render::{SeenSurfels, render};
+use crate::render::{SeenBody, draw};
 
 /// Samples per pixel at an edge.
 pub(crate) const SAMPLES: usize = 8;
@@ -101,23 +100,17 @@ impl Sites {
         }
     }
 
-    fn draw(&self, camera: &Camera, bodies: &[PlacedBody]) {
-        for PlacedBody {
-            body,
-            camera_from_body,
-        } in bodies
-        {
+    fn draw(&self, bodies: &[SeenBody]) {
+        for body in bodies {
             match body {
-                Body::Mesh(mesh) => {
-                    SeenMesh::new(camera, mesh, camera_from_body).draw_samples(self);
-                }
-                Body::Surfels(surfels) => {
+                SeenBody::Mesh(mesh) => mesh.draw_samples(self),
+                SeenBody::Surfels(surfels) => {
                     let rays: Vec<_> = self
                         .sites
                         .iter()
                         .flat_map(|site| (0..SAMPLES).map(|k| Some(site.sample(k).1)))
                         .collect();
-                    SeenSurfels::new(surfels, camera_from_body).cast(&rays, &self.buffer);
+                    surfels.cast(&rays, &self.buffer);
                 }
             }
         }
@@ -139,13 +132,14 @@ impl Backdrop {
     pub fn new(camera: &Camera, bodies: &[PlacedBody]) -> Self {
         let pixels = camera.rays().len();
         let sites = Sites::new(camera, 0..pixels as u32);
-        sites.draw(camera, bodies);
+        let bodies = SeenBody::all(camera, bodies);
+        sites.draw(&bodies);
         let mut samples = vec![[0.0; SAMPLES]; pixels];
         for (pixel, depths) in sites.into_depths() {
             samples[pixel as usize] = depths;
         }
         Self {
-            image: render(camera, bodies),
+            image: draw(camera, &bodies),
             samples,
         }
     }
@@ -160,11 +154,12 @@ impl Backdrop {
         camera: &Camera,
         bodies: &[PlacedBody],
     ) -> Result<SampledImage, DepthError> {
-        let limb = render(camera, bodies);
+        let bodies = SeenBody::all(camera, bodies);
+        let limb = draw(camera, &bodies);
         limb.require_visible()?;
         let image = DepthImage::nearer_of(&self.image, &limb)?;
         let sites = Sites::new(camera, edges(&image).into_iter());
-        sites.draw(camera, bodies);
+        sites.draw(&bodies);
         let merged = |(pixel, depths): (u32, [f32; SAMPLES])| {
             let behind = &self.samples[pixel as usize];
             (pixel, std::array::from_fn(|k| nearer(depths[k], behind[k])))

@@ -23,6 +23,8 @@ pub struct Sensor {
     device_seed: u64,
     offset_mm: f64,
     slope: f64,
+    /// Cosine of the largest angle of incidence.
+    least_cos: f64,
 }
 
 /// Light of a pixel: the sum of phasors relative to `reference_mm`, and of their lengths.
@@ -48,7 +50,9 @@ impl Sensor {
         let (offset_mm, slope) = spec.systematic.map_or((0.0, 0.0), |s| {
             (s.offset_mm * offset, s.per_metre_mm * slope / 1000.0)
         });
+        let largest_deg = spec.invalid.map_or(90.0, |invalid| invalid.max_angle_deg);
         Ok(Self {
+            least_cos: largest_deg.to_radians().cos(),
             spec,
             device_seed,
             offset_mm,
@@ -105,16 +109,16 @@ impl Sensor {
                         numbers = self.draw(seed, frame, block);
                     }
                     let samples = samples.filter(|_| self.spec.mixed.is_some());
-                    let light = self.light(&surface, image, pixel, samples);
+                    let cos_incidence = surface.cos_incidence(pixel);
                     let bounced = bounced.as_ref().map(|light| light[pixel]);
-                    let Some(range_mm) = light.and_then(|light| {
-                        self.range(&surface, pixel, light, bounced)
-                            .map(|(range, signal)| {
-                                self.disturbed(range, signal, [numbers.0[i % 4], numbers.1[i % 4]])
-                            })
-                    }) else {
+                    let measured = self
+                        .light(&surface, image, pixel, cos_incidence, samples)
+                        .and_then(|light| self.range(light, cos_incidence, bounced));
+                    let Some((range_mm, signal)) = measured else {
                         continue;
                     };
+                    let drawn = [numbers.0[i % 4], numbers.1[i % 4]];
+                    let range_mm = self.disturbed(range_mm, signal, drawn);
                     let ray = camera.rays()[pixel].expect("a pixel with a depth has a ray");
                     *z_mm = (range_mm / (1.0 + ray.norm_squared()).sqrt()).max(0.0) as f32;
                 }
@@ -141,13 +145,16 @@ impl Sensor {
         surface: &Surface,
         image: &DepthImage,
         pixel: usize,
+        cos_incidence: f64,
         samples: Option<&[f32; SAMPLES]>,
     ) -> Option<Light> {
         let ray = surface.ray_length(pixel)?;
         let Some(samples) = samples else {
             let reference_mm = f64::from(image.z_mm[pixel]) * ray;
-            let total =
-                (reference_mm > 0.0).then(|| signal(surface.cos_incidence(pixel), reference_mm))?;
+            if reference_mm <= 0.0 {
+                return None;
+            }
+            let total = signal(cos_incidence, reference_mm);
             return Some(Light {
                 sum: Complex::new(total, 0.0),
                 total,
@@ -181,35 +188,38 @@ impl Sensor {
     /// Range and signal that the light makes, `None` if the pixel is given up.
     fn range(
         &self,
-        surface: &Surface,
-        pixel: usize,
-        mut light: Light,
+        light: Light,
+        cos_incidence: f64,
         bounced: Option<Complex<f64>>,
     ) -> Option<(f64, f64)> {
         let mut range_mm = light.reference_mm;
-        if let Some(mixed) = self.spec.mixed {
+        let mut signal = light.total;
+        // The light of one surface has no phase of its own.
+        if let Some(mixed) = self.spec.mixed
+            && light.sum.im != 0.0
+        {
             range_mm += light.sum.arg() / phase_per_mm(mixed.modulation_mhz);
+            signal = light.sum.norm();
         }
         if let Some(invalid) = self.spec.invalid {
-            let too_oblique =
-                surface.cos_incidence(pixel) < invalid.max_angle_deg.to_radians().cos();
-            let mixed = light.sum.norm() < invalid.min_contrast * light.total;
-            if light.sum.norm() < invalid.min_signal || too_oblique || mixed {
+            let too_oblique = cos_incidence < self.least_cos;
+            let mixed = signal < invalid.min_contrast * light.total;
+            if signal < invalid.min_signal || too_oblique || mixed {
                 return None;
             }
         }
         // Bounced light comes with its phase relative to the direct light of the same pixel.
         if let (Some(bounced), Some(multipath)) = (bounced, self.spec.multipath) {
-            let direct = Complex::new(light.sum.norm(), 0.0);
-            light.sum = direct + bounced;
-            range_mm += light.sum.arg() / phase_per_mm(multipath.modulation_mhz);
+            let sum = Complex::new(signal, 0.0) + bounced;
+            signal = sum.norm();
+            range_mm += sum.arg() / phase_per_mm(multipath.modulation_mhz);
         }
-        Some((range_mm, light.sum.norm()))
+        Some((range_mm, signal))
     }
 
     fn disturbed(&self, range_mm: f64, signal: f64, [noise, pattern]: [f64; 2]) -> f64 {
         let random = self.spec.random.map_or(0.0, |random| {
-            noise * random.floor_mm.hypot(random.at_unit_signal_mm / signal)
+            noise * (random.floor_mm.powi(2) + (random.at_unit_signal_mm / signal).powi(2)).sqrt()
         });
         let fixed = (self.spec.systematic).map_or(0.0, |s| s.fixed_pattern_mm * pattern);
         range_mm * (1.0 + self.slope) + self.offset_mm + fixed + random

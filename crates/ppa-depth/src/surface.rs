@@ -26,40 +26,40 @@ impl<'a> Surface<'a> {
         (z_mm > 0.0).then(|| Point3::new(ray.x * z, ray.y * z, z))
     }
 
-    /// The pixel `step` further, if it lies on the same surface.
+    /// Points of the neighbours left, right, above and below that lie on the same surface.
     #[inline]
-    fn neighbour(&self, pixel: usize, step: isize, along_row: bool) -> Option<Point3<f64>> {
-        let width = self.image.width as usize;
-        let other = pixel.checked_add_signed(step)?;
-        if other >= self.image.z_mm.len() || (along_row && other / width != pixel / width) {
-            return None;
-        }
-        let apart = (self.image.z_mm[other] - self.image.z_mm[pixel]).abs();
-        self.point(other).filter(|_| apart <= EDGE_MM)
+    fn neighbours(&self, pixel: usize) -> [Option<Point3<f64>>; 4] {
+        let (width, count) = (self.image.width as usize, self.image.z_mm.len());
+        let column = pixel % width;
+        let on_surface = |exists: bool, other: usize| {
+            let other = if exists { other } else { pixel };
+            let apart = (self.image.z_mm[other] - self.image.z_mm[pixel]).abs();
+            self.point(other).filter(|_| exists && apart <= EDGE_MM)
+        };
+        [
+            on_surface(column > 0, pixel.wrapping_sub(1)),
+            on_surface(column + 1 < width, pixel + 1),
+            on_surface(pixel >= width, pixel.wrapping_sub(width)),
+            on_surface(pixel + width < count, pixel + width),
+        ]
     }
 
     /// Whether a pixel and its four neighbours lie on one surface.
     pub(crate) fn is_smooth(&self, pixel: usize) -> bool {
-        let width = self.image.width as isize;
-        let steps = [(1, true), (-1, true), (width, false), (-width, false)];
-        let same =
-            |&(step, along_row): &(isize, bool)| self.neighbour(pixel, step, along_row).is_some();
-        self.image.z_mm[pixel] > 0.0 && steps.iter().all(same)
+        self.image.z_mm[pixel] > 0.0 && self.neighbours(pixel).iter().all(Option::is_some)
     }
 
     /// Unit normal towards the camera, from the neighbours on the same surface; `None` if there are too few.
     #[inline]
     pub(crate) fn normal(&self, pixel: usize) -> Option<Vector3<f64>> {
         let here = self.point(pixel)?;
-        let across = |step: isize, along_row| {
-            let ahead = self.neighbour(pixel, step, along_row);
-            let behind = self.neighbour(pixel, -step, along_row);
-            match (behind, ahead) {
-                (None, None) => None,
-                (behind, ahead) => Some(ahead.unwrap_or(here) - behind.unwrap_or(here)),
-            }
+        let across = |behind: Option<Point3<f64>>, ahead: Option<Point3<f64>>| match (behind, ahead)
+        {
+            (None, None) => None,
+            (behind, ahead) => Some(ahead.unwrap_or(here) - behind.unwrap_or(here)),
         };
-        let (right, down) = (across(1, true)?, across(self.image.width as isize, false)?);
+        let [left, right, above, below] = self.neighbours(pixel);
+        let (right, down) = (across(left, right)?, across(above, below)?);
         let normal = down.cross(&right).try_normalize(0.0)?;
         Some(normal * -normal.dot(&here.coords).signum())
     }

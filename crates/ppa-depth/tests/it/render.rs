@@ -469,3 +469,34 @@ fn the_image_is_that_of_ray_casting_by_parry() {
     println!("{hits} hits, {jumps} on the other side of a rim, else within {worst_mm} mm");
     assert!(hits > 140_000 && jumps == 0 && worst_mm < 0.002);
 }
+
+#[test]
+fn a_camera_inside_a_closed_mesh_is_refused() {
+    let (vertices, triangles) = bumpy(3);
+    let body = Body::from(MeshBody::new(&vertices, &triangles).unwrap());
+    let at = |x: f64, y: f64, z: f64| {
+        let placed = PlacedBody {
+            body: &body,
+            camera_from_body: Isometry3::new(Vector3::new(x, y, z), Vector3::new(0.4, 0.0, 0.2)),
+        };
+        placed.require_camera_outside()
+    };
+    assert!(matches!(
+        at(3.0, -2.0, 5.0),
+        Err(BodyError::CameraInside { .. })
+    ));
+    // No point of it is further than 68 mm from its middle.
+    assert!(at(0.0, 0.0, 68.0).is_ok() && at(40.0, 40.0, -40.0).is_ok());
+    // Half a sphere has no inside.
+    let half: Vec<_> = triangles
+        .iter()
+        .filter(|t| t.iter().all(|&i| vertices[i as usize].z > -1.0))
+        .copied()
+        .collect();
+    let half = Body::from(MeshBody::new(&vertices, &half).unwrap());
+    let placed = PlacedBody {
+        body: &half,
+        camera_from_body: Isometry3::translation(0.0, 0.0, 20.0),
+    };
+    assert!(placed.require_camera_outside().is_ok());
+}

@@ -123,15 +123,23 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
             camera_from_body,
         };
         let placed: Vec<_> = bodies.iter().map(placed).collect();
-        match &eye {
+        for (path, placed) in args.meshes.iter().zip(&placed) {
+            placed
+                .require_camera_outside()
+                .with_context(|| path.display().to_string())?;
+        }
+        let image = match &eye {
             Eye::Ideal => {
                 let image = render(&camera, &placed);
-                image.require_visible().map(|()| image)
+                image.require_visible()?;
+                image
             }
-            Eye::Sensor(sensor, backdrop) => backdrop
-                .before(&camera, &placed)
-                .map(|seen| sensor.observe(&camera, &seen, args.seed, frame)),
-        }
+            Eye::Sensor(sensor, backdrop) => {
+                let seen = backdrop.before(&camera, &placed)?;
+                sensor.observe(&camera, &seen, args.seed, frame)
+            }
+        };
+        anyhow::Ok(image)
     };
     let image = see(0)?;
     let seconds = watch.read();
