@@ -325,3 +325,33 @@ fn choices_of_a_case_are_carried_out() {
     let found = PreparedLimb::of_case(&open).unwrap().landmarks;
     assert_eq!(found, first.landmarks);
 }
+
+/// A sensor changes depths by millimetres, with seeds in the manifest, and not the radiographs.
+#[test]
+fn a_sensor_disturbs_the_depth_images_and_nothing_else() {
+    let mut plan = plan();
+    plan.depth.sensor = Some(ppa_depth::SensorSpec::default());
+    let root = tempfile::tempdir().unwrap();
+    run(&plan, root.path(), 2);
+    let manifest = Manifest::read(root.path()).unwrap();
+    let ideal = Manifest::read(dataset()).unwrap();
+    for (row, ideal) in manifest.files.iter().zip(&ideal.files) {
+        assert_eq!(row.file, ideal.file);
+        if row.kind != FileKind::Depth {
+            assert_eq!(row.sha256, ideal.sha256);
+            continue;
+        }
+        assert!(row.seed.is_some() && ideal.seed.is_none());
+        let image = |root: &Path| DepthImage::read_png(&root.join(&row.file)).unwrap().z_mm;
+        let (noisy, exact) = (image(root.path()), image(dataset()));
+        let both = noisy
+            .iter()
+            .zip(&exact)
+            .filter(|(a, b)| **a > 0.0 && **b > 0.0);
+        let mut errors: Vec<f32> = both.map(|(a, b)| (a - b).abs()).collect();
+        assert!(errors.len() > exact.len() / 2);
+        errors.sort_unstable_by(f32::total_cmp);
+        let median = errors[errors.len() / 2];
+        assert!((0.5..40.0).contains(&median), "median error {median} mm");
+    }
+}

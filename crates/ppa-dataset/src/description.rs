@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ppa_depth::{CameraSpec, rows_from_isometry};
+use ppa_depth::{CameraSpec, SensorSpec, rows_from_isometry};
 use ppa_mesh::LimbSettings;
 use ppa_scene::{LandmarkOverrides, PlaneSettings, RoomSpec};
 use serde::Serialize;
@@ -28,6 +28,8 @@ pub(crate) struct Settings {
     room_from_device: Option<Rows>,
     rig_sha256: Option<String>,
     roi_mm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sensor: Option<SensorSpec>,
     xray: XraySettings,
 }
 
@@ -45,6 +47,7 @@ impl Settings {
             room_from_device: plan.room.room_from_device,
             rig_sha256: hash(&plan.depth.rig)?,
             roi_mm: plan.depth.roi_mm,
+            sensor: plan.depth.sensor.clone(),
             xray: plan.xray.clone(),
         })
     }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use ppa_depth::SensorSpec;
 use ppa_scene::{PlaneSettings, RoomSpec, Sweep};
 use ppa_xray::{Detector, FastSettings, HuCalibration, Presentation, Receptor, Source};
 use serde::{Deserialize, Serialize};
@@ -75,6 +76,8 @@ pub struct DepthSettings {
     pub rig: Option<PathBuf>,
     /// Side of the square region of interest around the joint, mm at the joint.
     pub roi_mm: f64,
+    /// Errors of the cameras' sensors; ideal images when absent.
+    pub sensor: Option<SensorSpec>,
 }
 
 impl Default for DepthSettings {
@@ -82,6 +85,7 @@ impl Default for DepthSettings {
         Self {
             rig: None,
             roi_mm: 260.0,
+            sensor: None,
         }
     }
 }
@@ -266,6 +270,11 @@ impl Plan {
                 "room.room_from_device is given without room.ply: the built-in room has its device"
                     .to_owned(),
             );
+        }
+        if let Some(sensor) = &self.depth.sensor {
+            sensor
+                .check()
+                .map_err(|error| format!("depth.sensor: {error}"))?;
         }
         self.rotation
             .poses()

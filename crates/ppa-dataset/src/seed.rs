@@ -14,6 +14,10 @@ pub enum Purpose {
     Bumps,
     /// Photon histories and quantum noise of a radiograph; item = step.
     Radiograph,
+    /// Errors that stay with a depth camera.
+    DepthSensor,
+    /// Noise of depth images; item = step.
+    DepthNoise,
 }
 
 impl Purpose {
@@ -22,6 +26,8 @@ impl Purpose {
             Self::TablePlane => "table-plane",
             Self::Bumps => "bumps",
             Self::Radiograph => "radiograph",
+            Self::DepthSensor => "depth-sensor",
+            Self::DepthNoise => "depth-noise",
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use nalgebra::Isometry3;
 use ppa_depth::{
-    Body, Camera, DepthImage, MeshBody, MountedCamera, PlacedBody, RigError, RigSpec, SurfelBody,
+    Backdrop, Body, Camera, DepthImage, MeshBody, MountedCamera, PlacedBody, RigError, RigSpec,
+    Sensor, SensorError, SurfelBody,
 };
 use ppa_mesh::{CloudError, estimate_normals, mean_spacing_mm};
 use ppa_scene::{PlaneSettings, Rigid, Room, RoomError, TablePlane, XrayDevice, table_plane};
@@ -31,6 +32,9 @@ pub enum StageError {
     /// The camera rig.
     #[error(transparent)]
     Rig(#[from] RigError),
+    /// The errors of the cameras' sensors.
+    #[error("depth.sensor of the plan")]
+    Sensor(#[from] SensorError),
     /// Furniture that cannot be rendered.
     #[error(transparent)]
     Body(#[from] ppa_depth::BodyError),
@@ -49,6 +53,8 @@ pub struct PlacedCamera {
     pub camera_from_room: Isometry3<f64>,
     /// Depth image of the room without the limb; rendered once, since nothing in it moves.
     pub background: DepthImage,
+    /// The sensor, if it is not ideal, and the empty room as it needs it.
+    pub sensor: Option<(Sensor, Backdrop)>,
 }
 
 /// Room, table and x-ray device: all that placing a limb needs.
@@ -109,12 +115,23 @@ impl Stage {
                 body: &furniture,
                 camera_from_body: camera_from_room,
             };
-            let background = ppa_depth::render(&camera, &[empty_room]);
+            let sensor = plan.depth.sensor.clone().map(|spec| {
+                // Both cameras have errors of their own.
+                let seed = plan_seed(plan.seed, Purpose::DepthSensor).wrapping_add(view as u64);
+                let sensor = Sensor::new(spec, seed)?;
+                Ok::<_, SensorError>((sensor, Backdrop::new(&camera, &[empty_room])))
+            });
+            let sensor = sensor.transpose()?;
+            let background = match &sensor {
+                Some((_, backdrop)) => backdrop.image.clone(),
+                None => ppa_depth::render(&camera, &[empty_room]),
+            };
             Ok::<_, StageError>(PlacedCamera {
                 view,
                 camera,
                 camera_from_room,
                 background,
+                sensor,
             })
         };
         let cameras = vec![

@@ -106,6 +106,7 @@ impl<'a> PosableLimb<'a> {
         root: &Path,
     ) -> Result<(Vec<FileRow>, RoiFile), UnitError> {
         let mut files = Vec::new();
+        let noise_seed = item_seed(self.plan.seed, Purpose::DepthNoise, self.id, pose.step);
         let placement = self.place(self.skin, pose)?;
         for shaped in &self.shapes {
             let placement = match shaped.shape {
@@ -114,11 +115,12 @@ impl<'a> PosableLimb<'a> {
             };
             for camera in &self.stage.cameras {
                 let file = self.id.depth(shaped.shape, camera.view, pose.step);
-                let image = self.depth_image(&shaped.body, camera, &placement)?;
+                let image = self.depth_image(shaped, camera, &placement, noise_seed)?;
                 let path = prepare_folder(root, &file)?;
                 image.write_png(&path)?;
                 files.push(FileRow {
                     camera: Some(camera.view),
+                    seed: camera.sensor.is_some().then_some(noise_seed),
                     shape: shaped.shape,
                     ..self.row(root, file, FileKind::Depth, pose, &placement)?
                 });
@@ -152,18 +154,24 @@ impl<'a> PosableLimb<'a> {
 
     fn depth_image(
         &self,
-        body: &Body,
+        shaped: &ShapedSkin,
         camera: &PlacedCamera,
         placement: &Placement,
+        noise_seed: u64,
     ) -> Result<DepthImage, UnitError> {
         let camera_from_body = self.camera_from_ct(camera, placement);
-        let limb = ppa_depth::render(
-            &camera.camera,
-            &[PlacedBody {
-                body,
-                camera_from_body,
-            }],
-        );
+        let placed = PlacedBody {
+            body: &shaped.body,
+            camera_from_body,
+        };
+        placed.require_camera_outside()?;
+        if let Some((sensor, backdrop)) = &camera.sensor {
+            let seen = backdrop.before(&camera.camera, &[placed])?;
+            // One frame per body shape and camera.
+            let frame = 2 * shaped.shape as u64 + camera.view as u64;
+            return Ok(sensor.observe(&camera.camera, &seen, noise_seed, frame));
+        }
+        let limb = ppa_depth::render(&camera.camera, &[placed]);
         limb.require_visible()?;
         Ok(DepthImage::nearer_of(&camera.background, &limb)?)
     }
