@@ -1,5 +1,6 @@
 //! From an exposure to a radiograph: followed photon by photon, or fast.
 
+mod adaptive_nodes;
 pub(crate) mod analog;
 mod attenuation_basis;
 mod coarse_cells;
@@ -16,6 +17,7 @@ mod node_grid;
 pub(crate) mod noise;
 mod outlook;
 mod paths;
+mod primary_signal;
 mod quasi_random;
 pub(crate) mod raytrace;
 mod scatter_field;
