@@ -39,7 +39,7 @@ pub(crate) struct Emitter {
 }
 
 /// Points per side of the spot and the field over which the intensity is integrated.
-const SPOT_POINTS: u32 = 5;
+const SPOT_POINTS: usize = 5;
 const FIELD_POINTS: u32 = 96;
 
 impl Emitter {
@@ -54,8 +54,7 @@ impl Emitter {
         let tilt: f64 = plane.axes.iter().map(|axis| axis.z.abs()).sum();
         // A spot of 2 % of the distance, the largest there is, takes less than a tenth of it away.
         let nearest_mm = distance_mm - spot.reach_mm() * tilt;
-        let points = spot.quadrature(SPOT_POINTS);
-        let spots: Vec<Point3<f64>> = points.iter().map(|&(at, _)| plane.at(at)).collect();
+        let spots = points_of(&spot, &plane, SPOT_POINTS);
         let heel = match &projection.source.heel_effect {
             None => None,
             Some(heel) => {
@@ -74,10 +73,8 @@ impl Emitter {
             heel,
             emitted_sr: 1.0,
         };
-        emitter.emitted_sr = points
-            .iter()
-            .map(|&(at, weight)| weight * emitter.emitted_from_sr(&plane.at(at)))
-            .sum();
+        let sent_sr = spots.iter().map(|spot| emitter.emitted_from_sr(spot));
+        emitter.emitted_sr = sent_sr.sum::<f64>() / spots.len() as f64;
         Ok(emitter)
     }
 
@@ -162,12 +159,26 @@ impl Emitter {
         &self.field
     }
 
-    /// `per_side`² points of the focal spot, device frame, with weights that sum to 1; one point for a point.
-    pub fn spot_points(&self, per_side: u32) -> Vec<(Point3<f64>, f64)> {
-        let points = self.spot.quadrature(per_side).into_iter();
-        points
-            .map(|(at, weight)| (self.plane.at(at), weight))
-            .collect()
+    /// The focal spot.
+    pub fn spot(&self) -> &FocalSpot {
+        &self.spot
+    }
+
+    /// A point of the focal spot's plane, device frame, by its offsets in mm.
+    #[inline]
+    pub fn spot_at(&self, offsets_mm: [f64; 2]) -> Point3<f64> {
+        self.plane.at(offsets_mm)
+    }
+
+    /// `per_side`² points of the focal spot, device frame, all of the same strength; one point for a point.
+    pub fn spot_points(&self, per_side: usize) -> Vec<Point3<f64>> {
+        points_of(&self.spot, &self.plane, per_side)
+    }
+
+    /// A point of the focal spot, drawn by its intensity; a point draws nothing.
+    #[inline]
+    pub fn draw_spot(&self, rng: &mut Philox) -> Point3<f64> {
+        self.plane.at(self.spot.sample(rng))
     }
 
     /// Photons per cm² and history at device (x, y) of the bare detector plane if all left from `spot`,
@@ -209,6 +220,12 @@ impl Emitter {
         let fluence = self.spectrum.fluence_per_mas_cm2_at_1m()?;
         Some(fluence * CM2_PER_SR_AT_1M * self.emitted_sr)
     }
+}
+
+fn points_of(spot: &FocalSpot, plane: &SpotPlane, per_side: usize) -> Vec<Point3<f64>> {
+    let strips = spot.strips_mm(if spot.is_point() { 1 } else { per_side });
+    let row = |&y: &f64| strips.iter().map(move |&x| plane.at([x, y]));
+    strips.iter().flat_map(row).collect()
 }
 
 #[cfg(test)]
@@ -278,9 +295,9 @@ mod tests {
                 let share = [n % fine, n / fine].map(|i| (i as f64 + 0.5) / fine as f64);
                 let at = Point2::from([0, 1].map(|a| field.low_mm[a] + share[a] * size[a]));
                 let cm2 = size[0] * size[1] / 100.0 / (fine * fine) as f64;
-                for (spot, weight) in &spots {
+                for spot in &spots {
                     expected[6 * n / fine % 6 + 6 * (6 * (n / fine) / fine)] +=
-                        weight * cm2 * emitter.open_fluence_cm2(spot, at);
+                        cm2 * emitter.open_fluence_cm2(spot, at) / spots.len() as f64;
                 }
             }
             let sum: f64 = expected.iter().sum();
@@ -305,17 +322,13 @@ mod tests {
     fn energies_are_those_of_the_take_off_angle() {
         let emitter = Emitter::new(&demanding(), &spectrum()).unwrap();
         let lines = emitter.lines();
-        let moment = |spectrum: usize, power: i32| -> f64 {
-            let terms = lines.energy_kev.iter().zip(&lines.weights[spectrum]);
-            terms.map(|(e, w)| w * e.powi(power)).sum()
-        };
         let (mut difference, mut variance) = ([0.0_f64; 2], [0.0_f64; 2]);
         for i in 0..20_000 {
             let photon = emitter.emit(&mut Philox::new(2, 0, i));
             let mixture = emitter.mixture(&photon.direction);
             let mean = |power| -> f64 {
-                let parts = mixture.parts();
-                parts.map(|(s, share)| share * moment(s, power)).sum()
+                let lines = lines.energy_kev.iter().zip(lines.mixed(mixture));
+                lines.map(|(e, photons)| photons * e.powi(power)).sum()
             };
             let side = usize::from(mixture.intensity > 1.0);
             difference[side] += photon.energy_kev - mean(1);

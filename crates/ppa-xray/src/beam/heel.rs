@@ -42,17 +42,6 @@ pub(crate) struct Mixture {
     pub intensity: f64,
 }
 
-impl Mixture {
-    /// Spectra that take part, with their shares, which sum to 1.
-    pub fn parts(self) -> impl Iterator<Item = (usize, f64)> {
-        let parts = [
-            (self.lower, 1.0 - self.upper_share),
-            (self.lower + 1, self.upper_share),
-        ];
-        parts.into_iter().filter(|(_, share)| *share > 0.0)
-    }
-}
-
 impl Heel {
     /// Spectra for all directions from `spots` to `targets`.
     pub fn new(
@@ -190,10 +179,9 @@ mod tests {
             (17.6, 1.015_70, 38.716),
         ] {
             let mixture = emitter.mixture(&Vector3::new(x_cm, 0.0, 100.0).normalize());
-            let parts = mixture.parts();
-            let mean: f64 = parts
-                .map(|(s, share)| share * emitter.spectra()[s].mean_energy_kev())
-                .sum();
+            let [lower, upper] =
+                [0, 1].map(|i| emitter.spectra()[mixture.lower + i].mean_energy_kev());
+            let mean = lower + mixture.upper_share * (upper - lower);
             let ratio = mixture.intensity / intensity;
             assert!((ratio - 1.0).abs() < 0.012, "{x_cm} cm: {ratio}");
             assert!(

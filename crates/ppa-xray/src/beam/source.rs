@@ -77,9 +77,6 @@ const FWHM_PER_SIGMA: f64 = 2.354_820_045_030_949;
 /// No standard normal number is farther from 0: random numbers come in steps of 2⁻³², and √(2 ln 2³²) is 6.66.
 const WIDEST: f64 = 6.67;
 
-/// Half-width of the square that stands for a Gaussian in sums over the spot, in standard deviations.
-const GAUSSIAN_REACH: f64 = 3.5;
-
 impl FocalSpot {
     pub(crate) fn is_point(&self) -> bool {
         self.size_mm == 0.0
@@ -89,7 +86,7 @@ impl FocalSpot {
     pub(crate) fn reach_mm(&self) -> f64 {
         match self.shape {
             SpotShape::Uniform => 0.5 * self.size_mm,
-            SpotShape::Gaussian => WIDEST * self.size_mm / FWHM_PER_SIGMA,
+            SpotShape::Gaussian => WIDEST * self.sigma_mm(),
         }
     }
 
@@ -101,46 +98,49 @@ impl FocalSpot {
         }
         match self.shape {
             SpotShape::Uniform => [(); 2].map(|()| self.size_mm * (rng.unit() - 0.5)),
-            SpotShape::Gaussian => rng.normals().map(|z| self.size_mm / FWHM_PER_SIGMA * z),
+            SpotShape::Gaussian => rng.normals().map(|z| self.sigma_mm() * z),
         }
     }
 
-    /// `per_side`² points (at least 4) with weights that sum to 1: midpoints of equal cells of the square, or of the
-    /// Gaussian within 3.5 standard deviations, moved outwards or inwards until their variance is that of the spot.
-    /// Four points are then those of Gauss and integrate cubics exactly. A point is one point.
-    pub(crate) fn quadrature(&self, per_side: u32) -> Vec<([f64; 2], f64)> {
-        if self.is_point() {
-            return vec![([0.0; 2], 1.0)];
+    /// Offsets along an axis of the spot's plane, mm: the medians of `count` equally strong strips, moved outwards until their
+    /// variance is that of the spot. The same in x and y, they stand for the spot with equal weights; for a point, and for
+    /// a single strip, its middle.
+    pub(crate) fn strips_mm(&self, count: usize) -> Vec<f64> {
+        if self.is_point() || count == 1 {
+            return vec![0.0; count];
         }
-        let sigma_mm = self.size_mm / FWHM_PER_SIGMA;
-        let half_mm = match self.shape {
-            SpotShape::Uniform => 0.5 * self.size_mm,
-            SpotShape::Gaussian => GAUSSIAN_REACH * sigma_mm,
+        let medians = (0..count).map(|strip| (strip as f64 + 0.5) / count as f64);
+        let line: Vec<f64> = match self.shape {
+            SpotShape::Uniform => medians.map(|share| share - 0.5).collect(),
+            SpotShape::Gaussian => gaussian_quantiles(medians),
         };
-        let line: Vec<(f64, f64)> = (0..per_side)
-            .map(|i| {
-                let at = half_mm * ((2.0 * f64::from(i) + 1.0) / f64::from(per_side) - 1.0);
-                let weight = match self.shape {
-                    SpotShape::Uniform => 1.0,
-                    SpotShape::Gaussian => (-0.5 * (at / sigma_mm).powi(2)).exp(),
-                };
-                (at, weight)
-            })
-            .collect();
-        let sum: f64 = line.iter().map(|(_, weight)| weight).sum();
-        let square: f64 = line.iter().map(|(at, weight)| at * at * weight / sum).sum();
-        let variance = match self.shape {
-            SpotShape::Uniform => half_mm * half_mm / 3.0,
-            SpotShape::Gaussian => sigma_mm * sigma_mm,
-        };
-        let spread = (variance / square).sqrt();
-        line.iter()
-            .flat_map(|&(y, wy)| {
-                line.iter()
-                    .map(move |&(x, wx)| ([spread * x, spread * y], wx * wy / (sum * sum)))
-            })
-            .collect()
+        let variance = line.iter().map(|at| at * at).sum::<f64>() / count as f64;
+        let spread_mm = self.sigma_mm() / variance.sqrt();
+        line.iter().map(|at| spread_mm * at).collect()
     }
+
+    /// Standard deviation along an axis, mm.
+    pub(crate) fn sigma_mm(&self) -> f64 {
+        match self.shape {
+            SpotShape::Uniform => self.size_mm / 12.0_f64.sqrt(),
+            SpotShape::Gaussian => self.size_mm / FWHM_PER_SIGMA,
+        }
+    }
+}
+
+/// Where the cumulative normal distribution takes the given values, which ascend.
+fn gaussian_quantiles(shares: impl Iterator<Item = f64>) -> Vec<f64> {
+    const STEP: f64 = 1.0 / 512.0;
+    let (mut at, mut sum) = (-6.0, 0.0);
+    let mut reached = |share: f64| {
+        while sum < share {
+            let middle: f64 = at + 0.5 * STEP;
+            sum += STEP * (-0.5 * middle * middle).exp() / std::f64::consts::TAU.sqrt();
+            at += STEP;
+        }
+        at
+    };
+    shares.map(&mut reached).collect()
 }
 
 impl Collimation {
@@ -183,7 +183,7 @@ impl SpotPlane {
 mod tests {
     use super::*;
 
-    /// Standard deviation of the samples and of the quadrature: side/√12, FWHM/2.3548.
+    /// Standard deviation of the samples and of the strips: side/√12, FWHM/2.3548.
     #[test]
     fn spots_are_as_wide_as_asked_for() {
         let draws = 40_000_u32;
@@ -205,11 +205,11 @@ mod tests {
             let spread = sigma_mm * sigma_mm * ((kurtosis - 1.0_f64) / n).sqrt();
             let z = (square / n - sigma_mm * sigma_mm) / spread;
             assert!(z.abs() < 4.0, "{shape:?}: {z:.1} sigma"); // 6e-5
-            for per_side in [2, 4, 16] {
-                let points = spot.quadrature(per_side);
-                let sum: f64 = points.iter().map(|(_, w)| w).sum();
-                let variance: f64 = points.iter().map(|([x, _], w)| w * x * x).sum();
-                assert!((sum - 1.0).abs() < 1e-12);
+            for count in [2, 4, 16] {
+                let strips = spot.strips_mm(count);
+                let mean = strips.iter().sum::<f64>() / count as f64;
+                let variance = strips.iter().map(|at| at * at).sum::<f64>() / count as f64;
+                assert!(mean.abs() < 0.01 * sigma_mm, "{strips:?}");
                 assert!((variance / (sigma_mm * sigma_mm) - 1.0).abs() < 1e-12);
             }
         }

@@ -1,5 +1,6 @@
 //! Spectra as lines at common energies, to sum over.
 
+use crate::beam::heel::Mixture;
 use crate::beam::spectrum::Spectrum;
 use crate::transport::attenuation::{CEILING_KEV, CUTOFF_KEV};
 
@@ -41,5 +42,14 @@ impl SpectralLines {
             energy_kev,
             weights,
         }
+    }
+    /// Photons of every line in a mixture of two neighbouring spectra.
+    #[inline]
+    pub fn mixed(&self, mixture: Mixture) -> impl Iterator<Item = f64> {
+        let last = self.weights.len() - 1;
+        let [lower, upper] = [0, 1].map(|i| &self.weights[(mixture.lower + i).min(last)]);
+        let share = mixture.upper_share;
+        let both = lower.iter().zip(upper);
+        both.map(move |(lower, upper)| lower + share * (upper - lower))
     }
 }

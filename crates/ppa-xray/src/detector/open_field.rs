@@ -37,14 +37,10 @@ impl OpenField {
             let direction = Point3::new(at.x, at.y, source_detector_mm)
                 .coords
                 .normalize();
-            let mut photons = vec![0.0; lines.energy_kev.len()];
-            for (spectrum, share) in emitter.mixture(&direction).parts() {
-                for (photons, weight) in photons.iter_mut().zip(&lines.weights[spectrum]) {
-                    *photons += share * weight;
-                }
-            }
-            let signal = response.signal(&mut photons, at.into(), &direction);
-            1e3 * signal.mean_kev * emitter.open_fluence_cm2(&Point3::origin(), at)
+            let photons = lines.mixed(emitter.mixture(&direction));
+            let left = response.moments(at.into(), &direction);
+            let signal_kev: f64 = photons.zip(left).map(|(n, left)| n * left.mean_kev).sum();
+            1e3 * signal_kev * emitter.open_fluence_cm2(&Point3::origin(), at)
         };
         let detector = transport.projection.detector;
         let Field { low_mm, high_mm } = detector.field();

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::beam::field::Field;
 use crate::engine::attenuation_basis::{LANES, dot};
-use crate::engine::lines::{Line, Lines};
+use crate::engine::lines::Lines;
 use crate::engine::outlook::Site;
 use crate::engine::paths::Paths;
 use crate::philox::Philox;
@@ -33,8 +33,6 @@ pub(crate) struct CollisionMap {
     /// Running sums of how often collisions are drawn in the cells.
     sums: Vec<f64>,
     field: Field,
-    /// Points of the focal spot and the running sums of their weights.
-    spots: Vec<(Point3<f64>, f64)>,
     /// Mean mass on the way in and out.
     pub mass: Vec<[f32; LANES]>,
     /// Mean energy of the photons that get through that mass, keV.
@@ -42,9 +40,6 @@ pub(crate) struct CollisionMap {
     /// The cells as single collisions, with the photons that can be expected to scatter in each.
     pub cells: Vec<Site>,
 }
-
-/// Points per side of a focal spot that is not a point.
-const SPOT_POINTS: u32 = 8;
 
 /// A drawn collision.
 #[derive(Debug, Clone, Copy)]
@@ -66,22 +61,13 @@ impl CollisionMap {
         let mut map = Self {
             sums: Vec::new(),
             field: *transport.emitter.field(),
-            spots: transport
-                .emitter
-                .spot_points(SPOT_POINTS)
-                .into_iter()
-                .scan(0.0, |sum, (spot, weight)| {
-                    *sum += weight;
-                    Some((spot, *sum))
-                })
-                .collect(),
             mass: vec![[0.0; LANES]; paths.basis.groups],
             typical_kev: 0.0,
             cells: Vec::new(),
         };
         let looked: Vec<Look> = (0..CELLS.iter().product::<usize>())
             .into_par_iter()
-            .map(|cell| map.look(cell, transport, paths, lines.usual()))
+            .map(|cell| map.look(cell, transport, paths, lines))
             .collect();
         let mut strength = 0.0;
         for look in &looked {
@@ -96,7 +82,7 @@ impl CollisionMap {
         for mean in map.mass.iter_mut().flatten() {
             *mean *= twice;
         }
-        map.typical_kev = mean_energy_behind(lines.usual(), &map.mass);
+        map.typical_kev = mean_energy_behind(lines, &map.mass);
         map.cells = looked.into_iter().map(|look| look.site).collect();
         map
     }
@@ -127,7 +113,7 @@ impl CollisionMap {
     }
 
     /// What a cell holds.
-    fn look(&self, cell: usize, transport: &Transport, paths: &Paths, lines: &[Line]) -> Look {
+    fn look(&self, cell: usize, transport: &Transport, paths: &Paths, lines: &Lines) -> Look {
         let mut mass = vec![[0.0; LANES]; paths.basis.groups];
         let mut sum_of_mass = mass.clone();
         let (mut strength, mut strongest) = (0.0, 0.0);
@@ -145,9 +131,9 @@ impl CollisionMap {
             if density > 0.05 {
                 paths.coarse_between(&Point3::origin(), &collision.position, &mut mass);
             }
-            let scattered = lines.iter().map(|line| {
+            let scattered = lines.usual().map(|(line, photons)| {
                 let through = f64::from(-dot(&mass, &line.attenuation)).exp();
-                line.photons * line.scattered[usize::from(found)] * through
+                photons * line.scattered[usize::from(found)] * through
             });
             let here = density * collision.mm3 * scattered.sum::<f64>();
             for (sum, mass) in sum_of_mass.iter_mut().flatten().zip(mass.iter().flatten()) {
@@ -221,14 +207,7 @@ impl CollisionMap {
         rng: &mut Philox,
     ) -> Collision {
         let sums = &self.sums;
-        let spot = match self.spots.as_slice() {
-            [(only, _)] => only,
-            spots => {
-                let lot = rng.unit();
-                let index = spots.partition_point(|&(_, sum)| sum <= lot);
-                &spots[index.min(spots.len() - 1)].0
-            }
-        };
+        let spot = transport.emitter.draw_spot(rng);
         // Row by row, then cell by cell in the row, then along the ray.
         let [columns, rows, depths] = CELLS;
         let total = sums[sums.len() - 1];
@@ -246,7 +225,7 @@ impl CollisionMap {
             column.low + w * column.size,
         );
         let inside = [column.inside, row.inside, depth.inside];
-        let mut collision = self.place(split(depth.index), inside, spot, transport, paths);
+        let mut collision = self.place(split(depth.index), inside, &spot, transport, paths);
         collision.mm3 *= total / depth.size;
         collision
     }
@@ -273,10 +252,10 @@ fn lent(own: &[f64]) -> Vec<f64> {
 }
 
 /// Mean energy of the photons that pass the given masses, keV.
-fn mean_energy_behind(lines: &[Line], mass: &[[f32; LANES]]) -> f64 {
+fn mean_energy_behind(lines: &Lines, mass: &[[f32; LANES]]) -> f64 {
     let (mut photons, mut energy) = (f64::MIN_POSITIVE, 0.0);
-    for line in lines {
-        let through = line.photons * f64::from(-dot(mass, &line.attenuation)).exp();
+    for (line, photons_sent) in lines.usual() {
+        let through = photons_sent * f64::from(-dot(mass, &line.attenuation)).exp();
         photons += through;
         energy += through * line.energy_kev;
     }

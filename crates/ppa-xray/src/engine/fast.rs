@@ -7,6 +7,7 @@ use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
 use crate::detector::open_field::OpenField;
 use crate::engine::adaptive_nodes::single_scatter_field;
+use crate::engine::adaptive_primary::primary_moments;
 use crate::engine::collision_map::CollisionMap;
 use crate::engine::first_collisions::{ESTIMATES, FirstFlights};
 use crate::engine::lines::Lines;
@@ -16,10 +17,10 @@ use crate::engine::noise::{self, ExpectedLayer};
 use crate::engine::outlook::Outlook;
 use crate::engine::paths::Paths;
 use crate::engine::primary_signal::PrimarySignal;
-use crate::engine::raytrace::{check_samples, primary_moments};
+use crate::engine::raytrace::check_samples;
 use crate::engine::scatter_field::ScatterField;
 use crate::engine::single_scatter::SingleScatter;
-use crate::engine::spectral_quadrature::SpectralQuadrature;
+use crate::engine::spectral_quadrature::compressed;
 use crate::image::radiograph::{CategorySums, Engine, Radiograph};
 use crate::matter::compton::ComptonModel;
 use crate::matter::scatter_density::ScatterDensities;
@@ -91,8 +92,8 @@ pub fn fast(
     let transport = Transport::new(phantom, spectrum, projection, settings.compton_model)?;
     let detector = &projection.detector;
     let paths = Paths::new(&transport);
-    let quadratures = SpectralQuadrature::compressed(&transport, PRIMARY_ENERGIES);
-    let primary = primary_moments(&transport, &paths, &quadratures, settings.samples_per_side);
+    let lines = compressed(&transport, PRIMARY_ENERGIES);
+    let primary = primary_moments(&transport, &paths, lines, settings.samples_per_side);
     let (open_field, open_field_ev_cm2) = OpenField::of(&transport);
     let signal = PrimarySignal {
         detector,

@@ -23,12 +23,9 @@ const ALIKE: f64 = 0.5;
 #[derive(Default)]
 pub(crate) struct FirstCollisions {
     pub sites: Vec<Site>,
-    /// The first of the up to two neighbouring spectra that the photons of a site have.
-    spectrum: Vec<usize>,
-    /// Photons of every line of those spectra that get to a site, times the mass that it stands for; so many for each
-    /// site. Their sum over a list is an integral over all sites: mm g/cm³ per history.
+    /// Photons of every line that get to a site, times the mass that it stands for, site by site. Their sum over a list is an
+    /// integral over all sites: mm g/cm³ per history.
     photons: Vec<f32>,
-    lines: usize,
     /// Photons that scatter at the sites, and running sums of how often histories go on from them.
     scattered: Vec<f64>,
     often: Vec<f64>,
@@ -65,10 +62,7 @@ impl FirstFlights<'_> {
             .collect();
         // Neighbours beside each other: even steps through the list are then even in space too.
         drawn.sort_by_key(|collision| collision.cell);
-        let mut list = FirstCollisions {
-            lines: self.lines.most(),
-            ..FirstCollisions::default()
-        };
+        let mut list = FirstCollisions::default();
         let mut mass = vec![[0.0; LANES]; self.paths.basis.groups];
         for collision in &drawn {
             self.enter(collision, 1.0 / collisions as f64, &mut mass, &mut list);
@@ -101,24 +95,15 @@ impl FirstFlights<'_> {
             .between(&collision.spot, &collision.position, mass);
         let material = phantom.material()[voxel];
         let mixture = emitter.mixture(&collision.direction);
-        let own = self.lines.of(mixture.lower).len();
-        let start = list.photons.len();
         let (mut arriving, mut energy, mut scattered) = (0.0, 0.0, 0.0);
-        for (index, line) in self.lines.of_mixture(mixture.lower).enumerate() {
-            let share = if index < own {
-                1.0 - mixture.upper_share
-            } else {
-                mixture.upper_share
-            };
+        for (line, photons) in self.lines.of(mixture) {
             let through = f64::from(-dot(mass, &line.attenuation)).exp();
-            let photons = (weight * share * line.photons * through) as f32;
+            let photons = (weight * photons * through) as f32;
             list.photons.push(photons);
             arriving += f64::from(photons);
             energy += f64::from(photons) * line.energy_kev;
             scattered += f64::from(photons) * line.scattered[usize::from(material)];
         }
-        list.photons.resize(start + list.lines, 0.0);
-        list.spectrum.push(mixture.lower);
         list.scattered.push(scattered);
         list.sites.push(Site {
             position: collision.position.cast(),
@@ -133,16 +118,17 @@ impl FirstFlights<'_> {
 }
 
 impl FirstCollisions {
-    /// The lines that the photons of a site have, with how many of them get there.
+    /// Every line, with how many of its photons get to a site.
     #[inline]
     pub fn photons<'a>(
         &'a self,
         site: usize,
         lines: &'a Lines,
     ) -> impl Iterator<Item = (&'a Line, f64)> {
-        let photons = &self.photons[site * self.lines..][..self.lines];
+        let lines = lines.all();
+        let photons = &self.photons[site * lines.len()..][..lines.len()];
         lines
-            .of_mixture(self.spectrum[site])
+            .iter()
             .zip(photons.iter().map(|&photons| f64::from(photons)))
     }
 

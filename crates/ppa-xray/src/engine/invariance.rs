@@ -5,13 +5,13 @@ use ppa_ct::Grid;
 
 use crate::beam::projection::{Detector, Projection};
 use crate::detector::open_field::OpenField;
+use crate::engine::adaptive_primary::primary_moments;
 use crate::engine::fast::{FastSettings, Scatter, fast};
 use crate::engine::multiple_scatter::Tactics;
 use crate::engine::paths::Paths;
 use crate::engine::primary_signal::PrimarySignal;
-use crate::engine::raytrace::primary_moments;
 use crate::engine::small_limb;
-use crate::engine::spectral_quadrature::SpectralQuadrature;
+use crate::engine::spectral_quadrature::compressed;
 use crate::matter::compton::ComptonModel;
 use crate::matter::material::Material;
 use crate::phantom::voxels::VoxelPhantom;
@@ -35,8 +35,7 @@ fn no_expectation_depends_on_how_the_work_is_done() {
         Paths::with_coarse_cells(&transport, 1_000),
     );
     assert!(exact.coarse_is_exact() && !coarse.coarse_is_exact());
-    let quadratures = SpectralQuadrature::compressed(&transport, 8);
-    let primary = primary_moments(&transport, &exact, &quadratures, 2);
+    let primary = primary_moments(&transport, &exact, compressed(&transport, 8), 2);
     let (_, open_ev_cm2) = OpenField::of(&transport);
     let signal = PrimarySignal {
         detector,

@@ -2,22 +2,24 @@
 
 use rayon::prelude::*;
 
+use crate::beam::heel::Mixture;
+use crate::beam::spectral_lines::SpectralLines;
 use crate::engine::attenuation_basis::LANES;
 use crate::engine::paths::Paths;
 use crate::engine::scatter_table::ScatterTable;
-use crate::engine::spectral_quadrature::SpectralQuadrature;
+use crate::engine::spectral_quadrature::compressed;
 use crate::matter::scatter_density::ScatterDensities;
 use crate::transport::tracking::Transport;
 
-/// Energies of a quadrature for each spectrum of the emitter.
+/// Energies of a quadrature, the same for all spectra of the emitter.
 pub(crate) struct Lines {
-    spectra: Vec<Vec<Line>>,
+    lines: Vec<Line>,
+    spectra: SpectralLines,
 }
 
 /// An energy of a quadrature.
 pub(crate) struct Line {
     pub energy_kev: f64,
-    pub photons: f64,
     /// Attenuation of the basis materials.
     pub attenuation: Vec<[f32; LANES]>,
     /// By material.
@@ -34,7 +36,7 @@ impl Lines {
         densities: &[ScatterDensities],
         nodes: usize,
     ) -> Self {
-        let line = |energy_kev: f64, photons: f64| {
+        let line = |energy_kev: f64| {
             let node = transport.attenuation.locate(energy_kev);
             let coefficients = |material: usize| transport.attenuation.at(material as u8, node);
             let table = |material: usize| {
@@ -44,7 +46,6 @@ impl Lines {
             };
             Line {
                 energy_kev,
-                photons,
                 attenuation: paths.basis.at(energy_kev),
                 scattering: (0..densities.len()).into_par_iter().map(table).collect(),
                 scattered: (0..densities.len())
@@ -53,38 +54,26 @@ impl Lines {
                     .collect(),
             }
         };
+        let spectra = compressed(transport, nodes);
         Self {
-            spectra: SpectralQuadrature::compressed(transport, nodes)
-                .iter()
-                .map(|quadrature| {
-                    let lines = quadrature.energy_kev.iter().zip(&quadrature.photons);
-                    lines.map(|(&e, &photons)| line(e, photons)).collect()
-                })
-                .collect(),
+            lines: spectra.energy_kev.iter().map(|&kev| line(kev)).collect(),
+            spectra,
         }
     }
 
-    /// Lines of one spectrum.
-    pub fn of(&self, spectrum: usize) -> &[Line] {
-        &self.spectra[spectrum]
+    pub fn all(&self) -> &[Line] {
+        &self.lines
     }
 
-    /// Lines of the spectrum in the middle of the field, more or less.
-    pub fn usual(&self) -> &[Line] {
-        self.of(self.spectra.len() / 2)
+    /// Every line with its photons in a mixture.
+    #[inline]
+    pub fn of(&self, mixture: Mixture) -> impl Iterator<Item = (&Line, f64)> {
+        self.lines.iter().zip(self.spectra.mixed(mixture))
     }
 
-    /// Lines of a spectrum and of the next one, if there is one: those that a mixture may have.
-    pub fn of_mixture(&self, lower: usize) -> impl Iterator<Item = &Line> {
-        let end = (lower + 2).min(self.spectra.len());
-        self.spectra[lower..end].iter().flatten()
-    }
-
-    /// Most lines of a mixture.
-    pub fn most(&self) -> usize {
-        (0..self.spectra.len())
-            .map(|lower| self.of_mixture(lower).count())
-            .max()
-            .unwrap_or(0)
+    /// Every line with its photons in the middle of the field, more or less.
+    pub fn usual(&self) -> impl Iterator<Item = (&Line, f64)> {
+        let middle = &self.spectra.weights[self.spectra.weights.len() / 2];
+        self.lines.iter().zip(middle.iter().copied())
     }
 }

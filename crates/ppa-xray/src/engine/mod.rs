@@ -1,6 +1,7 @@
 //! From an exposure to a radiograph: followed photon by photon, or fast.
 
 mod adaptive_nodes;
+mod adaptive_primary;
 pub(crate) mod analog;
 mod attenuation_basis;
 mod coarse_cells;
@@ -17,6 +18,7 @@ mod node_grid;
 pub(crate) mod noise;
 mod outlook;
 mod paths;
+mod primary_rays;
 mod primary_signal;
 mod quasi_random;
 pub(crate) mod raytrace;

@@ -109,6 +109,7 @@ impl ScatterField {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::first_collisions::ESTIMATES;
     use crate::philox::Philox;
 
     fn field(grid: NodeGrid, energy: impl Fn(usize, usize) -> f64) -> ScatterField {

@@ -1,92 +1,76 @@
-//! A spectrum as a few energies.
+//! The spectra of the source as a few energies.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
+use crate::beam::spectral_lines::SpectralLines;
 use crate::transport::tracking::Transport;
 
-/// Energies in keV and how many photons each stands for.
+/// At most `nodes` energies between two absorption edges of phantom or detector, the same for every spectrum that the
+/// source has.
 ///
 /// Integrals of smooth functions over a spectrum of 110 bins need no 110 energies: the Gauss quadrature of the
 /// spectrum with n energies is exact for polynomials of degree 2n − 1 in 1/E (Golub and Welsch, Math. Comp.
-/// 23 (1969) 221). An absorption edge is not smooth: the spectrum is cut there.
-#[derive(Debug, Clone)]
-pub(crate) struct SpectralQuadrature {
-    pub energy_kev: Vec<f64>,
-    pub photons: Vec<f64>,
+/// 23 (1969) 221). An absorption edge is not smooth: the spectrum is cut there. The energies are those of the mean of all
+/// spectra; the weights of a single one, which differs little, are exact for polynomials of degree n − 1 times the mean.
+pub(crate) fn compressed(transport: &Transport, nodes: usize) -> SpectralLines {
+    let mut edges: Vec<f64> = transport
+        .phantom
+        .materials()
+        .iter()
+        .flat_map(|material| material.edges_kev())
+        .chain(transport.response.edges_kev())
+        .collect();
+    edges.sort_by(f64::total_cmp);
+    edges.dedup();
+    gauss(&transport.emitter.lines(), &edges, nodes)
 }
 
-impl SpectralQuadrature {
-    /// Every energy bin of every spectrum that the source has.
-    pub fn exact(transport: &Transport) -> Vec<Self> {
-        Self::of_spectra(transport, Self::of_lines)
-    }
-
-    /// At most `nodes` energies between two absorption edges of phantom or detector, for every spectrum that the source
-    /// has.
-    pub fn compressed(transport: &Transport, nodes: usize) -> Vec<Self> {
-        let mut edges: Vec<f64> = transport
-            .phantom
-            .materials()
-            .iter()
-            .flat_map(|material| material.edges_kev())
-            .chain(transport.response.edges_kev())
-            .collect();
-        edges.sort_by(f64::total_cmp);
-        edges.dedup();
-        Self::of_spectra(transport, |lines| Self::gauss(lines, &edges, nodes))
-    }
-
-    fn of_spectra(transport: &Transport, of: impl Fn(&[(f64, f64)]) -> Self) -> Vec<Self> {
-        let lines = transport.emitter.lines();
-        lines
-            .weights
-            .iter()
-            .map(|weights| {
-                let filled: Vec<(f64, f64)> = lines
-                    .energy_kev
-                    .iter()
-                    .zip(weights)
-                    .map(|(&energy_kev, &photons)| (energy_kev, photons))
-                    .filter(|(_, photons)| *photons > 0.0)
-                    .collect();
-                of(&filled)
-            })
-            .collect()
-    }
-
-    /// All `lines` (energy in ascending order, photons) as they are.
-    fn of_lines(lines: &[(f64, f64)]) -> Self {
-        let (energy_kev, photons) = lines.iter().copied().unzip();
-        Self {
-            energy_kev,
-            photons,
+/// At most `nodes` energies between two neighbouring `edges_kev`, in ascending order.
+fn gauss(lines: &SpectralLines, edges_kev: &[f64], nodes: usize) -> SpectralLines {
+    let mut chosen = SpectralLines {
+        energy_kev: Vec::new(),
+        weights: vec![Vec::new(); lines.weights.len()],
+    };
+    let mut first = 0;
+    for edge in edges_kev.iter().copied().chain([f64::INFINITY]) {
+        let end = lines.energy_kev.partition_point(|&energy| energy < edge);
+        let piece = SpectralLines {
+            energy_kev: lines.energy_kev[first..end].to_vec(),
+            weights: lines
+                .weights
+                .iter()
+                .map(|w| w[first..end].to_vec())
+                .collect(),
+        };
+        let few = smooth_piece(piece, nodes);
+        chosen.energy_kev.extend(few.energy_kev);
+        for (all, piece) in chosen.weights.iter_mut().zip(few.weights) {
+            all.extend(piece);
         }
+        first = end;
     }
-
-    /// At most `nodes` energies between two neighbouring `edges_kev`, in ascending order.
-    fn gauss(lines: &[(f64, f64)], edges_kev: &[f64], nodes: usize) -> Self {
-        let mut rest = lines;
-        let mut chosen = Vec::new();
-        for edge in edges_kev.iter().copied().chain([f64::INFINITY]) {
-            let (below, above) = rest.split_at(rest.partition_point(|line| line.0 < edge));
-            chosen.extend(gauss(below, nodes));
-            rest = above;
-        }
-        Self::of_lines(&chosen)
-    }
+    chosen
 }
 
 /// The quadrature of one smooth piece.
-fn gauss(lines: &[(f64, f64)], nodes: usize) -> Vec<(f64, f64)> {
-    if lines.len() <= nodes {
-        return lines.to_vec();
+fn smooth_piece(lines: SpectralLines, nodes: usize) -> SpectralLines {
+    let n = lines.energy_kev.len();
+    if n <= nodes {
+        return lines;
     }
-    let total: f64 = lines.iter().map(|line| line.1).sum();
-    let n = lines.len();
+    let total = |line: usize| {
+        lines
+            .weights
+            .iter()
+            .map(|weights| weights[line])
+            .sum::<f64>()
+    };
+    let root = DVector::from_fn(n, |line, _| total(line).sqrt());
+    let norm = root.norm();
     // Lanczos on diag(1/E) from the square roots of the weights gives the Jacobi matrix of the measure; full
-    // orthogonalisation keeps it exact.
-    let x = DVector::from_fn(n, |i, _| 1.0 / lines[i].0);
-    let mut basis = vec![DVector::from_fn(n, |i, _| (lines[i].1 / total).sqrt())];
+    // orthogonalisation keeps it exact. Each vector is an orthonormal polynomial of 1/E times those roots.
+    let x = DVector::from_fn(n, |line, _| 1.0 / lines.energy_kev[line]);
+    let mut basis = vec![&root / norm];
     let mut jacobi = DMatrix::zeros(nodes, nodes);
     for k in 0..nodes {
         let mut next = x.component_mul(&basis[k]);
@@ -106,14 +90,31 @@ fn gauss(lines: &[(f64, f64)], nodes: usize) -> Vec<(f64, f64)> {
         basis.push(next / norm);
     }
     let eigen = SymmetricEigen::new(jacobi);
-    let mut chosen: Vec<(f64, f64)> = (0..nodes)
-        .map(|k| {
-            let share = eigen.eigenvectors[(0, k)].powi(2);
-            (1.0 / eigen.eigenvalues[k], total * share)
-        })
-        .collect();
-    chosen.sort_by(|a, b| a.0.total_cmp(&b.0));
-    chosen
+    let mut order: Vec<usize> = (0..nodes).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    // An eigenvector holds the polynomials at its energy times the root of the weight there; what a spectrum's polynomials
+    // sum up to must come out again.
+    let weights = lines.weights.iter().map(|weights| {
+        let moments: Vec<f64> = basis
+            .iter()
+            .map(|vector| {
+                let terms = (0..n).filter(|&line| root[line] > 0.0);
+                terms
+                    .map(|line| weights[line] * vector[line] / root[line])
+                    .sum::<f64>()
+                    * norm
+            })
+            .collect();
+        let at = |k: usize| -> f64 {
+            let vector = eigen.eigenvectors.column(k);
+            vector[0] * vector.iter().zip(&moments).map(|(v, m)| v * m).sum::<f64>()
+        };
+        order.iter().map(|&k| at(k)).collect()
+    });
+    SpectralLines {
+        weights: weights.collect(),
+        energy_kev: order.iter().map(|&k| 1.0 / eigen.eigenvalues[k]).collect(),
+    }
 }
 
 #[cfg(test)]
@@ -123,23 +124,36 @@ mod tests {
     use crate::beam::tube::TubeSpec;
     use crate::matter::material::Material;
 
-    /// Energy and squared energy behind water, bone and copper: 12 energies for 100 bins.
+    fn lines(spectra: &[Spectrum]) -> SpectralLines {
+        let bins = |spectrum: &Spectrum| spectrum.bins().filter(|bin| bin.0 >= 5.0).unzip();
+        let all: Vec<(Vec<f64>, Vec<f64>)> = spectra.iter().map(bins).collect();
+        assert!(all.iter().all(|one| one.0 == all[0].0), "the same bins");
+        SpectralLines {
+            energy_kev: all[0].0.clone(),
+            weights: all.into_iter().map(|one| one.1).collect(),
+        }
+    }
+
+    /// Energy and squared energy behind water, bone and copper, from the anode's side to the other: the same 12 energies for
+    /// 100 bins of three spectra.
     #[test]
-    fn a_dozen_energies_stand_for_a_spectrum() {
-        let spectrum = Spectrum::tungsten(&TubeSpec {
-            kvp: 100.0,
-            anode_angle_deg: 12.0,
-            filters: vec!["Al:2.5".parse().unwrap()],
-        })
-        .unwrap();
-        let lines: Vec<(f64, f64)> = spectrum.bins().filter(|bin| bin.0 >= 5.0).collect();
-        let exact = SpectralQuadrature::of_lines(&lines);
-        let few = SpectralQuadrature::gauss(&lines, &[], 12);
+    fn a_dozen_energies_stand_for_all_spectra_of_a_source() {
+        let spectra = [4.0, 8.0, 20.0].map(|anode_angle_deg| {
+            let filters = vec!["Al:2.5".parse().unwrap()];
+            let tube = TubeSpec {
+                kvp: 100.0,
+                anode_angle_deg,
+                filters,
+            };
+            Spectrum::tungsten(&tube).unwrap()
+        });
+        let exact = lines(&spectra);
+        let few = gauss(&exact, &[], 12);
         assert_eq!(few.energy_kev.len(), 12);
         for (name, cm) in [("water", 25.0), ("bone_cortical", 5.0), ("copper", 0.1)] {
             let material = Material::named(name).unwrap();
-            let behind = |quadrature: &SpectralQuadrature, power: i32| -> f64 {
-                let nodes = quadrature.energy_kev.iter().zip(&quadrature.photons);
+            let behind = |lines: &SpectralLines, spectrum: usize, power: i32| -> f64 {
+                let nodes = lines.energy_kev.iter().zip(&lines.weights[spectrum]);
                 nodes
                     .map(|(&energy, photons)| {
                         let mu = material.total_cm2_g(energy).unwrap() * material.density_g_cm3();
@@ -147,19 +161,26 @@ mod tests {
                     })
                     .sum()
             };
-            for power in [1, 2] {
-                let error = behind(&few, power) / behind(&exact, power) - 1.0;
-                assert!(error.abs() < 2e-4, "{name}: {error:e}");
+            for spectrum in 0..spectra.len() {
+                for power in [1, 2] {
+                    let [few, exact] = [&few, &exact].map(|of| behind(of, spectrum, power));
+                    let error = few / exact - 1.0;
+                    println!("{name} {spectrum} {power}: {error:e}");
+                    assert!(error.abs() < 2e-4, "{name}, spectrum {spectrum}: {error:e}");
+                }
             }
         }
     }
 
     #[test]
     fn an_absorption_edge_cuts_the_spectrum() {
-        let lines: Vec<(f64, f64)> = (0..100).map(|i| (20.0 + f64::from(i), 1.0)).collect();
-        let cut = SpectralQuadrature::gauss(&lines, &[69.5], 6);
+        let even = SpectralLines {
+            energy_kev: (0..100).map(|i| 20.0 + f64::from(i)).collect(),
+            weights: vec![vec![1.0; 100]],
+        };
+        let cut = gauss(&even, &[69.5], 6);
         assert_eq!(cut.energy_kev.len(), 12);
-        let below: f64 = cut.photons[..6].iter().sum();
+        let below: f64 = cut.weights[0][..6].iter().sum();
         assert!(
             (below - 50.0).abs() < 1e-9 && cut.energy_kev[5] < 69.5 && cut.energy_kev[6] > 69.5
         );
