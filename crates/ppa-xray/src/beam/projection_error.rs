@@ -25,6 +25,18 @@ pub enum ProjectionError {
         /// Pixels along device y.
         rows: u32,
     },
+    /// The image does not fit into the memory of this machine.
+    #[error(
+        "the image of {columns} x {rows} pixels takes about {needed_gib:.1} GiB while it is made, more memory than there is"
+    )]
+    Memory {
+        /// Pixels along device x.
+        columns: u32,
+        /// Pixels along device y.
+        rows: u32,
+        /// What it takes.
+        needed_gib: f64,
+    },
     /// Pixel side or source-detector distance is not a length that makes sense.
     #[error("{what} is {found_mm} mm, expected 0.001 mm to 1 km")]
     Length {

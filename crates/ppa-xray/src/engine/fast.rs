@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::beam::projection::Projection;
+use crate::beam::projection::{Detector, Projection};
 use crate::beam::spectrum::Spectrum;
 use crate::detector::open_field::OpenField;
 use crate::engine::adaptive_nodes::single_scatter_field;
@@ -88,7 +88,7 @@ pub fn fast(
     projection: &Projection,
     settings: &FastSettings,
 ) -> Result<Radiograph, TransportError> {
-    settings.validate()?;
+    settings.validate(&projection.detector)?;
     let transport = Transport::new(phantom, spectrum, projection, settings.compton_model)?;
     let detector = &projection.detector;
     let paths = Paths::new(&transport);
@@ -215,26 +215,41 @@ impl Scatter {
 }
 
 impl FastSettings {
-    fn validate(&self) -> Result<(), TransportError> {
-        let positive = "a positive number";
+    /// Most histories that the noise of an image may stand for, if not infinitely many: a tube load of 3e7 mAs.
+    const MOST_DOSE: f64 = 1e18;
+
+    /// Most histories for the scatter: their first collisions take about 3 GB.
+    const MOST_SCATTER: u64 = 1_000_000_000;
+
+    /// Most points for scatter before any are set closer; a point and those around it take about 2 kB.
+    const MOST_NODES: f64 = 1e5;
+
+    fn validate(&self, detector: &Detector) -> Result<(), TransportError> {
+        let [width, height] = detector.field().size_mm();
+        let along = |size_mm: f64| (size_mm / self.scatter_pixel_mm).ceil() + 1.0;
+        let distance_mm = self.scatter_pixel_mm;
         for (what, found, fine, expected) in [
             (
                 "the number of histories for the noise",
                 self.dose_histories,
-                self.dose_histories > 0.0,
-                positive,
+                self.dose_histories > 0.0
+                    && (self.dose_histories <= Self::MOST_DOSE
+                        || self.dose_histories == f64::INFINITY),
+                "above 0, up to 1e18, or infinite for none",
             ),
             (
                 "the number of histories for the scatter",
                 self.scatter_histories as f64,
-                self.scatter_histories > 0,
-                positive,
+                (1..=Self::MOST_SCATTER).contains(&self.scatter_histories),
+                "1 to 1e9",
             ),
             (
                 "the distance of the scatter points in mm",
-                self.scatter_pixel_mm,
-                self.scatter_pixel_mm > 0.0 && self.scatter_pixel_mm.is_finite(),
-                "a positive length",
+                distance_mm,
+                distance_mm > 0.0
+                    && distance_mm.is_finite()
+                    && along(width) * along(height) <= Self::MOST_NODES,
+                "a positive length that sets at most 100000 points on the detector",
             ),
         ] {
             if !fine {

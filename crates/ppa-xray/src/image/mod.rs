@@ -4,6 +4,7 @@
 pub(crate) mod dx;
 pub(crate) mod enhancement;
 mod log_exposure;
+pub(crate) mod memory;
 pub(crate) mod output;
 pub(crate) mod presentation;
 pub(crate) mod pyramid;

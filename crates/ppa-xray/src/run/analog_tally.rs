@@ -11,7 +11,7 @@ use crate::dose::report::Dose;
 use crate::dose::setup::DoseSetup;
 use crate::dose::tally::DoseTally;
 use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph};
-use crate::transport::tally::{Category, Moments, Tally};
+use crate::transport::tally::{Category, Tally};
 use crate::transport::tracking::Transport;
 
 /// Integer sums over a range of the histories of one run.
@@ -91,30 +91,22 @@ impl AnalogTally {
         }
     }
 
-    /// Median over the pixels of the relative standard error of the total reading; infinite for pixels that nothing has
-    /// reached.
+    /// Median over the pixels of the relative standard error of the image's total, blur and electronic noise included; infinite
+    /// for pixels that nothing has reached.
     pub fn relative_error(&self) -> f64 {
-        let counted = self.counted();
-        let mut pixels = vec![Moments::default(); self.image.raster.cells()];
-        for category in Category::ALL {
-            // A history arrives once at most, so the moments of the categories add.
-            for (pixel, moments) in pixels.iter_mut().zip(self.image.moments(category, counted)) {
-                pixel.mean_kev += moments.mean_kev;
-                pixel.square_kev2 += moments.square_kev2;
-            }
-        }
-        let mut errors: Vec<f64> = pixels
-            .iter()
-            .map(|pixel| {
-                if pixel.mean_kev > 0.0 {
-                    pixel.standard_error_kev(counted as f64) / pixel.mean_kev
+        let image = self.radiograph();
+        let pixels = image.sigma().into_iter().zip(image.total());
+        let mut errors: Vec<f32> = pixels
+            .map(|(sigma, total)| {
+                if total > 0.0 {
+                    sigma / total
                 } else {
-                    f64::INFINITY
+                    f32::INFINITY
                 }
             })
             .collect();
         let middle = errors.len() / 2;
-        *errors.select_nth_unstable_by(middle, f64::total_cmp).1
+        (*errors.select_nth_unstable_by(middle, f32::total_cmp).1).into()
     }
 
     /// The radiograph of the histories counted so far.

@@ -8,7 +8,7 @@ pub struct Stop {
     /// After this wall-clock time.
     pub time: Option<Duration>,
     /// When the median pixel is this precise: the median over the detector of the relative standard error of the total
-    /// reading, as a fraction. Pixels that nothing has reached count as infinitely wrong.
+    /// reading, blur and electronic noise included, as a fraction. Pixels that nothing has reached count as infinitely wrong.
     ///
     /// Looked at at fixed numbers of histories that grow by a tenth, so that the same seed stops at the same history
     /// on any machine and after any interruption.

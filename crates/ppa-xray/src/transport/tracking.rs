@@ -11,6 +11,7 @@ use crate::beam::projection_error::ProjectionError;
 use crate::beam::spectrum::Spectrum;
 use crate::detector::readout::Readout;
 use crate::detector::response::Response;
+use crate::image::memory;
 use crate::matter::compton::ComptonModel;
 use crate::matter::sampler::MaterialTables;
 use crate::phantom::lattice::Lattice;
@@ -51,7 +52,7 @@ pub enum TransportError {
         percent: f64,
     },
     /// A number in the settings is out of range.
-    #[error("{what} is {found}, expected {expected}")]
+    #[error("{what} is {found:?}, expected {expected}")]
     Setting {
         /// Which setting.
         what: &'static str,
@@ -88,6 +89,7 @@ impl<'a> Transport<'a> {
         compton_model: ComptonModel,
     ) -> Result<Self, TransportError> {
         let emitter = Emitter::new(projection, spectrum)?;
+        memory::check(&projection.detector)?;
         let response = Response::new(&projection.receptor, projection.detector.centre_mm)
             .map_err(ProjectionError::from)?;
         let readout = Readout::new(&projection.receptor, &projection.detector)

@@ -311,3 +311,39 @@ fn noise_is_white_and_as_large_as_that_of_analog() {
         ); // 4.5 of 1/√1500
     }
 }
+
+/// Numbers beyond all sense are refused in one sentence, not carried out.
+#[test]
+fn settings_beyond_all_sense_are_refused() {
+    let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
+    let usual = FastSettings {
+        dose_histories: f64::INFINITY,
+        ..expected_image(320, 1)
+    };
+    for (settings, said) in [
+        (
+            FastSettings {
+                dose_histories: 1e300,
+                ..usual
+            },
+            "the number of histories for the noise is 1e300, expected above 0, up to 1e18, or infinite for none",
+        ),
+        (
+            FastSettings {
+                scatter_histories: u64::MAX,
+                ..usual
+            },
+            "the number of histories for the scatter is 1.8446744073709552e19, expected 1 to 1e9",
+        ),
+        (
+            FastSettings {
+                scatter_pixel_mm: 0.01,
+                ..usual
+            },
+            "the distance of the scatter points in mm is 0.01, expected a positive length that sets at most 100000 points on the detector",
+        ),
+    ] {
+        let refused = fast(&phantom, &spectrum, &frontal(8, 5.0), &settings);
+        assert_eq!(refused.unwrap_err().to_string(), said);
+    }
+}

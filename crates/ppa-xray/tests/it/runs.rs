@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use nalgebra::Isometry3;
 use ppa_xray::{
-    AnalogRun, AnalogSettings, AnalogTally, DoseSettings, Part, Progress, Projection, Spectrum,
-    Stop, Stopped, TallyError, VoxelBox, VoxelPhantom, analog,
+    AnalogRun, AnalogSettings, AnalogTally, Blur, DoseSettings, Part, Progress, Projection,
+    Spectrum, Stop, Stopped, TallyError, VoxelBox, VoxelPhantom, analog,
 };
 use proptest::prelude::*;
 
@@ -387,4 +387,41 @@ fn a_target_error_is_reached_at_the_same_history_after_an_interruption() {
         }
     }
     assert_eq!(interrupted.radiograph(), image);
+}
+
+/// The reading of a blurred detector is the mean of several pixels and so more precise than one of them; electronic noise
+/// adds to its error.
+#[test]
+fn the_error_that_ends_a_run_is_that_of_the_image() {
+    let mut scene = Scene::new();
+    // Beside the bone.
+    scene.projection.detector.pixel_mm = 0.2;
+    scene.projection.detector.centre_mm = [27.0, 0.0];
+    let error = |scene: &Scene| {
+        let settings = settings(200_000, 3);
+        let run = AnalogRun::new(
+            &scene.phantom,
+            &scene.spectrum,
+            &scene.projection,
+            &settings,
+        );
+        let run = run.unwrap();
+        let mut tally = run.tally(Part::WHOLE);
+        run.follow(&mut tally, &Stop::default(), |_, _| go_on());
+        let image = tally.radiograph();
+        let pixels = image.sigma().into_iter().zip(image.total());
+        let mut errors: Vec<f32> = pixels.map(|(sigma, total)| sigma / total).collect();
+        errors.sort_by(f32::total_cmp);
+        assert_eq!(tally.relative_error(), f64::from(errors[errors.len() / 2]));
+        tally.relative_error()
+    };
+    let sharp = error(&scene);
+    scene.projection.receptor.blur = Some(Blur::Lorentzian { h_mm2: 0.45 });
+    let blurred = error(&scene);
+    scene.projection.receptor.electronic_noise_kev = 500.0;
+    let noisy = error(&scene);
+    assert!(
+        blurred < 0.6 * sharp && noisy > 1.5 * blurred,
+        "{sharp} {blurred} {noisy}"
+    );
 }
