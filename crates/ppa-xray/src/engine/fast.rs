@@ -10,8 +10,9 @@ use crate::engine::adaptive_nodes::single_scatter_field;
 use crate::engine::adaptive_primary::primary_moments;
 use crate::engine::collision_map::CollisionMap;
 use crate::engine::first_collisions::{ESTIMATES, FirstFlights};
+use crate::engine::later_collisions::{Histories, Tactics};
 use crate::engine::lines::Lines;
-use crate::engine::multiple_scatter::{MultipleScatter, Tactics};
+use crate::engine::multiple_scatter::MultipleScatter;
 use crate::engine::node_grid::NodeGrid;
 use crate::engine::noise::{self, ExpectedLayer};
 use crate::engine::outlook::Outlook;
@@ -193,14 +194,16 @@ impl Scatter {
         );
         let nodes = NodeGrid::new(detector, SMOOTHER * settings.scatter_pixel_mm);
         let multiple = MultipleScatter {
-            transport,
-            paths,
+            histories: Histories {
+                transport,
+                paths,
+                lines: &lines,
+                lists: &lists,
+                outlook: &outlook,
+                tactics,
+            },
             densities: &densities,
-            lines: &lines,
-            lists: &lists,
-            outlook: &outlook,
             nodes,
-            tactics,
         };
         let seen = multiple.seen(settings.seed);
         let multiple = ScatterField {

@@ -7,7 +7,7 @@ use crate::beam::projection::{Detector, Projection};
 use crate::detector::open_field::OpenField;
 use crate::engine::adaptive_primary::primary_moments;
 use crate::engine::fast::{FastSettings, Scatter, fast};
-use crate::engine::multiple_scatter::Tactics;
+use crate::engine::later_collisions::Tactics;
 use crate::engine::paths::Paths;
 use crate::engine::primary_signal::PrimarySignal;
 use crate::engine::small_limb;

@@ -12,6 +12,7 @@ pub(crate) mod fast;
 mod first_collisions;
 #[cfg(test)]
 mod invariance;
+mod later_collisions;
 mod lines;
 mod multiple_scatter;
 mod node_grid;
