@@ -40,6 +40,11 @@ pub enum FitError {
     /// Too few pixels see a surface.
     #[error("{0} pixels see a surface in every frame, expected at least 1000")]
     Pixels(usize),
+    /// The noise is too small to be seen.
+    #[error(
+        "the depths vary enough to be told from rounding in {0} of 20 classes of signal only, expected 4: record surfaces further away"
+    )]
+    Quiet(usize),
     /// All pixels have the same signal.
     #[error(
         "the signal varies by a factor of {0:.2} only, expected 1.2 or more: record surfaces at several distances"
@@ -49,6 +54,8 @@ pub enum FitError {
 
 /// Classes of equal size, by signal.
 const CLASSES: usize = 20;
+/// Classes that a fit of two numbers needs.
+const LEAST_CLASSES: usize = 4;
 /// Variance of rounding to whole millimetres, mm².
 const ROUNDING_MM2: f64 = 1.0 / 12.0;
 
@@ -123,10 +130,16 @@ pub fn fit_noise(
         let mean = |value: fn(&(f64, f64)) -> f64| points.iter().map(value).sum::<f64>() / n;
         (mean(|p| p.0.powi(-2)), mean(|p| p.1))
     };
+    // Rounding hides what is smaller than itself: such classes say nothing.
+    let least = if whole_mm { ROUNDING_MM2 } else { 0.0 };
     let classes: Vec<_> = measured
         .chunks(always.div_ceil(CLASSES))
         .map(class)
+        .filter(|(_, variance)| *variance > least)
         .collect();
+    if classes.len() < LEAST_CLASSES {
+        return Err(FitError::Quiet(classes.len()));
+    }
     let (floor2, unit2) = line(&classes);
     let fitted = |x: f64| (floor2 + unit2 * x).sqrt();
     let rows: Vec<[f64; 3]> = classes

@@ -302,6 +302,11 @@ fn the_noise_of_a_recording_is_found_again() {
         fit_noise(&camera, &frames[..2], true),
         Err(FitError::Frames(2))
     ));
+    let still = vec![frames[0].clone(); 3];
+    assert!(matches!(
+        fit_noise(&camera, &still, true),
+        Err(FitError::Quiet(0))
+    ));
     let small = vec![DepthImage::empty(3, 3); 3];
     assert!(matches!(
         fit_noise(&camera, &small, true),
