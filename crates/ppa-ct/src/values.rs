@@ -110,6 +110,13 @@ impl<'a> Values<'a> {
     }
 
     /// Whether int16 holds every value exactly.
+    #[cfg(any(
+        test,
+        feature = "dicom",
+        feature = "nifti",
+        feature = "nrrd",
+        feature = "metaimage"
+    ))]
     pub(crate) fn fit_i16(self) -> bool {
         match self {
             Self::I16(_) => true,
