@@ -70,7 +70,7 @@ impl NodeGrid {
         Interpolation {
             columns: axis(0, self.columns, detector.columns),
             rows: axis(1, self.rows, detector.rows),
-            nodes: self.columns,
+            nodes: [self.columns, self.rows],
         }
     }
 
@@ -84,7 +84,7 @@ impl NodeGrid {
         Interpolation {
             columns: axis(self.columns),
             rows: axis(self.rows),
-            nodes: self.columns,
+            nodes: [self.columns, self.rows],
         }
     }
 }
@@ -98,7 +98,8 @@ const LINEAR: usize = 2;
 pub(crate) struct Interpolation {
     columns: Vec<Stencil>,
     rows: Vec<Stencil>,
-    nodes: usize,
+    /// Nodes along each axis, also those that nothing in between is near to.
+    nodes: [usize; 2],
 }
 
 /// Neighbouring nodes and their weights.
@@ -139,12 +140,7 @@ impl Stencil {
 impl Interpolation {
     /// How much each node adds to the sum of all values in between.
     pub fn shares(&self) -> Vec<f64> {
-        let along = |stencils: &[Stencil]| {
-            let nodes = stencils
-                .iter()
-                .map(|s| s.first + s.length)
-                .max()
-                .unwrap_or(0);
+        let along = |stencils: &[Stencil], nodes: usize| {
             let mut sums = vec![0.0; nodes];
             for stencil in stencils {
                 for i in 0..stencil.length {
@@ -153,7 +149,8 @@ impl Interpolation {
             }
             sums
         };
-        let (columns, rows) = (along(&self.columns), along(&self.rows));
+        let columns = along(&self.columns, self.nodes[0]);
+        let rows = along(&self.rows, self.nodes[1]);
         rows.iter()
             .flat_map(|row| columns.iter().map(move |column| row * column))
             .collect()
@@ -162,7 +159,7 @@ impl Interpolation {
     /// Values in between.
     pub fn values(&self, nodes: &[f64]) -> Vec<f64> {
         let across: Vec<f64> = nodes
-            .chunks_exact(self.nodes)
+            .chunks_exact(self.nodes[0])
             .flat_map(|row| {
                 self.columns
                     .iter()
@@ -209,20 +206,24 @@ mod tests {
         }
     }
 
+    /// Also where the nodes are so close that no pixel is near to the outermost ones.
     #[test]
     fn shares_sum_up_what_the_pixels_get() {
         let detector = detector();
-        let grid = NodeGrid::new(&detector, 17.0);
-        let nodes: Vec<f64> = (0..grid.nodes()).map(|n| ((n * 7) % 11) as f64).collect();
-        let interpolation = grid.to_pixels(&detector);
-        let sum: f64 = interpolation.values(&nodes).iter().sum();
-        let shared: f64 = interpolation
-            .shares()
-            .iter()
-            .zip(&nodes)
-            .map(|(a, b)| a * b)
-            .sum();
-        assert!((sum / shared - 1.0).abs() < 1e-12);
+        for step_mm in [17.0, 0.5] {
+            let grid = NodeGrid::new(&detector, step_mm);
+            let nodes: Vec<f64> = (0..grid.nodes())
+                .map(|node| cubic(grid.place(node)))
+                .collect();
+            let interpolation = grid.to_pixels(&detector);
+            let sum: f64 = interpolation.values(&nodes).iter().sum();
+            let shares = interpolation.shares();
+            let shared: f64 = shares.iter().zip(&nodes).map(|(a, b)| a * b).sum();
+            assert!(
+                (sum / shared - 1.0).abs() < 1e-9,
+                "{step_mm} mm: {sum} {shared}"
+            );
+        }
     }
 
     /// A detector of one pixel, or one that is smaller than a step, has two nodes a side.
