@@ -221,8 +221,8 @@ impl FastSettings {
     /// Most histories that the noise of an image may stand for, if not infinitely many: a tube load of 3e7 mAs.
     const MOST_DOSE: f64 = 1e18;
 
-    /// Most histories for the scatter: their first collisions take about 3 GB.
-    const MOST_SCATTER: u64 = 1_000_000_000;
+    /// Most histories for the scatter: their first collisions take about 5 GB.
+    const MOST_SCATTER: u64 = 100_000_000;
 
     /// Most points for scatter before any are set closer; a point and those around it take about 2 kB.
     const MOST_NODES: f64 = 1e5;
@@ -244,7 +244,7 @@ impl FastSettings {
                 "the number of histories for the scatter",
                 self.scatter_histories as f64,
                 (1..=Self::MOST_SCATTER).contains(&self.scatter_histories),
-                "1 to 1e9",
+                "1 to 1e8",
             ),
             (
                 "the distance of the scatter points in mm",

@@ -333,7 +333,7 @@ fn settings_beyond_all_sense_are_refused() {
                 scatter_histories: u64::MAX,
                 ..usual
             },
-            "the number of histories for the scatter is 1.8446744073709552e19, expected 1 to 1e9",
+            "the number of histories for the scatter is 1.8446744073709552e19, expected 1 to 1e8",
         ),
         (
             FastSettings {
