@@ -64,6 +64,8 @@ pub(crate) fn primary_moments(
     let even = EVEN / (1.0 + 4.0 * shadow * shadow);
     let voxels_per_pixel = voxels_per_pixel(transport);
     let fine = voxels_per_pixel <= 0.5;
+    // An edge may cut off a corner that the five rays of an uncut pixel miss, and a part of the spot that the 20 rays of its
+    // quarters miss.
     let edge_cuts = if shadow > 0.0 { 2 } else { 1 };
     let sure_cuts = voxels_per_pixel.log2().ceil().max(0.0) as usize;
     rays.per_pixel(|pixel, scratch| {
@@ -84,7 +86,6 @@ pub(crate) fn primary_moments(
         let cut = Cut {
             rays: &rays,
             strips_mm: &strips_mm,
-            // An edge may cut off a corner that five points miss, and a part of the spot that twenty miss.
             sure: if worst > EDGE {
                 sure_cuts.max(edge_cuts)
             } else {
