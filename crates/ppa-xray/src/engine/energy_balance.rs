@@ -21,7 +21,6 @@ struct Balance {
     /// Emitted energy and what of it has been accounted for, keV.
     slots: Vec<Option<(f64, f64)>>,
     finished: u64,
-    deposited_kev: f64,
     worst: f64,
 }
 
@@ -42,7 +41,6 @@ impl Score for Balance {
     }
 
     fn deposit(&mut self, slot: usize, _voxel: usize, energy_kev: f64) {
-        self.deposited_kev += energy_kev;
         self.account(slot, energy_kev);
     }
 

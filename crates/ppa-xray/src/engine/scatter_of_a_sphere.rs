@@ -59,7 +59,7 @@ struct Scene {
     energy_kev: f64,
 }
 
-/// Energy per history, keV, and its standard error in rings by order of scattering.
+/// Energy per history, keV, and its standard error, ring by ring.
 type Rings = [(f64, f64); RINGS];
 
 impl Scene {
