@@ -157,7 +157,7 @@ fn doppler_width_of_water_is_that_of_its_profile() {
             quartile += step;
         }
         let line = at_rest(energy_kev, 0.5 - 0.5 * cos);
-        // |q|/E′ of dE′/dp = E′ |q| / (E D) in units of mc at the line, D = E/E′.
+        // dE′/dp = E′ q / E at the line, p along the momentum transfer q and in units of mₑc.
         let q = (energy_kev.powi(2) + line.powi(2) - 2.0 * energy_kev * line * cos).sqrt();
         let expected = 2.0 * quartile / ATOMIC_MOMENTA_PER_MC * line * q / energy_kev;
         let mut uniform = uniforms(3);
@@ -176,21 +176,22 @@ fn doppler_width_of_water_is_that_of_its_profile() {
     }
 }
 
-/// Impulse approximation against Klein–Nishina × S(q): nearly the same angles, since the total cross section is shared.
+/// Impulse approximation against Klein–Nishina × S(q): the same mean cosine to half a hundredth, and from 30° on the same density
+/// per solid angle to 4 %. At 10° they differ by up to 37 %, where both have next to nothing.
 #[test]
 fn both_models_have_nearly_the_same_angles() {
     println!(
         "material        keV     <cos>: impulse  S(q)    density ratio impulse/S(q) at 10, 30, 60, 90, 180 degrees"
     );
-    for (name, energy_kev, tolerance) in [
-        ("water", 15.0, 0.05),
-        ("water", 30.0, 0.03),
-        ("water", 60.0, 0.02),
-        ("water", 100.0, 0.02),
-        ("bone_cortical", 30.0, 0.03),
-        ("bone_cortical", 60.0, 0.02),
-        ("titanium", 60.0, 0.03),
-        ("lead", 100.0, 0.08),
+    for (name, energy_kev) in [
+        ("water", 15.0),
+        ("water", 30.0),
+        ("water", 60.0),
+        ("water", 100.0),
+        ("bone_cortical", 30.0),
+        ("bone_cortical", 60.0),
+        ("titanium", 60.0),
+        ("lead", 100.0),
     ] {
         let material = Material::named(name).unwrap();
         let [impulse, function] = [
@@ -214,8 +215,13 @@ fn both_models_have_nearly_the_same_angles() {
         let q = energy_kev / HC_KEV_ANGSTROM;
         println!("{name:<14} {energy_kev:>5}  {means:.4?}  {ratios:.3?}  q up to {q:.2}");
         assert!(
-            (means[0] - means[1]).abs() < tolerance,
+            (means[0] - means[1]).abs() < 5e-3,
             "{name} {energy_kev}: {means:?}"
+        );
+        let [_, beyond_30_degrees @ ..] = ratios;
+        assert!(
+            beyond_30_degrees.iter().all(|r| (r - 1.0).abs() < 0.04),
+            "{name} {energy_kev}: {ratios:?}"
         );
     }
 }
