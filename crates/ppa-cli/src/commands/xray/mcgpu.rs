@@ -119,10 +119,9 @@ impl McgpuArgs {
             working.set_message(which.clone());
             let (radiograph, left) = match self.engine {
                 EngineName::Analog => simulation.analog(station, length, |progress| {
-                    let seconds = progress
-                        .remaining
-                        .map_or(f64::NAN, |left| left.as_secs_f64());
-                    working.set_message(format!("{which}, {seconds:.0} s left"));
+                    if let Some(left) = progress.remaining {
+                        working.set_message(format!("{which}, {:.0} s left", left.as_secs_f64()));
+                    }
                 })?,
                 EngineName::Fast => self.fast(simulation, station, length)?,
             };
