@@ -94,7 +94,7 @@ mod tests {
         #[test]
         fn a_damaged_scan_is_followed_or_refused(damage in mangled::damage(), hurt in 0..3_usize) {
             let folder = tempfile::tempdir().unwrap();
-            // One or two injuries to one of the files: with more, few files are read.
+            // At most two injuries to one of the files: with more, few files are read.
             let damage = &damage[..damage.len().min(2)];
             let write = |index: usize, name: &str, text: &str| {
                 let path = folder.path().join(name);

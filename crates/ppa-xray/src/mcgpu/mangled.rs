@@ -22,7 +22,7 @@ pub(crate) enum Damage {
     Double(f64),
 }
 
-/// Up to six injuries.
+/// Up to five injuries.
 pub(crate) fn damage() -> impl Strategy<Value = Vec<Damage>> {
     let words = proptest::sample::select(&[
         "NaN",

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::matter::electron_shell::Shell;
+use crate::matter::electron_shell::{ATOMIC_MOMENTA_PER_MC, Shell};
 use crate::matter::material::Material;
 use crate::matter::photon_tables::PhotonTables;
 use crate::mcgpu::error::McgpuError;
@@ -15,17 +15,14 @@ const MOST_ENERGIES: usize = 200_000;
 /// Most nodes of the form factor and most shells.
 const MOST_NODES: usize = 10_000;
 
-/// 1/α: the profiles of PENELOPE are in units of 1/(mₑc), ours in atomic units.
-const INVERSE_FINE_STRUCTURE: f64 = 137.035_999_084;
-
 /// Squared momentum transfer, 1/Å², beyond that of any photon below 150 keV, which is (150 keV / hc)².
 const LARGEST_X: f64 = 146.5;
 
 /// Reads a material: mean free paths, squared molecular form factor, shells with their Compton profiles.
 ///
 /// The densities of the voxels scale the mean free paths; the one of the file is nominal. The form factor is the
-/// derivative of the rational inverse cumulative distribution that MC-GPU samples. The table that helps its search (ITL, ITU) and the largest cumulative probability of each
-/// energy follow from the rest and are read over.
+/// derivative of the rational inverse cumulative distribution that MC-GPU samples. The table that helps its search (ITL,
+/// ITU) and the largest cumulative probability of each energy follow from the rest and are read over.
 ///
 /// # Errors
 /// [`McgpuError`] naming line, what was found and what expected, and mean free paths that contradict their total.
@@ -140,7 +137,7 @@ impl MaterialFile {
                 Ok(Shell {
                     electrons,
                     binding_kev: binding_ev / 1000.0,
-                    profile_at_zero: profile / INVERSE_FINE_STRUCTURE,
+                    profile_at_zero: profile / ATOMIC_MOMENTA_PER_MC,
                 })
             })
             .collect()

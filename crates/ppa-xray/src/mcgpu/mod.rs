@@ -4,7 +4,7 @@
 //! detector, scan, doses; text or gzip. Paths resolve against the folder of the input file. A material line `ppa:NAME` stands
 //! for a material of this library ([`Material::named`](crate::Material::named)). Results have the layout of MC-GPU's.
 //!
-//! What is told apart from MC-GPU on purpose stands in `docs/physics.md`, section "Agreement with other codes".
+//! Where this is not what MC-GPU does, on purpose, stands in `docs/physics.md`, section "Agreement with other codes".
 
 mod analog;
 mod dose_file;
