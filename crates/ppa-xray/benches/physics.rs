@@ -20,12 +20,21 @@ fn tube() -> TubeSpec {
     }
 }
 
+/// Numbers from 0 to 1 that fill the interval evenly and jump about.
+fn golden(i: u64) -> f64 {
+    (i as f64 * 0.618_033_988_749_895).fract()
+}
+
+/// Energies of the spectrum in an order without order.
+fn energies_kev(spectrum: &Spectrum) -> Vec<f64> {
+    (0..LOOKUPS).map(|i| spectrum.sample(golden(i))).collect()
+}
+
 fn look_ups(criterion: &mut Criterion) {
     let bone = Material::named("bone_cortical").expect("in the library");
     let tables = MaterialTables::new(&bone, ComptonModel::default());
     let spectrum = Spectrum::tungsten(&tube()).expect("inside the tube model");
-    let golden = |i: u64| (i as f64 * 0.618_033_988_749_895).fract();
-    let energies: Vec<f64> = (0..LOOKUPS).map(|i| spectrum.sample(golden(i))).collect();
+    let energies = energies_kev(&spectrum);
 
     let mut group = criterion.benchmark_group("look_up");
     group.throughput(Throughput::Elements(LOOKUPS));
@@ -58,8 +67,7 @@ fn look_ups(criterion: &mut Criterion) {
 /// Scatterings per iteration, at the energies of the spectrum, with uniforms of a generator that costs about 1 ns.
 fn scattering(criterion: &mut Criterion) {
     let spectrum = Spectrum::tungsten(&tube()).expect("inside the tube model");
-    let golden = |i: u64| (i as f64 * 0.618_033_988_749_895).fract();
-    let energies: Vec<f64> = (0..LOOKUPS).map(|i| spectrum.sample(golden(i))).collect();
+    let energies = energies_kev(&spectrum);
     let mut state = 1_u64;
     let mut uniform = move || {
         // SplitMix64 (Steele, Lea, Flood 2014).

@@ -46,9 +46,9 @@ fn tables_for_transport_follow_the_material() {
         "csi",
         "gos",
         "lead",
-        "uranium",
+        "U",
     ] {
-        let material = Material::named(if name == "uranium" { "U" } else { name }).unwrap();
+        let material = Material::named(name).unwrap();
         let tables = MaterialTables::new(&material, ComptonModel::default());
         // K edges of Ti, I, Cs, Gd, Pb and U as xraylib's cross sections have them.
         let edges = [4.96600, 33.16996, 35.98653, 50.23664, 88.00069, 115.60101];

@@ -219,7 +219,7 @@ fn the_field_has_sharp_edges() {
     assert!((on_detector - expected).abs() < 4.0 * error); // 6e-5
 }
 
-/// Air kerma and fluence per mAs fall with the square of the distance; the field of a fan grows with it.
+/// The reading of the bare field per mAs falls with the square of the distance; the field of a fan grows with it.
 #[test]
 fn readings_per_mas_follow_the_inverse_square() {
     let spectrum = spectrum();

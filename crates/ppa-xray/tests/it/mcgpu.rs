@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Vector3};
-use ppa_xray::mcgpu::{Input, McgpuError, RunLength, ScanDose, Simulation, Station};
+use ppa_xray::mcgpu::{McgpuError, RunLength, ScanDose, Simulation, Station};
 use ppa_xray::{Category, Radiograph};
 use serde_json::Value;
 
@@ -372,7 +372,7 @@ fn case_a_from_its_input_file_agrees_with_mcgpu() {
     let path = folder.path().join("case_a.in");
     fs::write(&path, sections.text()).unwrap();
     let simulation = Simulation::read(path).unwrap();
-    let Input { run_length, .. } = *simulation.input();
+    let run_length = simulation.input().run_length;
     let station = simulation.input().stations()[0];
     let (image, dose) = simulation.analog(&station, run_length, |_| {}).unwrap();
     let text = fs::read_to_string(reference.join("case_a_mcgpu.json")).unwrap();
