@@ -158,7 +158,7 @@ pub enum ReadError {
     },
     /// Several slices in one place, as in a series with phases or without true positions.
     #[error(
-        "{}: {slices} slices share the position ({:.3}, {:.3}, {:.3}) mm; {total} slices lie in {positions} places",
+        "{}: {slices} slices share the position ({:.3}, {:.3}, {:.3}) mm; distinct positions of all {total}: {positions}",
         path.display(), position_mm[0], position_mm[1], position_mm[2]
     )]
     SamePosition {
