@@ -8,6 +8,7 @@ use crate::engine::attenuation_basis::{LANES, dot};
 use crate::engine::lines::Lines;
 use crate::engine::outlook::Site;
 use crate::engine::paths::Paths;
+use crate::engine::running_sums::Entry;
 use crate::philox::Philox;
 use crate::transport::attenuation::{CEILING_KEV, CUTOFF_KEV};
 use crate::transport::tracking::Transport;
@@ -211,14 +212,14 @@ impl CollisionMap {
         // Row by row, then cell by cell in the row, then along the ray.
         let [columns, rows, depths] = CELLS;
         let total = sums[sums.len() - 1];
-        let row = Step::find(sums, columns * depths, 0..rows, v * total);
-        let column = Step::find(
+        let row = Entry::find(sums, columns * depths, 0..rows, v * total);
+        let column = Entry::find(
             sums,
             depths,
             row.index * columns..(row.index + 1) * columns,
             row.low + u * row.size,
         );
-        let depth = Step::find(
+        let depth = Entry::find(
             sums,
             1,
             column.index * depths..(column.index + 1) * depths,
@@ -277,37 +278,4 @@ fn split(cell: usize) -> [usize; 3] {
         cell / (depths * columns),
         cell % depths,
     ]
-}
-
-/// An entry of running sums in strides.
-struct Step {
-    index: usize,
-    low: f64,
-    size: f64,
-    inside: f64,
-}
-
-impl Step {
-    /// The entry among `range` that holds `target`; entry i ends with the sum at (i + 1) · stride − 1.
-    #[inline]
-    fn find(sums: &[f64], stride: usize, range: std::ops::Range<usize>, target: f64) -> Self {
-        let end = |index: usize| sums[(index + 1) * stride - 1];
-        let (mut first, mut last) = (range.start, range.end - 1);
-        while first < last {
-            let middle = (first + last) / 2;
-            if end(middle) <= target {
-                first = middle + 1;
-            } else {
-                last = middle;
-            }
-        }
-        let low = if first == 0 { 0.0 } else { end(first - 1) };
-        let size = end(first) - low;
-        Self {
-            index: first,
-            low,
-            size,
-            inside: ((target - low) / size).clamp(0.0, 1.0),
-        }
-    }
 }

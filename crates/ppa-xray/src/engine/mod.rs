@@ -23,6 +23,7 @@ mod primary_rays;
 mod primary_signal;
 mod quasi_random;
 pub(crate) mod raytrace;
+mod running_sums;
 mod scatter_field;
 #[cfg(test)]
 mod scatter_of_a_sphere;
