@@ -9,7 +9,7 @@ use crate::run::tally_error::TallyError;
 impl AnalogTally {
     /// The tally of a whole run from the files of its parts, in any order; its bytes are those of a run in one part.
     ///
-    /// Holds two tallies in memory, whatever the number of files.
+    /// Holds two tallies and the bytes of one in memory, whatever the number of files.
     ///
     /// # Errors
     /// [`TallyError`] naming the file for a part that cannot be read, is unfinished or is of another run; the histories
