@@ -19,6 +19,16 @@ pub enum MetricError {
         /// Its length.
         second_count: usize,
     },
+    /// Too few of something.
+    #[error("{found} {what}, expected at least {expected}")]
+    TooFew {
+        /// Of what.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many it takes.
+        expected: usize,
+    },
     /// A value is infinite or NaN.
     #[error("{what} {index} is {found}, expected a finite number")]
     NotFinite {
@@ -29,8 +39,14 @@ pub enum MetricError {
         /// The value.
         found: f64,
     },
-    /// All values are the same, so they have no order that could correlate.
-    #[error("all {count} {what} are {value}: a rank correlation needs two different values")]
+    /// A grade below 0 where grades are compared by their ratio.
+    #[error("a grade is {found}, expected 0 or more: ratios need an absolute zero")]
+    BelowZero {
+        /// The lowest grade.
+        found: f64,
+    },
+    /// All values are the same, so there is nothing that could correlate.
+    #[error("all {count} {what} are {value}: a correlation needs two different values")]
     Constant {
         /// Which list.
         what: &'static str,

@@ -8,6 +8,8 @@
 //! [`pose_delta`] and [`pose_margin_accuracy`] rank one good against two bad poses ([`PoseTriple`]).
 //! [`sign_flip_permutation`] is the exact paired test on seeds.
 //!
+//! [`agreement`] says how far readers agree whose grades became the labels.
+//!
 //! Every function refuses empty, unequal, infinite or NaN input with a [`MetricError`]; none returns NaN.
 //!
 //! ```
@@ -29,6 +31,8 @@ mod poses;
 mod report;
 
 mod permutation;
+
+pub mod agreement;
 
 pub use diagnostic::{NON_DIAGNOSTIC, diagnostic_accuracy, sensitivity, specificity};
 pub use error::MetricError;

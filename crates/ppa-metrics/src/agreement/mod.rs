@@ -1,0 +1,15 @@
+//! How far readers agree: intraclass correlation, Krippendorff's α, weighted κ, bias of each reader, repeats.
+
+mod icc;
+mod kappa;
+mod krippendorff;
+mod ratings;
+mod readers;
+
+pub use icc::{Icc, IccForms, icc};
+pub use kappa::{KappaWeights, weighted_kappa};
+pub use krippendorff::{Measurement, krippendorff_alpha};
+pub use ratings::Ratings;
+pub use readers::{
+    Disagreement, ReaderError, RepeatAgreement, disagreements, reader_errors, repeat_agreement,
+};
