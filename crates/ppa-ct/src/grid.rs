@@ -9,13 +9,20 @@ pub enum GridError {
     /// At least one side has no voxels.
     #[error("a volume of {0:?} voxels is empty; every side needs at least one")]
     Empty([usize; 3]),
-    /// The affine has no inverse or holds NaN.
+    /// More voxels than the machine can count.
+    #[error("a volume of {0:?} voxels, expected at most {most} of them", most = usize::MAX)]
+    TooMany([usize; 3]),
+    /// The axes lie in a plane to rounding, or the affine or its inverse is not finite.
     #[error("the voxel-to-world affine is singular or not finite (determinant {determinant})")]
     Singular {
         /// Determinant of the 3x3 part, mm³.
         determinant: f64,
     },
 }
+
+/// Smallest volume of a voxel, as a share of the block with the same edges at right angles: what rounding
+/// leaves of axes in one plane is below it, the most sheared lattice in use far above.
+const LEAST_SHARE: f64 = 1e-6;
 
 /// A regular lattice of voxel centres in the `ct` frame (LPS, mm).
 ///
@@ -30,17 +37,25 @@ impl Grid {
     /// A lattice of `size` voxels (i, j, k) whose centres lie at `ct_from_voxel * (i, j, k)`.
     ///
     /// # Errors
-    /// [`GridError`] when a side is 0 or the affine is singular.
+    /// [`GridError`] when a side is 0, the voxels are too many to count or the affine is singular.
     pub fn new(size: [usize; 3], ct_from_voxel: Affine3<f64>) -> Result<Self, GridError> {
         if size.contains(&0) {
             return Err(GridError::Empty(size));
         }
-        let determinant = ct_from_voxel
-            .matrix()
-            .fixed_view::<3, 3>(0, 0)
-            .determinant();
-        let finite = ct_from_voxel.matrix().iter().all(|v| v.is_finite());
-        if !finite || determinant.abs() < 1e-12 {
+        let count = |n: usize, side: &usize| n.checked_mul(*side);
+        if size.iter().try_fold(1, count).is_none() {
+            return Err(GridError::TooMany(size));
+        }
+        let linear = ct_from_voxel.matrix().fixed_view::<3, 3>(0, 0);
+        let determinant = linear.determinant();
+        let block = linear
+            .column_iter()
+            .map(|axis| axis.norm())
+            .product::<f64>();
+        // False for NaN and for infinity over infinity.
+        let solid = determinant.abs() > LEAST_SHARE * block;
+        let finite = |affine: Affine3<f64>| affine.matrix().iter().all(|v| v.is_finite());
+        if !(solid && finite(ct_from_voxel) && ct_from_voxel.try_inverse().is_some_and(finite)) {
             return Err(GridError::Singular { determinant });
         }
         Ok(Self {
@@ -208,5 +223,46 @@ impl Grid {
             }
         }
         (high[0] > 0).then_some((low, high))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of_axes(axes: [[f64; 3]; 3]) -> Result<Grid, GridError> {
+        let axes = axes.map(Vector3::from);
+        let matrix = Matrix3::from_columns(&axes).to_homogeneous();
+        Grid::new([2, 2, 2], Affine3::from_matrix_unchecked(matrix))
+    }
+
+    /// Rounding leaves a determinant of axes in one plane, 1e200 mm overflow it, 1e-200 mm underflow it.
+    #[test]
+    fn axes_without_an_inverse_are_refused_whatever_their_length() {
+        let plane = [
+            [354.9, 864.5, 1219.4],
+            [691.6, 363.3, 1054.9],
+            [47.6, 717.5, 765.1],
+        ];
+        for scale in [1e200, 1e103, 1.0, 1e-3, 1e-200] {
+            let [large, flat] = [Matrix3::identity(), Matrix3::from(plane)]
+                .map(|m| of_axes(<[[f64; 3]; 3]>::from(m * scale)));
+            let refused = |grid| matches!(grid, Err(GridError::Singular { .. }));
+            assert!(refused(flat), "{scale}");
+            assert_eq!(refused(large), !(1e-9..=1e9).contains(&scale), "{scale}");
+        }
+        for bad in [f64::NAN, f64::INFINITY, 0.0] {
+            let grid = of_axes([[bad, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+            assert!(matches!(grid, Err(GridError::Singular { .. })), "{bad}");
+        }
+        // Micrometres, and the lean of a gantry far beyond any.
+        assert!(of_axes([[1e-5, 0.0, 0.0], [0.0, 1e-5, 0.0], [0.0, 1.0, 1e-4]]).is_ok());
+    }
+
+    #[test]
+    fn more_voxels_than_can_be_counted_are_refused() {
+        let side = 1 << (usize::BITS / 3 + 1);
+        let grid = Grid::axis_aligned([side; 3], Vector3::repeat(1.0), Point3::origin());
+        assert_eq!(grid, Err(GridError::TooMany([side; 3])));
     }
 }
