@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use crate::values::Values;
+use crate::values::{Values, with_room, zeros};
+use crate::volume::VolumeError;
 
 /// Where a Gaussian is cut off, in standard deviations.
 const REACH: f64 = 4.0;
@@ -22,14 +23,22 @@ pub(crate) fn sigma_voxels(step: f64) -> f64 {
 
 /// Values (i fastest) blurred by `sigma_voxels` along each axis; beyond the faces the volume is
 /// taken to be mirrored, which keeps its sum.
-pub(crate) fn low_pass(hu: Values, size: [usize; 3], sigma_voxels: [f64; 3]) -> Vec<f32> {
-    let mut values = hu.to_f32().into_owned();
+pub(crate) fn low_pass(
+    hu: Values,
+    size: [usize; 3],
+    sigma_voxels: [f64; 3],
+) -> Result<Vec<f32>, VolumeError> {
+    let mut values = with_room(hu.len())?;
+    values.extend(hu.iter());
     for (axis, sigma) in sigma_voxels.into_iter().enumerate() {
         if sigma > 0.0 && size[axis] > 1 {
-            values = along(&values, size, axis, &kernel(sigma));
+            // The mirrored volume repeats after twice its side: a Gaussian that wide leaves 5e-9 of its
+            // longest wave, 2 exp(-2 π² (σ / period)²), and a wider one is no other mean.
+            let sigma = sigma.min(2.0 * size[axis] as f64);
+            values = along(&values, size, axis, &kernel(sigma))?;
         }
     }
-    values
+    Ok(values)
 }
 
 /// Weights of a Gaussian at −reach..=reach, with sum 1.
@@ -41,48 +50,51 @@ fn kernel(sigma: f64) -> Vec<f64> {
     weights.into_iter().map(|w| w / sum).collect()
 }
 
-fn along(values: &[f32], [nx, ny, nz]: [usize; 3], axis: usize, kernel: &[f64]) -> Vec<f32> {
+fn along(
+    values: &[f32],
+    [nx, ny, nz]: [usize; 3],
+    axis: usize,
+    kernel: &[f64],
+) -> Result<Vec<f32>, VolumeError> {
     let count = [nx, ny, nz][axis];
-    let reach = kernel.len() / 2;
-    // Taps of each place: sources and weights, in fixed order.
-    let taps_of = |at: usize| {
-        let source = |n: usize| mirrored((at + n) as i64 - reach as i64, count);
-        let taps = kernel.iter().enumerate().map(|(n, &w)| (source(n), w));
-        taps.collect::<Vec<_>>()
-    };
-    let taps = (0..count).map(taps_of).collect::<Vec<_>>();
+    let reach = (kernel.len() / 2) as i64;
+    // Where the places from −reach to count + reach lie in the mirrored volume.
+    let sources = (-reach..count as i64 + reach).map(|at| mirrored(at, count));
+    let sources = sources.collect::<Vec<_>>();
     let row = |j: usize, k: usize| &values[nx * (j + ny * k)..][..nx];
-    let mut blurred = vec![0.0; values.len()];
+    let mut blurred = zeros(values.len())?;
     blurred
         .par_chunks_mut(nx)
         .enumerate()
         .for_each_init(Vec::new, |sums, (index, place)| {
             let (j, k) = (index % ny, index / ny);
-            sums.clear();
             if axis == 0 {
                 let source = row(j, k);
-                sums.extend(taps.iter().map(|taps| {
-                    let terms = taps.iter().map(|&(i, w)| w * f64::from(source[i]));
-                    terms.sum::<f64>()
-                }));
-            } else {
-                sums.resize(nx, 0.0);
-                for &(other, weight) in &taps[[0, j, k][axis]] {
-                    let source = if axis == 1 {
-                        row(other, k)
-                    } else {
-                        row(j, other)
-                    };
-                    for (sum, &value) in sums.iter_mut().zip(source) {
-                        *sum += weight * f64::from(value);
-                    }
+                sums.clear();
+                sums.extend(sources.iter().map(|&i| f64::from(source[i])));
+                for (place, near) in place.iter_mut().zip(sums.windows(kernel.len())) {
+                    let terms = kernel.iter().zip(near).map(|(w, value)| w * value);
+                    *place = terms.sum::<f64>() as f32;
+                }
+                return;
+            }
+            sums.clear();
+            sums.resize(nx, 0.0);
+            for (weight, &other) in kernel.iter().zip(&sources[[0, j, k][axis]..]) {
+                let source = if axis == 1 {
+                    row(other, k)
+                } else {
+                    row(j, other)
+                };
+                for (sum, &value) in sums.iter_mut().zip(source) {
+                    *sum += weight * f64::from(value);
                 }
             }
             for (place, &sum) in place.iter_mut().zip(sums.iter()) {
                 *place = sum as f32;
             }
         });
-    blurred
+    Ok(blurred)
 }
 
 /// The voxel that a place outside falls on when the volume is mirrored at its faces.

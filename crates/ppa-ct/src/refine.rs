@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::derived_grids::MOST_VOXELS;
 use crate::grid::Grid;
+use crate::values::{with_room, zeros};
 use crate::volume::{Volume, VolumeError};
 
 impl Volume {
@@ -16,7 +17,7 @@ impl Volume {
     ///
     /// # Errors
     /// [`VolumeError::Spacing`] unless `max_spacing_mm` is above 0, [`VolumeError::TooFine`] if it
-    /// makes more than 2^32 voxels.
+    /// makes more than 2^32 voxels, [`VolumeError::Memory`] if they do not fit.
     pub fn refined(&self, max_spacing_mm: f64) -> Result<Self, VolumeError> {
         if max_spacing_mm.is_nan() || max_spacing_mm <= 0.0 {
             return Err(VolumeError::Spacing(max_spacing_mm));
@@ -48,8 +49,10 @@ impl Volume {
             Matrix4::from_diagonal(&Vector4::new(scale[0], scale[1], scale[2], 1.0));
         let ct_from_fine = self.grid().ct_from_voxel().matrix() * coarse_from_fine;
         let grid = Grid::new(fine, Affine3::from_matrix_unchecked(ct_from_fine))?;
-        let axes = [0, 1, 2].map(|axis| weights(size[axis], fine[axis], scale[axis]));
-        let mut hu = vec![0.0; grid.len()];
+        let [along_i, along_j, along_k] =
+            [0, 1, 2].map(|axis| weights(size[axis], fine[axis], scale[axis]));
+        let axes = [along_i?, along_j?, along_k?];
+        let mut hu = zeros(grid.len())?;
         hu.par_chunks_mut(fine[0])
             .enumerate()
             .for_each(|(row, values)| {
@@ -71,14 +74,20 @@ impl Volume {
 }
 
 /// For each fine sample the two coarse ones around it and the weight of the second.
-fn weights(coarse: usize, fine: usize, scale: f64) -> Vec<(usize, usize, f32)> {
+fn weights(
+    coarse: usize,
+    fine: usize,
+    scale: f64,
+) -> Result<Vec<(usize, usize, f32)>, VolumeError> {
     let last = coarse - 1;
     let at = |n: usize| {
         let position = n as f64 * scale;
         let base = (position as usize).min(last);
         (base, (base + 1).min(last), (position - base as f64) as f32)
     };
-    (0..fine).map(at).collect()
+    let mut weights = with_room(fine)?;
+    weights.extend((0..fine).map(at));
+    Ok(weights)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::grid::Grid;
 use crate::low_pass::{low_pass, sigma_voxels};
-use crate::values::Values;
+use crate::values::{Values, zeros};
 use crate::volume::{Volume, VolumeError};
 
 /// How values between voxel centres follow from those around them.
@@ -49,7 +49,8 @@ impl Volume {
     /// [`Interpolation::Nearest`]. The result is the same for any number of threads.
     ///
     /// # Errors
-    /// [`VolumeError::NotFinite`] when `outside_hu` is needed and no number.
+    /// [`VolumeError::NotFinite`] when `outside_hu` is needed and no number, [`VolumeError::Memory`]
+    /// when the lattice has more voxels than fit.
     pub fn resampled_to(
         &self,
         grid: &Grid,
@@ -64,7 +65,7 @@ impl Volume {
         if how == Interpolation::Nearest || sigma == [0.0; 3] {
             return interpolated(self.values(), self.grid(), grid, how, outside_hu);
         }
-        let blurred = low_pass(self.values(), self.grid().size(), sigma);
+        let blurred = low_pass(self.values(), self.grid().size(), sigma)?;
         interpolated(Values::F32(&blurred), self.grid(), grid, how, outside_hu)
     }
 
@@ -106,7 +107,7 @@ fn interpolated(
         size: here.size(),
         outside_hu,
     };
-    let mut hu = vec![0.0; there.len()];
+    let mut hu = zeros(there.len())?;
     source.fill(&mut hu, there.size(), &here_from_there(here, there), how);
     Volume::new(there.clone(), hu)
 }

@@ -2,7 +2,7 @@
 
 use std::io::{self, Read, Write};
 
-use crate::values::{Values, Voxels};
+use crate::values::{Values, Voxels, with_room};
 
 /// Number types a CT may come in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,8 +72,10 @@ impl Stored {
     ///
     /// They are kept in 16 bits until one comes that these do not hold.
     pub(crate) fn read(&self, stream: &mut dyn Read, voxels: usize) -> io::Result<Voxels> {
+        // A file may promise more than memory holds.
+        let full = |error| io::Error::new(io::ErrorKind::OutOfMemory, error);
         let width = self.number.bytes();
-        let mut read = Voxels::I16(with_room(voxels)?);
+        let mut read = Voxels::I16(with_room(voxels).map_err(full)?);
         let mut bytes = Vec::with_capacity(voxels.min(CHUNK) * width);
         let mut hu = Vec::with_capacity(voxels.min(CHUNK));
         loop {
@@ -81,22 +83,39 @@ impl Stored {
             let wanted = CHUNK.min(left) * width;
             bytes.clear();
             stream.take(wanted as u64).read_to_end(&mut bytes)?;
-            hu.clear();
-            self.append(&bytes, &mut hu);
-            if let Voxels::I16(whole) = &read
-                && !Values::F32(&hu).fit_i16()
-            {
-                let mut all = with_room(voxels)?;
-                all.extend(whole.iter().map(|&v| f32::from(v)));
-                read = Voxels::F32(all);
-            }
-            match &mut read {
-                Voxels::I16(all) => all.extend(hu.iter().map(|&v| v as i16)),
-                Voxels::F32(all) => all.extend_from_slice(&hu),
+            if let (Voxels::I16(all), true) = (&mut read, self.is_whole_i16()) {
+                all.extend(bytes.as_chunks().0.iter().map(|b| self.i16(*b)));
+            } else {
+                hu.clear();
+                self.append(&bytes, &mut hu);
+                if let Voxels::I16(whole) = &read
+                    && !Values::F32(&hu).fit_i16()
+                {
+                    let mut all = with_room(voxels).map_err(full)?;
+                    all.extend(whole.iter().map(|&v| f32::from(v)));
+                    read = Voxels::F32(all);
+                }
+                match &mut read {
+                    Voxels::I16(all) => all.extend(hu.iter().map(|&v| v as i16)),
+                    Voxels::F32(all) => all.extend_from_slice(&hu),
+                }
             }
             if left <= CHUNK || bytes.len() < wanted {
                 return Ok(read);
             }
+        }
+    }
+
+    /// Whether the numbers are Hounsfield units of 16 bits as they stand.
+    fn is_whole_i16(&self) -> bool {
+        self.number == Number::I16 && self.slope == 1.0 && self.intercept == 0.0
+    }
+
+    fn i16(&self, bytes: [u8; 2]) -> i16 {
+        if self.big_endian {
+            i16::from_be_bytes(bytes)
+        } else {
+            i16::from_le_bytes(bytes)
         }
     }
 
@@ -138,17 +157,6 @@ impl Stored {
                 .map(|b| (slope * number(*b) + intercept) as f32),
         );
     }
-}
-
-/// An empty vector with room for `count` values.
-///
-/// A file may promise more than memory holds: an error, where a failed allocation would end the program.
-fn with_room<T>(count: usize) -> io::Result<Vec<T>> {
-    let mut values = Vec::new();
-    values
-        .try_reserve_exact(count)
-        .map_err(|_| io::ErrorKind::OutOfMemory)?;
-    Ok(values)
 }
 
 /// Writes values exactly and little-endian: as int16 where that holds them, else as float32.

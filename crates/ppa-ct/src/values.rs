@@ -5,6 +5,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use crate::volume::VolumeError;
+
 /// Hounsfield units, i fastest, in the type that a [`Volume`](crate::Volume) keeps them in.
 ///
 /// CT numbers are whole in nearly every scan. Readers then keep them in 16 bits, which is half of the
@@ -140,6 +142,22 @@ impl PartialEq for Values<'_> {
             (a, b) => a.iter().eq(b.iter()),
         }
     }
+}
+
+/// An empty vector with room for `voxels` values; an error where a failed allocation would end the program.
+pub(crate) fn with_room<T>(voxels: usize) -> Result<Vec<T>, VolumeError> {
+    let mut values = Vec::new();
+    match values.try_reserve_exact(voxels) {
+        Ok(()) => Ok(values),
+        Err(_) => Err(VolumeError::Memory { voxels }),
+    }
+}
+
+/// `voxels` zeros to be overwritten.
+pub(crate) fn zeros<T: Clone + Default>(voxels: usize) -> Result<Vec<T>, VolumeError> {
+    // Asked for and given back: `vec!` cannot fail, but takes pages that are zero without writing them.
+    drop(with_room::<T>(voxels)?);
+    Ok(vec![T::default(); voxels])
 }
 
 /// Values that a volume owns.

@@ -46,6 +46,22 @@ pub enum VolumeError {
         /// The volume's side along that axis, mm.
         side_mm: f64,
     },
+    /// A box whose ends are the wrong way round, or no numbers.
+    #[error("a box from {from_mm} to {to_mm} mm along {axis}, expected the smaller end first")]
+    Reversed {
+        /// `x`, `y` or `z`.
+        axis: char,
+        /// First end, LPS.
+        from_mm: f64,
+        /// Second end, LPS.
+        to_mm: f64,
+    },
+    /// More voxels than there is memory for.
+    #[error("no memory for {voxels} voxels")]
+    Memory {
+        /// Voxels asked for.
+        voxels: usize,
+    },
     /// A value is NaN or infinite.
     #[error("voxel {0:?} holds a value that is not a number")]
     NotFinite([usize; 3]),
@@ -170,8 +186,20 @@ impl Volume {
     /// `min..=max` (LPS, mm).
     ///
     /// # Errors
-    /// [`VolumeError::Grid`] when no centre lies in the box.
+    /// [`VolumeError::Reversed`] unless `min` ≤ `max` along every axis, [`VolumeError::Grid`] when no
+    /// centre lies in the box.
     pub fn crop_world(&self, min: &Point3<f64>, max: &Point3<f64>) -> Result<Self, VolumeError> {
+        for (n, axis) in ['x', 'y', 'z'].into_iter().enumerate() {
+            let [from_mm, to_mm] = [min[n], max[n]];
+            let in_order = from_mm <= to_mm;
+            if !in_order {
+                return Err(VolumeError::Reversed {
+                    axis,
+                    from_mm,
+                    to_mm,
+                });
+            }
+        }
         let (low, high) = self
             .grid
             .block_inside(min, max)
@@ -300,5 +328,23 @@ mod tests {
             assert!((volume.sample(&p).unwrap() - ramp(&p)).abs() < 1e-6);
         }
         assert_eq!(volume.sample(&Point3::new(1.51, 0.0, 0.0)), None);
+    }
+
+    #[test]
+    fn a_box_from_the_larger_end_to_the_smaller_is_refused() {
+        let grid = Grid::axis_aligned([4, 5, 6], Vector3::repeat(1.0), Point3::origin());
+        let volume = Volume::new(grid.unwrap(), vec![0.0; 120]).unwrap();
+        let crop = |z: [f64; 2]| {
+            let [min, max] = z.map(|z| Point3::new(1.0, 1.0, z));
+            volume.crop_world(&min, &max)
+        };
+        assert!(crop([2.0, 2.0]).is_ok());
+        for z in [[3.0, 2.0], [f64::NAN, 2.0], [2.0, f64::NAN]] {
+            let refused = crop(z);
+            assert!(
+                matches!(refused, Err(VolumeError::Reversed { axis: 'z', .. })),
+                "{z:?}"
+            );
+        }
     }
 }

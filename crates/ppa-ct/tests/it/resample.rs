@@ -291,3 +291,28 @@ fn spacings_that_are_none_are_refused() {
     assert_eq!(one.grid().size(), [1; 3]);
     assert!((one.grid().origin_mm() - volume.grid().centre([1.5; 3])).norm() < 1e-9);
 }
+
+/// A low-pass as wide as the volume leaves its mean, however wide.
+#[test]
+fn a_lattice_coarser_than_the_volume_sees_its_mean() {
+    let grid = upright_grid([4000, 2, 1], [0.5, 1.0, 1.0]);
+    let first_quarter = |p: &Point3<f64>| if p.x < 493.0 { 1000.0 } else { -1000.0 };
+    let volume = sampled(&grid, first_quarter);
+    let middle = grid.centre([1999.5, 0.5, 0.0]);
+    for spacing_mm in [1e5, 1e9, 1e18] {
+        let coarse = Grid::axis_aligned([1, 1, 1], Vector3::repeat(spacing_mm), middle).unwrap();
+        let mean = volume
+            .resampled_to(&coarse, Linear, 0.0)
+            .unwrap()
+            .at([0; 3]);
+        assert!((mean + 500.0).abs() < 0.01, "{spacing_mm}: {mean}");
+    }
+}
+
+#[test]
+fn voxels_that_no_memory_holds_are_an_error() {
+    let volume = sampled(&upright_grid([3, 3, 3], [1.0; 3]), |p| p.x);
+    let endless = upright_grid([1 << 20; 3], [1e-6; 3]);
+    let refused = volume.resampled_to(&endless, Linear, 0.0);
+    assert_eq!(refused, Err(VolumeError::Memory { voxels: 1 << 60 }));
+}
