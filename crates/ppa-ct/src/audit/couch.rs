@@ -1,5 +1,8 @@
 //! Is there a couch, and is it where the patient's position says?
 
+use std::iter;
+use std::ops::Range;
+
 use super::findings::{Finding, FindingCode, Severity};
 use super::survey::Survey;
 
@@ -23,44 +26,62 @@ pub(super) struct Couch {
     path: Vec<(usize, f64)>,
 }
 
-/// Thin places from column to column.
-type Chain = Vec<(usize, f64)>;
+/// A thin place that goes on one of an earlier column.
+struct Link {
+    x: usize,
+    y: f64,
+    before: Option<usize>,
+    /// Column in which the chain of links up to here begins, and how many they are.
+    start: usize,
+    count: usize,
+}
 
 /// The widest thin plate, if it is wide enough for a couch; `thick` are the blocks of thick things.
 pub(super) fn find(survey: &Survey, thick: &[bool]) -> Option<Couch> {
     let [dx, dy, _] = survey.spacing_mm;
     // A curved couch rises by less than three quarters of its way sideways.
     let rise = 0.75 * dx / dy + 1.0;
-    let width = |chain: &Chain| chain[chain.len() - 1].0 - chain[0].0 + 1;
-    let mut open = Vec::<Chain>::new();
-    let mut widest = Chain::new();
+    // By column, then by y.
+    let mut links = Vec::<Link>::new();
+    let mut columns = Vec::<Range<usize>>::new();
+    let mut widest = None;
     for x in 0..survey.size[0] {
-        let mut here = Vec::new();
+        let first = links.len();
         for y in thin_places(survey, x) {
-            let near = open
-                .iter()
-                .filter(|chain| (chain[chain.len() - 1].1 - y).abs() <= rise);
-            let mut chain = near
-                .max_by_key(|chain| chain.len())
-                .cloned()
-                .unwrap_or_default();
-            chain.push((x, y));
-            if widest.is_empty() || width(&chain) > width(&widest) {
-                widest.clone_from(&chain);
+            let near = columns[x.saturating_sub(HOLE)..].iter().flat_map(|column| {
+                let low = links[column.clone()].partition_point(|l| l.y < y - rise);
+                let open = (column.start + low..column.end).zip(&links[column.start + low..]);
+                open.take_while(|(_, link)| link.y <= y + rise)
+            });
+            let before = near.max_by_key(|(_, link)| link.count);
+            let link = Link {
+                x,
+                y,
+                before: before.map(|(index, _)| index),
+                start: before.map_or(x, |(_, link)| link.start),
+                count: before.map_or(1, |(_, link)| link.count + 1),
+            };
+            let width = x - link.start + 1;
+            if widest.is_none_or(|(_, most)| width > most) {
+                widest = Some((links.len(), width));
             }
-            here.push(chain);
+            links.push(link);
         }
-        open.retain(|chain| x - chain[chain.len() - 1].0 < HOLE);
-        open.extend(here);
+        columns.push(first..links.len());
     }
-    if widest.is_empty() || (width(&widest) as f64) * dx < LEAST_WIDTH_MM {
+    let (last, width) = widest?;
+    let width_mm = width as f64 * dx;
+    if width_mm < LEAST_WIDTH_MM {
         return None;
     }
-    let mean_y = widest.iter().map(|(_, y)| y).sum::<f64>() / widest.len() as f64;
+    let chain = iter::successors(Some(&links[last]), |link| Some(&links[link.before?]));
+    let mut path = chain.map(|link| (link.x, link.y)).collect::<Vec<_>>();
+    path.reverse();
+    let mean_y = path.iter().map(|(_, y)| y).sum::<f64>() / path.len() as f64;
     Some(Couch {
-        width_mm: width(&widest) as f64 * dx,
+        width_mm,
         behind: middle_y(survey, thick).is_none_or(|middle| mean_y > middle),
-        path: widest,
+        path,
     })
 }
 

@@ -18,6 +18,8 @@ pub(super) struct Histogram {
     pub max: f32,
     pub at_min: u64,
     pub at_max: u64,
+    /// Voxels less than 10.5 HU below the highest, itself left out.
+    pub near_max: u64,
 }
 
 impl Histogram {
@@ -26,11 +28,12 @@ impl Histogram {
         let bins = (HIGH - LOW + 1) as usize;
         // Whole numbers: the sum is the same in any order.
         let parts = hu.par_parts(1 << 20).map(|values| {
-            let mut counts = vec![0_u64; bins + 2];
+            let mut counts = vec![0_u64; bins + 3];
             let mut count = |bin: usize, value: f32| {
                 counts[bin] += 1;
                 counts[bins] += u64::from(value == min);
                 counts[bins + 1] += u64::from(value == max);
+                counts[bins + 2] += u64::from(value > max - 10.5 && value < max);
             };
             match values {
                 Values::I16(values) => {
@@ -45,8 +48,8 @@ impl Histogram {
             a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
             a
         };
-        let mut counts = parts.reduce(|| vec![0; bins + 2], add);
-        let (at_max, at_min) = (counts[bins + 1], counts[bins]);
+        let mut counts = parts.reduce(|| vec![0; bins + 3], add);
+        let (near_max, at_max, at_min) = (counts[bins + 2], counts[bins + 1], counts[bins]);
         counts.truncate(bins);
         Self {
             counts,
@@ -55,6 +58,7 @@ impl Histogram {
             max,
             at_min,
             at_max,
+            near_max,
         }
     }
 

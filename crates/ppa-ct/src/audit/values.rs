@@ -138,7 +138,7 @@ fn clipping(histogram: &Histogram, acquisition: &Acquisition) -> Vec<Finding> {
     let at_limit = acquisition
         .representable_hu
         .is_some_and(|[_, high]| f64::from(max) > high - 0.5);
-    let tail = histogram.between(max - 10.0, max - 1.0) as f64 / 10.0;
+    let tail = histogram.near_max as f64 / 10.0;
     let piled_up = histogram.at_max >= 20 && histogram.at_max as f64 > 5.0 * tail;
     // Below bone nothing is lost that a radiograph would show.
     if max > BONE_HU && (at_limit || piled_up) {

@@ -210,6 +210,26 @@ fn a_couch_is_found_where_it_is() {
     );
 }
 
+/// A copy of the chain at every column would take minutes here.
+#[test]
+fn the_couch_is_looked_for_in_time_that_grows_with_the_image() {
+    let grid = Grid::axis_aligned(
+        [200_000, 3, 1],
+        Vector3::new(2.0, 2.0, 2.0),
+        Point3::origin(),
+    );
+    let row = [-1000.0_f32, 100.0, -1000.0];
+    let hu = row
+        .into_iter()
+        .flat_map(|hu| std::iter::repeat_n(hu, 200_000))
+        .collect();
+    let mut scan = Leg::default().scan();
+    scan.volume = Volume::new(grid.unwrap(), hu).unwrap();
+    let start = std::time::Instant::now();
+    assert_eq!(Audit::of(&scan).measures.couch_mm, Some(400_000.0));
+    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
+}
+
 #[test]
 fn values_that_are_not_hounsfield_units_are_told() {
     let first = |change: fn(f32) -> f32| {
@@ -275,6 +295,28 @@ fn clipping_metal_and_padding_are_told() {
         ..stated(|a| a.representable_hu = Some([-1024.0, 3071.0]))
     };
     assert!(twelve_bit.codes().contains(&ClippedAbove));
+    // Metal beyond 12 bits, cut at 11 600 HU and as it is.
+    let beyond: [(fn(f32) -> f32, bool); 2] = [
+        (
+            |hu| {
+                if hu > 2000.0 {
+                    (4.0 * hu).min(11_600.0)
+                } else {
+                    hu
+                }
+            },
+            true,
+        ),
+        (|hu| if hu > 2000.0 { 4.0 * hu } else { hu }, false),
+    ];
+    for (change, expected) in beyond {
+        let metal = Leg {
+            plate_hu: 2900.0,
+            change,
+            ..Leg::default()
+        };
+        assert_eq!(metal.codes().contains(&ClippedAbove), expected);
+    }
     let cut_below = Leg {
         change: |hu| hu.max(-880.0),
         ..Leg::default()
