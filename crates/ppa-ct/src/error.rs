@@ -252,6 +252,14 @@ pub enum WriteError {
         /// Names that can be written.
         expected: &'static str,
     },
+    /// A name that the header of the format cannot hold.
+    #[error("cannot write {}: expected a name {expected}", path.display())]
+    Name {
+        /// The name given.
+        path: PathBuf,
+        /// Which names can be written.
+        expected: &'static str,
+    },
     /// A DICOM CT was asked for, and the source says that the scan is none.
     #[error("{} would be a DICOM CT in Hounsfield units, but the scan holds {found}: write NIfTI, NRRD or MetaImage", path.display())]
     NotCt {

@@ -6,7 +6,7 @@ use crate::error::WriteError;
 use crate::scan::Scan;
 use crate::volume::Volume;
 
-/// Writes a volume: NIfTI (`.nii`, `.nii.gz`), NRRD (`.nrrd`), MetaImage (`.mha`, `.mhd` with a `.zraw`), or a
+/// Writes a volume: NIfTI (`.nii`, `.nii.gz`), NRRD (`.nrrd`), MetaImage (`.mha`, `.mhd` and a `.zraw`), or a
 /// folder of DICOM slices, which is a name without an extension, one that ends in a slash, or an empty folder.
 ///
 /// ```

@@ -266,6 +266,13 @@ impl Header {
     }
 }
 
+/// Whether readers take this for the name of one data file, and for this name: MetaIO, which ITK reads with, takes
+/// whatever begins with LIST for a list, and blanks at the ends are dropped.
+pub(super) fn is_data_file(name: &str) -> bool {
+    let special = |c: char| c == '%' || c == '\\' || c.is_control();
+    name.trim() == name && !name.starts_with("LIST") && !name.contains(special)
+}
+
 /// `N` numbers parted by blanks.
 fn numbers<const N: usize>(key: &str, text: &str) -> Result<[f64; N], String> {
     let found = text.split_whitespace().map(|n| n.parse().ok());

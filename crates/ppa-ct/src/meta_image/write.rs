@@ -1,12 +1,15 @@
 //! Writing MetaImage.
 
+use std::fs;
 use std::io::{self, Seek, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use flate2::Compression;
 use flate2::write::ZlibEncoder;
+use flate2::{Compression, CrcWriter};
 
+use super::header::{Data, Header, is_data_file};
 use crate::error::WriteError;
+use crate::scan_file::ScanFile;
 use crate::stored::write_exact;
 use crate::volume::Volume;
 use crate::whole_file::write_whole;
@@ -14,48 +17,92 @@ use crate::whole_file::write_whole;
 /// Writes a volume as `.mha`, or as `.mhd` with its voxels in a `.zraw` beside it.
 ///
 /// Voxels are deflated; whole numbers that fit are stored as int16, anything else as float32. The
-/// affine may be sheared. Each file appears whole or not at all, the `.mhd` last, and their bytes
-/// depend on the volume and the file name only.
+/// affine may be sheared. A file appears whole or not at all, and its bytes depend on the volume and
+/// the file name only. The data file of `leg.mhd` is called `leg.<checksum of the voxels>.zraw`: the
+/// pair that stood there before, if any, stays readable until the new header takes its place, and
+/// then its data file is removed.
 ///
 /// # Errors
-/// [`WriteError`] for another extension and a file system that refuses.
+/// [`WriteError`] for another extension, a name that the header cannot hold, and a file system that refuses.
 pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     let extension = path.extension().unwrap_or_default();
-    let io = |path: &Path| {
-        let path = path.to_owned();
-        move |source| WriteError::Io { path, source }
-    };
-    // The data file's name goes into the header, which is text.
-    let data = path.with_extension("zraw");
-    let data_name = data.file_name().and_then(|name| name.to_str());
-    match data_name {
-        _ if extension.eq_ignore_ascii_case("mha") => write_whole(path, |out| {
+    if extension.eq_ignore_ascii_case("mha") {
+        write_whole(path, |out| {
             // The header tells the packed length, which is known last: it is written again, no longer.
             out.write_all(header(volume, 0, "LOCAL").as_bytes())?;
             let packed = write_packed(out, volume)?;
             out.rewind()?;
             out.write_all(header(volume, packed, "LOCAL").as_bytes())
         })
-        .map_err(io(path)),
-        Some(name) if extension.eq_ignore_ascii_case("mhd") => {
-            let mut packed = 0;
-            write_whole(&data, |out| {
-                packed = write_packed(out, volume)?;
-                Ok(())
-            })
-            .map_err(io(&data))?;
-            let header = header(volume, packed, name);
-            write_whole(path, |out| out.write_all(header.as_bytes())).map_err(|source| {
-                // Voxels without a header are of no use; the first failure is the one to report.
-                let _ = std::fs::remove_file(&data);
-                io(path)(source)
-            })
-        }
-        _ => Err(WriteError::Extension {
+        .map_err(io_at(path))
+    } else if extension.eq_ignore_ascii_case("mhd") {
+        write_pair(path, volume)
+    } else {
+        Err(WriteError::Extension {
             path: path.to_owned(),
             expected: "a name ending in .mha or .mhd",
-        }),
+        })
     }
+}
+
+fn io_at(path: &Path) -> impl FnOnce(io::Error) -> WriteError {
+    let path = path.to_owned();
+    move |source| WriteError::Io { path, source }
+}
+
+fn write_pair(path: &Path, volume: &Volume) -> Result<(), WriteError> {
+    let stem = path.file_stem().and_then(|stem| stem.to_str());
+    let name = |stem| Ok(format!("{stem}.{:08x}.zraw", checksum(volume)?));
+    let name = stem.map(name).transpose().map_err(io_at(path))?;
+    let name = name.filter(|name| is_data_file(name));
+    let Some(name) = name else {
+        return Err(WriteError::Name {
+            path: path.to_owned(),
+            expected: "in Unicode without a leading blank, LIST at its start, %, backslashes and control characters, \
+                       which the header of a .mhd cannot hold",
+        });
+    };
+    let data = path.with_file_name(&name);
+    let before = data_file_before(path);
+    let mut packed = 0;
+    write_whole(&data, |out| {
+        packed = write_packed(out, volume)?;
+        Ok(())
+    })
+    .map_err(io_at(&data))?;
+    let header = header(volume, packed, &name);
+    let written = write_whole(path, |out| out.write_all(header.as_bytes()));
+    // Voxels without a header are of no use; whether they can be removed matters less than what was asked for.
+    let unused = match &written {
+        Ok(()) => before.filter(|before| *before != data),
+        Err(_) => Some(data).filter(|data| before.as_ref() != Some(data)),
+    };
+    if let Some(unused) = unused {
+        let _ = fs::remove_file(unused);
+    }
+    written.map_err(io_at(path))
+}
+
+/// The data file of the pair that has this header, if its name is like ours: others may be shared.
+fn data_file_before(path: &Path) -> Option<PathBuf> {
+    let header = Header::read(&mut ScanFile::open(path).ok()?).ok()?;
+    let Ok(Data::Beside(name)) = header.data() else {
+        return None;
+    };
+    let stem = path.file_stem()?.to_str()?;
+    let sum = name
+        .strip_prefix(stem)?
+        .strip_prefix('.')?
+        .strip_suffix(".zraw")?;
+    let ours = sum.len() == 8 && sum.chars().all(|c| c.is_ascii_hexdigit());
+    ours.then(|| path.with_file_name(name))
+}
+
+/// CRC-32 of the voxels as they are written.
+fn checksum(volume: &Volume) -> io::Result<u32> {
+    let mut sum = CrcWriter::new(io::sink());
+    write_exact(&mut sum, volume.values())?;
+    Ok(sum.crc().sum())
 }
 
 /// Writes the deflated voxels and tells how many bytes they are.
