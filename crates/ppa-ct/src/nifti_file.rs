@@ -35,7 +35,8 @@ pub(crate) fn read(path: &Path) -> Result<Scan, ReadError> {
     let grid = file.grid(size, ct_from_voxel)?;
     let stored = stored(&header).map_err(|p| file.header(p))?;
     let gap = gap(&header).map_err(|p| file.header(p))?;
-    file.skip(gap)?;
+    // Header extensions: comments, DICOM elements, whatever a program likes to keep.
+    let extended = file.skip_filled(gap)?;
     let hu = file.voxels(&stored, size)?;
     let warning = (!oriented).then(|| {
         scan_file::no_orientation(
@@ -45,7 +46,10 @@ pub(crate) fn read(path: &Path) -> Result<Scan, ReadError> {
     });
     let acquisition = Acquisition {
         representable_hu: stored.representable_hu(),
-        identifiers: free_text(&header),
+        identifiers: free_text(&header)
+            .into_iter()
+            .chain(extended.then_some("header extensions"))
+            .collect(),
         ..Acquisition::default()
     };
     scan_file::scan(path, grid, hu, None, acquisition, warning)

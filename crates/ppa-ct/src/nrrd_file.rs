@@ -49,7 +49,7 @@ pub(crate) fn read(path: &Path) -> Result<Scan, ReadError> {
         }
     }
     let hu = data.voxels(&stored, size)?;
-    let warning = place.doubt.map(scan_file::no_orientation);
+    let warning = place.doubt.as_deref().map(scan_file::no_orientation);
     let acquisition = Acquisition {
         representable_hu: stored.representable_hu(),
         identifiers: header.free_text(),

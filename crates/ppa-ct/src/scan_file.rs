@@ -1,7 +1,8 @@
 //! A file that holds a scan: its bytes from the first to the last, and errors that name it.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read};
+use std::io::{self, BufRead, BufReader, Cursor, Read};
+use std::mem;
 use std::path::{Component, Path, PathBuf};
 
 use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
@@ -102,12 +103,13 @@ impl ScanFile {
 
     /// Whether the next bytes are these; nothing is consumed.
     pub(crate) fn next_is(&mut self, bytes: &[u8]) -> Result<bool, ReadError> {
-        let Self { path, stream, .. } = self;
-        let next = stream.fill_buf().map_err(|source| ReadError::Io {
-            path: path.clone(),
-            source,
-        })?;
-        Ok(next.starts_with(bytes))
+        // What is buffered may be a single byte: the bytes are taken out and put in front again.
+        let next = self.bytes(bytes.len())?;
+        let found = next == bytes;
+        self.most += next.len() as u64;
+        let rest = mem::replace(&mut self.stream, Box::new(io::empty()));
+        self.stream = Box::new(Cursor::new(next).chain(rest));
+        Ok(found)
     }
 
     /// Up to `count` bytes, fewer where the file ends.
@@ -137,6 +139,20 @@ impl ScanFile {
         io::copy(&mut (&mut self.stream).take(count), &mut io::sink()).map_err(|e| self.io(e))?;
         self.most = self.most.saturating_sub(count);
         Ok(())
+    }
+
+    /// Leaves out `count` bytes; tells whether any of them is not 0.
+    pub(crate) fn skip_filled(&mut self, count: u64) -> Result<bool, ReadError> {
+        let (mut left, mut filled) = (count, false);
+        while left > 0 {
+            let bytes = self.bytes(left.min(LINE_BYTES) as usize)?;
+            if bytes.is_empty() {
+                break;
+            }
+            filled |= bytes.iter().any(|byte| *byte != 0);
+            left -= bytes.len() as u64;
+        }
+        Ok(filled)
     }
 
     /// Leaves out all but the last `count` bytes of a file that is not packed.

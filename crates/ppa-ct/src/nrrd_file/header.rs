@@ -46,6 +46,13 @@ const IRRELEVANT: &[&str] = &[
     "measurementframe",
 ];
 
+/// Comments that teem, ITK and others write into every header.
+const COMMON_COMMENTS: &[&str] = &[
+    "",
+    "Complete NRRD file format specification at:",
+    "http://teem.sourceforge.net/nrrd/format.html",
+];
+
 /// Longest header read, lines.
 const MOST_LINES: usize = 10_000;
 
@@ -95,7 +102,10 @@ impl Header {
 
     /// One line. Messages leave its words out: they may be about a person.
     fn take(&mut self, line: &str) -> Result<(), &'static str> {
-        if line.starts_with('#') {
+        if let Some(comment) = line.strip_prefix('#') {
+            if !COMMON_COMMENTS.contains(&comment.trim()) {
+                self.free_text.insert("comments");
+            }
             return Ok(());
         }
         let Some((field, value)) = line.split_once(':') else {

@@ -8,11 +8,9 @@ use super::header::Header;
 pub(super) struct Place {
     pub(super) ct_from_voxel: Affine3<f64>,
     /// What the header leaves open.
-    pub(super) doubt: Option<&'static str>,
+    pub(super) doubt: Option<String>,
 }
 
-const NO_ORIENTATION: &str = "the header does not say how its axes lie in the patient: they are assumed to \
-    run to the left, posterior and superior, so left and right may be swapped";
 const NO_POSITION: &str = "the header gives no position: the first voxel is put at the origin";
 
 impl Place {
@@ -31,12 +29,13 @@ impl Place {
             Some(text) => columns.extend(vectors(text, 1, "space origin")?),
             None => columns.push(Vector3::zeros()),
         }
+        let signs = lps_from_space.unwrap_or(Vector4::repeat(1.0));
         let doubt = match (lps_from_space, directions, origin) {
             (Some(_), Some(_), Some(_)) => None,
-            (Some(_), Some(_), None) => Some(NO_POSITION),
-            _ => Some(NO_ORIENTATION),
+            (Some(_), Some(_), None) => Some(NO_POSITION.to_owned()),
+            _ => Some(no_orientation(signs)),
         };
-        let flip = Matrix4::from_diagonal(&lps_from_space.unwrap_or(Vector4::repeat(1.0)));
+        let flip = Matrix4::from_diagonal(&signs);
         let mut matrix = Matrix4::identity();
         for (column, vector) in columns.iter().enumerate() {
             matrix
@@ -48,6 +47,23 @@ impl Place {
             doubt,
         })
     }
+}
+
+fn no_orientation(lps_from_space: Vector4<f64>) -> String {
+    let x = if lps_from_space.x < 0.0 {
+        "right"
+    } else {
+        "left"
+    };
+    let y = if lps_from_space.y < 0.0 {
+        "anterior"
+    } else {
+        "posterior"
+    };
+    format!(
+        "the header does not say how its axes lie in the patient: they are assumed to run to the {x}, {y} and \
+         superior, so left and right may be swapped"
+    )
 }
 
 /// Signs that turn the axes of the header's space into LPS; `None` for a space that is not the patient's.

@@ -136,6 +136,24 @@ fn raw_packed_local_and_beside_are_one() {
     }
 }
 
+/// Whatever of the voxels the buffer holds when their packing is looked at.
+#[test]
+fn packed_voxels_are_known_wherever_the_header_ends() {
+    let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
+    gzip.write_all(&voxels()).unwrap();
+    let gzip = gzip.finish().unwrap();
+    let bare = ["CompressedData = True", "Comment = "];
+    let length = header(&bare, "LOCAL").len();
+    for end in 8190..8194 {
+        let comment = format!("Comment = {}", "x".repeat(end - length));
+        assert_eq!(header(&[bare[0], &comment], "LOCAL").len(), end);
+        for data in [&gzip, &deflated(&voxels())] {
+            let scan = local(&[bare[0], &comment], data);
+            assert_eq!(scan.unwrap().volume, small(), "{end}");
+        }
+    }
+}
+
 #[test]
 fn byte_orders_types_and_intensities_are_honoured() {
     let big = (-1000..-988_i16)
@@ -277,6 +295,62 @@ fn a_failed_write_leaves_nothing() {
     fs::create_dir(folder.path().join("v.mhd")).unwrap();
     assert!(matches!(write("v.mhd"), Err(WriteError::Io { .. })));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+/// Until the header is replaced the old pair is there to be read, afterwards no file of it is left.
+#[test]
+fn a_pair_is_replaced_by_its_header() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("v.mhd");
+    let other = small().crop([0; 3], [3, 2, 1]).unwrap();
+    let names = || {
+        let files = fs::read_dir(folder.path()).unwrap();
+        let mut names = files
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect::<Vec<_>>();
+        names.sort();
+        names
+    };
+    write_meta_image(&path, &small()).unwrap();
+    let (old_header, old) = (fs::read(&path).unwrap(), names());
+    write_meta_image(&path, &other).unwrap();
+    let new = names();
+    assert_eq!([old.len(), new.len()], [2, 2]);
+    assert_eq!(read(&path).unwrap().volume, other);
+
+    // A crash between the two files: the new data file beside the old pair.
+    let new_data = fs::read(folder.path().join(&new[0])).unwrap();
+    write_meta_image(&path, &small()).unwrap();
+    fs::write(folder.path().join(&new[0]), new_data).unwrap();
+    assert_eq!(fs::read(&path).unwrap(), old_header);
+    assert_eq!(read(&path).unwrap().volume, small());
+
+    // A data file that another program wrote may belong to others too.
+    fs::write(folder.path().join("v.raw"), voxels()).unwrap();
+    fs::write(&path, header(&[], "v.raw")).unwrap();
+    write_meta_image(&path, &small()).unwrap();
+    assert!(names().contains(&"v.raw".to_owned()));
+}
+
+#[test]
+fn names_come_back_or_are_refused() {
+    for name in ["a b", "über", "100", "a.b", "LOCAL", "list", "x LIST"] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name).with_added_extension("mhd");
+        write_meta_image(&path, &small()).unwrap();
+        assert_eq!(read(&path).unwrap().volume, small(), "{name}");
+    }
+    for name in ["50%", " a", "LIST", "LIST a", "LISTED", "a\nb", "a\\b"] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        let refused = write_meta_image(&path.with_added_extension("mhd"), &small());
+        assert!(matches!(refused, Err(WriteError::Name { .. })), "{name}");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+        // A single file needs no name in its header.
+        let single = path.with_added_extension("mha");
+        write_meta_image(&single, &small()).unwrap();
+        assert_eq!(read(&single).unwrap().volume, small(), "{name}");
+    }
 }
 
 #[test]

@@ -165,6 +165,27 @@ fn a_flipped_bit_never_changes_the_volume_unnoticed() {
 }
 
 #[test]
+fn free_text_is_reported_by_name() {
+    let names = |scan: ppa_ct::Scan| scan.acquisition.identifiers.into_iter().collect::<Vec<_>>();
+    assert!(names(patched(&[]).unwrap()).is_empty());
+    assert_eq!(names(patched(&[(148, b"Doe")]).unwrap()), ["descrip"]);
+
+    // An extension of 16 bytes, a comment, in front of voxels that begin behind it.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("v.nii");
+    write_nifti(&path, &small()).unwrap();
+    let mut bytes = std::fs::read(&path).unwrap();
+    bytes[348] = 1;
+    bytes[108..112].copy_from_slice(&368.0_f32.to_le_bytes());
+    bytes.splice(352..352, *b"\x10\0\0\0\x06\0\0\0Doe^John");
+    std::fs::write(&path, bytes).unwrap();
+    let scan = read(&path).unwrap();
+    assert_eq!(scan.volume, small());
+    assert!(!format!("{scan:?}").contains("Doe"));
+    assert_eq!(names(scan), ["header extensions"]);
+}
+
+#[test]
 fn a_failed_write_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let wrong = folder.path().join("v.nrrd");

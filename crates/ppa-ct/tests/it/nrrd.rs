@@ -198,6 +198,22 @@ fn what_the_header_leaves_open_is_said() {
     assert_eq!(codes(&bare), [WarningCode::NoOrientation]);
     assert_eq!(bare.volume.grid().spacing_mm(), Vector3::new(1.0, 2.0, 3.0));
     assert_eq!(bare.volume.grid().direction(), Matrix3::identity());
+    assert!(
+        bare.warnings[0]
+            .text
+            .contains("left, posterior and superior")
+    );
+    for (space, words) in [
+        ("space: RAS", "right, anterior and superior"),
+        ("space: LAS", "left, anterior and superior"),
+    ] {
+        let open = [space, "space directions:", "spacings: 1 2 3"];
+        let scan = attached(&open, &voxels()).unwrap();
+        assert_eq!(codes(&scan), [WarningCode::NoOrientation]);
+        let text = &scan.warnings[0].text;
+        assert!(text.contains(words), "{space}: {text}");
+        assert_eq!(scan.volume.grid().direction().row(2)[2], 1.0);
+    }
     let nowhere = attached(&["space origin:"], &voxels()).unwrap();
     assert_eq!(codes(&nowhere), [WarningCode::NoOrientation]);
     let unnamed = attached(&["space:", "space dimension: 3"], &voxels()).unwrap();
@@ -253,6 +269,39 @@ fn what_cannot_be_read_right_is_refused_by_name() {
     assert!(read(&path).unwrap_err().to_string().contains("once more"));
     fs::write(&path, "NIFTI?").unwrap();
     assert!(read(&path).unwrap_err().to_string().contains("NRRD0001"));
+}
+
+#[test]
+fn comments_and_keys_are_reported_by_name() {
+    let names = |changes: &[&str]| {
+        let scan = attached(changes, &voxels()).unwrap();
+        assert!(!format!("{scan:?}").contains("Doe"));
+        scan.acquisition.identifiers.into_iter().collect::<Vec<_>>()
+    };
+    let usual = [
+        "# Complete NRRD file format specification at:",
+        "# http://teem.sourceforge.net/nrrd/format.html",
+    ];
+    assert!(names(&usual).is_empty());
+    assert_eq!(names(&["# Doe^John"]), ["comments"]);
+    let all = ["# Doe", "content: Doe", "name:=Doe"];
+    assert_eq!(names(&all), ["comments", "content", "key/value pairs"]);
+}
+
+#[test]
+fn a_data_file_cut_anywhere_is_refused() {
+    let file = "data file: v.raw";
+    let gz = gzipped(&voxels());
+    for (encoding, data) in [("encoding: raw", &voxels()), ("encoding: gzip", &gz)] {
+        assert!(detached(&[encoding, file], data).is_ok());
+        for length in 0..data.len() {
+            let cut = detached(&[encoding, file], &data[..length]);
+            assert!(cut.is_err(), "{encoding}: {length} of {}", data.len());
+        }
+    }
+    for skip in ["byte skip: -1", "line skip: 1"] {
+        assert!(detached(&[file, skip], &voxels()[1..]).is_err(), "{skip}");
+    }
 }
 
 /// A header may hold anything about a person; messages repeat none of it.
