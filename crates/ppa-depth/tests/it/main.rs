@@ -1,8 +1,12 @@
 //! The depth camera against answers that can be derived.
 
+mod bad_surfaces;
 mod calibration;
 mod camera;
+mod cameras;
 mod reference;
 mod render;
 mod sensor;
 mod shapes;
+mod surfels;
+mod watertight;
