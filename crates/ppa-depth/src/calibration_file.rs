@@ -76,6 +76,9 @@ impl CameraSpec {
     /// Kinect or of an Orbbec camera in its place, an Orbbec `OBCameraParam` as JSON (`depth_intrinsic`,
     /// `depth_distortion`), or an OpenCV file storage in YAML (`.yml`, `.yaml`).
     ///
+    /// The Orbbec reader follows the field names of the public SDK and takes the lens for `brown_conrady`; no file of a device was at
+    /// hand. Compare a few pixels with the SDK before trusting it.
+    ///
     /// Only the raw calibration depends on the `mode`: it holds for the whole sensor. The numbers are checked by
     /// `Camera::try_from`.
     ///

@@ -70,6 +70,9 @@ pub struct Invalidation {
 }
 
 /// One bounce between diffuse surfaces that the camera sees.
+///
+/// Limits: nothing is taken to stand between two surfaces that face each other, so light also passes where the limb would block
+/// it, and what the camera does not see, such as the underside of the limb, sends nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Multipath {

@@ -11,8 +11,8 @@ use crate::output::Output;
 
 #[derive(Debug, Args)]
 pub struct CameraArgs {
-    /// Raw calibration JSON of an Azure Kinect or Orbbec camera, Orbbec parameters as JSON, OpenCV YAML, or a camera JSON
-    /// [default: an Azure Kinect]
+    /// Raw calibration JSON of an Azure Kinect or Orbbec camera, Orbbec parameters as JSON (read by the field names of the SDK,
+    /// not tried on a file of a device), OpenCV YAML, or a camera JSON [default: an Azure Kinect]
     calibration: Option<PathBuf>,
     /// Depth mode; matters for raw calibrations, which hold for the whole sensor
     #[arg(long, value_enum, default_value_t = Mode::NfovUnbinned)]
