@@ -3,7 +3,8 @@
 //! A [`CameraSpec`] is what a user writes down (JSON); [`Camera`] is the checked camera, with the exact inverse of its
 //! lens distortion. A [`Body`] is a triangle mesh ([`MeshBody`]) or a cloud of oriented discs ([`SurfelBody`]), made
 //! once and then placed in as many poses as needed ([`PlacedBody`]). [`render`] gives a [`DepthImage`]; [`roi_around`]
-//! the square around a joint. A [`RigSpec`] holds the two cameras on an x-ray device.
+//! the square around a joint. A [`RigSpec`] holds the two cameras on an x-ray device; [`JointSurface`] tells how much of a joint
+//! a camera at a [`Viewpoint`] would see.
 //!
 //! Units: millimetres, pixels. Pixel (0, 0) is the *centre* of the first pixel. Camera frame: x right, y down,
 //! z forward (OpenCV). Depth is the z coordinate of the surface, not the length of the ray; 0 means that a pixel saw
@@ -66,6 +67,7 @@ mod distortion;
 
 mod rig;
 mod rigid;
+mod viewpoint;
 
 mod body;
 mod inside;
@@ -98,10 +100,12 @@ mod png_file;
 mod points_file;
 mod preview;
 
+mod coverage;
 mod roi;
 
 pub use body::{Body, BodyError, PlacedBody};
 pub use camera::Camera;
+pub use coverage::{Coverage, CoverageError, CoverageSettings, JointSurface};
 pub use depth_mode::DepthMode;
 pub use field_mask::FieldMask;
 pub use fit_noise::{FitError, NoiseFit, fit_noise};
@@ -119,3 +123,4 @@ pub use sensor_spec::{
 pub use spec::{CameraError, CameraModel, CameraSpec};
 pub use surfel_body::SurfelBody;
 pub use tremor::Tremor;
+pub use viewpoint::Viewpoint;

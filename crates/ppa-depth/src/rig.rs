@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::depth_mode::DepthMode;
 use crate::rigid::{RigidError, isometry_from_rows, rows_from_isometry};
 use crate::spec::{CameraError, CameraSpec};
+use crate::viewpoint::looking_at;
 
 /// A camera and where it is mounted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -93,12 +94,12 @@ impl Default for RigSpec {
 }
 
 fn looking_at_isocentre(x_mm: f64) -> Isometry3<f64> {
-    let position = Vector3::new(x_mm, 0.0, MOUNT_Z_MM);
-    let forward = (Vector3::new(0.0, 0.0, ISOCENTRE_MM) - position).normalize();
-    let down = Vector3::y();
-    let axes = Matrix3::from_columns(&[down.cross(&forward), down, forward]);
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
-    Isometry3::from_parts(Translation3::from(position), rotation)
+    let position = Point3::new(x_mm, 0.0, MOUNT_Z_MM);
+    looking_at(
+        &position,
+        &Point3::new(0.0, 0.0, ISOCENTRE_MM),
+        &Vector3::y(),
+    )
 }
 
 impl MountedCamera {
@@ -151,7 +152,6 @@ impl RigSpec {
 mod tests {
     use super::*;
     use crate::Camera;
-    use nalgebra::Point3;
 
     #[test]
     fn default_cameras_look_at_the_isocentre_with_rows_along_y() {

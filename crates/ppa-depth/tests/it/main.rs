@@ -4,6 +4,7 @@ mod bad_surfaces;
 mod calibration;
 mod camera;
 mod cameras;
+mod coverage;
 mod reference;
 mod render;
 mod sensor;
