@@ -6,6 +6,7 @@ use image::imageops::{FilterType, resize};
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 
 use crate::body_shape::BodyShape;
+use crate::drawing::write_text;
 use crate::files::FileError;
 use crate::layout::{LimbId, View, angle_text};
 use crate::manifest::{FileKind, FileRow, Manifest, RoiRow};
@@ -218,26 +219,6 @@ fn fit(image: &Gray16) -> RgbImage {
     let colour = image::DynamicImage::ImageLuma8(small).into_rgb8();
     image::imageops::replace(&mut tile, &colour, i64::from(x), i64::from(y));
     tile
-}
-
-/// Writes ASCII text with its top left corner at (x, y), each dot `scale` pixels wide.
-fn write_text(sheet: &mut RgbImage, text: &str, x: u32, y: u32, scale: u32) {
-    for (i, byte) in text.bytes().filter(u8::is_ascii).enumerate() {
-        let glyph = font8x8::legacy::BASIC_LEGACY[usize::from(byte)];
-        for dot in 0..64 {
-            let (column, row) = (dot % 8, dot / 8);
-            if glyph[row as usize] >> column & 1 == 0 {
-                continue;
-            }
-            for pixel in 0..scale * scale {
-                let px = x + (i as u32 * 8 + column) * scale + pixel % scale;
-                let py = y + row * scale + pixel / scale;
-                if let Some(pixel) = sheet.get_pixel_mut_checked(px, py) {
-                    *pixel = Rgb([235; 3]);
-                }
-            }
-        }
-    }
 }
 
 #[cfg(test)]

@@ -14,7 +14,9 @@
 mod body_shape;
 mod case;
 mod contact_sheet;
+mod coverage_plot;
 mod description;
+mod drawing;
 mod files;
 mod generate;
 pub mod layout;
@@ -30,6 +32,7 @@ mod unit;
 pub use body_shape::{BodyShape, ShapeSettings, body_shape};
 pub use case::{Case, CaseError, Found, Source};
 pub use contact_sheet::{ContactSheetError, contact_sheet};
+pub use coverage_plot::{RankedView, coverage_plot};
 pub use files::{FileError, sha256_of_file, write_whole};
 pub use generate::{GenerateError, Progress, Summary, generate};
 pub use manifest::{FileKind, FileRow, Manifest, RoiFile, RoiRow, Rows};

@@ -78,6 +78,27 @@ impl Table {
         let plane = table_plane(&room.cloud, settings, seed)?;
         Ok(Self { room, plane })
     }
+
+    /// What stands in the room, for the cameras: its triangles, or discs at its points.
+    ///
+    /// # Errors
+    /// [`StageError`] for points whose normals cannot be told or that cannot be rendered.
+    pub fn furniture(&self) -> Result<Body, StageError> {
+        if let Some(mesh) = &self.room.mesh {
+            return Ok(Body::Mesh(MeshBody::new(&mesh.vertices, &mesh.triangles)?));
+        }
+        let cloud = &self.room.cloud;
+        let points = &cloud.points;
+        let estimated;
+        let normals = if cloud.normals.len() == points.len() {
+            &cloud.normals
+        } else {
+            estimated = estimate_normals(points, NORMAL_NEIGHBOURS)?;
+            &estimated
+        };
+        let radius_mm = DISC_RADIUS * mean_spacing_mm(points)?;
+        Ok(Body::Surfels(SurfelBody::new(points, normals, radius_mm)?))
+    }
 }
 
 /// Everything that stands still while the limb turns.
@@ -101,7 +122,7 @@ impl Stage {
             Some(path) => RigSpec::read(path)?,
             None => RigSpec::default(),
         };
-        let furniture = furniture(&table.room)?;
+        let furniture = table.furniture()?;
         let device = &table.room.device;
         let place = |view, side, mounted: &MountedCamera| {
             let camera = Camera::try_from(mounted.camera.clone())
@@ -188,19 +209,3 @@ const NORMAL_NEIGHBOURS: usize = 16;
 /// Radius of the discs of a recorded room over the mean distance of its points; leaves no holes
 /// in scattered points (see [`SurfelBody`]).
 const DISC_RADIUS: f64 = 1.5;
-
-fn furniture(room: &Room) -> Result<Body, StageError> {
-    if let Some(mesh) = &room.mesh {
-        return Ok(Body::Mesh(MeshBody::new(&mesh.vertices, &mesh.triangles)?));
-    }
-    let points = &room.cloud.points;
-    let estimated;
-    let normals = if room.cloud.normals.len() == points.len() {
-        &room.cloud.normals
-    } else {
-        estimated = estimate_normals(points, NORMAL_NEIGHBOURS)?;
-        &estimated
-    };
-    let radius_mm = DISC_RADIUS * mean_spacing_mm(points)?;
-    Ok(Body::Surfels(SurfelBody::new(points, normals, radius_mm)?))
-}

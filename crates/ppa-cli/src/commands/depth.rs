@@ -1,6 +1,8 @@
 //! `ppa depth`: depth images of meshes, and the camera model by itself.
 
 mod camera;
+mod coverage;
+mod coverage_table;
 mod fit_noise;
 mod project;
 mod render;
@@ -20,6 +22,8 @@ pub enum DepthCommand {
     FitNoise(fit_noise::FitNoiseArgs),
     /// Camera JSON from the calibration file of a device
     Camera(camera::CameraArgs),
+    /// Where a camera would see most of a joint
+    Coverage(coverage::CoverageArgs),
     /// Pixels of points given in the camera's frame
     Project(project::ProjectArgs),
 }
@@ -29,6 +33,7 @@ pub fn run(command: &DepthCommand, output: Output) -> anyhow::Result<()> {
         DepthCommand::Render(args) => render::run(args, output),
         DepthCommand::FitNoise(args) => fit_noise::run(args, output),
         DepthCommand::Camera(args) => camera::run(args, output),
+        DepthCommand::Coverage(args) => coverage::run(args, output),
         DepthCommand::Project(args) => project::run(args, output),
     }
 }

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod conversion;
+mod coverage;
 mod depth;
 mod identity;
 mod json;

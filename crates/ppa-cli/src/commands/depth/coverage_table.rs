@@ -1,0 +1,133 @@
+//! What `ppa depth coverage` finds, as JSON, CSV and text.
+
+use ppa_depth::{Coverage, Viewpoint};
+use serde::Serialize;
+
+#[derive(Debug, Serialize)]
+pub struct Study {
+    pub joint_mm: [f64; 3],
+    pub surface_mm2: f64,
+    pub radius_mm: f64,
+    pub max_angle_deg: f64,
+    pub places: Vec<Row>,
+}
+
+/// One place, as in the table.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    pub rank: usize,
+    pub name: String,
+    #[serde(flatten)]
+    pub viewpoint: Viewpoint,
+    #[serde(flatten)]
+    pub coverage: Coverage,
+    pub room_from_camera: [[f64; 4]; 4],
+}
+
+/// Places of the table on the screen, besides those of the rig.
+const SHOWN: usize = 12;
+
+impl Study {
+    /// The best places, and those of the rig, as text.
+    pub fn describe(&self) -> String {
+        let mut lines = vec![
+            format!(
+                "{:.0} cm² of skin within {} mm of the joint; seen at up to {} degrees of incidence:",
+                self.surface_mm2 / 100.0,
+                self.radius_mm,
+                self.max_angle_deg
+            ),
+            "rank  place            azimuth  elevation  distance  visible  pixels/cm²  mm/pixel"
+                .to_owned(),
+        ];
+        let shown = |row: &&Row| row.rank <= SHOWN || row.name.starts_with("rig ");
+        for row in self.places.iter().filter(shown) {
+            let (v, c) = (&row.viewpoint, &row.coverage);
+            let side = c
+                .mm_per_pixel
+                .map_or("-".to_owned(), |mm| format!("{mm:.2}"));
+            lines.push(format!(
+                "{:>4}  {:<15} {:>7.0}°  {:>8.0}°  {:>5.0} mm  {:>5.1} %  {:>10.1}  {side:>8}",
+                row.rank,
+                row.name,
+                v.azimuth_deg,
+                v.elevation_deg,
+                v.distance_mm,
+                100.0 * c.visible_share,
+                c.pixels_per_cm2,
+            ));
+        }
+        lines.push(format!(
+            "{} places; --csv and --json give all",
+            self.places.len()
+        ));
+        lines.join("\n")
+    }
+}
+
+/// All places as CSV.
+pub fn table_csv(rows: &[Row]) -> anyhow::Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record([
+        "rank",
+        "name",
+        "azimuth_deg",
+        "elevation_deg",
+        "distance_mm",
+        "x_mm",
+        "y_mm",
+        "z_mm",
+        "visible_mm2",
+        "visible_share",
+        "pixels",
+        "pixels_per_cm2",
+        "mm_per_pixel",
+    ])?;
+    for row in rows {
+        let Viewpoint {
+            azimuth_deg,
+            elevation_deg,
+            distance_mm,
+        } = row.viewpoint;
+        let [x, y, z] = [0, 1, 2].map(|axis| row.room_from_camera[axis][3]);
+        let c = &row.coverage;
+        // Thousandths are enough for all of them.
+        let [
+            azimuth,
+            elevation,
+            distance,
+            x,
+            y,
+            z,
+            area,
+            share,
+            pixels,
+            density,
+        ] = [
+            azimuth_deg,
+            elevation_deg,
+            distance_mm,
+            x,
+            y,
+            z,
+            c.visible_mm2,
+            c.visible_share,
+            c.pixels,
+            c.pixels_per_cm2,
+        ]
+        .map(|value| (1000.0 * value).round() / 1000.0);
+        writer.serialize((
+            row.rank,
+            &row.name,
+            (azimuth, elevation, distance),
+            (x, y, z),
+            (area, share),
+            (
+                pixels,
+                density,
+                c.mm_per_pixel.map(|mm| (1000.0 * mm).round() / 1000.0),
+            ),
+        ))?;
+    }
+    Ok(writer.into_inner()?)
+}
