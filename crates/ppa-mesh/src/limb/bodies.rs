@@ -32,7 +32,8 @@ pub struct Bodies {
 ///
 /// Two basins that meet become one body unless the place where they meet is a neck: less than
 /// `neck_ratio` as deep as the shallower of both. A calf and its foot become one, two
-/// calves that touch stay two.
+/// calves that touch stay two. A voxel of a neck belongs to the body of its deepest neighbour: were it
+/// always given to the deeper body, that one would creep around the other, layer by layer.
 pub fn bodies(tissue: &Tissue, least_depth_mm: f64, neck_ratio: f64) -> Bodies {
     let lattice = &tissue.lattice;
     let hollow = |at: usize| !tissue.is(at, CORE);
@@ -44,30 +45,33 @@ pub fn bodies(tissue: &Tissue, least_depth_mm: f64, neck_ratio: f64) -> Bodies {
     for at in deepest_first(&depth_sq, least_depth_mm) {
         let at = at as usize;
         let voxel = lattice.voxel(at);
-        let here = f64::from(depth_sq[at]).sqrt();
+        let here_sq = depth_sq[at];
+        let here = f64::from(here_sq).sqrt();
         let mut main: Option<u32> = None;
+        let mut uphill = here_sq;
         for axis in 0..3 {
-            let below = (voxel[axis] > 0).then(|| labels[at - strides[axis]]);
-            let above = (voxel[axis] + 1 < lattice.size[axis]).then(|| labels[at + strides[axis]]);
-            for label in below.into_iter().chain(above) {
-                if label == NO_BODY || Some(label) == main {
+            let below = (voxel[axis] > 0).then(|| at - strides[axis]);
+            let above = (voxel[axis] + 1 < lattice.size[axis]).then(|| at + strides[axis]);
+            for next in below.into_iter().chain(above) {
+                if labels[next] == NO_BODY {
                     continue;
                 }
-                let other = crate::topology::root(&mut parent, label);
+                let other = crate::topology::root(&mut parent, labels[next]);
+                let steeper = depth_sq[next] > uphill;
+                if steeper {
+                    uphill = depth_sq[next];
+                }
                 main = Some(match main {
                     None => other,
                     Some(main) if main == other => main,
                     Some(main) => {
                         let peak = |b: u32| basins[b as usize].peak_mm;
-                        let (higher, lower) = if peak(main) >= peak(other) {
-                            (main, other)
+                        if here >= neck_ratio * peak(main).min(peak(other)) {
+                            merge(&mut parent, &mut basins, main, other)
+                        } else if steeper {
+                            other
                         } else {
-                            (other, main)
-                        };
-                        if here >= neck_ratio * peak(lower) {
-                            merge(&mut parent, &mut basins, higher, lower)
-                        } else {
-                            higher
+                            main
                         }
                     }
                 });
@@ -95,8 +99,8 @@ pub fn bodies(tissue: &Tissue, least_depth_mm: f64, neck_ratio: f64) -> Bodies {
     compact(labels, &mut parent, &basins)
 }
 
-fn merge(parent: &mut [u32], basins: &mut [Basin], higher: u32, lower: u32) -> u32 {
-    let (keep, gone) = (higher.min(lower), higher.max(lower));
+fn merge(parent: &mut [u32], basins: &mut [Basin], one: u32, other: u32) -> u32 {
+    let (keep, gone) = (one.min(other), one.max(other));
     parent[gone as usize] = keep;
     let other = std::mem::take(&mut basins[gone as usize]);
     let basin = &mut basins[keep as usize];

@@ -61,17 +61,10 @@ pub fn keep_largest(lattice: &Lattice, mask: &mut [bool]) -> usize {
 /// many those were.
 pub fn fill_enclosed(lattice: &Lattice, mask: &mut [bool]) -> usize {
     let pieces = Pieces::of(lattice, |at| !mask[at]);
-    let mut open = vec![false; pieces.count];
-    for (piece, run) in pieces.runs() {
-        let [first, last] = [run.start, run.end - 1].map(|at| lattice.voxel(at));
-        open[piece] |= (0..3).any(|x| first[x] == 0 || last[x] + 1 == lattice.size[x]);
-    }
     let mut added = 0;
-    for (piece, run) in pieces.runs() {
-        if !open[piece] {
-            added += run.len();
-            mask[run].fill(true);
-        }
+    for (_, run) in pieces.enclosed(lattice).filter(|(enclosed, _)| *enclosed) {
+        added += run.len();
+        mask[run].fill(true);
     }
     added
 }

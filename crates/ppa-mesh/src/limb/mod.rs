@@ -1,13 +1,15 @@
 //! The limb in a scan: its skin surface and the voxels inside, without couch, sheets and neighbours.
 //!
 //! In order: tissue is what exceeds the skin's HU; the couch is removed by its shape, which does not
-//! change along the scan axis; solid bodies are what remains of denser tissue after an erosion that
-//! sheets do not survive, told apart where they only touch; the limb is the body that holds most
-//! bone; its skin is grown back to the tissue border, but not along what merely touches it; air
-//! enclosed by it belongs to it; and of the surface of that, connectivity and DBSCAN keep one piece.
+//! change along the scan axis; what solid flesh encloses (air, marrow) counts as flesh; solid bodies
+//! are what remains of denser tissue after an erosion that sheets do not survive, told apart where they
+//! only touch; the limb is the body that holds most bone; its skin is grown back to the tissue border,
+//! but not along what merely touches it; air enclosed by that belongs to it; and of the surface of it
+//! all, connectivity and DBSCAN keep one piece.
 
 mod bodies;
 mod cleaned;
+mod contact;
 mod couch;
 mod distance;
 mod growth;
@@ -25,13 +27,14 @@ use crate::mesh::Mesh;
 use crate::surface::{SurfaceError, surface_of_part};
 use bodies::{Bodies, NO_BODY, bodies};
 use cleaned::cleaned;
+use contact::smooth_contacts;
 use couch::couch_columns;
 use distance::{FAR_MM2, spread};
 use growth::{farthest_sq, fill_enclosed, grown_back, keep_largest};
 use lattice::Lattice;
 pub use report::{Body, CutFace, LimbReport};
 pub use settings::{LimbSettings, VoxelBox};
-use tissue::{TISSUE, Tissue};
+use tissue::{ENCLOSED, TISSUE, Tissue};
 
 /// A body weighs half as much when the side faces cut it through about half its size.
 const SIDE_CUT_WEIGHT: f64 = 2.0;
@@ -187,7 +190,8 @@ fn within_values<T: Hu>(grid: &Grid, hu: &[T], settings: &LimbSettings) -> Resul
     let columns = couch_columns(&whole, hu, iso, persistence, thickness_mm);
     report.couch_columns = count(&columns.couch);
     report.couch_voxels = columns.couch_voxels();
-    let tissue = Tissue::find(&whole, hu, &columns, settings).ok_or_else(nothing_solid)?;
+    let mut tissue = Tissue::find(&whole, hu, &columns, settings).ok_or_else(nothing_solid)?;
+    tissue.fill_enclosed();
     let lattice = &tissue.lattice;
 
     let mut found = bodies(&tissue, settings.core_radius_mm, settings.neck_ratio);
@@ -207,16 +211,20 @@ fn within_values<T: Hu>(grid: &Grid, hu: &[T], settings: &LimbSettings) -> Resul
     };
     report.describe_bodies(grid, lattice, &found, chosen);
 
-    let mut inside = grown_back(&tissue, &reach_sq, settings.core_radius_mm);
+    let grown = grown_back(&tissue, &reach_sq, settings.core_radius_mm);
     drop(reach_sq);
-    for (inside, body) in inside.iter_mut().zip(&found.labels) {
-        *inside &= *body == chosen;
-    }
+    let mut inside: Vec<bool> = std::iter::zip(&grown, &found.labels)
+        .map(|(grown, body)| *grown && *body == chosen)
+        .collect();
     drop(found);
+    smooth_contacts(lattice, &grown, &mut inside);
+    drop(grown);
     report.island_voxels = keep_largest(lattice, &mut inside);
     let tissue_voxels = columns.tissue.iter().map(|&n| n as usize).sum::<usize>();
-    report.other_voxels = tissue_voxels - report.couch_voxels - count(&inside);
-    report.interior_voxels = fill_enclosed(lattice, &mut inside);
+    let limb_tissue = |at: &usize| inside[*at] && !tissue.is(*at, ENCLOSED);
+    let limb_tissue = (0..inside.len()).filter(limb_tissue).count();
+    report.other_voxels = tissue_voxels - report.couch_voxels - limb_tissue;
+    report.interior_voxels = count(&inside) - limb_tissue + fill_enclosed(lattice, &mut inside);
     report.describe_limb(lattice, &inside);
 
     let mut mask = vec![false; whole.len()];

@@ -68,6 +68,16 @@ impl Pieces {
         labels.zip(self.runs.iter().map(voxels))
     }
 
+    /// The runs of voxels and whether their piece stays off the border of the box.
+    pub fn enclosed(&self, lattice: &Lattice) -> impl Iterator<Item = (bool, Range<usize>)> {
+        let mut open = vec![false; self.count];
+        for (piece, run) in self.runs() {
+            let [first, last] = [run.start, run.end - 1].map(|at| lattice.voxel(at));
+            open[piece] |= (0..3).any(|x| first[x] == 0 || last[x] + 1 == lattice.size[x]);
+        }
+        self.runs().map(move |(piece, run)| (!open[piece], run))
+    }
+
     /// Number of voxels of each piece.
     pub fn sizes(&self) -> Vec<usize> {
         let mut sizes = vec![0; self.count];

@@ -4,12 +4,15 @@ use rayon::prelude::*;
 
 use super::couch::Columns;
 use super::lattice::Lattice;
+use super::pieces::Pieces;
 use super::{Hu, LimbSettings};
 
 /// Bits of a voxel's kind: above the skin's HU, above that of solid flesh, above that of bone.
 pub const TISSUE: u8 = 1;
 pub const CORE: u8 = 2;
 pub const BONE: u8 = 4;
+/// Set with [`TISSUE`] and [`CORE`]: below the skin's HU, but enclosed by solid flesh.
+pub const ENCLOSED: u8 = 8;
 
 /// Voxels that are not couch.
 pub struct Tissue {
@@ -73,6 +76,25 @@ impl Tissue {
                 }
             });
         Some(Self { lattice, kinds })
+    }
+
+    /// Makes flesh of whatever solid flesh keeps from the border of the box: marrow, air in wounds and
+    /// joints. Else a limb would be shallow around each such place and fall into pieces there.
+    pub fn fill_enclosed(&mut self) {
+        let hollows = Pieces::of(&self.lattice, |at| !self.is(at, CORE));
+        for (enclosed, voxels) in hollows.enclosed(&self.lattice) {
+            if !enclosed {
+                continue;
+            }
+            for kind in &mut self.kinds[voxels] {
+                *kind |= CORE
+                    + if *kind & TISSUE == 0 {
+                        ENCLOSED + TISSUE
+                    } else {
+                        0
+                    };
+            }
+        }
     }
 
     pub fn is(&self, at: usize, kind: u8) -> bool {

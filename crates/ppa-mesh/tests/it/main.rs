@@ -3,6 +3,7 @@
 mod clusters;
 mod fields;
 mod limb;
+mod limb_real;
 mod ply;
 mod reference;
 mod surface;
