@@ -4,7 +4,7 @@ use std::path::Path;
 
 use ppa_depth::{CameraSpec, SensorSpec, rows_from_isometry};
 use ppa_mesh::LimbSettings;
-use ppa_scene::{LandmarkOverrides, PlaneSettings, RoomSpec};
+use ppa_scene::{LandmarkOverrides, PlaneSettings, RoomSpec, SoftTissue};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
@@ -22,6 +22,7 @@ pub(crate) struct Settings {
     generator: &'static str,
     seed: u64,
     shapes: ShapeSettings,
+    soft_tissue: SoftTissue,
     room_ply_sha256: Option<String>,
     room: RoomSpec,
     table: Option<PlaneSettings>,
@@ -41,6 +42,7 @@ impl Settings {
             generator: concat!("ppa ", env!("CARGO_PKG_VERSION")),
             seed: plan.seed,
             shapes: plan.shapes.clone(),
+            soft_tissue: plan.soft_tissue,
             room_ply_sha256: hash(&plan.room.ply)?,
             room: plan.room.parametric,
             table: plan.room.table.clone(),

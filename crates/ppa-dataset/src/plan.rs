@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use ppa_depth::SensorSpec;
-use ppa_scene::{PlaneSettings, RoomSpec, Sweep};
+use ppa_scene::{PlaneSettings, RoomSpec, SoftTissue, Sweep};
 use ppa_xray::{Detector, FastSettings, HuCalibration, Presentation, Receptor, Source};
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +31,9 @@ pub struct Plan {
     /// Body shapes.
     #[serde(default)]
     pub shapes: ShapeSettings,
+    /// How far heel and calf sink in where they rest; a rigid skin when left out.
+    #[serde(default)]
+    pub soft_tissue: SoftTissue,
     /// The x-ray room.
     #[serde(default)]
     pub room: PlanRoom,
@@ -186,6 +189,7 @@ impl Plan {
             cases,
             rotation: Sweep::default(),
             shapes: ShapeSettings::default(),
+            soft_tissue: SoftTissue::default(),
             room: PlanRoom::default(),
             depth: DepthSettings::default(),
             xray: XraySettings::default(),
@@ -271,6 +275,9 @@ impl Plan {
                     .to_owned(),
             );
         }
+        self.soft_tissue
+            .check()
+            .map_err(|error| format!("soft_tissue: {error}"))?;
         if let Some(sensor) = &self.depth.sensor {
             sensor
                 .check()

@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Point3};
 use ppa_depth::{Body, DepthImage, MeshBody, PlacedBody, roi_around, rows_from_isometry};
 use ppa_mesh::Mesh;
-use ppa_scene::{Placement, PoseAngle, place};
+use ppa_scene::{Placement, PoseAngle, place_soft};
 use ppa_xray::{FastSettings, VoxelPhantom};
 
 use crate::body_shape::{BodyShape, body_shape};
@@ -113,9 +113,20 @@ impl<'a> PosableLimb<'a> {
                 BodyShape::Orig => placement,
                 _ => self.place(&shaped.mesh, pose)?,
             };
+            let flattened = self.flattened(&shaped.mesh, &placement)?;
             for camera in &self.stage.cameras {
                 let file = self.id.depth(shaped.shape, camera.view, pose.step);
-                let image = self.depth_image(shaped, camera, &placement, noise_seed)?;
+                let placed = match &flattened {
+                    Some(body) => PlacedBody {
+                        body,
+                        camera_from_body: camera.camera_from_room,
+                    },
+                    None => PlacedBody {
+                        body: &shaped.body,
+                        camera_from_body: self.camera_from_ct(camera, &placement),
+                    },
+                };
+                let image = depth_image(shaped.shape, placed, camera, noise_seed)?;
                 let path = prepare_folder(root, &file)?;
                 image.write_png(&path)?;
                 files.push(FileRow {
@@ -137,12 +148,13 @@ impl<'a> PosableLimb<'a> {
 
     fn place(&self, skin: &Mesh, pose: PoseAngle) -> Result<Placement, UnitError> {
         let table = &self.stage.table;
-        Ok(place(
+        Ok(place_soft(
             &skin.vertices,
             &self.prepared.landmarks,
             pose.angle_rad(),
             &table.plane.plane,
             &table.room.device,
+            &self.plan.soft_tissue,
         )?)
     }
 
@@ -152,28 +164,13 @@ impl<'a> PosableLimb<'a> {
         camera.camera_from_room * room_from_ct.isometry()
     }
 
-    fn depth_image(
-        &self,
-        shaped: &ShapedSkin,
-        camera: &PlacedCamera,
-        placement: &Placement,
-        noise_seed: u64,
-    ) -> Result<DepthImage, UnitError> {
-        let camera_from_body = self.camera_from_ct(camera, placement);
-        let placed = PlacedBody {
-            body: &shaped.body,
-            camera_from_body,
-        };
-        placed.require_camera_outside()?;
-        if let Some((sensor, backdrop)) = &camera.sensor {
-            let seen = backdrop.before(&camera.camera, &[placed])?;
-            // One frame per body shape and camera.
-            let frame = 2 * shaped.shape as u64 + camera.view as u64;
-            return Ok(sensor.observe(&camera.camera, &seen, noise_seed, frame));
+    /// A skin that the table flattens, in the room; `None` for a rigid one.
+    fn flattened(&self, skin: &Mesh, placement: &Placement) -> Result<Option<Body>, UnitError> {
+        if placement.flattening.is_none() {
+            return Ok(None);
         }
-        let limb = ppa_depth::render(&camera.camera, &[placed]);
-        limb.require_visible()?;
-        Ok(DepthImage::nearer_of(&camera.background, &limb)?)
+        let in_room = placement.in_room(&skin.vertices, &self.prepared.landmarks);
+        Ok(Some(Body::Mesh(MeshBody::new(&in_room, &skin.triangles)?)))
     }
 
     fn roi(
@@ -254,6 +251,24 @@ impl<'a> PosableLimb<'a> {
             seed: None,
         })
     }
+}
+
+fn depth_image(
+    shape: BodyShape,
+    placed: PlacedBody,
+    camera: &PlacedCamera,
+    noise_seed: u64,
+) -> Result<DepthImage, UnitError> {
+    placed.require_camera_outside()?;
+    if let Some((sensor, backdrop)) = &camera.sensor {
+        let seen = backdrop.before(&camera.camera, &[placed])?;
+        // One frame per body shape and camera.
+        let frame = 2 * shape as u64 + camera.view as u64;
+        return Ok(sensor.observe(&camera.camera, &seen, noise_seed, frame));
+    }
+    let limb = ppa_depth::render(&camera.camera, &[placed]);
+    limb.require_visible()?;
+    Ok(DepthImage::nearer_of(&camera.background, &limb)?)
 }
 
 fn prepare_folder(root: &Path, file: &str) -> Result<std::path::PathBuf, FileError> {

@@ -7,6 +7,7 @@ use ppa_mesh::Mesh;
 use crate::axis_regions::Reference;
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
 use crate::landmarks::{Landmarks, Side};
+use crate::plane::first_not_finite;
 use crate::supporting_plane::{check_plane, plane_under};
 
 /// Finds joint level, rotation axis and supporting plane of a limb.
@@ -49,21 +50,25 @@ pub fn find_landmarks(
             vertices: limb.vertices.len(),
         });
     }
+    if let Some(vertex) = first_not_finite(&limb.vertices) {
+        return Err(LandmarkError::NotFinite { vertex });
+    }
     overrides.check()?;
     let mut notes = Vec::new();
     let reference = Reference::find(volume, mask, overrides, &mut notes)?;
     let (joint_region, calf_region, axis_source) = reference.regions(overrides, &mut notes)?;
     let [low, high] = [joint_region, calf_region].map(|region| Point3::from(region.centre_mm));
     let direction = reference.sections.direction;
-    let axis = (high - low).normalize();
-    if axis.dot(&direction) < std::f64::consts::FRAC_1_SQRT_2 {
-        return Err(LandmarkError::Region {
+    let axis = (high - low)
+        .try_normalize(1e-3)
+        .filter(|axis| axis.dot(&direction) >= std::f64::consts::FRAC_1_SQRT_2)
+        .ok_or(LandmarkError::Region {
             name: "calf region",
             from_mm: calf_region.range_mm[0],
             to_mm: calf_region.range_mm[1],
-            problem: "gives an axis more than 45 degrees off the scan's limb direction",
-        });
-    }
+            problem: "has the same centre as the joint region, or one that gives an axis more \
+                      than 45 degrees off the scan's limb direction",
+        })?;
     let (axis_point, joint_centre) = match overrides.joint_centre {
         Some(centre) => (Point3::from(centre), Point3::from(centre)),
         None => {

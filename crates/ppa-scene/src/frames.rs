@@ -114,12 +114,13 @@ impl<To, From> Rigid<To, From> {
 
     /// A motion from the axes of `From` written in `To` (columns) and its origin in `To`.
     ///
-    /// `axes` must be a rotation to rounding error; it is orthonormalised to the last bit.
+    /// `axes` must be a rotation to rounding error.
     pub(crate) fn from_axes(axes: Matrix3<f64>, origin: Point3<f64>) -> Self {
-        let rotation = Rotation3::from_matrix_unchecked(axes);
+        let rotation =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
         Self::new(Isometry3::from_parts(
             Translation3::from(origin),
-            UnitQuaternion::from_rotation_matrix(&rotation),
+            UnitQuaternion::new_normalize(rotation.into_inner()),
         ))
     }
 
@@ -148,7 +149,8 @@ impl<To, From> Rigid<To, From> {
 impl<To, From> TryFrom<[[f64; 4]; 4]> for Rigid<To, From> {
     type Error = NotRigid;
 
-    /// Accepts rotations that are orthonormal within 1e-6, the rounding of printed matrices.
+    /// Accepts rotations that are orthonormal within 1e-4 in RᵀR, as `ppa-depth` does: matrices
+    /// printed with five decimals. The rounding is removed: the rotation is the nearest one.
     fn try_from(rows: [[f64; 4]; 4]) -> Result<Self, NotRigid> {
         let matrix = Matrix4::from_fn(|row, column| rows[row][column]);
         if !matrix.iter().all(|v| v.is_finite()) {
@@ -160,14 +162,19 @@ impl<To, From> TryFrom<[[f64; 4]; 4]> for Rigid<To, From> {
         let linear: Matrix3<f64> = matrix.fixed_view::<3, 3>(0, 0).into_owned();
         let deviation = (linear.transpose() * linear - Matrix3::identity()).amax();
         let determinant = linear.determinant();
-        if deviation > 1e-6 || determinant < 0.0 {
+        if deviation > 1e-4 || determinant < 0.0 {
             return Err(NotRigid::NotARotation {
                 deviation,
                 determinant,
             });
         }
         let origin = Point3::new(rows[0][3], rows[1][3], rows[2][3]);
-        Ok(Self::from_axes(linear, origin))
+        // Nearest in the Frobenius norm: the orthogonal factor of the polar decomposition, U Vᵀ.
+        let factors = linear.svd(true, true);
+        let (Some(u), Some(v_t)) = (factors.u, factors.v_t) else {
+            unreachable!("both factors were asked for");
+        };
+        Ok(Self::from_axes(u * v_t, origin))
     }
 }
 

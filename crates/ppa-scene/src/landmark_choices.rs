@@ -44,7 +44,8 @@ impl Landmarks {
 }
 
 impl LandmarkOverrides {
-    /// Refuses numbers that are not finite and a front without direction.
+    /// Refuses numbers that are not finite, regions that run backwards and a front without
+    /// direction.
     pub(crate) fn check(&self) -> Result<(), LandmarkError> {
         let [a, b, c] = self.plane_points.unwrap_or_default().map(Some);
         let points = [
@@ -60,6 +61,22 @@ impl LandmarkOverrides {
                     name,
                     found,
                     expected: "three finite numbers",
+                });
+            }
+        }
+        let regions = [
+            ("joint region", self.joint_region),
+            ("calf region", self.calf_region),
+        ];
+        for (name, region) in regions {
+            if let Some([from_mm, to_mm]) =
+                region.filter(|[from, to]| from.is_nan() || to.is_nan() || from > to)
+            {
+                return Err(LandmarkError::Region {
+                    name,
+                    from_mm,
+                    to_mm,
+                    problem: "runs backwards, expected from <= to",
                 });
             }
         }
@@ -93,6 +110,12 @@ pub enum LandmarkError {
         voxels: usize,
         /// Vertices of the mesh.
         vertices: usize,
+    },
+    /// A vertex of the skin is NaN or infinite.
+    #[error("vertex {vertex} of the limb's skin is not finite")]
+    NotFinite {
+        /// Its index.
+        vertex: usize,
     },
     /// A lower leg was asked for but shows no ankle.
     #[error(
@@ -130,6 +153,14 @@ pub enum LandmarkError {
         /// Its value.
         found: [f64; 3],
         /// What it should be.
+        expected: &'static str,
+    },
+    /// Three points given by a person make no plane under the limb.
+    #[error("plane_points are {found:?}, expected {expected}")]
+    Plane {
+        /// The points.
+        found: [[f64; 3]; 3],
+        /// What they should be.
         expected: &'static str,
     },
     /// No plane touches both ends of the limb from below.

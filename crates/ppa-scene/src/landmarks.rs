@@ -90,6 +90,22 @@ impl Landmarks {
         ct_from_patient.inverse()
     }
 
+    /// [`Self::plane_patient`], or what the three points should be: not on one line (within 1 mm in
+    /// 1 m), and their plane along the limb.
+    pub(crate) fn supporting_plane(&self) -> Result<Plane, &'static str> {
+        let [a, b, c] = self.plane_points.map(Vector3::from);
+        let [u, v] = [b - a, c - a];
+        let sine = u.cross(&v).norm() / (u.norm() * v.norm());
+        if sine.is_nan() || sine < 1e-3 {
+            return Err("three points that are not on one line");
+        }
+        let plane = self.plane_patient();
+        // The normal lies within 64 degrees of across the limb's axis.
+        (plane.normal.z.abs() <= 0.9)
+            .then_some(plane)
+            .ok_or("three points of a plane along the limb")
+    }
+
     /// Π_P in the patient frame; its normal points to the limb (anterior).
     pub fn plane_patient(&self) -> Plane {
         let patient_from_ct = self.patient_from_ct();

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Matrix3, Point3, SymmetricEigen, Unit, Vector3};
 
 use crate::plane::{Plane, across};
-use crate::table_plane::PlaneSettings;
+use crate::plane_settings::PlaneSettings;
 
 /// A cell of the lattice drawn on a plane.
 type Cell = (i64, i64);

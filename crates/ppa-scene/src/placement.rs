@@ -1,16 +1,16 @@
 //! Laying a rotated limb on the table under the central beam: T_rot, T_mat and T_opt.
 
-use nalgebra::{
-    Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
-};
+use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::contact::{Profile, Tilt, split_level};
+use crate::contact::Profile;
 use crate::device::XrayDevice;
 use crate::frames::{Ct, Device, Patient, Rigid};
 use crate::landmarks::{Landmarks, Side};
-use crate::plane::Plane;
+use crate::matching::{axes_rotation, on_beam, plane_axes, table_axes};
+use crate::plane::{Plane, first_not_finite, on_one_line};
 use crate::room::Room;
+use crate::soft_tissue::{Flattening, SoftTissue};
 
 /// A limb on the table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -25,11 +25,13 @@ pub struct Placement {
     /// Tips the limb about the room's X axis through the joint centre until it rests on two
     /// places, and moves it onto the table.
     pub t_opt: Rigid<Room, Room>,
+    /// How soft tissue gives way; `None` for a rigid skin.
+    pub flattening: Option<Flattening>,
     /// How it rests.
     pub contact: Contact,
 }
 
-/// How a placed limb rests on the table plane; measured on the placed points.
+/// How a placed limb rests on the table plane; measured on the placed points, flattened ones if soft tissue gives way.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
     /// Air between the table and the lowest point, mm.
@@ -40,7 +42,11 @@ pub struct Contact {
     pub distal_mm: f64,
     /// Height of the lowest proximal point, mm.
     pub proximal_mm: f64,
-    /// Where distal ends and proximal begins, along z of the patient frame, mm.
+    /// Distance of both contacts, mm. Next to nothing when the limb rests on its middle: its ends
+    /// then hang in the air.
+    pub apart_mm: f64,
+    /// Where distal ends and proximal begins, from the joint along the table before the limb is
+    /// tipped, mm.
     pub split_mm: f64,
     /// Tilt found by T_opt, radians; + lifts the proximal end.
     pub tilt_rad: f64,
@@ -58,6 +64,12 @@ pub enum PlaceError {
         /// Points given.
         found: usize,
     },
+    /// There is no limb without width.
+    #[error("all {found} points of the limb lie on one line, expected a surface")]
+    OneLine {
+        /// Points given.
+        found: usize,
+    },
     /// A coordinate is NaN or infinite.
     #[error("point {index} of the limb is not finite")]
     NotFinite {
@@ -67,9 +79,20 @@ pub enum PlaceError {
     /// The rotation angle is NaN or infinite.
     #[error("the rotation angle is {0}, expected a finite number of radians")]
     Angle(f64),
-    /// Axis, anterior direction or plane points do not span what they should.
-    #[error("{0}")]
-    Landmarks(&'static str),
+    /// A depth of soft tissue does not make sense.
+    #[error("{name} of the soft tissue is {found_mm} mm, expected 0 to 20")]
+    SoftTissue {
+        /// Field of [`SoftTissue`].
+        name: &'static str,
+        /// Its value.
+        found_mm: f64,
+    },
+    /// The anterior direction and the axis do not span a plane.
+    #[error("the anterior direction runs along the limb's axis, expected one across it")]
+    Axes,
+    /// The plane points make no plane under the limb.
+    #[error("the plane points make no plane under the limb, expected {0}")]
+    Plane(&'static str),
     /// The beam runs along the table or away from it.
     #[error("the central beam does not meet the table plane in front of the source")]
     BeamMissesTable,
@@ -105,11 +128,11 @@ pub fn medial_rotation(side: Side, angle_rad: f64) -> Rigid<Patient, Patient> {
     Rigid::new(Isometry3::from_parts(Translation3::identity(), rotation))
 }
 
-/// Places a limb, given by the vertices of its skin in the `ct` frame.
+/// Places a limb with a rigid skin, given by its vertices in the `ct` frame.
 ///
-/// `table` faces the source. The limb is split into front (distal) and back (proximal) at the
-/// joint; a limb that has less than a tenth of its length on one side of the joint (a knee, a
-/// calf) is split at the middle of its length instead.
+/// `table` faces the source. The limb is split into front (distal) and back (proximal) across the
+/// table at the joint; a limb that has less than a tenth of its length on one side of the joint (a
+/// knee, a calf) is split at the middle of its length instead.
 ///
 /// # Errors
 /// [`PlaceError`] when the points or landmarks are unusable, the beam misses the table, or no
@@ -121,28 +144,39 @@ pub fn place(
     table: &Plane,
     device: &XrayDevice,
 ) -> Result<Placement, PlaceError> {
+    let rigid = SoftTissue::default();
+    place_soft(points_ct, landmarks, angle_rad, table, device, &rigid)
+}
+
+/// [`place`] with soft tissue that gives way where the limb rests: both parts sink in, and
+/// [`Placement::in_room`] is the skin as it then lies.
+///
+/// # Errors
+/// As [`place`], and for depths that make no sense.
+pub fn place_soft(
+    points_ct: &[Point3<f32>],
+    landmarks: &Landmarks,
+    angle_rad: f64,
+    table: &Plane,
+    device: &XrayDevice,
+    soft_tissue: &SoftTissue,
+) -> Result<Placement, PlaceError> {
     check_points(points_ct)?;
+    soft_tissue.check()?;
     if !angle_rad.is_finite() {
         return Err(PlaceError::Angle(angle_rad));
     }
     let patient_from_ct = landmarks.patient_from_ct();
-    let under_limb = landmarks.plane_patient();
-    let finite = |v: &Vector3<f64>| v.iter().all(|c| c.is_finite());
-    if !finite(&patient_from_ct.isometry().rotation.scaled_axis()) {
-        return Err(PlaceError::Landmarks(
-            "the anterior direction runs along the limb's axis, expected one across it",
-        ));
+    let turn = patient_from_ct.isometry().rotation;
+    if !turn.coords.iter().all(|c| c.is_finite()) {
+        return Err(PlaceError::Axes);
     }
-    if !finite(&under_limb.normal) || under_limb.normal.z.abs() > 0.9 {
-        return Err(PlaceError::Landmarks(
-            "the three plane points give no plane along the limb",
-        ));
-    }
+    let under_limb = landmarks.supporting_plane().map_err(PlaceError::Plane)?;
     let t_rot = medial_rotation(landmarks.side, angle_rad);
     let (room_axes, limb_axes) = (table_axes(table, device)?, plane_axes(&under_limb));
     let rotation = axes_rotation(&room_axes, &limb_axes);
 
-    // Heights and lengths about the joint centre, in table axes.
+    // Lengths and heights about the joint centre, along the table and above it.
     let table_from_ct = limb_axes.transpose()
         * (t_rot * patient_from_ct)
             .isometry()
@@ -150,12 +184,12 @@ pub fn place(
             .to_rotation_matrix()
             .matrix();
     let joint_ct = Point3::from(landmarks.joint_centre);
-    let axis_ct = patient_from_ct.inverse().rotate(&Vector3::z());
-    let (profile, split_mm) = halves(points_ct, &joint_ct, &axis_ct, &table_from_ct);
-    let Tilt {
-        angle_rad: tilt_rad,
-        iterations,
-    } = profile.resting_tilt().ok_or_else(|| {
+    let seen = |p: &Point3<f32>| {
+        let offset = table_from_ct * (p.cast::<f64>() - joint_ct);
+        [offset.y, offset.z]
+    };
+    let profile = Profile::split(points_ct.iter().map(seen)).lifted(soft_tissue.depths_mm());
+    let tilt = profile.resting_tilt().ok_or_else(|| {
         let [distal, proximal] = profile.heights(0.0);
         let low = distal.min(proximal);
         PlaceError::NoRest {
@@ -163,37 +197,64 @@ pub fn place(
             proximal_mm: proximal - low,
         }
     })?;
-    let [distal, proximal] = profile.heights(tilt_rad);
-    let lowest = distal.min(proximal);
+    let [distal, proximal] = profile.heights(tilt.angle_rad);
 
     let matched_joint = on_beam(-under_limb.offset_mm, table, device)?;
-    let placed_joint = on_beam(-lowest, table, device)?;
+    let placed_joint = on_beam(-distal.min(proximal), table, device)?;
     let t_mat = Rigid::new(Isometry3::from_parts(matched_joint.into(), rotation));
     let room_x = Unit::new_unchecked(room_axes.column(0).into_owned());
-    let tilt = UnitQuaternion::from_axis_angle(&room_x, tilt_rad);
+    let about_x = UnitQuaternion::from_axis_angle(&room_x, tilt.angle_rad);
     let t_opt = Rigid::new(
-        Translation3::from(placed_joint) * tilt * Translation3::from(matched_joint).inverse(),
+        Translation3::from(placed_joint) * about_x * Translation3::from(matched_joint).inverse(),
     );
     let room_from_patient = t_opt * t_mat * t_rot;
-    let contact = Contact {
-        split_mm,
-        tilt_rad,
-        iterations,
-        ..measure(
-            points_ct,
-            room_from_patient * patient_from_ct,
-            &axis_ct,
-            table,
-            |along| along - axis_ct.dot(&joint_ct.coords) < split_mm,
-        )
+    let room_from_ct = room_from_patient * patient_from_ct;
+    let is_distal = |p: &Point3<f32>| seen(p)[0] < profile.split_mm;
+    let flattening = if *soft_tissue == SoftTissue::default() {
+        None
+    } else {
+        lowest_points(points_ct, room_from_ct, table, is_distal)
+            .map(|lowest| Flattening::at(lowest, table, &room_axes))
     };
+    let [distal_mm, proximal_mm] = measure(
+        points_ct,
+        room_from_ct,
+        table,
+        flattening.as_ref(),
+        is_distal,
+    );
+    let lowest_mm = distal_mm.min(proximal_mm);
     Ok(Placement {
         room_from_patient,
         t_rot,
         t_mat,
         t_opt,
-        contact,
+        flattening,
+        contact: Contact {
+            gap_mm: lowest_mm.max(0.0),
+            penetration_mm: (-lowest_mm).max(0.0),
+            distal_mm,
+            proximal_mm,
+            apart_mm: tilt.apart_mm,
+            split_mm: profile.split_mm,
+            tilt_rad: tilt.angle_rad,
+            iterations: tilt.iterations,
+        },
     })
+}
+
+impl Placement {
+    /// A limb, given by the vertices of its skin in the `ct` frame, as it lies in the room.
+    pub fn in_room(&self, points_ct: &[Point3<f32>], landmarks: &Landmarks) -> Vec<Point3<f32>> {
+        let room_from_ct = self.room_from_patient * landmarks.patient_from_ct();
+        let lies = |p: &Point3<f32>| {
+            let placed = room_from_ct * p.cast::<f64>();
+            self.flattening
+                .map_or(placed, |flattening| flattening.flattened(&placed))
+                .cast()
+        };
+        points_ct.iter().map(lies).collect()
+    }
 }
 
 /// Pose of the device in the scan: (T^P_CT)⁻¹ (T^ToF_P)⁻¹ · device pose in the room.
@@ -215,102 +276,56 @@ fn check_points(points: &[Point3<f32>]) -> Result<(), PlaceError> {
             found: points.len(),
         });
     }
-    match points.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
-        Some(index) => Err(PlaceError::NotFinite { index }),
-        None => Ok(()),
+    if let Some(index) = first_not_finite(points) {
+        return Err(PlaceError::NotFinite { index });
     }
-}
-
-/// Columns x, y, z: across the table, towards the head end, up; in the room.
-fn table_axes(table: &Plane, device: &XrayDevice) -> Result<Matrix3<f64>, PlaceError> {
-    let up = table.normal.into_inner();
-    let head = device.head_direction();
-    let y = (head - up * up.dot(&head))
-        .try_normalize(1e-6)
-        .ok_or(PlaceError::BeamMissesTable)?;
-    Ok(Matrix3::from_columns(&[y.cross(&up), y, up]))
-}
-
-/// The same triad of the plane under the limb, in the patient frame: y along the limb's axis.
-fn plane_axes(under_limb: &Plane) -> Matrix3<f64> {
-    let up = under_limb.normal.into_inner();
-    let y = (Vector3::z() - up * up.z).normalize();
-    Matrix3::from_columns(&[y.cross(&up), y, up])
-}
-
-/// The rotation that takes one triad to another.
-fn axes_rotation(to: &Matrix3<f64>, from: &Matrix3<f64>) -> UnitQuaternion<f64> {
-    let matrix = Rotation3::from_matrix_unchecked(to * from.transpose());
-    UnitQuaternion::from_rotation_matrix(&matrix)
-}
-
-/// The point of the central beam at a height above the table.
-fn on_beam(height_mm: f64, table: &Plane, device: &XrayDevice) -> Result<Point3<f64>, PlaceError> {
-    let (source, beam) = (device.source(), device.beam_direction());
-    if table.normal.dot(&beam) >= 0.0 || table.hit(&source, &beam).is_none() {
-        return Err(PlaceError::BeamMissesTable);
+    if on_one_line(points.iter().map(|p| p.cast())) {
+        return Err(PlaceError::OneLine {
+            found: points.len(),
+        });
     }
-    let raised = Plane {
-        offset_mm: table.offset_mm + height_mm,
-        ..*table
-    };
-    raised
-        .hit(&source, &beam)
-        .ok_or(PlaceError::AboveSource { height_mm })
+    Ok(())
 }
 
-/// The two halves in table axes about the joint centre, and where they were split.
-fn halves(
-    points_ct: &[Point3<f32>],
-    joint_ct: &Point3<f64>,
-    axis_ct: &Vector3<f64>,
-    table_from_ct: &Matrix3<f64>,
-) -> (Profile, f64) {
-    let along = |p: &Point3<f32>| (p.cast::<f64>() - joint_ct).dot(axis_ct);
-    let split_mm = split_level(points_ct.iter().map(along));
-    let mut profile = Profile {
-        distal: Vec::new(),
-        proximal: Vec::new(),
-    };
-    for p in points_ct {
-        let offset = p.cast::<f64>() - joint_ct;
-        let seen = table_from_ct * offset;
-        if along(p) < split_mm {
-            profile.distal.push([seen.y, seen.z]);
-        } else {
-            profile.proximal.push([seen.y, seen.z]);
-        }
-    }
-    (profile, split_mm)
-}
-
-/// Heights of the placed points above the table.
+/// Heights of the skin above the table, as it lies.
 fn measure(
     points_ct: &[Point3<f32>],
     room_from_ct: Rigid<Room, Ct>,
-    axis_ct: &Vector3<f64>,
     table: &Plane,
-    is_distal: impl Fn(f64) -> bool,
-) -> Contact {
+    flattening: Option<&Flattening>,
+    is_distal: impl Fn(&Point3<f32>) -> bool,
+) -> [f64; 2] {
     let (mut distal_mm, mut proximal_mm) = (f64::INFINITY, f64::INFINITY);
     for p in points_ct {
-        let p = p.cast::<f64>();
-        let height = table.signed_distance(&(room_from_ct * p));
-        let half = if is_distal(axis_ct.dot(&p.coords)) {
+        let lies = room_from_ct * p.cast::<f64>();
+        let lies = flattening.map_or(lies, |flattening| flattening.flattened(&lies));
+        let half = if is_distal(p) {
             &mut distal_mm
         } else {
             &mut proximal_mm
         };
-        *half = half.min(height);
+        *half = half.min(table.signed_distance(&lies));
     }
-    let lowest = distal_mm.min(proximal_mm);
-    Contact {
-        gap_mm: lowest.max(0.0),
-        penetration_mm: (-lowest).max(0.0),
-        distal_mm,
-        proximal_mm,
-        split_mm: 0.0,
-        tilt_rad: 0.0,
-        iterations: 0,
-    }
+    [distal_mm, proximal_mm]
+}
+
+/// The lowest distal and the lowest proximal point of the placed limb, if there are both.
+fn lowest_points(
+    points_ct: &[Point3<f32>],
+    room_from_ct: Rigid<Room, Ct>,
+    table: &Plane,
+    is_distal: impl Fn(&Point3<f32>) -> bool,
+) -> Option<[Point3<f64>; 2]> {
+    let lowest = |distal: bool| {
+        points_ct
+            .iter()
+            .filter(|p| is_distal(p) == distal)
+            .map(|p| room_from_ct * p.cast::<f64>())
+            .min_by(|a, b| {
+                table
+                    .signed_distance(a)
+                    .total_cmp(&table.signed_distance(b))
+            })
+    };
+    Some([lowest(true)?, lowest(false)?])
 }

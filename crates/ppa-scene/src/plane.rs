@@ -31,14 +31,6 @@ impl Plane {
         point - self.normal.into_inner() * self.signed_distance(point)
     }
 
-    /// The same plane seen from the other side.
-    pub fn flipped(&self) -> Self {
-        Self {
-            normal: -self.normal,
-            offset_mm: -self.offset_mm,
-        }
-    }
-
     /// The plane in the frame that `target_from_source` leads to.
     pub fn transformed(&self, target_from_source: &Isometry3<f64>) -> Self {
         let point = Point3::from(self.normal.into_inner() * self.offset_mm);
@@ -66,4 +58,27 @@ pub(crate) fn across(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     };
     let e1 = axis.cross(&helper).normalize();
     (e1, axis.cross(&e1))
+}
+
+/// Index of the first point with a coordinate that is NaN or infinite.
+pub(crate) fn first_not_finite(points: &[Point3<f32>]) -> Option<usize> {
+    points.iter().position(|p| !p.iter().all(|c| c.is_finite()))
+}
+
+/// Whether all points lie on one line, within a hundred thousandth of their extent: f32 keeps
+/// seven digits.
+pub(crate) fn on_one_line(mut points: impl Iterator<Item = Point3<f64>> + Clone) -> bool {
+    let Some(first) = points.next() else {
+        return true;
+    };
+    let offsets = || points.clone().map(|p| p - first);
+    let longest = offsets().fold(Vector3::zeros(), |longest: Vector3<f64>, v| {
+        if v.norm_squared() > longest.norm_squared() {
+            v
+        } else {
+            longest
+        }
+    });
+    let length_sq = longest.norm_squared();
+    offsets().all(|v| v.cross(&longest).norm() <= 1e-5 * length_sq)
 }

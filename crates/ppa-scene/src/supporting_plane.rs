@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use ppa_mesh::Mesh;
 
-use crate::contact::{Profile, split_level};
+use crate::contact::Profile;
 use crate::landmark_choices::LandmarkError;
 use crate::landmarks::Landmarks;
 
@@ -19,13 +19,8 @@ pub(crate) fn plane_under(
         .iter()
         .map(|p| patient_from_ct * p.cast::<f64>())
         .collect();
-    let split_mm = split_level(points.iter().map(|p| p.z));
-    let (distal, proximal): (Vec<_>, Vec<_>) = points.iter().partition(|p| p.z < split_mm);
-    let seen = |half: &[&Point3<f64>]| half.iter().map(|p| [p.z, p.y]).collect();
-    let profile = Profile {
-        distal: seen(&distal),
-        proximal: seen(&proximal),
-    };
+    let profile = Profile::split(points.iter().map(|p| [p.z, p.y]));
+    let (distal, proximal): (Vec<_>, Vec<_>) = points.iter().partition(|p| p.z < profile.split_mm);
     let tilt = profile
         .resting_tilt()
         .ok_or(LandmarkError::NoSupport)?
@@ -48,14 +43,12 @@ pub(crate) fn plane_under(
 
 /// Notes or refuses a given plane that cuts the limb.
 pub(crate) fn check_plane(limb: &Mesh, landmarks: &mut Landmarks) -> Result<(), LandmarkError> {
-    let plane = landmarks.plane_patient();
-    if !plane.normal.iter().all(|c| c.is_finite()) {
-        return Err(LandmarkError::Override {
-            name: "plane_points",
-            found: landmarks.plane_points[0],
-            expected: "three points that are not on one line",
-        });
-    }
+    let plane = landmarks
+        .supporting_plane()
+        .map_err(|expected| LandmarkError::Plane {
+            found: landmarks.plane_points,
+            expected,
+        })?;
     let patient_from_ct = landmarks.patient_from_ct();
     let (mut behind, mut deepest) = (0_usize, 0.0_f64);
     for vertex in &limb.vertices {

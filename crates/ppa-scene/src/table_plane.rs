@@ -5,62 +5,9 @@ use ppa_mesh::PointCloud;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::device::XrayDevice;
 use crate::patch::{Patch, Sheet};
-use crate::plane::Plane;
-
-/// What counts as a table top.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct PlaneSettings {
-    /// Distance from the plane up to which a point belongs to it, mm.
-    pub threshold_mm: f64,
-    /// Planes tried per search.
-    pub iterations: u32,
-    /// The direction that is up; the normal of the result points there.
-    pub up: [f64; 3],
-    /// Largest angle between normal and up, degrees.
-    pub max_tilt_deg: f64,
-    /// Cell of the lattice that tells connected from separate patches, mm.
-    pub cell_mm: f64,
-    /// Smallest area of a table top, mm².
-    pub min_area_mm2: f64,
-    /// Only points in this box (low and high corner) are looked at, mm.
-    pub region: Option<[[f64; 3]; 2]>,
-    /// Central beam: the source and a direction. The table is the first large patch that it hits;
-    /// without a beam it is the largest patch.
-    pub beam: Option<[[f64; 3]; 2]>,
-    /// How far from the source the table is at least, mm: keeps collimator and housing out.
-    pub min_beam_mm: f64,
-}
-
-impl Default for PlaneSettings {
-    fn default() -> Self {
-        Self {
-            threshold_mm: 10.0,
-            iterations: 1000,
-            up: [0.0, 0.0, 1.0],
-            max_tilt_deg: 20.0,
-            cell_mm: 60.0,
-            min_area_mm2: 60_000.0,
-            region: None,
-            beam: None,
-            min_beam_mm: 300.0,
-        }
-    }
-}
-
-impl PlaneSettings {
-    /// The default for a device: up is against its beam, the table is what the beam hits first.
-    pub fn for_device(device: &XrayDevice) -> Self {
-        let (source, beam) = (device.source(), device.beam_direction());
-        Self {
-            up: (-beam).into(),
-            beam: Some([source.coords.into(), beam.into()]),
-            ..Self::default()
-        }
-    }
-}
+use crate::plane::{Plane, on_one_line};
+use crate::plane_settings::{PlaneError, PlaneSettings};
 
 /// The table top found in a cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -73,46 +20,6 @@ pub struct TablePlane {
     pub rms_mm: f64,
     /// Their mean, on the plane.
     pub centre: Point3<f64>,
-}
-
-/// Why no table was found.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum PlaneError {
-    /// A setting does not make sense.
-    #[error("{name} is {found}, expected {expected}")]
-    Setting {
-        /// Field of [`PlaneSettings`].
-        name: &'static str,
-        /// Its value.
-        found: f64,
-        /// What it should be.
-        expected: &'static str,
-    },
-    /// Too few points to fit a plane.
-    #[error("{found} finite points in the region, expected at least {expected}")]
-    TooFewPoints {
-        /// Points left after the region was cut out.
-        found: usize,
-        /// Points needed.
-        expected: usize,
-    },
-    /// Nothing flat, level, large and in the right place.
-    #[error(
-        "no plane: of {points} points none lie in a connected flat patch of {min_area_mm2} mm² \
-         or more, within {max_tilt_deg} degrees of level{}",
-        if *beam { ", under the central beam" } else { "" }
-    )]
-    NoPlane {
-        /// Points looked at.
-        points: usize,
-        /// Smallest area that was asked for.
-        min_area_mm2: f64,
-        /// Largest tilt that was asked for.
-        max_tilt_deg: f64,
-        /// Whether the patch had to be under the beam.
-        beam: bool,
-    },
 }
 
 /// How many points a search scores; more would not sharpen the choice, least squares does that.
@@ -150,6 +57,9 @@ pub fn table_plane(
             found,
             expected: MIN_POINTS,
         });
+    }
+    if on_one_line(points.iter().copied()) {
+        return Err(PlaneError::OneLine { found });
     }
     let mut best: Option<(f64, Sheet)> = None;
     for round in 0..MAX_PLANES {
@@ -195,28 +105,7 @@ struct Search<'a> {
 
 impl<'a> Search<'a> {
     fn new(settings: &'a PlaneSettings) -> Result<Self, PlaneError> {
-        let positive = [
-            ("threshold_mm", settings.threshold_mm),
-            ("iterations", f64::from(settings.iterations)),
-            ("cell_mm", settings.cell_mm),
-            ("min_area_mm2", settings.min_area_mm2),
-        ];
-        for (name, found) in positive {
-            if !(found > 0.0 && found.is_finite()) {
-                return Err(PlaneError::Setting {
-                    name,
-                    found,
-                    expected: "a positive number",
-                });
-            }
-        }
-        if !(0.0..=90.0).contains(&settings.max_tilt_deg) {
-            return Err(PlaneError::Setting {
-                name: "max_tilt_deg",
-                found: settings.max_tilt_deg,
-                expected: "0 to 90 degrees",
-            });
-        }
+        settings.check()?;
         let unit = |name, v: [f64; 3]| {
             Unit::try_new(Vector3::from(v), 1e-9).ok_or(PlaneError::Setting {
                 name,

@@ -6,9 +6,10 @@ use anyhow::Context;
 use clap::{Args, Subcommand};
 use ppa_dataset::{Case, Plan, PreparedLimb, Table};
 use ppa_mesh::{read_ply, write_ply, write_ply_cloud};
-use ppa_scene::{Contact, PlaneSettings, TablePlane, place, table_plane};
+use ppa_scene::{Contact, PlaneSettings, SoftTissue, TablePlane, place_soft, table_plane};
 use serde::Serialize;
 
+use crate::number_lists::range;
 use crate::output::{Output, working};
 
 #[derive(Debug, Subcommand)]
@@ -47,9 +48,12 @@ pub struct PlaceArgs {
     /// Medial rotation in degrees
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     angle: f64,
-    /// Take the room from this plan
+    /// Take room and soft tissue from this plan
     #[arg(long)]
     plan: Option<PathBuf>,
+    /// How far the distal and the proximal part sink in where they rest, mm [default: the plan's, or 0,0: a rigid skin]
+    #[arg(long, value_name = "DISTAL,PROXIMAL", value_parser = range)]
+    soft_tissue_mm: Option<[f64; 2]>,
     /// Write the placed skin in room coordinates as PLY
     #[arg(long)]
     ply: Option<PathBuf>,
@@ -141,23 +145,36 @@ struct Placed {
 
 fn place_limb(args: &PlaceArgs, output: Output) -> anyhow::Result<()> {
     let plan = plan(args.plan.as_ref())?;
+    let soft_tissue = match args.soft_tissue_mm {
+        Some([distal_mm, proximal_mm]) => SoftTissue {
+            distal_mm,
+            proximal_mm,
+        },
+        None => plan.soft_tissue,
+    };
     let case = Case::read(&args.case)?;
     let working = working("preparing the limb");
     let prepared = PreparedLimb::of_case(&case)
         .with_context(|| format!("cannot prepare the limb of {}", args.case.display()))?;
     let table = Table::of_plan(&plan)?;
     let skin = &prepared.limb.mesh;
-    let placement = place(
+    let placement = place_soft(
         &skin.vertices,
         &prepared.landmarks,
         args.angle.to_radians(),
         &table.plane.plane,
         &table.room.device,
+        &soft_tissue,
     )?;
     let patient_from_ct = prepared.landmarks.patient_from_ct();
     if let Some(ply) = &args.ply {
         let room_from_ct = placement.room_from_patient * patient_from_ct;
-        write_ply(ply, &skin.transformed(room_from_ct.isometry()))?;
+        let mut lies = skin.transformed(room_from_ct.isometry());
+        if placement.flattening.is_some() {
+            lies.vertices = placement.in_room(&skin.vertices, &prepared.landmarks);
+            lies.normals = lies.geometric_normals();
+        }
+        write_ply(ply, &lies)?;
     }
     working.finish_and_clear();
     let placed = Placed {

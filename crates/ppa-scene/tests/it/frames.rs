@@ -29,6 +29,13 @@ proptest! {
         prop_assert!((room_from_ct.inverse() * (room_from_ct * p) - p).norm() < 1e-8);
     }
 
+    /// A limb keeps its shape in whatever frame it is looked at.
+    #[test]
+    fn motions_keep_distances(a in isometries(), p in points(), q in points()) {
+        let rigid = Rigid::<Room, Ct>::new(a);
+        prop_assert!(((rigid * p - rigid * q).norm() - (p - q).norm()).abs() < 1e-8);
+    }
+
     /// Files keep a motion: rows, then JSON, then back.
     #[test]
     fn files_keep_motions(a in isometries(), p in points()) {
@@ -48,6 +55,21 @@ proptest! {
         prop_assert!((plane.signed_distance(&p) - moved.signed_distance(&(a * p))).abs() < 1e-7);
         prop_assert!(plane.signed_distance(&plane.project(&p)).abs() < 1e-7);
     }
+}
+
+/// Five decimals are read, and what they lack is not kept: distances stay.
+#[test]
+fn printed_matrices_are_read_as_the_nearest_motion() {
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -0.8, 1.1));
+    let exact = Rigid::<Room, Ct>::new(Isometry3::from_parts(Translation3::identity(), turn));
+    let printed = exact
+        .to_homogeneous_rows()
+        .map(|row| row.map(|v| (v * 1e5).round() / 1e5));
+    let read = Rigid::<Room, Ct>::try_from(printed).unwrap();
+    let angle = read.isometry().rotation.angle_to(&turn);
+    assert!(angle < 2e-5, "{angle}");
+    let far = Point3::new(2000.0, -1000.0, 500.0);
+    assert!(((read * far).coords.norm() - far.coords.norm()).abs() < 1e-9);
 }
 
 #[test]

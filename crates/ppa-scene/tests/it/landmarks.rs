@@ -1,53 +1,11 @@
-use std::sync::LazyLock;
-
-use nalgebra::{Affine3, Point3, Rotation3, Vector3};
+use nalgebra::{Point3, Rotation3, Vector3};
 use ppa_ct::phantom::{LowerLeg, TableTop};
-use ppa_ct::{Grid, Volume};
-use ppa_mesh::{Border, Mesh, iso_surface};
 use ppa_scene::{
     AxisSource, LandmarkError, LandmarkOverrides, Landmarks, LimbKind, Plane, Side, XrayDevice,
     bump_sites, find_landmarks, place,
 };
 
-/// A limb alone in its scan: everything above −500 HU.
-struct Scan {
-    volume: Volume,
-    skin: Mesh,
-    mask: Vec<bool>,
-}
-
-impl Scan {
-    fn of(volume: Volume) -> Self {
-        let skin = iso_surface(&volume, -500.0, Border::Open).unwrap();
-        let mask = volume.hu().iter().map(|hu| *hu >= -500.0).collect();
-        Self { volume, skin, mask }
-    }
-
-    fn find(&self, side: Side, overrides: &LandmarkOverrides) -> Result<Landmarks, LandmarkError> {
-        find_landmarks(&self.volume, &self.skin, &self.mask, side, overrides)
-    }
-
-    /// The same voxels in a turned world.
-    fn turned(&self, turn: &Rotation3<f64>) -> Self {
-        let grid = self.volume.grid();
-        let affine = turn.to_homogeneous() * grid.ct_from_voxel().matrix();
-        let grid = Grid::new(grid.size(), Affine3::from_matrix_unchecked(affine)).unwrap();
-        Self::of(Volume::new(grid, self.volume.hu().to_vec()).unwrap())
-    }
-
-    /// Slices `range` of the scan, counted from distal.
-    fn slices(&self, range: std::ops::Range<usize>) -> Self {
-        let [ni, nj, _] = self.volume.grid().size();
-        Self::of(
-            self.volume
-                .crop([0, 0, range.start], [ni, nj, range.end])
-                .unwrap(),
-        )
-    }
-}
-
-static P01: LazyLock<Scan> =
-    LazyLock::new(|| Scan::of(LowerLeg::p01().voxelise(2.0, TableTop::Absent).unwrap()));
+use crate::scan::{P01, Scan};
 
 fn automatic() -> LandmarkOverrides {
     LandmarkOverrides::default()
@@ -239,6 +197,19 @@ fn bump_sites_reach_the_skin() {
     );
 }
 
+/// A limb in one slice has no axis.
+#[test]
+fn a_single_slice_is_refused() {
+    let mut mask = P01.mask.clone();
+    let [ni, nj, nk] = P01.volume.grid().size();
+    for (index, inside) in mask.iter_mut().enumerate() {
+        *inside &= index / (ni * nj) == nk / 2;
+    }
+    let side = Side::Right;
+    let error = find_landmarks(&P01.volume, &P01.skin, &mask, side, &automatic()).unwrap_err();
+    assert!(matches!(error, LandmarkError::Region { .. }), "{error}");
+}
+
 #[test]
 fn unusable_input_is_refused() {
     let scan = &*P01;
@@ -286,6 +257,31 @@ fn unusable_input_is_refused() {
             ..
         }
     ));
+    for (name, joint_region, calf_region) in [
+        ("joint region", [90.0, 50.0], [130.0, 200.0]),
+        ("calf region", [50.0, 90.0], [130.0, f64::NAN]),
+    ] {
+        let regions = LandmarkOverrides {
+            joint_region: Some(joint_region),
+            calf_region: Some(calf_region),
+            ..automatic()
+        };
+        let error = find(&scan.mask, &regions);
+        let refused = matches!(error, LandmarkError::Region { name: found, .. } if found == name);
+        assert!(refused, "{error}");
+    }
+    let one_line = LandmarkOverrides {
+        plane_points: Some([[0.0, 85.0, -60.0], [10.0, 85.0, 0.0], [20.0, 85.0, 60.0]]),
+        ..automatic()
+    };
+    let error = find(&scan.mask, &one_line);
+    assert!(matches!(error, LandmarkError::Plane { .. }), "{error}");
+    let mut torn = scan.skin.clone();
+    torn.vertices[3].x = -f32::NAN;
+    assert_eq!(
+        find_landmarks(&scan.volume, &torn, &scan.mask, Side::Right, &automatic()).unwrap_err(),
+        LandmarkError::NotFinite { vertex: 3 }
+    );
     let above = LandmarkOverrides {
         plane_points: Some([
             [0.0, -900.0, 0.0],

@@ -5,4 +5,6 @@ mod frames;
 mod landmarks;
 mod placement;
 mod real_scans;
+mod scan;
+mod soft_tissue;
 mod table;

@@ -149,7 +149,7 @@ fn a_limb_without_foot_is_split_in_the_middle() {
         &device(),
     )
     .unwrap();
-    assert_eq!(placement.contact.split_mm, 125.0);
+    assert!((placement.contact.split_mm - 125.0).abs() < 1e-9);
     assert!(placement.contact.penetration_mm < 1e-9);
     // The cone's lower line must lie flat: its half-angle is atan(10/250).
     let tilt = f64::atan2(10.0, 250.0);
@@ -283,5 +283,16 @@ fn impossible_placements_are_refused() {
     let mut bent = landmarks.clone();
     bent.anterior = bent.axis_direction;
     let error = place(&points, &bent, 0.0, &table(), &device()).unwrap_err();
-    assert!(matches!(error, PlaceError::Landmarks(_)));
+    assert!(matches!(error, PlaceError::Axes));
+    let mut across = landmarks.clone();
+    across.plane_points = [[0.0, 85.0, -60.0], [10.0, 85.0, 0.0], [20.0, 85.0, 60.0]];
+    let error = place(&points, &across, 0.0, &table(), &device()).unwrap_err();
+    assert!(matches!(error, PlaceError::Plane(_)), "{error}");
+    let thin: Vec<Point3<f32>> = (0..50)
+        .map(|i| Point3::new(0.1, 0.2, 3.7) * i as f32)
+        .collect();
+    assert_eq!(
+        with(&thin, 0.0, &table()),
+        PlaceError::OneLine { found: 50 }
+    );
 }

@@ -133,8 +133,25 @@ fn clouds_without_a_plane_are_refused() {
         ..settings.clone()
     };
     assert!((table_plane(&wall, &upright, 1).unwrap().plane.offset_mm - 5.0).abs() < 1e-9);
+    let line = PointCloud {
+        points: (0..1000)
+            .map(|i| Point3::new(1.0, 2.0, 0.3) * i as f32)
+            .collect(),
+        normals: Vec::new(),
+    };
+    let error = table_plane(&line, &settings, 1).unwrap_err();
+    assert_eq!(error, PlaneError::OneLine { found: 1000 });
     let error = table_plane(&PointCloud::default(), &settings, 1).unwrap_err();
     assert!(matches!(error, PlaneError::TooFewPoints { found: 0, .. }));
+    let backwards = PlaneSettings {
+        region: Some([[0.0, 0.0, 9.0], [1.0, 1.0, 3.0]]),
+        ..settings.clone()
+    };
+    let error = table_plane(&wall, &backwards, 1).unwrap_err();
+    assert!(
+        matches!(error, PlaneError::Setting { name: "region", .. }),
+        "{error}"
+    );
     let bad = PlaneSettings {
         threshold_mm: f64::NAN,
         ..settings

@@ -6,7 +6,7 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 use ppa_ct::{Volume, write_nifti};
 use ppa_dataset::{Case, Plan, PreparedLimb, Table, joint_phantom, projection, spectrum};
-use ppa_scene::{Contact, place};
+use ppa_scene::{Contact, place_soft};
 use ppa_xray::{Dose, FastSettings, VoxelPhantom, fast};
 use serde::Serialize;
 
@@ -80,12 +80,13 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
     let prepared = PreparedLimb::of_case(&case)
         .with_context(|| format!("cannot prepare the limb of {}", args.case.display()))?;
     let table = Table::of_plan(&plan)?;
-    let placement = place(
+    let placement = place_soft(
         &prepared.limb.mesh.vertices,
         &prepared.landmarks,
         args.angle.to_radians(),
         &table.plane.plane,
         &table.room.device,
+        &plan.soft_tissue,
     )?;
     let phantom = joint_phantom(&prepared, &plan.xray)?;
     let spectrum = spectrum(&plan.xray)?;

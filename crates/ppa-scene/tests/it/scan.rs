@@ -1,0 +1,53 @@
+//! A phantom's limb alone in its scan.
+
+use std::sync::LazyLock;
+
+use nalgebra::{Affine3, Rotation3};
+use ppa_ct::phantom::{LowerLeg, TableTop};
+use ppa_ct::{Grid, Volume};
+use ppa_mesh::{Border, Mesh, iso_surface};
+use ppa_scene::{LandmarkError, LandmarkOverrides, Landmarks, Side, find_landmarks};
+
+/// A limb alone in its scan: everything above −500 HU.
+pub struct Scan {
+    pub volume: Volume,
+    pub skin: Mesh,
+    pub mask: Vec<bool>,
+}
+
+impl Scan {
+    pub fn of(volume: Volume) -> Self {
+        let skin = iso_surface(&volume, -500.0, Border::Open).unwrap();
+        let mask = volume.hu().iter().map(|hu| *hu >= -500.0).collect();
+        Self { volume, skin, mask }
+    }
+
+    pub fn find(
+        &self,
+        side: Side,
+        overrides: &LandmarkOverrides,
+    ) -> Result<Landmarks, LandmarkError> {
+        find_landmarks(&self.volume, &self.skin, &self.mask, side, overrides)
+    }
+
+    /// The same voxels in a turned world.
+    pub fn turned(&self, turn: &Rotation3<f64>) -> Self {
+        let grid = self.volume.grid();
+        let affine = turn.to_homogeneous() * grid.ct_from_voxel().matrix();
+        let grid = Grid::new(grid.size(), Affine3::from_matrix_unchecked(affine)).unwrap();
+        Self::of(Volume::new(grid, self.volume.hu().to_vec()).unwrap())
+    }
+
+    /// Slices `range` of the scan, counted from distal.
+    pub fn slices(&self, range: std::ops::Range<usize>) -> Self {
+        let [ni, nj, _] = self.volume.grid().size();
+        Self::of(
+            self.volume
+                .crop([0, 0, range.start], [ni, nj, range.end])
+                .unwrap(),
+        )
+    }
+}
+
+pub static P01: LazyLock<Scan> =
+    LazyLock::new(|| Scan::of(LowerLeg::p01().voxelise(2.0, TableTop::Absent).unwrap()));
