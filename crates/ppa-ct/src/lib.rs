@@ -87,4 +87,4 @@ pub use scan::{
 };
 pub use values::Values;
 pub use volume::{Volume, VolumeError};
-pub use write::write;
+pub use write::{Format, write};

@@ -26,18 +26,48 @@ use crate::volume::Volume;
 /// # Errors
 /// [`WriteError`] of the format, and for other extensions.
 pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
-    if names_dicom(path) {
-        return write_dicom(path, volume);
+    match Format::of_name(path)? {
+        Format::Dicom => write_dicom(path, volume),
+        Format::Nifti => write_nifti(path, volume),
+        Format::Nrrd => write_nrrd(path, volume),
+        Format::MetaImage => write_meta_image(path, volume),
     }
-    let extension = path.extension().unwrap_or_default().to_string_lossy();
-    match extension.to_ascii_lowercase().as_str() {
-        "nii" | "gz" => write_nifti(path, volume),
-        "nrrd" => write_nrrd(path, volume),
-        "mha" | "mhd" => write_meta_image(path, volume),
-        _ => Err(WriteError::Extension {
-            path: path.to_owned(),
-            expected: "a name ending in .nii, .nii.gz, .nrrd, .mha or .mhd, or a folder for DICOM slices",
-        }),
+}
+
+/// A format that can be written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Format {
+    /// A folder with a DICOM CT series.
+    Dicom,
+    /// NIfTI-1.
+    Nifti,
+    /// NRRD.
+    Nrrd,
+    /// MetaImage.
+    MetaImage,
+}
+
+impl Format {
+    /// The format in which [`write()`] writes to this name.
+    ///
+    /// # Errors
+    /// [`WriteError::Extension`] for other extensions than those of [`write()`].
+    pub fn of_name(path: &Path) -> Result<Self, WriteError> {
+        let slash = path.as_os_str().as_encoded_bytes().ends_with(b"/");
+        if slash || path.is_dir() || path.extension().is_none() {
+            return Ok(Self::Dicom);
+        }
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        match extension.to_ascii_lowercase().as_str() {
+            "nii" | "gz" => Ok(Self::Nifti),
+            "nrrd" => Ok(Self::Nrrd),
+            "mha" | "mhd" => Ok(Self::MetaImage),
+            _ => Err(WriteError::Extension {
+                path: path.to_owned(),
+                expected: "a name ending in .nii, .nii.gz, .nrrd, .mha or .mhd, or a folder for DICOM slices",
+            }),
+        }
     }
 }
 
@@ -54,19 +84,14 @@ impl Scan {
             (None, Some(unit)) => format!("values in {unit}"),
             (None, None) => return write(path, &self.volume),
         };
-        match names_dicom(path) {
-            true => Err(WriteError::NotCt {
+        match Format::of_name(path)? {
+            Format::Dicom => Err(WriteError::NotCt {
                 path: path.to_owned(),
                 found,
             }),
-            false => write(path, &self.volume),
+            _ => write(path, &self.volume),
         }
     }
-}
-
-fn names_dicom(path: &Path) -> bool {
-    let slash = path.as_os_str().as_encoded_bytes().ends_with(b"/");
-    slash || path.is_dir() || path.extension().is_none()
 }
 
 #[cfg(feature = "dicom")]

@@ -86,6 +86,38 @@ fn what_makes_no_phantom_is_refused_before_anything_is_written() {
             "0 to 20",
         ),
         ("demo --phantom Q1 --out demo", "P01 to P17"),
+        (
+            "ct phantom --spacing-mm 0.25 --out a.nii",
+            "expected at most 5.4e8",
+        ),
+        (
+            "ct phantom --spacing-mm 8 --out a.xyz --labels b.nii",
+            ".nrrd",
+        ),
+        (
+            "ct phantom --spacing-mm 8 --out a.nii --labels b.xyz",
+            ".nrrd",
+        ),
+        (
+            "ct phantom --spacing-mm 8 --out a.nii --labels a.nii",
+            "two files",
+        ),
+        (
+            "ct phantom --spacing-mm 8 --out a.nii --labels ./a.nii",
+            "two files",
+        ),
+        (
+            "ct phantom --spacing-mm 8 --out a.nii --labels bones",
+            "numbers of bones",
+        ),
+        (
+            "ct phantom --spacing-mm 8 --out a.nii --labels bones/",
+            "numbers of bones",
+        ),
+        (
+            "ct phantom --spacing-mm 8 --out a.nii --labels .",
+            "numbers of bones",
+        ),
     ] {
         let said = fail(folder.path(), arguments);
         assert!(said.contains(word), "{arguments}: {said}");

@@ -4,6 +4,7 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::grid::Grid;
+use crate::values::with_room;
 use crate::volume::{Volume, VolumeError};
 
 use super::limb::{Limb, Side};
@@ -45,6 +46,8 @@ pub enum TableTop {
 }
 
 const SPACING_MM: [f64; 2] = [0.25, 8.0];
+/// Most voxels of a phantom: 2 GiB of values. A lower leg has as many at 0.4 mm.
+const MOST_VOXELS: f64 = 536_870_912.0;
 const AIR_HU: f64 = -1000.0;
 /// Air around the limb inside the field of view.
 const MARGIN_MM: f64 = 12.0;
@@ -89,7 +92,8 @@ impl Limb {
     /// depend on the number of threads.
     ///
     /// # Errors
-    /// [`PhantomError::Spacing`] when `spacing_mm` is not between 0.25 and 8.
+    /// [`PhantomError::Spacing`] when `spacing_mm` is not between 0.25 and 8, [`VolumeError::TooFine`] when it makes
+    /// more than 2^29 voxels, [`VolumeError::Memory`] when there is no room for them.
     pub fn voxelise(&self, spacing_mm: f64, table: TableTop) -> Result<Volume, PhantomError> {
         let (mut low, mut high) = self.skin_box();
         low -= Vector3::repeat(MARGIN_MM);
@@ -107,7 +111,7 @@ impl Limb {
     /// on the lowest corner; on a left limb on the corner that is highest in x and lowest in y and z.
     ///
     /// # Errors
-    /// [`PhantomError`] when `spacing_mm` is not between 0.25 and 8, or the box is empty.
+    /// As [`Limb::voxelise`]; [`PhantomError::Volume`] when the box is empty.
     pub fn voxelise_box(
         &self,
         [low, high]: [Point3<f64>; 2],
@@ -135,10 +139,21 @@ impl Limb {
                 found_mm: spacing_mm,
             });
         }
-        let size = [0, 1, 2].map(|a| (((high[a] - low[a]) / spacing_mm).floor() + 1.0) as usize);
+        let counts = ((high - low) / spacing_mm).map(|steps| steps.floor().max(-1.0) + 1.0);
+        let voxels = counts.product();
+        if voxels > MOST_VOXELS {
+            return Err(PhantomError::Volume(VolumeError::TooFine {
+                spacing_mm,
+                voxels,
+                most: MOST_VOXELS,
+            }));
+        }
+        let size = [0, 1, 2].map(|a| counts[a] as usize);
         let spacing = Vector3::repeat(spacing_mm);
         let grid = Grid::axis_aligned(size, spacing, low).map_err(VolumeError::from)?;
-        let mut hu = self.hu_on(&grid, spacing_mm, table);
+        let mut hu = with_room(grid.len())?;
+        hu.resize(grid.len(), AIR_HU as f32);
+        self.paint_on(&grid, spacing_mm, table, &mut hu);
         if self.side == Side::Right {
             return Ok(Volume::new(grid, hu)?);
         }
@@ -148,14 +163,13 @@ impl Limb {
         Ok(Volume::new(mirrored.map_err(VolumeError::from)?, hu)?)
     }
 
-    /// One value per voxel of a lattice in the right limb's `ct`.
-    fn hu_on(&self, grid: &Grid, spacing_mm: f64, table: TableTop) -> Vec<f32> {
+    /// Fills in one value per voxel of a lattice in the right limb's `ct`.
+    fn paint_on(&self, grid: &Grid, spacing_mm: f64, table: TableTop, hu: &mut [f32]) {
         let table_top_mm = match table {
             TableTop::Absent => None,
             TableTop::Present => Some(self.table_top_y),
         };
         let [nx, ny, nz] = grid.size();
-        let mut hu = vec![AIR_HU as f32; grid.len()];
         let slab = nx * ny * BLOCK;
         hu.par_chunks_mut(slab).enumerate().for_each(|(n, hu)| {
             let painter = Painter {
@@ -177,7 +191,6 @@ impl Limb {
                 }
             }
         });
-        hu
     }
 }
 

@@ -1,11 +1,11 @@
 //! `ppa ct phantom`: a CT of a limb whose true shape is known.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use ppa_ct::phantom::{Limb, LowerLeg, Scanner, Side, TableTop, Truth};
-use ppa_ct::{Info, Volume, write};
+use ppa_ct::{Format, Info, Volume, write};
 use serde::Serialize;
 
 use super::describe;
@@ -57,7 +57,7 @@ pub struct PhantomArgs {
     /// Put a titanium plate with five screws on the fibula
     #[arg(long)]
     plate: bool,
-    /// Also write which bone each voxel belongs to, 0 for none: as --out
+    /// Also write which bone each voxel belongs to, 0 for none: as --out, but not as DICOM
     #[arg(long, value_name = "FILE")]
     labels: Option<PathBuf>,
     /// Side of the cubic voxels in mm
@@ -89,7 +89,43 @@ struct Made {
     labels: Vec<&'static str>,
 }
 
+/// Whether two names are those of one file, which need not exist yet.
+fn same_file(a: &Path, b: &Path) -> bool {
+    let resolved = |path: &Path| {
+        let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
+        Some(
+            path.canonicalize()
+                .unwrap_or(folder.join(path.file_name()?)),
+        )
+    };
+    resolved(a).is_some_and(|a| Some(a) == resolved(b))
+}
+
+/// Refuses names under which nothing, or the wrong thing, would be found later.
+fn check_outputs(args: &PhantomArgs) -> anyhow::Result<()> {
+    Format::of_name(&args.out)?;
+    let Some(labels) = &args.labels else {
+        return Ok(());
+    };
+    if Format::of_name(labels)? == Format::Dicom {
+        let labels = labels.display();
+        bail!(
+            "--labels {labels} would be a DICOM CT in Hounsfield units, but labels are numbers of bones: write NIfTI, \
+             NRRD or MetaImage"
+        );
+    }
+    if same_file(labels, &args.out) {
+        bail!(
+            "--labels and --out are both {}: expected two files",
+            labels.display()
+        );
+    }
+    Ok(())
+}
+
 pub fn run(args: &PhantomArgs, output: Output) -> anyhow::Result<()> {
+    check_outputs(args)?;
     let working = working("voxelising the phantom");
     let (phantom, limb, truth) = limb(args)?;
     let table = if args.table {
@@ -108,6 +144,7 @@ pub fn run(args: &PhantomArgs, output: Output) -> anyhow::Result<()> {
         };
         volume = scanner.scan(&volume).context("cannot scan the phantom")?;
     }
+    write(&args.out, &volume)?;
     let mut labels = Vec::new();
     if let Some(path) = &args.labels {
         let numbers = limb.bone_labels(volume.grid());
@@ -115,7 +152,6 @@ pub fn run(args: &PhantomArgs, output: Output) -> anyhow::Result<()> {
         write(path, &Volume::new(volume.grid().clone(), numbers)?)?;
         labels = limb.bone_names();
     }
-    write(&args.out, &volume)?;
     working.finish_and_clear();
     let made = Made {
         info: Info::of_volume(&volume),

@@ -87,3 +87,26 @@ fn spacing_outside_the_range_is_refused() {
         );
     }
 }
+
+/// Before any memory is asked for; an empty box is refused too.
+#[test]
+fn more_voxels_than_2_gib_hold_are_refused() {
+    let centre = LIMB.truth().joint_centre;
+    let around = |half_mm: f64, spacing_mm: f64| {
+        let half = Vector3::repeat(half_mm);
+        LIMB.voxelise_box([centre - half, centre + half], spacing_mm, TableTop::Absent)
+    };
+    for (half_mm, spacing_mm) in [
+        (110.0, 0.25),
+        (1e6, 8.0),
+        (1e300, 1.0),
+        (f64::INFINITY, 1.0),
+    ] {
+        let refusal = around(half_mm, spacing_mm).unwrap_err().to_string();
+        assert!(refusal.contains("expected at most 5.4e8"), "{refusal}");
+    }
+    for half_mm in [-1.0, f64::NAN] {
+        let refusal = around(half_mm, 1.0).unwrap_err().to_string();
+        assert!(refusal.contains("empty"), "{refusal}");
+    }
+}
