@@ -4,12 +4,14 @@ use rayon::prelude::*;
 
 use super::draw::{Purpose, normal};
 use super::voxelise::PhantomError;
-use crate::volume::Volume;
+use crate::values::with_room;
+use crate::volume::{Volume, VolumeError};
 
 /// A scanner with a Gaussian point spread and white noise, which stores whole Hounsfield units of 12 bits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scanner {
-    /// Full width at half maximum of the point spread along every axis, mm; 0 for none.
+    /// Full width at half maximum of the point spread along every axis, mm; 0 for none. It spreads what voxels hold,
+    /// which are means over their own width already.
     pub blur_fwhm_mm: f64,
     /// Standard deviation of the noise of a voxel, HU.
     pub noise_hu: f64,
@@ -37,11 +39,12 @@ impl Scanner {
             }
         }
         let grid = phantom.grid();
-        let mut hu = phantom.hu().to_vec();
+        let mut hu = with_room(grid.len())?;
+        hu.extend_from_slice(&phantom.hu());
         let sigma_mm = self.blur_fwhm_mm / (8.0 * 2.0_f64.ln()).sqrt();
         let mut stride = 1;
         for (count, spacing_mm) in grid.size().into_iter().zip(&grid.spacing_mm()) {
-            hu = blurred(&hu, count, stride, &kernel(sigma_mm / spacing_mm));
+            hu = blurred(&hu, count, stride, &kernel(sigma_mm / spacing_mm))?;
             stride *= count;
         }
         hu.par_iter_mut().enumerate().for_each(|(index, hu)| {
@@ -53,27 +56,45 @@ impl Scanner {
     }
 }
 
-/// A Gaussian in voxels, from the middle outwards to 4 standard deviations, with sum 1.
+/// A Gaussian in voxels, from the middle outwards, whose sum is 1 and whose variance is that of `sigma`.
+///
+/// A Gaussian of less than about half a voxel has a smaller variance on the lattice than between its points, down to
+/// none at all: the one that is sampled is so much wider that the lattice sees `sigma`.
 fn kernel(sigma: f64) -> Vec<f64> {
-    let half: Vec<f64> = (0..=(4.0 * sigma).ceil() as usize)
-        .map(|n| n as f64)
-        .map(|n| {
-            if n == 0.0 {
-                1.0
-            } else {
-                (-0.5 * (n / sigma).powi(2)).exp()
-            }
-        })
-        .collect();
+    let (mut narrow, mut wide) = (0.0, sigma + 0.5);
+    for _ in 0..60 {
+        let middle = 0.5 * (narrow + wide);
+        if variance(&sampled(middle)) < sigma * sigma {
+            narrow = middle;
+        } else {
+            wide = middle;
+        }
+    }
+    sampled(narrow)
+}
+
+/// The weights of a Gaussian at the points of a lattice, out to 5 standard deviations.
+fn sampled(sigma: f64) -> Vec<f64> {
+    let beside = 1..=(5.0 * sigma).ceil() as usize;
+    let beside = beside.map(|n| (-0.5 * (n as f64 / sigma).powi(2)).exp());
+    let half: Vec<f64> = std::iter::once(1.0).chain(beside).collect();
     let sum = half[0] + 2.0 * half[1..].iter().sum::<f64>();
     half.iter().map(|weight| weight / sum).collect()
 }
 
+fn variance(half: &[f64]) -> f64 {
+    let squares = half.iter().enumerate().map(|(n, w)| w * (n * n) as f64);
+    2.0 * squares.sum::<f64>()
+}
+
 /// Values convolved along the axis with this many voxels and this distance in memory.
-fn blurred(hu: &[f32], count: usize, stride: usize, kernel: &[f64]) -> Vec<f32> {
-    if kernel.len() == 1 {
-        return hu.to_vec();
-    }
+fn blurred(
+    hu: &[f32],
+    count: usize,
+    stride: usize,
+    kernel: &[f64],
+) -> Result<Vec<f32>, VolumeError> {
+    let mut blurred = with_room(hu.len())?;
     (0..hu.len())
         .into_par_iter()
         .with_min_len(1 << 14)
@@ -89,5 +110,6 @@ fn blurred(hu: &[f32], count: usize, stride: usize, kernel: &[f64]) -> Vec<f32> 
             }
             sum as f32
         })
-        .collect()
+        .collect_into_vec(&mut blurred);
+    Ok(blurred)
 }

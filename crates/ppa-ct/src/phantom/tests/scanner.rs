@@ -1,5 +1,7 @@
 //! Blur and noise.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Point3, Vector3};
 
 use crate::grid::Grid;
@@ -72,5 +74,54 @@ fn the_scanner_blurs_and_adds_noise_as_told() {
                 .to_string()
                 .contains("expected 0 to")
         );
+    }
+}
+
+/// A line of voxels 1 mm apart that reads `hu` at each, blurred.
+fn blurred_line(blur_fwhm_mm: f64, hu: impl Fn(f64) -> f64) -> Vec<f64> {
+    let grid = Grid::axis_aligned([161, 1, 1], Vector3::repeat(1.0), Point3::origin()).unwrap();
+    let line = (0..161).map(|n| hu(f64::from(n)) as f32).collect();
+    let scanner = Scanner {
+        blur_fwhm_mm,
+        noise_hu: 0.0,
+        seed: 0,
+    };
+    let line = Volume::new(grid, line).unwrap();
+    let blurred = scanner.scan(&line).unwrap();
+    blurred.hu().iter().map(|hu| f64::from(*hu)).collect()
+}
+
+/// The variance of the point spread and the contrast of waves 8 and 20 voxels long, exp(-(2π σ / λ)² / 2), from blurs far
+/// below a voxel to several. Values are rounded to whole HU.
+#[test]
+fn blur_is_as_wide_as_stated_below_a_voxel_too() {
+    for fwhm in [0.2, 0.4, 0.7, 1.0, 1.3, 2.0, 4.0] {
+        let sigma = fwhm / 2.354_82;
+        let spread = blurred_line(fwhm, |x| if x == 80.0 { 3000.0 } else { 0.0 });
+        let moment = |power: i32| -> f64 {
+            let places = (0..161).map(|n| f64::from(n - 80));
+            spread
+                .iter()
+                .zip(places)
+                .map(|(hu, x)| hu * x.powi(power))
+                .sum()
+        };
+        let variance = moment(2) / moment(0);
+        assert!(
+            (variance - sigma * sigma).abs() < 0.02 * sigma * sigma + 5e-4,
+            "{variance} for {fwhm} mm"
+        );
+        for wave in [8.0, 20.0] {
+            let phase = |x: f64| (TAU * (x - 80.0) / wave).cos();
+            let waves = blurred_line(fwhm, |x| 1000.0 * phase(x));
+            // Away from the ends, over whole waves.
+            let middle = (40..120).map(|n| waves[n] * phase(n as f64) / 40.0);
+            let contrast = middle.sum::<f64>() / 1000.0;
+            let expected = (-0.5 * (TAU * sigma / wave).powi(2)).exp();
+            assert!(
+                (contrast - expected).abs() < 0.006,
+                "{contrast} for {expected} at {fwhm} mm"
+            );
+        }
     }
 }
