@@ -23,7 +23,7 @@ impl Chord {
     }
 }
 
-/// Where a ray meets the skin.
+/// Where a ray crosses the skin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SkinHit {
     /// Distance from the ray's origin, mm.
@@ -84,9 +84,10 @@ impl Limb {
         chords
     }
 
-    /// Where a ray first meets the skin from outside, exact to 1e-7 mm; `None` within `reach_mm`.
+    /// Where a ray first crosses the skin, exact to 1e-7 mm: where it enters the limb, or, from an origin inside, where
+    /// it leaves it. `None` if it does neither within `reach_mm`.
     ///
-    /// A stretch inside the limb shorter than 0.02 mm may be missed.
+    /// A stretch shorter than 0.02 mm inside the limb, or outside of it, may be missed.
     pub fn skin_hit(
         &self,
         origin: &Point3<f64>,
@@ -95,11 +96,12 @@ impl Limb {
     ) -> Option<SkinHit> {
         let (start, along) = self.ray_in_limb(origin, direction);
         let distance = |t: f64| self.envelope.skin_distance(&(start + along * t));
+        let begins_inside = distance(0.0) < 0.0;
         let mut t = 0.0;
         while t < reach_mm {
-            let next = t + (distance(t) / CAUTION).max(LEAST_STEP_MM);
-            if distance(next) < 0.0 {
-                let distance_mm = bisect(t, next, |t| distance(t) >= 0.0);
+            let next = t + (distance(t).abs() / CAUTION).max(LEAST_STEP_MM);
+            if (distance(next) < 0.0) != begins_inside {
+                let distance_mm = bisect(t, next, |t| (distance(t) < 0.0) == begins_inside);
                 let point = origin + direction.scale(distance_mm);
                 return (distance_mm <= reach_mm).then(|| SkinHit {
                     distance_mm,

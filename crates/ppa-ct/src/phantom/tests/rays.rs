@@ -63,6 +63,25 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    /// From inside: where the skin is left for the first time, against points of the ray 0.05 mm apart.
+    #[test]
+    fn a_ray_from_inside_hits_the_skin_where_it_leaves_the_limb(
+        near in prop::array::uniform3(-8.0..8.0_f64), turn in -3.2..3.2_f64, tilt in -1.5..0.7_f64,
+    ) {
+        let origin = LIMB.truth().joint_centre + Vector3::from(near);
+        let (_, along) = ray(near, turn, tilt);
+        let outside = |n: &u32| LIMB.tissue(&(origin + along.scale(0.05 * f64::from(*n)))) == Tissue::Air;
+        let first = (0..8000).find(outside).map(|n| 0.05 * f64::from(n)).unwrap();
+        let hit = LIMB.skin_hit(&origin, &along, 400.0).unwrap();
+        prop_assert!(first - 0.05 - 1e-6 < hit.distance_mm && hit.distance_mm <= first, "{hit:?}, {first}");
+        prop_assert!(LIMB.skin_distance_mm(&hit.point).abs() < 1e-6);
+        prop_assert!(hit.normal.dot(&along) > -1e-6);
+        prop_assert_eq!(LIMB.skin_hit(&origin, &along, hit.distance_mm - 0.1), None);
+    }
+}
+
 /// A vertical ray through the marrow of the shaft crosses the cortex nowhere and leaves at the cut only.
 #[test]
 fn a_ray_up_the_shaft_stays_in_marrow() {
