@@ -14,6 +14,10 @@ pub(super) enum Purpose {
     Texture = 4,
     /// Noise of a voxel.
     ScannerNoise = 5,
+    /// Seed of the spongy bone of a phantom of the table, by its side.
+    TextureOfName = 6,
+    /// The same for a phantom drawn by seed.
+    TextureOfSeed = 7,
 }
 
 /// One step of the SplitMix64 generator (Steele, Lea and Flood 2014, doi:10.1145/2660193.2660195): every bit of
@@ -41,12 +45,19 @@ pub(super) fn normal(seed: u64, purpose: Purpose, index: u64) -> f64 {
     (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
 
-/// A standard normal number between -2 and 2: the first of the numbers of this index that lies there.
-pub(super) fn truncated_normal(seed: u64, purpose: Purpose, index: u64) -> f64 {
-    (0..)
+/// A number of this mean and deviation, at most two deviations from the mean and within a range that holds the mean: the
+/// first of the numbers of this index that lies there.
+pub(super) fn truncated_normal(
+    (seed, purpose, index): (u64, Purpose, u64),
+    [mean, deviation]: [f64; 2],
+    [least, most]: [f64; 2],
+) -> f64 {
+    (0..1 << 32)
         .map(|attempt| normal(seed, purpose, index << 32 | attempt))
-        .find(|z| z.abs() <= 2.0)
-        .unwrap_or(0.0)
+        .filter(|z| z.abs() <= 2.0)
+        .map(|z| mean + deviation * z)
+        .find(|value| (least..=most).contains(value))
+        .unwrap_or(mean)
 }
 
 #[cfg(test)]
@@ -71,13 +82,19 @@ mod tests {
     #[test]
     fn truncated_numbers_stay_within_two_standard_deviations() {
         let n = 100_000;
-        let numbers: Vec<f64> = (0..n)
-            .map(|i| truncated_normal(i, Purpose::Dimension, 3))
-            .collect();
+        let everything = [f64::NEG_INFINITY, f64::INFINITY];
+        let draw = |i, range| truncated_normal((i, Purpose::Dimension, 3), [0.0, 1.0], range);
+        let numbers: Vec<f64> = (0..n).map(|i| draw(i, everything)).collect();
         assert!(numbers.iter().all(|z| z.abs() <= 2.0));
         let variance = numbers.iter().map(|z| z * z).sum::<f64>() / n as f64;
         // The fourth moment is below 16 x 0.7737, so the standard error is below 3.5 / sqrt(n).
         assert!((variance - 0.7737).abs() < 4.0 * 3.5 / (n as f64).sqrt());
+        let cut: Vec<f64> = (0..n).map(|i| draw(i, [-0.5, 0.1])).collect();
+        assert!(cut.iter().all(|z| (-0.5..=0.1).contains(z)));
+        // Those that are kept anyway stay as they are.
+        let same = cut.iter().zip(&numbers).filter(|(a, b)| a == b).count();
+        let kept = numbers.iter().filter(|z| (-0.5..=0.1).contains(*z)).count();
+        assert_eq!(same, kept);
     }
 
     #[test]

@@ -31,18 +31,20 @@ pub(super) fn named(name: &str, side: Side) -> Result<Parameters, UnknownPhantom
     if number == 1 && side == Side::Right {
         return Ok(P01);
     }
-    let dimensions = on_side(dimensions, side, number as u64, Purpose::LeftSide);
-    Ok(parameters(sex, &dimensions))
+    let number = number as u64;
+    let dimensions = on_side(dimensions, side, number, Purpose::LeftSide);
+    let texture_seed = bits(number, Purpose::TextureOfName, side as u64);
+    Ok(parameters(sex, texture_seed, &dimensions))
 }
 
 /// The phantom of this seed.
 pub(super) fn of_seed(seed: u64, side: Side) -> Parameters {
-    let draw = |index: usize| truncated_normal(seed, Purpose::Dimension, index as u64);
     let female = bits(seed, Purpose::Dimension, u64::MAX) & 1 == 1;
     let sex = if female { Sex::Female } else { Sex::Male };
     let mut dimensions: Dimensions = std::array::from_fn(|index| {
-        let [mean, deviation] = DIMENSIONS[index].mean_and_deviation(sex);
-        (mean + deviation * draw(index)).max(DIMENSIONS[index].least)
+        let dimension = &DIMENSIONS[index];
+        let address = (seed, Purpose::Dimension, index as u64);
+        truncated_normal(address, dimension.mean_and_deviation(sex), dimension.range)
     });
     let size = dimensions[0];
     for (dimension, value) in DIMENSIONS.iter().zip(&mut dimensions) {
@@ -51,20 +53,28 @@ pub(super) fn of_seed(seed: u64, side: Side) -> Parameters {
         }
     }
     let dimensions = on_side(dimensions, side, seed, Purpose::LeftSideOfSeed);
-    parameters(sex, &dimensions)
+    let texture_seed = bits(seed, Purpose::TextureOfSeed, side as u64);
+    parameters(sex, texture_seed, &dimensions)
 }
 
 fn on_side(dimensions: Dimensions, side: Side, seed: u64, purpose: Purpose) -> Dimensions {
     match side {
         Side::Right => dimensions,
         Side::Left => std::array::from_fn(|index| {
-            let off = truncated_normal(seed, purpose, index as u64);
-            dimensions[index] * (1.0 + LEFT_RIGHT_SHARE * off)
+            let right = dimensions[index];
+            let deviation = LEFT_RIGHT_SHARE * right.abs();
+            let size = if DIMENSIONS[index].grows {
+                dimensions[0]
+            } else {
+                1.0
+            };
+            let range = DIMENSIONS[index].range.map(|end| end * size);
+            truncated_normal((seed, purpose, index as u64), [right, deviation], range)
         }),
     }
 }
 
-fn parameters(sex: Sex, dimensions: &Dimensions) -> Parameters {
+fn parameters(sex: Sex, texture_seed: u64, dimensions: &Dimensions) -> Parameters {
     let &[
         size,
         mortise_deg,
@@ -120,6 +130,7 @@ fn parameters(sex: Sex, dimensions: &Dimensions) -> Parameters {
         tibia_cortex_mm: [thin_cortex_mm, distal_cortex_mm, shaft_cortex_mm],
         trabecular_hu,
         trabecular_texture_hu,
+        texture_seed,
         ankle_girth,
         calf_girth,
         plantarflexion_rad: plantarflexion_deg.to_radians(),

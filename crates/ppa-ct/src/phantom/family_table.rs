@@ -10,8 +10,8 @@ pub(super) struct Dimension {
     pub women: Option<[f64; 2]>,
     /// Whether the numbers above are those of a foot of P01's size, to be multiplied by the size.
     pub grows: bool,
-    /// Smaller values would make bones touch.
-    pub least: f64,
+    /// The least and the most that is drawn, in the units of the numbers above.
+    pub range: [f64; 2],
 }
 
 impl Dimension {
@@ -20,7 +20,7 @@ impl Dimension {
             men: [mean, deviation],
             women: None,
             grows: false,
-            least: f64::NEG_INFINITY,
+            range: [f64::NEG_INFINITY, f64::INFINITY],
         }
     }
 
@@ -39,8 +39,11 @@ impl Dimension {
         }
     }
 
-    const fn at_least(self, least: f64) -> Self {
-        Self { least, ..self }
+    const fn between(self, least: f64, most: f64) -> Self {
+        Self {
+            range: [least, most],
+            ..self
+        }
     }
 
     pub(super) fn mean_and_deviation(&self, sex: Sex) -> [f64; 2] {
@@ -61,8 +64,8 @@ pub(super) type Dimensions = [f64; 31];
 pub(super) const DIMENSIONS: [Dimension; 31] = [
     // Size: length of the talus, men 60.9 ± 2.8, women 54.4 ± 2.5 (J Jilin Univ Med 2020;46:102).
     Dimension::by_sex([1.0, 0.046], [0.893, 0.041]),
-    // Mortise angle: men 21.2 ± 4.6, women 16.4 ± 4.1 (CT of 128 feet, 2001).
-    Dimension::by_sex([21.2, 4.6], [16.4, 4.1]),
+    // Mortise angle: men 21.2 ± 4.6, women 16.4 ± 4.1, all within 10 to 29 (CT of 128 feet, 2001).
+    Dimension::by_sex([21.2, 4.6], [16.4, 4.1]).between(10.0, 29.0),
     // Inclination of the talocrural axis: 9.9 ± 3.3 (BioMed Res Int 2019:8634159).
     Dimension::of(9.9, 3.3),
     // Radius of the trochlea: 20.7 ± 2.6 (PMC1888582).
@@ -84,7 +87,8 @@ pub(super) const DIMENSIONS: [Dimension; 31] = [
     Dimension::length(16.0, 0.8),
     Dimension::length(28.0, 2.6),
     // Syndesmosis in front and behind: 2.2 ± 0.9, 3.5 ± 0.9; incisura 3.3 ± 1.2 (CT of 203 legs).
-    Dimension::length(2.2, 0.9).at_least(1.2),
+    // Less in front would make the bones touch.
+    Dimension::length(2.2, 0.9).between(1.2, f64::INFINITY),
     Dimension::length(3.5, 0.9),
     Dimension::length(3.3, 1.2),
     // Heads of metatarsals I, III, IV, V in front of that of II (PMC3932714).

@@ -193,6 +193,7 @@ impl Limb {
             },
             table_top_y: JOINT_CENTRE_MM[1] + TABLE_DEPTH_MM,
             texture_hu: 45.0,
+            texture_seed: 0,
         }
     }
 }

@@ -41,6 +41,8 @@ pub struct Limb {
     pub(super) table_top_y: f64,
     /// Standard deviation of spongy bone from place to place, HU.
     pub(super) texture_hu: f64,
+    /// Seed of the places where it is denser.
+    pub(super) texture_seed: u64,
 }
 
 impl Limb {

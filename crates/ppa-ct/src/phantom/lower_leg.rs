@@ -48,7 +48,7 @@ impl LowerLeg {
 
     /// Phantom P01 to P17: nine of men's and eight of women's dimensions, mortise angles from 10° to 29°.
     ///
-    /// The other foot of the same phantom is the mirror image with every dimension off by about 1 %.
+    /// The other foot of the same phantom is the mirror image with every dimension off by about 1 %, and spongy bone of its own.
     ///
     /// # Errors
     /// [`UnknownPhantom`] unless `name` is `"P01"` to `"P17"`, in upper or lower case.
@@ -112,6 +112,7 @@ impl LowerLeg {
             },
             table_top_y: ct_from_limb.translation.y + rest.depth_mm,
             texture_hu: parameters.trabecular_texture_hu,
+            texture_seed: parameters.texture_seed,
         };
         Self {
             mortise: Mortise::new(&parameters),

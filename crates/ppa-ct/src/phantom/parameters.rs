@@ -61,6 +61,8 @@ pub(super) struct Parameters {
     pub trabecular_hu: f64,
     /// Standard deviation of spongy bone from place to place, HU.
     pub trabecular_texture_hu: f64,
+    /// Seed of the places where spongy bone is denser.
+    pub texture_seed: u64,
     /// Girth of the leg just above the malleoli, relative to P01's at the same size.
     pub ankle_girth: f64,
     /// Girth of the calf, relative to P01's at the same size.
@@ -102,6 +104,7 @@ pub(super) const P01: Parameters = Parameters {
     tibia_cortex_mm: [1.2, 3.6, 4.8],
     trabecular_hu: 280.0,
     trabecular_texture_hu: 0.0,
+    texture_seed: 0,
     ankle_girth: 1.0,
     calf_girth: 1.0,
     plantarflexion_rad: 0.0,

@@ -7,8 +7,8 @@ use super::draw::{Purpose, normal};
 /// Distance between places with independent values along x, y and z of the limb; struts of an ankle run along z.
 const CELL_MM: [f64; 3] = [1.6, 1.6, 4.0];
 
-/// A smooth random field with mean 0 and standard deviation 1 over the limb.
-pub(super) fn texture(p: &Point3<f64>) -> f64 {
+/// A smooth random field with mean 0 and standard deviation 1 over the limb, another one for every seed.
+pub(super) fn texture(seed: u64, p: &Point3<f64>) -> f64 {
     let mut base = [0_i64; 3];
     let mut share = [0.0; 3];
     for axis in 0..3 {
@@ -29,7 +29,7 @@ pub(super) fn texture(p: &Point3<f64>) -> f64 {
             // 21 bits per axis: the lattice repeats after a kilometre.
             index = index << 21 | ((base[axis] + upper) as u64 & 0x1f_ffff);
         }
-        sum += weight * normal(0, Purpose::Texture, index);
+        sum += weight * normal(seed, Purpose::Texture, index);
         square += weight * weight;
     }
     sum / f64::sqrt(square)

@@ -160,7 +160,7 @@ impl Limb {
             let mut spongy =
                 filling.trabecular_hu + SUBCHONDRAL_HU * (-depth / SUBCHONDRAL_MM).exp();
             if self.texture_hu > 0.0 && core > 0.0 && marrow < 1.0 {
-                spongy += self.texture_hu * texture(p);
+                spongy += self.texture_hu * texture(self.texture_seed, p);
             }
             let core_hu = spongy + marrow * (MARROW_HU - spongy);
             bone_share += share;
