@@ -58,7 +58,13 @@ fn chain(c: &mut Criterion) {
         b.iter_batched(
             || tempfile::tempdir().unwrap(),
             |out| {
-                generate(&plan, &out.path().join("dataset"), &|_| {}).unwrap();
+                generate(
+                    &plan,
+                    &out.path().join("dataset"),
+                    &Default::default(),
+                    &|_| {},
+                )
+                .unwrap();
                 out
             },
             BatchSize::PerIteration,

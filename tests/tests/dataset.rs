@@ -10,8 +10,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_dataset::layout::{LimbId, View};
 use ppa_dataset::{
-    BodyShape, Case, FileKind, GenerateError, Manifest, Plan, PlanCase, PreparedLimb, Rows, Stage,
-    Summary, generate, prepare,
+    BodyShape, Case, FileKind, FolderError, GenerateError, GenerateSettings, JobError, Manifest,
+    Plan, PlanCase, PreparedLimb, Rows, Stage, Summary, generate, prepare,
 };
 use ppa_depth::{DepthImage, isometry_from_rows};
 use ppa_scene::{Landmarks, Side, Sweep};
@@ -71,7 +71,8 @@ fn run(plan: &Plan, root: &Path, threads: usize) -> Summary {
         .num_threads(threads)
         .build()
         .unwrap();
-    pool.install(|| generate(plan, root, &|_| {})).unwrap()
+    pool.install(|| generate(plan, root, &GenerateSettings::default(), &|_| {}))
+        .unwrap()
 }
 
 /// A dataset made once by one thread, for tests that only look.
@@ -176,13 +177,25 @@ fn a_run_makes_only_what_is_missing_or_damaged() {
 fn a_folder_of_something_else_is_refused() {
     let root = tempfile::tempdir().unwrap();
     fs::write(root.path().join("holiday.jpg"), b"dear").unwrap();
-    let error = generate(&plan(), root.path(), &|_| {}).unwrap_err();
-    assert!(matches!(error, GenerateError::NotADataset(_)), "{error}");
+    let error = generate(&plan(), root.path(), &GenerateSettings::default(), &|_| {}).unwrap_err();
+    assert!(
+        matches!(
+            error,
+            GenerateError::Job(JobError::Folder(FolderError::NotADataset(_)))
+        ),
+        "{error}"
+    );
 
     let mut shorter = plan();
     shorter.rotation.to_deg = 0.0;
-    let error = generate(&shorter, dataset(), &|_| {}).unwrap_err();
-    assert!(matches!(error, GenerateError::OtherPlan { .. }), "{error}");
+    let error = generate(&shorter, dataset(), &GenerateSettings::default(), &|_| {}).unwrap_err();
+    assert!(
+        matches!(
+            error,
+            GenerateError::Job(JobError::Folder(FolderError::OtherPlan { .. }))
+        ),
+        "{error}"
+    );
 }
 
 #[test]
@@ -190,7 +203,13 @@ fn two_cases_of_one_limb_are_refused() {
     let mut plan = plan();
     plan.cases.push(plan.cases[0].clone());
     let root = tempfile::tempdir().unwrap();
-    let error = generate(&plan, &root.path().join("new"), &|_| {}).unwrap_err();
+    let error = generate(
+        &plan,
+        &root.path().join("new"),
+        &GenerateSettings::default(),
+        &|_| {},
+    )
+    .unwrap_err();
     assert!(matches!(error, GenerateError::SameLimb { .. }), "{error}");
 }
 

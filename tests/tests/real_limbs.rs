@@ -39,7 +39,13 @@ fn dataset(case: &Case) -> tempfile::TempDir {
     plan.xray.detector.rows = 112;
     plan.xray.detector.pixel_mm = 2.0;
     plan.xray.engine.scatter_histories = 50_000;
-    generate(&plan, &folder.path().join("data"), &|_| {}).unwrap();
+    generate(
+        &plan,
+        &folder.path().join("data"),
+        &Default::default(),
+        &|_| {},
+    )
+    .unwrap();
     folder
 }
 

@@ -5,7 +5,9 @@
 mod commands;
 mod number_lists;
 mod output;
+mod progress;
 mod scan_args;
+mod shard;
 
 use std::process::ExitCode;
 
@@ -53,6 +55,12 @@ enum Command {
     Xray(commands::xray::XrayCommand),
     /// Make, or go on with, the dataset of a plan
     Generate(commands::generate::GenerateArgs),
+    /// Tell how far a dataset has come
+    Status(commands::status::StatusArgs),
+    /// Join the shards of a plan
+    Merge(commands::merge::MergeArgs),
+    /// Check all files of a dataset, and make a sample of it again
+    Verify(commands::verify::VerifyArgs),
     /// Metrics of predictions against labels
     Metrics(commands::metrics::MetricsArgs),
     /// Statistical tests
@@ -76,6 +84,9 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Depth(command) => commands::depth::run(&command, output),
         Command::Xray(command) => commands::xray::run(&command, output),
         Command::Generate(args) => commands::generate::run(&args, output),
+        Command::Status(args) => commands::status::run(&args, output),
+        Command::Merge(args) => commands::merge::run(&args, output),
+        Command::Verify(args) => commands::verify::run(&args, output),
         Command::Metrics(args) => commands::metrics::run(&args, output),
         Command::Stats(command) => commands::stats::run(&command, output),
     }

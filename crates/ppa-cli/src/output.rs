@@ -50,6 +50,32 @@ pub fn bar(what: &str) -> ProgressBar {
         .with_message(what.to_owned())
 }
 
+/// A number of bytes for people: `1.5 GB`.
+pub fn bytes(bytes: u64) -> String {
+    indicatif::DecimalBytes(bytes).to_string()
+}
+
+/// Bytes from `800`, `1.5MB`, `20 GB`, `2TB`; units are powers of 1000.
+pub fn parse_bytes(text: &str) -> Result<u64, String> {
+    let wrong = || format!("{text:?} is no size; write a number with kB, MB, GB or TB");
+    let text = text.trim();
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit = match text[digits.len()..].to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "kb" => 1e3,
+        "mb" => 1e6,
+        "gb" => 1e9,
+        "tb" => 1e12,
+        _ => return Err(wrong()),
+    };
+    let number: f64 = digits.trim_end().parse().map_err(|_| wrong())?;
+    // f64 counts bytes up to 2^53 exactly.
+    let bytes = number * unit;
+    ((1.0..=9e15).contains(&bytes))
+        .then_some(bytes as u64)
+        .ok_or_else(wrong)
+}
+
 /// Wall-clock and processor time of a step.
 pub struct Stopwatch(Instant, ProcessTime);
 
@@ -73,6 +99,23 @@ impl Stopwatch {
         Seconds {
             wall_s: self.0.elapsed().as_secs_f64(),
             cpu_s: self.1.elapsed().as_secs_f64(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_read() {
+        assert_eq!(parse_bytes("800"), Ok(800));
+        assert_eq!(parse_bytes("1.5MB"), Ok(1_500_000));
+        assert_eq!(parse_bytes("20 GB"), Ok(20_000_000_000));
+        for bad in [
+            "", "GB", "-1MB", "nan", "inf GB", "0", "5 XB", "1e9TB", "5 Ω",
+        ] {
+            assert!(parse_bytes(bad).unwrap_err().contains("no size"), "{bad}");
         }
     }
 }

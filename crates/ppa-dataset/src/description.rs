@@ -1,25 +1,28 @@
 //! `dataset.json`: what all images of a dataset share, free of paths and identities.
 
-use std::path::Path;
-
 use ppa_depth::{CameraSpec, SensorSpec, rows_from_isometry};
 use ppa_mesh::LimbSettings;
-use ppa_scene::{LandmarkOverrides, PlaneSettings, RoomSpec, SoftTissue};
+use ppa_scene::{LandmarkOverrides, PlaneSettings, RoomSpec, SoftTissue, Sweep};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::body_shape::ShapeSettings;
 use crate::case::Case;
-use crate::files::{FileError, hex, sha256_of_file, write_whole};
+use crate::files::{FileError, hex, sha256_of_file};
 use crate::layout::{LimbId, View};
 use crate::manifest::Rows;
 use crate::plan::{Plan, XraySettings};
 use crate::stage::Stage;
 
+/// Name of the file.
+pub(crate) const DESCRIPTION_FILE: &str = "dataset.json";
+
 /// The settings of a plan that decide the bytes of its images; files stand by their hashes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Settings {
     generator: &'static str,
+    /// Hash of sources and physics data, see `build.rs`.
+    code: &'static str,
     seed: u64,
     shapes: ShapeSettings,
     soft_tissue: SoftTissue,
@@ -40,6 +43,7 @@ impl Settings {
             |path: &Option<std::path::PathBuf>| path.as_deref().map(sha256_of_file).transpose();
         Ok(Self {
             generator: concat!("ppa ", env!("CARGO_PKG_VERSION")),
+            code: env!("PPA_CODE"),
             seed: plan.seed,
             shapes: plan.shapes.clone(),
             soft_tissue: plan.soft_tissue,
@@ -55,7 +59,7 @@ impl Settings {
     }
 
     /// Hash of everything the images of a limb follow from, but the pose.
-    pub fn unit_key(&self, id: LimbId, case: &Case) -> String {
+    pub fn limb_key(&self, id: LimbId, case: &Case) -> String {
         let address = (
             self,
             id,
@@ -73,7 +77,8 @@ impl Settings {
 pub(crate) struct Description<'a> {
     version: u32,
     units: &'static str,
-    settings: Settings,
+    rotation: Sweep,
+    settings: &'a Settings,
     room_from_device: Rows,
     source_detector_mm: f64,
     table: Table,
@@ -98,6 +103,7 @@ struct CameraRow {
 struct LimbRow<'a> {
     #[serde(flatten)]
     limb: LimbId,
+    key: String,
     volume_sha256: &'a str,
     surface: &'a LimbSettings,
     choices: &'a LandmarkOverrides,
@@ -105,7 +111,8 @@ struct LimbRow<'a> {
 
 impl<'a> Description<'a> {
     pub fn of(
-        settings: Settings,
+        rotation: Sweep,
+        settings: &'a Settings,
         stage: &Stage,
         cases: impl Iterator<Item = (LimbId, &'a Case)>,
     ) -> Self {
@@ -116,6 +123,7 @@ impl<'a> Description<'a> {
         });
         let limbs = cases.map(|(limb, case)| LimbRow {
             limb,
+            key: settings.limb_key(limb, case),
             volume_sha256: &case.source.volume_sha256,
             surface: &case.surface,
             choices: &case.choices,
@@ -124,6 +132,7 @@ impl<'a> Description<'a> {
             version: 1,
             units: "mm; depth images: Z in mm, 0 invalid; tallies: eV/cm2 per history; \
                     transforms: row-major target_from_source; ct frame: LPS",
+            rotation,
             settings,
             room_from_device: stage
                 .table
@@ -141,8 +150,7 @@ impl<'a> Description<'a> {
         }
     }
 
-    pub fn write(&self, root: &Path) -> Result<(), FileError> {
-        let text = serde_json::to_string_pretty(self).expect("settings hold only JSON values");
-        write_whole(&root.join("dataset.json"), text.as_bytes())
+    pub fn to_text(&self) -> String {
+        serde_json::to_string_pretty(self).expect("settings hold only JSON values")
     }
 }

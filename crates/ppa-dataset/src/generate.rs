@@ -2,18 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use ppa_scene::{PoseAngle, SweepError};
-use rayon::prelude::*;
-use serde::Serialize;
+use ppa_scene::SweepError;
+use ppa_xray::Part;
 
 use crate::case::{Case, CaseError};
 use crate::description::{Description, Settings};
-use crate::files::{FileError, write_whole};
+use crate::files::FileError;
+use crate::job::{Job, JobError, MakeUnit, Progress, Summary, units_of_part};
 use crate::layout::LimbId;
-use crate::manifest::{FileKind, Manifest, RoiFile};
 use crate::plan::Plan;
 use crate::prepare::{PrepareError, PreparedLimb};
-use crate::record::{Record, claim};
 use crate::stage::{Stage, StageError};
 use crate::unit::{PosableLimb, UnitError};
 
@@ -56,7 +54,10 @@ pub enum GenerateError {
         /// What went wrong.
         source: UnitError,
     },
-    /// A file of the dataset.
+    /// The folder, its files, or the disk.
+    #[error(transparent)]
+    Job(#[from] JobError),
+    /// A file that the plan names.
     #[error(transparent)]
     File(#[from] FileError),
     /// Two cases would write the same files.
@@ -74,156 +75,136 @@ pub enum GenerateError {
         /// The side they share.
         side: &'static str,
     },
-    /// The folder holds poses that the plan does not.
+    /// Two patients are one person, whose images could then stand in training and test data.
     #[error(
-        "{} holds a dataset of another plan (its {record} is not in this one); choose another folder",
-        root.display()
+        "{} and {} come from the same scan, but are patients {} and {}; give them one number",
+        first.display(), second.display(), patients[0], patients[1]
     )]
-    OtherPlan {
-        /// The dataset's folder.
-        root: PathBuf,
-        /// The record of a pose that is not in the plan.
-        record: String,
+    SameScan {
+        /// A case file.
+        first: PathBuf,
+        /// Another case file.
+        second: PathBuf,
+        /// Their numbers.
+        patients: [u32; 2],
     },
-    /// The folder holds something else.
-    #[error("{} is neither empty nor a dataset that ppa generate began", .0.display())]
-    NotADataset(PathBuf),
-    /// Another process writes here.
-    #[error("{} is being written by another ppa generate", .0.display())]
-    Busy(PathBuf),
 }
 
-/// What [`generate`] did.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Summary {
-    /// Poses in the plan.
-    pub units: usize,
-    /// Poses that were made in this run; the others were there already.
-    pub made: usize,
-    /// Depth images in the dataset.
-    pub depth_images: usize,
-    /// Radiographs in the dataset.
-    pub radiographs: usize,
+/// Which poses of a plan are made, and how much disk they may take.
+#[derive(Debug, Clone, Copy)]
+pub struct GenerateSettings {
+    /// One of several equal parts of the plan; each goes into a folder of its own.
+    pub part: Part,
+    /// Bytes that the images may take; poses that are being made may exceed it for a moment.
+    pub disk_limit: Option<u64>,
 }
 
-/// What a run reports while it goes on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Progress {
-    /// The number of poses in the plan, first of all.
-    Total(usize),
-    /// Another pose is complete, or was found complete.
-    Done,
+impl Default for GenerateSettings {
+    /// All poses, as much disk as there is.
+    fn default() -> Self {
+        Self {
+            part: Part::WHOLE,
+            disk_limit: None,
+        }
+    }
 }
 
 /// Makes what is missing of the plan's dataset in the folder `root`.
 ///
 /// Every pose is a unit of its own: its files appear whole, its record last, so a run that was
 /// killed goes on where it stopped. A pose is made again when its record is missing, when what
-/// it follows from (plan settings, case, code version) has changed, or when one of its files is
-/// missing or altered.
+/// it follows from (plan settings, case, code and physics data) has changed, or when one of its
+/// files is missing or altered.
 ///
 /// # Errors
 /// [`GenerateError`], naming the file or pose at fault.
 pub fn generate(
     plan: &Plan,
     root: &Path,
+    settings: &GenerateSettings,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Summary, GenerateError> {
-    let limbs = planned_limbs(plan)?;
+    let work = Work::of_plan(plan)?;
     let poses = plan.rotation.poses()?;
-    let units = || {
-        limbs
-            .iter()
-            .flat_map(|limb| poses.iter().map(|pose| (limb.id, *pose)))
+    let job = Job {
+        root,
+        description: &work.description,
+        part: settings.part,
+        limbs: units_of_part(work.keys(), &poses, settings.part),
+        disk_limit: settings.disk_limit,
+        progress,
     };
-    let stage = Stage::of_plan(plan)?;
-    let settings = Settings::of(plan)?;
-    let _claim = claim(root, units())?;
-    progress(Progress::Total(units().count()));
+    job.complete(|limb| work.prepare(limb.limb, root))
+}
 
-    let mut made = 0;
-    let mut files = Vec::new();
-    for limb in &limbs {
-        let key = settings.unit_key(limb.id, &limb.case);
-        let missing: Vec<_> = poses
-            .par_iter()
-            .filter(|pose| Record::of_complete(root, limb.id, **pose, &key).is_none())
-            .copied()
-            .collect();
-        (missing.len()..poses.len()).for_each(|_| progress(Progress::Done));
-        if !missing.is_empty() {
-            limb.make(&missing, plan, &stage, &key, root, progress)?;
-            made += missing.len();
-        }
-        let mut rois = RoiFile::new();
-        for pose in &poses {
-            let record = Record::read(root, limb.id, *pose)?;
-            files.extend(record.files);
-            rois.extend(record.rois);
-        }
-        let rois = serde_json::to_string_pretty(&rois).expect("regions hold only JSON values");
-        write_whole(&root.join(limb.id.roi_file()), rois.as_bytes())?;
-    }
-    let cases = limbs.iter().map(|limb| (limb.id, &limb.case));
-    Description::of(settings, &stage, cases).write(root)?;
-    let manifest = Manifest {
-        root: root.to_owned(),
-        files,
-    };
-    manifest.write()?;
-    let count = |kind| manifest.files.iter().filter(|row| row.kind == kind).count();
-    Ok(Summary {
-        units: units().count(),
-        made,
-        depth_images: count(FileKind::Depth),
-        radiographs: count(FileKind::Radiograph),
-    })
+/// A plan with its cases and its stage: all that units are made from.
+pub(crate) struct Work<'a> {
+    plan: &'a Plan,
+    limbs: Vec<PlannedLimb>,
+    stage: Stage,
+    /// `dataset.json`.
+    pub description: String,
 }
 
 struct PlannedLimb {
     id: LimbId,
+    key: String,
     case: Case,
     file: PathBuf,
 }
 
-impl PlannedLimb {
-    /// Makes the given poses, several at a time.
-    fn make(
-        &self,
-        poses: &[PoseAngle],
-        plan: &Plan,
-        stage: &Stage,
-        key: &str,
-        root: &Path,
-        progress: &(dyn Fn(Progress) + Sync),
-    ) -> Result<(), GenerateError> {
-        let prepared = PreparedLimb::of_case(&self.case).map_err(|error| GenerateError::Limb {
-            case: self.file.clone(),
+impl<'a> Work<'a> {
+    pub fn of_plan(plan: &'a Plan) -> Result<Self, GenerateError> {
+        let settings = Settings::of(plan)?;
+        let limbs = planned_limbs(plan, &settings)?;
+        let stage = Stage::of_plan(plan)?;
+        let cases = limbs.iter().map(|limb| (limb.id, &limb.case));
+        let description = Description::of(plan.rotation, &settings, &stage, cases).to_text();
+        Ok(Self {
+            plan,
+            limbs,
+            stage,
+            description,
+        })
+    }
+
+    /// The limbs, each with the hash of what its images follow from.
+    pub fn keys(&self) -> impl ExactSizeIterator<Item = (LimbId, String)> {
+        self.limbs.iter().map(|limb| (limb.id, limb.key.clone()))
+    }
+
+    /// Reads, skins and shapes a limb; the result makes its poses below `root`.
+    pub fn prepare<'m>(
+        &'m self,
+        id: LimbId,
+        root: &'m Path,
+    ) -> Result<MakeUnit<'m, GenerateError>, GenerateError> {
+        let limb = self.limbs.iter().find(|limb| limb.id == id);
+        let limb = limb.expect("only limbs of the plan are asked for");
+        let case = || limb.file.clone();
+        let prepared = PreparedLimb::of_case(&limb.case).map_err(|error| GenerateError::Limb {
+            case: case(),
             source: Box::new(error),
         })?;
-        let limb = PosableLimb::new(self.id, plan, stage, &prepared).map_err(|source| {
+        let posable = PosableLimb::new(id, self.plan, &self.stage, prepared).map_err(|source| {
             GenerateError::Posable {
-                case: self.file.clone(),
+                case: case(),
                 source,
             }
         })?;
-        poses.par_iter().try_for_each(|&pose| {
-            let (files, rois) = limb
-                .make(pose, root)
+        Ok(Box::new(move |unit| {
+            posable
+                .make(unit.pose, root)
                 .map_err(|source| GenerateError::Unit {
-                    case: self.file.clone(),
-                    angle_deg: pose.angle_deg,
+                    case: limb.file.clone(),
+                    angle_deg: unit.pose.angle_deg,
                     source,
-                })?;
-            let key = key.to_owned();
-            Record { key, files, rois }.write(root, self.id, pose)?;
-            progress(Progress::Done);
-            Ok(())
-        })
+                })
+        }))
     }
 }
 
-fn planned_limbs(plan: &Plan) -> Result<Vec<PlannedLimb>, GenerateError> {
+fn planned_limbs(plan: &Plan, settings: &Settings) -> Result<Vec<PlannedLimb>, GenerateError> {
     let mut limbs: Vec<PlannedLimb> = Vec::new();
     for planned in &plan.cases {
         let case = Case::read(&planned.file)?;
@@ -239,8 +220,20 @@ fn planned_limbs(plan: &Plan) -> Result<Vec<PlannedLimb>, GenerateError> {
                 side: id.side_letter(),
             });
         }
+        let scan = &case.source.volume_sha256;
+        let of_another = |other: &&PlannedLimb| {
+            other.case.source.volume_sha256 == *scan && other.id.patient != id.patient
+        };
+        if let Some(other) = limbs.iter().find(of_another) {
+            return Err(GenerateError::SameScan {
+                first: other.file.clone(),
+                second: planned.file.clone(),
+                patients: [other.id.patient, id.patient],
+            });
+        }
         limbs.push(PlannedLimb {
             id,
+            key: settings.limb_key(id, &case),
             case,
             file: planned.file.clone(),
         });

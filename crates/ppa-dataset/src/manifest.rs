@@ -9,8 +9,6 @@ use crate::body_shape::BodyShape;
 use crate::files::{FileError, read_text, write_whole};
 use crate::layout::{LimbId, View};
 
-const MANIFEST_FILE: &str = "manifest.jsonl";
-
 /// A rigid motion as four rows of a homogeneous matrix, mm.
 pub type Rows = [[f64; 4]; 4];
 
@@ -87,12 +85,15 @@ pub struct Manifest {
 }
 
 impl Manifest {
+    /// Its file in a dataset.
+    pub(crate) const FILE: &str = "manifest.jsonl";
+
     /// Reads `manifest.jsonl`.
     ///
     /// # Errors
     /// [`FileError`] when the file is missing or one of its lines is not a row.
     pub fn read(root: &Path) -> Result<Self, FileError> {
-        let path = root.join(MANIFEST_FILE);
+        let path = root.join(Self::FILE);
         let text = read_text(&path)?;
         let rows = text
             .lines()
@@ -104,17 +105,18 @@ impl Manifest {
         })
     }
 
+    /// One line of JSON per row.
+    pub(crate) fn to_text(&self) -> String {
+        let line = |row| serde_json::to_string(row).expect("rows hold only JSON values") + "\n";
+        self.files.iter().map(line).collect()
+    }
+
     /// Writes `manifest.jsonl`, whole or not at all.
     ///
     /// # Errors
     /// [`FileError`] when it cannot be written.
     pub fn write(&self) -> Result<(), FileError> {
-        let mut text = String::new();
-        for row in &self.files {
-            text += &serde_json::to_string(row).expect("rows hold only JSON values");
-            text.push('\n');
-        }
-        write_whole(&self.root.join(MANIFEST_FILE), text.as_bytes())
+        write_whole(&self.root.join(Self::FILE), self.to_text().as_bytes())
     }
 
     /// The regions of interest of one limb.

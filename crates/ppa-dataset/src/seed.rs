@@ -18,6 +18,8 @@ pub enum Purpose {
     DepthSensor,
     /// Noise of depth images; item = step.
     DepthNoise,
+    /// Which poses are made again to verify a dataset; item = step.
+    Verification,
 }
 
 impl Purpose {
@@ -28,6 +30,7 @@ impl Purpose {
             Self::Radiograph => "radiograph",
             Self::DepthSensor => "depth-sensor",
             Self::DepthNoise => "depth-noise",
+            Self::Verification => "verification",
         }
     }
 }

@@ -57,14 +57,20 @@ struct ShapedSkin {
     body: Body,
 }
 
+/// What a pose is made of.
+pub(crate) struct Images {
+    /// Its images, already written.
+    pub files: Vec<FileRow>,
+    /// Regions of interest in them.
+    pub rois: RoiFile,
+}
+
 /// A limb with everything that all its poses share.
 pub(crate) struct PosableLimb<'a> {
     id: LimbId,
     plan: &'a Plan,
     stage: &'a Stage,
-    prepared: &'a PreparedLimb,
-    /// The skin of the scan: it decides the pose of the radiograph and the regions of interest.
-    skin: &'a Mesh,
+    prepared: PreparedLimb,
     shapes: Vec<ShapedSkin>,
     phantom: VoxelPhantom,
 }
@@ -74,7 +80,7 @@ impl<'a> PosableLimb<'a> {
         id: LimbId,
         plan: &'a Plan,
         stage: &'a Stage,
-        prepared: &'a PreparedLimb,
+        prepared: PreparedLimb,
     ) -> Result<Self, UnitError> {
         let skin = &prepared.limb.mesh;
         let shaped = |&shape: &BodyShape| {
@@ -83,31 +89,23 @@ impl<'a> PosableLimb<'a> {
             let body = Body::Mesh(MeshBody::new(&mesh.vertices, &mesh.triangles)?);
             Ok::<_, UnitError>(ShapedSkin { shape, mesh, body })
         };
+        let shapes = plan.shapes.variants.iter().map(shaped);
         Ok(Self {
             id,
             plan,
             stage,
+            shapes: shapes.collect::<Result<_, _>>()?,
+            phantom: joint_phantom(&prepared, &plan.xray)?,
             prepared,
-            skin,
-            shapes: plan
-                .shapes
-                .variants
-                .iter()
-                .map(shaped)
-                .collect::<Result<_, _>>()?,
-            phantom: joint_phantom(prepared, &plan.xray)?,
         })
     }
 
     /// Makes all images of one pose under `root`.
-    pub(crate) fn make(
-        &self,
-        pose: PoseAngle,
-        root: &Path,
-    ) -> Result<(Vec<FileRow>, RoiFile), UnitError> {
+    pub(crate) fn make(&self, pose: PoseAngle, root: &Path) -> Result<Images, UnitError> {
         let mut files = Vec::new();
         let noise_seed = item_seed(self.plan.seed, Purpose::DepthNoise, self.id, pose.step);
-        let placement = self.place(self.skin, pose)?;
+        // The skin of the scan decides the pose of the radiograph and the regions of interest.
+        let placement = self.place(&self.prepared.limb.mesh, pose)?;
         for shaped in &self.shapes {
             let placement = match shaped.shape {
                 BodyShape::Orig => placement,
@@ -143,7 +141,8 @@ impl<'a> PosableLimb<'a> {
             .cameras
             .iter()
             .map(|camera| self.roi(camera, &placement, pose));
-        Ok((files, rois.collect::<Result<_, _>>()?))
+        let rois = rois.collect::<Result<_, _>>()?;
+        Ok(Images { files, rois })
     }
 
     fn place(&self, skin: &Mesh, pose: PoseAngle) -> Result<Placement, UnitError> {

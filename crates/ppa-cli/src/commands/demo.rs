@@ -7,13 +7,14 @@ use clap::Args;
 use ppa_ct::phantom::{self, LowerLeg, TableTop};
 use ppa_ct::{ReadOptions, write_nifti};
 use ppa_dataset::layout::LimbId;
-use ppa_dataset::{Plan, PlanCase, Summary, contact_sheet, prepare, write_whole};
+use ppa_dataset::{GenerateSettings, Plan, PlanCase, Summary, contact_sheet, prepare, write_whole};
 use ppa_mesh::LimbSettings;
 use ppa_scene::{LandmarkOverrides, Side, Sweep};
 use serde::Serialize;
 
 use super::generate::with_progress;
 use crate::output::{Output, Seconds, Stopwatch, working};
+use crate::progress::ProgressArgs;
 
 #[derive(Debug, Args)]
 pub struct DemoArgs {
@@ -26,6 +27,8 @@ pub struct DemoArgs {
     /// Right lower leg to take: P01 to P17
     #[arg(long, value_name = "NAME", default_value = "P01")]
     phantom: String,
+    #[command(flatten)]
+    progress: ProgressArgs,
 }
 
 /// Side of the phantom's voxels, mm: fine enough for open joint gutters in the radiographs.
@@ -54,7 +57,12 @@ pub fn run(args: &DemoArgs, output: Output) -> anyhow::Result<()> {
     std::fs::create_dir_all(out)
         .with_context(|| format!("cannot create folder {}", out.display()))?;
     let plan = write_inputs(args, &leg)?;
-    let dataset = with_progress(&plan, &out.join("dataset"))?;
+    let dataset = with_progress(
+        &plan,
+        &out.join("dataset"),
+        &GenerateSettings::default(),
+        &args.progress.watch("poses", output),
+    )?;
     let limb = LimbId {
         patient: 0,
         side: Side::Right,

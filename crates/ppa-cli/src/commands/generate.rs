@@ -1,53 +1,86 @@
 //! `ppa generate`: the dataset of a plan.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use ppa_dataset::{Plan, Progress, Summary, generate};
+use ppa_dataset::{GenerateSettings, Plan, Summary, generate};
+use ppa_xray::Part;
 
-use crate::output::{Output, bar};
+use crate::output::Output;
+use crate::progress::{ProgressArgs, Watch};
+use crate::shard::shard;
 
 #[derive(Debug, Args)]
+#[command(after_long_help = "\
+A run may be killed at any moment and started again: only what is missing is made. On several machines each makes a \
+shard, into a folder of its own; `ppa merge` joins them to the same bytes as one run leaves.
+
+  ppa generate plan.toml --out dataset
+  ppa generate plan.toml --shard 2/7 --out shard_2 --disk-limit 20GB
+  ppa merge shard_1 shard_2 ... --out dataset --verify
+
+The shard is also taken from a Slurm job array (SLURM_ARRAY_TASK_ID, _COUNT, _MIN, _MAX, _STEP), from mpirun \
+(OMPI_COMM_WORLD_RANK, _SIZE) and from an indexed Kubernetes job (JOB_COMPLETION_INDEX, and JOB_COMPLETIONS, which you \
+set). Where two of them disagree, nothing is made.")]
 pub struct GenerateArgs {
     /// Plan file
     plan: PathBuf,
-    /// Folder of the dataset [default: a folder beside the plan, named after it]
+    /// Folder of the dataset [default: a folder beside the plan, named after it and the shard]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Use another seed than the plan's
     #[arg(long)]
     seed: Option<u64>,
+    /// Make only shard k of n
+    #[arg(long, value_name = "K/N")]
+    shard: Option<Part>,
+    /// Stop before the images take more than this, as 500MB or 20GB
+    #[arg(long, value_name = "SIZE", value_parser = crate::output::parse_bytes)]
+    disk_limit: Option<u64>,
+    #[command(flatten)]
+    progress: ProgressArgs,
 }
 
 pub fn run(args: &GenerateArgs, output: Output) -> anyhow::Result<()> {
     let mut plan = Plan::read(&args.plan)?;
     plan.seed = args.seed.unwrap_or(plan.seed);
+    let settings = GenerateSettings {
+        part: shard(args.shard)?,
+        disk_limit: args.disk_limit,
+    };
     let out = match &args.out {
         Some(out) => out.clone(),
-        None => args.plan.with_extension(""),
+        None if settings.part == Part::WHOLE => args.plan.with_extension(""),
+        None => {
+            let mut folder = args.plan.with_extension("").into_os_string();
+            folder.push(format!("_{}", settings.part).replace('/', "_of_"));
+            folder.into()
+        }
     };
     anyhow::ensure!(
         out != args.plan,
         "{} has no extension: name a folder with --out",
         out.display()
     );
-    let summary = with_progress(&plan, &out)?;
+    let watch = args.progress.watch("poses", output);
+    let summary = with_progress(&plan, &out, &settings, &watch)?;
     output.print(&summary, |s| describe(s, &out))
 }
 
-/// Generates under a progress bar.
-pub fn with_progress(plan: &Plan, out: &std::path::Path) -> anyhow::Result<Summary> {
-    let poses = bar("poses");
-    let summary = generate(plan, out, &|progress| match progress {
-        Progress::Total(total) => poses.set_length(total as u64),
-        Progress::Done => poses.inc(1),
-    })?;
-    poses.finish_and_clear();
+/// Generates and tells how far it has come.
+pub fn with_progress(
+    plan: &Plan,
+    out: &Path,
+    settings: &GenerateSettings,
+    watch: &Watch,
+) -> anyhow::Result<Summary> {
+    let summary = generate(plan, out, settings, &|progress| watch.report(progress))?;
+    watch.finish();
     Ok(summary)
 }
 
 /// The summary in words.
-pub fn describe(summary: &Summary, out: &std::path::Path) -> String {
+pub fn describe(summary: &Summary, out: &Path) -> String {
     format!(
         "{}: {} depth images and {} radiographs of {} poses, {} of them made now",
         out.display(),

@@ -4,11 +4,14 @@ pub mod ct;
 pub mod demo;
 pub mod depth;
 pub mod generate;
+pub mod merge;
 pub mod mesh;
 pub mod metrics;
 pub mod prepare;
 pub mod scene;
 pub mod stats;
+pub mod status;
+pub mod verify;
 pub mod xray;
 
 use std::path::Path;

@@ -1,9 +1,10 @@
 //! One of several equal parts of a run.
 
+use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
-/// Part `index` of `count`, counted from 1; parses from `2/8`.
+/// Part `index` of `count`, counted from 1; parses from and prints as `2/8`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Part {
     index: u64,
@@ -21,12 +22,17 @@ impl Part {
     /// The only part of a run.
     pub const WHOLE: Self = Self { index: 1, count: 1 };
 
-    /// Its share of `histories`; the parts of one run follow each other without gap.
-    pub(crate) fn share(&self, histories: u64) -> Range<u64> {
-        let bound = |index: u64| {
-            (u128::from(histories) * u128::from(index) / u128::from(self.count)) as u64
-        };
+    /// Its share of `total` items; the parts of one run follow each other without gap.
+    pub fn share(&self, total: u64) -> Range<u64> {
+        let bound =
+            |index: u64| (u128::from(total) * u128::from(index) / u128::from(self.count)) as u64;
         bound(self.index - 1)..bound(self.index)
+    }
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
     }
 }
 
@@ -69,7 +75,9 @@ mod tests {
 
     #[test]
     fn parts_are_read() {
-        assert_eq!("2/8".parse(), Ok(Part { index: 2, count: 8 }));
+        let part = Part { index: 2, count: 8 };
+        assert_eq!("2/8".parse(), Ok(part));
+        assert_eq!(part.to_string(), "2/8");
         for bad in ["", "0/3", "4/3", "1/0", "-1/2", "1", "a/b", "1/2/3"] {
             assert!(
                 bad.parse::<Part>().unwrap_err().to_string().contains("k/n"),

@@ -1,0 +1,39 @@
+//! `ppa merge`: the shards of a plan as one dataset.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use ppa_dataset::{check, merge};
+
+use super::generate::describe;
+use super::verify::require_none;
+use crate::output::{Output, working};
+use crate::progress::ProgressArgs;
+
+#[derive(Debug, Args)]
+pub struct MergeArgs {
+    /// Folders that `ppa generate --shard` filled, in any order
+    #[arg(required = true, value_name = "DIR")]
+    shards: Vec<PathBuf>,
+    /// Folder of the whole dataset: the same bytes as one run would have left
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Read the merged dataset back and compare every file with what was made
+    #[arg(long)]
+    verify: bool,
+    #[command(flatten)]
+    progress: ProgressArgs,
+}
+
+pub fn run(args: &MergeArgs, output: Output) -> anyhow::Result<()> {
+    let watch = args.progress.watch("poses", output);
+    let summary = merge(&args.shards, &args.out, &|progress| watch.report(progress))?;
+    watch.finish();
+    if args.verify {
+        let working = working("reading back");
+        let problems = check(&args.out)?.problems;
+        working.finish_and_clear();
+        require_none(&args.out, &problems)?;
+    }
+    output.print(&summary, |s| describe(s, &args.out))
+}

@@ -1,0 +1,42 @@
+//! `ppa status`: how far a dataset has come.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use ppa_dataset::{Status, status};
+
+use crate::output::{Output, bytes};
+
+#[derive(Debug, Args)]
+pub struct StatusArgs {
+    /// Folder of a dataset, or of a shard
+    dataset: PathBuf,
+}
+
+pub fn run(args: &StatusArgs, output: Output) -> anyhow::Result<()> {
+    output.print(&status(&args.dataset)?, describe)
+}
+
+fn describe(status: &Status) -> String {
+    let mut lines = vec![format!(
+        "shard {}: {} of {} poses made, {} images, {}{}",
+        status.part,
+        status.made,
+        status.units,
+        status.images,
+        bytes(status.bytes),
+        match (status.running, status.complete) {
+            (true, _) => ", being written now",
+            (false, true) => ", complete",
+            (false, false) => ", to be continued",
+        }
+    )];
+    for limb in &status.limbs {
+        let (patient, side) = (limb.limb.patient, limb.limb.side_letter());
+        lines.push(format!(
+            "patient {patient} {side}  {} of {}",
+            limb.made, limb.units
+        ));
+    }
+    lines.join("\n")
+}

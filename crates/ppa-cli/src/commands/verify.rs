@@ -1,0 +1,79 @@
+//! `ppa verify`: whether a dataset is what its plan makes.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+use clap::Args;
+use ppa_dataset::{Plan, Problem, verify};
+use serde::Serialize;
+
+use crate::output::Output;
+use crate::progress::ProgressArgs;
+
+#[derive(Debug, Args)]
+pub struct VerifyArgs {
+    /// Folder of a dataset, or of a shard
+    dataset: PathBuf,
+    /// Plan it was made from [default: the file beside the folder, named after it]
+    #[arg(long, value_name = "FILE")]
+    plan: Option<PathBuf>,
+    /// Share of the poses to make again and compare, at least one pose
+    #[arg(long, default_value_t = 0.001)]
+    fraction: f64,
+    /// Which poses: another number takes others
+    #[arg(long, default_value_t = 0)]
+    sample_seed: u64,
+    #[command(flatten)]
+    progress: ProgressArgs,
+}
+
+#[derive(Debug, Serialize)]
+struct Verified {
+    units: usize,
+    images: usize,
+    remade: usize,
+}
+
+pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
+    let beside = || args.dataset.with_extension("toml");
+    let plan = Plan::read(&args.plan.clone().unwrap_or_else(beside))?;
+    let watch = args.progress.watch("poses made again", output);
+    let found = verify(
+        &plan,
+        &args.dataset,
+        args.fraction,
+        args.sample_seed,
+        &|progress| watch.report(progress),
+    )?;
+    watch.finish();
+    let problems: Vec<_> = [found.check.problems, found.different].concat();
+    require_none(&args.dataset, &problems)?;
+    let verified = Verified {
+        units: found.check.units,
+        images: found.check.images,
+        remade: found.remade,
+    };
+    output.print(&verified, |v| {
+        format!(
+            "{}: {} images of {} poses are as they were made; {} poses came out the same again",
+            args.dataset.display(),
+            v.images,
+            v.units,
+            v.remade
+        )
+    })
+}
+
+/// Fails with the first problems, in one sentence.
+pub fn require_none(dataset: &Path, problems: &[Problem]) -> anyhow::Result<()> {
+    const TOLD: usize = 5;
+    if problems.is_empty() {
+        return Ok(());
+    }
+    let told: Vec<_> = problems.iter().take(TOLD).map(Problem::to_string).collect();
+    let more = match problems.len().saturating_sub(TOLD) {
+        0 => String::new(),
+        more => format!("; and {more} more"),
+    };
+    bail!("{}: {}{more}", dataset.display(), told.join("; "))
+}

@@ -1,0 +1,191 @@
+//! Shards joined to one dataset: the same bytes as a run over the whole plan.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use ppa_xray::Part;
+use sha2::{Digest, Sha256};
+
+use crate::claim::{Claim, FolderError, claim_existing, record_names};
+use crate::files::{FileError, hex, write_whole};
+use crate::job::{Job, JobError, LimbUnits, Progress, Summary};
+use crate::planned::{Planned, difference};
+use crate::record::{Record, Unit};
+use crate::unit::Images;
+
+/// Why shards could not be joined.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MergeError {
+    /// A shard's folder.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// A file of a shard.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The merged dataset.
+    #[error(transparent)]
+    Job(#[from] JobError),
+    /// No folder was given.
+    #[error("no shard to merge: name at least one folder")]
+    NoShard,
+    /// A shard would be merged into itself.
+    #[error("{} is one of the shards; merge them into another folder", .0.display())]
+    IntoShard(PathBuf),
+    /// Shards that do not belong together.
+    #[error("{} and {} are of different datasets: {key} differs", first.display(), second.display())]
+    OtherDataset {
+        /// A shard.
+        first: PathBuf,
+        /// Another shard.
+        second: PathBuf,
+        /// Key in `dataset.json`.
+        key: String,
+    },
+    /// Two shards hold the same pose.
+    #[error("both {} and {} hold {unit}", first.display(), second.display())]
+    Overlap {
+        /// A shard.
+        first: PathBuf,
+        /// Another shard.
+        second: PathBuf,
+        /// The pose.
+        unit: String,
+    },
+    /// Poses that no shard holds.
+    #[error("no shard holds {unit}; {missing} of {units} poses are missing")]
+    Hole {
+        /// The first of them.
+        unit: String,
+        /// Their number.
+        missing: usize,
+        /// Poses of the plan.
+        units: usize,
+    },
+    /// A pose was made from other settings than its shard's `dataset.json` tells.
+    #[error("{unit} in {} was made from other settings; run ppa generate for this shard again", shard.display())]
+    Stale {
+        /// The shard.
+        shard: PathBuf,
+        /// The pose.
+        unit: String,
+    },
+    /// An image of a shard is not the one that was made.
+    #[error("{} is altered: its hash is not the recorded one", .0.display())]
+    Altered(PathBuf),
+}
+
+/// Joins the shards of one plan in the folder `root`, copying their images.
+///
+/// Every image is compared with its recorded hash before it is written. What is there already is
+/// kept, so a merge that was killed goes on.
+///
+/// # Errors
+/// [`MergeError`]; shards of different plans, overlaps and holes are refused before anything is
+/// written.
+pub fn merge(
+    shards: &[PathBuf],
+    root: &Path,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Summary, MergeError> {
+    let shards = Shards::open(shards, root)?;
+    let limbs = shards.planned.part(Part::WHOLE);
+    shards.require_all(&limbs)?;
+    let job = Job {
+        root,
+        description: &shards.planned.text,
+        part: Part::WHOLE,
+        limbs,
+        disk_limit: None,
+        progress,
+    };
+    job.complete(|_| Ok(Box::new(|unit: Unit| shards.copy(&unit, root))))
+}
+
+struct Shards<'a> {
+    _claims: Vec<Claim>,
+    planned: Planned,
+    /// The folder that holds the record of a name.
+    holder: HashMap<String, &'a Path>,
+}
+
+impl<'a> Shards<'a> {
+    fn open(folders: &'a [PathBuf], root: &Path) -> Result<Self, MergeError> {
+        let first = folders.first().ok_or(MergeError::NoShard)?;
+        let planned = Planned::read(first)?;
+        let of_dataset = planned.part(Part::WHOLE);
+        let units = of_dataset.iter().flat_map(LimbUnits::units);
+        let units: HashMap<_, _> = units.map(|unit| (unit.record_name(), unit)).collect();
+        let mut claims = Vec::new();
+        let mut holder = HashMap::new();
+        for folder in folders {
+            if same_folder(folder, root) {
+                return Err(MergeError::IntoShard(root.to_owned()));
+            }
+            if let Some(key) = difference(&planned.text, &Planned::read(folder)?.text) {
+                return Err(MergeError::OtherDataset {
+                    first: first.clone(),
+                    second: folder.clone(),
+                    key,
+                });
+            }
+            for record in record_names(folder)? {
+                let Some(unit) = units.get(&record) else {
+                    let root = folder.clone();
+                    return Err(FolderError::OtherPlan { root, record }.into());
+                };
+                if let Some(first) = holder.insert(record, folder.as_path()) {
+                    return Err(MergeError::Overlap {
+                        first: first.to_owned(),
+                        second: folder.clone(),
+                        unit: unit.to_string(),
+                    });
+                }
+            }
+            claims.push(claim_existing(folder)?);
+        }
+        Ok(Self {
+            _claims: claims,
+            planned,
+            holder,
+        })
+    }
+
+    fn require_all(&self, limbs: &[LimbUnits]) -> Result<(), MergeError> {
+        let units = || limbs.iter().flat_map(LimbUnits::units);
+        let missing = || units().filter(|unit| !self.holder.contains_key(&unit.record_name()));
+        match missing().next() {
+            None => Ok(()),
+            Some(unit) => Err(MergeError::Hole {
+                unit: unit.to_string(),
+                missing: missing().count(),
+                units: units().count(),
+            }),
+        }
+    }
+
+    /// Copies the images of one pose from the shard that holds it.
+    fn copy(&self, unit: &Unit, root: &Path) -> Result<Images, MergeError> {
+        let shard = self.holder[&unit.record_name()];
+        let Record { key, files, rois } = Record::read(shard, unit)?;
+        if key != unit.key() {
+            return Err(MergeError::Stale {
+                shard: shard.to_owned(),
+                unit: unit.to_string(),
+            });
+        }
+        for row in &files {
+            let path = shard.join(&row.file);
+            let bytes = std::fs::read(&path).map_err(FileError::at("read", &path))?;
+            if hex(&Sha256::digest(&bytes)) != row.sha256 {
+                return Err(MergeError::Altered(path));
+            }
+            write_whole(&root.join(&row.file), &bytes)?;
+        }
+        Ok(Images { files, rois })
+    }
+}
+
+fn same_folder(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
