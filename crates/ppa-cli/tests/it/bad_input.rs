@@ -215,7 +215,7 @@ fn a_full_disk_leaves_only_whole_files() {
     fs::create_dir(&disk).unwrap();
     let ppa = Path::new(env!("CARGO_BIN_EXE_ppa"));
     let script = format!(
-        "mount -t tmpfs -o size=400k tmpfs disk || exit 90; {} generate plan.toml --out disk/data; \
+        "mount -t tmpfs -o size=400k tmpfs disk || exit 90; {} generate plan.toml --out disk/data --progress quiet; \
          code=$?; cp -r disk/data copy; exit $code",
         ppa.display()
     );

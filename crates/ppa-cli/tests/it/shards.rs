@@ -1,0 +1,274 @@
+//! Shards of a plan, merged to the bytes of one run; and a dataset looked over.
+
+use std::fs;
+use std::path::Path;
+use std::sync::OnceLock;
+
+use serde_json::Value;
+
+use crate::{contents, fail, ppa, succeed, write_plan};
+
+/// Writes a plan of five quick poses.
+pub fn write_quick_plan(folder: &Path) {
+    write_plan(folder, "");
+    let path = folder.join("plan.toml");
+    let plan = fs::read_to_string(&path).unwrap();
+    let quick = "half_length_mm = 20.0\ndetector = { columns = 8, rows = 8, pixel_mm = 25.0 }\n\
+                 engine = { scatter_histories = 100, scatter_pixel_mm = 200.0, samples_per_side = 1 }\n\
+                 [shapes]\nvariants = [\"orig\", \"bumps_a\"]\n";
+    let xray = plan.find("[xray]\n").unwrap() + "[xray]\n".len();
+    fs::write(&path, format!("{}{quick}", &plan[..xray])).unwrap();
+}
+
+/// A folder with the quick plan and its dataset `whole`, made by one run with two threads.
+fn whole() -> &'static Path {
+    static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        write_quick_plan(folder.path());
+        succeed(folder.path(), "generate plan.toml --out whole --threads 2");
+        folder
+    });
+    folder.path()
+}
+
+fn make_shards(out: &Path, count: u32, threads: u32) -> String {
+    let plan = whole().join("plan.toml");
+    let mut folders = String::new();
+    for k in 1..=count {
+        let arguments = format!(
+            "generate {} --shard {k}/{count} --out s{k} --threads {threads}",
+            plan.display()
+        );
+        succeed(out, &arguments);
+        folders += &format!(" s{k}");
+    }
+    folders
+}
+
+#[test]
+fn shards_merge_to_the_bytes_of_one_run() {
+    let expected = contents(&whole().join("whole"));
+    for (count, threads) in [(1, 1), (2, 2), (3, 1), (7, 2), (64, 1)] {
+        let folder = tempfile::tempdir().unwrap();
+        let shards = make_shards(folder.path(), count, threads);
+        let said = succeed(
+            folder.path(),
+            &format!("merge{shards} --out merged --verify --threads {threads}"),
+        );
+        assert!(said.contains("5 poses"), "{said}");
+        let merged = contents(&folder.path().join("merged"));
+        assert_eq!(
+            merged.keys().collect::<Vec<_>>(),
+            expected.keys().collect::<Vec<_>>()
+        );
+        for (file, bytes) in &expected {
+            assert!(
+                bytes == &merged[file],
+                "{count}: {} differs",
+                file.display()
+            );
+        }
+    }
+}
+
+#[test]
+fn overlaps_holes_and_strangers_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    make_shards(here, 2, 2);
+    let plan = whole().join("plan.toml");
+    let refused = |arguments: &str, words: &[&str]| {
+        let said = fail(here, arguments);
+        for word in words {
+            assert!(said.contains(word), "{said}");
+        }
+        assert!(!here.join("merged").exists(), "{arguments} wrote something");
+    };
+    refused(
+        "merge s1 --out merged",
+        &["no shard holds", "of 5 poses are missing"],
+    );
+    refused("merge s1 s1 s2 --out merged", &["both s1 and s1 hold"]);
+    refused("merge s1 s2 --out s1", &["s1 is one of the shards"]);
+    refused("merge s1 nowhere --out merged", &["nowhere"]);
+    let whole = whole().join("whole").display().to_string();
+    refused(
+        &format!("merge s1 {whole} --out merged"),
+        &["both s1 and", "at 0.0 degrees"],
+    );
+    let other = format!(
+        "generate {} --seed 5 --shard 2/2 --out other",
+        plan.display()
+    );
+    succeed(here, &other);
+    refused(
+        "merge s1 other --out merged",
+        &["different datasets", "settings.seed"],
+    );
+    let second = format!("generate {} --shard 2/2 --out s1", plan.display());
+    refused(&second, &["s1", "another plan or shard"]);
+
+    // A damaged image stops the merge, which goes on once the shard is made whole again.
+    let image = "patient_3/depth/r/orig/depth_cam_left_10.0.png";
+    let bytes = fs::read(here.join("s2").join(image)).unwrap();
+    fs::write(here.join("s2").join(image), &bytes[..bytes.len() / 2]).unwrap();
+    let said = fail(here, "merge s1 s2 --out merged");
+    assert!(
+        said.contains("depth_cam_left_10.0.png is altered"),
+        "{said}"
+    );
+    succeed(here, &second.replace("s1", "s2"));
+    succeed(here, "merge s1 s2 --out merged --verify");
+    assert!(contents(&here.join("merged")) == contents(Path::new(&whole)));
+}
+
+#[test]
+fn the_shard_is_taken_from_the_environment_and_must_agree() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = whole().join("plan.toml");
+    let run = |arguments: &str| {
+        let mut command = ppa(
+            folder.path(),
+            &format!("generate {} --json --out part {arguments}", plan.display()),
+        );
+        command.env("OMPI_COMM_WORLD_RANK", "2");
+        command.env("OMPI_COMM_WORLD_SIZE", "3");
+        command.output().unwrap()
+    };
+    let refused = run("--shard 1/3");
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(!refused.status.success());
+    assert!(
+        said.contains("--shard tells shard 1/3, but OMPI_COMM_WORLD_RANK tells 3/3"),
+        "{said}"
+    );
+    assert!(!folder.path().join("part").exists());
+    let made = run("");
+    assert!(made.status.success());
+    let summary: Value = serde_json::from_slice(&made.stdout).unwrap();
+    assert_eq!(summary["units"], 2);
+    let status: Value =
+        serde_json::from_str(&succeed(folder.path(), "status part --json")).unwrap();
+    assert_eq!(
+        (&status["part"], &status["made"]),
+        (&"3/3".into(), &2.into())
+    );
+}
+
+/// A copy of the finished dataset, to be damaged.
+fn copy() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in contents(&whole().join("whole")) {
+        let path = folder.path().join("plan").join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    }
+    fs::copy(whole().join("plan.toml"), folder.path().join("plan.toml")).unwrap();
+    folder
+}
+
+#[test]
+fn a_dataset_is_verified_by_making_a_part_of_it_again() {
+    let folder = copy();
+    let said = succeed(folder.path(), "verify plan --fraction 0.3 --json");
+    let verified: Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(verified["units"], 5);
+    assert_eq!(verified["images"], 5 * (2 * 2 + 2));
+    assert_eq!(verified["remade"], 2);
+
+    let said = fail(folder.path(), "verify plan --fraction 1.5");
+    assert!(said.contains("fraction is 1.5"), "{said}");
+    let plan = fs::read_to_string(folder.path().join("plan.toml")).unwrap();
+    let other = plan.replace("pixel_mm = 25.0", "pixel_mm = 24.0");
+    fs::write(folder.path().join("other.toml"), other).unwrap();
+    let said = fail(folder.path(), "verify plan --plan other.toml");
+    assert!(
+        said.contains("settings.xray.detector.pixel_mm differs"),
+        "{said}"
+    );
+}
+
+/// Records and hashes that fit each other do not hide an image that the plan does not make.
+#[test]
+fn a_forged_image_is_found_when_its_pose_is_made_again() {
+    let folder = copy();
+    let root = folder.path().join("plan");
+    let [image, another] =
+        ["0.0", "2.5"].map(|a| format!("patient_3/depth/r/orig/depth_cam_left_{a}.png"));
+    let of = |name: &str| ppa_dataset::sha256_of_file(&root.join(name)).unwrap();
+    let (old, new) = (of(&image), of(&another));
+    fs::copy(root.join(&another), root.join(&image)).unwrap();
+    for list in ["manifest.jsonl", ".ppa/patient_3_r_000.json"] {
+        let text = fs::read_to_string(root.join(list)).unwrap();
+        fs::write(root.join(list), text.replace(&old, &new)).unwrap();
+    }
+    let said = fail(folder.path(), "verify plan --fraction 1 --progress quiet");
+    assert!(
+        said.contains("depth_cam_left_0.0.png comes out otherwise"),
+        "{said}"
+    );
+    assert!(!said.contains(';'), "only that one: {said}");
+}
+
+#[test]
+fn what_was_altered_is_named_and_nothing_is_lost() {
+    let folder = copy();
+    let root = folder.path().join("plan");
+    let before = contents(&root);
+    let truncated = root.join("patient_3/depth/r/bumps_a/depth_cam_right_5.0.png");
+    let bytes = fs::read(&truncated).unwrap();
+    fs::write(&truncated, &bytes[..bytes.len() - 20]).unwrap();
+    fs::remove_file(root.join("patient_3/xray/r/xray_image_10.exr")).unwrap();
+    let manifest = fs::read_to_string(root.join("manifest.jsonl")).unwrap();
+    let edited = manifest.replacen("\"step\":5", "\"step\":6", 1);
+    assert_ne!(manifest, edited);
+    fs::write(root.join("manifest.jsonl"), edited).unwrap();
+    fs::write(root.join("patient_3/labels/r/roi_depth.json"), "{}").unwrap();
+
+    let said = fail(folder.path(), "verify plan --progress quiet");
+    for words in [
+        "depth_cam_right_5.0.png is altered",
+        "xray_image_10.exr cannot be read",
+        "manifest.jsonl line 7 is altered: expected the row of patient_3/depth/r/orig/depth_cam_left_2.5.png",
+        "roi_depth.json is missing or altered",
+    ] {
+        assert!(said.contains(words), "{said}");
+    }
+    let status: Value =
+        serde_json::from_str(&succeed(folder.path(), "status plan --json")).unwrap();
+    assert_eq!(
+        (&status["made"], &status["complete"]),
+        (&4.into(), &false.into())
+    );
+
+    let said = succeed(folder.path(), "generate plan.toml --json");
+    let summary: Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(summary["made"], 1, "both damaged images are of one pose");
+    assert!(contents(&root) == before);
+}
+
+#[test]
+fn images_stay_below_the_disk_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = whole().join("plan.toml").display().to_string();
+    let said = fail(
+        folder.path(),
+        &format!("generate {plan} --out data --disk-limit 400kB --threads 2 --progress quiet"),
+    );
+    assert!(said.contains("more than 400000 bytes"), "{said}");
+    let said = succeed(folder.path(), "status data --json");
+    let status: Value = serde_json::from_str(&said).unwrap();
+    let bytes = status["bytes"].as_u64().unwrap();
+    assert!(0 < bytes && bytes <= 400_000, "{status}");
+    let images = contents(&folder.path().join("data"));
+    let images = images
+        .iter()
+        .filter(|(name, _)| name.starts_with("patient_3"));
+    assert_eq!(
+        images.map(|(_, image)| image.len() as u64).sum::<u64>(),
+        bytes
+    );
+    succeed(folder.path(), &format!("generate {plan} --out data"));
+    assert!(contents(&folder.path().join("data")) == contents(&whole().join("whole")));
+}
