@@ -266,8 +266,7 @@ fn depth_image(
         return Ok(sensor.observe(&camera.camera, &seen, noise_seed, frame));
     }
     let limb = ppa_depth::render(&camera.camera, &[placed]);
-    limb.require_visible()?;
-    Ok(DepthImage::nearer_of(&camera.background, &limb)?)
+    Ok(limb.before(&camera.background)?)
 }
 
 fn prepare_folder(root: &Path, file: &str) -> Result<std::path::PathBuf, FileError> {

@@ -23,6 +23,21 @@ pub struct PlacedBody<'a> {
     pub camera_from_body: Isometry3<f64>,
 }
 
+/// Farthest that a body may be moved, mm.
+const FARTHEST_MM: f64 = 1e9;
+
+impl PlacedBody<'_> {
+    /// Whether the pose is made of numbers.
+    pub(crate) fn is_somewhere(&self) -> bool {
+        let Isometry3 {
+            rotation,
+            translation,
+        } = self.camera_from_body;
+        rotation.coords.iter().all(|x| x.is_finite())
+            && translation.vector.iter().all(|mm| mm.abs() <= FARTHEST_MM)
+    }
+}
+
 /// Why points or triangles do not make a body.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -73,13 +88,16 @@ pub enum BodyError {
         /// Where, in the frame of the body, mm.
         eye: [f64; 3],
     },
-    /// The disc radius is zero, negative or not finite.
-    #[error("disc radius {0} mm, expected a positive number")]
+    /// A pose that is not finite or too far away.
+    #[error("the surface is moved by {0:?} mm, expected finite numbers within 1e9 mm")]
+    Pose([f64; 3]),
+    /// The disc radius is zero, negative, not finite or beyond 1e6 mm.
+    #[error("disc radius {0} mm, expected a positive number up to 1e6")]
     Radius(f64),
 }
 
 /// Largest coordinate of a body, mm: a kilometre.
-const MAX_COORDINATE_MM: f32 = 1e6;
+pub(crate) const MAX_COORDINATE_MM: f32 = 1e6;
 
 /// The largest coordinate, if all points are where a body can be.
 pub(crate) fn check_points(points: &[nalgebra::Point3<f32>]) -> Result<f32, BodyError> {

@@ -76,8 +76,8 @@ pub fn fit_noise(
         return Err(FitError::Frames(frames.len()));
     }
     for (frame, image) in frames.iter().enumerate() {
-        let expected = DepthImage::empty(camera.width(), camera.height());
-        DepthImage::nearer_of(&expected, image)
+        image
+            .check_camera(camera)
             .map_err(|source| FitError::Size { frame, source })?;
     }
     let count = frames.len() as f64;

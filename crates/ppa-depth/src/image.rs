@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::camera::Camera;
+
 /// Depth along the camera's z axis in mm, row-major from the top left; 0 where nothing was seen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthImage {
@@ -40,8 +42,16 @@ pub enum DepthError {
         /// Rows.
         height: u32,
     },
+    /// Something else is in front of all that was to be seen.
+    #[error(
+        "the surface is hidden: in all of its {pixels} pixels something stands before it (check the poses)"
+    )]
+    Hidden {
+        /// Pixels that it would have.
+        pixels: usize,
+    },
     /// Two images that belong together differ in size.
-    #[error("depth images of {} x {} and {} x {} pixels cannot be merged", first[0], first[1], second[0], second[1])]
+    #[error("depth images of {} x {} and {} x {} pixels do not belong together", first[0], first[1], second[0], second[1])]
     SizeMismatch {
         /// Columns and rows of the first image.
         first: [u32; 2],
@@ -153,6 +163,23 @@ impl DepthImage {
         })
     }
 
+    /// This image before a background of the same camera: [`nearer_of`](Self::nearer_of), of which some must remain.
+    ///
+    /// # Errors
+    /// [`DepthError::NothingVisible`] if nothing is seen without the background, [`DepthError::Hidden`] if all is behind it,
+    /// [`DepthError::SizeMismatch`].
+    pub fn before(&self, background: &Self) -> Result<Self, DepthError> {
+        self.require_visible()?;
+        let merged = Self::nearer_of(background, self)?;
+        let mut pairs = self.z_mm.iter().zip(&merged.z_mm);
+        if pairs.any(|(own, merged)| *own > 0.0 && own == merged) {
+            return Ok(merged);
+        }
+        Err(DepthError::Hidden {
+            pixels: self.valid_pixels(),
+        })
+    }
+
     /// Depths rounded to whole millimetres. Those beyond 65 535 mm become 0 and are counted.
     pub fn to_u16(&self) -> DepthU16 {
         let mut too_far = 0;
@@ -169,6 +196,15 @@ impl DepthImage {
             z_mm,
             too_far,
         }
+    }
+
+    /// Refuses an image that is not of a camera's size.
+    pub(crate) fn check_camera(&self, camera: &Camera) -> Result<(), DepthError> {
+        let (first, second) = ([camera.width(), camera.height()], [self.width, self.height]);
+        if first != second {
+            return Err(DepthError::SizeMismatch { first, second });
+        }
+        self.check_length()
     }
 
     /// Refuses an image whose buffer does not fit its size, before a file is begun.

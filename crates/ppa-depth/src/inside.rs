@@ -11,8 +11,12 @@ impl PlacedBody<'_> {
     /// Refuses a camera that stands inside a closed mesh: it would see the mesh from within. Open meshes and discs have no inside.
     ///
     /// # Errors
-    /// [`BodyError::CameraInside`].
+    /// [`BodyError::CameraInside`]; [`BodyError::Pose`] for a pose that is not finite.
     pub fn require_camera_outside(&self) -> Result<(), BodyError> {
+        if !self.is_somewhere() {
+            let moved = self.camera_from_body.translation.vector;
+            return Err(BodyError::Pose(moved.into()));
+        }
         let eye = self.camera_from_body.inverse() * Point3::origin();
         match self.body {
             Body::Mesh(mesh) if mesh.encloses(&eye) => Err(BodyError::CameraInside {

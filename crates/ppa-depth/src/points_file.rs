@@ -16,8 +16,7 @@ impl DepthImage {
     /// # Errors
     /// [`DepthError::SizeMismatch`] if the image is not of the camera's size.
     pub fn points(&self, camera: &Camera) -> Result<Vec<Point3<f64>>, DepthError> {
-        let expected = Self::empty(camera.width(), camera.height());
-        Self::nearer_of(&expected, self)?;
+        self.check_camera(camera)?;
         let surface = Surface::new(camera, self);
         Ok((0..self.z_mm.len())
             .filter_map(|pixel| surface.point(pixel))

@@ -15,7 +15,8 @@ use crate::surfel_body::SurfelBody;
 /// through the pixel's centre, or 0.
 ///
 /// Rays follow the exact inverse of the lens distortion ([`Camera::rays`]); pixels without a ray stay 0. Bodies occlude
-/// each other and themselves. An image of nothing is all 0: see [`DepthImage::require_visible`].
+/// each other and themselves. An image of nothing is all 0: see [`DepthImage::require_visible`]. A body whose pose is not finite or
+/// further than 1e9 mm is not seen.
 pub fn render(camera: &Camera, bodies: &[PlacedBody]) -> DepthImage {
     draw(camera, &SeenBody::all(camera, bodies))
 }
@@ -34,7 +35,8 @@ impl<'a> SeenBody<'a> {
                 Self::Surfels(SeenSurfels::new(surfels, &placed.camera_from_body))
             }
         };
-        bodies.iter().map(seen).collect()
+        let somewhere = |placed: &&PlacedBody| placed.is_somewhere();
+        bodies.iter().filter(somewhere).map(seen).collect()
     }
 }
 

@@ -23,7 +23,7 @@ const OFFSETS: [[f64; 2]; SAMPLES] = {
     offsets
 };
 
-/// Neighbouring depths further apart than this, mm, have an edge between them.
+/// Neighbouring depths further apart than this, mm, may have an edge between them: such pixels are sampled.
 pub(crate) const EDGE_MM: f32 = 8.0;
 
 /// What stands still: rendered once per camera, then merged with what moves before it.
@@ -147,17 +147,15 @@ impl Backdrop {
     /// The bodies before the backdrop, with samples inside the pixels at edges.
     ///
     /// # Errors
-    /// [`DepthError::SizeMismatch`] if the backdrop is another camera's, [`DepthError::NothingVisible`] if no pixel sees the
-    /// bodies.
+    /// [`DepthError::SizeMismatch`] if the backdrop is another camera's, [`DepthError::NothingVisible`] or [`DepthError::Hidden`] if
+    /// no pixel sees the bodies.
     pub fn before(
         &self,
         camera: &Camera,
         bodies: &[PlacedBody],
     ) -> Result<SampledImage, DepthError> {
         let bodies = SeenBody::all(camera, bodies);
-        let limb = draw(camera, &bodies);
-        limb.require_visible()?;
-        let image = DepthImage::nearer_of(&self.image, &limb)?;
+        let image = draw(camera, &bodies).before(&self.image)?;
         let sites = Sites::new(camera, edges(&image).into_iter());
         sites.draw(&bodies);
         let merged = |(pixel, depths): (u32, [f32; SAMPLES])| {

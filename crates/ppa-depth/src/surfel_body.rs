@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::body::{BodyError, check_count, check_points};
+use crate::body::{BodyError, MAX_COORDINATE_MM, check_count, check_points};
 use crate::nearest::{Index, Ray};
 
 /// A cloud of equal discs, one around each point and square to its normal, in its own frame, mm.
@@ -41,7 +41,7 @@ impl SurfelBody {
                 normals: normals.len(),
             });
         }
-        if !(radius_mm > 0.0 && radius_mm.is_finite()) {
+        if !(radius_mm > 0.0 && radius_mm <= f64::from(MAX_COORDINATE_MM)) {
             return Err(BodyError::Radius(radius_mm));
         }
         let discs = points

@@ -9,6 +9,7 @@ mod render;
 
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::Subcommand;
 use ppa_depth::{Camera, CameraSpec, DepthMode};
 
@@ -40,7 +41,9 @@ pub fn run(command: &DepthCommand, output: Output) -> anyhow::Result<()> {
 
 fn read_camera(path: Option<&PathBuf>) -> anyhow::Result<Camera> {
     let spec = match path {
-        Some(path) => CameraSpec::read(path)?,
+        Some(path) => CameraSpec::read(path).context(
+            "--camera takes a camera JSON; `ppa depth camera` makes one of a calibration file",
+        )?,
         None => CameraSpec::azure_kinect(DepthMode::NfovUnbinned),
     };
     Ok(Camera::try_from(spec)?)

@@ -72,6 +72,14 @@ fn what_is_no_camera_recording_or_sensor_is_refused_and_leaves_nothing() {
             "odd.json",
         ),
         (
+            "depth render wall.ply --tremor-mm nan --out no.png",
+            "tremor.shift_mm is NaN",
+        ),
+        (
+            "depth render wall.ply --camera camera.yml --out no.png",
+            "ppa depth camera",
+        ),
+        (
             "depth render wall.ply --sensor missing.json --out no.png",
             "missing.json",
         ),

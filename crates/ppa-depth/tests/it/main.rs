@@ -5,6 +5,7 @@ mod calibration;
 mod camera;
 mod cameras;
 mod coverage;
+mod noise_fit;
 mod reference;
 mod render;
 mod sensor;

@@ -2,14 +2,14 @@
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_depth::{
-    Backdrop, Body, Camera, CameraModel, CameraSpec, DepthImage, DepthMode, FieldMask, FitError,
+    Backdrop, Body, Camera, CameraModel, CameraSpec, DepthError, DepthImage, DepthMode, FieldMask,
     Invalidation, MeshBody, MixedPixels, Multipath, PlacedBody, RandomError, SampledImage, Sensor,
-    SensorError, SensorSpec, SystematicError, Tremor, fit_noise,
+    SensorError, SensorSpec, SystematicError, Tremor,
 };
 
 use crate::shapes::sphere;
 
-const NONE: SensorSpec = SensorSpec {
+pub const NONE: SensorSpec = SensorSpec {
     random: None,
     systematic: None,
     mixed: None,
@@ -17,7 +17,7 @@ const NONE: SensorSpec = SensorSpec {
     multipath: None,
 };
 
-fn pinhole(side: u32, focal: f64) -> CameraSpec {
+pub fn pinhole(side: u32, focal: f64) -> CameraSpec {
     let centre = f64::from(side - 1) / 2.0;
     CameraSpec {
         model: CameraModel::Pinhole,
@@ -41,7 +41,7 @@ fn pinhole(side: u32, focal: f64) -> CameraSpec {
 }
 
 /// A rectangle from (x0, −9 m) to (x1, 9 m), square to the axis at depth `z_mm`.
-fn wall(x0: f32, x1: f32, z_mm: f32) -> Body {
+pub fn wall(x0: f32, x1: f32, z_mm: f32) -> Body {
     let corners =
         [(x0, -9e3), (x1, -9e3), (x1, 9e3), (x0, 9e3)].map(|(x, y)| Point3::new(x, y, z_mm));
     MeshBody::new(&corners, &[[0, 1, 2], [0, 2, 3]])
@@ -49,7 +49,7 @@ fn wall(x0: f32, x1: f32, z_mm: f32) -> Body {
         .into()
 }
 
-fn view(camera: &Camera, behind: &[&Body], before: &Body) -> SampledImage {
+pub fn view(camera: &Camera, behind: &[&Body], before: &Body) -> SampledImage {
     let placed = |body| PlacedBody {
         body,
         camera_from_body: Isometry3::identity(),
@@ -60,7 +60,7 @@ fn view(camera: &Camera, behind: &[&Body], before: &Body) -> SampledImage {
         .unwrap()
 }
 
-fn sensor(spec: SensorSpec) -> Sensor {
+pub fn sensor(spec: SensorSpec) -> Sensor {
     Sensor::new(spec, 5).unwrap()
 }
 
@@ -151,6 +151,41 @@ fn the_systematic_error_stays_with_the_device() {
         (slopes / 4.0 - 1.0).abs() < 4.0 * (2.0 / 400.0_f64).sqrt(),
         "{slopes}"
     );
+}
+
+/// The offset of a pixel is the same in every frame, and another for every pixel and device.
+#[test]
+fn the_fixed_pattern_stays_with_the_pixel() {
+    let camera = Camera::try_from(pinhole(100, 2000.0)).unwrap();
+    let seen = view(&camera, &[], &wall(-9e3, 9e3, 1000.0));
+    let fixed = SensorSpec {
+        systematic: Some(SystematicError {
+            offset_mm: 0.0,
+            per_metre_mm: 0.0,
+            fixed_pattern_mm: 3.0,
+        }),
+        random: Some(RandomError {
+            floor_mm: 0.0,
+            at_unit_signal_mm: 0.0,
+        }),
+        ..NONE
+    };
+    let frame = |device: u64, frame: u64| {
+        let sensor = Sensor::new(fixed.clone(), device).unwrap();
+        sensor.observe(&camera, &seen, 1, frame)
+    };
+    let image = frame(5, 0);
+    assert_eq!(image, frame(5, 7));
+    assert_ne!(image, frame(6, 0));
+    let errors: Vec<f64> = image.z_mm.iter().map(|z| f64::from(z - 1000.0)).collect();
+    let n = errors.len() as f64;
+    let variance = errors.iter().map(|e| e * e).sum::<f64>() / n;
+    assert!(
+        (variance / 9.0 - 1.0).abs() < 4.0 * (2.0 / n).sqrt() + 0.01,
+        "{variance}"
+    );
+    let beside: f64 = errors.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    assert!((beside / n / 9.0).abs() < 4.0 / n.sqrt());
 }
 
 /// A near wall covers a known share of one column of pixels; the phasors of both walls then give the range.
@@ -264,61 +299,6 @@ fn one_bounce_inside_a_sphere_lengthens_the_range_as_derived() {
     );
 }
 
-/// A tilted wall gives many signals; what is put in comes out, rounding to millimetres included.
-#[test]
-fn the_noise_of_a_recording_is_found_again() {
-    let camera = Camera::try_from(pinhole(160, 120.0)).unwrap();
-    let tilted = [(-2e3, -2e3), (2e3, -2e3), (2e3, 2e3), (-2e3, 2e3)]
-        .map(|(x, y)| Point3::new(x, y, 1200.0 + 0.4 * x));
-    let body = Body::from(MeshBody::new(&tilted, &[[0, 1, 2], [0, 2, 3]]).unwrap());
-    let seen = view(&camera, &[], &body);
-    let (floor_mm, at_unit_signal_mm) = (0.5, 0.5);
-    let noisy = sensor(SensorSpec {
-        random: Some(RandomError {
-            floor_mm,
-            at_unit_signal_mm,
-        }),
-        ..NONE
-    });
-    let frames: Vec<DepthImage> = (0..40)
-        .map(|frame| {
-            let mut image = noisy.observe(&camera, &seen, 3, frame);
-            image.z_mm.iter_mut().for_each(|z| *z = z.round());
-            image
-        })
-        .collect();
-    let fit = fit_noise(&camera, &frames, true).unwrap();
-    // Edges of the classes and normals from rounded depths leave some per cent.
-    assert!(
-        (fit.random.floor_mm / floor_mm - 1.0).abs() < 0.1,
-        "{fit:?}"
-    );
-    assert!(
-        (fit.random.at_unit_signal_mm / at_unit_signal_mm - 1.0).abs() < 0.05,
-        "{fit:?}"
-    );
-    assert!(fit.relative_misfit < 0.03 && fit.min_signal.is_none());
-    assert!(matches!(
-        fit_noise(&camera, &frames[..2], true),
-        Err(FitError::Frames(2))
-    ));
-    let still = vec![frames[0].clone(); 3];
-    assert!(matches!(
-        fit_noise(&camera, &still, true),
-        Err(FitError::Quiet(0))
-    ));
-    let small = vec![DepthImage::empty(3, 3); 3];
-    assert!(matches!(
-        fit_noise(&camera, &small, true),
-        Err(FitError::Size { frame: 0, .. })
-    ));
-    let nothing = vec![DepthImage::empty(160, 160); 3];
-    assert!(matches!(
-        fit_noise(&camera, &nothing, true),
-        Err(FitError::Pixels(0))
-    ));
-}
-
 #[test]
 fn a_tremor_keeps_its_size_and_its_memory() {
     let tremor = Tremor {
@@ -341,6 +321,43 @@ fn a_tremor_keeps_its_size_and_its_memory() {
     assert_eq!(moved(17), path[17]);
     let turned = tremor.motion(&pivot, 11, 5).rotation.angle().to_degrees();
     assert!(0.0 < turned && turned < 1.2);
+}
+
+#[test]
+fn what_is_hidden_by_the_backdrop_is_refused() {
+    let camera = Camera::try_from(pinhole(20, 50.0)).unwrap();
+    let placed = |body| PlacedBody {
+        body,
+        camera_from_body: Isometry3::identity(),
+    };
+    let (near, far) = (wall(-9e3, 9e3, 1000.0), wall(-100.0, 100.0, 1200.0));
+    let backdrop = Backdrop::new(&camera, &[placed(&near)]);
+    assert!(matches!(
+        backdrop.before(&camera, &[placed(&far)]),
+        Err(DepthError::Hidden { .. })
+    ));
+    let backdrop = Backdrop::new(&camera, &[placed(&far)]);
+    assert!(backdrop.before(&camera, &[placed(&near)]).is_ok());
+}
+
+#[test]
+fn numbers_that_make_no_tremor_are_named() {
+    let tremor = |shift_mm, turn_deg, correlation_frames| {
+        let tremor = Tremor {
+            shift_mm,
+            turn_deg,
+            correlation_frames,
+        };
+        match tremor.check() {
+            Ok(()) => "",
+            Err(SensorError::Parameter { name, .. }) => name,
+            Err(_) => unreachable!(),
+        }
+    };
+    assert_eq!(tremor(0.5, 0.1, 10.0), "");
+    assert_eq!(tremor(f64::NAN, 0.1, 10.0), "tremor.shift_mm");
+    assert_eq!(tremor(0.5, -1.0, 10.0), "tremor.turn_deg");
+    assert_eq!(tremor(0.5, 0.1, 1e6), "tremor.correlation_frames");
 }
 
 #[test]

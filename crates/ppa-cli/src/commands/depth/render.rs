@@ -103,6 +103,7 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
         turn_deg: args.tremor_deg,
         correlation_frames: TREMOR_FRAMES,
     };
+    tremor.check()?;
     let corners = meshes.iter().flat_map(|mesh| &mesh.vertices);
     let (sum, count) = corners.fold((nalgebra::Vector3::zeros(), 0), |(sum, n), corner| {
         (sum + corner.coords.cast::<f64>(), n + 1)
