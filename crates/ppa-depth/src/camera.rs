@@ -16,7 +16,7 @@ use crate::spec::{CameraError, CameraSpec};
 pub struct Camera {
     spec: CameraSpec,
     distortion: Distortion,
-    optics: OnceLock<Arc<Optics>>,
+    optics: Arc<OnceLock<Optics>>,
 }
 
 impl TryFrom<CameraSpec> for Camera {
@@ -27,7 +27,7 @@ impl TryFrom<CameraSpec> for Camera {
         Ok(Self {
             distortion: Distortion::new(&spec),
             spec,
-            optics: OnceLock::new(),
+            optics: Arc::default(),
         })
     }
 }
@@ -97,17 +97,20 @@ impl Camera {
     }
 
     pub(crate) fn optics(&self) -> &Optics {
-        self.optics.get_or_init(|| {
-            let width = self.spec.width;
-            let rays = (0..width * self.spec.height)
-                .into_par_iter()
-                .map(|index| {
-                    let (u, v) = (index % width, index / width);
-                    self.unproject(&Point2::new(f64::from(u), f64::from(v)))
-                        .filter(|ray| self.spec.mask.is_none_or(|mask| mask.contains(ray)))
-                })
-                .collect();
-            Arc::new(Optics::new(&self.spec, &self.distortion, rays))
-        })
+        if let Some(optics) = self.optics.get() {
+            return optics;
+        }
+        // Made before the cell is locked: a thread that waits for the others' rays may be handed another image of this camera.
+        let width = self.spec.width;
+        let rays = (0..width * self.spec.height)
+            .into_par_iter()
+            .map(|index| {
+                let (u, v) = (index % width, index / width);
+                self.unproject(&Point2::new(f64::from(u), f64::from(v)))
+                    .filter(|ray| self.spec.mask.is_none_or(|mask| mask.contains(ray)))
+            })
+            .collect();
+        let optics = Optics::new(&self.spec, &self.distortion, rays);
+        self.optics.get_or_init(|| optics)
     }
 }

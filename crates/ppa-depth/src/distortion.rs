@@ -17,6 +17,8 @@ pub(crate) struct Distortion {
     mixed: f64,
     /// Largest ideal radius that the camera uses; infinite if nothing limits it.
     radius: f64,
+    /// Ideal radius beyond which the lens folds over; infinite if it does not.
+    fold: f64,
 }
 
 /// Largest field angle that is searched for a fold, in degrees from the optical axis.
@@ -39,16 +41,16 @@ impl Distortion {
                 1.0
             },
             radius: 0.0,
+            fold: 0.0,
         };
-        lens.radius = lens
-            .fold_radius()
-            .min(spec.metric_radius.unwrap_or(f64::INFINITY));
+        lens.fold = lens.fold_radius();
+        lens.radius = lens.fold.min(spec.metric_radius.unwrap_or(f64::INFINITY));
         lens
     }
 
-    /// Largest ideal radius that the camera uses; infinite if nothing limits it.
-    pub(crate) fn radius(&self) -> f64 {
-        self.radius
+    /// Ideal radius beyond which the lens folds over; infinite if it does not. The metric radius plays no role.
+    pub(crate) fn fold(&self) -> f64 {
+        self.fold
     }
 
     /// Whether the ideal point lies on the disc that the camera uses.

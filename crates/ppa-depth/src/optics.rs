@@ -44,8 +44,8 @@ impl Optics {
             bounds = [bounds[0].inf(ray), bounds[1].sup(ray)];
             reach = reach.max(ray.norm());
         }
-        // At the fold itself the inverse has no finite slope.
-        let radius = (BEYOND * reach + LEAST_RADIUS).min(0.999 * lens.radius());
+        // At the fold the inverse has no finite slope, and near it edges bow without measure.
+        let radius = (BEYOND * reach + LEAST_RADIUS).min(0.5 * (reach + lens.fold()));
         let (bow, stretch) = bow_and_stretch(spec, lens, radius);
         // A pole: no triangle is projected, each is tested against all pixels.
         let (radius, bow, stretch) = if bow.is_finite() {
@@ -88,4 +88,48 @@ fn bow_and_stretch(spec: &CameraSpec, lens: &Distortion, radius: f64) -> (f64, f
         }
     }
     (SAFETY * bend / (8.0 * least * least), SAFETY * most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Camera, CameraModel, DepthMode};
+
+    /// A barrel whose fold lies just outside the corners of the image: r (1 − 0.2 r²) grows up to r = 1.29, the corners lie at 1.02.
+    #[test]
+    fn near_a_fold_triangles_still_have_narrow_outlines() {
+        let barrel = CameraSpec {
+            model: CameraModel::BrownConrady,
+            width: 640,
+            height: 480,
+            fx: 500.0,
+            fy: 500.0,
+            cx: 319.5,
+            cy: 239.5,
+            k1: -0.2,
+            k2: 0.0,
+            k3: 0.0,
+            k4: 0.0,
+            k5: 0.0,
+            k6: 0.0,
+            p1: 0.0,
+            p2: 0.0,
+            metric_radius: None,
+            mask: None,
+        };
+        let camera = Camera::try_from(barrel).unwrap();
+        let optics = camera.optics();
+        assert!(optics.radius > optics.bounds[1].norm() && optics.radius < 1.29);
+        assert!(optics.bow < 0.1, "{}", optics.bow);
+    }
+
+    /// The metric radius limits the rays, not the triangles that are projected.
+    #[test]
+    fn corners_beyond_the_metric_radius_are_projected() {
+        let wide = CameraSpec::azure_kinect(DepthMode::WfovBinned);
+        let camera = Camera::try_from(wide.clone()).unwrap();
+        let optics = camera.optics();
+        assert!(optics.radius > 1.1 * wide.metric_radius.unwrap());
+        assert!(optics.bow < 0.1, "{}", optics.bow);
+    }
 }

@@ -84,7 +84,7 @@ impl<'a> SeenMesh<'a> {
             translation,
             corners,
             rounding_mm: ROUNDING / 10.0 * (mesh.reach_mm + shift.amax()),
-            rounding_px: ROUNDING * camera.width().max(camera.height()) as f32,
+            rounding_px: ROUNDING * largest_pixel(camera, optics),
         }
     }
 
@@ -252,6 +252,19 @@ impl<'a> SeenMesh<'a> {
     }
 }
 
+/// Largest number that makes up a place in the image: its size, or the principal point of a part of a larger image.
+fn largest_pixel(camera: &Camera, optics: &Optics) -> f32 {
+    let (spec, size) = (camera.spec(), camera.width().max(camera.height()));
+    let centre = spec.cx.abs().max(spec.cy.abs());
+    let ray = optics.bounds[0].amax().max(optics.bounds[1].amax());
+    let reach = if ray.is_finite() {
+        spec.fx.max(spec.fy) * ray
+    } else {
+        0.0
+    };
+    f64::from(size).max(centre).max(reach) as f32
+}
+
 /// The smaller of two numbers that are not NaN: one instruction, unlike `f32::min`.
 #[inline(always)]
 fn least(a: f32, b: f32) -> f32 {
@@ -264,8 +277,12 @@ fn centres(low: f32, high: f32, count: u32) -> Range<u32> {
     // Truncation is a single instruction where ceil and floor are calls.
     let low = low.max(0.0);
     let first = low as u32;
-    let first = first + u32::from((first as f32) < low);
-    let last = if high < 0.0 { 0 } else { high as u32 + 1 };
+    let first = first.saturating_add(u32::from((first as f32) < low));
+    let last = if high < 0.0 {
+        0
+    } else {
+        (high as u32).saturating_add(1)
+    };
     first..last.min(count)
 }
 

@@ -66,6 +66,7 @@ fn what_is_no_surface_is_refused() {
         BodyError::Normal { index: 0, .. }
     ));
     assert_eq!(cloud(&[Vector3::z()], 0.0), BodyError::Radius(0.0));
+    assert_eq!(cloud(&[Vector3::z()], 1e39), BodyError::Radius(1e39));
 }
 
 #[test]
@@ -97,4 +98,43 @@ fn a_camera_inside_a_closed_mesh_is_refused() {
         camera_from_body: Isometry3::translation(0.0, 0.0, 20.0),
     };
     assert!(placed.require_camera_outside().is_ok());
+}
+
+/// Neither a triangle of numbers that are none nor all of them are tried at every pixel, which would take minutes.
+#[test]
+fn a_pose_that_is_no_pose_shows_nothing_and_is_refused() {
+    let (vertices, triangles) = bumpy(7);
+    let body = Body::from(MeshBody::new(&vertices, &triangles).unwrap());
+    let camera = pinhole(400, 400, 500.0);
+    for mm in [f64::NAN, f64::INFINITY, 1e12] {
+        let placed = PlacedBody {
+            body: &body,
+            camera_from_body: Isometry3::translation(0.0, mm, 500.0),
+        };
+        assert_eq!(render(&camera, &[placed]).valid_pixels(), 0);
+        assert!(matches!(
+            placed.require_camera_outside(),
+            Err(BodyError::Pose(_))
+        ));
+    }
+}
+
+/// A corner at the eye lies anywhere in the image.
+#[test]
+fn a_corner_at_the_eye_does_no_harm() {
+    let corners = [
+        (0.0, 0.0, 1e-12),
+        (-400.0, -300.0, 1000.0),
+        (400.0, -300.0, 1000.0),
+    ];
+    let corners = corners.map(|(x, y, z)| Point3::new(x, y, z));
+    let beyond = [(0.0, 300.0, 900.0)].map(|(x, y, z)| Point3::new(x, y, z));
+    let vertices: Vec<_> = corners.into_iter().chain(beyond).collect();
+    let body = Body::from(MeshBody::new(&vertices, &[[0, 1, 2], [1, 2, 3]]).unwrap());
+    let placed = PlacedBody {
+        body: &body,
+        camera_from_body: Isometry3::identity(),
+    };
+    let image = render(&pinhole(101, 101, 50.0), &[placed]);
+    assert!(image.z_mm[60 * 101 + 50] > 900.0);
 }

@@ -209,3 +209,25 @@ fn a_camera_file_needs_only_what_matters() {
         Err(CameraError::Read { .. })
     ));
 }
+
+/// Each pose of a limb may be drawn by another thread, with rays that nobody asked for before.
+#[test]
+fn threads_that_draw_at_once_share_the_rays() {
+    let threads = rayon::ThreadPoolBuilder::new()
+        .num_threads(4)
+        .build()
+        .unwrap();
+    for _ in 0..10 {
+        let camera = Camera::try_from(CameraSpec::azure_kinect(DepthMode::WfovBinned)).unwrap();
+        let clone = camera.clone();
+        let seen = threads.install(|| {
+            use rayon::prelude::*;
+            (0..64)
+                .into_par_iter()
+                .map(|_| camera.rays().len())
+                .sum::<usize>()
+        });
+        assert_eq!(seen, 64 * 512 * 512);
+        assert!(std::ptr::eq(camera.rays(), clone.rays()));
+    }
+}
