@@ -66,7 +66,16 @@ struct OrbbecDistortion {
     k6: f64,
     p1: f64,
     p2: f64,
+    /// `OBCameraDistortionModel`, as a number or a name; older bindings leave it out.
+    #[serde(default)]
+    model: Option<serde_json::Value>,
 }
+
+/// Names of the Orbbec models that are ours: with three and with six radial coefficients.
+const ORBBEC_MODELS: &[&str] = &[
+    "OB_DISTORTION_BROWN_CONRADY",
+    "OB_DISTORTION_BROWN_CONRADY_K6",
+];
 
 /// Stands for a metric radius that the factory could not determine (public Azure Kinect Sensor SDK, `calibration.c`).
 const DEFAULT_METRIC_RADIUS: f64 = 1.7;
@@ -109,7 +118,7 @@ impl CameraSpec {
             found.camera(mode).map_err(refused)
         } else if value.get("depth_intrinsic").is_some() || value.get("depthIntrinsic").is_some() {
             let found: OrbbecParam = serde_json::from_value(value).map_err(bad_json)?;
-            Ok(found.camera())
+            found.camera().map_err(refused)
         } else {
             serde_json::from_value(value).map_err(bad_json)
         }
@@ -192,7 +201,17 @@ impl DeviceCalibration {
 }
 
 impl OrbbecParam {
-    fn camera(&self) -> CameraSpec {
+    fn camera(&self) -> Result<CameraSpec, String> {
+        let model = self.depth_distortion.model.as_ref();
+        let known = |model: &serde_json::Value| match model {
+            serde_json::Value::String(name) => ORBBEC_MODELS.contains(&name.as_str()),
+            number => number == 3 || number == 4,
+        };
+        if let Some(model) = model.filter(|model| !known(model)) {
+            return Err(format!(
+                "its distortion model is {model}, expected 3 or 4 (Brown-Conrady)"
+            ));
+        }
         let OrbbecIntrinsic {
             fx,
             fy,
@@ -210,8 +229,9 @@ impl OrbbecParam {
             k6,
             p1,
             p2,
+            ..
         } = self.depth_distortion;
-        CameraSpec {
+        Ok(CameraSpec {
             model: CameraModel::BrownConrady,
             width,
             height,
@@ -229,6 +249,6 @@ impl OrbbecParam {
             p2,
             metric_radius: None,
             mask: None,
-        }
+        })
     }
 }

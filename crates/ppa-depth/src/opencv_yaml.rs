@@ -9,8 +9,22 @@ use crate::spec::{CameraModel, CameraSpec};
 const MATRIX_KEYS: &[&str] = &["camera_matrix", "cameraMatrix", "K"];
 const COEFFICIENT_KEYS: &[&str] = &["distortion_coefficients", "distCoeffs", "D"];
 
+/// Names that ROS has for OpenCV's model with 5 and with 8 coefficients.
+const ROS_MODELS: &[&str] = &["plumb_bob", "rational_polynomial"];
+
 /// The camera in the text of a file storage, or what is wrong with it.
 pub(crate) fn camera(text: &str) -> Result<CameraSpec, String> {
+    // ROS names the model, which the number of coefficients does not tell from a fisheye.
+    if let Some(entry) = after(text, "distortion_model") {
+        let name = entry.lines().next().unwrap_or_default();
+        let name = name.trim().trim_matches(['"', '\'']);
+        if !ROS_MODELS.contains(&name) {
+            return Err(format!(
+                "its distortion_model is {name:?}, expected {}",
+                ROS_MODELS.join(" or ")
+            ));
+        }
+    }
     let matrix = matrix(text, MATRIX_KEYS)?;
     let &[fx, skew, cx, zero, fy, cy, ..] = matrix.as_slice() else {
         return Err(format!(

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use crate::atomic::write_whole;
 use crate::image::{DepthError, DepthImage};
+use crate::spec::CameraSpec;
 
 impl DepthImage {
     /// Writes a 16-bit grey PNG in whole millimetres, 0 for nothing; whole or not at all.
@@ -60,6 +61,12 @@ impl DepthImage {
             });
         }
         let (width, height) = reader.info().size();
+        // A header of a few bytes can claim more than there is memory.
+        if width.max(height) > CameraSpec::MAX_SIDE {
+            let claim =
+                format!("{width} x {height} pixels, expected at most 16384 along each side");
+            return Err(broken(io::Error::other(claim)));
+        }
         let too_large = || broken(io::Error::other("the image is too large for this machine"));
         let mut bytes = vec![0; reader.output_buffer_size().ok_or_else(too_large)?];
         reader
@@ -123,6 +130,16 @@ mod tests {
             DepthImage::read_png(&grey8),
             Err(DepthError::Read { .. })
         ));
+        // What a header claims is looked at before memory is asked for.
+        let wide = folder.path().join("wide.png");
+        let mut encoder = png::Encoder::new(File::create(&wide).unwrap(), 20_000, 1);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        let mut row = encoder.write_header().unwrap();
+        row.write_image_data(&[0; 40_000]).unwrap();
+        row.finish().unwrap();
+        let refused = DepthImage::read_png(&wide).unwrap_err();
+        let why = std::error::Error::source(&refused).unwrap().to_string();
+        assert!(why.contains("20000 x 1 pixels"), "{why}");
         let missing = folder.path().join("no folder/depth.png");
         assert!(matches!(
             DepthImage::empty(2, 2).write_png(&missing),

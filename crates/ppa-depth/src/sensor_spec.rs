@@ -106,7 +106,7 @@ impl Default for SensorSpec {
     /// * Systematic: the limits as two standard deviations of offset and slope.
     /// * Signal: that of the reference target at 3.86 m, 1 / 3.86².
     /// * Modulation at 200 MHz (the sensor goes up to 320 MHz: Bamji et al., ISSCC 2018), least contrast 0.9, largest angle
-    ///   85°: choices of ours. An even mix of surfaces 0.1 m apart is then just given up.
+    ///   85°: choices of ours. An even mix of surfaces 0.11 m apart is then just given up.
     ///
     /// Multipath is left out.
     fn default() -> Self {

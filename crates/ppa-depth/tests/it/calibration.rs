@@ -63,12 +63,17 @@ fn device_orbbec_and_opencv_files_tell_the_same_camera() {
     let opencv = import("camera.yml", OPENCV, DepthMode::WfovBinned).unwrap();
     assert_eq!(opencv.metric_radius, None);
     same_camera(&opencv, &ours);
+    let ros = OPENCV.replace("flags: 16384", "distortion_model: rational_polynomial");
+    same_camera(
+        &import("ros.yaml", &ros, DepthMode::NfovBinned).unwrap(),
+        &ours,
+    );
     let CameraSpec { fx, fy, cx, cy, .. } = ours;
     let CameraSpec { k1, k2, k3, k4, .. } = ours;
     let CameraSpec { k5, k6, p1, p2, .. } = ours;
     let orbbec = serde_json::json!({
         "depthIntrinsic": {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "width": 640, "height": 576},
-        "depthDistortion": {"k1": k1, "k2": k2, "k3": k3, "k4": k4, "k5": k5, "k6": k6, "p1": p1, "p2": p2},
+        "depthDistortion": {"k1": k1, "k2": k2, "k3": k3, "k4": k4, "k5": k5, "k6": k6, "p1": p1, "p2": p2, "model": 4},
         "rgbIntrinsic": {},
     });
     let orbbec = import("orbbec.json", &orbbec.to_string(), DepthMode::NfovBinned).unwrap();
@@ -186,6 +191,18 @@ fn files_that_are_no_depth_camera_say_why() {
             "tall",
         ),
         ("a.yaml", OPENCV.replace("321.73828125", "wide"), "wide"),
+        (
+            "a.yaml",
+            OPENCV.replace("flags: 16384", "distortion_model: equidistant"),
+            "equidistant",
+        ),
+        (
+            "orbbec.json",
+            r#"{"depth_intrinsic": {"fx": 500, "fy": 500, "cx": 320, "cy": 288, "width": 640, "height": 576},
+                "depth_distortion": {"k1": 0, "k2": 0, "k3": 0, "k4": 0, "k5": 0, "k6": 0, "p1": 0, "p2": 0, "model": 5}}"#
+                .to_owned(),
+            "distortion model is 5",
+        ),
         (
             "a.yaml",
             OPENCV.replace("-2.0833556845900603e-05, ", ""),
