@@ -64,9 +64,12 @@ fn points_and_pixels_of_three_devices() {
             .zip(&case.pixels)
             .zip(case.inside_metric_radius)
         {
-            match camera.project(&Point3::from(*point)) {
-                Some(found) => worst_px = worst_px.max((found - Point2::from(*pixel)).amax()),
-                None => assert!(!inside, "{}: {point:?}", case.camera.name),
+            let found = camera.project(&Point3::from(*point));
+            assert_eq!(found.is_some(), inside, "{}: {point:?}", case.camera.name);
+            if let Some(found) = found {
+                let away_px = (found - Point2::from(*pixel)).amax();
+                assert!(away_px.is_finite());
+                worst_px = worst_px.max(away_px);
             }
         }
         for (pixel, xy) in case.unproject.pixels.iter().zip(&case.unproject.xy) {
