@@ -26,22 +26,46 @@ impl<'a> Surface<'a> {
         (z_mm > 0.0).then(|| Point3::new(ray.x * z, ray.y * z, z))
     }
 
+    /// Depth of the pixel some columns and rows away, mm; `None` outside the image and where nothing was seen.
+    #[inline]
+    fn depth(&self, pixel: usize, columns: isize, rows: isize) -> Option<f64> {
+        let (width, height) = (self.image.width as usize, self.image.height as usize);
+        let column = (pixel % width).checked_add_signed(columns)?;
+        let row = (pixel / width).checked_add_signed(rows)?;
+        let z_mm = (column < width && row < height).then(|| self.image.z_mm[row * width + column]);
+        z_mm.filter(|z_mm| *z_mm > 0.0).map(f64::from)
+    }
+
+    /// Whether a pixel and its neighbour one step away lie on one surface, however steep it is.
+    ///
+    /// 1/z of a plane is linear in the image of a pinhole, so that of three pixels in a row it has no second difference, where a step of
+    /// h makes h / z². One of the three may lie before the two or behind them.
+    #[inline]
+    fn is_continued(&self, pixel: usize, columns: isize, rows: isize) -> bool {
+        let at = |steps: isize| self.depth(pixel, steps * columns, steps * rows);
+        let (Some(here), Some(next)) = (at(0), at(1)) else {
+            return false;
+        };
+        if (next - here).abs() <= f64::from(EDGE_MM) {
+            return true;
+        }
+        let straight = |third: Option<f64>, middle: f64, end: f64| {
+            third.is_some_and(|third| {
+                let bend = 1.0 / third + 1.0 / end - 2.0 / middle;
+                (bend * middle * middle).abs() <= f64::from(EDGE_MM)
+            })
+        };
+        straight(at(-1), here, next) || straight(at(2), next, here)
+    }
+
     /// Points of the neighbours left, right, above and below that lie on the same surface.
     #[inline]
     fn neighbours(&self, pixel: usize) -> [Option<Point3<f64>>; 4] {
-        let (width, count) = (self.image.width as usize, self.image.z_mm.len());
-        let column = pixel % width;
-        let on_surface = |exists: bool, other: usize| {
-            let other = if exists { other } else { pixel };
-            let apart = (self.image.z_mm[other] - self.image.z_mm[pixel]).abs();
-            self.point(other).filter(|_| exists && apart <= EDGE_MM)
-        };
-        [
-            on_surface(column > 0, pixel.wrapping_sub(1)),
-            on_surface(column + 1 < width, pixel + 1),
-            on_surface(pixel >= width, pixel.wrapping_sub(width)),
-            on_surface(pixel + width < count, pixel + width),
-        ]
+        let width = self.image.width as isize;
+        [(-1, 0), (1, 0), (0, -1), (0, 1)].map(|(columns, rows)| {
+            let next = pixel.checked_add_signed(rows * width + columns)?;
+            (self.is_continued(pixel, columns, rows)).then(|| self.point(next))?
+        })
     }
 
     /// Whether a pixel and its four neighbours lie on one surface.

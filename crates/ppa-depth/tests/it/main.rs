@@ -6,6 +6,7 @@ mod camera;
 mod cameras;
 mod coverage;
 mod noise_fit;
+mod obliquity;
 mod reference;
 mod render;
 mod sensor;
