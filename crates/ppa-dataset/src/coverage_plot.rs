@@ -82,11 +82,13 @@ fn draw_sky(sheet: &mut RgbImage, views: &[RankedView], colour: impl Fn(&RankedV
     number(sheet, views, |view| Some((place(view), size(view))));
     write_text(
         sheet,
-        "camera seen from the joint; up: y, right: x; circles: 0, 30, 60 degrees up",
+        "camera seen from the joint; up: y, right: x",
         MARGIN as u32,
         20,
         1,
     );
+    let circles = "circles: 0, 30, 60 degrees up";
+    write_text(sheet, circles, MARGIN as u32, HEIGHT - 40, 1);
     if distances.len() <= 6 {
         let texts: Vec<String> = distances.iter().map(|d| format!("{d}")).collect();
         let legend = format!("discs from small to large: {} mm away", texts.join(", "));
