@@ -24,6 +24,9 @@ pub(super) enum Fault {
     /// No element, or sequences in sequences beyond all measure.
     #[error("byte {0} of the data set starts no element")]
     Damaged(usize),
+    /// A deflated header beyond all measure.
+    #[error("no pixels in the first {0} bytes that it inflates to")]
+    Endless(u64),
 }
 
 /// Sequences in sequences; real ones go five deep.
@@ -62,10 +65,17 @@ pub(super) struct ElementHeader {
 
 /// An element that lies whole in its bytes.
 #[derive(Debug)]
-struct Element {
-    tag: Tag,
+pub(super) struct Element {
+    pub tag: Tag,
     vr: Option<[u8; 2]>,
     value: Range<usize>,
+}
+
+impl Element {
+    /// Value representation, where it is written.
+    pub fn vr(&self) -> Option<VR> {
+        self.vr.and_then(VR::from_binary)
+    }
 }
 
 /// The elements of one data set or item.
@@ -109,20 +119,21 @@ impl<'a> DataSet<'a> {
 
     /// The value of an element; `None` when it is absent.
     pub fn get(&self, tag: Tag) -> Option<&'a [u8]> {
-        self.find(tag)
-            .map(|element| &self.bytes[element.value.clone()])
+        self.find(tag).map(|element| self.value(element))
+    }
+
+    /// The value of one of its elements.
+    pub fn value(&self, element: &Element) -> &'a [u8] {
+        &self.bytes[element.value.clone()]
     }
 
     fn find(&self, tag: Tag) -> Option<&Element> {
         self.elements.iter().find(|element| element.tag == tag)
     }
 
-    /// All elements: tag, value representation where it is written, value.
-    pub fn elements(&self) -> impl Iterator<Item = (Tag, Option<VR>, &'a [u8])> {
-        self.elements.iter().map(|element| {
-            let vr = element.vr.and_then(VR::from_binary);
-            (element.tag, vr, &self.bytes[element.value.clone()])
-        })
+    /// All elements; a damaged file may hold a tag more than once.
+    pub fn elements(&self) -> &[Element] {
+        &self.elements
     }
 
     /// How the numbers in it are written.
@@ -132,9 +143,12 @@ impl<'a> DataSet<'a> {
 
     /// The items of a sequence; none when it is absent.
     pub fn items(&self, sequence: Tag) -> Result<Vec<DataSet<'a>>, Fault> {
-        let Some(element) = self.find(sequence) else {
-            return Ok(Vec::new());
-        };
+        let found = self.find(sequence);
+        found.map_or(Ok(Vec::new()), |element| self.items_of(element))
+    }
+
+    /// The items of one of its elements.
+    pub fn items_of(&self, element: &Element) -> Result<Vec<DataSet<'a>>, Fault> {
         let encoding = inside(element.vr, self.encoding);
         let bytes = &self.bytes[..element.value.end];
         let (mut items, mut at) = (Vec::new(), element.value.start);
@@ -246,114 +260,4 @@ fn end_of(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    const SEQUENCE: Tag = Tag(0x0040, 0x0100);
-    const TEXT: Tag = Tag(0x0008, 0x0060);
-
-    /// An explicit little-endian element.
-    fn element(tag: Tag, vr: &[u8; 2], value: &[u8], delimited: bool) -> Vec<u8> {
-        let mut bytes = [tag.0.to_le_bytes(), tag.1.to_le_bytes(), *vr].concat();
-        if has_short_length(vr) {
-            bytes.extend((value.len() as u16).to_le_bytes());
-        } else {
-            bytes.extend([0, 0]);
-            let length = if delimited {
-                u32::MAX
-            } else {
-                value.len() as u32
-            };
-            bytes.extend(length.to_le_bytes());
-        }
-        bytes.extend(value);
-        if delimited {
-            bytes.extend(b"\xfe\xff\xdd\xe0\0\0\0\0");
-        }
-        bytes
-    }
-
-    fn item(value: &[u8], delimited: bool) -> Vec<u8> {
-        let length = if delimited {
-            u32::MAX
-        } else {
-            value.len() as u32
-        };
-        let mut bytes = [b"\xfe\xff\x00\xe0".as_slice(), &length.to_le_bytes(), value].concat();
-        if delimited {
-            bytes.extend(b"\xfe\xff\x0d\xe0\0\0\0\0");
-        }
-        bytes
-    }
-
-    fn nested(delimited: [bool; 2], texts: &[String]) -> Vec<u8> {
-        let items = texts
-            .iter()
-            .map(|t| item(&element(TEXT, b"CS", t.as_bytes(), false), delimited[1]));
-        let sequence = element(
-            SEQUENCE,
-            b"SQ",
-            &items.collect::<Vec<_>>().concat(),
-            delimited[0],
-        );
-        [
-            element(TEXT, b"CS", b"CT", false),
-            sequence,
-            element(Tag(0x7fe0, 0x10), b"OW", b"1234", false),
-        ]
-        .concat()
-    }
-
-    proptest! {
-        /// Both ways to end sequences and items give the same elements, and nothing short is taken.
-        #[test]
-        fn items_are_found_and_cut_bytes_are_not_read(
-            delimited in any::<[bool; 2]>(),
-            texts in prop::collection::vec("[A-Z]{0,9}", 0..4),
-            cut in any::<prop::sample::Index>(),
-        ) {
-            let bytes = nested(delimited, &texts);
-            let pixels = |tag: Tag| tag.0 == 0x7fe0;
-            let (set, end) = DataSet::parse(&bytes, 0, Encoding::ExplicitLittle, pixels).unwrap();
-            prop_assert_eq!(end, bytes.len() - 16);
-            prop_assert_eq!(set.get(TEXT), Some(b"CT".as_slice()));
-            let found = set.items(SEQUENCE).unwrap();
-            let found = found.iter().map(|i| i.get(TEXT).unwrap().to_vec()).collect::<Vec<_>>();
-            prop_assert_eq!(found, texts.iter().map(|t| t.clone().into_bytes()).collect::<Vec<_>>());
-
-            let cut = cut.index(end);
-            let parsed = DataSet::parse(&bytes[..cut], 0, Encoding::ExplicitLittle, pixels);
-            // Whole elements may remain; a cut one is short.
-            prop_assert!(cut == 0 || cut == 10 || parsed.unwrap_err() == Fault::Short);
-        }
-
-        #[test]
-        fn damage_never_panics(
-            texts in prop::collection::vec("[A-Z]{0,9}", 0..4),
-            damage in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
-            encoding in prop::sample::select(vec![Encoding::ExplicitLittle, Encoding::ImplicitLittle, Encoding::ExplicitBig]),
-        ) {
-            let mut bytes = nested([true, true], &texts);
-            for (at, byte) in damage {
-                let at = at.index(bytes.len());
-                bytes[at] = byte;
-            }
-            if let Ok((set, _)) = DataSet::parse(&bytes, 0, encoding, |_| false) {
-                let _ = set.items(SEQUENCE);
-            }
-        }
-    }
-
-    #[test]
-    fn endless_nesting_is_refused() {
-        let opened = [element(SEQUENCE, b"UN", b"", true), item(b"", true)].concat();
-        // Without the delimiter of the sequence, before and behind which the item is.
-        let mut bytes = [&opened[..12], &opened[20..28]].concat();
-        for _ in 0..100_000 {
-            bytes.extend(b"\x40\0\0\x01\xff\xff\xff\xff\xfe\xff\x00\xe0\xff\xff\xff\xff");
-        }
-        let parsed = DataSet::parse(&bytes, 0, Encoding::ExplicitLittle, |_| false);
-        assert!(matches!(parsed.unwrap_err(), Fault::Damaged(_)));
-    }
-}
+mod tests;

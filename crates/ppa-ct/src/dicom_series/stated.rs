@@ -106,20 +106,21 @@ const KINDS: [Tag; 3] = [
 ];
 
 fn collect_identifiers(data_set: &DataSet, depth: usize, found: &mut BTreeSet<&'static str>) {
-    for (tag, vr, value) in data_set.elements() {
-        let vr = vr.unwrap_or_else(|| {
+    for element in data_set.elements() {
+        let tag = element.tag;
+        // Servers write UN for what they do not know (PS3.5, section 6.2.2).
+        let vr = element.vr().filter(|vr| *vr != VR::UN).unwrap_or_else(|| {
             let known = StandardDataDictionary.by_tag(tag);
             known.map_or(VR::UN, |entry| entry.vr.relaxed())
         });
-        if vr == VR::SQ {
+        if vr == VR::SQ && depth > 0 {
             // A damaged sequence that nothing else needs does not stop the reading.
-            let items = data_set.items(tag).unwrap_or_default();
-            for item in items.iter().filter(|_| depth > 0) {
+            let items = data_set.items_of(element).unwrap_or_default();
+            for item in &items {
                 collect_identifiers(item, depth - 1, found);
             }
-            continue;
         }
-        if file::text(value).is_empty() {
+        if vr == VR::SQ || file::text(data_set.value(element)).is_empty() {
             continue;
         }
         if tag.group() % 2 == 1 {
@@ -142,4 +143,56 @@ fn name(tag: Tag) -> &'static str {
     StandardDataDictionary
         .by_tag(tag)
         .map_or("an attribute without a name", |entry| entry.alias)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dicom_series::element::Encoding;
+
+    const SEQUENCE: Tag = tags::REQUEST_ATTRIBUTES_SEQUENCE;
+
+    fn element(tag: Tag, vr: &[u8; 2], value: &[u8]) -> Vec<u8> {
+        let start = [tag.0.to_le_bytes(), tag.1.to_le_bytes(), *vr, [0; 2]].concat();
+        [&start, &(value.len() as u32).to_le_bytes()[..], value].concat()
+    }
+
+    fn sequence(items: &[u8], vr: &[u8; 2]) -> Vec<u8> {
+        let length = (items.len() as u32).to_le_bytes();
+        let item = [b"\xfe\xff\x00\xe0", &length[..], items].concat();
+        element(SEQUENCE, vr, &item)
+    }
+
+    fn identifiers(bytes: &[u8]) -> Vec<&'static str> {
+        let (set, _) = DataSet::parse(bytes, 0, Encoding::ExplicitLittle, |_| false).unwrap();
+        let mut found = BTreeSet::new();
+        collect_identifiers(&set, DEEPEST, &mut found);
+        found.into_iter().collect()
+    }
+
+    /// Every occurrence has its own items: the walk is as long as the file, not 8^16 steps.
+    #[test]
+    fn a_sequence_that_stands_again_and_again_is_walked_once_each() {
+        let mut bytes = element(tags::PATIENT_NAME, b"UN", b"Doe^John");
+        for _ in 0..DEEPEST {
+            let empty = sequence(&[], b"SQ").repeat(7);
+            bytes = [sequence(&bytes, b"SQ"), empty].concat();
+        }
+        assert_eq!(identifiers(&bytes), ["PatientName"]);
+        let second = [
+            sequence(&[], b"SQ"),
+            sequence(&element(tags::PATIENT_ID, b"UN", b"1"), b"SQ"),
+        ];
+        assert_eq!(identifiers(&second.concat()), ["PatientID"]);
+    }
+
+    /// Elements of unknown representation are known by their tags; their items are written implicitly.
+    #[test]
+    fn unknown_representations_do_not_hide_an_identifier() {
+        let implicit = b"\x10\0\x10\0\x08\0\0\0Doe^John";
+        assert_eq!(identifiers(&sequence(implicit, b"UN")), ["PatientName"]);
+        let date = element(tags::STUDY_DATE, b"UN", b"20200101");
+        assert_eq!(identifiers(&date), ["StudyDate"]);
+        assert!(identifiers(&element(tags::ROWS, b"UN", b"\0\x02")).is_empty());
+    }
 }
