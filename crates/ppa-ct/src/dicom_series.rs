@@ -22,19 +22,18 @@ use rayon::prelude::*;
 use crate::acquisition::Acquisition;
 use crate::error::ReadError;
 use crate::scan::{ReadOptions, Scan, Warning, WarningCode, hu_plausibility, starts_as_dicom};
-use crate::values::Voxels;
-use crate::volume::Volume;
+use crate::values::{Voxels, zeros};
+use crate::volume::{Volume, VolumeError};
+pub(crate) use frame::RIGHT_ANGLE;
 use header::{Found, Slice};
 use series::Sorted;
 use stack::{Between, Stack};
 use stored::StoredFormat;
 
-/// Reads one series in a folder, or below it when the folder itself has no DICOM file.
+/// Reads one series in a folder, or below it when the folder itself has no DICOM image.
 pub(crate) fn read_folder(folder: &Path, options: &ReadOptions) -> Result<Scan, ReadError> {
-    let files = dicom_files(folder)?;
-    let looked_at = files.len();
-    let dicom = files.into_iter().filter(|(_, dicom)| *dicom).map(|f| f.0);
-    assemble(folder, scan_headers(dicom, options)?, looked_at, options)
+    let (found, looked_at) = search(folder, options)?;
+    assemble(folder, found, looked_at, options)
 }
 
 /// Reads a single file of one or more slices.
@@ -42,34 +41,38 @@ pub(crate) fn read_file(file: &Path, options: &ReadOptions) -> Result<Scan, Read
     assemble(file, scan_headers([file.to_owned()], options)?, 1, options)
 }
 
-/// All files of a folder in the order of their names, and whether each starts as DICOM; where
-/// none does, those of its subfolders too, since series are often handed over in a folder of
-/// their own beside a licence or a viewer.
-fn dicom_files(folder: &Path) -> Result<Vec<(PathBuf, bool)>, ReadError> {
+/// What the DICOM files of a folder are, in the order of their names, and how many files there are; where none is an
+/// image, those of its subfolders too, since series are often handed over in a folder of their own beside a licence,
+/// a viewer or a DICOMDIR.
+fn search(folder: &Path, options: &ReadOptions) -> Result<(Vec<Found>, usize), ReadError> {
     let io = |path: &Path, source| ReadError::Io {
         path: path.to_owned(),
         source,
     };
-    let mut files = Vec::new();
-    let mut subfolders = Vec::new();
+    let (mut files, mut dicom, mut subfolders) = (0, Vec::new(), Vec::new());
     for entry in std::fs::read_dir(folder).map_err(|e| io(folder, e))? {
         let entry = entry.map_err(|e| io(folder, e))?;
         let path = entry.path();
         if path.is_file() {
-            let dicom = starts_as_dicom(&path).map_err(|e| io(&path, e))?;
-            files.push((path, dicom));
+            files += 1;
+            if starts_as_dicom(&path).map_err(|e| io(&path, e))? {
+                dicom.push(path);
+            }
         } else if entry.file_type().map_err(|e| io(&path, e))?.is_dir() {
             subfolders.push(path);
         }
     }
-    files.sort();
+    dicom.sort();
     subfolders.sort();
-    if files.iter().all(|(_, dicom)| !dicom) {
+    let mut found = scan_headers(dicom, options)?;
+    if found.iter().all(|f| matches!(f, Found::NotAnImage)) {
         for subfolder in subfolders {
-            files.extend(dicom_files(&subfolder)?);
+            let (below, more) = search(&subfolder, options)?;
+            found.extend(below);
+            files += more;
         }
     }
-    Ok(files)
+    Ok((found, files))
 }
 
 /// Reads all headers in parallel; of several errors, the first file's is reported.
@@ -96,10 +99,13 @@ fn assemble(
     let chosen = sorted.choose(source, looked_at, options)?;
     let slices = chosen.slices;
     warnings.extend(meaning_warnings(&slices, options.force)?);
-    slices.iter().try_for_each(pixels::check_size)?;
+    pixels::check_sizes(&slices)?;
     let stack = Stack::of(source, &slices, options.fill_gaps)?;
     warnings.extend(stack.warnings());
-    let (voxels, padded) = decode(&slices, &stack)?;
+    let grid = stack.grid().map_err(|e| unusable(source, e))?;
+    let mut several = slices.iter().filter(|s| s.index == 0 && s.image.frames > 1);
+    several.try_for_each(|slice| slice.file.hold())?;
+    let (voxels, padded) = decode(source, &slices, &stack)?;
     let pixels = slices[0].image.pixels() * slices.len();
     warnings.extend(padding_warning(padded, pixels));
     let acquisition = Acquisition {
@@ -108,12 +114,7 @@ fn assemble(
         unit: slices.iter().find_map(|s| s.frame.foreign_unit),
         ..Acquisition::of_slices(slices.iter().map(|s| &*s.stated))
     };
-    let unusable = |source_error| ReadError::Volume {
-        path: source.to_owned(),
-        source: source_error,
-    };
-    let grid = stack.grid().map_err(|e| unusable(e.into()))?;
-    let volume = Volume::of_voxels(grid, voxels).map_err(unusable)?;
+    let volume = Volume::of_voxels(grid, voxels).map_err(|e| unusable(source, e))?;
     warnings.extend(chosen.modality_warning);
     warnings.extend(hu_plausibility(&volume));
     Ok(Scan {
@@ -123,6 +124,13 @@ fn assemble(
         acquisition,
         warnings,
     })
+}
+
+fn unusable(path: &Path, source: impl Into<VolumeError>) -> ReadError {
+    ReadError::Volume {
+        path: path.to_owned(),
+        source: source.into(),
+    }
 }
 
 /// What the headers say about the meaning of the values; other units than HU are refused unless forced.
@@ -161,20 +169,21 @@ fn padding_warning(padded: usize, pixels: usize) -> Option<Warning> {
 }
 
 /// Decodes all slices and counts padding, in 16 bits if these hold all values.
-fn decode(slices: &[Slice], stack: &Stack) -> Result<(Voxels, usize), ReadError> {
+fn decode(source: &Path, slices: &[Slice], stack: &Stack) -> Result<(Voxels, usize), ReadError> {
     let whole = |s: &Slice| stored::whole_intercept(s.rescale()).is_some();
     if stack.between().is_none() && slices.iter().all(whole) {
-        let done = decode_as(slices, stack, StoredFormat::read_whole)?;
+        let done = decode_as(source, slices, stack, StoredFormat::read_whole)?;
         if let Some((hu, padded)) = done {
             return Ok((Voxels::I16(hu), padded));
         }
     }
-    let done = decode_as(slices, stack, |format, containers, rescale, hu| {
+    let done = decode_as(source, slices, stack, |format, containers, rescale, hu| {
         Some(format.read_hu(containers, rescale, hu))
     })?;
     let (mut hu, padded) = done.expect("any value is a number");
     if let Some(between) = stack.between() {
-        hu = interpolate(&hu, slices[0].image.pixels(), between);
+        hu =
+            interpolate(&hu, slices[0].image.pixels(), between).map_err(|e| unusable(source, e))?;
     }
     Ok((Voxels::F32(hu), padded))
 }
@@ -182,12 +191,13 @@ fn decode(slices: &[Slice], stack: &Stack) -> Result<(Voxels, usize), ReadError>
 /// Decodes all slices in parallel, each into its place; the first slice's error is reported. `None` where `fill`
 /// finds that the type does not hold the values, else the values and how many of them are padding.
 fn decode_as<T: Clone + Default + Send>(
+    source: &Path,
     slices: &[Slice],
     stack: &Stack,
     fill: impl Fn(&StoredFormat, &[u8], [f64; 2], &mut [T]) -> Option<usize> + Sync,
 ) -> Result<Option<(Vec<T>, usize)>, ReadError> {
     let pixels = slices[0].image.pixels();
-    let mut hu = vec![T::default(); pixels * slices.len()];
+    let mut hu = zeros(pixels * slices.len()).map_err(|e| unusable(source, e))?;
     let done = hu.par_chunks_mut(pixels).zip(stack.order()).map_init(
         Vec::new,
         |containers, (place, &index)| {
@@ -203,8 +213,8 @@ fn decode_as<T: Clone + Default + Send>(
 }
 
 /// Slices between those of a stack, mixed linearly.
-fn interpolate(hu: &[f32], pixels: usize, between: &[Between]) -> Vec<f32> {
-    let mut filled = vec![0.0; pixels * between.len()];
+fn interpolate(hu: &[f32], pixels: usize, between: &[Between]) -> Result<Vec<f32>, VolumeError> {
+    let mut filled = zeros(pixels * between.len())?;
     let places = filled.par_chunks_mut(pixels).zip(between);
     places.for_each(|(place, &Between { below, weight })| {
         let [low, high] = [below, below + 1].map(|n| &hu[n * pixels..][..pixels]);
@@ -212,5 +222,5 @@ fn interpolate(hu: &[f32], pixels: usize, between: &[Between]) -> Vec<f32> {
             *place = low * (1.0 - weight) + high * weight;
         }
     });
-    filled
+    Ok(filled)
 }

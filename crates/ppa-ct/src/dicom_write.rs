@@ -30,14 +30,16 @@ use ct_image::CtSeries;
 /// The folder must not exist yet, or be empty; it appears whole or not at all.
 ///
 /// # Errors
-/// [`WriteError`] for axes i and j that are not perpendicular, more than 65535 voxels along an
+/// [`WriteError`] for axes i and j more than 0.28 degrees from perpendicular, which readers refuse too, more than 65535 voxels along an
 /// axis, a folder that holds something, and a file system that refuses.
 pub fn write(folder: &Path, volume: &Volume) -> Result<(), WriteError> {
     let series = CtSeries::of(volume)?;
-    if folder.exists() && fs::remove_dir(folder).is_err() {
-        return Err(WriteError::Exists {
-            path: folder.to_owned(),
-        });
+    let exists = || WriteError::Exists {
+        path: folder.to_owned(),
+    };
+    let taken = folder.exists();
+    if taken && fs::read_dir(folder).map_or(true, |mut files| files.next().is_some()) {
+        return Err(exists());
     }
     let io = |source| WriteError::Io {
         path: folder.to_owned(),
@@ -75,5 +77,9 @@ pub fn write(folder: &Path, volume: &Volume) -> Result<(), WriteError> {
             },
         })
     })?;
+    if taken {
+        // It may have been filled meanwhile.
+        fs::remove_dir(folder).map_err(|_| exists())?;
+    }
     fs::rename(&slices, folder).map_err(io)
 }

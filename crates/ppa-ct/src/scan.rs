@@ -38,6 +38,9 @@ pub struct SeriesSummary {
     pub size: [usize; 2],
     /// Whether this is the series that was read.
     pub read: bool,
+    /// Why it cannot be read, if one of its images is no slice of a CT: in colour, or without a place.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refused: Option<String>,
 }
 
 /// What to read, and what to let pass.
@@ -124,7 +127,7 @@ pub fn read(path: &Path) -> Result<Scan, ReadError> {
 /// Reads a CT as told.
 ///
 /// DICOM slices are sorted by their position along the slice normal; names and instance numbers
-/// are ignored. Subfolders are searched when the folder itself has no DICOM file. A tilted gantry
+/// are ignored. Subfolders are searched when the folder itself has no DICOM image. A tilted gantry
 /// gives a sheared affine, exactly as acquired. Padding becomes air.
 ///
 /// # Errors

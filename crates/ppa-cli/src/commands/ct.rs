@@ -49,7 +49,11 @@ fn describe(info: &Info) -> String {
         let number = series
             .number
             .map_or("without number".to_owned(), |n| n.to_string());
-        let left = if series.read { "" } else { ", not read" };
+        let left = match &series.refused {
+            Some(reason) => format!(", refused: {reason}"),
+            None if series.read => String::new(),
+            None => ", not read".to_owned(),
+        };
         lines.push(format!(
             "series     {number}: {} slices{left}",
             series.slices

@@ -42,13 +42,13 @@ impl Codec {
 
     /// Most bytes that come out of one byte of a right stream: constant frames pack best.
     ///
-    /// RLE makes 128 bytes of 2; a JPEG pixel takes at least a bit, a block of 8 x 8 pixels two; JPEG-LS
-    /// puts up to 2^15 equal pixels into one bit, whole lines of a frame into a few bits each; a JPEG 2000 frame may be empty.
-    pub fn expands_at_most(self) -> u64 {
+    /// RLE makes 128 bytes of 2; a JPEG pixel takes at least a bit, a block of 8 x 8 pixels two. `None` where nothing
+    /// bounds it: JPEG-LS puts whole equal lines into a bit each, a JPEG 2000 frame may be empty.
+    pub fn expands_at_most(self) -> Option<u64> {
         match self {
-            Self::Rle => 64,
-            Self::Jpeg => 1 << 10,
-            Self::JpegLs | Self::Jpeg2000 => 1 << 14,
+            Self::Rle => Some(64),
+            Self::Jpeg => Some(1 << 10),
+            Self::JpegLs | Self::Jpeg2000 => None,
         }
     }
 }
@@ -63,6 +63,17 @@ fn expect_size(found: [usize; 2], image: &Image) -> Result<(), CodecError> {
     Err(CodecError::Unexpected {
         found: text(found),
         expected: text(expected),
+    })
+}
+
+/// Refuses a stream in colour.
+fn expect_grey(components: usize) -> Result<(), CodecError> {
+    if components == 1 {
+        return Ok(());
+    }
+    Err(CodecError::Unexpected {
+        found: format!("{components} components"),
+        expected: "1 (grey)".to_owned(),
     })
 }
 

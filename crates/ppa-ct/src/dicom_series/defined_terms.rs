@@ -17,6 +17,28 @@ const RESCALE_TYPES: &str = "OD MGML Z_EFF ED EDW HU_MOD PCT";
 const UNITS: &str = "\
     ml/100ml/s ml/100ml/min ml/100g/min ml/min/100ml ml/min/100g ml/100ml ml/100g mg/ml mg/cm3 g/ml g/cm3 keV s ms % 1";
 
+/// Photometric Interpretation of images in colour (PS3.3, section C.7.6.3.1.2), retired ones included.
+const COLOURS: [&str; 12] = [
+    "PALETTE COLOR",
+    "RGB",
+    "HSV",
+    "ARGB",
+    "CMYK",
+    "XYB",
+    "YBR_FULL",
+    "YBR_FULL_422",
+    "YBR_PARTIAL_422",
+    "YBR_PARTIAL_420",
+    "YBR_ICT",
+    "YBR_RCT",
+];
+
+/// The photometric interpretation of a colour image, unless the standard does not know it.
+pub(super) fn photometric(text: &str) -> &'static str {
+    let known = COLOURS.into_iter().find(|term| *term == text);
+    known.unwrap_or("(no DICOM term)")
+}
+
 /// The modality, unless the standard does not know it.
 pub(super) fn modality(text: &str) -> &'static str {
     listed(MODALITIES, text).unwrap_or("(no DICOM term)")

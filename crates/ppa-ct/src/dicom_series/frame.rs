@@ -7,6 +7,10 @@ use super::attributes::Attributes;
 use super::defined_terms;
 use crate::error::ReadError;
 
+/// Largest cosine between row and column directions that are at right angles, in files read and written: some
+/// writers round direction cosines to three digits.
+pub(crate) const RIGHT_ANGLE: f64 = 5e-3;
+
 /// Geometry and units of one slice.
 #[derive(Debug)]
 pub(super) struct Frame {
@@ -33,9 +37,9 @@ impl Frame {
             attributes.numbers(tags::IMAGE_ORIENTATION_PATIENT, "ImageOrientationPatient")?;
         let [along_row, down_column] =
             [0, 3].map(|at| Vector3::from_column_slice(&cosines[at..at + 3]));
-        // Written with up to 16 digits, but some writers round to 3.
-        let unit = |v: Vector3<f64>| (v.norm() - 1.0).abs() < 5e-3;
-        if !(unit(along_row) && unit(down_column) && along_row.dot(&down_column).abs() < 5e-3) {
+        let unit = |v: Vector3<f64>| (v.norm() - 1.0).abs() < RIGHT_ANGLE;
+        let square = along_row.dot(&down_column).abs() < RIGHT_ANGLE;
+        if !(unit(along_row) && unit(down_column) && square) {
             return Err(attributes.bad(
                 "ImageOrientationPatient",
                 format!("{cosines:?}"),
@@ -82,18 +86,47 @@ fn rescale(attributes: &Attributes) -> Result<Option<[f64; 2]>, ReadError> {
 fn foreign_unit(attributes: &Attributes) -> Result<Option<&'static str>, ReadError> {
     let rescale_type = attributes.text(tags::RESCALE_TYPE)?;
     // US: unspecified (PS3.3, section C.11.1.1.2).
-    let foreign = rescale_type.filter(|t| is_code(t) && !matches!(t.as_str(), "HU" | "US"));
-    if let Some(term) = foreign {
-        return Ok(Some(defined_terms::unit(&term)));
-    }
-    // Hounsfield units in UCUM.
+    let rescale_type = rescale_type.filter(|text| text != "US");
     let unit = attributes.real_world_unit()?;
-    let foreign = unit.filter(|u| !matches!(u.as_str(), "[hnsf'U]" | "hnsf'U" | "HU"));
-    Ok(foreign.map(|unit| defined_terms::unit(&unit)))
+    let stated = [rescale_type, unit].into_iter().flatten();
+    let mut foreign = stated.filter(|text| !is_hounsfield(text));
+    Ok(foreign.next().map(|text| defined_terms::unit(&text)))
 }
 
-/// Whether a text could be a term; some scanners write words for Hounsfield units.
-fn is_code(text: &str) -> bool {
-    let allowed = |c: char| c.is_ascii_uppercase() || c.is_ascii_digit() || matches!(c, '_' | ' ');
-    text.len() <= 16 && text.chars().all(allowed)
+/// Whether a text stands for Hounsfield units; writers differ in case and blanks, and some write the words.
+fn is_hounsfield(text: &str) -> bool {
+    let letters = text.chars().filter(char::is_ascii_alphanumeric);
+    let letters = letters.map(|c| c.to_ascii_uppercase()).collect::<String>();
+    // `[hnsf'U]` in UCUM.
+    [
+        "HU",
+        "HNSFU",
+        "HOUNSFIELD",
+        "HOUNSFIELDUNIT",
+        "HOUNSFIELDUNITS",
+    ]
+    .contains(&letters.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hounsfield_units_are_known_by_their_spellings() {
+        for text in [
+            "HU",
+            "hu",
+            " Hu ",
+            "H.U.",
+            "HOUNSFIELD",
+            "Hounsfield units",
+            "[hnsf'U]",
+        ] {
+            assert!(is_hounsfield(text), "{text}");
+        }
+        for text in ["HU_MOD", "mg/ml", "MGML", "Z_EFF", "EDW", "normalized", "1"] {
+            assert!(!is_hounsfield(text), "{text}");
+        }
+    }
 }

@@ -19,6 +19,8 @@ use crate::error::ReadError;
 pub(super) enum Found {
     /// The slices of a CT, or of whatever was asked to be taken for one.
     Slices(Series, Vec<Slice>),
+    /// An image that cannot be one of its series, and why.
+    Refused(Series, ReadError),
     /// An image of another modality; its geometry is not looked at.
     OtherModality(Series),
     /// A scout view.
@@ -78,20 +80,22 @@ impl Image {
 /// Reads the header of `path`, up to the pixels; `force` takes any modality for CT.
 pub(super) fn scan(path: &Path, force: bool) -> Result<Found, ReadError> {
     let opened = open(path)?;
-    let (series, image, frames, stated) = {
-        let data_set = opened.data_set()?;
-        let top = Attributes::of(path, &data_set);
-        let series = match kind(&top, &opened.file.sop_class, force)? {
-            Kind::Slices(series) => series,
-            Kind::Other(found) => return Ok(found),
-        };
-        let enhanced = opened.file.sop_class == uids::ENHANCED_CT_IMAGE_STORAGE;
-        let image = image(&top)?;
-        let frames = frames(&top, image.frames, enhanced)?;
-        let stated = stated(&top, &image, frames.first());
-        (series, image, frames, Arc::new(stated))
+    let data_set = opened.data_set()?;
+    let top = Attributes::of(path, &data_set);
+    let series = match kind(&top, &opened.file.sop_class, force)? {
+        Kind::Slices(series) => series,
+        Kind::Other(found) => return Ok(found),
     };
-    let file = Arc::new(opened.into_file(image.frames)?);
+    let enhanced = opened.file.sop_class == uids::ENHANCED_CT_IMAGE_STORAGE;
+    let described =
+        image(&top).and_then(|image| Ok((image, frames(&top, image.frames, enhanced)?)));
+    // Whether that matters is known when a series is chosen.
+    let (image, frames) = match described {
+        Ok(described) => described,
+        Err(error) => return Ok(Found::Refused(series, error)),
+    };
+    let stated = Arc::new(stated(&top, &image, frames.first()));
+    let file = Arc::new(opened.file);
     let slices = frames.into_iter().enumerate().map(|(index, frame)| Slice {
         file: Arc::clone(&file),
         index,
@@ -122,7 +126,8 @@ fn kind(top: &Attributes, sop_class: &str, force: bool) -> Result<Kind, ReadErro
         size: [side(tags::COLUMNS), side(tags::ROWS)],
     };
     let Some(modality) = &series.modality else {
-        return Err(top.missing("Modality"));
+        let error = top.missing("Modality");
+        return Ok(Kind::Other(Found::Refused(series, error)));
     };
     if modality != "CT" && !force {
         return Ok(Kind::Other(Found::OtherModality(series)));
@@ -141,6 +146,16 @@ fn image(top: &Attributes) -> Result<Image, ReadError> {
     ];
     if rows == 0 || columns == 0 {
         return Err(top.bad("Rows", format!("{rows} x {columns}"), "at least one pixel"));
+    }
+    let photometric = top.text(tags::PHOTOMETRIC_INTERPRETATION)?;
+    if let Some(other) =
+        photometric.filter(|p| !["MONOCHROME1", "MONOCHROME2"].contains(&p.as_str()))
+    {
+        return Err(top.bad(
+            "PhotometricInterpretation",
+            defined_terms::photometric(&other).to_owned(),
+            "MONOCHROME1 or MONOCHROME2 (grey)",
+        ));
     }
     let samples = top.needed_word(tags::SAMPLES_PER_PIXEL, "SamplesPerPixel")?;
     if samples != 1 {

@@ -7,26 +7,39 @@ use super::header::Slice;
 use super::{fragments, syntax};
 use crate::error::ReadError;
 
-/// Refuses a file that claims more pixels than its bytes can hold, before memory is reserved for them.
-pub(super) fn check_size(slice: &Slice) -> Result<(), ReadError> {
-    let (file, image) = (&slice.file, &slice.image);
-    let expected = image.native_bytes() as u64 * image.frames as u64;
-    let found = file.pixel_bytes()?;
-    let fits = if file.is_native() {
-        // An odd number of bytes is padded to an even one.
-        found == expected || found == expected.next_multiple_of(2)
-    } else {
-        let most = syntax::codec(&file.path, &file.syntax)?.expands_at_most();
-        expected <= found.saturating_mul(most)
-    };
-    if fits {
-        return Ok(());
-    }
-    Err(ReadError::PixelCount {
-        path: file.path.clone(),
+/// Most bytes that one byte makes on average over a series of JPEG-LS or JPEG 2000.
+const EXPANDS_AT_MOST: u64 = 1 << 14;
+/// What any such series may come to, however well it packs: a blank slice of 4096 x 4096 pixels of 32 bits, or eight
+/// of 2048 x 2048 of 16.
+const ALWAYS_BYTES: u64 = 1 << 26;
+
+/// Refuses files that claim more pixels than their bytes can hold, before memory is reserved for them.
+pub(super) fn check_sizes(slices: &[Slice]) -> Result<(), ReadError> {
+    let wrong = |slice: &Slice, found, expected| ReadError::PixelCount {
+        path: slice.file.path.clone(),
         found,
         expected,
-    })
+    };
+    let (mut packed, mut unpacked) = (0_u64, 0_u64);
+    for slice in slices.iter().filter(|slice| slice.index == 0) {
+        let (file, image) = (&slice.file, &slice.image);
+        let expected = (image.native_bytes() as u64).saturating_mul(image.frames as u64);
+        let found = file.pixel_bytes()?;
+        let fits = if file.is_native() {
+            // An odd number of bytes is padded to an even one.
+            found == expected || found == expected.next_multiple_of(2)
+        } else if let Some(most) = syntax::codec(&file.path, &file.syntax)?.expands_at_most() {
+            expected <= found.saturating_mul(most)
+        } else {
+            packed = packed.saturating_add(found);
+            unpacked = unpacked.saturating_add(expected);
+            unpacked <= packed.saturating_mul(EXPANDS_AT_MOST).max(ALWAYS_BYTES)
+        };
+        if !fits {
+            return Err(wrong(slice, found, expected));
+        }
+    }
+    Ok(())
 }
 
 /// Fills `containers` (rows x columns, columns fastest, little-endian) with the slice's pixels.
@@ -44,7 +57,7 @@ pub(super) fn read(slice: &Slice, containers: &mut Vec<u8>) -> Result<(), ReadEr
 fn unpack(slice: &Slice, path: &Path) -> Result<Vec<u8>, ReadError> {
     let uid = &slice.file.syntax;
     let codec = syntax::codec(path, uid)?;
-    let bytes = slice.file.rest()?;
+    let bytes = slice.file.fragments()?;
     let packed = fragments::of_frame(&bytes, slice.index, slice.image.frames)
         .map_err(|fault| damaged(path, fault))?
         .ok_or_else(|| syntax::unsupported(path, uid, "its fragments tell no frames apart"))?;

@@ -20,6 +20,26 @@ struct Member {
     summary: SeriesSummary,
     /// Empty for modalities that are not read.
     slices: Vec<Slice>,
+    /// Why the first image that cannot be read is refused, and the series with it.
+    refused: Option<ReadError>,
+}
+
+impl Member {
+    fn without_images(series: Series) -> Self {
+        Self {
+            summary: SeriesSummary {
+                number: series.number,
+                modality: series.modality,
+                slices: 0,
+                size: series.size,
+                read: false,
+                refused: None,
+            },
+            uid: series.uid,
+            slices: Vec::new(),
+            refused: None,
+        }
+    }
 }
 
 /// The series to read.
@@ -35,10 +55,10 @@ pub(super) struct Chosen {
 impl Sorted {
     /// Groups files by series.
     pub fn of(found: Vec<Found>) -> Self {
-        let mut by_uid = BTreeMap::<String, (usize, Series, usize, Vec<Slice>)>::new();
+        let mut by_uid = BTreeMap::<String, (usize, Member)>::new();
         let (mut localizers, mut others) = (0, 0);
         for (order, item) in found.into_iter().enumerate() {
-            let (series, slices) = match item {
+            let (series, slices, refused) = match item {
                 Found::Localizer => {
                     localizers += 1;
                     continue;
@@ -47,32 +67,24 @@ impl Sorted {
                     others += 1;
                     continue;
                 }
-                Found::OtherModality(series) => (series, Vec::new()),
-                Found::Slices(series, slices) => (series, slices),
+                Found::OtherModality(series) => (series, Vec::new(), None),
+                Found::Refused(series, error) => (series, Vec::new(), Some(error)),
+                Found::Slices(series, slices) => (series, slices, None),
             };
-            let (_, _, images, members) = by_uid
+            let (_, member) = by_uid
                 .entry(series.uid.clone())
-                .or_insert_with(|| (order, series, 0, Vec::new()));
-            *images += slices.len().max(1);
-            members.extend(slices);
+                .or_insert_with(|| (order, Member::without_images(series)));
+            member.summary.slices += slices.len().max(1);
+            member.slices.extend(slices);
+            if let (None, Some(error)) = (&member.refused, refused) {
+                member.summary.refused = Some(error.without_path());
+                member.refused = Some(error);
+            }
         }
         let mut series = by_uid.into_values().collect::<Vec<_>>();
-        series.sort_by_key(|(order, series, ..)| (series.number, *order));
-        let series = series
-            .into_iter()
-            .map(|(_, series, images, slices)| Member {
-                summary: SeriesSummary {
-                    number: series.number,
-                    modality: series.modality,
-                    slices: images,
-                    size: series.size,
-                    read: false,
-                },
-                uid: series.uid,
-                slices,
-            });
+        series.sort_by_key(|(order, member)| (member.summary.number, *order));
         Self {
-            series: series.collect(),
+            series: series.into_iter().map(|(_, member)| member).collect(),
             localizers,
             others,
         }
@@ -143,6 +155,7 @@ impl Sorted {
         let member = &mut self.series[chosen];
         member.summary.read = true;
         let slices = std::mem::take(&mut member.slices);
+        let refused = member.refused.take();
         let modality = member.summary.modality.clone();
         let other = modality.clone().filter(|m| m != "CT");
         if let Some(modality) = &other
@@ -150,6 +163,9 @@ impl Sorted {
         {
             let modality = modality.clone();
             return Err(ReadError::NotCt { modality, path });
+        }
+        if let Some(error) = refused {
+            return Err(error);
         }
         Ok(Chosen {
             slices,

@@ -27,7 +27,7 @@ pub(super) fn codec(path: &Path, uid: &str) -> Result<Codec, ReadError> {
         Some("4.50" | "4.51" | "4.57" | "4.70") => Ok(Codec::Jpeg),
         Some("4.80" | "4.81") => Ok(Codec::JpegLs),
         Some("4.90" | "4.91") => Ok(Codec::Jpeg2000),
-        Some("4.53" | "4.55") => Err(unsupported(
+        _ if name(uid).is_some_and(|name| name.ends_with("retired")) => Err(unsupported(
             path,
             uid,
             "the standard has retired it and no maintained decoder reads it; convert it first",
@@ -44,9 +44,18 @@ pub(super) fn unsupported(
 ) -> ReadError {
     ReadError::TransferSyntax {
         path: path.to_owned(),
-        uid: uid.to_owned(),
+        uid: shown(uid).to_owned(),
         name: name(uid).unwrap_or("an encoding unknown to ppa"),
         source: source.into(),
+    }
+}
+
+/// A UID as messages may repeat it: any text may stand in its place, and other roots than DICOM's name an institution.
+fn shown(uid: &str) -> &str {
+    let digits = |c: char| c.is_ascii_digit() || c == '.';
+    match uid.starts_with("1.2.840.10008.") && uid.len() <= 64 && uid.chars().all(digits) {
+        true => uid,
+        false => "no UID of the standard",
     }
 }
 
@@ -56,12 +65,33 @@ fn name(uid: &str) -> Option<&'static str> {
         "1.2.840.10008.1.2" => "implicit VR little endian",
         "1.2.840.10008.1.2.1" => "explicit VR little endian",
         "1.2.840.10008.1.2.1.99" => "deflated explicit VR little endian",
+        // Retired too, but read.
         "1.2.840.10008.1.2.2" => "explicit VR big endian",
         "1.2.840.10008.1.2.4.50" => "JPEG baseline, process 1",
         "1.2.840.10008.1.2.4.51" => "JPEG extended, processes 2 and 4",
+        "1.2.840.10008.1.2.4.52" => "JPEG extended, processes 3 and 5, retired",
         "1.2.840.10008.1.2.4.53" => "JPEG spectral selection, processes 6 and 8, retired",
+        "1.2.840.10008.1.2.4.54" => "JPEG spectral selection, processes 7 and 9, retired",
         "1.2.840.10008.1.2.4.55" => "JPEG full progression, processes 10 and 12, retired",
+        "1.2.840.10008.1.2.4.56" => "JPEG full progression, processes 11 and 13, retired",
         "1.2.840.10008.1.2.4.57" => "JPEG lossless, process 14",
+        "1.2.840.10008.1.2.4.58" => "JPEG lossless, process 15, retired",
+        "1.2.840.10008.1.2.4.59" => "JPEG extended hierarchical, processes 16 and 18, retired",
+        "1.2.840.10008.1.2.4.60" => "JPEG extended hierarchical, processes 17 and 19, retired",
+        "1.2.840.10008.1.2.4.61" => {
+            "JPEG spectral selection hierarchical, processes 20 and 22, retired"
+        }
+        "1.2.840.10008.1.2.4.62" => {
+            "JPEG spectral selection hierarchical, processes 21 and 23, retired"
+        }
+        "1.2.840.10008.1.2.4.63" => {
+            "JPEG full progression hierarchical, processes 24 and 26, retired"
+        }
+        "1.2.840.10008.1.2.4.64" => {
+            "JPEG full progression hierarchical, processes 25 and 27, retired"
+        }
+        "1.2.840.10008.1.2.4.65" => "JPEG lossless hierarchical, process 28, retired",
+        "1.2.840.10008.1.2.4.66" => "JPEG lossless hierarchical, process 29, retired",
         "1.2.840.10008.1.2.4.70" => "JPEG lossless, process 14, first-order prediction",
         "1.2.840.10008.1.2.4.80" => "JPEG-LS lossless",
         "1.2.840.10008.1.2.4.81" => "JPEG-LS near-lossless",
@@ -76,4 +106,37 @@ fn name(uid: &str) -> Option<&'static str> {
         "1.2.840.10008.1.2.5" => "RLE lossless",
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(uid: &str) -> String {
+        codec(Path::new("slice"), uid).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn retired_encodings_are_refused_by_name() {
+        let retired = [52, 53, 54, 55, 56].into_iter().chain(58..=66);
+        for n in retired {
+            let uid = format!("1.2.840.10008.1.2.4.{n}");
+            let text = refusal(&uid);
+            assert!(text.contains("JPEG") && text.contains("retired"), "{text}");
+            assert!(text.contains(&uid), "{text}");
+            assert_eq!(
+                encoding(Path::new("slice"), &uid).unwrap(),
+                Encoding::ExplicitLittle
+            );
+        }
+    }
+
+    #[test]
+    fn what_stands_in_the_place_of_a_uid_is_not_repeated() {
+        for text in ["Doe^John", "1.2.840.10008.Doe", "1.3.6.1.4.1.5962.1950"] {
+            let error = encoding(Path::new("slice"), text).unwrap_err().to_string();
+            assert!(!error.contains(text) && !error.contains("Doe"), "{error}");
+        }
+        assert!(refusal("1.2.840.10008.1.2.4.999").contains("1.2.840.10008.1.2.4.999"));
+    }
 }

@@ -9,11 +9,9 @@ use nalgebra::Vector3;
 use super::decimal::{decimal, decimals};
 use super::rescale::Rescale;
 use super::uid::Fingerprint;
+use crate::dicom_series::RIGHT_ANGLE;
 use crate::error::WriteError;
 use crate::volume::Volume;
-
-/// Row and column directions further from perpendicular than this are refused; viewers allow about as much.
-const LEAN_DEG: f64 = 0.01;
 
 /// A volume about to become DICOM slices.
 pub(super) struct CtSeries<'a> {
@@ -40,8 +38,9 @@ impl<'a> CtSeries<'a> {
         }
         let direction = grid.direction();
         let axes = [0, 1].map(|axis| direction.column(axis).into_owned());
-        let lean_deg = axes[0].dot(&axes[1]).abs().asin().to_degrees();
-        if lean_deg > LEAN_DEG {
+        let lean = axes[0].dot(&axes[1]).abs();
+        if lean >= RIGHT_ANGLE {
+            let lean_deg = lean.asin().to_degrees();
             return Err(WriteError::SlantedSlices { lean_deg });
         }
         let normal = axes[0].cross(&axes[1]).normalize();

@@ -149,6 +149,24 @@ fn tilt_and_single_slices_survive() {
     assert_eq!(read(&folder).unwrap().volume, single);
 }
 
+/// What may be read may be written: direction cosines rounded to three digits.
+#[test]
+fn axes_nearly_at_right_angles_survive() {
+    let parent = tempfile::tempdir().unwrap();
+    let leaning = Matrix3::new(1.0, 0.004, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.0);
+    let grid = Grid::new(
+        [3, 2, 2],
+        Affine3::from_matrix_unchecked(leaning.to_homogeneous()),
+    );
+    let volume = Volume::new(grid.unwrap(), small().hu().to_vec()).unwrap();
+    let folder = parent.path().join("leaning");
+    write_dicom(&folder, &volume).unwrap();
+    let back = read(&folder).unwrap().volume;
+    assert_eq!(back.hu(), volume.hu());
+    let apart = back.grid().ct_from_voxel().matrix() - volume.grid().ct_from_voxel().matrix();
+    assert!(apart.amax() < 1e-9, "{apart}");
+}
+
 #[test]
 fn a_failed_write_leaves_nothing() {
     let parent = tempfile::tempdir().unwrap();

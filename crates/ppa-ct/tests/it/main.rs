@@ -4,6 +4,7 @@ mod audit;
 mod damage;
 mod damaged_volumes;
 mod dicom;
+mod dicom_odd;
 mod dicom_write;
 mod meta_image;
 mod nifti;

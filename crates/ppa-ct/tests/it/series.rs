@@ -25,6 +25,8 @@ pub struct SliceSpec {
     pub modality: &'static str,
     pub image_type: &'static str,
     pub syntax: &'static str,
+    /// What is odd about it: made to the data set last.
+    pub change: fn(&mut InMemDicomObject),
 }
 
 impl SliceSpec {
@@ -47,6 +49,7 @@ impl SliceSpec {
             modality: "CT",
             image_type: "ORIGINAL\\PRIMARY\\AXIAL",
             syntax: uids::EXPLICIT_VR_LITTLE_ENDIAN,
+            change: |_| {},
         }
     }
 
@@ -117,6 +120,7 @@ impl SliceSpec {
             VR::OW,
             PrimitiveValue::U16(self.stored.iter().copied().collect()),
         ));
+        (self.change)(&mut object);
         object
             .with_meta(
                 FileMetaTableBuilder::new()

@@ -3,7 +3,7 @@
 use libjpeg_turbo_rs::precision::{decompress_12bit, decompress_lossless_arbitrary};
 use libjpeg_turbo_rs::{Decoder, JpegError, PixelFormat};
 
-use super::{CodecError, contain, expect_depth, expect_size};
+use super::{CodecError, contain, expect_depth, expect_grey, expect_size};
 use crate::dicom_series::header::Image;
 
 /// What the start of a frame tells.
@@ -52,12 +52,7 @@ fn frame(packed: &[u8], image: &Image) -> Result<Frame, CodecError> {
                 };
                 let size = [[*x1, *x0], [*y1, *y0]].map(|v| u16::from_be_bytes(v).into());
                 expect_size(size, image)?;
-                if *components != 1 {
-                    return Err(CodecError::Unexpected {
-                        found: format!("{components} components"),
-                        expected: "1 (grey)".to_owned(),
-                    });
-                }
+                expect_grey((*components).into())?;
                 return Ok(Frame {
                     lossless: *marker == 0xc3,
                     bits: *bits,

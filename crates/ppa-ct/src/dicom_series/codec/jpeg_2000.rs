@@ -2,7 +2,7 @@
 
 use hayro_jpeg2000::{DecodeSettings, DecoderContext, Image as Jp2};
 
-use super::{CodecError, contain, expect_depth, expect_size};
+use super::{CodecError, contain, expect_depth, expect_grey, expect_size};
 use crate::dicom_series::header::Image;
 
 pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError> {
@@ -13,16 +13,15 @@ pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError
     };
     let stream = Jp2::new(packed, &settings).map_err(|e| damaged(&e))?;
     expect_size([stream.width() as usize, stream.height() as usize], image)?;
+    let components = u32::from(stream.color_space().num_channels()) + u32::from(stream.has_alpha());
+    expect_grey(components as usize)?;
     let bits = u32::from(stream.original_bit_depth());
     expect_depth(bits, image)?;
     let mut context = DecoderContext::default();
     let decoded = stream.decode(&mut context).map_err(|e| damaged(&e))?;
-    let [component] = decoded.components() else {
-        return Err(CodecError::Unexpected {
-            found: format!("{} components", decoded.components().len()),
-            expected: "1 (grey)".to_owned(),
-        });
-    };
+    // A palette makes several of one.
+    let components = decoded.components();
+    expect_grey(components.len())?;
     // The decoder hands out samples above the lowest possible one; f32 holds up to 24 bits exactly.
     let (lowest, most) = (1_u32 << (bits - 1), (1_u64 << bits) as f32 - 1.0);
     let signed = is_signed(packed);
@@ -34,7 +33,7 @@ pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError
             above_lowest
         }
     };
-    contain(component.samples().iter().map(sample), image)
+    contain(components[0].samples().iter().map(sample), image)
 }
 
 /// Whether the codestream itself says that its samples are signed; headers are known to disagree (section A.5.1).
@@ -46,4 +45,52 @@ fn is_signed(packed: &[u8]) -> bool {
     let start = packed.windows(START.len()).position(|w| w == START);
     let depth = start.and_then(|start| packed.get(start + DEPTH_AT));
     depth.is_some_and(|depth| depth & 0x80 != 0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dicom_series::stored::StoredFormat;
+
+    /// A codestream of 4 x 4 pixels whose one tile is empty.
+    fn stream(components: u8) -> Vec<u8> {
+        let size = [[0, 0, 0, 4], [0; 4], [0, 0, 0, 4], [0; 4]].map(|v: [u8; 4]| [v, v].concat());
+        let segment = |marker: u8, body: &[u8]| {
+            let length = (body.len() as u16 + 2).to_be_bytes();
+            [&[0xff, marker], &length[..], body].concat()
+        };
+        let depths = [7, 1, 1].repeat(components.into());
+        [
+            vec![0xff, 0x4f],
+            segment(
+                0x51,
+                &[&[0; 2], &size.concat()[..], &[0, components], &depths].concat(),
+            ),
+            segment(0x52, &[0, 0, 0, 1, 0, 0, 4, 4, 0, 1]),
+            segment(0x5c, &[0x40, 0x40]),
+            segment(0x90, &[0, 0, 0, 0, 0, 0, 0, 1]),
+            vec![0xff, 0x93, 0xff, 0xd9],
+        ]
+        .concat()
+    }
+
+    #[test]
+    fn colour_is_refused_before_it_is_decoded() {
+        let image = Image {
+            columns: 4,
+            rows: 4,
+            frames: 1,
+            stored: StoredFormat {
+                bits_allocated: 8,
+                bits_stored: 8,
+                high_bit: 7,
+                signed: false,
+                padding: None,
+            },
+        };
+        let error = |components| unpack(&stream(components), &image).unwrap_err().to_string();
+        assert!(error(1).contains("damaged"), "{}", error(1));
+        assert!(error(3).contains("3 components"), "{}", error(3));
+        assert!(error(4).contains("4 components"), "{}", error(4));
+    }
 }

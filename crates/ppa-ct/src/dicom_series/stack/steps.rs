@@ -1,0 +1,112 @@
+//! From slice to slice: distinct places, and whether the steps are even.
+
+use std::path::Path;
+
+use nalgebra::{Point3, Vector3};
+
+use crate::error::{Gap, ReadError};
+
+/// Two slices closer than this lie in the same place.
+const SAME_PLACE_MM: f64 = 1e-3;
+/// How far a slice may lie from its place on the lattice: positions rounded to 0.1 mm pass.
+pub(super) const OFF_LATTICE_MM: f64 = 0.1;
+/// The same for small steps, as a fraction of the step; one missing slice moves others by 0.5.
+pub(super) const OFF_LATTICE_STEPS: f64 = 0.2;
+
+/// Refuses slices in the same place; `heights` are those of `positions` along the normal, rising.
+pub(super) fn distinct_places(
+    source: &Path,
+    positions: &[Point3<f64>],
+    heights: &[f64],
+) -> Result<(), ReadError> {
+    let (mut distinct, mut start) = (1, 0);
+    let mut crowd = 0..1;
+    for k in 1..=heights.len() {
+        let apart = k == heights.len() || heights[k] - heights[k - 1] > SAME_PLACE_MM;
+        if !apart {
+            continue;
+        }
+        if k - start > crowd.len() {
+            crowd = start..k;
+        }
+        if k < heights.len() {
+            distinct += 1;
+        }
+        start = k;
+    }
+    if crowd.len() == 1 {
+        return Ok(());
+    }
+    Err(ReadError::SamePosition {
+        path: source.to_owned(),
+        slices: crowd.len(),
+        position_mm: positions[crowd.start].coords.into(),
+        total: positions.len(),
+        positions: distinct,
+    })
+}
+
+/// How slices follow each other along a line.
+pub(super) enum Steps {
+    /// By the same step.
+    Even(Vector3<f64>),
+    /// By different steps, with the error that tells them.
+    Uneven(ReadError),
+}
+
+/// The step from slice to slice, if every slice lies on the lattice that the ends span; slices beside the line
+/// between the ends are refused, since no lattice holds them.
+pub(super) fn even_step(
+    source: &Path,
+    positions: &[Point3<f64>],
+    heights: &[f64],
+) -> Result<Steps, ReadError> {
+    let at = |k: usize| positions[k];
+    let last = positions.len() - 1;
+    let step = (at(last) - at(0)) / last as f64;
+    let slack_mm =
+        OFF_LATTICE_MM.min(OFF_LATTICE_STEPS * (heights[last] - heights[0]) / last as f64);
+    let off_mm = |k: usize| (at(k) - (at(0) + step * k as f64)).norm();
+    if (1..last).all(|k| off_mm(k) <= slack_mm) {
+        return Ok(Steps::Even(step));
+    }
+    let (steps, expected_mm) = steps(positions);
+    let differs = |found_mm: f64, by_mm: f64| (found_mm - expected_mm).abs() > by_mm;
+    let worst_mm = steps
+        .iter()
+        .map(|s| (s - expected_mm).abs())
+        .fold(0.0, f64::max);
+    // A slow drift has no single step out of line: then the worst ones are named.
+    let by_mm = slack_mm.min(0.999 * worst_mm);
+    let gaps = (0..last).filter(|&k| differs(steps[k], by_mm));
+    let gaps = gaps.map(|k| Gap {
+        after_slice: k,
+        found_mm: steps[k],
+    });
+    let gaps = gaps.collect::<Vec<_>>();
+    let line = step.normalize();
+    let beside_mm = |k: usize| (at(k) - at(0)).cross(&line).norm();
+    let farthest = (1..last).max_by(|&a, &b| beside_mm(a).total_cmp(&beside_mm(b)));
+    if let Some(slice) = farthest.filter(|&k| gaps.is_empty() || beside_mm(k) > OFF_LATTICE_MM) {
+        return Err(ReadError::Sideways {
+            path: source.to_owned(),
+            slice,
+            off_mm: beside_mm(slice),
+        });
+    }
+    Ok(Steps::Uneven(ReadError::UnevenSteps {
+        path: source.to_owned(),
+        expected_mm,
+        gaps,
+    }))
+}
+
+/// The distances of neighbours and the usual one: the lower median, which of a right and a doubled step is the right one.
+pub(super) fn steps(positions: &[Point3<f64>]) -> (Vec<f64>, f64) {
+    let steps = positions.windows(2).map(|pair| (pair[1] - pair[0]).norm());
+    let steps = steps.collect::<Vec<_>>();
+    let mut sorted = steps.clone();
+    sorted.sort_by(f64::total_cmp);
+    let usual = sorted[(sorted.len() - 1) / 2];
+    (steps, usual)
+}

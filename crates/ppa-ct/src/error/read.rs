@@ -1,0 +1,283 @@
+//! Why a scan could not be read.
+
+use std::path::PathBuf;
+
+use super::Cause;
+use crate::scan::SeriesSummary;
+use crate::volume::VolumeError;
+
+/// Why a scan was refused.
+///
+/// Messages name files and numbers only, never what a header says about a person.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// The file or folder cannot be opened or read.
+    #[error("cannot read {}", path.display())]
+    Io {
+        /// What was asked for.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// Neither a folder of DICOM files, nor a DICOM file, nor NIfTI, NRRD or MetaImage.
+    #[error("{} is no scan ppa can read: expected a folder with one DICOM series, a DICOM file, .nii, .nii.gz, .nrrd, .nhdr, .mha or .mhd", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The crate was built without this reader.
+    #[error("{} needs the feature `{feature}` of ppa-ct, which this build lacks", path.display())]
+    FeatureOff {
+        /// The file or folder.
+        path: PathBuf,
+        /// Cargo feature that holds the reader.
+        feature: &'static str,
+    },
+    /// A folder without a single DICOM image.
+    #[error("no DICOM image in {} ({files} files looked at, subfolders included)", path.display())]
+    NoDicom {
+        /// The folder.
+        path: PathBuf,
+        /// Files in it.
+        files: usize,
+    },
+    /// A file that starts as DICOM cannot be parsed to the end.
+    #[error("{} is damaged or no valid DICOM file", path.display())]
+    Dicom {
+        /// The file.
+        path: PathBuf,
+        /// What the parser says.
+        source: Cause,
+    },
+    /// An attribute that the geometry or the pixel values need is missing.
+    #[error("{} lacks {tag}", path.display())]
+    MissingTag {
+        /// The file.
+        path: PathBuf,
+        /// DICOM keyword.
+        tag: &'static str,
+    },
+    /// An attribute holds something unusable.
+    #[error("{}: {tag} is {found}, expected {expected}", path.display())]
+    BadTag {
+        /// The file.
+        path: PathBuf,
+        /// DICOM keyword.
+        tag: &'static str,
+        /// The value.
+        found: String,
+        /// What it should have been.
+        expected: &'static str,
+    },
+    /// Another modality than CT: its values are not Hounsfield units.
+    #[error("{} holds modality {modality}, not CT; its values are not Hounsfield units and are read only when forced", path.display())]
+    NotCt {
+        /// The modality found.
+        modality: String,
+        /// The file or folder.
+        path: PathBuf,
+    },
+    /// A CT whose header gives its values another unit than HU, as in maps of blood flow.
+    #[error("{} holds values in {unit}, not in Hounsfield units; they are read only when forced", path.display())]
+    NotHu {
+        /// The file.
+        path: PathBuf,
+        /// Rescale Type or UCUM code.
+        unit: &'static str,
+    },
+    /// More than one series to choose from.
+    #[error("{} holds {} series, expected one or a choice by number or UID: {}", path.display(), series.len(), list_series(series))]
+    SeveralSeries {
+        /// The folder.
+        path: PathBuf,
+        /// Each series, by number.
+        series: Vec<SeriesSummary>,
+    },
+    /// The series that was chosen is not there.
+    #[error("{} does not hold the chosen series, but {}", path.display(), list_series(series))]
+    NoSuchSeries {
+        /// The folder or file.
+        path: PathBuf,
+        /// Each series that is there, by number.
+        series: Vec<SeriesSummary>,
+    },
+    /// Nothing but localizers (scout views).
+    #[error("{} holds {localizers} localizer images and no slices", path.display())]
+    OnlyLocalizers {
+        /// The folder.
+        path: PathBuf,
+        /// Localizers found.
+        localizers: usize,
+    },
+    /// A multi-frame object that does not tell where its frames lie.
+    #[error("{} holds {frames} frames and places for {described} of them", path.display())]
+    MultiFrame {
+        /// The file.
+        path: PathBuf,
+        /// Frames in it.
+        frames: usize,
+        /// Frames with functional groups of their own.
+        described: usize,
+    },
+    /// No decoder for the way the pixels are packed.
+    #[error("cannot unpack the pixels of {}: transfer syntax {name} ({uid})", path.display())]
+    TransferSyntax {
+        /// The file.
+        path: PathBuf,
+        /// Transfer syntax UID: names an encoding, never a person.
+        uid: String,
+        /// Its name.
+        name: &'static str,
+        /// What the decoder says.
+        source: Cause,
+    },
+    /// The pixel data do not have the size that the header promises, or are compressed beyond belief.
+    #[error("{} holds {found} bytes of pixels, from which its header expects {expected}", path.display())]
+    PixelCount {
+        /// The file.
+        path: PathBuf,
+        /// Bytes found, compressed or not.
+        found: u64,
+        /// Bytes promised, not compressed.
+        expected: u64,
+    },
+    /// Slices of one series that do not fit on one lattice.
+    #[error("{}: {what} is {found}, but {expected} in the other slices", path.display())]
+    Mixed {
+        /// First file that differs.
+        path: PathBuf,
+        /// What differs.
+        what: &'static str,
+        /// Its value there.
+        found: String,
+        /// The value in the first slice.
+        expected: String,
+    },
+    /// Several slices in one place, as in a series with phases or without true positions.
+    #[error(
+        "{}: {slices} slices share the position ({:.3}, {:.3}, {:.3}) mm; distinct positions of all {total}: {positions}",
+        path.display(), position_mm[0], position_mm[1], position_mm[2]
+    )]
+    SamePosition {
+        /// The folder.
+        path: PathBuf,
+        /// Slices at the most crowded position.
+        slices: usize,
+        /// That position, LPS.
+        position_mm: [f64; 3],
+        /// Slices altogether.
+        total: usize,
+        /// Distinct positions.
+        positions: usize,
+    },
+    /// Slices are missing, or their steps vary.
+    #[error("the slices in {} are not evenly spaced: expected steps of {expected_mm:.3} mm, found {}; gaps are filled only when asked for", path.display(), list_gaps(gaps))]
+    UnevenSteps {
+        /// The folder.
+        path: PathBuf,
+        /// Usual distance between neighbours (the median).
+        expected_mm: f64,
+        /// Steps that differ.
+        gaps: Vec<Gap>,
+    },
+    /// Slices that do not follow each other along one line.
+    #[error("the slices in {} do not follow one line: number {slice} lies {off_mm:.3} mm beside that from the first to the last", path.display())]
+    Sideways {
+        /// The folder.
+        path: PathBuf,
+        /// The slice farthest from the line, counted from 0 along the slice normal.
+        slice: usize,
+        /// How far.
+        off_mm: f64,
+    },
+    /// Gaps that would take far more slices to fill than there are.
+    #[error("the gaps between the {slices} slices in {} take {needed:.0} slices to fill, expected at most {most}", path.display())]
+    TooManyGaps {
+        /// The folder.
+        path: PathBuf,
+        /// Slices that are there.
+        slices: usize,
+        /// Slices of the even stack.
+        needed: f64,
+        /// Most slices of an even stack.
+        most: usize,
+    },
+    /// A NIfTI, NRRD or MetaImage file whose header cannot be used.
+    #[error("{}: {problem}", path.display())]
+    Header {
+        /// The file.
+        path: PathBuf,
+        /// What was found and what expected.
+        problem: String,
+    },
+    /// The values or the affine do not make a volume.
+    #[error("{} does not hold a usable volume", path.display())]
+    Volume {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why not.
+        source: VolumeError,
+    },
+}
+
+/// A step between two neighbouring slices that differs from the others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    /// Slice before the step, counted from 0 along the slice normal.
+    pub after_slice: usize,
+    /// Length of the step.
+    pub found_mm: f64,
+}
+
+impl ReadError {
+    /// What is wrong with an image, without the file's name.
+    #[cfg(feature = "dicom")]
+    pub(crate) fn without_path(&self) -> String {
+        match self {
+            Self::MissingTag { tag, .. } => format!("lacks {tag}"),
+            Self::BadTag {
+                tag,
+                found,
+                expected,
+                ..
+            } => format!("{tag} is {found}, expected {expected}"),
+            Self::MultiFrame {
+                frames, described, ..
+            } => format!("{frames} frames and places for {described} of them"),
+            _ => "damaged".to_owned(),
+        }
+    }
+}
+
+fn list_series(series: &[SeriesSummary]) -> String {
+    let names = series.iter().map(|s| {
+        let number = s.number.map_or("?".to_owned(), |n| n.to_string());
+        let modality = s.modality.as_deref().unwrap_or("no modality");
+        let [columns, rows] = s.size;
+        let refused = s.refused.as_ref();
+        let refused = refused.map_or(String::new(), |reason| format!(", refused: {reason}"));
+        format!(
+            "number {number} ({modality}, {} images of {columns} x {rows}{refused})",
+            s.slices
+        )
+    });
+    match series {
+        [] => "no series at all".to_owned(),
+        _ => names.collect::<Vec<_>>().join("; "),
+    }
+}
+
+fn list_gaps(gaps: &[Gap]) -> String {
+    const SHOWN: usize = 5;
+    let mut text = gaps
+        .iter()
+        .take(SHOWN)
+        .map(|gap| format!("{:.3} mm after slice {}", gap.found_mm, gap.after_slice))
+        .collect::<Vec<_>>()
+        .join(", ");
+    if gaps.len() > SHOWN {
+        text += &format!(" and {} more", gaps.len() - SHOWN);
+    }
+    text
+}

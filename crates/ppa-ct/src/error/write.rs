@@ -1,0 +1,83 @@
+//! Why a volume could not be written.
+
+use std::path::PathBuf;
+
+use super::Cause;
+
+/// Why a volume could not be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WriteError {
+    /// The name does not say a format that can be written.
+    #[error("cannot write {}: expected {expected}", path.display())]
+    Extension {
+        /// The name given.
+        path: PathBuf,
+        /// Names that can be written.
+        expected: &'static str,
+    },
+    /// A name that the header of the format cannot hold.
+    #[error("cannot write {}: expected a name {expected}", path.display())]
+    Name {
+        /// The name given.
+        path: PathBuf,
+        /// Which names can be written.
+        expected: &'static str,
+    },
+    /// A DICOM CT was asked for, and the source says that the scan is none.
+    #[error("{} would be a DICOM CT in Hounsfield units, but the scan holds {found}: write NIfTI, NRRD or MetaImage", path.display())]
+    NotCt {
+        /// The folder asked for.
+        path: PathBuf,
+        /// Modality or unit.
+        found: String,
+    },
+    /// The crate was built without this writer.
+    #[error("{} needs the feature `{feature}` of ppa-ct, which this build lacks", path.display())]
+    FeatureOff {
+        /// The file or folder.
+        path: PathBuf,
+        /// Cargo feature that holds the writer.
+        feature: &'static str,
+    },
+    /// The format cannot hold so many voxels along one axis.
+    #[error("a volume of {size:?} voxels does not fit {format}, which holds {most} along an axis")]
+    TooLarge {
+        /// Voxels along i, j, k.
+        size: [usize; 3],
+        /// The format.
+        format: &'static str,
+        /// Voxels it holds along an axis.
+        most: usize,
+    },
+    /// The axes i and j are not perpendicular: no DICOM slice.
+    #[error(
+        "the axes i and j lean {lean_deg:.3} degrees from perpendicular, which a DICOM slice cannot say"
+    )]
+    SlantedSlices {
+        /// How far from perpendicular.
+        lean_deg: f64,
+    },
+    /// A folder to be written holds something already.
+    #[error("{} exists and is not an empty folder; nothing was written", path.display())]
+    Exists {
+        /// The folder asked for.
+        path: PathBuf,
+    },
+    /// An object could not be encoded.
+    #[error("cannot encode {}", path.display())]
+    Encode {
+        /// The file asked for.
+        path: PathBuf,
+        /// Why not.
+        source: Cause,
+    },
+    /// The file could not be written; nothing is left behind.
+    #[error("cannot write {}", path.display())]
+    Io {
+        /// The file asked for.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+}
