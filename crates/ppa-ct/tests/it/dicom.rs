@@ -301,41 +301,6 @@ fn a_cut_file_is_an_error_at_every_length() {
     }
 }
 
-/// Seen in public test images: an application title of 18 characters, where 16 are allowed.
-#[test]
-fn a_mistake_in_the_meta_group_does_not_stop_the_reading() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("slice.dcm");
-    SliceSpec::axial([4, 3], 0.0, |i, _| i as i16 - 1000).write(&path);
-    let right = read(&path).unwrap();
-    let mut bytes = std::fs::read(&path).unwrap();
-    let length = u32::from_le_bytes(bytes[140..144].try_into().unwrap());
-    let end = 144 + length as usize;
-    let title = [b"\x02\0\x16\0AE\x12\0".as_slice(), &[b' '; 18]].concat();
-    bytes.splice(end..end, title.iter().copied());
-    bytes[140..144].copy_from_slice(&(length + title.len() as u32).to_le_bytes());
-    std::fs::write(&path, &bytes).unwrap();
-    assert_eq!(read(&path).unwrap(), right);
-}
-
-#[test]
-fn what_is_no_scan_is_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let missing = folder.path().join("missing.nii");
-    assert!(matches!(read(&missing), Err(ReadError::Io { .. })));
-    assert!(matches!(
-        read(folder.path()),
-        Err(ReadError::NoDicom { files: 0, .. })
-    ));
-    let text = folder.path().join("notes.txt");
-    std::fs::write(&text, "not a scan").unwrap();
-    let error = read(&text).unwrap_err().to_string();
-    assert!(
-        error.contains("notes.txt") && error.contains(".nii.gz"),
-        "{error}"
-    );
-}
-
 /// Facts pass on; of identifying attributes the names alone.
 #[test]
 fn the_acquisition_is_told_without_a_value_that_identifies() {

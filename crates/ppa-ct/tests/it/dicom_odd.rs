@@ -246,7 +246,7 @@ fn blank_slices_are_read_however_well_they_pack() {
         let frame = [0xff, 0xf7, 0, 11, 16, high, low, high, low, 1, 1, 0x11, 0];
         let scan = [0xff, 0xda, 0, 8, 1, 1, 0, 0, 0, 0];
         // Ones only, which say that runs go on; behind 0xff a zero is stuffed in.
-        let ones = [0xff, 0x7f].repeat(2 * usize::from(side) / 15);
+        let ones = [0xff, 0x7f].repeat(usize::from(side) / 15 + 5);
         let stream = [&[0xff, 0xd8], &frame[..], &scan, &ones, &[0xff, 0xd9]].concat();
         let slice = SliceSpec {
             size: [side, side],
@@ -256,7 +256,7 @@ fn blank_slices_are_read_however_well_they_pack() {
         stream.len() as u64
     };
     let packed = blank(2048);
-    assert!(2 * 2048 * 2048 > 14_000 * packed, "{packed}");
+    assert!(2 * 2048 * 2048 > 20_000 * packed, "{packed}");
     let volume = read(&path).unwrap().volume;
     assert_eq!(volume.grid().size(), [2048, 2048, 1]);
     assert_eq!(
@@ -266,4 +266,39 @@ fn blank_slices_are_read_however_well_they_pack() {
     blank(u16::MAX);
     let bomb = read(&path).unwrap_err();
     assert!(matches!(bomb, ReadError::PixelCount { .. }), "{bomb}");
+}
+
+/// Seen in public test images: an application title of 18 characters, where 16 are allowed.
+#[test]
+fn a_mistake_in_the_meta_group_does_not_stop_the_reading() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("slice.dcm");
+    SliceSpec::axial([4, 3], 0.0, |i, _| i as i16 - 1000).write(&path);
+    let right = read(&path).unwrap();
+    let mut bytes = std::fs::read(&path).unwrap();
+    let length = u32::from_le_bytes(bytes[140..144].try_into().unwrap());
+    let end = 144 + length as usize;
+    let title = [b"\x02\0\x16\0AE\x12\0".as_slice(), &[b' '; 18]].concat();
+    bytes.splice(end..end, title.iter().copied());
+    bytes[140..144].copy_from_slice(&(length + title.len() as u32).to_le_bytes());
+    std::fs::write(&path, &bytes).unwrap();
+    assert_eq!(read(&path).unwrap(), right);
+}
+
+#[test]
+fn what_is_no_scan_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let missing = folder.path().join("missing.nii");
+    assert!(matches!(read(&missing), Err(ReadError::Io { .. })));
+    assert!(matches!(
+        read(folder.path()),
+        Err(ReadError::NoDicom { files: 0, .. })
+    ));
+    let text = folder.path().join("notes.txt");
+    std::fs::write(&text, "not a scan").unwrap();
+    let error = read(&text).unwrap_err().to_string();
+    assert!(
+        error.contains("notes.txt") && error.contains(".nii.gz"),
+        "{error}"
+    );
 }
