@@ -2,13 +2,13 @@
 //!
 //! [`iso_surface`] turns a volume into a triangle [`Mesh`]; [`extract_limb`] finds the limb in a scan
 //! and cuts couch, sheets and neighbours; [`offset`], [`add_bumps`] and [`seeded_bumps`] make other
-//! body shapes of it; [`dbscan`] clusters points; [`write_ply`] and [`read_ply`] exchange meshes and
-//! clouds with other programs.
+//! body shapes of it; [`dbscan`] clusters points; [`write_mesh_file`], [`write_cloud_file`] and
+//! [`read_mesh_file`] exchange meshes and clouds with other programs as PLY, OBJ and STL.
 //!
 //! Units: mm, HU. Frame: whatever frame the volume's affine leads to, normally `ct` (LPS).
 //! Triangles are counter-clockwise seen from outside and normals point outward.
 //! Repeatable: the same input gives the same vertices in the same order for any number of threads.
-//! Left out: decimation, self-intersection tests, and any file format but PLY.
+//! Left out: decimation and any other file format.
 
 mod body_shape;
 mod dbscan;
@@ -16,8 +16,8 @@ mod estimate_normals;
 mod inward_limit;
 mod limb;
 mod mesh;
+mod mesh_file;
 mod neighbours;
-mod ply;
 mod point_cells;
 mod surface;
 mod topology;
@@ -27,6 +27,8 @@ pub use dbscan::{Clusters, dbscan};
 pub use estimate_normals::{CloudError, estimate_normals, mean_spacing_mm};
 pub use limb::{Body, CutFace, Limb, LimbError, LimbReport, LimbSettings, VoxelBox, extract_limb};
 pub use mesh::{Mesh, PointCloud};
-pub use ply::{PlyContents, PlyError, read_ply, write_ply, write_ply_cloud};
+pub use mesh_file::{
+    MeshContents, MeshFileError, read_mesh_file, write_cloud_file, write_mesh_file,
+};
 pub use surface::{Border, SurfaceError, iso_surface, iso_surfaces};
 pub use topology::Topology;

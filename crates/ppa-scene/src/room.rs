@@ -1,6 +1,6 @@
 //! The x-ray room: built in from a few lengths, or recorded by a user.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nalgebra::{Point3, Vector3};
 use ppa_mesh::{Mesh, PointCloud};
@@ -90,15 +90,9 @@ pub enum RoomError {
         /// What it should be.
         expected: &'static str,
     },
-    /// A file holds no points.
-    #[error("{} holds no points", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A file cannot be read as PLY.
+    /// A file cannot be read, or holds no points.
     #[error(transparent)]
-    Ply(#[from] ppa_mesh::PlyError),
+    Ply(#[from] ppa_mesh::MeshFileError),
 }
 
 impl Room {
@@ -118,20 +112,14 @@ impl Room {
         })
     }
 
-    /// Reads a recorded room from a PLY file in mm; its frame becomes the room frame.
+    /// Reads a recorded room from a PLY, OBJ or STL file in mm; its frame becomes the room frame.
     ///
     /// Triangles are kept if the file has any. The device is given, as no cloud tells it.
     ///
     /// # Errors
     /// [`RoomError`] when the file is missing, broken or empty.
     pub fn from_ply(path: impl AsRef<Path>, device: XrayDevice) -> Result<Self, RoomError> {
-        let path = path.as_ref();
-        let contents = ppa_mesh::read_ply(path)?;
-        if contents.cloud.points.is_empty() {
-            return Err(RoomError::Empty {
-                path: path.to_path_buf(),
-            });
-        }
+        let contents = ppa_mesh::read_mesh_file(path.as_ref())?;
         let cloud = contents.cloud.clone();
         let mesh = (!contents.triangles.is_empty()).then(|| contents.into_mesh());
         Ok(Self {

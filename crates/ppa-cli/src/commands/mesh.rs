@@ -5,16 +5,16 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use ppa_ct::read;
 use ppa_dataset::{BodyShape, Case, PreparedLimb, ShapeSettings, body_shape, layout::LimbId};
-use ppa_mesh::{Border, Mesh, dbscan, iso_surface, read_ply, write_ply};
+use ppa_mesh::{Border, Mesh, dbscan, iso_surface, read_mesh_file, write_mesh_file};
 use serde::Serialize;
 
 use crate::output::{Output, Seconds, Stopwatch};
 
 #[derive(Debug, Subcommand)]
 pub enum MeshCommand {
-    /// Iso-surface of a CT as PLY
+    /// Iso-surface of a CT as PLY, OBJ or STL
     Extract(ExtractArgs),
-    /// The skin of a case, or a body shape of it, as PLY
+    /// The skin of a case, or a body shape of it, as PLY, OBJ or STL
     Augment(AugmentArgs),
     /// DBSCAN clusters of a point cloud
     Cluster(ClusterArgs),
@@ -30,7 +30,7 @@ pub struct ExtractArgs {
     /// Close the surface where the volume ends
     #[arg(long)]
     close: bool,
-    /// PLY file to write
+    /// File to write: .ply, .obj or .stl
     #[arg(long)]
     out: PathBuf,
 }
@@ -48,7 +48,7 @@ pub struct AugmentArgs {
     /// Seed of the bumps
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// PLY file to write
+    /// File to write: .ply, .obj or .stl
     #[arg(long)]
     out: PathBuf,
 }
@@ -65,7 +65,7 @@ fn body_shape_named(name: &str) -> Result<BodyShape, String> {
 
 #[derive(Debug, Args)]
 pub struct ClusterArgs {
-    /// PLY point cloud
+    /// Point cloud: .ply, .obj or .stl
     cloud: PathBuf,
     /// Neighbours are at most this far away
     #[arg(long)]
@@ -135,7 +135,7 @@ fn extract(args: &ExtractArgs, output: Output) -> anyhow::Result<()> {
     let watch = Stopwatch::start();
     let mesh = iso_surface(&volume, args.iso, border)?;
     let seconds = watch.read();
-    write_ply(&args.out, &mesh)?;
+    write_mesh_file(&args.out, &mesh)?;
     output.print(&Surface::of(&mesh, seconds), Surface::describe)
 }
 
@@ -163,7 +163,7 @@ fn augment(args: &AugmentArgs, output: Output) -> anyhow::Result<()> {
         args.seed,
     )?;
     let seconds = watch.read();
-    write_ply(&args.out, &mesh)?;
+    write_mesh_file(&args.out, &mesh)?;
     output.print(&Surface::of(&mesh, seconds), Surface::describe)
 }
 
@@ -185,7 +185,7 @@ fn cluster(args: &ClusterArgs, output: Output) -> anyhow::Result<()> {
         args.min_points > 0,
         "--min-points is 0, expected at least 1"
     );
-    let cloud = read_ply(&args.cloud)?.cloud;
+    let cloud = read_mesh_file(&args.cloud)?.cloud;
     let clusters = dbscan(&cloud.points, args.eps_mm, args.min_points);
     let clustering = Clustering {
         clusters: clusters.sizes.len(),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use ppa_dataset::{Case, Found, prepare};
-use ppa_mesh::{LimbSettings, VoxelBox, write_ply};
+use ppa_mesh::{LimbSettings, VoxelBox, write_mesh_file};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
 
 use crate::number_lists::{point, range, voxel_box};
@@ -43,7 +43,7 @@ pub struct PrepareArgs {
     /// Case file to write
     #[arg(long)]
     out: PathBuf,
-    /// Save the skin as PLY, ct frame
+    /// Save the skin, ct frame: .ply, .obj or .stl
     #[arg(long)]
     ply: Option<PathBuf>,
     /// Kind of limb
@@ -121,7 +121,7 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
         &choices,
     )?;
     if let Some(ply) = &args.ply {
-        write_ply(ply, &prepared.limb.mesh)?;
+        write_mesh_file(ply, &prepared.limb.mesh)?;
     }
     case.write(&args.out)?;
     working.finish_and_clear();

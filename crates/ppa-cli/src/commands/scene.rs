@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use ppa_dataset::{Case, Plan, PreparedLimb, Table};
-use ppa_mesh::{read_ply, write_ply, write_ply_cloud};
+use ppa_mesh::{read_mesh_file, write_cloud_file, write_mesh_file};
 use ppa_scene::{Contact, PlaneSettings, SoftTissue, TablePlane, place_soft, table_plane};
 use serde::Serialize;
 
@@ -24,7 +24,7 @@ pub enum SceneCommand {
 
 #[derive(Debug, Args)]
 pub struct RoomArgs {
-    /// PLY file to write, mm
+    /// Cloud to write, mm: .ply or .obj
     #[arg(long)]
     out: PathBuf,
     /// Take the room from this plan instead of the built-in one
@@ -34,7 +34,7 @@ pub struct RoomArgs {
 
 #[derive(Debug, Args)]
 pub struct PlaneArgs {
-    /// PLY point cloud, mm, z up
+    /// Point cloud, mm, z up: .ply, .obj or .stl
     cloud: PathBuf,
     /// Seed of the search
     #[arg(long, default_value_t = 0)]
@@ -54,7 +54,7 @@ pub struct PlaceArgs {
     /// How far the distal and the proximal part sink in where they rest, mm [default: the plan's, or 0,0: a rigid skin]
     #[arg(long, value_name = "DISTAL,PROXIMAL", value_parser = range)]
     soft_tissue_mm: Option<[f64; 2]>,
-    /// Write the placed skin in room coordinates as PLY
+    /// Write the placed skin in room coordinates: .ply, .obj or .stl
     #[arg(long)]
     ply: Option<PathBuf>,
 }
@@ -112,7 +112,7 @@ struct RoomFacts {
 
 fn room(args: &RoomArgs, output: Output) -> anyhow::Result<()> {
     let Table { room, plane } = Table::of_plan(&plan(args.plan.as_ref())?)?;
-    write_ply_cloud(&args.out, &room.cloud)?;
+    write_cloud_file(&args.out, &room.cloud)?;
     let facts = RoomFacts {
         points: room.cloud.points.len(),
         table: FoundPlane::from(&plane),
@@ -129,7 +129,7 @@ fn room(args: &RoomArgs, output: Output) -> anyhow::Result<()> {
 }
 
 fn plane(args: &PlaneArgs, output: Output) -> anyhow::Result<()> {
-    let cloud = read_ply(&args.cloud)?.cloud;
+    let cloud = read_mesh_file(&args.cloud)?.cloud;
     let found = table_plane(&cloud, &PlaneSettings::default(), args.seed)
         .with_context(|| args.cloud.display().to_string())?;
     output.print(&FoundPlane::from(&found), FoundPlane::describe)
@@ -174,7 +174,7 @@ fn place_limb(args: &PlaceArgs, output: Output) -> anyhow::Result<()> {
             lies.vertices = placement.in_room(&skin.vertices, &prepared.landmarks);
             lies.normals = lies.geometric_normals();
         }
-        write_ply(ply, &lies)?;
+        write_mesh_file(ply, &lies)?;
     }
     working.finish_and_clear();
     let placed = Placed {

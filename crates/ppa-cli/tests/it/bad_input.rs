@@ -60,6 +60,75 @@ fn an_empty_surface_is_refused() {
 }
 
 #[test]
+fn a_mesh_that_is_none_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    let header = "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\n\
+                  property float y\nproperty float z\nend_header\n";
+    put("empty.ply", header);
+    put("empty.stl", "solid empty\nendsolid empty\n");
+    put("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n");
+    put("points.obj", "v 0 0 500\nv 1 0 500\nv 0 1 500\n");
+    let files = names(folder.path());
+    for (command, parts) in [
+        (
+            "depth render empty.ply --out d.png",
+            ["empty.ply", "no vertices"],
+        ),
+        (
+            "mesh cluster empty.stl --eps-mm 1 --min-points 3",
+            ["empty.stl", "no vertices"],
+        ),
+        (
+            "depth render nan.obj --out d.png",
+            ["vertex 1 of nan.obj", "not a number"],
+        ),
+        (
+            "scene plane nan.obj",
+            ["vertex 1 of nan.obj", "not a number"],
+        ),
+        (
+            "depth render points.obj --out d.png",
+            ["points.obj", "triangle"],
+        ),
+        (
+            "depth render mesh.gltf --out d.png",
+            ["mesh.gltf", ".ply, .obj and .stl"],
+        ),
+        (
+            "scene room --out room.stl",
+            ["room.stl", "cannot hold a cloud"],
+        ),
+    ] {
+        contains(&fail(folder.path(), command), &parts);
+    }
+    assert_eq!(names(folder.path()), files);
+}
+
+#[test]
+fn a_volume_of_one_slice_has_no_surface() {
+    let folder = tempfile::tempdir().unwrap();
+    let grid = ppa_ct::Grid::axis_aligned(
+        [32, 32, 1],
+        nalgebra::Vector3::repeat(2.0),
+        nalgebra::Point3::origin(),
+    );
+    let disk = |at: usize| {
+        let off_centre = (at % 32).abs_diff(16).pow(2) + (at / 32).abs_diff(16).pow(2);
+        if off_centre < 100 { 40.0 } else { -1000.0 }
+    };
+    let slice = ppa_ct::Volume::new(grid.unwrap(), (0..1024).map(disk).collect()).unwrap();
+    ppa_ct::write_nifti(&folder.path().join("slice.nii"), &slice).unwrap();
+    for command in [
+        "prepare slice.nii --side r --out case.toml --ply skin.ply",
+        "mesh extract slice.nii --out skin.ply",
+    ] {
+        contains(&fail(folder.path(), command), &["[32, 32, 1]"]);
+    }
+    assert_eq!(names(folder.path()), ["slice.nii"]);
+}
+
+#[test]
 fn a_room_without_a_table_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     // A lattice of scattered points: nothing flat in it.

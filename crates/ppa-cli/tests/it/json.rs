@@ -84,6 +84,23 @@ fn every_command_keeps_its_keys() {
             "cpu_s",
         ],
     );
+    for format in ["obj", "stl"] {
+        let other = object(
+            &format!("mesh extract p01.nii --out iso.{format} --close"),
+            &[],
+        );
+        let points = object(
+            &format!("mesh cluster iso.{format} --eps-mm 6 --min-points 1"),
+            &[],
+        );
+        let count: f64 = points["sizes"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter_map(|n| n.as_f64())
+            .sum();
+        assert_eq!(other["vertices"].as_f64(), Some(count), "{format}");
+    }
     object(
         "mesh cluster p01.ply --eps-mm 6 --min-points 5",
         &["clusters", "noise", "core_points", "sizes"],

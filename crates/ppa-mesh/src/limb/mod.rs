@@ -179,6 +179,9 @@ fn within(volume: &Volume, settings: &LimbSettings) -> Result<Limb, LimbError> {
 }
 
 fn within_values<T: Hu>(grid: &Grid, hu: &[T], settings: &LimbSettings) -> Result<Limb, LimbError> {
+    if grid.size().contains(&1) {
+        return Err(SurfaceError::TooThin(grid.size()).into());
+    }
     let (whole, iso) = (Lattice::of(grid), settings.iso_hu as f32);
     let mut report = LimbReport::default();
     let nothing_solid = || LimbError::NothingSolid {

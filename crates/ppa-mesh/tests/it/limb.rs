@@ -6,8 +6,8 @@ use nalgebra::Point3;
 use ppa_ct::Volume;
 use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_mesh::{
-    BumpError, BumpSite, Limb, LimbError, LimbSettings, Mesh, VoxelBox, add_bumps, extract_limb,
-    offset, seeded_bumps,
+    BumpError, BumpSite, Limb, LimbError, LimbSettings, Mesh, SurfaceError, VoxelBox, add_bumps,
+    extract_limb, offset, seeded_bumps,
 };
 
 use crate::fields::volume;
@@ -288,6 +288,12 @@ fn air_and_wild_settings_are_refused() {
     let air = volume([8; 3], [1.0; 3], |_| -1000.0);
     let found = extract_limb(&air, &LimbSettings::default());
     assert!(matches!(found, Err(LimbError::NothingSolid { .. })));
+    let slice = volume([64, 64, 1], [1.0; 3], |_| 40.0);
+    let thin = SurfaceError::TooThin([64, 64, 1]);
+    assert_eq!(
+        extract_limb(&slice, &LimbSettings::default()),
+        Err(LimbError::Surface(thin))
+    );
     let (_, scan, _) = &*PHANTOM;
     let far = LimbSettings {
         inside: Some([1e4; 3]),

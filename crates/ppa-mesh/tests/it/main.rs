@@ -4,6 +4,6 @@ mod clusters;
 mod fields;
 mod limb;
 mod limb_real;
-mod ply;
+mod mesh_file;
 mod reference;
 mod surface;

@@ -270,7 +270,7 @@ fn recorded_rooms_come_from_ply() {
     })
     .unwrap();
     let path = folder.path().join("room.ply");
-    ppa_mesh::write_ply_cloud(&path, &built_in.cloud).unwrap();
+    ppa_mesh::write_cloud_file(&path, &built_in.cloud).unwrap();
     let recorded = Room::from_ply(&path, built_in.device).unwrap();
     assert_eq!(recorded.cloud.points, built_in.cloud.points);
     assert!(recorded.mesh.is_none());

@@ -9,14 +9,14 @@ use ppa_depth::{
     Backdrop, Body, Camera, DepthImage, MeshBody, PlacedBody, Sensor, SensorSpec, Tremor,
     isometry_from_rows, render,
 };
-use ppa_mesh::read_ply;
+use ppa_mesh::read_mesh_file;
 use serde::{Deserialize, Serialize};
 
 use crate::output::{Output, Seconds, Stopwatch};
 
 #[derive(Debug, Args)]
 pub struct RenderArgs {
-    /// PLY meshes in one frame, mm
+    /// Meshes in one frame, mm: .ply, .obj or .stl
     #[arg(required = true)]
     meshes: Vec<PathBuf>,
     /// Camera JSON [default: an Azure Kinect, 640 x 576]
@@ -95,7 +95,7 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
     let meshes = args
         .meshes
         .iter()
-        .map(|path| read_ply(path).map(ppa_mesh::PlyContents::into_mesh))
+        .map(|path| read_mesh_file(path).map(ppa_mesh::MeshContents::into_mesh))
         .collect::<Result<Vec<_>, _>>()?;
     let eye = eye(args, &camera)?;
     let tremor = Tremor {

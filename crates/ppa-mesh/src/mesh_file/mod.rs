@@ -1,0 +1,161 @@
+//! Meshes and clouds in files: PLY, OBJ or STL, by the extension of the name.
+
+mod error;
+mod obj;
+mod ply;
+mod polygons;
+mod stl;
+
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, Write};
+use std::path::Path;
+
+use atomic_write_file::AtomicWriteFile;
+use nalgebra::{Point3, Vector3};
+
+use crate::mesh::{Mesh, PointCloud};
+use error::Fault;
+pub use error::MeshFileError;
+
+/// What a file holds.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct MeshContents {
+    /// All vertices; normals are empty when the file has none of use.
+    pub cloud: PointCloud,
+    /// Faces, polygons cut into fans; empty for a cloud.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl MeshContents {
+    /// The contents as a mesh; missing normals are made from the triangles.
+    pub fn into_mesh(self) -> Mesh {
+        let mut mesh = Mesh {
+            vertices: self.cloud.points,
+            normals: self.cloud.normals,
+            triangles: self.triangles,
+        };
+        if mesh.normals.len() != mesh.vertices.len() {
+            mesh.normals = mesh.geometric_normals();
+        }
+        mesh
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Format {
+    Ply,
+    Obj,
+    Stl,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Self, MeshFileError> {
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        match extension.to_ascii_lowercase().as_str() {
+            "ply" => Ok(Self::Ply),
+            "obj" => Ok(Self::Obj),
+            "stl" => Ok(Self::Stl),
+            _ => Err(MeshFileError::Extension {
+                path: path.to_owned(),
+            }),
+        }
+    }
+}
+
+/// Reads a mesh or a cloud in mm: PLY or STL, text or binary, or OBJ.
+///
+/// Colours, textures and groups are skipped. Normals are kept where the file has one per vertex, each
+/// of them a direction; vertices of an STL file that lie in one place become one.
+///
+/// # Errors
+/// [`MeshFileError`] when the file is missing, broken, or has no points.
+pub fn read_mesh_file(path: &Path) -> Result<MeshContents, MeshFileError> {
+    let format = Format::of(path)?;
+    let open = |source| MeshFileError::Open {
+        path: path.to_owned(),
+        source,
+    };
+    let contents = match format {
+        Format::Ply => ply::read(BufReader::new(File::open(path).map_err(open)?)),
+        Format::Obj => obj::read(&std::fs::read(path).map_err(open)?),
+        Format::Stl => stl::read(&std::fs::read(path).map_err(open)?),
+    };
+    let checked = contents.and_then(|mut contents| {
+        let points = &contents.cloud.points;
+        let finite = |p: &Point3<f32>| p.coords.iter().all(|c| c.is_finite());
+        if points.is_empty() {
+            return Err(Fault::NoVertices);
+        }
+        if let Some(vertex) = points.iter().position(|p| !finite(p)) {
+            return Err(Fault::NotFinite(vertex));
+        }
+        contents.cloud.normals = directions(contents.cloud.normals);
+        Ok(contents)
+    });
+    checked.map_err(|fault| MeshFileError::in_file(path, fault))
+}
+
+/// Unit vectors, or none at all if one of them points nowhere.
+fn directions(mut normals: Vec<Vector3<f32>>) -> Vec<Vector3<f32>> {
+    for normal in &mut normals {
+        let length = normal.norm();
+        if !(length.is_finite() && length > 0.0) {
+            return Vec::new();
+        }
+        // What rounding left stays, so that writing and reading change nothing.
+        if (length - 1.0).abs() > 1e-4 {
+            *normal /= length;
+        }
+    }
+    normals
+}
+
+/// Writes a mesh, whole or not at all: binary little-endian PLY or OBJ with normals, or binary STL.
+///
+/// # Errors
+/// [`MeshFileError::Extension`] and [`MeshFileError::Write`].
+pub fn write_mesh_file(path: &Path, mesh: &Mesh) -> Result<(), MeshFileError> {
+    let (points, normals) = (&mesh.vertices, &mesh.normals);
+    match Format::of(path)? {
+        Format::Ply => store(path, |out| {
+            ply::write(out, points, normals, Some(&mesh.triangles))
+        }),
+        Format::Obj => store(path, |out| {
+            obj::write(out, points, normals, &mesh.triangles)
+        }),
+        Format::Stl => store(path, |out| stl::write(out, mesh)),
+    }
+}
+
+/// Writes a cloud, with normals if it has one per point, whole or not at all: PLY or OBJ.
+///
+/// # Errors
+/// [`MeshFileError::Extension`], [`MeshFileError::NoCloud`] and [`MeshFileError::Write`].
+pub fn write_cloud_file(path: &Path, cloud: &PointCloud) -> Result<(), MeshFileError> {
+    let (points, normals) = (&cloud.points, &cloud.normals);
+    match Format::of(path)? {
+        Format::Ply => store(path, |out| ply::write(out, points, normals, None)),
+        Format::Obj => store(path, |out| obj::write(out, points, normals, &[])),
+        Format::Stl => Err(MeshFileError::NoCloud {
+            path: path.to_owned(),
+        }),
+    }
+}
+
+fn store(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), MeshFileError> {
+    let store = || -> io::Result<()> {
+        if path.is_dir() {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
+        let mut out = BufWriter::new(AtomicWriteFile::open(path)?);
+        write(&mut out)?;
+        out.into_inner().map_err(|e| e.into_error())?.commit()
+    };
+    store().map_err(|source| MeshFileError::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
