@@ -5,7 +5,7 @@ use std::path::Path;
 use dicom_core::Tag;
 use dicom_dictionary_std::tags;
 
-use super::element::DataSet;
+use super::element::{DataSet, Fault};
 use super::file::{damaged, text};
 use crate::error::ReadError;
 
@@ -13,8 +13,34 @@ use crate::error::ReadError;
 pub(super) struct Attributes<'a> {
     pub path: &'a Path,
     pub data_set: &'a DataSet<'a>,
-    /// Per-frame, then shared functional groups (PS3.3, section C.7.6.16); empty for plain objects.
-    pub groups: Vec<&'a DataSet<'a>>,
+    /// Per-frame, then shared functional groups; empty for plain objects.
+    pub groups: Vec<&'a Groups<'a>>,
+    /// Real-world value mappings of the object itself.
+    pub mappings: &'a [DataSet<'a>],
+}
+
+/// Functional groups of one frame, or those that all frames share (PS3.3, section C.7.6.16).
+///
+/// Their sequences are parsed once, not for each frame and attribute.
+pub(super) struct Groups<'a>(Vec<(Tag, Vec<DataSet<'a>>)>);
+
+impl<'a> Groups<'a> {
+    pub fn of(item: &DataSet<'a>) -> Result<Self, Fault> {
+        let sequences = [
+            tags::PLANE_POSITION_SEQUENCE,
+            tags::PLANE_ORIENTATION_SEQUENCE,
+            tags::PIXEL_MEASURES_SEQUENCE,
+            tags::PIXEL_VALUE_TRANSFORMATION_SEQUENCE,
+            tags::REAL_WORLD_VALUE_MAPPING_SEQUENCE,
+        ];
+        let sequences = sequences.map(|tag| Ok((tag, item.items(tag)?)));
+        sequences.into_iter().collect::<Result<_, _>>().map(Self)
+    }
+
+    fn items(&self, sequence: Tag) -> &[DataSet<'a>] {
+        let found = self.0.iter().find(|(tag, _)| *tag == sequence);
+        found.map_or(&[], |(_, items)| items)
+    }
 }
 
 impl<'a> Attributes<'a> {
@@ -24,25 +50,21 @@ impl<'a> Attributes<'a> {
             path,
             data_set,
             groups: Vec::new(),
+            mappings: &[],
         }
     }
 
-    fn value(&self, tag: Tag) -> Result<Option<&'a [u8]>, ReadError> {
-        let Some(sequence) = group_of(tag) else {
-            return Ok(self.data_set.get(tag));
-        };
-        for group in &self.groups {
-            let items = group.items(sequence).map_err(|f| damaged(self.path, f))?;
-            if let Some(value) = items.first().and_then(|item| item.get(tag)) {
-                return Ok(Some(value));
-            }
-        }
-        Ok(self.data_set.get(tag))
+    fn value(&self, tag: Tag) -> Option<&'a [u8]> {
+        let grouped = group_of(tag).and_then(|sequence| {
+            let first = |group: &&'a Groups<'a>| group.items(sequence).first()?.get(tag);
+            self.groups.iter().find_map(first)
+        });
+        grouped.or_else(|| self.data_set.get(tag))
     }
 
     /// An attribute as text without padding; `None` when it is absent or empty.
-    pub fn text(&self, tag: Tag) -> Result<Option<String>, ReadError> {
-        Ok(self.value(tag)?.map(text).filter(|text| !text.is_empty()))
+    pub fn text(&self, tag: Tag) -> Option<String> {
+        self.value(tag).map(text).filter(|text| !text.is_empty())
     }
 
     /// A binary number of 16 bits, which all frames share.
@@ -62,7 +84,7 @@ impl<'a> Attributes<'a> {
         tag: Tag,
         name: &'static str,
     ) -> Result<[f64; N], ReadError> {
-        let text = self.text(tag)?.ok_or_else(|| self.missing(name))?;
+        let text = self.text(tag).ok_or_else(|| self.missing(name))?;
         let values = text.split('\\').map(|part| part.trim().parse::<f64>().ok());
         let values = values.collect::<Option<Vec<_>>>();
         values
@@ -81,7 +103,7 @@ impl<'a> Attributes<'a> {
 
     /// A number written as text; `None` when it is absent or empty.
     pub fn optional(&self, tag: Tag, name: &'static str) -> Result<Option<f64>, ReadError> {
-        match self.text(tag)? {
+        match self.text(tag) {
             None => Ok(None),
             Some(_) => self.numbers::<1>(tag, name).map(|[value]| Some(value)),
         }
@@ -90,17 +112,13 @@ impl<'a> Attributes<'a> {
     /// The code of the unit that the frame's real-world values are in.
     pub fn real_world_unit(&self) -> Result<Option<String>, ReadError> {
         let fault = |f| damaged(self.path, f);
-        for group in self.groups.iter().copied().chain([self.data_set]) {
-            for mapping in group
-                .items(tags::REAL_WORLD_VALUE_MAPPING_SEQUENCE)
-                .map_err(fault)?
-            {
-                let units = mapping
-                    .items(tags::MEASUREMENT_UNITS_CODE_SEQUENCE)
-                    .map_err(fault)?;
-                if let Some(code) = units.first().and_then(|unit| unit.get(tags::CODE_VALUE)) {
-                    return Ok(Some(text(code)));
-                }
+        let sequence = tags::REAL_WORLD_VALUE_MAPPING_SEQUENCE;
+        let grouped = self.groups.iter().flat_map(|group| group.items(sequence));
+        for mapping in grouped.chain(self.mappings) {
+            let units = mapping.items(tags::MEASUREMENT_UNITS_CODE_SEQUENCE);
+            let units = units.map_err(fault)?;
+            if let Some(code) = units.first().and_then(|unit| unit.get(tags::CODE_VALUE)) {
+                return Ok(Some(text(code)));
             }
         }
         Ok(None)

@@ -84,7 +84,7 @@ fn rescale(attributes: &Attributes) -> Result<Option<[f64; 2]>, ReadError> {
 
 /// A rescale type or real-world unit other than HU.
 fn foreign_unit(attributes: &Attributes) -> Result<Option<&'static str>, ReadError> {
-    let rescale_type = attributes.text(tags::RESCALE_TYPE)?;
+    let rescale_type = attributes.text(tags::RESCALE_TYPE);
     // US: unspecified (PS3.3, section C.11.1.1.2).
     let rescale_type = rescale_type.filter(|text| text != "US");
     let unit = attributes.real_world_unit()?;

@@ -5,9 +5,8 @@ use std::sync::Arc;
 
 use dicom_dictionary_std::{tags, uids};
 
-use super::attributes::Attributes;
+use super::attributes::{Attributes, Groups};
 use super::defined_terms;
-use super::element::DataSet;
 use super::file::{DicomFile, damaged, open};
 use super::frame::Frame;
 use super::stated::stated;
@@ -82,7 +81,7 @@ pub(super) fn scan(path: &Path, force: bool) -> Result<Found, ReadError> {
     let opened = open(path)?;
     let data_set = opened.data_set()?;
     let top = Attributes::of(path, &data_set);
-    let series = match kind(&top, &opened.file.sop_class, force)? {
+    let series = match kind(&top, &opened.file.sop_class, force) {
         Kind::Slices(series) => series,
         Kind::Other(found) => return Ok(found),
     };
@@ -111,32 +110,32 @@ enum Kind {
     Other(Found),
 }
 
-fn kind(top: &Attributes, sop_class: &str, force: bool) -> Result<Kind, ReadError> {
+fn kind(top: &Attributes, sop_class: &str, force: bool) -> Kind {
     let ct_classes = [uids::CT_IMAGE_STORAGE, uids::ENHANCED_CT_IMAGE_STORAGE, ""];
     if !ct_classes.contains(&sop_class) && top.data_set.get(tags::ROWS).is_none() {
-        return Ok(Kind::Other(Found::NotAnImage));
+        return Kind::Other(Found::NotAnImage);
     }
     let side = |tag| usize::from(top.word(tag).unwrap_or_default());
     let series = Series {
-        uid: top.text(tags::SERIES_INSTANCE_UID)?.unwrap_or_default(),
-        number: top.text(tags::SERIES_NUMBER)?.and_then(|n| n.parse().ok()),
+        uid: top.text(tags::SERIES_INSTANCE_UID).unwrap_or_default(),
+        number: top.text(tags::SERIES_NUMBER).and_then(|n| n.parse().ok()),
         modality: top
-            .text(tags::MODALITY)?
+            .text(tags::MODALITY)
             .map(|m| defined_terms::modality(&m).to_owned()),
         size: [side(tags::COLUMNS), side(tags::ROWS)],
     };
     let Some(modality) = &series.modality else {
         let error = top.missing("Modality");
-        return Ok(Kind::Other(Found::Refused(series, error)));
+        return Kind::Other(Found::Refused(series, error));
     };
     if modality != "CT" && !force {
-        return Ok(Kind::Other(Found::OtherModality(series)));
+        return Kind::Other(Found::OtherModality(series));
     }
-    let image_type = top.text(tags::IMAGE_TYPE)?.unwrap_or_default();
+    let image_type = top.text(tags::IMAGE_TYPE).unwrap_or_default();
     if image_type.split('\\').any(|v| v.trim() == "LOCALIZER") {
-        return Ok(Kind::Other(Found::Localizer));
+        return Kind::Other(Found::Localizer);
     }
-    Ok(Kind::Slices(series))
+    Kind::Slices(series)
 }
 
 fn image(top: &Attributes) -> Result<Image, ReadError> {
@@ -147,7 +146,7 @@ fn image(top: &Attributes) -> Result<Image, ReadError> {
     if rows == 0 || columns == 0 {
         return Err(top.bad("Rows", format!("{rows} x {columns}"), "at least one pixel"));
     }
-    let photometric = top.text(tags::PHOTOMETRIC_INTERPRETATION)?;
+    let photometric = top.text(tags::PHOTOMETRIC_INTERPRETATION);
     if let Some(other) =
         photometric.filter(|p| !["MONOCHROME1", "MONOCHROME2"].contains(&p.as_str()))
     {
@@ -179,12 +178,16 @@ fn image(top: &Attributes) -> Result<Image, ReadError> {
 
 /// The frames in the order of the file, each with the groups that hold for it.
 fn frames(top: &Attributes, count: usize, enhanced: bool) -> Result<Vec<Frame>, ReadError> {
+    let fault = |fault| damaged(top.path, fault);
+    let items = |sequence| top.data_set.items(sequence).map_err(fault);
     let groups = |sequence| {
-        let items = top.data_set.items(sequence);
-        items.map_err(|fault| damaged(top.path, fault))
+        let groups = items(sequence)?.iter().map(Groups::of).collect();
+        let groups: Result<Vec<_>, _> = groups;
+        groups.map_err(fault)
     };
     let shared = groups(tags::SHARED_FUNCTIONAL_GROUPS_SEQUENCE)?;
     let per_frame = groups(tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE)?;
+    let mappings = items(tags::REAL_WORLD_VALUE_MAPPING_SEQUENCE)?;
     if (count > 1 || enhanced) && per_frame.len() != count {
         return Err(ReadError::MultiFrame {
             path: top.path.to_owned(),
@@ -196,7 +199,8 @@ fn frames(top: &Attributes, count: usize, enhanced: bool) -> Result<Vec<Frame>, 
         .map(|index| {
             let groups = per_frame.get(index).into_iter().chain(shared.first());
             Frame::of(&Attributes {
-                groups: groups.collect::<Vec<&DataSet>>(),
+                groups: groups.collect(),
+                mappings: &mappings,
                 ..*top
             })
         })

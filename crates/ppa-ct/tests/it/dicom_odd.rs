@@ -190,6 +190,41 @@ fn frames_of_an_odd_number_of_bytes_in_big_endian_words_are_told_apart() {
     assert_eq!(*volume.hu(), (0..18).map(|n| n as f32).collect::<Vec<_>>());
 }
 
+/// Parsed for each frame and attribute, this would take minutes.
+#[test]
+fn groups_that_all_frames_share_are_parsed_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("frames.dcm");
+    let change = |o: &mut InMemDicomObject| {
+        put(o, tags::NUMBER_OF_FRAMES, VR::IS, "20000");
+        let sequence = |tag, items: Vec<InMemDicomObject>| {
+            DataElement::new(tag, VR::SQ, DataSetSequence::from(items))
+        };
+        let mut place = InMemDicomObject::new_empty();
+        put(&mut place, tags::IMAGE_POSITION_PATIENT, VR::DS, "1\\2\\3");
+        for n in 0x1000..0xf000 {
+            put(&mut place, Tag(0x29, n), VR::LO, "x");
+        }
+        let mut shared = InMemDicomObject::new_empty();
+        shared.put(sequence(tags::PLANE_POSITION_SEQUENCE, vec![place]));
+        o.put(sequence(
+            tags::SHARED_FUNCTIONAL_GROUPS_SEQUENCE,
+            vec![shared],
+        ));
+        let empty = vec![InMemDicomObject::new_empty(); 20_000];
+        o.put(sequence(tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE, empty));
+    };
+    SliceSpec {
+        change,
+        ..slice(0.0)
+    }
+    .write(&path);
+    let start = std::time::Instant::now();
+    let error = read(&path).unwrap_err();
+    assert!(matches!(error, ReadError::PixelCount { .. }), "{error}");
+    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
+}
+
 #[test]
 fn slices_beside_the_line_and_endless_gaps_are_told() {
     let folder = tempfile::tempdir().unwrap();
