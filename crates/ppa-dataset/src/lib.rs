@@ -22,6 +22,7 @@ mod drawing;
 mod files;
 mod generate;
 mod job;
+pub mod labels;
 pub mod layout;
 mod manifest;
 mod merge;

@@ -1,0 +1,258 @@
+//! Tibia, fibula and talus as smooth bodies.
+
+use nalgebra::{Affine3, Point3, Vector3};
+use ppa_ct::Grid;
+use serde::{Deserialize, Serialize};
+
+/// A bone of the ankle joint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AnkleBone {
+    /// Shin bone, with plafond and medial malleolus.
+    Tibia,
+    /// Calf bone, with the lateral malleolus.
+    Fibula,
+    /// Ankle bone, with the trochlea.
+    Talus,
+}
+
+impl AnkleBone {
+    /// All three.
+    pub const ALL: [Self; 3] = [Self::Tibia, Self::Fibula, Self::Talus];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Tibia => "tibia",
+            Self::Fibula => "fibula",
+            Self::Talus => "talus",
+        }
+    }
+}
+
+/// Which label stands for which bone; the defaults are those of `ppa ct phantom --labels`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BoneNumbers {
+    /// Label of the tibia.
+    pub tibia: u8,
+    /// Label of the fibula.
+    pub fibula: u8,
+    /// Label of the talus.
+    pub talus: u8,
+}
+
+impl Default for BoneNumbers {
+    fn default() -> Self {
+        Self {
+            tibia: 3,
+            fibula: 4,
+            talus: 1,
+        }
+    }
+}
+
+impl BoneNumbers {
+    fn of(&self, bone: AnkleBone) -> u8 {
+        match bone {
+            AnkleBone::Tibia => self.tibia,
+            AnkleBone::Fibula => self.fibula,
+            AnkleBone::Talus => self.talus,
+        }
+    }
+}
+
+/// Why labels do not give the bones of an ankle.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BonesError {
+    /// Labels and lattice disagree.
+    #[error("{found} labels, expected {expected}, one per voxel")]
+    Count {
+        /// Labels.
+        found: usize,
+        /// Voxels.
+        expected: usize,
+    },
+    /// A bone is missing near the joint.
+    #[error("no voxel of the {bone} (label {label}) lies within {reach_mm} mm of the joint")]
+    Missing {
+        /// The bone.
+        bone: &'static str,
+        /// Its label.
+        label: u8,
+        /// How far was looked.
+        reach_mm: f64,
+    },
+}
+
+/// Half the side of the box around the joint that is looked at, mm: the whole talus and both malleoli.
+const REACH_MM: f64 = 60.0;
+/// Blur of the labels, voxels: it turns their stairs into surfaces good to about a tenth of a voxel.
+const BLUR_VOXELS: f64 = 0.8;
+
+/// The bones around an ankle: blurred indicators whose level 1/2 is the surface.
+#[derive(Debug, Clone)]
+pub struct AnkleBones {
+    size: [usize; 3],
+    voxel_from_ct: Affine3<f64>,
+    ct_from_voxel: Affine3<f64>,
+    spacing_mm: Vector3<f64>,
+    /// Tibia, fibula, talus.
+    bodies: [Vec<f32>; 3],
+    /// Every bone.
+    skeleton: Vec<f32>,
+}
+
+impl AnkleBones {
+    /// The bones within 60 mm of the joint, from one label per voxel, i fastest; 0 is no bone.
+    ///
+    /// # Errors
+    /// [`BonesError`] when a label is missing near the joint, or their number is not the lattice's.
+    pub fn new(
+        grid: &Grid,
+        labels: &[u8],
+        numbers: BoneNumbers,
+        joint: &Point3<f64>,
+    ) -> Result<Self, BonesError> {
+        if labels.len() != grid.len() {
+            return Err(BonesError::Count {
+                found: labels.len(),
+                expected: grid.len(),
+            });
+        }
+        let (low, size) = box_around(grid, joint);
+        let indicator = |holds: &dyn Fn(u8) -> bool| -> Vec<f32> {
+            let mut values = Vec::with_capacity(size.iter().product());
+            for k in low[2]..low[2] + size[2] {
+                for j in low[1]..low[1] + size[1] {
+                    let row = grid.index([low[0], j, k]);
+                    let row = &labels[row..row + size[0]];
+                    values.extend(row.iter().map(|&l| f32::from(u8::from(holds(l)))));
+                }
+            }
+            values
+        };
+        for bone in AnkleBone::ALL {
+            let label = numbers.of(bone);
+            if !indicator(&|l| l == label).contains(&1.0) {
+                return Err(BonesError::Missing {
+                    bone: bone.name(),
+                    label,
+                    reach_mm: REACH_MM,
+                });
+            }
+        }
+        let shift = nalgebra::Translation3::new(low[0] as f64, low[1] as f64, low[2] as f64);
+        let ct_from_voxel = grid.ct_from_voxel() * shift;
+        let blurred = |holds: &dyn Fn(u8) -> bool| blur(indicator(holds), size);
+        Ok(Self {
+            size,
+            voxel_from_ct: ct_from_voxel.inverse(),
+            ct_from_voxel,
+            spacing_mm: grid.spacing_mm(),
+            bodies: AnkleBone::ALL.map(|bone| blurred(&|l| l == numbers.of(bone))),
+            skeleton: blurred(&|l| l != 0),
+        })
+    }
+
+    pub(super) fn size(&self) -> [usize; 3] {
+        self.size
+    }
+
+    /// The longest side of a voxel, mm.
+    pub(super) fn coarseness_mm(&self) -> f64 {
+        self.spacing_mm.max()
+    }
+
+    pub(super) fn voxel(&self, p: &Point3<f64>) -> Point3<f64> {
+        self.voxel_from_ct * p
+    }
+
+    pub(super) fn voxel_vector(&self, v: &Vector3<f64>) -> Vector3<f64> {
+        self.voxel_from_ct * v
+    }
+
+    pub(super) fn centre(&self, voxel: [usize; 3]) -> Point3<f64> {
+        self.ct_from_voxel * Point3::from(voxel.map(|v| v as f64))
+    }
+
+    pub(super) fn body(&self, bone: AnkleBone) -> &[f32] {
+        &self.bodies[bone as usize]
+    }
+
+    pub(super) fn skeleton(&self) -> &[f32] {
+        &self.skeleton
+    }
+
+    /// Trilinear value of a body at voxel coordinates; 0 outside the box.
+    pub(super) fn at(&self, body: &[f32], voxel: &Point3<f64>) -> f32 {
+        let [nx, ny, nz] = self.size;
+        let (x, y, z) = (voxel.x, voxel.y, voxel.z);
+        let inside = |v: f64, n: usize| v >= 0.0 && v < (n - 1) as f64;
+        if !(inside(x, nx) && inside(y, ny) && inside(z, nz)) {
+            return 0.0;
+        }
+        let (i, j, k) = (x as usize, y as usize, z as usize);
+        let (fx, fy, fz) = (
+            (x - i as f64) as f32,
+            (y - j as f64) as f32,
+            (z - k as f64) as f32,
+        );
+        let first = (k * ny + j) * nx + i;
+        let mix = |a: f32, b: f32, t: f32| a + t * (b - a);
+        let along = |at: usize| mix(body[at], body[at + 1], fx);
+        let face = |at: usize| mix(along(at), along(at + nx), fy);
+        mix(face(first), face(first + nx * ny), fz)
+    }
+
+    /// Outward unit normal of a body in the `ct` frame, from central differences half a voxel apart; `None` where the body
+    /// has no slope.
+    pub(super) fn normal(&self, body: &[f32], p: &Point3<f64>) -> Option<Vector3<f64>> {
+        let step = 0.5 * self.spacing_mm.min();
+        let value = |offset: Vector3<f64>| f64::from(self.at(body, &self.voxel(&(p + offset))));
+        let slope = Vector3::from_fn(|axis, _| {
+            let offset = Vector3::ith(axis, step);
+            value(-offset) - value(offset)
+        });
+        slope.try_normalize(1e-6)
+    }
+}
+
+/// First voxel and size of the box around the joint, cut to the lattice; at least 2 voxels along each axis where there
+/// are as many.
+fn box_around(grid: &Grid, joint: &Point3<f64>) -> ([usize; 3], [usize; 3]) {
+    let centre = grid.voxel_from_ct() * joint;
+    let spacing = grid.spacing_mm();
+    let (mut low, mut size) = ([0; 3], [0; 3]);
+    for axis in 0..3 {
+        let reach = REACH_MM / spacing[axis];
+        let last = (grid.size()[axis] - 1) as f64;
+        let from = (centre[axis] - reach).floor().clamp(0.0, last) as usize;
+        let to = (centre[axis] + reach).ceil().clamp(0.0, last) as usize;
+        low[axis] = from;
+        size[axis] = to - from + 1;
+    }
+    (low, size)
+}
+
+/// Gaussian blur along the three axes; beyond the box its border goes on.
+fn blur(mut values: Vec<f32>, size: [usize; 3]) -> Vec<f32> {
+    const REACH: isize = 3;
+    let weight = |d: isize| (-0.5 * (d as f64 / BLUR_VOXELS).powi(2)).exp();
+    let sum: f64 = (-REACH..=REACH).map(weight).sum();
+    let weights: Vec<f32> = (-REACH..=REACH).map(|d| (weight(d) / sum) as f32).collect();
+    let strides = [1, size[0], size[0] * size[1]];
+    for axis in 0..3 {
+        let (n, stride) = (size[axis] as isize, strides[axis]);
+        let source = values.clone();
+        for (index, value) in values.iter_mut().enumerate() {
+            let at = (index / stride) as isize % n;
+            let start = index - at as usize * stride;
+            *value = (-REACH..=REACH)
+                .zip(&weights)
+                .map(|(d, w)| w * source[start + (at + d).clamp(0, n - 1) as usize * stride])
+                .sum();
+        }
+    }
+    values
+}
