@@ -4,6 +4,7 @@ pub mod ct;
 pub mod demo;
 pub mod depth;
 pub mod generate;
+pub mod label;
 pub mod merge;
 pub mod mesh;
 pub mod metrics;

@@ -6,6 +6,7 @@ mod coverage;
 mod depth;
 mod identity;
 mod json;
+mod labels;
 mod mcgpu;
 mod phantoms;
 mod planted_series;
