@@ -115,24 +115,28 @@ impl DicomFile {
 
     /// Reads `length` bytes from byte `at` of the file on, or of what it inflates to.
     fn read(&self, at: u64, length: u64, bytes: &mut Vec<u8>) -> Result<(), ReadError> {
-        let (path, io) = (&self.path, |error: std::io::Error| match error.kind() {
-            ErrorKind::UnexpectedEof => damaged(&self.path, Fault::Short),
-            _ => self.io(error),
-        });
-        // Sizes were compared with the header: nothing is asked for that it does not speak of.
-        bytes.resize(length as usize, 0);
+        let short = || damaged(&self.path, Fault::Short);
         if self.deflated_at.is_some() {
+            // Memory grows with what is there: how much that is nobody knows before.
             let mut stream = self.inflated()?;
+            bytes.clear();
             let skipped = std::io::copy(&mut (&mut stream).take(at), &mut std::io::sink());
-            let read = skipped.and_then(|_| stream.read_exact(bytes));
-            return read.map_err(|error| match error.kind() {
-                ErrorKind::UnexpectedEof => io(error),
-                _ => undeflatable(path, error),
-            });
+            let read = skipped.and_then(|_| stream.take(length).read_to_end(bytes));
+            let read = read.map_err(|error| undeflatable(&self.path, error))?;
+            return if read as u64 == length {
+                Ok(())
+            } else {
+                Err(short())
+            };
         }
-        let mut file = File::open(path).map_err(io)?;
-        file.seek(SeekFrom::Start(at)).map_err(io)?;
-        file.read_exact(bytes).map_err(io)
+        let mut file = File::open(&self.path).map_err(|e| self.io(e))?;
+        file.seek(SeekFrom::Start(at)).map_err(|e| self.io(e))?;
+        // The length was there when the header was read.
+        bytes.resize(length as usize, 0);
+        file.read_exact(bytes).map_err(|error| match error.kind() {
+            ErrorKind::UnexpectedEof => short(),
+            _ => self.io(error),
+        })
     }
 
     /// The data set of a deflated file, from its start.

@@ -17,6 +17,8 @@ use crate::error::ReadError;
 const META_AT: usize = 132;
 /// Headers are a few kilobytes long; longer ones are read in further steps.
 const FIRST_BYTES: u64 = 1 << 16;
+/// Deflate packs at most 1032 bytes into one (zlib technical details), so this refuses no right file.
+const INFLATES_AT_MOST: u64 = 1032;
 /// Longest header that a deflated file is inflated for.
 const LONGEST_DEFLATED: u64 = 1 << 26;
 
@@ -94,11 +96,13 @@ pub(in crate::dicom_series) fn open(path: &Path) -> Result<Opened, ReadError> {
     let at = start.value_at as u64;
     let rest = length.saturating_sub(at);
     let pixels = start.length.map(|length| length as u64);
-    // How much a deflated file holds is seen when its pixels are read; they are no fragments.
-    let whole = match pixels {
-        Some(pixels) => deflated || pixels <= rest,
-        None => !deflated,
+    // How much a deflated file holds is seen only when its pixels are read; they are no fragments.
+    let most = if deflated {
+        length.saturating_mul(INFLATES_AT_MOST)
+    } else {
+        rest
     };
+    let whole = pixels.map_or(!deflated, |pixels| pixels <= most);
     if !whole {
         return Err(damaged(Fault::Short));
     }
@@ -198,20 +202,24 @@ mod tests {
         assert_eq!((start.value_at, start.length), (many.len() + 12, Some(2)));
     }
 
+    fn deflated(path: &Path, data_set: &[u8]) {
+        let uid = b"\x02\0\x10\0UI\x16\x001.2.840.10008.1.2.1.99";
+        let mut file = [&[0; 128], &b"DICM"[..], uid].concat();
+        let mut encoder = DeflateEncoder::new(&mut file, Compression::fast());
+        encoder.write_all(data_set).unwrap();
+        encoder.finish().unwrap();
+        std::fs::write(path, &file).unwrap();
+    }
+
     /// Of a deflated file no more is inflated than its header, and then the pixels that this speaks of.
     #[test]
     fn a_deflated_file_is_inflated_as_far_as_its_header_asks() {
-        let uid = b"\x02\0\x10\0UI\x16\x001.2.840.10008.1.2.1.99";
-        let mut data_set = b"\xe0\x7f\x10\0OW\0\0\x04\0\0\0abcd".to_vec();
-        data_set.resize(1 << 26, 0);
-        let mut file = [&[0; 128], &b"DICM"[..], uid].concat();
-        let mut encoder = DeflateEncoder::new(&mut file, Compression::fast());
-        encoder.write_all(&data_set).unwrap();
-        encoder.finish().unwrap();
-        assert!(file.len() < 1 << 20);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("bomb");
-        std::fs::write(&path, &file).unwrap();
+        let mut data_set = b"\xe0\x7f\x10\0OW\0\0\x04\0\0\0abcd".to_vec();
+        data_set.resize(1 << 26, 0);
+        deflated(&path, &data_set);
+        assert!(path.metadata().unwrap().len() < 1 << 20);
         let opened = open(&path).unwrap();
         assert!(opened.bytes.len() < 1 << 17, "{} bytes", opened.bytes.len());
         assert_eq!(opened.file.pixel_bytes().unwrap(), 4);
@@ -221,5 +229,20 @@ mod tests {
         opened.file.hold().unwrap();
         opened.file.native(1, 2, &mut pixels).unwrap();
         assert_eq!(pixels, b"bc");
+    }
+
+    /// 2 GiB in a file of some hundred bytes are more than any deflate stream holds; a hundred thousand bytes are not.
+    #[test]
+    fn a_deflated_file_that_promises_what_it_does_not_hold_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("empty");
+        deflated(&path, b"\xe0\x7f\x10\0OW\0\0\0\0\0\x80ab");
+        assert!(open(&path).is_err());
+        deflated(&path, b"\xe0\x7f\x10\0OW\0\0\xa0\x86\x01\0ab");
+        let file = open(&path).unwrap().file;
+        let mut pixels = Vec::new();
+        assert!(file.native(0, 2, &mut pixels).is_ok());
+        assert!(file.native(0, 100_000, &mut pixels).is_err());
+        assert!(pixels.capacity() < 100_000 && file.hold().is_err());
     }
 }
