@@ -173,6 +173,20 @@ fn a_run_makes_only_what_is_missing_or_damaged() {
     );
 }
 
+/// What another plan leaves in the folder is that of a run into an empty one.
+#[test]
+fn images_of_an_earlier_plan_do_not_stay() {
+    let (edited, fresh) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    run(&plan(), edited.path(), 2);
+    let mut fewer = plan();
+    fewer.shapes.variants = vec![BodyShape::Orig];
+    run(&fewer, edited.path(), 2);
+    run(&fewer, fresh.path(), 2);
+    let (edited, fresh) = (contents(edited.path()), contents(fresh.path()));
+    let (edited, fresh) = (edited.iter(), fresh.iter());
+    assert!(edited.eq(fresh), "the folder still shows the earlier plan");
+}
+
 #[test]
 fn a_folder_of_something_else_is_refused() {
     let root = tempfile::tempdir().unwrap();

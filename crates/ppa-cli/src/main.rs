@@ -53,6 +53,8 @@ enum Command {
     /// Radiographs, spectra and materials
     #[command(subcommand)]
     Xray(commands::xray::XrayCommand),
+    /// Tell what the dataset of a plan will take, and whether it can be made
+    Plan(commands::plan::PlanArgs),
     /// Make, or go on with, the dataset of a plan
     Generate(commands::generate::GenerateArgs),
     /// Tell how far a dataset has come
@@ -86,6 +88,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Scene(command) => commands::scene::run(&command, output),
         Command::Depth(command) => commands::depth::run(&command, output),
         Command::Xray(command) => commands::xray::run(&command, output),
+        Command::Plan(args) => commands::plan::run(&args, output),
         Command::Generate(args) => commands::generate::run(&args, output),
         Command::Status(args) => commands::status::run(&args, output),
         Command::Merge(args) => commands::merge::run(&args, output),

@@ -55,6 +55,16 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     write().map_err(FileError::at("write", path))
 }
 
+/// Removes a file that may not be there.
+pub(crate) fn remove_if_there(path: &Path) -> Result<(), FileError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(FileError::at("remove", path)(error))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// What a file at `path` is to hold, as TOML; refuses paths that are not UTF-8.
 pub(crate) fn to_toml<T: Serialize>(value: &T, path: &Path) -> Result<String, FileError> {
     toml::to_string(value).map_err(|e| FileError::at("write", path)(io::Error::other(e)))

@@ -9,10 +9,11 @@ use ppa_xray::Part;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::body_shape::BodyShape;
 use crate::claim::{FolderError, claim};
 use crate::description::DESCRIPTION_FILE;
-use crate::files::{FileError, write_whole};
-use crate::layout::LimbId;
+use crate::files::{FileError, remove_if_there, write_whole};
+use crate::layout::{LimbId, View};
 use crate::manifest::{FileKind, Manifest, RoiFile};
 use crate::part_file::write_part;
 use crate::record::{Record, Unit};
@@ -144,6 +145,7 @@ impl Job<'_> {
             if missing.is_empty() {
                 continue;
             }
+            self.make_room(limb, &missing).map_err(JobError::from)?;
             let make = prepare(limb)?;
             missing
                 .par_iter()
@@ -174,6 +176,24 @@ impl Job<'_> {
         poses.filter_map(|pose| lacks(pose).transpose()).collect()
     }
 
+    /// Removes what stands in the place of poses that are to be made: the manifest, which would
+    /// list images that are gone, and the images that an earlier plan, code or kill left, of which
+    /// this plan may make fewer.
+    fn make_room(&self, limb: &LimbUnits, missing: &[PoseAngle]) -> Result<(), FileError> {
+        remove_if_there(&self.root.join(Manifest::FILE))?;
+        remove_if_there(&self.root.join(limb.limb.roi_file()))?;
+        for &pose in missing {
+            for shape in BodyShape::ALL {
+                for view in View::ALL {
+                    remove_if_there(&self.root.join(limb.limb.depth(shape, view, pose.step)))?;
+                }
+            }
+            remove_if_there(&self.root.join(limb.limb.radiograph_png(pose.step)))?;
+            remove_if_there(&self.root.join(limb.limb.radiograph_exr(pose.step)))?;
+        }
+        Ok(())
+    }
+
     fn make<E: From<JobError>>(
         &self,
         unit: &Unit,
@@ -200,8 +220,7 @@ impl Job<'_> {
         {
             used.fetch_sub(size, Ordering::Relaxed);
             for row in &record.files {
-                let path = self.root.join(&row.file);
-                std::fs::remove_file(&path).map_err(FileError::at("remove", &path))?;
+                remove_if_there(&self.root.join(&row.file))?;
             }
             return Err(JobError::DiskLimit {
                 root: self.root.to_owned(),

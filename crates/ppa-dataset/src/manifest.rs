@@ -57,6 +57,28 @@ pub struct FileRow {
     pub seed: Option<u64>,
 }
 
+impl FileRow {
+    /// Whether the row fits the layout: its angle on the grid, its file where such an image lies.
+    fn check(&self) -> Result<(), String> {
+        let (step, angle) = (self.step, self.angle_deg);
+        if angle != f64::from(step) / 2.0 {
+            return Err(format!(
+                "the angle is {angle} degrees, expected half of step {step}"
+            ));
+        }
+        let expected = match (self.kind, self.camera) {
+            (FileKind::Depth, Some(view)) => self.limb.depth(self.shape, view, step),
+            (FileKind::Depth, None) => return Err("a depth image without a camera".to_owned()),
+            (FileKind::Radiograph, _) => self.limb.radiograph_png(step),
+            (FileKind::RadiographTallies, _) => self.limb.radiograph_exr(step),
+        };
+        if self.file != expected {
+            return Err(format!("the file is {}, expected {expected}", self.file));
+        }
+        Ok(())
+    }
+}
+
 /// Region of interest of a depth image, as published: pixels from the top left corner.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RoiRow {
@@ -95,13 +117,16 @@ impl Manifest {
     pub fn read(root: &Path) -> Result<Self, FileError> {
         let path = root.join(Self::FILE);
         let text = read_text(&path)?;
-        let rows = text
-            .lines()
-            .map(serde_json::from_str)
-            .collect::<Result<_, _>>();
+        let row = |(i, line)| {
+            let row: FileRow =
+                serde_json::from_str(line).map_err(|e| format!("line {}: {e}", i + 1))?;
+            row.check().map_err(|e| format!("line {}: {e}", i + 1))?;
+            Ok::<_, String>(row)
+        };
+        let rows = text.lines().enumerate().map(row).collect::<Result<_, _>>();
         Ok(Self {
             root: root.to_owned(),
-            files: rows.map_err(|e| FileError::at("parse", &path)(e.into()))?,
+            files: rows.map_err(|e| FileError::at("parse", &path)(std::io::Error::other(e)))?,
         })
     }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use ppa_xray::Part;
 
-use crate::files::{FileError, write_whole};
+use crate::files::{FileError, remove_if_there, write_whole};
 use crate::record::FOLDER;
 
 fn path(root: &Path) -> PathBuf {
@@ -18,12 +18,7 @@ pub(crate) fn write_part(root: &Path, part: Part) -> Result<(), FileError> {
     if part != Part::WHOLE {
         return write_whole(&path, part.to_string().as_bytes());
     }
-    match fs::remove_file(&path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => {
-            Err(FileError::at("remove", &path)(error))
-        }
-        _ => Ok(()),
-    }
+    remove_if_there(&path)
 }
 
 pub(crate) fn read_part(root: &Path) -> Result<Part, FileError> {

@@ -50,21 +50,27 @@ pub fn run(args: &GenerateArgs, output: Output) -> anyhow::Result<()> {
     };
     let out = match &args.out {
         Some(out) => out.clone(),
-        None if settings.part == Part::WHOLE => args.plan.with_extension(""),
+        None if settings.part == Part::WHOLE => dataset_folder(&args.plan)?,
         None => {
-            let mut folder = args.plan.with_extension("").into_os_string();
+            let mut folder = dataset_folder(&args.plan)?.into_os_string();
             folder.push(format!("_{}", settings.part).replace('/', "_of_"));
             folder.into()
         }
     };
-    anyhow::ensure!(
-        out != args.plan,
-        "{} has no extension: name a folder with --out",
-        out.display()
-    );
     let watch = args.progress.watch("poses", output);
     let summary = with_progress(&plan, &out, &settings, &watch)?;
     output.print(&summary, |s| describe(s, &out))
+}
+
+/// The folder beside a plan that is named after it.
+pub fn dataset_folder(plan: &Path) -> anyhow::Result<PathBuf> {
+    let folder = plan.with_extension("");
+    anyhow::ensure!(
+        folder != plan,
+        "{} has no extension: name a folder with --out",
+        plan.display()
+    );
+    Ok(folder)
 }
 
 /// Generates and tells how far it has come.

@@ -8,6 +8,7 @@ pub mod label;
 pub mod merge;
 pub mod mesh;
 pub mod metrics;
+pub mod plan;
 pub mod prepare;
 pub mod scene;
 pub mod stats;

@@ -4,6 +4,7 @@ mod bad_input;
 mod conversion;
 mod coverage;
 mod depth;
+mod faults;
 mod identity;
 mod json;
 mod labels;

@@ -272,3 +272,88 @@ fn images_stay_below_the_disk_limit() {
     succeed(folder.path(), &format!("generate {plan} --out data"));
     assert!(contents(&folder.path().join("data")) == contents(&whole().join("whole")));
 }
+
+/// Until a run has mended what is missing, no manifest tells that the dataset is whole.
+#[test]
+fn a_broken_run_over_a_finished_dataset_leaves_no_manifest() {
+    let folder = copy();
+    let root = folder.path().join("plan");
+    fs::remove_file(root.join("patient_3/xray/r/xray_image_0.png")).unwrap();
+    // A folder where an image belongs cannot be written over.
+    fs::create_dir(root.join("patient_3/xray/r/xray_image_0.png")).unwrap();
+    let said = fail(folder.path(), "generate plan.toml --progress quiet");
+    assert!(said.contains("xray_image_0.png"), "{said}");
+    assert!(!root.join("manifest.jsonl").exists());
+    fs::remove_dir(root.join("patient_3/xray/r/xray_image_0.png")).unwrap();
+    succeed(folder.path(), "generate plan.toml");
+    assert!(contents(&root) == contents(&whole().join("whole")));
+}
+
+#[test]
+fn a_plan_tells_what_it_takes_or_why_it_cannot_work() {
+    let folder = tempfile::tempdir().unwrap();
+    write_quick_plan(folder.path());
+    let said = succeed(folder.path(), "plan plan.toml --fraction 0.4 --json");
+    let told: Value = serde_json::from_str(&said).unwrap();
+    let counts = ["limbs", "units", "depth_images", "radiographs", "measured"];
+    assert_eq!(
+        counts.map(|key| told[key].as_u64().unwrap()),
+        [1, 5, 20, 5, 2]
+    );
+    let number = |key: &str| told[key].as_f64().unwrap();
+    let expected = (number("cpu_s_per_limb") + 5.0 * number("cpu_s_per_unit")) / 3600.0;
+    assert!(
+        (number("cpu_hours") / expected - 1.0).abs() < 1e-9,
+        "{told}"
+    );
+    assert_eq!(
+        crate::names(folder.path()),
+        ["plan.toml"],
+        "nothing was made"
+    );
+    let made: usize = contents(&whole().join("whole"))
+        .iter()
+        .filter(|(name, _)| name.extension().is_some_and(|e| e == "png" || e == "exr"))
+        .map(|(_, bytes)| bytes.len())
+        .sum();
+    let ratio = number("bytes") / made as f64;
+    assert!((0.95..1.05).contains(&ratio), "forecast over made: {ratio}");
+
+    let text = fs::read_to_string(folder.path().join("plan.toml")).unwrap();
+    for (from, to, words) in [
+        ("p01.toml", "p02.toml", ["cannot read", "p02.toml"]),
+        ("half_length_mm = 20.0", "kvp = 500.0", ["500", "kV"]),
+        (
+            "to_deg = 10.0",
+            "to_deg = 10.2",
+            ["to_deg is 10.2", "multiple of 0.5"],
+        ),
+        ("columns = 8", "columns = 0", ["detector", "0"]),
+    ] {
+        assert!(text.contains(from));
+        fs::write(folder.path().join("bad.toml"), text.replace(from, to)).unwrap();
+        let said = fail(folder.path(), "plan bad.toml");
+        for word in words {
+            assert!(said.contains(word), "{said}");
+        }
+    }
+}
+
+#[test]
+fn one_scan_under_two_numbers_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    write_quick_plan(folder.path());
+    let text = fs::read_to_string(folder.path().join("plan.toml")).unwrap();
+    let case = &text[text.find("[[case]]").unwrap()..text.find("[rotation]").unwrap()];
+    for (patient, words) in [
+        ("4", "same scan, but are patients 3 and 4"),
+        ("3", "both the r limb of patient 3"),
+    ] {
+        let again = case.replace("patient = 3", &format!("patient = {patient}"));
+        let twice = text.replace("[rotation]", &format!("{again}[rotation]"));
+        fs::write(folder.path().join("twice.toml"), twice).unwrap();
+        let said = fail(folder.path(), "generate twice.toml --out data");
+        assert!(said.contains(words), "{said}");
+        assert!(!folder.path().join("data").exists());
+    }
+}

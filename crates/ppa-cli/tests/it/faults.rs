@@ -1,0 +1,156 @@
+//! Runs that are killed or cannot write, over and over, end in the dataset of an undisturbed run.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use crate::shards::write_quick_plan;
+use crate::{contents, ppa, succeed};
+
+/// Marsaglia's xorshift: which moments are tried stays the same from run to run.
+struct Moments(u64);
+
+impl Moments {
+    fn below(&mut self, limit: u64) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0 % limit
+    }
+}
+
+/// Kills a run (SIGKILL) after a while; whether it was still at work.
+fn kill_after(folder: &Path, arguments: &str, wait: Duration) -> bool {
+    let mut command = ppa(folder, arguments);
+    let mut run = command
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(wait);
+    let at_work = run.try_wait().unwrap().is_none();
+    run.kill().unwrap();
+    run.wait().unwrap();
+    at_work
+}
+
+/// Runs `arguments` where no file may grow beyond `kilobytes`, as on a disk that refuses writes.
+fn run_with_small_files(folder: &Path, arguments: &str, kilobytes: u64) -> std::process::Output {
+    // A write beyond the limit fails instead of killing the process, since the signal is ignored.
+    let script = format!("trap '' XFSZ; ulimit -f {kilobytes}; exec \"$0\" {arguments}");
+    Command::new("bash")
+        .args(["-c", &script, env!("CARGO_BIN_EXE_ppa")])
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+/// Removes one image that is there, so that a finished dataset gives the next run work.
+fn lose_an_image(root: &Path, moments: &mut Moments) {
+    if !root.exists() {
+        return; // killed before it began
+    }
+    let images = contents(root);
+    let images: Vec<_> = images
+        .keys()
+        .filter(|name| name.starts_with("patient_3"))
+        .collect();
+    if !images.is_empty() {
+        let image = images[moments.below(images.len() as u64) as usize];
+        fs::remove_file(root.join(image)).unwrap();
+    }
+}
+
+/// Images that a record vouches for have the recorded hash, whenever the run was killed; those
+/// that are gone are made again.
+fn assert_records_are_true(root: &Path) {
+    let Ok(records) = fs::read_dir(root.join(".ppa")) else {
+        return;
+    };
+    for record in records.map(|entry| entry.unwrap().path()) {
+        let name = record.file_name().unwrap().to_string_lossy().into_owned();
+        if !name.starts_with("patient") {
+            continue;
+        }
+        let record: serde_json::Value =
+            serde_json::from_slice(&fs::read(&record).unwrap()).unwrap();
+        for row in record["files"].as_array().unwrap() {
+            let path = root.join(row["file"].as_str().unwrap());
+            if path.exists() {
+                let found = ppa_dataset::sha256_of_file(&path).unwrap();
+                assert_eq!(found, row["sha256"].as_str().unwrap(), "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+#[ignore = "takes some two minutes of processor time"]
+fn fifty_kills_and_refused_writes_change_no_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_quick_plan(here);
+    succeed(here, "generate plan.toml --out whole --progress quiet");
+    let expected = contents(&here.join("whole"));
+    let run = "generate plan.toml --out data --progress quiet";
+    let root = here.join("data");
+
+    let mut moments = Moments(0x9E37_79B9_7F4A_7C15);
+    let (mut kills, mut refusals) = (0, 0);
+    while kills < 50 {
+        let wait = Duration::from_millis(moments.below(1500));
+        if kill_after(here, run, wait) {
+            kills += 1;
+            assert_records_are_true(&root);
+        } else {
+            lose_an_image(&root, &mut moments);
+        }
+        if kills % 5 == 0 {
+            lose_an_image(&root, &mut moments);
+            let output = run_with_small_files(here, run, moments.below(40));
+            let said = String::from_utf8(output.stderr).unwrap();
+            if !output.status.success() {
+                refusals += 1;
+                assert!(
+                    said.contains("cannot write") && said.contains("large"),
+                    "{said}"
+                );
+                assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+            }
+            assert_records_are_true(&root);
+        }
+    }
+    assert!(refusals > 0, "some writes were refused");
+    succeed(here, run);
+    assert!(contents(&root) == expected);
+}
+
+/// Merging is nearly all reading and writing, so a kill often meets it at work on a file.
+#[test]
+fn a_merge_that_is_killed_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_quick_plan(here);
+    succeed(
+        here,
+        "generate plan.toml --shard 1/1 --out shard --progress quiet",
+    );
+    let expected = contents(&here.join("shard"));
+    let mut moments = Moments(7);
+    let mut kills = 0;
+    for _ in 0..60 {
+        let wait = Duration::from_micros(moments.below(60_000));
+        kills += u32::from(kill_after(here, "merge shard --out merged", wait));
+        assert_records_are_true(&here.join("merged"));
+        if moments.below(3) == 0 {
+            lose_an_image(&here.join("merged"), &mut moments);
+        }
+    }
+    assert!(
+        kills > 10,
+        "{kills} of 60 merges were at work when they were killed"
+    );
+    succeed(here, "merge shard --out merged --verify");
+    assert!(contents(&here.join("merged")) == expected);
+}
