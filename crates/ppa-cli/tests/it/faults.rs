@@ -86,7 +86,6 @@ fn assert_records_are_true(root: &Path) {
 }
 
 #[test]
-#[ignore = "takes some two minutes of processor time"]
 fn fifty_kills_and_refused_writes_change_no_byte() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
