@@ -1,10 +1,10 @@
 //! What the sensor model makes of scenes whose answer can be derived.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3};
 use ppa_depth::{
-    Backdrop, Body, Camera, CameraModel, CameraSpec, DepthError, DepthImage, DepthMode, FieldMask,
-    Invalidation, MeshBody, MixedPixels, Multipath, PlacedBody, RandomError, SampledImage, Sensor,
-    SensorError, SensorSpec, SystematicError, Tremor,
+    Backdrop, Body, Camera, CameraModel, CameraSpec, DepthError, DepthMode, FieldMask,
+    Invalidation, MeshBody, Multipath, PlacedBody, RandomError, SampledImage, Sensor, SensorError,
+    SensorSpec, SystematicError,
 };
 
 use crate::shapes::sphere;
@@ -188,55 +188,6 @@ fn the_fixed_pattern_stays_with_the_pixel() {
     assert!((beside / n / 9.0).abs() < 4.0 / n.sqrt());
 }
 
-/// A near wall covers a known share of one column of pixels; the phasors of both walls then give the range.
-#[test]
-fn a_pixel_that_sees_two_walls_has_the_phase_of_their_light() {
-    let camera = Camera::try_from(pinhole(101, 1000.0)).unwrap();
-    let (near, far, megahertz) = (1000.0_f64, 1200.0_f64, 200.0);
-    // The edge lies 1/4 pixel left of the middle of column 60: a quarter of its width (2 of 8 columns of samples) is near.
-    let edge = (60.0 - 50.0 - 0.25) * near / 1000.0;
-    let seen = view(
-        &camera,
-        &[&wall(-9e3, 9e3, far as f32)],
-        &wall(-9e3, edge as f32, near as f32),
-    );
-    let mixing = SensorSpec {
-        mixed: Some(MixedPixels {
-            modulation_mhz: megahertz,
-        }),
-        ..NONE
-    };
-    let image = sensor(mixing.clone()).observe(&camera, &seen, 1, 0);
-    let at = |image: &DepthImage, column: usize| f64::from(image.z_mm[50 * 101 + column]);
-    assert!((at(&image, 58) - near).abs() < 0.05 && (at(&image, 62) - far).abs() < 0.05);
-    let length = (1.0 + (10.0_f64 / 1000.0).powi(2)).sqrt();
-    let phase = 4.0 * std::f64::consts::PI * megahertz / 299_792.458;
-    let (a, b) = (0.25 / near.powi(2), 0.75 / far.powi(2));
-    let turn = phase * (far - near) * length;
-    let range = near * length + (b * turn.sin()).atan2(a + b * turn.cos()) / phase;
-    assert!(
-        (at(&image, 60) - range / length).abs() < 0.1,
-        "{} {}",
-        at(&image, 60),
-        range / length
-    );
-    // Its contrast decides whether it is given up.
-    let contrast = (a + b * turn.cos()).hypot(b * turn.sin()) / (a + b);
-    for (limit, given_up) in [(contrast - 0.005, false), (contrast + 0.005, true)] {
-        let spec = SensorSpec {
-            invalid: Some(Invalidation {
-                min_signal: 0.0,
-                max_angle_deg: 90.0,
-                min_contrast: limit,
-            }),
-            ..mixing.clone()
-        };
-        let image = sensor(spec).observe(&camera, &seen, 1, 0);
-        assert_eq!(at(&image, 60) == 0.0, given_up);
-        assert!(at(&image, 58) > 0.0 && at(&image, 62) > 0.0);
-    }
-}
-
 #[test]
 fn dim_and_oblique_pixels_are_given_up() {
     let camera = Camera::try_from(pinhole(101, 50.0)).unwrap();
@@ -300,30 +251,6 @@ fn one_bounce_inside_a_sphere_lengthens_the_range_as_derived() {
 }
 
 #[test]
-fn a_tremor_keeps_its_size_and_its_memory() {
-    let tremor = Tremor {
-        shift_mm: 0.7,
-        turn_deg: 0.2,
-        correlation_frames: 6.0,
-    };
-    let pivot = Point3::new(10.0, -20.0, 900.0);
-    let moved = |frame: u64| tremor.motion(&pivot, 11, frame) * pivot - pivot;
-    let n = 6000;
-    let path: Vec<Vector3<f64>> = (0..n).map(moved).collect();
-    let mean = |lag: usize| {
-        let pairs = path.iter().zip(&path[lag..]).map(|(a, b)| a.dot(b) / 3.0);
-        pairs.sum::<f64>() / (path.len() - lag) as f64
-    };
-    // Some 6000 / 15 independent values on three axes: standard error √(2 / 1200) = 4 %.
-    let variance = mean(0);
-    assert!((variance / 0.49 - 1.0).abs() < 0.16, "{variance}");
-    assert!((mean(6) / 0.49 - (-1.0_f64).exp()).abs() < 0.16);
-    assert_eq!(moved(17), path[17]);
-    let turned = tremor.motion(&pivot, 11, 5).rotation.angle().to_degrees();
-    assert!(0.0 < turned && turned < 1.2);
-}
-
-#[test]
 fn what_is_hidden_by_the_backdrop_is_refused() {
     let camera = Camera::try_from(pinhole(20, 50.0)).unwrap();
     let placed = |body| PlacedBody {
@@ -338,26 +265,6 @@ fn what_is_hidden_by_the_backdrop_is_refused() {
     ));
     let backdrop = Backdrop::new(&camera, &[placed(&far)]);
     assert!(backdrop.before(&camera, &[placed(&near)]).is_ok());
-}
-
-#[test]
-fn numbers_that_make_no_tremor_are_named() {
-    let tremor = |shift_mm, turn_deg, correlation_frames| {
-        let tremor = Tremor {
-            shift_mm,
-            turn_deg,
-            correlation_frames,
-        };
-        match tremor.check() {
-            Ok(()) => "",
-            Err(SensorError::Parameter { name, .. }) => name,
-            Err(_) => unreachable!(),
-        }
-    };
-    assert_eq!(tremor(0.5, 0.1, 10.0), "");
-    assert_eq!(tremor(f64::NAN, 0.1, 10.0), "tremor.shift_mm");
-    assert_eq!(tremor(0.5, -1.0, 10.0), "tremor.turn_deg");
-    assert_eq!(tremor(0.5, 0.1, 1e6), "tremor.correlation_frames");
 }
 
 #[test]
