@@ -79,6 +79,7 @@ mod depth_buffer;
 mod optics;
 mod raster;
 mod render;
+mod sample_raster;
 mod single_lens;
 mod triangle;
 

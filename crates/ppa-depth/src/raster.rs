@@ -5,6 +5,7 @@
 //! although they bow in the image.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Vector2, Vector3};
 use rayon::prelude::*;
@@ -13,20 +14,16 @@ use crate::camera::Camera;
 use crate::depth_buffer::DepthBuffer;
 use crate::mesh_body::MeshBody;
 use crate::optics::Optics;
-use crate::sampled::{SAMPLES, Sites};
-use crate::single_lens::{Corner, SingleLens};
+use crate::single_lens::{Corner, LANES, Motion, SingleLens};
 use crate::triangle::Triangle;
 
 /// Relative error of a projection in single precision, some 20 roundings.
 const ROUNDING: f32 = 1e-5;
 /// Triangles or corners that a thread takes at a time.
-const CHUNK: usize = 1 << 14;
-
-/// How far the rays of samples may lie beside their place in the image, pixels.
-const SAMPLE_SLACK_PX: f32 = 0.005;
+pub(crate) const CHUNK: usize = 1 << 14;
 
 /// Where in the image a triangle may be.
-enum Outline {
+pub(crate) enum Outline {
     /// Anywhere: it reaches behind the camera or far outside the image.
     Unknown,
     /// Within some columns and rows, and `slack` pixels around its straight edges.
@@ -37,6 +34,8 @@ enum Outline {
         rows: Range<u32>,
         /// Smallest and largest column of its corners.
         across: [f32; 2],
+        /// No part of it is further from a corner along either axis, pixels.
+        extent: f32,
         /// No part of it is nearer than this, mm.
         nearest: f32,
     },
@@ -44,12 +43,14 @@ enum Outline {
 
 /// A mesh as the camera sees it.
 pub(crate) struct SeenMesh<'a> {
-    camera: &'a Camera,
+    pub(crate) camera: &'a Camera,
     optics: &'a Optics,
-    mesh: &'a MeshBody,
+    pub(crate) mesh: &'a MeshBody,
     rotation: Matrix3<f64>,
     translation: Vector3<f64>,
-    corners: Vec<Corner>,
+    pub(crate) corners: Vec<Corner>,
+    /// Largest extent of the triangles of each chunk in the image, known once they were drawn.
+    pub(crate) extents: OnceLock<Vec<f32>>,
     /// By which single precision may misplace a corner in space.
     rounding_mm: f32,
     /// By which it may misplace a corner in the image, on top of that.
@@ -66,14 +67,19 @@ impl<'a> SeenMesh<'a> {
         let rotation = camera_from_body.rotation.to_rotation_matrix().into_inner();
         let translation = camera_from_body.translation.vector;
         let lens = SingleLens::new(camera.spec(), optics.radius);
-        let (turn, shift) = (rotation.cast::<f32>(), translation.cast::<f32>());
+        let shift = translation.cast::<f32>();
+        let motion = Motion {
+            rotation: rotation.cast(),
+            translation: shift,
+        };
         let mut corners = vec![[0.0; 3]; mesh.vertices.len()];
         corners
             .par_chunks_mut(CHUNK)
             .zip(mesh.vertices.par_chunks(CHUNK))
             .for_each(|(corners, vertices)| {
-                for (corner, vertex) in corners.iter_mut().zip(vertices) {
-                    *corner = lens.corner(turn * vertex.coords + shift);
+                let blocks = corners.chunks_mut(LANES).zip(vertices.chunks(LANES));
+                for (corners, vertices) in blocks {
+                    lens.corners(&motion, vertices, corners);
                 }
             });
         Self {
@@ -83,6 +89,7 @@ impl<'a> SeenMesh<'a> {
             rotation,
             translation,
             corners,
+            extents: OnceLock::new(),
             rounding_mm: ROUNDING / 10.0 * (mesh.reach_mm + shift.amax()),
             rounding_px: ROUNDING * largest_pixel(camera, optics),
         }
@@ -90,25 +97,24 @@ impl<'a> SeenMesh<'a> {
 
     /// Offers the depth of every triangle at the centre of every pixel it covers.
     pub(crate) fn draw(&self, buffer: &DepthBuffer) {
-        self.mesh.triangles.par_chunks(CHUNK).for_each(|triangles| {
+        let chunks = self.mesh.triangles.par_chunks(CHUNK);
+        let extents = chunks.map(|triangles| {
+            let mut largest = 0.0;
             for triangle in triangles {
-                self.draw_triangle(triangle, buffer);
+                let extent = self.draw_triangle(triangle, buffer);
+                if extent > largest {
+                    largest = extent;
+                }
             }
+            largest
         });
-    }
-
-    /// Offers the depth of every triangle at all samples of the sites it covers.
-    pub(crate) fn draw_samples(&self, sites: &Sites) {
-        self.mesh.triangles.par_chunks(CHUNK).for_each(|triangles| {
-            for triangle in triangles {
-                self.sample_triangle(triangle, sites);
-            }
-        });
+        let extents = extents.collect();
+        self.extents.get_or_init(|| extents);
     }
 
     /// The part of the image that a triangle may cover, each pixel widened by `reach` on all sides.
     #[inline(always)] // a call per triangle would take as long as the work
-    fn outline(&self, triangle: &[u32; 3], reach: f32) -> Outline {
+    pub(crate) fn outline(&self, triangle: &[u32; 3], reach: f32) -> Outline {
         let corners @ [a, b, c] = triangle.map(|corner| self.corners[corner as usize]);
         if (a[2] + b[2] + c[2]).is_nan() {
             return Outline::Unknown;
@@ -126,28 +132,33 @@ impl<'a> SeenMesh<'a> {
             columns: centres(low[0] - wide, high[0] + wide, self.camera.width()),
             rows: centres(low[1] - wide, high[1] + wide, self.camera.height()),
             across: [low[0], high[0]],
+            extent: if du < dv { dv } else { du } + slack,
             nearest: low[2] * (1.0 - ROUNDING) - self.rounding_mm,
         }
     }
 
+    /// Returns how far in the image a part of the triangle may lie from a corner, pixels; ∞ if there is no telling.
     #[inline]
-    fn draw_triangle(&self, triangle: &[u32; 3], buffer: &DepthBuffer) {
+    fn draw_triangle(&self, triangle: &[u32; 3], buffer: &DepthBuffer) -> f32 {
         let Outline::Within {
             corners,
             slack,
             columns,
             rows,
+            extent,
             nearest,
             ..
         } = self.outline(triangle, 0.0)
         else {
             let rays = self.optics.rays.iter().enumerate();
-            return self.draw_anywhere(
-                triangle,
-                buffer,
-                rays.filter_map(|(i, ray)| Some((i, (*ray)?))),
-            );
+            let rays = rays.filter_map(|(i, ray)| Some((i, (*ray)?)));
+            self.draw_anywhere(triangle, buffer, rays);
+            return f32::INFINITY;
         };
+        // One branch, since most triangles hold no centre, but many a column or a row of centres.
+        if columns.is_empty() | rows.is_empty() {
+            return extent;
+        }
         let mut exact = None;
         for row in rows {
             for column in columns.clone() {
@@ -164,55 +175,11 @@ impl<'a> SeenMesh<'a> {
                 }
             }
         }
-    }
-
-    #[inline]
-    fn sample_triangle(&self, triangle: &[u32; 3], sites: &Sites) {
-        let Outline::Within {
-            corners,
-            slack,
-            columns,
-            rows,
-            across: [left, right],
-            nearest,
-        } = self.outline(triangle, 0.5)
-        else {
-            let all = sites.sites.iter().enumerate();
-            let rays = all.flat_map(|(i, site)| {
-                (0..SAMPLES).map(move |k| (i * SAMPLES + k, site.sample(k).1))
-            });
-            return self.draw_anywhere(triangle, &sites.buffer, rays);
-        };
-        // The rays of samples follow the lens to first order only.
-        let slack = slack + SAMPLE_SLACK_PX;
-        let mut exact = None;
-        for row in rows {
-            for column in columns.clone() {
-                let site = sites.of_pixel[(row * self.camera.width() + column) as usize];
-                let Some(seen) = sites.sites.get(site as usize) else {
-                    continue;
-                };
-                // Sample k lies in the k-th of equal columns of the pixel.
-                let place = |u: f32| (u - column as f32 + 0.5) * SAMPLES as f32 - 0.5;
-                let covered = centres(place(left - slack), place(right + slack), SAMPLES as u32);
-                for k in covered.map(|k| k as usize) {
-                    let index = site as usize * SAMPLES + k;
-                    let ([du, dv], ray) = seen.sample(k);
-                    let at = [column as f32 + du as f32, row as f32 + dv as f32];
-                    if sites.buffer.nearest(index) <= nearest || misses(corners, at, slack) {
-                        continue;
-                    }
-                    let exact = exact.get_or_insert_with(|| self.exact(triangle));
-                    if let Some(z_mm) = exact.depth(&ray) {
-                        sites.buffer.offer(index, z_mm as f32);
-                    }
-                }
-            }
-        }
+        extent
     }
 
     /// A triangle that cannot be projected as a whole, because it is large and reaches behind the camera or far outside.
-    fn draw_anywhere(
+    pub(crate) fn draw_anywhere(
         &self,
         triangle: &[u32; 3],
         buffer: &DepthBuffer,
@@ -242,7 +209,7 @@ impl<'a> SeenMesh<'a> {
         }
     }
 
-    fn exact(&self, triangle: &[u32; 3]) -> Triangle {
+    pub(crate) fn exact(&self, triangle: &[u32; 3]) -> Triangle {
         Triangle::new(triangle.map(|corner| self.in_camera(corner)))
     }
 
@@ -273,7 +240,7 @@ fn least(a: f32, b: f32) -> f32 {
 
 /// Whole numbers in [low, high] that are columns or rows of the image.
 #[inline]
-fn centres(low: f32, high: f32, count: u32) -> Range<u32> {
+pub(crate) fn centres(low: f32, high: f32, count: u32) -> Range<u32> {
     // Truncation is a single instruction where ceil and floor are calls.
     let low = low.max(0.0);
     let first = low as u32;
@@ -288,7 +255,7 @@ fn centres(low: f32, high: f32, count: u32) -> Range<u32> {
 
 /// Whether a point in the image is outside the triangle by more than the slack.
 #[inline]
-fn misses([a, b, c]: [Corner; 3], at: [f32; 2], slack: f32) -> bool {
+pub(crate) fn misses([a, b, c]: [Corner; 3], at: [f32; 2], slack: f32) -> bool {
     // Twice the area that the point spans with each edge, and the length of the edge (as a sum, which is no shorter).
     let span = |p: Corner, q: Corner| {
         let (du, dv) = (q[0] - p[0], q[1] - p[1]);

@@ -1,6 +1,6 @@
 //! Images with samples inside the pixels at edges, where a pixel sees two surfaces at once.
 
-use nalgebra::{Matrix2, Point3, Vector2};
+use nalgebra::{Matrix2, Point2, Point3, Vector2};
 
 use crate::body::PlacedBody;
 use crate::camera::Camera;
@@ -80,6 +80,9 @@ pub(crate) struct Sites {
     pub sites: Vec<Site>,
     /// Site of each pixel, `u32::MAX` for none.
     pub of_pixel: Vec<u32>,
+    /// Whether a site is at most a column and a row away.
+    near: Vec<bool>,
+    width: u32,
     pub buffer: DepthBuffer,
 }
 
@@ -93,11 +96,35 @@ impl Sites {
             of_pixel[site.pixel as usize] = index as u32;
         }
         let buffer = DepthBuffer::empty(sites.len() * SAMPLES);
+        let (width, height) = (camera.width() as usize, camera.height() as usize);
+        let mut near = vec![false; of_pixel.len()];
+        for site in &sites {
+            let (column, row) = (site.pixel as usize % width, site.pixel as usize / width);
+            let columns = column.saturating_sub(1)..(column + 2).min(width);
+            for row in row.saturating_sub(1)..(row + 2).min(height) {
+                near[row * width..][columns.clone()].fill(true);
+            }
+        }
         Self {
             sites,
             of_pixel,
+            near,
+            width: camera.width(),
             buffer,
         }
+    }
+
+    /// Points this close to the centre of a site along both axes are near it, pixels.
+    pub(crate) const NEAR_PX: f32 = 1.5;
+
+    /// Whether a place in the image, or the place on its border nearest to one beside it, is near a site.
+    #[inline]
+    pub(crate) fn is_near(&self, at: &Point2<f32>) -> bool {
+        // Conversion takes what is below 0 to 0.
+        let column = ((at.x + 0.5) as u32).min(self.width - 1) as usize;
+        let last = self.near.len() - self.width as usize;
+        let row = ((at.y + 0.5) as usize).saturating_mul(self.width as usize);
+        self.near[row.min(last) + column]
     }
 
     fn draw(&self, bodies: &[SeenBody]) {

@@ -26,46 +26,47 @@ impl<'a> Surface<'a> {
         (z_mm > 0.0).then(|| Point3::new(ray.x * z, ray.y * z, z))
     }
 
-    /// Depth of the pixel some columns and rows away, mm; `None` outside the image and where nothing was seen.
-    #[inline]
-    fn depth(&self, pixel: usize, columns: isize, rows: isize) -> Option<f64> {
-        let (width, height) = (self.image.width as usize, self.image.height as usize);
-        let column = (pixel % width).checked_add_signed(columns)?;
-        let row = (pixel / width).checked_add_signed(rows)?;
-        let z_mm = (column < width && row < height).then(|| self.image.z_mm[row * width + column]);
-        z_mm.filter(|z_mm| *z_mm > 0.0).map(f64::from)
-    }
-
-    /// Whether a pixel and its neighbour one step away lie on one surface, however steep it is.
+    /// The next pixel `step` indices away, if it lies on the same surface, however steep that is. There are `ahead` pixels that
+    /// way and `behind` the other way.
     ///
     /// 1/z of a plane is linear in the image of a pinhole, so that of three pixels in a row it has no second difference, where a step of
-    /// h makes h / z². One of the three may lie before the two or behind them.
-    #[inline]
-    fn is_continued(&self, pixel: usize, columns: isize, rows: isize) -> bool {
-        let at = |steps: isize| self.depth(pixel, steps * columns, steps * rows);
-        let (Some(here), Some(next)) = (at(0), at(1)) else {
-            return false;
-        };
-        if (next - here).abs() <= f64::from(EDGE_MM) {
-            return true;
+    /// h makes h / z². The third may be the one before the two or the one behind them.
+    #[inline(always)]
+    fn next(&self, pixel: usize, step: isize, ahead: usize, behind: usize) -> Option<Point3<f64>> {
+        let z_mm = &self.image.z_mm;
+        if ahead == 0 {
+            return None;
         }
-        let straight = |third: Option<f64>, middle: f64, end: f64| {
-            third.is_some_and(|third| {
-                let bend = 1.0 / third + 1.0 / end - 2.0 / middle;
-                (bend * middle * middle).abs() <= f64::from(EDGE_MM)
-            })
+        let at = |steps: isize| z_mm[pixel.wrapping_add_signed(steps * step)];
+        let (here, next) = (at(0), at(1));
+        let point = || self.point(pixel.wrapping_add_signed(step));
+        if (next - here).abs() <= EDGE_MM {
+            return point();
+        }
+        let straight = |third: f32, middle: f32, end: f32| {
+            let [third, middle, end] = [third, middle, end].map(f64::from);
+            let bend = 1.0 / third + 1.0 / end - 2.0 / middle;
+            third > 0.0 && end > 0.0 && (bend * middle * middle).abs() <= f64::from(EDGE_MM)
         };
-        straight(at(-1), here, next) || straight(at(2), next, here)
+        let continued = behind > 0 && straight(at(-1), here, next)
+            || next > 0.0 && ahead > 1 && straight(at(2), next, here);
+        if continued { point() } else { None }
     }
 
     /// Points of the neighbours left, right, above and below that lie on the same surface.
-    #[inline]
+    #[inline(always)]
     fn neighbours(&self, pixel: usize) -> [Option<Point3<f64>>; 4] {
-        let width = self.image.width as isize;
-        [(-1, 0), (1, 0), (0, -1), (0, 1)].map(|(columns, rows)| {
-            let next = pixel.checked_add_signed(rows * width + columns)?;
-            (self.is_continued(pixel, columns, rows)).then(|| self.point(next))?
-        })
+        let (width, height) = (self.image.width, self.image.height);
+        let (column, row) = (pixel as u32 % width, pixel as u32 / width);
+        let [left, above] = [column, row].map(|pixels| pixels as usize);
+        let [right, below] = [width - 1 - column, height - 1 - row].map(|pixels| pixels as usize);
+        let width = width as isize;
+        [
+            self.next(pixel, -1, left, right),
+            self.next(pixel, 1, right, left),
+            self.next(pixel, -width, above, below),
+            self.next(pixel, width, below, above),
+        ]
     }
 
     /// Whether a pixel and its four neighbours lie on one surface.
