@@ -107,13 +107,15 @@ impl Filling {
     }
 }
 
-/// Joint space that a bone keeps from a neighbour; it may grow along one direction.
+/// Joint space that a bone keeps from a neighbour; it may grow along one direction, within a range.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Gap {
     /// At the origin of the limb, mm.
     pub at_origin_mm: f64,
     /// Growth per mm.
     pub slope: Vector3<f64>,
+    /// The least and the most, kept where growth would go on beyond it, mm.
+    pub range_mm: [f64; 2],
 }
 
 impl Gap {
@@ -121,6 +123,7 @@ impl Gap {
         Self {
             at_origin_mm: mm,
             slope: Vector3::zeros(),
+            range_mm: [mm; 2],
         }
     }
 
@@ -130,11 +133,13 @@ impl Gap {
             at_origin_mm: self.at_origin_mm * to.scaling()
                 - slope.dot(&to.isometry.translation.vector),
             slope,
+            range_mm: self.range_mm.map(|mm| mm * to.scaling()),
         }
     }
 
     fn at(&self, p: &Point3<f64>) -> f64 {
-        self.at_origin_mm + self.slope.dot(&p.coords)
+        let [least, most] = self.range_mm;
+        (self.at_origin_mm + self.slope.dot(&p.coords)).clamp(least, most)
     }
 }
 

@@ -20,8 +20,8 @@ pub(super) struct Mortise {
     width_level: f64,
 }
 
-/// The same in P01, from the joint centre.
-const WIDTH_LEVEL_MM: f64 = -4.0;
+/// Height in P01, from the joint centre, at which the width of the trochlea is meant.
+pub(super) const WIDTH_LEVEL_MM: f64 = -4.0;
 /// From the joint centre of P01 down to the sole.
 pub(super) const SOLE_DEPTH_MM: f64 = 83.0;
 
@@ -67,6 +67,15 @@ impl Mortise {
         Placement::rotation_wrt_point(turn, self.point(0.0, 0.0, self.axis_z).into(), 1.0)
     }
 
+    /// Where along the talocrural axis, from its middle, the groove of the trochlea runs: below the middle of the dome.
+    ///
+    /// The dome above a place `a` of the axis, of radius R - a tan(i), lies a cos(i) - (R - a tan(i)) sin(i) medial of
+    /// the middle, since the axis is inclined by i.
+    pub(super) fn groove_at(&self, p: &Parameters) -> f64 {
+        let (sine, cosine) = p.axis_inclination_rad.sin_cos();
+        p.trochlea_radius_mm * sine * cosine
+    }
+
     /// The cone of the trochlea.
     pub(super) fn cone(&self, p: &Parameters) -> Shape {
         Shape::Cone(Cone {
@@ -75,6 +84,7 @@ impl Mortise {
             radius: p.trochlea_radius_mm,
             taper: p.axis_inclination_rad.tan(),
             groove_depth: p.trochlea_groove_mm,
+            groove_at: self.groove_at(p),
             crest: 0.75 * self.half_width,
         })
     }

@@ -159,7 +159,8 @@ impl LowerLeg {
             .placed(&self.flexion())
     }
 
-    fn flexion(&self) -> Placement {
+    /// The motion of the talus from a right angle between foot and leg.
+    pub(super) fn flexion(&self) -> Placement {
         self.mortise.flexion(&self.parameters)
     }
 

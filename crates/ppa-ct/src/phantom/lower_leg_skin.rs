@@ -2,14 +2,17 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{
+    Isometry3, Matrix3, Point3, Rotation2, Rotation3, Translation3, UnitQuaternion, Vector2,
+    Vector3,
+};
 
 use super::envelope::{Bounded, Cover, Envelope};
-use super::hindfoot::{Mortise, SOLE_DEPTH_MM, heel_valgus};
+use super::hindfoot::{Mortise, SOLE_DEPTH_MM, WIDTH_LEVEL_MM, heel_valgus};
 use super::loft::{End, Loft, Section};
 use super::lower_leg_skin_table::{FOOT, SHANK, ShankSection, TOES};
 use super::midfoot_forefoot::ray_shifts_mm;
-use super::parameters::{P01, Parameters};
+use super::parameters::{P01, Parameters, TABLES};
 use super::placement::Placement;
 use super::sdf::{Plane, Shape, smooth_step};
 
@@ -54,6 +57,11 @@ fn wider_behind(p: &Parameters, station: f64) -> f64 {
     ankle * (p.ankle_girth - 1.0) + calf * (p.calf_girth - 1.0)
 }
 
+/// How far the bones of the leg turn a section of the shank with them, away from that of P01.
+fn turn_rad(p: &Parameters, station: f64) -> f64 {
+    smooth_step(10.0, 90.0, station) * (P01.mortise_angle_rad - p.mortise_angle_rad)
+}
+
 /// A section of the shank with the girth of the leg, turned with the bones of the leg.
 fn shank_section(p: &Parameters, (station, centre, radii): &ShankSection) -> Section {
     let wider = wider_behind(p, *station);
@@ -62,8 +70,34 @@ fn shank_section(p: &Parameters, (station, centre, radii): &ShankSection) -> Sec
         let behind = 1.0 + (n as f64 / 12.0 * TAU).sin();
         radii[n] * (1.0 + wider * behind)
     });
-    let turn = smooth_step(10.0, 90.0, *station) * (P01.mortise_angle_rad - p.mortise_angle_rad);
-    Section::polar(*station, *centre, &radii).turned(turn)
+    Section::polar(*station, *centre, &radii).turned(turn_rad(p, *station))
+}
+
+/// A place so far below the skin at the back of a section of the shank.
+fn below_the_back(
+    p: &Parameters,
+    (station, centre, radii): &ShankSection,
+    depth_mm: f64,
+) -> [f64; 3] {
+    const BACK: usize = 3; // the fourth radius is the one at 90°
+    let radius = radii[BACK] * (1.0 + 2.0 * wider_behind(p, *station));
+    let place = Vector2::from(*centre) + Vector2::new(0.0, radius - depth_mm);
+    let place = Rotation2::new(turn_rad(p, *station)) * place;
+    [place.x, place.y, *station]
+}
+
+/// The Achilles tendon, from the heel to where the calf begins, in the drawing of the leg.
+fn achilles(p: &Parameters, insertion: Point3<f64>) -> Shape {
+    let [ankle, above, calf] = [(&SHANK[3], 3.6), (&SHANK[4], 3.8), (&SHANK[6], 10.0)]
+        .map(|(section, depth_mm)| below_the_back(p, section, depth_mm));
+    Shape::union(
+        8.0,
+        vec![
+            Shape::round_cone(insertion.into(), 6.0, ankle, 4.6),
+            Shape::round_cone(ankle, 4.6, above, 4.7),
+            Shape::round_cone(above, 4.7, calf, 6.0),
+        ],
+    )
 }
 
 fn shank(p: &Parameters, mortise: &Mortise) -> Shape {
@@ -75,15 +109,16 @@ fn shank(p: &Parameters, mortise: &Mortise) -> Shape {
         End::Open,
     );
     let (medial, lateral) = (p.medial_shift_mm(), p.lateral_shift_mm());
-    let tip = P01.lateral_malleolus_mm - p.lateral_malleolus_mm;
+    let lean = p.medial_lean_mm(WIDTH_LEVEL_MM + p.medial_malleolus_mm);
+    let tip = TABLES.lateral_malleolus_mm - p.lateral_malleolus_mm;
     Shape::union(
         10.0,
         vec![
             Shape::Loft(Box::new(loft)),
-            mortise.ellipsoid([22.0 + medial, -1.0, -3.0], [10.0, 15.0, 19.0]),
+            mortise.ellipsoid([22.0 + medial + lean, -1.0, -3.0], [10.0, 15.0, 19.0]),
             mortise.ellipsoid(
-                [-26.5 - lateral, 3.0, -10.0 + tip.min(0.0)],
-                [10.5, 14.0, 22.0],
+                [-26.5 - lateral, 3.0, -4.0 + tip.min(0.0)],
+                [10.5, 14.0, 28.0],
             ),
         ],
     )
@@ -144,14 +179,10 @@ pub(super) fn envelope(
     let heel = foot_placement * heel_valgus(p);
     let from_leg = leg_placement.inverse();
     let insertion = from_leg * (heel * Point3::new(-3.0, 44.0, -42.0));
-    let achilles = Shape::union(
-        8.0,
-        vec![
-            Shape::round_cone(insertion.into(), 6.0, [-3.0, 45.0, 20.0], 4.5),
-            Shape::round_cone([-3.0, 45.0, 20.0], 4.5, [-4.0, 52.0, 110.0], 6.0),
-        ],
-    );
-    let kager = Shape::ellipsoid([-2.0, 31.0, 18.0], [13.0, 12.0, 38.0]);
+    let achilles = achilles(p, insertion);
+    // Between tibia and tendon, with which it moves.
+    let [_, back, _] = below_the_back(p, &SHANK[3], 17.5);
+    let kager = Shape::ellipsoid([-2.0, back, 18.0], [13.0, 12.0, 38.0]);
     let heel_pad = Shape::ellipsoid([-3.0, 27.0, 6.0 - SOLE_DEPTH_MM], [26.0, 30.0, 16.0]);
     let size = leg_placement.scaling();
     let sole = sole().placed(foot_placement);

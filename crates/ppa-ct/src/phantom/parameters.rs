@@ -31,9 +31,9 @@ pub(super) struct Parameters {
     pub syndesmosis_mm: [f64; 2],
     /// Depth of the incisura below the tubercles that flank it, at the plafond: 3.3 ± 1.2 (n = 203).
     pub incisura_depth_mm: f64,
-    /// Sagittal radius of the trochlea: 20.7 ± 2.6 (PMC1888582).
+    /// Sagittal radius of the trochlea: 20.7 ± 2.6 over both sexes (PMC1888582), which makes 21.8 in men.
     pub trochlea_radius_mm: f64,
-    /// Width of the trochlea half-way along it: 27.9 ± 3.0 (PMC1888582).
+    /// Width of the trochlea half-way along it: 27.9 ± 3.0 over both sexes (PMC1888582), which makes 29.4 in men.
     pub trochlea_width_mm: f64,
     /// Angle between its medial and lateral facet; 29.9 mm in front and 25.2 mm behind (PMC1888582) would
     /// be 9.0°, within the spread of both widths.
@@ -91,12 +91,12 @@ pub(super) const P01: Parameters = Parameters {
     lateral_gutter_mm: 2.5,
     syndesmosis_mm: [2.7, 2.7],
     incisura_depth_mm: 4.8,
-    trochlea_radius_mm: 20.7,
-    trochlea_width_mm: 27.9,
+    trochlea_radius_mm: 21.8,
+    trochlea_width_mm: 29.4,
     trochlea_wedge_rad: 6.0_f64.to_radians(),
     trochlea_groove_mm: 1.0,
     axis_inclination_rad: 8.0_f64.to_radians(),
-    medial_facet_slope_rad: 20.0_f64.to_radians(),
+    medial_facet_slope_rad: 24.0_f64.to_radians(),
     lateral_facet_slope_rad: 10.0_f64.to_radians(),
     medial_malleolus_mm: 15.3,
     lateral_malleolus_mm: 26.5,
@@ -113,6 +113,13 @@ pub(super) const P01: Parameters = Parameters {
     skin_mm: 1.5,
     leg_length_mm: 250.0,
     joint_centre_ct_mm: [-92.0, 14.0, -310.0],
+};
+
+/// The foot that the tables of sections were drawn around: bones and skin lie further out or in by the difference.
+pub(super) const TABLES: Parameters = Parameters {
+    trochlea_width_mm: 27.9,
+    medial_facet_slope_rad: 20.0_f64.to_radians(),
+    ..P01
 };
 
 impl Parameters {
@@ -145,18 +152,24 @@ impl Parameters {
         p01_hu * (self.trabecular_hu / P01.trabecular_hu)
     }
 
-    /// How far the lateral malleolus and all that goes with it lies further out than in P01.
+    /// How far the lateral malleolus and all that goes with it lies further out than in the tables.
     pub(super) fn lateral_shift_mm(&self) -> f64 {
-        self.side_shift_mm() + self.lateral_gutter_mm - P01.lateral_gutter_mm
+        self.side_shift_mm() + self.lateral_gutter_mm - TABLES.lateral_gutter_mm
     }
 
     /// The same for the medial malleolus.
     pub(super) fn medial_shift_mm(&self) -> f64 {
-        self.side_shift_mm() + self.medial_gutter_mm - P01.medial_gutter_mm
+        self.side_shift_mm() + self.medial_gutter_mm - TABLES.medial_gutter_mm
     }
 
-    /// How far each facet of the trochlea lies further out than in P01.
+    /// How far the medial facet, at this depth below the level of its width, lies further out than in the tables
+    /// because it slopes more.
+    pub(super) fn medial_lean_mm(&self, depth_mm: f64) -> f64 {
+        depth_mm * (self.medial_facet_slope_rad.tan() - TABLES.medial_facet_slope_rad.tan())
+    }
+
+    /// How far each facet of the trochlea lies further out than in the tables.
     pub(super) fn side_shift_mm(&self) -> f64 {
-        0.5 * (self.trochlea_width_mm - P01.trochlea_width_mm)
+        0.5 * (self.trochlea_width_mm - TABLES.trochlea_width_mm)
     }
 }

@@ -69,6 +69,7 @@ impl Shape {
                 radius: cone.radius * size,
                 taper: cone.taper,
                 groove_depth: cone.groove_depth * size,
+                groove_at: cone.groove_at * size,
                 crest: cone.crest * size,
             }),
             Self::Loft(loft) => Self::Loft(Box::new(loft.placed(to))),

@@ -91,6 +91,8 @@ pub(super) struct Cone {
     /// Tangent of the half-angle.
     pub taper: f64,
     pub groove_depth: f64,
+    /// Distance along the axis from the centre to the groove.
+    pub groove_at: f64,
     /// Distance along the axis from the groove to either crest.
     pub crest: f64,
 }
@@ -100,8 +102,9 @@ impl Cone {
         let q = p - self.centre;
         let along = q.dot(&self.axis);
         let radial = (q - self.axis.scale(along)).norm();
-        let groove = if along.abs() < self.crest {
-            0.5 * self.groove_depth * (1.0 + (std::f64::consts::PI * along / self.crest).cos())
+        let beside = along - self.groove_at;
+        let groove = if beside.abs() < self.crest {
+            0.5 * self.groove_depth * (1.0 + (std::f64::consts::PI * beside / self.crest).cos())
         } else {
             0.0
         };

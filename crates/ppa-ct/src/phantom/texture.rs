@@ -26,7 +26,7 @@ pub(super) fn texture(seed: u64, p: &Point3<f64>) -> f64 {
             } else {
                 1.0 - share[axis]
             };
-            // 21 bits per axis: the lattice repeats after a kilometre.
+            // 21 bits per axis: the lattice repeats after three kilometres.
             index = index << 21 | ((base[axis] + upper) as u64 & 0x1f_ffff);
         }
         sum += weight * normal(seed, Purpose::Texture, index);

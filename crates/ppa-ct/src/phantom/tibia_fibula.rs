@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::bone::{Bone, Filling, Gap, Knot};
-use super::hindfoot::Mortise;
+use super::hindfoot::{Mortise, WIDTH_LEVEL_MM};
 use super::loft::{End, Loft, Section};
 use super::parameters::{P01, Parameters};
 use super::placement::Placement;
@@ -73,13 +73,15 @@ fn fibula_shift_mm(p: &Parameters, station: f64) -> f64 {
     share_of_shift(station) * p.lateral_shift_mm() + smooth_step(-4.0, 8.0, station) * wider
 }
 
-/// The space that the fibula keeps from the tibia, measured [`SYNDESMOSIS_REACH_MM`] in front of and behind the shaft.
+/// The space that the fibula keeps from the tibia: what is measured [`SYNDESMOSIS_REACH_MM`] in front of and behind the
+/// shaft, even between, and no more or less beyond.
 fn syndesmosis(p: &Parameters, mortise: &Mortise) -> Gap {
     let [front, back] = p.syndesmosis_mm;
     let posterior = mortise.limb_from_mortise * Vector3::y();
     Gap {
         at_origin_mm: 0.5 * (front + back),
         slope: posterior * ((back - front) / (2.0 * SYNDESMOSIS_REACH_MM)),
+        range_mm: [front.min(back), front.max(back)],
     }
 }
 
@@ -99,6 +101,8 @@ pub(super) fn tibia(p: &Parameters, mortise: &Mortise, flexion: &Placement, talu
     );
     let at = |m, b, z| mortise.point(m, b, z);
     let (tip, shift) = (-p.medial_malleolus_mm, p.medial_shift_mm());
+    // The malleolus follows its facet; the posterior colliculus ends 4 mm higher.
+    let lean = |end: f64| p.medial_lean_mm(WIDTH_LEVEL_MM - end);
     let solid = Shape::union(
         5.0,
         vec![
@@ -107,13 +111,13 @@ pub(super) fn tibia(p: &Parameters, mortise: &Mortise, flexion: &Placement, talu
             Shape::round_cone(
                 at(17.5 + shift, -4.0, 8.0),
                 8.0,
-                at(22.0 + shift, -4.5, tip + 5.5),
+                at(22.0 + shift + lean(tip), -4.5, tip + 5.5),
                 5.5,
             ),
             Shape::round_cone(
                 at(17.0 + shift, 4.0, 8.0),
                 8.0,
-                at(21.0 + shift, 5.5, tip + 9.5),
+                at(21.0 + shift + lean(tip + 4.0), 5.5, tip + 9.5),
                 5.5,
             ),
         ],

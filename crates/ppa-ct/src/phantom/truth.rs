@@ -46,7 +46,7 @@ pub struct Truth {
     pub lateral_malleolus_mm: f64,
     /// Plane under the limb, which heel and calf touch: y of the table top.
     pub back_plane_y_mm: f64,
-    /// The most anterior point of the skin: the tip of the big toe.
+    /// The most anterior point of the skin: the tip of the longest toe.
     pub toe_tip: Point3<f64>,
     /// From the back of the heel to the tip of the longest toe, along y.
     pub foot_length_mm: f64,

@@ -187,9 +187,16 @@ impl<'a> Gauge<'a> {
     }
 }
 
-/// The internal rotation of the least of 61 values from -10 to 50 degrees.
+/// The internal rotation of the least of 61 values from -10 to 50 degrees, each the amount of bone in mm: the middle of
+/// the angles around it with at most a millimetre more, since the valley is flat and other bones lie across it.
 pub(super) fn least_deg(values: &[f64]) -> f64 {
     let least =
         (0..values.len()).fold(0, |best, n| if values[n] < values[best] { n } else { best });
-    least as f64 - 10.0
+    let open = |n: &usize| values[*n] <= values[least] + 1.0;
+    let from = (0..=least).rev().take_while(open).last().unwrap_or(least);
+    let to = (least..values.len())
+        .take_while(open)
+        .last()
+        .unwrap_or(least);
+    0.5 * (from + to) as f64 - 10.0
 }

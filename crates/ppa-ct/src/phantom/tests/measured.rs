@@ -35,7 +35,8 @@ fn joint(gauge: &Gauge, voxel_mm: f64) -> Vec<Check> {
             voxel_mm,
         ));
         // Three quarters of the half-width is the crest.
-        let share = (medial / (0.375 * p.trochlea_width_mm)).abs().min(1.0);
+        let beside = medial - leg.mortise.groove_at(p);
+        let share = (beside / (0.375 * p.trochlea_width_mm)).abs().min(1.0);
         let groove = 0.5 * p.trochlea_groove_mm * (1.0 + (share * PI).cos());
         let found = radius + 0.3 * p.superior_gutter_mm + back;
         checks.push(within(
@@ -105,7 +106,7 @@ fn mortise(gauge: &Gauge, voxel_mm: f64) -> Vec<Check> {
     for (what, medial, posterior, reach) in [
         (
             "medial malleolus",
-            22.0 + drawn.medial_shift_mm(),
+            22.0 + drawn.medial_shift_mm() + drawn.medial_lean_mm(drawn.medial_malleolus_mm - 4.0),
             -4.5,
             truth.medial_malleolus_mm,
         ),

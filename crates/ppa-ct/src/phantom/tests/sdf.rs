@@ -58,6 +58,7 @@ fn every_shape() -> Shape {
         radius: 20.0,
         taper: 0.1,
         groove_depth: 1.0,
+        groove_at: 2.0,
         crest: 9.0,
     };
     let plane = Plane {
