@@ -7,7 +7,7 @@ use nalgebra::{Rotation3, Vector3};
 
 use super::bone::{Bone, Filling, Gap};
 use super::forefoot_table::{METATARSALS, Metatarsal, TOES};
-use super::parameters::{P01, Parameters};
+use super::parameters::{Parameters, TABLES};
 use super::sdf::Shape;
 
 /// Indices of the bones that carry the midfoot.
@@ -48,10 +48,10 @@ fn phalanx(base: [f64; 3], end: [f64; 3], waist: f64) -> Shape {
     )
 }
 
-/// How far the heads of the five metatarsals and their toes lie further forward than in P01.
+/// How far the heads of the five metatarsals and their toes lie further forward than in the tables.
 pub(super) fn ray_shifts_mm(p: &Parameters) -> [f64; 5] {
     let [first, third, fourth, fifth] =
-        std::array::from_fn(|ray| p.metatarsal_heads_mm[ray] - P01.metatarsal_heads_mm[ray]);
+        std::array::from_fn(|ray| p.metatarsal_heads_mm[ray] - TABLES.metatarsal_heads_mm[ray]);
     [first, 0.0, third, fourth, fifth]
 }
 
@@ -130,8 +130,8 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
     let medial = push(
         "medial cuneiform",
         Shape::block(
-            [19.5, -74.0, -38.5],
-            [8.0, 16.0, 13.5],
+            [19.5, -76.0, -38.5],
+            [8.0, 18.0, 13.5],
             6.5,
             arched(-12.0, 15.0),
         ),
@@ -141,8 +141,8 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
     let lateral = push(
         "lateral cuneiform",
         Shape::block(
-            [-5.5, -70.0, -35.5],
-            [7.5, 15.5, 10.5],
+            [-5.5, -68.5, -35.5],
+            [7.5, 14.0, 10.5],
             5.5,
             arched(18.0, 13.0),
         ),

@@ -1,6 +1,8 @@
 //! The phantoms measured back: from their shapes and from their voxels.
 
 mod anatomy;
+mod apart;
+mod bone_points;
 mod foot_turns;
 mod gauge;
 mod knee;
@@ -8,10 +10,12 @@ mod leg_and_foot;
 mod loft;
 mod measured;
 mod plate;
+mod proportions;
 mod rays;
 mod scanner;
 mod sdf;
 mod skin;
+mod tendon;
 mod variants;
 mod voxels;
 

@@ -1,45 +1,16 @@
 //! How the foot is turned against the leg, from the voxels of its bones alone.
 
-use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
+use nalgebra::{Point3, Rotation3, Vector3};
 
+use super::bone_points::{bone_voxels, long_axis};
 use super::family;
 use super::gauge::{Check, Gauge, SKIN_HU, within};
-use crate::grid::Grid;
 use crate::phantom::parameters::Parameters;
 use crate::phantom::*;
 
 const VOXEL_MM: f64 = 1.0;
 /// The sole is cut softly over 8 mm, which lifts a flat skin by up to a quarter of that.
 const SOFT_SOLE_MM: f64 = 2.0;
-
-/// Centres of the voxels of a bone, limb frame.
-fn bone_voxels(leg: &LowerLeg, name: &str) -> Vec<Point3<f64>> {
-    let (low, high) = leg.skin_box();
-    let foot = Point3::new(high.x, high.y, leg.truth().joint_centre.z + 20.0);
-    let size = ((foot - low) / VOXEL_MM).map(|n| n as usize).into();
-    let grid = Grid::axis_aligned(size, Vector3::repeat(VOXEL_MM), low).unwrap();
-    let label = leg.bone_names().iter().position(|n| *n == name).unwrap() as u8 + 1;
-    let labels = leg.bone_labels(&grid);
-    let voxels = (0..grid.len()).filter(|n| labels[*n] == label);
-    voxels
-        .map(|n| leg.limb_point(&grid.centre(grid.voxel(n).map(|v| v as f64))))
-        .collect()
-}
-
-/// Direction in which points spread most.
-fn long_axis(points: &[Point3<f64>]) -> Vector3<f64> {
-    let count = points.len() as f64;
-    let mean = points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / count;
-    let spread: Matrix3<f64> = points
-        .iter()
-        .map(|p| (p.coords - mean) * (p.coords - mean).transpose())
-        .sum();
-    let eigen = spread.symmetric_eigen();
-    eigen
-        .eigenvectors
-        .column(eigen.eigenvalues.imax())
-        .into_owned()
-}
 
 fn with(leg: &LowerLeg, change: impl Fn(&mut Parameters)) -> LowerLeg {
     let mut parameters = leg.parameters;
@@ -51,7 +22,7 @@ fn with(leg: &LowerLeg, change: impl Fn(&mut Parameters)) -> LowerLeg {
 fn plantarflexion_deg(leg: &LowerLeg) -> f64 {
     let axis = leg.mortise.axis(&leg.parameters);
     let shaft = |leg: &LowerLeg| {
-        let along = long_axis(&bone_voxels(leg, "second metatarsal"));
+        let along = long_axis(&bone_voxels(leg, "second metatarsal", VOXEL_MM));
         let forward = along * -along.y.signum();
         forward - axis.scale(axis.dot(&forward))
     };
@@ -69,7 +40,7 @@ fn heel_lean_deg(leg: &LowerLeg) -> f64 {
     let axis = leg.mortise.axis(&leg.parameters);
     let turn = Rotation3::from_axis_angle(&axis, truth.plantarflexion_rad);
     let pivot = leg.limb_point(&truth.talocrural_centre);
-    let tuberosity: Vec<Point3<f64>> = bone_voxels(leg, "calcaneus")
+    let tuberosity: Vec<Point3<f64>> = bone_voxels(leg, "calcaneus", VOXEL_MM)
         .into_iter()
         .map(|p| turn.inverse() * (p - pivot))
         .filter(|q| q.y > 28.0 * leg.parameters.size)
