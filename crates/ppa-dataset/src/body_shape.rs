@@ -83,7 +83,7 @@ pub fn body_shape(
         let seed = item_seed(seed, Purpose::Bumps, limb, draw);
         let count = settings.bumps[draw as usize];
         let bumps = seeded_bumps(skin, &bump_sites(landmarks), count, seed)?;
-        Ok(add_bumps(skin, &bumps))
+        add_bumps(skin, &bumps)
     };
     match shape {
         BodyShape::Orig => Ok(skin.clone()),

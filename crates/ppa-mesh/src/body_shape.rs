@@ -2,28 +2,27 @@
 
 use std::cmp::Ordering;
 use std::collections::{BinaryHeap, HashMap};
-use std::iter::zip;
 
 use nalgebra::{Point3, Vector3};
-use rayon::prelude::*;
 
-use crate::inward_limit::without_folds;
 use crate::mesh::Mesh;
 use crate::neighbours::Neighbours;
+use crate::shift_limit::without_folds;
+use crate::smooth_normals::smooth_normals;
 
 /// Heights of [`seeded_bumps`], mm: mild to marked swelling.
 const HEIGHT_MM: [f64; 2] = [4.0, 10.0];
 /// Widths of [`seeded_bumps`], mm.
 const SIGMA_MM: [f64; 2] = [8.0, 20.0];
+/// Largest height, depth and sigma of a bump, mm.
+const MOST_MM: f64 = 200.0;
+/// Most bumps of one draw.
+const MOST_BUMPS: usize = 1000;
 /// A bump ends at this many sigma; there it is exp(−8) of its height.
 const REACH_SIGMA: f64 = 4.0;
 /// Paths along triangle edges are longer than the surface allows, by at most about this factor on a
 /// lattice of diagonals.
 const EDGE_PATH_EXCESS: f64 = 1.15;
-/// Rounds of averaging over neighbours that make normals smooth.
-const SMOOTHING_ROUNDS: usize = 24;
-/// Edges shorter than this weigh no more than it, mm.
-const SHORTEST_MM: f32 = 1e-4;
 
 /// A swelling: a Gaussian along the normals.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,6 +54,25 @@ pub enum BumpError {
         /// Bumps wanted.
         count: usize,
     },
+    /// More bumps than a skin has room for.
+    #[error("{count} bumps are wanted, expected at most {MOST_BUMPS}")]
+    TooMany {
+        /// Bumps wanted.
+        count: usize,
+    },
+    /// A bump that is none.
+    #[error(
+        "bump {index} is {height_mm} mm high with a sigma of {sigma_mm} mm: its place must be finite, its height \
+         between -{MOST_MM} and {MOST_MM} mm, its sigma above 0 and at most {MOST_MM} mm"
+    )]
+    Size {
+        /// Place in the list, from 0.
+        index: usize,
+        /// Height found, mm.
+        height_mm: f64,
+        /// Width found, mm.
+        sigma_mm: f64,
+    },
     /// No site holds a vertex.
     #[error("no vertex of the mesh lies in any of the {sites} bump sites")]
     NoSkin {
@@ -66,25 +84,37 @@ pub enum BumpError {
 /// The mesh moved along its smoothed normals, outward for a positive distance.
 ///
 /// Normals are averaged over a few rings of neighbours first, so that creases and noise do not
-/// make spikes. The distance is exact nearly everywhere. Only where the skin is curved more tightly
-/// than an inward distance (the tips of toes) would it turn inside out: there it moves less, and the
-/// distance grows back by 0.2 mm per millimetre of skin around. Opposite sides of a part thinner
-/// than twice the distance still pass through each other.
+/// make spikes. The distance is exact nearly everywhere. Only where the skin would turn inside out or
+/// pass through itself (inwards at the tips of toes, outwards between them) it moves less, and the
+/// distance grows back by 0.2 mm per millimetre of skin around. [`Displacement`] tells where.
 pub fn offset(mesh: &Mesh, distance_mm: f64) -> Mesh {
     let neighbours = Neighbours::of(mesh);
     let normals = smooth_normals(mesh, &neighbours);
-    let mut shifts = vec![distance_mm; mesh.vertices.len()];
-    if distance_mm < 0.0 {
-        shifts = without_folds(mesh, &neighbours, &normals, shifts);
-    }
-    displaced(mesh, &normals, &shifts)
+    let shifts = vec![distance_mm; mesh.vertices.len()];
+    displaced(mesh, &neighbours, normals, shifts)
 }
 
 /// The mesh with bumps along its smoothed normals; overlapping bumps add up.
 ///
 /// Distance from the middle is measured along the surface, so that the other side of a thin limb
-/// stays where it is. A mesh without vertices stays as it is.
-pub fn add_bumps(mesh: &Mesh, bumps: &[Bump]) -> Mesh {
+/// stays where it is. Where the skin would fold or pass through itself it moves less, as in
+/// [`offset`]. A mesh without vertices stays as it is.
+///
+/// # Errors
+/// [`BumpError::Size`] for a bump whose place, height or width is no number or out of range.
+pub fn add_bumps(mesh: &Mesh, bumps: &[Bump]) -> Result<Mesh, BumpError> {
+    for (index, bump) in bumps.iter().enumerate() {
+        let placed = bump.centre.coords.iter().all(|c| c.is_finite());
+        let (height_mm, sigma_mm) = (bump.height_mm, bump.sigma_mm);
+        let high = height_mm.abs() <= MOST_MM;
+        if !(placed && high && sigma_mm > 0.0 && sigma_mm <= MOST_MM) {
+            return Err(BumpError::Size {
+                index,
+                height_mm,
+                sigma_mm,
+            });
+        }
+    }
     let neighbours = Neighbours::of(mesh);
     let mut heights = vec![0.0; mesh.vertices.len()];
     for bump in bumps {
@@ -94,7 +124,8 @@ pub fn add_bumps(mesh: &Mesh, bumps: &[Bump]) -> Mesh {
                 bump.height_mm * (-0.5 * (distance / bump.sigma_mm).powi(2)).exp();
         }
     }
-    displaced(mesh, &smooth_normals(mesh, &neighbours), &heights)
+    let normals = smooth_normals(mesh, &neighbours);
+    Ok(displaced(mesh, &neighbours, normals, heights))
 }
 
 /// `count` bumps of 4 to 10 mm height and 8 to 20 mm sigma at vertices of the sites, taken in turn.
@@ -112,6 +143,9 @@ pub fn seeded_bumps(
 ) -> Result<Vec<Bump>, BumpError> {
     if count == 0 {
         return Ok(Vec::new());
+    }
+    if count > MOST_BUMPS {
+        return Err(BumpError::TooMany { count });
     }
     if sites.is_empty() {
         return Err(BumpError::NoSite { count });
@@ -155,10 +189,14 @@ fn uniform(seed: u64, index: u64) -> f64 {
     (mix(z) >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-fn displaced(mesh: &Mesh, normals: &[Vector3<f64>], heights_mm: &[f64]) -> Mesh {
-    let vertices = zip(&mesh.vertices, zip(normals, heights_mm))
-        .map(|(vertex, (normal, height))| (vertex.cast::<f64>() + normal * *height).cast())
-        .collect();
+fn displaced(
+    mesh: &Mesh,
+    neighbours: &Neighbours,
+    normals: Vec<Vector3<f64>>,
+    shifts_mm: Vec<f64>,
+) -> Mesh {
+    let places = without_folds(mesh, neighbours, &normals, shifts_mm);
+    let vertices = places.iter().map(|place| place.cast()).collect();
     let mut moved = Mesh {
         vertices,
         normals: Vec::new(),
@@ -180,30 +218,6 @@ fn displaced(mesh: &Mesh, normals: &[Vector3<f64>], heights_mm: &[f64]) -> Mesh 
         })
         .collect();
     moved
-}
-
-/// Normals averaged with those of near neighbours, the nearer the more: vertices of a sliver get
-/// nearly the same normal, so that it does not turn over when they move.
-fn smooth_normals(mesh: &Mesh, neighbours: &Neighbours) -> Vec<Vector3<f64>> {
-    let mut normals: Vec<Vector3<f64>> = mesh.normals.iter().map(|n| n.cast()).collect();
-    for _ in 0..SMOOTHING_ROUNDS {
-        normals = (0..normals.len())
-            .into_par_iter()
-            .map(|vertex| {
-                let here = mesh.vertices[vertex];
-                let (mut sum, mut weights) = (Vector3::zeros(), 0.0);
-                for &other in neighbours.of_vertex(vertex) {
-                    let length = (mesh.vertices[other as usize] - here).norm();
-                    let weight = 1.0 / f64::from(length.max(SHORTEST_MM));
-                    sum += normals[other as usize] * weight;
-                    weights += weight;
-                }
-                let blend = sum + normals[vertex] * weights;
-                blend.try_normalize(1e-9).unwrap_or(normals[vertex])
-            })
-            .collect();
-    }
-    normals
 }
 
 #[derive(PartialEq)]

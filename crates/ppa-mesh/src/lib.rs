@@ -2,7 +2,7 @@
 //!
 //! [`iso_surface`] turns a volume into a triangle [`Mesh`]; [`extract_limb`] finds the limb in a scan
 //! and cuts couch, sheets and neighbours; [`offset`], [`add_bumps`] and [`seeded_bumps`] make other
-//! body shapes of it; [`dbscan`] clusters points; [`write_mesh_file`], [`write_cloud_file`] and
+//! body shapes of it, whose [`Displacement`] can be measured; [`dbscan`] clusters points; [`write_mesh_file`], [`write_cloud_file`] and
 //! [`read_mesh_file`] exchange meshes and clouds with other programs as PLY, OBJ and STL.
 //!
 //! Units: mm, HU. Frame: whatever frame the volume's affine leads to, normally `ct` (LPS).
@@ -12,18 +12,22 @@
 
 mod body_shape;
 mod dbscan;
+mod displacement;
 mod estimate_normals;
-mod inward_limit;
 mod limb;
 mod mesh;
 mod mesh_file;
 mod neighbours;
 mod point_cells;
+mod self_crossings;
+mod shift_limit;
+mod smooth_normals;
 mod surface;
 mod topology;
 
 pub use body_shape::{Bump, BumpError, BumpSite, add_bumps, offset, seeded_bumps};
 pub use dbscan::{Clusters, dbscan};
+pub use displacement::Displacement;
 pub use estimate_normals::{CloudError, estimate_normals, mean_spacing_mm};
 pub use limb::{Body, CutFace, Limb, LimbError, LimbReport, LimbSettings, VoxelBox, extract_limb};
 pub use mesh::{Mesh, PointCloud};

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use ppa_ct::read;
 use ppa_dataset::{BodyShape, Case, PreparedLimb, ShapeSettings, body_shape, layout::LimbId};
-use ppa_mesh::{Border, Mesh, dbscan, iso_surface, read_mesh_file, write_mesh_file};
+use ppa_mesh::{Border, Displacement, Mesh, dbscan, iso_surface, read_mesh_file, write_mesh_file};
 use serde::Serialize;
 
 use crate::output::{Output, Seconds, Stopwatch};
@@ -125,6 +125,30 @@ impl Surface {
     }
 }
 
+/// A body shape, and how far it is from the skin of the scan.
+#[derive(Debug, Serialize)]
+struct Variant {
+    #[serde(flatten)]
+    surface: Surface,
+    volume_change_mm3: f64,
+    least_shift_mm: f64,
+    mean_shift_mm: f64,
+    most_shift_mm: f64,
+}
+
+impl Variant {
+    fn describe(&self) -> String {
+        format!(
+            "{}\nmoved by {:.2} to {:.2} mm, {:.2} on average; volume changed by {:.1} mm³",
+            self.surface.describe(),
+            self.least_shift_mm,
+            self.most_shift_mm,
+            self.mean_shift_mm,
+            self.volume_change_mm3
+        )
+    }
+}
+
 fn extract(args: &ExtractArgs, output: Output) -> anyhow::Result<()> {
     let volume = read(&args.volume)?.volume;
     let border = if args.close {
@@ -164,7 +188,16 @@ fn augment(args: &AugmentArgs, output: Output) -> anyhow::Result<()> {
     )?;
     let seconds = watch.read();
     write_mesh_file(&args.out, &mesh)?;
-    output.print(&Surface::of(&mesh, seconds), Surface::describe)
+    let displacement = Displacement::between(&prepared.limb.mesh, &mesh);
+    let [least, mean, most] = displacement.least_mean_most_mm();
+    let variant = Variant {
+        surface: Surface::of(&mesh, seconds),
+        volume_change_mm3: displacement.volume_mm3,
+        least_shift_mm: least,
+        mean_shift_mm: mean,
+        most_shift_mm: most,
+    };
+    output.print(&variant, Variant::describe)
 }
 
 #[derive(Debug, Serialize)]

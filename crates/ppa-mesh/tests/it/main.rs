@@ -1,5 +1,6 @@
 //! Tests through the public interface.
 
+mod body_shape;
 mod clusters;
 mod fields;
 mod limb;
