@@ -14,10 +14,10 @@ pub(crate) struct Ankle {
 }
 
 /// The tibia flares when its outline is this much larger than at its thinnest.
-const FLARE: f64 = 1.8;
+const FLARE: f64 = 1.5;
 
-/// The flare starts this far above the joint, mm: the distal tibia widens over 15 to 40 mm.
-const FLARE_TO_JOINT_MM: [f64; 2] = [5.0, 50.0];
+/// The flare starts this far above the joint, mm: the distal tibia widens over 15 to 50 mm.
+const FLARE_TO_JOINT_MM: [f64; 2] = [5.0, 60.0];
 
 /// Outline of the thinnest adult tibia, roughly; those of adults measure 300 to 500 mm².
 const MIN_TIBIA_MM2: f64 = 220.0;
@@ -88,6 +88,7 @@ fn flare(sections: &Sections, slices: &[usize]) -> Option<(f64, Vec<Level>)> {
     let mut levels: Vec<Level> = Vec::new();
     let mut thinnest_mm2 = f64::INFINITY;
     let mut start: Option<usize> = None;
+    let mut shortest_mm = 0.0;
     for (index, slice) in slices.iter().enumerate() {
         let level_mm = sections.level(*slice);
         let bones = sections.bones(*slice);
@@ -109,14 +110,54 @@ fn flare(sections: &Sections, slices: &[usize]) -> Option<(f64, Vec<Level>)> {
         let first = *start.get_or_insert(index);
         let top_mm = sections.level(slices[first]);
         if top_mm - level_mm >= SUSTAINED_MM {
-            if !fibula_beside(&levels, top_mm) {
-                return None;
+            let shaft_mm = levels[0].level_mm - top_mm;
+            if shaft_mm < shortest_mm || !fibula_beside(&levels, top_mm) {
+                // The end of a thigh: a lower leg may follow, if there is a shaft between the
+                // condyles, of which there are two as well, and the next flare.
+                levels.clear();
+                (thinnest_mm2, start, shortest_mm) = (f64::INFINITY, None, SHAFT_MM);
+                continue;
             }
             levels.retain(|l| (top_mm..=top_mm + SHAFT_MM).contains(&l.level_mm));
             return Some((top_mm, levels));
         }
     }
     None
+}
+
+/// Direction of the largest bone in the proximal half of the limb, towards proximal; `None` for
+/// fewer than ten slices with bone.
+///
+/// The median of the slopes between any two slices (Theil 1950, Sen 1968, doi:10.1080/01621459.1968.10480934)
+/// is not misled by slices in which a knee, a plate or a fused fibula is largest, if they are
+/// fewer than a quarter. Centres of oblique sections of a shaft lie on its axis.
+pub(crate) fn shaft_direction(sections: &Sections) -> Option<Vector3<f64>> {
+    const MOST_SLICES: usize = 100;
+    let mut slices = sections.proximal_to_distal();
+    slices.truncate(slices.len() / 2);
+    let stride = slices.len().div_ceil(MOST_SLICES).max(1);
+    let centres: Vec<Point3<f64>> = slices
+        .iter()
+        .step_by(stride)
+        .filter_map(|slice| sections.bones(*slice).first().map(|bone| bone.centre))
+        .collect();
+    if centres.len() < 10 {
+        return None;
+    }
+    let far = centres.len() / 3;
+    let mut slopes: [Vec<f64>; 3] = Default::default();
+    for (i, upper) in centres.iter().enumerate() {
+        for lower in centres.iter().skip(i + far) {
+            let d = upper - lower;
+            let slope = d / sections.direction.dot(&d);
+            (0..3).for_each(|axis| slopes[axis].push(slope[axis]));
+        }
+    }
+    let median = slopes.map(|mut slopes| {
+        let middle = slopes.len() / 2;
+        *slopes.select_nth_unstable_by(middle, f64::total_cmp).1
+    });
+    Vector3::from(median).try_normalize(1e-9)
 }
 
 /// Whether a thinner bone runs along most of the shaft above a level.
@@ -193,4 +234,62 @@ fn vertex(column: &[(f64, f64)], i: usize) -> f64 {
         return x1;
     }
     x1 - 0.5 * ((x1 - x0) * left - (x1 - x2) * right) / curvature
+}
+
+#[cfg(test)]
+mod tests {
+    use ppa_ct::{Grid, Volume};
+
+    use super::*;
+
+    /// Radii of the larger and the smaller bone at a height above the joint: thigh, condyles, tibia
+    /// and fibula that flare above the ankle, talus.
+    fn radii_mm(height: f64) -> [f64; 2] {
+        match height {
+            ..-2.0 => [22.0, 0.0],
+            ..2.0 => [0.0, 0.0],
+            ..40.0 => [22.0 - 0.27 * (height - 2.0), 5.0],
+            ..290.0 => [11.3, 5.0],
+            ..350.0 => [25.0, 0.0],
+            _ => [14.0, 0.0],
+        }
+    }
+
+    /// Slices of 2 mm from 30 mm below the ankle up to `top_mm` above it.
+    fn leg(top_mm: f64) -> Volume {
+        let slices = ((top_mm + 30.0) / 2.0) as usize;
+        let grid = Grid::axis_aligned(
+            [60, 60, slices],
+            Vector3::repeat(2.0),
+            Point3::new(0.0, 0.0, -30.0),
+        )
+        .unwrap();
+        let hu = (0..grid.len()).map(|index| {
+            let p = grid.centre(grid.voxel(index).map(|v| v as f64));
+            let within = |x: f64, radius: f64| (p.x - x).hypot(p.y - 60.0) < radius;
+            let [large, small] = radii_mm(p.z);
+            let bone = within(60.0, large) || within(94.0, small);
+            if bone { 600.0 } else { 20.0 }
+        });
+        let hu = hu.collect();
+        Volume::new(grid, hu).unwrap()
+    }
+
+    /// Whatever lies above the calf: the ankle is where it is, and a knee alone is none.
+    #[test]
+    fn a_thigh_does_not_hide_the_ankle() {
+        for top_mm in [200.0, 320.0, 420.0] {
+            let volume = leg(top_mm);
+            let mask = vec![true; volume.grid().len()];
+            let sections = Sections::along(&volume, &mask, &Vector3::z());
+            let ankle = find_ankle(&sections).unwrap_or_else(|| panic!("none of {top_mm} mm"));
+            assert!(ankle.level_mm.abs() < 2.0, "{ankle:?} of {top_mm} mm");
+        }
+        let whole = leg(420.0);
+        let [ni, nj, nk] = whole.grid().size();
+        let knee = whole.crop([0, 0, 100], [ni, nj, nk]).unwrap();
+        let mask = vec![true; knee.grid().len()];
+        let sections = Sections::along(&knee, &mask, &Vector3::z());
+        assert_eq!(find_ankle(&sections), None);
+    }
 }

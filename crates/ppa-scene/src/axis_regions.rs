@@ -3,10 +3,30 @@
 use nalgebra::Vector3;
 use ppa_ct::Volume;
 
-use crate::ankle::find_ankle;
+use crate::ankle::{find_ankle, shaft_direction};
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
 use crate::landmarks::{AxisRegion, AxisSource, LimbKind};
 use crate::limb_sections::Sections;
+
+const REVERSED: &str = "the ankle lies superior to the calf: proximal is inferior";
+
+/// Slices across the tibia: the scan's own, or interpolated ones if it leans by more than 3 degrees.
+fn across_the_shaft<'a>(
+    volume: &'a Volume,
+    mask: &'a [bool],
+    towards_proximal: &Vector3<f64>,
+) -> Result<Sections<'a>, LandmarkError> {
+    const LEAN: f64 = 0.9986; // cos 3°
+    const STEEPEST: f64 = 0.82; // cos 35°
+    let mut sections = Sections::along(volume, mask, towards_proximal);
+    for _ in 0..2 {
+        let aslant = shaft_direction(&sections)
+            .filter(|shaft| (STEEPEST..LEAN).contains(&shaft.dot(&sections.direction)));
+        let Some(shaft) = aslant else { break };
+        sections = Sections::across(volume, mask, &shaft)?;
+    }
+    Ok(sections)
+}
 
 /// What region ranges are measured from.
 pub(crate) struct Reference<'a> {
@@ -29,13 +49,14 @@ impl<'a> Reference<'a> {
         let mut sections = Sections::along(volume, mask, &Vector3::z());
         let mut ankle = None;
         if overrides.limb != Some(LimbKind::Other) {
-            ankle = find_ankle(&sections);
-            if ankle.is_none() {
-                let reversed = Sections::along(volume, mask, &-Vector3::z());
-                ankle = find_ankle(&reversed);
+            for (towards_proximal, note) in [(Vector3::z(), None), (-Vector3::z(), Some(REVERSED))]
+            {
+                let tried = across_the_shaft(volume, mask, &towards_proximal)?;
+                ankle = find_ankle(&tried);
                 if ankle.is_some() {
-                    sections = reversed;
-                    notes.push("the ankle lies superior to the calf: proximal is inferior".into());
+                    sections = tried;
+                    notes.extend(note.map(str::to_owned));
+                    break;
                 }
             }
         }
@@ -160,7 +181,8 @@ impl<'a> Reference<'a> {
         for slice in 0..self.sections.count() {
             let above = self.sections.level(slice) - self.level_mm;
             // A level that went through a file and back may have lost its last bit.
-            if !(from_mm - 1e-6..=to_mm + 1e-6).contains(&above) {
+            let there = (from_mm - 1e-6..=to_mm + 1e-6).contains(&above);
+            if !there || !self.sections.is_whole(slice) {
                 continue;
             }
             let centre = match source {

@@ -16,6 +16,8 @@ use crate::supporting_plane::{check_plane, plane_under};
 /// belongs to the limb. Scans are patient scans (LPS), so proximal is superior; only when a lower
 /// leg shows its ankle the other way round is it turned, with a note.
 ///
+/// * Slices: the scan's own; where the tibia leans in them by more than 3 degrees, interpolated ones
+///   across it.
 /// * Joint level of a lower leg: the gap between plafond and talar dome in a column along the
 ///   tibia's shaft. Other limbs: the middle of the limb.
 /// * Axis: through the centres of two regions, 50 to 90 mm and 130 to 200 mm proximal of the joint

@@ -95,6 +95,9 @@ impl LandmarkOverrides {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LandmarkError {
+    /// The scan cannot be cut across a limb that lies aslant in it.
+    #[error("the scan cannot be cut across the limb's shaft")]
+    Reslice(#[from] ppa_ct::VolumeError),
     /// The mask is not one value per voxel.
     #[error("the limb mask has {found} values, expected {expected}, one per voxel")]
     MaskLength {

@@ -57,7 +57,8 @@ pub struct Landmarks {
     pub limb: LimbKind,
     /// What the two region centres are centres of.
     pub axis_source: AxisSource,
-    /// Unit direction across the scan's slices, towards proximal; region ranges run along it.
+    /// Unit direction across the slices, towards proximal: the scan's own, or across a shaft that
+    /// leans in them by more than 3 degrees; region ranges run along it.
     pub scan_direction: [f64; 3],
     /// The distal region, just proximal to the joint.
     pub joint_region: AxisRegion,

@@ -1,19 +1,29 @@
 //! Cross-sections of a limb along the scan: skin outline, bones, density along a line.
 
+use std::borrow::Cow;
+
 use nalgebra::{Point3, Vector3};
-use ppa_ct::Volume;
+use ppa_ct::{Volume, VolumeError};
+
+use crate::outlines::{filled, flood, parts};
+use crate::reslice::Resliced;
 
 /// HU from which a voxel is bone; trabecular bone next to a joint starts near 150 to 200.
 const BONE_HU: f32 = 200.0;
 
+/// Tibia and fibula hang together in coarse voxels over necks narrower than twice this, mm.
+const NECK_MM: f64 = 3.0;
+
 /// Slices of a limb across the scan's limb direction, numbered as in the volume.
 pub(crate) struct Sections<'a> {
-    volume: &'a Volume,
-    mask: &'a [bool],
+    volume: Cow<'a, Volume>,
+    mask: Cow<'a, [bool]>,
     /// Grid axis that runs along the limb, then the two in-slice axes.
     axes: [usize; 3],
     /// Unit normal of the slices, towards proximal.
     pub(crate) direction: Vector3<f64>,
+    /// Slices that show only part of the limb's cross-section, since the scan ends there.
+    cut: Vec<bool>,
 }
 
 /// One bone in one slice, with everything inside its outline.
@@ -42,11 +52,33 @@ impl<'a> Sections<'a> {
             .max_by(|a, b| alignment(*a).abs().total_cmp(&alignment(*b).abs()))
             .unwrap_or(2);
         Self {
-            volume,
-            mask,
+            cut: vec![false; volume.grid().size()[axis]],
+            volume: Cow::Borrowed(volume),
+            mask: Cow::Borrowed(mask),
             axes: [axis, (axis + 1) % 3, (axis + 2) % 3],
             direction: normal(axis) * alignment(axis).signum(),
         }
+    }
+
+    /// Slices across `towards_proximal` of a limb that lies aslant in the scan, interpolated.
+    pub(crate) fn across(
+        volume: &Volume,
+        mask: &[bool],
+        towards_proximal: &Vector3<f64>,
+    ) -> Result<Self, VolumeError> {
+        let resliced = Resliced::across(volume, mask, towards_proximal)?;
+        Ok(Self {
+            volume: Cow::Owned(resliced.volume),
+            mask: Cow::Owned(resliced.mask),
+            axes: [2, 0, 1],
+            direction: *towards_proximal,
+            cut: resliced.cut,
+        })
+    }
+
+    /// Whether a slice shows the limb's whole cross-section.
+    pub(crate) fn is_whole(&self, slice: usize) -> bool {
+        !self.cut[slice]
     }
 
     /// Number of slices.
@@ -63,10 +95,10 @@ impl<'a> Sections<'a> {
         self.direction.dot(&centre.coords)
     }
 
-    /// Slices that show the limb, from proximal to distal.
+    /// Whole slices that show the limb, from proximal to distal.
     pub(crate) fn proximal_to_distal(&self) -> Vec<usize> {
         let mut slices: Vec<usize> = (0..self.count())
-            .filter(|slice| self.limb_pixels(*slice).next().is_some())
+            .filter(|slice| self.is_whole(*slice) && self.limb_pixels(*slice).next().is_some())
             .collect();
         slices.sort_by(|a, b| self.level(*b).total_cmp(&self.level(*a)));
         slices
@@ -90,12 +122,13 @@ impl<'a> Sections<'a> {
                 continue;
             }
             let pixels = flood(start, (nu, nv), true, |p| std::mem::take(&mut open[p]));
-            let filled = filled(&pixels);
-            let centre = self.mean(slice, filled.iter().copied());
-            bones.extend(centre.map(|centre| BoneSection {
-                area_mm2: filled.len() as f64 * self.pixel_mm2(),
-                centre,
-            }));
+            for part in parts(filled(&pixels), self.pixel_mm(), NECK_MM) {
+                let centre = self.mean(slice, part.iter().copied());
+                bones.extend(centre.map(|centre| BoneSection {
+                    area_mm2: part.len() as f64 * self.pixel_mm2(),
+                    centre,
+                }));
+            }
         }
         bones.sort_by(|a, b| b.area_mm2.total_cmp(&a.area_mm2));
         bones
@@ -134,6 +167,11 @@ impl<'a> Sections<'a> {
         voxel
     }
 
+    fn pixel_mm(&self) -> [f64; 2] {
+        let spacing = self.volume.grid().spacing_mm();
+        [spacing[self.axes[1]], spacing[self.axes[2]]]
+    }
+
     fn pixel_mm2(&self) -> f64 {
         let affine = self.volume.grid().ct_from_voxel().matrix();
         let column = |axis: usize| affine.fixed_view::<3, 1>(0, axis).into_owned();
@@ -167,56 +205,4 @@ impl<'a> Sections<'a> {
         }
         Some(self.volume.grid().centre(voxel))
     }
-}
-
-/// Pixels (u, v) that hang together with `start`; `take` says whether a pixel belongs and must
-/// do so only once per pixel.
-fn flood(
-    start: usize,
-    (nu, nv): (usize, usize),
-    diagonals: bool,
-    mut take: impl FnMut(usize) -> bool,
-) -> Vec<(usize, usize)> {
-    let mut pixels = Vec::new();
-    let mut front = Vec::new();
-    if take(start) {
-        front.push(start);
-    }
-    while let Some(p) = front.pop() {
-        let (u, v) = (p % nu, p / nu);
-        pixels.push((u, v));
-        for near_v in v.saturating_sub(1)..=(v + 1).min(nv - 1) {
-            for near_u in u.saturating_sub(1)..=(u + 1).min(nu - 1) {
-                if (diagonals || near_u == u || near_v == v) && take(near_u + nu * near_v) {
-                    front.push(near_u + nu * near_v);
-                }
-            }
-        }
-    }
-    pixels
-}
-
-/// A set of pixels together with the holes it encloses.
-fn filled(pixels: &[(usize, usize)]) -> Vec<(usize, usize)> {
-    let bounds = |pick: fn(&(usize, usize)) -> usize| {
-        let low = pixels.iter().map(pick).min().unwrap_or(0);
-        let high = pixels.iter().map(pick).max().unwrap_or(0);
-        (low, high - low + 1)
-    };
-    let ((u0, width), (v0, height)) = (bounds(|p| p.0), bounds(|p| p.1));
-    // A frame of one pixel around the bounding box joins everything outside.
-    let (w, h) = (width + 2, height + 2);
-    let mut free = vec![true; w * h];
-    for (u, v) in pixels {
-        free[u - u0 + 1 + w * (v - v0 + 1)] = false;
-    }
-    let outside = flood(0, (w, h), false, |p| std::mem::take(&mut free[p]));
-    let mut inside = vec![true; w * h];
-    for (u, v) in outside {
-        inside[u + w * v] = false;
-    }
-    (0..w * h)
-        .filter(|p| inside[*p])
-        .map(|p| (p % w + u0 - 1, p / w + v0 - 1))
-        .collect()
 }

@@ -1,6 +1,7 @@
 //! Tests across the modules of ppa-scene.
 
 mod boot;
+mod family;
 mod frames;
 mod landmarks;
 mod placement;

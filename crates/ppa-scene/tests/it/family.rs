@@ -1,0 +1,170 @@
+//! Landmarks of the seventeen phantoms, however they lie in the scan.
+
+use nalgebra::{Affine3, Matrix4, Point3, Rotation3, Translation3, Vector3};
+use ppa_ct::phantom::{LowerLeg, Side as PhantomSide, TableTop, Truth};
+use ppa_ct::{Grid, Interpolation, Volume};
+use ppa_mesh::{Border, iso_surface};
+use ppa_scene::{LandmarkOverrides, LimbKind, Side};
+
+use crate::scan::Scan;
+
+const SPACING_MM: f64 = 1.5;
+
+/// A phantom and points of its exact skin.
+struct Subject {
+    name: String,
+    side: Side,
+    truth: Truth,
+    volume: Volume,
+    skin: Vec<Point3<f64>>,
+}
+
+impl Subject {
+    /// Odd numbers are left legs.
+    fn numbered(number: u32) -> Self {
+        let (side, phantom_side) = match number % 2 {
+            0 => (Side::Right, PhantomSide::Right),
+            _ => (Side::Left, PhantomSide::Left),
+        };
+        let name = format!("P{number:02}");
+        let leg = LowerLeg::family(&name, phantom_side).unwrap();
+        let volume = leg.voxelise(SPACING_MM, TableTop::Absent).unwrap();
+        let near = iso_surface(&volume, -500.0, Border::Open).unwrap();
+        let skin = near.vertices.iter().map(|vertex| {
+            // Newton's steps along the normal end on the surface.
+            (0..3).fold(vertex.cast::<f64>(), |p, _| {
+                p - leg.skin_normal(&p).into_inner() * leg.skin_distance_mm(&p)
+            })
+        });
+        Self {
+            name,
+            side,
+            skin: skin.collect(),
+            truth: leg.truth(),
+            volume,
+        }
+    }
+
+    /// The leg turned in the world while the scanner's slices stay level.
+    fn turned(&self, turn: &Rotation3<f64>) -> Scan {
+        let (low, high) = self.skin.iter().fold(
+            (
+                Point3::from(Vector3::repeat(f64::INFINITY)),
+                Point3::from(Vector3::repeat(f64::NEG_INFINITY)),
+            ),
+            |(low, high), p| {
+                let p = turn * p;
+                (low.inf(&p), high.sup(&p))
+            },
+        );
+        let origin = low - Vector3::repeat(5.0 * SPACING_MM);
+        let size = (high - low).map(|d| (d / SPACING_MM).ceil() as usize + 10);
+        let level = Translation3::from(origin.coords).to_homogeneous()
+            * Matrix4::new_nonuniform_scaling(&Vector3::repeat(SPACING_MM));
+        let grid = |matrix| Grid::new(size.into(), Affine3::from_matrix_unchecked(matrix)).unwrap();
+        let in_the_leg = grid(turn.inverse().to_homogeneous() * level);
+        let sampled = self
+            .volume
+            .resampled_to(&in_the_leg, Interpolation::Linear, -1000.0)
+            .unwrap();
+        Scan::of(Volume::new(grid(level), sampled.hu().to_vec()).unwrap())
+    }
+
+    /// Normal of the plane that touches the exact skin from behind, and how far the joint lies above.
+    fn plane(&self, turn: &Rotation3<f64>) -> (Vector3<f64>, f64) {
+        let z = turn * self.truth.axis_direction.into_inner();
+        let y = (z * z.y - Vector3::y()).normalize();
+        let joint = turn * self.truth.joint_centre;
+        let mut points: Vec<[f64; 2]> = self
+            .skin
+            .iter()
+            .map(|p| turn * p - joint)
+            .map(|v| [v.dot(&z), v.dot(&y)])
+            .collect();
+        points.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        let mut hull: Vec<[f64; 2]> = Vec::new();
+        for p in points {
+            while let [.., a, b] = hull[..] {
+                if (b[0] - a[0]) * (p[1] - a[1]) > (b[1] - a[1]) * (p[0] - a[0]) {
+                    break;
+                }
+                hull.pop();
+            }
+            hull.push(p);
+        }
+        let back = hull.iter().position(|p| p[0] >= 0.0).unwrap();
+        let (a, b) = (hull[back - 1], hull[back]);
+        let tilt = f64::atan2(b[1] - a[1], b[0] - a[0]);
+        let normal = y * tilt.cos() - z * tilt.sin();
+        let height = -(a[1] * tilt.cos() - a[0] * tilt.sin());
+        (normal, height)
+    }
+}
+
+fn degrees_between(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+    a.cross(b).norm().atan2(a.dot(b)).to_degrees()
+}
+
+/// Axis within 1 degree, joint within 2 mm, and Π_P within 1 degree and 1 mm of the exact skin's.
+fn check(subject: &Subject, turn: &Rotation3<f64>) {
+    let scan = subject.turned(turn);
+    let name = format!(
+        "{} {:?} {:?}",
+        subject.name,
+        subject.side,
+        turn.scaled_axis()
+    );
+    let found = scan.find(subject.side, &LandmarkOverrides::default());
+    let landmarks = found.unwrap_or_else(|error| panic!("{name}: {error}"));
+    assert_eq!(landmarks.limb, LimbKind::LowerLeg, "{name}");
+    let axis = turn * subject.truth.axis_direction.into_inner();
+    let joint = turn * subject.truth.joint_centre;
+    let axis_deg = degrees_between(&landmarks.axis_direction.into(), &axis);
+    let off = Point3::from(landmarks.joint_centre) - joint;
+    let (normal, height_mm) = subject.plane(turn);
+    let ct_from_patient = landmarks.patient_from_ct().inverse();
+    let plane = landmarks
+        .plane_patient()
+        .transformed(ct_from_patient.isometry());
+    let plane_deg = degrees_between(&plane.normal, &normal);
+    let plane_mm = plane.signed_distance(&joint) - height_mm;
+    println!(
+        "{name}: axis {axis_deg:.2} degrees, joint {:.2} mm along and {:.2} mm beside the axis, \
+         plane {plane_deg:.2} degrees, {plane_mm:.2} mm",
+        off.dot(&axis),
+        off.cross(&axis).norm()
+    );
+    assert!(axis_deg < 1.0, "{name}: axis {axis_deg:.2} degrees off");
+    assert!(off.norm() < 2.0, "{name}: joint off by {off:?}");
+    assert!(
+        plane_deg < 1.0 && plane_mm.abs() < 1.0,
+        "{name}: {plane_deg:.2} degrees, {plane_mm:.2} mm"
+    );
+}
+
+fn twenty_degrees(axis: usize, sign: f64) -> Rotation3<f64> {
+    Rotation3::from_scaled_axis(Vector3::ith(axis, sign * 20_f64.to_radians()))
+}
+
+/// A left leg with its toes down by 12 degrees that leans backwards, and lies across the table.
+#[test]
+fn a_leaning_leg_is_measured_across_its_shaft() {
+    let subject = Subject::numbered(13);
+    assert!(subject.truth.plantarflexion_rad.to_degrees() > 10.0);
+    check(&subject, &twenty_degrees(0, 1.0));
+    check(&subject, &twenty_degrees(1, -1.0));
+}
+
+/// Feet from 2 degrees up to 12 degrees down, as they lie and turned about each axis.
+#[test]
+#[ignore = "minutes"]
+fn seventeen_legs_turned_about_each_axis() {
+    for number in 1..=17 {
+        let subject = Subject::numbered(number);
+        check(&subject, &Rotation3::identity());
+        for axis in 0..3 {
+            check(&subject, &twenty_degrees(axis, -1.0));
+            check(&subject, &twenty_degrees(axis, 1.0));
+        }
+    }
+}
