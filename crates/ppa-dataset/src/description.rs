@@ -1,6 +1,6 @@
 //! `dataset.json`: what all images of a dataset share, free of paths and identities.
 
-use ppa_depth::{CameraSpec, SensorSpec, rows_from_isometry};
+use ppa_depth::{CameraSpec, RigSpec, SensorSpec, rows_from_isometry};
 use ppa_mesh::LimbSettings;
 use ppa_scene::{LandmarkOverrides, PlaneSettings, RoomSpec, SoftTissue, Sweep};
 use serde::Serialize;
@@ -31,6 +31,8 @@ pub(crate) struct Settings {
     table: Option<PlaneSettings>,
     room_from_device: Option<Rows>,
     rig_sha256: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cameras: Option<RigSpec>,
     roi_mm: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     sensor: Option<SensorSpec>,
@@ -52,6 +54,7 @@ impl Settings {
             table: plan.room.table.clone(),
             room_from_device: plan.room.room_from_device,
             rig_sha256: hash(&plan.depth.rig)?,
+            cameras: plan.depth.cameras.clone(),
             roi_mm: plan.depth.roi_mm,
             sensor: plan.depth.sensor.clone(),
             xray: plan.xray.clone(),

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ppa_depth::SensorSpec;
+use ppa_depth::{RigSpec, SensorSpec};
 use ppa_scene::{PlaneSettings, RoomSpec, SoftTissue, Sweep};
 use ppa_xray::{Detector, FastSettings, HuCalibration, Presentation, Receptor, Source};
 use serde::{Deserialize, Serialize};
@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::body_shape::ShapeSettings;
 use crate::files::{FileError, read_text, to_toml, write_whole};
 use crate::manifest::Rows;
+use crate::room_file::RoomFile;
 
 /// Everything a dataset is made of; unknown keys are refused.
 ///
@@ -37,6 +38,10 @@ pub struct Plan {
     /// The x-ray room.
     #[serde(default)]
     pub room: PlanRoom,
+    /// Room, device, detector and cameras from a [`RoomFile`]; reading the plan puts its contents in
+    /// place of the path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub room_file: Option<PathBuf>,
     /// Depth images.
     #[serde(default)]
     pub depth: DepthSettings,
@@ -77,6 +82,9 @@ pub struct PlanRoom {
 pub struct DepthSettings {
     /// Camera rig (JSON); the built-in Azure Kinect pair when absent.
     pub rig: Option<PathBuf>,
+    /// The camera rig written out, instead of a file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cameras: Option<RigSpec>,
     /// Side of the square region of interest around the joint, mm at the joint.
     pub roi_mm: f64,
     /// Errors of the cameras' sensors; ideal images when absent.
@@ -87,8 +95,23 @@ impl Default for DepthSettings {
     fn default() -> Self {
         Self {
             rig: None,
+            cameras: None,
             roi_mm: 260.0,
             sensor: None,
+        }
+    }
+}
+
+impl DepthSettings {
+    /// The camera rig.
+    ///
+    /// # Errors
+    /// [`RigError`](ppa_depth::RigError) when it is a file that cannot be read.
+    pub fn cameras(&self) -> Result<RigSpec, ppa_depth::RigError> {
+        match (&self.cameras, &self.rig) {
+            (Some(cameras), _) => Ok(cameras.clone()),
+            (None, Some(path)) => RigSpec::read(path),
+            (None, None) => Ok(RigSpec::default()),
         }
     }
 }
@@ -170,6 +193,9 @@ pub enum PlanError {
     /// The HU calibration it names.
     #[error(transparent)]
     Calibration(#[from] ppa_xray::CalibrationError),
+    /// Its camera rig.
+    #[error(transparent)]
+    Rig(#[from] ppa_depth::RigError),
     /// Something in it cannot work.
     #[error("{}: {message}", path.display())]
     Invalid {
@@ -191,6 +217,7 @@ impl Plan {
             shapes: ShapeSettings::default(),
             soft_tissue: SoftTissue::default(),
             room: PlanRoom::default(),
+            room_file: None,
             depth: DepthSettings::default(),
             xray: XraySettings::default(),
         }
@@ -225,6 +252,14 @@ impl Plan {
             .flatten()
         {
             *file = folder.join(&*file);
+        }
+        if let Some(file) = plan.room_file.take() {
+            RoomFile::read(&folder.join(file))?
+                .put_into(&mut plan)
+                .map_err(|message| PlanError::Invalid {
+                    path: path.to_owned(),
+                    message,
+                })?;
         }
         if let Some(file) = plan.xray.calibration_file.take() {
             if plan.xray.calibration != HuCalibration::default() {
@@ -268,6 +303,9 @@ impl Plan {
             if !(value.is_finite() && value > 0.0) {
                 return Err(format!("{name} is {value}, expected a length above 0 mm"));
             }
+        }
+        if self.depth.rig.is_some() && self.depth.cameras.is_some() {
+            return Err("depth.rig and depth.cameras are both given".to_owned());
         }
         if self.room.ply.is_none() && self.room.room_from_device.is_some() {
             return Err(

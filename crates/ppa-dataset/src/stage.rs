@@ -2,8 +2,8 @@
 
 use nalgebra::Isometry3;
 use ppa_depth::{
-    Backdrop, Body, Camera, DepthImage, MeshBody, MountedCamera, PlacedBody, RigError, RigSpec,
-    Sensor, SensorError, SurfelBody,
+    Backdrop, Body, Camera, DepthImage, MeshBody, MountedCamera, PlacedBody, RigError, Sensor,
+    SensorError, SurfelBody,
 };
 use ppa_mesh::{CloudError, estimate_normals, mean_spacing_mm};
 use ppa_scene::{PlaneSettings, Rigid, Room, RoomError, TablePlane, XrayDevice, table_plane};
@@ -118,10 +118,7 @@ impl Stage {
     /// [`StageError`] naming the room, table, camera or beam at fault.
     pub fn of_plan(plan: &Plan) -> Result<Self, StageError> {
         let table = Table::of_plan(plan)?;
-        let rig = match &plan.depth.rig {
-            Some(path) => RigSpec::read(path)?,
-            None => RigSpec::default(),
-        };
+        let rig = plan.depth.cameras()?;
         let furniture = table.furniture()?;
         let device = &table.room.device;
         let place = |view, side, mounted: &MountedCamera| {

@@ -1,10 +1,10 @@
 //! `ppa scene`: the table, and the limb on it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
-use ppa_dataset::{Case, Plan, PreparedLimb, Table};
+use ppa_dataset::{Case, Frames, Plan, PreparedLimb, RoomFile, Table, write_whole};
 use ppa_mesh::{read_mesh_file, write_cloud_file, write_mesh_file};
 use ppa_scene::{Contact, PlaneSettings, SoftTissue, TablePlane, place_soft, table_plane};
 use serde::Serialize;
@@ -23,13 +23,39 @@ pub enum SceneCommand {
 }
 
 #[derive(Debug, Args)]
+#[group(multiple = false)]
+struct WhichRoom {
+    /// Take the room, and soft tissue, from this plan instead of the built-in one
+    #[arg(long)]
+    plan: Option<PathBuf>,
+    /// Take the room from this room file
+    #[arg(long = "room")]
+    file: Option<PathBuf>,
+}
+
+impl WhichRoom {
+    fn plan(&self) -> anyhow::Result<Plan> {
+        Ok(match (&self.plan, &self.file) {
+            (Some(plan), _) => Plan::read(plan)?,
+            (None, Some(file)) => Plan::in_room(file)?,
+            (None, None) => Plan::new(Vec::new()),
+        })
+    }
+}
+
+#[derive(Debug, Args)]
 pub struct RoomArgs {
     /// Cloud to write, mm: .ply or .obj
     #[arg(long)]
     out: PathBuf,
-    /// Take the room from this plan instead of the built-in one
+    #[command(flatten)]
+    room: WhichRoom,
+    /// Room file to write: room, device, detector and cameras as they are, to be changed
     #[arg(long)]
-    plan: Option<PathBuf>,
+    toml: Option<PathBuf>,
+    /// Write the poses of device and cameras as JSON: named 4x4, mm
+    #[arg(long)]
+    frames: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -48,9 +74,11 @@ pub struct PlaceArgs {
     /// Medial rotation in degrees
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     angle: f64,
-    /// Take room and soft tissue from this plan
+    #[command(flatten)]
+    room: WhichRoom,
+    /// Write all poses, from the scan to the cameras, as JSON: named 4x4, mm
     #[arg(long)]
-    plan: Option<PathBuf>,
+    frames: Option<PathBuf>,
     /// How far the distal and the proximal part sink in where they rest, mm [default: the plan's, or 0,0: a rigid skin]
     #[arg(long, value_name = "DISTAL,PROXIMAL", value_parser = range)]
     soft_tissue_mm: Option<[f64; 2]>,
@@ -65,13 +93,6 @@ pub fn run(command: &SceneCommand, output: Output) -> anyhow::Result<()> {
         SceneCommand::Plane(args) => plane(args, output),
         SceneCommand::Place(args) => place_limb(args, output),
     }
-}
-
-fn plan(path: Option<&PathBuf>) -> anyhow::Result<Plan> {
-    Ok(match path {
-        Some(path) => Plan::read(path)?,
-        None => Plan::new(Vec::new()),
-    })
 }
 
 #[derive(Debug, Serialize)]
@@ -111,7 +132,15 @@ struct RoomFacts {
 }
 
 fn room(args: &RoomArgs, output: Output) -> anyhow::Result<()> {
-    let Table { room, plane } = Table::of_plan(&plan(args.plan.as_ref())?)?;
+    let plan = args.room.plan()?;
+    let table = Table::of_plan(&plan)?;
+    if let Some(path) = &args.frames {
+        write_frames(path, &Frames::of_room(&table, &plan.depth.cameras()?)?)?;
+    }
+    if let Some(path) = &args.toml {
+        RoomFile::of_plan(&plan)?.write(path)?;
+    }
+    let Table { room, plane } = table;
     write_cloud_file(&args.out, &room.cloud)?;
     let facts = RoomFacts {
         points: room.cloud.points.len(),
@@ -126,6 +155,11 @@ fn room(args: &RoomArgs, output: Output) -> anyhow::Result<()> {
             facts.points
         )
     })
+}
+
+fn write_frames(path: &Path, frames: &Frames) -> anyhow::Result<()> {
+    let text = serde_json::to_string_pretty(frames)?;
+    Ok(write_whole(path, text.as_bytes())?)
 }
 
 fn plane(args: &PlaneArgs, output: Output) -> anyhow::Result<()> {
@@ -144,7 +178,7 @@ struct Placed {
 }
 
 fn place_limb(args: &PlaceArgs, output: Output) -> anyhow::Result<()> {
-    let plan = plan(args.plan.as_ref())?;
+    let plan = args.room.plan()?;
     let soft_tissue = match args.soft_tissue_mm {
         Some([distal_mm, proximal_mm]) => SoftTissue {
             distal_mm,
@@ -175,6 +209,13 @@ fn place_limb(args: &PlaceArgs, output: Output) -> anyhow::Result<()> {
             lies.normals = lies.geometric_normals();
         }
         write_mesh_file(ply, &lies)?;
+    }
+    if let Some(path) = &args.frames {
+        let frames = Frames::of_room(&table, &plan.depth.cameras()?)?;
+        write_frames(
+            path,
+            &frames.with_limb(&placement, &prepared.landmarks, &table),
+        )?;
     }
     working.finish_and_clear();
     let placed = Placed {
