@@ -37,8 +37,11 @@ impl RoomFile {
             path: path.to_owned(),
             message,
         };
-        let mut file: Self = toml::from_str(&text)
-            .map_err(|error| invalid(format!("no room file: {}", error.to_string().trim_end())))?;
+        let mut file: Self = toml::from_str(&text).map_err(|error| {
+            let before = error.span().map_or("", |span| &text[..span.start]);
+            let line = before.matches('\n').count() + 1;
+            invalid(format!("line {line} of the room file: {}", error.message()))
+        })?;
         if file.version != 1 {
             return Err(invalid(format!(
                 "room file version {}, expected 1",

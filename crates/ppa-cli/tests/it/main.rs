@@ -13,6 +13,7 @@ mod phantoms;
 mod planted_series;
 mod reading;
 mod resume;
+mod room_file;
 mod shards;
 mod tallies;
 
