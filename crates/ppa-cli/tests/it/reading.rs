@@ -140,6 +140,30 @@ fn one_of_several_series_is_chosen_by_number_or_uid() {
     assert_remembered(folder, "--series 1", "series = 1", "2 series");
 }
 
+/// A page of doses in colour that calls itself CT.
+#[test]
+fn a_page_beside_a_series_is_listed_with_the_reason_why_it_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    copy_with(&folder.join("scan"), "a_", &[]);
+    copy_with(
+        &folder.join("scan"),
+        "b_",
+        &[
+            (tags::SERIES_INSTANCE_UID, VR::UI, "2.25.4711"),
+            (tags::SERIES_NUMBER, VR::IS, "999"),
+            (tags::PHOTOMETRIC_INTERPRETATION, VR::CS, "RGB"),
+        ],
+    );
+    let reason = "refused: PhotometricInterpretation is RGB";
+    let said = fail(folder, "ct info scan");
+    assert!(said.contains(reason), "{said}");
+    let said = succeed(folder, "ct info scan --series 1");
+    assert!(said.contains(reason), "{said}");
+    let said = fail(folder, "ct info scan --series 999");
+    assert!(said.contains("PhotometricInterpretation is RGB"), "{said}");
+}
+
 #[test]
 fn another_modality_is_read_only_when_forced_and_never_called_a_ct() {
     let folder = tempfile::tempdir().unwrap();
