@@ -70,8 +70,8 @@ impl Mesh {
 
     /// Signed volume enclosed, mm³; positive when triangles are counter-clockwise seen from outside.
     ///
-    /// Only meaningful without boundary edges: for an open mesh it depends on where the mesh
-    /// lies, as cones from the first vertex close it.
+    /// Only meaningful without boundary edges: an open mesh is closed by a cone from its first vertex,
+    /// whichever that is.
     pub fn volume_mm3(&self) -> f64 {
         let origin = self
             .vertices

@@ -46,6 +46,8 @@ impl PointCells {
     /// Cells of `radius` (mm, positive) for the finite ones of `points` (mm).
     pub fn new(points: &[Point3<f32>], radius: f64) -> Self {
         let finite = |i: &u32| points[*i as usize].coords.iter().all(|c| c.is_finite());
+        // A little wider, so that rounding puts no two places within the radius two cells apart.
+        let width = radius * (1.0 + 1e-9);
         let low = (0..points.len() as u32)
             .filter(finite)
             .map(|i| points[i as usize])
@@ -54,7 +56,7 @@ impl PointCells {
         let mut order: Vec<(u64, u32)> = (0..points.len() as u32)
             .filter(finite)
             .map(|i| {
-                let from_low = (points[i as usize].cast::<f64>() - low.cast::<f64>()) / radius;
+                let from_low = (points[i as usize].cast::<f64>() - low.cast::<f64>()) / width;
                 // From 1 on, so that every cell has neighbours on both sides.
                 let [x, y, z] = from_low.map(|c| c.min(LAST_CELL) as u64 + 1).into();
                 (z << 42 | y << 21 | x, i)

@@ -7,6 +7,15 @@ use ndarray16::Array2;
 use ppa_mesh::dbscan;
 use proptest::prelude::*;
 
+/// At a distance of exactly the radius, where rounding could put the two a cell too far apart.
+#[test]
+fn points_at_the_radius_are_neighbours() {
+    let points = [0.5_f32.powi(53), 1.0, 2.0].map(|x| Point3::new(x, 0.0, 0.0));
+    assert_eq!(dbscan(&points, 1.0, 2).noise, 0);
+    assert_eq!(dbscan(&points, f64::INFINITY, 3).sizes, [3]);
+    assert_eq!(dbscan(&points, f64::NAN, 2).noise, 3);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
     /// On lattice points (many equal coordinates), from the definition in O(n²).
