@@ -1,6 +1,6 @@
 //! `case.toml`: every preprocessing decision for one limb of one CT.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use ppa_ct::{ReadOptions, SeriesChoice};
 use ppa_mesh::{LimbReport, LimbSettings};
@@ -8,7 +8,7 @@ use ppa_scene::{LandmarkOverrides, Landmarks, Side};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
-use crate::files::{FileError, read_text, to_toml, write_whole};
+use crate::files::{FileError, other_version, read_text, to_toml, write_whole};
 
 /// One limb of one CT. `ppa prepare` proposes it; a person changes `side`, `surface` and
 /// `choices`, and everything else is computed again when the case is used.
@@ -116,16 +116,14 @@ impl Case {
     /// [`CaseError`] naming the file and the line or key at fault.
     pub fn read(path: &Path) -> Result<Self, CaseError> {
         let text = read_text(path)?;
+        if let Some(found) = other_version(&text) {
+            let path = path.to_owned();
+            return Err(CaseError::Version { path, found });
+        }
         let case: CaseFile = toml::from_str(&text).map_err(|error| CaseError::Parse {
             path: path.to_owned(),
             message: error.to_string().trim_end().to_owned(),
         })?;
-        if case.version != 1 {
-            return Err(CaseError::Version {
-                path: path.to_owned(),
-                found: case.version,
-            });
-        }
         let folder = path.parent().unwrap_or(Path::new(""));
         Ok(Self {
             version: case.version,
@@ -161,7 +159,8 @@ const HEADER: &str = "\
 
 ";
 
-/// `path` as seen from `folder`: with `..` where the two part; absolute paths stay absolute.
+/// `path` as seen from `folder`: with `..` where the two part. Absolute paths stay absolute, and
+/// paths become so where the way back out of `folder` is not known, since it has `..` itself.
 fn relative_to(path: &Path, folder: &Path) -> Result<PathBuf, FileError> {
     if path.is_absolute() {
         return Ok(path.to_owned());
@@ -178,7 +177,11 @@ fn relative_to(path: &Path, folder: &Path) -> Result<PathBuf, FileError> {
         .zip(folder.components())
         .take_while(|(a, b)| a == b)
         .count();
-    let up = folder.components().skip(shared).map(|_| Path::new(".."));
+    let out_of = folder.components().skip(shared);
+    if out_of.clone().any(|part| part == Component::ParentDir) {
+        return Ok(path);
+    }
+    let up = out_of.map(|_| Path::new(".."));
     let down = path.components().skip(shared);
     Ok(up
         .map(PathBuf::from)
@@ -198,5 +201,9 @@ mod tests {
         assert_eq!(see("scans/ct", "scans"), Path::new("ct"));
         assert_eq!(see("p01.nii.gz", ""), Path::new("p01.nii.gz"));
         assert_eq!(see("../data/ct", "out"), Path::new("../../data/ct"));
+        assert_eq!(see("../data/ct", "../cases"), Path::new("../data/ct"));
+        let absolute = std::path::absolute("scan").unwrap();
+        assert_eq!(see("scan", "../cases"), absolute);
+        assert_eq!(see("scan", "a/../b"), absolute);
     }
 }

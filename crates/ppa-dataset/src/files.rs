@@ -70,6 +70,16 @@ pub(crate) fn to_toml<T: Serialize>(value: &T, path: &Path) -> Result<String, Fi
     toml::to_string(value).map_err(|e| FileError::at("write", path)(io::Error::other(e)))
 }
 
+/// The format version of a TOML file, if it is not 1; its other keys may then be any.
+pub(crate) fn other_version(text: &str) -> Option<u32> {
+    #[derive(serde::Deserialize)]
+    struct Versioned {
+        version: u32,
+    }
+    let versioned: Versioned = toml::from_str(text).ok()?;
+    (versioned.version != 1).then_some(versioned.version)
+}
+
 /// Reads a text file.
 pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
     fs::read_to_string(path).map_err(FileError::at("read", path))

@@ -60,6 +60,9 @@ pub enum GenerateError {
     /// A file that the plan names.
     #[error(transparent)]
     File(#[from] FileError),
+    /// A plan that was not read from a file, and that reading would have refused.
+    #[error("the plan cannot be used: {0}")]
+    Unusable(String),
     /// Two cases would write the same files.
     #[error(
         "{} and {} are both the {side} limb of patient {patient}; give one of them another number",
@@ -155,6 +158,7 @@ struct PlannedLimb {
 
 impl<'a> Work<'a> {
     pub fn of_plan(plan: &'a Plan) -> Result<Self, GenerateError> {
+        plan.check().map_err(GenerateError::Unusable)?;
         let settings = Settings::of(plan)?;
         let limbs = planned_limbs(plan, &settings)?;
         let stage = Stage::of_plan(plan)?;

@@ -52,7 +52,7 @@ pub struct FileRow {
     /// Radiographs: pose of the x-ray device in the scan.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub ct_from_device: Option<Rows>,
-    /// Radiographs: seed of histories and noise.
+    /// Seed of a radiograph's histories and noise, or of a depth sensor's noise.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub seed: Option<u64>,
 }

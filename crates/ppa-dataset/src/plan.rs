@@ -8,7 +8,7 @@ use ppa_xray::{Detector, FastSettings, HuCalibration, Presentation, Receptor, So
 use serde::{Deserialize, Serialize};
 
 use crate::body_shape::ShapeSettings;
-use crate::files::{FileError, read_text, to_toml, write_whole};
+use crate::files::{FileError, other_version, read_text, to_toml, write_whole};
 use crate::manifest::Rows;
 use crate::room_file::RoomFile;
 
@@ -167,6 +167,12 @@ impl Default for XraySettings {
     }
 }
 
+/// Farther out or in, a limb is none any more, mm.
+const MOST_OFFSET_MM: f64 = 100.0;
+
+/// Bumps of a body shape: without any it would be `orig`, with more they cover the skin.
+const BUMPS: std::ops::RangeInclusive<usize> = 1..=100;
+
 /// Why a plan cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -229,19 +235,13 @@ impl Plan {
     /// [`PlanError`] naming the file and the line, key or value at fault.
     pub fn read(path: &Path) -> Result<Self, PlanError> {
         let text = read_text(path)?;
+        if let Some(found) = other_version(&text) {
+            let path = path.to_owned();
+            return Err(PlanError::Version { path, found });
+        }
         let mut plan: Self = toml::from_str(&text).map_err(|error| PlanError::Parse {
             path: path.to_owned(),
             message: error.to_string().trim_end().to_owned(),
-        })?;
-        if plan.version != 1 {
-            return Err(PlanError::Version {
-                path: path.to_owned(),
-                found: plan.version,
-            });
-        }
-        plan.check().map_err(|message| PlanError::Invalid {
-            path: path.to_owned(),
-            message,
         })?;
         let folder = path.parent().unwrap_or(Path::new(""));
         for case in &mut plan.cases {
@@ -270,6 +270,10 @@ impl Plan {
             }
             plan.xray.calibration = HuCalibration::read(&folder.join(file))?;
         }
+        plan.check().map_err(|message| PlanError::Invalid {
+            path: path.to_owned(),
+            message,
+        })?;
         Ok(plan)
     }
 
@@ -281,7 +285,8 @@ impl Plan {
         Ok(write_whole(path, to_toml(self, path)?.as_bytes())?)
     }
 
-    fn check(&self) -> Result<(), String> {
+    /// Whether a dataset can be made of it; says what is wrong.
+    pub(crate) fn check(&self) -> Result<(), String> {
         if self.cases.is_empty() {
             return Err("no [[case]]: a plan needs at least one limb".to_owned());
         }
@@ -306,6 +311,25 @@ impl Plan {
         }
         if self.depth.rig.is_some() && self.depth.cameras.is_some() {
             return Err("depth.rig and depth.cameras are both given".to_owned());
+        }
+        let offset_mm = self.shapes.offset_mm;
+        if offset_mm > MOST_OFFSET_MM {
+            return Err(format!(
+                "shapes.offset_mm is {offset_mm}, expected at most {MOST_OFFSET_MM} mm"
+            ));
+        }
+        if let Some(bumps) = self.shapes.bumps.iter().find(|n| !BUMPS.contains(n)) {
+            return Err(format!(
+                "shapes.bumps holds {bumps}, expected {} to {} bumps",
+                BUMPS.start(),
+                BUMPS.end()
+            ));
+        }
+        if self.xray.engine.seed != 0 {
+            return Err("xray.engine.seed is given, but the plan's seed decides".to_owned());
+        }
+        if self.xray.calibration_file.is_some() {
+            return Err("xray.calibration_file is only looked at when a plan is read".to_owned());
         }
         if self.room.ply.is_none() && self.room.room_from_device.is_some() {
             return Err(
@@ -389,6 +413,48 @@ mod tests {
         let plan = read("").unwrap();
         assert_eq!(plan.xray.source, Source::default());
         assert_eq!(plan.xray.receptor, Receptor::default());
+    }
+
+    #[test]
+    fn what_cannot_work_is_named() {
+        for (more, words) in [
+            (
+                "[shapes]\nbumps = [1000000000, 3]\n",
+                "shapes.bumps holds 1000000000",
+            ),
+            ("[shapes]\nbumps = [2, 0]\n", "expected 1 to 100 bumps"),
+            ("[shapes]\noffset_mm = 101\n", "at most 100 mm"),
+            ("[xray.engine]\nseed = 5\n", "xray.engine.seed"),
+        ] {
+            let error = read(more).unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
+    }
+
+    /// Of a newer format more than the version is unknown; the version is what matters.
+    #[test]
+    fn another_version_is_told_before_its_keys() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("plan.toml");
+        std::fs::write(&path, "version = 2\n[holograms]\ncount = 3\n").unwrap();
+        let error = Plan::read(&path).unwrap_err();
+        assert!(
+            matches!(error, PlanError::Version { found: 2, .. }),
+            "{error}"
+        );
+    }
+
+    /// `plans/paper` is the published dataset's size.
+    #[test]
+    fn the_shipped_plan_has_the_papers_size() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../plans/paper/plan.toml");
+        let plan = Plan::read(&path).unwrap();
+        let units = plan.cases.len() * plan.rotation.poses().unwrap().len();
+        assert_eq!((plan.cases.len(), units), (17, 3077));
+        assert_eq!(units * 2 * plan.shapes.variants.len(), 30_770);
+        let mut patients: Vec<_> = plan.cases.iter().map(|case| case.patient).collect();
+        patients.dedup();
+        assert_eq!(patients, (0..17).collect::<Vec<_>>());
     }
 
     #[test]
