@@ -92,7 +92,7 @@ pub fn bodies(tissue: &Tissue, least_depth_mm: f64, neck_ratio: f64) -> Bodies {
         for (axis, &place) in voxel.iter().enumerate() {
             basin.index_sum[axis] += place as f64;
             if axis != lattice.scan_axis && lattice.at_walls(voxel, axis).contains(&true) {
-                basin.side_cut_mm2 += lattice.voxel_mm3() / lattice.spacing_mm[axis];
+                basin.side_cut_mm2 += lattice.face_mm2[axis];
             }
         }
     }

@@ -63,6 +63,8 @@ mod tests {
             size: SIZE,
             whole: SIZE,
             spacing_mm: [1.0; 3],
+            voxel_mm3: 1.0,
+            face_mm2: [1.0; 3],
             scan_axis: 2,
         };
         let voxels = || (0..lattice.len()).map(|at| lattice.voxel(at));

@@ -68,6 +68,8 @@ pub fn couch_columns<T: Hu>(
         size,
         whole: size,
         spacing_mm: spacing,
+        voxel_mm3: spacing.iter().product(),
+        face_mm2: [0, 1, 2].map(|axis| spacing[(axis + 1) % 3] * spacing[(axis + 2) % 3]),
         scan_axis: 2,
     };
     let pieces = Pieces::of(&plane, thin);

@@ -11,6 +11,10 @@ pub struct Lattice {
     /// Size of the volume.
     pub whole: [usize; 3],
     pub spacing_mm: [f64; 3],
+    /// Volume of a voxel: less than the product of the spacings where the lattice is sheared.
+    pub voxel_mm3: f64,
+    /// Area of a voxel's face across each axis.
+    pub face_mm2: [f64; 3],
     /// Index axis nearest to the patient's z, along which the couch moves.
     pub scan_axis: usize,
 }
@@ -20,11 +24,15 @@ impl Lattice {
     pub fn of(grid: &Grid) -> Self {
         let direction = grid.direction();
         let spacing: Vector3<f64> = grid.spacing_mm();
+        let edges = [0, 1, 2].map(|axis| direction.column(axis) * spacing[axis]);
+        let face = |axis: usize| edges[(axis + 1) % 3].cross(&edges[(axis + 2) % 3]);
         Self {
             low: [0; 3],
             size: grid.size(),
             whole: grid.size(),
             spacing_mm: spacing.into(),
+            voxel_mm3: edges[0].dot(&face(0)).abs(),
+            face_mm2: [0, 1, 2].map(|axis| face(axis).norm()),
             scan_axis: direction.transpose().column(2).iamax(),
         }
     }
@@ -42,10 +50,6 @@ impl Lattice {
 
     pub fn len(&self) -> usize {
         self.size.iter().product()
-    }
-
-    pub fn voxel_mm3(&self) -> f64 {
-        self.spacing_mm.iter().product()
     }
 
     pub fn strides(&self) -> [usize; 3] {

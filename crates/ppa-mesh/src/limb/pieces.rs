@@ -127,6 +127,8 @@ mod tests {
                 size,
                 whole: size,
                 spacing_mm: [1.0; 3],
+            voxel_mm3: 1.0,
+            face_mm2: [1.0; 3],
                 scan_axis: 2,
             };
             let pieces = Pieces::of(&lattice, |at| mask[at]);

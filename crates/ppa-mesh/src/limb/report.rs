@@ -78,8 +78,8 @@ impl LimbReport {
                 let middle = [0, 1, 2].map(|axis| lattice.low[axis] as f64 + mean(axis));
                 Body {
                     chosen: at as u32 == chosen,
-                    core_mm3: basin.voxels as f64 * lattice.voxel_mm3(),
-                    bone_mm3: basin.bone_voxels as f64 * lattice.voxel_mm3(),
+                    core_mm3: basin.voxels as f64 * lattice.voxel_mm3,
+                    bone_mm3: basin.bone_voxels as f64 * lattice.voxel_mm3,
                     side_cut_mm2: basin.side_cut_mm2,
                     centre_mm: grid.centre(middle).into(),
                 }
@@ -123,7 +123,7 @@ impl LimbReport {
                 }
             }
         }
-        self.limb_mm3 = self.limb_voxels as f64 * lattice.voxel_mm3();
+        self.limb_mm3 = self.limb_voxels as f64 * lattice.voxel_mm3;
         (self.low, self.high) = (low, high);
         self.cut_faces = ["-i", "+i", "-j", "+j", "-k", "+k"]
             .into_iter()
@@ -132,7 +132,7 @@ impl LimbReport {
             .filter(|(_, (_, voxels))| *voxels > 0)
             .map(|(at, (face, voxels))| CutFace {
                 face: face.to_owned(),
-                area_mm2: voxels as f64 * lattice.voxel_mm3() / lattice.spacing_mm[at / 2],
+                area_mm2: voxels as f64 * lattice.face_mm2[at / 2],
             })
             .collect();
     }

@@ -2,12 +2,12 @@
 
 use std::sync::LazyLock;
 
-use nalgebra::Point3;
-use ppa_ct::Volume;
+use nalgebra::{Affine3, Matrix4, Point3};
 use ppa_ct::phantom::{LowerLeg, TableTop};
+use ppa_ct::{Grid, Volume};
 use ppa_mesh::{Limb, LimbError, LimbSettings, SurfaceError, VoxelBox, extract_limb};
 
-use crate::fields::volume;
+use crate::fields::{on_grid, volume};
 
 pub const VOXEL_MM: f64 = 1.5;
 
@@ -165,6 +165,33 @@ fn a_crop_finds_the_same_skin() {
     let differ = (0..grid.len()).filter(|&at| within(at) && part.mask[at] != whole.mask[at]);
     assert!(differ.count() * 1000 < whole.report.limb_voxels);
     assert_eq!(part.report.low[2], 20);
+}
+
+/// A rod through all of a scan with a tilted gantry.
+#[test]
+fn a_sheared_scan_has_the_limb_s_own_volume() {
+    let tilt = 20_f64.to_radians();
+    let mut matrix = Matrix4::identity();
+    matrix[(1, 2)] = 2.0 * tilt.sin();
+    matrix[(2, 2)] = 2.0 * tilt.cos();
+    let grid = Grid::new([60, 90, 40], Affine3::from_matrix_unchecked(matrix)).expect("grid");
+    let (middle, radius_mm) = (Point3::new(29.6, 58.2, 0.0), 20.0);
+    let rod = on_grid(grid, |p| {
+        let depth = radius_mm - (p.x - middle.x).hypot(p.y - middle.y);
+        (-500.0 + 500.0 * depth).clamp(-1000.0, 40.0) as f32
+    });
+    let report = extract_limb(&rod, &LimbSettings::default())
+        .expect("rod")
+        .report;
+    let area_mm2 = std::f64::consts::PI * radius_mm * radius_mm;
+    let volume_mm3 = area_mm2 * 40.0 * 2.0 * tilt.cos();
+    let off = report.limb_mm3 / volume_mm3 - 1.0;
+    assert!(off.abs() < 0.01, "volume off by {off}");
+    for cut in &report.cut_faces {
+        let off = cut.area_mm2 / area_mm2 - 1.0;
+        assert!(off.abs() < 0.01, "{cut:?} off by {off}");
+    }
+    assert_eq!(report.cut_faces.len(), 2);
 }
 
 #[test]
