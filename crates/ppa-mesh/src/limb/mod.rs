@@ -106,7 +106,9 @@ pub enum LimbError {
 ///
 /// Where two limbs are pressed together HU do not tell whose skin is whose: there the border is found by
 /// depth, in a scan of two hands up to 4 voxels from where an eye puts it. A hollow that the end of the
-/// scan cuts open is not filled. Working memory is about four times that of the scan's 16-bit voxels.
+/// scan cuts open is not filled. Working memory goes with the
+/// box around all tissue: once that of the scan's 16-bit voxels where a limb lies in the middle of it, over
+/// four times where limbs fill it.
 ///
 /// # Errors
 /// [`LimbError`] when the settings do not fit or nothing solid is there.
