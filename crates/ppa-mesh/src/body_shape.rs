@@ -86,7 +86,7 @@ pub enum BumpError {
 /// Normals are averaged over a few rings of neighbours first, so that creases and noise do not
 /// make spikes. The distance is exact nearly everywhere. Only where the skin would turn inside out or
 /// pass through itself (inwards at the tips of toes, outwards between them) it moves less, and the
-/// distance grows back by 0.2 mm per millimetre of skin around. [`Displacement`] tells where.
+/// distance grows back by 0.2 mm per millimetre of skin around. [`Displacement`](crate::Displacement) tells where.
 pub fn offset(mesh: &Mesh, distance_mm: f64) -> Mesh {
     let neighbours = Neighbours::of(mesh);
     let normals = smooth_normals(mesh, &neighbours);
