@@ -16,6 +16,7 @@ const ARROWS: &[(&str, &[&str])] = &[
         &["ppa-ct", "ppa-mesh", "ppa-scene", "ppa-depth", "ppa-xray"],
     ),
     ("ppa-metrics", &[]),
+    ("ppa-learn", &["ppa-dataset", "ppa-metrics"]),
     (
         "ppa-cli",
         &[

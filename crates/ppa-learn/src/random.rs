@@ -1,0 +1,49 @@
+//! Random numbers by address: (seed, purpose, index) names a stream, whoever draws from it and whenever.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+/// What a stream of random numbers is for; streams of different purposes never share numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u64)]
+pub enum Purpose {
+    /// First values of the weights; index: the parameter's place in the network.
+    Weights = 0,
+    /// Dropout and stochastic depth; index: the step of training.
+    Dropout = 1,
+    /// Which images a batch holds; index: the place in the endless sequence of images.
+    Sampling = 2,
+    /// Augmentation of one image; index: its place in the endless sequence of images.
+    Augmentation = 3,
+}
+
+/// The stream of random numbers at `index` of a purpose (ChaCha with 8 rounds; key from `seed`, nonce from the address).
+///
+/// # Panics
+/// If `index` is 2^56 or more.
+pub fn stream(seed: u64, purpose: Purpose, index: u64) -> ChaCha8Rng {
+    assert!(
+        index < 1 << 56,
+        "a stream has the index {index}, expected less than 2^56"
+    );
+    let mut stream = ChaCha8Rng::seed_from_u64(seed);
+    stream.set_stream((purpose as u64) << 56 | index);
+    stream
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::Rng;
+
+    use super::*;
+
+    #[test]
+    fn streams_depend_on_every_part_of_their_address_and_on_nothing_else() {
+        let first = |seed, purpose, index| stream(seed, purpose, index).next_u64();
+        let one = first(1, Purpose::Weights, 0);
+        assert_eq!(one, first(1, Purpose::Weights, 0));
+        assert_ne!(one, first(2, Purpose::Weights, 0));
+        assert_ne!(one, first(1, Purpose::Dropout, 0));
+        assert_ne!(one, first(1, Purpose::Weights, 1));
+    }
+}
