@@ -1,0 +1,118 @@
+//! The label of one radiograph.
+
+use serde::{Deserialize, Serialize};
+
+/// Who says how good a pose is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum LabelSource {
+    /// People who looked at the radiograph.
+    #[serde(rename = "readers")]
+    Readers,
+    /// Openness of the joint space, first edition: a surrogate that no reader has confirmed.
+    #[serde(rename = "surrogate-jso/1")]
+    Surrogate,
+}
+
+impl LabelSource {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Readers => "readers",
+            Self::Surrogate => "surrogate-jso/1",
+        }
+    }
+}
+
+/// The label of one radiograph.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LabelRow {
+    /// Quality from 1 (ideal) to 3 (inadequate): the mean over the readers.
+    pub label: f64,
+    /// Its spread. Readers: standard deviation dividing by their number (ddof 0), as published.
+    pub std: f64,
+    /// Half degrees of medial rotation.
+    pub step: u32,
+}
+
+impl LabelRow {
+    /// Mean and standard deviation (ddof 0) of grades; `None` without any.
+    pub fn of_grades(grades: &[f64], step: u32) -> Option<Self> {
+        let n = grades.len() as f64;
+        let label = grades.iter().sum::<f64>() / n;
+        let variance = grades.iter().map(|g| (g - label).powi(2)).sum::<f64>() / n;
+        (!grades.is_empty()).then(|| Self {
+            label,
+            std: variance.sqrt(),
+            step,
+        })
+    }
+
+    pub(super) fn check(&self, image: &str) -> Result<(), LabelError> {
+        let at = || image.to_owned();
+        if !(1.0..=3.0).contains(&self.label) {
+            return Err(LabelError::Label(at(), self.label));
+        }
+        // Grades from 1 to 3 spread by at most 1.
+        if !(0.0..=1.0).contains(&self.std) {
+            return Err(LabelError::Std(at(), self.std));
+        }
+        let expected = radiograph_name(self.step);
+        if image != expected {
+            return Err(LabelError::Step(at(), self.step));
+        }
+        if self.step > LAST_STEP {
+            return Err(LabelError::Angle(at(), f64::from(self.step) / 2.0));
+        }
+        Ok(())
+    }
+}
+
+/// The last step that a sweep can have: 180 degrees.
+const LAST_STEP: u32 = 360;
+
+/// The name of a radiograph, the key of `labels.json`.
+pub(super) fn radiograph_name(step: u32) -> String {
+    format!("xray_image_{step}.png")
+}
+
+/// Why a label is none.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LabelError {
+    /// Off the scale.
+    #[error("{0} has the label {1}, expected 1 to 3")]
+    Label(String, f64),
+    /// A spread that grades from 1 to 3 cannot have.
+    #[error("{0} has the std {1}, expected 0 to 1")]
+    Std(String, f64),
+    /// Name and step differ.
+    #[error("{0} has the step {1}, expected that of its name, xray_image_STEP.png")]
+    Step(String, u32),
+    /// Beyond the rotations of the layout.
+    #[error("{0} lies at {1} degrees, expected half degrees from 0 to 180")]
+    Angle(String, f64),
+    /// Labels of several sources.
+    #[error("{image} is labelled by {found}, others by {expected}; one file has one source")]
+    Mixed {
+        /// The radiograph.
+        image: String,
+        /// Its source.
+        found: &'static str,
+        /// That of the first.
+        expected: &'static str,
+    },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Four readers and half steps: the only grades that give the published 1.5 and 0.35355, ddof 0.
+    #[test]
+    fn mean_and_spread_are_those_published() {
+        let row = LabelRow::of_grades(&[1.0, 1.5, 1.5, 2.0], 36).unwrap();
+        assert_eq!(row.label, 1.5);
+        assert!((row.std - 0.353_55).abs() < 5e-6);
+        assert_eq!(LabelRow::of_grades(&[], 36), None);
+        assert_eq!(LabelRow::of_grades(&[1.0, 3.0], 36).unwrap().std, 1.0);
+    }
+}
