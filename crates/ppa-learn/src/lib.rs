@@ -2,4 +2,6 @@
 
 mod random;
 
+pub mod data;
+
 pub use random::{Purpose, stream};

@@ -1,0 +1,100 @@
+//! Region of interest, size and scale: the part that training and evaluation share.
+
+use super::error::DataError;
+use super::raster::Raster;
+
+/// Depths are clipped here, and this depth becomes 1.
+pub const RANGE_MM: u16 = 1500;
+
+/// Square region around the joint, in pixels of the depth image, as `roi_depth.json` holds it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Roi {
+    /// First column.
+    pub x: u32,
+    /// First row.
+    pub y: u32,
+    /// Columns and rows; what lies beyond the image's border is left out.
+    pub size: u32,
+}
+
+/// Side of a prepared image for a network whose input has `side` columns and rows: 1.2 times as many, rounded down.
+pub fn prepared_side(side: usize) -> usize {
+    side * 6 / 5
+}
+
+/// The region of a depth image (mm, 0 invalid) at [`prepared_side`], still in mm.
+///
+/// # Errors
+/// [`DataError::RoiOutside`] if no pixel of the region lies in the image.
+///
+/// # Panics
+/// If `side` is 0.
+pub fn prepare(depth_mm: &Raster<u16>, roi: Roi, side: usize) -> Result<Raster<u16>, DataError> {
+    let [x, y, size] = [roi.x, roi.y, roi.size].map(|pixels| pixels as usize);
+    let region = depth_mm
+        .crop(x, y, size, size)
+        .ok_or(DataError::RoiOutside {
+            x: roi.x,
+            y: roi.y,
+            size: roi.size,
+            width: depth_mm.width(),
+            height: depth_mm.height(),
+        })?;
+    Ok(region.resized(prepared_side(side), prepared_side(side)))
+}
+
+/// Depth in mm as a share of [`RANGE_MM`], in [0, 1]; invalid pixels stay 0.
+pub(super) fn share_of_range(prepared_mm: &Raster<u16>) -> Raster<f32> {
+    prepared_mm.map(|mm| f32::from(mm.min(RANGE_MM)) / f32::from(RANGE_MM))
+}
+
+/// What the network sees of a share of the range.
+pub(super) fn network_value(share: f32) -> f32 {
+    share - 0.5
+}
+
+/// A prepared image as the network sees it in evaluation, `side * side` values in [−0.5, 0.5].
+pub fn evaluation_input(prepared_mm: &Raster<u16>, side: usize) -> Raster<f32> {
+    share_of_range(&prepared_mm.resized(side, side)).map(network_value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_papers_sides() {
+        assert_eq!(prepared_side(336), 403);
+        assert_eq!([5, 96, 1].map(prepared_side), [6, 115, 1]);
+    }
+
+    #[test]
+    fn depths_are_clipped_and_shifted_and_invalid_ones_stay_least() {
+        let image = Raster::new(2, 2, vec![0, 750, 1500, 40_000]).unwrap();
+        let whole = Roi {
+            x: 0,
+            y: 0,
+            size: 2,
+        };
+        let prepared = prepare(&image, whole, 5).unwrap();
+        assert_eq!((prepared.width(), prepared.height()), (6, 6));
+        assert_eq!(prepared.values()[..6], [0, 0, 0, 750, 750, 750]);
+        let input = evaluation_input(&prepared, 2);
+        assert_eq!(input.values(), [-0.5, 0.0, 0.5, 0.5]);
+    }
+
+    #[test]
+    fn a_region_outside_is_named() {
+        let image = Raster::new(4, 3, vec![0; 12]).unwrap();
+        let beyond = Roi {
+            x: 4,
+            y: 0,
+            size: 9,
+        };
+        let error = prepare(&image, beyond, 5).unwrap_err().to_string();
+        assert_eq!(
+            error,
+            "the region of 9 x 9 pixels from column 4 and row 0 lies outside the image of 4 x 3"
+        );
+    }
+}
