@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::phantom::{LowerLeg, TableTop};
-use ppa_dataset::layout::{LimbId, View};
+use ppa_dataset::layout::{self, LimbId, View};
 use ppa_dataset::{
     BodyShape, Case, FileKind, FolderError, GenerateError, GenerateSettings, JobError, Manifest,
     Plan, PlanCase, PreparedLimb, Rows, Stage, Summary, generate, prepare,
@@ -20,7 +20,7 @@ const SPACING_MM: f64 = 2.0;
 
 const LIMB: LimbId = LimbId {
     patient: 0,
-    side: Side::Right,
+    side: layout::Side::Right,
 };
 
 /// A folder with the phantom's scan and case, made once.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use ppa_ct::read;
-use ppa_dataset::layout::{LimbId, View};
+use ppa_dataset::layout::{self, LimbId, View};
 use ppa_dataset::{
     BodyShape, Case, FileKind, Manifest, Plan, PlanCase, PreparedLimb, generate, prepare,
 };
@@ -95,7 +95,7 @@ fn both_containers_of_sts028_give_the_same_images() {
         .map(|scan| dataset(&prepared(scan, Side::Left).0));
     let limb = LimbId {
         patient: 0,
-        side: Side::Left,
+        side: layout::Side::Left,
     };
     for view in View::ALL {
         let file = limb.depth(BodyShape::Orig, view, 40);

@@ -94,31 +94,34 @@ fn crates_depend_only_along_the_arrows() {
 #[test]
 fn libraries_used_alone_pull_in_no_reader_network_or_frontend() {
     for (name, forbidden) in FORBIDDEN {
-        let tree = std::process::Command::new(env!("CARGO"))
-            .args([
-                "tree",
-                "--locked",
-                "--edges",
-                "normal",
-                "--prefix",
-                "none",
-                "--package",
-                name,
-            ])
-            .current_dir(root())
-            .output()
-            .unwrap();
-        assert!(
-            tree.status.success(),
-            "{}",
-            String::from_utf8_lossy(&tree.stderr)
-        );
-        for line in String::from_utf8(tree.stdout).unwrap().lines() {
+        for line in tree(&["--package", name]) {
             for prefix in *forbidden {
                 assert!(!line.starts_with(prefix), "{name} pulls in {line}");
             }
         }
     }
+}
+
+#[test]
+fn datasets_are_read_without_the_crates_that_make_them() {
+    for line in tree(&["--package", "ppa-dataset", "--no-default-features"]) {
+        let ours = line.starts_with("ppa-") && !line.starts_with("ppa-dataset ");
+        assert!(!ours, "reading a dataset pulls in {line}");
+    }
+}
+
+/// Name and version of all that a crate links against, a line each.
+fn tree(which: &[&str]) -> Vec<String> {
+    let tree = std::process::Command::new(env!("CARGO"))
+        .args(["tree", "--locked", "--edges", "normal", "--prefix", "none"])
+        .args(which)
+        .current_dir(root())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&tree.stderr);
+    assert!(tree.status.success(), "{said}");
+    let text = String::from_utf8(tree.stdout).unwrap();
+    text.lines().map(str::to_owned).collect()
 }
 
 #[test]

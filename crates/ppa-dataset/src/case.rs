@@ -8,7 +8,8 @@ use ppa_scene::{LandmarkOverrides, Landmarks, Side};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
-use crate::files::{FileError, other_version, read_text, to_toml, write_whole};
+use crate::files::{FileError, read_text, write_whole};
+use crate::toml_file::{other_version, to_toml};
 
 /// One limb of one CT. `ppa prepare` proposes it; a person changes `side`, `surface` and
 /// `choices`, and everything else is computed again when the case is used.

@@ -6,12 +6,12 @@ use ppa_scene::{LandmarkOverrides, PlaneSettings, RoomSpec, SoftTissue, Sweep};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::body_shape::ShapeSettings;
 use crate::case::Case;
 use crate::files::{FileError, hex, sha256_of_file};
 use crate::layout::{LimbId, View};
 use crate::manifest::Rows;
 use crate::plan::{Plan, XraySettings};
+use crate::shaped_skin::ShapeSettings;
 use crate::stage::Stage;
 
 /// Name of the file.

@@ -5,7 +5,6 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use atomic_write_file::AtomicWriteFile;
-use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 /// A file could not be read or written.
@@ -56,6 +55,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
 }
 
 /// Removes a file that may not be there.
+#[cfg(feature = "generate")]
 pub(crate) fn remove_if_there(path: &Path) -> Result<(), FileError> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => {
@@ -63,21 +63,6 @@ pub(crate) fn remove_if_there(path: &Path) -> Result<(), FileError> {
         }
         _ => Ok(()),
     }
-}
-
-/// What a file at `path` is to hold, as TOML; refuses paths that are not UTF-8.
-pub(crate) fn to_toml<T: Serialize>(value: &T, path: &Path) -> Result<String, FileError> {
-    toml::to_string(value).map_err(|e| FileError::at("write", path)(io::Error::other(e)))
-}
-
-/// The format version of a TOML file, if it is not 1; its other keys may then be any.
-pub(crate) fn other_version(text: &str) -> Option<u32> {
-    #[derive(serde::Deserialize)]
-    struct Versioned {
-        version: u32,
-    }
-    let versioned: Versioned = toml::from_str(text).ok()?;
-    (versioned.version != 1).then_some(versioned.version)
 }
 
 /// Reads a text file.

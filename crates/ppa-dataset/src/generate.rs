@@ -214,7 +214,7 @@ fn planned_limbs(plan: &Plan, settings: &Settings) -> Result<Vec<PlannedLimb>, G
         let case = Case::read(&planned.file)?;
         let id = LimbId {
             patient: planned.patient,
-            side: case.side,
+            side: case.side.into(),
         };
         if let Some(other) = limbs.iter().find(|other| other.id == id) {
             return Err(GenerateError::SameLimb {

@@ -8,13 +8,12 @@
 //! with `angle = step / 2` degrees, written with one decimal. All paths are relative to the
 //! dataset's root and use `/`.
 
-use ppa_scene::Side;
 use serde::{Deserialize, Serialize};
 
 use crate::body_shape::BodyShape;
 
 /// Which of the two cameras on the tube housing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum View {
     /// The paper's V1.
     #[serde(rename = "cam_left")]
@@ -37,8 +36,42 @@ impl View {
     }
 }
 
+/// The person's left or right; "l" or "r" in files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Side {
+    /// Left limb.
+    #[serde(rename = "l")]
+    Left,
+    /// Right limb.
+    #[serde(rename = "r")]
+    Right,
+}
+
+impl Side {
+    /// Both sides, left first.
+    pub const ALL: [Self; 2] = [Self::Left, Self::Right];
+
+    /// `l` or `r`.
+    pub fn letter(self) -> &'static str {
+        match self {
+            Self::Left => "l",
+            Self::Right => "r",
+        }
+    }
+}
+
+#[cfg(feature = "generate")]
+impl From<ppa_scene::Side> for Side {
+    fn from(side: ppa_scene::Side) -> Self {
+        match side {
+            ppa_scene::Side::Left => Self::Left,
+            ppa_scene::Side::Right => Self::Right,
+        }
+    }
+}
+
 /// One limb of one person: the unit of everything below `patient_N/*/{l,r}`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct LimbId {
     /// N of `patient_N`.
     pub patient: u32,
@@ -49,10 +82,7 @@ pub struct LimbId {
 impl LimbId {
     /// `l` or `r`.
     pub fn side_letter(self) -> &'static str {
-        match self.side {
-            Side::Left => "l",
-            Side::Right => "r",
-        }
+        self.side.letter()
     }
 
     fn folder(self, kind: &str) -> String {

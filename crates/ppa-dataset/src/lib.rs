@@ -4,6 +4,9 @@
 //! names cases, room, cameras, beam, rotations and body shapes; [`generate`] makes the dataset
 //! in the layout published by the paper's authors ([`layout`]), with a [`Manifest`].
 //!
+//! Feature `generate` (on by default): cases, plans and all that makes images. Without it the crate reads and writes
+//! datasets and depends on no other crate of the workspace.
+//!
 //! Units: mm, degrees in files; 16-bit depth in mm, 0 invalid. Frames: as in `ppa-scene`.
 //! Repeatable: the same plan and seed give the same bytes for any number of threads and after
 //! any interruption.
@@ -12,55 +15,104 @@
 //! Synthetic Data Generation, MELBA 2026:027, doi:10.59275/j.melba.2026-c874.
 
 mod body_shape;
+#[cfg(feature = "generate")]
 mod case;
+#[cfg(feature = "generate")]
 mod check;
+#[cfg(feature = "generate")]
 mod claim;
+#[cfg(feature = "generate")]
 mod contact_sheet;
+#[cfg(feature = "generate")]
 mod coverage_plot;
+#[cfg(feature = "generate")]
 mod description;
+#[cfg(feature = "generate")]
 mod drawing;
 mod files;
+#[cfg(feature = "generate")]
 mod forecast;
+#[cfg(feature = "generate")]
 mod frames;
+#[cfg(feature = "generate")]
 mod generate;
+#[cfg(feature = "generate")]
 mod job;
+#[cfg(feature = "generate")]
 pub mod labels;
 pub mod layout;
-#[cfg(test)]
+#[cfg(all(test, feature = "generate"))]
 mod load;
 mod manifest;
+#[cfg(feature = "generate")]
 mod merge;
+#[cfg(feature = "generate")]
 mod part_file;
+#[cfg(feature = "generate")]
 mod plan;
+#[cfg(feature = "generate")]
 mod planned;
+#[cfg(feature = "generate")]
 mod prepare;
+#[cfg(feature = "generate")]
 mod radiograph;
+#[cfg(feature = "generate")]
 mod record;
+#[cfg(feature = "generate")]
 mod room_file;
+#[cfg(feature = "generate")]
 mod seed;
+#[cfg(feature = "generate")]
+mod shaped_skin;
+#[cfg(feature = "generate")]
 mod stage;
+#[cfg(feature = "generate")]
 mod status;
+#[cfg(feature = "generate")]
+mod toml_file;
+#[cfg(feature = "generate")]
 mod unit;
+#[cfg(feature = "generate")]
 mod verify;
 
-pub use body_shape::{BodyShape, ShapeSettings, body_shape};
+pub use body_shape::BodyShape;
+#[cfg(feature = "generate")]
 pub use case::{Case, CaseError, Found, Source};
+#[cfg(feature = "generate")]
 pub use check::{Check, Problem, check};
+#[cfg(feature = "generate")]
 pub use claim::FolderError;
+#[cfg(feature = "generate")]
 pub use contact_sheet::{ContactSheetError, contact_sheet};
+#[cfg(feature = "generate")]
 pub use coverage_plot::{RankedView, coverage_plot};
 pub use files::{FileError, sha256_of_file, write_whole};
+#[cfg(feature = "generate")]
 pub use forecast::{Forecast, ForecastError, forecast};
+#[cfg(feature = "generate")]
 pub use frames::Frames;
+#[cfg(feature = "generate")]
 pub use generate::{GenerateError, GenerateSettings, generate};
+#[cfg(feature = "generate")]
 pub use job::{JobError, Progress, Summary};
 pub use manifest::{FileKind, FileRow, Manifest, RoiFile, RoiRow, Rows};
+#[cfg(feature = "generate")]
 pub use merge::{MergeError, merge};
+#[cfg(feature = "generate")]
 pub use plan::{DepthSettings, Plan, PlanCase, PlanError, PlanRoom, XraySettings};
+#[cfg(feature = "generate")]
 pub use prepare::{PrepareError, PreparedLimb, prepare, volume_sha256};
+#[cfg(feature = "generate")]
 pub use radiograph::{JointError, joint_phantom, projection};
+#[cfg(feature = "generate")]
 pub use room_file::RoomFile;
+#[cfg(feature = "generate")]
+pub use shaped_skin::{ShapeSettings, body_shape};
+#[cfg(feature = "generate")]
 pub use stage::{PlacedCamera, Stage, StageError, Table, spectrum, tube};
+#[cfg(feature = "generate")]
 pub use status::{LimbStatus, Status, status};
+#[cfg(feature = "generate")]
 pub use unit::UnitError;
+#[cfg(feature = "generate")]
 pub use verify::{Verification, VerifyError, verify};

@@ -3,11 +3,11 @@
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use ppa_scene::{Side, Sweep};
+use ppa_scene::Sweep;
 use ppa_xray::Part;
 
 use crate::job::{Job, JobError, LimbUnits, MakeUnit, Progress, units_of_part};
-use crate::layout::LimbId;
+use crate::layout::{LimbId, Side};
 use crate::manifest::RoiFile;
 use crate::unit::Images;
 

@@ -7,10 +7,11 @@ use ppa_scene::{PlaneSettings, RoomSpec, SoftTissue, Sweep};
 use ppa_xray::{Detector, FastSettings, HuCalibration, Presentation, Receptor, Source};
 use serde::{Deserialize, Serialize};
 
-use crate::body_shape::ShapeSettings;
-use crate::files::{FileError, other_version, read_text, to_toml, write_whole};
+use crate::files::{FileError, read_text, write_whole};
 use crate::manifest::Rows;
 use crate::room_file::RoomFile;
+use crate::shaped_skin::ShapeSettings;
+use crate::toml_file::{other_version, to_toml};
 
 /// Everything a dataset is made of; unknown keys are refused.
 ///

@@ -6,8 +6,9 @@ use ppa_depth::RigSpec;
 use ppa_xray::Detector;
 use serde::{Deserialize, Serialize};
 
-use crate::files::{read_text, to_toml, write_whole};
+use crate::files::{read_text, write_whole};
 use crate::plan::{Plan, PlanError, PlanRoom};
+use crate::toml_file::to_toml;
 
 /// All that stands still in an x-ray room; unknown keys are refused.
 ///

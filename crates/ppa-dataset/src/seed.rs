@@ -58,7 +58,7 @@ fn hash(address: &str) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ppa_scene::Side;
+    use crate::layout::Side;
 
     #[test]
     fn every_part_of_the_address_matters() {

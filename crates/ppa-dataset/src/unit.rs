@@ -8,7 +8,7 @@ use ppa_mesh::Mesh;
 use ppa_scene::{Placement, PoseAngle, place_soft};
 use ppa_xray::{FastSettings, VoxelPhantom};
 
-use crate::body_shape::{BodyShape, body_shape};
+use crate::body_shape::BodyShape;
 use crate::files::{FileError, sha256_of_file};
 use crate::layout::LimbId;
 use crate::manifest::{FileKind, FileRow, RoiFile, RoiRow};
@@ -16,6 +16,7 @@ use crate::plan::Plan;
 use crate::prepare::PreparedLimb;
 use crate::radiograph::{JointError, joint_phantom, projection};
 use crate::seed::{Purpose, item_seed};
+use crate::shaped_skin::body_shape;
 use crate::stage::{PlacedCamera, Stage};
 
 /// Why a pose could not be made.

@@ -149,10 +149,10 @@ fn compare(
 
 #[cfg(test)]
 mod tests {
-    use ppa_scene::{Side, Sweep};
+    use ppa_scene::Sweep;
 
     use super::*;
-    use crate::layout::LimbId;
+    use crate::layout::{LimbId, Side};
 
     #[test]
     fn the_share_of_a_sample_is_the_fraction() {

@@ -6,7 +6,7 @@ use anyhow::Context;
 use clap::Args;
 use ppa_ct::phantom::{self, LowerLeg, TableTop};
 use ppa_ct::{ReadOptions, write_nifti};
-use ppa_dataset::layout::LimbId;
+use ppa_dataset::layout::{self, LimbId};
 use ppa_dataset::{GenerateSettings, Plan, PlanCase, Summary, contact_sheet, prepare, write_whole};
 use ppa_mesh::LimbSettings;
 use ppa_scene::{LandmarkOverrides, Side, Sweep};
@@ -65,7 +65,7 @@ pub fn run(args: &DemoArgs, output: Output) -> anyhow::Result<()> {
     )?;
     let limb = LimbId {
         patient: 0,
-        side: Side::Right,
+        side: layout::Side::Right,
     };
     let poses = POSES.poses()?.len();
     let sheet = contact_sheet(&out.join("dataset"), limb, poses)?;

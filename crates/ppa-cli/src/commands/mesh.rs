@@ -175,7 +175,7 @@ fn augment(args: &AugmentArgs, output: Output) -> anyhow::Result<()> {
     );
     let limb = LimbId {
         patient: 0,
-        side: case.side,
+        side: case.side.into(),
     };
     let watch = Stopwatch::start();
     let mesh = body_shape(
