@@ -4,6 +4,8 @@
 //! names cases, room, cameras, beam, rotations and body shapes; [`generate`] makes the dataset
 //! in the layout published by the paper's authors ([`layout`]), with a [`Manifest`].
 //!
+//! [`published`] reads datasets, ours and those of the authors, as rows for training.
+//!
 //! Feature `generate` (on by default): cases, plans and all that makes images. Without it the crate reads and writes
 //! datasets and depends on no other crate of the workspace.
 //!
@@ -54,6 +56,7 @@ mod plan;
 mod planned;
 #[cfg(feature = "generate")]
 mod prepare;
+pub mod published;
 #[cfg(feature = "generate")]
 mod radiograph;
 #[cfg(feature = "generate")]

@@ -1,0 +1,160 @@
+//! `labels.json` and `roi_depth.json` of either layout.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+use super::{Label, PublishedError};
+use crate::files::{FileError, read_text};
+use crate::layout::View;
+use crate::manifest::RoiRow;
+
+#[derive(Deserialize)]
+struct LabelEntry {
+    label: f64,
+    std: f64,
+    /// Of the synthetic layout.
+    step: Option<u32>,
+    /// Of the specimen layout.
+    image_number: Option<u32>,
+    label_source: Option<String>,
+}
+
+#[derive(Deserialize)]
+struct RoiEntry {
+    camera: View,
+    image_number: Option<u32>,
+    x_start: u32,
+    y_start: u32,
+    size: u32,
+}
+
+/// Labels by number of the pose; none if the file is missing. `of_key` is the number in the name of a radiograph.
+pub(super) fn labels(
+    path: &Path,
+    of_key: impl Fn(&str) -> Option<u32>,
+) -> Result<BTreeMap<u32, Label>, PublishedError> {
+    let mut labels = BTreeMap::new();
+    for (key, entry) in entries::<LabelEntry>(path)? {
+        let wrong = |message| PublishedError::Entry {
+            path: path.to_owned(),
+            key: key.clone(),
+            message,
+        };
+        let number = one_number(entry.step.or(entry.image_number), of_key(&key)).map_err(wrong)?;
+        if !(1.0..=3.0).contains(&entry.label) {
+            let found = entry.label;
+            return Err(wrong(format!("the label is {found}, expected 1 to 3")));
+        }
+        if !(entry.std.is_finite() && entry.std >= 0.0) {
+            return Err(wrong(format!("std is {}, expected at least 0", entry.std)));
+        }
+        let label = Label {
+            label: entry.label,
+            std: entry.std,
+            source: entry.label_source,
+        };
+        if labels.insert(number, label).is_some() {
+            return Err(wrong(format!("pose {number} has two labels")));
+        }
+    }
+    Ok(labels)
+}
+
+/// Regions by camera and number of the pose; none if the file is missing. `of_key` is what the name of a depth image tells.
+pub(super) fn rois(
+    path: &Path,
+    of_key: impl Fn(&str) -> Option<(View, u32)>,
+) -> Result<BTreeMap<(View, u32), RoiRow>, PublishedError> {
+    let mut rois = BTreeMap::new();
+    for (key, entry) in entries::<RoiEntry>(path)? {
+        let wrong = |message| PublishedError::Entry {
+            path: path.to_owned(),
+            key: key.clone(),
+            message,
+        };
+        let (named, numbered) = of_key(&key).unzip();
+        let image_number = one_number(entry.image_number, numbered).map_err(wrong)?;
+        let camera = entry.camera;
+        if named.is_some_and(|view| view != camera) {
+            return Err(wrong(format!(
+                "the camera is {}, not that of the key",
+                camera.name()
+            )));
+        }
+        if entry.size == 0 {
+            return Err(wrong("size is 0, expected at least one pixel".to_owned()));
+        }
+        let roi = RoiRow {
+            camera,
+            image_number,
+            x_start: entry.x_start,
+            y_start: entry.y_start,
+            size: entry.size,
+        };
+        // The specimen layout may repeat the region of a pose for each of its images.
+        if let Some(other) = rois.insert((camera, image_number), roi.clone())
+            && other != roi
+        {
+            let text = format!("pose {image_number} has two regions for {}", camera.name());
+            return Err(wrong(text));
+        }
+    }
+    Ok(rois)
+}
+
+/// The number of a pose, which entry and key both may tell.
+fn one_number(entry: Option<u32>, key: Option<u32>) -> Result<u32, String> {
+    match (entry, key) {
+        (Some(entry), Some(key)) if entry != key => Err(format!(
+            "the entry is of pose {entry}, its key of pose {key}"
+        )),
+        (Some(number), _) | (None, Some(number)) => Ok(number),
+        (None, None) => Err("neither key nor entry tells the number of the pose".to_owned()),
+    }
+}
+
+/// A JSON object whose keys are all different; empty if the file is missing.
+fn entries<T: DeserializeOwned>(path: &Path) -> Result<Vec<(String, T)>, FileError> {
+    if !std::fs::exists(path).map_err(FileError::at("read", path))? {
+        return Ok(Vec::new());
+    }
+    let text = read_text(path)?;
+    let parsed: UniqueKeys<T> =
+        serde_json::from_str(&text).map_err(|e| FileError::at("parse", path)(e.into()))?;
+    Ok(parsed.0)
+}
+
+/// The entries of an object in their order. A map would keep the last of two entries with one key without a word.
+struct UniqueKeys<T>(Vec<(String, T)>);
+
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for UniqueKeys<T> {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Entries<T>(std::marker::PhantomData<T>);
+        impl<'de, T: Deserialize<'de>> serde::de::Visitor<'de> for Entries<T> {
+            type Value = UniqueKeys<T>;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+                f.write_str("an object with one entry per image")
+            }
+
+            fn visit_map<A: serde::de::MapAccess<'de>>(
+                self,
+                mut map: A,
+            ) -> Result<Self::Value, A::Error> {
+                let mut entries = BTreeMap::new();
+                while let Some((key, value)) = map.next_entry::<String, T>()? {
+                    if entries.contains_key(&key) {
+                        let text = format!("the entry {key:?} stands there twice");
+                        return Err(serde::de::Error::custom(text));
+                    }
+                    entries.insert(key, value);
+                }
+                Ok(UniqueKeys(entries.into_iter().collect()))
+            }
+        }
+        deserializer.deserialize_map(Entries(std::marker::PhantomData))
+    }
+}

@@ -1,0 +1,59 @@
+//! Why a folder is no dataset in a published layout.
+
+use std::path::PathBuf;
+
+use crate::files::FileError;
+
+/// Why a folder is no dataset in a published layout.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PublishedError {
+    /// A file or folder.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// No person in it.
+    #[error("{} holds no images of patients: expected folders patient_0, patient_1, … or patient_1_l, patient_1_r, …", .0.display())]
+    NoSubjects(PathBuf),
+    /// Folders of both layouts.
+    #[error("{} is of the specimen layout, {} of the synthetic one; one folder holds one layout", specimen.display(), synthetic.display())]
+    TwoLayouts {
+        /// A folder `patient_N_l` or `patient_N_r`.
+        specimen: PathBuf,
+        /// A folder `patient_N`.
+        synthetic: PathBuf,
+    },
+    /// A file or folder whose name the layout does not know.
+    #[error("{} does not fit the layout: expected {expected}", path.display())]
+    Name {
+        /// The file or folder.
+        path: PathBuf,
+        /// Names that stand there.
+        expected: &'static str,
+    },
+    /// Two folders of one person or limb, as `patient_1` and `patient_01`.
+    #[error("{} is another name of {}", second.display(), first.display())]
+    SameSubject {
+        /// The folder as it should be called.
+        first: PathBuf,
+        /// The other one.
+        second: PathBuf,
+    },
+    /// An angle between the steps.
+    #[error("{}: the angle is {angle} degrees, expected a multiple of 0.5 with one decimal", path.display())]
+    OffGrid {
+        /// The depth image.
+        path: PathBuf,
+        /// The angle in its name.
+        angle: String,
+    },
+    /// An entry of a JSON file that cannot be.
+    #[error("{}, entry {key:?}: {message}", path.display())]
+    Entry {
+        /// The file.
+        path: PathBuf,
+        /// The entry's key.
+        key: String,
+        /// What was found and what expected.
+        message: String,
+    },
+}

@@ -1,0 +1,75 @@
+//! Images of one channel with 16 bits.
+
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use image::{DynamicImage, ImageFormat, ImageReader};
+
+use crate::files::FileError;
+
+/// Why a file is no image of one channel with 16 bits.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImageFileError {
+    /// The file.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// It is no PNG, or not a whole one.
+    #[error("{} is not a whole PNG", path.display())]
+    Damaged {
+        /// The image.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: image::ImageError,
+    },
+    /// Its pixels are of another kind.
+    #[error("{} holds pixels of type {found}, expected one channel with 16 bits", path.display())]
+    Pixels {
+        /// The image.
+        path: PathBuf,
+        /// Channels and bits, as `Rgb8`.
+        found: String,
+    },
+}
+
+/// A depth image (mm, 0 invalid) or a radiograph for viewing.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GrayImage16 {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Row by row from the top left corner.
+    pub pixels: Vec<u16>,
+}
+
+impl GrayImage16 {
+    /// Reads a PNG.
+    ///
+    /// # Errors
+    /// [`ImageFileError`] naming the file; images with fewer bits or colour are not converted.
+    pub fn read(path: &Path) -> Result<Self, ImageFileError> {
+        let bytes = std::fs::read(path).map_err(FileError::at("read", path))?;
+        Self::decode(&bytes, path)
+    }
+
+    /// Reads the bytes of the PNG at `path`.
+    pub(crate) fn decode(bytes: &[u8], path: &Path) -> Result<Self, ImageFileError> {
+        let reader = ImageReader::with_format(Cursor::new(bytes), ImageFormat::Png);
+        let decoded = reader.decode().map_err(|source| ImageFileError::Damaged {
+            path: path.to_owned(),
+            source,
+        })?;
+        match decoded {
+            DynamicImage::ImageLuma16(image) => Ok(Self {
+                width: image.width(),
+                height: image.height(),
+                pixels: image.into_raw(),
+            }),
+            other => Err(ImageFileError::Pixels {
+                path: path.to_owned(),
+                found: format!("{:?}", other.color()),
+            }),
+        }
+    }
+}

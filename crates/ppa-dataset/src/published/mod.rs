@@ -1,0 +1,189 @@
+//! Datasets in the two layouts that the paper's authors published, read as one kind of row.
+//!
+//! ```text
+//! synthetic  patient_0/depth/{l,r}/{orig,big,small,bumps_a,bumps_b}/depth_cam_{left,right}_{angle}.png
+//!            patient_0/xray/{l,r}/xray_image_{step}.png
+//!            patient_0/labels/{l,r}/{labels,roi_depth}.json
+//! specimen   patient_1_l/{min,medium,max}/data/dataset/depth/depth_cam_{left,right}_orig_{image}_{timestamp}.png
+//!            …/xray/xray_{image}.png   …/label/quality/labels.json   …/label/roi/roi_depth.json
+//! ```
+//! In both, N of `patient_N` is the person, so that `patient_1_l` and `patient_1_r` are two feet of one. A side, a flexion, a
+//! body shape, a camera, radiographs, labels and regions of interest may be missing; what is there must fit the layout.
+//!
+//! [`Published::read`] looks at names and JSON files; [`GrayImage16::read`] decodes an image.
+
+mod entries;
+mod error;
+mod folders;
+mod gray16;
+mod specimen;
+mod synthetic;
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+pub use self::error::PublishedError;
+pub use self::gray16::{GrayImage16, ImageFileError};
+use crate::body_shape::BodyShape;
+use crate::layout::{LimbId, View};
+use crate::manifest::RoiRow;
+
+/// Which of the published layouts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Layout {
+    /// Poses on a grid of angles, several body shapes.
+    Synthetic,
+    /// Poses as they were recorded, three flexions of the foot.
+    Specimen,
+}
+
+/// How far the foot of a specimen was bent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Flexion {
+    /// Least.
+    Min,
+    /// Between.
+    Medium,
+    /// Most.
+    Max,
+}
+
+impl Flexion {
+    /// All three.
+    pub const ALL: [Self; 3] = [Self::Min, Self::Medium, Self::Max];
+
+    /// Folder name in the specimen layout.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Min => "min",
+            Self::Medium => "medium",
+            Self::Max => "max",
+        }
+    }
+}
+
+/// Which pose of a limb an image shows. Ordered by pose first, so that all images of a pose are neighbours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(untagged)]
+pub enum Pose {
+    /// Of the synthetic layout.
+    Rotated {
+        /// Half degrees of medial rotation.
+        step: u32,
+        /// Variant of the skin; radiograph, label and region of interest are those of the pose.
+        shape: BodyShape,
+    },
+    /// Of the specimen layout.
+    Recorded {
+        /// Bending of the foot.
+        flexion: Flexion,
+        /// Number of the pose within limb and flexion; radiograph, label and region of interest are its.
+        image_number: u32,
+        /// Grows with time from image to image of a pose; no unit.
+        timestamp: u64,
+    },
+}
+
+/// What both cameras saw at one moment, with what is known of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ImagePair {
+    /// Person and side.
+    #[serde(flatten)]
+    pub limb: LimbId,
+    /// Its pose.
+    #[serde(flatten)]
+    pub pose: Pose,
+    /// Image of the left camera. At least one of both is there.
+    pub left: Option<DepthFile>,
+    /// Image of the right camera.
+    pub right: Option<DepthFile>,
+    /// Radiograph of the pose: path from the root.
+    pub radiograph: Option<String>,
+    /// Quality of the pose.
+    pub label: Option<Label>,
+}
+
+impl ImagePair {
+    /// The image of one camera.
+    pub fn depth(&self, view: View) -> Option<&DepthFile> {
+        match view {
+            View::Left => self.left.as_ref(),
+            View::Right => self.right.as_ref(),
+        }
+    }
+
+    fn depth_mut(&mut self, view: View) -> &mut Option<DepthFile> {
+        match view {
+            View::Left => &mut self.left,
+            View::Right => &mut self.right,
+        }
+    }
+}
+
+/// A depth image: 16-bit PNG, mm, 0 invalid.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct DepthFile {
+    /// Path from the root.
+    pub file: String,
+    /// Square region around the joint; may reach beyond the image.
+    pub roi: Option<RoiRow>,
+}
+
+/// Quality of a pose, as graded or computed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Label {
+    /// From 1 (ideal) to 3 (inadequate).
+    pub label: f64,
+    /// Standard deviation over the readers (over all of them, not one less), or of what was assumed.
+    pub std: f64,
+    /// Where it comes from, if the file tells.
+    pub source: Option<String>,
+}
+
+/// A dataset as it lies on disk.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Published {
+    /// The folder that holds the folders of the persons.
+    pub root: PathBuf,
+    /// Its layout.
+    pub layout: Layout,
+    /// By person, side and pose.
+    pub pairs: Vec<ImagePair>,
+}
+
+impl Published {
+    /// Lists the dataset in `root` without decoding its images.
+    ///
+    /// # Errors
+    /// [`PublishedError`] naming the first file or entry that fits neither layout.
+    pub fn read(root: &Path) -> Result<Self, PublishedError> {
+        let subjects = folders::subjects(root)?;
+        let mut pairs = Vec::new();
+        for subject in &subjects.folders {
+            let folder = folders::Folder::new(root, &subject.name);
+            match subject.side {
+                None => pairs.extend(synthetic::read(&folder, subject.patient)?),
+                Some(side) => {
+                    let patient = subject.patient;
+                    pairs.extend(specimen::read(&folder, LimbId { patient, side })?);
+                }
+            }
+        }
+        pairs.sort_by_key(|pair| (pair.limb, pair.pose));
+        Ok(Self {
+            root: root.to_owned(),
+            layout: subjects.layout,
+            pairs,
+        })
+    }
+
+    /// The persons in it, in order.
+    pub fn patients(&self) -> Vec<u32> {
+        let mut patients: Vec<_> = self.pairs.iter().map(|pair| pair.limb.patient).collect();
+        patients.dedup();
+        patients
+    }
+}

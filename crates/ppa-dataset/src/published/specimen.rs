@@ -1,0 +1,130 @@
+//! The specimen layout, read.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::folders::{Folder, digits};
+use super::{DepthFile, Flexion, ImagePair, Pose, PublishedError, entries};
+use crate::layout::{LimbId, View};
+
+/// All image pairs of one limb.
+pub(super) fn read(limb_folder: &Folder, limb: LimbId) -> Result<Vec<ImagePair>, PublishedError> {
+    let mut pairs = Vec::new();
+    for name in limb_folder.folders()? {
+        let folder = limb_folder.below(&name);
+        let flexion = Flexion::ALL
+            .into_iter()
+            .find(|flexion| flexion.name() == name);
+        let flexion = flexion.ok_or_else(|| PublishedError::Name {
+            path: folder.path.clone(),
+            expected: "min, medium or max",
+        })?;
+        pairs.extend(read_flexion(
+            &folder.below("data").below("dataset"),
+            limb,
+            flexion,
+        )?);
+    }
+    Ok(pairs)
+}
+
+fn read_flexion(
+    dataset: &Folder,
+    limb: LimbId,
+    flexion: Flexion,
+) -> Result<Vec<ImagePair>, PublishedError> {
+    let lists = dataset.below("label");
+    let labels = lists.path.join("quality").join("labels.json");
+    let labels = entries::labels(&labels, number_of_radiograph)?;
+    let rois = lists.path.join("roi").join("roi_depth.json");
+    let of_key = |key: &str| depth_name(key).map(|(view, number, _)| (view, number));
+    let rois = entries::rois(&rois, of_key)?;
+    let xray = dataset.below("xray");
+    let radiographs = radiographs(&xray)?;
+    let depth = dataset.below("depth");
+    let mut pairs: BTreeMap<Pose, ImagePair> = BTreeMap::new();
+    for image in depth.images()? {
+        let named = depth_name(&image).ok_or_else(|| PublishedError::Name {
+            path: depth.path.join(&image),
+            expected: "depth_cam_{left,right}_orig_{image}_{timestamp}.png",
+        });
+        let (view, image_number, timestamp) = named?;
+        let pose = Pose::Recorded {
+            flexion,
+            image_number,
+            timestamp,
+        };
+        let radiograph = radiographs.contains(&image_number);
+        let pair = pairs.entry(pose).or_insert_with(|| ImagePair {
+            limb,
+            pose,
+            left: None,
+            right: None,
+            radiograph: radiograph
+                .then(|| format!("{}/{}", xray.name, radiograph_name(image_number))),
+            label: labels.get(&image_number).cloned(),
+        });
+        *pair.depth_mut(view) = Some(DepthFile {
+            file: format!("{}/{image}", depth.name),
+            roi: rois.get(&(view, image_number)).cloned(),
+        });
+    }
+    Ok(pairs.into_values().collect())
+}
+
+fn radiographs(folder: &Folder) -> Result<BTreeSet<u32>, PublishedError> {
+    let number = |name: String| {
+        number_of_radiograph(&name).ok_or_else(|| PublishedError::Name {
+            path: folder.path.join(&name),
+            expected: "xray_{image}.png",
+        })
+    };
+    folder.images()?.into_iter().map(number).collect()
+}
+
+/// File name of a radiograph.
+fn radiograph_name(image_number: u32) -> String {
+    format!("xray_{image_number}.png")
+}
+
+fn number_of_radiograph(name: &str) -> Option<u32> {
+    let number = name.strip_prefix("xray_")?.strip_suffix(".png")?;
+    digits(number).filter(|&number| radiograph_name(number) == name)
+}
+
+/// File name of a depth image.
+fn depth_file_name(view: View, image_number: u32, timestamp: u64) -> String {
+    format!("depth_{}_orig_{image_number}_{timestamp}.png", view.name())
+}
+
+fn depth_name(name: &str) -> Option<(View, u32, u64)> {
+    let rest = |view: View| name.strip_prefix(&format!("depth_{}_orig_", view.name()));
+    let (view, rest) = View::ALL
+        .into_iter()
+        .find_map(|view| Some((view, rest(view)?)))?;
+    let (number, timestamp) = rest.strip_suffix(".png")?.split_once('_')?;
+    let named = (view, digits(number)?, digits(timestamp)?);
+    (depth_file_name(named.0, named.1, named.2) == name).then_some(named)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_tell_camera_number_and_time() {
+        let name = depth_file_name(View::Right, 7, 163_840_211_922);
+        assert_eq!(name, "depth_cam_right_orig_7_163840211922.png");
+        assert_eq!(depth_name(&name), Some((View::Right, 7, 163_840_211_922)));
+        for other in [
+            "depth_cam_right_7_1.png",
+            "depth_cam_right_orig_7.png",
+            "depth_cam_right_orig_07_1.png",
+            "depth_cam_right_orig_7_-1.png",
+            "depth_cam_right_big_7_1.png",
+        ] {
+            assert_eq!(depth_name(other), None, "{other}");
+        }
+        assert_eq!(number_of_radiograph("xray_0.png"), Some(0));
+        assert_eq!(number_of_radiograph("xray_image_0.png"), None);
+    }
+}

@@ -1,0 +1,112 @@
+//! Small datasets in the published layouts, written from the description of the formats alone.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use image::{ImageBuffer, Luma};
+use serde_json::{Map, Value, json};
+
+/// A dataset in a temporary folder.
+pub struct Tree(tempfile::TempDir);
+
+impl Tree {
+    /// Person 0 with both sides, radiographs, labels and regions; person 12 with depth images of the right side only.
+    pub fn synthetic() -> Self {
+        let tree = Self(tempfile::tempdir().unwrap());
+        for (patient, side) in [(0, "l"), (0, "r"), (12, "r")] {
+            let (mut labels, mut rois) = (Map::new(), Map::new());
+            for step in [91_u32, 180] {
+                let angle = format!("{:.1}", f64::from(step) / 2.0);
+                for camera in ["cam_left", "cam_right"] {
+                    for shape in ["orig", "big"] {
+                        let name = format!("depth/{side}/{shape}/depth_{camera}_{angle}.png");
+                        let fill = patient + step as u16 + shape.len() as u16 + camera.len() as u16;
+                        tree.image(&format!("patient_{patient}/{name}"), fill);
+                    }
+                    let roi = json!({"camera": camera, "image_number": step, "x_start": 2, "y_start": 1, "size": 5});
+                    rois.insert(format!("depth_{camera}_{angle}.png"), roi);
+                }
+                let name = format!("xray_image_{step}.png");
+                let label = if step == 180 { (3.0, 0.0) } else { (2.5, 0.5) };
+                labels.insert(
+                    name.clone(),
+                    json!({"label": label.0, "std": label.1, "step": step}),
+                );
+                if patient == 0 {
+                    tree.image(&format!("patient_0/xray/{side}/{name}"), 3000 + step as u16);
+                }
+            }
+            if patient == 0 {
+                tree.json(&format!("patient_0/labels/{side}/labels.json"), labels);
+                tree.json(&format!("patient_0/labels/{side}/roi_depth.json"), rois);
+            }
+        }
+        tree
+    }
+
+    /// Feet 1 l, 1 r and 2 l with three flexions of two poses each, the second with three images per camera.
+    pub fn specimen() -> Self {
+        let tree = Self(tempfile::tempdir().unwrap());
+        for (number, foot) in ["patient_1_l", "patient_1_r", "patient_2_l"]
+            .iter()
+            .enumerate()
+        {
+            for (bend, flexion) in ["min", "medium", "max"].iter().enumerate() {
+                let folder = format!("{foot}/{flexion}/data/dataset");
+                let (mut labels, mut rois) = (Map::new(), Map::new());
+                for (image, times) in [(0, &[1000][..]), (10, &[1000, 999, 20_000])] {
+                    for camera in ["cam_left", "cam_right"] {
+                        for (i, time) in times.iter().enumerate() {
+                            let fill = 700 + 100 * number + 10 * bend + image + i + camera.len();
+                            let name = format!("depth/depth_{camera}_orig_{image}_{time}.png");
+                            tree.image(&format!("{folder}/{name}"), fill as u16);
+                        }
+                        let roi = json!({"camera": camera, "image_number": image,
+                            "x_start": 1 + number, "y_start": bend, "size": 6});
+                        rois.insert(format!("depth_{camera}_orig_{image}.png"), roi);
+                    }
+                    let name = format!("xray_{image}.png");
+                    tree.image(&format!("{folder}/xray/{name}"), 4000 + image as u16);
+                    let label = json!({"label": 1.5, "std": 0.353_553_390_593_273_8, "image_number": image});
+                    labels.insert(name, label);
+                }
+                tree.json(&format!("{folder}/label/quality/labels.json"), labels);
+                tree.json(&format!("{folder}/label/roi/roi_depth.json"), rois);
+            }
+        }
+        tree
+    }
+
+    pub fn root(&self) -> &Path {
+        self.0.path()
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.root().join(name)
+    }
+
+    /// A 16-bit image whose pixels grow from `first`.
+    pub fn image(&self, name: &str, first: u16) {
+        let image = ImageBuffer::from_fn(12, 9, |x, y| Luma([first + x as u16 + 12 * y as u16]));
+        let path = self.parent_made(name);
+        image.save(path).unwrap();
+    }
+
+    pub fn json(&self, name: &str, value: Map<String, Value>) {
+        let text = serde_json::to_string_pretty(&value).unwrap();
+        fs::write(self.parent_made(name), text).unwrap();
+    }
+
+    /// Replaces text in a file.
+    pub fn edit(&self, name: &str, from: &str, to: &str) {
+        let text = fs::read_to_string(self.path(name)).unwrap();
+        assert!(text.contains(from), "{from:?} is not in {name}");
+        fs::write(self.path(name), text.replacen(from, to, 1)).unwrap();
+    }
+
+    fn parent_made(&self, name: &str) -> PathBuf {
+        let path = self.path(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        path
+    }
+}
