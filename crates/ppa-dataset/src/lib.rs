@@ -40,7 +40,6 @@ mod frames;
 mod generate;
 #[cfg(feature = "generate")]
 mod job;
-#[cfg(feature = "generate")]
 pub mod labels;
 pub mod layout;
 #[cfg(all(test, feature = "generate"))]

@@ -164,7 +164,7 @@ impl<'de> Visitor<'de> for Rows {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ppa_scene::Side;
+    use crate::layout::Side;
 
     const LIMB: LimbId = LimbId {
         patient: 0,

@@ -1,4 +1,4 @@
-//! `labels.json` and `roi_depth.json` of either layout.
+//! `labels.json` of the specimen layout, and `roi_depth.json` of either.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,15 +11,12 @@ use crate::files::{FileError, read_text};
 use crate::layout::View;
 use crate::manifest::RoiRow;
 
+/// Of the specimen layout; `crate::labels::LabelFile` is that of the synthetic one.
 #[derive(Deserialize)]
 struct LabelEntry {
     label: f64,
     std: f64,
-    /// Of the synthetic layout.
-    step: Option<u32>,
-    /// Of the specimen layout.
     image_number: Option<u32>,
-    label_source: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -31,7 +28,7 @@ struct RoiEntry {
     size: u32,
 }
 
-/// Labels by number of the pose; none if the file is missing. `of_key` is the number in the name of a radiograph.
+/// Labels of the specimen layout by number of the pose; none if the file is missing. `of_key` is the number in the name of a radiograph.
 pub(super) fn labels(
     path: &Path,
     of_key: impl Fn(&str) -> Option<u32>,
@@ -43,7 +40,7 @@ pub(super) fn labels(
             key: key.clone(),
             message,
         };
-        let number = one_number(entry.step.or(entry.image_number), of_key(&key)).map_err(wrong)?;
+        let number = one_number(entry.image_number, of_key(&key)).map_err(wrong)?;
         if !(1.0..=3.0).contains(&entry.label) {
             let found = entry.label;
             return Err(wrong(format!("the label is {found}, expected 1 to 3")));
@@ -54,7 +51,7 @@ pub(super) fn labels(
         let label = Label {
             label: entry.label,
             std: entry.std,
-            source: entry.label_source,
+            source: None,
         };
         if labels.insert(number, label).is_some() {
             return Err(wrong(format!("pose {number} has two labels")));

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::files::FileError;
+use crate::labels::LabelFileError;
 
 /// Why a folder is no dataset in a published layout.
 #[derive(Debug, thiserror::Error)]
@@ -11,6 +12,9 @@ pub enum PublishedError {
     /// A file or folder.
     #[error(transparent)]
     File(#[from] FileError),
+    /// Labels of a limb in the synthetic layout.
+    #[error(transparent)]
+    Labels(#[from] LabelFileError),
     /// No person in it.
     #[error("{} holds no images of patients: expected folders patient_0, patient_1, … or patient_1_l, patient_1_r, …", .0.display())]
     NoSubjects(PathBuf),

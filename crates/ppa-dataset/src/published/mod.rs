@@ -26,6 +26,7 @@ use serde::{Deserialize, Serialize};
 pub use self::error::PublishedError;
 pub use self::gray16::{GrayImage16, ImageFileError};
 use crate::body_shape::BodyShape;
+use crate::labels::LabelSource;
 use crate::layout::{LimbId, View};
 use crate::manifest::RoiRow;
 
@@ -139,8 +140,8 @@ pub struct Label {
     pub label: f64,
     /// Standard deviation over the readers (over all of them, not one less), or of what was assumed.
     pub std: f64,
-    /// Where it comes from, if the file tells.
-    pub source: Option<String>,
+    /// Who says so, if the file tells.
+    pub source: Option<LabelSource>,
 }
 
 /// A dataset as it lies on disk.
@@ -163,14 +164,14 @@ impl Published {
         let subjects = folders::subjects(root)?;
         let mut pairs = Vec::new();
         for subject in &subjects.folders {
-            let folder = folders::Folder::new(root, &subject.name);
-            match subject.side {
-                None => pairs.extend(synthetic::read(&folder, subject.patient)?),
+            let patient = subject.patient;
+            pairs.extend(match subject.side {
+                None => synthetic::read(root, patient)?,
                 Some(side) => {
-                    let patient = subject.patient;
-                    pairs.extend(specimen::read(&folder, LimbId { patient, side })?);
+                    let folder = folders::Folder::new(root, &subject.name);
+                    specimen::read(&folder, LimbId { patient, side })?
                 }
-            }
+            });
         }
         pairs.sort_by_key(|pair| (pair.limb, pair.pose));
         Ok(Self {

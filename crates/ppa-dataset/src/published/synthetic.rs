@@ -1,14 +1,17 @@
 //! The synthetic layout, read.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 use super::folders::{Folder, digits};
-use super::{DepthFile, ImagePair, Pose, PublishedError, entries};
+use super::{DepthFile, ImagePair, Label, Pose, PublishedError, entries};
 use crate::body_shape::BodyShape;
+use crate::labels::LabelFile;
 use crate::layout::{LimbId, Side, View, angle_text};
 
 /// All image pairs of one person.
-pub(super) fn read(person: &Folder, patient: u32) -> Result<Vec<ImagePair>, PublishedError> {
+pub(super) fn read(root: &Path, patient: u32) -> Result<Vec<ImagePair>, PublishedError> {
+    let person = Folder::new(root, &format!("patient_{patient}"));
     let mut pairs = Vec::new();
     for kind in ["depth", "xray", "labels"] {
         for name in person.below(kind).folders()? {
@@ -21,15 +24,15 @@ pub(super) fn read(person: &Folder, patient: u32) -> Result<Vec<ImagePair>, Publ
         }
     }
     for side in Side::ALL {
-        pairs.extend(read_limb(person, LimbId { patient, side })?);
+        pairs.extend(read_limb(root, &person, LimbId { patient, side })?);
     }
     Ok(pairs)
 }
 
-fn read_limb(person: &Folder, limb: LimbId) -> Result<Vec<ImagePair>, PublishedError> {
+fn read_limb(root: &Path, person: &Folder, limb: LimbId) -> Result<Vec<ImagePair>, PublishedError> {
     let of_kind = |kind| person.below(kind).below(limb.side_letter());
     let lists = of_kind("labels");
-    let labels = entries::labels(&lists.path.join("labels.json"), step_of_radiograph)?;
+    let labels = LabelFile::read(root, limb)?;
     let rois = entries::rois(&lists.path.join("roi_depth.json"), |key| {
         depth_name(key).ok()
     })?;
@@ -63,7 +66,7 @@ fn read_limb(person: &Folder, limb: LimbId) -> Result<Vec<ImagePair>, PublishedE
                 radiograph: radiographs
                     .contains(&step)
                     .then(|| limb.radiograph_png(step)),
-                label: labels.get(&step).cloned(),
+                label: labels.as_ref().and_then(|labels| label(labels, step)),
             });
             *pair.depth_mut(view) = Some(DepthFile {
                 file: format!("{}/{image}", folder.name),
@@ -72,6 +75,14 @@ fn read_limb(person: &Folder, limb: LimbId) -> Result<Vec<ImagePair>, PublishedE
         }
     }
     Ok(pairs.into_values().collect())
+}
+
+fn label(labels: &LabelFile, step: u32) -> Option<Label> {
+    labels.of_step(step).map(|row| Label {
+        label: row.label,
+        std: row.std,
+        source: labels.source,
+    })
 }
 
 fn radiographs(folder: &Folder) -> Result<BTreeSet<u32>, PublishedError> {

@@ -38,10 +38,7 @@ fn the_synthetic_layout_gives_a_row_per_pose_and_shape() {
         Some("patient_0/xray/r/xray_image_91.png")
     );
     let label = found.label.as_ref().unwrap();
-    assert_eq!(
-        (label.label, label.std, label.source.as_deref()),
-        (2.5, 0.5, None)
-    );
+    assert_eq!((label.label, label.std, label.source), (2.5, 0.5, None));
     let bare = pair(12, 180, BodyShape::Orig);
     assert!(bare.label.is_none() && bare.radiograph.is_none());
     assert!(bare.depth(View::Left).unwrap().roi.is_none());

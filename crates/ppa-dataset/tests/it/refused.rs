@@ -110,26 +110,26 @@ fn entries_edited_by_hand_are_told() {
             labels,
             "2.5",
             "3.5",
-            ["xray_image_91.png", "label is 3.5, expected 1 to 3"],
+            ["xray_image_91.png", "label 3.5, expected 1 to 3"],
         ),
         (
             labels,
             "2.5",
             "0.5",
-            ["xray_image_91.png", "label is 0.5, expected 1 to 3"],
+            ["xray_image_91.png", "label 0.5, expected 1 to 3"],
         ),
-        (labels, "0.5", "-0.5", ["xray_image_91.png", "std is -0.5"]),
+        (labels, "0.5", "-0.5", ["xray_image_91.png", "std -0.5"]),
         (
             labels,
             "\"step\": 91",
             "\"step\": 90",
-            ["pose 90", "key of pose 91"],
+            ["xray_image_91.png", "step 90"],
         ),
         (
             labels,
             "image_91.png",
             "image_180.png",
-            ["labels.json", "stands there twice"],
+            ["image_180.png", "step 91"],
         ),
         (
             labels,
@@ -164,6 +164,44 @@ fn entries_edited_by_hand_are_told() {
         ),
     ] {
         let tree = Tree::synthetic();
+        tree.edit(file, from, to);
+        assert_says(&refusal(&tree), &parts);
+    }
+}
+
+#[test]
+fn entries_of_a_specimen_edited_by_hand_are_told() {
+    let lists = "patient_2_l/max/data/dataset/label";
+    let labels = format!("{lists}/quality/labels.json");
+    let rois = format!("{lists}/roi/roi_depth.json");
+    for (file, from, to, parts) in [
+        (
+            &labels,
+            "1.5",
+            "3.5",
+            ["xray_0.png", "label is 3.5, expected 1 to 3"],
+        ),
+        (&labels, "0.353", "-1.353", ["xray_0.png", "std is -1.353"]),
+        (
+            &labels,
+            "\"image_number\": 10",
+            "\"image_number\": 0",
+            ["pose 0", "key of pose 10"],
+        ),
+        (
+            &labels,
+            "xray_10",
+            "xray_0",
+            ["labels.json", "stands there twice"],
+        ),
+        (
+            &rois,
+            "\"size\": 6",
+            "\"size\": 0",
+            ["roi_depth.json", "at least one pixel"],
+        ),
+    ] {
+        let tree = Tree::specimen();
         tree.edit(file, from, to);
         assert_says(&refusal(&tree), &parts);
     }
