@@ -1,0 +1,12 @@
+//! Arithmetic on channels-last images: rows of pixels, each pixel with all its channels in a row of f32.
+//!
+//! Every kernel is vector code chosen when the program runs; the plain copy gives equal results to rounding.
+
+pub(crate) mod batch_norm;
+pub(crate) mod buffer;
+pub(crate) mod depthwise;
+pub(crate) mod depthwise_backward;
+pub(crate) mod gradient;
+pub(crate) mod matrix;
+pub(crate) mod simd;
+pub(crate) mod stem;

@@ -1,0 +1,193 @@
+//! Convolution of each channel by itself, forward, row by row.
+
+use pulp::{Simd, WithSimd};
+
+use super::simd::{dispatch, fma, lanes, lanes_mut};
+
+/// Kernel and stride of a depthwise convolution; padding is (kernel - 1) / 2 on every side.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    pub kernel: usize,
+    pub stride: usize,
+}
+
+impl Window {
+    pub fn padding(self) -> usize {
+        (self.kernel - 1) / 2
+    }
+
+    /// Length of the output of a side of `len`.
+    pub fn output(self, len: usize) -> usize {
+        (len - 1) / self.stride + 1
+    }
+}
+
+/// Runs a kernel generic in (kernel, stride) for the windows that the network has.
+macro_rules! for_window {
+    ($window:expr, $channels:expr, $kernel:ident { $($field:tt)* }) => {
+        match ($window.kernel, $window.stride) {
+            (3, 1) => dispatch($channels, $kernel::<3, 1> { $($field)* }),
+            (3, 2) => dispatch($channels, $kernel::<3, 2> { $($field)* }),
+            (5, 1) => dispatch($channels, $kernel::<5, 1> { $($field)* }),
+            (5, 2) => dispatch($channels, $kernel::<5, 2> { $($field)* }),
+            (kernel, stride) => unreachable!("a {kernel}x{kernel} window with stride {stride}"),
+        }
+    };
+}
+pub(crate) use for_window;
+
+/// One row of the output [width, channels] from `kernel` rows of the input [width + 2 padding, channels].
+///
+/// `weights` is [kernel, kernel, channels].
+pub fn forward_row(
+    window: Window,
+    rows: &[&[f32]],
+    weights: &[f32],
+    channels: usize,
+    out: &mut [f32],
+) {
+    assert_eq!(rows.len(), window.kernel);
+    for_window!(
+        window,
+        channels,
+        ForwardRow {
+            rows,
+            weights,
+            channels,
+            out
+        }
+    );
+}
+
+struct ForwardRow<'a, const K: usize, const STRIDE: usize> {
+    rows: &'a [&'a [f32]],
+    weights: &'a [f32],
+    channels: usize,
+    out: &'a mut [f32],
+}
+
+impl<const K: usize, const STRIDE: usize> WithSimd for ForwardRow<'_, K, STRIDE> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let width = self.out.len() / self.channels;
+        let row: [&[S::f32s]; K] = std::array::from_fn(|ky| lanes::<S>(self.rows[ky]));
+        let weights = lanes::<S>(self.weights);
+        let blocks = weights.len() / (K * K);
+        let out = lanes_mut::<S>(self.out);
+        let mut x = 0;
+        while x + 8 <= width {
+            forward_block::<S, K, STRIDE, 8>(simd, row, weights, blocks, x, out);
+            x += 8;
+        }
+        while x + 2 <= width {
+            forward_block::<S, K, STRIDE, 2>(simd, row, weights, blocks, x, out);
+            x += 2;
+        }
+        if x < width {
+            forward_block::<S, K, STRIDE, 1>(simd, row, weights, blocks, x, out);
+        }
+    }
+}
+
+/// `B` pixels of a row from `x` on, all channels.
+#[inline(always)]
+fn forward_block<S: Simd, const K: usize, const STRIDE: usize, const B: usize>(
+    simd: S,
+    rows: [&[S::f32s]; K],
+    weights: &[S::f32s],
+    blocks: usize,
+    x: usize,
+    out: &mut [S::f32s],
+) {
+    for block in 0..blocks {
+        let mut sums = [simd.splat_f32s(0.0); B];
+        for ky in 0..K {
+            let row = &rows[ky][x * STRIDE * blocks + block..];
+            for kx in 0..K {
+                let weight = weights[(ky * K + kx) * blocks + block];
+                for j in 0..B {
+                    sums[j] = fma(simd, row[(j * STRIDE + kx) * blocks], weight, sums[j]);
+                }
+            }
+        }
+        for j in 0..B {
+            out[(x + j) * blocks + block] = sums[j];
+        }
+    }
+}
+
+/// [channels, kernel, kernel] as [kernel, kernel, channels].
+pub fn channels_last(weights: &[f32], channels: usize) -> Vec<f32> {
+    let taps = weights.len() / channels;
+    (0..weights.len())
+        .map(|i| weights[i % channels * taps + i / channels])
+        .collect()
+}
+
+/// [kernel, kernel, channels] as [channels, kernel, kernel].
+pub fn channels_first(weights: &[f32], channels: usize) -> Vec<f32> {
+    let taps = weights.len() / channels;
+    (0..weights.len())
+        .map(|i| weights[i % taps * channels + i / taps])
+        .collect()
+}
+
+/// A few padded rows of an image: row `y` takes the place of row `y - count`.
+pub struct Rows<'a> {
+    values: &'a mut [f32],
+    zeros: &'a [f32],
+    pub count: usize,
+    pub height: usize,
+    row: usize,
+    margin: usize,
+}
+
+impl<'a> Rows<'a> {
+    /// Values that the rows need, the row of zeros among them.
+    pub fn len(count: usize, width: usize, padding: usize, channels: usize) -> usize {
+        (count + 1) * (width + 2 * padding) * channels
+    }
+
+    /// Empty rows in memory of [`Rows::len`] values.
+    pub fn new(
+        values: &'a mut [f32],
+        count: usize,
+        height: usize,
+        width: usize,
+        padding: usize,
+        channels: usize,
+    ) -> Self {
+        values.fill(0.0);
+        let row = (width + 2 * padding) * channels;
+        let (zeros, values) = values.split_at_mut(row);
+        Self {
+            values,
+            zeros,
+            count,
+            height,
+            row,
+            margin: padding * channels,
+        }
+    }
+
+    /// Where row `y` goes, without its padding.
+    pub fn place(&mut self, y: usize) -> &mut [f32] {
+        let start = y % self.count * self.row;
+        &mut self.values[start + self.margin..start + self.row - self.margin]
+    }
+
+    /// Row `y` with its padding; zeros above and below the image.
+    pub fn padded(&self, y: isize) -> &[f32] {
+        match usize::try_from(y) {
+            Ok(y) if y < self.height => &self.values[y % self.count * self.row..][..self.row],
+            _ => self.zeros,
+        }
+    }
+
+    /// Row `y` of the image without its padding.
+    pub fn inner(&self, y: usize) -> &[f32] {
+        &self.values[y % self.count * self.row..][self.margin..self.row - self.margin]
+    }
+}

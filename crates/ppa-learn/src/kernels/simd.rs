@@ -1,0 +1,87 @@
+//! Which vector instructions a kernel runs with, and the sigmoid in them.
+
+use pulp::{Arch, Scalar, Simd, WithSimd};
+
+/// Runs a kernel with the widest vectors that this machine has and that divide the number of channels.
+pub fn dispatch<K: WithSimd>(channels: usize, kernel: K) -> K::Output {
+    match Arch::new() {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(simd) if channels.is_multiple_of(16) => Simd::vectorize(simd, kernel),
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(_) | Arch::V3(_) if channels.is_multiple_of(8) => match pulp::x86::V3::try_new() {
+            Some(simd) => Simd::vectorize(simd, kernel),
+            None => Simd::vectorize(Scalar, kernel),
+        },
+        #[cfg(target_arch = "aarch64")]
+        Arch::Neon(simd) if channels.is_multiple_of(4) => Simd::vectorize(simd, kernel),
+        _ => Simd::vectorize(Scalar, kernel),
+    }
+}
+
+/// The vectors of a slice, whose length is a multiple of theirs.
+#[inline(always)]
+pub fn lanes<S: Simd>(values: &[f32]) -> &[S::f32s] {
+    let (vectors, rest) = S::as_simd_f32s(values);
+    debug_assert!(rest.is_empty(), "a slice of {} values", values.len());
+    vectors
+}
+
+/// As [`lanes`], to write.
+#[inline(always)]
+pub fn lanes_mut<S: Simd>(values: &mut [f32]) -> &mut [S::f32s] {
+    let (vectors, rest) = S::as_mut_simd_f32s(values);
+    debug_assert!(rest.is_empty());
+    vectors
+}
+
+/// a b + c, rounded once where the machine can. (The plain copy would call a function for each.)
+#[inline(always)]
+pub fn fma<S: Simd>(simd: S, a: S::f32s, b: S::f32s, c: S::f32s) -> S::f32s {
+    if S::IS_SCALAR {
+        simd.add_f32s(simd.mul_f32s(a, b), c)
+    } else {
+        simd.mul_add_e_f32s(a, b, c)
+    }
+}
+
+/// 1 / (1 + exp(-y)) to 2e-7.
+///
+/// exp(x) = 2^n exp(r) with |r| <= ln(2)/2, and exp(r) by the polynomial of Cephes' expf (Moshier 1992).
+/// -y is held within ±87, where exp is a normal number: beyond, the sigmoid is 0 or 1 to 2e-38.
+#[inline(always)]
+pub fn sigmoid<S: Simd>(simd: S, y: S::f32s) -> S::f32s {
+    const LN2_HIGH: f32 = 0.693_359_4;
+    const LN2_LOW: f32 = -2.121_944_4e-4;
+    // Adding 1.5 * 2^23 leaves the nearest integer in the low bits of the mantissa.
+    const ROUND: f32 = 12_582_912.0;
+    let splat = |value| simd.splat_f32s(value);
+    let x = simd.min_f32s(simd.max_f32s(simd.neg_f32s(y), splat(-87.0)), splat(87.0));
+    let shifted = fma(simd, x, splat(std::f32::consts::LOG2_E), splat(ROUND));
+    let n = simd.sub_f32s(shifted, splat(ROUND));
+    let r = fma(simd, n, splat(-LN2_HIGH), x);
+    let r = fma(simd, n, splat(-LN2_LOW), r);
+    let mut p = splat(1.987_569_1e-4);
+    for coefficient in [
+        1.398_2e-3,
+        8.333_452e-3,
+        4.166_579_6e-2,
+        1.666_666_5e-1,
+        0.5,
+    ] {
+        p = fma(simd, p, r, splat(coefficient));
+    }
+    let exp_r = fma(simd, p, simd.mul_f32s(r, r), simd.add_f32s(r, splat(1.0)));
+    let exponent = simd.add_u32s(simd.transmute_u32s_f32s(shifted), simd.splat_u32s(127));
+    let power = simd.wrapping_dyn_shl_u32s(exponent, simd.splat_u32s(23));
+    let exp = simd.mul_f32s(exp_r, simd.transmute_f32s_u32s(power));
+    simd.div_f32s(splat(1.0), simd.add_f32s(splat(1.0), exp))
+}
+
+/// SiLU y s(y) and its derivative s (1 + y (1 - s)).
+#[inline(always)]
+pub fn silu_and_derivative<S: Simd>(simd: S, y: S::f32s) -> (S::f32s, S::f32s) {
+    let s = sigmoid(simd, y);
+    let value = simd.mul_f32s(y, s);
+    let rest = simd.sub_f32s(simd.splat_f32s(1.0), s);
+    (value, fma(simd, value, rest, s))
+}

@@ -1,0 +1,119 @@
+//! The first convolution: one channel in, 3 x 3 with stride 2 and padding 1.
+
+use pulp::{Simd, WithSimd};
+
+use super::simd::{dispatch, fma, lanes, lanes_mut};
+
+/// Taps of the kernel.
+pub const TAPS: usize = 9;
+
+/// The pixels under the kernel at output pixel (y, x) of an image; zeros outside it.
+fn neighbours(image: &[f32], width: usize, y: usize, x: usize) -> [f32; TAPS] {
+    std::array::from_fn(|tap| {
+        let (y, x) = (
+            (2 * y + tap / 3).wrapping_sub(1),
+            (2 * x + tap % 3).wrapping_sub(1),
+        );
+        let inside = x < width && y < image.len() / width;
+        if inside { image[y * width + x] } else { 0.0 }
+    })
+}
+
+/// Output row `y` [width of the output, channels] from an image in rows of `width`; `weights` [3, 3, channels].
+pub fn forward_row(image: &[f32], width: usize, y: usize, weights: &[f32], out: &mut [f32]) {
+    let channels = weights.len() / TAPS;
+    dispatch(
+        channels,
+        ForwardRow {
+            image,
+            width,
+            y,
+            weights,
+            out,
+        },
+    );
+}
+
+struct ForwardRow<'a> {
+    image: &'a [f32],
+    width: usize,
+    y: usize,
+    weights: &'a [f32],
+    out: &'a mut [f32],
+}
+
+impl WithSimd for ForwardRow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let weights = lanes::<S>(self.weights);
+        let channels = weights.len() / TAPS;
+        for (x, out) in lanes_mut::<S>(self.out)
+            .chunks_exact_mut(channels)
+            .enumerate()
+        {
+            let under = neighbours(self.image, self.width, self.y, x);
+            for c in 0..channels {
+                let mut sum = simd.splat_f32s(0.0);
+                for tap in 0..TAPS {
+                    sum = fma(
+                        simd,
+                        simd.splat_f32s(under[tap]),
+                        weights[tap * channels + c],
+                        sum,
+                    );
+                }
+                out[c] = sum;
+            }
+        }
+    }
+}
+
+/// Adds to the gradient of the weights [3, 3, channels] what output row `y` gives.
+pub fn add_weight_gradient(
+    image: &[f32],
+    width: usize,
+    y: usize,
+    gradient: &[f32],
+    sums: &mut [f32],
+) {
+    let channels = sums.len() / TAPS;
+    dispatch(
+        channels,
+        WeightRow {
+            image,
+            width,
+            y,
+            gradient,
+            sums,
+        },
+    );
+}
+
+struct WeightRow<'a> {
+    image: &'a [f32],
+    width: usize,
+    y: usize,
+    gradient: &'a [f32],
+    sums: &'a mut [f32],
+}
+
+impl WithSimd for WeightRow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let sums = lanes_mut::<S>(self.sums);
+        let channels = sums.len() / TAPS;
+        for (x, gradient) in lanes::<S>(self.gradient).chunks_exact(channels).enumerate() {
+            let under = neighbours(self.image, self.width, self.y, x);
+            for c in 0..channels {
+                for tap in 0..TAPS {
+                    let sum = &mut sums[tap * channels + c];
+                    *sum = fma(simd, simd.splat_f32s(under[tap]), gradient[c], *sum);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,239 @@
+//! EfficientNet-B0 (Tan and Le 2019, arXiv:1905.11946) for one channel in and one value out, as torchvision builds it.
+
+mod architecture;
+mod backward;
+mod forward;
+mod initialise;
+mod norm;
+mod operation;
+mod squeeze;
+mod tape;
+
+use candle_core::{Tensor, Var};
+
+pub use architecture::Entry;
+use architecture::{Architecture, FEATURES};
+use operation::Backbone;
+
+use crate::kernels::buffer::Pool;
+use crate::random::{Purpose, stream};
+
+/// How much is left out at random while training.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Probability that a feature is left out before the last layer.
+    pub dropout: f32,
+    /// Probability that the last block leaves out its residual branch for an image; block i of 16 does with i/16 of it.
+    pub stochastic_depth: f32,
+}
+
+impl Default for Options {
+    /// As the paper's authors train: 0.5 and 0.2.
+    fn default() -> Self {
+        Self {
+            dropout: 0.5,
+            stochastic_depth: 0.2,
+        }
+    }
+}
+
+/// What a forward pass is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mode {
+    /// Normalises by the batch, moves the running statistics, and leaves out what (seed, step) says.
+    ///
+    /// A network that is run twice in one step needs two numbers for the two to leave out different things.
+    Train {
+        /// Index of the random numbers.
+        step: u64,
+    },
+    /// Normalises by the running statistics and leaves out nothing.
+    Eval,
+}
+
+/// Why a network cannot be run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NetworkError {
+    /// Images of another shape.
+    #[error(
+        "images have the shape {found:?}, expected [images, 1, height, width] with nothing empty"
+    )]
+    Shape {
+        /// The shape found.
+        found: Vec<usize>,
+    },
+    /// One value for each channel has no variance.
+    #[error(
+        "training on {images} image(s) of {height} x {width} leaves one value for each channel, which has no variance; expected more images or more than 32 pixels on a side"
+    )]
+    OneValue {
+        /// Images in the batch.
+        images: usize,
+        /// Rows of an image.
+        height: usize,
+        /// Columns of an image.
+        width: usize,
+    },
+    /// An error of candle.
+    #[error("the network's arithmetic failed")]
+    Candle(#[from] candle_core::Error),
+}
+
+/// A named tensor of the network, in torchvision's order and by its names.
+#[derive(Debug, Clone)]
+pub struct Named {
+    /// torchvision's name, such as `features.0.0.weight`.
+    pub name: String,
+    /// Its values now, in torchvision's shape; a copy.
+    pub tensor: Tensor,
+}
+
+/// EfficientNet-B0 with 4,008,253 parameters, all f32 on the CPU.
+///
+/// The parameters are two flat variables, one of the backbone and one of the classifier, so that a whole backbone is a
+/// single operation to candle: `loss.backward()` gives one gradient for each of the two. [`EfficientNetB0::parameters`] names their parts.
+#[derive(Debug, Clone)]
+pub struct EfficientNetB0 {
+    architecture: std::sync::Arc<Architecture>,
+    backbone: Var,
+    classifier: Var,
+    statistics: Var,
+    pool: Pool,
+    seed: u64,
+    options: Options,
+}
+
+impl EfficientNetB0 {
+    /// A network with torchvision's first values: convolutions normal with variance 2 / fan-out, the last layer uniform
+    /// in ±1 / sqrt(outputs), normalisation 1 and 0. `seed` fixes them and what training leaves out.
+    ///
+    /// # Errors
+    /// If candle cannot make the variables.
+    pub fn new(seed: u64, options: Options) -> Result<Self, NetworkError> {
+        let architecture = Architecture::new(options.stochastic_depth);
+        let (backbone, classifier) = initialise::parameters(&architecture, seed);
+        let statistics = initialise::statistics(&architecture);
+        Ok(Self {
+            backbone: variable(backbone)?,
+            classifier: variable(classifier)?,
+            statistics: variable(statistics)?,
+            architecture: std::sync::Arc::new(architecture),
+            pool: Pool::default(),
+            seed,
+            options,
+        })
+    }
+
+    /// One value for each image [images, 1], from images [images, 1, height, width] in f32, of any height and width.
+    ///
+    /// # Errors
+    /// If the images have another shape, or train on a single value for each channel.
+    pub fn forward(&self, images: &Tensor, mode: Mode) -> Result<Tensor, NetworkError> {
+        self.classify(&self.features(images, mode)?, mode)
+    }
+
+    /// The features [images, 1280] that the last layer sees.
+    ///
+    /// # Errors
+    /// As [`EfficientNetB0::forward`].
+    pub fn features(&self, images: &Tensor, mode: Mode) -> Result<Tensor, NetworkError> {
+        let &[count, 1, height, width] = images.dims() else {
+            return Err(NetworkError::Shape {
+                found: images.dims().to_vec(),
+            });
+        };
+        if images.elem_count() == 0 {
+            return Err(NetworkError::Shape {
+                found: images.dims().to_vec(),
+            });
+        }
+        if mode != Mode::Eval && count * height.div_ceil(32) * width.div_ceil(32) == 1 {
+            return Err(NetworkError::OneValue {
+                images: count,
+                height,
+                width,
+            });
+        }
+        let operation = Backbone::new(self, mode);
+        Ok(images.contiguous()?.apply_op2(&self.backbone, operation)?)
+    }
+
+    /// The last layer on features [images, 1280], after dropout while training.
+    ///
+    /// # Errors
+    /// If the features have another shape.
+    pub fn classify(&self, features: &Tensor, mode: Mode) -> Result<Tensor, NetworkError> {
+        let weight = self
+            .classifier
+            .narrow(0, 0, FEATURES)?
+            .reshape((1, FEATURES))?;
+        let bias = self.classifier.narrow(0, FEATURES, 1)?;
+        let kept = match mode {
+            Mode::Train { step } if 0.0 < self.options.dropout => {
+                let mut random = stream(self.seed, Purpose::Dropout, 2 * step + 1);
+                let gains =
+                    initialise::gains(&mut random, features.elem_count(), self.options.dropout);
+                (features * Tensor::from_vec(gains, features.shape(), features.device())?)?
+            }
+            _ => features.clone(),
+        };
+        Ok(kept.matmul(&weight.t()?)?.broadcast_add(&bias)?)
+    }
+
+    /// The two flat variables that training changes: the backbone's and the classifier's.
+    pub fn variables(&self) -> [&Var; 2] {
+        [&self.backbone, &self.classifier]
+    }
+
+    /// The running means and variances of all normalisations, one flat variable that training moves but has no gradient.
+    pub fn statistics_variable(&self) -> &Var {
+        &self.statistics
+    }
+
+    /// Where in [`EfficientNetB0::variables`] (first index) each parameter lies, in torchvision's order.
+    pub fn layout(&self) -> impl Iterator<Item = (usize, &Entry)> {
+        let backbone = self.architecture.backbone.iter().map(|entry| (0, entry));
+        backbone.chain(self.architecture.classifier.iter().map(|entry| (1, entry)))
+    }
+
+    /// Where in [`EfficientNetB0::statistics_variable`] each running mean and variance lies.
+    pub fn statistics_layout(&self) -> impl Iterator<Item = &Entry> {
+        self.architecture.statistics.iter()
+    }
+
+    /// Every parameter by name.
+    ///
+    /// # Errors
+    /// If candle cannot copy.
+    pub fn parameters(&self) -> Result<Vec<Named>, NetworkError> {
+        self.named([self.backbone.as_tensor(), self.classifier.as_tensor()])
+    }
+
+    /// The parts by name of two flat tensors that go with [`EfficientNetB0::variables`], such as their gradients.
+    ///
+    /// # Errors
+    /// If the tensors have other lengths than the variables.
+    pub fn named(&self, flat: [&Tensor; 2]) -> Result<Vec<Named>, NetworkError> {
+        self.layout()
+            .map(|(variable, entry)| entry.of(flat[variable]))
+            .collect()
+    }
+
+    /// The running means and variances by name.
+    ///
+    /// # Errors
+    /// If candle cannot copy.
+    pub fn statistics(&self) -> Result<Vec<Named>, NetworkError> {
+        self.architecture
+            .statistics
+            .iter()
+            .map(|entry| entry.of(&self.statistics))
+            .collect()
+    }
+}
+
+fn variable(values: Vec<f32>) -> Result<Var, NetworkError> {
+    let tensor = Tensor::new(values, &candle_core::Device::Cpu)?;
+    Ok(Var::from_tensor(&tensor)?)
+}

@@ -1,0 +1,219 @@
+//! The blocks of EfficientNet-B0, and where each parameter lies in the flat variables.
+
+use std::ops::Range;
+
+use candle_core::Tensor;
+
+use super::{Named, NetworkError};
+use crate::kernels::depthwise::Window;
+
+/// Features that the last layer sees.
+pub const FEATURES: usize = 1280;
+/// Channels of the first convolution.
+const STEM: usize = 32;
+
+/// (expansion, kernel, stride, channels out, blocks) of the seven stages: table 1 of Tan and Le 2019.
+const STAGES: [(usize, usize, usize, usize, usize); 7] = [
+    (1, 3, 1, 16, 1),
+    (6, 3, 2, 24, 2),
+    (6, 5, 2, 40, 2),
+    (6, 3, 2, 80, 3),
+    (6, 5, 1, 112, 3),
+    (6, 5, 2, 192, 4),
+    (6, 3, 1, 320, 1),
+];
+
+/// A named part of a flat variable.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Entry {
+    /// torchvision's name.
+    pub name: String,
+    /// torchvision's shape.
+    pub shape: Vec<usize>,
+    /// Where it lies.
+    pub range: Range<usize>,
+}
+
+impl Entry {
+    pub(super) fn of(&self, flat: &Tensor) -> Result<Named, NetworkError> {
+        let part = flat
+            .detach()
+            .narrow(0, self.range.start, self.range.len())?;
+        Ok(Named {
+            name: self.name.clone(),
+            tensor: part.reshape(&self.shape[..])?.copy()?,
+        })
+    }
+}
+
+/// Parameters and running statistics of a normalisation; all four ranges have the length of its channels.
+#[derive(Debug, Clone)]
+pub struct NormPlace {
+    pub weight: Range<usize>,
+    pub bias: Range<usize>,
+    pub mean: Range<usize>,
+    pub variance: Range<usize>,
+}
+
+/// A pointwise convolution or the stem, without bias, and the normalisation after it.
+#[derive(Debug, Clone)]
+pub struct ConvPlace {
+    pub weight: Range<usize>,
+    pub norm: NormPlace,
+    pub channels: usize,
+}
+
+/// The two layers of a squeeze-and-excitation.
+#[derive(Debug, Clone)]
+pub struct SqueezePlace {
+    pub squeeze_weight: Range<usize>,
+    pub squeeze_bias: Range<usize>,
+    pub expand_weight: Range<usize>,
+    pub expand_bias: Range<usize>,
+}
+
+/// One inverted residual block. The first one's expansion is the network's first convolution.
+#[derive(Debug, Clone)]
+pub struct Block {
+    pub channels_in: usize,
+    pub expand: ConvPlace,
+    pub window: Window,
+    pub depthwise: ConvPlace,
+    pub squeeze: SqueezePlace,
+    pub project: ConvPlace,
+    /// Whether the block adds its input to its output.
+    pub residual: bool,
+    /// Probability that training leaves out the branch for an image.
+    pub drop: f32,
+}
+
+/// All blocks, and the names of all parameters in torchvision's order.
+#[derive(Debug)]
+pub struct Architecture {
+    pub blocks: Vec<Block>,
+    pub head: ConvPlace,
+    pub backbone: Vec<Entry>,
+    pub classifier: Vec<Entry>,
+    pub statistics: Vec<Entry>,
+}
+
+/// The entries so far, and where the next one begins.
+#[derive(Default)]
+struct Names {
+    entries: Vec<Entry>,
+    end: usize,
+}
+
+impl Names {
+    fn add(&mut self, name: String, shape: &[usize]) -> Range<usize> {
+        let range = self.end..self.end + shape.iter().product::<usize>();
+        self.end = range.end;
+        self.entries.push(Entry {
+            name,
+            shape: shape.to_vec(),
+            range: range.clone(),
+        });
+        range
+    }
+}
+
+#[derive(Default)]
+struct Builder {
+    parameters: Names,
+    statistics: Names,
+}
+
+impl Builder {
+    fn conv(&mut self, prefix: &str, shape: [usize; 4]) -> ConvPlace {
+        let channels = shape[0];
+        let norm = format!("{prefix}.1");
+        ConvPlace {
+            weight: self.parameters.add(format!("{prefix}.0.weight"), &shape),
+            norm: NormPlace {
+                weight: self.parameters.add(format!("{norm}.weight"), &[channels]),
+                bias: self.parameters.add(format!("{norm}.bias"), &[channels]),
+                mean: self
+                    .statistics
+                    .add(format!("{norm}.running_mean"), &[channels]),
+                variance: self
+                    .statistics
+                    .add(format!("{norm}.running_var"), &[channels]),
+            },
+            channels,
+        }
+    }
+
+    fn squeeze(&mut self, prefix: &str, channels: usize, squeezed: usize) -> SqueezePlace {
+        SqueezePlace {
+            squeeze_weight: self
+                .parameters
+                .add(format!("{prefix}.fc1.weight"), &[squeezed, channels, 1, 1]),
+            squeeze_bias: self
+                .parameters
+                .add(format!("{prefix}.fc1.bias"), &[squeezed]),
+            expand_weight: self
+                .parameters
+                .add(format!("{prefix}.fc2.weight"), &[channels, squeezed, 1, 1]),
+            expand_bias: self
+                .parameters
+                .add(format!("{prefix}.fc2.bias"), &[channels]),
+        }
+    }
+}
+
+impl Architecture {
+    pub fn new(stochastic_depth: f32) -> Self {
+        let mut builder = Builder::default();
+        let mut stem = Some(builder.conv("features.0", [STEM, 1, 3, 3]));
+        let count: usize = STAGES.iter().map(|stage| stage.4).sum();
+        let mut blocks: Vec<Block> = Vec::with_capacity(count);
+        let mut channels_in = STEM;
+        for (stage, (expansion, kernel, stride, channels_out, repeats)) in
+            STAGES.into_iter().enumerate()
+        {
+            for repeat in 0..repeats {
+                let prefix = format!("features.{}.{repeat}.block", stage + 1);
+                let expanded = channels_in * expansion;
+                let stride = if repeat == 0 { stride } else { 1 };
+                // The only block that does not expand comes first, and takes the stem in its stead.
+                let (expand, next) = match stem.take() {
+                    Some(stem) => (stem, 0),
+                    None => (
+                        builder.conv(&format!("{prefix}.0"), [expanded, channels_in, 1, 1]),
+                        1,
+                    ),
+                };
+                let depthwise =
+                    builder.conv(&format!("{prefix}.{next}"), [expanded, 1, kernel, kernel]);
+                let squeeze =
+                    builder.squeeze(&format!("{prefix}.{}", next + 1), expanded, channels_in / 4);
+                let project = builder.conv(
+                    &format!("{prefix}.{}", next + 2),
+                    [channels_out, expanded, 1, 1],
+                );
+                blocks.push(Block {
+                    channels_in,
+                    expand,
+                    window: Window { kernel, stride },
+                    depthwise,
+                    squeeze,
+                    project,
+                    residual: stride == 1 && channels_in == channels_out,
+                    drop: stochastic_depth * blocks.len() as f32 / count as f32,
+                });
+                channels_in = channels_out;
+            }
+        }
+        let head = builder.conv("features.8", [FEATURES, channels_in, 1, 1]);
+        let mut classifier = Names::default();
+        classifier.add("classifier.1.weight".into(), &[1, FEATURES]);
+        classifier.add("classifier.1.bias".into(), &[1]);
+        Self {
+            blocks,
+            head,
+            backbone: builder.parameters.entries,
+            classifier: classifier.entries,
+            statistics: builder.statistics.entries,
+        }
+    }
+}

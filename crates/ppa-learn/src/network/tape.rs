@@ -1,0 +1,84 @@
+//! What a training pass leaves for its gradient.
+
+use std::ops::Range;
+
+use super::norm::Norm;
+use super::squeeze::Squeeze;
+use crate::kernels::buffer::Buffer;
+
+/// Images, and rows and columns of each, at one place in the network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size {
+    pub images: usize,
+    pub height: usize,
+    pub width: usize,
+}
+
+impl Size {
+    /// Pixels of one image.
+    pub fn pixels(self) -> usize {
+        self.height * self.width
+    }
+
+    /// Pixels of all images.
+    pub fn count(self) -> usize {
+        self.images * self.pixels()
+    }
+
+    /// Images that one task takes: the batch in eight parts, whatever the number of threads, so that sums come out the same.
+    pub fn images_per_task(self) -> usize {
+        self.images.div_ceil(8)
+    }
+
+    /// Pixels that one task takes.
+    pub fn pixels_per_task(self) -> usize {
+        self.images_per_task() * self.pixels()
+    }
+}
+
+/// Pixels that are worked on at once, so that what belongs to them stays in the second-level cache (512 KiB).
+pub fn tile_pixels(values_per_pixel: usize) -> usize {
+    (131_072 / values_per_pixel).max(64)
+}
+
+/// Parts of a run of pixels that belong to one image each: (image, pixels counted from the start of the run).
+pub fn by_image(run: Range<usize>, size: Size) -> impl Iterator<Item = (usize, Range<usize>)> {
+    let mut at = run.start;
+    std::iter::from_fn(move || {
+        let image = at / size.pixels();
+        let end = ((image + 1) * size.pixels()).min(run.end);
+        let part = at - run.start..end - run.start;
+        at = end;
+        (!part.is_empty()).then_some((image, part))
+    })
+}
+
+/// A convolution's output before its normalisation, and the normalisation.
+#[derive(Debug)]
+pub struct Normed {
+    pub pixels: Buffer,
+    pub norm: Norm,
+}
+
+/// One block: its input, its three convolutions, its gates and the gains of stochastic depth.
+#[derive(Debug)]
+pub struct BlockTape {
+    pub input: Buffer,
+    pub size_in: Size,
+    pub size_out: Size,
+    pub expand: Normed,
+    pub depthwise: Normed,
+    pub squeeze: Squeeze,
+    pub project: Normed,
+    pub gains: Vec<f32>,
+}
+
+/// A whole pass.
+#[derive(Debug)]
+pub struct Tape {
+    pub image_size: Size,
+    pub blocks: Vec<BlockTape>,
+    pub head_input: Buffer,
+    pub head_size: Size,
+    pub head: Normed,
+}

@@ -1,0 +1,106 @@
+//! What a new network is and does.
+
+use candle_core::{Device, Tensor};
+use ppa_learn::{EfficientNetB0, Mode, NetworkError, Options};
+
+/// Images of smooth waves, different for each number.
+fn images(count: usize, height: usize, width: usize) -> Tensor {
+    let values: Vec<f32> = (0..count * height * width)
+        .map(|i| ((i * i % 8191) as f32 * 0.37).sin() * 0.5)
+        .collect();
+    Tensor::from_vec(values, (count, 1, height, width), &Device::Cpu).unwrap()
+}
+
+fn column(tensor: &Tensor) -> Vec<f32> {
+    tensor.flatten_all().unwrap().to_vec1().unwrap()
+}
+
+fn gradient(network: &EfficientNetB0, images: &Tensor, step: u64) -> Vec<f32> {
+    let loss = network
+        .forward(images, Mode::Train { step })
+        .unwrap()
+        .sqr()
+        .unwrap()
+        .mean_all()
+        .unwrap();
+    column(
+        loss.backward()
+            .unwrap()
+            .get(network.variables()[0])
+            .unwrap(),
+    )
+}
+
+#[test]
+fn a_network_has_the_parameters_of_torchvision_with_one_channel_and_one_output() {
+    let network = EfficientNetB0::new(0, Options::default()).unwrap();
+    let parameters = network.parameters().unwrap();
+    assert_eq!(
+        parameters
+            .iter()
+            .map(|p| p.tensor.elem_count())
+            .sum::<usize>(),
+        4_008_253
+    );
+    assert_eq!(parameters[0].name, "features.0.0.weight");
+    assert_eq!(parameters[0].tensor.dims(), [32, 1, 3, 3]);
+    assert_eq!(parameters.last().unwrap().name, "classifier.1.bias");
+    assert_eq!(network.statistics().unwrap().len(), 2 * 49);
+}
+
+#[test]
+fn an_image_of_any_size_gives_the_same_alone_and_among_others() {
+    let network = EfficientNetB0::new(3, Options::default()).unwrap();
+    for (height, width) in [(32, 32), (45, 71), (97, 33)] {
+        let batch = images(3, height, width);
+        let together = column(&network.forward(&batch, Mode::Eval).unwrap());
+        for (index, together) in together.iter().enumerate() {
+            let alone = column(
+                &network
+                    .forward(&batch.narrow(0, index, 1).unwrap(), Mode::Eval)
+                    .unwrap(),
+            );
+            assert!(
+                (alone[0] - together).abs() <= 1e-5 * (1.0 + together.abs()),
+                "{alone:?} {together}"
+            );
+        }
+    }
+}
+
+#[test]
+fn seed_and_step_fix_every_byte_for_any_number_of_threads() {
+    let run = |threads: usize, step| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| {
+            gradient(
+                &EfficientNetB0::new(5, Options::default()).unwrap(),
+                &images(5, 65, 40),
+                step,
+            )
+        })
+    };
+    let one = run(1, 0);
+    assert!(one.iter().all(|g| g.is_finite()) && one.iter().any(|g| *g != 0.0));
+    assert_eq!(one, run(2, 0));
+    assert_eq!(one, run(3, 0));
+    assert_ne!(one, run(1, 1), "another step leaves out the same");
+}
+
+#[test]
+fn images_of_another_shape_are_refused() {
+    let network = EfficientNetB0::new(0, Options::default()).unwrap();
+    let three = Tensor::zeros((1, 3, 32, 32), candle_core::DType::F32, &Device::Cpu).unwrap();
+    assert!(matches!(
+        network.forward(&three, Mode::Eval),
+        Err(NetworkError::Shape { .. })
+    ));
+    let small = images(1, 32, 20);
+    assert!(matches!(
+        network.forward(&small, Mode::Train { step: 0 }),
+        Err(NetworkError::OneValue { .. })
+    ));
+}
