@@ -20,6 +20,8 @@ pub enum Purpose {
     DepthNoise,
     /// Which poses are made again to verify a dataset; item = step.
     Verification,
+    /// In which order readers see radiographs, and under which names.
+    Showing,
 }
 
 impl Purpose {
@@ -31,6 +33,7 @@ impl Purpose {
             Self::DepthSensor => "depth-sensor",
             Self::DepthNoise => "depth-noise",
             Self::Verification => "verification",
+            Self::Showing => "showing",
         }
     }
 }

@@ -5,6 +5,7 @@ mod conversion;
 mod coverage;
 mod depth;
 mod faults;
+mod grading;
 mod identity;
 mod json;
 mod labels;

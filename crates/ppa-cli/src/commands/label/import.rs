@@ -1,0 +1,59 @@
+//! `ppa label import`: labels from the grades of readers.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use ppa_dataset::Manifest;
+use ppa_dataset::labels::{Imported, import_grades, read_key};
+
+use crate::output::Output;
+
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Writes labels.json of every limb that was graded: mean and standard deviation (dividing by the number of readers) over \
+the readers' first grades. All grades are kept in grades.csv of the dataset: give that file as well to add \
+further readers, and to `ppa label agree`. Readers' labels take the place of computed ones.
+
+  ppa label import dataset --key for_readers.key.csv grades_anna.csv grades_ben.csv
+  ppa label import dataset --key second.key.csv dataset/grades.csv grades_carl.csv
+  ppa label agree dataset/grades.csv")]
+pub struct ImportArgs {
+    /// Folder of a dataset
+    dataset: PathBuf,
+    /// CSV files with the columns image, reader, grade; image is a name of the key or a radiograph of the dataset
+    #[arg(required = true)]
+    csv: Vec<PathBuf>,
+    /// Keys that `ppa label export` wrote
+    #[arg(long, value_name = "FILE")]
+    key: Vec<PathBuf>,
+}
+
+pub fn run(args: &ImportArgs, output: Output) -> anyhow::Result<()> {
+    let manifest = Manifest::read(&args.dataset)?;
+    let mut shown = Vec::new();
+    for key in &args.key {
+        shown.extend(read_key(key)?);
+    }
+    let imported = import_grades(&manifest, &shown, &args.csv)?;
+    output.print(&imported, describe)
+}
+
+fn describe(done: &Imported) -> String {
+    let mut lines = vec![format!(
+        "{} radiographs labelled by {} readers; {} repeats kept aside",
+        done.labelled, done.readers, done.repeats
+    )];
+    if done.replaced_computed > 0 {
+        lines.push(format!(
+            "{} computed labels gave way",
+            done.replaced_computed
+        ));
+    }
+    if done.without_label > 0 {
+        lines.push(format!(
+            "{} radiographs of the same limbs were not graded and have no label",
+            done.without_label
+        ));
+    }
+    lines.join("\n")
+}

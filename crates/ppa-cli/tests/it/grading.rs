@@ -1,0 +1,165 @@
+//! From a dataset to readers and back: the page that they get, and the labels that their grades become.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::shards::write_quick_plan;
+use crate::{fail, names, succeed};
+
+/// A folder with a dataset of five radiographs, `data`, exported to `out`.
+fn exported() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    write_quick_plan(folder.path());
+    succeed(folder.path(), "generate plan.toml --out data");
+    succeed(folder.path(), "label export data --out out/");
+    folder
+}
+
+/// Rows of the key: name, image, sha256.
+fn key(folder: &Path) -> Vec<[String; 3]> {
+    let key = fs::read_to_string(folder.join("out.key.csv")).unwrap();
+    let mut lines = key.lines();
+    assert_eq!(lines.next(), Some("name,image,sha256"));
+    let cells = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
+    lines.map(|line| cells(line).try_into().unwrap()).collect()
+}
+
+/// What a page saves when a reader gives the nth picture the nth grade.
+fn grade(folder: &Path, reader: &str, grades: &[f64]) {
+    let mut csv = "image,reader,grade\n".to_owned();
+    for ([name, ..], grade) in key(folder).iter().zip(grades) {
+        csv += &format!("{name},\"{reader}\",{grade}\n");
+    }
+    fs::write(folder.join(format!("{reader}.csv")), csv).unwrap();
+}
+
+fn labels(folder: &Path) -> Value {
+    let path = folder.join("data/patient_3/labels/r/labels.json");
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn file_name(image: &str) -> &str {
+    image.rsplit('/').next().unwrap()
+}
+
+#[test]
+fn readers_get_pictures_without_a_trace_of_what_they_show() {
+    let folder = exported();
+    let here = folder.path();
+    assert_eq!(names(&here.join("out")), ["grading.html"]);
+    let page = fs::read_to_string(here.join("out/grading.html")).unwrap();
+    for trace in ["patient", "xray_image", "http", "src=\"", "5.0"] {
+        assert!(!page.contains(trace), "the page tells {trace}");
+    }
+    let key = key(here);
+    assert_eq!(key.len(), 6, "five radiographs, one of them twice");
+    for [name, image, sha256] in &key {
+        assert!(page.contains(&format!("{{\"name\":\"{name}\",\"png\":\"")));
+        assert!(!page.contains(image) && !page.contains(sha256));
+    }
+    let refused = fail(here, "label export data --out o2 --key o2/key.csv");
+    assert!(refused.contains("would lie in the folder for readers"));
+    assert!(!here.join("o2").exists());
+    let refused = fail(here, "label export data --out o2 --every-deg 0.7");
+    assert!(refused.contains("--every-deg is 0.7"), "{refused}");
+    let refused = fail(here, "label export nowhere --out o2");
+    assert!(refused.contains("nowhere"), "{refused}");
+}
+
+#[test]
+fn grades_become_labels_and_are_kept() {
+    let folder = exported();
+    let here = folder.path();
+    let key = key(here);
+    let again = (0..key.len())
+        .find(|&n| key[..n].iter().any(|before| before[1] == key[n][1]))
+        .unwrap();
+    // The published example: 1, 1.5, 1.5 and 2 have mean 1.5 and std 0.35355; repeats count nowhere.
+    for (reader, grade_given) in [("a", 1.0), ("b", 1.5), ("c, d", 1.5), ("e", 2.0)] {
+        let mut grades = [grade_given; 6];
+        grades[again] = 3.0;
+        grade(here, reader, &grades);
+    }
+    fs::rename(here.join("c, d.csv"), here.join("c.csv")).unwrap();
+    let surrogate = r#"{"xray_image_5.png": {"label": 3.0, "std": 0.5, "step": 5, "label_source": "surrogate-jso/1"}}"#;
+    fs::write(here.join("data/patient_3/labels/r/labels.json"), surrogate).unwrap();
+
+    let said = succeed(
+        here,
+        "label import data --key out.key.csv e.csv b.csv c.csv a.csv --json",
+    );
+    let said: Value = serde_json::from_str(&said).unwrap();
+    let expected = serde_json::json!({
+        "readers": 4, "labelled": 5, "repeats": 4, "replaced_computed": 1, "without_label": 0
+    });
+    assert_eq!(said, expected);
+    let found = labels(here);
+    assert_eq!(found.as_object().unwrap().len(), 5);
+    let label = &found["xray_image_10.png"];
+    assert_eq!((&label["label"], &label["step"]), (&1.5.into(), &10.into()));
+    assert_eq!(label["label_source"], "readers");
+    assert!((label["std"].as_f64().unwrap() - 0.353_55).abs() < 5e-6);
+
+    let agreed = succeed(here, "label agree data/grades.csv --json");
+    let agreed: Value = serde_json::from_str(&agreed).unwrap();
+    assert_eq!(agreed["images"], 5);
+    assert_eq!(agreed["readers"][0]["against_self"]["mae"], 2.0);
+
+    // Another reader adds to what is there; without it, that would be lost.
+    grade(here, "f", &[3.0; 4]);
+    let lost = fail(here, "label import data --key out.key.csv f.csv");
+    assert!(lost.contains("none of the given files does"), "{lost}");
+    assert_eq!(labels(here), found);
+    succeed(
+        here,
+        "label import data --key out.key.csv data/grades.csv f.csv",
+    );
+    let [_, image, _] = &key[0];
+    let label = &labels(here)[file_name(image)]["label"];
+    assert_eq!(label.as_f64(), Some((1.0 + 1.5 + 1.5 + 2.0 + 3.0) / 5.0));
+}
+
+#[test]
+fn grades_that_cannot_be_are_named_and_nothing_is_written() {
+    let folder = exported();
+    let here = folder.path();
+    let key = key(here);
+    let refused = |csv: &str, expected: &str| {
+        fs::write(here.join("x.csv"), format!("image,reader,grade\n{csv}\n")).unwrap();
+        let said = fail(here, "label import data --key out.key.csv x.csv");
+        assert!(said.contains(expected), "{said}");
+        assert!(!here.join("data/grades.csv").exists());
+    };
+    let [name, image, _] = &key[0];
+    refused(
+        &format!("{name},a,0.5"),
+        "with 0.5, expected 1, 1.5, 2, 2.5 or 3",
+    );
+    refused(&format!("{name},a,1.2"), "with 1.2, expected");
+    refused(&format!("{name},a,good"), "x.csv is not the expected table");
+    refused(
+        "0123456789,a,1",
+        "0123456789 is neither a picture of the key",
+    );
+    refused(&format!("{name},a,1\n{name},a,2"), "a grades");
+    refused(
+        &format!("{image},a,1\n{image},a,2\n{image},a,2"),
+        "in x.csv and again in x.csv",
+    );
+    grade(here, "a", &[1.0; 6]);
+    fs::copy(here.join("a.csv"), here.join("b.csv")).unwrap();
+    let twice = fail(here, "label import data --key out.key.csv a.csv b.csv");
+    assert!(twice.contains("in a.csv and again in b.csv"), "{twice}");
+
+    // The dataset was made anew with another seed since.
+    let plan = fs::read_to_string(here.join("plan.toml")).unwrap();
+    fs::write(here.join("plan.toml"), format!("seed = 9\n{plan}")).unwrap();
+    succeed(here, "generate plan.toml --out data");
+    let changed = fail(here, "label import data --key out.key.csv a.csv");
+    assert!(
+        changed.contains("is not the radiograph that the readers saw"),
+        "{changed}"
+    );
+}

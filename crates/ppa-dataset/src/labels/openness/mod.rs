@@ -1,0 +1,13 @@
+//! Computed labels: how open the joint space of an ankle lies to the beam.
+
+mod bones;
+mod exposure;
+mod grade;
+mod gutter;
+mod joint_space;
+mod rays;
+
+pub use bones::{AnkleBone, AnkleBones, BoneNumbers, BonesError};
+pub use exposure::Exposure;
+pub use grade::{ComputedLabel, GradeThresholds, ThresholdError};
+pub use joint_space::{FREE_CHORDS_MM, Gutter, JointSpace, JointSpaceError, Openness};
