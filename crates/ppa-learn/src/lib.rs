@@ -6,6 +6,7 @@ mod random;
 mod weights;
 
 pub mod data;
+pub mod experiment;
 
 pub use network::{EfficientNetB0, Entry, Mode, Named, NetworkError, Options};
 pub use random::{Purpose, stream};

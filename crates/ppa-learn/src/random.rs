@@ -15,6 +15,8 @@ pub enum Purpose {
     Sampling = 2,
     /// Augmentation of one image; index: its place in the endless sequence of images.
     Augmentation = 3,
+    /// Which persons are tested in which fold.
+    Folds = 4,
 }
 
 /// The stream of random numbers at `index` of a purpose (ChaCha with 8 rounds; key from `seed`, nonce from the address).

@@ -1,0 +1,267 @@
+//! What the paper compares: the columns of its tables 1 to 4.
+
+use serde::{Deserialize, Serialize};
+
+/// One of the paper's experiments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Experiment {
+    /// Synthetic images alone: does a network learn from them, and which body shapes help (table 1)?
+    #[serde(rename = "1")]
+    One,
+    /// Finetuning on preparations: does pretraining on synthetic images help (table 2)?
+    #[serde(rename = "2a")]
+    TwoA,
+    /// Finetuning on clinical images with weak labels (table 3).
+    #[serde(rename = "2b")]
+    TwoB,
+    /// Linear probing on preparations: what are the features worth (table 4)?
+    #[serde(rename = "2c")]
+    TwoC,
+}
+
+/// Body shapes of the synthetic dataset that a network is trained with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Shapes {
+    /// The skin of the scan.
+    Original,
+    /// The skin, grown and shrunk.
+    Size,
+    /// The skin, with bumps.
+    Bumps,
+    /// All of them.
+    All,
+}
+
+/// Camera views whose synthetic images a pair of networks is pretrained with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ViewChoice {
+    /// Both networks begin with the same weights, pretrained with the images of both views.
+    Unified,
+    /// Each network begins with weights that are pretrained with the images of its own view.
+    Specific,
+}
+
+/// Weights that a network begins with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Start {
+    /// Random ones.
+    Scratch,
+    /// Those of a file, trained on ImageNet.
+    ImageNet,
+    /// Pretrained on all of the synthetic dataset.
+    Synthetic {
+        /// Views that the weights are pretrained with.
+        views: ViewChoice,
+        /// Shapes that the weights are pretrained with.
+        shapes: Shapes,
+    },
+}
+
+/// One column of a table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Configuration {
+    /// The table.
+    pub experiment: Experiment,
+    /// Weights to begin with.
+    pub start: Start,
+    /// Shapes that are trained with after that: [`Shapes::Original`] where the images are not synthetic.
+    pub shapes: Shapes,
+}
+
+impl Experiment {
+    /// All of them, in the paper's order.
+    pub const ALL: [Self; 4] = [Self::One, Self::TwoA, Self::TwoB, Self::TwoC];
+
+    /// The name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::One => "1",
+            Self::TwoA => "2a",
+            Self::TwoB => "2b",
+            Self::TwoC => "2c",
+        }
+    }
+
+    /// The columns of its table, in the paper's order.
+    ///
+    /// The four tables have 22 columns. The paper's text counts 21 configurations and 980 runs, which is what these are
+    /// without ImageNet in experiment 2b: (4 x 3 + 10 x 2 + 3 x 3 + 4 x 2) folds x 2 views x 10 seeds.
+    pub fn configurations(self) -> Vec<Configuration> {
+        use Shapes::{All, Bumps, Original, Size};
+        use ViewChoice::{Specific, Unified};
+        let synthetic = |views, shapes| Start::Synthetic { views, shapes };
+        let starts = match self {
+            Self::One => {
+                let column = |shapes| Configuration {
+                    experiment: self,
+                    start: Start::Scratch,
+                    shapes,
+                };
+                return [Original, Size, Bumps, All].map(column).to_vec();
+            }
+            Self::TwoA => {
+                let pretrained = [Unified, Specific].into_iter().flat_map(|views| {
+                    [Original, Size, Bumps, All].map(|shapes| synthetic(views, shapes))
+                });
+                [Start::Scratch, Start::ImageNet]
+                    .into_iter()
+                    .chain(pretrained)
+                    .collect()
+            }
+            Self::TwoB => vec![
+                Start::Scratch,
+                Start::ImageNet,
+                synthetic(Specific, Size),
+                synthetic(Specific, All),
+            ],
+            Self::TwoC => vec![
+                Start::Scratch,
+                Start::ImageNet,
+                synthetic(Unified, All),
+                synthetic(Specific, All),
+            ],
+        };
+        let column = |start| Configuration {
+            experiment: self,
+            start,
+            shapes: Original,
+        };
+        starts.into_iter().map(column).collect()
+    }
+
+    /// The two columns whose MAE the paper compares by a permutation test: from scratch and pretrained.
+    pub fn tested_pair(self) -> Option<[Configuration; 2]> {
+        let shapes = match self {
+            Self::TwoA => Shapes::Size,
+            Self::TwoB => Shapes::All,
+            Self::One | Self::TwoC => return None,
+        };
+        let pretrained = Start::Synthetic {
+            views: ViewChoice::Specific,
+            shapes,
+        };
+        Some([Start::Scratch, pretrained].map(|start| Configuration {
+            experiment: self,
+            start,
+            shapes: Shapes::Original,
+        }))
+    }
+}
+
+impl Shapes {
+    /// Folders of the synthetic layout that hold these shapes.
+    pub fn folders(self) -> &'static [&'static str] {
+        match self {
+            Self::Original => &["orig"],
+            Self::Size => &["orig", "big", "small"],
+            Self::Bumps => &["orig", "bumps_a", "bumps_b"],
+            Self::All => &["orig", "big", "small", "bumps_a", "bumps_b"],
+        }
+    }
+
+    fn heading(self) -> &'static str {
+        match self {
+            Self::Original => "without aug.",
+            Self::Size => "size aug.",
+            Self::Bumps => "bump aug.",
+            Self::All => "all aug.",
+        }
+    }
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Original => "original",
+            Self::Size => "size",
+            Self::Bumps => "bumps",
+            Self::All => "all",
+        }
+    }
+}
+
+impl ViewChoice {
+    fn heading(self) -> &'static str {
+        match self {
+            Self::Unified => "unified camera view",
+            Self::Specific => "camera view specific",
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Unified => "unified",
+            Self::Specific => "specific",
+        }
+    }
+}
+
+impl Configuration {
+    /// Headings of the column as the paper prints them, the most general first.
+    pub fn headings(self) -> Vec<&'static str> {
+        let Start::Synthetic { views, shapes } = self.start else {
+            return vec![match self {
+                Self {
+                    experiment: Experiment::One,
+                    ..
+                } => self.shapes.heading(),
+                Self {
+                    start: Start::Scratch,
+                    ..
+                } => "from scratch",
+                _ => "pretrained on ImageNet",
+            }];
+        };
+        let below = match self.experiment {
+            Experiment::TwoB => vec![shapes.heading()],
+            Experiment::TwoC => vec![views.heading()],
+            _ => vec![views.heading(), shapes.heading()],
+        };
+        [vec!["pretrained on synthetic dataset"], below].concat()
+    }
+
+    /// A name for folders and rows: unique within its experiment, of lower-case letters and `-`.
+    pub fn name(self) -> String {
+        match self.start {
+            Start::Scratch if self.experiment == Experiment::One => self.shapes.name().to_owned(),
+            Start::Scratch => "scratch".to_owned(),
+            Start::ImageNet => "imagenet".to_owned(),
+            Start::Synthetic { views, shapes } => format!("{}-{}", views.name(), shapes.name()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn the_tables_have_the_papers_columns() {
+        let columns = Experiment::ALL.map(|e| e.configurations().len());
+        assert_eq!(columns, [4, 10, 4, 4]);
+        // The paper's counts: 21 configurations, 980 downstream runs, 1100 networks (section 4.3).
+        let folds = [3, 2, 3, 2];
+        let imagenet_2b = 1;
+        assert_eq!(columns.iter().sum::<usize>() - imagenet_2b, 21);
+        let runs = columns.iter().zip(folds).map(|(c, f)| c * f * 2 * 10);
+        let runs = runs.sum::<usize>() - imagenet_2b * 3 * 2 * 10;
+        assert_eq!(runs, 980);
+    }
+
+    #[test]
+    fn names_are_unique_within_an_experiment() {
+        for experiment in Experiment::ALL {
+            let columns = experiment.configurations();
+            let names: BTreeSet<_> = columns.iter().map(|c| c.name()).collect();
+            assert_eq!(names.len(), columns.len());
+            let headings: BTreeSet<_> = columns.iter().map(|c| c.headings()).collect();
+            assert_eq!(headings.len(), columns.len());
+            if let Some(pair) = experiment.tested_pair() {
+                assert!(pair.iter().all(|column| columns.contains(column)));
+            }
+        }
+    }
+}

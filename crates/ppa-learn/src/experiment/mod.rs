@@ -1,0 +1,21 @@
+//! The paper's experiments: what is compared, which trainings that takes, and the tables of their results.
+//!
+//! A [`Configuration`] is a column of a table. Each is trained for every fold, camera view and seed ([`runs`]), some on
+//! top of a pretraining that several runs share ([`Unit::needs`]). The predictions of the two views are joined
+//! ([`join_views`]), their metrics brought together ([`Results`]) and printed as the paper does ([`Table`]).
+
+mod configuration;
+mod folds;
+mod metric;
+mod predictions;
+mod results;
+mod table;
+mod unit;
+
+pub use configuration::{Configuration, Experiment, Shapes, Start, ViewChoice};
+pub use folds::{FoldError, cross_validation, folds_of_limbs};
+pub use metric::Metric;
+pub use predictions::{Moment, Prediction, PredictionError, join_views, pose_triples};
+pub use results::{Missing, Results, Summary};
+pub use table::{Incomplete, Table};
+pub use unit::{Unit, View, runs};

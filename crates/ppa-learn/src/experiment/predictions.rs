@@ -1,0 +1,252 @@
+//! What the networks of the two views said of the images that they were tested with.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use ppa_metrics::{MetricError, PoseTriple, mean_per_pose};
+use serde::{Deserialize, Serialize};
+
+/// A depth image of a test set without its camera: both cameras see the same moment.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct Moment {
+    /// Whose limb.
+    pub person: String,
+    /// Which of the person's limbs, `l` or `r`.
+    pub side: String,
+    /// The pose, unique among those of the limb.
+    pub pose: String,
+    /// Number of the frame within the pose, from 0.
+    pub frame: u32,
+}
+
+/// The prediction of one network for one image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Prediction {
+    /// Whose limb.
+    pub person: String,
+    /// Which of the person's limbs, `l` or `r`.
+    pub side: String,
+    /// The pose, unique among those of the limb.
+    pub pose: String,
+    /// Number of the frame within the pose, from 0.
+    pub frame: u32,
+    /// Quality given by readers, 1 to 3.
+    pub label: f64,
+    /// Quality that the network says.
+    pub prediction: f64,
+}
+
+/// Why predictions of two views could not be joined or judged.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PredictionError {
+    /// Two predictions of one view for one image.
+    #[error("{0} is predicted twice in one view")]
+    Twice(Moment),
+    /// Only one of the views has the image.
+    #[error("{0} is predicted in one view only")]
+    OneView(Moment),
+    /// The views do not agree on the label.
+    #[error("{moment} has the label {first} in one view and {second} in the other")]
+    Label {
+        /// The image.
+        moment: Moment,
+        /// Label in the first view.
+        first: f64,
+        /// Label in the second view.
+        second: f64,
+    },
+    /// A limb without one good and two bad poses.
+    #[error("{person} {side} has {good} poses of label 1 and {bad} of label 3, expected 1 and 2")]
+    NoTriple {
+        /// Whose limb.
+        person: String,
+        /// Which limb.
+        side: String,
+        /// Poses of label 1.
+        good: usize,
+        /// Poses of label 3.
+        bad: usize,
+    },
+    /// A metric that is not defined.
+    #[error(transparent)]
+    Metric(#[from] MetricError),
+}
+
+impl fmt::Display for Moment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            person,
+            side,
+            pose,
+            frame,
+        } = self;
+        write!(f, "{person} {side}, pose {pose}, frame {frame}")
+    }
+}
+
+impl Prediction {
+    /// What was seen.
+    pub fn moment(&self) -> Moment {
+        Moment {
+            person: self.person.clone(),
+            side: self.side.clone(),
+            pose: self.pose.clone(),
+            frame: self.frame,
+        }
+    }
+}
+
+/// Label and prediction of each moment, the mean of the two views: y_j = (y_j^V1 + y_j^V2) / 2 (paper, section 4.4).
+///
+/// # Errors
+/// [`PredictionError`] if the views do not have the same moments and labels.
+pub fn join_views(
+    first: &[Prediction],
+    second: &[Prediction],
+) -> Result<Vec<Prediction>, PredictionError> {
+    let mut others = by_moment(second)?;
+    let mut joined = Vec::with_capacity(first.len());
+    for (moment, one) in by_moment(first)? {
+        let Some(other) = others.remove(&moment) else {
+            return Err(PredictionError::OneView(moment));
+        };
+        if one.label != other.label {
+            return Err(PredictionError::Label {
+                moment,
+                first: one.label,
+                second: other.label,
+            });
+        }
+        joined.push(Prediction {
+            prediction: 0.5 * (one.prediction + other.prediction),
+            ..one.clone()
+        });
+    }
+    match others.into_keys().next() {
+        Some(moment) => Err(PredictionError::OneView(moment)),
+        None => Ok(joined),
+    }
+}
+
+fn by_moment(rows: &[Prediction]) -> Result<BTreeMap<Moment, &Prediction>, PredictionError> {
+    let mut found = BTreeMap::new();
+    for row in rows {
+        if found.insert(row.moment(), row).is_some() {
+            return Err(PredictionError::Twice(row.moment()));
+        }
+    }
+    Ok(found)
+}
+
+/// Frame-averaged predictions of each limb's one good (label 1) and two bad (label 3) poses, as in the paper's clinical
+/// dataset.
+///
+/// # Errors
+/// [`PredictionError::NoTriple`] for a limb with other poses.
+pub fn pose_triples(rows: &[Prediction]) -> Result<Vec<PoseTriple>, PredictionError> {
+    let mut limbs: BTreeMap<_, BTreeMap<_, Pose>> = BTreeMap::new();
+    for row in rows {
+        let poses = limbs.entry((&row.person, &row.side)).or_default();
+        let pose = poses.entry(&row.pose).or_insert_with(|| Pose {
+            label: row.label,
+            frames: vec![],
+        });
+        pose.frames.push(row.prediction);
+    }
+    let mut triples = Vec::with_capacity(limbs.len());
+    for ((person, side), poses) in limbs {
+        let good = means(&poses, 1.0)?;
+        let bad = means(&poses, 3.0)?;
+        triples.push(match (&good[..], &bad[..]) {
+            (&[good], &[b1, b2]) if poses.len() == 3 => PoseTriple {
+                good,
+                bad: [b1, b2],
+            },
+            _ => {
+                return Err(PredictionError::NoTriple {
+                    person: person.clone(),
+                    side: side.clone(),
+                    good: good.len(),
+                    bad: bad.len(),
+                });
+            }
+        });
+    }
+    Ok(triples)
+}
+
+struct Pose {
+    label: f64,
+    frames: Vec<f64>,
+}
+
+/// Mean predictions of the poses of a label.
+fn means(poses: &BTreeMap<&String, Pose>, label: f64) -> Result<Vec<f64>, MetricError> {
+    let poses = poses.values().filter(|pose| pose.label == label);
+    let mean = |pose: &Pose| Ok(mean_per_pose(&[&pose.frames])?[0]);
+    poses.map(mean).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(pose: &str, frame: u32, label: f64, prediction: f64) -> Prediction {
+        Prediction {
+            person: "patient_1".to_owned(),
+            side: "l".to_owned(),
+            pose: pose.to_owned(),
+            frame,
+            label,
+            prediction,
+        }
+    }
+
+    #[test]
+    fn views_are_joined_by_moment_whatever_their_order() {
+        let first = [row("a", 0, 1.0, 1.0), row("b", 0, 3.0, 2.0)];
+        let second = [row("b", 0, 3.0, 3.0), row("a", 0, 1.0, 1.5)];
+        let joined = join_views(&first, &second).unwrap();
+        assert_eq!(joined, [row("a", 0, 1.0, 1.25), row("b", 0, 3.0, 2.5)]);
+
+        let one_view = PredictionError::OneView(row("b", 0, 3.0, 0.0).moment());
+        assert_eq!(join_views(&first, &second[1..]), Err(one_view.clone()));
+        assert_eq!(join_views(&first[..1], &second), Err(one_view));
+        let twice = [first[0].clone(), first[0].clone()];
+        assert!(matches!(
+            join_views(&twice, &second),
+            Err(PredictionError::Twice(_))
+        ));
+        let other_label = [row("a", 0, 1.5, 1.0), row("b", 0, 3.0, 2.0)];
+        assert!(matches!(
+            join_views(&first, &other_label),
+            Err(PredictionError::Label { .. })
+        ));
+    }
+
+    #[test]
+    fn each_limb_has_one_good_and_two_bad_poses() {
+        let rows = [
+            row("a", 0, 1.0, 1.0),
+            row("a", 1, 1.0, 2.0),
+            row("b", 0, 3.0, 2.0),
+            row("c", 0, 3.0, 3.0),
+        ];
+        let triple = PoseTriple {
+            good: 1.5,
+            bad: [2.0, 3.0],
+        };
+        assert_eq!(pose_triples(&rows), Ok(vec![triple]));
+        let found = pose_triples(&rows[..3]);
+        let missing = matches!(
+            found,
+            Err(PredictionError::NoTriple {
+                good: 1,
+                bad: 1,
+                ..
+            })
+        );
+        assert!(missing, "{found:?}");
+    }
+}

@@ -1,0 +1,219 @@
+//! Metrics of an experiment's runs, brought together over views, folds and seeds.
+
+use std::collections::BTreeMap;
+
+use ppa_metrics::{MetricError, PermutationTest, sign_flip_permutation};
+use serde::Serialize;
+
+use super::configuration::{Configuration, Experiment};
+use super::metric::Metric;
+use super::predictions::{Prediction, PredictionError};
+
+/// Metrics of each column's test sets.
+///
+/// The folds of one seed are averaged first, as in the paper's test; mean and standard deviation are those of the seeds.
+#[derive(Debug, Clone)]
+pub struct Results {
+    experiment: Experiment,
+    folds: usize,
+    seeds: Vec<u64>,
+    values: BTreeMap<(Configuration, u64, usize), BTreeMap<Metric, Option<f64>>>,
+}
+
+/// A test set that has not been predicted yet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Missing {
+    /// The column.
+    pub configuration: Configuration,
+    /// The repetition.
+    pub seed: u64,
+    /// The fold, from 0.
+    pub fold: usize,
+}
+
+/// Mean over the seeds of a column.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Summary {
+    /// Mean over the seeds.
+    pub mean: f64,
+    /// Standard deviation of the seeds, divided by n - 1; `None` for a single one.
+    pub std: Option<f64>,
+    /// Seeds whose folds are all there and where the metric is defined.
+    pub seeds: usize,
+    /// Seeds whose folds are all there, but where the metric is not defined.
+    pub undefined: usize,
+}
+
+impl Results {
+    /// No results yet, of an experiment with so many folds and these seeds.
+    pub fn new(experiment: Experiment, folds: usize, seeds: &[u64]) -> Self {
+        Self {
+            experiment,
+            folds,
+            seeds: seeds.to_vec(),
+            values: BTreeMap::new(),
+        }
+    }
+
+    /// Adds the predictions of one test set, the views joined.
+    ///
+    /// # Errors
+    /// [`PredictionError`] for predictions that cannot be judged.
+    pub fn insert(
+        &mut self,
+        place: Missing,
+        predictions: &[Prediction],
+    ) -> Result<(), PredictionError> {
+        let values = Metric::of(self.experiment).into_iter();
+        let values = values.map(|metric| Ok((metric, metric.value(predictions)?)));
+        let values = values.collect::<Result<_, PredictionError>>()?;
+        let key = (place.configuration, place.seed, place.fold);
+        self.values.insert(key, values);
+        Ok(())
+    }
+
+    /// The experiment.
+    pub fn experiment(&self) -> Experiment {
+        self.experiment
+    }
+
+    /// Number of seeds that are planned.
+    pub fn planned_seeds(&self) -> usize {
+        self.seeds.len()
+    }
+
+    /// Test sets without predictions.
+    pub fn missing(&self) -> Vec<Missing> {
+        let mut missing = Vec::new();
+        for configuration in self.experiment.configurations() {
+            for &seed in &self.seeds {
+                for fold in 0..self.folds {
+                    if !self.values.contains_key(&(configuration, seed, fold)) {
+                        missing.push(Missing {
+                            configuration,
+                            seed,
+                            fold,
+                        });
+                    }
+                }
+            }
+        }
+        missing
+    }
+
+    /// A metric of one seed: the mean over its folds. `None` if a fold is missing, `Some(None)` if it is not defined.
+    fn of_seed(&self, column: Configuration, metric: Metric, seed: u64) -> Option<Option<f64>> {
+        let folds = (0..self.folds).map(|fold| self.values.get(&(column, seed, fold)));
+        let folds = folds.collect::<Option<Vec<_>>>()?;
+        let values: Option<Vec<f64>> = folds.iter().map(|values| values[&metric]).collect();
+        Some(values.map(|values| mean(&values)))
+    }
+
+    /// Mean and standard deviation over the seeds of a column; `None` if no seed has a value.
+    pub fn summary(&self, column: Configuration, metric: Metric) -> Option<Summary> {
+        let there = self.seeds.iter();
+        let there: Vec<_> = there
+            .filter_map(|&seed| self.of_seed(column, metric, seed))
+            .collect();
+        let values: Vec<_> = there.iter().copied().flatten().collect();
+        (!values.is_empty()).then(|| Summary {
+            mean: mean(&values),
+            std: standard_deviation(&values),
+            seeds: values.len(),
+            undefined: there.len() - values.len(),
+        })
+    }
+
+    /// The paper's test of the MAE, from scratch against pretrained, paired by seed; the folds of a seed are averaged
+    /// first. `None` for experiments without such a test.
+    ///
+    /// # Errors
+    /// [`MetricError`] if no seed is complete in both columns, or too many are.
+    pub fn permutation_test(&self) -> Option<Result<PermutationTest, MetricError>> {
+        let pair = self.experiment.tested_pair()?;
+        let both = |&seed: &u64| {
+            let [scratch, pretrained] =
+                pair.map(|column| self.of_seed(column, Metric::Mae, seed).flatten());
+            Some((scratch?, pretrained?))
+        };
+        let (scratch, pretrained): (Vec<_>, Vec<_>) = self.seeds.iter().filter_map(both).unzip();
+        Some(sign_flip_permutation(&scratch, &pretrained))
+    }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+fn standard_deviation(values: &[f64]) -> Option<f64> {
+    let mean = mean(values);
+    let squares = values.iter().map(|value| (value - mean).powi(2));
+    (values.len() > 1).then(|| (squares.sum::<f64>() / (values.len() - 1) as f64).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use approx::assert_relative_eq;
+
+    use super::*;
+
+    fn test_set(error: f64) -> Vec<Prediction> {
+        let row = |pose: &str, label: f64, prediction: f64| Prediction {
+            person: "patient_1".to_owned(),
+            side: "r".to_owned(),
+            pose: pose.to_owned(),
+            frame: 0,
+            label,
+            prediction,
+        };
+        vec![row("a", 1.0, 1.0 + error), row("b", 3.0, 3.0 - error)]
+    }
+
+    #[test]
+    fn folds_are_averaged_before_seeds() {
+        let seeds = [7, 8, 9];
+        let mut results = Results::new(Experiment::TwoA, 2, &seeds);
+        let [scratch, pretrained] = Experiment::TwoA.tested_pair().unwrap();
+        for (configuration, worse) in [(scratch, 0.125), (pretrained, 0.0)] {
+            for (n, &seed) in seeds.iter().enumerate() {
+                for fold in 0..2 {
+                    if n == 2 && fold == 1 {
+                        continue;
+                    }
+                    let place = Missing {
+                        configuration,
+                        seed,
+                        fold,
+                    };
+                    let error = 0.125 + worse + 0.25 * fold as f64 + 0.125 * n as f64;
+                    results.insert(place, &test_set(error)).unwrap();
+                }
+            }
+        }
+        // Two complete seeds, 0.25 and 0.375; the third lacks a fold.
+        let found = results.summary(pretrained, Metric::Mae).unwrap();
+        assert_eq!((found.mean, found.seeds, found.undefined), (0.3125, 2, 0));
+        assert_relative_eq!(
+            found.std.unwrap(),
+            0.125 / 2f64.sqrt(),
+            max_relative = 1e-12
+        );
+
+        let test = results.permutation_test().unwrap().unwrap();
+        assert_eq!((test.mean_difference, test.patterns), (0.125, 4));
+        assert_eq!(test.p_one_sided, 0.25);
+
+        assert_eq!(results.missing().len(), 2 + 8 * 6);
+    }
+
+    #[test]
+    fn a_constant_prediction_has_no_correlation() {
+        let configuration = Experiment::TwoC.configurations()[0];
+        let mut results = Results::new(Experiment::TwoC, 1, &[1]);
+        let place = results.missing()[0];
+        results.insert(place, &test_set(1.0)).unwrap();
+        assert_eq!(results.summary(configuration, Metric::Correlation), None);
+        let mae = results.summary(configuration, Metric::Mae).unwrap();
+        assert_eq!((mae.mean, mae.std), (1.0, None));
+    }
+}

@@ -1,0 +1,306 @@
+//! Tables of results in the paper's form: mean ± standard deviation of the seeds, the best of each row in bold.
+
+use super::configuration::Configuration;
+use super::metric::Metric;
+use super::results::{Missing, Results, Summary};
+
+/// A table: a row for each metric, a column for each configuration.
+#[derive(Debug, Clone)]
+pub struct Table {
+    columns: Vec<Configuration>,
+    rows: Vec<(Metric, Vec<Cell>)>,
+    notes: Vec<String>,
+}
+
+#[derive(Debug, Clone)]
+struct Cell {
+    summary: Option<Summary>,
+    mean: String,
+    std: Option<String>,
+    best: bool,
+    /// Seeds that count, where they are fewer than planned.
+    of_seeds: Option<usize>,
+}
+
+/// Why there is no table.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{count} test sets of experiment {} are not predicted yet, the first is column {}, seed {}, fold {}",
+    first.configuration.experiment.name(), first.configuration.name(), first.seed, first.fold
+)]
+pub struct Incomplete {
+    /// How many are missing.
+    pub count: usize,
+    /// One of them.
+    pub first: Missing,
+}
+
+impl Table {
+    /// The table of complete results.
+    ///
+    /// # Errors
+    /// [`Incomplete`] if a test set is missing.
+    pub fn complete(results: &Results) -> Result<Self, Incomplete> {
+        let missing = results.missing();
+        match missing.first() {
+            Some(&first) => Err(Incomplete {
+                count: missing.len(),
+                first,
+            }),
+            None => Ok(Self::so_far(results)),
+        }
+    }
+
+    /// The table of what there is; cells of fewer seeds than planned say how many they hold.
+    pub fn so_far(results: &Results) -> Self {
+        let columns = results.experiment().configurations();
+        let rows = Metric::of(results.experiment()).into_iter().map(|metric| {
+            let cells = columns
+                .iter()
+                .map(|&column| Cell::new(results.summary(column, metric), metric, results));
+            (metric, with_best(cells.collect(), metric))
+        });
+        let rows: Vec<_> = rows.collect();
+        let missing = results.missing().len();
+        let mut notes = vec![format!(
+            "Mean ± standard deviation over {} seeds, the folds of a seed averaged first; the best of a row in bold.",
+            results.planned_seeds()
+        )];
+        if missing > 0 {
+            notes.push(format!(
+                "INCOMPLETE: {missing} test sets are missing; n is the number of seeds in a cell where some are."
+            ));
+        }
+        let undefined = |cell: &Cell| cell.summary.is_none_or(|summary| summary.undefined > 0);
+        if missing == 0 && rows.iter().any(|(_, cells)| cells.iter().any(undefined)) {
+            notes.push(
+                "n is the number of seeds for which a metric is defined, – where it is for none: a correlation needs predictions that differ."
+                    .to_owned(),
+            );
+        }
+        Self {
+            columns,
+            rows,
+            notes,
+        }
+    }
+
+    /// As a table of Markdown, with its notes.
+    pub fn to_markdown(&self) -> String {
+        let headings = self
+            .columns
+            .iter()
+            .map(|column| column.headings().join(", "));
+        let mut lines = vec![
+            format!("| Metric | {} |", headings.collect::<Vec<_>>().join(" | ")),
+            format!("|---|{}", "---|".repeat(self.columns.len())),
+        ];
+        for (metric, cells) in &self.rows {
+            let cells: Vec<_> = cells.iter().map(Cell::to_markdown).collect();
+            lines.push(format!("| {} | {} |", metric.name(), cells.join(" | ")));
+        }
+        for note in &self.notes {
+            lines.extend([String::new(), note.clone()]);
+        }
+        lines.join("\n") + "\n"
+    }
+
+    /// As rows of `metric,configuration,mean,std,seeds,undefined`, unrounded and not as percentages.
+    pub fn to_csv(&self) -> String {
+        let mut text = "metric,configuration,mean,std,seeds,undefined\n".to_owned();
+        for (metric, cells) in &self.rows {
+            for (column, cell) in self.columns.iter().zip(cells) {
+                let Some(summary) = cell.summary else {
+                    continue;
+                };
+                let std = summary.std.map_or(String::new(), |std| std.to_string());
+                let (metric, column) = (metric.name().trim_end_matches(" [%]"), column.name());
+                let Summary {
+                    mean,
+                    seeds,
+                    undefined,
+                    ..
+                } = summary;
+                text += &format!("{metric},{column},{mean},{std},{seeds},{undefined}\n");
+            }
+        }
+        text
+    }
+
+    /// As a `tabular` of LaTeX with the rules of the package booktabs.
+    pub fn to_latex(&self) -> String {
+        let mut lines = vec![format!(
+            "\\begin{{tabular}}{{l{}}}",
+            "r".repeat(self.columns.len())
+        )];
+        lines.push("\\toprule".to_owned());
+        lines.extend(self.latex_headings());
+        lines.push("\\midrule".to_owned());
+        for (metric, cells) in &self.rows {
+            let name = metric.name().replace('%', "\\%").replace("r_s", "$r_s$");
+            let cells: Vec<_> = cells.iter().map(Cell::to_latex).collect();
+            lines.push(format!("{name} & {} \\\\", cells.join(" & ")));
+        }
+        lines.push("\\bottomrule".to_owned());
+        lines.push("\\end{tabular}".to_owned());
+        let notes = self.notes.iter().map(|note| format!("% {note}"));
+        notes.chain(lines).collect::<Vec<_>>().join("\n") + "\n"
+    }
+
+    /// One line for each level of the headings; neighbours with the same words share a cell.
+    fn latex_headings(&self) -> Vec<String> {
+        let headings: Vec<_> = self
+            .columns
+            .iter()
+            .map(|column| column.headings())
+            .collect();
+        let levels = headings.iter().map(Vec::len).max().unwrap_or(0);
+        let line = |level: usize| {
+            let up_to = |n: usize| headings[n].get(..=level);
+            let mut cells = vec![if level == 0 { "Metric" } else { "" }.to_owned()];
+            let mut n = 0;
+            while n < headings.len() {
+                let alike = (n..headings.len()).take_while(|&m| up_to(m) == up_to(n));
+                let span = if up_to(n).is_some() { alike.count() } else { 1 };
+                let words = up_to(n).map_or("", |words| words[level]);
+                cells.push(match span {
+                    1 => words.to_owned(),
+                    _ => format!("\\multicolumn{{{span}}}{{c}}{{{words}}}"),
+                });
+                n += span;
+            }
+            cells.join(" & ") + " \\\\"
+        };
+        (0..levels).map(line).collect()
+    }
+}
+
+impl Cell {
+    fn new(summary: Option<Summary>, metric: Metric, results: &Results) -> Self {
+        let print = |value: f64| format!("{:.2}", value * metric.scale());
+        let seeds = summary.map_or(0, |summary| summary.seeds);
+        Self {
+            summary,
+            mean: summary.map_or("–".to_owned(), |summary| print(summary.mean)),
+            std: summary.and_then(|summary| summary.std).map(print),
+            best: false,
+            of_seeds: (0 < seeds && seeds < results.planned_seeds()).then_some(seeds),
+        }
+    }
+
+    fn to_markdown(&self) -> String {
+        let mean = match self.best {
+            true => format!("**{}**", self.mean),
+            false => self.mean.clone(),
+        };
+        let std = self
+            .std
+            .as_ref()
+            .map_or(String::new(), |std| format!("±{std}"));
+        let n = self.of_seeds.map_or(String::new(), |n| format!(" (n={n})"));
+        mean + &std + &n
+    }
+
+    fn to_latex(&self) -> String {
+        let mean = match (self.best, self.summary) {
+            (true, _) => format!("\\textbf{{{}}}", self.mean),
+            (false, Some(_)) => self.mean.clone(),
+            (false, None) => "--".to_owned(),
+        };
+        let std = self.std.as_ref();
+        let std = std.map_or(String::new(), |std| format!("{{\\scriptsize$\\pm${std}}}"));
+        let n = self
+            .of_seeds
+            .map_or(String::new(), |n| format!(" ($n={n}$)"));
+        mean + &std + &n
+    }
+}
+
+/// Marks the best cells; those that print the same number are equally good.
+fn with_best(mut cells: Vec<Cell>, metric: Metric) -> Vec<Cell> {
+    let means = cells.iter().filter_map(|cell| Some(cell.summary?.mean));
+    let best = match metric.lower_is_better() {
+        true => means.reduce(f64::min),
+        false => means.reduce(f64::max),
+    };
+    let best = cells
+        .iter()
+        .find(|cell| best.is_some() && cell.summary.map(|summary| summary.mean) == best)
+        .map(|cell| cell.mean.clone());
+    for cell in &mut cells {
+        cell.best = Some(&cell.mean) == best.as_ref();
+    }
+    cells
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::configuration::Experiment;
+    use super::super::predictions::Prediction;
+    use super::*;
+
+    fn test_set(error: f64) -> Vec<Prediction> {
+        let row = |pose: &str, label: f64, prediction: f64| Prediction {
+            person: "patient_1".to_owned(),
+            side: "r".to_owned(),
+            pose: pose.to_owned(),
+            frame: 0,
+            label,
+            prediction,
+        };
+        vec![row("a", 1.0, 1.0 + error), row("b", 3.0, 3.0 - error)]
+    }
+
+    fn filled(skip: usize) -> Results {
+        let mut results = Results::new(Experiment::TwoC, 1, &[1, 2]);
+        for (n, place) in results.missing().into_iter().enumerate().skip(skip) {
+            let column = n / 2;
+            let error = [1.0, 0.75, 0.25, 0.2525][column] + 0.125 * (n % 2) as f64;
+            let error = if column == 0 { 1.0 } else { error };
+            results.insert(place, &test_set(error)).unwrap();
+        }
+        results
+    }
+
+    #[test]
+    fn tables_have_the_papers_form() {
+        let table = Table::complete(&filled(0)).unwrap();
+        let markdown = table.to_markdown();
+        let mae = markdown
+            .lines()
+            .find(|line| line.starts_with("| MAE"))
+            .unwrap();
+        assert_eq!(
+            mae,
+            "| MAE | 1.00±0.00 | 0.81±0.09 | **0.31**±0.09 | **0.31**±0.09 |"
+        );
+        let correlation = markdown.lines().find(|line| line.contains("r_s")).unwrap();
+        assert!(correlation.starts_with("| Correlation r_s | – | **1.00**±0.00"));
+        let latex = table.to_latex();
+        let headings = "Metric & from scratch & pretrained on ImageNet & \\multicolumn{2}{c}{pretrained on synthetic dataset} \\\\\n";
+        assert!(latex.contains(headings), "{latex}");
+        assert!(latex.contains("\n &  &  & unified camera view & camera view specific \\\\\n"));
+        assert!(latex.contains("& \\textbf{0.31}{\\scriptsize$\\pm$0.09} &"));
+        let csv = table.to_csv();
+        assert!(csv.contains("\nMAE,scratch,1,0,2,0\n"), "{csv}");
+        assert!(csv.contains("\nAccuracy,unified-all,1,0,2,0\n"), "{csv}");
+    }
+
+    #[test]
+    fn incomplete_tables_are_refused_or_marked() {
+        let results = filled(1);
+        let refused = Table::complete(&results).unwrap_err();
+        assert_eq!(
+            refused.to_string(),
+            "1 test sets of experiment 2c are not predicted yet, the first is column scratch, seed 1, fold 0"
+        );
+        let markdown = Table::so_far(&results).to_markdown();
+        assert!(
+            markdown.contains("| MAE | 1.00 (n=1) | 0.81±0.09"),
+            "{markdown}"
+        );
+        assert!(markdown.contains("INCOMPLETE: 1 test sets"), "{markdown}");
+        let latex = Table::so_far(&results).to_latex();
+        assert!(latex.starts_with("% ") && latex.contains("% INCOMPLETE"));
+    }
+}
