@@ -63,6 +63,9 @@ enum Command {
     Merge(commands::merge::MergeArgs),
     /// Check all files of a dataset, and make a sample of it again
     Verify(commands::verify::VerifyArgs),
+    /// Check, split or convert a dataset, ours or the authors'
+    #[command(subcommand)]
+    Dataset(commands::dataset::DatasetCommand),
     /// The quality of poses, as readers grade it
     #[command(subcommand)]
     Label(commands::label::LabelCommand),
@@ -93,6 +96,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Status(args) => commands::status::run(&args, output),
         Command::Merge(args) => commands::merge::run(&args, output),
         Command::Verify(args) => commands::verify::run(&args, output),
+        Command::Dataset(command) => commands::dataset::run(&command, output),
         Command::Label(command) => commands::label::run(&command, output),
         Command::Metrics(args) => commands::metrics::run(&args, output),
         Command::Stats(command) => commands::stats::run(&command, output),

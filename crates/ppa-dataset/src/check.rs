@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use crate::claim::{Claim, FolderError, claim_existing};
 use crate::files::{read_text, sha256_of_file};
-use crate::job::{LimbUnits, roi_text};
-use crate::manifest::{FileRow, Manifest, RoiFile};
+use crate::job::LimbUnits;
+use crate::manifest::{FileRow, Manifest, RoiFile, roi_text};
 use crate::part_file::read_part;
 use crate::planned::Planned;
 use crate::record::{Record, Unit};

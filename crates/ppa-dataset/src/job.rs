@@ -14,7 +14,7 @@ use crate::claim::{FolderError, claim};
 use crate::description::DESCRIPTION_FILE;
 use crate::files::{FileError, remove_if_there, write_whole};
 use crate::layout::{LimbId, View};
-use crate::manifest::{FileKind, Manifest, RoiFile};
+use crate::manifest::{FileKind, Manifest, RoiFile, roi_text};
 use crate::part_file::write_part;
 use crate::record::{Record, Unit};
 use crate::unit::Images;
@@ -258,9 +258,4 @@ impl Job<'_> {
             radiographs: count(FileKind::Radiograph),
         })
     }
-}
-
-/// `roi_depth.json`.
-pub(crate) fn roi_text(rois: &RoiFile) -> String {
-    serde_json::to_string_pretty(rois).expect("regions hold only JSON values")
 }

@@ -66,6 +66,7 @@ mod room_file;
 mod seed;
 #[cfg(feature = "generate")]
 mod shaped_skin;
+mod split;
 #[cfg(feature = "generate")]
 mod stage;
 #[cfg(feature = "generate")]
@@ -76,6 +77,7 @@ mod toml_file;
 mod unit;
 #[cfg(feature = "generate")]
 mod verify;
+mod whole_folder;
 
 pub use body_shape::BodyShape;
 #[cfg(feature = "generate")]
@@ -110,6 +112,7 @@ pub use radiograph::{JointError, joint_phantom, projection};
 pub use room_file::RoomFile;
 #[cfg(feature = "generate")]
 pub use shaped_skin::{ShapeSettings, body_shape};
+pub use split::{Split, SplitError};
 #[cfg(feature = "generate")]
 pub use stage::{PlacedCamera, Stage, StageError, Table, spectrum, tube};
 #[cfg(feature = "generate")]

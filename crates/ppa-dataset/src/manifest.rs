@@ -97,6 +97,11 @@ pub struct RoiRow {
 /// `roi_depth.json`: depth image name to region; the same for all body shapes.
 pub type RoiFile = BTreeMap<String, RoiRow>;
 
+/// `roi_depth.json` as text.
+pub(crate) fn roi_text(rois: &RoiFile) -> String {
+    serde_json::to_string_pretty(rois).expect("regions hold only JSON values")
+}
+
 /// All rows of a dataset, in the order of its plan.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Manifest {

@@ -1,6 +1,7 @@
 //! One file per command.
 
 pub mod ct;
+pub mod dataset;
 pub mod demo;
 pub mod depth;
 pub mod generate;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::Args;
-use ppa_dataset::{Plan, Problem, verify};
+use ppa_dataset::{Plan, verify};
 use serde::Serialize;
 
 use crate::output::Output;
@@ -65,12 +65,16 @@ pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
 }
 
 /// Fails with the first problems, in one sentence.
-pub fn require_none(dataset: &Path, problems: &[Problem]) -> anyhow::Result<()> {
+pub fn require_none(dataset: &Path, problems: &[impl ToString]) -> anyhow::Result<()> {
     const TOLD: usize = 5;
     if problems.is_empty() {
         return Ok(());
     }
-    let told: Vec<_> = problems.iter().take(TOLD).map(Problem::to_string).collect();
+    let told: Vec<_> = problems
+        .iter()
+        .take(TOLD)
+        .map(ToString::to_string)
+        .collect();
     let more = match problems.len().saturating_sub(TOLD) {
         0 => String::new(),
         more => format!("; and {more} more"),

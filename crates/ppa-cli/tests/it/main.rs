@@ -3,6 +3,7 @@
 mod bad_input;
 mod conversion;
 mod coverage;
+mod datasets;
 mod depth;
 mod faults;
 mod grading;

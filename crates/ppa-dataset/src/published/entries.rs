@@ -8,6 +8,7 @@ use serde::de::DeserializeOwned;
 
 use super::{Label, PublishedError};
 use crate::files::{FileError, read_text};
+use crate::labels::LabelSource;
 use crate::layout::View;
 use crate::manifest::RoiRow;
 
@@ -17,6 +18,7 @@ struct LabelEntry {
     label: f64,
     std: f64,
     image_number: Option<u32>,
+    label_source: Option<LabelSource>,
 }
 
 #[derive(Deserialize)]
@@ -51,7 +53,7 @@ pub(super) fn labels(
         let label = Label {
             label: entry.label,
             std: entry.std,
-            source: None,
+            source: entry.label_source,
         };
         if labels.insert(number, label).is_some() {
             return Err(wrong(format!("pose {number} has two labels")));

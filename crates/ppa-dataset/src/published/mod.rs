@@ -12,10 +12,12 @@
 //!
 //! [`Published::read`] looks at names and JSON files; [`GrayImage16::read`] decodes an image.
 
+mod convert;
 mod entries;
 mod error;
 mod folders;
 mod gray16;
+mod inspect;
 mod specimen;
 mod synthetic;
 
@@ -23,8 +25,10 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+pub use self::convert::{ConvertError, Converted, convert};
 pub use self::error::PublishedError;
 pub use self::gray16::{GrayImage16, ImageFileError};
+pub use self::inspect::{Flaw, Inspection, inspect};
 use crate::body_shape::BodyShape;
 use crate::labels::LabelSource;
 use crate::layout::{LimbId, View};

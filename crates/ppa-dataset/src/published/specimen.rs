@@ -1,10 +1,16 @@
-//! The specimen layout, read.
+//! The specimen layout: names, and how it is read.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::folders::{Folder, digits};
 use super::{DepthFile, Flexion, ImagePair, Pose, PublishedError, entries};
 use crate::layout::{LimbId, View};
+
+/// The folder of one flexion of a limb.
+pub(super) fn flexion_folder(limb: LimbId, flexion: Flexion) -> String {
+    let (patient, side) = (limb.patient, limb.side_letter());
+    format!("patient_{patient}_{side}/{}/data/dataset", flexion.name())
+}
 
 /// All image pairs of one limb.
 pub(super) fn read(limb_folder: &Folder, limb: LimbId) -> Result<Vec<ImagePair>, PublishedError> {
@@ -82,7 +88,7 @@ fn radiographs(folder: &Folder) -> Result<BTreeSet<u32>, PublishedError> {
 }
 
 /// File name of a radiograph.
-fn radiograph_name(image_number: u32) -> String {
+pub(super) fn radiograph_name(image_number: u32) -> String {
     format!("xray_{image_number}.png")
 }
 
@@ -92,7 +98,7 @@ fn number_of_radiograph(name: &str) -> Option<u32> {
 }
 
 /// File name of a depth image.
-fn depth_file_name(view: View, image_number: u32, timestamp: u64) -> String {
+pub(super) fn depth_file_name(view: View, image_number: u32, timestamp: u64) -> String {
     format!("depth_{}_orig_{image_number}_{timestamp}.png", view.name())
 }
 

@@ -1,6 +1,8 @@
 //! Datasets as others wrote them, read, checked and written.
 
 mod authors_loader;
+mod converted;
+mod inspected;
 mod refused;
 mod trees;
 

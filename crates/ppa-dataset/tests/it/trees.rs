@@ -20,7 +20,11 @@ impl Tree {
                 for camera in ["cam_left", "cam_right"] {
                     for shape in ["orig", "big"] {
                         let name = format!("depth/{side}/{shape}/depth_{camera}_{angle}.png");
-                        let fill = patient + step as u16 + shape.len() as u16 + camera.len() as u16;
+                        let fill = 500 * u16::from(side == "r")
+                            + patient
+                            + step as u16
+                            + shape.len() as u16
+                            + camera.len() as u16;
                         tree.image(&format!("patient_{patient}/{name}"), fill);
                     }
                     let roi = json!({"camera": camera, "image_number": step, "x_start": 2, "y_start": 1, "size": 5});
@@ -33,7 +37,10 @@ impl Tree {
                     json!({"label": label.0, "std": label.1, "step": step}),
                 );
                 if patient == 0 {
-                    tree.image(&format!("patient_0/xray/{side}/{name}"), 3000 + step as u16);
+                    tree.image(
+                        &format!("patient_0/xray/{side}/{name}"),
+                        3000 + 500 * u16::from(side == "r") + step as u16,
+                    );
                 }
             }
             if patient == 0 {
@@ -66,7 +73,10 @@ impl Tree {
                         rois.insert(format!("depth_{camera}_orig_{image}.png"), roi);
                     }
                     let name = format!("xray_{image}.png");
-                    tree.image(&format!("{folder}/xray/{name}"), 4000 + image as u16);
+                    tree.image(
+                        &format!("{folder}/xray/{name}"),
+                        (4000 + 100 * number + image) as u16,
+                    );
                     let label = json!({"label": 1.5, "std": 0.353_553_390_593_273_8, "image_number": image});
                     labels.insert(name, label);
                 }

@@ -1,0 +1,58 @@
+//! `ppa dataset convert`: from one published layout to the other.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use ppa_dataset::published::{Flexion, Layout, Published, convert};
+
+use crate::output::{Output, working};
+
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Synthetic to specimen: the step becomes the image number, the body shape the time stamp (0 orig, 1 big, 2 small, 3 bumps_a, \
+4 bumps_b), and all poses stand under --flexion, since a scan does not tell it.
+
+Specimen to synthetic: the poses of --flexion; the number of an image becomes its step, so that the angle in a file's name is only \
+half that number. The earliest image of a pose becomes orig; what is left out is counted.")]
+pub struct ConvertArgs {
+    /// Dataset in either layout
+    dataset: PathBuf,
+    /// Folder of the new dataset, which must not be there yet
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Which flexion to write, or to read
+    #[arg(long, value_enum, default_value = "medium")]
+    flexion: FlexionName,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum FlexionName {
+    Min,
+    Medium,
+    Max,
+}
+
+pub fn run(args: &ConvertArgs, output: Output) -> anyhow::Result<()> {
+    let from = Published::read(&args.dataset)?;
+    let flexion = match args.flexion {
+        FlexionName::Min => Flexion::Min,
+        FlexionName::Medium => Flexion::Medium,
+        FlexionName::Max => Flexion::Max,
+    };
+    let working = working("copying images");
+    let done = convert(&from, &args.out, flexion)?;
+    working.finish_and_clear();
+    output.print(&done, |done| {
+        let layout = match from.layout {
+            Layout::Synthetic => "specimen",
+            Layout::Specimen => "synthetic",
+        };
+        format!(
+            "{}: {} depth images and {} radiographs in the {layout} layout, {} depth images left out",
+            args.out.display(),
+            done.depth_images,
+            done.radiographs,
+            done.left_out
+        )
+    })
+}

@@ -1,0 +1,61 @@
+//! `ppa dataset split`: persons for training and testing.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use ppa_dataset::Split;
+use ppa_dataset::published::Published;
+
+use crate::output::Output;
+
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+The split is written into the dataset, as splits/NAME.json. It is by person: both feet of a person stand on one side. To choose the \
+persons yourself, edit the file; `ppa dataset check` refuses one with a person in two parts or in none.")]
+pub struct SplitArgs {
+    /// Dataset in either layout
+    dataset: PathBuf,
+    /// Name of the split
+    #[arg(long, default_value = "default")]
+    name: String,
+    /// A part and its share of the persons, relative to the others
+    #[arg(long = "part", value_name = "NAME=SHARE", value_parser = part,
+        default_values = ["train=0.7", "val=0.15", "test=0.15"])]
+    parts: Vec<(String, f64)>,
+    /// Another seed draws other persons
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+fn part(text: &str) -> Result<(String, f64), String> {
+    let (name, share) = text
+        .split_once('=')
+        .ok_or("expected NAME=SHARE, as train=0.7")?;
+    let share = share
+        .parse()
+        .map_err(|_| format!("{share:?} is no number"))?;
+    Ok((name.to_owned(), share))
+}
+
+pub fn run(args: &SplitArgs, output: Output) -> anyhow::Result<()> {
+    let name = &args.name;
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    anyhow::ensure!(
+        !name.is_empty() && name.chars().all(plain),
+        "--name is {name:?}, expected letters, digits, _ and -"
+    );
+    let path = Split::path(&args.dataset, name);
+    anyhow::ensure!(
+        !path.exists(),
+        "{} is there already; remove it or choose another --name",
+        path.display()
+    );
+    let patients = Published::read(&args.dataset)?.patients();
+    let split = Split::draw(&patients, &args.parts, args.seed)?;
+    split.write(&path)?;
+    output.print(&split, |split| {
+        let part = |(name, patients): (&String, &Vec<u32>)| format!("{name} {patients:?}");
+        let parts: Vec<_> = split.parts.iter().map(part).collect();
+        format!("{}: {}", path.display(), parts.join(", "))
+    })
+}

@@ -1,0 +1,334 @@
+//! From one published layout to the other.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use super::specimen::{depth_file_name, flexion_folder, radiograph_name};
+use super::{DepthFile, Flexion, ImagePair, Label, Layout, Pose, Published};
+use crate::body_shape::BodyShape;
+use crate::files::{FileError, write_whole};
+use crate::labels::{LabelError, LabelFile, LabelRow, LabelSource};
+use crate::layout::{LimbId, View};
+use crate::manifest::{RoiFile, roi_text};
+use crate::whole_folder::write_whole_folder;
+
+/// Why a dataset cannot be converted.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConvertError {
+    /// A file of either dataset.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A label that the other layout does not know, among them of poses whose number is no step.
+    #[error("limb {side} of patient {patient}")]
+    Label {
+        /// Person.
+        patient: u32,
+        /// `l` or `r`.
+        side: &'static str,
+        /// What is wrong.
+        source: LabelError,
+    },
+    /// No pose of the flexion that was asked for.
+    #[error("{0} holds no images of flexion {1}")]
+    NoFlexion(String, &'static str),
+}
+
+/// What was converted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Converted {
+    /// Depth images in the new dataset.
+    pub depth_images: usize,
+    /// Radiographs in it.
+    pub radiographs: usize,
+    /// Depth images that have no place in it: of other flexions, or later ones of a pose.
+    pub left_out: usize,
+}
+
+/// Writes the dataset in the other layout, in the folder `to`, whole or not at all.
+///
+/// *Synthetic to specimen*: all poses stand under `flexion`, since a scan does not tell it; the step becomes the image
+/// number, the body shape the time stamp (0 `orig`, 1 `big`, 2 `small`, 3 `bumps_a`, 4 `bumps_b`). The other flexions get empty
+/// lists, without which the authors' loader stops.
+///
+/// *Specimen to synthetic*: the poses of `flexion`; the image number becomes the step, and so the "angle" of a recorded pose is
+/// only half its number. Time stamps are body shapes if all are 0 to 4, else the earliest image of a pose becomes `orig` and the
+/// later ones are left out.
+///
+/// Tallies (EXR), `manifest.jsonl` and `dataset.json` are not carried over.
+///
+/// # Errors
+/// [`ConvertError`]; `to` must not exist or be empty.
+pub fn convert(from: &Published, to: &Path, flexion: Flexion) -> Result<Converted, ConvertError> {
+    write_whole_folder(to, |root| {
+        let mut limbs: BTreeMap<LimbId, Vec<Moved>> = BTreeMap::new();
+        let of_other_layout = match from.layout {
+            Layout::Synthetic => recorded(&from.pairs, flexion),
+            Layout::Specimen => rotated(from, flexion)?,
+        };
+        for moved in of_other_layout {
+            limbs.entry(moved.pair.limb).or_default().push(moved);
+        }
+        let mut converted = Converted {
+            depth_images: 0,
+            radiographs: 0,
+            left_out: 0,
+        };
+        for (&limb, moved) in &limbs {
+            let copy = Copy { from, root, limb };
+            converted.radiographs += copy.radiographs(moved)?;
+            converted.depth_images += copy.depth_images(moved)?;
+            match from.layout {
+                Layout::Synthetic => copy.specimen_lists(moved, flexion)?,
+                Layout::Specimen => copy.synthetic_lists(moved)?,
+            }
+        }
+        let count = |pair: &ImagePair| {
+            View::ALL
+                .iter()
+                .filter(|&&v| pair.depth(v).is_some())
+                .count()
+        };
+        let all: usize = from.pairs.iter().map(count).sum();
+        converted.left_out = all - converted.depth_images;
+        Ok(converted)
+    })
+}
+
+/// A pair and its pose in the other layout.
+struct Moved<'a> {
+    pair: &'a ImagePair,
+    pose: Pose,
+}
+
+fn recorded(pairs: &[ImagePair], flexion: Flexion) -> Vec<Moved<'_>> {
+    let moved = pairs.iter().filter_map(|pair| match pair.pose {
+        Pose::Rotated { step, shape } => Some(Moved {
+            pair,
+            pose: Pose::Recorded {
+                flexion,
+                image_number: step,
+                timestamp: shape as u64,
+            },
+        }),
+        Pose::Recorded { .. } => None,
+    });
+    moved.collect()
+}
+
+fn rotated(from: &Published, wanted: Flexion) -> Result<Vec<Moved<'_>>, ConvertError> {
+    let of_flexion = |pair: &ImagePair| match pair.pose {
+        Pose::Recorded {
+            flexion,
+            image_number,
+            timestamp,
+        } if flexion == wanted => Some((image_number, timestamp)),
+        _ => None,
+    };
+    let found: Vec<_> = from
+        .pairs
+        .iter()
+        .filter_map(|pair| Some((pair, of_flexion(pair)?)))
+        .collect();
+    if found.is_empty() {
+        return Err(ConvertError::NoFlexion(
+            from.root.display().to_string(),
+            wanted.name(),
+        ));
+    }
+    let shape_of = |timestamp: u64| {
+        BodyShape::ALL
+            .into_iter()
+            .find(|&shape| shape as u64 == timestamp)
+    };
+    let are_shapes = found
+        .iter()
+        .all(|(_, (_, timestamp))| shape_of(*timestamp).is_some());
+    let mut seen = BTreeSet::new();
+    let mut moved = Vec::new();
+    for (pair, (step, timestamp)) in found {
+        let shape = if are_shapes {
+            shape_of(timestamp)
+        } else {
+            None
+        };
+        let first = seen.insert((pair.limb, step));
+        if let Some(shape) = shape.or(first.then_some(BodyShape::Orig)) {
+            moved.push(Moved {
+                pair,
+                pose: Pose::Rotated { step, shape },
+            });
+        }
+    }
+    Ok(moved)
+}
+
+/// One limb on its way to the new dataset.
+struct Copy<'a> {
+    from: &'a Published,
+    root: &'a Path,
+    limb: LimbId,
+}
+
+impl Copy<'_> {
+    fn file(&self, from: &str, to: &str) -> Result<(), FileError> {
+        let (from, to) = (self.from.root.join(from), self.root.join(to));
+        let folder = to.parent().expect("files lie in folders of the dataset");
+        fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
+        fs::copy(&from, &to).map_err(FileError::at("copy", &from))?;
+        Ok(())
+    }
+
+    fn radiographs(&self, moved: &[Moved]) -> Result<usize, FileError> {
+        let mut copied = BTreeSet::new();
+        for Moved { pair, pose } in moved {
+            let to = match *pose {
+                Pose::Rotated { step, .. } => self.limb.radiograph_png(step),
+                Pose::Recorded {
+                    flexion,
+                    image_number,
+                    ..
+                } => {
+                    let folder = flexion_folder(self.limb, flexion);
+                    format!("{folder}/xray/{}", radiograph_name(image_number))
+                }
+            };
+            if let Some(from) = &pair.radiograph
+                && !copied.contains(&to)
+            {
+                self.file(from, &to)?;
+                copied.insert(to);
+            }
+        }
+        Ok(copied.len())
+    }
+
+    fn depth_images(&self, moved: &[Moved]) -> Result<usize, FileError> {
+        let mut copied = 0;
+        for Moved { pair, pose } in moved {
+            for (view, depth) in depth_files(pair) {
+                let to = match *pose {
+                    Pose::Rotated { step, shape } => self.limb.depth(shape, view, step),
+                    Pose::Recorded {
+                        flexion,
+                        image_number,
+                        timestamp,
+                    } => format!(
+                        "{}/depth/{}",
+                        flexion_folder(self.limb, flexion),
+                        depth_file_name(view, image_number, timestamp)
+                    ),
+                };
+                self.file(&depth.file, &to)?;
+                copied += 1;
+            }
+        }
+        Ok(copied)
+    }
+
+    fn specimen_lists(&self, moved: &[Moved], filled: Flexion) -> Result<(), FileError> {
+        let (mut labels, mut rois) = (Map::new(), Map::new());
+        for Moved { pair, pose } in moved {
+            let Pose::Recorded {
+                image_number,
+                timestamp,
+                ..
+            } = *pose
+            else {
+                continue;
+            };
+            if let Some(label) = &pair.label {
+                labels.insert(
+                    radiograph_name(image_number),
+                    label_entry(label, image_number),
+                );
+            }
+            for (view, depth) in depth_files(pair) {
+                if let Some(roi) = &depth.roi {
+                    let roi = serde_json::to_value(roi).expect("regions hold only JSON values");
+                    rois.insert(depth_file_name(view, image_number, timestamp), roi);
+                }
+            }
+        }
+        for flexion in Flexion::ALL {
+            let folder = self
+                .root
+                .join(flexion_folder(self.limb, flexion))
+                .join("label");
+            for (list, entries) in [
+                ("quality/labels.json", &labels),
+                ("roi/roi_depth.json", &rois),
+            ] {
+                let entries = if flexion == filled {
+                    entries.clone()
+                } else {
+                    Map::new()
+                };
+                write_whole(
+                    &folder.join(list),
+                    format!("{:#}", Value::Object(entries)).as_bytes(),
+                )?;
+            }
+        }
+        Ok(())
+    }
+
+    fn synthetic_lists(&self, moved: &[Moved]) -> Result<(), ConvertError> {
+        let (mut labels, mut rois) = (BTreeMap::new(), RoiFile::new());
+        let mut source = None;
+        for Moved { pair, pose } in moved {
+            let Pose::Rotated { step, .. } = *pose else {
+                continue;
+            };
+            if let Some(Label {
+                label,
+                std,
+                source: by,
+            }) = pair.label
+            {
+                source = by;
+                labels.insert(step, LabelRow { label, std, step });
+            }
+            for (view, depth) in depth_files(pair) {
+                if let Some(roi) = &depth.roi {
+                    rois.insert(LimbId::depth_name(view, step), roi.clone());
+                }
+            }
+        }
+        if !rois.is_empty() {
+            write_whole(
+                &self.root.join(self.limb.roi_file()),
+                roi_text(&rois).as_bytes(),
+            )?;
+        }
+        if labels.is_empty() {
+            return Ok(());
+        }
+        let file = LabelFile::new(LabelSource::Readers, labels.into_values());
+        let mut file = file.map_err(|source| ConvertError::Label {
+            patient: self.limb.patient,
+            side: self.limb.side_letter(),
+            source,
+        })?;
+        file.source = source;
+        Ok(file.write(self.root, self.limb)?)
+    }
+}
+
+fn depth_files(pair: &ImagePair) -> impl Iterator<Item = (View, &DepthFile)> {
+    View::ALL
+        .into_iter()
+        .filter_map(|view| Some((view, pair.depth(view)?)))
+}
+
+fn label_entry(label: &Label, image_number: u32) -> Value {
+    let mut entry = json!({"label": label.label, "std": label.std, "image_number": image_number});
+    if let Some(source) = label.source {
+        entry["label_source"] = json!(source);
+    }
+    entry
+}

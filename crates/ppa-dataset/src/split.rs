@@ -1,0 +1,316 @@
+//! Which persons are for training, which for testing: `splits/*.json`.
+//!
+//! A split is by person, never by image or foot: poses of one foot are alike, and so are both feet of one person.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::files::{FileError, read_text, write_whole};
+
+/// Folder of the splits inside a dataset.
+const FOLDER: &str = "splits";
+
+/// Persons by name of their part.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Split {
+    /// Format of this file; 1.
+    pub version: u32,
+    /// What the persons were drawn with; absent where somebody chose them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
+    /// N of `patient_N` for each part, as `train`, `val`, `test`.
+    pub parts: BTreeMap<String, Vec<u32>>,
+}
+
+/// Why a split cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SplitError {
+    /// The file cannot be read or written, or is none.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The file is of another format version.
+    #[error("the split has version {0}; this program reads version 1")]
+    Version(u32),
+    /// A person in two parts: what is tested was trained on.
+    #[error("patient {patient} stands in {first} and in {second}: a person belongs to one part")]
+    Leak {
+        /// The person.
+        patient: u32,
+        /// A part.
+        first: String,
+        /// Another part, or the same one again.
+        second: String,
+    },
+    /// A person of the dataset in no part.
+    #[error("patient {0} stands in no part of the split")]
+    Unassigned(u32),
+    /// A person that the dataset does not hold.
+    #[error("patient {patient} of part {part} is not in the dataset")]
+    Unknown {
+        /// The person.
+        patient: u32,
+        /// Its part.
+        part: String,
+    },
+    /// Shares that cannot be drawn.
+    #[error("{0}")]
+    Shares(String),
+}
+
+impl Split {
+    /// Draws the persons of each part. Shares are taken relative to their sum and rounded to whole persons, the largest
+    /// remainder first; the same seed orders the same persons alike, whichever others there are.
+    ///
+    /// # Errors
+    /// [`SplitError::Shares`] for shares that are not positive, a name twice, or a part that would stay empty.
+    pub fn draw(patients: &[u32], shares: &[(String, f64)], seed: u64) -> Result<Self, SplitError> {
+        let counts = counts(patients.len(), shares)?;
+        let mut order: Vec<_> = patients.iter().map(|&p| (draw(seed, p), p)).collect();
+        order.sort_unstable();
+        order.dedup();
+        let mut order = order.into_iter().map(|(_, patient)| patient);
+        let mut parts = BTreeMap::new();
+        for ((name, _), count) in shares.iter().zip(counts) {
+            let mut part: Vec<_> = order.by_ref().take(count).collect();
+            part.sort_unstable();
+            parts.insert(name.clone(), part);
+        }
+        Ok(Self {
+            version: 1,
+            seed: Some(seed),
+            parts,
+        })
+    }
+
+    /// Reads a split.
+    ///
+    /// # Errors
+    /// [`SplitError`]; a person in two parts is refused here already.
+    pub fn read(path: &Path) -> Result<Self, SplitError> {
+        let parsed = serde_json::from_str(&read_text(path)?);
+        let split: Self = parsed.map_err(|e| FileError::at("parse", path)(e.into()))?;
+        if split.version != 1 {
+            return Err(SplitError::Version(split.version));
+        }
+        split.by_patient()?;
+        Ok(split)
+    }
+
+    /// Writes it, whole or not at all.
+    ///
+    /// # Errors
+    /// [`FileError`] when it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), FileError> {
+        let text = serde_json::to_string_pretty(self).expect("splits hold only JSON values");
+        write_whole(path, format!("{text}\n").as_bytes())
+    }
+
+    /// The file of a split in a dataset: `splits/NAME.json`.
+    pub fn path(root: &Path, name: &str) -> PathBuf {
+        root.join(FOLDER).join(format!("{name}.json"))
+    }
+
+    /// Names of the splits in a dataset, sorted.
+    ///
+    /// # Errors
+    /// [`FileError`] when their folder cannot be read.
+    pub fn names(root: &Path) -> Result<Vec<String>, FileError> {
+        let folder = root.join(FOLDER);
+        let entries = match fs::read_dir(&folder) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+            entries => entries.map_err(FileError::at("read", &folder))?,
+        };
+        let mut names = Vec::new();
+        for entry in entries {
+            let file = entry.map_err(FileError::at("read", &folder))?.file_name();
+            let file = file.to_string_lossy();
+            if let Some(name) = file
+                .strip_suffix(".json")
+                .filter(|name| !name.starts_with('.'))
+            {
+                names.push(name.to_owned());
+            }
+        }
+        names.sort();
+        Ok(names)
+    }
+
+    /// The part of a person.
+    pub fn part_of(&self, patient: u32) -> Option<&str> {
+        let mut parts = self.parts.iter();
+        let (name, _) = parts.find(|(_, patients)| patients.contains(&patient))?;
+        Some(name)
+    }
+
+    /// Whether every person of a dataset stands in exactly one part, and nobody else.
+    ///
+    /// # Errors
+    /// [`SplitError`] naming the person at fault.
+    pub fn check(&self, patients: &[u32]) -> Result<(), SplitError> {
+        let by_patient = self.by_patient()?;
+        if let Some(&patient) = patients.iter().find(|&p| !by_patient.contains_key(p)) {
+            return Err(SplitError::Unassigned(patient));
+        }
+        match by_patient
+            .into_iter()
+            .find(|(patient, _)| !patients.contains(patient))
+        {
+            None => Ok(()),
+            Some((patient, part)) => Err(SplitError::Unknown {
+                patient,
+                part: part.to_owned(),
+            }),
+        }
+    }
+
+    fn by_patient(&self) -> Result<BTreeMap<u32, &str>, SplitError> {
+        let mut parts = BTreeMap::new();
+        for (part, patients) in &self.parts {
+            for &patient in patients {
+                if let Some(first) = parts.insert(patient, part.as_str()) {
+                    return Err(SplitError::Leak {
+                        patient,
+                        first: first.to_owned(),
+                        second: part.clone(),
+                    });
+                }
+            }
+        }
+        Ok(parts)
+    }
+}
+
+/// Where a person stands in the order of a seed.
+fn draw(seed: u64, patient: u32) -> [u8; 32] {
+    Sha256::digest(format!("{seed}/split/{patient}").as_bytes()).into()
+}
+
+/// Persons of each part.
+fn counts(patients: usize, shares: &[(String, f64)]) -> Result<Vec<usize>, SplitError> {
+    let wrong = |text: String| Err(SplitError::Shares(text));
+    for (i, (name, share)) in shares.iter().enumerate() {
+        if !(share.is_finite() && *share > 0.0) {
+            return wrong(format!(
+                "the share of {name} is {share}, expected a number above 0"
+            ));
+        }
+        if shares[..i].iter().any(|(other, _)| other == name) {
+            return wrong(format!("the part {name} is named twice"));
+        }
+    }
+    let sum: f64 = shares.iter().map(|(_, share)| share).sum();
+    let exact: Vec<_> = shares
+        .iter()
+        .map(|(_, share)| share / sum * patients as f64)
+        .collect();
+    let mut counts: Vec<_> = exact.iter().map(|e| e.floor() as usize).collect();
+    let mut order: Vec<_> = (0..shares.len()).collect();
+    order.sort_by(|&a, &b| exact[b].fract().total_cmp(&exact[a].fract()));
+    let left = patients.saturating_sub(counts.iter().sum());
+    for &i in order.iter().take(left) {
+        counts[i] += 1;
+    }
+    match counts.iter().position(|&count| count == 0) {
+        None if !counts.is_empty() => Ok(counts),
+        None => wrong("no part to draw".to_owned()),
+        Some(i) => wrong(format!(
+            "{patients} persons leave the part {} empty; give it a larger share or name fewer parts",
+            shares[i].0
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shares(shares: &[(&str, f64)]) -> Vec<(String, f64)> {
+        shares
+            .iter()
+            .map(|(name, share)| ((*name).to_owned(), *share))
+            .collect()
+    }
+
+    #[test]
+    fn shares_are_rounded_to_whole_persons() {
+        let parts = shares(&[("train", 0.7), ("val", 0.15), ("test", 0.15)]);
+        assert_eq!(counts(10, &parts).unwrap(), [7, 2, 1]);
+        assert_eq!(counts(17, &parts).unwrap(), [12, 3, 2]);
+        assert_eq!(
+            counts(3, &shares(&[("a", 1.0), ("b", 1.0), ("c", 1.0)])).unwrap(),
+            [1, 1, 1]
+        );
+        for (patients, wrong, part) in [
+            (2, shares(&[("train", 0.9), ("test", 0.1)]), "test empty"),
+            (
+                9,
+                shares(&[("train", 0.9), ("test", 0.0)]),
+                "share of test is 0",
+            ),
+            (9, shares(&[("train", f64::NAN)]), "share of train is NaN"),
+            (9, shares(&[("train", 1.0), ("train", 1.0)]), "named twice"),
+            (9, shares(&[]), "no part"),
+        ] {
+            let said = counts(patients, &wrong).unwrap_err().to_string();
+            assert!(said.contains(part), "{said}");
+        }
+    }
+
+    #[test]
+    fn every_person_stands_in_one_part_whatever_the_seed() {
+        let patients: Vec<_> = (0..17).collect();
+        let parts = shares(&[("train", 0.7), ("val", 0.15), ("test", 0.15)]);
+        let mut drawn = Vec::new();
+        for seed in 0..20 {
+            let split = Split::draw(&patients, &parts, seed).unwrap();
+            split.check(&patients).unwrap();
+            assert_eq!(split, Split::draw(&patients, &parts, seed).unwrap());
+            drawn.push(split.parts["test"].clone());
+        }
+        drawn.sort();
+        drawn.dedup();
+        // Two of 17 persons: 136 pairs. That 20 seeds give fewer than ten of them would be odd.
+        assert!(drawn.len() >= 10, "{drawn:?}");
+    }
+
+    #[test]
+    fn a_person_in_two_parts_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = Split::path(folder.path(), "mine");
+        let put = |text: &str| {
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(&path, text).unwrap();
+            Split::read(&path)
+        };
+        let split = put(r#"{"version": 1, "parts": {"train": [0, 3], "test": [7]}}"#).unwrap();
+        assert_eq!((split.part_of(7), split.part_of(8)), (Some("test"), None));
+        assert_eq!(Split::names(folder.path()).unwrap(), ["mine"]);
+        split.check(&[0, 3, 7]).unwrap();
+        let said = |patients: &[u32]| split.check(patients).unwrap_err().to_string();
+        assert_eq!(
+            said(&[0, 3, 5, 7]),
+            "patient 5 stands in no part of the split"
+        );
+        assert_eq!(
+            said(&[0, 3]),
+            "patient 7 of part test is not in the dataset"
+        );
+        let leak = put(r#"{"version": 1, "parts": {"train": [0, 3], "test": [3]}}"#).unwrap_err();
+        assert!(
+            matches!(leak, SplitError::Leak { patient: 3, .. }),
+            "{leak}"
+        );
+        assert!(matches!(
+            put(r#"{"version": 2, "parts": {}}"#),
+            Err(SplitError::Version(2))
+        ));
+        assert!(put(r#"{"version": 1, "part": {}}"#).is_err());
+    }
+}

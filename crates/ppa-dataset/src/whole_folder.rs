@@ -1,0 +1,50 @@
+//! Folders that appear whole or not at all.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::files::FileError;
+
+/// Fills a hidden folder beside `to` and gives it that name when it is finished.
+///
+/// Refuses a `to` that holds something. Whatever fails, nothing is left behind.
+pub(crate) fn write_whole_folder<T, E: From<FileError>>(
+    to: &Path,
+    fill: impl FnOnce(&Path) -> Result<T, E>,
+) -> Result<T, E> {
+    if holds_something(to).map_err(FileError::at("read", to))? {
+        let full = io::Error::other("it is there already and not an empty folder");
+        return Err(FileError::at("write", to)(full).into());
+    }
+    let unfinished = beside(to)?;
+    let clear = || match fs::remove_dir_all(&unfinished) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    };
+    clear().map_err(FileError::at("clear", &unfinished))?;
+    fs::create_dir_all(&unfinished).map_err(FileError::at("create folder", &unfinished))?;
+    let filled = fill(&unfinished).and_then(|filled| {
+        let renamed = fs::rename(&unfinished, to).map_err(FileError::at("write", to));
+        renamed.map(|()| filled).map_err(E::from)
+    });
+    if filled.is_err() {
+        // What failed first is what counts.
+        let _ = clear();
+    }
+    filled
+}
+
+fn holds_something(folder: &Path) -> io::Result<bool> {
+    if folder.is_dir() {
+        return Ok(fs::read_dir(folder)?.next().is_some());
+    }
+    fs::exists(folder)
+}
+
+fn beside(to: &Path) -> Result<PathBuf, FileError> {
+    let name = to
+        .file_name()
+        .ok_or_else(|| FileError::at("write", to)(io::Error::other("it is no name of a folder")))?;
+    Ok(to.with_file_name(format!(".{}.unfinished", name.to_string_lossy())))
+}
