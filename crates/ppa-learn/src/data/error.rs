@@ -1,7 +1,11 @@
-//! What can be wrong with images and labels.
+//! What can be wrong with images, labels and splits.
 
-/// An image, a region or a label that cannot be used.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+use std::path::PathBuf;
+
+use ppa_dataset::published::{ImageFileError, PublishedError};
+
+/// Images, regions, labels or splits that cannot be used.
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DataError {
     /// The number of values is not columns times rows, or there is none.
@@ -30,4 +34,48 @@ pub enum DataError {
         /// Rows of the image.
         height: usize,
     },
+    /// An image whose region cannot be cut out.
+    #[error("{}", path.display())]
+    Region {
+        /// The image.
+        path: PathBuf,
+        /// Why not.
+        source: Box<DataError>,
+    },
+    /// An image of another size than the others of its camera.
+    #[error("{} has {}x{} pixels, expected {}x{} as in the other images of its camera", path.display(), found[0], found[1], expected[0], expected[1])]
+    Size {
+        /// The image.
+        path: PathBuf,
+        /// Its columns and rows.
+        found: [usize; 2],
+        /// Columns and rows of the camera's first image.
+        expected: [usize; 2],
+    },
+    /// A depth image without region of interest.
+    #[error("{} has no region of interest in roi_depth.json", .0.display())]
+    NoRoi(PathBuf),
+    /// A depth image without label.
+    #[error("{} has no label in labels.json", .0.display())]
+    NoLabel(PathBuf),
+    /// A label beyond the scale.
+    #[error("{sample} has the label {label}, expected 1 to 3")]
+    Label {
+        /// The sample.
+        sample: String,
+        /// Its label.
+        label: f64,
+    },
+    /// Nothing to train or evaluate on.
+    #[error("there is no image {0}")]
+    Empty(String),
+    /// A person on both sides of a split.
+    #[error("{0} would be in training and in evaluation; a person belongs to one of both")]
+    Leak(String),
+    /// A file that is no depth image.
+    #[error(transparent)]
+    Image(#[from] ImageFileError),
+    /// A folder that is no dataset.
+    #[error(transparent)]
+    Dataset(#[from] PublishedError),
 }

@@ -3,19 +3,32 @@
 //! A 16-bit image in mm is cut to the square around the joint and brought to 1.2 times the network's side
 //! ([`prepare`]); training augments ([`Augmentation`]), evaluation only resizes ([`evaluation_input`]). Depths are divided by
 //! [`RANGE_MM`] and shifted by −0.5; invalid pixels are 0 in mm and −0.5 for the network.
+//!
+//! [`read_samples`] lists a dataset of either published layout; [`Loader`] makes batches: for training an endless sequence,
+//! balanced over the labels ([`Balanced`]), for evaluation each sample once.
 
 mod augment;
+mod balance;
 mod blur;
+mod dataset;
 mod error;
 mod gradient;
+mod images;
+mod loader;
 mod prepare;
 mod raster;
 mod rotate;
+mod sample;
 
 pub use augment::Augmentation;
+pub use balance::{BUCKETS, Balanced, bucket};
 pub use blur::box_blur;
+pub use dataset::{FRAMES_PER_POSE, Views, read_samples};
 pub use error::DataError;
 pub use gradient::{gradient, quantile};
+pub use images::Images;
+pub use loader::{Batch, Loader, Order};
 pub use prepare::{RANGE_MM, Roi, evaluation_input, prepare, prepared_side};
 pub use raster::Raster;
 pub use rotate::rotate;
+pub use sample::{Sample, SampleImage, check_split};

@@ -1,0 +1,177 @@
+//! Batches made ahead by worker threads, in an order that does not depend on them.
+
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread;
+
+use super::augment::Augmentation;
+use super::balance::Balanced;
+use super::error::DataError;
+use super::images::Images;
+use super::prepare::evaluation_input;
+
+/// Batches that each worker makes ahead.
+const AHEAD: usize = 2;
+
+/// What a network gets at once.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Batch {
+    /// Places of the samples in the list of samples.
+    pub samples: Vec<usize>,
+    /// For each camera of a sample `samples.len() * side * side` values in [−0.5, 0.5].
+    pub images: Vec<Vec<f32>>,
+    /// One label for each sample.
+    pub labels: Vec<f32>,
+}
+
+/// Which samples stand in which batch.
+#[derive(Debug, Clone)]
+pub enum Order {
+    /// Endless: balanced over the labels, augmented.
+    Training {
+        /// The samples by label.
+        balanced: Balanced,
+        /// How images are changed.
+        augmentation: Augmentation,
+        /// Names, with the place in the sequence, all random numbers.
+        seed: u64,
+        /// Number of the first batch; a training that goes on begins where it stopped.
+        first_batch: u64,
+    },
+    /// Each sample once, in order; the last batch may be short.
+    Once,
+}
+
+/// An iterator over batches that worker threads make ahead; it ends the threads when it is dropped.
+#[derive(Debug)]
+pub struct Loader {
+    /// Worker w of W makes the batches w, w + W, w + 2 W …
+    workers: Vec<Receiver<Result<Batch, DataError>>>,
+    next: usize,
+}
+
+impl Loader {
+    /// Begins to load batches of `batch_size` samples with some worker threads.
+    ///
+    /// # Panics
+    /// If no thread can be made.
+    pub fn new(
+        images: &Arc<Images>,
+        order: &Order,
+        batch_size: NonZeroUsize,
+        workers: NonZeroUsize,
+    ) -> Self {
+        let start = |worker| {
+            let (sender, receiver) = sync_channel(AHEAD);
+            let maker = Maker {
+                images: Arc::clone(images),
+                order: order.clone(),
+                batch_size: batch_size.get(),
+            };
+            let step = workers.get();
+            thread::Builder::new()
+                .name(format!("loader {worker}"))
+                .spawn(move || maker.send(worker, step, &sender))
+                .expect("a thread can be made");
+            receiver
+        };
+        Self {
+            workers: (0..workers.get()).map(start).collect(),
+            next: 0,
+        }
+    }
+}
+
+impl Iterator for Loader {
+    type Item = Result<Batch, DataError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let batch = self.workers[self.next].recv().ok()?;
+        self.next = (self.next + 1) % self.workers.len();
+        Some(batch)
+    }
+}
+
+struct Maker {
+    images: Arc<Images>,
+    order: Order,
+    batch_size: usize,
+}
+
+impl Maker {
+    /// Sends every `step`th batch until there is no more, one failed, or nobody listens.
+    fn send(&self, worker: usize, step: usize, listener: &SyncSender<Result<Batch, DataError>>) {
+        for number in (worker..).step_by(step) {
+            let Some(batch) = self.batch(number as u64).transpose() else {
+                return;
+            };
+            let failed = batch.is_err();
+            if listener.send(batch).is_err() || failed {
+                return;
+            }
+        }
+    }
+
+    fn batch(&self, number: u64) -> Result<Option<Batch>, DataError> {
+        let size = self.batch_size as u64;
+        // Places in the sequence of samples.
+        let places = match &self.order {
+            Order::Training { first_batch, .. } => {
+                let start = (first_batch + number) * size;
+                start..start + size
+            }
+            Order::Once => {
+                let end = self.images.samples().len() as u64;
+                (number * size).min(end)..((number + 1) * size).min(end)
+            }
+        };
+        if places.is_empty() {
+            return Ok(None);
+        }
+        let mut batch = Batch {
+            samples: Vec::new(),
+            images: Vec::new(),
+            labels: Vec::new(),
+        };
+        for place in places {
+            let (sample, inputs) = self.inputs(place)?;
+            batch.samples.push(sample);
+            batch
+                .labels
+                .push(self.images.samples()[sample].label as f32);
+            batch.images.resize_with(inputs.len(), Vec::new);
+            for (camera, input) in batch.images.iter_mut().zip(inputs) {
+                camera.extend(input);
+            }
+        }
+        Ok(Some(batch))
+    }
+
+    /// The sample at a place of the sequence, and what the network sees of each camera's image.
+    fn inputs(&self, place: u64) -> Result<(usize, Vec<Vec<f32>>), DataError> {
+        let side = self.images.side();
+        match &self.order {
+            Order::Training {
+                balanced,
+                augmentation,
+                seed,
+                ..
+            } => {
+                let sample = balanced.pick(*seed, place);
+                let prepared = self.images.get(sample)?;
+                let prepared: Vec<_> = prepared.iter().collect();
+                let inputs = augmentation.apply(&prepared, side, *seed, place);
+                Ok((
+                    sample,
+                    inputs.into_iter().map(|i| i.into_values()).collect(),
+                ))
+            }
+            Order::Once => {
+                let prepared = self.images.get(place as usize)?;
+                let inputs = prepared.iter().map(|image| evaluation_input(image, side));
+                Ok((place as usize, inputs.map(|i| i.into_values()).collect()))
+            }
+        }
+    }
+}

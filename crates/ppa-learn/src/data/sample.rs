@@ -1,0 +1,117 @@
+//! What networks train on and are evaluated on, and the split between both.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use ppa_dataset::layout::View;
+
+use super::error::DataError;
+use super::prepare::{Roi, prepare};
+use super::raster::Raster;
+
+/// A depth image on disk.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SampleImage {
+    /// 16-bit PNG in mm.
+    pub path: PathBuf,
+    /// The camera.
+    pub camera: View,
+    /// Region around the joint.
+    pub roi: Roi,
+    /// Columns and rows that the camera's images have.
+    pub size: [usize; 2],
+}
+
+impl SampleImage {
+    /// Reads and prepares the image for a network of `side` x `side` inputs.
+    ///
+    /// # Errors
+    /// [`DataError`] naming the file that cannot be read, is of another size, or whose region lies outside.
+    pub fn load(&self, side: usize) -> Result<Raster<u16>, DataError> {
+        let image = ppa_dataset::published::GrayImage16::read(&self.path)?;
+        let found = [image.width as usize, image.height as usize];
+        if found != self.size {
+            return Err(DataError::Size {
+                path: self.path.clone(),
+                found,
+                expected: self.size,
+            });
+        }
+        let of_region = |source| DataError::Region {
+            path: self.path.clone(),
+            source: Box::new(source),
+        };
+        let depth = Raster::new(found[0], found[1], image.pixels).map_err(of_region)?;
+        prepare(&depth, self.roi, side).map_err(of_region)
+    }
+}
+
+/// What a network gets at once and the label it shall give: an image of one camera, or of both.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sample {
+    /// Path of its first image from the dataset's root.
+    pub id: String,
+    /// One image, or the left and the right camera's.
+    pub images: Vec<SampleImage>,
+    /// Quality from 1 (ideal) to 3 (inadequate).
+    pub label: f64,
+    /// The person, with the dataset's folder: equal for the feet of one person only.
+    pub person: String,
+    /// Equal for samples of one pose (of all cameras and frames) only.
+    pub pose: String,
+    /// Medial rotation in degrees, where the dataset tells it.
+    pub angle_deg: Option<f64>,
+}
+
+/// Refuses a split that has images of one person in training and in evaluation.
+///
+/// # Errors
+/// [`DataError::Leak`] naming the first such person.
+pub fn check_split(training: &[Sample], evaluation: &[Sample]) -> Result<(), DataError> {
+    let persons: BTreeSet<&str> = training.iter().map(|s| s.person.as_str()).collect();
+    match evaluation
+        .iter()
+        .find(|s| persons.contains(s.person.as_str()))
+    {
+        Some(sample) => Err(DataError::Leak(sample.person.clone())),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// A sample without images.
+    pub fn sample(label: f64, number: u32) -> Sample {
+        Sample {
+            id: format!("sample {number}"),
+            images: Vec::new(),
+            label,
+            person: format!("patient_{number}"),
+            pose: format!("pose {number}"),
+            angle_deg: None,
+        }
+    }
+
+    #[test]
+    fn a_person_is_on_one_side_of_a_split() {
+        let [first, second] = [sample(1.0, 1), sample(2.0, 2)];
+        let split = |training: &Sample, evaluation: &Sample| {
+            check_split(
+                std::slice::from_ref(training),
+                std::slice::from_ref(evaluation),
+            )
+        };
+        assert!(split(&first, &second).is_ok());
+        let other_foot = Sample {
+            id: "other foot".into(),
+            ..first.clone()
+        };
+        let error = split(&first, &other_foot).unwrap_err().to_string();
+        assert!(
+            error.starts_with("patient_1 would be in training"),
+            "{error}"
+        );
+    }
+}
