@@ -3,9 +3,13 @@
 mod architecture;
 mod backward;
 mod forward;
+#[cfg(test)]
+mod gradient_tests;
 mod initialise;
 mod norm;
 mod operation;
+#[cfg(test)]
+mod reference;
 mod squeeze;
 mod tape;
 

@@ -12,8 +12,11 @@ pub const FEATURES: usize = 1280;
 /// Channels of the first convolution.
 const STEM: usize = 32;
 
-/// (expansion, kernel, stride, channels out, blocks) of the seven stages: table 1 of Tan and Le 2019.
-const STAGES: [(usize, usize, usize, usize, usize); 7] = [
+/// Expansion, kernel, stride, channels out and blocks of a stage.
+pub(super) type Stage = (usize, usize, usize, usize, usize);
+
+/// The seven stages: table 1 of Tan and Le 2019.
+const STAGES: [Stage; 7] = [
     (1, 3, 1, 16, 1),
     (6, 3, 2, 24, 2),
     (6, 5, 2, 40, 2),
@@ -162,14 +165,25 @@ impl Builder {
 }
 
 impl Architecture {
+    /// EfficientNet-B0, whose last block is left out with the probability `stochastic_depth`.
     pub fn new(stochastic_depth: f32) -> Self {
+        Self::of_stages(STEM, &STAGES, FEATURES, stochastic_depth)
+    }
+
+    /// A network of the same kind. Its first stage expands nothing and changes the number of channels.
+    pub(super) fn of_stages(
+        stem_channels: usize,
+        stages: &[Stage],
+        features: usize,
+        stochastic_depth: f32,
+    ) -> Self {
         let mut builder = Builder::default();
-        let mut stem = Some(builder.conv("features.0", [STEM, 1, 3, 3]));
-        let count: usize = STAGES.iter().map(|stage| stage.4).sum();
+        let mut stem = Some(builder.conv("features.0", [stem_channels, 1, 3, 3]));
+        let count: usize = stages.iter().map(|stage| stage.4).sum();
         let mut blocks: Vec<Block> = Vec::with_capacity(count);
-        let mut channels_in = STEM;
+        let mut channels_in = stem_channels;
         for (stage, (expansion, kernel, stride, channels_out, repeats)) in
-            STAGES.into_iter().enumerate()
+            stages.iter().copied().enumerate()
         {
             for repeat in 0..repeats {
                 let prefix = format!("features.{}.{repeat}.block", stage + 1);
@@ -185,8 +199,11 @@ impl Architecture {
                 };
                 let depthwise =
                     builder.conv(&format!("{prefix}.{next}"), [expanded, 1, kernel, kernel]);
-                let squeeze =
-                    builder.squeeze(&format!("{prefix}.{}", next + 1), expanded, channels_in / 4);
+                let squeeze = builder.squeeze(
+                    &format!("{prefix}.{}", next + 1),
+                    expanded,
+                    (channels_in / 4).max(1),
+                );
                 let project = builder.conv(
                     &format!("{prefix}.{}", next + 2),
                     [channels_out, expanded, 1, 1],
@@ -204,9 +221,12 @@ impl Architecture {
                 channels_in = channels_out;
             }
         }
-        let head = builder.conv("features.8", [FEATURES, channels_in, 1, 1]);
+        let head = builder.conv(
+            &format!("features.{}", stages.len() + 1),
+            [features, channels_in, 1, 1],
+        );
         let mut classifier = Names::default();
-        classifier.add("classifier.1.weight".into(), &[1, FEATURES]);
+        classifier.add("classifier.1.weight".into(), &[1, features]);
         classifier.add("classifier.1.bias".into(), &[1]);
         Self {
             blocks,
