@@ -6,10 +6,6 @@ use super::field::{Sample, Stencil};
 use super::inside::ones;
 use super::slab::March;
 
-/// Crossings nearer to a voxel than this fraction of an edge are moved away from it: in f32 they
-/// could coincide with one on another edge of that voxel.
-const NEAREST: f64 = 1e-4;
-
 /// Vertex numbers of one slice.
 pub struct Slice {
     /// Voxels that are vertices because they equal the iso value, ascending, with their numbers.
@@ -151,7 +147,8 @@ impl<T: Sample> March<'_, T> {
             f64::from(row.hu(i)) - iso,
             f64::from(far_row.hu(far_i)) - iso,
         );
-        let t = (a / (a - b)).clamp(NEAREST, 1.0 - NEAREST);
+        let nearest = self.world.nearest;
+        let t = (a / (a - b)).clamp(nearest, 1.0 - nearest);
         let mut place = Vector3::new(x as f64, y as f64, z as f64);
         place[axis] += t;
         let (near, far) = (row.gradient(i), far_row.gradient(far_i));

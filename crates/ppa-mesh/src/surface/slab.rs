@@ -30,7 +30,7 @@ pub struct Slab {
 pub struct March<'a, T> {
     pub field: &'a Field<'a, T>,
     pub inside: InsideBits,
-    world: &'a World,
+    pub world: &'a World,
     shortcuts: &'static [Shortcut],
     slab: Slab,
 }

@@ -11,10 +11,16 @@ pub struct World {
     outward: Matrix3<f32>,
     /// Whether the map turns right hands into left ones.
     pub mirrored: bool,
+    /// Crossings nearer to a voxel than this fraction of an edge are moved away from it: in f32 they
+    /// could coincide with one on another edge of that voxel.
+    pub nearest: f64,
 }
 
+/// [`World::nearest`] unless the volume lies so far from the origin that f32 needs more.
+const NEAREST: f64 = 1e-4;
+
 impl World {
-    /// For a field whose first lattice point is the voxel `origin` of the grid.
+    /// For a field whose first lattice point is the voxel `origin` of the grid, at most one voxel outside.
     pub fn new(grid: &Grid, origin: Vector3<f64>) -> Self {
         let affine = *grid.ct_from_voxel();
         let linear: Matrix3<f64> = affine.matrix().fixed_view::<3, 3>(0, 0).into_owned();
@@ -25,6 +31,7 @@ impl World {
             affine: affine * nalgebra::convert::<_, Affine3<f64>>(shift),
             outward: outward.cast(),
             mirrored: linear.determinant() < 0.0,
+            nearest: NEAREST.max(resolved_fraction(grid)),
         }
     }
 
@@ -41,4 +48,24 @@ impl World {
         let normal = self.outward * gradient;
         normal.try_normalize(0.0).unwrap_or_default()
     }
+}
+
+/// The fraction of the shortest edge that moves a point by two steps of f32 along some axis, wherever in the
+/// volume it lies; at most a quarter.
+fn resolved_fraction(grid: &Grid) -> f64 {
+    let last = grid.size().map(|n| n as f64);
+    let corners = (0..8).map(|corner: usize| {
+        let end = |axis: usize| {
+            if corner >> axis & 1 == 1 {
+                last[axis]
+            } else {
+                -1.0
+            }
+        };
+        grid.centre([end(0), end(1), end(2)])
+    });
+    let farthest = corners.fold(0.0_f64, |most, p| most.max(p.coords.amax()));
+    let step = farthest * f64::from(f32::EPSILON);
+    // An edge has at least 1/sqrt(3) of its length along one axis.
+    (2.0 * 3_f64.sqrt() * step / grid.spacing_mm().min()).min(0.25)
 }

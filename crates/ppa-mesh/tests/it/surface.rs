@@ -95,6 +95,25 @@ fn a_voxel_at_the_iso_value_is_one_vertex() {
     );
 }
 
+/// A voxel a hair above the iso value 1.5 m from the origin, where f32 has steps of 0.12 µm: its six crossings stay apart.
+#[test]
+fn crossings_beside_a_voxel_stay_apart_far_from_the_origin() {
+    for (origin_mm, spacing_mm) in [(0.0, 0.5), (1500.0, 0.5), (-20_000.0, 0.3)] {
+        let place = Point3::from(Vector3::repeat(origin_mm));
+        let grid = Grid::axis_aligned([3; 3], Vector3::repeat(spacing_mm), place).unwrap();
+        let mut hu = vec![-1000.0; 27];
+        hu[13] = -499.99;
+        let mesh = iso_surface(&Volume::new(grid, hu).unwrap(), -500.0, Border::Open).unwrap();
+        assert_eq!((mesh.vertices.len(), mesh.euler()), (6, 2));
+        for (i, a) in mesh.vertices.iter().enumerate() {
+            assert!(
+                mesh.vertices[..i].iter().all(|b| a != b),
+                "{origin_mm} mm: {a}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_full_volume_closes_to_its_own_box() {
     let field = volume([3, 4, 5], [1.0, 2.0, 3.0], |_| 40.0);
