@@ -41,7 +41,7 @@ pub fn body_shape(
     settings: &ShapeSettings,
     limb: LimbId,
     seed: u64,
-) -> Result<Mesh, ppa_mesh::BumpError> {
+) -> Result<Mesh, ppa_mesh::ShapeError> {
     let bumped = |draw: u32| {
         let seed = item_seed(seed, Purpose::Bumps, limb, draw);
         let count = settings.bumps[draw as usize];
@@ -50,8 +50,8 @@ pub fn body_shape(
     };
     match shape {
         BodyShape::Orig => Ok(skin.clone()),
-        BodyShape::Big => Ok(offset(skin, settings.offset_mm)),
-        BodyShape::Small => Ok(offset(skin, -settings.offset_mm)),
+        BodyShape::Big => offset(skin, settings.offset_mm),
+        BodyShape::Small => offset(skin, -settings.offset_mm),
         BodyShape::BumpsA => bumped(0),
         BodyShape::BumpsB => bumped(1),
     }

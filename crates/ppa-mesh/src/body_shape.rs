@@ -14,7 +14,7 @@ use crate::smooth_normals::smooth_normals;
 const HEIGHT_MM: [f64; 2] = [4.0, 10.0];
 /// Widths of [`seeded_bumps`], mm.
 const SIGMA_MM: [f64; 2] = [8.0, 20.0];
-/// Largest height, depth and sigma of a bump, mm.
+/// Largest shift, and largest height, depth and sigma of a bump, mm.
 const MOST_MM: f64 = 200.0;
 /// Most bumps of one draw.
 const MOST_BUMPS: usize = 1000;
@@ -44,10 +44,10 @@ pub struct BumpSite {
     pub radius_mm: f64,
 }
 
-/// Why no bumps could be chosen.
+/// Why there is no such body shape.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum BumpError {
+pub enum ShapeError {
     /// Bumps are wanted but there is nowhere to put them.
     #[error("{count} bumps are wanted but no site is given")]
     NoSite {
@@ -73,6 +73,12 @@ pub enum BumpError {
         /// Width found, mm.
         sigma_mm: f64,
     },
+    /// A shift that is none.
+    #[error("the shift is {found_mm} mm, expected -{MOST_MM} to {MOST_MM} mm")]
+    Shift {
+        /// Distance found, mm.
+        found_mm: f64,
+    },
     /// No site holds a vertex.
     #[error("no vertex of the mesh lies in any of the {sites} bump sites")]
     NoSkin {
@@ -87,11 +93,19 @@ pub enum BumpError {
 /// make spikes. The distance is exact nearly everywhere. Only where the skin would turn inside out or
 /// pass through itself (inwards at the tips of toes, outwards between them) it moves less, and the
 /// distance grows back by 0.2 mm per millimetre of skin around. [`Displacement`](crate::Displacement) tells where.
-pub fn offset(mesh: &Mesh, distance_mm: f64) -> Mesh {
+///
+/// # Errors
+/// [`ShapeError::Shift`] for a distance that is no number or out of range.
+pub fn offset(mesh: &Mesh, distance_mm: f64) -> Result<Mesh, ShapeError> {
+    if !(-MOST_MM..=MOST_MM).contains(&distance_mm) {
+        return Err(ShapeError::Shift {
+            found_mm: distance_mm,
+        });
+    }
     let neighbours = Neighbours::of(mesh);
     let normals = smooth_normals(mesh, &neighbours);
     let shifts = vec![distance_mm; mesh.vertices.len()];
-    displaced(mesh, &neighbours, normals, shifts)
+    Ok(displaced(mesh, &neighbours, normals, shifts))
 }
 
 /// The mesh with bumps along its smoothed normals; overlapping bumps add up.
@@ -101,14 +115,14 @@ pub fn offset(mesh: &Mesh, distance_mm: f64) -> Mesh {
 /// [`offset`]. A mesh without vertices stays as it is.
 ///
 /// # Errors
-/// [`BumpError::Size`] for a bump whose place, height or width is no number or out of range.
-pub fn add_bumps(mesh: &Mesh, bumps: &[Bump]) -> Result<Mesh, BumpError> {
+/// [`ShapeError::Size`] for a bump whose place, height or width is no number or out of range.
+pub fn add_bumps(mesh: &Mesh, bumps: &[Bump]) -> Result<Mesh, ShapeError> {
     for (index, bump) in bumps.iter().enumerate() {
         let placed = bump.centre.coords.iter().all(|c| c.is_finite());
         let (height_mm, sigma_mm) = (bump.height_mm, bump.sigma_mm);
         let high = height_mm.abs() <= MOST_MM;
         if !(placed && high && sigma_mm > 0.0 && sigma_mm <= MOST_MM) {
-            return Err(BumpError::Size {
+            return Err(ShapeError::Size {
                 index,
                 height_mm,
                 sigma_mm,
@@ -134,21 +148,21 @@ pub fn add_bumps(mesh: &Mesh, bumps: &[Bump]) -> Result<Mesh, BumpError> {
 /// mesh, the sites and the seed only; bump i is the same for any count.
 ///
 /// # Errors
-/// [`BumpError`] when bumps are wanted but there is no site or no site holds a vertex.
+/// [`ShapeError`] when bumps are wanted but there is no site or no site holds a vertex.
 pub fn seeded_bumps(
     mesh: &Mesh,
     sites: &[BumpSite],
     count: usize,
     seed: u64,
-) -> Result<Vec<Bump>, BumpError> {
+) -> Result<Vec<Bump>, ShapeError> {
     if count == 0 {
         return Ok(Vec::new());
     }
     if count > MOST_BUMPS {
-        return Err(BumpError::TooMany { count });
+        return Err(ShapeError::TooMany { count });
     }
     if sites.is_empty() {
-        return Err(BumpError::NoSite { count });
+        return Err(ShapeError::NoSite { count });
     }
     let skin_of = |site: &BumpSite| -> Vec<Point3<f64>> {
         let points = mesh.vertices.iter().map(|v| v.cast::<f64>());
@@ -162,7 +176,7 @@ pub fn seeded_bumps(
         .filter(|skin| !skin.is_empty())
         .collect();
     if skins.is_empty() {
-        return Err(BumpError::NoSkin { sites: sites.len() });
+        return Err(ShapeError::NoSkin { sites: sites.len() });
     }
     let bump = |index: usize| {
         let skin = &skins[index % skins.len()];

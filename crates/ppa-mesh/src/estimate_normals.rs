@@ -18,6 +18,12 @@ pub enum CloudError {
         /// Points needed.
         expected: usize,
     },
+    /// More points than the search tree can number.
+    #[error("a cloud of {found} points is too large for a search of neighbours")]
+    TooManyPoints {
+        /// Points given.
+        found: usize,
+    },
     /// A coordinate is NaN or infinite.
     #[error("point {0} of the cloud is not finite")]
     NotFinite(usize),
@@ -86,7 +92,7 @@ fn tree(points: &[Point3<f32>], expected: usize) -> Result<ImmutableKdTree<f32, 
         return Err(CloudError::NotFinite(bad));
     }
     let rows: Vec<[f32; 3]> = points.iter().map(|p| p.coords.into()).collect();
-    ImmutableKdTree::new_from_slice(&rows).map_err(|_| CloudError::TooFewPoints { found, expected })
+    ImmutableKdTree::new_from_slice(&rows).map_err(|_| CloudError::TooManyPoints { found })
 }
 
 #[cfg(test)]

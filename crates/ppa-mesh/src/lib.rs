@@ -25,7 +25,7 @@ mod smooth_normals;
 mod surface;
 mod topology;
 
-pub use body_shape::{Bump, BumpError, BumpSite, add_bumps, offset, seeded_bumps};
+pub use body_shape::{Bump, BumpSite, ShapeError, add_bumps, offset, seeded_bumps};
 pub use dbscan::{Clusters, dbscan};
 pub use displacement::Displacement;
 pub use estimate_normals::{CloudError, estimate_normals, mean_spacing_mm};

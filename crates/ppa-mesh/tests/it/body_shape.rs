@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 use ppa_mesh::{
-    Border, Bump, BumpError, BumpSite, Displacement, Mesh, add_bumps, iso_surface, offset,
+    Border, Bump, BumpSite, Displacement, Mesh, ShapeError, add_bumps, iso_surface, offset,
     seeded_bumps,
 };
 
@@ -21,7 +21,7 @@ fn body_shapes_move_the_skin_by_what_was_asked() {
         sum / mesh.vertices.len() as f64
     };
     for distance in [4.0, -3.0] {
-        let moved = mean(&offset(&limb.mesh, distance)) - mean(&limb.mesh);
+        let moved = mean(&offset(&limb.mesh, distance).unwrap()) - mean(&limb.mesh);
         assert!(
             (moved - distance).abs() < 0.1 * distance.abs(),
             "{moved} for {distance}"
@@ -58,7 +58,7 @@ fn body_shapes_move_the_skin_by_what_was_asked() {
 #[test]
 fn a_thinner_limb_does_not_turn_inside_out_and_keeps_the_distance() {
     let mesh = &PHANTOM.2.mesh;
-    let thin = offset(mesh, -4.0);
+    let thin = offset(mesh, -4.0).unwrap();
     let (mut flipped, mut total) = (0.0, 0.0);
     for triangle in &mesh.triangles {
         let area = |mesh: &Mesh| {
@@ -88,7 +88,7 @@ fn the_inward_shift_ends_short_of_the_radius_of_curvature() {
         ppa_mesh::iso_surface(&field, -500.0, ppa_mesh::Border::Open).expect("rod")
     };
     let largest = |mesh: &Mesh| {
-        let moved = offset(mesh, -4.0);
+        let moved = offset(mesh, -4.0).unwrap();
         let shifts = std::iter::zip(&mesh.vertices, &moved.vertices);
         let most = shifts.map(|(a, b)| (b - a).norm()).fold(0.0, f32::max);
         (most, moved.volume_mm3())
@@ -119,8 +119,8 @@ fn sites_without_skin_are_passed_over() {
     let air = site(leg.truth().joint_centre + nalgebra::Vector3::x() * 1e4);
     let bumps = |sites: &[BumpSite]| seeded_bumps(&limb.mesh, sites, 3, 11);
     assert_eq!(bumps(&[air, skin, air]), bumps(&[skin]));
-    assert_eq!(bumps(&[air, air]), Err(BumpError::NoSkin { sites: 2 }));
-    assert_eq!(bumps(&[]), Err(BumpError::NoSite { count: 3 }));
+    assert_eq!(bumps(&[air, air]), Err(ShapeError::NoSkin { sites: 2 }));
+    assert_eq!(bumps(&[]), Err(ShapeError::NoSite { count: 3 }));
 }
 
 /// Two fingers 4 mm apart that grow out of one palm, and the palm's flat far side.
@@ -144,7 +144,7 @@ fn fingers_that_grow_do_not_pass_through_each_other() {
     assert_eq!(hand.topology().components, 1);
     assert!(hand.self_crossings().is_empty());
     for distance in [4.0_f64, -2.0] {
-        let moved = offset(&hand, distance);
+        let moved = offset(&hand, distance).unwrap();
         let pairs = moved.self_crossings();
         assert!(
             pairs.is_empty(),
@@ -167,7 +167,7 @@ fn fingers_that_grow_do_not_pass_through_each_other() {
         );
     }
     // Where nothing limits it the new skin is as far from the old one as was asked.
-    let moved = offset(&hand, 4.0);
+    let moved = offset(&hand, 4.0).unwrap();
     let shifts = Displacement::between(&hand, &moved).shifts_mm;
     let whole = moved.vertices.iter().zip(shifts);
     for (new, _) in whole.filter(|(_, shift)| (shift - 4.0).abs() < 1e-3) {
@@ -181,7 +181,7 @@ fn fingers_that_grow_do_not_pass_through_each_other() {
 fn no_variant_of_the_phantom_passes_through_itself() {
     let skin = &PHANTOM.2.mesh;
     for distance in [6.0, -6.0] {
-        let moved = offset(skin, distance);
+        let moved = offset(skin, distance).unwrap();
         let pairs = moved.self_crossings();
         assert!(
             pairs.is_empty(),
@@ -195,7 +195,7 @@ fn no_variant_of_the_phantom_passes_through_itself() {
 fn the_volume_of_a_displacement_is_that_of_the_meshes() {
     let hand = fingers();
     for distance in [2.0, -1.0] {
-        let moved = offset(&hand, distance);
+        let moved = offset(&hand, distance).unwrap();
         let change = Displacement::between(&hand, &moved).volume_mm3;
         let closed = moved.volume_mm3() - hand.volume_mm3();
         assert!(
@@ -206,7 +206,7 @@ fn the_volume_of_a_displacement_is_that_of_the_meshes() {
     }
     // An open skin has a volume of its own only with a lid, its change needs none.
     let (leg, scan, limb) = &*PHANTOM;
-    let change = Displacement::between(&limb.mesh, &offset(&limb.mesh, 3.0)).volume_mm3;
+    let change = Displacement::between(&limb.mesh, &offset(&limb.mesh, 3.0).unwrap()).volume_mm3;
     let grid = scan.grid();
     let between = (0..grid.len()).filter(|&at| {
         let p = grid.centre(grid.voxel(at).map(|v| v as f64));
@@ -240,7 +240,7 @@ fn bumps_that_are_none_are_refused() {
     ] {
         let found = add_bumps(skin, &[good, bad]);
         assert!(
-            matches!(found, Err(BumpError::Size { index: 1, .. })),
+            matches!(found, Err(ShapeError::Size { index: 1, .. })),
             "{bad:?}"
         );
     }
@@ -249,5 +249,12 @@ fn bumps_that_are_none_are_refused() {
         radius_mm: 60.0,
     };
     let many = seeded_bumps(skin, &[site], 1001, 0);
-    assert_eq!(many, Err(BumpError::TooMany { count: 1001 }));
+    assert_eq!(many, Err(ShapeError::TooMany { count: 1001 }));
+    for shift in [f64::NAN, f64::INFINITY, 201.0] {
+        let found = offset(skin, shift);
+        assert!(
+            matches!(found, Err(ShapeError::Shift { .. })),
+            "{shift}: {found:?}"
+        );
+    }
 }
