@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use ppa_ct::{ReadOptions, Scan, Volume};
-use ppa_mesh::{Limb, LimbSettings, extract_limb};
+use ppa_mesh::{Limb, LimbReport, LimbSettings, extract_limb};
 use ppa_scene::{LandmarkOverrides, Landmarks, Side, find_landmarks};
 use sha2::{Digest, Sha256};
 
@@ -58,7 +58,16 @@ impl PreparedLimb {
         surface: &LimbSettings,
         choices: &LandmarkOverrides,
     ) -> Result<Self, PrepareError> {
-        let limb = extract_limb(&volume, surface)?;
+        // LPS: x grows towards the patient's left.
+        let towards_side = match side {
+            Side::Right => [-1.0, 0.0, 0.0],
+            Side::Left => [1.0, 0.0, 0.0],
+        };
+        let surface = LimbSettings {
+            towards: surface.towards.or(Some(towards_side)),
+            ..surface.clone()
+        };
+        let limb = extract_limb(&volume, &surface)?;
         let landmarks = find_landmarks(&volume, &limb.mesh, &limb.mask, side, choices)?;
         Ok(Self {
             volume,
@@ -87,7 +96,8 @@ impl PreparedLimb {
 
 /// Proposes a case for one limb of the scan at `path`, read as `reading` tells.
 ///
-/// Given `surface` and `choices` are kept; what they leave open is found.
+/// Given `surface` and `choices` are kept; what they leave open is found. Of two limbs side by side the one on
+/// `side` of the patient is taken, and a warning says so.
 ///
 /// # Errors
 /// [`PrepareError`] when the scan is unreadable, holds no limb, or shows no landmarks.
@@ -124,12 +134,28 @@ pub fn prepare(
         surface: surface.clone(),
         choices: prepared.landmarks.as_choices(choices),
         found: Some(Found {
-            warnings: warnings.into_iter().map(|warning| warning.text).collect(),
+            warnings: warnings
+                .into_iter()
+                .map(|warning| warning.text)
+                .chain(several_limbs(&prepared.limb.report))
+                .collect(),
             landmarks: prepared.landmarks.clone(),
             surface: prepared.limb.report.clone(),
         }),
     };
     Ok((case, prepared))
+}
+
+/// Which of several limbs was taken.
+fn several_limbs(report: &LimbReport) -> Option<String> {
+    let alike = report.bodies.iter().filter(|body| body.alike).count();
+    let chosen = report.bodies.iter().find(|body| body.chosen)?;
+    let [x, y, z] = chosen.centre_mm;
+    (alike > 1).then(|| {
+        format!(
+            "the scan shows {alike} limbs; the one around {x:.0}, {y:.0}, {z:.0} mm was taken (--inside takes another)"
+        )
+    })
 }
 
 /// The number of the series that was read, unless it has none or shares it; its UID stays out of the case.

@@ -37,7 +37,7 @@ enum AxisName {
 pub struct PrepareArgs {
     #[command(flatten)]
     scan: ScanArgs,
-    /// Which limb it is
+    /// Which limb it is; of two side by side in the scan the one on this side of the patient is taken
     #[arg(long, value_enum)]
     side: SideName,
     /// Case file to write

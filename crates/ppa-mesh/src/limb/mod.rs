@@ -8,6 +8,7 @@
 //! all, connectivity and DBSCAN keep one piece.
 
 mod bodies;
+mod choice;
 mod cleaned;
 mod contact;
 mod couch;
@@ -19,13 +20,13 @@ mod report;
 mod settings;
 mod tissue;
 
-use nalgebra::Point3;
+use nalgebra::Vector3;
 use ppa_ct::{Grid, Values, Volume, VolumeError};
 
 use crate::dbscan::dbscan;
 use crate::mesh::Mesh;
 use crate::surface::{SurfaceError, surface_of_part};
-use bodies::{Bodies, NO_BODY, bodies};
+use bodies::{NO_BODY, bodies};
 use cleaned::cleaned;
 use contact::smooth_contacts;
 use couch::couch_columns;
@@ -34,10 +35,7 @@ use growth::{farthest_sq, fill_enclosed, grown_back, keep_largest};
 use lattice::Lattice;
 pub use report::{Body, CutFace, LimbReport};
 pub use settings::{LimbSettings, VoxelBox};
-use tissue::{ENCLOSED, TISSUE, Tissue};
-
-/// A body weighs half as much when the side faces cut it through about half its size.
-const SIDE_CUT_WEIGHT: f64 = 2.0;
+use tissue::{ENCLOSED, Tissue};
 
 /// Hounsfield units in a type that a volume keeps them in.
 trait Hu: Copy + Into<f32> + Send + Sync {}
@@ -167,6 +165,16 @@ fn check(settings: &LimbSettings) -> Result<(), LimbError> {
             });
         }
     }
+    if let Some(towards) = settings.towards {
+        let length = Vector3::from(towards).norm();
+        if !(length > 0.0 && length.is_finite()) {
+            return Err(LimbError::Setting {
+                name: "towards",
+                value: length,
+                expected: "a direction of length above 0",
+            });
+        }
+    }
     if settings.core_hu < settings.iso_hu {
         return Err(LimbError::Setting {
             name: "core_hu",
@@ -214,10 +222,7 @@ fn within_values<T: Hu>(grid: &Grid, hu: &[T], settings: &LimbSettings) -> Resul
     let limit_sq = settings.inside.is_none().then_some(farthest_sq);
     let (size, spacing_mm) = (lattice.size, lattice.spacing_mm);
     spread(size, spacing_mm, &mut reach_sq, &mut found.labels, limit_sq);
-    let chosen = match settings.inside {
-        Some(point) => body_at(grid, &tissue, &found, point)?,
-        None => best_body(lattice, &found),
-    };
+    let chosen = choice::body(grid, &tissue, &found, settings)?;
     report.describe_bodies(grid, lattice, &found, chosen);
 
     let grown = grown_back(&tissue, &reach_sq, settings.core_radius_mm);
@@ -257,43 +262,6 @@ fn count(mask: &[bool]) -> usize {
 
 fn from_body(label: &u32) -> f32 {
     if *label == NO_BODY { FAR_MM2 } else { 0.0 }
-}
-
-/// The body with the most bone, those cut by side faces counting less; without bone the largest.
-fn best_body(lattice: &Lattice, found: &Bodies) -> u32 {
-    let any_bone = found.basins.iter().any(|b| b.bone_voxels > 0);
-    let score = |at: usize| {
-        let basin = &found.basins[at];
-        let amount = if any_bone {
-            basin.bone_voxels
-        } else {
-            basin.voxels
-        } as f64;
-        let size_mm2 = (basin.voxels as f64 * lattice.voxel_mm3).powf(2.0 / 3.0);
-        amount / (1.0 + SIDE_CUT_WEIGHT * basin.side_cut_mm2 / size_mm2)
-    };
-    let order = |&a: &usize, &b: &usize| score(a).total_cmp(&score(b)).then(b.cmp(&a));
-    (0..found.basins.len()).max_by(order).unwrap_or_default() as u32
-}
-
-fn body_at(
-    grid: &Grid,
-    tissue: &Tissue,
-    found: &Bodies,
-    point: [f64; 3],
-) -> Result<u32, LimbError> {
-    let lattice = &tissue.lattice;
-    let voxel = grid.voxel_from_ct() * Point3::from(point);
-    let place = [0, 1, 2].map(|x| voxel[x].round() - lattice.low[x] as f64);
-    if !(0..3).all(|x| (0.0..lattice.size[x] as f64).contains(&place[x])) {
-        return Err(LimbError::Inside(point));
-    }
-    let strides = lattice.strides();
-    let at = (0..3).map(|x| place[x] as usize * strides[x]).sum();
-    if !tissue.is(at, TISSUE) {
-        return Err(LimbError::Inside(point));
-    }
-    Ok(found.labels[at])
 }
 
 /// The largest connected piece of the main cluster of surface points.

@@ -4,6 +4,7 @@ use ppa_ct::Grid;
 use serde::{Deserialize, Serialize};
 
 use super::bodies::Bodies;
+use super::choice::alike;
 use super::lattice::Lattice;
 
 /// A body found in the volume, before one was chosen.
@@ -11,6 +12,9 @@ use super::lattice::Lattice;
 pub struct Body {
     /// Whether this is the limb.
     pub chosen: bool,
+    /// Whether it could be one: it holds about as much bone as the body with the most.
+    #[serde(default)]
+    pub alike: bool,
     /// Volume of its solid core, mm³.
     pub core_mm3: f64,
     /// Volume of bone in the core, mm³.
@@ -71,18 +75,16 @@ impl LimbReport {
         found: &Bodies,
         chosen: u32,
     ) {
+        let alike = alike(lattice, found);
         let basins = found.basins.iter().enumerate();
         self.bodies = basins
-            .map(|(at, basin)| {
-                let mean = |axis: usize| basin.index_sum[axis] / basin.voxels as f64;
-                let middle = [0, 1, 2].map(|axis| lattice.low[axis] as f64 + mean(axis));
-                Body {
-                    chosen: at as u32 == chosen,
-                    core_mm3: basin.voxels as f64 * lattice.voxel_mm3,
-                    bone_mm3: basin.bone_voxels as f64 * lattice.voxel_mm3,
-                    side_cut_mm2: basin.side_cut_mm2,
-                    centre_mm: grid.centre(middle).into(),
-                }
+            .map(|(at, basin)| Body {
+                chosen: at as u32 == chosen,
+                alike: alike[at],
+                core_mm3: basin.voxels as f64 * lattice.voxel_mm3,
+                bone_mm3: basin.bone_voxels as f64 * lattice.voxel_mm3,
+                side_cut_mm2: basin.side_cut_mm2,
+                centre_mm: lattice.centre(grid, basin).into(),
             })
             .collect();
         self.bodies.sort_by(|a, b| {

@@ -24,6 +24,10 @@ pub struct LimbSettings {
     /// A point of the wanted limb in the `ct` frame, mm, when the automatic choice is not wanted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inside: Option<[f64; 3]>,
+    /// Of several limbs alike, side by side in this direction of the `ct` frame, take the one farthest along it;
+    /// when absent the one with the most bone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub towards: Option<[f64; 3]>,
     /// HU that only bone (or metal) exceeds in bulk; the limb is what holds most of it.
     pub bone_hu: f64,
     /// HU that solid flesh exceeds but cloth and foam blurred with air do not.
@@ -50,6 +54,7 @@ impl Default for LimbSettings {
             iso_hu: -500.0,
             crop: None,
             inside: None,
+            towards: None,
             bone_hu: 200.0,
             core_hu: -250.0,
             core_radius_mm: 4.0,

@@ -119,6 +119,50 @@ fn a_neighbour_and_a_sheet_leave_the_skin_where_it_was() {
     );
 }
 
+/// Two legs alike a hand's breadth apart: the direction chooses, not the few voxels of bone by which one is larger.
+#[test]
+fn of_two_limbs_the_one_in_the_wanted_direction_is_taken() {
+    let leg = LowerLeg::p01()
+        .voxelise(3.0, TableTop::Absent)
+        .expect("phantom");
+    let [nx, ny, nz] = leg.grid().size();
+    let [spacing, origin] = [leg.grid().spacing_mm(), leg.grid().centre([0.0; 3]).coords];
+    let grid = Grid::axis_aligned([2 * nx, ny, nz], spacing, origin.into()).expect("grid");
+    let hu = (0..grid.len()).map(|at| {
+        let [i, j, k] = grid.voxel(at);
+        leg.at([i % nx, j, k])
+    });
+    let pair = Volume::new(grid.clone(), hu.collect()).expect("finite");
+    let middle = grid.centre([nx as f64 - 0.5, 0.0, 0.0]).x;
+    for sign in [-1.0, 1.0] {
+        let settings = LimbSettings {
+            towards: Some([sign, 0.0, 0.0]),
+            ..LimbSettings::default()
+        };
+        let limb = extract_limb(&pair, &settings).expect("limb");
+        assert!(
+            limb.mesh
+                .vertices
+                .iter()
+                .all(|v| (f64::from(v.x) - middle) * sign > 0.0)
+        );
+        assert_eq!(
+            limb.report.bodies.iter().filter(|body| body.alike).count(),
+            2
+        );
+    }
+    // Lengthwise they do not lie side by side: nothing is chosen by that direction.
+    let lengthwise = LimbSettings {
+        towards: Some([0.0, 0.0, 1.0]),
+        ..LimbSettings::default()
+    };
+    let default = extract_limb(&pair, &LimbSettings::default()).expect("limb");
+    assert_eq!(
+        extract_limb(&pair, &lengthwise).expect("limb").mask,
+        default.mask
+    );
+}
+
 /// Air in the flesh, marrow as light as lung and bone in all of it leave the cloud as it was.
 #[test]
 fn nothing_inside_reaches_the_surface() {

@@ -1,0 +1,95 @@
+//! Which of the bodies in a scan is the limb.
+
+use nalgebra::{Point3, Vector3};
+use ppa_ct::Grid;
+
+use super::bodies::Bodies;
+use super::lattice::Lattice;
+use super::tissue::{TISSUE, Tissue};
+use super::{LimbError, LimbSettings};
+
+/// A body weighs half as much when the side faces cut it through about half its size.
+const SIDE_CUT_WEIGHT: f64 = 2.0;
+/// Bodies that weigh at least this much of the heaviest are limbs like it: a foot weighs as much as the
+/// other one, a few toes in the corner of the image do not.
+const ALIKE: f64 = 0.4;
+
+/// Two limbs lie side by side along a direction when it points from one to the other within 60 degrees; parts
+/// of one limb do not.
+const SIDE_BY_SIDE: f64 = 0.5;
+
+/// The body around the point that was given; else the heaviest, or of those alike that lie beside it in the
+/// direction that was given the farthest.
+pub fn body(
+    grid: &Grid,
+    tissue: &Tissue,
+    found: &Bodies,
+    settings: &LimbSettings,
+) -> Result<u32, LimbError> {
+    if let Some(point) = settings.inside {
+        return body_at(grid, tissue, found, point);
+    }
+    let lattice = &tissue.lattice;
+    let weights = weights(lattice, found);
+    let order = |a: &usize, b: &usize| weights[*a].total_cmp(&weights[*b]).then(b.cmp(a));
+    let heaviest = (0..weights.len()).max_by(order).unwrap_or_default();
+    let Some(towards) = settings.towards else {
+        return Ok(heaviest as u32);
+    };
+    let towards = Vector3::from(towards).normalize();
+    let from_heaviest = |body: usize| {
+        lattice.centre(grid, &found.basins[body]) - lattice.centre(grid, &found.basins[heaviest])
+    };
+    let beside = alike(lattice, found)
+        .into_iter()
+        .enumerate()
+        .filter(|(_, alike)| *alike)
+        .map(|(body, _)| (body, from_heaviest(body)))
+        .filter(|(_, offset)| offset.dot(&towards) >= SIDE_BY_SIDE * offset.norm());
+    let farthest = beside.max_by(|(_, a), (_, b)| a.dot(&towards).total_cmp(&b.dot(&towards)));
+    Ok(farthest.map_or(heaviest, |(body, _)| body) as u32)
+}
+
+/// Whether each body weighs enough to be a limb like the heaviest.
+pub fn alike(lattice: &Lattice, found: &Bodies) -> Vec<bool> {
+    let weights = weights(lattice, found);
+    let heaviest = weights.iter().copied().fold(0.0, f64::max);
+    weights
+        .iter()
+        .map(|weight| *weight >= ALIKE * heaviest)
+        .collect()
+}
+
+/// Voxels of bone, those of bodies cut by side faces counting less; without any bone all voxels.
+fn weights(lattice: &Lattice, found: &Bodies) -> Vec<f64> {
+    let any_bone = found.basins.iter().any(|b| b.bone_voxels > 0);
+    let weight = found.basins.iter().map(|basin| {
+        let voxels = match any_bone {
+            true => basin.bone_voxels,
+            false => basin.voxels,
+        };
+        let size_mm2 = (basin.voxels as f64 * lattice.voxel_mm3).powf(2.0 / 3.0);
+        voxels as f64 / (1.0 + SIDE_CUT_WEIGHT * basin.side_cut_mm2 / size_mm2)
+    });
+    weight.collect()
+}
+
+fn body_at(
+    grid: &Grid,
+    tissue: &Tissue,
+    found: &Bodies,
+    point: [f64; 3],
+) -> Result<u32, LimbError> {
+    let lattice = &tissue.lattice;
+    let voxel = grid.voxel_from_ct() * Point3::from(point);
+    let place = [0, 1, 2].map(|x| voxel[x].round() - lattice.low[x] as f64);
+    if !(0..3).all(|x| (0.0..lattice.size[x] as f64).contains(&place[x])) {
+        return Err(LimbError::Inside(point));
+    }
+    let strides = lattice.strides();
+    let at = (0..3).map(|x| place[x] as usize * strides[x]).sum();
+    if !tissue.is(at, TISSUE) {
+        return Err(LimbError::Inside(point));
+    }
+    Ok(found.labels[at])
+}
