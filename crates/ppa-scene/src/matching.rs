@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::device::XrayDevice;
-use crate::placement::PlaceError;
+use crate::place_error::PlaceError;
 use crate::plane::Plane;
 
 /// Columns x, y, z: across the table, towards the head end, up; in the room.

@@ -38,13 +38,17 @@ impl Lattice {
     }
 }
 
-/// Cells of a plane that hang together.
+/// Cells of a plane that hang together, and the points in and above them.
 #[derive(Debug, Clone)]
 pub(crate) struct Patch {
     plane: Plane,
     lattice: Lattice,
     cells: BTreeSet<Cell>,
+    members: Vec<Point3<f64>>,
 }
+
+/// Points within this many thresholds of the plane may join a patch while it is refined.
+const MEMBER_THRESHOLDS: f64 = 4.0;
 
 /// A plane fitted to one patch.
 #[derive(Debug, Clone)]
@@ -110,10 +114,23 @@ impl Patch {
                     plane: *plane,
                     lattice,
                     cells,
+                    members: Vec::new(),
                 });
             }
         }
         patches.sort_by_key(|patch| std::cmp::Reverse(patch.cells.len()));
+        // Points are handed out in one pass, for there may be as many patches as cells.
+        let numbered = patches.iter().enumerate();
+        let patch_of: BTreeMap<Cell, usize> = numbered
+            .flat_map(|(number, patch)| patch.cells.iter().map(move |cell| (*cell, number)))
+            .collect();
+        for p in points {
+            if plane.signed_distance(p).abs() <= MEMBER_THRESHOLDS * settings.threshold_mm
+                && let Some(&number) = patch_of.get(&lattice.cell(p))
+            {
+                patches[number].members.push(*p);
+            }
+        }
         patches
     }
 
@@ -121,36 +138,26 @@ impl Patch {
     ///
     /// `None` when the points do not gather on a plane: evenly spread points put twice as many
     /// between one and three thresholds as within one.
-    pub(crate) fn refined(
-        &self,
-        points: &[Point3<f64>],
-        settings: &PlaneSettings,
-    ) -> Option<Sheet> {
-        let members: Vec<&Point3<f64>> = points
-            .iter()
-            .filter(|p| {
-                self.plane.signed_distance(p).abs() <= 4.0 * settings.threshold_mm
-                    && self.cells.contains(&self.lattice.cell(p))
-            })
-            .collect();
+    pub(crate) fn refined(self, settings: &PlaneSettings) -> Option<Sheet> {
+        let members = &self.members;
         let mut plane = self.plane;
         let mut reach_mm = settings.threshold_mm;
         let mut fit = None;
         let mut last = Vec::new();
         for _ in 0..MAX_REFITS {
             let near: Vec<usize> = (0..members.len())
-                .filter(|i| plane.signed_distance(members[*i]).abs() <= reach_mm)
+                .filter(|i| plane.signed_distance(&members[*i]).abs() <= reach_mm)
                 .collect();
             if near == last {
                 break;
             }
-            let (fitted, centre, rms_mm) = total_least_squares(&members, &near, &plane)?;
+            let (fitted, centre, rms_mm) = total_least_squares(members, &near, &plane)?;
             plane = fitted;
             // Three standard deviations keep a Gaussian sheet whole; what a wall or a cushion
             // adds evenly over the threshold is cut off.
             reach_mm = settings
                 .threshold_mm
-                .min(3.0 * robust_sigma(&members, &near, &plane).max(0.01));
+                .min(3.0 * robust_sigma(members, &near, &plane).max(0.01));
             fit = Some((near.len(), rms_mm, centre));
             last = near;
         }
@@ -169,7 +176,7 @@ impl Patch {
             rms_mm,
             centre,
             lattice: self.lattice,
-            cells: self.cells.clone(),
+            cells: self.cells,
         })
     }
 }
@@ -177,10 +184,10 @@ impl Patch {
 const MAX_REFITS: usize = 30;
 
 /// Standard deviation from the median absolute distance (1.4826 = 1 / Φ⁻¹(3/4)).
-fn robust_sigma(members: &[&Point3<f64>], near: &[usize], plane: &Plane) -> f64 {
+fn robust_sigma(members: &[Point3<f64>], near: &[usize], plane: &Plane) -> f64 {
     let mut distances: Vec<f64> = near
         .iter()
-        .map(|i| plane.signed_distance(members[*i]).abs())
+        .map(|i| plane.signed_distance(&members[*i]).abs())
         .collect();
     let middle = distances.len() / 2;
     let (_, median, _) = distances.select_nth_unstable_by(middle, f64::total_cmp);
@@ -190,7 +197,7 @@ fn robust_sigma(members: &[&Point3<f64>], near: &[usize], plane: &Plane) -> f64 
 /// Plane through the mean along the direction of least scatter, facing as before; also the mean
 /// and the root mean square distance. `None` for fewer than three points.
 fn total_least_squares(
-    members: &[&Point3<f64>],
+    members: &[Point3<f64>],
     near: &[usize],
     facing: &Plane,
 ) -> Option<(Plane, Point3<f64>, f64)> {

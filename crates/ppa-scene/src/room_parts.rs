@@ -100,6 +100,16 @@ impl Parts {
         mesh
     }
 
+    /// Area of all patches, mm².
+    pub(crate) fn area_mm2(&self) -> f64 {
+        let area = |patch: &Patch| match patch {
+            Patch::Rectangle { a, b, .. } => a.cross(b).norm(),
+            Patch::Side { axis, radius, .. } => axis.norm() * TAU * radius,
+            Patch::Lid { radius, .. } => 0.5 * TAU * radius * radius,
+        };
+        self.patches.iter().map(area).sum()
+    }
+
     /// Points on all patches, about `spacing_mm` apart, in a fixed order.
     pub(crate) fn cloud(&self, spacing_mm: f64) -> PointCloud {
         let mut cloud = PointCloud::default();

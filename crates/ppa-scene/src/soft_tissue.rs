@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
-use crate::placement::PlaceError;
+use crate::place_error::PlaceError;
 use crate::plane::Plane;
 
 /// How far the two parts of a limb that rest on the table sink in: heel and calf of a lower leg.

@@ -16,9 +16,10 @@ pub struct TablePlane {
     pub plane: Plane,
     /// Points of the patch within the threshold.
     pub inliers: usize,
-    /// Root mean square distance of these points from the plane, mm.
+    /// Root mean square distance from the plane, mm, of the points it was fitted to: the inliers within three standard
+    /// deviations, without what a wall or a cushion adds.
     pub rms_mm: f64,
-    /// Their mean, on the plane.
+    /// Mean of the points it was fitted to, on the plane.
     pub centre: Point3<f64>,
 }
 
@@ -67,7 +68,7 @@ pub fn table_plane(
             break;
         };
         for patch in Patch::of_plane(&points, &plane, settings) {
-            let Some(sheet) = patch.refined(&points, settings) else {
+            let Some(sheet) = patch.refined(settings) else {
                 continue;
             };
             if let Some(merit) = search.merit(&sheet)

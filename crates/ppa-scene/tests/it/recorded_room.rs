@@ -1,0 +1,39 @@
+//! The noisy room that other programs were measured on.
+
+use nalgebra::{Point3, Vector3};
+use ppa_mesh::PointCloud;
+
+/// SplitMix64 of (index + seed · 2³²), sum of two uniforms: in [-1, 1), triangular.
+pub fn hash_noise(index: u64, seed: u64) -> f64 {
+    let mut z = (index + (seed << 32) + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^= z >> 31;
+    (z & 0xFFFF_FFFF) as f64 / 4_294_967_296.0 + (z >> 32) as f64 / 4_294_967_296.0 - 1.0
+}
+
+/// A noisy room in mm, `room_cloud` of `../shared/peers/geometry_bench.py`: table of 2.0 x 0.6 m at 900 mm, floor at 0, wall at y = 1.5 m, clutter;
+/// noise of 3 mm standard deviation. `keep` picks heights before rounding to f32.
+pub fn room_cloud(n: u64, seed: u64, keep: std::ops::Range<f64>) -> PointCloud {
+    let uniform = |i: u64, which: u64| (hash_noise(i, seed + 10 * which) + 1.0) / 2.0;
+    let noise = |i: u64, which: u64| hash_noise(i, seed + 10 * which + 5) * 2.45 * 3.0;
+    let points = (0..n)
+        .map(|i| {
+            let (u, v, w) = (uniform(i, 0), uniform(i, 1), uniform(i, 2));
+            let (x, y) = (u * 4000.0 - 2000.0, v * 3000.0 - 1500.0);
+            let p = match i % 100 {
+                0..30 => Point3::new(u * 2000.0 - 1000.0, v * 600.0 - 300.0, 900.0),
+                30..65 => Point3::new(x, y, 0.0),
+                65..85 => Point3::new(x, 1500.0, v * 2500.0),
+                _ => Point3::new(x, y, w * 2500.0),
+            };
+            p + Vector3::new(noise(i, 0), noise(i, 1), noise(i, 2))
+        })
+        .filter(|p| keep.contains(&p.z))
+        .map(|p| p.cast())
+        .collect();
+    PointCloud {
+        points,
+        normals: Vec::new(),
+    }
+}
