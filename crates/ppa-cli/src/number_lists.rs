@@ -1,6 +1,7 @@
 //! Options that are lists of numbers: points, ranges, boxes.
 
-use ppa_mesh::VoxelBox;
+use nalgebra::Point3;
+use ppa_mesh::{Bump, VoxelBox};
 
 fn finite<const N: usize>(text: &str) -> Option<[f64; N]> {
     let numbers: Option<Vec<f64>> = text
@@ -18,6 +19,16 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 /// `X,Y,Z`.
 pub fn point(text: &str) -> Result<[f64; 3], String> {
     numbers(text)
+}
+
+/// `X,Y,Z,HEIGHT,SIGMA`: a bump and its place, mm.
+pub fn bump(text: &str) -> Result<Bump, String> {
+    let [x, y, z, height_mm, sigma_mm] = numbers(text)?;
+    Ok(Bump {
+        centre: Point3::new(x, y, z),
+        height_mm,
+        sigma_mm,
+    })
 }
 
 /// `FROM,TO`.

@@ -45,6 +45,12 @@ pub struct FileRow {
     pub camera: Option<View>,
     /// Body shape; radiographs show the scan itself.
     pub shape: BodyShape,
+    /// Depth images of other body shapes: how much more than the skin of the scan this one encloses, mm³.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub volume_change_mm3: Option<f64>,
+    /// Depth images: pixels that see something beyond the 65.535 m that 16 bits hold, 0 in the file.
+    #[serde(skip_serializing_if = "is_zero", default)]
+    pub too_far_pixels: usize,
     /// The limb's frame in the scan: T^P_CT.
     pub patient_from_ct: Rows,
     /// Pose of the limb: T^ToF_P = T_opt · T_mat · T_rot.
@@ -55,6 +61,14 @@ pub struct FileRow {
     /// Seed of a radiograph's histories and noise, or of a depth sensor's noise.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub seed: Option<u64>,
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde calls it with a reference"
+)]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 impl FileRow {

@@ -1,5 +1,7 @@
 //! What all limbs of a plan share: room, table, x-ray device, cameras, x-ray beam.
 
+use std::path::PathBuf;
+
 use nalgebra::Isometry3;
 use ppa_depth::{
     Backdrop, Body, Camera, DepthImage, MeshBody, MountedCamera, PlacedBody, RigError, Sensor,
@@ -35,6 +37,14 @@ pub enum StageError {
     /// The errors of the cameras' sensors.
     #[error("depth.sensor of the plan")]
     Sensor(#[from] SensorError),
+    /// Points or triangles of a recorded room that the cameras cannot be shown.
+    #[error("{}", path.display())]
+    RoomFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: Box<StageError>,
+    },
     /// Furniture that cannot be rendered.
     #[error(transparent)]
     Body(#[from] ppa_depth::BodyError),
@@ -119,7 +129,15 @@ impl Stage {
     pub fn of_plan(plan: &Plan) -> Result<Self, StageError> {
         let table = Table::of_plan(plan)?;
         let rig = plan.depth.cameras()?;
-        let furniture = table.furniture()?;
+        let furniture = match (table.furniture(), &plan.room.ply) {
+            (Err(source), Some(path)) => {
+                return Err(StageError::RoomFile {
+                    path: path.clone(),
+                    source: source.into(),
+                });
+            }
+            (furniture, _) => furniture?,
+        };
         let device = &table.room.device;
         let place = |view, side, mounted: &MountedCamera| {
             let camera = Camera::try_from(mounted.camera.clone())

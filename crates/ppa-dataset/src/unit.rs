@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3};
 use ppa_depth::{Body, DepthImage, MeshBody, PlacedBody, roi_around, rows_from_isometry};
-use ppa_mesh::Mesh;
+use ppa_mesh::{Displacement, Mesh};
 use ppa_scene::{Placement, PoseAngle, place_soft};
 use ppa_xray::{FastSettings, VoxelPhantom};
 
@@ -25,7 +25,7 @@ use crate::stage::{PlacedCamera, Stage};
 pub enum UnitError {
     /// A body shape.
     #[error(transparent)]
-    Shape(#[from] ppa_mesh::BumpError),
+    Shape(#[from] ppa_mesh::ShapeError),
     /// A skin that cannot be rendered.
     #[error(transparent)]
     Body(#[from] ppa_depth::BodyError),
@@ -56,6 +56,8 @@ struct ShapedSkin {
     shape: BodyShape,
     mesh: Mesh,
     body: Body,
+    /// How much more it encloses than the skin of the scan; `None` for that itself.
+    volume_change_mm3: Option<f64>,
 }
 
 /// What a pose is made of.
@@ -88,7 +90,14 @@ impl<'a> PosableLimb<'a> {
             let (landmarks, settings) = (&prepared.landmarks, &plan.shapes);
             let mesh = body_shape(skin, landmarks, shape, settings, id, plan.seed)?;
             let body = Body::Mesh(MeshBody::new(&mesh.vertices, &mesh.triangles)?);
-            Ok::<_, UnitError>(ShapedSkin { shape, mesh, body })
+            let change = || Displacement::between(skin, &mesh).volume_mm3;
+            let volume_change_mm3 = (shape != BodyShape::Orig).then(change);
+            Ok::<_, UnitError>(ShapedSkin {
+                shape,
+                mesh,
+                body,
+                volume_change_mm3,
+            })
         };
         let shapes = plan.shapes.variants.iter().map(shaped);
         Ok(Self {
@@ -127,11 +136,13 @@ impl<'a> PosableLimb<'a> {
                 };
                 let image = depth_image(shaped.shape, placed, camera, noise_seed)?;
                 let path = prepare_folder(root, &file)?;
-                image.write_png(&path)?;
+                let too_far_pixels = image.write_png(&path)?;
                 files.push(FileRow {
                     camera: Some(camera.view),
                     seed: camera.sensor.is_some().then_some(noise_seed),
                     shape: shaped.shape,
+                    volume_change_mm3: shaped.volume_change_mm3,
+                    too_far_pixels,
                     ..self.row(root, file, FileKind::Depth, pose, &placement)?
                 });
             }
@@ -241,6 +252,8 @@ impl<'a> PosableLimb<'a> {
             angle_deg: pose.angle_deg,
             camera: None,
             shape: BodyShape::Orig,
+            volume_change_mm3: None,
+            too_far_pixels: 0,
             patient_from_ct: self
                 .prepared
                 .landmarks
@@ -264,7 +277,9 @@ fn depth_image(
         let seen = backdrop.before(&camera.camera, &[placed])?;
         // One frame per body shape and camera.
         let frame = 2 * shape as u64 + camera.view as u64;
-        return Ok(sensor.observe(&camera.camera, &seen, noise_seed, frame));
+        let image = sensor.observe(&camera.camera, &seen, noise_seed, frame);
+        image.require_measured(seen.image.valid_pixels())?;
+        return Ok(image);
     }
     let limb = ppa_depth::render(&camera.camera, &[placed]);
     Ok(limb.before(&camera.background)?)

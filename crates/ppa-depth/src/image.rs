@@ -42,6 +42,24 @@ pub enum DepthError {
         /// Rows.
         height: u32,
     },
+    /// A sensor gave up all pixels.
+    #[error(
+        "the sensor measures nothing: of {seen} pixels that see a surface it gives up all (too dim, too oblique or at edges)"
+    )]
+    NothingMeasured {
+        /// Pixels that have a depth without the sensor.
+        seen: usize,
+    },
+    /// No depth fits into 16 bits.
+    #[error(
+        "{} cannot hold depths beyond 65.535 m, and all {pixels} pixels that see a surface are farther", path.display()
+    )]
+    TooFar {
+        /// The file.
+        path: PathBuf,
+        /// Pixels with a depth.
+        pixels: usize,
+    },
     /// Something else is in front of all that was to be seen.
     #[error(
         "the surface is hidden: in all of its {pixels} pixels something stands before it (check the poses)"
@@ -134,6 +152,17 @@ impl DepthImage {
                 width: self.width,
                 height: self.height,
             }),
+        }
+    }
+
+    /// Refuses an image of a sensor in which nothing was measured; `seen` pixels see a surface.
+    ///
+    /// # Errors
+    /// [`DepthError::NothingMeasured`].
+    pub fn require_measured(&self, seen: usize) -> Result<(), DepthError> {
+        match self.valid().next() {
+            Some(_) => Ok(()),
+            None => Err(DepthError::NothingMeasured { seen }),
         }
     }
 

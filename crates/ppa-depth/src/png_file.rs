@@ -14,10 +14,17 @@ impl DepthImage {
     /// Returns the number of pixels too far for 16 bits (65.535 m), which are 0 in the file.
     ///
     /// # Errors
-    /// [`DepthError::Write`] names the file; [`DepthError::Length`] for a buffer that does not fit the size.
+    /// [`DepthError::Write`] names the file; [`DepthError::TooFar`] when no depth fits into it; [`DepthError::Length`] for a
+    /// buffer that does not fit the size.
     pub fn write_png(&self, path: &Path) -> Result<usize, DepthError> {
         self.check_length()?;
         let rounded = self.to_u16();
+        if rounded.too_far > 0 && rounded.too_far == self.valid_pixels() {
+            return Err(DepthError::TooFar {
+                path: path.into(),
+                pixels: rounded.too_far,
+            });
+        }
         let bytes: Vec<u8> = rounded
             .z_mm
             .iter()
@@ -101,6 +108,16 @@ mod tests {
         };
         image.z_mm[7] = 70_000.0;
         assert_eq!(image.write_png(&path).unwrap(), 1);
+        let far = DepthImage {
+            z_mm: vec![0.0, 70_000.0],
+            width: 2,
+            height: 1,
+        };
+        let found = far.write_png(&folder.path().join("far.png"));
+        assert!(
+            matches!(found, Err(DepthError::TooFar { pixels: 1, .. })),
+            "{found:?}"
+        );
         image.z_mm[7] = 0.0;
         assert_eq!(DepthImage::read_png(&path).unwrap(), image);
         assert_eq!(

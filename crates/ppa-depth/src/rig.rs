@@ -53,6 +53,14 @@ pub enum RigError {
         /// What the parser said, with line and column.
         source: serde_json::Error,
     },
+    /// A file describes a rig that makes no sense.
+    #[error("{}", path.display())]
+    Rig {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: Box<RigError>,
+    },
     /// The intrinsics of one camera make no sense.
     #[error("{side} camera of the rig")]
     Camera {
@@ -126,7 +134,10 @@ impl RigSpec {
             path: path.into(),
             source,
         })?;
-        rig.check()?;
+        rig.check().map_err(|source| RigError::Rig {
+            path: path.into(),
+            source: source.into(),
+        })?;
         Ok(rig)
     }
 
@@ -188,16 +199,20 @@ mod tests {
 
         rig.right.device_from_camera[0][1] += 0.1;
         std::fs::write(&path, serde_json::to_string(&rig).unwrap()).unwrap();
-        assert!(matches!(
-            RigSpec::read(&path),
-            Err(RigError::Pose { side: "right", .. })
-        ));
+        let wrong = |path: &Path| match RigSpec::read(path) {
+            Err(RigError::Rig {
+                path: named,
+                source,
+            }) if named == path => *source,
+            other => panic!("{other:?}"),
+        };
+        assert!(matches!(wrong(&path), RigError::Pose { side: "right", .. }));
         rig = RigSpec::default();
         rig.left.camera.fx = -1.0;
         std::fs::write(&path, serde_json::to_string(&rig).unwrap()).unwrap();
         assert!(matches!(
-            RigSpec::read(&path),
-            Err(RigError::Camera { side: "left", .. })
+            wrong(&path),
+            RigError::Camera { side: "left", .. }
         ));
         assert!(matches!(
             RigSpec::read(&folder.path().join("none.json")),

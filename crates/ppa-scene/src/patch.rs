@@ -170,7 +170,7 @@ impl Patch {
         };
         let inliers = within(settings.threshold_mm);
         let beside = within(3.0 * settings.threshold_mm) - inliers;
-        (inliers > beside && inliers >= 3).then(|| Sheet {
+        (inliers > beside && inliers >= 3).then_some(Sheet {
             plane,
             inliers,
             rms_mm,

@@ -32,7 +32,7 @@ pub enum PlaceError {
     /// A depth of soft tissue does not make sense.
     #[error("{name} of the soft tissue is {found_mm} mm, expected 0 to 20")]
     SoftTissue {
-        /// Field of [`SoftTissue`].
+        /// Field of [`SoftTissue`](crate::SoftTissue).
         name: &'static str,
         /// Its value.
         found_mm: f64,

@@ -46,5 +46,9 @@ fn read_camera(path: Option<&PathBuf>) -> anyhow::Result<Camera> {
         )?,
         None => CameraSpec::azure_kinect(DepthMode::NfovUnbinned),
     };
-    Ok(Camera::try_from(spec)?)
+    let camera = Camera::try_from(spec);
+    Ok(match path {
+        Some(path) => camera.with_context(|| path.display().to_string())?,
+        None => camera?,
+    })
 }

@@ -3,12 +3,16 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use ppa_ct::read;
 use ppa_dataset::{BodyShape, Case, PreparedLimb, ShapeSettings, body_shape, layout::LimbId};
-use ppa_mesh::{Border, Displacement, Mesh, dbscan, iso_surface, read_mesh_file, write_mesh_file};
+use ppa_mesh::{
+    Border, Bump, Displacement, Mesh, add_bumps, dbscan, iso_surface, read_mesh_file,
+    write_mesh_file,
+};
 use serde::Serialize;
 
+use crate::number_lists::bump;
 use crate::output::{Output, Seconds, Stopwatch};
+use crate::scan_args::ScanArgs;
 
 #[derive(Debug, Subcommand)]
 pub enum MeshCommand {
@@ -22,8 +26,8 @@ pub enum MeshCommand {
 
 #[derive(Debug, Args)]
 pub struct ExtractArgs {
-    /// DICOM folder or file, or a volume in one file such as .nii.gz
-    volume: PathBuf,
+    #[command(flatten)]
+    scan: ScanArgs,
     /// Hounsfield units of the surface
     #[arg(long, default_value_t = -500.0, allow_negative_numbers = true)]
     iso: f32,
@@ -45,9 +49,12 @@ pub struct AugmentArgs {
     /// Shift of big and small in mm [default: 4]
     #[arg(long)]
     offset_mm: Option<f64>,
-    /// Seed of the bumps
+    /// Seed of the bumps of bumps_a and bumps_b: another one makes another variant
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// A bump more, at a place in the ct frame, so high and so wide (sigma) in mm; negative heights are dents
+    #[arg(long = "bump", value_name = "X,Y,Z,HEIGHT,SIGMA", value_parser = bump, allow_hyphen_values = true)]
+    bumps: Vec<Bump>,
     /// File to write: .ply, .obj or .stl
     #[arg(long)]
     out: PathBuf,
@@ -150,7 +157,7 @@ impl Variant {
 }
 
 fn extract(args: &ExtractArgs, output: Output) -> anyhow::Result<()> {
-    let volume = read(&args.volume)?.volume;
+    let volume = args.scan.read()?.volume;
     let border = if args.close {
         Border::Closed
     } else {
@@ -186,6 +193,10 @@ fn augment(args: &AugmentArgs, output: Output) -> anyhow::Result<()> {
         limb,
         args.seed,
     )?;
+    let mesh = match args.bumps[..] {
+        [] => mesh,
+        ref bumps => add_bumps(&mesh, bumps)?,
+    };
     let seconds = watch.read();
     write_mesh_file(&args.out, &mesh)?;
     let displacement = Displacement::between(&prepared.limb.mesh, &mesh);

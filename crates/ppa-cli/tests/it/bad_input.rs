@@ -167,6 +167,29 @@ fn a_camera_that_sees_nothing_is_refused() {
 }
 
 #[test]
+fn a_rig_or_a_room_that_cannot_be_used_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rig = serde_json::to_value(ppa_depth::RigSpec::default()).unwrap();
+    rig["left"]["device_from_camera"][0][1] = serde_json::json!(0.3);
+    fs::write(folder.path().join("rig.json"), rig.to_string()).unwrap();
+    write_plan(folder.path(), "[depth]\nrig = \"rig.json\"\n");
+    let said = fail(folder.path(), "generate plan.toml --out data");
+    contains(&said, &["rig.json", "left camera"]);
+
+    // A table whose points are all there twice: discs of no radius.
+    let mut ply = "ply\nformat ascii 1.0\nelement vertex 20000\nproperty float x\n\
+                   property float y\nproperty float z\nend_header\n"
+        .to_owned();
+    for i in 0..20_000 {
+        ply += &format!("{} {} 0\n", i / 2 % 100 * 12 - 600, i / 200 * 12 - 600);
+    }
+    fs::write(folder.path().join("room.ply"), ply).unwrap();
+    write_plan(folder.path(), "[room]\nply = \"room.ply\"\n");
+    let said = fail(folder.path(), "generate plan.toml --out data");
+    contains(&said, &["room.ply", "radius"]);
+}
+
+#[test]
 fn a_broken_calibration_is_told_with_file_and_place() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("scanner.toml");

@@ -93,3 +93,97 @@ fn what_is_no_camera_recording_or_sensor_is_refused_and_leaves_nothing() {
             .any(|name| name.starts_with("no."))
     );
 }
+
+/// A square of side 2 `half_mm` across the camera's axis.
+fn square(half_mm: f64, z_mm: f64) -> String {
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let vertex = |[x, y]: [f64; 2]| format!("v {} {} {z_mm}\n", x * half_mm, y * half_mm);
+    corners.map(vertex).concat() + "f 1 3 2\nf 1 4 3\n"
+}
+
+#[test]
+fn depths_beyond_16_bits_are_counted_or_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    scene(folder);
+    fs::write(folder.join("near.obj"), square(100.0, 1500.0)).unwrap();
+    fs::write(folder.join("far.obj"), square(60_000.0, 70_000.0)).unwrap();
+    let command = "depth render far.obj --camera camera.json --out far.png";
+    let said = fail(folder, command);
+    assert!(
+        said.contains("far.png cannot hold depths beyond 65.535 m"),
+        "{said}"
+    );
+    assert!(!folder.join("far.png").exists());
+    let both = "depth render near.obj far.obj --camera camera.json --out both.png";
+    let object: Value = serde_json::from_str(&succeed(folder, &format!("{both} --json"))).unwrap();
+    assert_eq!(object["valid_pixels"], 96 * 80);
+    let written = ppa_depth::DepthImage::read_png(&folder.join("both.png")).unwrap();
+    let lost = 96 * 80 - written.valid_pixels();
+    assert!(lost > 0 && lost < 96 * 80, "{lost}");
+    assert_eq!(object["too_far_pixels"], lost);
+    assert!(succeed(folder, both).contains("beyond 65.535 m"));
+}
+
+#[test]
+fn a_sensor_that_measures_nothing_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    scene(folder.path());
+    let blind = r#"{"invalid": {"min_signal": 100, "max_angle_deg": 85, "min_contrast": 0}}"#;
+    fs::write(folder.path().join("blind.json"), blind).unwrap();
+    let command = "depth render wall.ply --camera camera.json --sensor blind.json --out d.png";
+    let said = fail(folder.path(), command);
+    assert!(
+        said.contains("of 7680 pixels that see a surface it gives up all"),
+        "{said}"
+    );
+    assert!(!folder.path().join("d.png").exists());
+}
+
+#[test]
+fn only_three_numbers_are_a_point() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |text: &str| fs::write(folder.path().join("points.csv"), text).unwrap();
+    for text in ["0,0,1000\n", "x, y, z\n0,0,1000\n"] {
+        put(text);
+        assert_eq!(
+            succeed(folder.path(), "depth project points.csv")
+                .lines()
+                .count(),
+            1
+        );
+    }
+    for (text, part) in [
+        ("0;0;1000\n", "row 1"),
+        ("0,0,1000,7\n", "row 1"),
+        ("x,y,z\n0,0,1000\n0,zero,1000\n", "row 3"),
+        ("0,0,one\n", "row 1"),
+        ("0,0,nan\n", "row 1"),
+        ("x,y,z\n", "no points"),
+    ] {
+        put(text);
+        let said = fail(folder.path(), "depth project points.csv");
+        assert!(
+            said.contains("points.csv") && said.contains(part),
+            "{text}: {said}"
+        );
+    }
+}
+
+#[test]
+fn a_camera_of_impossible_numbers_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    scene(folder.path());
+    let camera = fs::read_to_string(folder.path().join("camera.json")).unwrap();
+    let mut camera: Value = serde_json::from_str(&camera).unwrap();
+    camera["fx"] = (-90.0).into();
+    fs::write(folder.path().join("odd.json"), camera.to_string()).unwrap();
+    let said = fail(
+        folder.path(),
+        "depth render wall.ply --camera odd.json --out d.png",
+    );
+    assert!(
+        said.contains("odd.json") && said.contains("fx is -90"),
+        "{said}"
+    );
+}

@@ -105,6 +105,41 @@ fn every_command_keeps_its_keys() {
         "mesh cluster p01.ply --eps-mm 6 --min-points 5",
         &["clusters", "noise", "core_points", "sizes"],
     );
+    let augmented = [
+        "vertices",
+        "triangles",
+        "area_mm2",
+        "volume_mm3",
+        "components",
+        "boundary_edges",
+        "euler",
+        "volume_change_mm3",
+        "least_shift_mm",
+        "mean_shift_mm",
+        "most_shift_mm",
+        "wall_s",
+        "cpu_s",
+    ];
+    let same = object("mesh augment p01.toml --out orig.ply", &augmented);
+    assert_eq!(same["volume_change_mm3"], 0.0);
+    let bigger = object(
+        "mesh augment p01.toml --shape big --offset-mm 2 --out big.ply",
+        &augmented,
+    );
+    assert!((bigger["most_shift_mm"].as_f64().unwrap() - 2.0).abs() < 1e-3);
+    // A dent of 3 mm where the centre of the joint comes nearest to the skin.
+    let joint = fs::read_to_string(folder.join("p01.toml")).unwrap();
+    let joint = joint
+        .lines()
+        .find_map(|line| line.strip_prefix("joint_centre = "))
+        .unwrap();
+    let joint: String = joint.chars().filter(|c| !"[] ".contains(*c)).collect();
+    let dent = format!("mesh augment p01.toml --bump {joint},-3,9 --out dent.ply");
+    let dented = object(&dent, &augmented);
+    let change = dented["volume_change_mm3"].as_f64().unwrap();
+    // 2 pi sigma² h over a plane.
+    assert!((-1.5..-0.5).contains(&(change / 1527.0)), "{change}");
+    assert!((dented["most_shift_mm"].as_f64().unwrap() - 3.0).abs() < 0.3);
     object(
         "scene place p01.toml --angle 18",
         &["gap_mm", "penetration_mm", "room_from_patient"],

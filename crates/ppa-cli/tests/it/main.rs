@@ -17,6 +17,7 @@ mod reading;
 mod resume;
 mod room_file;
 mod shards;
+mod soft_tissue;
 mod tallies;
 
 use std::collections::BTreeMap;

@@ -91,6 +91,15 @@ fn gaps_are_filled_only_when_asked_for() {
         serde_json::json!([10, 11, 29])
     );
     assert_eq!(codes(&filled), ["gaps-filled"]);
+    let extract = "mesh extract scan --out skin.ply";
+    assert!(fail(folder, extract).contains("9.000 mm after slice 9"));
+    let skin = told(folder, &format!("{extract} --fill-gaps"));
+    let whole = told(slices(), "mesh extract slices --out whole.ply");
+    let area = |skin: &Value| skin["area_mm2"].as_f64().unwrap();
+    assert!(
+        (area(&skin) / area(&whole) - 1.0).abs() < 0.02,
+        "{skin} and {whole}"
+    );
     // The file cannot tell; what is printed does.
     let converted = told(folder, "ct convert scan out.nrrd --fill-gaps");
     assert_eq!(codes(&converted), ["gaps-filled"]);
@@ -128,6 +137,7 @@ fn one_of_several_series_is_chosen_by_number_or_uid() {
         told(slices(), "ct info slices")["hu_sum"],
         "series 1 is the phantom"
     );
+    told(folder, "mesh extract scan --series 1 --out skin.ply");
     for choice in ["7", "2.25.4711"] {
         let seventh = told(folder, &format!("ct info scan --series {choice}"));
         assert_ne!(seventh["hu_sum"], first["hu_sum"]);

@@ -18,7 +18,7 @@ pub struct ProjectArgs {
     camera: Option<PathBuf>,
 }
 
-/// Reads rows of x, y, z; a first row that is not numbers is a header.
+/// Reads rows of x, y, z; a first row of three words of which none is a number is a header.
 fn read_points(path: &Path) -> anyhow::Result<Vec<[f64; 3]>> {
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
@@ -28,16 +28,20 @@ fn read_points(path: &Path) -> anyhow::Result<Vec<[f64; 3]>> {
     let mut points = Vec::new();
     for (row, record) in reader.records().enumerate() {
         let record = record.with_context(|| format!("cannot read {}", path.display()))?;
-        match record.deserialize(None) {
-            Ok(point) => points.push(point),
-            Err(_) if row == 0 => {}
-            Err(_) => anyhow::bail!(
+        let fields: Vec<Option<f64>> = record.iter().map(|field| field.parse().ok()).collect();
+        match fields[..] {
+            [Some(x), Some(y), Some(z)] if [x, y, z].iter().all(|v| v.is_finite()) => {
+                points.push([x, y, z]);
+            }
+            [None, None, None] if row == 0 => {}
+            _ => anyhow::bail!(
                 "row {} of {} is not three numbers x, y, z",
                 row + 1,
                 path.display()
             ),
         }
     }
+    anyhow::ensure!(!points.is_empty(), "{} holds no points", path.display());
     Ok(points)
 }
 

@@ -71,6 +71,8 @@ struct Rendered {
     height: u32,
     frames: u64,
     valid_pixels: usize,
+    /// Pixels farther than a 16-bit PNG can say, 0 in the file; of the first frame.
+    too_far_pixels: usize,
     min_mm: Option<f32>,
     max_mm: Option<f32>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -137,17 +139,21 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
             }
             Eye::Sensor(sensor, backdrop) => {
                 let seen = backdrop.before(&camera, &placed)?;
-                sensor.observe(&camera, &seen, args.seed, frame)
+                let image = sensor.observe(&camera, &seen, args.seed, frame);
+                image.require_measured(seen.image.valid_pixels())?;
+                image
             }
         };
         anyhow::Ok(image)
     };
     let image = see(0)?;
     let seconds = watch.read();
-    if args.frames == 1 {
-        image.write_png(&args.out)?;
-    }
-    for frame in (0..args.frames).filter(|_| args.frames > 1) {
+    let first = match args.frames {
+        1 => args.out.clone(),
+        _ => numbered(&args.out, 0),
+    };
+    let too_far_pixels = image.write_png(&first)?;
+    for frame in 1..args.frames {
         see(frame)?.write_png(&numbered(&args.out, frame))?;
     }
     write_others(args, &camera, &image)?;
@@ -156,6 +162,7 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
         height: image.height,
         frames: args.frames,
         valid_pixels: image.valid_pixels(),
+        too_far_pixels,
         min_mm: image.min_mm(),
         max_mm: image.max_mm(),
         sensor: match eye {
@@ -166,8 +173,12 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
         seconds,
     };
     output.print(&rendered, |r| {
+        let too_far = match r.too_far_pixels {
+            0 => String::new(),
+            pixels => format!("; {pixels} of them, beyond 65.535 m, are 0 in the file"),
+        };
         format!(
-            "{}: {} of {} x {} pixels see a surface",
+            "{}: {} of {} x {} pixels see a surface{too_far}",
             args.out.display(),
             r.valid_pixels,
             r.width,

@@ -102,6 +102,8 @@ mod tests {
             angle_deg: f64::from(step) / 2.0,
             camera: None,
             shape: BodyShape::Orig,
+            volume_change_mm3: None,
+            too_far_pixels: 0,
             patient_from_ct: [[0.0; 4]; 4],
             room_from_patient: [[0.0; 4]; 4],
             ct_from_device: None,
