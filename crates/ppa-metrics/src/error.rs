@@ -61,6 +61,16 @@ pub enum MetricError {
     /// No label is diagnostic, so there is no specificity.
     #[error("no label is diagnostic (below 2.5), so specificity is not defined")]
     NoNegatives,
+    /// A seed with more or fewer folds than the first.
+    #[error("seed {seed} has {found} rows, expected {expected} as the first seed has")]
+    UnequalFolds {
+        /// The seed.
+        seed: u64,
+        /// Rows it has.
+        found: usize,
+        /// Rows of the first seed.
+        expected: usize,
+    },
     /// More pairs than the exact test counts.
     #[error("{found} pairs, expected at most {max}: the exact test counts all 2^n sign patterns")]
     TooManyPairs {

@@ -6,7 +6,7 @@
 //! cameras or several frames are averaged first ([`mean_per_pose`], [`mean_of_views`]).
 //!
 //! [`pose_delta`] and [`pose_margin_accuracy`] rank one good against two bad poses ([`PoseTriple`]).
-//! [`sign_flip_permutation`] is the exact paired test on seeds.
+//! [`sign_flip_permutation`] is the exact paired test on seeds, whose folds [`mean_per_seed`] averages first.
 //!
 //! [`agreement`] says how far readers agree whose grades became the labels.
 //!
@@ -31,6 +31,7 @@ mod poses;
 mod report;
 
 mod permutation;
+mod seeds;
 
 pub mod agreement;
 
@@ -40,4 +41,5 @@ pub use permutation::{MAX_PAIRS, PermutationTest, sign_flip_permutation};
 pub use poses::{PoseTriple, mean_of_views, mean_per_pose, pose_delta, pose_margin_accuracy};
 pub use regression::{ANNOTATION_STEP, accuracy, mae, mse};
 pub use report::{Report, evaluate};
+pub use seeds::mean_per_seed;
 pub use spearman::spearman;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
-use ppa_metrics::sign_flip_permutation;
+use ppa_metrics::{mean_per_seed, sign_flip_permutation};
 use serde::Deserialize;
 
 use crate::output::Output;
@@ -17,12 +17,13 @@ pub enum StatsCommand {
 
 #[derive(Debug, Args)]
 pub struct PermutationArgs {
-    /// CSV with the columns a, b: one pair per row
+    /// CSV with the columns a, b: one pair per row; with a column seed, the rows of a seed (its folds) are averaged first
     csv: PathBuf,
 }
 
 #[derive(Debug, Deserialize)]
 struct Pair {
+    seed: Option<u64>,
     a: f64,
     b: f64,
 }
@@ -30,9 +31,13 @@ struct Pair {
 pub fn run(command: &StatsCommand, output: Output) -> anyhow::Result<()> {
     let StatsCommand::Permutation(args) = command;
     let pairs: Vec<Pair> = super::read_csv(&args.csv)?;
-    let a: Vec<f64> = pairs.iter().map(|pair| pair.a).collect();
-    let b: Vec<f64> = pairs.iter().map(|pair| pair.b).collect();
-    let test = sign_flip_permutation(&a, &b).with_context(|| args.csv.display().to_string())?;
+    let (mut a, mut b): (Vec<_>, Vec<_>) = pairs.iter().map(|pair| (pair.a, pair.b)).unzip();
+    let file = || args.csv.display().to_string();
+    let seeds: Vec<_> = pairs.iter().filter_map(|pair| pair.seed).collect();
+    if !seeds.is_empty() {
+        (a, b) = mean_per_seed(&seeds, &a, &b).with_context(file)?;
+    }
+    let test = sign_flip_permutation(&a, &b).with_context(file)?;
     output.print(&test, |test| {
         format!(
             "mean difference {:.6}, p one-sided {:.6}, p two-sided {:.6}, {} sign patterns",

@@ -25,6 +25,8 @@ fn every_command_keeps_its_keys() {
     let folder = phantom();
     fs::write(folder.join("points.csv"), "x,y,z\n0,0,1000\n0,0,-1\n").unwrap();
     fs::write(folder.join("pairs.csv"), "a,b\n3,1\n4,2\n5,1\n").unwrap();
+    let folds = "seed,fold,a,b\n1,0,3,1\n1,1,4,2\n2,0,2,1\n2,1,3,2\n";
+    fs::write(folder.join("folds.csv"), folds).unwrap();
     let predictions = "id,label,prediction\na,1,1.2\nb,2,2.1\nc,3,2.9\nd,2.5,2.4\n";
     fs::write(folder.join("predictions.csv"), predictions).unwrap();
     // The camera a metre above the phantom, looking down (towards posterior).
@@ -238,4 +240,9 @@ fn every_command_keeps_its_keys() {
         &["mean_difference", "p_one_sided", "p_two_sided", "patterns"],
     );
     assert_eq!(test["patterns"], 8);
+    let folds = object("stats permutation folds.csv", &["mean_difference"]);
+    assert_eq!(
+        (&folds["patterns"], &folds["mean_difference"]),
+        (&4.into(), &1.5.into())
+    );
 }
