@@ -1,5 +1,6 @@
 //! What the paper compares: the columns of its tables 1 to 4.
 
+use ppa_dataset::BodyShape;
 use serde::{Deserialize, Serialize};
 
 /// One of the paper's experiments.
@@ -152,13 +153,14 @@ impl Experiment {
 }
 
 impl Shapes {
-    /// Folders of the synthetic layout that hold these shapes.
-    pub fn folders(self) -> &'static [&'static str] {
+    /// The variants of the skin that these are.
+    pub fn variants(self) -> &'static [BodyShape] {
+        use BodyShape::{Big, BumpsA, BumpsB, Orig, Small};
         match self {
-            Self::Original => &["orig"],
-            Self::Size => &["orig", "big", "small"],
-            Self::Bumps => &["orig", "bumps_a", "bumps_b"],
-            Self::All => &["orig", "big", "small", "bumps_a", "bumps_b"],
+            Self::Original => &[Orig],
+            Self::Size => &[Orig, Big, Small],
+            Self::Bumps => &[Orig, BumpsA, BumpsB],
+            Self::All => &BodyShape::ALL,
         }
     }
 

@@ -42,15 +42,15 @@ pub enum FoldError {
 /// # Errors
 /// [`FoldError::TooFewPersons`].
 pub fn cross_validation(
-    persons: &BTreeSet<String>,
+    persons: &BTreeSet<u32>,
     folds: usize,
     seed: u64,
-) -> Result<Vec<BTreeSet<String>>, FoldError> {
+) -> Result<Vec<BTreeSet<u32>>, FoldError> {
     if folds < 2 {
         let persons = persons.len();
         return Err(FoldError::TooFewPersons { persons, folds });
     }
-    let order = shuffled(persons.iter().cloned(), folds, seed)?;
+    let order = shuffled(persons.iter().copied(), folds, seed)?;
     let mut sets = vec![BTreeSet::new(); folds];
     for (n, person) in order.into_iter().enumerate() {
         sets[n % folds].insert(person);
@@ -66,12 +66,12 @@ pub fn cross_validation(
 /// # Errors
 /// [`FoldError`] if there are too few persons, or if no choice of them makes up the number in every fold.
 pub fn folds_of_limbs(
-    limbs_of: &BTreeMap<String, usize>,
+    limbs_of: &BTreeMap<u32, usize>,
     limbs: usize,
     folds: usize,
     seed: u64,
-) -> Result<Vec<BTreeSet<String>>, FoldError> {
-    let order = shuffled(limbs_of.keys().cloned(), folds, seed)?;
+) -> Result<Vec<BTreeSet<u32>>, FoldError> {
+    let order = shuffled(limbs_of.keys().copied(), folds, seed)?;
     let mut search = Search {
         limbs,
         counts: order.iter().map(|person| limbs_of[person]).collect(),
@@ -143,10 +143,10 @@ impl Search {
 }
 
 fn shuffled(
-    persons: impl Iterator<Item = String>,
+    persons: impl Iterator<Item = u32>,
     folds: usize,
     seed: u64,
-) -> Result<Vec<String>, FoldError> {
+) -> Result<Vec<u32>, FoldError> {
     let mut order: Vec<_> = persons.collect();
     if order.len() < folds.max(2) {
         return Err(FoldError::TooFewPersons {
@@ -164,8 +164,8 @@ mod tests {
 
     use super::*;
 
-    fn persons(count: usize) -> BTreeSet<String> {
-        (0..count).map(|n| format!("patient_{n}")).collect()
+    fn persons(count: usize) -> BTreeSet<u32> {
+        (0..count as u32).collect()
     }
 
     #[test]
@@ -185,8 +185,7 @@ mod tests {
         // 10 persons with 17 ankles: seven with both.
         let limbs: BTreeMap<_, _> = persons(10)
             .into_iter()
-            .enumerate()
-            .map(|(n, person)| (person, if n < 7 { 2 } else { 1 }))
+            .map(|person| (person, if person < 7 { 2 } else { 1 }))
             .collect();
         for seed in 0..100 {
             let sets = folds_of_limbs(&limbs, 3, 3, seed).unwrap();

@@ -18,4 +18,4 @@ pub use metric::Metric;
 pub use predictions::{Moment, Prediction, PredictionError, join_views, pose_triples};
 pub use results::{Missing, Results, Summary};
 pub use table::{Incomplete, Table};
-pub use unit::{Unit, View, runs};
+pub use unit::{Unit, runs};

@@ -3,16 +3,17 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+use ppa_dataset::layout::{LimbId, Side};
 use ppa_metrics::{MetricError, PoseTriple, mean_per_pose};
 use serde::{Deserialize, Serialize};
 
 /// A depth image of a test set without its camera: both cameras see the same moment.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Moment {
-    /// Whose limb.
-    pub person: String,
-    /// Which of the person's limbs, `l` or `r`.
-    pub side: String,
+    /// N of `patient_N`.
+    pub patient: u32,
+    /// Which of the person's limbs.
+    pub side: Side,
     /// The pose, unique among those of the limb.
     pub pose: String,
     /// Number of the frame within the pose, from 0.
@@ -22,10 +23,10 @@ pub struct Moment {
 /// The prediction of one network for one image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Prediction {
-    /// Whose limb.
-    pub person: String,
-    /// Which of the person's limbs, `l` or `r`.
-    pub side: String,
+    /// N of `patient_N`.
+    pub patient: u32,
+    /// Which of the person's limbs.
+    pub side: Side,
     /// The pose, unique among those of the limb.
     pub pose: String,
     /// Number of the frame within the pose, from 0.
@@ -57,12 +58,10 @@ pub enum PredictionError {
         second: f64,
     },
     /// A limb without one good and two bad poses.
-    #[error("{person} {side} has {good} poses of label 1 and {bad} of label 3, expected 1 and 2")]
+    #[error("patient {} {} has {good} poses of label 1 and {bad} of label 3, expected 1 and 2", limb.patient, limb.side_letter())]
     NoTriple {
-        /// Whose limb.
-        person: String,
-        /// Which limb.
-        side: String,
+        /// The limb.
+        limb: LimbId,
         /// Poses of label 1.
         good: usize,
         /// Poses of label 3.
@@ -76,12 +75,16 @@ pub enum PredictionError {
 impl fmt::Display for Moment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
-            person,
+            patient,
             side,
             pose,
             frame,
         } = self;
-        write!(f, "{person} {side}, pose {pose}, frame {frame}")
+        write!(
+            f,
+            "patient {patient} {}, pose {pose}, frame {frame}",
+            side.letter()
+        )
     }
 }
 
@@ -89,8 +92,8 @@ impl Prediction {
     /// What was seen.
     pub fn moment(&self) -> Moment {
         Moment {
-            person: self.person.clone(),
-            side: self.side.clone(),
+            patient: self.patient,
+            side: self.side,
             pose: self.pose.clone(),
             frame: self.frame,
         }
@@ -147,7 +150,11 @@ fn by_moment(rows: &[Prediction]) -> Result<BTreeMap<Moment, &Prediction>, Predi
 pub fn pose_triples(rows: &[Prediction]) -> Result<Vec<PoseTriple>, PredictionError> {
     let mut limbs: BTreeMap<_, BTreeMap<_, Pose>> = BTreeMap::new();
     for row in rows {
-        let poses = limbs.entry((&row.person, &row.side)).or_default();
+        let limb = LimbId {
+            patient: row.patient,
+            side: row.side,
+        };
+        let poses = limbs.entry(limb).or_default();
         let pose = poses.entry(&row.pose).or_insert_with(|| Pose {
             label: row.label,
             frames: vec![],
@@ -155,7 +162,7 @@ pub fn pose_triples(rows: &[Prediction]) -> Result<Vec<PoseTriple>, PredictionEr
         pose.frames.push(row.prediction);
     }
     let mut triples = Vec::with_capacity(limbs.len());
-    for ((person, side), poses) in limbs {
+    for (limb, poses) in limbs {
         let good = means(&poses, 1.0)?;
         let bad = means(&poses, 3.0)?;
         triples.push(match (&good[..], &bad[..]) {
@@ -165,8 +172,7 @@ pub fn pose_triples(rows: &[Prediction]) -> Result<Vec<PoseTriple>, PredictionEr
             },
             _ => {
                 return Err(PredictionError::NoTriple {
-                    person: person.clone(),
-                    side: side.clone(),
+                    limb,
                     good: good.len(),
                     bad: bad.len(),
                 });
@@ -194,8 +200,8 @@ mod tests {
 
     fn row(pose: &str, frame: u32, label: f64, prediction: f64) -> Prediction {
         Prediction {
-            person: "patient_1".to_owned(),
-            side: "l".to_owned(),
+            patient: 1,
+            side: Side::Left,
             pose: pose.to_owned(),
             frame,
             label,

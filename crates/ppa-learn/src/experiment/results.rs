@@ -154,13 +154,14 @@ fn standard_deviation(values: &[f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use approx::assert_relative_eq;
+    use ppa_dataset::layout::Side;
 
     use super::*;
 
     fn test_set(error: f64) -> Vec<Prediction> {
         let row = |pose: &str, label: f64, prediction: f64| Prediction {
-            person: "patient_1".to_owned(),
-            side: "r".to_owned(),
+            patient: 1,
+            side: Side::Right,
             pose: pose.to_owned(),
             frame: 0,
             label,

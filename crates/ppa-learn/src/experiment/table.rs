@@ -235,14 +235,16 @@ fn with_best(mut cells: Vec<Cell>, metric: Metric) -> Vec<Cell> {
 
 #[cfg(test)]
 mod tests {
+    use ppa_dataset::layout::Side;
+
     use super::super::configuration::Experiment;
     use super::super::predictions::Prediction;
     use super::*;
 
     fn test_set(error: f64) -> Vec<Prediction> {
         let row = |pose: &str, label: f64, prediction: f64| Prediction {
-            person: "patient_1".to_owned(),
-            side: "r".to_owned(),
+            patient: 1,
+            side: Side::Right,
             pose: pose.to_owned(),
             frame: 0,
             label,

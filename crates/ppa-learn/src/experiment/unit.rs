@@ -2,19 +2,9 @@
 
 use std::fmt;
 
-use serde::{Deserialize, Serialize};
+use ppa_dataset::layout::View;
 
 use super::configuration::{Configuration, Experiment, Shapes, Start, ViewChoice};
-
-/// One of the two cameras.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum View {
-    /// V1.
-    Left,
-    /// V2.
-    Right,
-}
 
 /// One training, and the test of its network where it has one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -39,19 +29,6 @@ pub enum Unit {
         /// The repetition.
         seed: u64,
     },
-}
-
-impl View {
-    /// Both.
-    pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
-
-    /// The name in file names.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Left => "left",
-            Self::Right => "right",
-        }
-    }
 }
 
 impl Unit {
@@ -104,7 +81,7 @@ pub fn runs(experiment: Experiment, folds: usize, seeds: &[u64]) -> Vec<Unit> {
     for &seed in seeds {
         for configuration in experiment.configurations() {
             for fold in 0..folds {
-                runs.extend(View::BOTH.map(|view| Unit::Run {
+                runs.extend(View::ALL.map(|view| Unit::Run {
                     configuration,
                     fold,
                     view,
@@ -157,7 +134,7 @@ mod tests {
             view,
             seed: 3,
         };
-        let needs = |views| View::BOTH.map(|view| run(view, views).needs().unwrap());
+        let needs = |views| View::ALL.map(|view| run(view, views).needs().unwrap());
         let [left, right] = needs(ViewChoice::Unified);
         assert_eq!(left, right);
         let [left, right] = needs(ViewChoice::Specific);
