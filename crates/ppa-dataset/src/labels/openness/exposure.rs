@@ -45,6 +45,11 @@ impl Exposure {
         [offset.dot(&self.across), offset.dot(&self.along)]
     }
 
+    /// Direction of the ray to a point.
+    pub(super) fn ray_to(&self, point: &Point3<f64>) -> Vector3<f64> {
+        (point - self.source).normalize()
+    }
+
     pub(super) fn distance_mm(&self) -> f64 {
         (self.joint - self.source).norm()
     }
@@ -56,4 +61,15 @@ pub(super) struct LimbAxes {
     pub joint: Point3<f64>,
     pub axis: Unit<Vector3<f64>>,
     pub anterior: Unit<Vector3<f64>>,
+}
+
+impl LimbAxes {
+    /// The axes of the patient frame: joint at the origin, z towards proximal, y anterior.
+    pub fn of_patient(ct_from_patient: &Isometry3<f64>) -> Self {
+        Self {
+            joint: ct_from_patient * Point3::origin(),
+            axis: ct_from_patient * Vector3::z_axis(),
+            anterior: ct_from_patient * Vector3::y_axis(),
+        }
+    }
 }

@@ -23,6 +23,13 @@ pub(super) struct Gap {
     pub width_mm: f64,
 }
 
+impl Gap {
+    /// On the other bone, `ct`.
+    pub fn end(&self) -> Point3<f64> {
+        self.foot + self.across * self.width_mm
+    }
+}
+
 /// The gaps from the talus to `other`, one for each voxel of the talus that has a neighbour outside it, without the
 /// outermost 1.5 mm of the facet: past its rim rays are free whatever their direction.
 pub(super) fn gaps(bones: &AnkleBones, other: AnkleBone) -> Vec<Gap> {

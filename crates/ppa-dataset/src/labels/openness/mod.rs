@@ -5,9 +5,15 @@ mod exposure;
 mod grade;
 mod gutter;
 mod joint_space;
+mod overlap;
 mod rays;
+mod visible;
+
+#[cfg(test)]
+mod tests;
 
 pub use bones::{AnkleBone, AnkleBones, BoneNumbers, BonesError};
 pub use exposure::Exposure;
-pub use grade::{ComputedLabel, GradeThresholds, ThresholdError};
+pub use grade::{ComputedLabel, GradeScale, GradeThresholds, ThresholdError};
 pub use joint_space::{FREE_CHORDS_MM, Gutter, JointSpace, JointSpaceError, Openness};
+pub use overlap::Overlaps;

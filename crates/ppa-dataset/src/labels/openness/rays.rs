@@ -35,7 +35,7 @@ impl Window {
             *high = high.max(value);
         };
         for gap in gaps {
-            for end in [gap.foot, gap.foot + gap.across * gap.width_mm] {
+            for end in [gap.foot, gap.end()] {
                 let [across, along] = exposure.projected(&end);
                 widen(&mut window.across_mm, across);
                 widen(&mut window.along_mm, along);
@@ -72,7 +72,8 @@ impl Ray {
         }
     }
 
-    fn points(&self) -> impl Iterator<Item = Point3<f64>> {
+    /// Middles of its steps, voxels.
+    pub fn points(&self) -> impl Iterator<Item = Point3<f64>> {
         (0..self.steps).map(|n| self.start + self.step * (n as f64 + 0.5))
     }
 

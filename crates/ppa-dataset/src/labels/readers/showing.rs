@@ -53,10 +53,10 @@ impl Showing {
             .iter()
             .map(|first| showing(&first.image, &first.sha256, 2))
             .collect();
-        let half = shown.len() / 2;
-        shown.extend(again);
         // One radiograph alone has no second half.
-        shown[half.max(1)..].sort_by(|a, b| a.name.cmp(&b.name));
+        let half = shown.len().div_ceil(2);
+        shown.extend(again);
+        shown[half..].sort_by(|a, b| a.name.cmp(&b.name));
         shown
     }
 }
