@@ -1,6 +1,7 @@
 //! Options that are lists of numbers: points, ranges, boxes.
 
 use nalgebra::Point3;
+use ppa_dataset::labels::BoneNumbers;
 use ppa_mesh::{Bump, VoxelBox};
 
 fn finite<const N: usize>(text: &str) -> Option<[f64; N]> {
@@ -66,5 +67,23 @@ pub fn voxel_box(text: &str) -> Result<VoxelBox, String> {
             high: [i1, j1, k1],
         }),
         _ => Err("expected 6 voxel indices separated by commas".to_owned()),
+    }
+}
+
+/// `TIBIA,FIBULA,TALUS`: three labels of bones.
+pub fn bone_numbers(text: &str) -> Result<BoneNumbers, String> {
+    let numbers: Option<Vec<u8>> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok().filter(|&label| label > 0))
+        .collect();
+    match numbers.as_deref() {
+        Some(&[tibia, fibula, talus]) if tibia != fibula && fibula != talus && talus != tibia => {
+            Ok(BoneNumbers {
+                tibia,
+                fibula,
+                talus,
+            })
+        }
+        _ => Err("expected three different numbers from 1 to 255, separated by commas".to_owned()),
     }
 }

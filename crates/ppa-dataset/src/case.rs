@@ -9,6 +9,7 @@ use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use crate::files::{FileError, read_text, write_whole};
+use crate::labels::BoneFile;
 use crate::toml_file::{other_version, to_toml};
 
 /// One limb of one CT. `ppa prepare` proposes it; a person changes `side`, `surface` and
@@ -25,6 +26,9 @@ pub struct Case {
     pub surface: LimbSettings,
     /// Landmark decisions, filled in with what was found; edit them to overrule it.
     pub choices: LandmarkOverrides,
+    /// Which bone each voxel belongs to, for computed labels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bones: Option<BoneFile>,
     /// What followed from them when the case was written; `None` for a case that was read,
     /// since a person may have edited it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -40,6 +44,8 @@ struct CaseFile {
     source: Source,
     surface: LimbSettings,
     choices: LandmarkOverrides,
+    #[serde(default)]
+    bones: Option<BoneFile>,
     #[serde(default, rename = "found")]
     _found: IgnoredAny,
 }
@@ -111,7 +117,7 @@ pub enum CaseError {
 }
 
 impl Case {
-    /// Reads a case; the path of its scan becomes relative to the current folder.
+    /// Reads a case; the paths of its scan and bones become relative to the current folder.
     ///
     /// # Errors
     /// [`CaseError`] naming the file and the line or key at fault.
@@ -135,19 +141,27 @@ impl Case {
             },
             surface: case.surface,
             choices: case.choices,
+            bones: case.bones.map(|bones| BoneFile {
+                path: folder.join(&bones.path),
+                ..bones
+            }),
             found: None,
         })
     }
 
     /// Writes the case, whole or not at all.
     ///
-    /// A relative scan path is rewritten to start at the case file's folder.
+    /// Relative paths of scan and bones are rewritten to start at the case file's folder.
     ///
     /// # Errors
     /// [`CaseError::File`], also for a scan path that is not UTF-8, which TOML cannot hold.
     pub fn write(&self, path: &Path) -> Result<(), CaseError> {
         let mut case = self.clone();
-        case.source.path = relative_to(&case.source.path, path.parent().unwrap_or(Path::new("")))?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        case.source.path = relative_to(&case.source.path, folder)?;
+        if let Some(bones) = &mut case.bones {
+            bones.path = relative_to(&bones.path, folder)?;
+        }
         let text = to_toml(&case, path)?;
         Ok(write_whole(path, format!("{HEADER}{text}").as_bytes())?)
     }

@@ -8,6 +8,8 @@
 //! with `angle = step / 2` degrees, written with one decimal. All paths are relative to the
 //! dataset's root and use `/`.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use crate::body_shape::BodyShape;
@@ -77,6 +79,12 @@ pub struct LimbId {
     pub patient: u32,
     /// Left or right.
     pub side: Side,
+}
+
+impl fmt::Display for LimbId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "limb {} of patient {}", self.side_letter(), self.patient)
+    }
 }
 
 impl LimbId {

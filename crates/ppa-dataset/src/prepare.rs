@@ -133,6 +133,7 @@ pub fn prepare(
         },
         surface: surface.clone(),
         choices: prepared.landmarks.as_choices(choices),
+        bones: None,
         found: Some(Found {
             warnings: warnings
                 .into_iter()

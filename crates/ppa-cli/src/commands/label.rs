@@ -1,6 +1,7 @@
 //! `ppa label`: the quality of poses.
 
 mod agree;
+mod auto;
 mod export;
 mod import;
 
@@ -12,6 +13,8 @@ use crate::output::Output;
 pub enum LabelCommand {
     /// How far readers agree with each other, and with themselves
     Agree(agree::AgreeArgs),
+    /// Labels computed from the bones: how open the joint space lies to the beam
+    Auto(auto::AutoArgs),
     /// A page on which readers grade radiographs, blinded and shuffled
     Export(export::ExportArgs),
     /// Labels from the grades of readers
@@ -21,6 +24,7 @@ pub enum LabelCommand {
 pub fn run(command: &LabelCommand, output: Output) -> anyhow::Result<()> {
     match command {
         LabelCommand::Agree(args) => agree::run(args, output),
+        LabelCommand::Auto(args) => auto::run(args, output),
         LabelCommand::Export(args) => export::run(args, output),
         LabelCommand::Import(args) => import::run(args, output),
     }

@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use ppa_dataset::labels::{BoneFile, BoneNumbers};
 use ppa_dataset::{Case, Found, prepare};
 use ppa_mesh::{LimbSettings, VoxelBox, write_mesh_file};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
 
-use crate::number_lists::{point, range, voxel_box};
+use crate::number_lists::{bone_numbers, point, range, voxel_box};
 use crate::output::{Output, working};
 use crate::scan_args::ScanArgs;
 
@@ -76,6 +77,12 @@ pub struct PrepareArgs {
     /// A point of the plane under the limb, ct frame; give three: one distal, two proximal
     #[arg(long = "plane-point", value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     plane_points: Vec<[f64; 3]>,
+    /// Which bone each voxel belongs to, for `ppa label auto`: NIfTI, NRRD or MetaImage in the scan's frame
+    #[arg(long, value_name = "FILE")]
+    bones: Option<PathBuf>,
+    /// Numbers of tibia, fibula and talus in it
+    #[arg(long, value_name = "TIBIA,FIBULA,TALUS", default_value = "3,4,1", requires = "bones", value_parser = bone_numbers)]
+    bone_numbers: BoneNumbers,
 }
 
 pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
@@ -113,13 +120,22 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
         SideName::R => Side::Right,
     };
     let working = working("finding the limb");
-    let (case, prepared) = prepare(
+    let (mut case, prepared) = prepare(
         &args.scan.path,
         &args.scan.options(),
         side,
         &surface,
         &choices,
     )?;
+    if let Some(path) = &args.bones {
+        let bones = BoneFile {
+            path: path.clone(),
+            numbers: args.bone_numbers,
+        };
+        // Refused now rather than after the dataset was made.
+        bones.read(&prepared.landmarks.joint_centre.into())?;
+        case.bones = Some(bones);
+    }
     if let Some(ply) = &args.ply {
         write_mesh_file(ply, &prepared.limb.mesh)?;
     }

@@ -1,5 +1,6 @@
 //! The program as a user meets it.
 
+mod auto_labels;
 mod bad_input;
 mod conversion;
 mod coverage;

@@ -7,18 +7,26 @@
 //!
 //! Computed labels (feature `generate`) say how open the joint space of an ankle lies to the beam. `AnkleBones` tells
 //! tibia, fibula and talus apart; `JointSpace` finds the three gutters between them; its `openness` follows the rays of an
-//! `Exposure`; `GradeThresholds` make a grade of it. What is computed here is a surrogate: no reader has confirmed it.
+//! `Exposure`; `GradeThresholds` make a grade of it; `label_limb` does so for a dataset. What is computed here is a surrogate: no reader has confirmed it.
 
+#[cfg(feature = "generate")]
+mod computed;
 mod file;
 mod label;
 #[cfg(feature = "generate")]
 mod openness;
 #[cfg(feature = "generate")]
 mod readers;
+#[cfg(feature = "generate")]
+mod table;
 
+#[cfg(feature = "generate")]
+pub use computed::{AutoLabelError, ComputedRow, LabelledLimb, label_limb};
 pub use file::{LabelFile, LabelFileError};
 pub use label::{LabelError, LabelRow, LabelSource};
 #[cfg(feature = "generate")]
 pub use openness::*;
 #[cfg(feature = "generate")]
 pub use readers::*;
+#[cfg(feature = "generate")]
+pub use table::TableError;

@@ -20,7 +20,8 @@ pub enum GradeScale {
 
 /// How open the worst gutter must be for a grade; below the last one the grade is 3.
 ///
-/// No reader has set these numbers.
+/// No reader has set these numbers. With the defaults a pose is diagnostic (below 2.5) while the worst gutter shows a quarter of
+/// what this foot can attain: in the phantoms up to about 5° either side of the best pose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GradeThresholds {

@@ -1,5 +1,6 @@
 //! Computed labels: how open the joint space of an ankle lies to the beam.
 
+mod bone_file;
 mod bones;
 mod exposure;
 mod grade;
@@ -12,6 +13,7 @@ mod visible;
 #[cfg(test)]
 mod tests;
 
+pub use bone_file::{BoneFile, BoneFileError};
 pub use bones::{AnkleBone, AnkleBones, BoneNumbers, BonesError};
 pub use exposure::Exposure;
 pub use grade::{ComputedLabel, GradeScale, GradeThresholds, ThresholdError};

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::showing::Showing;
-use super::table::{TableError, read_table, write_table};
 use crate::files::FileError;
 use crate::labels::file::{LabelFile, LabelFileError};
 use crate::labels::label::{LabelError, LabelRow, LabelSource};
+use crate::labels::table::{TableError, read_table, write_table};
 use crate::layout::LimbId;
 use crate::manifest::{FileKind, FileRow, Manifest};
 

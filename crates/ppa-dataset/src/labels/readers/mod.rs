@@ -3,9 +3,7 @@
 mod grades;
 mod page;
 mod showing;
-mod table;
 
 pub use grades::{Grade, ImportError, Imported, import_grades};
 pub use page::{PageError, grading_page};
 pub use showing::{Showing, read_key, write_key};
-pub use table::TableError;

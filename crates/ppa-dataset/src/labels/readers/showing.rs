@@ -5,8 +5,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::table::{TableError, read_table, write_table};
 use crate::files::{FileError, hex};
+use crate::labels::table::{TableError, read_table, write_table};
 use crate::manifest::{FileKind, Manifest};
 use crate::seed::{Purpose, plan_seed};
 

@@ -1,0 +1,84 @@
+//! `ppa label auto`: labels computed from the bones.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::Args;
+use ppa_dataset::labels::{GradeThresholds, LabelledLimb, label_limb};
+use ppa_dataset::layout::LimbId;
+use ppa_dataset::{Case, Manifest, Plan};
+use serde::Serialize;
+
+use crate::output::{Output, working};
+
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+The gutters between talus, tibia and fibula are followed along the rays of every radiograph; the worst one decides. The \
+cases of the plan name the bones (`ppa prepare --bones`). Writes labels.json, with label_source surrogate-jso/1, and \
+openness.csv beside it: openness of each gutter, overlaps and clear spaces in mm. Labels of readers stay as they are. \
+No reader has confirmed these labels.
+
+  ppa ct phantom --out p01.nii.gz --labels p01.bones.nii.gz
+  ppa prepare p01.nii.gz --side r --bones p01.bones.nii.gz --out p01.case.toml
+  ppa generate plan.toml && ppa label auto plan
+
+Thresholds are a TOML file; these are the defaults, the least openness for grades 1, 1.5, 2 and 2.5:
+
+  relative_to = \"own_best\"             # or \"each_gutter\": no credit for facets that are never open together
+  at_least = [0.75, 0.5, 0.25, 0.03]")]
+pub struct AutoArgs {
+    /// Folder of a dataset
+    dataset: PathBuf,
+    /// Plan it was made from [default: the file beside the folder, named after it]
+    #[arg(long, value_name = "FILE")]
+    plan: Option<PathBuf>,
+    /// Thresholds of openness, TOML
+    #[arg(long, value_name = "FILE")]
+    thresholds: Option<PathBuf>,
+}
+
+#[derive(Debug, Serialize)]
+struct Labelled {
+    limbs: Vec<LabelledLimb>,
+    thresholds: GradeThresholds,
+}
+
+pub fn run(args: &AutoArgs, output: Output) -> anyhow::Result<()> {
+    let thresholds = match &args.thresholds {
+        Some(path) => GradeThresholds::read(path)?,
+        None => GradeThresholds::default(),
+    };
+    let manifest = Manifest::read(&args.dataset)?;
+    let beside = || args.dataset.with_extension("toml");
+    let plan = Plan::read(&args.plan.clone().unwrap_or_else(beside))?;
+    let working = working("following rays through the joint");
+    let limbs = plan.cases.iter().map(|planned| {
+        let case = Case::read(&planned.file)?;
+        let limb = LimbId {
+            patient: planned.patient,
+            side: case.side.into(),
+        };
+        label_limb(&manifest, limb, &case, &thresholds)
+            .with_context(|| format!("cannot label by {}", planned.file.display()))
+    });
+    let limbs = limbs.collect::<anyhow::Result<_>>()?;
+    working.finish_and_clear();
+    output.print(&Labelled { limbs, thresholds }, describe)
+}
+
+fn describe(labelled: &Labelled) -> String {
+    let line = |limb: &LabelledLimb| {
+        let kept = if limb.readers_kept {
+            "; labels of readers kept, see openness.csv"
+        } else {
+            ""
+        };
+        format!(
+            "{}: {} radiographs, {} diagnostic, most open at {:.1} degrees{kept}",
+            limb.limb, limb.radiographs, limb.diagnostic, limb.best_angle_deg
+        )
+    };
+    let mut lines: Vec<String> = labelled.limbs.iter().map(line).collect();
+    lines.push("surrogate, not validated on readers".to_owned());
+    lines.join("\n")
+}

@@ -1,0 +1,125 @@
+//! Labels computed from the bones of a phantom.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::{fail, succeed};
+
+/// A coarse phantom with its bones, its case and a dataset of radiographs from 0 to 36 degrees, `plan`; the images
+/// themselves are as small as they can be, since only their poses matter.
+fn dataset(here: &Path) {
+    succeed(
+        here,
+        "ct phantom --out p01.nii --spacing-mm 1.2 --table --labels bones.nii",
+    );
+    succeed(
+        here,
+        "prepare p01.nii --side r --bones bones.nii --out p01.toml",
+    );
+    let plan = "version = 1\n[[case]]\nfile = \"p01.toml\"\npatient = 3\n\
+                [rotation]\nfrom_deg = 0.0\nto_deg = 36.0\nstep_deg = 3.0\n\
+                [shapes]\nvariants = [\"orig\"]\n\
+                [xray]\nhalf_length_mm = 10.0\nmax_voxel_mm = 5.0\n\
+                detector = { columns = 4, rows = 4, pixel_mm = 50.0 }\n\
+                engine = { scatter_histories = 100, scatter_pixel_mm = 200.0, samples_per_side = 1 }\n";
+    fs::write(here.join("plan.toml"), plan).unwrap();
+    succeed(here, "generate plan.toml");
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap()
+}
+
+fn labels(here: &Path) -> Value {
+    json(&fs::read_to_string(here.join("plan/patient_3/labels/r/labels.json")).unwrap())
+}
+
+#[test]
+fn a_phantom_is_graded_best_at_its_mortise_angle() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    dataset(here);
+    refusals(here);
+    let said = json(&succeed(here, "label auto plan --json"));
+    // P01 turns its malleoli parallel to the detector at 18 degrees.
+    let best = said["limbs"][0]["best_angle_deg"].as_f64().unwrap();
+    assert!((best - 18.0).abs() < 3.0, "{best}");
+    let found = labels(here);
+    let label = |step: u32| {
+        let row = &found[format!("xray_image_{step}.png")];
+        assert_eq!(row["label_source"], "surrogate-jso/1");
+        row["label"].as_f64().unwrap()
+    };
+    assert_eq!(found.as_object().unwrap().len(), 13);
+    assert_eq!((label(0), label(36), label(72)), (3.0, 1.0, 3.0));
+    let curve: Vec<f64> = (0..13).map(|n| label(6 * n)).collect();
+    let middle = curve.iter().position(|&l| l == 1.0).unwrap();
+    assert!(curve[..middle].is_sorted_by(|a, b| a >= b), "{curve:?}");
+    assert!(curve[middle..].is_sorted_by(|a, b| a <= b), "{curve:?}");
+
+    // Overlap falls on the way to the mortise view.
+    let table = fs::read_to_string(here.join("plan/patient_3/labels/r/openness.csv")).unwrap();
+    let mut lines = table.lines();
+    let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let column = |name: &str| columns.iter().position(|c| *c == name).unwrap();
+    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    let at = |row: usize, name: &str| rows[row][column(name)].parse::<f64>().unwrap();
+    let overlap = |row| at(row, "tibiofibular_overlap_mm");
+    assert!(overlap(6) < overlap(0) - 2.0);
+    // Patil 2012 at 15 degrees: 4.5 ± 1.2 mm, here within two standard deviations.
+    let clear = at(6, "tibiofibular_clear_space_mm");
+    assert!((2.1..6.9).contains(&clear), "{clear}");
+
+    // Readers' labels win, whichever comes first.
+    let graded = "image,reader,grade\npatient_3/xray/r/xray_image_36.png,a,2.5\n";
+    fs::write(here.join("a.csv"), graded).unwrap();
+    let said = json(&succeed(here, "label import plan a.csv --json"));
+    assert_eq!(
+        (&said["replaced_computed"], &said["without_label"]),
+        (&13.into(), &12.into())
+    );
+    let by_reader = labels(here);
+    let said = json(&succeed(here, "label auto plan --json"));
+    assert_eq!(said["limbs"][0]["readers_kept"], true);
+    assert_eq!(labels(here), by_reader);
+}
+
+/// Nothing is written by what is refused.
+fn refusals(here: &Path) {
+    let case = fs::read(here.join("p01.toml")).unwrap();
+    let refused = |arguments: &str, expected: &str| {
+        let said = fail(here, arguments);
+        assert!(said.contains(expected), "{said}");
+        assert!(!here.join("plan/patient_3/labels/r/openness.csv").exists());
+    };
+    fs::write(here.join("t.toml"), "at_least = [0.1, 0.2, 0.3, 0.4]").unwrap();
+    refused(
+        "label auto plan --thresholds t.toml",
+        "expected four falling numbers",
+    );
+    refused(
+        "prepare p01.nii --side r --bones p01.nii --out x.toml",
+        "p01.nii holds the value -1000",
+    );
+    refused(
+        "prepare p01.nii --side r --bones bones.nii --bone-numbers 3,4,99 --out x.toml",
+        "no voxel of the talus (label 99)",
+    );
+    succeed(here, "prepare p01.nii --side r --out p01.toml");
+    refused(
+        "label auto plan",
+        "names no bones: write it again with `ppa prepare --bones`",
+    );
+    succeed(
+        here,
+        "ct phantom --out p02.nii --name P02 --spacing-mm 2.5 --labels p02.bones.nii",
+    );
+    succeed(
+        here,
+        "prepare p02.nii --side r --bones p02.bones.nii --out p01.toml",
+    );
+    refused("label auto plan", "were not made from the scan of the case");
+    fs::write(here.join("p01.toml"), case).unwrap();
+}

@@ -1,0 +1,252 @@
+//! Computed labels of a dataset: every radiograph of a limb graded by how open its joint space lies.
+
+use std::path::PathBuf;
+
+use nalgebra::{Isometry3, Point3};
+use ppa_depth::isometry_from_rows;
+use serde::Serialize;
+
+use super::file::{LabelFile, LabelFileError};
+use super::label::{LabelError, LabelRow, LabelSource};
+use super::openness::{
+    BoneFileError, Exposure, GradeThresholds, JointSpace, JointSpaceError, ThresholdError,
+};
+use super::table::write_table;
+use crate::case::Case;
+use crate::description::DESCRIPTION_FILE;
+use crate::files::{FileError, read_text};
+use crate::layout::LimbId;
+use crate::manifest::{FileKind, FileRow, Manifest, Rows};
+
+/// What was computed for one radiograph; a row of `openness.csv`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ComputedRow {
+    /// The radiograph, from the dataset's root.
+    pub image: String,
+    /// Half degrees of medial rotation.
+    pub step: u32,
+    /// Degrees of medial rotation.
+    pub angle_deg: f64,
+    /// Openness of the medial gutter, 0 to 1.
+    pub medial: f64,
+    /// Of the superior one.
+    pub superior: f64,
+    /// Of the lateral one.
+    pub lateral: f64,
+    /// Openness of the worst, as the thresholds scale it.
+    pub worst: f64,
+    /// Grade from 1 to 3 in half steps.
+    pub label: f64,
+    /// Half the range that other tolerances and thresholds give.
+    pub std: f64,
+    /// See [`Overlaps`](super::Overlaps), as the next three.
+    pub tibiofibular_overlap_mm: Option<f64>,
+    /// Floor of the incisura to fibula.
+    pub tibiofibular_clear_space_mm: Option<f64>,
+    /// Talus to medial malleolus.
+    pub medial_clear_space_mm: Option<f64>,
+    /// Trochlea to plafond.
+    pub superior_clear_space_mm: Option<f64>,
+}
+
+/// What [`label_limb`] did.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LabelledLimb {
+    /// The limb.
+    #[serde(flatten)]
+    pub limb: LimbId,
+    /// Radiographs that were graded.
+    pub radiographs: usize,
+    /// How many of them are diagnostic, below 2.5.
+    pub diagnostic: usize,
+    /// Rotation at which the worst gutter is most open: the middle of what reaches nine tenths of the best.
+    pub best_angle_deg: f64,
+    /// Whether `labels.json` holds readers' labels and was left as it is.
+    pub readers_kept: bool,
+}
+
+/// Why a limb cannot be labelled.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum AutoLabelError {
+    /// The case names no bones.
+    #[error("the case of {0} names no bones: write it again with `ppa prepare --bones`")]
+    NoBones(LimbId),
+    /// The dataset shows no radiographs of the limb.
+    #[error("{} lists no radiographs of {limb}", root.display())]
+    NoRadiographs {
+        /// The dataset.
+        root: PathBuf,
+        /// The limb.
+        limb: LimbId,
+    },
+    /// The dataset was made from another scan.
+    #[error("the radiographs of {0} were not made from the scan of the case")]
+    OtherScan(LimbId),
+    /// A radiograph without a pose of the device, or with one that is none.
+    #[error("{file} has no usable {what} in the manifest")]
+    Pose {
+        /// The radiograph.
+        file: String,
+        /// `ct_from_device` or `patient_from_ct`.
+        what: &'static str,
+    },
+    /// The bones.
+    #[error(transparent)]
+    Bones(#[from] BoneFileError),
+    /// Their joint space.
+    #[error("bones of {limb}")]
+    JointSpace {
+        /// The limb.
+        limb: LimbId,
+        /// What is wrong with it.
+        source: JointSpaceError,
+    },
+    /// The thresholds.
+    #[error(transparent)]
+    Thresholds(#[from] ThresholdError),
+    /// A file.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// Labels that are there are none.
+    #[error(transparent)]
+    Labels(#[from] LabelFileError),
+    /// A label off the grid.
+    #[error(transparent)]
+    Label(#[from] LabelError),
+}
+
+/// Grades every radiograph of a limb from the bones that its case names, and writes `openness.csv` and `labels.json`
+/// beside its regions of interest. Labels of readers, and labels that do not tell their source, stay as they are.
+///
+/// # Errors
+/// [`AutoLabelError`], before anything is written.
+pub fn label_limb(
+    manifest: &Manifest,
+    limb: LimbId,
+    case: &Case,
+    thresholds: &GradeThresholds,
+) -> Result<LabelledLimb, AutoLabelError> {
+    let before = LabelFile::read(&manifest.root, limb)?;
+    let readers_kept = before.is_some_and(|labels| labels.source != Some(LabelSource::Surrogate));
+    let rows = computed_rows(manifest, limb, case, thresholds)?;
+    let table = manifest.root.join(limb.roi_file());
+    let table = table.with_file_name("openness.csv");
+    let labels = rows.iter().map(|row| LabelRow {
+        label: row.label,
+        std: row.std,
+        step: row.step,
+    });
+    let labels = LabelFile::new(LabelSource::Surrogate, labels)?;
+    write_table(&table, &rows)?;
+    if !readers_kept {
+        labels.write(&manifest.root, limb)?;
+    }
+    Ok(LabelledLimb {
+        limb,
+        radiographs: rows.len(),
+        diagnostic: rows.iter().filter(|row| row.label < 2.5).count(),
+        best_angle_deg: best_angle_deg(&rows),
+        readers_kept,
+    })
+}
+
+fn computed_rows(
+    manifest: &Manifest,
+    limb: LimbId,
+    case: &Case,
+    thresholds: &GradeThresholds,
+) -> Result<Vec<ComputedRow>, AutoLabelError> {
+    thresholds.check()?;
+    let Some(bones) = &case.bones else {
+        return Err(AutoLabelError::NoBones(limb));
+    };
+    let radiographs: Vec<&FileRow> = manifest
+        .files
+        .iter()
+        .filter(|row| row.kind == FileKind::Radiograph && row.limb == limb)
+        .collect();
+    let Some(first) = radiographs.first() else {
+        return Err(AutoLabelError::NoRadiographs {
+            root: manifest.root.clone(),
+            limb,
+        });
+    };
+    if scan_of(manifest, limb)?.as_deref() != Some(&case.source.volume_sha256) {
+        return Err(AutoLabelError::OtherScan(limb));
+    }
+    let patient_from_ct = pose(first, "patient_from_ct", Some(&first.patient_from_ct))?;
+    let ct_from_patient = patient_from_ct.inverse();
+    let joint = ct_from_patient * Point3::origin();
+    let exposures: Vec<Exposure> = radiographs
+        .iter()
+        .map(|row| {
+            let ct_from_device = pose(row, "ct_from_device", row.ct_from_device.as_ref())?;
+            Ok(Exposure::of_device(&ct_from_device, joint))
+        })
+        .collect::<Result<_, AutoLabelError>>()?;
+    let of_limb = |source| AutoLabelError::JointSpace { limb, source };
+    let space = JointSpace::new(bones.read(&joint)?, &ct_from_patient).map_err(of_limb)?;
+    let openness = space.openness(&exposures).map_err(of_limb)?;
+    let rows = radiographs.iter().zip(&exposures).zip(&openness);
+    Ok(rows
+        .map(|((row, exposure), openness)| {
+            let grade = thresholds.grade(openness);
+            let overlaps = space.overlaps(exposure);
+            ComputedRow {
+                image: row.file.clone(),
+                step: row.step,
+                angle_deg: row.angle_deg,
+                medial: openness.medial[1],
+                superior: openness.superior,
+                lateral: openness.lateral[1],
+                worst: thresholds.scaled(openness)[1],
+                label: grade.label,
+                std: grade.std,
+                tibiofibular_overlap_mm: overlaps.tibiofibular_overlap_mm,
+                tibiofibular_clear_space_mm: overlaps.tibiofibular_clear_space_mm,
+                medial_clear_space_mm: overlaps.medial_clear_space_mm,
+                superior_clear_space_mm: overlaps.superior_clear_space_mm,
+            }
+        })
+        .collect())
+}
+
+fn pose(
+    row: &FileRow,
+    what: &'static str,
+    rows: Option<&Rows>,
+) -> Result<Isometry3<f64>, AutoLabelError> {
+    let usable = rows.and_then(|rows| isometry_from_rows(rows).ok());
+    usable.ok_or_else(|| AutoLabelError::Pose {
+        file: row.file.clone(),
+        what,
+    })
+}
+
+/// Hash of the scan that a limb of a dataset was made from.
+fn scan_of(manifest: &Manifest, limb: LimbId) -> Result<Option<String>, FileError> {
+    #[derive(serde::Deserialize)]
+    struct Described {
+        limbs: Vec<Limb>,
+    }
+    #[derive(serde::Deserialize)]
+    struct Limb {
+        #[serde(flatten)]
+        limb: LimbId,
+        volume_sha256: String,
+    }
+    let path = manifest.root.join(DESCRIPTION_FILE);
+    let described: Described = serde_json::from_str(&read_text(&path)?)
+        .map_err(|error| FileError::at("parse", &path)(error.into()))?;
+    let found = described.limbs.into_iter().find(|found| found.limb == limb);
+    Ok(found.map(|found| found.volume_sha256))
+}
+
+/// The middle of the rotations at which the worst gutter shows at least nine tenths of the most: both flanks are steep.
+fn best_angle_deg(rows: &[ComputedRow]) -> f64 {
+    let most = rows.iter().map(|row| row.worst).fold(0.0, f64::max);
+    let near = rows.iter().filter(|row| row.worst >= 0.9 * most);
+    let angles: Vec<f64> = near.map(|row| row.angle_deg).collect();
+    angles.iter().sum::<f64>() / angles.len() as f64
+}
