@@ -16,7 +16,9 @@ mod tape;
 use candle_core::{Tensor, Var};
 
 pub use architecture::Entry;
-use architecture::{Architecture, FEATURES};
+use architecture::FEATURES;
+pub(crate) use architecture::{Architecture, ConvPlace, SqueezePlace};
+pub(crate) use norm::running;
 use operation::Backbone;
 
 use crate::kernels::buffer::Pool;
@@ -183,6 +185,10 @@ impl EfficientNetB0 {
             _ => features.clone(),
         };
         Ok(kept.matmul(&weight.t()?)?.broadcast_add(&bias)?)
+    }
+
+    pub(crate) fn architecture(&self) -> &Architecture {
+        &self.architecture
     }
 
     /// The two flat variables that training changes: the backbone's and the classifier's.

@@ -1,49 +1,110 @@
-//! Values of a whole network by torchvision's names.
+//! Values of a whole network by torchvision's names, from files and to files.
+
+mod file;
+mod names;
+mod onnx;
+mod onnx_messages;
 
 use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 
 use candle_core::{DType, Tensor};
 
 use crate::network::{EfficientNetB0, Entry, NetworkError};
 
-/// Why a network could not take the values that it was given.
+/// What becomes of a first convolution that was trained on several channels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum FirstConvolution {
+    /// Thrown away: the network keeps its own. The paper's authors do so.
+    #[default]
+    Fresh,
+    /// The sum over the channels: what an image that is the same in all channels would have given.
+    Sum,
+    /// The mean over the channels.
+    Mean,
+}
+
+/// What was not taken from a weight file as it stood.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Loaded {
+    /// How a first convolution of several channels became one of one channel.
+    pub first_convolution: Option<FirstConvolution>,
+    /// The file's classifier has another number of outputs; the network kept its own.
+    pub fresh_classifier: bool,
+    /// Names that the network does not have.
+    pub unused: Vec<String>,
+}
+
+/// Why a network could not take the values that it was given, or not write its own.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WeightsError {
-    /// Tensors that are not there or have another shape.
-    #[error("weights do not fit EfficientNet-B0 with one channel and one output: {}", .0.join("; "))]
-    Misfit(Vec<String>),
+    /// Tensors that are not there, have another shape or hold what is no weight.
+    #[error("{} not fit EfficientNet-B0 with one channel and one output: {}", place(.path), .misfits.join("; "))]
+    Misfit {
+        /// The file, if the values came from one.
+        path: Option<PathBuf>,
+        /// One clause for each tensor.
+        misfits: Vec<String>,
+    },
+    /// A file that cannot be read.
+    #[error("cannot read weights from {}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// A file that cannot be written.
+    #[error(transparent)]
+    Write(#[from] ppa_dataset::FileError),
     /// An error of the network.
     #[error(transparent)]
     Network(#[from] NetworkError),
     /// An error of candle.
-    #[error("cannot read the weights")]
+    #[error("the weights cannot be turned into f32")]
     Candle(#[from] candle_core::Error),
+}
+
+fn place(path: &Option<PathBuf>) -> String {
+    path.as_ref().map_or_else(
+        || "the weights do".into(),
+        |path| format!("the weights of {} do", path.display()),
+    )
+}
+
+impl WeightsError {
+    fn in_file(self, file: &Path) -> Self {
+        match self {
+            Self::Misfit { misfits, .. } => Self::Misfit {
+                path: Some(file.to_owned()),
+                misfits,
+            },
+            other => other,
+        }
+    }
 }
 
 impl EfficientNetB0 {
     /// Takes the values of every parameter and running statistic, by torchvision's names; other names are not looked at.
     ///
     /// # Errors
-    /// If any is missing or has another shape, each named; the network is then as before.
+    /// If any is missing, has another shape or holds what is no weight, each named; the network is then as before.
     pub fn assign(&self, tensors: &HashMap<String, Tensor>) -> Result<(), WeightsError> {
         let mut flat = [Vec::new(), Vec::new(), Vec::new()];
         let mut misfits = Vec::new();
         let statistics = self.statistics_layout().map(|entry| (2, entry));
         for (variable, entry) in self.layout().chain(statistics) {
             match fitting(tensors, entry) {
-                Ok(tensor) => {
-                    let values = tensor
-                        .to_dtype(DType::F32)?
-                        .flatten_all()?
-                        .to_vec1::<f32>()?;
-                    flat[variable].extend(values);
-                }
+                Ok(values) => flat[variable].extend(values),
                 Err(misfit) => misfits.push(misfit),
             }
         }
         if !misfits.is_empty() {
-            return Err(WeightsError::Misfit(misfits));
+            return Err(WeightsError::Misfit {
+                path: None,
+                misfits,
+            });
         }
         let [backbone, classifier] = self.variables();
         for (variable, values) in [backbone, classifier, self.statistics_variable()]
@@ -56,16 +117,33 @@ impl EfficientNetB0 {
     }
 }
 
-/// The tensor of an entry, or a sentence on why there is none.
-fn fitting<'a>(tensors: &'a HashMap<String, Tensor>, entry: &Entry) -> Result<&'a Tensor, String> {
-    match tensors.get(&entry.name) {
-        None => Err(format!("{} is missing", entry.name)),
-        Some(tensor) if tensor.dims() != entry.shape => Err(format!(
-            "{} has the shape {:?}, expected {:?}",
-            entry.name,
+/// The values of an entry, or a clause on why there are none.
+fn fitting(tensors: &HashMap<String, Tensor>, entry: &Entry) -> Result<Vec<f32>, String> {
+    let name = &entry.name;
+    let tensor = tensors
+        .get(name)
+        .ok_or_else(|| format!("{name} is missing"))?;
+    if tensor.dims() != entry.shape {
+        return Err(format!(
+            "{name} has the shape {:?}, expected {:?}",
             tensor.dims(),
             entry.shape
-        )),
-        Some(tensor) => Ok(tensor),
+        ));
+    }
+    let values = tensor
+        .to_dtype(DType::F32)
+        .and_then(|tensor| tensor.flatten_all()?.to_vec1::<f32>());
+    let values = values.map_err(|error| format!("{name} is not made of numbers ({error})"))?;
+    let least = if name.ends_with("running_var") {
+        0.0
+    } else {
+        f32::MIN
+    };
+    match values
+        .iter()
+        .find(|value| !(least..=f32::MAX).contains(*value))
+    {
+        Some(value) => Err(format!("{name} holds {value}")),
+        None => Ok(values),
     }
 }

@@ -18,6 +18,11 @@ pub struct Norm {
     inverse: Vec<f64>,
 }
 
+/// What a normalisation amounts to in evaluation.
+pub fn running(place: &NormPlace, parameters: &[f32], statistics: &[f32]) -> Affine {
+    Norm::running(place, parameters, statistics).affine
+}
+
 impl Norm {
     /// By the running statistics.
     pub fn running(place: &NormPlace, parameters: &[f32], statistics: &[f32]) -> Self {

@@ -1,0 +1,123 @@
+//! Weight files: safetensors and PyTorch's zip files in, safetensors out.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use candle_core::{DType, Device, Tensor, pickle};
+
+use super::names::{timm_name, without_prefix};
+use super::{FirstConvolution, Loaded, WeightsError};
+use crate::network::EfficientNetB0;
+
+const FIRST: &str = "features.0.0.weight";
+const CLASSIFIER: [&str; 2] = ["classifier.1.weight", "classifier.1.bias"];
+
+impl EfficientNetB0 {
+    /// Takes weights of torchvision's or timm's `efficientnet_b0` from a `.safetensors` file or from a `.pth` or `.pt` file of torch 1.6 or later.
+    ///
+    /// A first convolution of several channels becomes one of one channel as `first` says; a classifier with another number of outputs
+    /// is left as it is here. [`Loaded`] tells both, and what else the file holds. timm's `tf_efficientnet_b0` bears the same names
+    /// but pads and normalises in another way: it is read without complaint and gives other outputs than in timm.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or if any tensor is missing, has another shape or holds what is no weight; each is named, and
+    /// the network is then as before.
+    pub fn load(&self, path: &Path, first: FirstConvolution) -> Result<Loaded, WeightsError> {
+        let at = |error: Box<dyn std::error::Error + Send + Sync>| WeightsError::Read {
+            path: path.to_owned(),
+            source: error,
+        };
+        let found = read(path).map_err(at)?;
+        let (loaded, tensors) = self.fit(found, first)?;
+        self.assign(&tensors).map_err(|error| error.in_file(path))?;
+        Ok(loaded)
+    }
+
+    /// The tensors of a file by torchvision's names, with the own values where the file has none to give.
+    fn fit(
+        &self,
+        found: HashMap<String, Tensor>,
+        first: FirstConvolution,
+    ) -> Result<(Loaded, HashMap<String, Tensor>), WeightsError> {
+        let mut found: HashMap<String, Tensor> = found
+            .into_iter()
+            .map(|(name, tensor)| (without_prefix(&name).to_owned(), tensor))
+            .collect();
+        let timm = found.contains_key("conv_stem.weight");
+        let mut tensors = HashMap::new();
+        let mut loaded = Loaded::default();
+        for own in self.parameters()?.into_iter().chain(self.statistics()?) {
+            let name =
+                if timm { timm_name(&own.name) } else { None }.unwrap_or_else(|| own.name.clone());
+            let Some(tensor) = found.remove(&name) else {
+                continue;
+            };
+            let several = own.name == FIRST
+                && matches!(tensor.dims(), [32, channels, 3, 3] if *channels != 1);
+            let outputs = CLASSIFIER.contains(&own.name.as_str())
+                && tensor.dims()[..] != own.tensor.dims()[..];
+            let taken = if several {
+                loaded.first_convolution = Some(first);
+                match first {
+                    FirstConvolution::Fresh => own.tensor,
+                    FirstConvolution::Sum => tensor.to_dtype(DType::F32)?.sum_keepdim(1)?,
+                    FirstConvolution::Mean => tensor.to_dtype(DType::F32)?.mean_keepdim(1)?,
+                }
+            } else if outputs {
+                loaded.fresh_classifier = true;
+                own.tensor
+            } else {
+                tensor
+            };
+            tensors.insert(own.name, taken);
+        }
+        loaded.unused = found
+            .into_keys()
+            .filter(|name| !name.ends_with("num_batches_tracked"))
+            .collect();
+        loaded.unused.sort();
+        if loaded.fresh_classifier {
+            // A weight without its bias, or the other way round, is no classifier.
+            for own in self
+                .parameters()?
+                .into_iter()
+                .filter(|own| CLASSIFIER.contains(&own.name.as_str()))
+            {
+                tensors.insert(own.name, own.tensor);
+            }
+        }
+        Ok((loaded, tensors))
+    }
+
+    /// Writes all weights and running statistics as safetensors with torchvision's names, whole or not at all.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), WeightsError> {
+        let named = self.parameters()?.into_iter().chain(self.statistics()?);
+        let tensors: Vec<(String, Tensor)> =
+            named.map(|named| (named.name, named.tensor)).collect();
+        let bytes = safetensors::serialize(tensors, None).map_err(|error| WeightsError::Read {
+            path: path.to_owned(),
+            source: error.into(),
+        })?;
+        Ok(ppa_dataset::write_whole(path, &bytes)?)
+    }
+}
+
+fn read(path: &Path) -> Result<HashMap<String, Tensor>, Box<dyn std::error::Error + Send + Sync>> {
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("safetensors") => Ok(candle_core::safetensors::load(path, &Device::Cpu)?),
+        Some("pth" | "pt") => {
+            let tensors = pickle::read_all(path)?;
+            // Training scripts put the weights beside other things.
+            let tensors = if tensors.is_empty() {
+                pickle::read_all_with_key(path, Some("state_dict"))?
+            } else {
+                tensors
+            };
+            Ok(tensors.into_iter().collect())
+        }
+        _ => Err("weights are read from .safetensors, .pth and .pt files".into()),
+    }
+}

@@ -1,0 +1,309 @@
+//! Weight files: what is written is read, what does not fit is named, and nothing that a file holds can break the reader.
+
+use std::collections::HashMap;
+use std::error::Error;
+
+use candle_core::{DType, Device, Tensor};
+use ppa_learn::{EfficientNetB0, FirstConvolution, Loaded, Mode, Named, Options, WeightsError};
+use proptest::prelude::*;
+
+fn network(seed: u64) -> EfficientNetB0 {
+    EfficientNetB0::new(seed, Options::default()).unwrap()
+}
+
+fn named(network: &EfficientNetB0) -> Vec<Named> {
+    let mut all = network.parameters().unwrap();
+    all.extend(network.statistics().unwrap());
+    all
+}
+
+fn values(network: &EfficientNetB0) -> Vec<Vec<f32>> {
+    named(network)
+        .iter()
+        .map(|named| named.tensor.flatten_all().unwrap().to_vec1().unwrap())
+        .collect()
+}
+
+fn tensors(network: &EfficientNetB0) -> HashMap<String, Tensor> {
+    named(network)
+        .into_iter()
+        .map(|named| (named.name, named.tensor))
+        .collect()
+}
+
+fn write(tensors: &HashMap<String, Tensor>) -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("weights.safetensors");
+    candle_core::safetensors::save(tensors, &path).unwrap();
+    (folder, path)
+}
+
+#[test]
+fn saved_weights_are_read_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("weights.safetensors");
+    let (one, other) = (network(1), network(2));
+    // Also running statistics that are not the first ones.
+    let images = Tensor::rand(0.0_f32, 1.0, (4, 1, 40, 40), &Device::Cpu).unwrap();
+    one.forward(&images, Mode::Train { step: 0 }).unwrap();
+    one.save(&path).unwrap();
+    assert_ne!(values(&one), values(&other));
+    assert_eq!(
+        other.load(&path, FirstConvolution::Fresh).unwrap(),
+        Loaded::default()
+    );
+    assert_eq!(values(&one), values(&other));
+}
+
+#[test]
+fn colour_and_classes_of_a_pretrained_file_give_way() {
+    let (one, other) = (network(1), network(2));
+    let mut tensors = tensors(&one);
+    let first = tensors["features.0.0.weight"].clone();
+    let colour = Tensor::cat(
+        &[&first, &(&first * 2.0).unwrap(), &(&first * 3.0).unwrap()],
+        1,
+    )
+    .unwrap();
+    tensors.insert("features.0.0.weight".into(), colour);
+    for (name, shape) in [
+        ("classifier.1.weight", vec![1000, 1280]),
+        ("classifier.1.bias", vec![1000]),
+    ] {
+        tensors.insert(
+            name.into(),
+            Tensor::zeros(shape, DType::F32, &Device::Cpu).unwrap(),
+        );
+    }
+    tensors.insert(
+        "features.0.1.num_batches_tracked".into(),
+        Tensor::new(7_i64, &Device::Cpu).unwrap(),
+    );
+    tensors.insert(
+        "ema.decay".into(),
+        Tensor::new(0.5_f32, &Device::Cpu).unwrap(),
+    );
+    let tensors = tensors
+        .into_iter()
+        .map(|(name, tensor)| (format!("module.model.{name}"), tensor))
+        .collect();
+    let (_folder, path) = write(&tensors);
+    let fresh = values(&other);
+    for (choice, factor) in [
+        (FirstConvolution::Fresh, None),
+        (FirstConvolution::Sum, Some(6.0_f32)),
+        (FirstConvolution::Mean, Some(2.0)),
+    ] {
+        let loaded = other.load(&path, choice).unwrap();
+        assert_eq!(
+            loaded,
+            Loaded {
+                first_convolution: Some(choice),
+                fresh_classifier: true,
+                unused: vec!["ema.decay".into()]
+            }
+        );
+        let (ours, theirs) = (values(&other), values(&one));
+        for (ours, theirs) in ours[0].iter().zip(&theirs[0]) {
+            assert!(factor.is_none_or(|factor| (ours - factor * theirs).abs() < 1e-5));
+        }
+        assert_eq!(factor.is_none(), ours[0] == fresh[0]);
+        assert_eq!(ours[1..211], theirs[1..211]);
+        assert_eq!(ours[211..213], fresh[211..213], "the classifier");
+        assert_eq!(ours[213..], theirs[213..]);
+    }
+}
+
+#[test]
+fn everything_that_does_not_fit_is_named_and_changes_nothing() {
+    let (one, other) = (network(1), network(2));
+    let mut tensors = tensors(&one);
+    tensors.remove("features.3.1.block.2.fc1.bias");
+    tensors.insert(
+        "features.8.0.weight".into(),
+        Tensor::zeros((1280, 320), DType::F32, &Device::Cpu).unwrap(),
+    );
+    tensors.insert(
+        "features.0.1.bias".into(),
+        Tensor::full(f32::NAN, 32, &Device::Cpu).unwrap(),
+    );
+    tensors.insert(
+        "features.8.1.running_var".into(),
+        Tensor::full(-1.0_f32, 1280, &Device::Cpu).unwrap(),
+    );
+    let (_folder, path) = write(&tensors);
+    let before = values(&other);
+    let error = other
+        .load(&path, FirstConvolution::Fresh)
+        .unwrap_err()
+        .to_string();
+    for part in [
+        "weights.safetensors",
+        "features.3.1.block.2.fc1.bias is missing",
+        "features.8.0.weight has the shape [1280, 320], expected [1280, 320, 1, 1]",
+        "features.0.1.bias holds NaN",
+        "features.8.1.running_var holds -1",
+    ] {
+        assert!(error.contains(part), "{error}");
+    }
+    assert_eq!(values(&other), before);
+}
+
+#[test]
+fn what_is_no_weight_file_is_told_by_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["w.safetensors", "w.pth", "w.onnx"] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, b"not a weight file").unwrap();
+        let error = network(0).load(&path, FirstConvolution::Fresh).unwrap_err();
+        assert!(matches!(error, WeightsError::Read { .. }), "{error}");
+        assert!(
+            error.to_string().contains(name) && error.source().is_some(),
+            "{error}"
+        );
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+
+    /// A file cut short, lengthened, or with other bytes in its header gives an error or weights, and never a panic.
+    #[test]
+    fn a_corrupt_file_is_an_error(cut in 0_usize..60_000, flips in prop::collection::vec((0_usize..30_000, any::<u8>()), 0..4)) {
+        thread_local! {
+            static NETWORK: EfficientNetB0 = network(4);
+            static BYTES: Vec<u8> = NETWORK.with(|network| {
+                let folder = tempfile::tempdir().unwrap();
+                let path = folder.path().join("weights.safetensors");
+                network.save(&path).unwrap();
+                std::fs::read(path).unwrap()
+            });
+        }
+        let mut bytes = BYTES.with(Clone::clone);
+        for (at, byte) in &flips {
+            bytes[*at] = *byte;
+        }
+        let untouched = bytes == BYTES.with(Clone::clone);
+        if 30_000 < cut {
+            bytes.truncate(bytes.len() - (cut - 30_000));
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("corrupt.safetensors");
+        std::fs::write(&path, &bytes).unwrap();
+        let result = NETWORK.with(|network| network.load(&path, FirstConvolution::Fresh));
+        prop_assert_eq!(30_000 < cut && result.is_ok(), false, "a file cut short was read");
+        prop_assert!(!(untouched && cut <= 30_000) || result.is_ok());
+    }
+}
+
+#[test]
+#[ignore = "needs the name lists of torchvision and timm in PPA_SHARED"]
+fn files_of_timm_are_those_of_torchvision() {
+    let shared = std::env::var_os("PPA_SHARED")
+        .map_or_else(|| "../../../shared".into(), std::path::PathBuf::from);
+    let map =
+        std::fs::File::open(shared.join("reference/learn/map_torchvision_timm.json")).unwrap();
+    let map: HashMap<String, String> = serde_json::from_reader::<_, Vec<(String, String)>>(map)
+        .unwrap()
+        .into_iter()
+        .collect();
+    let (one, other) = (network(1), network(2));
+    let theirs = tensors(&one)
+        .into_iter()
+        .map(|(name, tensor)| (map[&name].clone(), tensor))
+        .collect();
+    let (_folder, path) = write(&theirs);
+    assert_eq!(
+        other.load(&path, FirstConvolution::Fresh).unwrap(),
+        Loaded::default()
+    );
+    assert_eq!(values(&one), values(&other));
+}
+
+/// Runs `script` with the arguments, in the Python that PPA_PYTHON names.
+fn python(script: &str, arguments: &[&std::path::Path]) {
+    let program = std::env::var_os("PPA_PYTHON").expect("PPA_PYTHON names a Python");
+    let out = std::process::Command::new(program)
+        .arg("-c")
+        .arg(script)
+        .args(arguments)
+        .output()
+        .unwrap();
+    println!("{}", String::from_utf8_lossy(&out.stdout));
+    assert!(
+        out.status.success(),
+        "{}",
+        String::from_utf8_lossy(&out.stderr)
+    );
+}
+
+/// A network whose running statistics are not the first ones, with what it gives for images of odd sides.
+fn exported(folder: &std::path::Path) -> (EfficientNetB0, std::path::PathBuf) {
+    let one = network(1);
+    for step in 0..3 {
+        let images = Tensor::rand(-0.5_f32, 0.5, (4, 1, 64, 64), &Device::Cpu).unwrap();
+        one.forward(&images, Mode::Train { step }).unwrap();
+    }
+    let images = Tensor::rand(-0.5_f32, 0.5, (2, 1, 77, 64), &Device::Cpu).unwrap();
+    let output = one.forward(&images, Mode::Eval).unwrap();
+    let path = folder.join("io.safetensors");
+    let io = HashMap::from([
+        ("images".to_owned(), images),
+        ("quality".to_owned(), output),
+    ]);
+    candle_core::safetensors::save(&io, &path).unwrap();
+    (one, path)
+}
+
+#[test]
+#[ignore = "needs a Python with onnx, onnxruntime, safetensors and numpy in PPA_PYTHON"]
+fn onnxruntime_gives_the_same_outputs() {
+    let folder = tempfile::tempdir().unwrap();
+    let (network, io) = exported(folder.path());
+    let path = folder.path().join("network.onnx");
+    network.save_onnx(&path).unwrap();
+    let script = "
+import sys, numpy, onnx, onnxruntime
+from safetensors.numpy import load_file
+onnx.checker.check_model(onnx.load(sys.argv[1]), full_check=True)
+io = load_file(sys.argv[2])
+quality, = onnxruntime.InferenceSession(sys.argv[1]).run(None, {'images': io['images']})
+error = numpy.abs(quality - io['quality']).max() / numpy.abs(io['quality']).max()
+print('onnxruntime: largest relative error', error, 'of', io['quality'].ravel())
+assert error < 1e-4
+";
+    python(script, &[&path, &io]);
+}
+
+#[test]
+#[ignore = "needs a Python with torch, torchvision and safetensors in PPA_PYTHON"]
+fn pytorch_loads_what_is_saved_and_the_network_loads_what_pytorch_saves() {
+    let folder = tempfile::tempdir().unwrap();
+    let (network, io) = exported(folder.path());
+    let (path, back) = (
+        folder.path().join("network.safetensors"),
+        folder.path().join("network.pth"),
+    );
+    network.save(&path).unwrap();
+    let script = "
+import sys, torch, torchvision
+from safetensors.torch import load_file
+model = torchvision.models.efficientnet_b0(num_classes=1)
+model.features[0][0] = torch.nn.Conv2d(1, 32, 3, 2, 1, bias=False)
+model.load_state_dict(load_file(sys.argv[1]))
+io = load_file(sys.argv[2])
+with torch.no_grad():
+    quality = model.eval()(io['images'])
+error = ((quality - io['quality']).abs().max() / io['quality'].abs().max()).item()
+print('torch: largest relative error', error)
+assert error < 1e-4
+torch.save(model.state_dict(), sys.argv[3])
+";
+    python(script, &[&path, &io, &back]);
+    let other = self::network(2);
+    assert_eq!(
+        other.load(&back, FirstConvolution::Fresh).unwrap(),
+        Loaded::default()
+    );
+    assert_eq!(values(&network), values(&other));
+}
