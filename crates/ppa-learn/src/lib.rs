@@ -2,6 +2,7 @@
 
 mod kernels;
 mod network;
+mod parity;
 mod random;
 mod weights;
 
@@ -9,5 +10,6 @@ pub mod data;
 pub mod experiment;
 
 pub use network::{EfficientNetB0, Entry, Mode, Named, NetworkError, Options};
+pub use parity::{Parity, parity};
 pub use random::{Purpose, stream};
-pub use weights::WeightsError;
+pub use weights::{FirstConvolution, Loaded, WeightsError};

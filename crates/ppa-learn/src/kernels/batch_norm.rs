@@ -2,7 +2,7 @@
 
 use pulp::{Simd, WithSimd};
 
-use super::simd::{dispatch, fma, lanes, lanes_mut, sigmoid};
+use super::simd::{dispatch, fma, lanes, lanes_mut, sigmoid, silu_and_derivative};
 
 /// y = scale x + shift for each channel, which is what a normalisation with known moments amounts to.
 #[derive(Debug, Clone, Default)]
@@ -167,6 +167,56 @@ pub fn normalise(
         if let Some(added) = added {
             for (out, added) in out.iter_mut().zip(&added[index * channels..]) {
                 *out += added;
+            }
+        }
+    }
+}
+
+/// SiLU(affine(x)) and its derivative by y.
+pub fn activate_with_derivative(
+    pixels: &[f32],
+    affine: &Affine,
+    value: &mut [f32],
+    derivative: &mut [f32],
+) {
+    dispatch(
+        affine.scale.len(),
+        Both {
+            pixels,
+            affine,
+            value,
+            derivative,
+        },
+    );
+}
+
+struct Both<'a> {
+    pixels: &'a [f32],
+    affine: &'a Affine,
+    value: &'a mut [f32],
+    derivative: &'a mut [f32],
+}
+
+impl WithSimd for Both<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let (scale, shift) = (
+            lanes::<S>(&self.affine.scale),
+            lanes::<S>(&self.affine.shift),
+        );
+        let channels = scale.len();
+        let values = lanes_mut::<S>(self.value).chunks_exact_mut(channels);
+        let derivatives = lanes_mut::<S>(self.derivative).chunks_exact_mut(channels);
+        for ((pixel, value), derivative) in lanes::<S>(self.pixels)
+            .chunks_exact(channels)
+            .zip(values)
+            .zip(derivatives)
+        {
+            for c in 0..channels {
+                let y = fma(simd, pixel[c], scale[c], shift[c]);
+                (value[c], derivative[c]) = silu_and_derivative(simd, y);
             }
         }
     }

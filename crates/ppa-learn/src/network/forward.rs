@@ -3,18 +3,17 @@
 //! A convolution is kept before its normalisation; whoever reads it normalises and activates it on the way, a tile of
 //! pixels or a few rows at a time, so that activated images never go through memory.
 
+mod convolutions;
+
 use rayon::prelude::*;
 
 use super::architecture::{Architecture, Block, ConvPlace};
 use super::initialise::gains;
 use super::norm::Norm;
 use super::squeeze::Squeeze;
-use super::tape::{BlockTape, Normed, Size, Tape, by_image, tile_pixels};
-use crate::kernels::batch_norm::{Affine, activate, add_activated, add_moments, normalise};
+use super::tape::{BlockTape, Normed, Size, Tape, by_image};
+use crate::kernels::batch_norm::{Affine, activate, add_activated, normalise};
 use crate::kernels::buffer::{Buffer, Pool};
-use crate::kernels::depthwise::{Rows, Window, channels_last, forward_row};
-use crate::kernels::matrix::{Matrix, Store, multiply};
-use crate::kernels::stem;
 
 /// Whether a pass normalises by the batch, and from which random numbers it leaves out branches.
 pub enum Pass<'a> {
@@ -155,162 +154,6 @@ impl Forward<'_> {
         };
         Normed { pixels, norm }
     }
-
-    /// What moments are taken about; nothing where none are needed.
-    fn center(&self, place: &ConvPlace) -> Option<&[f32]> {
-        matches!(self.pass, Pass::Train(_)).then(|| &self.statistics[place.norm.mean.clone()])
-    }
-
-    fn stem(
-        &self,
-        place: &ConvPlace,
-        images: &[f32],
-        size: Size,
-        size_out: Size,
-        out: &mut [f32],
-    ) -> Vec<f64> {
-        let weights = channels_last(&self.parameters[place.weight.clone()], place.channels);
-        let row = size_out.width * place.channels;
-        let center = self.center(place);
-        let task = size.images_per_task();
-        let parts = out
-            .par_chunks_mut(task * size_out.height * row)
-            .zip(images.par_chunks(task * size.pixels()));
-        total(parts.map(|(out, images)| {
-            let mut sums = vec![0.0; 2 * place.channels];
-            for (image, out) in images
-                .chunks(size.pixels())
-                .zip(out.chunks_mut(size_out.height * row))
-            {
-                for (y, out) in out.chunks_mut(row).enumerate() {
-                    stem::forward_row(image, size.width, y, &weights, out);
-                    moments(out, center, &mut sums);
-                }
-            }
-            sums
-        }))
-    }
-
-    fn pointwise(&self, place: &ConvPlace, input: &[f32], size: Size, out: &mut [f32]) -> Vec<f64> {
-        let channels = place.channels;
-        let weight = &self.parameters[place.weight.clone()];
-        let columns = weight.len() / channels;
-        let center = self.center(place);
-        let task = size.pixels_per_task();
-        let parts = out
-            .par_chunks_mut(task * channels)
-            .zip(input.par_chunks(task * columns));
-        total(parts.map(|(out, input)| {
-            let mut sums = vec![0.0; 2 * channels];
-            let tile = tile_pixels(channels + columns);
-            for (out, input) in out
-                .chunks_mut(tile * channels)
-                .zip(input.chunks(tile * columns))
-            {
-                multiply(
-                    out,
-                    Matrix::new(input, columns),
-                    Matrix::new(weight, columns).transposed(),
-                    Store::Replace,
-                );
-                moments(out, center, &mut sums);
-            }
-            sums
-        }))
-    }
-
-    fn depthwise(
-        &self,
-        place: &ConvPlace,
-        window: Window,
-        input: &Normed,
-        size: Size,
-        size_out: Size,
-        out: &mut [f32],
-    ) -> Vec<f64> {
-        let channels = place.channels;
-        let weights = channels_last(&self.parameters[place.weight.clone()], channels);
-        let center = self.center(place);
-        let (kernel, padding) = (window.kernel, window.padding());
-        let (row, row_out) = (size.width * channels, size_out.width * channels);
-        let task = size.images_per_task();
-        let parts = out
-            .par_chunks_mut(task * size_out.height * row_out)
-            .zip(input.pixels.par_chunks(task * size.height * row));
-        total(parts.map(|(out, pixels)| {
-            let mut sums = vec![0.0; 2 * channels];
-            let mut memory = self
-                .pool
-                .take(Rows::len(kernel, size.width, padding, channels));
-            for (out, pixels) in out
-                .chunks_mut(size_out.height * row_out)
-                .zip(pixels.chunks(size.height * row))
-            {
-                let mut rows = Rows::new(
-                    &mut memory,
-                    kernel,
-                    size.height,
-                    size.width,
-                    padding,
-                    channels,
-                );
-                let mut next = 0;
-                for (y, out) in out.chunks_mut(row_out).enumerate() {
-                    let first = (y * window.stride) as isize - padding as isize;
-                    while next < size.height && (next as isize) < first + kernel as isize {
-                        activate(
-                            &pixels[next * row..][..row],
-                            &input.norm.affine,
-                            None,
-                            rows.place(next),
-                        );
-                        next += 1;
-                    }
-                    let under: Vec<&[f32]> = (0..kernel)
-                        .map(|ky| rows.padded(first + ky as isize))
-                        .collect();
-                    forward_row(window, &under, &weights, channels, out);
-                    moments(out, center, &mut sums);
-                }
-            }
-            sums
-        }))
-    }
-
-    fn project(
-        &self,
-        place: &ConvPlace,
-        input: &Normed,
-        gates: &[f32],
-        size: Size,
-        out: &mut [f32],
-    ) -> Vec<f64> {
-        let channels = place.channels;
-        let weight = &self.parameters[place.weight.clone()];
-        let columns = weight.len() / channels;
-        let center = self.center(place);
-        let task = size.pixels_per_task();
-        let parts = out.par_chunks_mut(task * channels).enumerate();
-        total(parts.map(|(index, out)| {
-            let mut sums = vec![0.0; 2 * channels];
-            let tile = tile_pixels(channels + 2 * columns);
-            let mut active = self.pool.take(tile * columns);
-            for (number, out) in out.chunks_mut(tile * channels).enumerate() {
-                let start = index * task + number * tile;
-                let run = start..start + out.len() / channels;
-                let active = &mut active[..run.len() * columns];
-                gated(&input.pixels, &input.norm.affine, gates, size, run, active);
-                multiply(
-                    out,
-                    Matrix::new(active, columns),
-                    Matrix::new(weight, columns).transposed(),
-                    Store::Replace,
-                );
-                moments(out, center, &mut sums);
-            }
-            sums
-        }))
-    }
 }
 
 /// Activated pixels of a run times the gates of their image.
@@ -328,12 +171,6 @@ pub fn gated(
         let part = part.start * channels..part.end * channels;
         let gate = &gates[image * channels..][..channels];
         activate(&pixels[part.clone()], affine, Some(gate), &mut out[part]);
-    }
-}
-
-fn moments(pixels: &[f32], center: Option<&[f32]>, sums: &mut [f64]) {
-    if let Some(center) = center {
-        add_moments(pixels, center, sums);
     }
 }
 

@@ -1,0 +1,153 @@
+//! Through the depthwise convolution.
+
+use rayon::prelude::*;
+
+use super::super::architecture::Block;
+use super::super::forward::total;
+use super::super::tape::BlockTape;
+use super::{Backward, Gated};
+use crate::kernels::batch_norm::{activate_with_derivative, add};
+use crate::kernels::buffer::Buffer;
+use crate::kernels::depthwise::{Rows, channels_first, channels_last};
+use crate::kernels::depthwise_backward::{InputRow, add_weight_gradient};
+use crate::kernels::gradient::{ActivationGradient, Linear};
+
+impl Backward<'_> {
+    /// Through the depthwise convolution: the gradient of the expansion's activation input, and how that of the
+    /// expansion follows from it.
+    pub(super) fn depthwise(
+        &mut self,
+        block: &Block,
+        tape: &BlockTape,
+        gated: Gated,
+        of_gated: Buffer,
+    ) -> (Linear, Buffer) {
+        let (place, window) = (&block.depthwise, block.window);
+        let channels = place.channels;
+        let weights = channels_last(&self.parameters[place.weight.clone()], channels);
+        let (size, size_out) = (tape.size_in, tape.size_out);
+        let (expand, depthwise) = (&tape.expand, &tape.depthwise);
+        let (row, row_out) = (size.width * channels, size_out.width * channels);
+        let (kernel, stride, padding) = (window.kernel, window.stride, window.padding());
+        let mut of_expanded = self.pool.take(size.count() * channels);
+        let parts: Vec<(Vec<f32>, Vec<f64>)> = of_expanded
+            .par_chunks_mut(size.images_per_task() * size.height * row)
+            .enumerate()
+            .map(|(task, of_expanded)| {
+                let mut of_weights = vec![0.0; weights.len()];
+                let mut sums = vec![0.0; 2 * channels];
+                // Rows of the input live until their gradient is known, a stride after the kernel has passed.
+                let count = kernel + stride;
+                let mut memory: [Buffer; 3] = [
+                    self.pool
+                        .take(Rows::len(count, size.width, padding, channels)),
+                    self.pool.take(Rows::len(count, size.width, 0, channels)),
+                    self.pool
+                        .take(Rows::len(kernel, size_out.width, padding, channels)),
+                ];
+                for (index, of_expanded) in of_expanded.chunks_mut(size.height * row).enumerate() {
+                    let image = task * size.images_per_task() + index;
+                    let [first, second, third] = &mut memory;
+                    let mut active =
+                        Rows::new(first, count, size.height, size.width, padding, channels);
+                    let mut derivative =
+                        Rows::new(second, count, size.height, size.width, 0, channels);
+                    let mut gradient = Rows::new(
+                        third,
+                        kernel,
+                        size_out.height,
+                        size_out.width,
+                        padding,
+                        channels,
+                    );
+                    let pixels = &expand.pixels[image * size.height * row..][..size.height * row];
+                    let (mut next_active, mut next_done) = (0, 0);
+                    for y in 0..size_out.height {
+                        let top = (y * stride) as isize - padding as isize;
+                        while next_active < size.height
+                            && (next_active as isize) < top + kernel as isize
+                        {
+                            let pixels = &pixels[next_active * row..][..row];
+                            activate_with_derivative(
+                                pixels,
+                                &expand.norm.affine,
+                                active.place(next_active),
+                                derivative.place(next_active),
+                            );
+                            next_active += 1;
+                        }
+                        let at = (image * size_out.height + y) * row_out;
+                        ActivationGradient {
+                            upstream: Some(&of_gated[at..at + row_out]),
+                            pixels: &depthwise.pixels[at..at + row_out],
+                            affine: &depthwise.norm.affine,
+                            linear: &gated.linear,
+                            gate: &tape.squeeze.gate[image * channels..][..channels],
+                            pooled: &gated.pooled[image * channels..][..channels],
+                            out: gradient.place(y),
+                        }
+                        .run();
+                        let under: Vec<&[f32]> = (0..kernel)
+                            .map(|ky| active.padded(top + ky as isize))
+                            .collect();
+                        add_weight_gradient(
+                            window,
+                            &under,
+                            gradient.inner(y),
+                            channels,
+                            &mut of_weights,
+                        );
+                        // Input row r takes from output rows up to (r + padding) / stride.
+                        let done = if y + 1 == size_out.height {
+                            size.height
+                        } else {
+                            ((y + 1) * stride).saturating_sub(padding)
+                        };
+                        while next_done < done {
+                            let from = rows_from(next_done, kernel, stride, padding, &gradient);
+                            let mut part = vec![0.0; 2 * channels];
+                            InputRow {
+                                rows: &from,
+                                weights: &weights,
+                                derivative: derivative.inner(next_done),
+                                pixels: &pixels[next_done * row..][..row],
+                                mean: &expand.norm.mean,
+                                out: &mut of_expanded[next_done * row..][..row],
+                                sums: &mut part,
+                            }
+                            .run(window);
+                            add(&mut sums, &part);
+                            next_done += 1;
+                        }
+                    }
+                }
+                (of_weights, sums)
+            })
+            .collect();
+        let (of_weights, sums): (Vec<_>, Vec<_>) = parts.into_iter().unzip();
+        let of_weights = total(of_weights.into_par_iter());
+        self.gradients[place.weight.clone()]
+            .copy_from_slice(&channels_first(&of_weights, channels));
+        let sums = total(sums.into_par_iter());
+        let linear = expand
+            .norm
+            .backward(&block.expand.norm, &sums, size.count(), self.gradients);
+        (linear, of_expanded)
+    }
+}
+
+/// Rows of the gradient of the output that input row `y` contributed to, each with its row of the kernel.
+fn rows_from<'a>(
+    y: usize,
+    kernel: usize,
+    stride: usize,
+    padding: usize,
+    gradient: &'a Rows,
+) -> Vec<(usize, &'a [f32])> {
+    (0..kernel)
+        .filter(|ky| y + padding >= *ky && (y + padding - ky).is_multiple_of(stride))
+        .map(|ky| (ky, (y + padding - ky) / stride))
+        .filter(|(_, from)| *from < gradient.height)
+        .map(|(ky, from)| (ky, gradient.padded(from as isize)))
+        .collect()
+}

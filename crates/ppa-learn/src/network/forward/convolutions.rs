@@ -1,0 +1,181 @@
+//! The four kinds of convolution, each with the moments of what it gives.
+
+use rayon::prelude::*;
+
+use super::super::architecture::ConvPlace;
+use super::super::tape::{Normed, Size, tile_pixels};
+use super::{Forward, Pass, gated, total};
+use crate::kernels::batch_norm::{activate, add_moments};
+use crate::kernels::depthwise::{Rows, Window, channels_last, forward_row};
+use crate::kernels::matrix::{Matrix, Store, multiply};
+use crate::kernels::stem;
+
+impl Forward<'_> {
+    /// What moments are taken about; nothing where none are needed.
+    pub(super) fn center(&self, place: &ConvPlace) -> Option<&[f32]> {
+        matches!(self.pass, Pass::Train(_)).then(|| &self.statistics[place.norm.mean.clone()])
+    }
+
+    pub(super) fn stem(
+        &self,
+        place: &ConvPlace,
+        images: &[f32],
+        size: Size,
+        size_out: Size,
+        out: &mut [f32],
+    ) -> Vec<f64> {
+        let weights = channels_last(&self.parameters[place.weight.clone()], place.channels);
+        let row = size_out.width * place.channels;
+        let center = self.center(place);
+        let task = size.images_per_task();
+        let parts = out
+            .par_chunks_mut(task * size_out.height * row)
+            .zip(images.par_chunks(task * size.pixels()));
+        total(parts.map(|(out, images)| {
+            let mut sums = vec![0.0; 2 * place.channels];
+            for (image, out) in images
+                .chunks(size.pixels())
+                .zip(out.chunks_mut(size_out.height * row))
+            {
+                for (y, out) in out.chunks_mut(row).enumerate() {
+                    stem::forward_row(image, size.width, y, &weights, out);
+                    moments(out, center, &mut sums);
+                }
+            }
+            sums
+        }))
+    }
+
+    pub(super) fn pointwise(
+        &self,
+        place: &ConvPlace,
+        input: &[f32],
+        size: Size,
+        out: &mut [f32],
+    ) -> Vec<f64> {
+        let channels = place.channels;
+        let weight = &self.parameters[place.weight.clone()];
+        let columns = weight.len() / channels;
+        let center = self.center(place);
+        let task = size.pixels_per_task();
+        let parts = out
+            .par_chunks_mut(task * channels)
+            .zip(input.par_chunks(task * columns));
+        total(parts.map(|(out, input)| {
+            let mut sums = vec![0.0; 2 * channels];
+            let tile = tile_pixels(channels + columns);
+            for (out, input) in out
+                .chunks_mut(tile * channels)
+                .zip(input.chunks(tile * columns))
+            {
+                multiply(
+                    out,
+                    Matrix::new(input, columns),
+                    Matrix::new(weight, columns).transposed(),
+                    Store::Replace,
+                );
+                moments(out, center, &mut sums);
+            }
+            sums
+        }))
+    }
+
+    pub(super) fn depthwise(
+        &self,
+        place: &ConvPlace,
+        window: Window,
+        input: &Normed,
+        size: Size,
+        size_out: Size,
+        out: &mut [f32],
+    ) -> Vec<f64> {
+        let channels = place.channels;
+        let weights = channels_last(&self.parameters[place.weight.clone()], channels);
+        let center = self.center(place);
+        let (kernel, padding) = (window.kernel, window.padding());
+        let (row, row_out) = (size.width * channels, size_out.width * channels);
+        let task = size.images_per_task();
+        let parts = out
+            .par_chunks_mut(task * size_out.height * row_out)
+            .zip(input.pixels.par_chunks(task * size.height * row));
+        total(parts.map(|(out, pixels)| {
+            let mut sums = vec![0.0; 2 * channels];
+            let mut memory = self
+                .pool
+                .take(Rows::len(kernel, size.width, padding, channels));
+            for (out, pixels) in out
+                .chunks_mut(size_out.height * row_out)
+                .zip(pixels.chunks(size.height * row))
+            {
+                let mut rows = Rows::new(
+                    &mut memory,
+                    kernel,
+                    size.height,
+                    size.width,
+                    padding,
+                    channels,
+                );
+                let mut next = 0;
+                for (y, out) in out.chunks_mut(row_out).enumerate() {
+                    let first = (y * window.stride) as isize - padding as isize;
+                    while next < size.height && (next as isize) < first + kernel as isize {
+                        activate(
+                            &pixels[next * row..][..row],
+                            &input.norm.affine,
+                            None,
+                            rows.place(next),
+                        );
+                        next += 1;
+                    }
+                    let under: Vec<&[f32]> = (0..kernel)
+                        .map(|ky| rows.padded(first + ky as isize))
+                        .collect();
+                    forward_row(window, &under, &weights, channels, out);
+                    moments(out, center, &mut sums);
+                }
+            }
+            sums
+        }))
+    }
+
+    pub(super) fn project(
+        &self,
+        place: &ConvPlace,
+        input: &Normed,
+        gates: &[f32],
+        size: Size,
+        out: &mut [f32],
+    ) -> Vec<f64> {
+        let channels = place.channels;
+        let weight = &self.parameters[place.weight.clone()];
+        let columns = weight.len() / channels;
+        let center = self.center(place);
+        let task = size.pixels_per_task();
+        let parts = out.par_chunks_mut(task * channels).enumerate();
+        total(parts.map(|(index, out)| {
+            let mut sums = vec![0.0; 2 * channels];
+            let tile = tile_pixels(channels + 2 * columns);
+            let mut active = self.pool.take(tile * columns);
+            for (number, out) in out.chunks_mut(tile * channels).enumerate() {
+                let start = index * task + number * tile;
+                let run = start..start + out.len() / channels;
+                let active = &mut active[..run.len() * columns];
+                gated(&input.pixels, &input.norm.affine, gates, size, run, active);
+                multiply(
+                    out,
+                    Matrix::new(active, columns),
+                    Matrix::new(weight, columns).transposed(),
+                    Store::Replace,
+                );
+                moments(out, center, &mut sums);
+            }
+            sums
+        }))
+    }
+}
+
+fn moments(pixels: &[f32], center: Option<&[f32]>, sums: &mut [f64]) {
+    if let Some(center) = center {
+        add_moments(pixels, center, sums);
+    }
+}
