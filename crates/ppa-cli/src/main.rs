@@ -69,6 +69,9 @@ enum Command {
     /// The quality of poses, as readers grade it
     #[command(subcommand)]
     Label(commands::label::LabelCommand),
+    /// The network's weights, and the network beside reference values
+    #[command(subcommand)]
+    Learn(commands::learn::LearnCommand),
     /// Metrics of predictions against labels
     Metrics(commands::metrics::MetricsArgs),
     /// Statistical tests
@@ -98,6 +101,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Verify(args) => commands::verify::run(&args, output),
         Command::Dataset(command) => commands::dataset::run(&command, output),
         Command::Label(command) => commands::label::run(&command, output),
+        Command::Learn(command) => commands::learn::run(&command, output),
         Command::Metrics(args) => commands::metrics::run(&args, output),
         Command::Stats(command) => commands::stats::run(&command, output),
     }

@@ -6,6 +6,7 @@ pub mod demo;
 pub mod depth;
 pub mod generate;
 pub mod label;
+pub mod learn;
 pub mod merge;
 pub mod mesh;
 pub mod metrics;
