@@ -4,12 +4,14 @@ use std::path::{Path, PathBuf};
 
 use image::imageops::{FilterType, resize};
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
+use ppa_depth::false_colour;
 
 use crate::body_shape::BodyShape;
 use crate::drawing::write_text;
 use crate::files::FileError;
 use crate::layout::{LimbId, View, angle_text};
 use crate::manifest::{FileKind, FileRow, Manifest, RoiRow};
+use crate::published::{GrayImage16, ImageFileError};
 
 const TILE: u32 = 208;
 const GAP: u32 = 6;
@@ -24,13 +26,8 @@ pub enum ContactSheetError {
     #[error(transparent)]
     File(#[from] FileError),
     /// An image of the dataset cannot be decoded.
-    #[error("cannot decode {}", path.display())]
-    Image {
-        /// The image.
-        path: PathBuf,
-        /// What is wrong with it.
-        source: image::ImageError,
-    },
+    #[error(transparent)]
+    Image(#[from] ImageFileError),
     /// A depth image has no region of interest.
     #[error("{} has no region of interest for {image}", path.display())]
     NoRoi {
@@ -69,6 +66,7 @@ pub fn contact_sheet(
         rows.filter(move |row| row.kind == kind && row.limb == limb)
     };
     let mut steps: Vec<u32> = of_limb(FileKind::Depth).map(|row| row.step).collect();
+    steps.sort_unstable();
     steps.dedup();
     if steps.is_empty() {
         return Err(ContactSheetError::Empty {
@@ -125,20 +123,17 @@ fn depth_rows<'a>(files: impl Iterator<Item = &'a FileRow>) -> Vec<(BodyShape, V
     rows
 }
 
-fn evenly_chosen(steps: &[u32], columns: usize) -> Vec<u32> {
+pub(crate) fn evenly_chosen(steps: &[u32], columns: usize) -> Vec<u32> {
     let count = columns.clamp(1, steps.len());
     let last = (steps.len() - 1) as f64;
     let at = |i: usize| (i as f64 * last / (count.max(2) - 1) as f64).round() as usize;
     (0..count).map(|i| steps[at(i)]).collect()
 }
 
-fn read_gray16(path: &Path) -> Result<Gray16, ContactSheetError> {
-    let bytes = std::fs::read(path).map_err(FileError::at("read", path))?;
-    let image = image::load_from_memory(&bytes).map_err(|source| ContactSheetError::Image {
-        path: path.to_owned(),
-        source,
-    })?;
-    Ok(image.into_luma16())
+fn read_gray16(path: &Path) -> Result<Gray16, ImageFileError> {
+    let image = GrayImage16::read(path)?;
+    let buffer = ImageBuffer::from_raw(image.width, image.height, image.pixels);
+    Ok(buffer.expect("a decoded image holds all its pixels"))
 }
 
 fn crop(depth: &Gray16, roi: &RoiRow) -> Gray16 {
@@ -146,7 +141,7 @@ fn crop(depth: &Gray16, roi: &RoiRow) -> Gray16 {
 }
 
 /// Nearest and farthest depth of the colour scale, mm.
-fn depth_range(rows: &[(String, Vec<Tile>)]) -> (f64, f64) {
+fn depth_range(rows: &[(String, Vec<Tile>)]) -> [f64; 2] {
     let mut depths: Vec<u16> = rows
         .iter()
         .flat_map(|(_, tiles)| tiles)
@@ -157,21 +152,11 @@ fn depth_range(rows: &[(String, Vec<Tile>)]) -> (f64, f64) {
         .flat_map(|depth| depth.pixels().map(|p| p.0[0]).filter(|&z| z > 0))
         .collect();
     if depths.is_empty() {
-        return (0.0, 1.0);
+        return [0.0, 1.0];
     }
     depths.sort_unstable();
     let at = |fraction: f64| f64::from(depths[((depths.len() - 1) as f64 * fraction) as usize]);
-    (at(0.01), at(0.99).max(at(0.01) + 1.0))
-}
-
-fn false_colour(z_mm: u16, (near, far): (f64, f64)) -> Rgb<u8> {
-    if z_mm == 0 {
-        return Rgb([0; 3]);
-    }
-    let t = ((far - f64::from(z_mm)) / (far - near)).clamp(0.0, 1.0);
-    // The low end of the scale is nearly black, which means invalid here.
-    let colour = colorous::TURBO.eval_continuous(0.1 + 0.9 * t);
-    Rgb([colour.r, colour.g, colour.b])
+    [at(0.01), at(0.99)]
 }
 
 fn draw(rows: &[(String, Vec<Tile>)], steps: &[u32]) -> RgbImage {
@@ -190,7 +175,7 @@ fn draw(rows: &[(String, Vec<Tile>)], steps: &[u32]) -> RgbImage {
                 Tile::Depth(depth) => {
                     let small = resize(depth, TILE, TILE, FilterType::Nearest);
                     RgbImage::from_fn(TILE, TILE, |x, y| {
-                        false_colour(small.get_pixel(x, y).0[0], range)
+                        Rgb(false_colour(small.get_pixel(x, y).0[0].into(), range))
                     })
                 }
                 Tile::Radiograph(image) => fit(image),
@@ -233,13 +218,5 @@ mod tests {
             [0, 90, 180]
         );
         assert_eq!(evenly_chosen(&[4, 5], 1), [4]);
-    }
-
-    #[test]
-    fn near_is_red_far_is_blue_invalid_is_black() {
-        let range = (900.0, 1000.0);
-        let (near, far) = (false_colour(900, range).0, false_colour(1000, range).0);
-        assert!(near[0] > near[2] && far[2] > far[0], "{near:?} {far:?}");
-        assert_eq!(false_colour(0, range).0, [0; 3]);
     }
 }

@@ -112,6 +112,7 @@ pub use field_mask::FieldMask;
 pub use fit_noise::{FitError, NoiseFit, fit_noise};
 pub use image::{DepthError, DepthImage, DepthU16};
 pub use mesh_body::MeshBody;
+pub use preview::false_colour;
 pub use render::render;
 pub use rig::{MountedCamera, RigError, RigSpec};
 pub use rigid::{RigidError, isometry_from_rows, rows_from_isometry};

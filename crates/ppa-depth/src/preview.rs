@@ -5,6 +5,17 @@ use std::path::Path;
 use crate::atomic::write_whole;
 use crate::image::{DepthError, DepthImage};
 
+/// A depth in false colour (8 bits of red, green and blue): `range` from near, red, to far, blue; black where it is not above 0.
+pub fn false_colour(z_mm: f64, [near_mm, far_mm]: [f64; 2]) -> [u8; 3] {
+    if z_mm > 0.0 {
+        let t = ((far_mm - z_mm) / (far_mm - near_mm).max(1.0)).clamp(0.0, 1.0);
+        // The low end of the scale is nearly black, which means invalid here.
+        colorous::TURBO.eval_continuous(0.1 + 0.9 * t).into_array()
+    } else {
+        [0; 3]
+    }
+}
+
 impl DepthImage {
     /// Writes a PNG in false colour: near red, far blue, nothing black; from the 1st to the 99th percentile of the depths.
     ///
@@ -15,16 +26,11 @@ impl DepthImage {
         self.check_length()?;
         self.require_visible()?;
         let [near, far] = self.percentiles([0.01, 0.99]);
-        let pixels = self.z_mm.iter().flat_map(|&z_mm| {
-            let t = f64::from((far - z_mm) / (far - near).max(1.0)).clamp(0.0, 1.0);
-            // The dark ends of the scale would look like black.
-            let colour = colorous::TURBO.eval_continuous(0.1 + 0.8 * t);
-            if z_mm > 0.0 {
-                colour.into_array()
-            } else {
-                [0; 3]
-            }
-        });
+        let range = [near, far].map(f64::from);
+        let pixels = self
+            .z_mm
+            .iter()
+            .flat_map(|&z_mm| false_colour(z_mm.into(), range));
         let bytes: Vec<u8> = pixels.collect();
         write_whole(path, |writer| {
             let mut encoder = png::Encoder::new(writer, self.width, self.height);
