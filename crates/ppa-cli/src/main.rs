@@ -66,6 +66,9 @@ enum Command {
     /// Check, split or convert a dataset, ours or the authors'
     #[command(subcommand)]
     Dataset(commands::dataset::DatasetCommand),
+    /// Tables, metadata and archives of a dataset for other programs
+    #[command(subcommand)]
+    Export(commands::export::ExportCommand),
     /// The quality of poses, as readers grade it
     #[command(subcommand)]
     Label(commands::label::LabelCommand),
@@ -100,6 +103,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Merge(args) => commands::merge::run(&args, output),
         Command::Verify(args) => commands::verify::run(&args, output),
         Command::Dataset(command) => commands::dataset::run(&command, output),
+        Command::Export(command) => commands::export::run(&command, output),
         Command::Label(command) => commands::label::run(&command, output),
         Command::Learn(command) => commands::learn::run(&command, output),
         Command::Metrics(args) => commands::metrics::run(&args, output),

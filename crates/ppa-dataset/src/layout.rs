@@ -93,6 +93,11 @@ impl LimbId {
         self.side.letter()
     }
 
+    /// Name of a pose of this limb, as `patient_0_r_036`.
+    pub fn unit_name(self, step: u32) -> String {
+        format!("patient_{}_{}_{step:03}", self.patient, self.side_letter())
+    }
+
     fn folder(self, kind: &str) -> String {
         format!("patient_{}/{kind}/{}", self.patient, self.side_letter())
     }

@@ -31,6 +31,7 @@ mod coverage_plot;
 mod description;
 #[cfg(feature = "generate")]
 mod drawing;
+pub mod export;
 mod files;
 #[cfg(feature = "generate")]
 mod forecast;

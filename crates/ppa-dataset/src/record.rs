@@ -29,8 +29,7 @@ pub(crate) struct Unit<'a> {
 impl Unit<'_> {
     /// File name of its record.
     pub fn record_name(&self) -> String {
-        let (patient, side) = (self.limb.patient, self.limb.side_letter());
-        format!("patient_{patient}_{side}_{:03}.json", self.pose.step)
+        self.limb.unit_name(self.pose.step) + ".json"
     }
 
     fn path(&self, root: &Path) -> PathBuf {

@@ -4,6 +4,7 @@ pub mod ct;
 pub mod dataset;
 pub mod demo;
 pub mod depth;
+pub mod export;
 pub mod generate;
 pub mod label;
 pub mod learn;

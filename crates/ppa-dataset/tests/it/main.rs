@@ -2,6 +2,7 @@
 
 mod authors_loader;
 mod converted;
+mod exported;
 mod inspected;
 mod refused;
 mod trees;

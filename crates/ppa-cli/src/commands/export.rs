@@ -1,0 +1,31 @@
+//! `ppa export`: a dataset for other programs, archives and search engines.
+
+mod bagit;
+mod metadata;
+mod table;
+mod webdataset;
+
+use clap::Subcommand;
+
+use crate::output::Output;
+
+#[derive(Debug, Subcommand)]
+pub enum ExportCommand {
+    /// One row per file, with pose, camera, seed, label, split and hash, as CSV or Parquet
+    Table(table::TableArgs),
+    /// What the dataset is: Croissant for search engines, RO-Crate for archives
+    Metadata(metadata::MetadataArgs),
+    /// A copy with the hash of every file, as archives take it
+    Bagit(bagit::BagitArgs),
+    /// Tar archives for training programs that stream
+    Webdataset(webdataset::WebdatasetArgs),
+}
+
+pub fn run(command: &ExportCommand, output: Output) -> anyhow::Result<()> {
+    match command {
+        ExportCommand::Table(args) => table::run(args, output),
+        ExportCommand::Metadata(args) => metadata::run(args, output),
+        ExportCommand::Bagit(args) => bagit::run(args, output),
+        ExportCommand::Webdataset(args) => webdataset::run(args, output),
+    }
+}

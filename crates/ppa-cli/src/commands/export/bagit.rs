@@ -1,0 +1,31 @@
+//! `ppa export bagit`: a dataset as a bag.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use ppa_dataset::export::bag;
+
+use crate::output::{Output, bytes, working};
+
+#[derive(Debug, Args)]
+pub struct BagitArgs {
+    /// Dataset
+    dataset: PathBuf,
+    /// Folder of the bag, which must not be there yet
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+pub fn run(args: &BagitArgs, output: Output) -> anyhow::Result<()> {
+    let working = working("copying files");
+    let bag = bag(&args.dataset, &args.out)?;
+    working.finish_and_clear();
+    output.print(&bag, |bag| {
+        format!(
+            "{}: {} files, {}",
+            args.out.display(),
+            bag.files,
+            bytes(bag.bytes)
+        )
+    })
+}

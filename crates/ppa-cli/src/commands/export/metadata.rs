@@ -1,0 +1,55 @@
+//! `ppa export metadata`: Croissant and RO-Crate.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use ppa_dataset::export::{Metadata, write_metadata};
+use serde_json::json;
+
+use crate::output::Output;
+
+#[derive(Debug, Args)]
+#[command(after_long_help = "\
+Writes manifest.csv, croissant.json (Croissant 1.1) and ro-crate-metadata.json (RO-Crate 1.1, Process Run profile) into the dataset.
+
+  ppa export metadata dataset --name ankles --license https://creativecommons.org/licenses/by/4.0/ --date 2026-11-21")]
+pub struct MetadataArgs {
+    /// Dataset that `ppa generate` finished
+    dataset: PathBuf,
+    /// Name of the dataset
+    #[arg(long)]
+    name: String,
+    /// Address of its licence
+    #[arg(long, value_name = "URL")]
+    license: String,
+    /// Day of publication
+    #[arg(long, value_name = "YYYY-MM-DD", value_parser = date)]
+    date: String,
+    /// Split whose parts stand in the table
+    #[arg(long, value_name = "NAME")]
+    split: Option<String>,
+}
+
+fn date(text: &str) -> Result<String, String> {
+    let numbers: Vec<_> = text
+        .split('-')
+        .map(|part| (part.len(), part.parse::<u32>().ok()))
+        .collect();
+    match numbers[..] {
+        [(4, Some(_)), (2, Some(1..=12)), (2, Some(1..=31))] => Ok(text.to_owned()),
+        _ => Err(format!("{text:?} is no day, expected YYYY-MM-DD")),
+    }
+}
+
+pub fn run(args: &MetadataArgs, output: Output) -> anyhow::Result<()> {
+    let metadata = Metadata {
+        name: args.name.clone(),
+        license: args.license.clone(),
+        date: args.date.clone(),
+    };
+    write_metadata(&args.dataset, &metadata, args.split.as_deref())?;
+    let files = ["manifest.csv", "croissant.json", "ro-crate-metadata.json"];
+    output.print(&json!({ "files": files }), |_| {
+        format!("{}: {}", args.dataset.display(), files.join(", "))
+    })
+}

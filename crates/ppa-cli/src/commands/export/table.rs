@@ -1,0 +1,44 @@
+//! `ppa export table`: the manifest as a table.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use ppa_dataset::export::Table;
+use serde::Serialize;
+
+use crate::output::Output;
+
+#[derive(Debug, Args)]
+pub struct TableArgs {
+    /// Dataset that `ppa generate` finished
+    dataset: PathBuf,
+    /// File to write: .csv, or .parquet in a program built with the feature parquet
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Split whose parts stand in the column split
+    #[arg(long, value_name = "NAME")]
+    split: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Written {
+    rows: usize,
+    columns: usize,
+}
+
+pub fn run(args: &TableArgs, output: Output) -> anyhow::Result<()> {
+    let table = Table::of_dataset(&args.dataset, args.split.as_deref())?;
+    table.write(&args.out)?;
+    let written = Written {
+        rows: table.rows(),
+        columns: table.columns.len(),
+    };
+    output.print(&written, |w| {
+        format!(
+            "{}: {} files, {} columns",
+            args.out.display(),
+            w.rows,
+            w.columns
+        )
+    })
+}

@@ -1,0 +1,119 @@
+//! BagIt (RFC 8493): a copy of a dataset with the hash of every file, as archives and journals take it.
+
+use std::fs::{self, File};
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use crate::files::{FileError, hex};
+use crate::whole_folder::write_whole_folder;
+
+const MANIFEST: &str = "manifest-sha256.txt";
+const DECLARATION: &str = "BagIt-Version: 1.0\nTag-File-Character-Encoding: UTF-8\n";
+
+/// What a bag holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Bag {
+    /// Files of the dataset.
+    pub files: u64,
+    /// Their bytes.
+    pub bytes: u64,
+}
+
+/// Copies the dataset in `root` into the bag `to`, whole or not at all. Hidden files and folders, among them the records of
+/// `ppa generate`, stay behind.
+///
+/// # Errors
+/// [`FileError`]; `to` must not exist or be empty.
+pub fn bag(root: &Path, to: &Path) -> Result<Bag, FileError> {
+    let mut files = Vec::new();
+    list(root, "", &mut files)?;
+    write_whole_folder(to, |bag| {
+        let mut bytes = 0;
+        let mut manifest = String::new();
+        for name in &files {
+            let (size, hash) = copy(&root.join(name), &bag.join("data").join(name))?;
+            bytes += size;
+            manifest += &format!("{hash}  data/{}\n", encoded(name));
+        }
+        let count = files.len() as u64;
+        let agent = concat!("ppa ", env!("CARGO_PKG_VERSION"));
+        let info = format!("Bag-Software-Agent: {agent}\nPayload-Oxum: {bytes}.{count}\n");
+        let mut tags = String::new();
+        for (name, text) in [
+            ("bagit.txt", DECLARATION),
+            ("bag-info.txt", &info),
+            (MANIFEST, &manifest),
+        ] {
+            let path = bag.join(name);
+            fs::write(&path, text).map_err(FileError::at("write", &path))?;
+            tags += &format!("{}  {name}\n", hex(&Sha256::digest(text.as_bytes())));
+        }
+        let path = bag.join("tagmanifest-sha256.txt");
+        fs::write(&path, tags).map_err(FileError::at("write", &path))?;
+        Ok(Bag {
+            files: count,
+            bytes,
+        })
+    })
+}
+
+/// Names of all files below a folder, as paths from the root, sorted within each folder.
+fn list(root: &Path, below: &str, files: &mut Vec<String>) -> Result<(), FileError> {
+    let folder = root.join(below);
+    let entries = fs::read_dir(&folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+    let mut entries = entries.map_err(FileError::at("read", &folder))?;
+    entries.sort_by_key(fs::DirEntry::file_name);
+    for entry in entries {
+        let path = entry.path();
+        let name = entry
+            .file_name()
+            .into_string()
+            .map_err(|_| FileError::at("name", &path)(io::Error::other("its name is not UTF-8")))?;
+        let name = if below.is_empty() {
+            name
+        } else {
+            format!("{below}/{name}")
+        };
+        if entry.file_name().to_string_lossy().starts_with('.') {
+            continue;
+        }
+        if path.is_dir() {
+            list(root, &name, files)?;
+        } else {
+            files.push(name);
+        }
+    }
+    Ok(())
+}
+
+/// Copies a file; its size and hash as they were read.
+fn copy(from: &Path, to: &Path) -> Result<(u64, String), FileError> {
+    let folder = to.parent().expect("payload lies in the folder data");
+    fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
+    let mut source = File::open(from).map_err(FileError::at("read", from))?;
+    let mut target = File::create(to).map_err(FileError::at("write", to))?;
+    let (mut size, mut hasher, mut buffer) = (0, Sha256::new(), vec![0; 1 << 16]);
+    loop {
+        let read = source
+            .read(&mut buffer)
+            .map_err(FileError::at("read", from))?;
+        if read == 0 {
+            return Ok((size, hex(&hasher.finalize())));
+        }
+        size += read as u64;
+        hasher.update(&buffer[..read]);
+        target
+            .write_all(&buffer[..read])
+            .map_err(FileError::at("write", to))?;
+    }
+}
+
+/// A path as manifests write it: the characters that end a line, and the percent sign, by their codes.
+fn encoded(name: &str) -> String {
+    name.replace('%', "%25")
+        .replace('\r', "%0D")
+        .replace('\n', "%0A")
+}

@@ -1,0 +1,15 @@
+//! What other programs read of a dataset: tables, metadata, archives. All of it is derived and can be made anew.
+
+mod bag;
+mod croissant;
+mod metadata;
+mod ro_crate;
+mod table;
+#[cfg(feature = "parquet")]
+mod table_parquet;
+mod web_dataset;
+
+pub use self::bag::{Bag, bag};
+pub use self::metadata::{Metadata, write_metadata};
+pub use self::table::{Column, Table, TableError, Values};
+pub use self::web_dataset::{Shards, WebDatasetError, web_dataset};

@@ -1,0 +1,253 @@
+//! One row per file, with everything that is known of it.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::files::{FileError, read_text, write_whole};
+use crate::labels::{LabelFile, LabelFileError};
+use crate::layout::{LimbId, View};
+use crate::manifest::{FileRow, Manifest, Rows};
+use crate::split::{Split, SplitError};
+
+/// Why a dataset has no table.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TableError {
+    /// A file of the dataset, or the table's.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// Labels of a limb.
+    #[error(transparent)]
+    Labels(#[from] LabelFileError),
+    /// The split that was asked for.
+    #[error(transparent)]
+    Split(#[from] SplitError),
+}
+
+/// Columns of equal length.
+///
+/// | column | what |
+/// |---|---|
+/// | `file`, `sha256` | path from the root of the dataset, hash of its bytes |
+/// | `kind` | `depth`, `radiograph` or `radiograph_tallies` |
+/// | `unit` | the pose it belongs to, as `patient_0_r_036` |
+/// | `patient`, `side`, `step`, `angle_deg` | person, `l` or `r`, half degrees and degrees of medial rotation |
+/// | `camera`, `shape` | `cam_left` or `cam_right` of a depth image; body shape |
+/// | `intrinsics` | lens of the camera: JSON of a camera file, pixels |
+/// | `patient_from_ct`, `room_from_patient`, `room_from_camera`, `ct_from_device` | 4x4 rows as JSON, mm |
+/// | `seed` | of the noise in the image |
+/// | `dose_histories`, `scatter_histories` | of a radiograph: photons whose noise it carries, photons followed |
+/// | `label`, `label_std`, `label_source` | quality of the pose, 1 (ideal) to 3 |
+/// | `split` | part of the split that the person is in |
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// In a fixed order.
+    pub columns: Vec<Column>,
+}
+
+/// One column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Its name.
+    pub name: &'static str,
+    /// A value per file.
+    pub values: Values,
+}
+
+/// Values of a column; `None` where a file has none.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// Text.
+    Text(Vec<Option<String>>),
+    /// Whole numbers.
+    Count(Vec<Option<u64>>),
+    /// Numbers.
+    Real(Vec<Option<f64>>),
+}
+
+impl Values {
+    fn cell(&self, row: usize) -> String {
+        match self {
+            Self::Text(values) => values[row].clone().unwrap_or_default(),
+            Self::Count(values) => values[row].map(|v| v.to_string()).unwrap_or_default(),
+            Self::Real(values) => values[row].map(|v| v.to_string()).unwrap_or_default(),
+        }
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Text(values) => values.len(),
+            Self::Count(values) => values.len(),
+            Self::Real(values) => values.len(),
+        }
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// What the rows of a manifest share, from `dataset.json`.
+#[derive(Deserialize)]
+struct Shared {
+    settings: Settings,
+    cameras: Vec<CameraRow>,
+}
+
+#[derive(Deserialize)]
+struct Settings {
+    xray: Xray,
+}
+
+#[derive(Deserialize)]
+struct Xray {
+    engine: Engine,
+}
+
+#[derive(Deserialize)]
+struct Engine {
+    dose_histories: Option<f64>,
+    scatter_histories: u64,
+}
+
+#[derive(Deserialize)]
+struct CameraRow {
+    view: View,
+    intrinsics: Value,
+    room_from_camera: Rows,
+}
+
+impl Table {
+    /// The table of the dataset in `root`, which `ppa generate` finished; `split` names one of its splits.
+    ///
+    /// # Errors
+    /// [`TableError`] naming the file at fault.
+    pub fn of_dataset(root: &Path, split: Option<&str>) -> Result<Self, TableError> {
+        let manifest = Manifest::read(root)?;
+        let path = root.join("dataset.json");
+        let shared: Shared = serde_json::from_str(&read_text(&path)?)
+            .map_err(|e| FileError::at("parse", &path)(e.into()))?;
+        let mut labels = BTreeMap::new();
+        for limb in manifest.limbs() {
+            if let Some(file) = LabelFile::read(root, limb)? {
+                labels.insert(limb, file);
+            }
+        }
+        let split = split
+            .map(|name| Split::read(&Split::path(root, name)))
+            .transpose()?;
+        if let Some(split) = &split {
+            let mut patients: Vec<_> = manifest.limbs().iter().map(|limb| limb.patient).collect();
+            patients.dedup();
+            split.check(&patients)?;
+        }
+        Ok(Self::of(&manifest.files, &shared, &labels, split.as_ref()))
+    }
+
+    fn of(
+        rows: &[FileRow],
+        shared: &Shared,
+        labels: &BTreeMap<LimbId, LabelFile>,
+        split: Option<&Split>,
+    ) -> Self {
+        let text = |name, of: &dyn Fn(&FileRow) -> Option<String>| Column {
+            name,
+            values: Values::Text(rows.iter().map(of).collect()),
+        };
+        let count = |name, of: &dyn Fn(&FileRow) -> Option<u64>| Column {
+            name,
+            values: Values::Count(rows.iter().map(of).collect()),
+        };
+        let real = |name, of: &dyn Fn(&FileRow) -> Option<f64>| Column {
+            name,
+            values: Values::Real(rows.iter().map(of).collect()),
+        };
+        let camera = |row: &FileRow| shared.cameras.iter().find(|c| Some(c.view) == row.camera);
+        let radiograph = |row: &FileRow| row.ct_from_device.map(|_| &shared.settings.xray.engine);
+        let label = |row: &FileRow| labels.get(&row.limb)?.of_step(row.step).copied();
+        let columns = vec![
+            text("file", &|row| Some(row.file.clone())),
+            text("sha256", &|row| Some(row.sha256.clone())),
+            text("kind", &|row| name(&row.kind)),
+            text("unit", &|row| Some(row.limb.unit_name(row.step))),
+            count("patient", &|row| Some(row.limb.patient.into())),
+            text("side", &|row| Some(row.limb.side_letter().to_owned())),
+            count("step", &|row| Some(row.step.into())),
+            real("angle_deg", &|row| Some(row.angle_deg)),
+            text("camera", &|row| Some(row.camera?.name().to_owned())),
+            text("shape", &|row| Some(row.shape.name().to_owned())),
+            text("intrinsics", &|row| json(&camera(row)?.intrinsics)),
+            text("patient_from_ct", &|row| json(&row.patient_from_ct)),
+            text("room_from_patient", &|row| json(&row.room_from_patient)),
+            text("room_from_camera", &|row| {
+                json(&camera(row)?.room_from_camera)
+            }),
+            text("ct_from_device", &|row| json(&row.ct_from_device?)),
+            count("seed", &|row| row.seed),
+            real("dose_histories", &|row| radiograph(row)?.dose_histories),
+            count("scatter_histories", &|row| {
+                Some(radiograph(row)?.scatter_histories)
+            }),
+            real("label", &|row| Some(label(row)?.label)),
+            real("label_std", &|row| Some(label(row)?.std)),
+            text("label_source", &|row| name(&labels.get(&row.limb)?.source?)),
+            text("split", &|row| {
+                Some(split?.part_of(row.limb.patient)?.to_owned())
+            }),
+        ];
+        Self { columns }
+    }
+
+    /// Number of files.
+    pub fn rows(&self) -> usize {
+        self.columns.first().map_or(0, |column| column.values.len())
+    }
+
+    /// The table as CSV with a header line; what a file does not have is empty.
+    pub fn to_csv(&self) -> Vec<u8> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        let names = self.columns.iter().map(|column| column.name);
+        writer.write_record(names).expect("memory takes all");
+        for row in 0..self.rows() {
+            let cells = self.columns.iter().map(|column| column.values.cell(row));
+            writer.write_record(cells).expect("memory takes all");
+        }
+        writer.into_inner().expect("memory takes all")
+    }
+
+    /// Writes it as CSV, or with the feature `parquet` as Parquet, by the extension of `path`; whole or not at all.
+    ///
+    /// # Errors
+    /// [`FileError`] for other extensions, or when it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), FileError> {
+        match path.extension().and_then(|extension| extension.to_str()) {
+            Some("csv") => write_whole(path, &self.to_csv()),
+            #[cfg(feature = "parquet")]
+            Some("parquet") => write_whole(path, &self.to_parquet()),
+            _ => {
+                let kinds = if cfg!(feature = "parquet") {
+                    ".csv or .parquet"
+                } else {
+                    ".csv (.parquet needs a program built with the feature parquet)"
+                };
+                let text = format!("expected a name ending in {kinds}");
+                Err(FileError::at("write", path)(std::io::Error::other(text)))
+            }
+        }
+    }
+}
+
+fn json(value: &impl Serialize) -> Option<String> {
+    Some(serde_json::to_string(value).expect("manifests hold only JSON values"))
+}
+
+/// The name of a value of an enumeration, as JSON has it.
+fn name(value: &impl Serialize) -> Option<String> {
+    let value = serde_json::to_value(value).expect("manifests hold only JSON values");
+    value.as_str().map(str::to_owned)
+}
