@@ -1,4 +1,11 @@
-//! Table search in the built-in room and placement of the phantom's skin.
+//! Table search in the built-in room and in a recorded one, landmarks and placement of the phantom's skin.
+//!
+//! Times are processor seconds of all threads.
+
+#[path = "../../ppa-depth/benches/processor_time/mod.rs"]
+mod processor_time;
+#[path = "../tests/it/recorded_room.rs"]
+mod recorded_room;
 
 use std::hint::black_box;
 
@@ -8,8 +15,9 @@ use ppa_mesh::{Border, iso_surface};
 use ppa_scene::{
     LandmarkOverrides, PlaneSettings, Room, RoomSpec, Side, find_landmarks, place, table_plane,
 };
+use processor_time::ProcessorTime;
 
-fn scene(criterion: &mut Criterion) {
+fn scene(criterion: &mut Criterion<ProcessorTime>) {
     let room = Room::parametric(&RoomSpec::default()).expect("default room");
     let settings = PlaneSettings::for_device(&room.device);
     let table = table_plane(&room.cloud, &settings, 1).expect("table");
@@ -19,6 +27,14 @@ fn scene(criterion: &mut Criterion) {
     group.throughput(Throughput::Elements(room.cloud.points.len() as u64));
     group.bench_function("built_in_room", |b| {
         b.iter(|| table_plane(black_box(&room.cloud), &settings, 1))
+    });
+    // 1000 planes, as Open3D's `segment_plane` is asked for by ../shared/peers/geometry_bench.py.
+    let recorded = recorded_room::room_cloud(368_640, 11, 300.0..1400.0);
+    group.throughput(Throughput::Elements(recorded.points.len() as u64));
+    let settings = PlaneSettings::default();
+    assert_eq!(settings.iterations, 1000);
+    group.bench_function("recorded_room", |b| {
+        b.iter(|| table_plane(black_box(&recorded), &settings, 1))
     });
     group.finish();
 
@@ -55,8 +71,26 @@ fn scene(criterion: &mut Criterion) {
             })
         });
     }
+    // As many vertices as the surface of a whole scan with voxels of half a millimetre has.
+    let fine = LowerLeg::p01()
+        .voxelise(0.5, TableTop::Absent)
+        .expect("phantom");
+    let skin = iso_surface(&fine, -500.0, Border::Open).expect("skin");
+    group.throughput(Throughput::Elements(skin.vertices.len() as u64));
+    group.bench_function("p01_0.5mm_45_degrees", |b| {
+        b.iter(|| {
+            let points = black_box(&skin.vertices);
+            place(
+                points,
+                &landmarks,
+                45_f64.to_radians(),
+                &table.plane,
+                &room.device,
+            )
+        })
+    });
     group.finish();
 }
 
-criterion_group!(benches, scene);
+criterion_group!(name = benches; config = Criterion::default().with_measurement(ProcessorTime); targets = scene);
 criterion_main!(benches);

@@ -30,12 +30,11 @@ pub(crate) struct Tilt {
 impl Profile {
     /// Splits a limb at the joint, or at the middle of its length when less than a tenth of it
     /// lies on one side of the joint.
-    pub(crate) fn split(points: impl Iterator<Item = [f64; 2]>) -> Self {
-        let points: Vec<[f64; 2]> = points.collect();
+    pub(crate) fn split(points: impl Iterator<Item = [f64; 2]> + Clone) -> Self {
         let (low, high) = points
-            .iter()
+            .clone()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), [y, _]| {
-                (low.min(*y), high.max(*y))
+                (low.min(y), high.max(y))
             });
         let tenth = 0.1 * (high - low);
         let split_mm = if low < -tenth && high > tenth {
@@ -43,7 +42,7 @@ impl Profile {
         } else {
             0.5 * (low + high)
         };
-        let (distal, proximal) = points.into_iter().partition(|[y, _]| *y < split_mm);
+        let (distal, proximal) = points.partition(|[y, _]| *y < split_mm);
         Self {
             distal,
             proximal,

@@ -219,15 +219,19 @@ fn measure(
     is_distal: impl Fn(&Point3<f32>) -> bool,
 ) -> [f64; 2] {
     let (mut distal_mm, mut proximal_mm) = (f64::INFINITY, f64::INFINITY);
+    // The table as the scan sees it: one product per point.
+    let table_ct = table.transformed(room_from_ct.inverse().isometry());
+    let height = |p: Point3<f64>| match flattening {
+        None => table_ct.signed_distance(&p),
+        Some(flattening) => table.signed_distance(&flattening.flattened(&(room_from_ct * p))),
+    };
     for p in points_ct {
-        let lies = room_from_ct * p.cast::<f64>();
-        let lies = flattening.map_or(lies, |flattening| flattening.flattened(&lies));
         let half = if is_distal(p) {
             &mut distal_mm
         } else {
             &mut proximal_mm
         };
-        *half = half.min(table.signed_distance(&lies));
+        *half = half.min(height(p.cast()));
     }
     [distal_mm, proximal_mm]
 }
