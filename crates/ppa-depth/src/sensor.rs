@@ -94,7 +94,7 @@ impl Sensor {
                 let mut edge = seen
                     .edges
                     .partition_point(|(pixel, _)| (*pixel as usize) < first);
-                let mut numbers = ([0.0; 4], [0.0; 4]);
+                let mut numbers = None;
                 for (i, z_mm) in z_mm.iter_mut().enumerate() {
                     let pixel = first + i;
                     let samples = match seen.edges.get(edge) {
@@ -105,22 +105,28 @@ impl Sensor {
                         _ => None,
                     };
                     if i % 4 == 0 {
-                        let block = (pixel / 4) as u32;
-                        numbers = self.draw(seed, frame, block);
+                        numbers = None;
                     }
                     let samples = samples.filter(|_| self.spec.mixed.is_some());
+                    if samples.is_none() && image.z_mm[pixel] == 0.0 {
+                        continue;
+                    }
+                    let Some(ray) = surface.ray_length(pixel) else {
+                        continue;
+                    };
                     let cos_incidence = surface.cos_incidence(pixel);
                     let bounced = bounced.as_ref().map(|light| light[pixel]);
                     let measured = self
-                        .light(&surface, image, pixel, cos_incidence, samples)
+                        .light(&surface, image, (pixel, ray), cos_incidence, samples)
                         .and_then(|light| self.range(light, cos_incidence, bounced));
                     let Some((range_mm, signal)) = measured else {
                         continue;
                     };
-                    let drawn = [numbers.0[i % 4], numbers.1[i % 4]];
+                    let (noise, pattern) =
+                        numbers.get_or_insert_with(|| self.draw(seed, frame, (pixel / 4) as u32));
+                    let drawn = [noise[i % 4], pattern[i % 4]];
                     let range_mm = self.disturbed(range_mm, signal, drawn);
-                    let ray = camera.rays()[pixel].expect("a pixel with a depth has a ray");
-                    *z_mm = (range_mm / (1.0 + ray.norm_squared()).sqrt()).max(0.0) as f32;
+                    *z_mm = (range_mm / ray).max(0.0) as f32;
                 }
             });
         DepthImage {
@@ -139,16 +145,15 @@ impl Sensor {
         (noise.unwrap_or_default(), pattern.unwrap_or_default())
     }
 
-    /// Direct light of a pixel.
+    /// Direct light of a pixel, whose ray (X/Z, Y/Z, 1) is so long.
     fn light(
         &self,
         surface: &Surface,
         image: &DepthImage,
-        pixel: usize,
+        (pixel, ray): (usize, f64),
         cos_incidence: f64,
         samples: Option<&[f32; SAMPLES]>,
     ) -> Option<Light> {
-        let ray = surface.ray_length(pixel)?;
         let Some(samples) = samples else {
             let reference_mm = f64::from(image.z_mm[pixel]) * ray;
             if reference_mm <= 0.0 {

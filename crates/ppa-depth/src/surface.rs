@@ -78,6 +78,13 @@ impl<'a> Surface<'a> {
     #[inline]
     pub(crate) fn normal(&self, pixel: usize) -> Option<Vector3<f64>> {
         let here = self.point(pixel)?;
+        let normal = self.across(pixel, here)?.try_normalize(0.0)?;
+        Some(normal * -normal.dot(&here.coords).signum())
+    }
+
+    /// A vector across the surface at the point that a pixel sees, to either side and of any length.
+    #[inline(always)]
+    fn across(&self, pixel: usize, here: Point3<f64>) -> Option<Vector3<f64>> {
         let across = |behind: Option<Point3<f64>>, ahead: Option<Point3<f64>>| match (behind, ahead)
         {
             (None, None) => None,
@@ -85,8 +92,7 @@ impl<'a> Surface<'a> {
         };
         let [left, right, above, below] = self.neighbours(pixel);
         let (right, down) = (across(left, right)?, across(above, below)?);
-        let normal = down.cross(&right).try_normalize(0.0)?;
-        Some(normal * -normal.dot(&here.coords).signum())
+        Some(down.cross(&right))
     }
 
     /// Length of the ray (X/Z, Y/Z, 1) of a pixel.
@@ -128,9 +134,18 @@ impl<'a> Surface<'a> {
     /// Cosine of the angle of incidence; 1 where there is no telling.
     #[inline]
     pub(crate) fn cos_incidence(&self, pixel: usize) -> f64 {
-        match (self.point(pixel), self.normal(pixel)) {
-            (Some(point), Some(normal)) => -normal.dot(&point.coords) / point.coords.norm(),
-            _ => 1.0,
+        let Some(point) = self.point(pixel) else {
+            return 1.0;
+        };
+        let Some(across) = self.across(pixel, point) else {
+            return 1.0;
+        };
+        // One root for both lengths.
+        let lengths_sq = across.norm_squared() * point.coords.norm_squared();
+        if lengths_sq > 0.0 {
+            across.dot(&point.coords).abs() / lengths_sq.sqrt()
+        } else {
+            1.0
         }
     }
 }
