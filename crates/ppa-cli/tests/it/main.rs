@@ -1,6 +1,7 @@
 //! The program as a user meets it.
 
 mod auto_labels;
+mod bad_geometry;
 mod bad_input;
 mod conversion;
 mod coverage;
@@ -53,6 +54,13 @@ fn fail(folder: &Path, arguments: &str) -> String {
     assert!(!stderr.contains("panicked"), "{stderr}");
     assert_eq!(stderr.trim_end().lines().count(), 1, "{stderr}");
     stderr
+}
+
+/// Asserts that all parts stand in a text.
+fn contains(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "{part:?} is missing in: {text}");
+    }
 }
 
 /// Names of the files in a folder.

@@ -100,6 +100,10 @@ fn gaps_are_filled_only_when_asked_for() {
         (area(&skin) / area(&whole) - 1.0).abs() < 0.02,
         "{skin} and {whole}"
     );
+    let voxels = |arguments: &str| told(folder, arguments)["voxels"].clone();
+    assert!(fail(folder, "xray audit scan").contains("9.000 mm after slice 9"));
+    let audited = told(slices(), "xray audit slices");
+    assert_eq!(voxels("xray audit scan --fill-gaps"), audited["voxels"]);
     // The file cannot tell; what is printed does.
     let converted = told(folder, "ct convert scan out.nrrd --fill-gaps");
     assert_eq!(codes(&converted), ["gaps-filled"]);

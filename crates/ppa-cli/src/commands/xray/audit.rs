@@ -5,15 +5,17 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
+use ppa_ct::ReadOptions;
 use ppa_dataset::{Case, PreparedLimb};
 use ppa_xray::{Audit, HuBin, HuCalibration};
 
 use crate::output::{Output, working};
+use crate::scan_args::ScanArgs;
 
 #[derive(Debug, Args)]
 pub struct AuditArgs {
-    /// CT (DICOM folder or file, or a volume in one file such as .nii.gz), or case written by `ppa prepare` (.toml): its limb alone
-    path: PathBuf,
+    #[command(flatten)]
+    scan: ScanArgs,
     /// HU calibration (TOML) in place of the built-in one
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
@@ -25,13 +27,19 @@ pub fn run(args: &AuditArgs, output: Output) -> anyhow::Result<()> {
         None => HuCalibration::default(),
     };
     let working = working("reading the scan");
-    let audit = if args.path.extension().is_some_and(|ending| ending == "toml") {
-        let case = Case::read(&args.path)?;
+    let path = &args.scan.path;
+    let audit = if path.extension().is_some_and(|ending| ending == "toml") {
+        anyhow::ensure!(
+            args.scan.options() == ReadOptions::default(),
+            "{} says itself how its scan is read: --series, --fill-gaps and --force go with a scan",
+            path.display()
+        );
+        let case = Case::read(path)?;
         let prepared = PreparedLimb::of_case(&case)
-            .with_context(|| format!("cannot prepare the limb of {}", args.path.display()))?;
+            .with_context(|| format!("cannot prepare the limb of {}", path.display()))?;
         calibration.audit(&prepared.volume, Some(&prepared.limb.mask))?
     } else {
-        calibration.audit(&ppa_ct::read(&args.path)?.volume, None)?
+        calibration.audit(&args.scan.read()?.volume, None)?
     };
     working.finish_and_clear();
     output.print(&audit, describe)
