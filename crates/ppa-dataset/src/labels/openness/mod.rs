@@ -8,6 +8,7 @@ mod gutter;
 mod joint_space;
 mod overlap;
 mod rays;
+mod visibility;
 mod visible;
 
 #[cfg(test)]
@@ -19,3 +20,4 @@ pub use exposure::Exposure;
 pub use grade::{ComputedLabel, GradeScale, GradeThresholds, ThresholdError};
 pub use joint_space::{FREE_CHORDS_MM, Gutter, JointSpace, JointSpaceError, Openness};
 pub use overlap::Overlaps;
+pub use visibility::{Reading, Visibility};
