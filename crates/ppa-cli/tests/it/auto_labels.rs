@@ -122,4 +122,12 @@ fn refusals(here: &Path) {
     );
     refused("label auto plan", "were not made from the scan of the case");
     fs::write(here.join("p01.toml"), case).unwrap();
+    let tallies = here.join("plan/patient_3/xray/r/xray_image_36.exr");
+    let bytes = fs::read(&tallies).unwrap();
+    fs::write(&tallies, &bytes[..bytes.len() / 2]).unwrap();
+    refused(
+        "label auto plan",
+        "xray_image_36.exr holds no tallies of a radiograph",
+    );
+    fs::write(&tallies, bytes).unwrap();
 }

@@ -6,15 +6,16 @@ use nalgebra::{Isometry3, Point3};
 use ppa_depth::isometry_from_rows;
 use serde::Serialize;
 
+use super::described::Described;
 use super::file::{LabelFile, LabelFileError};
 use super::label::{LabelError, LabelRow, LabelSource};
 use super::openness::{
     BoneFileError, Exposure, GradeThresholds, JointSpace, JointSpaceError, ThresholdError,
 };
 use super::table::write_table;
+use super::tallies::TalliesError;
 use crate::case::Case;
-use crate::description::DESCRIPTION_FILE;
-use crate::files::{FileError, read_text};
+use crate::files::FileError;
 use crate::layout::LimbId;
 use crate::manifest::{FileKind, FileRow, Manifest, Rows};
 
@@ -47,6 +48,12 @@ pub struct ComputedRow {
     pub medial_clear_space_mm: Option<f64>,
     /// Trochlea to plafond.
     pub superior_clear_space_mm: Option<f64>,
+    /// How well the radiograph shows the medial gutter, see [`Visibility`](super::Visibility); as the next two.
+    pub medial_visibility: f64,
+    /// The superior one.
+    pub superior_visibility: f64,
+    /// The lateral one.
+    pub lateral_visibility: f64,
 }
 
 /// What [`label_limb`] did.
@@ -102,6 +109,9 @@ pub enum AutoLabelError {
         /// What is wrong with it.
         source: JointSpaceError,
     },
+    /// The tallies of a radiograph.
+    #[error(transparent)]
+    Tallies(#[from] TalliesError),
     /// The thresholds.
     #[error(transparent)]
     Thresholds(#[from] ThresholdError),
@@ -172,44 +182,52 @@ fn computed_rows(
             limb,
         });
     };
-    if scan_of(manifest, limb)?.as_deref() != Some(&case.source.volume_sha256) {
+    let described = Described::read(manifest)?;
+    if described.scan_of(limb) != Some(&case.source.volume_sha256) {
         return Err(AutoLabelError::OtherScan(limb));
     }
     let patient_from_ct = pose(first, "patient_from_ct", Some(&first.patient_from_ct))?;
     let ct_from_patient = patient_from_ct.inverse();
     let joint = ct_from_patient * Point3::origin();
-    let exposures: Vec<Exposure> = radiographs
+    let devices: Vec<Isometry3<f64>> = radiographs
         .iter()
-        .map(|row| {
-            let ct_from_device = pose(row, "ct_from_device", row.ct_from_device.as_ref())?;
-            Ok(Exposure::of_device(&ct_from_device, joint))
-        })
+        .map(|row| pose(row, "ct_from_device", row.ct_from_device.as_ref()))
         .collect::<Result<_, AutoLabelError>>()?;
+    let exposures: Vec<Exposure> = devices
+        .iter()
+        .map(|device| Exposure::of_device(device, joint))
+        .collect();
     let of_limb = |source| AutoLabelError::JointSpace { limb, source };
     let space = JointSpace::new(bones.read(&joint)?, &ct_from_patient).map_err(of_limb)?;
     let openness = space.openness(&exposures).map_err(of_limb)?;
-    let rows = radiographs.iter().zip(&exposures).zip(&openness);
-    Ok(rows
-        .map(|((row, exposure), openness)| {
-            let grade = thresholds.grade(openness);
-            let overlaps = space.overlaps(exposure);
-            ComputedRow {
-                image: row.file.clone(),
-                step: row.step,
-                angle_deg: row.angle_deg,
-                medial: openness.medial[1],
-                superior: openness.superior,
-                lateral: openness.lateral[1],
-                worst: thresholds.scaled(openness)[1],
-                label: grade.label,
-                std: grade.std,
-                tibiofibular_overlap_mm: overlaps.tibiofibular_overlap_mm,
-                tibiofibular_clear_space_mm: overlaps.tibiofibular_clear_space_mm,
-                medial_clear_space_mm: overlaps.medial_clear_space_mm,
-                superior_clear_space_mm: overlaps.superior_clear_space_mm,
-            }
+    let rows = radiographs
+        .iter()
+        .zip(&devices)
+        .zip(exposures.iter().zip(&openness));
+    rows.map(|((row, device), (exposure, openness))| {
+        let visibility = described.visibility(manifest, row, device, &space)?;
+        let grade = thresholds.grade(openness);
+        let overlaps = space.overlaps(exposure);
+        Ok(ComputedRow {
+            image: row.file.clone(),
+            step: row.step,
+            angle_deg: row.angle_deg,
+            medial: openness.medial[1],
+            superior: openness.superior,
+            lateral: openness.lateral[1],
+            worst: thresholds.scaled(openness)[1],
+            label: grade.label,
+            std: grade.std,
+            tibiofibular_overlap_mm: overlaps.tibiofibular_overlap_mm,
+            tibiofibular_clear_space_mm: overlaps.tibiofibular_clear_space_mm,
+            medial_clear_space_mm: overlaps.medial_clear_space_mm,
+            superior_clear_space_mm: overlaps.superior_clear_space_mm,
+            medial_visibility: visibility.medial,
+            superior_visibility: visibility.superior,
+            lateral_visibility: visibility.lateral,
         })
-        .collect())
+    })
+    .collect()
 }
 
 fn pose(
@@ -222,25 +240,6 @@ fn pose(
         file: row.file.clone(),
         what,
     })
-}
-
-/// Hash of the scan that a limb of a dataset was made from.
-fn scan_of(manifest: &Manifest, limb: LimbId) -> Result<Option<String>, FileError> {
-    #[derive(serde::Deserialize)]
-    struct Described {
-        limbs: Vec<Limb>,
-    }
-    #[derive(serde::Deserialize)]
-    struct Limb {
-        #[serde(flatten)]
-        limb: LimbId,
-        volume_sha256: String,
-    }
-    let path = manifest.root.join(DESCRIPTION_FILE);
-    let described: Described = serde_json::from_str(&read_text(&path)?)
-        .map_err(|error| FileError::at("parse", &path)(error.into()))?;
-    let found = described.limbs.into_iter().find(|found| found.limb == limb);
-    Ok(found.map(|found| found.volume_sha256))
 }
 
 /// The middle of the rotations at which the worst gutter shows at least nine tenths of the most: both flanks are steep.

@@ -11,6 +11,8 @@
 
 #[cfg(feature = "generate")]
 mod computed;
+#[cfg(feature = "generate")]
+mod described;
 mod file;
 mod label;
 #[cfg(feature = "generate")]
@@ -19,6 +21,8 @@ mod openness;
 mod readers;
 #[cfg(feature = "generate")]
 mod table;
+#[cfg(feature = "generate")]
+mod tallies;
 
 #[cfg(feature = "generate")]
 pub use computed::{AutoLabelError, ComputedRow, LabelledLimb, label_limb};
@@ -30,3 +34,5 @@ pub use openness::*;
 pub use readers::*;
 #[cfg(feature = "generate")]
 pub use table::TableError;
+#[cfg(feature = "generate")]
+pub use tallies::TalliesError;

@@ -15,7 +15,8 @@ use crate::output::{Output, working};
 #[command(after_long_help = "\
 The gutters between talus, tibia and fibula are followed along the rays of every radiograph; the worst one decides. The \
 cases of the plan name the bones (`ppa prepare --bones`). Writes labels.json, with label_source surrogate-jso/1, and \
-openness.csv beside it: openness of each gutter, overlaps and clear spaces in mm. Labels of readers stay as they are. \
+openness.csv beside it: openness of each gutter, overlaps and clear spaces in mm, \
+and how well the radiograph itself shows each gutter. Labels of readers stay as they are. \
 No reader has confirmed these labels.
 
   ppa ct phantom --out p01.nii.gz --labels p01.bones.nii.gz
