@@ -53,10 +53,11 @@ pub(super) fn croissant(
 }
 
 fn field(column: &Column) -> Value {
-    let of_type = match column.values {
-        Values::Text(_) => "sc:Text",
-        Values::Count(_) => "sc:Integer",
-        Values::Real(_) => "sc:Float",
+    // Croissant knows no number that is missing.
+    let of_type = match &column.values {
+        Values::Count(values) if values.iter().all(Option::is_some) => "sc:Integer",
+        Values::Real(values) if values.iter().all(Option::is_some) => "sc:Float",
+        _ => "sc:Text",
     };
     let name = column.name;
     json!({
