@@ -66,6 +66,8 @@ enum Command {
     /// Check, split or convert a dataset, ours or the authors'
     #[command(subcommand)]
     Dataset(commands::dataset::DatasetCommand),
+    /// A dataset on one page of HTML, to look through before anything is trained on it
+    Qa(commands::qa::QaArgs),
     /// Tables, metadata and archives of a dataset for other programs
     #[command(subcommand)]
     Export(commands::export::ExportCommand),
@@ -103,6 +105,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Merge(args) => commands::merge::run(&args, output),
         Command::Verify(args) => commands::verify::run(&args, output),
         Command::Dataset(command) => commands::dataset::run(&command, output),
+        Command::Qa(args) => commands::qa::run(&args, output),
         Command::Export(command) => commands::export::run(&command, output),
         Command::Label(command) => commands::label::run(&command, output),
         Command::Learn(command) => commands::learn::run(&command, output),

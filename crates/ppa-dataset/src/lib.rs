@@ -58,6 +58,8 @@ mod planned;
 mod prepare;
 pub mod published;
 #[cfg(feature = "generate")]
+mod qa;
+#[cfg(feature = "generate")]
 mod radiograph;
 #[cfg(feature = "generate")]
 mod record;
@@ -107,6 +109,8 @@ pub use merge::{MergeError, merge};
 pub use plan::{DepthSettings, Plan, PlanCase, PlanError, PlanRoom, XraySettings};
 #[cfg(feature = "generate")]
 pub use prepare::{PrepareError, PreparedLimb, prepare, volume_sha256};
+#[cfg(feature = "generate")]
+pub use qa::{QaError, qa_page};
 #[cfg(feature = "generate")]
 pub use radiograph::{JointError, joint_phantom, projection};
 #[cfg(feature = "generate")]

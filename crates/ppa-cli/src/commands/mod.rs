@@ -13,6 +13,7 @@ pub mod mesh;
 pub mod metrics;
 pub mod plan;
 pub mod prepare;
+pub mod qa;
 pub mod scene;
 pub mod stats;
 pub mod status;

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use crate::{contents, fail, names, succeed, write_plan};
+use crate::{contents, fail, names, ppa, succeed, write_plan};
 
 /// A dataset of one limb and five poses in the folder `data`.
 fn dataset() -> &'static Path {
@@ -150,4 +150,77 @@ fn persons_are_split_and_leaks_refused() {
         assert!(said.contains(part), "{said}");
     }
     assert_eq!(names(&data.join("splits")), ["default.json"]);
+}
+
+#[test]
+fn tables_and_archives_are_written_from_a_generated_dataset() {
+    let folder = copy();
+    let said = succeed(folder.path(), "export table data --out manifest.csv --json");
+    // Five poses: four depth images, a radiograph and its tallies.
+    assert_eq!(serde_json::from_str::<Value>(&said).unwrap()["rows"], 30);
+    let csv = fs::read_to_string(folder.path().join("manifest.csv")).unwrap();
+    let mut rows = csv::Reader::from_reader(csv.as_bytes());
+    let header = rows.headers().unwrap().clone();
+    let at = |name: &str| header.iter().position(|column| column == name).unwrap();
+    for row in rows.records().map(Result::unwrap) {
+        let is_depth = &row[at("kind")] == "depth";
+        assert_eq!(row[at("intrinsics")].contains("\"fx\""), is_depth);
+        assert_eq!(&row[at("scatter_histories")] == "20000", !is_depth);
+    }
+    let metadata = "export metadata data --name ankle --license https://example.org/licence --date";
+    let said = ppa(folder.path(), &format!("{metadata} 2026-13-01"))
+        .output()
+        .unwrap();
+    assert!(String::from_utf8_lossy(&said.stderr).contains("YYYY-MM-DD"));
+    succeed(folder.path(), &format!("{metadata} 2026-11-21"));
+    succeed(folder.path(), "dataset check data");
+    succeed(
+        folder.path(),
+        "export webdataset data --out shards --per-shard 4",
+    );
+    assert_eq!(
+        names(&folder.path().join("shards")),
+        ["all-000000.tar", "all-000001.tar", "all-000002.tar"]
+    );
+    succeed(folder.path(), "export bagit data --out bag");
+    let images = |root: &Path| {
+        let mut files = contents(root);
+        files.retain(|name, _| !name.starts_with(".ppa"));
+        files
+    };
+    assert!(contents(&folder.path().join("bag/data")) == images(&folder.path().join("data")));
+    let said = fail(folder.path(), "export table specimen --out t.csv");
+    assert!(said.contains("manifest.jsonl"), "{said}");
+}
+
+/// Nothing on it comes from elsewhere, and nothing tells where the dataset lay.
+#[test]
+fn the_page_of_a_dataset_stands_by_itself() {
+    let folder = copy();
+    succeed(folder.path(), "qa data");
+    let page = fs::read_to_string(folder.path().join("data/qa.html")).unwrap();
+    for outside in [
+        "http:", "https:", "//", "url(", "<script", "<link", "@import", "/tmp",
+    ] {
+        let text = page
+            .split("data:image/png;base64,")
+            .map(|part| part.split_once('"').map_or(part, |(_, rest)| rest));
+        for part in text {
+            assert!(
+                !part.contains(outside),
+                "{outside}: {}",
+                part.chars().take(300).collect::<String>()
+            );
+        }
+    }
+    // A contact sheet, and three poses of two cameras.
+    assert_eq!(page.matches("src=\"data:image/png").count(), 1 + 6);
+    assert!(page.contains("Fewer than 9 poses") && page.contains("is as in manifest.jsonl"));
+    let image = "patient_3/depth/r/big/depth_cam_right_2.5.png";
+    let path = folder.path().join("data").join(image);
+    fs::write(&path, &fs::read(&path).unwrap()[..200]).unwrap();
+    succeed(folder.path(), "qa data --out other.html");
+    let page = fs::read_to_string(folder.path().join("other.html")).unwrap();
+    assert!(page.contains(&format!("{image} is not a whole PNG")));
+    assert!(!page.contains("/tmp"));
 }

@@ -1,0 +1,35 @@
+//! `ppa qa`: a dataset on one page.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use ppa_dataset::{qa_page, write_whole};
+use serde_json::json;
+
+use crate::output::{Output, bytes, working};
+
+#[derive(Debug, Args)]
+pub struct QaArgs {
+    /// Dataset that `ppa generate` finished
+    dataset: PathBuf,
+    /// Page to write [default: qa.html in the dataset]
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+pub fn run(args: &QaArgs, output: Output) -> anyhow::Result<()> {
+    let working = working("looking at all images");
+    let page = qa_page(&args.dataset)?;
+    working.finish_and_clear();
+    let inside = || args.dataset.join("qa.html");
+    let path = args.out.clone().unwrap_or_else(inside);
+    write_whole(&path, page.as_bytes())?;
+    let size = page.len() as u64;
+    output.print(&json!({ "page": path, "bytes": size }), |_| {
+        format!(
+            "{}: {}, to be opened in any browser",
+            path.display(),
+            bytes(size)
+        )
+    })
+}
