@@ -85,3 +85,47 @@ pub fn silu_and_derivative<S: Simd>(simd: S, y: S::f32s) -> (S::f32s, S::f32s) {
     let rest = simd.sub_f32s(simd.splat_f32s(1.0), s);
     (value, fma(simd, value, rest, s))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Both<'a>(&'a mut [f32]);
+
+    impl WithSimd for Both<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) {
+            let (value, derivative) = self.0.split_at_mut(self.0.len() / 2);
+            for (x, d) in lanes_mut::<S>(value)
+                .iter_mut()
+                .zip(lanes_mut::<S>(derivative))
+            {
+                (*x, *d) = silu_and_derivative(simd, *x);
+            }
+        }
+    }
+
+    #[test]
+    fn silu_and_its_derivative_are_those_of_f64_with_all_widths() {
+        let values: Vec<f32> = (0..4096).map(|i| (i as f32 - 2048.0) / 16.0).collect();
+        for channels in [1, 8, 16] {
+            let mut both = values.repeat(2);
+            dispatch(channels, Both(&mut both));
+            for (i, x) in values.iter().map(|&x| f64::from(x)).enumerate() {
+                let s = 1.0 / (1.0 + (-x).exp());
+                let (value, derivative) = (f64::from(both[i]), f64::from(both[4096 + i]));
+                assert!(
+                    (value - x * s).abs() <= 4e-7 * (x * s).abs() + 1e-30,
+                    "{x}: {value}"
+                );
+                let expected = s * (1.0 + x * (1.0 - s));
+                assert!(
+                    (derivative - expected).abs() < 6e-7 * (1.0 + x.abs() * s),
+                    "{x}: {derivative} {expected}"
+                );
+            }
+        }
+    }
+}
