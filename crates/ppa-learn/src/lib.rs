@@ -7,7 +7,9 @@ mod random;
 mod weights;
 
 pub mod data;
+pub mod evaluate;
 pub mod experiment;
+pub mod train;
 
 pub use network::{EfficientNetB0, Entry, Mode, Named, NetworkError, Options};
 pub use parity::{Parity, parity};

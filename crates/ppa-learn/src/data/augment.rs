@@ -23,7 +23,8 @@ const LOST_SHARE: [f64; 2] = [0.1, 0.5];
 /// cut to a square whose side lies between the network's and the prepared image's. The default is the paper's.
 ///
 /// Semantics follow albumentations 1.3.1 as the authors' repository uses it; noise and blur change invalid pixels as well.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Augmentation {
     /// Probability of mirroring left to right.
     pub flip_probability: f64,

@@ -94,6 +94,7 @@ impl Reader<'_> {
         if *taken == self.frames_per_pose {
             return Ok(None);
         }
+        let frame = *taken as u32;
         *taken += 1;
         let path = |file: &DepthFile| self.dataset.root.join(&file.file);
         let no_label = || DataError::NoLabel(path(files[0]));
@@ -106,7 +107,10 @@ impl Reader<'_> {
             images: images?,
             label,
             person: format!("{}, patient {}", self.dataset.root.display(), limb.patient),
+            limb,
+            camera: views[0],
             pose,
+            frame,
             angle_deg: match pair.pose {
                 Pose::Rotated { step, .. } => Some(f64::from(step) / 2.0),
                 Pose::Recorded { .. } => None,

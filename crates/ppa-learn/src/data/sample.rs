@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use ppa_dataset::layout::View;
+use ppa_dataset::layout::{LimbId, View};
 
 use super::error::DataError;
 use super::prepare::{Roi, prepare};
@@ -57,8 +57,14 @@ pub struct Sample {
     pub label: f64,
     /// The person, with the dataset's folder: equal for the feet of one person only.
     pub person: String,
+    /// N of `patient_N`, and which of the person's limbs.
+    pub limb: LimbId,
+    /// The camera of its first image.
+    pub camera: View,
     /// Equal for samples of one pose (of all cameras and frames) only.
     pub pose: String,
+    /// Number of the frame within pose and camera, from 0.
+    pub frame: u32,
     /// Medial rotation in degrees, where the dataset tells it.
     pub angle_deg: Option<f64>,
 }
@@ -80,6 +86,8 @@ pub fn check_split(training: &[Sample], evaluation: &[Sample]) -> Result<(), Dat
 
 #[cfg(test)]
 pub(crate) mod tests {
+    use ppa_dataset::layout::Side;
+
     use super::*;
 
     /// A sample without images.
@@ -89,7 +97,13 @@ pub(crate) mod tests {
             images: Vec::new(),
             label,
             person: format!("patient_{number}"),
+            limb: LimbId {
+                patient: number,
+                side: Side::Left,
+            },
+            camera: View::Left,
             pose: format!("pose {number}"),
+            frame: 0,
             angle_deg: None,
         }
     }

@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::num::NonZeroUsize;
-use std::path::Path;
 use std::sync::Arc;
 
 use ppa_learn::data::{
@@ -10,50 +9,9 @@ use ppa_learn::data::{
 };
 use tempfile::TempDir;
 
+use crate::toy::{dataset, png};
+
 const SIDE: usize = 30;
-
-fn png(path: &Path, side: u32, value: impl Fn(u32, u32) -> u16) {
-    fs::create_dir_all(path.parent().unwrap()).unwrap();
-    image::ImageBuffer::from_fn(side, side, |x, y| image::Luma([value(x, y)]))
-        .save(path)
-        .unwrap();
-}
-
-/// Two persons, right feet, poses at 0, 45 and 90 degrees with labels 1, 2 and 3.
-fn synthetic() -> TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    for patient in 0..2 {
-        let root = folder.path().join(format!("patient_{patient}"));
-        let mut labels = serde_json::Map::new();
-        let mut rois = serde_json::Map::new();
-        for (step, label) in [(0, 1.0), (90, 2.0), (180, 3.0)] {
-            for view in ["left", "right"] {
-                let angle = f64::from(step) / 2.0;
-                let name = format!("depth_cam_{view}_{angle:.1}.png");
-                let value = |x, y| (700 + step + x * y % 300) as u16;
-                png(&root.join("depth/r/orig").join(&name), 60, value);
-                let camera = format!("cam_{view}");
-                let roi = serde_json::json!({"camera": camera, "image_number": step, "x_start": 10, "y_start": 5, "size": 48});
-                rois.insert(name, roi);
-            }
-            let entry = serde_json::json!({"label": label, "std": 0.0, "step": step});
-            labels.insert(format!("xray_image_{step}.png"), entry);
-        }
-        let folder = root.join("labels/r");
-        fs::create_dir_all(&folder).unwrap();
-        fs::write(
-            folder.join("labels.json"),
-            serde_json::to_string(&labels).unwrap(),
-        )
-        .unwrap();
-        fs::write(
-            folder.join("roi_depth.json"),
-            serde_json::to_string(&rois).unwrap(),
-        )
-        .unwrap();
-    }
-    folder
-}
 
 fn n(number: usize) -> NonZeroUsize {
     NonZeroUsize::new(number).unwrap()
@@ -80,7 +38,7 @@ fn first_batches(images: &Arc<Images>, first: u64, workers: usize) -> Vec<Batch>
 
 #[test]
 fn batches_do_not_depend_on_workers_memory_or_where_training_began() {
-    let folder = synthetic();
+    let folder = dataset(2, &[0, 90, 180]);
     let all = images(&folder, Views::Pairs, usize::MAX);
     let none = images(&folder, Views::Pairs, 0);
     let batches = first_batches(&all, 0, 1);
@@ -94,7 +52,7 @@ fn batches_do_not_depend_on_workers_memory_or_where_training_began() {
 
 #[test]
 fn evaluation_sees_each_sample_once_and_the_last_batch_is_short() {
-    let folder = synthetic();
+    let folder = dataset(2, &[0, 90, 180]);
     let images = images(&folder, Views::Unified, 20_000);
     assert_eq!(images.samples().len(), 12);
     for workers in 1..4 {
@@ -111,7 +69,7 @@ fn evaluation_sees_each_sample_once_and_the_last_batch_is_short() {
 
 #[test]
 fn samples_are_those_of_the_views_and_persons() {
-    let folder = synthetic();
+    let folder = dataset(2, &[0, 90, 180]);
     let read = |persons, views| read_samples(folder.path(), persons, views, 5);
     let left = read(Some(&[1]), Views::Left).unwrap();
     assert_eq!(left.len(), 3);
@@ -127,7 +85,7 @@ fn samples_are_those_of_the_views_and_persons() {
 
 #[test]
 fn what_is_missing_or_of_another_size_is_named() {
-    let folder = synthetic();
+    let folder = dataset(2, &[0, 90, 180]);
     let labels = folder.path().join("patient_1/labels/r/labels.json");
     fs::remove_file(&labels).unwrap();
     let error = read_samples(folder.path(), None, Views::Left, 5).unwrap_err();
@@ -137,12 +95,12 @@ fn what_is_missing_or_of_another_size_is_named() {
     );
     assert!(read_samples(folder.path(), Some(&[0]), Views::Left, 5).is_ok());
 
-    let folder = synthetic();
+    let folder = dataset(2, &[0, 90, 180]);
     fs::remove_file(folder.path().join("patient_1/labels/r/roi_depth.json")).unwrap();
     let error = read_samples(folder.path(), None, Views::Left, 5).unwrap_err();
     assert!(matches!(error, DataError::NoRoi(_)), "{error}");
 
-    let folder = synthetic();
+    let folder = dataset(2, &[0, 90, 180]);
     let odd = folder
         .path()
         .join("patient_1/depth/r/orig/depth_cam_left_90.0.png");
@@ -162,13 +120,13 @@ fn what_is_missing_or_of_another_size_is_named() {
 #[test]
 fn five_frames_of_a_recorded_pose_are_used_the_first_ones() {
     let folder = tempfile::tempdir().unwrap();
-    let dataset = folder.path().join("patient_3_l/min/data/dataset");
+    let recorded = folder.path().join("patient_3_l/min/data/dataset");
     for time in 0..7 {
         let name = format!("depth/depth_cam_left_orig_0_{}.png", 1000 + 10 * time);
-        png(&dataset.join(name), 20, |_, _| 800);
+        png(&recorded.join(name), 20, |_, _| 800);
     }
-    let quality = dataset.join("label/quality");
-    let roi = dataset.join("label/roi");
+    let quality = recorded.join("label/quality");
+    let roi = recorded.join("label/roi");
     fs::create_dir_all(&quality).unwrap();
     fs::create_dir_all(&roi).unwrap();
     fs::write(

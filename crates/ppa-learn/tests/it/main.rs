@@ -2,3 +2,5 @@
 
 mod augmentation;
 mod loading;
+mod toy;
+mod training;

@@ -1,0 +1,59 @@
+//! An evaluation as files.
+
+use std::path::Path;
+
+use ppa_dataset::{FileError, write_whole};
+
+use super::figure::Figure;
+use super::figures::{calibration_figure, error_figure, scatter};
+use super::report::Evaluation;
+use super::row::Row;
+
+/// Why an evaluation cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EvaluateError {
+    /// A file.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A row that is no CSV.
+    #[error("predictions cannot be written as CSV")]
+    Csv(#[from] csv::Error),
+}
+
+/// Writes `predictions.csv`, `evaluation.json`, and the figures `scatter`, `calibration`, `errors_by_angle` (where angles are
+/// known) and those given, by name, each as SVG and PNG.
+///
+/// # Errors
+/// [`EvaluateError`] naming the file that cannot be written.
+pub fn write_evaluation(
+    folder: &Path,
+    rows: &[Row],
+    evaluation: &Evaluation,
+    more: Vec<(&str, Figure)>,
+) -> Result<(), EvaluateError> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        table.serialize(row)?;
+    }
+    let table = table.into_inner().map_err(|error| error.into_error());
+    let table = table.map_err(csv::Error::from)?;
+    write_whole(&folder.join("predictions.csv"), &table)?;
+    let json = serde_json::to_string_pretty(evaluation).expect("names and numbers are JSON");
+    write_whole(&folder.join("evaluation.json"), json.as_bytes())?;
+    let mut figures = vec![
+        ("scatter", scatter(rows)),
+        ("calibration", calibration_figure(evaluation)),
+    ];
+    if !evaluation.error_by_angle.is_empty() {
+        figures.push(("errors_by_angle", error_figure(evaluation)));
+    }
+    for (name, figure) in figures.into_iter().chain(more) {
+        write_whole(
+            &folder.join(format!("{name}.svg")),
+            figure.to_svg().as_bytes(),
+        )?;
+        write_whole(&folder.join(format!("{name}.png")), &figure.to_png())?;
+    }
+    Ok(())
+}

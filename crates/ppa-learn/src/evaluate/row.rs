@@ -1,0 +1,55 @@
+//! One prediction, as `predictions.csv` holds it.
+
+use ppa_dataset::layout::{Side, View};
+use serde::{Deserialize, Serialize};
+
+use crate::data::Sample;
+
+/// A prediction and its label. The columns are those that `ppa metrics` and the experiments read, and more.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Path of the image from the dataset's root.
+    pub id: String,
+    /// The camera.
+    pub camera: View,
+    /// N of `patient_N`.
+    pub patient: u32,
+    /// Which of the person's limbs.
+    pub side: Side,
+    /// The pose, unique among those of the limb.
+    pub pose: String,
+    /// Number of the frame within pose and camera, from 0.
+    pub frame: u32,
+    /// Medial rotation in degrees, where the dataset tells it.
+    pub angle_deg: Option<f64>,
+    /// Quality from 1 to 3.
+    pub label: f64,
+    /// What the network says.
+    pub prediction: f64,
+}
+
+impl Row {
+    /// The rows of some samples and what a network said of each.
+    ///
+    /// # Panics
+    /// If there is not one prediction for each sample.
+    pub fn of(samples: &[Sample], predictions: &[f64]) -> Vec<Self> {
+        assert_eq!(
+            samples.len(),
+            predictions.len(),
+            "one prediction for each sample"
+        );
+        let row = |(sample, &prediction): (&Sample, &f64)| Self {
+            id: sample.id.clone(),
+            camera: sample.camera,
+            patient: sample.limb.patient,
+            side: sample.limb.side,
+            pose: sample.pose.clone(),
+            frame: sample.frame,
+            angle_deg: sample.angle_deg,
+            label: sample.label,
+            prediction,
+        };
+        samples.iter().zip(predictions).map(row).collect()
+    }
+}

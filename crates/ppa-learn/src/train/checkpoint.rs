@@ -1,0 +1,153 @@
+//! Weights and the state of a training in safetensors files.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use candle_core::{Device, Tensor};
+use ppa_dataset::write_whole;
+use safetensors::tensor::TensorView;
+use safetensors::{Dtype, SafeTensors};
+use serde::{Deserialize, Serialize};
+
+use crate::network::EfficientNetB0;
+
+use super::adam::Adam;
+use super::config::TrainConfig;
+use super::error::{TrainError, at};
+
+/// Name of the network in checkpoints.
+const ARCHITECTURE: &str = "efficientnet_b0";
+/// Key of what is not a tensor; a single one, so that equal trainings give equal bytes.
+const METADATA: &str = "ppa";
+
+#[derive(Debug, Serialize, Deserialize)]
+struct State {
+    architecture: String,
+    steps: u64,
+    config: TrainConfig,
+}
+
+/// Writes parameters and running statistics by torchvision's names.
+pub(super) fn save_weights(path: &Path, network: &EfficientNetB0) -> Result<(), TrainError> {
+    write(path, by_name(network)?, None)
+}
+
+/// Writes all that a training needs to go on.
+pub(super) fn save(
+    path: &Path,
+    network: &EfficientNetB0,
+    adam: &Adam,
+    config: &TrainConfig,
+) -> Result<(), TrainError> {
+    let state = State {
+        architecture: ARCHITECTURE.to_owned(),
+        steps: adam.steps,
+        config: config.clone(),
+    };
+    let state = serde_json::to_string(&state).expect("names and numbers are JSON");
+    let mut tensors = by_name(network)?;
+    for (name, moments) in [("first", &adam.first), ("second", &adam.second)] {
+        for (i, moments) in moments.iter().enumerate() {
+            let moments = Tensor::new(moments.as_slice(), &Device::Cpu)?;
+            tensors.push((format!("adam.{name}.{i}"), moments));
+        }
+    }
+    write(path, tensors, Some([(METADATA.to_owned(), state)].into()))
+}
+
+/// Puts a checkpoint's values into a network and its moments into Adam.
+pub(super) fn load(
+    path: &Path,
+    network: &EfficientNetB0,
+    config: &TrainConfig,
+) -> Result<Adam, TrainError> {
+    let wrong = |message: String| TrainError::Checkpoint {
+        path: path.to_owned(),
+        message,
+    };
+    let bytes = std::fs::read(path).map_err(at("read", path))?;
+    let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|e| wrong(e.to_string()))?;
+    let state = header.metadata().as_ref().and_then(|m| m.get(METADATA));
+    let state = state.ok_or_else(|| wrong("it tells neither step nor configuration".into()))?;
+    let state: State = serde_json::from_str(state).map_err(|e| wrong(e.to_string()))?;
+    if state.architecture != ARCHITECTURE {
+        let found = state.architecture;
+        return Err(wrong(format!("it is of {found}, expected {ARCHITECTURE}")));
+    }
+    if state.config.of_results() != config.of_results() {
+        return Err(wrong(
+            "its configuration is another one; take another folder".into(),
+        ));
+    }
+    let tensors = candle_core::safetensors::load_buffer(&bytes, &Device::Cpu)
+        .map_err(|e| wrong(e.to_string()))?;
+    let mut adam = Adam::new(network.variables().map(|variable| variable.elem_count()));
+    adam.steps = state.steps;
+    for (name, moments) in [("first", &mut adam.first), ("second", &mut adam.second)] {
+        for (i, moments) in moments.iter_mut().enumerate() {
+            let name = format!("adam.{name}.{i}");
+            let tensor = tensors
+                .get(&name)
+                .ok_or_else(|| wrong(format!("{name} is missing")))?;
+            if tensor.elem_count() != moments.len() {
+                let (found, expected) = (tensor.elem_count(), moments.len());
+                return Err(wrong(format!(
+                    "{name} has {found} values, expected {expected}"
+                )));
+            }
+            *moments = tensor.flatten_all()?.to_vec1()?;
+        }
+    }
+    assign(path, network, &tensors)?;
+    Ok(adam)
+}
+
+/// Puts the weights of a file, checkpoint or not, into a network.
+pub(super) fn load_weights(path: &Path, network: &EfficientNetB0) -> Result<(), TrainError> {
+    let bytes = std::fs::read(path).map_err(at("read", path))?;
+    let tensors = candle_core::safetensors::load_buffer(&bytes, &Device::Cpu);
+    let tensors = tensors.map_err(|error| TrainError::Checkpoint {
+        path: path.to_owned(),
+        message: error.to_string(),
+    })?;
+    assign(path, network, &tensors)
+}
+
+fn assign(
+    path: &Path,
+    network: &EfficientNetB0,
+    tensors: &HashMap<String, Tensor>,
+) -> Result<(), TrainError> {
+    let assigned = network.assign(tensors);
+    assigned.map_err(|source| TrainError::Weights {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+fn by_name(network: &EfficientNetB0) -> Result<Vec<(String, Tensor)>, TrainError> {
+    let named = network
+        .parameters()?
+        .into_iter()
+        .chain(network.statistics()?);
+    Ok(named.map(|named| (named.name, named.tensor)).collect())
+}
+
+fn write(
+    path: &Path,
+    tensors: Vec<(String, Tensor)>,
+    metadata: Option<HashMap<String, String>>,
+) -> Result<(), TrainError> {
+    let mut values = Vec::new();
+    for (name, tensor) in &tensors {
+        let numbers: Vec<f32> = tensor.flatten_all()?.to_vec1()?;
+        let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_le_bytes()).collect();
+        values.push((name, tensor.dims().to_vec(), bytes));
+    }
+    let views = values.iter().map(|(name, shape, bytes)| {
+        let view = TensorView::new(Dtype::F32, shape.clone(), bytes);
+        (name, view.expect("bytes were counted by the shape"))
+    });
+    let file = safetensors::serialize(views, metadata).map_err(candle_core::Error::from)?;
+    Ok(write_whole(path, &file)?)
+}

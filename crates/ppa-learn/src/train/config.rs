@@ -1,0 +1,384 @@
+//! What a training does, as a file says.
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::data::{Augmentation, FRAMES_PER_POSE, Views};
+use crate::network::Options;
+
+use super::schedule::{Schedule, StepCounting};
+
+/// A training, with nothing left open.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrainConfig {
+    /// Names all random numbers.
+    pub seed: u64,
+    /// Which cameras' images the network gets.
+    pub views: Views,
+    /// Columns and rows that the network sees.
+    pub side: usize,
+    /// Samples of a step.
+    pub batch_size: NonZeroUsize,
+    /// Number of steps, as `step_counting` counts them.
+    pub steps: u64,
+    /// What `steps` counts.
+    pub step_counting: StepCounting,
+    /// Rate of the first step; it falls by four factors of ten in the last 5 % of the steps.
+    pub learning_rate: f64,
+    /// Frames that are used of a recorded pose.
+    pub frames_per_pose: usize,
+    /// Threads that load images.
+    pub workers: NonZeroUsize,
+    /// Prepared images that may stay in memory, in MB (10⁶ bytes).
+    pub keep_mb: usize,
+    /// Steps between two rows of the log.
+    pub log_every: NonZeroUsize,
+    /// Steps between two checkpoints.
+    pub checkpoint_every: NonZeroUsize,
+    /// Weights to begin with, from the folder of the configuration; random ones if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start: Option<PathBuf>,
+    /// What training leaves out at random.
+    pub network: NetworkConfig,
+    /// How training images are changed.
+    pub augmentation: Augmentation,
+    /// Persons to train on.
+    pub training: Vec<Source>,
+    /// Persons to evaluate on; none of them in training.
+    #[serde(default)]
+    pub evaluation: Vec<Source>,
+}
+
+/// What training leaves out at random.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NetworkConfig {
+    /// Probability that a feature is left out before the last layer.
+    pub dropout: f32,
+    /// Probability that the last block leaves out its residual branch.
+    pub stochastic_depth: f32,
+}
+
+/// Persons of a dataset.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Source {
+    /// Folder of the dataset, from the folder of the configuration.
+    pub dataset: PathBuf,
+    /// Numbers of the persons; all of them if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub patients: Option<Vec<u32>>,
+}
+
+/// A configuration that cannot be.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("cannot read {}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// It is no TOML, or lacks or has too many keys.
+    #[error("{}: {message}", path.display())]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// What and where.
+        message: String,
+    },
+    /// No such preset.
+    #[error("{}: there is no preset {found:?}; expected \"paper\" or \"quick\"", path.display())]
+    Preset {
+        /// The file.
+        path: PathBuf,
+        /// What stands there.
+        found: String,
+    },
+    /// A number out of range.
+    #[error("{key} is {found}, expected {expected}")]
+    Range {
+        /// The key.
+        key: &'static str,
+        /// Its value.
+        found: String,
+        /// What it could be.
+        expected: &'static str,
+    },
+}
+
+impl TrainConfig {
+    /// The paper's training, without data.
+    pub fn paper() -> Self {
+        let number = |n| NonZeroUsize::new(n).expect("the numbers below are not 0");
+        let options = Options::default();
+        Self {
+            seed: 1,
+            views: Views::Left,
+            side: 336,
+            batch_size: number(16),
+            steps: 200_000,
+            step_counting: StepCounting::Optimiser,
+            learning_rate: 1e-3,
+            frames_per_pose: FRAMES_PER_POSE,
+            workers: number(2),
+            keep_mb: 2000,
+            log_every: number(50),
+            checkpoint_every: number(1000),
+            start: None,
+            network: NetworkConfig {
+                dropout: options.dropout,
+                stochastic_depth: options.stochastic_depth,
+            },
+            augmentation: Augmentation::default(),
+            training: Vec::new(),
+            evaluation: Vec::new(),
+        }
+    }
+
+    /// The paper's training with images of 64 x 64 pixels and 600 steps, for minutes on two cores. The rate is ten times the
+    /// paper's: torchvision draws the last layer of a network with one output from ±1, and 600 steps of 10⁻³ are too few to
+    /// make it smaller, in PyTorch as well.
+    pub fn quick() -> Self {
+        let paper = Self::paper();
+        Self {
+            side: 64,
+            steps: 600,
+            learning_rate: 1e-2,
+            log_every: NonZeroUsize::MIN.saturating_add(9),
+            checkpoint_every: NonZeroUsize::MIN.saturating_add(99),
+            ..paper
+        }
+    }
+
+    /// Reads a TOML file: `preset = "paper"` or `"quick"`, and every key that shall differ from it.
+    ///
+    /// # Errors
+    /// [`ConfigError`] naming file and key.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        let wrong = |message: String| ConfigError::Parse {
+            path: path.to_owned(),
+            message: message.trim_end().to_owned(),
+        };
+        let mut given: toml::Table =
+            toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        let preset = match given.remove("preset") {
+            None => Self::paper(),
+            Some(toml::Value::String(name)) if name == "paper" => Self::paper(),
+            Some(toml::Value::String(name)) if name == "quick" => Self::quick(),
+            Some(other) => {
+                return Err(ConfigError::Preset {
+                    path: path.to_owned(),
+                    found: other.as_str().map_or(other.to_string(), str::to_owned),
+                });
+            }
+        };
+        let mut all = toml::Table::try_from(&preset).map_err(|e| wrong(e.to_string()))?;
+        merge(&mut all, given);
+        let mut config: Self = all
+            .try_into()
+            .map_err(|e: toml::de::Error| wrong(e.to_string()))?;
+        // Whole paths, so that the echo in another folder says the same.
+        let whole = std::path::absolute(path).map_err(|source| ConfigError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        let folder = whole.parent().unwrap_or(Path::new(""));
+        for source in config.training.iter_mut().chain(&mut config.evaluation) {
+            source.dataset = folder.join(&source.dataset);
+        }
+        config.start = config.start.map(|start| folder.join(start));
+        config.check()?;
+        Ok(config)
+    }
+
+    /// The rates of all steps.
+    pub fn schedule(&self) -> Schedule {
+        Schedule {
+            counting: self.step_counting,
+            count: self.steps,
+            first_rate: self.learning_rate,
+        }
+    }
+
+    /// Refuses numbers that no training can have.
+    ///
+    /// # Errors
+    /// [`ConfigError::Range`] naming the key.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let require = |fine: bool, key, found: String, expected| {
+            let wrong = ConfigError::Range {
+                key,
+                found,
+                expected,
+            };
+            if fine { Ok(()) } else { Err(wrong) }
+        };
+        let side = self.side;
+        require(
+            (32..=4096).contains(&side),
+            "side",
+            side.to_string(),
+            "32 to 4096",
+        )?;
+        require(
+            self.steps > 0,
+            "steps",
+            self.steps.to_string(),
+            "at least 1",
+        )?;
+        let frames = self.frames_per_pose;
+        require(
+            frames > 0,
+            "frames_per_pose",
+            frames.to_string(),
+            "at least 1",
+        )?;
+        let rate = self.learning_rate;
+        let fine = rate.is_finite() && rate > 0.0;
+        require(fine, "learning_rate", rate.to_string(), "more than 0")?;
+        let augmentation = &self.augmentation;
+        for (key, share) in [
+            (
+                "augmentation.flip_probability",
+                augmentation.flip_probability,
+            ),
+            (
+                "augmentation.rotate_probability",
+                augmentation.rotate_probability,
+            ),
+            (
+                "augmentation.noise_probability",
+                augmentation.noise_probability,
+            ),
+            (
+                "augmentation.blur_probability",
+                augmentation.blur_probability,
+            ),
+            (
+                "augmentation.invalid_probability",
+                augmentation.invalid_probability,
+            ),
+            (
+                "augmentation.noise_max_variance",
+                augmentation.noise_max_variance,
+            ),
+        ] {
+            require(
+                (0.0..=1.0).contains(&share),
+                key,
+                share.to_string(),
+                "0 to 1",
+            )?;
+        }
+        for (key, share) in [
+            ("network.dropout", self.network.dropout),
+            ("network.stochastic_depth", self.network.stochastic_depth),
+        ] {
+            require(
+                (0.0..1.0).contains(&share),
+                key,
+                share.to_string(),
+                "0 to less than 1",
+            )?;
+        }
+        let limit = augmentation.rotate_limit_deg;
+        let fine = (0.0..=180.0).contains(&limit);
+        require(
+            fine,
+            "augmentation.rotate_limit_deg",
+            limit.to_string(),
+            "0 to 180",
+        )?;
+        require(
+            !self.training.is_empty(),
+            "training",
+            "empty".into(),
+            "at least one dataset",
+        )
+    }
+
+    /// What must be equal for a training to go on; threads, memory and intervals may change.
+    pub(super) fn of_results(&self) -> Self {
+        let paper = Self::paper();
+        Self {
+            workers: paper.workers,
+            keep_mb: paper.keep_mb,
+            log_every: paper.log_every,
+            checkpoint_every: paper.checkpoint_every,
+            ..self.clone()
+        }
+    }
+}
+
+/// Puts every value that is given over the one that stands there; tables are merged key by key.
+fn merge(all: &mut toml::Table, given: toml::Table) {
+    for (key, value) in given {
+        match (all.get_mut(&key), value) {
+            (Some(toml::Value::Table(all)), toml::Value::Table(given)) => merge(all, given),
+            (_, value) => {
+                all.insert(key, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<TrainConfig, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("train.toml");
+        std::fs::write(&path, text).unwrap();
+        TrainConfig::read(&path).map_err(|error| error.to_string())
+    }
+
+    const DATA: &str = "[[training]]\ndataset = \"data\"\npatients = [1, 2]\n";
+
+    #[test]
+    fn a_preset_is_changed_key_by_key_and_written_whole() {
+        let text = format!(
+            "preset = \"quick\"\nsteps = 70\n[augmentation]\nblur_probability = 0.0\n{DATA}"
+        );
+        let config = read(&text).unwrap();
+        assert_eq!((config.side, config.steps), (64, 70));
+        assert_eq!(config.augmentation.blur_probability, 0.0);
+        assert_eq!(config.augmentation.rotate_limit_deg, 15.0);
+        assert!(config.training[0].dataset.ends_with("data"));
+        let echoed = toml::to_string(&config).unwrap();
+        assert_eq!(read(&echoed).unwrap(), config);
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        for (text, expected) in [
+            ("preset = \"fast\"", "there is no preset \"fast\""),
+            ("stepz = 3", "unknown field `stepz`"),
+            ("side = 8", "side is 8, expected 32 to 4096"),
+            ("learning_rate = nan", "learning_rate is NaN"),
+            ("steps = 0", "steps is 0"),
+            ("batch_size = 0", "nonzero"),
+            (
+                "augmentation.flip_probability = 1.5",
+                "flip_probability is 1.5, expected 0 to 1",
+            ),
+            ("", "training is empty"),
+            ("seed = -1", "invalid value"),
+        ] {
+            let data = if text.is_empty() { "" } else { DATA };
+            let error = read(&format!("{text}\n{data}")).unwrap_err();
+            assert!(error.contains(expected), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Why a training cannot begin, go on or be evaluated.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use ppa_dataset::FileError;
+
+use crate::data::DataError;
+use crate::network::NetworkError;
+use crate::weights::WeightsError;
+
+use super::config::ConfigError;
+use super::finite::Trouble;
+
+/// Why a training cannot begin, go on or be evaluated.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrainError {
+    /// The configuration.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Images, labels or the split.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// A file.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The network.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+    /// Weights of another network.
+    #[error("{}", path.display())]
+    Weights {
+        /// The file.
+        path: PathBuf,
+        /// What does not fit.
+        source: WeightsError,
+    },
+    /// A file that is no checkpoint of this network.
+    #[error("{} is no checkpoint of this training: {message}", path.display())]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// What was found and what expected.
+        message: String,
+    },
+    /// Numbers that are not finite.
+    #[error("step {step}: the loss is {loss}; {trouble}")]
+    NotFinite {
+        /// The step, from 0.
+        step: u64,
+        /// Its loss.
+        loss: f32,
+        /// Where it began.
+        trouble: Trouble,
+    },
+    /// Views that this network has no input for.
+    #[error("the network takes the image of one camera, views = \"pairs\" gives two")]
+    TwoCameras,
+    /// candle's arithmetic.
+    #[error("arithmetic failed")]
+    Candle(#[from] candle_core::Error),
+}
+
+/// Names the file and what was done to it.
+pub(super) fn at<'a>(
+    action: &'static str,
+    path: &'a Path,
+) -> impl FnOnce(io::Error) -> FileError + 'a {
+    move |source| FileError {
+        action,
+        path: path.to_owned(),
+        source,
+    }
+}

@@ -1,0 +1,73 @@
+//! Where numbers that are not finite began.
+
+use std::fmt;
+
+use candle_core::backprop::GradStore;
+use candle_core::{Error, Tensor};
+
+use crate::network::{EfficientNetB0, Entry};
+
+/// The layer at which numbers stopped being finite.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Trouble {
+    /// A parameter: the step before was too far.
+    Parameter(String),
+    /// Running statistics: the first layer whose values were not finite on the way forward.
+    Forward(String),
+    /// A gradient: the first layer on the way back.
+    Backward(String),
+    /// Inputs, labels or the last layer.
+    Output,
+}
+
+impl fmt::Display for Trouble {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Parameter(name) => write!(f, "the parameter {name} is not finite"),
+            Self::Forward(name) => write!(f, "the first statistics that are not finite are {name}"),
+            Self::Backward(name) => {
+                write!(f, "the gradient of {name} is the first not to be finite")
+            }
+            Self::Output => write!(f, "all layers are finite, inputs or labels are not"),
+        }
+    }
+}
+
+/// Where it began, on a network whose loss or gradient is not finite.
+pub(super) fn trouble(network: &EfficientNetB0, gradients: &GradStore) -> Result<Trouble, Error> {
+    let variables = network.variables();
+    let flat = variables.map(|variable| variable.flatten_all()?.to_vec1());
+    let [backbone, classifier] = flat;
+    let flat: [Vec<f32>; 2] = [backbone?, classifier?];
+    if let Some(entry) = network.layout().find(|&(v, entry)| is_bad(&flat[v], entry)) {
+        return Ok(Trouble::Parameter(entry.1.name.clone()));
+    }
+    let statistics: Vec<f32> = network.statistics_variable().flatten_all()?.to_vec1()?;
+    if let Some(entry) = network
+        .statistics_layout()
+        .find(|entry| is_bad(&statistics, entry))
+    {
+        return Ok(Trouble::Forward(entry.name.clone()));
+    }
+    let mut last = None;
+    for (variable, entry) in network.layout() {
+        if let Some(gradient) = gradients.get(variables[variable])
+            && is_bad(&gradient.flatten_all()?.to_vec1()?, entry)
+        {
+            last = Some(entry);
+        }
+    }
+    Ok(last.map_or(Trouble::Output, |entry| {
+        Trouble::Backward(entry.name.clone())
+    }))
+}
+
+fn is_bad(flat: &[f32], entry: &Entry) -> bool {
+    flat[entry.range.clone()].iter().any(|x| !x.is_finite())
+}
+
+/// Whether all values of a tensor are finite.
+pub(super) fn is_finite(tensor: &Tensor) -> Result<bool, Error> {
+    let values: Vec<f32> = tensor.flatten_all()?.to_vec1()?;
+    Ok(values.iter().all(|x| x.is_finite()))
+}

@@ -1,0 +1,75 @@
+//! The scalars of a training, one line of JSON per row.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use ppa_dataset::{FileError, write_whole};
+use serde::{Deserialize, Serialize};
+
+use super::error::{TrainError, at};
+
+/// What was measured after a step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LogRow {
+    /// Steps made.
+    pub step: u64,
+    /// Seconds of training so far, all runs of it together.
+    pub seconds: f64,
+    /// Values by TensorBoard's tags.
+    #[serde(flatten)]
+    pub scalars: BTreeMap<String, f64>,
+}
+
+/// The rows of a log; a line that was cut short by a crash ends it.
+///
+/// # Errors
+/// [`FileError`] if it is there but cannot be read.
+pub fn read_log(path: &Path) -> Result<Vec<LogRow>, FileError> {
+    if !path.exists() {
+        return Ok(Vec::new());
+    }
+    let text = std::fs::read_to_string(path).map_err(at("read", path))?;
+    let rows = text
+        .lines()
+        .map_while(|line| serde_json::from_str(line).ok());
+    Ok(rows.collect())
+}
+
+/// A log that is being written.
+pub(super) struct Log {
+    path: PathBuf,
+    file: File,
+    /// All rows so far.
+    pub rows: Vec<LogRow>,
+}
+
+impl Log {
+    /// Goes on with a log after `step`; what was written behind it is taken away.
+    pub fn resume(path: &Path, step: u64) -> Result<Self, TrainError> {
+        let mut rows = read_log(path)?;
+        rows.retain(|row| row.step <= step);
+        let lines: String = rows.iter().map(line).collect();
+        write_whole(path, lines.as_bytes())?;
+        let file = OpenOptions::new().append(true).open(path);
+        Ok(Self {
+            path: path.to_owned(),
+            file: file.map_err(at("write", path))?,
+            rows,
+        })
+    }
+
+    /// Adds a row.
+    pub fn push(&mut self, row: LogRow) -> Result<(), TrainError> {
+        let written = self.file.write_all(line(&row).as_bytes());
+        written.map_err(at("write", &self.path))?;
+        self.rows.push(row);
+        Ok(())
+    }
+}
+
+fn line(row: &LogRow) -> String {
+    let json = serde_json::to_string(row).expect("numbers by name are JSON");
+    json + "\n"
+}

@@ -1,0 +1,25 @@
+//! Training of a network, from a configuration to weights: resumable, and the same bytes whenever it was stopped.
+//!
+//! [`train`] follows a [`TrainConfig`] and fills a run folder: `config.toml` (what was resolved), `log.jsonl` and TensorBoard
+//! events (the same scalars), `checkpoint.safetensors` (weights by torchvision's names, running statistics, Adam's moments,
+//! step), and at the end `weights.safetensors`. Data position and random numbers follow from seed and step.
+
+mod adam;
+mod checkpoint;
+mod config;
+mod crc32c;
+mod error;
+mod finite;
+mod log;
+mod run;
+mod schedule;
+mod tensorboard;
+
+pub use adam::Adam;
+pub use config::{ConfigError, NetworkConfig, Source, TrainConfig};
+pub use error::TrainError;
+pub use finite::Trouble;
+pub use log::{LogRow, read_log};
+pub use run::{Ended, Progress, predict, samples, train, trained};
+pub use schedule::{Schedule, StepCounting};
+pub use tensorboard::tensorboard_events;

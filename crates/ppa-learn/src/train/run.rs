@@ -1,0 +1,294 @@
+//! The loop of a training.
+
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use candle_core::{Device, Tensor};
+use ppa_dataset::write_whole;
+
+use crate::data::{
+    Balanced, Batch, Images, Loader, Order, Sample, Views, check_split, read_samples,
+};
+use crate::network::{EfficientNetB0, Mode, Options};
+
+use super::adam::Adam;
+use super::checkpoint;
+use super::config::{Source, TrainConfig};
+use super::error::TrainError;
+use super::finite::{is_finite, trouble};
+use super::log::{Log, LogRow};
+use super::tensorboard::tensorboard_events;
+
+/// How far a training is; told after every step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Progress {
+    /// Steps made.
+    pub step: u64,
+    /// Steps in all.
+    pub steps: u64,
+    /// Mean squared error of the step's batch.
+    pub loss: f32,
+    /// Rate of the step.
+    pub rate: f64,
+}
+
+/// How a training ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// All steps are made.
+    Finished,
+    /// It was asked to stop; the checkpoint holds the steps made so far.
+    Stopped {
+        /// Steps made.
+        step: u64,
+    },
+}
+
+/// Trains as a configuration says, in a folder; goes on from the folder's checkpoint, if there is one, to the same bytes
+/// as a training that was never stopped.
+///
+/// # Errors
+/// [`TrainError`]; the checkpoint then is the last whole one.
+pub fn train(
+    config: &TrainConfig,
+    folder: &Path,
+    stop: &AtomicBool,
+    mut report: impl FnMut(&Progress),
+) -> Result<Ended, TrainError> {
+    config.check()?;
+    if config.views == Views::Pairs {
+        return Err(TrainError::TwoCameras);
+    }
+    let training = samples(config, &config.training)?;
+    let evaluation = samples(config, &config.evaluation)?;
+    check_split(&training, &evaluation)?;
+    let echoed = toml::to_string(config).expect("names and numbers are TOML");
+    let balanced = Balanced::new(&training)?;
+    if !evaluation.is_empty() {
+        Balanced::new(&evaluation)?; // Labels outside the scale are found before training.
+    }
+
+    let network = network(config)?;
+    let checkpoint = folder.join("checkpoint.safetensors");
+    let adam = if checkpoint.exists() {
+        checkpoint::load(&checkpoint, &network, config)?
+    } else {
+        if let Some(start) = &config.start {
+            checkpoint::load_weights(start, &network)?;
+        }
+        Adam::new(network.variables().map(|variable| variable.elem_count()))
+    };
+    write_whole(&folder.join("config.toml"), echoed.as_bytes())?;
+    let log = Log::resume(&folder.join("log.jsonl"), adam.steps)?;
+    let keep_bytes = config.keep_mb.saturating_mul(1_000_000);
+    let mut run = Run {
+        config,
+        folder,
+        network,
+        adam,
+        seconds_before: log.rows.last().map_or(0.0, |row| row.seconds),
+        log,
+        started: Instant::now(),
+        evaluation: match evaluation.is_empty() {
+            true => None,
+            false => Some(Arc::new(Images::new(evaluation, config.side, keep_bytes)?)),
+        },
+    };
+    let images = Arc::new(Images::new(training, config.side, keep_bytes)?);
+    let order = Order::Training {
+        balanced,
+        augmentation: config.augmentation,
+        seed: config.seed,
+        first_batch: run.adam.steps,
+    };
+    let mut loader = Loader::new(&images, &order, config.batch_size, config.workers);
+    let steps = config.schedule().steps();
+    while run.adam.steps < steps {
+        let batch = loader.next().expect("training batches never end")?;
+        let progress = run.step(&batch)?;
+        report(&progress);
+        let step = run.adam.steps;
+        let due = |every: NonZeroUsize| step.is_multiple_of(every.get() as u64) || step == steps;
+        let stopped = stop.load(Ordering::Relaxed);
+        if due(config.log_every) {
+            run.log_step(&progress)?;
+        }
+        if due(config.checkpoint_every) || stopped {
+            run.save(&checkpoint, !stopped)?;
+        }
+        if stopped && step < steps {
+            return Ok(Ended::Stopped { step });
+        }
+    }
+    checkpoint::save_weights(&folder.join("weights.safetensors"), &run.network)?;
+    Ok(Ended::Finished)
+}
+
+fn network(config: &TrainConfig) -> Result<EfficientNetB0, TrainError> {
+    let options = Options {
+        dropout: config.network.dropout,
+        stochastic_depth: config.network.stochastic_depth,
+    };
+    Ok(EfficientNetB0::new(config.seed, options)?)
+}
+
+/// The network of a finished training: its configuration and its weights, from its folder.
+///
+/// # Errors
+/// [`TrainError`] naming the file that is missing or is none of a training.
+pub fn trained(folder: &Path) -> Result<(TrainConfig, EfficientNetB0), TrainError> {
+    let config = TrainConfig::read(&folder.join("config.toml"))?;
+    let network = network(&config)?;
+    checkpoint::load_weights(&folder.join("weights.safetensors"), &network)?;
+    Ok((config, network))
+}
+
+/// The labelled samples of some sources, as a training reads them.
+///
+/// # Errors
+/// [`TrainError`] for data that cannot be used.
+pub fn samples(config: &TrainConfig, sources: &[Source]) -> Result<Vec<Sample>, TrainError> {
+    let mut samples = Vec::new();
+    for source in sources {
+        let persons = source.patients.as_deref();
+        let frames = config.frames_per_pose;
+        samples.extend(read_samples(
+            &source.dataset,
+            persons,
+            config.views,
+            frames,
+        )?);
+    }
+    Ok(samples)
+}
+
+/// Images of one camera as a tensor [samples, 1, side, side].
+fn tensor(batch: Batch, side: usize) -> Result<Tensor, TrainError> {
+    let count = batch.samples.len();
+    let [image] = <[Vec<f32>; 1]>::try_from(batch.images).map_err(|_| TrainError::TwoCameras)?;
+    Ok(Tensor::from_vec(
+        image,
+        (count, 1, side, side),
+        &Device::Cpu,
+    )?)
+}
+
+struct Run<'a> {
+    config: &'a TrainConfig,
+    folder: &'a Path,
+    network: EfficientNetB0,
+    adam: Adam,
+    log: Log,
+    started: Instant,
+    /// Of earlier runs of the same training.
+    seconds_before: f64,
+    evaluation: Option<Arc<Images>>,
+}
+
+impl Run<'_> {
+    fn step(&mut self, batch: &Batch) -> Result<Progress, TrainError> {
+        let step = self.adam.steps;
+        let labels = Tensor::new(batch.labels.as_slice(), &Device::Cpu)?.unsqueeze(1)?;
+        let images = tensor(batch.clone(), self.config.side)?;
+        let outputs = self.network.forward(&images, Mode::Train { step })?;
+        let loss = (outputs - labels)?.sqr()?.mean_all()?;
+        let gradients = loss.backward()?;
+        let loss = loss.to_scalar::<f32>()?;
+        let mut finite = loss.is_finite();
+        for variable in self.network.variables() {
+            if let Some(gradient) = gradients.get(variable) {
+                finite &= is_finite(gradient)?;
+            }
+        }
+        if !finite {
+            return Err(TrainError::NotFinite {
+                step,
+                loss,
+                trouble: trouble(&self.network, &gradients)?,
+            });
+        }
+        let schedule = self.config.schedule();
+        let rate = schedule.rate(step);
+        self.adam
+            .step(&self.network.variables(), &gradients, rate)?;
+        Ok(Progress {
+            step: self.adam.steps,
+            steps: schedule.steps(),
+            loss,
+            rate,
+        })
+    }
+
+    fn seconds(&self) -> f64 {
+        self.seconds_before + self.started.elapsed().as_secs_f64()
+    }
+
+    fn log_step(&mut self, progress: &Progress) -> Result<(), TrainError> {
+        let scalars = [
+            ("training/loss".to_owned(), f64::from(progress.loss)),
+            ("training/rate".to_owned(), progress.rate),
+        ];
+        self.log.push(LogRow {
+            step: progress.step,
+            seconds: self.seconds(),
+            scalars: scalars.into(),
+        })
+    }
+
+    /// Writes the checkpoint and, from the log, the events; evaluates before, if asked.
+    fn save(&mut self, checkpoint: &Path, evaluate: bool) -> Result<(), TrainError> {
+        if let Some(images) = self.evaluation.as_ref().filter(|_| evaluate) {
+            let predictions = predict(
+                &self.network,
+                images,
+                self.config.batch_size,
+                self.config.workers,
+            )?;
+            let errors = predictions.iter().zip(images.samples());
+            let errors: Vec<f64> = errors.map(|(y, sample)| y - sample.label).collect();
+            let mean = |score: fn(&f64) -> f64| {
+                errors.iter().map(score).sum::<f64>() / errors.len() as f64
+            };
+            let scalars = [
+                ("evaluation/mae".to_owned(), mean(|e| e.abs())),
+                ("evaluation/mse".to_owned(), mean(|e| e * e)),
+            ];
+            self.log.push(LogRow {
+                step: self.adam.steps,
+                seconds: self.seconds(),
+                scalars: scalars.into(),
+            })?;
+        }
+        checkpoint::save(checkpoint, &self.network, &self.adam, self.config)?;
+        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+        let started = now.map_or(0.0, |now| now.as_secs_f64()) - self.seconds();
+        let events = tensorboard_events(&self.log.rows, started);
+        Ok(write_whole(
+            &self.folder.join("events.out.tfevents.ppa"),
+            &events,
+        )?)
+    }
+}
+
+/// What a network says of each sample, in order, from its evaluation images.
+///
+/// # Errors
+/// [`TrainError`] naming the image that cannot be used.
+pub fn predict(
+    network: &EfficientNetB0,
+    images: &Arc<Images>,
+    batch_size: NonZeroUsize,
+    workers: NonZeroUsize,
+) -> Result<Vec<f64>, TrainError> {
+    let mut predictions = Vec::new();
+    for batch in Loader::new(images, &Order::Once, batch_size, workers) {
+        let images = tensor(batch?, images.side())?;
+        let outputs = network.forward(&images, Mode::Eval)?;
+        let outputs: Vec<f32> = outputs.flatten_all()?.to_vec1()?;
+        predictions.extend(outputs.into_iter().map(f64::from));
+    }
+    Ok(predictions)
+}

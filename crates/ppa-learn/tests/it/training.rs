@@ -1,0 +1,251 @@
+//! Trainings on toy data: they learn, go on where they were stopped, and refuse what cannot be.
+
+use std::collections::HashMap;
+use std::fs;
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use candle_core::Tensor;
+use ppa_learn::data::Augmentation;
+use ppa_learn::train::{Ended, NetworkConfig, Source, TrainConfig, TrainError, read_log, train};
+use ppa_learn::{EfficientNetB0, Options};
+
+use crate::toy::dataset;
+
+fn n(number: usize) -> NonZeroUsize {
+    NonZeroUsize::new(number).unwrap()
+}
+
+fn source(data: &Path, patients: &[u32]) -> Vec<Source> {
+    vec![Source {
+        dataset: data.to_owned(),
+        patients: Some(patients.to_vec()),
+    }]
+}
+
+/// Few and small steps on person 0, evaluated on person 1.
+fn config(data: &Path) -> TrainConfig {
+    TrainConfig {
+        side: 32,
+        steps: 6,
+        batch_size: n(4),
+        log_every: n(1),
+        checkpoint_every: n(2),
+        training: source(data, &[0]),
+        evaluation: source(data, &[1]),
+        ..TrainConfig::quick()
+    }
+}
+
+fn run(config: &TrainConfig, folder: &Path) -> Result<Ended, TrainError> {
+    train(config, folder, &AtomicBool::new(false), |_| {})
+}
+
+fn stop_after(config: &TrainConfig, folder: &Path, step: u64) -> Ended {
+    let stop = AtomicBool::new(false);
+    let report = |progress: &ppa_learn::train::Progress| {
+        stop.store(progress.step == step, Ordering::Relaxed);
+    };
+    train(config, folder, &stop, report).unwrap()
+}
+
+#[test]
+fn a_training_that_was_stopped_ends_with_the_same_bytes() {
+    let data = dataset(2, &[0, 90, 180]);
+    let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let [whole, parts] = folders.each_ref().map(|folder| folder.path().join("run"));
+    let config = config(data.path());
+    assert_eq!(run(&config, &whole).unwrap(), Ended::Finished);
+    // Stopped beside and at a checkpoint; other workers and memory make no difference.
+    assert_eq!(stop_after(&config, &parts, 3), Ended::Stopped { step: 3 });
+    assert!(!parts.join("weights.safetensors").exists());
+    let other = TrainConfig {
+        workers: n(1),
+        keep_mb: 0,
+        ..config.clone()
+    };
+    assert_eq!(stop_after(&other, &parts, 4), Ended::Stopped { step: 4 });
+    // What a crash leaves behind the checkpoint: rows of steps to be made again, and half a line.
+    let log = parts.join("log.jsonl");
+    let mut text = fs::read_to_string(&log).unwrap();
+    text += "{\"step\":5,\"seconds\":1.0,\"training/loss\":0.0}\n{\"step\":6,\"sec";
+    fs::write(&log, text).unwrap();
+    assert_eq!(run(&config, &parts).unwrap(), Ended::Finished);
+    for file in ["weights.safetensors", "checkpoint.safetensors"] {
+        let [whole, parts] = [&whole, &parts].map(|folder| fs::read(folder.join(file)).unwrap());
+        assert!(whole == parts, "{file}");
+    }
+    let losses = |folder: &Path| {
+        let rows = read_log(&folder.join("log.jsonl")).unwrap();
+        let of_training = rows
+            .into_iter()
+            .filter_map(|row| Some((row.step, *row.scalars.get("training/loss")?)));
+        of_training.collect::<Vec<_>>()
+    };
+    assert_eq!(losses(&whole).len(), 6);
+    assert_eq!(losses(&whole), losses(&parts));
+    // A finished training stays as it is.
+    assert_eq!(run(&config, &parts).unwrap(), Ended::Finished);
+}
+
+/// Weights whose last layer says nearly 2 of everything. torchvision draws it from ±1 for a single output, so that the first
+/// hundreds of steps would only make it smaller, here as in PyTorch.
+fn mild_weights(path: &Path) {
+    let network = EfficientNetB0::new(1, Options::default()).unwrap();
+    let named = network.parameters().unwrap().into_iter();
+    let mut tensors: HashMap<String, Tensor> = named
+        .chain(network.statistics().unwrap())
+        .map(|named| (named.name, named.tensor))
+        .collect();
+    let weight = tensors.get_mut("classifier.1.weight").unwrap();
+    *weight = (&*weight * 0.01).unwrap();
+    let bias = tensors.get_mut("classifier.1.bias").unwrap();
+    *bias = (&*bias + 2.0).unwrap();
+    candle_core::safetensors::save(&tensors, path).unwrap();
+}
+
+#[test]
+fn one_batch_can_be_learned_by_heart() {
+    let data = dataset(1, &[0, 60, 120, 180]);
+    let folder = tempfile::tempdir().unwrap();
+    let start = folder.path().join("start.safetensors");
+    mild_weights(&start);
+    let config = TrainConfig {
+        steps: 160,
+        batch_size: n(8),
+        learning_rate: 1e-3,
+        log_every: n(10),
+        checkpoint_every: n(1000),
+        evaluation: Vec::new(),
+        start: Some(start),
+        network: NetworkConfig {
+            dropout: 0.0,
+            stochastic_depth: 0.0,
+        },
+        augmentation: Augmentation {
+            flip_probability: 0.0,
+            rotate_probability: 0.0,
+            noise_probability: 0.0,
+            blur_probability: 0.0,
+            invalid_probability: 0.0,
+            ..Augmentation::default()
+        },
+        ..config(data.path())
+    };
+    run(&config, folder.path()).unwrap();
+    let log = read_log(&folder.path().join("log.jsonl")).unwrap();
+    let losses: Vec<f64> = log.iter().map(|row| row.scalars["training/loss"]).collect();
+    // Labels spread by 0.55 about their mean: a constant loses that at best.
+    assert!(*losses.last().unwrap() < 0.05, "{losses:?}");
+}
+
+#[test]
+fn a_person_on_both_sides_stops_before_anything_is_written() {
+    let data = dataset(2, &[0, 90]);
+    let folder = tempfile::tempdir().unwrap();
+    let leaking = TrainConfig {
+        evaluation: source(data.path(), &[1, 0]),
+        ..config(data.path())
+    };
+    let error = run(&leaking, &folder.path().join("run"))
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("patient 0 would be in training and in evaluation"),
+        "{error}"
+    );
+    assert!(!folder.path().join("run").exists());
+}
+
+#[test]
+fn numbers_that_are_not_finite_stop_with_step_and_layer() {
+    let data = dataset(2, &[0, 90, 180]);
+    let folder = tempfile::tempdir().unwrap();
+    let config = TrainConfig {
+        learning_rate: 1e38,
+        ..config(data.path())
+    };
+    let error = run(&config, folder.path()).unwrap_err();
+    let TrainError::NotFinite { step, .. } = &error else {
+        panic!("{error}")
+    };
+    assert!((1..6).contains(step));
+    let text = error.to_string();
+    assert!(
+        text.starts_with("step ") && text.contains("features."),
+        "{text}"
+    );
+}
+
+#[test]
+fn checkpoints_of_other_trainings_networks_and_files_are_refused() {
+    let data = dataset(2, &[0, 90, 180]);
+    let folder = tempfile::tempdir().unwrap();
+    let config = config(data.path());
+    stop_after(&config, folder.path(), 1);
+    let checkpoint = folder.path().join("checkpoint.safetensors");
+    let error = |config: &TrainConfig| run(config, folder.path()).unwrap_err().to_string();
+    let other = TrainConfig {
+        seed: 2,
+        ..config.clone()
+    };
+    assert!(error(&other).contains("its configuration is another one"));
+    let bytes = fs::read(&checkpoint).unwrap();
+    let place = bytes
+        .windows(15)
+        .position(|w| w == b"efficientnet_b0")
+        .unwrap();
+    let mut renamed = bytes.clone();
+    renamed[place + 14] = b'7';
+    fs::write(&checkpoint, &renamed).unwrap();
+    assert!(error(&config).contains("it is of efficientnet_b7, expected efficientnet_b0"));
+    for broken in [
+        &bytes[..0],
+        &bytes[..100],
+        &bytes[..bytes.len() - 1],
+        b"no tensors here",
+    ] {
+        fs::write(&checkpoint, broken).unwrap();
+        assert!(error(&config).contains("is no checkpoint of this training"));
+    }
+    fs::write(&checkpoint, &bytes).unwrap();
+    run(&config, folder.path()).unwrap();
+}
+
+#[test]
+fn the_angle_of_a_bar_is_learned_from_other_bars() {
+    let steps: Vec<u32> = (0..=180).step_by(12).collect();
+    let data = dataset(6, &steps);
+    let folder = tempfile::tempdir().unwrap();
+    let start = folder.path().join("start.safetensors");
+    mild_weights(&start);
+    let config = TrainConfig {
+        steps: 400,
+        learning_rate: 1e-3,
+        batch_size: n(16),
+        log_every: n(25),
+        checkpoint_every: n(400),
+        start: Some(start),
+        network: NetworkConfig {
+            dropout: 0.0,
+            stochastic_depth: 0.0,
+        },
+        training: source(data.path(), &[0, 1, 2, 3, 5]),
+        evaluation: source(data.path(), &[4]),
+        augmentation: Augmentation {
+            // A mirrored bar lies at another angle, a turned one as well.
+            flip_probability: 0.0,
+            rotate_probability: 0.0,
+            // At 32 pixels a box of 7 would hide it.
+            blur_probability: 0.0,
+            ..Augmentation::default()
+        },
+        ..config(data.path())
+    };
+    run(&config, folder.path()).unwrap();
+    let log = read_log(&folder.path().join("log.jsonl")).unwrap();
+    let mae = log.last().unwrap().scalars["evaluation/mae"];
+    // A constant 2 is wrong by 0.53 on average.
+    assert!(mae < 0.25, "{log:?}");
+}
