@@ -26,6 +26,7 @@ const ARROWS: &[(&str, &[&str])] = &[
             "ppa-depth",
             "ppa-xray",
             "ppa-dataset",
+            "ppa-learn",
             "ppa-metrics",
         ],
     ),

@@ -77,6 +77,10 @@ enum Command {
     /// The network's weights, and the network beside reference values
     #[command(subcommand)]
     Learn(commands::learn::LearnCommand),
+    /// Train a network on depth images and labels, or go on with it
+    Train(commands::train::TrainArgs),
+    /// Metrics, predictions and figures of a trained network
+    Eval(commands::eval::EvalArgs),
     /// Metrics of predictions against labels
     Metrics(commands::metrics::MetricsArgs),
     /// Statistical tests
@@ -109,6 +113,8 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Export(command) => commands::export::run(&command, output),
         Command::Label(command) => commands::label::run(&command, output),
         Command::Learn(command) => commands::learn::run(&command, output),
+        Command::Train(args) => commands::train::run(&args, output),
+        Command::Eval(args) => commands::eval::run(&args, output),
         Command::Metrics(args) => commands::metrics::run(&args, output),
         Command::Stats(command) => commands::stats::run(&command, output),
     }

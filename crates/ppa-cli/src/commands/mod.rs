@@ -4,6 +4,7 @@ pub mod ct;
 pub mod dataset;
 pub mod demo;
 pub mod depth;
+pub mod eval;
 pub mod export;
 pub mod generate;
 pub mod label;
@@ -17,6 +18,7 @@ pub mod qa;
 pub mod scene;
 pub mod stats;
 pub mod status;
+pub mod train;
 pub mod verify;
 pub mod xray;
 

@@ -21,6 +21,7 @@ mod room_file;
 mod shards;
 mod soft_tissue;
 mod tallies;
+mod training;
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,0 +1,95 @@
+//! `ppa eval`: what the predictions of a trained network are worth.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use anyhow::Context;
+use clap::Args;
+use ppa_learn::data::{Images, check_split};
+use ppa_learn::evaluate::{Evaluation, Row, Scores, learning_curve, write_evaluation};
+use ppa_learn::train::{Source, predict, read_log, samples, trained};
+
+use crate::output::{Output, working};
+
+#[derive(Debug, Args)]
+pub struct EvalArgs {
+    /// Folder of a finished `ppa train`
+    run: PathBuf,
+    /// Another dataset than the configuration's `[[evaluation]]`
+    #[arg(long, value_name = "DIR")]
+    dataset: Option<PathBuf>,
+    /// Persons of --dataset [default: all]
+    #[arg(
+        long,
+        value_name = "N,...",
+        value_delimiter = ',',
+        requires = "dataset"
+    )]
+    patients: Option<Vec<u32>>,
+    /// Folder for predictions, metrics and figures [default: evaluation, in the run's folder]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
+    let (config, network) = trained(&args.run)?;
+    let sources = match &args.dataset {
+        Some(dataset) => vec![Source {
+            dataset: dataset.clone(),
+            patients: args.patients.clone(),
+        }],
+        None => config.evaluation.clone(),
+    };
+    let tested = samples(&config, &sources)?;
+    anyhow::ensure!(
+        !tested.is_empty(),
+        "the configuration names no [[evaluation]]; say --dataset"
+    );
+    check_split(&samples(&config, &config.training)?, &tested)?;
+    let spinner = working("evaluating");
+    let images = Arc::new(Images::new(tested, config.side, 0)?);
+    let predictions = predict(&network, &images, config.batch_size, config.workers)?;
+    spinner.finish_and_clear();
+    let rows = Row::of(images.samples(), &predictions);
+    let evaluation = Evaluation::of(&rows);
+    let log = read_log(&args.run.join("log.jsonl"))?;
+    let out = args.out.clone().unwrap_or(args.run.join("evaluation"));
+    let figures = vec![("learning_curve", learning_curve(&log))];
+    write_evaluation(&out, &rows, &evaluation, figures)
+        .with_context(|| format!("writing into {}", out.display()))?;
+    output.print(&evaluation, describe)
+}
+
+fn describe(evaluation: &Evaluation) -> String {
+    let mut lines = vec![format!(
+        "{:<14}{:>6}{:>8}{:>8}{:>10}{:>10}{:>12}{:>13}{:>13}",
+        "", "n", "MSE", "MAE", "Spearman", "Accuracy", "Diagnostic", "Sensitivity", "Specificity"
+    )];
+    lines.push(line("images", &evaluation.images));
+    lines.push(line("poses", &evaluation.poses));
+    for person in &evaluation.persons {
+        lines.push(line(&format!("patient {}", person.patient), &person.scores));
+    }
+    lines.push("Images by class of label (rows) and prediction (columns), 1 to 3:".into());
+    for row in evaluation.confusion {
+        lines.push(row.map(|n| format!("{n:>8}")).concat());
+    }
+    lines.join("\n")
+}
+
+fn line(name: &str, scores: &Scores) -> String {
+    let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
+    let percent =
+        |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{:.1} %", 100.0 * v));
+    format!(
+        "{name:<14}{:>6}{:>8}{:>8}{:>10}{:>10}{:>12}{:>13}{:>13}",
+        scores.n,
+        number(scores.mse),
+        number(scores.mae),
+        number(scores.spearman),
+        percent(scores.accuracy),
+        percent(scores.diagnostic_accuracy),
+        percent(scores.sensitivity),
+        percent(scores.specificity)
+    )
+}

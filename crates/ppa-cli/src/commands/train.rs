@@ -1,0 +1,83 @@
+//! `ppa train`: a network from a configuration.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::Context;
+use clap::Args;
+use ppa_learn::train::{Ended, TrainConfig, train};
+use serde::Serialize;
+
+use crate::output::{Output, bar};
+
+#[derive(Debug, Args)]
+pub struct TrainArgs {
+    /// TOML with `preset = "paper"` or "quick", `[[training]]` and `[[evaluation]]`, and what shall differ
+    config: PathBuf,
+    /// Folder of the run; a run that was stopped goes on
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+#[derive(Debug, Serialize)]
+struct Trained {
+    out: PathBuf,
+    finished: bool,
+    step: u64,
+    steps: u64,
+    last_loss: Option<f32>,
+}
+
+pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
+    let config = TrainConfig::read(&args.config)?;
+    let schedule = config.schedule();
+    let steps = schedule.steps();
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    // Asked a second time, the program ends at once.
+    ctrlc::set_handler(move || {
+        if asked.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })
+    .context("cannot listen for Ctrl-C")?;
+    let bar = bar("training");
+    bar.set_length(steps);
+    let mut last_loss = None;
+    let ended = train(&config, &args.out, &stop, |progress| {
+        // Steps that an earlier run made took no time of this one.
+        if last_loss.is_none() {
+            bar.suspend(|| {
+                eprintln!(
+                    "{steps} steps of the optimiser (steps = {}, counted as {:?}), {} samples each",
+                    config.steps, config.step_counting, config.batch_size
+                );
+            });
+            bar.set_position(progress.step - 1);
+            bar.reset_eta();
+        }
+        last_loss = Some(progress.loss);
+        bar.set_position(progress.step);
+        bar.set_message(format!("loss {:.4}", progress.loss));
+    });
+    bar.finish_and_clear();
+    let step = match ended? {
+        Ended::Finished => steps,
+        Ended::Stopped { step } => step,
+    };
+    let trained = Trained {
+        out: args.out.clone(),
+        finished: step == steps,
+        step,
+        steps,
+        last_loss,
+    };
+    output.print(&trained, |trained| {
+        let out = trained.out.display();
+        match trained.finished {
+            true => format!("{out}/weights.safetensors after {steps} steps"),
+            false => format!("stopped after {step} of {steps} steps; the same command goes on"),
+        }
+    })
+}

@@ -1,0 +1,140 @@
+//! Training and evaluation as a user meets them.
+
+use std::fs;
+use std::path::Path;
+use std::time::Duration;
+
+use crate::{fail, names, ppa, succeed};
+
+/// Two persons with three poses each, and a configuration of few and small steps.
+fn write_data(folder: &Path) {
+    for patient in 0..2 {
+        let root = folder.join(format!("data/patient_{patient}"));
+        let (depth, labels) = (root.join("depth/l/orig"), root.join("labels/l"));
+        fs::create_dir_all(&depth).unwrap();
+        fs::create_dir_all(&labels).unwrap();
+        let mut grades = serde_json::Map::new();
+        let mut rois = serde_json::Map::new();
+        for (step, label) in [(0, 1.0), (90, 2.0), (180, 3.0)] {
+            let name = format!("depth_cam_left_{:.1}.png", f64::from(step) / 2.0);
+            let value = |x, y| image::Luma([(700 + step + (x * y + 20 * patient) % 300) as u16]);
+            image::ImageBuffer::from_fn(50, 50, value)
+                .save(depth.join(&name))
+                .unwrap();
+            let roi = serde_json::json!({"camera": "cam_left", "image_number": step, "x_start": 1, "y_start": 2, "size": 45});
+            rois.insert(name, roi);
+            let grade = serde_json::json!({"label": label, "std": 0.0, "step": step});
+            grades.insert(format!("xray_image_{step}.png"), grade);
+        }
+        for (name, entries) in [("labels.json", grades), ("roi_depth.json", rois)] {
+            fs::write(labels.join(name), serde_json::to_string(&entries).unwrap()).unwrap();
+        }
+    }
+    let config = "preset = \"quick\"\nside = 32\nsteps = 8\nbatch_size = 4\nlog_every = 1\ncheckpoint_every = 2\n\
+        [[training]]\ndataset = \"data\"\npatients = [0]\n[[evaluation]]\ndataset = \"data\"\npatients = [1]\n";
+    fs::write(folder.join("train.toml"), config).unwrap();
+}
+
+#[test]
+fn a_killed_training_goes_on_to_the_same_weights_and_is_evaluated() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_data(folder);
+    succeed(folder, "train train.toml --out whole");
+
+    let mut run = ppa(folder, "train train.toml --out killed");
+    let mut run = run.stderr(std::process::Stdio::null()).spawn().unwrap();
+    while !folder.join("killed/checkpoint.safetensors").exists() {
+        assert!(
+            run.try_wait().unwrap().is_none(),
+            "it ended before its first checkpoint"
+        );
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    run.kill().unwrap(); // SIGKILL: the program gets no chance to tidy up
+    run.wait().unwrap();
+    assert!(!folder.join("killed/weights.safetensors").exists());
+    let said = succeed(folder, "train train.toml --out killed --threads 2 --json");
+    let said: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(
+        (&said["finished"], &said["step"]),
+        (&true.into(), &8.into())
+    );
+    for file in [
+        "weights.safetensors",
+        "checkpoint.safetensors",
+        "config.toml",
+    ] {
+        let read = |run: &str| fs::read(folder.join(run).join(file)).unwrap();
+        assert!(read("whole") == read("killed"), "{file}");
+    }
+
+    let said = succeed(folder, "eval whole --json");
+    let said: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(
+        (&said["images"]["n"], &said["persons"][0]["patient"]),
+        (&3.into(), &1.into())
+    );
+    let files = names(&folder.join("whole/evaluation"));
+    assert_eq!(files.len(), 10, "{files:?}");
+    // The same metrics by way of the CSV.
+    let again = succeed(folder, "metrics whole/evaluation/predictions.csv --json");
+    let again: serde_json::Value = serde_json::from_str(&again).unwrap();
+    assert_eq!(again["mae"], said["images"]["mae"]);
+}
+
+#[test]
+fn what_cannot_be_trained_or_evaluated_is_told_in_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_data(folder);
+    let config = fs::read_to_string(folder.join("train.toml")).unwrap();
+    fs::write(folder.join("leak.toml"), config.replace("[1]", "[0]")).unwrap();
+    let said = fail(folder, "train leak.toml --out run");
+    assert!(said.contains("a person belongs to one of both"), "{said}");
+    fs::write(folder.join("nobody.toml"), config.replace("[1]", "[5]")).unwrap();
+    assert!(fail(folder, "train nobody.toml --out run").contains("patient 5"));
+    fs::write(folder.join("typo.toml"), config.replace("steps", "stepz")).unwrap();
+    assert!(fail(folder, "train typo.toml --out run").contains("stepz"));
+    assert!(!folder.join("run").exists());
+    assert!(fail(folder, "eval run").contains("config.toml"));
+}
+
+/// Ctrl-C saves: no step is made twice.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_training_saves_its_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_data(folder);
+    let config = fs::read_to_string(folder.join("train.toml")).unwrap();
+    let config = config
+        .replace("steps = 8", "steps = 5000")
+        .replace("checkpoint_every = 2", "checkpoint_every = 5000");
+    fs::write(folder.join("train.toml"), config).unwrap();
+    let mut run = ppa(folder, "train train.toml --out run --json");
+    let mut run = run
+        .stderr(std::process::Stdio::null())
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let log = folder.join("run/log.jsonl");
+    while fs::metadata(&log).map_or(0, |log| log.len()) == 0 {
+        assert!(
+            run.try_wait().unwrap().is_none(),
+            "it ended before its first step"
+        );
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let interrupt = std::process::Command::new("kill")
+        .args(["-INT", &run.id().to_string()])
+        .status();
+    assert!(interrupt.unwrap().success());
+    let said = run.wait_with_output().unwrap();
+    assert!(said.status.success());
+    let said: serde_json::Value = serde_json::from_slice(&said.stdout).unwrap();
+    assert_eq!(said["finished"], false);
+    let text = fs::read_to_string(log).unwrap();
+    assert_eq!(said["step"], text.lines().count());
+    assert!(folder.join("run/checkpoint.safetensors").exists());
+}
