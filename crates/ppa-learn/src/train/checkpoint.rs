@@ -121,7 +121,7 @@ fn assign(
     let assigned = network.assign(tensors);
     assigned.map_err(|source| TrainError::Weights {
         path: path.to_owned(),
-        source,
+        source: Box::new(source),
     })
 }
 

@@ -34,7 +34,7 @@ pub enum TrainError {
         /// The file.
         path: PathBuf,
         /// What does not fit.
-        source: WeightsError,
+        source: Box<WeightsError>,
     },
     /// A file that is no checkpoint of this network.
     #[error("{} is no checkpoint of this training: {message}", path.display())]
