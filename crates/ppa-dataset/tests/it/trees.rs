@@ -69,7 +69,7 @@ impl Tree {
                             tree.image(&format!("{folder}/{name}"), fill as u16);
                         }
                         let roi = json!({"camera": camera, "image_number": image,
-                            "x_start": 1 + number, "y_start": bend, "size": 6});
+                            "x_start": 1 + number, "y_start": bend, "size": 6 + image / 10});
                         rois.insert(format!("depth_{camera}_orig_{image}.png"), roi);
                     }
                     let name = format!("xray_{image}.png");
