@@ -37,6 +37,7 @@ pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
         Some(dataset) => vec![Source {
             dataset: dataset.clone(),
             patients: args.patients.clone(),
+            shapes: None,
         }],
         None => config.evaluation.clone(),
     };

@@ -5,6 +5,7 @@ pub mod dataset;
 pub mod demo;
 pub mod depth;
 pub mod eval;
+pub mod experiment;
 pub mod export;
 pub mod generate;
 pub mod label;

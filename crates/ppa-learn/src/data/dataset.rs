@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use ppa_dataset::BodyShape;
 use ppa_dataset::layout::View;
 use ppa_dataset::published::{DepthFile, GrayImage16, ImagePair, Pose, Published};
 
@@ -27,13 +28,15 @@ pub enum Views {
     Pairs,
 }
 
-/// The labelled samples of some persons of a dataset, or of all persons, in the order of the dataset.
+/// The labelled samples of some persons of a dataset, or of all persons, in the order of the dataset. Of rotated poses only
+/// some body shapes, or all.
 ///
 /// # Errors
 /// [`DataError`] for a folder that is no dataset, an image without label or region, a person that is not there, or no image.
 pub fn read_samples(
     root: &Path,
     persons: Option<&[u32]>,
+    shapes: Option<&[BodyShape]>,
     views: Views,
     frames_per_pose: usize,
 ) -> Result<Vec<Sample>, DataError> {
@@ -48,7 +51,13 @@ pub fn read_samples(
         let root = root.display();
         return Err(DataError::Empty(format!("of patient {missing} in {root}")));
     }
-    let chosen = |pair: &&ImagePair| persons.is_none_or(|p| p.contains(&pair.limb.patient));
+    let chosen = |pair: &&ImagePair| {
+        let of_shape = match pair.pose {
+            Pose::Rotated { shape, .. } => shapes.is_none_or(|s| s.contains(&shape)),
+            Pose::Recorded { .. } => true,
+        };
+        of_shape && persons.is_none_or(|p| p.contains(&pair.limb.patient))
+    };
     let mut reader = Reader {
         dataset: &dataset,
         frames_per_pose,

@@ -32,13 +32,7 @@ pub fn write_evaluation(
     evaluation: &Evaluation,
     more: Vec<(&str, Figure)>,
 ) -> Result<(), EvaluateError> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        table.serialize(row)?;
-    }
-    let table = table.into_inner().map_err(|error| error.into_error());
-    let table = table.map_err(csv::Error::from)?;
-    write_whole(&folder.join("predictions.csv"), &table)?;
+    write_predictions(&folder.join("predictions.csv"), rows)?;
     let json = serde_json::to_string_pretty(evaluation).expect("names and numbers are JSON");
     write_whole(&folder.join("evaluation.json"), json.as_bytes())?;
     let mut figures = vec![
@@ -56,4 +50,18 @@ pub fn write_evaluation(
         write_whole(&folder.join(format!("{name}.png")), &figure.to_png())?;
     }
     Ok(())
+}
+
+/// Writes rows as CSV, with a heading.
+///
+/// # Errors
+/// [`EvaluateError`] naming the file that cannot be written.
+pub fn write_predictions(path: &Path, rows: &[Row]) -> Result<(), EvaluateError> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        table.serialize(row)?;
+    }
+    let table = table.into_inner().map_err(|error| error.into_error());
+    let table = table.map_err(csv::Error::from)?;
+    Ok(write_whole(path, &table)?)
 }

@@ -2,20 +2,26 @@
 //!
 //! A [`Configuration`] is a column of a table. Each is trained for every fold, camera view and seed ([`runs`]), some on
 //! top of a pretraining that several runs share ([`Unit::needs`]). The predictions of the two views are joined
-//! ([`join_views`]), their metrics brought together ([`Results`]) and printed as the paper does ([`Table`]).
+//! ([`join_views`]), their metrics brought together ([`Results`]) and printed as the paper does ([`Table`]). A [`Runner`] carries all that out for an [`ExperimentPlan`].
 
 mod configuration;
+mod error;
 mod folds;
 mod metric;
+mod plan;
 mod predictions;
 mod results;
+mod run;
 mod table;
 mod unit;
 
 pub use configuration::{Configuration, Experiment, Shapes, Start, ViewChoice};
+pub use error::ExperimentError;
 pub use folds::{FoldError, cross_validation, folds_of_limbs};
 pub use metric::Metric;
+pub use plan::{ExperimentPlan, Fold, Synthetic, Target};
 pub use predictions::{Moment, Prediction, PredictionError, join_views, pose_triples};
 pub use results::{Missing, Results, Summary};
+pub use run::{Event, Runner};
 pub use table::{Incomplete, Table};
 pub use unit::{Unit, runs};

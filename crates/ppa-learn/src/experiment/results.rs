@@ -1,6 +1,7 @@
 //! Metrics of an experiment's runs, brought together over views, folds and seeds.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use ppa_metrics::{MetricError, PermutationTest, sign_flip_permutation};
 use serde::Serialize;
@@ -42,6 +43,21 @@ pub struct Summary {
     pub seeds: usize,
     /// Seeds whose folds are all there, but where the metric is not defined.
     pub undefined: usize,
+}
+
+impl fmt::Display for Missing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            configuration,
+            seed,
+            fold,
+        } = self;
+        let (experiment, column) = (configuration.experiment.name(), configuration.name());
+        write!(
+            f,
+            "experiment {experiment}, column {column}, seed {seed}, fold {fold}"
+        )
+    }
 }
 
 impl Results {

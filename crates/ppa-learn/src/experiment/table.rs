@@ -24,10 +24,7 @@ struct Cell {
 
 /// Why there is no table.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "{count} test sets of experiment {} are not predicted yet, the first is column {}, seed {}, fold {}",
-    first.configuration.experiment.name(), first.configuration.name(), first.seed, first.fold
-)]
+#[error("{count} test sets are not predicted yet, the first is {first}")]
 pub struct Incomplete {
     /// How many are missing.
     pub count: usize,
@@ -294,7 +291,7 @@ mod tests {
         let refused = Table::complete(&results).unwrap_err();
         assert_eq!(
             refused.to_string(),
-            "1 test sets of experiment 2c are not predicted yet, the first is column scratch, seed 1, fold 0"
+            "1 test sets are not predicted yet, the first is experiment 2c, column scratch, seed 1, fold 0"
         );
         let markdown = Table::so_far(&results).to_markdown();
         assert!(

@@ -4,7 +4,7 @@ use std::fmt;
 
 use ppa_dataset::layout::View;
 
-use super::configuration::{Configuration, Experiment, Shapes, Start, ViewChoice};
+use super::configuration::{Configuration, Shapes, Start, ViewChoice};
 
 /// One training, and the test of its network where it has one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -75,11 +75,11 @@ impl fmt::Display for Unit {
     }
 }
 
-/// The runs of an experiment, repetition by repetition: columns that a test pairs by seed grow together.
-pub fn runs(experiment: Experiment, folds: usize, seeds: &[u64]) -> Vec<Unit> {
+/// The runs of some columns, repetition by repetition: columns that a test pairs by seed grow together.
+pub fn runs(columns: &[Configuration], folds: usize, seeds: &[u64]) -> Vec<Unit> {
     let mut runs = Vec::new();
     for &seed in seeds {
-        for configuration in experiment.configurations() {
+        for &configuration in columns {
             for fold in 0..folds {
                 runs.extend(View::ALL.map(|view| Unit::Run {
                     configuration,
@@ -97,6 +97,7 @@ pub fn runs(experiment: Experiment, folds: usize, seeds: &[u64]) -> Vec<Unit> {
 mod tests {
     use std::collections::BTreeSet;
 
+    use super::super::configuration::Experiment;
     use super::*;
 
     #[test]
@@ -105,7 +106,7 @@ mod tests {
         let all: Vec<_> = [3, 2, 3, 2]
             .into_iter()
             .zip(Experiment::ALL)
-            .flat_map(|(folds, experiment)| runs(experiment, folds, &seeds))
+            .flat_map(|(folds, experiment)| runs(&experiment.configurations(), folds, &seeds))
             .collect();
         // 980 and the 60 of ImageNet in experiment 2b, which the paper's count leaves out.
         assert_eq!(all.len(), 1040);

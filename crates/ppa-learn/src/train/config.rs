@@ -3,6 +3,7 @@
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
+use ppa_dataset::BodyShape;
 use serde::{Deserialize, Serialize};
 
 use crate::data::{Augmentation, FRAMES_PER_POSE, Views};
@@ -41,6 +42,8 @@ pub struct TrainConfig {
     /// Weights to begin with, from the folder of the configuration; random ones if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<PathBuf>,
+    /// Layers that are trained.
+    pub layers: Layers,
     /// What training leaves out at random.
     pub network: NetworkConfig,
     /// How training images are changed.
@@ -50,6 +53,16 @@ pub struct TrainConfig {
     /// Persons to evaluate on; none of them in training.
     #[serde(default)]
     pub evaluation: Vec<Source>,
+}
+
+/// Which layers are trained.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Layers {
+    /// All.
+    All,
+    /// The last one, on features of images that are not augmented: linear probing.
+    Last,
 }
 
 /// What training leaves out at random.
@@ -71,6 +84,9 @@ pub struct Source {
     /// Numbers of the persons; all of them if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub patients: Option<Vec<u32>>,
+    /// Body shapes, of poses that were rotated; all of them if left out. Recorded poses have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shapes: Option<Vec<BodyShape>>,
 }
 
 /// A configuration that cannot be.
@@ -132,6 +148,7 @@ impl TrainConfig {
             log_every: number(50),
             checkpoint_every: number(1000),
             start: None,
+            layers: Layers::All,
             network: NetworkConfig {
                 dropout: options.dropout,
                 stochastic_depth: options.stochastic_depth,
@@ -162,16 +179,29 @@ impl TrainConfig {
     /// # Errors
     /// [`ConfigError`] naming file and key.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
-        let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Read {
+        let unreadable = |source| ConfigError::Read {
             path: path.to_owned(),
             source,
-        })?;
-        let wrong = |message: String| ConfigError::Parse {
-            path: path.to_owned(),
-            message: message.trim_end().to_owned(),
         };
-        let mut given: toml::Table =
-            toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
+        let text = std::fs::read_to_string(path).map_err(unreadable)?;
+        let given = toml::from_str(&text).map_err(|error| wrong(path, &error))?;
+        let mut config = Self::from_table(given, path)?;
+        // Whole paths, so that the echo in another folder says the same.
+        let whole = std::path::absolute(path).map_err(unreadable)?;
+        let folder = whole.parent().unwrap_or(Path::new(""));
+        for source in config.training.iter_mut().chain(&mut config.evaluation) {
+            source.dataset = folder.join(&source.dataset);
+        }
+        config.start = config.start.map(|start| folder.join(start));
+        config.check()?;
+        Ok(config)
+    }
+
+    /// The configuration that a table of the file `path` says: its preset and every key that differs.
+    ///
+    /// # Errors
+    /// [`ConfigError`] naming file and key.
+    pub(crate) fn from_table(mut given: toml::Table, path: &Path) -> Result<Self, ConfigError> {
         let preset = match given.remove("preset") {
             None => Self::paper(),
             Some(toml::Value::String(name)) if name == "paper" => Self::paper(),
@@ -183,23 +213,9 @@ impl TrainConfig {
                 });
             }
         };
-        let mut all = toml::Table::try_from(&preset).map_err(|e| wrong(e.to_string()))?;
+        let mut all = toml::Table::try_from(&preset).map_err(|e| wrong(path, &e))?;
         merge(&mut all, given);
-        let mut config: Self = all
-            .try_into()
-            .map_err(|e: toml::de::Error| wrong(e.to_string()))?;
-        // Whole paths, so that the echo in another folder says the same.
-        let whole = std::path::absolute(path).map_err(|source| ConfigError::Read {
-            path: path.to_owned(),
-            source,
-        })?;
-        let folder = whole.parent().unwrap_or(Path::new(""));
-        for source in config.training.iter_mut().chain(&mut config.evaluation) {
-            source.dataset = folder.join(&source.dataset);
-        }
-        config.start = config.start.map(|start| folder.join(start));
-        config.check()?;
-        Ok(config)
+        all.try_into().map_err(|e: toml::de::Error| wrong(path, &e))
     }
 
     /// The rates of all steps.
@@ -309,7 +325,7 @@ impl TrainConfig {
     }
 
     /// What must be equal for a training to go on; threads, memory and intervals may change.
-    pub(super) fn of_results(&self) -> Self {
+    pub(crate) fn of_results(&self) -> Self {
         let paper = Self::paper();
         Self {
             workers: paper.workers,
@@ -318,6 +334,13 @@ impl TrainConfig {
             checkpoint_every: paper.checkpoint_every,
             ..self.clone()
         }
+    }
+}
+
+fn wrong(path: &Path, error: &dyn std::fmt::Display) -> ConfigError {
+    ConfigError::Parse {
+        path: path.to_owned(),
+        message: error.to_string().trim_end().to_owned(),
     }
 }
 

@@ -9,6 +9,7 @@ mod checkpoint;
 mod config;
 mod crc32c;
 mod error;
+mod feed;
 mod finite;
 mod log;
 mod run;
@@ -16,7 +17,7 @@ mod schedule;
 mod tensorboard;
 
 pub use adam::Adam;
-pub use config::{ConfigError, NetworkConfig, Source, TrainConfig};
+pub use config::{ConfigError, Layers, NetworkConfig, Source, TrainConfig};
 pub use error::TrainError;
 pub use finite::Trouble;
 pub use log::{LogRow, read_log};

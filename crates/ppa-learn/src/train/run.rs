@@ -18,6 +18,7 @@ use super::adam::Adam;
 use super::checkpoint;
 use super::config::{Source, TrainConfig};
 use super::error::TrainError;
+use super::feed::{Answers, Feed};
 use super::finite::{is_finite, trouble};
 use super::log::{Log, LogRow};
 use super::tensorboard::tensorboard_events;
@@ -66,9 +67,9 @@ pub fn train(
     let evaluation = samples(config, &config.evaluation)?;
     check_split(&training, &evaluation)?;
     let echoed = toml::to_string(config).expect("names and numbers are TOML");
-    let balanced = Balanced::new(&training)?;
+    Balanced::new(&training)?; // Labels outside the scale are found before training.
     if !evaluation.is_empty() {
-        Balanced::new(&evaluation)?; // Labels outside the scale are found before training.
+        Balanced::new(&evaluation)?;
     }
 
     let network = network(config)?;
@@ -98,17 +99,11 @@ pub fn train(
         },
     };
     let images = Arc::new(Images::new(training, config.side, keep_bytes)?);
-    let order = Order::Training {
-        balanced,
-        augmentation: config.augmentation,
-        seed: config.seed,
-        first_batch: run.adam.steps,
-    };
-    let mut loader = Loader::new(&images, &order, config.batch_size, config.workers);
+    let mut feed = Feed::new(config, &run.network, &images, run.adam.steps)?;
     let steps = config.schedule().steps();
     while run.adam.steps < steps {
-        let batch = loader.next().expect("training batches never end")?;
-        let progress = run.step(&batch)?;
+        let answers = feed.answers(config, &run.network, run.adam.steps)?;
+        let progress = run.step(answers)?;
         report(&progress);
         let step = run.adam.steps;
         let due = |every: NonZeroUsize| step.is_multiple_of(every.get() as u64) || step == steps;
@@ -155,9 +150,12 @@ pub fn samples(config: &TrainConfig, sources: &[Source]) -> Result<Vec<Sample>, 
     for source in sources {
         let persons = source.patients.as_deref();
         let frames = config.frames_per_pose;
+        let shapes = source.shapes.as_deref();
+        let dataset = &source.dataset;
         samples.extend(read_samples(
-            &source.dataset,
+            dataset,
             persons,
+            shapes,
             config.views,
             frames,
         )?);
@@ -166,7 +164,7 @@ pub fn samples(config: &TrainConfig, sources: &[Source]) -> Result<Vec<Sample>, 
 }
 
 /// Images of one camera as a tensor [samples, 1, side, side].
-fn tensor(batch: Batch, side: usize) -> Result<Tensor, TrainError> {
+pub(super) fn tensor(batch: Batch, side: usize) -> Result<Tensor, TrainError> {
     let count = batch.samples.len();
     let [image] = <[Vec<f32>; 1]>::try_from(batch.images).map_err(|_| TrainError::TwoCameras)?;
     Ok(Tensor::from_vec(
@@ -189,12 +187,10 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    fn step(&mut self, batch: &Batch) -> Result<Progress, TrainError> {
+    fn step(&mut self, answers: Answers) -> Result<Progress, TrainError> {
         let step = self.adam.steps;
-        let labels = Tensor::new(batch.labels.as_slice(), &Device::Cpu)?.unsqueeze(1)?;
-        let images = tensor(batch.clone(), self.config.side)?;
-        let outputs = self.network.forward(&images, Mode::Train { step })?;
-        let loss = (outputs - labels)?.sqr()?.mean_all()?;
+        let labels = Tensor::new(answers.labels, &Device::Cpu)?.unsqueeze(1)?;
+        let loss = (answers.outputs - labels)?.sqr()?.mean_all()?;
         let gradients = loss.backward()?;
         let loss = loss.to_scalar::<f32>()?;
         let mut finite = loss.is_finite();

@@ -18,7 +18,7 @@ fn n(number: usize) -> NonZeroUsize {
 }
 
 fn images(folder: &TempDir, views: Views, keep_bytes: usize) -> Arc<Images> {
-    let samples = read_samples(folder.path(), None, views, 5).unwrap();
+    let samples = read_samples(folder.path(), None, None, views, 5).unwrap();
     Arc::new(Images::new(samples, SIDE, keep_bytes).unwrap())
 }
 
@@ -70,7 +70,7 @@ fn evaluation_sees_each_sample_once_and_the_last_batch_is_short() {
 #[test]
 fn samples_are_those_of_the_views_and_persons() {
     let folder = dataset(2, &[0, 90, 180]);
-    let read = |persons, views| read_samples(folder.path(), persons, views, 5);
+    let read = |persons, views| read_samples(folder.path(), persons, None, views, 5);
     let left = read(Some(&[1]), Views::Left).unwrap();
     assert_eq!(left.len(), 3);
     assert_eq!(left[1].id, "patient_1/depth/r/orig/depth_cam_left_45.0.png");
@@ -88,16 +88,16 @@ fn what_is_missing_or_of_another_size_is_named() {
     let folder = dataset(2, &[0, 90, 180]);
     let labels = folder.path().join("patient_1/labels/r/labels.json");
     fs::remove_file(&labels).unwrap();
-    let error = read_samples(folder.path(), None, Views::Left, 5).unwrap_err();
+    let error = read_samples(folder.path(), None, None, Views::Left, 5).unwrap_err();
     assert!(
         matches!(&error, DataError::NoLabel(path) if path.ends_with("depth_cam_left_0.0.png")),
         "{error}"
     );
-    assert!(read_samples(folder.path(), Some(&[0]), Views::Left, 5).is_ok());
+    assert!(read_samples(folder.path(), Some(&[0]), None, Views::Left, 5).is_ok());
 
     let folder = dataset(2, &[0, 90, 180]);
     fs::remove_file(folder.path().join("patient_1/labels/r/roi_depth.json")).unwrap();
-    let error = read_samples(folder.path(), None, Views::Left, 5).unwrap_err();
+    let error = read_samples(folder.path(), None, None, Views::Left, 5).unwrap_err();
     assert!(matches!(error, DataError::NoRoi(_)), "{error}");
 
     let folder = dataset(2, &[0, 90, 180]);
@@ -139,7 +139,7 @@ fn five_frames_of_a_recorded_pose_are_used_the_first_ones() {
         r#"{"depth_cam_left_orig_0_1000.png": {"camera": "cam_left", "image_number": 0, "x_start": 1, "y_start": 2, "size": 15}}"#,
     )
     .unwrap();
-    let samples = read_samples(folder.path(), None, Views::Unified, 5).unwrap();
+    let samples = read_samples(folder.path(), None, None, Views::Unified, 5).unwrap();
     let names: Vec<&str> = samples
         .iter()
         .map(|s| s.id.rsplit('_').next().unwrap())

@@ -21,6 +21,7 @@ fn source(data: &Path, patients: &[u32]) -> Vec<Source> {
     vec![Source {
         dataset: data.to_owned(),
         patients: Some(patients.to_vec()),
+        shapes: None,
     }]
 }
 

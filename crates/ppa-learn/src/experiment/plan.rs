@@ -1,0 +1,165 @@
+//! What an experiment runs on, as a file says.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use ppa_dataset::published::Published;
+use serde::{Deserialize, Serialize};
+
+use super::configuration::{Configuration, Experiment, Start};
+use super::error::ExperimentError;
+use super::folds::{cross_validation, folds_of_limbs};
+use crate::train::{ConfigError, TrainConfig};
+
+/// Datasets and settings of the experiments.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExperimentPlan {
+    /// Number of repetitions with different seeds; the paper's is 10.
+    pub seeds: u64,
+    /// Names the division into folds, the same for all repetitions.
+    #[serde(default = "first_seed")]
+    pub fold_seed: u64,
+    /// Weights trained on ImageNet, by torchvision's or timm's names. Columns that begin with them are left out without it.
+    #[serde(default)]
+    pub imagenet_weights: Option<PathBuf>,
+    /// How networks are trained: a preset and what differs from it. Seed, views and data are filled in.
+    pub training: toml::Table,
+    /// The synthetic dataset: of experiment 1, and to pretrain with.
+    pub synthetic: Synthetic,
+    /// The preparations, or what stands for them: of experiments 2a and 2c.
+    #[serde(default)]
+    pub preparations: Option<Target>,
+    /// The clinical dataset, or what stands for it: of experiment 2b.
+    #[serde(default)]
+    pub clinical: Option<Target>,
+    /// The file that said all this.
+    #[serde(skip)]
+    path: PathBuf,
+}
+
+/// The synthetic dataset.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Synthetic {
+    /// Its folder, from the folder of the plan.
+    pub dataset: PathBuf,
+    /// Folds of experiment 1; the paper's number is 3.
+    pub folds: usize,
+    /// Limbs that a fold tests; the paper's number is 3.
+    pub test_limbs: usize,
+}
+
+/// A dataset to finetune and test with.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Target {
+    /// Its folder, from the folder of the plan.
+    pub dataset: PathBuf,
+    /// Folds, by person: the paper has 2 for the preparations and 3 for the clinical dataset.
+    pub folds: usize,
+}
+
+/// Persons of a fold.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fold {
+    /// N of `patient_N` to train with.
+    pub training: Vec<u32>,
+    /// N of `patient_N` to test.
+    pub test: Vec<u32>,
+}
+
+fn first_seed() -> u64 {
+    1
+}
+
+impl ExperimentPlan {
+    /// Reads a TOML file; folders in it are from the folder of the file.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] naming the file and the key.
+    pub fn read(path: &Path) -> Result<Self, ExperimentError> {
+        let wrong = |message: String| ExperimentError::Plan {
+            path: path.to_owned(),
+            message,
+        };
+        let text = std::fs::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
+        let mut plan: Self =
+            toml::from_str(&text).map_err(|e| wrong(e.to_string().trim_end().to_owned()))?;
+        if plan.seeds == 0 {
+            return Err(wrong("seeds is 0, expected at least 1".to_owned()));
+        }
+        let whole = std::path::absolute(path).map_err(|e| wrong(e.to_string()))?;
+        let folder = whole.parent().unwrap_or(Path::new(""));
+        let targets = [&mut plan.preparations, &mut plan.clinical];
+        let targets = targets.into_iter().flatten().map(|t| &mut t.dataset);
+        let paths = targets.chain([&mut plan.synthetic.dataset]);
+        for path in paths.chain(&mut plan.imagenet_weights) {
+            *path = folder.join(&*path);
+        }
+        plan.path = path.to_owned();
+        plan.training_config()?;
+        Ok(plan)
+    }
+
+    /// How networks are trained, without data.
+    pub(super) fn training_config(&self) -> Result<TrainConfig, ConfigError> {
+        TrainConfig::from_table(self.training.clone(), &self.path)
+    }
+
+    /// The columns of an experiment that can be run: without ImageNet where there is no file of its weights.
+    pub fn configurations(&self, experiment: Experiment) -> Vec<Configuration> {
+        let mut columns = experiment.configurations();
+        columns.retain(|c| c.start != Start::ImageNet || self.imagenet_weights.is_some());
+        columns
+    }
+
+    /// The dataset that an experiment tests with.
+    ///
+    /// # Errors
+    /// [`ExperimentError::NoTarget`] if the plan names none.
+    pub fn target(&self, experiment: Experiment) -> Result<&Path, ExperimentError> {
+        let (target, key) = match experiment {
+            Experiment::One => return Ok(&self.synthetic.dataset),
+            Experiment::TwoA | Experiment::TwoC => (&self.preparations, "preparations"),
+            Experiment::TwoB => (&self.clinical, "clinical"),
+        };
+        match target {
+            Some(target) => Ok(&target.dataset),
+            None => Err(ExperimentError::NoTarget { experiment, key }),
+        }
+    }
+
+    /// Persons of each fold of an experiment.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] if the dataset cannot be read, or has too few persons.
+    pub fn folds(&self, experiment: Experiment) -> Result<Vec<Fold>, ExperimentError> {
+        let dataset = Published::read(self.target(experiment)?)?;
+        let limbs: BTreeSet<_> = dataset.pairs.iter().map(|pair| pair.limb).collect();
+        let mut limbs_of = BTreeMap::new();
+        for limb in limbs {
+            *limbs_of.entry(limb.patient).or_insert(0) += 1;
+        }
+        let everybody: BTreeSet<u32> = limbs_of.keys().copied().collect();
+        let by_person = |target: &Option<Target>| {
+            let folds = target.as_ref().map_or(0, |target| target.folds);
+            cross_validation(&everybody, folds, self.fold_seed)
+        };
+        let tests = match experiment {
+            Experiment::One => {
+                let Synthetic {
+                    folds, test_limbs, ..
+                } = self.synthetic;
+                folds_of_limbs(&limbs_of, test_limbs, folds, self.fold_seed)
+            }
+            Experiment::TwoA | Experiment::TwoC => by_person(&self.preparations),
+            Experiment::TwoB => by_person(&self.clinical),
+        }?;
+        let fold = |test: BTreeSet<u32>| Fold {
+            training: everybody.difference(&test).copied().collect(),
+            test: test.into_iter().collect(),
+        };
+        Ok(tests.into_iter().map(fold).collect())
+    }
+}

@@ -1,0 +1,342 @@
+//! Carries out the trainings of an experiment, each in a folder of its own, and gathers their results.
+
+use std::fs::{File, create_dir_all, remove_file};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use ppa_dataset::layout::View;
+use ppa_dataset::{BodyShape, FileError, sha256_of_file, write_whole};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::configuration::{Experiment, Start};
+use super::error::ExperimentError;
+use super::plan::{ExperimentPlan, Fold};
+use super::predictions::{Prediction, join_views};
+use super::results::Results;
+use super::unit::{Unit, runs};
+use crate::data::{Images, Sample, Views, check_split};
+use crate::evaluate::{Row, write_predictions};
+use crate::train::{
+    Ended, Layers, Progress, Source, TrainConfig, TrainError, predict, samples, train, trained,
+};
+
+/// What is told while an experiment runs.
+#[derive(Debug)]
+pub enum Event<'a> {
+    /// A training begins, or goes on.
+    Begins {
+        /// Which one.
+        unit: Unit,
+        /// Its number among the runs of this share, from 1.
+        number: usize,
+        /// Runs of this share.
+        of: usize,
+    },
+    /// It made a step.
+    Step(&'a Progress),
+}
+
+/// One experiment of a plan, in a folder that holds a folder for each training.
+#[derive(Debug)]
+pub struct Runner<'a> {
+    plan: &'a ExperimentPlan,
+    experiment: Experiment,
+    root: &'a Path,
+    folds: Vec<Fold>,
+}
+
+/// What a finished training was: its settings without paths, and what it began with and saw.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct Record {
+    config: TrainConfig,
+    start_sha256: Option<String>,
+    data_sha256: String,
+}
+
+impl<'a> Runner<'a> {
+    /// An experiment of a plan in the folder `root`.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] if its dataset is not named, cannot be read or has too few persons.
+    pub fn new(
+        plan: &'a ExperimentPlan,
+        experiment: Experiment,
+        root: &'a Path,
+    ) -> Result<Self, ExperimentError> {
+        let folds = plan.folds(experiment)?;
+        Ok(Self {
+            plan,
+            experiment,
+            root,
+            folds,
+        })
+    }
+
+    /// Its runs, those with ImageNet only if the plan has weights.
+    pub fn runs(&self) -> Vec<Unit> {
+        let seeds: Vec<_> = (1..=self.plan.seeds).collect();
+        runs(
+            &self.plan.configurations(self.experiment),
+            self.folds.len(),
+            &seeds,
+        )
+    }
+
+    /// Carries out the runs that `mine` picks by their number from 0, each after the pretraining it needs. What is
+    /// finished is left as it is, what was begun goes on; a training that another process makes is waited for.
+    ///
+    /// Returns whether all are finished; `stop` ends it after a step.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] naming the training.
+    pub fn run(
+        &self,
+        mine: impl Fn(usize) -> bool,
+        stop: &AtomicBool,
+        mut report: impl FnMut(Event),
+    ) -> Result<bool, ExperimentError> {
+        let all = self.runs().into_iter().enumerate();
+        let share: Vec<_> = all
+            .filter(|&(n, _)| mine(n))
+            .map(|(_, unit)| unit)
+            .collect();
+        for (n, &unit) in share.iter().enumerate() {
+            for unit in unit.needs().into_iter().chain([unit]) {
+                let begins = Event::Begins {
+                    unit,
+                    number: n + 1,
+                    of: share.len(),
+                };
+                if !self.make(unit, stop, begins, &mut report)? {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    /// Carries out one training, unless it is finished.
+    fn make(
+        &self,
+        unit: Unit,
+        stop: &AtomicBool,
+        begins: Event,
+        report: &mut impl FnMut(Event),
+    ) -> Result<bool, ExperimentError> {
+        let named = |source: TrainError| ExperimentError::Training {
+            unit: unit.to_string(),
+            source: Box::new(source),
+        };
+        let folder = self.folder(unit);
+        create_dir_all(&folder).map_err(file("create", &folder))?;
+        let path = folder.join("lock");
+        let lock = File::create(&path).map_err(file("create", &path))?;
+        lock.lock().map_err(file("lock", &path))?;
+
+        let config = self.config(unit)?;
+        let record = self.record(unit, &config).map_err(named)?;
+        let path = folder.join("finished.json");
+        if path.exists() {
+            return match read_json::<Record>(&path)? == record {
+                true => Ok(true),
+                false => Err(ExperimentError::OtherSettings(folder)),
+            };
+        }
+        report(begins);
+        let steps = |progress: &Progress| report(Event::Step(progress));
+        if train(&config, &folder, stop, steps).map_err(named)? != Ended::Finished {
+            return Ok(false);
+        }
+        if let Unit::Run { .. } = unit {
+            let rows = test(&folder, &config).map_err(named)?;
+            write_predictions(&folder.join("predictions.csv"), &rows)?;
+        }
+        let text = serde_json::to_string_pretty(&record).expect("settings are JSON");
+        write_whole(&path, text.as_bytes())?;
+        let checkpoint = folder.join("checkpoint.safetensors");
+        remove_file(&checkpoint).map_err(file("remove", &checkpoint))?;
+        Ok(true)
+    }
+
+    fn folder(&self, unit: Unit) -> PathBuf {
+        self.root.join(unit.to_string())
+    }
+
+    /// The whole configuration of a training.
+    fn config(&self, unit: Unit) -> Result<TrainConfig, ExperimentError> {
+        let all = |shapes: &[BodyShape]| Source {
+            dataset: self.plan.synthetic.dataset.clone(),
+            patients: None,
+            shapes: Some(shapes.to_vec()),
+        };
+        let base = self.plan.training_config()?;
+        Ok(match unit {
+            Unit::Pretraining { shapes, view, seed } => TrainConfig {
+                seed,
+                views: view.map_or(Views::Unified, of_view),
+                training: vec![all(shapes.variants())],
+                ..base
+            },
+            Unit::Run {
+                configuration,
+                fold,
+                view,
+                seed,
+            } => {
+                let fold = &self.folds[fold];
+                let target = self.plan.target(self.experiment)?;
+                // Recorded images have no shapes; of synthetic ones the skin of the scan is tested, whatever was trained with.
+                let of = |patients: &[u32], shapes: &[BodyShape]| Source {
+                    dataset: target.to_owned(),
+                    patients: Some(patients.to_vec()),
+                    shapes: Some(shapes.to_vec()),
+                };
+                TrainConfig {
+                    seed,
+                    views: of_view(view),
+                    start: self.start(unit),
+                    layers: match self.experiment {
+                        Experiment::TwoC => Layers::Last,
+                        _ => Layers::All,
+                    },
+                    training: vec![of(&fold.training, configuration.shapes.variants())],
+                    evaluation: vec![of(&fold.test, &[BodyShape::Orig])],
+                    ..base
+                }
+            }
+        })
+    }
+
+    /// The weights that a training begins with.
+    fn start(&self, unit: Unit) -> Option<PathBuf> {
+        match unit {
+            Unit::Run { configuration, .. } if configuration.start == Start::ImageNet => {
+                self.plan.imagenet_weights.clone()
+            }
+            _ => Some(self.folder(unit.needs()?).join("weights.safetensors")),
+        }
+    }
+
+    /// What tells whether a finished training is still the one that the plan asks for.
+    ///
+    /// Nobody whose images the weights come from may be tested with them.
+    fn record(&self, unit: Unit, config: &TrainConfig) -> Result<Record, TrainError> {
+        let training = samples(config, &config.training)?;
+        let tested = samples(config, &config.evaluation)?;
+        if let Some(pretraining) = unit.needs() {
+            let config = self.config(pretraining).map_err(|e| match e {
+                ExperimentError::Config(e) => TrainError::Config(e),
+                _ => unreachable!("a pretraining has no target"),
+            })?;
+            check_split(&samples(&config, &config.training)?, &tested)?;
+        }
+        let start_sha256 = config.start.as_deref().map(sha256_of_file).transpose()?;
+        let without_paths = TrainConfig {
+            start: None,
+            training: vec![],
+            evaluation: vec![],
+            ..config.of_results()
+        };
+        Ok(Record {
+            config: without_paths,
+            start_sha256,
+            data_sha256: fingerprint(&[training, tested]),
+        })
+    }
+
+    /// What is known so far: the results of all test sets of which both views are finished.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] naming predictions that cannot be read or joined.
+    pub fn results(&self) -> Result<Results, ExperimentError> {
+        let seeds: Vec<_> = (1..=self.plan.seeds).collect();
+        let mut results = Results::new(self.experiment, self.folds.len(), &seeds);
+        for place in results.missing() {
+            let views = View::ALL.map(|view| {
+                let unit = Unit::Run {
+                    configuration: place.configuration,
+                    fold: place.fold,
+                    view,
+                    seed: place.seed,
+                };
+                predictions(&self.folder(unit))
+            });
+            let [left, right] = views;
+            let (Some(left), Some(right)) = (left?, right?) else {
+                continue;
+            };
+            let wrong = |source| ExperimentError::Predictions {
+                place: place.to_string(),
+                source,
+            };
+            let joined = join_views(&left, &right).map_err(wrong)?;
+            results.insert(place, &joined).map_err(wrong)?;
+        }
+        Ok(results)
+    }
+}
+
+/// What the network of a finished training says of its test set.
+fn test(folder: &Path, config: &TrainConfig) -> Result<Vec<Row>, TrainError> {
+    let (_, network) = trained(folder)?;
+    let tested = samples(config, &config.evaluation)?;
+    let images = Arc::new(Images::new(tested, config.side, 0)?);
+    let predictions = predict(&network, &images, config.batch_size, config.workers)?;
+    Ok(Row::of(images.samples(), &predictions))
+}
+
+/// A hash of what training and test sets hold, but not where they lie.
+fn fingerprint(sets: &[Vec<Sample>; 2]) -> String {
+    let mut hash = Sha256::new();
+    for set in sets {
+        for sample in set {
+            let regions: Vec<_> = sample.images.iter().map(|image| image.roi).collect();
+            hash.update(format!("{} {} {regions:?}\n", sample.id, sample.label));
+        }
+        hash.update("end\n");
+    }
+    hash.finalize()
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect()
+}
+
+/// Predictions of a finished run.
+fn predictions(folder: &Path) -> Result<Option<Vec<Prediction>>, ExperimentError> {
+    if !folder.join("finished.json").exists() {
+        return Ok(None);
+    }
+    let path = folder.join("predictions.csv");
+    let wrong = |error: csv::Error| ExperimentError::Unreadable {
+        path: path.clone(),
+        message: error.to_string(),
+    };
+    let mut rows = csv::Reader::from_path(&path).map_err(wrong)?;
+    let rows = rows.deserialize().collect::<Result<_, _>>();
+    Ok(Some(rows.map_err(wrong)?))
+}
+
+fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, ExperimentError> {
+    let text = std::fs::read_to_string(path).map_err(file("read", path))?;
+    serde_json::from_str(&text).map_err(|error| ExperimentError::Unreadable {
+        path: path.to_owned(),
+        message: error.to_string(),
+    })
+}
+
+fn of_view(view: View) -> Views {
+    match view {
+        View::Left => Views::Left,
+        View::Right => Views::Right,
+    }
+}
+
+fn file<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(std::io::Error) -> FileError + 'a {
+    move |source| FileError {
+        action,
+        path: path.to_owned(),
+        source,
+    }
+}

@@ -1,0 +1,114 @@
+//! What a network says of the next training batch, through all its layers or through the last one only.
+
+use std::sync::Arc;
+
+use candle_core::{Device, Tensor};
+
+use super::config::{Layers, TrainConfig};
+use super::error::TrainError;
+use super::run::tensor;
+use crate::data::{Balanced, Images, Loader, Order};
+use crate::network::{EfficientNetB0, Mode};
+
+/// The endless sequence of training batches.
+pub(super) enum Feed {
+    /// Augmented images, through all layers.
+    Images(Loader),
+    /// Linear probing: features of the images as evaluation sees them, which stay what they are while only the last
+    /// layer changes, so that each is computed once.
+    Features {
+        /// [samples, 1280].
+        features: Tensor,
+        labels: Vec<f32>,
+        balanced: Balanced,
+    },
+}
+
+/// Outputs [samples, 1] for a batch, and its labels.
+pub(super) struct Answers {
+    pub outputs: Tensor,
+    pub labels: Vec<f32>,
+}
+
+impl Feed {
+    /// Batches from number `first_batch` on.
+    pub fn new(
+        config: &TrainConfig,
+        network: &EfficientNetB0,
+        images: &Arc<Images>,
+        first_batch: u64,
+    ) -> Result<Self, TrainError> {
+        let balanced = Balanced::new(images.samples())?;
+        if config.layers == Layers::Last {
+            let labels = images.samples().iter().map(|s| s.label as f32).collect();
+            return Ok(Self::Features {
+                features: features(config, network, images)?,
+                labels,
+                balanced,
+            });
+        }
+        let order = Order::Training {
+            balanced,
+            augmentation: config.augmentation,
+            seed: config.seed,
+            first_batch,
+        };
+        let loader = Loader::new(images, &order, config.batch_size, config.workers);
+        Ok(Self::Images(loader))
+    }
+
+    /// What the network answers to batch number `step`, which must be the next one.
+    pub fn answers(
+        &mut self,
+        config: &TrainConfig,
+        network: &EfficientNetB0,
+        step: u64,
+    ) -> Result<Answers, TrainError> {
+        let mode = Mode::Train { step };
+        match self {
+            Self::Images(loader) => {
+                let batch = loader.next().expect("training batches never end")?;
+                let labels = batch.labels.clone();
+                let images = tensor(batch, config.side)?;
+                Ok(Answers {
+                    outputs: network.forward(&images, mode)?,
+                    labels,
+                })
+            }
+            Self::Features {
+                features,
+                labels,
+                balanced,
+            } => {
+                let size = config.batch_size.get() as u64;
+                let places = step * size..(step + 1) * size;
+                let picked: Vec<_> = places
+                    .map(|place| balanced.pick(config.seed, place))
+                    .collect();
+                let rows: Vec<_> = picked.iter().map(|&sample| sample as u32).collect();
+                let rows = Tensor::new(rows, &Device::Cpu)?;
+                let batch = features.index_select(&rows, 0)?;
+                Ok(Answers {
+                    outputs: network.classify(&batch, mode)?,
+                    labels: picked.iter().map(|&sample| labels[sample]).collect(),
+                })
+            }
+        }
+    }
+}
+
+/// Features of each sample's evaluation image.
+fn features(
+    config: &TrainConfig,
+    network: &EfficientNetB0,
+    images: &Arc<Images>,
+) -> Result<Tensor, TrainError> {
+    let batches = Loader::new(images, &Order::Once, config.batch_size, config.workers);
+    let of_batch = |batch: Result<_, _>| {
+        let images = tensor(batch?, config.side)?;
+        // Detached: the layers before have no gradient.
+        Ok(network.features(&images, Mode::Eval)?.detach())
+    };
+    let features: Vec<_> = batches.map(of_batch).collect::<Result<_, TrainError>>()?;
+    Ok(Tensor::cat(&features, 0)?)
+}
