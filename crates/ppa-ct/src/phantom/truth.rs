@@ -15,7 +15,8 @@ const GIRTH_LEVELS_MM: [f64; 2] = [75.0, 220.0];
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Truth {
-    /// Middle of the joint space between trochlea and plafond.
+    /// Middle of the joint space between trochlea and plafond, both without the groove in the middle of the trochlea (1 mm deep in P01);
+    /// with the groove the middle lies lower by less than that.
     pub joint_centre: Point3<f64>,
     /// Direction of the tibial shaft towards the knee.
     ///
