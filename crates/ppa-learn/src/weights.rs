@@ -9,11 +9,13 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use candle_core::{DType, Tensor};
+use serde::{Deserialize, Serialize};
 
 use crate::network::{EfficientNetB0, Entry, NetworkError};
 
 /// What becomes of a first convolution that was trained on several channels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum FirstConvolution {
     /// Thrown away: the network keeps its own. The paper's authors do so.
     #[default]
@@ -74,7 +76,7 @@ fn place(path: &Option<PathBuf>) -> String {
 }
 
 impl WeightsError {
-    fn in_file(self, file: &Path) -> Self {
+    pub(crate) fn in_file(self, file: &Path) -> Self {
         match self {
             Self::Misfit { misfits, .. } => Self::Misfit {
                 path: Some(file.to_owned()),

@@ -27,11 +27,6 @@ struct State {
     config: TrainConfig,
 }
 
-/// Writes parameters and running statistics by torchvision's names.
-pub(super) fn save_weights(path: &Path, network: &EfficientNetB0) -> Result<(), TrainError> {
-    write(path, by_name(network)?, None)
-}
-
 /// Writes all that a training needs to go on.
 pub(super) fn save(
     path: &Path,
@@ -98,31 +93,9 @@ pub(super) fn load(
             *moments = tensor.flatten_all()?.to_vec1()?;
         }
     }
-    assign(path, network, &tensors)?;
+    let assigned = network.assign(&tensors);
+    assigned.map_err(|error| error.in_file(path))?;
     Ok(adam)
-}
-
-/// Puts the weights of a file, checkpoint or not, into a network.
-pub(super) fn load_weights(path: &Path, network: &EfficientNetB0) -> Result<(), TrainError> {
-    let bytes = std::fs::read(path).map_err(at("read", path))?;
-    let tensors = candle_core::safetensors::load_buffer(&bytes, &Device::Cpu);
-    let tensors = tensors.map_err(|error| TrainError::Checkpoint {
-        path: path.to_owned(),
-        message: error.to_string(),
-    })?;
-    assign(path, network, &tensors)
-}
-
-fn assign(
-    path: &Path,
-    network: &EfficientNetB0,
-    tensors: &HashMap<String, Tensor>,
-) -> Result<(), TrainError> {
-    let assigned = network.assign(tensors);
-    assigned.map_err(|source| TrainError::Weights {
-        path: path.to_owned(),
-        source: Box::new(source),
-    })
 }
 
 fn by_name(network: &EfficientNetB0) -> Result<Vec<(String, Tensor)>, TrainError> {

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::data::{Augmentation, FRAMES_PER_POSE, Views};
 use crate::network::Options;
+use crate::weights::FirstConvolution;
 
 use super::schedule::{Schedule, StepCounting};
 
@@ -39,9 +40,12 @@ pub struct TrainConfig {
     pub log_every: NonZeroUsize,
     /// Steps between two checkpoints.
     pub checkpoint_every: NonZeroUsize,
-    /// Weights to begin with, from the folder of the configuration; random ones if left out.
+    /// Weights to begin with, from the folder of the configuration: safetensors or `.pth`, by torchvision's or timm's names. Random
+    /// ones if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<PathBuf>,
+    /// What becomes of a first convolution of several channels in `start`.
+    pub first_convolution: FirstConvolution,
     /// Layers that are trained.
     pub layers: Layers,
     /// What training leaves out at random.
@@ -148,6 +152,7 @@ impl TrainConfig {
             log_every: number(50),
             checkpoint_every: number(1000),
             start: None,
+            first_convolution: FirstConvolution::default(),
             layers: Layers::All,
             network: NetworkConfig {
                 dropout: options.dropout,

@@ -28,14 +28,9 @@ pub enum TrainError {
     /// The network.
     #[error(transparent)]
     Network(#[from] NetworkError),
-    /// Weights of another network.
-    #[error("{}", path.display())]
-    Weights {
-        /// The file.
-        path: PathBuf,
-        /// What does not fit.
-        source: Box<WeightsError>,
-    },
+    /// Weights that do not fit, or cannot be read or written.
+    #[error(transparent)]
+    Weights(Box<WeightsError>),
     /// A file that is no checkpoint of this network.
     #[error("{} is no checkpoint of this training: {message}", path.display())]
     Checkpoint {
@@ -60,6 +55,12 @@ pub enum TrainError {
     /// candle's arithmetic.
     #[error("arithmetic failed")]
     Candle(#[from] candle_core::Error),
+}
+
+impl From<WeightsError> for TrainError {
+    fn from(error: WeightsError) -> Self {
+        Self::Weights(Box::new(error))
+    }
 }
 
 /// Names the file and what was done to it.

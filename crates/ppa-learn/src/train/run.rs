@@ -78,7 +78,7 @@ pub fn train(
         checkpoint::load(&checkpoint, &network, config)?
     } else {
         if let Some(start) = &config.start {
-            checkpoint::load_weights(start, &network)?;
+            network.load(start, config.first_convolution)?;
         }
         Adam::new(network.variables().map(|variable| variable.elem_count()))
     };
@@ -118,7 +118,7 @@ pub fn train(
             return Ok(Ended::Stopped { step });
         }
     }
-    checkpoint::save_weights(&folder.join("weights.safetensors"), &run.network)?;
+    run.network.save(&folder.join("weights.safetensors"))?;
     Ok(Ended::Finished)
 }
 
@@ -137,7 +137,8 @@ fn network(config: &TrainConfig) -> Result<EfficientNetB0, TrainError> {
 pub fn trained(folder: &Path) -> Result<(TrainConfig, EfficientNetB0), TrainError> {
     let config = TrainConfig::read(&folder.join("config.toml"))?;
     let network = network(&config)?;
-    checkpoint::load_weights(&folder.join("weights.safetensors"), &network)?;
+    let weights = folder.join("weights.safetensors");
+    network.load(&weights, config.first_convolution)?;
     Ok((config, network))
 }
 
