@@ -59,6 +59,9 @@ pub enum SplitError {
         /// Its part.
         part: String,
     },
+    /// A part whose name could not be that of a file everywhere.
+    #[error("a part is called {0:?}, expected letters, digits, _ and -")]
+    Name(String),
     /// Shares that cannot be drawn.
     #[error("{0}")]
     Shares(String),
@@ -71,6 +74,7 @@ impl Split {
     /// # Errors
     /// [`SplitError::Shares`] for shares that are not positive, a name twice, or a part that would stay empty.
     pub fn draw(patients: &[u32], shares: &[(String, f64)], seed: u64) -> Result<Self, SplitError> {
+        shares.iter().try_for_each(|(name, _)| check_name(name))?;
         let counts = counts(patients.len(), shares)?;
         let mut order: Vec<_> = patients.iter().map(|&p| (draw(seed, p), p)).collect();
         order.sort_unstable();
@@ -99,6 +103,7 @@ impl Split {
         if split.version != 1 {
             return Err(SplitError::Version(split.version));
         }
+        split.parts.keys().try_for_each(|name| check_name(name))?;
         split.by_patient()?;
         Ok(split)
     }
@@ -184,6 +189,15 @@ impl Split {
             }
         }
         Ok(parts)
+    }
+}
+
+/// Archives are named after parts: a name must not lead out of their folder.
+fn check_name(name: &str) -> Result<(), SplitError> {
+    let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    match !name.is_empty() && name.chars().all(plain) {
+        true => Ok(()),
+        false => Err(SplitError::Name(name.to_owned())),
     }
 }
 
@@ -312,5 +326,8 @@ mod tests {
             Err(SplitError::Version(2))
         ));
         assert!(put(r#"{"version": 1, "part": {}}"#).is_err());
+        let way_out = put(r#"{"version": 1, "parts": {"../../train": [0]}}"#).unwrap_err();
+        assert!(matches!(way_out, SplitError::Name(_)), "{way_out}");
+        assert!(Split::draw(&[0, 1], &shares(&[("/tmp/x", 1.0)]), 0).is_err());
     }
 }

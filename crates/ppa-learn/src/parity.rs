@@ -83,16 +83,19 @@ pub fn parity(weights: &Path, io: &Path) -> Result<Parity, WeightsError> {
         }
         let difference: Vec<f64> = ours.iter().zip(&reference).map(|(a, b)| a - b).collect();
         if 1e-6 * whole < length(&reference) {
-            worst = worst.max(length(&difference) / length(&reference));
+            worst = larger(worst, length(&difference) / length(&reference));
         }
     }
     let error = |ours: &Tensor, name: &str| -> Result<f64, WeightsError> {
-        let reference = values(tensor(name)?)?;
-        Ok(values(ours)?
-            .iter()
-            .zip(reference)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max))
+        let (ours, reference) = (values(ours)?, values(tensor(name)?)?);
+        if ours.len() != reference.len() {
+            let (found, expected) = (reference.len(), ours.len());
+            return Err(unreadable(
+                format!("{name} has {found} values, expected {expected}").into(),
+            ));
+        }
+        let differences = ours.iter().zip(reference).map(|(a, b)| (a - b).abs());
+        Ok(differences.fold(0.0, larger))
     };
     Ok(Parity {
         max_abs_output_error: error(&evaluated, "eval_output_f64")?
@@ -100,6 +103,11 @@ pub fn parity(weights: &Path, io: &Path) -> Result<Parity, WeightsError> {
         loss: loss.to_dtype(DType::F64)?.to_scalar()?,
         worst_gradient_rel_l2: worst,
     })
+}
+
+/// The larger of two errors; what is no number is as wrong as can be.
+fn larger(a: f64, b: f64) -> f64 {
+    if b.is_nan() { f64::INFINITY } else { a.max(b) }
 }
 
 fn values(tensor: &Tensor) -> Result<Vec<f64>, WeightsError> {

@@ -14,7 +14,7 @@ pub enum LabelSource {
 }
 
 impl LabelSource {
-    pub(super) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Readers => "readers",
             Self::Surrogate => "surrogate-jso/1",

@@ -36,6 +36,7 @@ pub(super) fn labels(
     of_key: impl Fn(&str) -> Option<u32>,
 ) -> Result<BTreeMap<u32, Label>, PublishedError> {
     let mut labels = BTreeMap::new();
+    let mut source = None;
     for (key, entry) in entries::<LabelEntry>(path)? {
         let wrong = |message| PublishedError::Entry {
             path: path.to_owned(),
@@ -43,6 +44,14 @@ pub(super) fn labels(
             message,
         };
         let number = one_number(entry.image_number, of_key(&key)).map_err(wrong)?;
+        let expected = *source.get_or_insert(entry.label_source);
+        if entry.label_source != expected {
+            let name = |s: Option<LabelSource>| s.map_or("nobody named", LabelSource::name);
+            let (found, expected) = (name(entry.label_source), name(expected));
+            return Err(wrong(format!(
+                "the label comes from {found}, those before it from {expected}"
+            )));
+        }
         if !(1.0..=3.0).contains(&entry.label) {
             let found = entry.label;
             return Err(wrong(format!("the label is {found}, expected 1 to 3")));

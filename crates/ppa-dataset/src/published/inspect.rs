@@ -22,7 +22,7 @@ pub enum Flaw {
     /// A region that reaches beyond its image.
     #[error(
         "{file} has {width} x {height} pixels, its region reaches to column {} and row {}",
-        roi.x_start + roi.size, roi.y_start + roi.size
+        roi.x_start.saturating_add(roi.size), roi.y_start.saturating_add(roi.size)
     )]
     RoiOutside {
         /// The depth image.

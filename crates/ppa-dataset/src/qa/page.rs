@@ -86,19 +86,25 @@ fn checks(root: &Path, flaws: &[Flaw]) -> String {
     if flaws.is_empty() {
         return "<p class=\"good\">Every image could be decoded and is as in manifest.jsonl; no region reaches beyond its image.</p>".to_owned();
     }
-    let folder = format!("{}/", root.display());
-    // The page may be passed on; where the dataset lay is nobody's business.
-    let told = flaws.iter().take(TOLD).map(|flaw| {
-        format!(
-            "<li>{}</li>",
-            escaped(&flaw.to_string().replace(&folder, ""))
-        )
-    });
+    let told = flaws.iter().take(TOLD);
+    let told = told.map(|flaw| format!("<li>{}</li>", escaped(&without_folder(flaw, root))));
     format!(
         "<div class=\"bad\"><p>{} flaws:</p><ul>{}</ul></div>",
         flaws.len(),
         told.collect::<String>()
     )
+}
+
+/// An error with its causes. The page may be passed on: where the dataset lay is nobody's business.
+fn without_folder(error: &dyn std::error::Error, root: &Path) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(source) = cause {
+        text += &format!(": {source}");
+        cause = source.source();
+    }
+    let folder = root.join("").display().to_string();
+    text.replace(&folder, "")
 }
 
 fn splits(root: &Path, patients: &[u32]) -> Result<String, QaError> {
@@ -110,7 +116,7 @@ fn splits(root: &Path, patients: &[u32]) -> Result<String, QaError> {
             Err(error) => format!(
                 "<tr class=\"bad\"><td>{}</td><td>{}</td></tr>",
                 escaped(&name),
-                escaped(&error.to_string())
+                escaped(&without_folder(&error, root))
             ),
             Ok(split) => {
                 let parts = split
@@ -387,4 +393,22 @@ fn escaped(text: &str) -> String {
         .replace('<', "&lt;")
         .replace('>', "&gt;")
         .replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn where_a_dataset_lay_is_not_told() {
+        for root in ["/home/name/data", "/home/name/data/"] {
+            let path = Path::new(root).join("splits/x.json");
+            let error = crate::files::read_text(&path).unwrap_err();
+            let told = without_folder(&error, Path::new(root));
+            assert!(
+                told.contains("splits/x.json") && !told.contains("name"),
+                "{told}"
+            );
+        }
+    }
 }

@@ -28,7 +28,7 @@ fn a_whole_dataset_has_no_flaws() {
 fn each_flaw_is_told_with_its_file() {
     let file = "patient_0/depth/r/orig/depth_cam_left_45.5.png";
     type Break<'a> = &'a dyn Fn(&Tree);
-    let broken: [(&str, Break); 5] = [
+    let broken: [(&str, Break); 6] = [
         ("is not a whole PNG", &|tree| {
             let bytes = fs::read(tree.path(file)).unwrap();
             fs::write(tree.path(file), &bytes[..bytes.len() / 2]).unwrap();
@@ -47,6 +47,14 @@ fn each_flaw_is_told_with_its_file() {
                 );
             },
         ),
+        ("its region reaches to column 4294967295", &|tree| {
+            let roi = "\"camera\": \"cam_left\",\n    \"image_number\": 91,\n    \"size\": 5";
+            tree.edit(
+                "patient_0/labels/r/roi_depth.json",
+                roi,
+                &roi.replace("size\": 5", "size\": 4294967295"),
+            );
+        }),
         ("has no counterpart of the other camera", &|tree| {
             fs::remove_file(tree.path("patient_0/depth/r/orig/depth_cam_right_45.5.png")).unwrap();
         }),

@@ -231,3 +231,14 @@ fn images_that_are_damaged_or_of_other_pixels_are_told() {
         &[name, "L8", "16 bits"],
     );
 }
+
+#[test]
+fn labels_of_two_sources_do_not_mix() {
+    let tree = Tree::specimen();
+    let file = "patient_1_l/min/data/dataset/label/quality/labels.json";
+    let text = fs::read_to_string(tree.path(file)).unwrap();
+    let mixed = text.replacen("\"std\"", "\"label_source\": \"readers\", \"std\"", 1);
+    assert_ne!(mixed, text);
+    fs::write(tree.path(file), mixed).unwrap();
+    assert_says(&refusal(&tree), &["labels.json", "readers", "nobody named"]);
+}

@@ -1,7 +1,7 @@
 //! Samples from a dataset in either published layout.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use ppa_dataset::BodyShape;
 use ppa_dataset::layout::View;
@@ -60,6 +60,7 @@ pub fn read_samples(
     };
     let mut reader = Reader {
         dataset: &dataset,
+        place: root.canonicalize().unwrap_or_else(|_| root.to_owned()),
         frames_per_pose,
         sizes: BTreeMap::new(),
         frames: BTreeMap::new(),
@@ -84,6 +85,8 @@ pub fn read_samples(
 
 struct Reader<'a> {
     dataset: &'a Published,
+    /// The one path of the dataset's folder, however it was spelled: persons of one dataset must be known again.
+    place: PathBuf,
     frames_per_pose: usize,
     /// Columns and rows of each camera's first image.
     sizes: BTreeMap<View, [usize; 2]>,
@@ -115,7 +118,7 @@ impl Reader<'_> {
             id: files[0].file.clone(),
             images: images?,
             label,
-            person: format!("{}, patient {}", self.dataset.root.display(), limb.patient),
+            person: format!("{}, patient {}", self.place.display(), limb.patient),
             limb,
             camera: views[0],
             pose,

@@ -121,10 +121,13 @@ impl Search {
             }
             return found;
         }
+        // Where a person did not help, no later one with as many limbs does.
+        let mut tried = BTreeSet::new();
         for n in from..self.counts.len() {
-            if self.fold_of[n].is_none() && self.counts[n] <= open {
+            let count = self.counts[n];
+            if self.fold_of[n].is_none() && count <= open && tried.insert(count) {
                 self.fold_of[n] = Some(fold);
-                if self.fill(fold, n + 1, open - self.counts[n]) {
+                if self.fill(fold, n + 1, open - count) {
                     return true;
                 }
                 self.fold_of[n] = None;
@@ -148,7 +151,7 @@ fn shuffled(
     seed: u64,
 ) -> Result<Vec<u32>, FoldError> {
     let mut order: Vec<_> = persons.collect();
-    if order.len() < folds.max(2) {
+    if folds == 0 || order.len() < folds.max(2) {
         return Err(FoldError::TooFewPersons {
             persons: order.len(),
             folds,
@@ -195,6 +198,10 @@ mod tests {
                 assert_eq!(set.iter().map(|person| limbs[person]).sum::<usize>(), 3);
             }
         }
+        assert!(folds_of_limbs(&limbs, 3, 0, 1).is_err());
+        // An odd number of limbs of persons with two: said at once, however many persons there are.
+        let pairs: BTreeMap<_, _> = persons(200).into_iter().map(|p| (p, 2)).collect();
+        assert!(folds_of_limbs(&pairs, 21, 3, 1).is_err());
         assert_eq!(
             folds_of_limbs(&persons(4).into_iter().map(|p| (p, 2)).collect(), 3, 1, 0),
             Err(FoldError::NoSuchLimbs {

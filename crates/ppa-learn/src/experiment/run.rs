@@ -233,17 +233,31 @@ impl<'a> Runner<'a> {
             check_split(&samples(&config, &config.training)?, &tested)?;
         }
         let start_sha256 = config.start.as_deref().map(sha256_of_file).transpose()?;
-        let without_paths = TrainConfig {
-            start: None,
-            training: vec![],
-            evaluation: vec![],
-            ..config.of_results()
-        };
         Ok(Record {
-            config: without_paths,
+            config: without_paths(config),
             start_sha256,
             data_sha256: fingerprint(&[training, tested]),
         })
+    }
+
+    /// Predictions of a finished run.
+    fn predictions(&self, unit: Unit) -> Result<Option<Vec<Prediction>>, ExperimentError> {
+        let folder = self.folder(unit);
+        let finished = folder.join("finished.json");
+        if !finished.exists() {
+            return Ok(None);
+        }
+        if read_json::<Record>(&finished)?.config != without_paths(&self.config(unit)?) {
+            return Err(ExperimentError::OtherSettings(folder));
+        }
+        let path = folder.join("predictions.csv");
+        let wrong = |error: csv::Error| ExperimentError::Unreadable {
+            path: path.clone(),
+            message: error.to_string(),
+        };
+        let mut rows = csv::Reader::from_path(&path).map_err(wrong)?;
+        let rows = rows.deserialize().collect::<Result<_, _>>();
+        Ok(Some(rows.map_err(wrong)?))
     }
 
     /// What is known so far: the results of all test sets of which both views are finished.
@@ -261,7 +275,7 @@ impl<'a> Runner<'a> {
                     view,
                     seed: place.seed,
                 };
-                predictions(&self.folder(unit))
+                self.predictions(unit)
             });
             let [left, right] = views;
             let (Some(left), Some(right)) = (left?, right?) else {
@@ -275,6 +289,16 @@ impl<'a> Runner<'a> {
             results.insert(place, &joined).map_err(wrong)?;
         }
         Ok(results)
+    }
+}
+
+/// The settings that the results of a training depend on.
+fn without_paths(config: &TrainConfig) -> TrainConfig {
+    TrainConfig {
+        start: None,
+        training: vec![],
+        evaluation: vec![],
+        ..config.of_results()
     }
 }
 
@@ -301,21 +325,6 @@ fn fingerprint(sets: &[Vec<Sample>; 2]) -> String {
         .iter()
         .map(|byte| format!("{byte:02x}"))
         .collect()
-}
-
-/// Predictions of a finished run.
-fn predictions(folder: &Path) -> Result<Option<Vec<Prediction>>, ExperimentError> {
-    if !folder.join("finished.json").exists() {
-        return Ok(None);
-    }
-    let path = folder.join("predictions.csv");
-    let wrong = |error: csv::Error| ExperimentError::Unreadable {
-        path: path.clone(),
-        message: error.to_string(),
-    };
-    let mut rows = csv::Reader::from_path(&path).map_err(wrong)?;
-    let rows = rows.deserialize().collect::<Result<_, _>>();
-    Ok(Some(rows.map_err(wrong)?))
 }
 
 fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, ExperimentError> {

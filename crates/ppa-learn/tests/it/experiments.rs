@@ -69,6 +69,8 @@ fn probing_is_gathered_from_shards_and_left_as_it_is() {
     let other = Runner::new(&other, Experiment::TwoC, &root).unwrap();
     let refused = other.run(|_| true, &go(), |_| ());
     assert!(matches!(refused, Err(ExperimentError::OtherSettings(_))));
+    let refused = other.results();
+    assert!(matches!(refused, Err(ExperimentError::OtherSettings(_))));
 }
 
 #[test]

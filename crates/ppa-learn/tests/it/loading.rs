@@ -154,3 +154,12 @@ fn five_frames_of_a_recorded_pose_are_used_the_first_ones() {
             .all(|s| s.pose == samples[0].pose && s.label == 1.5)
     );
 }
+
+#[test]
+fn persons_are_known_again_however_the_dataset_is_spelled() {
+    let folder = dataset(2, &[0]);
+    let inner = folder.path().join("patient_0/..");
+    let read = |root| read_samples(root, None, None, Views::Left, 5).unwrap();
+    let (one, other) = (read(folder.path()), read(&inner));
+    assert!(ppa_learn::data::check_split(&one, &other).is_err());
+}

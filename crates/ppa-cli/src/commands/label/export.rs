@@ -60,11 +60,18 @@ pub fn run(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
         key.display(),
         args.out.display()
     );
+    let page = args.out.join(PAGE);
+    for path in [&key, &page] {
+        ensure!(
+            !path.exists(),
+            "{} is there already, and grades may depend on it; choose another --out",
+            path.display()
+        );
+    }
     let working = working("collecting radiographs");
     let manifest = Manifest::read(&args.dataset)?;
     let shown = Showing::of_dataset(&manifest, args.seed, args.every_deg);
     let html = grading_page(&args.dataset, &shown)?;
-    let page = args.out.join(PAGE);
     write_key(&key, &shown)?;
     write_whole(&page, html.as_bytes())?;
     working.finish_and_clear();
