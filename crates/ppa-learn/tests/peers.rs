@@ -1,0 +1,103 @@
+//! Weights as PyTorch and onnxruntime read and write them.
+//!
+//! By hand only, with a Python that has torch, torchvision, onnx, onnxruntime, safetensors and numpy:
+//! `PPA_PYTHON=python cargo test -p ppa-learn --features peers --test peers`.
+
+use std::collections::HashMap;
+
+use candle_core::{Device, Tensor};
+use ppa_learn::{EfficientNetB0, FirstConvolution, Loaded, Mode, Options};
+
+fn values(network: &EfficientNetB0) -> Vec<Vec<f32>> {
+    let named = network.parameters().unwrap().into_iter();
+    named
+        .chain(network.statistics().unwrap())
+        .map(|named| named.tensor.flatten_all().unwrap().to_vec1().unwrap())
+        .collect()
+}
+
+/// Runs `script` with the arguments, in the Python that PPA_PYTHON names.
+fn python(script: &str, arguments: &[&std::path::Path]) {
+    let program = std::env::var_os("PPA_PYTHON").expect("PPA_PYTHON names a Python");
+    let out = std::process::Command::new(program)
+        .arg("-c")
+        .arg(script)
+        .args(arguments)
+        .output()
+        .unwrap();
+    println!("{}", String::from_utf8_lossy(&out.stdout));
+    assert!(
+        out.status.success(),
+        "{}",
+        String::from_utf8_lossy(&out.stderr)
+    );
+}
+
+/// A network whose running statistics are not the first ones, with what it gives for images of odd sides.
+fn exported(folder: &std::path::Path) -> (EfficientNetB0, std::path::PathBuf) {
+    let one = EfficientNetB0::new(1, Options::default()).unwrap();
+    for step in 0..3 {
+        let images = Tensor::rand(-0.5_f32, 0.5, (4, 1, 64, 64), &Device::Cpu).unwrap();
+        one.forward(&images, Mode::Train { step }).unwrap();
+    }
+    let images = Tensor::rand(-0.5_f32, 0.5, (2, 1, 77, 64), &Device::Cpu).unwrap();
+    let output = one.forward(&images, Mode::Eval).unwrap();
+    let path = folder.join("io.safetensors");
+    let io = HashMap::from([
+        ("images".to_owned(), images),
+        ("quality".to_owned(), output),
+    ]);
+    candle_core::safetensors::save(&io, &path).unwrap();
+    (one, path)
+}
+
+#[test]
+fn onnxruntime_gives_the_same_outputs() {
+    let folder = tempfile::tempdir().unwrap();
+    let (network, io) = exported(folder.path());
+    let path = folder.path().join("network.onnx");
+    network.save_onnx(&path).unwrap();
+    let script = "
+import sys, numpy, onnx, onnxruntime
+from safetensors.numpy import load_file
+onnx.checker.check_model(onnx.load(sys.argv[1]), full_check=True)
+io = load_file(sys.argv[2])
+quality, = onnxruntime.InferenceSession(sys.argv[1]).run(None, {'images': io['images']})
+error = numpy.abs(quality - io['quality']).max() / numpy.abs(io['quality']).max()
+print('onnxruntime: largest relative error', error, 'of', io['quality'].ravel())
+assert error < 1e-4
+";
+    python(script, &[&path, &io]);
+}
+
+#[test]
+fn pytorch_loads_what_is_saved_and_the_network_loads_what_pytorch_saves() {
+    let folder = tempfile::tempdir().unwrap();
+    let (network, io) = exported(folder.path());
+    let (path, back) = (
+        folder.path().join("network.safetensors"),
+        folder.path().join("network.pth"),
+    );
+    network.save(&path).unwrap();
+    let script = "
+import sys, torch, torchvision
+from safetensors.torch import load_file
+model = torchvision.models.efficientnet_b0(num_classes=1)
+model.features[0][0] = torch.nn.Conv2d(1, 32, 3, 2, 1, bias=False)
+model.load_state_dict(load_file(sys.argv[1]))
+io = load_file(sys.argv[2])
+with torch.no_grad():
+    quality = model.eval()(io['images'])
+error = ((quality - io['quality']).abs().max() / io['quality'].abs().max()).item()
+print('torch: largest relative error', error)
+assert error < 1e-4
+torch.save(model.state_dict(), sys.argv[3])
+";
+    python(script, &[&path, &io, &back]);
+    let other = EfficientNetB0::new(2, Options::default()).unwrap();
+    assert_eq!(
+        other.load(&back, FirstConvolution::Fresh).unwrap(),
+        Loaded::default()
+    );
+    assert_eq!(values(&network), values(&other));
+}
