@@ -89,8 +89,15 @@ pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
         Which::TwoB => Experiment::TwoB,
         Which::TwoC => Experiment::TwoC,
     };
-    let runner = Runner::new(&plan, experiment, &args.out)?;
+    // A whole path: begun trainings compare the paths of the weights that they began with.
+    let out = std::path::absolute(&args.out)?;
+    let runner = Runner::new(&plan, experiment, &out)?;
     let part = shard(args.shard)?;
+    if plan.configurations(experiment).len() < experiment.configurations().len() {
+        eprintln!(
+            "the plan names no imagenet_weights: their column is left out, and tables can only be written with --so-far"
+        );
+    }
     let finished = args.so_far || train(&runner, part)?;
 
     let results = runner.results()?;
@@ -102,27 +109,31 @@ pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
         ),
         (false, false) => None,
     };
+    // So far there may be no seed yet that is complete in both columns.
     let permutation_test = match (&table, results.permutation_test()) {
-        (Some(_), Some(test)) => test.ok(),
+        (Some(_), Some(test)) if args.so_far => test.ok(),
+        (Some(_), Some(test)) => Some(test?),
         _ => None,
     };
-    if let Some(table) = &table {
-        for (ending, text) in [
-            ("md", table.to_markdown()),
-            ("csv", table.to_csv()),
-            ("tex", table.to_latex()),
-        ] {
-            let name = format!("experiment_{}.{ending}", experiment.name());
-            write_whole(&args.out.join(name), text.as_bytes())?;
-        }
-    }
     let outcome = Outcome {
         experiment: experiment.name(),
         finished,
         missing: results.missing().len(),
         permutation_test,
-        table: table.map(|table| table.to_markdown()),
+        table: table.as_ref().map(Table::to_markdown),
     };
+    if let Some(table) = &table {
+        let json = serde_json::to_string_pretty(&outcome)?;
+        for (ending, text) in [
+            ("md", table.to_markdown()),
+            ("csv", table.to_csv()),
+            ("tex", table.to_latex()),
+            ("json", json),
+        ] {
+            let name = format!("experiment_{}.{ending}", experiment.name());
+            write_whole(&out.join(name), text.as_bytes())?;
+        }
+    }
     output.print(&outcome, describe)
 }
 
@@ -167,8 +178,8 @@ fn describe(outcome: &Outcome) -> String {
     }];
     if let Some(test) = &outcome.permutation_test {
         lines.push(format!(
-            "\nMAE from scratch minus pretrained: {:.3}, exact one-sided p = {:.4} ({} sign patterns)",
-            test.mean_difference, test.p_one_sided, test.patterns
+            "\nMAE from scratch minus pretrained over {} seeds: {:.3}, exact one-sided p = {:.4} ({} sign patterns)",
+            test.patterns.ilog2(), test.mean_difference, test.p_one_sided, test.patterns
         ));
     }
     lines.join("\n")

@@ -138,3 +138,27 @@ fn an_interrupted_training_saves_its_step() {
     assert_eq!(said["step"], text.lines().count());
     assert!(folder.join("run/checkpoint.safetensors").exists());
 }
+
+#[test]
+fn tables_of_an_experiment_are_marked_while_results_are_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_data(folder);
+    let plan = "seeds = 2\n[training]\npreset = \"quick\"\n[synthetic]\ndataset = \"data\"\nfolds = 1\ntest_limbs = 1\n\
+        [preparations]\ndataset = \"data\"\nfolds = 2\n";
+    fs::write(folder.join("plan.toml"), plan).unwrap();
+    let said = succeed(folder, "experiment 2a plan.toml --out runs --so-far --json");
+    let said: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(said["missing"], 10 * 2 * 2);
+    assert_eq!(said["permutation_test"], serde_json::Value::Null);
+    let table = fs::read_to_string(folder.join("runs/experiment_2a.md")).unwrap();
+    assert!(table.contains("INCOMPLETE: 40 test sets"), "{table}");
+    let refused = fail(folder, "experiment 2b plan.toml --out runs --so-far");
+    assert!(refused.contains("2b needs [clinical]"), "{refused}");
+    fs::write(folder.join("plan.toml"), plan.replace("quick", "fast")).unwrap();
+    let refused = fail(folder, "experiment 2a plan.toml --out runs --so-far");
+    assert!(
+        refused.contains("plan.toml: there is no preset \"fast\""),
+        "{refused}"
+    );
+}
