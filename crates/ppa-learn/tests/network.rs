@@ -1,6 +1,6 @@
 //! What a new network is and does.
 
-use candle_core::{Device, Tensor};
+use candle_core::{Device, Storage, Tensor};
 use ppa_learn::{EfficientNetB0, Mode, NetworkError, Options};
 
 /// Images of smooth waves, different for each number.
@@ -46,6 +46,25 @@ fn a_network_has_the_parameters_of_torchvision_with_one_channel_and_one_output()
     assert_eq!(parameters[0].tensor.dims(), [32, 1, 3, 3]);
     assert_eq!(parameters.last().unwrap().name, "classifier.1.bias");
     assert_eq!(network.statistics().unwrap().len(), 2 * 49);
+}
+
+/// Each named part holds its own values only: 213 clones of all parameters would be 3.4 GB.
+#[test]
+fn a_named_part_holds_no_more_than_its_own_values() {
+    let network = EfficientNetB0::new(0, Options::default()).unwrap();
+    let parts = [network.parameters(), network.statistics()];
+    for part in parts.into_iter().flat_map(Result::unwrap) {
+        let (storage, _) = part.tensor.storage_and_layout();
+        let Storage::Cpu(storage) = &*storage else {
+            panic!("{} is not in main memory", part.name)
+        };
+        assert_eq!(
+            storage.as_slice::<f32>().unwrap().len(),
+            part.tensor.elem_count(),
+            "{}",
+            part.name
+        );
+    }
 }
 
 #[test]

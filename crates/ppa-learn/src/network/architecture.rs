@@ -44,7 +44,8 @@ impl Entry {
             .narrow(0, self.range.start, self.range.len())?;
         Ok(Named {
             name: self.name.clone(),
-            tensor: part.reshape(&self.shape[..])?.copy()?,
+            // `copy` would clone all of `flat` for each of its parts.
+            tensor: part.reshape(&self.shape[..])?.force_contiguous()?,
         })
     }
 }
