@@ -121,6 +121,7 @@ impl CustomOp2 for Backbone {
             pool: &self.pool,
         };
         backward.run(tape, &of_features);
-        Ok((None, Some(Tensor::new(gradients, parameters.device())?)))
+        let gradients = Tensor::from_vec(gradients, parameters.shape(), parameters.device())?;
+        Ok((None, Some(gradients)))
     }
 }

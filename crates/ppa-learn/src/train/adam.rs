@@ -1,7 +1,9 @@
 //! Adam with a state that can be saved.
 
+use std::sync::{Mutex, PoisonError};
+
 use candle_core::backprop::GradStore;
-use candle_core::{Error, Tensor, Var};
+use candle_core::{CpuStorage, Error, InplaceOp2, Layout, Var};
 
 const BETA_1: f64 = 0.9;
 const BETA_2: f64 = 0.999;
@@ -42,34 +44,68 @@ impl Adam {
         self.steps += 1;
         // Above 2³¹ steps both corrections are 1 anyway.
         let t = i32::try_from(self.steps).unwrap_or(i32::MAX);
-        let scale = (rate / (1.0 - BETA_1.powi(t))) as f32;
-        let correction = (1.0 - BETA_2.powi(t)).sqrt() as f32;
         let moments = self.first.iter_mut().zip(&mut self.second);
         for (variable, (first, second)) in variables.iter().zip(moments) {
             let Some(gradient) = gradients.get(variable) else {
                 continue;
             };
-            let gradient = gradient.flatten_all()?.to_vec1::<f32>()?;
-            let mut values = variable.flatten_all()?.to_vec1::<f32>()?;
-            if values.len() != first.len() || values.len() != gradient.len() {
-                return Err(Error::Msg(format!(
-                    "Adam has moments of {} values, the variable has {}, its gradient {}",
-                    first.len(),
-                    values.len(),
-                    gradient.len()
-                )));
-            }
-            let moments = first.iter_mut().zip(second);
-            for ((value, g), (m, v)) in values.iter_mut().zip(gradient).zip(moments) {
-                *m += (g - *m) * (1.0 - BETA_1) as f32;
-                *v = BETA_2 as f32 * *v + (1.0 - BETA_2) as f32 * g * g;
-                *value -= scale * *m / (v.sqrt() / correction + EPSILON as f32);
-            }
-            variable.set(&Tensor::from_vec(
-                values,
-                variable.shape(),
-                variable.device(),
-            )?)?;
+            let update = Update {
+                moments: Mutex::new((first, second)),
+                scale: (rate / (1.0 - BETA_1.powi(t))) as f32,
+                correction: (1.0 - BETA_2.powi(t)).sqrt() as f32,
+            };
+            variable.inplace_op2(&gradient.contiguous()?, &update)?;
+        }
+        Ok(())
+    }
+}
+
+/// One step of a variable, in place: copies of four million values would cost as much as the step itself.
+struct Update<'a> {
+    /// In a mutex because an operation of candle is shared.
+    moments: Mutex<(&'a mut [f32], &'a mut [f32])>,
+    scale: f32,
+    correction: f32,
+}
+
+impl InplaceOp2 for Update<'_> {
+    fn name(&self) -> &'static str {
+        "adam"
+    }
+
+    fn cpu_fwd(
+        &self,
+        variable: &mut CpuStorage,
+        layout: &Layout,
+        gradient: &CpuStorage,
+        gradient_layout: &Layout,
+    ) -> Result<(), Error> {
+        let contiguous = |layout: &Layout| {
+            let (start, end) = layout
+                .contiguous_offsets()
+                .ok_or_else(|| Error::RequiresContiguous { op: "adam" }.bt())?;
+            Ok::<_, Error>(start..end)
+        };
+        let CpuStorage::F32(values) = variable else {
+            return Err(Error::Msg("Adam moves variables of f32 only".to_owned()));
+        };
+        let values = &mut values[contiguous(layout)?];
+        let gradient = &gradient.as_slice::<f32>()?[contiguous(gradient_layout)?];
+        let mut moments = self.moments.lock().unwrap_or_else(PoisonError::into_inner);
+        let (first, second) = &mut *moments;
+        if values.len() != first.len() || values.len() != gradient.len() {
+            return Err(Error::Msg(format!(
+                "Adam has moments of {} values, the variable has {}, its gradient {}",
+                first.len(),
+                values.len(),
+                gradient.len()
+            )));
+        }
+        let moments = first.iter_mut().zip(second.iter_mut());
+        for ((value, g), (m, v)) in values.iter_mut().zip(gradient).zip(moments) {
+            *m += (g - *m) * (1.0 - BETA_1) as f32;
+            *v = BETA_2 as f32 * *v + (1.0 - BETA_2) as f32 * g * g;
+            *value -= self.scale * *m / (v.sqrt() / self.correction + EPSILON as f32);
         }
         Ok(())
     }

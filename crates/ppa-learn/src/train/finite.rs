@@ -3,7 +3,7 @@
 use std::fmt;
 
 use candle_core::backprop::GradStore;
-use candle_core::{Error, Tensor};
+use candle_core::{Error, Storage, Tensor};
 
 use crate::network::{EfficientNetB0, Entry};
 
@@ -66,8 +66,14 @@ fn is_bad(flat: &[f32], entry: &Entry) -> bool {
     flat[entry.range.clone()].iter().any(|x| !x.is_finite())
 }
 
-/// Whether all values of a tensor are finite.
+/// Whether all values of a contiguous tensor are finite.
 pub(super) fn is_finite(tensor: &Tensor) -> Result<bool, Error> {
-    let values: Vec<f32> = tensor.flatten_all()?.to_vec1()?;
-    Ok(values.iter().all(|x| x.is_finite()))
+    let (storage, layout) = tensor.storage_and_layout();
+    match (&*storage, layout.contiguous_offsets()) {
+        (Storage::Cpu(values), Some((start, end))) => {
+            let values = &values.as_slice::<f32>()?[start..end];
+            Ok(values.iter().all(|x| x.is_finite()))
+        }
+        _ => Err(Error::RequiresContiguous { op: "is_finite" }.bt()),
+    }
 }
