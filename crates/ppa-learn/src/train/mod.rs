@@ -17,7 +17,7 @@ mod schedule;
 mod tensorboard;
 
 pub use adam::Adam;
-pub use config::{ConfigError, Layers, NetworkConfig, Source, TrainConfig};
+pub use config::{ConfigError, LastLayer, Layers, NetworkConfig, Source, TrainConfig};
 pub use error::TrainError;
 pub use finite::Trouble;
 pub use log::{LogRow, read_log};

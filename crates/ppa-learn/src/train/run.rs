@@ -16,12 +16,15 @@ use crate::network::{EfficientNetB0, Mode, Options};
 
 use super::adam::Adam;
 use super::checkpoint;
-use super::config::{Source, TrainConfig};
+use super::config::{LastLayer, Source, TrainConfig};
 use super::error::TrainError;
 use super::feed::{Answers, Feed};
 use super::finite::{is_finite, trouble};
 use super::log::{Log, LogRow};
 use super::tensorboard::tensorboard_events;
+
+/// The middle of the labels, 1 to 3.
+const MIDDLE: f32 = 2.0;
 
 /// How far a training is; told after every step.
 #[derive(Debug, Clone, PartialEq)]
@@ -127,7 +130,15 @@ fn network(config: &TrainConfig) -> Result<EfficientNetB0, TrainError> {
         dropout: config.network.dropout,
         stochastic_depth: config.network.stochastic_depth,
     };
-    Ok(EfficientNetB0::new(config.seed, options)?)
+    let network = EfficientNetB0::new(config.seed, options)?;
+    if config.network.last_layer == LastLayer::Middle {
+        let [_, classifier] = network.variables();
+        let mut values = vec![0.0; classifier.elem_count()];
+        // The bias stands behind the weights.
+        *values.last_mut().expect("a layer has a bias") = MIDDLE;
+        classifier.set(&Tensor::new(values, &Device::Cpu)?)?;
+    }
+    Ok(network)
 }
 
 /// The network of a finished training: its configuration and its weights, from its folder.
