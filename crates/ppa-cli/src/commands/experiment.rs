@@ -94,9 +94,7 @@ pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
     let runner = Runner::new(&plan, experiment, &out)?;
     let part = shard(args.shard)?;
     if plan.configurations(experiment).len() < experiment.configurations().len() {
-        eprintln!(
-            "the plan names no imagenet_weights: their column is left out, and tables can only be written with --so-far"
-        );
+        eprintln!("the plan names no imagenet_weights: their column is left out");
     }
     let finished = args.so_far || train(&runner, part)?;
 

@@ -16,6 +16,7 @@ use super::predictions::{Prediction, PredictionError};
 #[derive(Debug, Clone)]
 pub struct Results {
     experiment: Experiment,
+    columns: Vec<Configuration>,
     folds: usize,
     seeds: Vec<u64>,
     values: BTreeMap<(Configuration, u64, usize), BTreeMap<Metric, Option<f64>>>,
@@ -61,10 +62,16 @@ impl fmt::Display for Missing {
 }
 
 impl Results {
-    /// No results yet, of an experiment with so many folds and these seeds.
-    pub fn new(experiment: Experiment, folds: usize, seeds: &[u64]) -> Self {
+    /// No results yet, of the columns of an experiment that are run, with so many folds and these seeds.
+    pub fn new(
+        experiment: Experiment,
+        columns: Vec<Configuration>,
+        folds: usize,
+        seeds: &[u64],
+    ) -> Self {
         Self {
             experiment,
+            columns,
             folds,
             seeds: seeds.to_vec(),
             values: BTreeMap::new(),
@@ -93,6 +100,11 @@ impl Results {
         self.experiment
     }
 
+    /// The columns that are run.
+    pub fn columns(&self) -> &[Configuration] {
+        &self.columns
+    }
+
     /// Number of seeds that are planned.
     pub fn planned_seeds(&self) -> usize {
         self.seeds.len()
@@ -101,7 +113,7 @@ impl Results {
     /// Test sets without predictions.
     pub fn missing(&self) -> Vec<Missing> {
         let mut missing = Vec::new();
-        for configuration in self.experiment.configurations() {
+        for &configuration in &self.columns {
             for &seed in &self.seeds {
                 for fold in 0..self.folds {
                     if !self.values.contains_key(&(configuration, seed, fold)) {
@@ -189,7 +201,8 @@ mod tests {
     #[test]
     fn folds_are_averaged_before_seeds() {
         let seeds = [7, 8, 9];
-        let mut results = Results::new(Experiment::TwoA, 2, &seeds);
+        let columns = Experiment::TwoA.configurations();
+        let mut results = Results::new(Experiment::TwoA, columns, 2, &seeds);
         let [scratch, pretrained] = Experiment::TwoA.tested_pair().unwrap();
         for (configuration, worse) in [(scratch, 0.125), (pretrained, 0.0)] {
             for (n, &seed) in seeds.iter().enumerate() {
@@ -225,8 +238,9 @@ mod tests {
 
     #[test]
     fn a_constant_prediction_has_no_correlation() {
-        let configuration = Experiment::TwoC.configurations()[0];
-        let mut results = Results::new(Experiment::TwoC, 1, &[1]);
+        let columns = Experiment::TwoC.configurations();
+        let configuration = columns[0];
+        let mut results = Results::new(Experiment::TwoC, columns, 1, &[1]);
         let place = results.missing()[0];
         results.insert(place, &test_set(1.0)).unwrap();
         assert_eq!(results.summary(configuration, Metric::Correlation), None);

@@ -266,7 +266,8 @@ impl<'a> Runner<'a> {
     /// [`ExperimentError`] naming predictions that cannot be read or joined.
     pub fn results(&self) -> Result<Results, ExperimentError> {
         let seeds: Vec<_> = (1..=self.plan.seeds).collect();
-        let mut results = Results::new(self.experiment, self.folds.len(), &seeds);
+        let columns = self.plan.configurations(self.experiment);
+        let mut results = Results::new(self.experiment, columns, self.folds.len(), &seeds);
         for place in results.missing() {
             let views = View::ALL.map(|view| {
                 let unit = Unit::Run {

@@ -50,7 +50,7 @@ impl Table {
 
     /// The table of what there is; cells of fewer seeds than planned say how many they hold.
     pub fn so_far(results: &Results) -> Self {
-        let columns = results.experiment().configurations();
+        let columns = results.columns().to_vec();
         let rows = Metric::of(results.experiment()).into_iter().map(|metric| {
             let cells = columns
                 .iter()
@@ -63,6 +63,14 @@ impl Table {
             "Mean ± standard deviation over {} seeds, the folds of a seed averaged first; the best of a row in bold.",
             results.planned_seeds()
         )];
+        let left_out = results.experiment().configurations();
+        let left_out = left_out.into_iter().filter(|c| !columns.contains(c));
+        for column in left_out {
+            notes.push(format!(
+                "Left out: the column {}, since the plan names no such weights.",
+                column.headings().join(", ")
+            ));
+        }
         if missing > 0 {
             notes.push(format!(
                 "INCOMPLETE: {missing} test sets are missing; n is the number of seeds in a cell where some are."
@@ -251,7 +259,8 @@ mod tests {
     }
 
     fn filled(skip: usize) -> Results {
-        let mut results = Results::new(Experiment::TwoC, 1, &[1, 2]);
+        let columns = Experiment::TwoC.configurations();
+        let mut results = Results::new(Experiment::TwoC, columns, 1, &[1, 2]);
         for (n, place) in results.missing().into_iter().enumerate().skip(skip) {
             let column = n / 2;
             let error = [1.0, 0.75, 0.25, 0.2525][column] + 0.125 * (n % 2) as f64;
