@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::cell::edge_corners;
 use super::field::Sample;
-use super::slab::March;
+use super::march::March;
 
 impl<T: Sample> March<'_, T> {
     /// Where a cell edge is crossed, and the gradient there.
@@ -16,7 +16,8 @@ impl<T: Sample> March<'_, T> {
         let (va, vb) = [a, b].map(|v| self.field.above(v)).into();
         let t = va / (va - vb);
         let [p, q] = [a, b].map(|v| Vector3::from(v.map(|c| c as f64)));
-        let [near, far] = [a, b].map(|[i, j, k]| self.field.stencil(j, k).gradient(i));
+        let [near, far] =
+            [a, b].map(|[i, j, k]| Vector3::from(self.field.stencil(j, k).gradient(i)));
         (p + (q - p) * t, near + (far - near) * t as f32)
     }
 

@@ -93,6 +93,10 @@ impl<'a, T: Sample> Field<'a, T> {
     }
 }
 
+fn rise<T: Sample>(low: T, high: T) -> f32 {
+    high.into() - low.into()
+}
+
 /// A row of the lattice with its neighbours in y and z; at the border, itself in place of the missing one.
 pub struct Stencil<'a, T> {
     here: &'a [T],
@@ -101,28 +105,26 @@ pub struct Stencil<'a, T> {
 }
 
 impl<T: Sample> Stencil<'_, T> {
+    #[inline]
     pub fn hu(&self, i: usize) -> f32 {
         self.here[i].into()
     }
 
     /// HU per voxel step: central differences, one-sided at the border.
-    pub fn gradient(&self, i: usize) -> Vector3<f32> {
-        let rise = |low: T, high: T| -> f32 { high.into() - low.into() };
+    #[inline]
+    pub fn gradient(&self, i: usize) -> [f32; 3] {
         let (west, east) = (i.saturating_sub(1), (i + 1).min(self.here.len() - 1));
         let along_x = rise(self.here[west], self.here[east]);
-        let [y, z] = [0, 1].map(|axis| {
-            let [low, high] = self.beside[axis];
-            rise(low[i], high[i]) * self.per_step[axis]
-        });
-        Vector3::new(
+        let [[south, north], [below, above]] = self.beside;
+        [
             if east - west == 2 {
                 0.5 * along_x
             } else {
                 along_x
             },
-            y,
-            z,
-        )
+            rise(south[i], north[i]) * self.per_step[0],
+            rise(below[i], above[i]) * self.per_step[1],
+        ]
     }
 }
 

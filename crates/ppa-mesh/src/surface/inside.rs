@@ -1,45 +1,78 @@
 //! Which voxels are inside, one bit each.
 
-use std::ops::Range;
+use rayon::prelude::*;
 
 use super::field::{Field, Sample};
 
-/// Bits of some slices, 64 voxels of a row to a word; the bits behind the end of a row are 0.
-#[derive(Default)]
+/// Bits of a field, 64 voxels of a row to a word; the bits behind the end of a row are 0.
 pub struct InsideBits {
-    slices: Range<usize>,
     rows: usize,
     words: usize,
     /// The last voxel of a row, in its word.
     last: u64,
+    slices: Vec<SliceBits>,
+}
+
+/// Bits of one slice.
+struct SliceBits {
     bits: Vec<u64>,
+    /// By row: whether a sample equals the iso value.
+    at_iso: Vec<bool>,
+}
+
+impl SliceBits {
+    fn of<T: Sample>(field: &Field<T>, k: usize, first_inside: T) -> Self {
+        let [nx, rows, _] = field.size();
+        let iso_occurs = first_inside.into() == field.iso();
+        let mut bits = Vec::with_capacity(nx.div_ceil(64) * rows);
+        let mut at_iso = Vec::with_capacity(rows);
+        for j in 0..rows {
+            let row = field.row(j, k);
+            let (whole, rest) = row.as_chunks::<64>();
+            bits.extend(whole.iter().map(|chunk| pack(chunk, first_inside)));
+            if !rest.is_empty() {
+                let rest = rest.iter().enumerate();
+                bits.push(rest.fold(0, |word, (bit, &hu)| {
+                    word | u64::from(hu >= first_inside) << bit
+                }));
+            }
+            // Without an early end, so that the compiler compares many at once.
+            let equal = |found: bool, &hu: &T| found | (hu == first_inside);
+            at_iso.push(iso_occurs && row.iter().fold(false, equal));
+        }
+        Self { bits, at_iso }
+    }
 }
 
 impl InsideBits {
-    /// The bits of `slices` of a field whose samples are inside from `first_inside` on.
-    pub fn of<T: Sample>(field: &Field<T>, slices: Range<usize>, first_inside: T) -> Self {
-        let [nx, rows, _] = field.size();
-        let words = nx.div_ceil(64);
-        let mut bits = Vec::with_capacity(words * rows * slices.len());
-        for k in slices.clone() {
-            for j in 0..rows {
-                let (whole, rest) = field.row(j, k).as_chunks::<64>();
-                bits.extend(whole.iter().map(|chunk| pack(chunk, first_inside)));
-                if !rest.is_empty() {
-                    let rest = rest.iter().enumerate();
-                    bits.push(rest.fold(0, |word, (bit, &hu)| {
-                        word | u64::from(hu >= first_inside) << bit
-                    }));
-                }
+    /// The bits of each of several fields of one size, whose samples are inside from `first_inside` on; slice
+    /// by slice, so that fields which share their samples read them from the cache.
+    pub fn of<T: Sample>(fields: &[Field<T>], first_inside: &[T]) -> Vec<Self> {
+        let Some([nx, rows, slices]) = fields.first().map(Field::size) else {
+            return Vec::new();
+        };
+        let by_slice: Vec<Vec<SliceBits>> = (0..slices)
+            .into_par_iter()
+            .map(|k| {
+                let each = fields.iter().zip(first_inside);
+                each.map(|(field, &inside)| SliceBits::of(field, k, inside))
+                    .collect()
+            })
+            .collect();
+        let mut by_field: Vec<Self> = (fields.iter())
+            .map(|_| Self {
+                rows,
+                words: nx.div_ceil(64),
+                last: 1 << ((nx - 1) % 64),
+                slices: Vec::with_capacity(slices),
+            })
+            .collect();
+        for slice in by_slice {
+            for (field, slice) in by_field.iter_mut().zip(slice) {
+                field.slices.push(slice);
             }
         }
-        Self {
-            slices,
-            rows,
-            words,
-            last: 1 << ((nx - 1) % 64),
-            bits,
-        }
+        by_field
     }
 
     /// Words per row.
@@ -58,8 +91,29 @@ impl InsideBits {
 
     /// Row j of slice k.
     pub fn row(&self, j: usize, k: usize) -> &[u64] {
-        let start = self.words * (j + self.rows * (k - self.slices.start));
-        &self.bits[start..start + self.words]
+        &self.slices[k].bits[self.words * j..self.words * (j + 1)]
+    }
+
+    /// Whether a sample of row j of slice k equals the iso value.
+    pub fn at_iso(&self, j: usize, k: usize) -> bool {
+        self.slices[k].at_iso[j]
+    }
+
+    /// Crossed edges from slice k on: those within it and those to the next slice, if there is one.
+    pub fn crossings(&self, k: usize) -> usize {
+        let differing = |a: &[u64], b: &[u64]| -> usize {
+            let pairs = a.iter().zip(b);
+            pairs.map(|(a, b)| (a ^ b).count_ones() as usize).sum()
+        };
+        let slice = &self.slices[k].bits;
+        let next = self.slices.get(k + 1);
+        let along_x = slice.chunks_exact(self.words).map(|row| {
+            let words = (0..self.words).map(|word| self.crossed_along_x(row, word));
+            words.map(|word| word.count_ones() as usize).sum::<usize>()
+        });
+        along_x.sum::<usize>()
+            + differing(slice, &slice[self.words..])
+            + next.map_or(0, |next| differing(slice, &next.bits))
     }
 
     /// Pairs of neighbours in a row of which one is inside, as a bit at the left one.
@@ -86,7 +140,7 @@ impl InsideBits {
             }
         }
         for slice in [k.wrapping_sub(1), k + 1] {
-            if self.slices.contains(&slice) {
+            if slice < self.slices.len() {
                 inner &= self.row(j, slice)[word];
             }
         }
@@ -144,8 +198,12 @@ mod tests {
             let float: Vec<f32> = hu.iter().map(|&v| v.into()).collect();
             let whole = Field::new(hu, size, [0.0; 3], iso);
             let exact = Field::new(&float, size, [0.0; 3], iso);
-            let bits = InsideBits::of(&whole, 0..3, i16::first_inside(iso).unwrap());
-            prop_assert_eq!(&bits.bits, &InsideBits::of(&exact, 0..3, iso).bits);
+            let [bits] = InsideBits::of(&[whole], &[i16::first_inside(iso).unwrap()]).try_into().ok().unwrap();
+            let [of_floats] = InsideBits::of(&[exact], &[iso]).try_into().ok().unwrap();
+            for (slice, of_floats) in bits.slices.iter().zip(&of_floats.slices) {
+                prop_assert_eq!(&slice.bits, &of_floats.bits);
+                prop_assert_eq!(&slice.at_iso, &of_floats.at_iso);
+            }
             let inside = |i: usize, j: usize, k: usize| float[i + nx * (j + 3 * k)] >= iso;
             for (i, j, k) in (0..9 * nx).map(|at| (at % nx, at / nx % 3, at / nx / 3)) {
                 let bit = |word: u64| word >> (i % 64) & 1 == 1;

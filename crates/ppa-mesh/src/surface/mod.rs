@@ -1,28 +1,30 @@
-//! Iso-surface of a volume by marching cubes over slabs of slices.
+//! Iso-surface of a volume by marching cubes in parts of equal work.
 
 mod cell;
-mod cell_row;
+mod cells;
 mod crossings;
 mod extra;
 mod field;
 mod inside;
+mod join;
+mod march;
+mod numbers;
+mod points;
 mod shortcut;
-mod slab;
 mod tunnel;
 mod world;
 
-use nalgebra::Vector3;
+use std::ops::Range;
+
 use ppa_ct::{Grid, Values, Volume};
 use rayon::prelude::*;
 
 use crate::mesh::Mesh;
 use field::{Field, Sample, padded};
-use slab::{NEXT_SLAB, Slab};
+use inside::InsideBits;
+use join::{MOST_VERTICES, join};
+use march::{Part, march};
 use world::World;
-
-/// Slices of cells per unit of parallel work; fixed, so that the vertex order never depends on the
-/// number of threads.
-const SLAB_CELLS: usize = 16;
 
 /// What happens where the body reaches the border of the volume.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -54,8 +56,8 @@ pub enum SurfaceError {
     /// Surfaces need neighbouring voxels on every axis.
     #[error("a volume of {0:?} voxels is too thin for a surface; every side needs at least two")]
     TooThin([usize; 3]),
-    /// Vertex indices have 31 bits.
-    #[error("the surface has more than 2^31 vertices")]
+    /// Vertex indices have 30 bits.
+    #[error("the surface has more than 2^30 vertices")]
     TooLarge,
 }
 
@@ -162,33 +164,60 @@ fn surfaces<T: Sample>(fields: &[Field<T>], grid: &Grid) -> Result<Vec<Mesh>, Su
         .map(|field| T::first_inside(field.iso()).ok_or_else(|| empty(field)))
         .collect::<Result<_, _>>()?;
     let world = World::new(grid, field.origin());
-    let layers = field.size()[2] - 1;
-    let by_slab: Vec<Vec<Slab>> = (0..layers.div_ceil(SLAB_CELLS))
+    let inside = InsideBits::of(fields, &first_inside);
+    let each = fields.iter().zip(&inside);
+    each.map(|(field, inside)| surface(field, inside, &world))
+        .collect()
+}
+
+fn surface<T: Sample>(
+    field: &Field<T>,
+    inside: &InsideBits,
+    world: &World,
+) -> Result<Mesh, SurfaceError> {
+    let crossings: Vec<usize> = (0..field.size()[2])
         .into_par_iter()
-        .map(|slab| {
-            let first = slab * SLAB_CELLS;
-            let layers = first..(first + SLAB_CELLS).min(layers);
-            let each = fields.iter().zip(&first_inside);
-            each.map(|(field, &inside)| slab::march(field, &world, inside, layers.clone()))
-                .collect()
+        .map(|k| inside.crossings(k))
+        .collect();
+    let all = crossings.iter().sum();
+    if all >= MOST_VERTICES {
+        return Err(SurfaceError::TooLarge);
+    }
+    // One part per thread: the first is made where the whole is to lie, the others are copied behind it. What
+    // comes out is the same for any parts.
+    let parts = layers_of_parts(&crossings, rayon::current_num_threads());
+    let parts: Vec<Part> = (parts.into_par_iter().enumerate())
+        .map(|(at, layers)| {
+            let room = match at {
+                0 => all,
+                _ => crossings[layers.clone()].iter().sum(),
+            };
+            march(field, inside, world, layers, room)
         })
         .collect();
-    let mut slabs: Vec<Vec<Slab>> = fields.iter().map(|_| Vec::new()).collect();
-    for slab in by_slab {
-        for (of_field, slab) in slabs.iter_mut().zip(slab) {
-            of_field.push(slab);
+    let mesh = join(parts, world.mirrored)?;
+    if mesh.triangles.is_empty() {
+        return Err(empty(field));
+    }
+    Ok(mesh)
+}
+
+/// Divides the layers of cells between slices, so that each part has as many crossings as the others, as far
+/// as whole layers let it.
+fn layers_of_parts(crossings: &[usize], parts: usize) -> Vec<Range<usize>> {
+    let layers = crossings.len() - 1;
+    let all: usize = crossings.iter().sum();
+    let mut ranges = Vec::new();
+    let (mut start, mut done) = (0, 0);
+    for k in 0..layers {
+        done += crossings[k];
+        let part_is_full = done * parts >= all * (ranges.len() + 1);
+        if part_is_full || k + 1 == layers {
+            ranges.push(start..k + 1);
+            start = k + 1;
         }
     }
-    let meshes = slabs.into_iter().zip(fields);
-    meshes
-        .map(|(slabs, field)| {
-            let mesh = join(&slabs)?;
-            if mesh.triangles.is_empty() {
-                return Err(empty(field));
-            }
-            Ok(mesh)
-        })
-        .collect()
+    ranges
 }
 
 fn empty<T: Sample>(field: &Field<T>) -> SurfaceError {
@@ -197,60 +226,5 @@ fn empty<T: Sample>(field: &Field<T>) -> SurfaceError {
         iso_hu: field.iso(),
         min_hu,
         max_hu,
-    }
-}
-
-fn join(slabs: &[Slab]) -> Result<Mesh, SurfaceError> {
-    let mut offsets = vec![0_usize];
-    for slab in slabs {
-        offsets.push(offsets[offsets.len() - 1] + slab.vertices.len());
-    }
-    if offsets[slabs.len()] >= NEXT_SLAB as usize {
-        return Err(SurfaceError::TooLarge);
-    }
-    let vertices_and_normals = || {
-        let mut joined = (
-            Vec::with_capacity(offsets[slabs.len()]),
-            Vec::with_capacity(offsets[slabs.len()]),
-        );
-        for slab in slabs {
-            joined.0.extend_from_slice(&slab.vertices);
-            joined.1.extend_from_slice(&slab.normals);
-        }
-        joined
-    };
-    let triangles = || {
-        let mut joined = Vec::with_capacity(slabs.iter().map(|slab| slab.triangles.len()).sum());
-        for (at, slab) in slabs.iter().enumerate() {
-            let (own, next) = (offsets[at] as u32, offsets[at + 1] as u32);
-            joined.extend(slab.triangles.iter().map(|triangle| {
-                triangle.map(|id| match id & NEXT_SLAB {
-                    0 => own + id,
-                    _ => next + (id & !NEXT_SLAB),
-                })
-            }));
-        }
-        joined
-    };
-    let ((vertices, normals), triangles) = rayon::join(vertices_and_normals, triangles);
-    let mut mesh = Mesh {
-        vertices,
-        normals,
-        triangles,
-    };
-    fill_flat_normals(&mut mesh);
-    Ok(mesh)
-}
-
-/// Where the gradient vanishes (a plateau at the iso value) the triangles say what is outward.
-fn fill_flat_normals(mesh: &mut Mesh) {
-    if mesh.normals.iter().all(|n| *n != Vector3::zeros()) {
-        return;
-    }
-    let geometric = mesh.geometric_normals();
-    for (normal, replacement) in mesh.normals.iter_mut().zip(geometric) {
-        if *normal == Vector3::zeros() {
-            *normal = replacement;
-        }
     }
 }

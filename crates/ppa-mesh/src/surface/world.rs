@@ -48,6 +48,38 @@ impl World {
         let normal = self.outward * gradient;
         normal.try_normalize(0.0).unwrap_or_default()
     }
+
+    /// [`World::point`] of several places, by component.
+    pub fn points<const N: usize>(&self, voxel: &[[f64; N]; 3]) -> [[f32; N]; 3] {
+        let m = self.affine.matrix();
+        let mut points = [[0.0; N]; 3];
+        for (r, row) in points.iter_mut().enumerate() {
+            let [x, y, z, shift] = [0, 1, 2, 3].map(|c| m[(r, c)]);
+            for (n, value) in row.iter_mut().enumerate() {
+                *value = (x * voxel[0][n] + y * voxel[1][n] + z * voxel[2][n] + shift) as f32;
+            }
+        }
+        points
+    }
+
+    /// [`World::normal`] of several gradients, by component.
+    pub fn normals<const N: usize>(&self, gradient: &[[f32; N]; 3]) -> [[f32; N]; 3] {
+        let m = &self.outward;
+        let mut normals = [[0.0; N]; 3];
+        for (r, row) in normals.iter_mut().enumerate() {
+            let [x, y, z] = [0, 1, 2].map(|c| m[(r, c)]);
+            for (n, value) in row.iter_mut().enumerate() {
+                *value = x * gradient[0][n] + y * gradient[1][n] + z * gradient[2][n];
+            }
+        }
+        let [x, y, z] = &mut normals;
+        for n in 0..N {
+            let length = (x[n] * x[n] + y[n] * y[n] + z[n] * z[n]).sqrt();
+            let unit = |value: f32| if length > 0.0 { value / length } else { 0.0 };
+            (x[n], y[n], z[n]) = (unit(x[n]), unit(y[n]), unit(z[n]));
+        }
+        normals
+    }
 }
 
 /// The fraction of the shortest edge that moves a point by two steps of f32 along some axis, wherever in the

@@ -1,90 +1,96 @@
-//! Marching through a few layers of cells with the crossings of two slices in memory.
+//! Marching through layers of cells with the numbers of two slices in memory.
 
 use std::ops::Range;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use super::cell::{CONFIGURATIONS, Configuration, inside_joined};
-use super::cell_row::CellRow;
-use super::crossings::Slice;
+use super::cells::CellRow;
 use super::field::{Field, Sample};
 use super::inside::{InsideBits, ones};
-use super::shortcut::{SHORTCUTS, Shortcut};
+use super::numbers::{AT_VOXEL, EXTRA, Numbers, Slice};
+use super::points::{Batch, Points};
+use super::shortcut::{EdgePlace, Filling, SHORTCUTS, Shortcut, is_crossed};
 use super::tunnel;
 use super::world::World;
 
-/// Marks a vertex of the first slice of the slab above.
-pub const NEXT_SLAB: u32 = 1 << 31;
-
 /// Vertices and triangles of some layers of cells, in the world.
 #[derive(Default)]
-pub struct Slab {
-    pub vertices: Vec<Point3<f32>>,
-    /// Unit vectors, or zero where the gradient vanishes.
-    pub normals: Vec<Vector3<f32>>,
-    /// Own vertices, or those of the next slab's first slice marked by [`NEXT_SLAB`].
+pub struct Part {
+    /// Vertices by the kinds of [`super::numbers`].
+    pub crossings: Points,
+    pub at_voxels: Points,
+    pub extra: Points,
+    /// Vertex numbers; those behind the own ones are the first of the next part.
     pub triangles: Vec<[u32; 3]>,
+    /// The triangles that have other vertices than crossings.
+    pub marked: Vec<usize>,
 }
 
 /// The march with what it has made so far.
 pub struct March<'a, T> {
     pub field: &'a Field<'a, T>,
-    pub inside: InsideBits,
+    pub inside: &'a InsideBits,
     pub world: &'a World,
-    shortcuts: &'static [Shortcut],
-    slab: Slab,
+    shortcuts: &'static [Shortcut; 256],
+    pub batch: Batch,
+    /// Crossings numbered so far.
+    pub crossings: u32,
+    pub part: Part,
 }
 
-/// Surface within the layers of cells between slices k and k + 1 for k in `layers`; samples are inside
-/// from `first_inside` on.
+/// Surface within the layers of cells between slices k and k + 1 for k in `layers`, with room for so many
+/// crossings.
 pub fn march<T: Sample>(
     field: &Field<T>,
+    inside: &InsideBits,
     world: &World,
-    first_inside: T,
     layers: Range<usize>,
-) -> Slab {
-    let [nx, ny, nz] = field.size();
-    let slices = layers.start.saturating_sub(1)..(layers.end + 2).min(nz);
+    room: usize,
+) -> Part {
     let mut march = March {
         field,
-        inside: InsideBits::of(field, slices, first_inside),
+        inside,
         world,
         shortcuts: &SHORTCUTS,
-        slab: Slab::default(),
+        batch: Batch::new(),
+        crossings: 0,
+        part: Part {
+            crossings: Points::with_capacity(room),
+            // Euler: a closed surface without handles has fewer than twice as many triangles as vertices.
+            triangles: Vec::with_capacity(2 * room),
+            ..Part::default()
+        },
     };
-    let [mut low, mut high] = [0, 1].map(|_| Slice::new(nx * ny));
-    let mut upright = vec![0; nx * ny];
-    march.number(&mut low, layers.start, 0, true);
+    let [mut low, mut high] = <[Slice; 2]>::default();
+    let mut upright = Numbers::default();
+    march.voxels(&mut low, layers.start, true);
+    march.edges_within(&mut low, layers.start, true);
     for k in layers.clone() {
-        // The slice on top belongs to the slab above, if there is one; its numbers start at 0.
-        let own = k + 1 < layers.end || k + 2 == nz;
-        let first = if own {
-            march.slab.vertices.len() as u32
-        } else {
-            NEXT_SLAB
-        };
-        march.number(&mut high, k + 1, first, own);
-        march.number_upright(&mut upright, k, &low, &high);
+        // The slice on top belongs to the next part, if there is one.
+        let own = k + 1 < layers.end || k + 2 == field.size()[2];
+        march.voxels(&mut high, k + 1, own);
+        march.edges_between(&mut upright, k, [&low, &high]);
+        march.edges_within(&mut high, k + 1, own);
         march.layer(k, [&low, &high], &upright);
         std::mem::swap(&mut low, &mut high);
     }
-    march.slab
+    march.part
 }
 
 impl<T: Sample> March<'_, T> {
-    /// Stores a vertex at a place in voxel indices of the field, with its gradient in HU per voxel step.
+    /// Stores an extra vertex at a place in voxel indices of the field, with its gradient in HU per voxel step.
     pub fn push(&mut self, place: Vector3<f64>, gradient: Vector3<f32>) -> u32 {
-        let id = self.slab.vertices.len() as u32;
-        self.slab.vertices.push(self.world.point(place));
-        self.slab.normals.push(self.world.normal(gradient));
+        let id = EXTRA | self.part.extra.vertices.len() as u32;
+        self.part.extra.push(self.world, place, gradient);
         id
     }
 
-    fn layer(&mut self, k: usize, slices: [&Slice; 2], upright: &[u32]) {
+    fn layer(&mut self, k: usize, slices: [&Slice; 2], upright: &Numbers) {
         let ny = self.field.size()[1];
-        let inside = std::mem::take(&mut self.inside);
+        let inside = self.inside;
         for j in 0..ny - 1 {
-            let row = CellRow::new(self.field, &inside, slices, upright, [j, k]);
+            let mut row = CellRow::new(self.field, inside, slices, upright, [j, k]);
             for word in 0..inside.words() {
                 let corners = row.corners(word);
                 let (mut all, mut any) = (u64::MAX, 0);
@@ -94,33 +100,31 @@ impl<T: Sample> March<'_, T> {
                 for bit in ones(any & !all & inside.cells(word)) {
                     let mut configuration = 0;
                     for (corner, word) in corners.iter().enumerate() {
-                        configuration |= ((word >> bit & 1) as usize) << corner;
+                        configuration |= ((word >> bit & 1) as u8) << corner;
                     }
                     self.cell(&row, [64 * word + bit, j, k], configuration);
+                    row.advance(&self.shortcuts[usize::from(configuration)].crossed);
                 }
             }
         }
-        self.inside = inside;
     }
 
-    fn cell(&mut self, row: &CellRow<T>, voxel: [usize; 3], inside: usize) {
-        let ids = row.ids(voxel[0]);
-        // Written out where nearly all cells pass: arrays mapped by closures are not inlined here.
-        let id = |edge: u8| ids[usize::from(edge)];
-        match &self.shortcuts[inside] {
-            Shortcut::Triangles(count, triangles) => {
+    fn cell(&mut self, row: &CellRow<T>, voxel: [usize; 3], inside: u8) {
+        let shortcuts = self.shortcuts;
+        match &shortcuts[usize::from(inside)].filling {
+            Filling::Triangles(count, triangles) => {
                 for &[a, b, c] in &triangles[..*count] {
-                    self.triangle([id(a), id(b), id(c)]);
+                    self.triangle([row.id(a), row.id(b), row.id(c)]);
                 }
             }
-            Shortcut::Quad(quad) => {
+            Filling::Quad(quad) => {
                 let iso = self.field.iso();
                 let mut above = row.hu(voxel[0]);
                 for hu in &mut above {
                     *hu -= iso;
                 }
                 let [p, q, r, s] = quad.ring;
-                let (p, q, r, s) = (id(p), id(q), id(r), id(s));
+                let (p, q, r, s) = (row.id(p), row.id(q), row.id(r), row.id(s));
                 if quad.first_diagonal_fits_better(&above) {
                     self.triangle([p, q, r]);
                     self.triangle([p, r, s]);
@@ -129,10 +133,15 @@ impl<T: Sample> March<'_, T> {
                     self.triangle([q, r, s]);
                 }
             }
-            Shortcut::None => {
+            Filling::Other => {
                 let iso = f64::from(self.field.iso());
                 let above = row.hu(voxel[0]).map(|hu| f64::from(hu) - iso);
-                self.several_disks(voxel, &CONFIGURATIONS[inside], &above, &ids);
+                let ids = std::array::from_fn(|edge| match is_crossed(inside, edge as u8) {
+                    true => row.id(EdgePlace::new(inside, edge as u8)),
+                    false => u32::MAX,
+                });
+                let configuration = &CONFIGURATIONS[usize::from(inside)];
+                self.several_disks(voxel, configuration, &above, &ids);
             }
         }
     }
@@ -192,14 +201,14 @@ impl<T: Sample> March<'_, T> {
     }
 
     /// Stores a triangle unless voxels at the iso value have merged two of its corners.
-    pub fn triangle(&mut self, [a, b, c]: [u32; 3]) {
-        if a != b && b != c && c != a {
-            let turned = if self.world.mirrored {
-                [a, c, b]
-            } else {
-                [a, b, c]
-            };
-            self.slab.triangles.push(turned);
+    pub fn triangle(&mut self, triangle: [u32; 3]) {
+        let [a, b, c] = triangle;
+        if a | b | c >= AT_VOXEL {
+            if a == b || b == c || c == a {
+                return;
+            }
+            self.part.marked.push(self.part.triangles.len());
         }
+        self.part.triangles.push(triangle);
     }
 }

@@ -1,18 +1,22 @@
-//! A row of cells: what lies at their corners and on their edges.
+//! A row of cells: what lies at their corners and on their edges, from left to right.
 
-use super::crossings::Slice;
 use super::field::{Field, Sample};
 use super::inside::{InsideBits, right_of};
+use super::numbers::{Numbers, Slice};
+use super::shortcut::EdgePlace;
 
 /// The cells between rows j and j + 1 of slices k and k + 1.
+///
+/// Every crossed edge belongs to a cell with crossings, so that the numbers on a row of edges are used up in
+/// their order while those cells are visited in theirs.
 pub struct CellRow<'a, T> {
     /// By the corner bits of y and z.
     inside: [&'a [u64]; 4],
     hu: [&'a [T]; 4],
     /// Numbers on edges along x by the corner bits of y and z, along y by that of z, along z by that of y.
-    along_x: [&'a [u32]; 4],
-    along_y: [&'a [u32]; 2],
-    along_z: [&'a [u32]; 2],
+    numbers: [&'a [u32]; 8],
+    /// How many of them belong to edges left of the cell.
+    used: [u32; 8],
 }
 
 impl<'a, T: Sample> CellRow<'a, T> {
@@ -20,24 +24,25 @@ impl<'a, T: Sample> CellRow<'a, T> {
         field: &'a Field<T>,
         inside: &'a InsideBits,
         [low, high]: [&'a Slice; 2],
-        upright: &'a [u32],
+        upright: &'a Numbers,
         [j, k]: [usize; 2],
     ) -> Self {
-        let nx = field.size()[0];
-        let row = |numbers: &'a [u32], j: usize| &numbers[nx * j..nx * (j + 1)];
         let rows = [(j, k), (j + 1, k), (j, k + 1), (j + 1, k + 1)];
-        let [low_x, high_x] = [low, high].map(|slice| &slice.along[0]);
+        let ([low_x, low_y], [high_x, high_y]) = (&low.along, &high.along);
         Self {
             inside: rows.map(|(j, k)| inside.row(j, k)),
             hu: rows.map(|(j, k)| field.row(j, k)),
-            along_x: [
-                row(low_x, j),
-                row(low_x, j + 1),
-                row(high_x, j),
-                row(high_x, j + 1),
+            numbers: [
+                low_x.row(j),
+                low_x.row(j + 1),
+                high_x.row(j),
+                high_x.row(j + 1),
+                low_y.row(j),
+                high_y.row(j),
+                upright.row(j),
+                upright.row(j + 1),
             ],
-            along_y: [low, high].map(|slice| row(&slice.along[1], j)),
-            along_z: [row(upright, j), row(upright, j + 1)],
+            used: [0; 8],
         }
     }
 
@@ -52,26 +57,23 @@ impl<'a, T: Sample> CellRow<'a, T> {
         })
     }
 
-    /// Vertex numbers by cell edge; meaningless where nothing crosses.
-    pub fn ids(&self, i: usize) -> [u32; 12] {
-        let [x, y, z] = [&self.along_x[..], &self.along_y, &self.along_z];
-        [
-            x[0][i],
-            x[1][i],
-            x[2][i],
-            x[3][i],
-            y[0][i],
-            y[1][i],
-            y[0][i + 1],
-            y[1][i + 1],
-            z[0][i],
-            z[0][i + 1],
-            z[1][i],
-            z[1][i + 1],
-        ]
+    /// The number on a crossed edge.
+    #[inline]
+    pub fn id(&self, edge: EdgePlace) -> u32 {
+        let row = edge.row();
+        self.numbers[row][(self.used[row] + edge.further()) as usize]
+    }
+
+    /// Leaves the cell, of whose left side and edges along x these are crossed, for the next with crossings.
+    #[inline]
+    pub fn advance(&mut self, crossed: &[u32; 8]) {
+        for (used, crossed) in self.used.iter_mut().zip(crossed) {
+            *used += crossed;
+        }
     }
 
     /// HU at the corners.
+    #[inline]
     pub fn hu(&self, i: usize) -> [f32; 8] {
         let [p, q, r, s] = &self.hu;
         [
