@@ -1,21 +1,21 @@
 //! Vertices on the edges of the lattice.
 
 use super::field::{Sample, Stencil};
-use super::inside::ones;
+use super::inside::{InsideBits, ones};
 use super::march::March;
 use super::numbers::{AT_VOXEL, Numbers, Slice};
 use super::points::End;
 
 impl<T: Sample> March<'_, T> {
     /// Numbers the voxels of slice k that are vertices themselves and, when the slice is `own`, stores them.
-    pub fn voxels(&mut self, slice: &mut Slice, k: usize, own: bool) {
+    pub fn voxels(&mut self, inside: &InsideBits<T>, slice: &mut Slice, k: usize, own: bool) {
         let [nx, ny, _] = self.field.size();
         slice.at_voxel.clear();
         let mut next = AT_VOXEL | self.part.at_voxels.vertices.len() as u32;
-        for j in (0..ny).filter(|&j| self.inside.at_iso(j, k)) {
+        for j in (0..ny).filter(|&j| inside.at_iso(j, k)) {
             let row = self.field.stencil(j, k);
-            for word in 0..self.inside.words() {
-                for bit in ones(self.inside.at_surface(j, k, word)) {
+            for word in 0..inside.words() {
+                for bit in ones(inside.at_surface(j, k, word)) {
                     let i = 64 * word + bit;
                     if row.hu(i) != self.field.iso() {
                         continue;
@@ -33,19 +33,26 @@ impl<T: Sample> March<'_, T> {
     }
 
     /// Numbers the vertices on the edges of slice k and, when it is `own`, stores them.
-    pub fn edges_within(&mut self, slice: &mut Slice, k: usize, own: bool) {
+    pub fn edges_within(&mut self, inside: &InsideBits<T>, slice: &mut Slice, k: usize, own: bool) {
         let ny = self.field.size()[1];
         let [mut along_x, mut along_y] = std::mem::take(&mut slice.along);
         along_x.clear();
         along_y.clear();
         for j in 0..ny {
-            self.edges(&mut along_x, 0, [[j, k]; 2], [slice, slice], own);
+            self.edges(inside, &mut along_x, 0, [[j, k]; 2], [slice, slice], own);
             along_x.end_row();
         }
         self.store(0);
         for j in 0..ny {
             if j + 1 < ny {
-                self.edges(&mut along_y, 1, [[j, k], [j + 1, k]], [slice, slice], own);
+                self.edges(
+                    inside,
+                    &mut along_y,
+                    1,
+                    [[j, k], [j + 1, k]],
+                    [slice, slice],
+                    own,
+                );
             }
             along_y.end_row();
         }
@@ -54,10 +61,16 @@ impl<T: Sample> March<'_, T> {
     }
 
     /// Numbers and stores the vertices on the edges between slices k and k + 1.
-    pub fn edges_between(&mut self, upright: &mut Numbers, k: usize, slices: [&Slice; 2]) {
+    pub fn edges_between(
+        &mut self,
+        inside: &InsideBits<T>,
+        upright: &mut Numbers,
+        k: usize,
+        slices: [&Slice; 2],
+    ) {
         upright.clear();
         for j in 0..self.field.size()[1] {
-            self.edges(upright, 2, [[j, k], [j, k + 1]], slices, true);
+            self.edges(inside, upright, 2, [[j, k], [j, k + 1]], slices, true);
             upright.end_row();
         }
         self.store(2);
@@ -66,6 +79,7 @@ impl<T: Sample> March<'_, T> {
     /// The edges along an axis from the voxels of one row to those of another, or to the next in the same.
     fn edges(
         &mut self,
+        inside: &InsideBits<T>,
         numbers: &mut Numbers,
         axis: usize,
         rows: [[usize; 2]; 2],
@@ -74,7 +88,6 @@ impl<T: Sample> March<'_, T> {
     ) {
         let [[j, k], [far_j, far_k]] = rows;
         let [nx, step] = [self.field.size()[0], usize::from(axis == 0)];
-        let inside = self.inside;
         let (here, far) = (inside.row(j, k), inside.row(far_j, far_k));
         let may_merge = inside.at_iso(j, k) || inside.at_iso(far_j, far_k);
         let mut stencils: Option<[Stencil<T>; 2]> = None;

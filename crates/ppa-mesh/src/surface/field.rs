@@ -77,6 +77,21 @@ impl<'a, T: Sample> Field<'a, T> {
         f64::from(hu) - f64::from(self.iso)
     }
 
+    /// HU above iso at the corners of the cell from a voxel, whose index is `at`.
+    #[inline]
+    pub fn above_at_corners(&self, at: usize) -> [f32; 8] {
+        let [nx, ny, _] = self.size;
+        let slice = nx * ny;
+        let rows = [at, at + nx, at + slice, at + slice + nx];
+        let mut above = [0.0; 8];
+        for (pair, row) in above.as_chunks_mut::<2>().0.iter_mut().zip(rows) {
+            let ends = &self.hu[row..row + 2];
+            pair[0] = ends[0].into() - self.iso;
+            pair[1] = ends[1].into() - self.iso;
+        }
+        above
+    }
+
     /// A row with the four beside it.
     pub fn stencil(&self, j: usize, k: usize) -> Stencil<'a, T> {
         let [_, ny, nz] = self.size;

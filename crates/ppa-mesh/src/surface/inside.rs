@@ -1,15 +1,16 @@
 //! Which voxels are inside, one bit each.
 
-use rayon::prelude::*;
-
 use super::field::{Field, Sample};
 
-/// Bits of a field, 64 voxels of a row to a word; the bits behind the end of a row are 0.
-pub struct InsideBits {
+/// Bits of neighbouring slices of a field, 64 voxels of a row to a word; the bits behind the end of a row
+/// are 0.
+pub struct InsideBits<T> {
+    first_inside: T,
     rows: usize,
     words: usize,
     /// The last voxel of a row, in its word.
     last: u64,
+    first_slice: usize,
     slices: Vec<SliceBits>,
 }
 
@@ -44,35 +45,25 @@ impl SliceBits {
     }
 }
 
-impl InsideBits {
-    /// The bits of each of several fields of one size, whose samples are inside from `first_inside` on; slice
-    /// by slice, so that fields which share their samples read them from the cache.
-    pub fn of<T: Sample>(fields: &[Field<T>], first_inside: &[T]) -> Vec<Self> {
-        let Some([nx, rows, slices]) = fields.first().map(Field::size) else {
-            return Vec::new();
-        };
-        let by_slice: Vec<Vec<SliceBits>> = (0..slices)
-            .into_par_iter()
-            .map(|k| {
-                let each = fields.iter().zip(first_inside);
-                each.map(|(field, &inside)| SliceBits::of(field, k, inside))
-                    .collect()
-            })
-            .collect();
-        let mut by_field: Vec<Self> = (fields.iter())
-            .map(|_| Self {
-                rows,
-                words: nx.div_ceil(64),
-                last: 1 << ((nx - 1) % 64),
-                slices: Vec::with_capacity(slices),
-            })
-            .collect();
-        for slice in by_slice {
-            for (field, slice) in by_field.iter_mut().zip(slice) {
-                field.slices.push(slice);
-            }
+impl<T: Sample> InsideBits<T> {
+    /// For a field whose samples are inside from `first_inside` on; without slices yet.
+    pub fn new(field: &Field<T>, first_inside: T, first_slice: usize) -> Self {
+        let [nx, rows, _] = field.size();
+        Self {
+            first_inside,
+            rows,
+            words: nx.div_ceil(64),
+            last: 1 << ((nx - 1) % 64),
+            first_slice,
+            slices: Vec::new(),
         }
-        by_field
+    }
+
+    /// Adds the slices before `end`.
+    pub fn extend_to(&mut self, end: usize, field: &Field<T>) {
+        for k in self.first_slice + self.slices.len()..end {
+            (self.slices).push(SliceBits::of(field, k, self.first_inside));
+        }
     }
 
     /// Words per row.
@@ -91,29 +82,24 @@ impl InsideBits {
 
     /// Row j of slice k.
     pub fn row(&self, j: usize, k: usize) -> &[u64] {
-        &self.slices[k].bits[self.words * j..self.words * (j + 1)]
+        &self.slices[k - self.first_slice].bits[self.words * j..self.words * (j + 1)]
     }
 
     /// Whether a sample of row j of slice k equals the iso value.
     pub fn at_iso(&self, j: usize, k: usize) -> bool {
-        self.slices[k].at_iso[j]
+        self.slices[k - self.first_slice].at_iso[j]
     }
 
-    /// Crossed edges from slice k on: those within it and those to the next slice, if there is one.
+    /// Crossed edges within slice k.
     pub fn crossings(&self, k: usize) -> usize {
-        let differing = |a: &[u64], b: &[u64]| -> usize {
-            let pairs = a.iter().zip(b);
-            pairs.map(|(a, b)| (a ^ b).count_ones() as usize).sum()
-        };
-        let slice = &self.slices[k].bits;
-        let next = self.slices.get(k + 1);
-        let along_x = slice.chunks_exact(self.words).map(|row| {
-            let words = (0..self.words).map(|word| self.crossed_along_x(row, word));
-            words.map(|word| word.count_ones() as usize).sum::<usize>()
+        let rows = (0..self.rows).flat_map(|j| {
+            let (row, next) = (self.row(j, k), self.row((j + 1).min(self.rows - 1), k));
+            (0..self.words).map(move |word| {
+                let along = [self.crossed_along_x(row, word), row[word] ^ next[word]];
+                along.map(|crossed| crossed.count_ones() as usize)
+            })
         });
-        along_x.sum::<usize>()
-            + differing(slice, &slice[self.words..])
-            + next.map_or(0, |next| differing(slice, &next.bits))
+        rows.map(|[x, y]| x + y).sum()
     }
 
     /// Pairs of neighbours in a row of which one is inside, as a bit at the left one.
@@ -140,7 +126,7 @@ impl InsideBits {
             }
         }
         for slice in [k.wrapping_sub(1), k + 1] {
-            if slice < self.slices.len() {
+            if (self.first_slice..self.first_slice + self.slices.len()).contains(&slice) {
                 inner &= self.row(j, slice)[word];
             }
         }
@@ -198,8 +184,10 @@ mod tests {
             let float: Vec<f32> = hu.iter().map(|&v| v.into()).collect();
             let whole = Field::new(hu, size, [0.0; 3], iso);
             let exact = Field::new(&float, size, [0.0; 3], iso);
-            let [bits] = InsideBits::of(&[whole], &[i16::first_inside(iso).unwrap()]).try_into().ok().unwrap();
-            let [of_floats] = InsideBits::of(&[exact], &[iso]).try_into().ok().unwrap();
+            let mut bits = InsideBits::new(&whole, i16::first_inside(iso).unwrap(), 0);
+            let mut of_floats = InsideBits::new(&exact, iso, 0);
+            bits.extend_to(3, &whole);
+            of_floats.extend_to(3, &exact);
             for (slice, of_floats) in bits.slices.iter().zip(&of_floats.slices) {
                 prop_assert_eq!(&slice.bits, &of_floats.bits);
                 prop_assert_eq!(&slice.at_iso, &of_floats.at_iso);

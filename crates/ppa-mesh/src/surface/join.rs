@@ -9,7 +9,7 @@ use super::points::Points;
 use crate::mesh::Mesh;
 
 /// Numbers from here on would have the bits of another kind.
-pub const MOST_VERTICES: usize = AT_VOXEL as usize;
+const MOST_VERTICES: usize = AT_VOXEL as usize;
 
 /// All crossings, then all voxels that are vertices, then all extra vertices, each part behind the one before.
 pub fn join(mut parts: Vec<Part>, mirrored: bool) -> Result<Mesh, SurfaceError> {

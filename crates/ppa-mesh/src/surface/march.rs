@@ -1,7 +1,5 @@
 //! Marching through layers of cells with the numbers of two slices in memory.
 
-use std::ops::Range;
-
 use nalgebra::Vector3;
 
 use super::cell::{CONFIGURATIONS, Configuration, inside_joined};
@@ -30,52 +28,60 @@ pub struct Part {
 /// The march with what it has made so far.
 pub struct March<'a, T> {
     pub field: &'a Field<'a, T>,
-    pub inside: &'a InsideBits,
     pub world: &'a World,
     shortcuts: &'static [Shortcut; 256],
     pub batch: Batch,
     /// Crossings numbered so far.
     pub crossings: u32,
+    /// The slices below and above the layer of cells, and the edges between them.
+    slices: [Slice; 2],
+    upright: Numbers,
     pub part: Part,
 }
 
-/// Surface within the layers of cells between slices k and k + 1 for k in `layers`, with room for so many
-/// crossings.
-pub fn march<T: Sample>(
-    field: &Field<T>,
-    inside: &InsideBits,
-    world: &World,
-    layers: Range<usize>,
-    room: usize,
-) -> Part {
-    let mut march = March {
-        field,
-        inside,
-        world,
-        shortcuts: &SHORTCUTS,
-        batch: Batch::new(),
-        crossings: 0,
-        part: Part {
-            crossings: Points::with_capacity(room),
-            // Euler: a closed surface without handles has fewer than twice as many triangles as vertices.
-            triangles: Vec::with_capacity(2 * room),
-            ..Part::default()
-        },
-    };
-    let [mut low, mut high] = <[Slice; 2]>::default();
-    let mut upright = Numbers::default();
-    march.voxels(&mut low, layers.start, true);
-    march.edges_within(&mut low, layers.start, true);
-    for k in layers.clone() {
-        // The slice on top belongs to the next part, if there is one.
-        let own = k + 1 < layers.end || k + 2 == field.size()[2];
-        march.voxels(&mut high, k + 1, own);
-        march.edges_between(&mut upright, k, [&low, &high]);
-        march.edges_within(&mut high, k + 1, own);
-        march.layer(k, [&low, &high], &upright);
-        std::mem::swap(&mut low, &mut high);
+impl<'a, T: Sample> March<'a, T> {
+    /// Begins at slice `start`, with room for so many crossings. `inside` has the slices on both sides of it.
+    pub fn new(
+        field: &'a Field<'a, T>,
+        inside: &InsideBits<T>,
+        world: &'a World,
+        start: usize,
+        room: usize,
+    ) -> Self {
+        let mut march = March {
+            field,
+            world,
+            shortcuts: &SHORTCUTS,
+            batch: Batch::new(),
+            crossings: 0,
+            slices: Default::default(),
+            upright: Numbers::default(),
+            part: Part {
+                crossings: Points::with_capacity(room),
+                // Euler: a closed surface without handles has fewer than twice as many triangles as vertices.
+                triangles: Vec::with_capacity(2 * room),
+                ..Part::default()
+            },
+        };
+        let mut low = Slice::default();
+        march.voxels(inside, &mut low, start, true);
+        march.edges_within(inside, &mut low, start, true);
+        march.slices[0] = low;
+        march
     }
-    march.part
+
+    /// Marches through the cells between slices k and k + 1; slice k + 1 belongs to the part if it is `own`, else to
+    /// the next. `inside` has slice k + 2, if there is one.
+    pub fn layer(&mut self, inside: &InsideBits<T>, k: usize, own: bool) {
+        let [low, mut high] = std::mem::take(&mut self.slices);
+        let mut upright = std::mem::take(&mut self.upright);
+        self.voxels(inside, &mut high, k + 1, own);
+        self.edges_between(inside, &mut upright, k, [&low, &high]);
+        self.edges_within(inside, &mut high, k + 1, own);
+        self.cells(inside, k, [&low, &high], &upright);
+        self.slices = [high, low];
+        self.upright = upright;
+    }
 }
 
 impl<T: Sample> March<'_, T> {
@@ -86,11 +92,10 @@ impl<T: Sample> March<'_, T> {
         id
     }
 
-    fn layer(&mut self, k: usize, slices: [&Slice; 2], upright: &Numbers) {
+    fn cells(&mut self, inside: &InsideBits<T>, k: usize, slices: [&Slice; 2], upright: &Numbers) {
         let ny = self.field.size()[1];
-        let inside = self.inside;
         for j in 0..ny - 1 {
-            let mut row = CellRow::new(self.field, inside, slices, upright, [j, k]);
+            let mut row = CellRow::new(inside, slices, upright, [j, k]);
             for word in 0..inside.words() {
                 let corners = row.corners(word);
                 let (mut all, mut any) = (u64::MAX, 0);
@@ -109,7 +114,7 @@ impl<T: Sample> March<'_, T> {
         }
     }
 
-    fn cell(&mut self, row: &CellRow<T>, voxel: [usize; 3], inside: u8) {
+    fn cell(&mut self, row: &CellRow, voxel: [usize; 3], inside: u8) {
         let shortcuts = self.shortcuts;
         match &shortcuts[usize::from(inside)].filling {
             Filling::Triangles(count, triangles) => {
@@ -118,13 +123,12 @@ impl<T: Sample> March<'_, T> {
                 }
             }
             Filling::Quad(quad) => {
-                let iso = self.field.iso();
-                let mut above = row.hu(voxel[0]);
-                for hu in &mut above {
-                    *hu -= iso;
-                }
+                let [i, j, k] = voxel;
+                let [nx, ny, _] = self.field.size();
+                let first_voxel = i + nx * (j + ny * k);
                 let [p, q, r, s] = quad.ring;
                 let (p, q, r, s) = (row.id(p), row.id(q), row.id(r), row.id(s));
+                let above = self.field.above_at_corners(first_voxel);
                 if quad.first_diagonal_fits_better(&above) {
                     self.triangle([p, q, r]);
                     self.triangle([p, r, s]);
@@ -134,8 +138,10 @@ impl<T: Sample> March<'_, T> {
                 }
             }
             Filling::Other => {
-                let iso = f64::from(self.field.iso());
-                let above = row.hu(voxel[0]).map(|hu| f64::from(hu) - iso);
+                let above = std::array::from_fn(|corner| {
+                    let corner = [0, 1, 2].map(|axis| voxel[axis] + (corner >> axis & 1));
+                    self.field.above(corner)
+                });
                 let ids = std::array::from_fn(|edge| match is_crossed(inside, edge as u8) {
                     true => row.id(EdgePlace::new(inside, edge as u8)),
                     false => u32::MAX,

@@ -65,8 +65,8 @@ impl Batch {
     /// Adds the edge from a voxel; true when the batch is full and has to be stored.
     pub fn add(&mut self, voxel: [usize; 3], ends: [End; 2]) -> bool {
         let lane = self.waiting % LANES;
-        for axis in 0..3 {
-            self.voxel[axis][lane] = voxel[axis] as u32;
+        for (lanes, index) in self.voxel.iter_mut().zip(voxel) {
+            lanes[lane] = index as u32;
         }
         for (end, values) in ends.iter().enumerate() {
             self.hu[end][lane] = values.hu;

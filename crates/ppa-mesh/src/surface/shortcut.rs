@@ -99,10 +99,13 @@ fn filling(inside: u8, configuration: &Configuration) -> Filling {
 pub struct Quad {
     /// Where its numbers stand.
     pub ring: [EdgePlace; 4],
-    /// The ends of the edges in the order of the ring, and the other two corners if the loop is around an edge.
+    /// The ends of the edges in the order of the ring.
     near: [u8; 4],
     far: [u8; 4],
-    others: Option<[u8; 2]>,
+    /// The other two corners if the loop is around an edge.
+    others: [u8; 2],
+    /// 1 for parallel edges, else 0.
+    parallel: f32,
 }
 
 impl Quad {
@@ -122,12 +125,13 @@ impl Quad {
             }
         });
         let met = |corner: &u8| ends.iter().any(|ends| ends.contains(corner));
-        let mut others = (0..8).filter(|corner| !met(corner));
+        let others: Vec<u8> = (0..8).filter(|corner| !met(corner)).collect();
         Self {
             ring: ring.map(|edge| EdgePlace::new(inside, edge)),
             near: ends.map(|[near, _]| near),
             far: ends.map(|[_, far]| far),
-            others: others.next().zip(others.next()).map(|(a, b)| [a, b]),
+            others: others.try_into().unwrap_or_default(),
+            parallel: if is_parallel { 1.0 } else { 0.0 },
         }
     }
 
@@ -144,19 +148,19 @@ impl Quad {
         for (t, (near, far)) in t.iter_mut().zip(near.iter().zip(&far)) {
             *t = near / (near - far);
         }
-        let Some(others) = self.others else {
-            // Half-way between the four edges the interpolant is linear along them.
-            let [near, far] = [near, far].map(|[p, q, r, s]| (p + q) + (r + s));
-            let misfit = |t: f32| (near + (far - near) * (0.5 * t)).abs();
-            return misfit(t[0] + t[2]) <= misfit(t[1] + t[3]);
+        // Between parallel edges the interpolant is linear along them, half-way across. Around an edge it is
+        // bilinear across it, half-way along. Both are written as one, in sums over corners, so that no
+        // branch is taken.
+        let parallel = self.parallel;
+        let base = near[0] + near[1] + parallel * (near[2] + near[3]);
+        let (one, two) = (far[0] + far[1], far[2] + far[3]);
+        let (u, v) = (one + parallel * two - base, two + parallel * one - base);
+        let [p, q] = self.others.map(|corner| above[usize::from(corner & 7)]);
+        let uv = (1.0 - parallel) * (p + q - base - u - v);
+        let misfit = |s: f32, t: f32| {
+            let (s, t) = (0.5 * s, 0.5 * t);
+            (base + u * s + (v + uv * s) * t).abs()
         };
-        // Half-way along the edge the interpolant is bilinear across it; twice its values at the corners.
-        let base = near[0] + near[1];
-        let [u, v] = [far[0] + far[1] - base, far[2] + far[3] - base];
-        let [p, q] = others.map(|corner| above[usize::from(corner & 7)]);
-        let uv = p + q - base - u - v;
-        let misfit =
-            |s: f32, t: f32| (base + u * (0.5 * s) + (v + uv * (0.5 * s)) * (0.5 * t)).abs();
         misfit(t[0], t[2]) <= misfit(t[1], t[3])
     }
 }
