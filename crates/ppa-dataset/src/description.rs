@@ -134,7 +134,8 @@ impl<'a> Description<'a> {
         Self {
             version: 1,
             units: "mm; depth images: Z in mm, 0 invalid; tallies: eV/cm2 per history; \
-                    transforms: row-major target_from_source; ct frame: LPS",
+                    transforms: row-major target_from_source; ct frame: LPS; dose_histories: null \
+                    where the radiographs carry no noise",
             rotation,
             settings,
             room_from_device: stage

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::files::{read_text, write_whole};
 use crate::plan::{Plan, PlanError, PlanRoom};
-use crate::toml_file::to_toml;
+use crate::toml_file::{relative_to, to_toml};
 
 /// All that stands still in an x-ray room; unknown keys are refused.
 ///
@@ -74,12 +74,16 @@ impl RoomFile {
         })
     }
 
-    /// Writes the file, whole or not at all.
+    /// Writes the file, whole or not at all. A relative path is rewritten to start at its folder.
     ///
     /// # Errors
     /// [`PlanError::File`], also for a path that is not UTF-8, which TOML cannot hold.
     pub fn write(&self, path: &Path) -> Result<(), PlanError> {
-        Ok(write_whole(path, to_toml(self, path)?.as_bytes())?)
+        let mut file = self.clone();
+        if let Some(ply) = &mut file.room.ply {
+            *ply = relative_to(ply, path.parent().unwrap_or(Path::new("")))?;
+        }
+        Ok(write_whole(path, to_toml(&file, path)?.as_bytes())?)
     }
 
     /// Puts this room into a plan that says nothing about it.

@@ -21,8 +21,8 @@ pub struct DemoArgs {
     /// Folder for everything the demo makes
     #[arg(long, default_value = "ppa-demo")]
     out: PathBuf,
-    /// Seed of the dataset
-    #[arg(long, default_value_t = 1)]
+    /// Seed of the dataset, which TOML holds up to 2^63 - 1
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     seed: u64,
     /// Right lower leg to take: P01 to P17
     #[arg(long, value_name = "NAME", default_value = "P01")]
@@ -109,7 +109,7 @@ fn write_inputs(args: &DemoArgs, leg: &LowerLeg) -> anyhow::Result<Plan> {
     let case_file = PathBuf::from(format!("{name}.case.toml"));
     case.write(&out.join(&case_file))?;
     let mut plan = Plan::new(vec![PlanCase {
-        file: case_file,
+        file: out.join(case_file),
         patient: 0,
     }]);
     plan.seed = args.seed;

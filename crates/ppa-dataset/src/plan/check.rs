@@ -1,0 +1,77 @@
+//! What of a plan cannot work, found before anything is made.
+
+use super::Plan;
+
+/// Farther out or in, a limb is none any more, mm.
+const MOST_OFFSET_MM: f64 = 100.0;
+
+/// Bumps of a body shape: without any it would be `orig`, with more they cover the skin.
+const BUMPS: std::ops::RangeInclusive<usize> = 1..=100;
+
+impl Plan {
+    /// Whether a dataset can be made of it; says what is wrong.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        if self.cases.is_empty() {
+            return Err("no [[case]]: a plan needs at least one limb".to_owned());
+        }
+        if self.shapes.variants.is_empty() {
+            return Err("shapes.variants is empty: at least \"orig\" is needed".to_owned());
+        }
+        let mut shapes = self.shapes.variants.clone();
+        shapes.sort_unstable();
+        shapes.dedup();
+        if shapes.len() != self.shapes.variants.len() {
+            return Err("shapes.variants names a shape twice".to_owned());
+        }
+        for (name, value) in [
+            ("shapes.offset_mm", self.shapes.offset_mm),
+            ("depth.roi_mm", self.depth.roi_mm),
+            ("xray.half_length_mm", self.xray.half_length_mm),
+            ("xray.max_voxel_mm", self.xray.max_voxel_mm),
+        ] {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(format!("{name} is {value}, expected a length above 0 mm"));
+            }
+        }
+        if self.depth.rig.is_some() && self.depth.cameras.is_some() {
+            return Err("depth.rig and depth.cameras are both given".to_owned());
+        }
+        let offset_mm = self.shapes.offset_mm;
+        if offset_mm > MOST_OFFSET_MM {
+            return Err(format!(
+                "shapes.offset_mm is {offset_mm}, expected at most {MOST_OFFSET_MM} mm"
+            ));
+        }
+        if let Some(bumps) = self.shapes.bumps.iter().find(|n| !BUMPS.contains(n)) {
+            return Err(format!(
+                "shapes.bumps holds {bumps}, expected {} to {} bumps",
+                BUMPS.start(),
+                BUMPS.end()
+            ));
+        }
+        if self.xray.engine.seed != 0 {
+            return Err("xray.engine.seed is given, but the plan's seed decides".to_owned());
+        }
+        if self.xray.calibration_file.is_some() {
+            return Err("xray.calibration_file is only looked at when a plan is read".to_owned());
+        }
+        if self.room.ply.is_none() && self.room.room_from_device.is_some() {
+            return Err(
+                "room.room_from_device is given without room.ply: the built-in room has its device"
+                    .to_owned(),
+            );
+        }
+        self.soft_tissue
+            .check()
+            .map_err(|error| format!("soft_tissue: {error}"))?;
+        if let Some(sensor) = &self.depth.sensor {
+            sensor
+                .check()
+                .map_err(|error| format!("depth.sensor: {error}"))?;
+        }
+        self.rotation
+            .poses()
+            .map_err(|error| format!("rotation: {error}"))?;
+        Ok(())
+    }
+}

@@ -1,0 +1,117 @@
+//! Room, depth images and radiographs of a plan.
+
+use std::path::PathBuf;
+
+use ppa_depth::{RigSpec, SensorSpec};
+use ppa_scene::{PlaneSettings, RoomSpec};
+use ppa_xray::{Detector, FastSettings, HuCalibration, Presentation, Receptor, Source};
+use serde::{Deserialize, Serialize};
+
+use crate::manifest::Rows;
+
+/// The x-ray room: built in, or a recorded one.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlanRoom {
+    /// Point cloud of a recorded room, mm. Replaces the built-in furniture.
+    pub ply: Option<PathBuf>,
+    /// Pose of the x-ray device in a recorded room (row-major 4x4; source at the origin, z along
+    /// the beam, y towards the patient's feet). When absent, the recorded frame is that of the
+    /// built-in room: z up, y towards the head, origin where the beam meets the table.
+    pub room_from_device: Option<Rows>,
+    /// The built-in room, and the x-ray device in either room.
+    pub parametric: RoomSpec,
+    /// How the table plane is searched; when absent, it is what the central beam hits first.
+    pub table: Option<PlaneSettings>,
+}
+
+/// How depth images are made.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DepthSettings {
+    /// Camera rig (JSON); the built-in Azure Kinect pair when absent.
+    pub rig: Option<PathBuf>,
+    /// The camera rig written out, instead of a file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cameras: Option<RigSpec>,
+    /// Side of the square region of interest around the joint, mm at the joint.
+    pub roi_mm: f64,
+    /// Errors of the cameras' sensors; ideal images when absent.
+    pub sensor: Option<SensorSpec>,
+}
+
+impl Default for DepthSettings {
+    fn default() -> Self {
+        Self {
+            rig: None,
+            cameras: None,
+            roi_mm: 260.0,
+            sensor: None,
+        }
+    }
+}
+
+impl DepthSettings {
+    /// The camera rig.
+    ///
+    /// # Errors
+    /// [`RigError`](ppa_depth::RigError) when it is a file that cannot be read.
+    pub fn cameras(&self) -> Result<RigSpec, ppa_depth::RigError> {
+        match (&self.cameras, &self.rig) {
+            (Some(cameras), _) => Ok(cameras.clone()),
+            (None, Some(path)) => RigSpec::read(path),
+            (None, None) => Ok(RigSpec::default()),
+        }
+    }
+}
+
+/// How radiographs are made.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct XraySettings {
+    /// Tube voltage in kV.
+    pub kvp: f64,
+    /// Angle of the tungsten anode in degrees.
+    pub anode_angle_deg: f64,
+    /// Filters as `MATERIAL:mm`.
+    pub filters: Vec<String>,
+    /// Focal spot, heel effect and collimation; a point that fills the detector when left out.
+    pub source: Source,
+    /// Pixels of the image.
+    pub detector: Detector,
+    /// Anti-scatter grid and converter; none and an ideal one when left out.
+    pub receptor: Receptor,
+    /// Length of limb kept on either side of the joint, mm.
+    pub half_length_mm: f64,
+    /// Largest voxel that photons travel through, mm: thicker slices are interpolated, so that
+    /// bone edges do not come out as stairs.
+    pub max_voxel_mm: f64,
+    /// HU to material and density, written out as `[[xray.calibration.segment]]`.
+    pub calibration: HuCalibration,
+    /// HU to material and density from a file instead; reading the plan puts its contents in place of the path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration_file: Option<PathBuf>,
+    /// The engine.
+    pub engine: FastSettings,
+    /// The mapping to a radiograph for viewing.
+    pub presentation: Presentation,
+}
+
+impl Default for XraySettings {
+    fn default() -> Self {
+        Self {
+            kvp: 60.0,
+            anode_angle_deg: 12.0,
+            filters: vec!["Al:2.5".to_owned()],
+            source: Source::default(),
+            detector: Detector::centred(448, 448, 0.5),
+            receptor: Receptor::default(),
+            half_length_mm: 120.0,
+            max_voxel_mm: 1.0,
+            calibration: HuCalibration::default(),
+            calibration_file: None,
+            engine: FastSettings::default(),
+            presentation: Presentation::default(),
+        }
+    }
+}
