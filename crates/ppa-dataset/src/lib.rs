@@ -48,6 +48,8 @@ mod load;
 mod manifest;
 #[cfg(feature = "generate")]
 mod merge;
+#[cfg(all(test, feature = "generate"))]
+mod only_read;
 #[cfg(feature = "generate")]
 mod part_file;
 #[cfg(feature = "generate")]
