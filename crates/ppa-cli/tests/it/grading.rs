@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::shards::write_quick_plan;
-use crate::{fail, names, succeed};
+use crate::{fail, names, ppa, succeed};
 
 /// A folder with a dataset of five radiographs, `data`, exported to `out`.
 fn exported() -> tempfile::TempDir {
@@ -162,4 +162,73 @@ fn grades_that_cannot_be_are_named_and_nothing_is_written() {
         changed.contains("is not the radiograph that the readers saw"),
         "{changed}"
     );
+}
+
+#[test]
+fn no_grade_and_no_label_of_readers_is_lost() {
+    let folder = exported();
+    let here = folder.path();
+    let key = key(here);
+    grade(here, "a", &[1.0, 1.5, 2.0, 2.5, 3.0, 3.0]);
+    succeed(here, "label import data --key out.key.csv a.csv");
+    let kept = fs::read_to_string(here.join("data/grades.csv")).unwrap();
+    let before = labels(here);
+    for [_, image, sha256] in &key {
+        assert!(kept.contains(sha256), "grades.csv tells what was graded");
+        assert_eq!(before[file_name(image)]["radiograph_sha256"], **sha256);
+    }
+
+    // Second grades, and other grades than those that are there, are not let go.
+    grade(here, "a", &[1.0, 1.5, 2.0, 2.5, 3.0]);
+    let lost = fail(here, "label import data --key out.key.csv a.csv");
+    assert!(lost.contains("holds a's grade"), "{lost}");
+    grade(here, "a", &[3.0, 1.5, 2.0, 2.5, 3.0, 3.0]);
+    let lost = fail(here, "label import data --key out.key.csv a.csv");
+    assert!(lost.contains("holds a's grade 1 of"), "{lost}");
+    // Files that hold all of it, in any number: a page may have been saved in parts.
+    let whole = "image,reader,grade\n".to_owned();
+    let row = |n: usize, grade: f64| format!("{},a,{grade}\n", key[n][0]);
+    let grades = [1.0, 1.5, 2.0, 2.5, 3.0, 3.0];
+    for (name, part) in [("p.csv", 0..3), ("q.csv", 3..6)] {
+        let rows: String = part.map(|n| row(n, grades[n])).collect();
+        fs::write(here.join(name), whole.clone() + &rows).unwrap();
+    }
+    succeed(here, "label import data --key out.key.csv p.csv q.csv");
+    assert_eq!(
+        fs::read_to_string(here.join("data/grades.csv")).unwrap(),
+        kept
+    );
+    assert_eq!(labels(here), before);
+    let twice = fail(
+        here,
+        "label import data --key out.key.csv data/grades.csv p.csv q.csv",
+    );
+    assert!(twice.contains("a grades"), "{twice}");
+
+    // Labels of readers whose grades are elsewhere.
+    fs::rename(here.join("data/grades.csv"), here.join("grades.csv")).unwrap();
+    let refused = fail(here, "label import data --key out.key.csv p.csv q.csv");
+    assert!(
+        refused.contains("do not follow from grades.csv"),
+        "{refused}"
+    );
+    assert_eq!(labels(here), before);
+    fs::rename(here.join("grades.csv"), here.join("data/grades.csv")).unwrap();
+
+    // The radiographs are made anew: labels and grades belong to the old ones.
+    let plan = fs::read_to_string(here.join("plan.toml")).unwrap();
+    fs::write(here.join("plan.toml"), format!("seed = 9\n{plan}")).unwrap();
+    let done = ppa(here, "generate plan.toml --out data").output().unwrap();
+    let told = String::from_utf8(done.stderr).unwrap();
+    assert!(
+        done.status.success() && told.contains("5 labels, the first of step 0"),
+        "{told}"
+    );
+    for command in ["dataset check data", "export table data --out t.csv"] {
+        let refused = fail(here, command);
+        assert!(refused.contains("of step 0"), "{refused}");
+    }
+    let refused = fail(here, "label import data data/grades.csv");
+    assert!(refused.contains("a graded another radiograph"), "{refused}");
+    assert_eq!(labels(here), before);
 }

@@ -147,7 +147,7 @@ pub fn label_limb(
         std: row.std,
         step: row.step,
     });
-    let labels = LabelFile::new(LabelSource::Surrogate, labels)?;
+    let labels = LabelFile::new(LabelSource::Surrogate, labels)?.of_radiographs(manifest, limb);
     write_table(&table, &rows)?;
     if !readers_kept {
         labels.write(&manifest.root, limb)?;

@@ -4,18 +4,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
 use clap::Args;
-use ppa_dataset::labels::{Showing, grading_page, write_key};
+use ppa_dataset::labels::{PICTURES_PER_PAGE, PageNumber, Showing, grading_page, write_key};
 use ppa_dataset::{Manifest, write_whole};
 use serde::Serialize;
 
 use crate::output::{Output, bytes, working};
 
-/// The page in the folder for readers.
-const PAGE: &str = "grading.html";
-
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
-Give readers the folder: it holds one page that needs no network. Open it in a browser, grade by key, save the grades as \
+Give readers the folder: it holds a page that needs no network, or several of 200 pictures. Open each in a browser, grade by key, save the grades as \
 CSV. Names and order of the pictures tell nothing; a tenth of them comes twice; all have the same window. Keep the key: \
 it tells which picture is which.
 
@@ -40,7 +37,7 @@ pub struct ExportArgs {
 
 #[derive(Debug, Serialize)]
 struct Exported {
-    page: PathBuf,
+    pages: Vec<PathBuf>,
     key: PathBuf,
     pictures: usize,
     repeats: usize,
@@ -60,33 +57,42 @@ pub fn run(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
         key.display(),
         args.out.display()
     );
-    let page = args.out.join(PAGE);
-    for path in [&key, &page] {
+    let working = working("collecting radiographs");
+    let manifest = Manifest::read(&args.dataset)?;
+    let shown = Showing::of_dataset(&manifest, args.seed, args.every_deg);
+    let pages = pages(&args.out, shown.len());
+    for path in pages.iter().chain([&key]) {
         ensure!(
             !path.exists(),
             "{} is there already, and grades may depend on it; choose another --out",
             path.display()
         );
     }
-    let working = working("collecting radiographs");
-    let manifest = Manifest::read(&args.dataset)?;
-    let shown = Showing::of_dataset(&manifest, args.seed, args.every_deg);
-    let html = grading_page(&args.dataset, &shown)?;
+    let mut size = 0;
+    let of = pages.len();
+    for (i, path) in pages.iter().enumerate() {
+        let number = PageNumber { page: i + 1, of };
+        let first = (i * PICTURES_PER_PAGE).min(shown.len());
+        let last = (first + PICTURES_PER_PAGE).min(shown.len());
+        let html = grading_page(&args.dataset, &shown[first..last], number)?;
+        size += html.len() as u64;
+        write_whole(path, html.as_bytes())?;
+    }
     write_key(&key, &shown)?;
-    write_whole(&page, html.as_bytes())?;
     working.finish_and_clear();
     let images: std::collections::HashSet<_> = shown.iter().map(|showing| &showing.image).collect();
     let exported = Exported {
-        page,
+        pages,
         key,
         pictures: shown.len(),
         repeats: shown.len() - images.len(),
-        bytes: html.len() as u64,
+        bytes: size,
     };
     output.print(&exported, |done| {
         format!(
-            "{}: {} pictures, {} of them repeats ({})\nkeep the key to yourself: {}",
-            done.page.display(),
+            "{}: {} pages with {} pictures, {} of them repeats ({})\nkeep the key to yourself: {}",
+            args.out.display(),
+            done.pages.len(),
             done.pictures,
             done.repeats,
             bytes(done.bytes),
@@ -100,4 +106,30 @@ fn beside(folder: &Path) -> PathBuf {
     let mut name = folder.components().as_path().as_os_str().to_owned();
     name.push(".key.csv");
     name.into()
+}
+
+/// `grading.html`, or `grading_01.html` and so on.
+fn pages(folder: &Path, pictures: usize) -> Vec<PathBuf> {
+    match pictures.div_ceil(PICTURES_PER_PAGE) {
+        0 | 1 => vec![folder.join("grading.html")],
+        of => (1..=of)
+            .map(|n| folder.join(format!("grading_{n:02}.html")))
+            .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As many as the paper's dataset has radiographs and repeats.
+    #[test]
+    fn many_pictures_are_parted_into_pages() {
+        let names = |pictures| pages(Path::new("out"), pictures);
+        assert_eq!(names(PICTURES_PER_PAGE), [Path::new("out/grading.html")]);
+        let many = names(3077 + 308);
+        assert_eq!(many.len(), 17);
+        assert_eq!(many[0], Path::new("out/grading_01.html"));
+        assert_eq!(many[16], Path::new("out/grading_17.html"));
+    }
 }

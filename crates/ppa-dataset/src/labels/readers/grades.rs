@@ -1,20 +1,14 @@
-//! Grades of readers: from their files to `grades.csv` and `labels.json` of a dataset.
+//! Grades of readers, and the radiographs that they are of.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::import::ImportError;
 use super::showing::Showing;
-use crate::files::FileError;
-use crate::labels::file::{LabelFile, LabelFileError};
-use crate::labels::label::{LabelError, LabelRow, LabelSource};
-use crate::labels::table::{TableError, read_table, write_table};
-use crate::layout::LimbId;
+use crate::labels::table::read_table;
 use crate::manifest::{FileKind, FileRow, Manifest};
-
-/// All grades of a dataset, as they were given.
-const GRADES_FILE: &str = "grades.csv";
 
 /// What a reader says of a radiograph; a row of `grades.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -25,170 +19,44 @@ pub struct Grade {
     pub reader: String,
     /// From 1 (ideal) to 3 (inadequate) in half steps.
     pub grade: f64,
-}
-
-/// What [`import_grades`] did.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
-pub struct Imported {
-    /// Readers.
-    pub readers: usize,
-    /// Radiographs that have a label now.
-    pub labelled: usize,
-    /// Second grades of a radiograph by one reader: kept, but without influence on the label.
-    pub repeats: usize,
-    /// Computed labels that gave way.
-    pub replaced_computed: usize,
-    /// Radiographs of the graded limbs that no reader graded; they have no label.
-    pub without_label: usize,
-}
-
-/// Why grades do not become labels; nothing was written then.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ImportError {
-    /// A file cannot be read or written.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// A file of grades is none.
-    #[error(transparent)]
-    Table(#[from] TableError),
-    /// Off the scale.
-    #[error("{}: {reader} grades {image} with {grade}, expected 1, 1.5, 2, 2.5 or 3", path.display())]
-    Grade {
-        /// The file.
-        path: PathBuf,
-        /// The reader.
-        reader: String,
-        /// The picture.
-        image: String,
-        /// The grade.
-        grade: f64,
-    },
-    /// A picture that neither key nor dataset know.
-    #[error("{}: {image} is neither a picture of the key nor a radiograph of the dataset", path.display())]
-    Unknown {
-        /// The file.
-        path: PathBuf,
-        /// The picture.
-        image: String,
-    },
-    /// The dataset has changed since the readers saw it.
-    #[error("{0} is not the radiograph that the readers saw: its hash is not that of the key")]
-    Changed(String),
-    /// One picture graded twice, a radiograph a third time, or in two files.
-    #[error("{reader} grades {image} in {} and again in {}", first.display(), second.display())]
-    Twice {
-        /// The reader.
-        reader: String,
-        /// The picture or radiograph.
-        image: String,
-        /// A file.
-        first: PathBuf,
-        /// Another one, or the same.
-        second: PathBuf,
-    },
-    /// Grades that are there would be lost.
-    #[error("{} holds {reader}'s grade of {image}, which none of the given files does: give {} as well", path.display(), path.display())]
-    Lost {
-        /// `grades.csv` of the dataset.
-        path: PathBuf,
-        /// The reader.
-        reader: String,
-        /// The radiograph.
-        image: String,
-    },
-    /// Labels that are there are none.
-    #[error(transparent)]
-    Labels(#[from] LabelFileError),
-    /// A label off the grid.
-    #[error(transparent)]
-    Label(#[from] LabelError),
+    /// SHA-256 of the radiograph as it was graded; may be missing from what readers hand in.
+    #[serde(default)]
+    pub sha256: Option<String>,
 }
 
 /// A grade with the file that holds it and the place of its picture among those shown.
-struct Given<'a> {
-    grade: Grade,
+pub(super) struct Given<'a> {
+    pub grade: Grade,
     file: &'a Path,
-    radiograph: &'a FileRow,
+    pub radiograph: &'a FileRow,
     place: usize,
 }
 
-/// Makes the labels of a dataset from readers' grades: mean and standard deviation (ddof 0) over the readers' first grades.
-///
-/// `files` are tables with the columns image, reader, grade, where image is a name of the key `shown` or a radiograph
-/// of the dataset. All grades are kept in `grades.csv`, so that further ones can be added by giving that file as well.
-/// Readers' labels take the place of computed ones, for whole limbs: the two never stand in one `labels.json`.
-///
-/// # Errors
-/// [`ImportError`], before anything is written: grades off the scale, unknown pictures, radiographs that changed since
-/// the key was made, two grades of one picture, and files without the grades that are there.
-pub fn import_grades(
-    manifest: &Manifest,
-    shown: &[Showing],
-    files: &[PathBuf],
-) -> Result<Imported, ImportError> {
-    let given = Pictures::of(manifest, shown)?.all_of(files)?;
-    let path = manifest.root.join(GRADES_FILE);
-    refuse_loss(&path, &given)?;
-
-    let mut limbs: BTreeMap<LimbId, BTreeMap<u32, Vec<f64>>> = BTreeMap::new();
-    let mut seen = HashSet::new();
-    for given in &given {
-        if seen.insert((&given.grade.reader, &given.radiograph.file)) {
-            let of_limb = limbs.entry(given.radiograph.limb).or_default();
-            let grades = of_limb.entry(given.radiograph.step).or_default();
-            grades.push(given.grade.grade);
-        }
-    }
-    let readers: HashSet<_> = given.iter().map(|given| &given.grade.reader).collect();
-    let mut done = Imported {
-        readers: readers.len(),
-        repeats: given.len() - seen.len(),
-        ..Imported::default()
-    };
-    let mut labels = Vec::new();
-    for (limb, steps) in &limbs {
-        if let Some(before) = LabelFile::read(&manifest.root, *limb)?
-            && before.source == Some(LabelSource::Surrogate)
-        {
-            done.replaced_computed += before.labels().len();
-        }
-        let radiographs = manifest.files.iter();
-        let radiographs =
-            radiographs.filter(|row| row.kind == FileKind::Radiograph && row.limb == *limb);
-        done.without_label += radiographs.count() - steps.len();
-        done.labelled += steps.len();
-        let rows = steps.iter();
-        let rows = rows.filter_map(|(&step, grades)| LabelRow::of_grades(grades, step));
-        labels.push((*limb, LabelFile::new(LabelSource::Readers, rows)?));
-    }
-
-    let kept: Vec<Grade> = given.into_iter().map(Given::by_radiograph).collect();
-    write_table(&path, &kept)?;
-    for (limb, labels) in labels {
-        labels.write(&manifest.root, limb)?;
-    }
-    Ok(done)
-}
-
 impl Given<'_> {
-    fn by_radiograph(self) -> Grade {
+    /// Whether it was given to a picture of the key.
+    fn by_name(&self) -> bool {
+        self.place < usize::MAX
+    }
+
+    /// As it is kept: what was shown is the radiograph, and which bytes it had.
+    pub fn by_radiograph(&self) -> Grade {
         Grade {
             image: self.radiograph.file.clone(),
-            ..self.grade
+            sha256: Some(self.radiograph.sha256.clone()),
+            ..self.grade.clone()
         }
     }
 }
 
 /// What pictures may be graded.
-struct Pictures<'a> {
+pub(super) struct Pictures<'a> {
     radiographs: HashMap<&'a str, &'a FileRow>,
     /// By name: place among those shown, and radiograph.
     shown: HashMap<&'a str, (usize, &'a FileRow)>,
 }
 
 impl<'a> Pictures<'a> {
-    fn of(manifest: &'a Manifest, shown: &'a [Showing]) -> Result<Self, ImportError> {
+    pub fn of(manifest: &'a Manifest, shown: &'a [Showing]) -> Result<Self, ImportError> {
         let rows = manifest.files.iter();
         let radiographs: HashMap<_, _> = rows
             .filter(|row| row.kind == FileKind::Radiograph)
@@ -209,7 +77,10 @@ impl<'a> Pictures<'a> {
     }
 
     /// The grades of several files: by reader, for each in the order of showing.
-    fn all_of(&self, files: &'a [PathBuf]) -> Result<Vec<Given<'a>>, ImportError> {
+    pub fn all_of<'f>(&self, files: &'f [PathBuf]) -> Result<Vec<Given<'f>>, ImportError>
+    where
+        'a: 'f,
+    {
         let mut all = Vec::new();
         for file in files {
             for grade in read_grades(file)? {
@@ -221,21 +92,22 @@ impl<'a> Pictures<'a> {
             let by_reader = a.grade.reader.cmp(&b.grade.reader);
             by_reader.then(a.place.cmp(&b.place))
         });
-        let mut times: HashMap<(&str, &str), (u32, &Path)> = HashMap::new();
+        let mut times: HashMap<(&str, &str), (u32, &Given)> = HashMap::new();
         let mut names = HashSet::new();
         for given in &all {
             let reader = given.grade.reader.as_str();
             let (times, first) = times
                 .entry((reader, &given.radiograph.file))
-                .or_insert((0, given.file));
+                .or_insert((0, given));
             *times += 1;
-            let by_name = given.place < usize::MAX;
-            let again = by_name && !names.insert((reader, given.grade.image.as_str()));
-            if again || *times > 2 || *first != given.file {
+            let again = given.by_name() && !names.insert((reader, given.grade.image.as_str()));
+            // The pages of one export show a picture and its repeat, each saved to a file of its own.
+            let elsewhere = first.file != given.file && !(first.by_name() && given.by_name());
+            if again || *times > 2 || elsewhere {
                 return Err(ImportError::Twice {
                     reader: reader.to_owned(),
                     image: given.grade.image.clone(),
-                    first: first.to_owned(),
+                    first: first.file.to_owned(),
                     second: given.file.to_owned(),
                 });
             }
@@ -243,10 +115,27 @@ impl<'a> Pictures<'a> {
         Ok(all)
     }
 
-    fn find(&self, grade: Grade, file: &'a Path) -> Result<Given<'a>, ImportError> {
+    fn find<'f>(&self, grade: Grade, file: &'f Path) -> Result<Given<'f>, ImportError>
+    where
+        'a: 'f,
+    {
         let found = self.shown.get(grade.image.as_str()).copied();
         let itself = || Some((usize::MAX, *self.radiographs.get(grade.image.as_str())?));
         match found.or_else(itself) {
+            Some((_, row))
+                if grade
+                    .sha256
+                    .as_ref()
+                    .is_some_and(|hash| *hash != row.sha256) =>
+            {
+                Err(ImportError::OtherRadiograph {
+                    path: file.to_owned(),
+                    reader: grade.reader,
+                    image: row.file.clone(),
+                    found: grade.sha256.unwrap_or_default(),
+                    expected: row.sha256.clone(),
+                })
+            }
             Some((place, radiograph)) => Ok(Given {
                 grade,
                 file,
@@ -271,27 +160,6 @@ fn read_grades(path: &Path) -> Result<Vec<Grade>, ImportError> {
             reader: wrong.reader.clone(),
             image: wrong.image.clone(),
             grade: wrong.grade,
-        }),
-    }
-}
-
-/// Refuses to write over grades that are not among those given.
-fn refuse_loss(path: &Path, given: &[Given]) -> Result<(), ImportError> {
-    if !path.try_exists().map_err(FileError::at("read", path))? {
-        return Ok(());
-    }
-    let given: HashSet<_> = given
-        .iter()
-        .map(|given| (&given.grade.reader, &given.radiograph.file))
-        .collect();
-    let before = read_grades(path)?;
-    let lost = |old: &&Grade| !given.contains(&(&old.reader, &old.image));
-    match before.iter().find(lost) {
-        None => Ok(()),
-        Some(lost) => Err(ImportError::Lost {
-            path: path.to_owned(),
-            reader: lost.reader.clone(),
-            image: lost.image.clone(),
         }),
     }
 }

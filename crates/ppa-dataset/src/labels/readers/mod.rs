@@ -1,9 +1,11 @@
 //! Labels of readers: what they are shown, and what becomes of their grades.
 
 mod grades;
+mod import;
 mod page;
 mod showing;
 
-pub use grades::{Grade, ImportError, Imported, import_grades};
-pub use page::{PageError, grading_page};
+pub use grades::Grade;
+pub use import::{ImportError, Imported, import_grades};
+pub use page::{PICTURES_PER_PAGE, PageError, PageNumber, grading_page};
 pub use showing::{Showing, read_key, write_key};

@@ -11,6 +11,9 @@ use serde::Serialize;
 use super::showing::Showing;
 use crate::files::FileError;
 
+/// Pictures on one page: radiographs of 448 x 448 pixels make about 30 MB, which any browser takes.
+pub const PICTURES_PER_PAGE: usize = 200;
+
 /// Why a page could not be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -38,6 +41,15 @@ struct Picture<'a> {
     png: String,
 }
 
+/// Which of several pages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PageNumber {
+    /// Counted from 1.
+    pub page: usize,
+    /// Their number.
+    pub of: usize,
+}
+
 /// A page of HTML that shows the radiographs one by one, takes a grade of each by key, and saves them as CSV with the
 /// columns image (the name of the showing), reader and grade.
 ///
@@ -46,7 +58,11 @@ struct Picture<'a> {
 ///
 /// # Errors
 /// [`PageError`] without radiographs, and naming one that cannot be read.
-pub fn grading_page(root: &Path, shown: &[Showing]) -> Result<String, PageError> {
+pub fn grading_page(
+    root: &Path,
+    shown: &[Showing],
+    number: PageNumber,
+) -> Result<String, PageError> {
     if shown.is_empty() {
         return Err(PageError::Empty);
     }
@@ -72,7 +88,9 @@ pub fn grading_page(root: &Path, shown: &[Showing]) -> Result<String, PageError>
     let (before, after) = include_str!("page.html")
         .split_once("/*PICTURES*/[]")
         .expect("the page has a place for its pictures");
-    Ok(format!("{before}[{}]{after}", pictures.join(",\n")))
+    let page = format!("{before}[{}]{after}", pictures.join(",\n"));
+    let PageNumber { page: n, of } = number;
+    Ok(page.replacen("/*PAGE*/[1, 1]", &format!("[{n}, {of}]"), 1))
 }
 
 fn format_picture(name: &str, png: &[u8]) -> String {
