@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use ppa_dataset::published::{Published, PublishedError};
 use ppa_dataset::{GenerateSettings, Plan, Summary, generate};
 use ppa_xray::Part;
 
@@ -59,6 +60,11 @@ pub fn run(args: &GenerateArgs, output: Output) -> anyhow::Result<()> {
     };
     let watch = args.progress.watch("poses", output);
     let summary = with_progress(&plan, &out, &settings, &watch)?;
+    if summary.made > 0
+        && let Err(outdated @ PublishedError::Outdated { .. }) = Published::read(&out)
+    {
+        eprintln!("{outdated}");
+    }
     output.print(&summary, |s| describe(s, &out))
 }
 

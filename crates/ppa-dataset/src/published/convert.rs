@@ -5,15 +5,13 @@ use std::fs;
 use std::path::Path;
 
 use serde::Serialize;
-use serde_json::{Map, Value, json};
 
 use super::specimen::{depth_file_name, flexion_folder, radiograph_name};
-use super::{DepthFile, Flexion, ImagePair, Label, Layout, Pose, Published};
+use super::{DepthFile, Flexion, ImagePair, Layout, Pose, Published, Unpaired};
 use crate::body_shape::BodyShape;
-use crate::files::{FileError, write_whole};
-use crate::labels::{LabelError, LabelFile, LabelRow, LabelSource};
+use crate::files::FileError;
+use crate::labels::LabelError;
 use crate::layout::{LimbId, View};
-use crate::manifest::{RoiFile, roi_text};
 use crate::whole_folder::write_whole_folder;
 
 /// Why a dataset cannot be converted.
@@ -39,14 +37,20 @@ pub enum ConvertError {
 }
 
 /// What was converted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Converted {
     /// Depth images in the new dataset.
     pub depth_images: usize,
     /// Radiographs in it.
     pub radiographs: usize,
+    /// Poses with a label in it.
+    pub labels: usize,
     /// Depth images that have no place in it: of other flexions, or later ones of a pose.
     pub left_out: usize,
+    /// Radiographs that have none: of other flexions, or of poses without depth images.
+    pub radiographs_left_out: usize,
+    /// Labels that have none, for the same reasons.
+    pub labels_left_out: usize,
 }
 
 /// Writes the dataset in the other layout, in the folder `to`, whole or not at all.
@@ -73,36 +77,56 @@ pub fn convert(from: &Published, to: &Path, flexion: Flexion) -> Result<Converte
         for moved in of_other_layout {
             limbs.entry(moved.pair.limb).or_default().push(moved);
         }
-        let mut converted = Converted {
-            depth_images: 0,
-            radiographs: 0,
-            left_out: 0,
-        };
+        let mut converted = Converted::default();
         for (&limb, moved) in &limbs {
             let copy = Copy { from, root, limb };
             converted.radiographs += copy.radiographs(moved)?;
             converted.depth_images += copy.depth_images(moved)?;
-            match from.layout {
+            converted.labels += match from.layout {
                 Layout::Synthetic => copy.specimen_lists(moved, flexion)?,
                 Layout::Specimen => copy.synthetic_lists(moved)?,
-            }
+            };
         }
-        let count = |pair: &ImagePair| {
-            View::ALL
-                .iter()
-                .filter(|&&v| pair.depth(v).is_some())
-                .count()
-        };
-        let all: usize = from.pairs.iter().map(count).sum();
-        converted.left_out = all - converted.depth_images;
+        let all = Converted::all_of(from);
+        converted.left_out = all.depth_images - converted.depth_images;
+        converted.radiographs_left_out = all.radiographs - converted.radiographs;
+        converted.labels_left_out = all.labels - converted.labels;
         Ok(converted)
     })
 }
 
+impl Converted {
+    /// What there is to convert.
+    fn all_of(from: &Published) -> Self {
+        let mut all = Self::default();
+        let (mut radiographs, mut labels) = (BTreeSet::new(), BTreeSet::new());
+        for pair in &from.pairs {
+            all.depth_images += depth_files(pair).count();
+            radiographs.extend(pair.radiograph.as_deref());
+            if pair.label.is_some() {
+                let pose = match pair.pose {
+                    Pose::Rotated { step, .. } => (None, step),
+                    Pose::Recorded {
+                        flexion,
+                        image_number,
+                        ..
+                    } => (Some(flexion), image_number),
+                };
+                labels.insert((pair.limb, pose));
+            }
+        }
+        let unpaired = |of: fn(&Unpaired) -> bool| from.unpaired.iter().filter(|u| of(u)).count();
+        all.radiographs =
+            radiographs.len() + unpaired(|u| matches!(u, Unpaired::Radiograph { .. }));
+        all.labels = labels.len() + unpaired(|u| matches!(u, Unpaired::Label { .. }));
+        all
+    }
+}
+
 /// A pair and its pose in the other layout.
-struct Moved<'a> {
-    pair: &'a ImagePair,
-    pose: Pose,
+pub(super) struct Moved<'a> {
+    pub pair: &'a ImagePair,
+    pub pose: Pose,
 }
 
 fn recorded(pairs: &[ImagePair], flexion: Flexion) -> Vec<Moved<'_>> {
@@ -168,10 +192,10 @@ fn rotated(from: &Published, wanted: Flexion) -> Result<Vec<Moved<'_>>, ConvertE
 }
 
 /// One limb on its way to the new dataset.
-struct Copy<'a> {
-    from: &'a Published,
-    root: &'a Path,
-    limb: LimbId,
+pub(super) struct Copy<'a> {
+    pub from: &'a Published,
+    pub root: &'a Path,
+    pub limb: LimbId,
 }
 
 impl Copy<'_> {
@@ -229,106 +253,10 @@ impl Copy<'_> {
         }
         Ok(copied)
     }
-
-    fn specimen_lists(&self, moved: &[Moved], filled: Flexion) -> Result<(), FileError> {
-        let (mut labels, mut rois) = (Map::new(), Map::new());
-        for Moved { pair, pose } in moved {
-            let Pose::Recorded {
-                image_number,
-                timestamp,
-                ..
-            } = *pose
-            else {
-                continue;
-            };
-            if let Some(label) = &pair.label {
-                labels.insert(
-                    radiograph_name(image_number),
-                    label_entry(label, image_number),
-                );
-            }
-            for (view, depth) in depth_files(pair) {
-                if let Some(roi) = &depth.roi {
-                    let roi = serde_json::to_value(roi).expect("regions hold only JSON values");
-                    rois.insert(depth_file_name(view, image_number, timestamp), roi);
-                }
-            }
-        }
-        for flexion in Flexion::ALL {
-            let folder = self
-                .root
-                .join(flexion_folder(self.limb, flexion))
-                .join("label");
-            for (list, entries) in [
-                ("quality/labels.json", &labels),
-                ("roi/roi_depth.json", &rois),
-            ] {
-                let entries = if flexion == filled {
-                    entries.clone()
-                } else {
-                    Map::new()
-                };
-                write_whole(
-                    &folder.join(list),
-                    format!("{:#}", Value::Object(entries)).as_bytes(),
-                )?;
-            }
-        }
-        Ok(())
-    }
-
-    fn synthetic_lists(&self, moved: &[Moved]) -> Result<(), ConvertError> {
-        let (mut labels, mut rois) = (BTreeMap::new(), RoiFile::new());
-        let mut source = None;
-        for Moved { pair, pose } in moved {
-            let Pose::Rotated { step, .. } = *pose else {
-                continue;
-            };
-            if let Some(Label {
-                label,
-                std,
-                source: by,
-            }) = pair.label
-            {
-                source = by;
-                labels.insert(step, LabelRow { label, std, step });
-            }
-            for (view, depth) in depth_files(pair) {
-                if let Some(roi) = &depth.roi {
-                    rois.insert(LimbId::depth_name(view, step), roi.clone());
-                }
-            }
-        }
-        if !rois.is_empty() {
-            write_whole(
-                &self.root.join(self.limb.roi_file()),
-                roi_text(&rois).as_bytes(),
-            )?;
-        }
-        if labels.is_empty() {
-            return Ok(());
-        }
-        let file = LabelFile::new(LabelSource::Readers, labels.into_values());
-        let mut file = file.map_err(|source| ConvertError::Label {
-            patient: self.limb.patient,
-            side: self.limb.side_letter(),
-            source,
-        })?;
-        file.source = source;
-        Ok(file.write(self.root, self.limb)?)
-    }
 }
 
-fn depth_files(pair: &ImagePair) -> impl Iterator<Item = (View, &DepthFile)> {
+pub(super) fn depth_files(pair: &ImagePair) -> impl Iterator<Item = (View, &DepthFile)> {
     View::ALL
         .into_iter()
         .filter_map(|view| Some((view, pair.depth(view)?)))
-}
-
-fn label_entry(label: &Label, image_number: u32) -> Value {
-    let mut entry = json!({"label": label.label, "std": label.std, "image_number": image_number});
-    if let Some(source) = label.source {
-        entry["label_source"] = json!(source);
-    }
-    entry
 }

@@ -50,6 +50,20 @@ pub enum PublishedError {
         /// The angle in its name.
         angle: String,
     },
+    /// Labels of radiographs that were made anew since.
+    #[error(
+        "{}: {count} labels, the first of step {step}, were given to other radiographs than those there now; make them again \
+         (`ppa label auto` or `ppa label import`) or remove the file",
+        path.display()
+    )]
+    Outdated {
+        /// `labels.json` of the limb.
+        path: PathBuf,
+        /// Half degrees of rotation of the first of them.
+        step: u32,
+        /// Their number.
+        count: usize,
+    },
     /// An entry of a JSON file that cannot be.
     #[error("{}, entry {key:?}: {message}", path.display())]
     Entry {

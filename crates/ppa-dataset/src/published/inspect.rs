@@ -7,65 +7,12 @@ use rayon::prelude::*;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use super::{GrayImage16, ImageFileError, Published, PublishedError};
+use super::against_lists::{against_lists, told};
+use super::convert::depth_files;
+use super::{Flaw, GrayImage16, ImageFileError, Published, PublishedError, Unpaired};
 use crate::files::{FileError, hex};
 use crate::layout::View;
-use crate::manifest::{FileKind, Manifest, RoiRow};
-
-/// Something in a dataset that a training program would stumble over, or never notice.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Flaw {
-    /// An image that is missing, damaged, or of other pixels.
-    #[error("{0}")]
-    Image(String),
-    /// A region that reaches beyond its image.
-    #[error(
-        "{file} has {width} x {height} pixels, its region reaches to column {} and row {}",
-        roi.x_start.saturating_add(roi.size), roi.y_start.saturating_add(roi.size)
-    )]
-    RoiOutside {
-        /// The depth image.
-        file: String,
-        /// Its columns.
-        width: u32,
-        /// Its rows.
-        height: u32,
-        /// Its region.
-        roi: RoiRow,
-    },
-    /// A pose that only one camera saw.
-    #[error("{file} has no counterpart of the other camera")]
-    OneCamera {
-        /// The only depth image.
-        file: String,
-    },
-    /// Two persons with one image: one of them is the other, or a copy.
-    #[error("{first} and {second} are the same image, but of different persons")]
-    SameImage {
-        /// An image.
-        first: String,
-        /// The image of another person.
-        second: String,
-    },
-    /// An image that is not the one in `manifest.jsonl`.
-    #[error("{file} is altered: its hash is not that in manifest.jsonl")]
-    Altered {
-        /// The image.
-        file: String,
-    },
-    /// An image without a row, or a row without an image.
-    #[error("{file} stands {where}")]
-    Unlisted {
-        /// The image.
-        file: String,
-        /// In which of both.
-        r#where: &'static str,
-    },
-    /// The manifest as a whole.
-    #[error("{0}")]
-    Manifest(String),
-}
+use crate::manifest::{Manifest, RoiRow};
 
 /// What [`inspect`] found.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -92,22 +39,33 @@ pub struct Inspection {
 }
 
 /// Reads the dataset in `root` in either layout, decodes all PNG files, and compares them with regions of interest, with each
-/// other and, where there is one, with `manifest.jsonl`. Changes nothing.
+/// other and, where they are there, with `manifest.jsonl` (tallies too) and `dataset.json`. Changes nothing.
 ///
 /// # Errors
 /// [`PublishedError`] for what fits no layout; single images are told as [`Flaw`]s.
 pub fn inspect(root: &Path) -> Result<Inspection, PublishedError> {
-    let dataset = Published::read(root)?;
-    let mut flaws = Vec::new();
+    let dataset = Published::list(root)?;
+    let unpaired = dataset.unpaired.iter().cloned();
+    let mut flaws: Vec<_> = unpaired.map(Flaw::Unpaired).collect();
     let mut images: Vec<(&str, u32, Option<&RoiRow>)> = Vec::new();
     let (mut regions, mut depth_images) = (0, 0);
     let mut radiographs = BTreeSet::new();
+    let seen: BTreeSet<_> = dataset
+        .pairs
+        .iter()
+        .flat_map(|pair| depth_files(pair).map(|(view, _)| (pair.limb, view)))
+        .collect();
     for pair in &dataset.pairs {
         let views: Vec<_> = View::ALL
             .into_iter()
             .filter_map(|view| pair.depth(view))
             .collect();
-        if let [only] = views[..] {
+        // A whole camera may be missing.
+        if let [only] = views[..]
+            && View::ALL
+                .iter()
+                .all(|view| seen.contains(&(pair.limb, *view)))
+        {
             let file = only.file.clone();
             flaws.push(Flaw::OneCamera { file });
         }
@@ -120,6 +78,13 @@ pub fn inspect(root: &Path) -> Result<Inspection, PublishedError> {
             && radiographs.insert(file.as_str())
         {
             images.push((file, pair.limb.patient, None));
+        }
+    }
+    for unpaired in &dataset.unpaired {
+        if let Unpaired::Radiograph { patient, file } = unpaired
+            && radiographs.insert(file)
+        {
+            images.push((file, *patient, None));
         }
     }
     let looked_at = images
@@ -139,10 +104,7 @@ pub fn inspect(root: &Path) -> Result<Inspection, PublishedError> {
         }
         hashes.insert(*file, hash);
     }
-    let manifest = root.join(Manifest::FILE).exists();
-    if manifest {
-        flaws.extend(against_manifest(root, &hashes));
-    }
+    flaws.extend(against_lists(&dataset, hashes));
     let mut limbs: Vec<_> = dataset.pairs.iter().map(|pair| pair.limb).collect();
     limbs.dedup();
     Ok(Inspection {
@@ -157,7 +119,7 @@ pub fn inspect(root: &Path) -> Result<Inspection, PublishedError> {
             .iter()
             .filter(|pair| pair.label.is_some())
             .count(),
-        manifest,
+        manifest: root.join(Manifest::FILE).exists(),
         flaws,
     })
 }
@@ -167,11 +129,11 @@ fn look(root: &Path, file: &str, roi: Option<&RoiRow>) -> (Option<String>, Optio
     let path = root.join(file);
     let bytes = match std::fs::read(&path).map_err(FileError::at("read", &path)) {
         Ok(bytes) => bytes,
-        Err(error) => return (None, Some(told(&error.into()))),
+        Err(error) => return (None, Some(damaged(&error.into()))),
     };
     let hash = Some(hex(&Sha256::digest(&bytes)));
     match GrayImage16::decode(&bytes, &path) {
-        Err(error) => (hash, Some(told(&error))),
+        Err(error) => (hash, Some(damaged(&error))),
         Ok(image) => {
             let beyond = |roi: &&RoiRow| {
                 roi.x_start.saturating_add(roi.size) > image.width
@@ -188,56 +150,6 @@ fn look(root: &Path, file: &str, roi: Option<&RoiRow>) -> (Option<String>, Optio
     }
 }
 
-/// An error with its causes in one line.
-fn told(error: &ImageFileError) -> Flaw {
-    let mut text = error.to_string();
-    let mut cause = std::error::Error::source(error);
-    while let Some(source) = cause {
-        text += &format!(": {source}");
-        cause = source.source();
-    }
-    Flaw::Image(text)
-}
-
-fn against_manifest(root: &Path, hashes: &BTreeMap<&str, String>) -> Vec<Flaw> {
-    let manifest = match Manifest::read(root) {
-        Ok(manifest) => manifest,
-        Err(error) => {
-            let cause = std::error::Error::source(&error);
-            let cause = cause.map(|cause| format!(": {cause}")).unwrap_or_default();
-            return vec![Flaw::Manifest(format!("{error}{cause}"))];
-        }
-    };
-    let mut flaws = Vec::new();
-    let mut listed = BTreeSet::new();
-    for row in manifest
-        .files
-        .iter()
-        .filter(|row| row.kind != FileKind::RadiographTallies)
-    {
-        let file = row.file.clone();
-        if !listed.insert(row.file.as_str()) {
-            flaws.push(Flaw::Unlisted {
-                file,
-                r#where: "twice in manifest.jsonl",
-            });
-            continue;
-        }
-        match hashes.get(row.file.as_str()) {
-            None => flaws.push(Flaw::Unlisted {
-                file,
-                r#where: "in manifest.jsonl, but is not there",
-            }),
-            Some(hash) if *hash != row.sha256 => flaws.push(Flaw::Altered { file }),
-            Some(_) => {}
-        }
-    }
-    for file in hashes.keys().filter(|file| !listed.contains(*file)) {
-        let file = (*file).to_owned();
-        flaws.push(Flaw::Unlisted {
-            file,
-            r#where: "not in manifest.jsonl",
-        });
-    }
-    flaws
+fn damaged(error: &ImageFileError) -> Flaw {
+    Flaw::Image(told(error))
 }

@@ -12,14 +12,19 @@
 //!
 //! [`Published::read`] looks at names and JSON files; [`GrayImage16::read`] decodes an image.
 
+mod against_lists;
 mod convert;
+mod converted_lists;
 mod entries;
 mod error;
+mod flaw;
 mod folders;
 mod gray16;
 mod inspect;
+mod outdated;
 mod specimen;
 mod synthetic;
+mod unpaired;
 
 use std::path::{Path, PathBuf};
 
@@ -27,12 +32,14 @@ use serde::{Deserialize, Serialize};
 
 pub use self::convert::{ConvertError, Converted, convert};
 pub use self::error::PublishedError;
+pub use self::flaw::Flaw;
 pub use self::gray16::{GrayImage16, ImageFileError};
-pub use self::inspect::{Flaw, Inspection, inspect};
+pub use self::inspect::{Inspection, inspect};
+pub use self::unpaired::Unpaired;
 use crate::body_shape::BodyShape;
-use crate::labels::LabelSource;
+use crate::labels::{LabelFile, LabelSource};
 use crate::layout::{LimbId, View};
-use crate::manifest::RoiRow;
+use crate::manifest::{Manifest, RoiRow};
 
 /// Which of the published layouts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -157,31 +164,60 @@ pub struct Published {
     pub layout: Layout,
     /// By person, side and pose.
     pub pairs: Vec<ImagePair>,
+    /// What else is there: of poses without depth images.
+    pub unpaired: Vec<Unpaired>,
 }
+
+/// What was found of a person or limb.
+type Found = (Vec<ImagePair>, Vec<Unpaired>);
 
 impl Published {
     /// Lists the dataset in `root` without decoding its images.
     ///
     /// # Errors
-    /// [`PublishedError`] naming the first file or entry that fits neither layout.
+    /// [`PublishedError`] naming the first file or entry that fits neither layout, or labels of radiographs that were made
+    /// anew since.
     pub fn read(root: &Path) -> Result<Self, PublishedError> {
+        let dataset = Self::list(root)?;
+        let found = outdated::outdated(&dataset, || {
+            // Without a manifest the dataset is not finished, or not ours.
+            match root.join(Manifest::FILE).exists() {
+                true => Ok(Manifest::read(root)?),
+                false => Ok(Manifest::default()),
+            }
+        })?;
+        match found.first() {
+            None => Ok(dataset),
+            Some(outdated) => Err(PublishedError::Outdated {
+                path: LabelFile::path(root, outdated.limb),
+                step: outdated.steps[0],
+                count: outdated.steps.len(),
+            }),
+        }
+    }
+
+    /// As [`Published::read`], labels that no longer belong to their radiographs included.
+    pub(crate) fn list(root: &Path) -> Result<Self, PublishedError> {
         let subjects = folders::subjects(root)?;
-        let mut pairs = Vec::new();
+        let (mut pairs, mut unpaired) = (Vec::new(), Vec::new());
         for subject in &subjects.folders {
             let patient = subject.patient;
-            pairs.extend(match subject.side {
+            let found = match subject.side {
                 None => synthetic::read(root, patient)?,
                 Some(side) => {
                     let folder = folders::Folder::new(root, &subject.name);
                     specimen::read(&folder, LimbId { patient, side })?
                 }
-            });
+            };
+            pairs.extend(found.0);
+            unpaired.extend(found.1);
         }
         pairs.sort_by_key(|pair| (pair.limb, pair.pose));
         Ok(Self {
             root: root.to_owned(),
             layout: subjects.layout,
             pairs,
+            unpaired,
         })
     }
 

@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::folders::{Folder, digits};
-use super::{DepthFile, Flexion, ImagePair, Pose, PublishedError, entries};
+use super::unpaired::Seen;
+use super::{DepthFile, Flexion, Found, ImagePair, Pose, PublishedError, Unpaired, entries};
 use crate::layout::{LimbId, View};
 
 /// The folder of one flexion of a limb.
@@ -12,9 +13,9 @@ pub(super) fn flexion_folder(limb: LimbId, flexion: Flexion) -> String {
     format!("patient_{patient}_{side}/{}/data/dataset", flexion.name())
 }
 
-/// All image pairs of one limb.
-pub(super) fn read(limb_folder: &Folder, limb: LimbId) -> Result<Vec<ImagePair>, PublishedError> {
-    let mut pairs = Vec::new();
+/// All image pairs of one limb, and what else there is.
+pub(super) fn read(limb_folder: &Folder, limb: LimbId) -> Result<Found, PublishedError> {
+    let mut found = Found::default();
     for name in limb_folder.folders()? {
         let folder = limb_folder.below(&name);
         let flexion = Flexion::ALL
@@ -24,20 +25,15 @@ pub(super) fn read(limb_folder: &Folder, limb: LimbId) -> Result<Vec<ImagePair>,
             path: folder.path.clone(),
             expected: "min, medium or max",
         })?;
-        pairs.extend(read_flexion(
-            &folder.below("data").below("dataset"),
-            limb,
-            flexion,
-        )?);
+        let dataset = folder.below("data").below("dataset");
+        let (pairs, unpaired) = read_flexion(&dataset, limb, flexion)?;
+        found.0.extend(pairs);
+        found.1.extend(unpaired);
     }
-    Ok(pairs)
+    Ok(found)
 }
 
-fn read_flexion(
-    dataset: &Folder,
-    limb: LimbId,
-    flexion: Flexion,
-) -> Result<Vec<ImagePair>, PublishedError> {
+fn read_flexion(dataset: &Folder, limb: LimbId, flexion: Flexion) -> Result<Found, PublishedError> {
     let lists = dataset.below("label");
     let labels = lists.path.join("quality").join("labels.json");
     let labels = entries::labels(&labels, number_of_radiograph)?;
@@ -74,7 +70,21 @@ fn read_flexion(
             roi: rois.get(&(view, image_number)).cloned(),
         });
     }
-    Ok(pairs.into_values().collect())
+    let pairs: Vec<_> = pairs.into_values().collect();
+    let seen = Seen::of(&pairs);
+    let mut unpaired = Vec::new();
+    for &number in radiographs.difference(&seen.poses) {
+        let file = format!("{}/{}", xray.name, radiograph_name(number));
+        let patient = limb.patient;
+        unpaired.push(Unpaired::Radiograph { patient, file });
+    }
+    for &pose in labels.keys().filter(|pose| !seen.poses.contains(pose)) {
+        let list = format!("{}/quality/labels.json", lists.name);
+        unpaired.push(Unpaired::Label { list, pose });
+    }
+    let list = format!("{}/roi/roi_depth.json", lists.name);
+    unpaired.extend(seen.regions_of_none(&list, rois.keys()));
+    Ok((pairs, unpaired))
 }
 
 fn radiographs(folder: &Folder) -> Result<BTreeSet<u32>, PublishedError> {

@@ -4,15 +4,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::folders::{Folder, digits};
-use super::{DepthFile, ImagePair, Label, Pose, PublishedError, entries};
+use super::unpaired::Seen;
+use super::{DepthFile, Found, ImagePair, Label, Pose, PublishedError, Unpaired, entries};
 use crate::body_shape::BodyShape;
 use crate::labels::LabelFile;
 use crate::layout::{LimbId, Side, View, angle_text};
 
-/// All image pairs of one person.
-pub(super) fn read(root: &Path, patient: u32) -> Result<Vec<ImagePair>, PublishedError> {
+/// All image pairs of one person, and what else there is.
+pub(super) fn read(root: &Path, patient: u32) -> Result<Found, PublishedError> {
     let person = Folder::new(root, &format!("patient_{patient}"));
-    let mut pairs = Vec::new();
+    let mut found = Found::default();
     for kind in ["depth", "xray", "labels"] {
         for name in person.below(kind).folders()? {
             if !Side::ALL.iter().any(|side| side.letter() == name) {
@@ -24,12 +25,14 @@ pub(super) fn read(root: &Path, patient: u32) -> Result<Vec<ImagePair>, Publishe
         }
     }
     for side in Side::ALL {
-        pairs.extend(read_limb(root, &person, LimbId { patient, side })?);
+        let (pairs, unpaired) = read_limb(root, &person, LimbId { patient, side })?;
+        found.0.extend(pairs);
+        found.1.extend(unpaired);
     }
-    Ok(pairs)
+    Ok(found)
 }
 
-fn read_limb(root: &Path, person: &Folder, limb: LimbId) -> Result<Vec<ImagePair>, PublishedError> {
+fn read_limb(root: &Path, person: &Folder, limb: LimbId) -> Result<Found, PublishedError> {
     let of_kind = |kind| person.below(kind).below(limb.side_letter());
     let lists = of_kind("labels");
     let labels = LabelFile::read(root, limb)?;
@@ -74,7 +77,23 @@ fn read_limb(root: &Path, person: &Folder, limb: LimbId) -> Result<Vec<ImagePair
             });
         }
     }
-    Ok(pairs.into_values().collect())
+    let pairs: Vec<_> = pairs.into_values().collect();
+    let seen = Seen::of(&pairs);
+    let mut unpaired = Vec::new();
+    for &step in radiographs.difference(&seen.poses) {
+        let (patient, file) = (limb.patient, limb.radiograph_png(step));
+        unpaired.push(Unpaired::Radiograph { patient, file });
+    }
+    let list = |name: &str| format!("{}/{name}", lists.name);
+    let labels = labels.iter().flat_map(LabelFile::labels);
+    for pose in labels.map(|row| row.step) {
+        if !seen.poses.contains(&pose) {
+            let list = list("labels.json");
+            unpaired.push(Unpaired::Label { list, pose });
+        }
+    }
+    unpaired.extend(seen.regions_of_none(&list("roi_depth.json"), rois.keys()));
+    Ok((pairs, unpaired))
 }
 
 fn label(labels: &LabelFile, step: u32) -> Option<Label> {

@@ -45,7 +45,8 @@ fn a_synthetic_dataset_comes_back_from_the_specimen_layout_as_it_was() {
     let expected = Converted {
         depth_images: 24,
         radiographs: 4,
-        left_out: 0,
+        labels: 4,
+        ..Converted::default()
     };
     assert_eq!(done, expected);
     let read = Published::read(&specimen).unwrap();
@@ -61,6 +62,8 @@ fn a_synthetic_dataset_comes_back_from_the_specimen_layout_as_it_was() {
 #[test]
 fn the_earliest_image_of_each_recorded_pose_is_taken() {
     let tree = Tree::specimen();
+    // Of a pose that no camera saw.
+    tree.image("patient_1_l/max/data/dataset/xray/xray_7.png", 9000);
     let folder = tempfile::tempdir().unwrap();
     let to = folder.path().join("synthetic");
     let done = convert(&Published::read(tree.root()).unwrap(), &to, Flexion::Max).unwrap();
@@ -68,7 +71,10 @@ fn the_earliest_image_of_each_recorded_pose_is_taken() {
     let expected = Converted {
         depth_images: 12,
         radiographs: 6,
+        labels: 6,
         left_out: 60,
+        radiographs_left_out: 13,
+        labels_left_out: 12,
     };
     assert_eq!(done, expected);
     let read = Published::read(&to).unwrap();

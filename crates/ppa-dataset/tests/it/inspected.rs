@@ -2,7 +2,8 @@
 
 use std::fs;
 
-use ppa_dataset::published::{Flaw, inspect};
+use ppa_dataset::published::{Flaw, Published, inspect};
+use ppa_dataset::sha256_of_file;
 
 use crate::trees::Tree;
 
@@ -72,4 +73,119 @@ fn each_flaw_is_told_with_its_file() {
             .any(|flaw| flaw.contains(file) && flaw.contains(expected));
         assert!(told, "{expected:?} is missing in {said:?}");
     }
+}
+
+/// The layout allows that a camera is missing; it is then missing in each pose.
+#[test]
+fn a_limb_that_one_camera_saw_alone_is_no_flaw() {
+    let tree = Tree::synthetic();
+    for step in ["45.5", "90.0"] {
+        for shape in ["orig", "big"] {
+            let file = format!("patient_12/depth/r/{shape}/depth_cam_right_{step}.png");
+            fs::remove_file(tree.path(&file)).unwrap();
+        }
+    }
+    assert_eq!(flaws(&tree), [""; 0]);
+}
+
+#[test]
+fn what_belongs_to_no_depth_image_is_told_and_its_radiograph_looked_at() {
+    let tree = Tree::synthetic();
+    for camera in ["left", "right"] {
+        for shape in ["orig", "big"] {
+            let file = format!("patient_0/depth/r/{shape}/depth_cam_{camera}_90.0.png");
+            fs::remove_file(tree.path(&file)).unwrap();
+        }
+    }
+    let radiograph = "patient_0/xray/r/xray_image_180.png";
+    assert_eq!(
+        flaws(&tree),
+        [
+            format!("{radiograph} is of a pose without depth images"),
+            "patient_0/labels/r/labels.json has a label of pose 180, which has no depth image".to_owned(),
+            "patient_0/labels/r/roi_depth.json has a region of pose 180 for cam_left, which has no depth image of it".to_owned(),
+            "patient_0/labels/r/roi_depth.json has a region of pose 180 for cam_right, which has no depth image of it".to_owned(),
+        ]
+    );
+    fs::write(tree.path(radiograph), "no picture").unwrap();
+    let told = flaws(&tree);
+    let damaged = |flaw: &String| flaw.contains(radiograph) && flaw.contains("not a whole PNG");
+    assert!(told.iter().any(damaged), "{told:?}");
+
+    let tree = Tree::specimen();
+    let folder = "patient_1_r/max/data/dataset";
+    for camera in ["left", "right"] {
+        let file = format!("{folder}/depth/depth_cam_{camera}_orig_0_1000.png");
+        fs::remove_file(tree.path(&file)).unwrap();
+    }
+    let told = flaws(&tree);
+    assert_eq!(told.len(), 4, "{told:?}");
+    let expected = format!("{folder}/xray/xray_0.png is of a pose without depth images");
+    assert_eq!(told[0], expected);
+}
+
+#[test]
+fn tallies_scans_and_labels_are_compared_with_the_lists() {
+    let tree = Tree::generated();
+    assert_eq!(flaws(&tree), unlisted(&tree));
+    let tallies = "patient_0/xray/r/xray_image_91.exr";
+    fs::write(tree.path(tallies), "others").unwrap();
+    let said = flaws(&tree);
+    let altered = |flaw: &String| flaw.starts_with(&format!("{tallies} is altered: its hash is "));
+    assert!(said.iter().any(altered), "{said:?}");
+    fs::remove_file(tree.path(tallies)).unwrap();
+    let missing = format!("{tallies} stands in manifest.jsonl, but is not there");
+    assert!(flaws(&tree).contains(&missing));
+
+    let tree = Tree::generated();
+    let [first, second] = [0, 12].map(|patient| format!("\"{patient:064}\""));
+    tree.edit("dataset.json", &second, &first);
+    let same = "patients 0 and 12 come from the same scan, as dataset.json tells";
+    assert!(flaws(&tree).contains(&same.to_owned()));
+
+    // A label tells which radiograph it was given to.
+    let tree = Tree::generated();
+    let labels = "patient_0/labels/r/labels.json";
+    let hash = sha256_of_file(&tree.path("patient_0/xray/r/xray_image_91.png")).unwrap();
+    let bound = |hash: &str| format!("\"radiograph_sha256\": \"{hash}\", \"step\": 91");
+    tree.edit(labels, "\"step\": 91", &bound(&hash));
+    assert_eq!(flaws(&tree), unlisted(&tree));
+    Published::read(tree.root()).unwrap();
+    tree.edit(labels, &bound(&hash), &bound("0123"));
+    let outdated = "1 labels, the first of step 91, were given to other radiographs";
+    assert!(flaws(&tree).iter().any(|flaw| flaw.contains(outdated)));
+    let refused = Published::read(tree.root()).unwrap_err().to_string();
+    assert!(
+        refused.contains(labels) && refused.contains(outdated),
+        "{refused}"
+    );
+    fs::remove_file(tree.path("manifest.jsonl")).unwrap();
+    let refused = Published::read(tree.root()).unwrap_err().to_string();
+    assert!(refused.contains(outdated), "{refused}");
+}
+
+/// The manifest of [`Tree::generated`] lists only some of its images.
+fn unlisted(tree: &Tree) -> Vec<String> {
+    let manifest = fs::read_to_string(tree.path("manifest.jsonl")).unwrap();
+    let dataset = Published::read(tree.root()).unwrap();
+    let mut files: Vec<_> = dataset
+        .pairs
+        .iter()
+        .flat_map(|pair| [&pair.left, &pair.right])
+        .flatten()
+        .map(|depth| depth.file.clone())
+        .chain(
+            dataset
+                .pairs
+                .iter()
+                .filter_map(|pair| pair.radiograph.clone()),
+        )
+        .filter(|file| !manifest.contains(file.as_str()))
+        .collect();
+    files.sort();
+    files.dedup();
+    let told = files
+        .iter()
+        .map(|file| format!("{file} stands not in manifest.jsonl"));
+    told.collect()
 }

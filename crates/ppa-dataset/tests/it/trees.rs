@@ -4,7 +4,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use image::{ImageBuffer, Luma};
+use ppa_dataset::sha256_of_file;
 use serde_json::{Map, Value, json};
+
+pub const POSE: [[f64; 4]; 4] = [
+    [1.0, 0.0, 0.0, 0.1 + 0.2],
+    [0.0, 1.0, 0.0, -7.25],
+    [0.0, 0.0, 1.0, 1e-17],
+    [0.0, 0.0, 0.0, 1.0],
+];
 
 /// A dataset in a temporary folder.
 pub struct Tree(tempfile::TempDir);
@@ -84,6 +92,63 @@ impl Tree {
                 tree.json(&format!("{folder}/label/roi/roi_depth.json"), rois);
             }
         }
+        tree
+    }
+
+    /// The synthetic tree with the lists that `ppa generate` writes, as far as exports look at them.
+    pub fn generated() -> Self {
+        let tree = Self::synthetic();
+        fs::write(tree.path("patient_0/xray/r/xray_image_91.exr"), "tallies").unwrap();
+        let mut rows = String::new();
+        for (file, camera) in [
+            (
+                "patient_0/depth/r/big/depth_cam_left_45.5.png",
+                Some("cam_left"),
+            ),
+            ("patient_0/xray/r/xray_image_91.png", None),
+            (
+                "patient_12/depth/r/orig/depth_cam_right_90.0.png",
+                Some("cam_right"),
+            ),
+            ("patient_0/xray/r/xray_image_91.exr", None),
+        ] {
+            let (patient, step) = if file.contains("12") {
+                (12, 180)
+            } else {
+                (0, 91)
+            };
+            let kind = match camera {
+                Some(_) => "depth",
+                None if file.ends_with(".exr") => "radiograph_tallies",
+                None => "radiograph",
+            };
+            let mut row = json!({
+                "file": file, "sha256": sha256_of_file(&tree.path(file)).unwrap(),
+                "kind": kind, "patient": patient, "side": "r",
+                "step": step, "angle_deg": f64::from(step) / 2.0, "shape": if file.contains("big") { "big" } else { "orig" },
+                "patient_from_ct": POSE, "room_from_patient": POSE,
+            });
+            match camera {
+                Some(camera) => row["camera"] = json!(camera),
+                None => {
+                    row["ct_from_device"] = json!(POSE);
+                    row["seed"] = json!(u64::MAX - 1);
+                }
+            }
+            rows += &format!("{row}\n");
+        }
+        fs::write(tree.path("manifest.jsonl"), rows).unwrap();
+        let camera = |view| json!({"view": view, "intrinsics": {"fx": 504.25, "width": 12}, "room_from_camera": POSE});
+        let limb = |patient: u32| json!({"patient": patient, "side": "r", "volume_sha256": format!("{patient:064}")});
+        let engine = json!({"dose_histories": 2e10, "scatter_histories": 320_000});
+        let description = json!({
+            "settings": {"generator": "ppa 0.1.0", "code": "0123", "xray": {"engine": engine}},
+            "cameras": [camera("cam_left"), camera("cam_right")], "limbs": [limb(0), limb(12)],
+        });
+        fs::write(tree.path("dataset.json"), description.to_string()).unwrap();
+        fs::create_dir(tree.path("splits")).unwrap();
+        let split = json!({"version": 1, "parts": {"train": [12], "test": [0]}});
+        fs::write(tree.path("splits/mine.json"), split.to_string()).unwrap();
         tree
     }
 

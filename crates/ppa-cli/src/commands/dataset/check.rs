@@ -14,7 +14,8 @@ use crate::output::{Output, working};
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
 Every PNG is decoded and compared with its region of interest, with the images of other persons and, where there is one, with \
-manifest.jsonl. Splits are those in the dataset's folder splits: each person in exactly one part.
+manifest.jsonl, as are tallies. Labels must be those of the radiographs that are there now; scans may not stand under two patients; \
+radiographs, labels and regions of poses without depth images are told. Splits are those in the dataset's folder splits: each person in exactly one part.
 
 `ppa verify` makes a sample again and compares; this command needs no plan and takes datasets of others as well.")]
 pub struct CheckArgs {

@@ -48,11 +48,14 @@ pub fn run(args: &ConvertArgs, output: Output) -> anyhow::Result<()> {
             Layout::Specimen => "synthetic",
         };
         format!(
-            "{}: {} depth images and {} radiographs in the {layout} layout, {} depth images left out",
+            "{}: {} depth images, {} radiographs and {} labels in the {layout} layout; left out: {} depth images, {} radiographs, {} labels",
             args.out.display(),
             done.depth_images,
             done.radiographs,
-            done.left_out
+            done.labels,
+            done.left_out,
+            done.radiographs_left_out,
+            done.labels_left_out
         )
     })
 }

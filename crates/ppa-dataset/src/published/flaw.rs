@@ -1,0 +1,87 @@
+//! What may be wrong with a dataset that fits its layout.
+
+use super::Unpaired;
+use crate::layout::LimbId;
+use crate::manifest::RoiRow;
+
+/// Something in a dataset that a training program would stumble over, or never notice.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Flaw {
+    /// An image that is missing, damaged, or of other pixels.
+    #[error("{0}")]
+    Image(String),
+    /// A region that reaches beyond its image.
+    #[error(
+        "{file} has {width} x {height} pixels, its region reaches to column {} and row {}",
+        roi.x_start.saturating_add(roi.size), roi.y_start.saturating_add(roi.size)
+    )]
+    RoiOutside {
+        /// The depth image.
+        file: String,
+        /// Its columns.
+        width: u32,
+        /// Its rows.
+        height: u32,
+        /// Its region.
+        roi: RoiRow,
+    },
+    /// A pose that only one camera saw, of a limb that both did.
+    #[error("{file} has no counterpart of the other camera")]
+    OneCamera {
+        /// The only depth image.
+        file: String,
+    },
+    /// Two persons with one image: one of them is the other, or a copy.
+    #[error("{first} and {second} are the same image, but of different persons")]
+    SameImage {
+        /// An image.
+        first: String,
+        /// The image of another person.
+        second: String,
+    },
+    /// Two persons with one scan: they are one person.
+    #[error("patients {} and {} come from the same scan, as dataset.json tells", patients[0], patients[1])]
+    SameScan {
+        /// Their numbers.
+        patients: [u32; 2],
+    },
+    /// What no image pair tells of.
+    #[error("{0}")]
+    Unpaired(Unpaired),
+    /// Labels of radiographs that were made anew since.
+    #[error("limb {} of patient {}: {count} labels, the first of step {step}, were given to other radiographs than those there now",
+        limb.side_letter(), limb.patient)]
+    Outdated {
+        /// The limb.
+        limb: LimbId,
+        /// Half degrees of rotation of the first of them.
+        step: u32,
+        /// Their number.
+        count: usize,
+    },
+    /// An image that is not the one in `manifest.jsonl`.
+    #[error("{file} is altered: its hash is {found}, that in manifest.jsonl {expected}")]
+    Altered {
+        /// The image.
+        file: String,
+        /// Its hash.
+        found: String,
+        /// That of its row.
+        expected: String,
+    },
+    /// An image without a row, or a row without an image.
+    #[error("{file} stands {where}")]
+    Unlisted {
+        /// The image.
+        file: String,
+        /// In which of both.
+        r#where: &'static str,
+    },
+    /// Metadata that were written before the dataset changed.
+    #[error("{0}")]
+    Metadata(String),
+    /// The manifest as a whole.
+    #[error("{0}")]
+    Manifest(String),
+}

@@ -1,0 +1,39 @@
+//! Labels of radiographs that were made anew since.
+
+use super::{Layout, Published, PublishedError};
+use crate::labels::LabelFile;
+use crate::layout::LimbId;
+use crate::manifest::Manifest;
+
+/// Labels of a limb that belong to other radiographs than those in the manifest.
+pub(super) struct Outdated {
+    pub limb: LimbId,
+    pub steps: Vec<u32>,
+}
+
+/// All of them, as far as labels tell which bytes their radiographs had; `manifest` is read only if one does.
+pub(super) fn outdated(
+    dataset: &Published,
+    manifest: impl FnOnce() -> Result<Manifest, PublishedError>,
+) -> Result<Vec<Outdated>, PublishedError> {
+    if dataset.layout == Layout::Specimen {
+        return Ok(Vec::new());
+    }
+    let mut limbs: Vec<_> = dataset.pairs.iter().map(|pair| pair.limb).collect();
+    limbs.dedup();
+    let mut bound = Vec::new();
+    for limb in limbs {
+        let labels = LabelFile::read(&dataset.root, limb)?;
+        bound.extend(labels.filter(LabelFile::is_bound).map(|file| (limb, file)));
+    }
+    if bound.is_empty() {
+        return Ok(Vec::new());
+    }
+    let manifest = manifest()?;
+    let of_limb = |(limb, file): (LimbId, LabelFile)| Outdated {
+        limb,
+        steps: file.outdated(&manifest, limb),
+    };
+    let all = bound.into_iter().map(of_limb);
+    Ok(all.filter(|found| !found.steps.is_empty()).collect())
+}
