@@ -25,6 +25,7 @@ pub(crate) fn write_whole_folder<T, E: From<FileError>>(
     clear().map_err(FileError::at("clear", &unfinished))?;
     fs::create_dir_all(&unfinished).map_err(FileError::at("create folder", &unfinished))?;
     let filled = fill(&unfinished).and_then(|filled| {
+        sync(&unfinished)?;
         let renamed = fs::rename(&unfinished, to).map_err(FileError::at("write", to));
         renamed.map(|()| filled).map_err(E::from)
     });
@@ -33,6 +34,22 @@ pub(crate) fn write_whole_folder<T, E: From<FileError>>(
         let _ = clear();
     }
     filled
+}
+
+/// Brings all files below a folder to the disk: a name must not outlive a power cut without them.
+fn sync(folder: &Path) -> Result<(), FileError> {
+    let entries = fs::read_dir(folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+    for entry in entries.map_err(FileError::at("read", folder))? {
+        let path = entry.path();
+        if path.is_dir() {
+            sync(&path)?;
+        } else {
+            let synced = fs::OpenOptions::new().append(true).open(&path);
+            let synced = synced.and_then(|file| file.sync_all());
+            synced.map_err(FileError::at("write", &path))?;
+        }
+    }
+    Ok(())
 }
 
 fn holds_something(folder: &Path) -> io::Result<bool> {

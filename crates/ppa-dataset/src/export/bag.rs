@@ -1,13 +1,16 @@
 //! BagIt (RFC 8493): a copy of a dataset with the hash of every file, as archives and journals take it.
 
+use std::collections::HashMap;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::files::{FileError, hex};
+use crate::manifest::Manifest;
+use crate::published::{Published, PublishedError};
 use crate::whole_folder::write_whole_folder;
 
 const MANIFEST: &str = "manifest-sha256.txt";
@@ -22,21 +25,63 @@ pub struct Bag {
     pub bytes: u64,
 }
 
-/// Copies the dataset in `root` into the bag `to`, whole or not at all. Hidden files and folders, among them the records of
-/// `ppa generate`, stay behind.
+/// Why a dataset cannot be bagged; nothing is left behind then.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BagError {
+    /// A file of the dataset or the bag.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A folder that is no dataset.
+    #[error(transparent)]
+    Published(#[from] PublishedError),
+    /// `ppa generate` began it and did not finish it.
+    #[error("{} is not finished: it has no manifest.jsonl; run ppa generate again", .0.display())]
+    Unfinished(PathBuf),
+    /// A link or device, whose contents are no part of the dataset.
+    #[error("{} is neither a file nor a folder, and a bag holds nothing else", .0.display())]
+    Special(PathBuf),
+    /// An image that is not the one in `manifest.jsonl`.
+    #[error("{} is altered or missing: its hash is {found}, that in manifest.jsonl {expected}", path.display())]
+    Altered {
+        /// The image.
+        path: PathBuf,
+        /// Its hash.
+        found: String,
+        /// That of its row.
+        expected: String,
+    },
+}
+
+/// What never leaves with a dataset: it names the readers.
+const GRADES: &str = "grades.csv";
+
+/// Copies the dataset in `root`, of either published layout, into the bag `to`, whole or not at all. Hidden files and folders,
+/// among them the records of `ppa generate`, and `grades.csv`, which names readers, stay behind.
 ///
 /// # Errors
-/// [`FileError`]; `to` must not exist or be empty.
-pub fn bag(root: &Path, to: &Path) -> Result<Bag, FileError> {
+/// [`BagError`]; among them images that are not as in `manifest.jsonl`, and links. `to` must not exist or be empty.
+pub fn bag(root: &Path, to: &Path) -> Result<Bag, BagError> {
+    Published::list(root)?;
+    let mut listed = listed(root)?;
     let mut files = Vec::new();
     list(root, "", &mut files)?;
+    files.retain(|name| name != GRADES);
     write_whole_folder(to, |bag| {
         let mut bytes = 0;
         let mut manifest = String::new();
         for name in &files {
             let (size, hash) = copy(&root.join(name), &bag.join("data").join(name))?;
+            if let Some(expected) = listed.remove(name)
+                && hash != expected
+            {
+                return Err(altered(root, name, &hash, expected));
+            }
             bytes += size;
             manifest += &format!("{hash}  data/{}\n", encoded(name));
+        }
+        if let Some((name, expected)) = listed.into_iter().min() {
+            return Err(altered(root, &name, "none", expected));
         }
         let count = files.len() as u64;
         let agent = concat!("ppa ", env!("CARGO_PKG_VERSION"));
@@ -60,8 +105,29 @@ pub fn bag(root: &Path, to: &Path) -> Result<Bag, FileError> {
     })
 }
 
+fn altered(root: &Path, name: &str, found: &str, expected: String) -> BagError {
+    BagError::Altered {
+        path: root.join(name),
+        found: found.to_owned(),
+        expected,
+    }
+}
+
+/// Hashes of the images in `manifest.jsonl`; none for a dataset that others made.
+fn listed(root: &Path) -> Result<HashMap<String, String>, BagError> {
+    if !root.join(Manifest::FILE).exists() {
+        return if root.join(".ppa").exists() {
+            Err(BagError::Unfinished(root.to_owned()))
+        } else {
+            Ok(HashMap::new())
+        };
+    }
+    let rows = Manifest::read(root)?.files.into_iter();
+    Ok(rows.map(|row| (row.file, row.sha256)).collect())
+}
+
 /// Names of all files below a folder, as paths from the root, sorted within each folder.
-fn list(root: &Path, below: &str, files: &mut Vec<String>) -> Result<(), FileError> {
+fn list(root: &Path, below: &str, files: &mut Vec<String>) -> Result<(), BagError> {
     let folder = root.join(below);
     let entries = fs::read_dir(&folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
     let mut entries = entries.map_err(FileError::at("read", &folder))?;
@@ -80,10 +146,13 @@ fn list(root: &Path, below: &str, files: &mut Vec<String>) -> Result<(), FileErr
         if entry.file_name().to_string_lossy().starts_with('.') {
             continue;
         }
-        if path.is_dir() {
+        let kind = entry.file_type().map_err(FileError::at("read", &path))?;
+        if kind.is_dir() {
             list(root, &name, files)?;
-        } else {
+        } else if kind.is_file() {
             files.push(name);
+        } else {
+            return Err(BagError::Special(path));
         }
     }
     Ok(())

@@ -9,7 +9,7 @@ mod table;
 mod table_parquet;
 mod web_dataset;
 
-pub use self::bag::{Bag, bag};
+pub use self::bag::{Bag, BagError, bag};
 pub use self::metadata::{Metadata, write_metadata};
 pub use self::table::{Column, Table, TableError, Values};
 pub use self::web_dataset::{Shards, WebDatasetError, web_dataset};

@@ -9,7 +9,12 @@ const RO_CRATE: &str = "https://w3id.org/ro/crate/1.1";
 const PROCESS_RUN: &str = "https://w3id.org/ro/wfrun/process/0.5";
 
 /// The metadata document of the crate.
-pub(super) fn ro_crate(metadata: &Metadata, table: &Table, provenance: &Provenance) -> Value {
+pub(super) fn ro_crate(
+    metadata: &Metadata,
+    table: &Table,
+    other_lists: &[(String, &str)],
+    provenance: &Provenance,
+) -> Value {
     let lists = [
         (TABLE, "text/csv", "One row per image."),
         (
@@ -30,6 +35,7 @@ pub(super) fn ro_crate(metadata: &Metadata, table: &Table, provenance: &Provenan
     let parts: Vec<_> = lists
         .iter()
         .map(|(file, ..)| *file)
+        .chain(other_lists.iter().map(|(file, _)| file.as_str()))
         .chain(images.iter().map(|(file, _)| *file))
         .map(id)
         .collect();
@@ -75,6 +81,9 @@ pub(super) fn ro_crate(metadata: &Metadata, table: &Table, provenance: &Provenan
             json!({"@id": file, "@type": "File", "encodingFormat": format, "description": text}),
         );
     }
+    for (file, format) in other_lists {
+        graph.push(json!({"@id": file, "@type": "File", "encodingFormat": format}));
+    }
     for (file, sha256) in images {
         let format = if file.ends_with(".png") {
             "image/png"
@@ -85,7 +94,12 @@ pub(super) fn ro_crate(metadata: &Metadata, table: &Table, provenance: &Provenan
             json!({"@id": file, "@type": "File", "encodingFormat": format, "sha256": sha256}),
         );
     }
-    json!({"@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph})
+    // RO-Crate's own context does not know the term; readers would drop it.
+    let context = json!([
+        "https://w3id.org/ro/crate/1.1/context",
+        {"sha256": "https://schema.org/sha256"},
+    ]);
+    json!({"@context": context, "@graph": graph})
 }
 
 /// Path and hash of every image.

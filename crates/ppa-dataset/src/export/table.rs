@@ -1,7 +1,7 @@
 //! One row per file, with everything that is known of it.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -22,6 +22,17 @@ pub enum TableError {
     /// Labels of a limb.
     #[error(transparent)]
     Labels(#[from] LabelFileError),
+    /// Labels of radiographs that were made anew since.
+    #[error("{}: the label of step {step} was given to another radiograph than the one there now; label them again", path.display())]
+    Outdated {
+        /// `labels.json` of the limb.
+        path: PathBuf,
+        /// Half degrees of rotation.
+        step: u32,
+    },
+    /// Name, licence or date.
+    #[error("{0}")]
+    Metadata(String),
     /// The split that was asked for.
     #[error(transparent)]
     Split(#[from] SplitError),
@@ -39,13 +50,14 @@ pub enum TableError {
 /// | `intrinsics` | lens of the camera: JSON of a camera file, pixels |
 /// | `patient_from_ct`, `room_from_patient`, `room_from_camera`, `ct_from_device` | 4x4 rows as JSON, mm |
 /// | `seed` | of the noise in the image |
-/// | `dose_histories`, `scatter_histories` | of a radiograph: photons whose noise it carries, photons followed |
+/// | `dose_histories`, `scatter_histories` | of a radiograph: photons whose noise it carries (`inf`: none), photons followed |
 /// | `label`, `label_std`, `label_source` | quality of the pose, 1 (ideal) to 3 |
 /// | `split` | part of the split that the person is in |
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     /// In a fixed order.
     pub columns: Vec<Column>,
+    limbs: Vec<LimbId>,
 }
 
 /// One column.
@@ -111,6 +123,7 @@ struct Xray {
 
 #[derive(Deserialize)]
 struct Engine {
+    /// JSON knows no infinity, which is an image without noise.
     dose_histories: Option<f64>,
     scatter_histories: u64,
 }
@@ -135,6 +148,10 @@ impl Table {
         let mut labels = BTreeMap::new();
         for limb in manifest.limbs() {
             if let Some(file) = LabelFile::read(root, limb)? {
+                if let Some(&step) = file.outdated(&manifest, limb).first() {
+                    let path = LabelFile::path(root, limb);
+                    return Err(TableError::Outdated { path, step });
+                }
                 labels.insert(limb, file);
             }
         }
@@ -146,61 +163,14 @@ impl Table {
             patients.dedup();
             split.check(&patients)?;
         }
-        Ok(Self::of(&manifest.files, &shared, &labels, split.as_ref()))
+        let limbs = manifest.limbs();
+        let columns = columns(&manifest.files, &shared, &labels, split.as_ref());
+        Ok(Self { columns, limbs })
     }
 
-    fn of(
-        rows: &[FileRow],
-        shared: &Shared,
-        labels: &BTreeMap<LimbId, LabelFile>,
-        split: Option<&Split>,
-    ) -> Self {
-        let text = |name, of: &dyn Fn(&FileRow) -> Option<String>| Column {
-            name,
-            values: Values::Text(rows.iter().map(of).collect()),
-        };
-        let count = |name, of: &dyn Fn(&FileRow) -> Option<u64>| Column {
-            name,
-            values: Values::Count(rows.iter().map(of).collect()),
-        };
-        let real = |name, of: &dyn Fn(&FileRow) -> Option<f64>| Column {
-            name,
-            values: Values::Real(rows.iter().map(of).collect()),
-        };
-        let camera = |row: &FileRow| shared.cameras.iter().find(|c| Some(c.view) == row.camera);
-        let radiograph = |row: &FileRow| row.ct_from_device.map(|_| &shared.settings.xray.engine);
-        let label = |row: &FileRow| labels.get(&row.limb)?.of_step(row.step).copied();
-        let columns = vec![
-            text("file", &|row| Some(row.file.clone())),
-            text("sha256", &|row| Some(row.sha256.clone())),
-            text("kind", &|row| name(&row.kind)),
-            text("unit", &|row| Some(row.limb.unit_name(row.step))),
-            count("patient", &|row| Some(row.limb.patient.into())),
-            text("side", &|row| Some(row.limb.side_letter().to_owned())),
-            count("step", &|row| Some(row.step.into())),
-            real("angle_deg", &|row| Some(row.angle_deg)),
-            text("camera", &|row| Some(row.camera?.name().to_owned())),
-            text("shape", &|row| Some(row.shape.name().to_owned())),
-            text("intrinsics", &|row| json(&camera(row)?.intrinsics)),
-            text("patient_from_ct", &|row| json(&row.patient_from_ct)),
-            text("room_from_patient", &|row| json(&row.room_from_patient)),
-            text("room_from_camera", &|row| {
-                json(&camera(row)?.room_from_camera)
-            }),
-            text("ct_from_device", &|row| json(&row.ct_from_device?)),
-            count("seed", &|row| row.seed),
-            real("dose_histories", &|row| radiograph(row)?.dose_histories),
-            count("scatter_histories", &|row| {
-                Some(radiograph(row)?.scatter_histories)
-            }),
-            real("label", &|row| Some(label(row)?.label)),
-            real("label_std", &|row| Some(label(row)?.std)),
-            text("label_source", &|row| name(&labels.get(&row.limb)?.source?)),
-            text("split", &|row| {
-                Some(split?.part_of(row.limb.patient)?.to_owned())
-            }),
-        ];
-        Self { columns }
+    /// The limbs in it, in order.
+    pub(super) fn limbs(&self) -> &[LimbId] {
+        &self.limbs
     }
 
     /// Number of files.
@@ -240,6 +210,62 @@ impl Table {
             }
         }
     }
+}
+
+/// The columns of [`Table`].
+fn columns(
+    rows: &[FileRow],
+    shared: &Shared,
+    labels: &BTreeMap<LimbId, LabelFile>,
+    split: Option<&Split>,
+) -> Vec<Column> {
+    let text = |name, of: &dyn Fn(&FileRow) -> Option<String>| Column {
+        name,
+        values: Values::Text(rows.iter().map(of).collect()),
+    };
+    let count = |name, of: &dyn Fn(&FileRow) -> Option<u64>| Column {
+        name,
+        values: Values::Count(rows.iter().map(of).collect()),
+    };
+    let real = |name, of: &dyn Fn(&FileRow) -> Option<f64>| Column {
+        name,
+        values: Values::Real(rows.iter().map(of).collect()),
+    };
+    let camera = |row: &FileRow| shared.cameras.iter().find(|c| Some(c.view) == row.camera);
+    let radiograph = |row: &FileRow| row.ct_from_device.map(|_| &shared.settings.xray.engine);
+    let label = |row: &FileRow| labels.get(&row.limb)?.of_step(row.step).copied();
+    vec![
+        text("file", &|row| Some(row.file.clone())),
+        text("sha256", &|row| Some(row.sha256.clone())),
+        text("kind", &|row| name(&row.kind)),
+        text("unit", &|row| Some(row.limb.unit_name(row.step))),
+        count("patient", &|row| Some(row.limb.patient.into())),
+        text("side", &|row| Some(row.limb.side_letter().to_owned())),
+        count("step", &|row| Some(row.step.into())),
+        real("angle_deg", &|row| Some(row.angle_deg)),
+        text("camera", &|row| Some(row.camera?.name().to_owned())),
+        text("shape", &|row| Some(row.shape.name().to_owned())),
+        text("intrinsics", &|row| json(&camera(row)?.intrinsics)),
+        text("patient_from_ct", &|row| json(&row.patient_from_ct)),
+        text("room_from_patient", &|row| json(&row.room_from_patient)),
+        text("room_from_camera", &|row| {
+            json(&camera(row)?.room_from_camera)
+        }),
+        text("ct_from_device", &|row| json(&row.ct_from_device?)),
+        count("seed", &|row| row.seed),
+        real("dose_histories", &|row| {
+            Some(radiograph(row)?.dose_histories.unwrap_or(f64::INFINITY))
+        }),
+        count("scatter_histories", &|row| {
+            Some(radiograph(row)?.scatter_histories)
+        }),
+        real("label", &|row| Some(label(row)?.label)),
+        real("label_std", &|row| Some(label(row)?.std)),
+        text("label_source", &|row| name(&labels.get(&row.limb)?.source?)),
+        text("split", &|row| {
+            Some(split?.part_of(row.limb.patient)?.to_owned())
+        }),
+    ]
 }
 
 fn json(value: &impl Serialize) -> Option<String> {

@@ -1,5 +1,6 @@
 //! Datasets as others wrote them, read, checked and written.
 
+mod archived;
 mod authors_loader;
 mod converted;
 mod exported;

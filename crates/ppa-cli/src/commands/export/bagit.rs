@@ -8,6 +8,8 @@ use ppa_dataset::export::bag;
 use crate::output::{Output, bytes, working};
 
 #[derive(Debug, Args)]
+#[command(after_long_help = "\
+Every image must be as in manifest.jsonl. Hidden files and grades.csv, which names readers, stay behind; links are refused.")]
 pub struct BagitArgs {
     /// Dataset
     dataset: PathBuf,
