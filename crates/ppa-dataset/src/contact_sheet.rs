@@ -25,17 +25,6 @@ pub enum ContactSheetError {
     /// A file of the dataset cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
-    /// An image of the dataset cannot be decoded.
-    #[error(transparent)]
-    Image(#[from] ImageFileError),
-    /// A depth image has no region of interest.
-    #[error("{} has no region of interest for {image}", path.display())]
-    NoRoi {
-        /// The `roi_depth.json` of the limb.
-        path: PathBuf,
-        /// The depth image.
-        image: String,
-    },
     /// The dataset shows no poses of this limb.
     #[error("{} holds no depth images of {limb:?}", root.display())]
     Empty {
@@ -50,10 +39,11 @@ pub enum ContactSheetError {
 /// row, the radiographs below.
 ///
 /// Depth images are cropped to their region of interest and share one colour scale: the 1st to
-/// the 99th percentile of all depths shown, near red, far blue, invalid black.
+/// the 99th percentile of all depths shown, near red, far blue, invalid black. A cross stands for an image that cannot be read
+/// or has no region of interest.
 ///
 /// # Errors
-/// [`ContactSheetError`] when an image is missing or unreadable.
+/// [`ContactSheetError`] when a list is missing or unreadable, or shows nothing of the limb.
 pub fn contact_sheet(
     root: &Path,
     limb: LimbId,
@@ -79,28 +69,24 @@ pub fn contact_sheet(
     let mut rows: Vec<(String, Vec<Tile>)> = Vec::new();
     for (shape, view) in depth_rows(of_limb(FileKind::Depth)) {
         let tiles = steps.iter().map(|&step| {
-            let depth = read_gray16(&root.join(limb.depth(shape, view, step)))?;
-            let name = LimbId::depth_name(view, step);
-            let roi = rois.get(&name).ok_or_else(|| ContactSheetError::NoRoi {
-                path: root.join(limb.roi_file()),
-                image: name,
-            })?;
-            Ok(Tile::Depth(crop(&depth, roi)))
+            let depth = read_gray16(&root.join(limb.depth(shape, view, step)));
+            let roi = rois.get(&LimbId::depth_name(view, step));
+            let cropped = depth.ok().zip(roi).map(|(depth, roi)| crop(&depth, roi));
+            cropped.map_or(Tile::Unreadable, Tile::Depth)
         });
         let caption = format!(
             "{} {}",
             shape.name(),
             view.name().trim_start_matches("cam_")
         );
-        rows.push((caption, tiles.collect::<Result<_, ContactSheetError>>()?));
+        rows.push((caption, tiles.collect()));
     }
     if of_limb(FileKind::Radiograph).next().is_some() {
         let tiles = steps.iter().map(|&step| {
-            let image = read_gray16(&root.join(limb.radiograph_png(step)))?;
-            Ok(Tile::Radiograph(image))
+            let image = read_gray16(&root.join(limb.radiograph_png(step)));
+            image.map_or(Tile::Unreadable, Tile::Radiograph)
         });
-        let tiles = tiles.collect::<Result<_, ContactSheetError>>()?;
-        rows.push(("radiograph".to_owned(), tiles));
+        rows.push(("radiograph".to_owned(), tiles.collect()));
     }
     Ok(draw(&rows, &steps))
 }
@@ -110,6 +96,7 @@ type Gray16 = ImageBuffer<Luma<u16>, Vec<u16>>;
 enum Tile {
     Depth(Gray16),
     Radiograph(Gray16),
+    Unreadable,
 }
 
 /// The original in both views, then each further shape in the left view.
@@ -147,7 +134,7 @@ fn depth_range(rows: &[(String, Vec<Tile>)]) -> [f64; 2] {
         .flat_map(|(_, tiles)| tiles)
         .filter_map(|tile| match tile {
             Tile::Depth(depth) => Some(depth),
-            Tile::Radiograph(_) => None,
+            Tile::Radiograph(_) | Tile::Unreadable => None,
         })
         .flat_map(|depth| depth.pixels().map(|p| p.0[0]).filter(|&z| z > 0))
         .collect();
@@ -179,6 +166,7 @@ fn draw(rows: &[(String, Vec<Tile>)], steps: &[u32]) -> RgbImage {
                     })
                 }
                 Tile::Radiograph(image) => fit(image),
+                Tile::Unreadable => cross(),
             };
             image::imageops::replace(&mut sheet, &picture, i64::from(x), i64::from(y));
             let angle = format!("{} deg", angle_text(steps[c]));
@@ -186,6 +174,18 @@ fn draw(rows: &[(String, Vec<Tile>)], steps: &[u32]) -> RgbImage {
         }
     }
     sheet
+}
+
+/// What stands for an image that cannot be read.
+fn cross() -> RgbImage {
+    let on_diagonal = |x: u32, y: u32| x.abs_diff(y) < 2 || (x + y).abs_diff(TILE - 1) < 2;
+    RgbImage::from_fn(TILE, TILE, |x, y| {
+        Rgb(if on_diagonal(x, y) {
+            [200, 60, 60]
+        } else {
+            [40; 3]
+        })
+    })
 }
 
 /// A grey image scaled into a tile, its shape kept.

@@ -216,11 +216,21 @@ fn the_page_of_a_dataset_stands_by_itself() {
     // A contact sheet, and three poses of two cameras.
     assert_eq!(page.matches("src=\"data:image/png").count(), 1 + 6);
     assert!(page.contains("Fewer than 9 poses") && page.contains("is as in manifest.jsonl"));
-    let image = "patient_3/depth/r/big/depth_cam_right_2.5.png";
-    let path = folder.path().join("data").join(image);
-    fs::write(&path, &fs::read(&path).unwrap()[..200]).unwrap();
+    // What is damaged is told, and where it would stand is a cross: there is a page when one is needed.
+    let images = [
+        "patient_3/depth/r/orig/depth_cam_left_0.0.png",
+        "patient_3/xray/r/xray_image_0.png",
+    ];
+    for image in images {
+        let path = folder.path().join("data").join(image);
+        fs::write(&path, &fs::read(&path).unwrap()[..100]).unwrap();
+    }
     succeed(folder.path(), "qa data --out other.html");
     let page = fs::read_to_string(folder.path().join("other.html")).unwrap();
-    assert!(page.contains(&format!("{image} is not a whole PNG")));
+    for image in images {
+        assert!(page.contains(&format!("{image} is not a whole PNG")));
+    }
+    assert_eq!(page.matches("src=\"data:image/png").count(), 1 + 5);
+    assert!(page.contains("cannot be read"));
     assert!(!page.contains("/tmp"));
 }

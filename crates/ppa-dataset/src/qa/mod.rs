@@ -1,6 +1,7 @@
 //! A dataset on one page, for a person to look through before anything is trained on it.
 
 mod chart;
+mod curves;
 mod histogram;
 mod outliers;
 mod page;

@@ -2,27 +2,19 @@
 
 use std::path::Path;
 
-use super::chart::{Series, chart};
-use super::histogram::Depths;
-use super::outliers::{LEAST_POSES, outliers};
-use super::scene::{Scene, height_and_tilt};
+use super::curves::{heights_and_tilts, histograms, labels};
+use super::scene::Scene;
 use super::views::{depth_view, embedded};
 use crate::body_shape::BodyShape;
 use crate::contact_sheet::{ContactSheetError, contact_sheet, evenly_chosen};
 use crate::files::FileError;
 use crate::layout::{LimbId, View, angle_text};
 use crate::manifest::{FileKind, FileRow, Manifest, RoiFile};
-use crate::published::{Flaw, GrayImage16, ImageFileError, Published, PublishedError, inspect};
+use crate::published::{Flaw, GrayImage16, Published, PublishedError, inspect};
 use crate::split::{Split, SplitError};
 
 /// Poses on the contact sheet of a limb.
 const COLUMNS: usize = 7;
-
-/// Depth images per limb and camera that histograms are made of.
-const SAMPLE: usize = 24;
-
-/// Outliers are looked for beyond these jumps, mm and degrees.
-const FLOOR: [f64; 2] = [0.5, 0.1];
 
 /// Why there is no page.
 #[derive(Debug, thiserror::Error)]
@@ -31,9 +23,6 @@ pub enum QaError {
     /// A file of the dataset.
     #[error(transparent)]
     File(#[from] FileError),
-    /// An image of the dataset.
-    #[error(transparent)]
-    Image(#[from] ImageFileError),
     /// Its layout or lists.
     #[error(transparent)]
     Published(#[from] PublishedError),
@@ -49,11 +38,11 @@ pub enum QaError {
 /// files, contact sheets, regions and joints in whole images, labels against angle, depths, heights and tilts with outliers, origin.
 ///
 /// # Errors
-/// [`QaError`] naming the file at fault. Flaws of single images stand on the page; damaged ones that it would show are errors.
+/// [`QaError`] naming the file at fault. Flaws of single images stand on the page, and a cross in their place.
 pub fn qa_page(root: &Path) -> Result<String, QaError> {
     let inspection = inspect(root)?;
     let manifest = Manifest::read(root)?;
-    let dataset = Published::read(root)?;
+    let dataset = Published::list(root)?;
     let scene = Scene::read(root)?;
     let mut page = String::from(HEAD);
     page += &format!(
@@ -167,6 +156,9 @@ fn limb_section(
     shapes.sort_unstable();
     shapes.dedup();
     let mut section = format!("<h2>Patient {}, {}</h2>", limb.patient, side(limb));
+    if shapes.is_empty() {
+        return Ok(section + "<p class=\"bad\">No depth images.</p>");
+    }
     section += "<h3>Poses</h3>";
     let sheet = contact_sheet(root, limb, COLUMNS)?;
     section += &embedded(
@@ -181,13 +173,13 @@ fn limb_section(
     );
     section += &figure(
         "Depths in the regions of interest, share of the valid pixels per 10 mm.",
-        histograms(root, &rois, |view| depth(shapes[0], view))?,
+        histograms(root, &rois, |view| depth(shapes[0], view)),
     );
     let sweeps: Vec<_> = shapes
         .iter()
         .map(|&shape| (shape, depth(shape, View::Left)))
         .collect();
-    let (charts, told) = heights_and_tilts(&sweeps);
+    let (charts, told) = heights_and_tilts(scene, &sweeps);
     section += &charts;
     section += "</div>";
     section += &told;
@@ -215,141 +207,11 @@ fn side(limb: LimbId) -> &'static str {
     }
 }
 
-fn figure(caption: &str, content: String) -> String {
+pub(super) fn figure(caption: &str, content: String) -> String {
     if content.is_empty() {
         return String::new();
     }
     format!("<figure>{content}<figcaption>{caption}</figcaption></figure>")
-}
-
-fn labels(dataset: &Published, limb: LimbId) -> String {
-    let mut labels: Vec<_> = dataset
-        .pairs
-        .iter()
-        .filter(|pair| pair.limb == limb)
-        .filter_map(|pair| match (pair.pose, &pair.label) {
-            (crate::published::Pose::Rotated { step, .. }, Some(label)) => Some((step, label)),
-            _ => None,
-        })
-        .collect();
-    labels.dedup_by_key(|(step, _)| *step);
-    let Some((_, first)) = labels.first() else {
-        return String::new();
-    };
-    let source = first
-        .source
-        .and_then(|source| serde_json::to_value(source).ok());
-    let name = source
-        .as_ref()
-        .and_then(|source| source.as_str())
-        .unwrap_or("source not told");
-    let series = Series {
-        name: name.to_owned(),
-        points: labels
-            .iter()
-            .map(|(step, label)| [f64::from(*step) / 2.0, label.label])
-            .collect(),
-        spread: labels.iter().map(|(_, label)| label.std).collect(),
-        marked: Vec::new(),
-    };
-    chart(
-        "medial rotation, degrees",
-        "label: 1 ideal, 3 inadequate",
-        &[series],
-        Some([0.8, 3.2]),
-    )
-}
-
-fn histograms<'a>(
-    root: &Path,
-    rois: &RoiFile,
-    of_view: impl Fn(View) -> Vec<&'a FileRow>,
-) -> Result<String, QaError> {
-    let mut series = Vec::new();
-    for view in View::ALL {
-        let rows = of_view(view);
-        let steps: Vec<_> = rows.iter().map(|row| row.step).collect();
-        if steps.is_empty() {
-            continue;
-        }
-        let chosen = evenly_chosen(&steps, SAMPLE);
-        let mut depths = Depths::default();
-        for row in rows.into_iter().filter(|row| chosen.contains(&row.step)) {
-            let image = GrayImage16::read(&root.join(&row.file))?;
-            depths.add(&image, rois.get(&LimbId::depth_name(view, row.step)));
-        }
-        let name = format!(
-            "{}, {:.1} % without depth",
-            view.name().replace('_', " "),
-            100.0 * depths.invalid_share()
-        );
-        series.push(depths.series(&name));
-    }
-    Ok(chart("depth, mm", "pixels, %", &series, None))
-}
-
-/// Two charts, and a sentence on every pose that does not follow from its neighbours.
-fn heights_and_tilts(sweeps: &[(BodyShape, Vec<&FileRow>)]) -> (String, String) {
-    let (mut charts, mut told) = (String::new(), Vec::new());
-    for (i, [what, unit]) in [
-        ["height of the joint", "mm"],
-        ["tilt of the axis", "degrees"],
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        let mut series = Vec::new();
-        for (shape, rows) in sweeps {
-            let values: Vec<f64> = rows.iter().map(|row| height_and_tilt(row)[i]).collect();
-            let points: Vec<_> = rows
-                .iter()
-                .zip(&values)
-                .map(|(row, value)| [row.angle_deg, *value])
-                .collect();
-            let odd = if values.len() < LEAST_POSES {
-                Vec::new()
-            } else {
-                outliers(&values, FLOOR[i])
-            };
-            told.extend(odd.iter().map(|&at| {
-                let angle = angle_text(rows[at].step);
-                format!(
-                    "<li>{}, {angle} degrees: {what} {:.2} {unit} is off those beside it</li>",
-                    shape.name(),
-                    values[at]
-                )
-            }));
-            let marked = odd.iter().map(|&at| points[at]).collect();
-            series.push(Series {
-                name: shape.name().to_owned(),
-                points,
-                spread: Vec::new(),
-                marked,
-            });
-        }
-        let caption = format!("{what} in the room, {unit}; outliers are ringed.");
-        charts += &figure(
-            &caption,
-            chart(
-                "medial rotation, degrees",
-                &format!("{what}, {unit}"),
-                &series,
-                None,
-            ),
-        );
-    }
-    let longest = sweeps.iter().map(|(_, rows)| rows.len()).max();
-    let told = match told.len() {
-        0 if longest.is_none_or(|poses| poses < LEAST_POSES) => {
-            format!("<p>Fewer than {LEAST_POSES} poses: too few to tell which stands out.</p>")
-        }
-        0 => "<p class=\"good\">No pose stands out from those beside it.</p>".to_owned(),
-        _ => format!(
-            "<div class=\"bad\"><p>Poses that stand out:</p><ul>{}</ul></div>",
-            told.concat()
-        ),
-    };
-    (charts, told)
 }
 
 fn whole_view(
@@ -359,14 +221,20 @@ fn whole_view(
     scene: &Scene,
     view: View,
 ) -> Result<String, QaError> {
-    let image = GrayImage16::read(&root.join(&row.file))?;
-    let roi = rois.get(&LimbId::depth_name(view, row.step));
-    let picture = depth_view(&image, roi, scene.joint_pixel(row));
     let text = format!(
         "{}, {} degrees",
         view.name().replace('_', " "),
         angle_text(row.step)
     );
+    // What is wrong with it stands among the flaws.
+    let Ok(image) = GrayImage16::read(&root.join(&row.file)) else {
+        return Ok(figure(
+            &text,
+            "<p class=\"bad\">cannot be read</p>".to_owned(),
+        ));
+    };
+    let roi = rois.get(&LimbId::depth_name(view, row.step));
+    let picture = depth_view(&image, roi, scene.joint_pixel(row));
     Ok(figure(&text, embedded(&picture, &text, root)?))
 }
 

@@ -14,6 +14,7 @@ use crate::manifest::{FileRow, Rows};
 #[derive(Deserialize)]
 struct Described {
     settings: Settings,
+    table: Table,
     cameras: Vec<CameraRow>,
     limbs: Vec<Limb>,
 }
@@ -23,6 +24,13 @@ struct Settings {
     generator: String,
     code: String,
     seed: u64,
+}
+
+/// The plane that limbs lie on, in the room: points p with n·p = offset.
+#[derive(Deserialize)]
+struct Table {
+    normal: [f64; 3],
+    offset_mm: f64,
 }
 
 #[derive(Deserialize)]
@@ -46,6 +54,7 @@ pub(super) struct Scene {
     pub code: String,
     pub seed: u64,
     pub limbs: Vec<Limb>,
+    table: Table,
     cameras: Vec<(View, Camera, Isometry3<f64>)>,
 }
 
@@ -67,6 +76,7 @@ impl Scene {
             code: described.settings.code,
             seed: described.settings.seed,
             limbs: described.limbs,
+            table: described.table,
             cameras,
         })
     }
@@ -82,12 +92,18 @@ impl Scene {
         let pixel = camera.project(&(camera_from_room * joint))?;
         Some([pixel.x, pixel.y])
     }
-}
 
-/// Height of the joint above the room's origin, mm, and how far the limb's axis points above the horizontal, degrees.
-pub(super) fn height_and_tilt(row: &FileRow) -> [f64; 2] {
-    let pose = row.room_from_patient;
-    [pose[2][3], pose[2][2].clamp(-1.0, 1.0).asin().to_degrees()]
+    /// Height of the joint above the table, mm, and how far the limb's axis points away from it, degrees. A recorded room may
+    /// have any frame: only the table tells what is up.
+    pub fn height_and_tilt(&self, row: &FileRow) -> [f64; 2] {
+        let pose = row.room_from_patient;
+        let up = |column: usize| -> f64 {
+            let normal = self.table.normal.iter();
+            normal.zip(&pose).map(|(n, row)| n * row[column]).sum()
+        };
+        let tilt = up(2).clamp(-1.0, 1.0).asin();
+        [up(3) - self.table.offset_mm, tilt.to_degrees()]
+    }
 }
 
 #[cfg(test)]
@@ -124,6 +140,7 @@ mod tests {
         let lens = json!({"model": "pinhole", "width": 320, "height": 288, "fx": 250.0, "fy": 260.0, "cx": 160.0, "cy": 140.0});
         let described = json!({
             "settings": {"generator": "ppa 0", "code": "0", "seed": 3}, "limbs": [],
+            "table": {"normal": [0.0, 0.0, 1.0], "offset_mm": 0.0},
             "cameras": [{"view": "cam_left", "intrinsics": lens, "room_from_camera": down}],
         });
         std::fs::write(folder.path().join("dataset.json"), described.to_string()).unwrap();
@@ -137,8 +154,21 @@ mod tests {
 
     #[test]
     fn an_axis_that_rises_by_three_fifths_tilts_by_37_degrees() {
-        let [height_mm, tilt_deg] = height_and_tilt(&row("cam_left"));
-        assert_eq!(height_mm, 110.0);
+        let scene = |normal: [f64; 3], offset_mm: f64| Scene {
+            generator: String::new(),
+            code: String::new(),
+            seed: 0,
+            limbs: Vec::new(),
+            table: Table { normal, offset_mm },
+            cameras: Vec::new(),
+        };
+        let [height_mm, tilt_deg] = scene([0.0, 0.0, 1.0], 30.0).height_and_tilt(&row("cam_left"));
+        assert_eq!(height_mm, 80.0);
         assert!((tilt_deg - 36.869_897_645_844).abs() < 1e-9);
+        // A room recorded with y upwards: the joint at y = -20 over a table at y = -120, the axis rising by four fifths.
+        let [height_mm, tilt_deg] =
+            scene([0.0, 1.0, 0.0], -120.0).height_and_tilt(&row("cam_left"));
+        assert_eq!(height_mm, 100.0);
+        assert!((tilt_deg - 53.130_102_354_156).abs() < 1e-9);
     }
 }

@@ -1,0 +1,159 @@
+//! What the page shows against the angle, and of depths: charts of one limb.
+
+use std::path::Path;
+
+use super::chart::{Series, chart};
+use super::histogram::Depths;
+use super::outliers::{LEAST_POSES, outliers};
+use super::page::figure;
+use super::scene::Scene;
+use crate::body_shape::BodyShape;
+use crate::contact_sheet::evenly_chosen;
+use crate::layout::{LimbId, View, angle_text};
+use crate::manifest::{FileRow, RoiFile};
+use crate::published::{GrayImage16, Pose, Published};
+
+/// Depth images per limb and camera that histograms are made of.
+const SAMPLE: usize = 24;
+
+/// Outliers are looked for beyond these jumps, mm and degrees.
+const FLOOR: [f64; 2] = [0.5, 0.1];
+
+pub(super) fn labels(dataset: &Published, limb: LimbId) -> String {
+    let mut labels: Vec<_> = dataset
+        .pairs
+        .iter()
+        .filter(|pair| pair.limb == limb)
+        .filter_map(|pair| match (pair.pose, &pair.label) {
+            (Pose::Rotated { step, .. }, Some(label)) => Some((step, label)),
+            _ => None,
+        })
+        .collect();
+    labels.dedup_by_key(|(step, _)| *step);
+    let Some((_, first)) = labels.first() else {
+        return String::new();
+    };
+    let source = first
+        .source
+        .and_then(|source| serde_json::to_value(source).ok());
+    let name = source
+        .as_ref()
+        .and_then(|source| source.as_str())
+        .unwrap_or("source not told");
+    let series = Series {
+        name: name.to_owned(),
+        points: labels
+            .iter()
+            .map(|(step, label)| [f64::from(*step) / 2.0, label.label])
+            .collect(),
+        spread: labels.iter().map(|(_, label)| label.std).collect(),
+        marked: Vec::new(),
+    };
+    chart(
+        "medial rotation, degrees",
+        "label: 1 ideal, 3 inadequate",
+        &[series],
+        Some([0.8, 3.2]),
+    )
+}
+
+pub(super) fn histograms<'a>(
+    root: &Path,
+    rois: &RoiFile,
+    of_view: impl Fn(View) -> Vec<&'a FileRow>,
+) -> String {
+    let mut series = Vec::new();
+    for view in View::ALL {
+        let rows = of_view(view);
+        let steps: Vec<_> = rows.iter().map(|row| row.step).collect();
+        if steps.is_empty() {
+            continue;
+        }
+        let chosen = evenly_chosen(&steps, SAMPLE);
+        let mut depths = Depths::default();
+        for row in rows.into_iter().filter(|row| chosen.contains(&row.step)) {
+            // What cannot be read stands among the flaws.
+            let Ok(image) = GrayImage16::read(&root.join(&row.file)) else {
+                continue;
+            };
+            depths.add(&image, rois.get(&LimbId::depth_name(view, row.step)));
+        }
+        let name = format!(
+            "{}, {:.1} % without depth",
+            view.name().replace('_', " "),
+            100.0 * depths.invalid_share()
+        );
+        series.push(depths.series(&name));
+    }
+    chart("depth, mm", "pixels, %", &series, None)
+}
+
+/// Two charts, and a sentence on every pose that does not follow from its neighbours.
+pub(super) fn heights_and_tilts(
+    scene: &Scene,
+    sweeps: &[(BodyShape, Vec<&FileRow>)],
+) -> (String, String) {
+    let (mut charts, mut told) = (String::new(), Vec::new());
+    for (i, [what, unit]) in [
+        ["height of the joint", "mm"],
+        ["tilt of the axis", "degrees"],
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let mut series = Vec::new();
+        for (shape, rows) in sweeps {
+            let values: Vec<f64> = rows
+                .iter()
+                .map(|row| scene.height_and_tilt(row)[i])
+                .collect();
+            let points: Vec<_> = rows
+                .iter()
+                .zip(&values)
+                .map(|(row, value)| [row.angle_deg, *value])
+                .collect();
+            let odd = if values.len() < LEAST_POSES {
+                Vec::new()
+            } else {
+                outliers(&points, FLOOR[i])
+            };
+            told.extend(odd.iter().map(|&at| {
+                let angle = angle_text(rows[at].step);
+                format!(
+                    "<li>{}, {angle} degrees: {what} {:.2} {unit} is off those beside it</li>",
+                    shape.name(),
+                    values[at]
+                )
+            }));
+            let marked = odd.iter().map(|&at| points[at]).collect();
+            series.push(Series {
+                name: shape.name().to_owned(),
+                points,
+                spread: Vec::new(),
+                marked,
+            });
+        }
+        let caption = format!("{what} above the table, {unit}; outliers are ringed.");
+        charts += &figure(
+            &caption,
+            chart(
+                "medial rotation, degrees",
+                &format!("{what}, {unit}"),
+                &series,
+                None,
+            ),
+        );
+    }
+    let longest = sweeps.iter().map(|(_, rows)| rows.len()).max();
+    let told = match told.len() {
+        0 if longest.is_none_or(|poses| poses < LEAST_POSES) => {
+            format!("<p>Fewer than {LEAST_POSES} poses: too few to tell which stands out.</p>")
+        }
+        0 => "<p class=\"good\">No pose stands out from those beside it.</p>".to_owned(),
+        _ => format!(
+            "<div class=\"bad\"><p>Poses that stand out:</p><ul>{}</ul></div>",
+            told.concat()
+        ),
+    };
+    (charts, told)
+}
