@@ -5,6 +5,7 @@ mod bad_geometry;
 mod bad_input;
 mod conversion;
 mod coverage;
+mod damaged;
 mod datasets;
 mod depth;
 mod faults;
