@@ -49,6 +49,28 @@ fn dataset(case: &Case) -> tempfile::TempDir {
     folder
 }
 
+/// The left calf is mostly outside the image, so that the right one is taken for either side, without the
+/// other; for the left this is told.
+#[test]
+#[ignore = "needs ../shared/data"]
+fn of_the_calves_of_sts032_the_whole_one_is_taken_and_doubted_where_the_other_was_meant() {
+    let scan = data("two-calves-sts032/CT_image.nii.gz");
+    for (side, doubts) in [(Side::Right, 0), (Side::Left, 1)] {
+        let (case, limb) = prepared(&scan, side);
+        let found = case.found.as_ref().unwrap();
+        let litres = 1e-6 * found.surface.limb_mm3;
+        assert!((1.5..1.6).contains(&litres), "{side:?}: {litres} litres");
+        let end = (limb.limb.mesh.vertices.iter()).fold(f32::MIN, |end, v| end.max(v.x));
+        // By eye, the calves touch where x is about 4 mm.
+        assert!(end < 8.0, "{side:?}: the limb reaches to x = {end} mm");
+        let told = found
+            .warnings
+            .iter()
+            .filter(|text| text.contains("patient's left"));
+        assert_eq!(told.count(), doubts, "{side:?}: {:?}", found.warnings);
+    }
+}
+
 /// The ankle sits where a person sees it (slice 20, z = 201 mm), a couch was cut away, and the
 /// other leg, whose bones lie around x = 52 mm, is gone.
 #[test]

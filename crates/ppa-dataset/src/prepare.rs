@@ -58,13 +58,8 @@ impl PreparedLimb {
         surface: &LimbSettings,
         choices: &LandmarkOverrides,
     ) -> Result<Self, PrepareError> {
-        // LPS: x grows towards the patient's left.
-        let towards_side = match side {
-            Side::Right => [-1.0, 0.0, 0.0],
-            Side::Left => [1.0, 0.0, 0.0],
-        };
         let surface = LimbSettings {
-            towards: surface.towards.or(Some(towards_side)),
+            towards: surface.towards.or(Some([towards_left(side), 0.0, 0.0])),
             ..surface.clone()
         };
         let limb = extract_limb(&volume, &surface)?;
@@ -97,7 +92,7 @@ impl PreparedLimb {
 /// Proposes a case for one limb of the scan at `path`, read as `reading` tells.
 ///
 /// Given `surface` and `choices` are kept; what they leave open is found. Of two limbs side by side the one on
-/// `side` of the patient is taken, and a warning says so.
+/// `side` of the patient is taken, and a warning says so; one says as well when the image shows too little of that one.
 ///
 /// # Errors
 /// [`PrepareError`] when the scan is unreadable, holds no limb, or shows no landmarks.
@@ -139,12 +134,50 @@ pub fn prepare(
                 .into_iter()
                 .map(|warning| warning.text)
                 .chain(several_limbs(&prepared.limb.report))
+                .chain(other_on_side(&prepared.limb.report, side, surface))
                 .collect(),
             landmarks: prepared.landmarks.clone(),
             surface: prepared.limb.report.clone(),
         }),
     };
     Ok((case, prepared))
+}
+
+/// 1 for the left, -1 for the right: in LPS, x grows towards the patient's left.
+fn towards_left(side: Side) -> f64 {
+    match side {
+        Side::Right => -1.0,
+        Side::Left => 1.0,
+    }
+}
+
+/// A body with bone that holds at least this much of the limb's solid volume may be the limb that was meant.
+const LEAST_OF_LIMB: f64 = 0.1;
+
+/// That beside the limb, on the side which was asked for, another one lies of which the scan shows too little to be
+/// taken; nothing when a person said where the limb is.
+fn other_on_side(report: &LimbReport, side: Side, settings: &LimbSettings) -> Option<String> {
+    if settings.inside.is_some() || settings.towards.is_some() {
+        return None;
+    }
+    let chosen = report.bodies.iter().find(|body| body.chosen)?;
+    let beside = report.bodies.iter().find(|body| {
+        let [x, y, z] = [0, 1, 2].map(|axis| body.centre_mm[axis] - chosen.centre_mm[axis]);
+        // Within 60 degrees of the side, as bodies side by side are told for the choice of the limb.
+        let is_on_side = 2.0 * x * towards_left(side) >= x.hypot(y).hypot(z);
+        let may_be_limb = body.bone_mm3 > 0.0 && body.core_mm3 >= LEAST_OF_LIMB * chosen.core_mm3;
+        !body.chosen && !body.alike && is_on_side && may_be_limb
+    })?;
+    let (name, other) = match side {
+        Side::Right => ("right", "left"),
+        Side::Left => ("left", "right"),
+    };
+    let [x, y, z] = chosen.centre_mm;
+    let millilitres = beside.core_mm3 * 1e-3;
+    Some(format!(
+        "the limb around {x:.0}, {y:.0}, {z:.0} mm was taken, but towards the patient's {name} lies another one, cut by the \
+         image ({millilitres:.0} ml with little bone): is it the {other} limb that was taken? (--inside takes the other)"
+    ))
 }
 
 /// Which of several limbs was taken.
@@ -180,4 +213,52 @@ pub fn volume_sha256(volume: &Volume) -> String {
         hasher.update(bytes.collect::<Vec<_>>());
     }
     hex(&hasher.finalize())
+}
+
+#[cfg(test)]
+mod tests {
+    use ppa_mesh::Body;
+
+    use super::*;
+
+    fn body(chosen: bool, core_mm3: f64, x: f64) -> Body {
+        Body {
+            chosen,
+            alike: chosen,
+            core_mm3,
+            bone_mm3: 1e-2 * core_mm3,
+            side_cut_mm2: 0.0,
+            centre_mm: [x, 80.0, 400.0],
+        }
+    }
+
+    #[test]
+    fn a_cut_limb_on_the_wanted_side_is_told() {
+        let settings = LimbSettings::default();
+        let with = |other: Body, side, settings: &LimbSettings| {
+            let bodies = vec![body(true, 1.4e6, -67.0), other];
+            let report = LimbReport {
+                bodies,
+                ..LimbReport::default()
+            };
+            other_on_side(&report, side, settings)
+        };
+        let told = with(body(false, 4e5, 31.0), Side::Left, &settings).unwrap();
+        assert!(
+            told.contains("patient's left") && told.contains("-67, 80, 400"),
+            "{told}"
+        );
+        assert_eq!(with(body(false, 4e5, 31.0), Side::Right, &settings), None);
+        assert_eq!(with(body(false, 1e5, 31.0), Side::Left, &settings), None);
+        let without_bone = Body {
+            bone_mm3: 0.0,
+            ..body(false, 4e5, 31.0)
+        };
+        assert_eq!(with(without_bone, Side::Left, &settings), None);
+        let pointed_at = LimbSettings {
+            inside: Some([-67.0, 80.0, 400.0]),
+            ..settings
+        };
+        assert_eq!(with(body(false, 4e5, 31.0), Side::Left, &pointed_at), None);
+    }
 }
