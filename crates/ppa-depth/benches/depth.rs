@@ -122,6 +122,26 @@ fn depth(c: &mut Criterion<ProcessorTime>) {
     group.bench_function("write_png", |b| {
         b.iter(|| noisy.write_png(&folder.path().join("depth.png")))
     });
+    // What a pose of one body shape takes in a dataset: both cameras, with noise, as files.
+    let other = PlacedBody {
+        body: &limb,
+        camera_from_body: Isometry3::new(
+            Vector3::new(30.0, 0.0, 1100.0),
+            Vector3::new(0.0, -0.4, 0.0),
+        ),
+    };
+    group.throughput(Throughput::Elements(2));
+    group.bench_function("images_of_two_cameras_with_noise_as_files", |b| {
+        b.iter(|| {
+            for (stream, seen_from) in [placed(&limb), other].into_iter().enumerate() {
+                let seen = backdrop.before(&camera, &[seen_from]).expect("in view");
+                let noisy = sensor.observe(&camera, &seen, stream as u64, 0);
+                noisy
+                    .write_png(&folder.path().join("depth.png"))
+                    .expect("written");
+            }
+        })
+    });
     group.finish();
 }
 
