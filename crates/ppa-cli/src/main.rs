@@ -81,6 +81,8 @@ enum Command {
     Train(commands::train::TrainArgs),
     /// Metrics, predictions and figures of a trained network
     Eval(commands::eval::EvalArgs),
+    /// Judge depth images while cameras deliver them, pair by pair
+    Predict(commands::predict::PredictArgs),
     /// The paper's experiments: trainings and tables from one plan
     Experiment(commands::experiment::ExperimentArgs),
     /// Metrics of predictions against labels
@@ -117,6 +119,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Learn(command) => commands::learn::run(&command, output),
         Command::Train(args) => commands::train::run(&args, output),
         Command::Eval(args) => commands::eval::run(&args, output),
+        Command::Predict(args) => commands::predict::run(&args, output),
         Command::Experiment(args) => commands::experiment::run(&args, output),
         Command::Metrics(args) => commands::metrics::run(&args, output),
         Command::Stats(command) => commands::stats::run(&command, output),

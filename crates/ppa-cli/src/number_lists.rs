@@ -2,6 +2,7 @@
 
 use nalgebra::Point3;
 use ppa_dataset::labels::BoneNumbers;
+use ppa_learn::data::Roi;
 use ppa_mesh::{Bump, VoxelBox};
 
 fn finite<const N: usize>(text: &str) -> Option<[f64; N]> {
@@ -53,6 +54,18 @@ pub fn world_box(text: &str) -> Result<[[f64; 3]; 2], String> {
         return Err("expected each range to end above its start".to_owned());
     }
     Ok(corners)
+}
+
+/// `X,Y,SIZE`: first column, first row, and columns and rows of a square, in pixels.
+pub fn square(text: &str) -> Result<Roi, String> {
+    let numbers: Option<Vec<u32>> = text
+        .split(',')
+        .map(|part| part.trim().parse().ok())
+        .collect();
+    match numbers.as_deref() {
+        Some(&[x, y, size]) if size > 0 => Ok(Roi { x, y, size }),
+        _ => Err("expected three whole numbers separated by commas, the last above 0".to_owned()),
+    }
 }
 
 /// First and one past the last index along i, j and k.

@@ -9,6 +9,7 @@ mod weights;
 pub mod data;
 pub mod evaluate;
 pub mod experiment;
+pub mod frames;
 pub mod train;
 
 pub use network::{EfficientNetB0, Entry, Mode, Named, NetworkError, Options};

@@ -14,6 +14,7 @@ pub mod merge;
 pub mod mesh;
 pub mod metrics;
 pub mod plan;
+pub mod predict;
 pub mod prepare;
 pub mod qa;
 pub mod scene;

@@ -16,6 +16,7 @@ mod labels;
 mod mcgpu;
 mod phantoms;
 mod planted_series;
+mod prediction;
 mod reading;
 mod resume;
 mod room_file;

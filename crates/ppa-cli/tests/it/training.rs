@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use crate::{fail, names, ppa, succeed};
 
-/// Two persons with three poses each, and a configuration of few and small steps.
-fn write_data(folder: &Path) {
+/// Two persons with three poses each, seen by both cameras, and a configuration of few and small steps.
+pub fn write_data(folder: &Path) {
     for patient in 0..2 {
         let root = folder.join(format!("data/patient_{patient}"));
         let (depth, labels) = (root.join("depth/l/orig"), root.join("labels/l"));
@@ -16,13 +16,17 @@ fn write_data(folder: &Path) {
         let mut grades = serde_json::Map::new();
         let mut rois = serde_json::Map::new();
         for (step, label) in [(0, 1.0), (90, 2.0), (180, 3.0)] {
-            let name = format!("depth_cam_left_{:.1}.png", f64::from(step) / 2.0);
-            let value = |x, y| image::Luma([(700 + step + (x * y + 20 * patient) % 300) as u16]);
-            image::ImageBuffer::from_fn(50, 50, value)
-                .save(depth.join(&name))
-                .unwrap();
-            let roi = serde_json::json!({"camera": "cam_left", "image_number": step, "x_start": 1, "y_start": 2, "size": 45});
-            rois.insert(name, roi);
+            for (view, nearer) in [("cam_left", 0), ("cam_right", 90)] {
+                let name = format!("depth_{view}_{:.1}.png", f64::from(step) / 2.0);
+                let value = |x, y| {
+                    image::Luma([(700 - nearer + step + (x * y + 20 * patient) % 300) as u16])
+                };
+                image::ImageBuffer::from_fn(50, 50, value)
+                    .save(depth.join(&name))
+                    .unwrap();
+                let roi = serde_json::json!({"camera": view, "image_number": step, "x_start": 1, "y_start": 2, "size": 45});
+                rois.insert(name, roi);
+            }
             let grade = serde_json::json!({"label": label, "std": 0.0, "step": step});
             grades.insert(format!("xray_image_{step}.png"), grade);
         }

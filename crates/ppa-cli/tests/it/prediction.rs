@@ -1,0 +1,194 @@
+//! Prediction on streams of depth images as a user meets it.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+
+use crate::training::write_data;
+use crate::{contains, fail, ppa, succeed};
+
+const REGIONS: &str = "--roi-left 1,2,45 --roi-right 1,2,45";
+
+/// Networks of the left, the right and both views after a step each.
+fn train(folder: &Path) {
+    write_data(folder);
+    let config = fs::read_to_string(folder.join("train.toml")).unwrap();
+    let config = config.replace("steps = 8", "steps = 1");
+    for views in ["left", "right", "unified"] {
+        let file = format!("{views}.toml");
+        fs::write(folder.join(&file), format!("views = {views:?}\n{config}")).unwrap();
+        succeed(folder, &format!("train {file} --out {views}"));
+    }
+}
+
+/// Runs a command with some input; its lines of JSON and what stands on stderr.
+fn answers(mut command: Command, input: &str) -> (Vec<Value>, String) {
+    let pipes = command.stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut run = pipes.stderr(Stdio::piped()).spawn().unwrap();
+    run.stdin
+        .take()
+        .unwrap()
+        .write_all(input.as_bytes())
+        .unwrap();
+    let output = run.wait_with_output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{stderr}");
+    let lines = std::str::from_utf8(&output.stdout).unwrap().lines();
+    let lines = lines.map(|line| serde_json::from_str(line).unwrap());
+    (lines.collect(), stderr)
+}
+
+/// What `ppa eval` says of each image of person 1.
+fn evaluated(folder: &Path, run: &str) -> BTreeMap<String, f64> {
+    succeed(folder, &format!("eval {run}"));
+    let table = folder.join(run).join("evaluation/predictions.csv");
+    let mut rows = csv::Reader::from_path(table).unwrap();
+    let rows = rows.deserialize::<BTreeMap<String, String>>();
+    rows.map(|row| row.unwrap())
+        .map(|row| (row["id"].clone(), row["prediction"].parse().unwrap()))
+        .collect()
+}
+
+#[test]
+fn pairs_of_standard_input_are_judged_as_evaluation_judges_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    train(folder);
+    let image =
+        |view: &str, angle: &str| format!("patient_1/depth/l/orig/depth_cam_{view}_{angle}.png");
+    let mut input = String::new();
+    for angle in ["0.0", "45.0", "90.0"] {
+        let [left, right] = ["left", "right"].map(|view| image(view, angle));
+        input += &format!("data/{left}\tdata/{right}\n");
+    }
+    let (lines, _) = answers(
+        ppa(folder, &format!("predict left right {REGIONS} --stdin")),
+        &input,
+    );
+    let [left, right] = ["left", "right"].map(|run| evaluated(folder, run));
+    assert_eq!(lines.len(), 3);
+    for (line, angle) in lines.iter().zip(["0.0", "45.0", "90.0"]) {
+        let expected = [left[&image("left", angle)], right[&image("right", angle)]];
+        let close = |key: &str, expected: f64| {
+            let found = line[key].as_f64().unwrap();
+            assert!(
+                (found - expected).abs() < 1e-5 * expected.abs(),
+                "{key} {line}"
+            );
+        };
+        close("left", expected[0]);
+        close("right", expected[1]);
+        close("quality", (expected[0] + expected[1]) / 2.0);
+        assert!(line["latency_ms"].as_f64().unwrap() > 0.0);
+    }
+    // A network of both views, whatever the number of threads.
+    let both = ["1", "2"].map(|threads| {
+        let command = format!("predict unified {REGIONS} --stdin --threads {threads}");
+        let (lines, _) = answers(ppa(folder, &command), &input);
+        let bits =
+            |line: &Value| ["left", "right"].map(|key| line[key].as_f64().unwrap().to_bits());
+        lines.iter().map(bits).collect::<Vec<_>>()
+    });
+    assert_eq!(both[0], both[1]);
+}
+
+#[test]
+fn frames_that_cannot_be_used_are_named_and_skipped() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    train(folder);
+    let good = "data/patient_1/depth/l/orig/depth_cam_left_0.0.png";
+    let whole = fs::read(folder.join(good)).unwrap();
+    fs::write(folder.join("half.png"), &whole[..whole.len() / 2]).unwrap();
+    image::GrayImage::new(50, 50)
+        .save(folder.join("bits.png"))
+        .unwrap();
+    let wide = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::new(60, 50);
+    wide.save(folder.join("wide.png")).unwrap();
+    let bad = ["half.png", "bits.png", "wide.png", "nowhere.png"];
+    let mut input = format!("{good}\t{good}\nno tab here\n");
+    for bad in bad {
+        input += &format!("{bad}\t{good}\n");
+    }
+    input += &format!("{good}\t{good}\n");
+    let command = format!("predict unified {REGIONS} --stdin --json");
+    let (lines, stderr) = answers(ppa(folder, &command), &input);
+    let [first, last, summary] = &lines[..] else {
+        panic!("{lines:?}")
+    };
+    assert_eq!(first["quality"], last["quality"]);
+    assert_eq!(
+        (&summary["pairs"], &summary["skipped"]),
+        (&2.into(), &5.into())
+    );
+    assert!(summary["pairs_per_s"].as_f64().unwrap() > 0.0);
+    assert!(summary["latency_95_ms"].as_f64() >= summary["median_latency_ms"].as_f64());
+    assert_eq!(stderr.lines().count(), 5, "{stderr}");
+    contains(&stderr, &bad);
+    contains(&stderr, &["line 2", "60x50", "expected 50x50"]);
+
+    contains(
+        &fail(folder, &format!("predict right left {REGIONS} --stdin")),
+        &["right was trained with views", "cam_left"],
+    );
+    contains(
+        &fail(folder, &format!("predict data {REGIONS} --stdin")),
+        &["config.toml"],
+    );
+    let nowhere = format!("predict unified {REGIONS} --watch nowhere");
+    contains(&fail(folder, &nowhere), &["nowhere"]);
+}
+
+/// A recorder that writes slowly; Ctrl-C ends with a summary.
+#[cfg(unix)]
+#[test]
+fn a_folder_is_watched_until_ctrl_c() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    train(folder);
+    let stream = folder.join("stream");
+    fs::create_dir(&stream).unwrap();
+    let frame = |view: &str| {
+        let name = format!("data/patient_1/depth/l/orig/depth_cam_{view}_0.0.png");
+        fs::read(folder.join(name)).unwrap()
+    };
+    let put = |view: &str, name: &str, bytes: &[u8]| {
+        fs::write(stream.join(format!("depth_cam_{view}_{name}.png")), bytes).unwrap();
+    };
+    let (left, right) = (frame("left"), frame("right"));
+    put("left", "1", &left);
+    put("right", "1", &right);
+    put("left", "alone", &left);
+    let command = format!("predict unified {REGIONS} --watch stream --json");
+    let mut run = ppa(folder, &command);
+    let mut run = run.stdout(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(run.stdout.take().unwrap()).lines();
+    let mut next = || -> Value { serde_json::from_str(&lines.next().unwrap().unwrap()).unwrap() };
+    let first = next();
+    assert_eq!(first["name"], "1");
+    put("left", "2", &left[..left.len() - 5]);
+    put("right", "2", &right);
+    put("right", "3", &right);
+    put("left", "3", &left);
+    assert_eq!(next()["name"], "3");
+    put("left", "2", &left);
+    let second = next();
+    assert_eq!(
+        (&second["name"], &second["quality"]),
+        (&"2".into(), &first["quality"])
+    );
+    let interrupt = Command::new("kill")
+        .args(["-INT", &run.id().to_string()])
+        .status();
+    assert!(interrupt.unwrap().success());
+    let summary = next();
+    assert_eq!(
+        (&summary["pairs"], &summary["skipped"], &summary["alone"]),
+        (&3.into(), &0.into(), &1.into())
+    );
+    assert!(run.wait().unwrap().success());
+}

@@ -1,0 +1,47 @@
+//! One camera of a stream.
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use ppa_dataset::layout::View;
+use ppa_dataset::published::GrayImage16;
+
+use crate::data::{DataError, Raster, Roi, SampleImage, evaluation_input};
+
+/// A camera whose frames all show the joint in the same region.
+#[derive(Debug)]
+pub(super) struct Camera {
+    view: View,
+    roi: Roi,
+    /// Columns and rows of its first frame that could be read: a region fits one size of images only.
+    size: OnceLock<[usize; 2]>,
+}
+
+impl Camera {
+    pub fn new(view: View, roi: Roi) -> Self {
+        Self {
+            view,
+            roi,
+            size: OnceLock::new(),
+        }
+    }
+
+    /// A frame as a network of `side` x `side` inputs sees it.
+    pub fn input(&self, path: &Path, side: usize) -> Result<Raster<f32>, DataError> {
+        let size = match self.size.get() {
+            Some(&size) => size,
+            None => {
+                let first = GrayImage16::read(path)?;
+                let size = [first.width as usize, first.height as usize];
+                *self.size.get_or_init(|| size)
+            }
+        };
+        let image = SampleImage {
+            path: path.to_owned(),
+            camera: self.view,
+            roi: self.roi,
+            size,
+        };
+        Ok(evaluation_input(&image.load(side)?, side))
+    }
+}
