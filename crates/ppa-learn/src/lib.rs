@@ -12,7 +12,10 @@ pub mod experiment;
 pub mod frames;
 pub mod train;
 
-pub use network::{EfficientNetB0, Entry, Mode, Named, NetworkError, Options};
+pub use network::{
+    EfficientNetB0, Entry, Fusion, FusionKind, Mode, Named, NetworkError, Options, Place,
+    QualityNetwork,
+};
 pub use parity::{Parity, parity};
 pub use random::{Purpose, stream};
 pub use weights::{FirstConvolution, Loaded, WeightsError};

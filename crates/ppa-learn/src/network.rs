@@ -3,11 +3,13 @@
 mod architecture;
 mod backward;
 mod forward;
+mod fusion;
 #[cfg(test)]
 mod gradient_tests;
 mod initialise;
 mod norm;
 mod operation;
+mod quality;
 #[cfg(test)]
 mod reference;
 mod squeeze;
@@ -16,10 +18,12 @@ mod tape;
 use candle_core::{Tensor, Var};
 
 pub use architecture::Entry;
-use architecture::FEATURES;
 pub(crate) use architecture::{Architecture, ConvPlace, SqueezePlace};
+pub(crate) use fusion::LateFusion;
+pub use fusion::{Fusion, FusionKind};
 pub(crate) use norm::running;
 use operation::Backbone;
+pub use quality::{Place, QualityNetwork};
 
 use crate::kernels::buffer::Pool;
 use crate::random::{Purpose, stream};
@@ -61,6 +65,14 @@ pub enum Mode {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NetworkError {
+    /// Images of another number of cameras than the network is for.
+    #[error("the network takes images of {expected} camera(s), found those of {found}")]
+    Cameras {
+        /// Cameras whose images were given.
+        found: usize,
+        /// Cameras that the network is for.
+        expected: usize,
+    },
     /// Images of another shape.
     #[error(
         "images have the shape {found:?}, expected [images, 1, height, width] with nothing empty"
@@ -95,7 +107,7 @@ pub struct Named {
     pub tensor: Tensor,
 }
 
-/// EfficientNet-B0 with 4,008,253 parameters, all f32 on the CPU.
+/// EfficientNet-B0 with 4,008,253 parameters for one output, all f32 on the CPU.
 ///
 /// The parameters are two flat variables, one of the backbone and one of the classifier, so that a whole backbone is a
 /// single operation to candle: `loss.backward()` gives one gradient for each of the two. [`EfficientNetB0::parameters`] names their parts.
@@ -117,7 +129,19 @@ impl EfficientNetB0 {
     /// # Errors
     /// If candle cannot make the variables.
     pub fn new(seed: u64, options: Options) -> Result<Self, NetworkError> {
-        let architecture = Architecture::new(options.stochastic_depth);
+        Self::with_outputs(seed, options, 1)
+    }
+
+    /// The same with another number of values for each image.
+    ///
+    /// # Errors
+    /// If candle cannot make the variables.
+    pub(crate) fn with_outputs(
+        seed: u64,
+        options: Options,
+        outputs: usize,
+    ) -> Result<Self, NetworkError> {
+        let architecture = Architecture::new(outputs, options.stochastic_depth);
         let (backbone, classifier) = initialise::parameters(&architecture, seed);
         let statistics = initialise::statistics(&architecture);
         Ok(Self {
@@ -170,11 +194,10 @@ impl EfficientNetB0 {
     /// # Errors
     /// If the features have another shape.
     pub fn classify(&self, features: &Tensor, mode: Mode) -> Result<Tensor, NetworkError> {
-        let weight = self
-            .classifier
-            .narrow(0, 0, FEATURES)?
-            .reshape((1, FEATURES))?;
-        let bias = self.classifier.narrow(0, FEATURES, 1)?;
+        let [weight, bias] = &self.architecture.classifier[..] else {
+            unreachable!("a classifier has a weight and a bias")
+        };
+        let [weight, bias] = [weight, bias].map(|entry| entry.view(&self.classifier));
         let kept = match mode {
             Mode::Train { step } if 0.0 < self.options.dropout => {
                 let mut random = stream(self.seed, Purpose::Dropout, 2 * step + 1);
@@ -184,7 +207,7 @@ impl EfficientNetB0 {
             }
             _ => features.clone(),
         };
-        Ok(kept.matmul(&weight.t()?)?.broadcast_add(&bias)?)
+        Ok(kept.matmul(&weight?.t()?)?.broadcast_add(&bias?)?)
     }
 
     pub(crate) fn architecture(&self) -> &Architecture {
@@ -243,7 +266,7 @@ impl EfficientNetB0 {
     }
 }
 
-fn variable(values: Vec<f32>) -> Result<Var, NetworkError> {
+pub(crate) fn variable(values: Vec<f32>) -> Result<Var, NetworkError> {
     let tensor = Tensor::new(values, &candle_core::Device::Cpu)?;
     Ok(Var::from_tensor(&tensor)?)
 }

@@ -17,6 +17,12 @@ pub enum Purpose {
     Augmentation = 3,
     /// Which persons are tested in which fold.
     Folds = 4,
+    /// First values of what joins both cameras; index: the layer's place.
+    FusionWeights = 5,
+    /// Dropout where both cameras are joined; index: the step of training.
+    FusionDropout = 6,
+    /// Seeds of the networks of both cameras; index: the camera.
+    Branches = 7,
 }
 
 /// The stream of random numbers at `index` of a purpose (ChaCha with 8 rounds; key from `seed`, nonce from the address).

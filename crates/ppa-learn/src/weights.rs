@@ -4,11 +4,12 @@ mod file;
 mod names;
 mod onnx;
 mod onnx_messages;
+mod quality;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use candle_core::{DType, Tensor};
+use candle_core::{DType, Tensor, Var};
 use serde::{Deserialize, Serialize};
 
 use crate::network::{EfficientNetB0, Entry, NetworkError};
@@ -42,7 +43,7 @@ pub struct Loaded {
 #[non_exhaustive]
 pub enum WeightsError {
     /// Tensors that are not there, have another shape or hold what is no weight.
-    #[error("{} not fit EfficientNet-B0 with one channel and one output: {}", place(.path), .misfits.join("; "))]
+    #[error("{} not fit EfficientNet-B0 with one channel: {}", place(.path), .misfits.join("; "))]
     Misfit {
         /// The file, if the values came from one.
         path: Option<PathBuf>,
@@ -93,30 +94,37 @@ impl EfficientNetB0 {
     /// # Errors
     /// If any is missing, has another shape or holds what is no weight, each named; the network is then as before.
     pub fn assign(&self, tensors: &HashMap<String, Tensor>) -> Result<(), WeightsError> {
-        let mut flat = [Vec::new(), Vec::new(), Vec::new()];
-        let mut misfits = Vec::new();
         let statistics = self.statistics_layout().map(|entry| (2, entry));
-        for (variable, entry) in self.layout().chain(statistics) {
-            match fitting(tensors, entry) {
-                Ok(values) => flat[variable].extend(values),
-                Err(misfit) => misfits.push(misfit),
-            }
-        }
-        if !misfits.is_empty() {
-            return Err(WeightsError::Misfit {
-                path: None,
-                misfits,
-            });
-        }
         let [backbone, classifier] = self.variables();
-        for (variable, values) in [backbone, classifier, self.statistics_variable()]
-            .into_iter()
-            .zip(flat)
-        {
-            variable.set(&Tensor::new(values, variable.device())?)?;
-        }
-        Ok(())
+        let variables = [backbone, classifier, self.statistics_variable()];
+        assign(&variables, self.layout().chain(statistics), tensors)
     }
+}
+
+/// Fills flat variables with tensors, by the names of entries that lie one after the other in each.
+fn assign<'a>(
+    variables: &[&Var],
+    entries: impl IntoIterator<Item = (usize, &'a Entry)>,
+    tensors: &HashMap<String, Tensor>,
+) -> Result<(), WeightsError> {
+    let mut flat = vec![Vec::new(); variables.len()];
+    let mut misfits = Vec::new();
+    for (variable, entry) in entries {
+        match fitting(tensors, entry) {
+            Ok(values) => flat[variable].extend(values),
+            Err(misfit) => misfits.push(misfit),
+        }
+    }
+    if !misfits.is_empty() {
+        return Err(WeightsError::Misfit {
+            path: None,
+            misfits,
+        });
+    }
+    for (variable, values) in variables.iter().zip(flat) {
+        variable.set(&Tensor::new(values, variable.device())?)?;
+    }
+    Ok(())
 }
 
 /// The values of an entry, or a clause on why there are none.

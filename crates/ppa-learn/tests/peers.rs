@@ -6,7 +6,9 @@
 use std::collections::HashMap;
 
 use candle_core::{Device, Tensor};
-use ppa_learn::{EfficientNetB0, FirstConvolution, Loaded, Mode, Options};
+use ppa_learn::{
+    EfficientNetB0, FirstConvolution, Fusion, FusionKind, Loaded, Mode, Options, QualityNetwork,
+};
 
 fn values(network: &EfficientNetB0) -> Vec<Vec<f32>> {
     let named = network.parameters().unwrap().into_iter();
@@ -100,4 +102,71 @@ torch.save(model.state_dict(), sys.argv[3])
         Loaded::default()
     );
     assert_eq!(values(&network), values(&other));
+}
+
+/// Modules of the authors' names and semantics, in evaluation.
+const FUSED: &str = "
+import sys, torch, torchvision
+from safetensors.torch import load_file
+weights, io = load_file(sys.argv[1]), load_file(sys.argv[2])
+late = 'fc.3.weight' in weights
+class Fused(torch.nn.Module):
+    def __init__(self):
+        super().__init__()
+        def branch():
+            model = torchvision.models.efficientnet_b0(num_classes=512 if late else 1)
+            model.features[0][0] = torch.nn.Conv2d(1, 32, 3, 2, 1, bias=False)
+            return model
+        for name in ['module', 'cam_left_module', 'cam_right_module']:
+            if name + '.classifier.1.bias' in weights:
+                setattr(self, name, branch())
+        if late:
+            nn = torch.nn
+            self.fc = nn.Sequential(nn.Linear(1024, 256), nn.SiLU(), nn.Dropout(0.3), nn.Linear(256, 1))
+    def forward(self, left, right):
+        shared = hasattr(self, 'module')
+        left = (self.module if shared else self.cam_left_module)(left)
+        right = (self.module if shared else self.cam_right_module)(right)
+        if not late:
+            return (left + right) / 2
+        return self.fc(torch.nn.functional.silu(torch.cat([left, right], 1)))
+model = Fused()
+strange = model.load_state_dict(weights, strict=False)
+assert not strange.unexpected_keys and all('num_batches' in key for key in strange.missing_keys), strange
+with torch.no_grad():
+    quality = model.eval()(io['left'], io['right'])
+error = ((quality - io['quality']).abs().max() / io['quality'].abs().max()).item()
+print('torch: largest relative error', error, 'of', io['quality'].ravel())
+assert error < 1e-4
+";
+
+#[test]
+fn pytorch_says_the_same_of_pairs_by_every_fusion() {
+    let folder = tempfile::tempdir().unwrap();
+    for kind in [FusionKind::Score, FusionKind::Late] {
+        for shared_weights in [false, true] {
+            let fusion = Fusion {
+                kind,
+                shared_weights,
+                ..Fusion::default()
+            };
+            let network = QualityNetwork::new(5, Options::default(), Some(fusion)).unwrap();
+            let images = || Tensor::rand(-0.5_f32, 0.5, (3, 1, 64, 64), &Device::Cpu).unwrap();
+            for step in 0..3 {
+                network
+                    .forward(&[images(), images()], Mode::Train { step })
+                    .unwrap();
+            }
+            let [left, right] = [images(), images()];
+            let quality = network
+                .forward(&[left.clone(), right.clone()], Mode::Eval)
+                .unwrap();
+            let [weights, io] =
+                ["weights", "io"].map(|n| folder.path().join(format!("{n}.safetensors")));
+            network.save(&weights).unwrap();
+            let tensors = [("left", left), ("right", right), ("quality", quality)];
+            candle_core::safetensors::save(&HashMap::from(tensors), &io).unwrap();
+            python(FUSED, &[&weights, &io]);
+        }
+    }
 }

@@ -4,7 +4,10 @@ use std::collections::HashMap;
 use std::error::Error;
 
 use candle_core::{DType, Device, Tensor};
-use ppa_learn::{EfficientNetB0, FirstConvolution, Loaded, Mode, Named, Options, WeightsError};
+use ppa_learn::{
+    EfficientNetB0, FirstConvolution, Fusion, FusionKind, Loaded, Mode, Named, Options,
+    QualityNetwork, WeightsError,
+};
 use proptest::prelude::*;
 
 fn network(seed: u64) -> EfficientNetB0 {
@@ -53,6 +56,58 @@ fn saved_weights_are_read_again() {
         Loaded::default()
     );
     assert_eq!(values(&one), values(&other));
+}
+
+#[test]
+fn networks_of_both_cameras_are_read_again_and_begin_with_those_of_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let [fused, single] =
+        ["fused", "single"].map(|n| folder.path().join(format!("{n}.safetensors")));
+    let image = |value: f32| Tensor::full(value, (2, 1, 32, 32), &Device::Cpu).unwrap();
+    let images = [image(0.3), image(-0.2)];
+    let say = |network: &QualityNetwork| -> Vec<f32> {
+        let quality = network.forward(&images, Mode::Eval).unwrap();
+        quality.flatten_all().unwrap().to_vec1().unwrap()
+    };
+    network(7).save(&single).unwrap();
+    for (kind, shared_weights) in [(FusionKind::Score, false), (FusionKind::Late, true)] {
+        let fusion = Fusion {
+            kind,
+            shared_weights,
+            ..Fusion::default()
+        };
+        let new = |seed| QualityNetwork::new(seed, Options::default(), Some(fusion)).unwrap();
+        let (one, other) = (new(1), new(2));
+        one.save(&fused).unwrap();
+        let loaded = other.load(&fused, FirstConvolution::Fresh).unwrap();
+        assert_eq!(loaded, Loaded::default());
+        assert_eq!(say(&one), say(&other));
+
+        let loaded = other.load(&single, FirstConvolution::Fresh).unwrap();
+        assert_eq!(loaded.fresh_classifier, kind == FusionKind::Late);
+        let alone = network(7);
+        let features = alone.features(&images[1], Mode::Eval).unwrap();
+        let found = &other.features(&images, Mode::Eval).unwrap()[1];
+        let [found, features] = [found, &features].map(|t| t.to_vec2::<f32>().unwrap());
+        assert_eq!(found, features);
+
+        // Half of a pair is none.
+        let mut tensors = candle_core::safetensors::load(&fused, &Device::Cpu).unwrap();
+        let name = if shared_weights {
+            "fc.0.bias"
+        } else {
+            "cam_right_module.features.0.0.weight"
+        };
+        tensors.remove(name).unwrap();
+        let (_folder, path) = write(&tensors);
+        let before = say(&other);
+        let error = other
+            .load(&path, FirstConvolution::Fresh)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains(&format!("{name} is missing")), "{error}");
+        assert_eq!(say(&other), before);
+    }
 }
 
 #[test]

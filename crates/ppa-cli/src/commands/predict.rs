@@ -20,14 +20,14 @@ const PAUSE: Duration = Duration::from_millis(5);
 
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Prints one line of JSON for each pair: `name`, `left`, `right` and `quality` (their mean) from 1 (ideal) to 3 \
+    after_help = "Prints one line of JSON for each pair: `name`, `left`, `right` and `quality` (their mean; alone where one network judges pairs) from 1 (ideal) to 3 \
 (inadequate), and `latency_ms` from the moment when both frames were there to the answer. Frames that cannot be used are named on stderr and \
 skipped. The last line tells pairs per second and latencies: on stderr, or on stdout with --json."
 )]
 pub struct PredictArgs {
     /// Folder of the finished `ppa train` of the left camera's network
     left: PathBuf,
-    /// Of the right camera's [default: the first one's network judges both, which has to be of views = "unified"]
+    /// Of the right camera's [default: the first one judges both, and has to be of views = "unified" or "pairs"]
     right: Option<PathBuf>,
     /// Square around the joint in the left camera's frames, in pixels, as in `roi_depth.json`
     #[arg(long, value_name = "X,Y,SIZE", value_parser = square)]
@@ -73,8 +73,8 @@ struct Summary {
 }
 
 pub fn run(args: &PredictArgs, output: Output) -> anyhow::Result<()> {
-    let right = args.right.as_ref().unwrap_or(&args.left);
-    let predictor = PairPredictor::new([&args.left, right], [args.roi_left, args.roi_right])?;
+    let regions = [args.roi_left, args.roi_right];
+    let predictor = PairPredictor::new(&args.left, args.right.as_deref(), regions)?;
     let mut judge = Judge {
         predictor,
         watch: Stopwatch::start(),

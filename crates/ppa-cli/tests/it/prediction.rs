@@ -5,6 +5,7 @@ use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::sync::OnceLock;
 
 use serde_json::Value;
 
@@ -13,16 +14,23 @@ use crate::{contains, fail, ppa, succeed};
 
 const REGIONS: &str = "--roi-left 1,2,45 --roi-right 1,2,45";
 
-/// Networks of the left, the right and both views after a step each.
-fn train(folder: &Path) {
-    write_data(folder);
-    let config = fs::read_to_string(folder.join("train.toml")).unwrap();
-    let config = config.replace("steps = 8", "steps = 1");
-    for views in ["left", "right", "unified"] {
-        let file = format!("{views}.toml");
-        fs::write(folder.join(&file), format!("views = {views:?}\n{config}")).unwrap();
-        succeed(folder, &format!("train {file} --out {views}"));
-    }
+/// A folder with data and networks of the left camera, the right one, each of both, and pairs of both, after a step each.
+fn trained() -> &'static Path {
+    static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        write_data(folder.path());
+        let config = fs::read_to_string(folder.path().join("train.toml")).unwrap();
+        let config = config.replace("steps = 8", "steps = 1");
+        for views in ["left", "right", "unified", "pairs"] {
+            let file = format!("{views}.toml");
+            let text = format!("views = {views:?}\n{config}");
+            fs::write(folder.path().join(&file), text).unwrap();
+            succeed(folder.path(), &format!("train {file} --out {views}"));
+        }
+        folder
+    });
+    folder.path()
 }
 
 /// Runs a command with some input; its lines of JSON and what stands on stderr.
@@ -55,9 +63,7 @@ fn evaluated(folder: &Path, run: &str) -> BTreeMap<String, f64> {
 
 #[test]
 fn pairs_of_standard_input_are_judged_as_evaluation_judges_them() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    train(folder);
+    let folder = trained();
     let image =
         |view: &str, angle: &str| format!("patient_1/depth/l/orig/depth_cam_{view}_{angle}.png");
     let mut input = String::new();
@@ -85,6 +91,21 @@ fn pairs_of_standard_input_are_judged_as_evaluation_judges_them() {
         close("quality", (expected[0] + expected[1]) / 2.0);
         assert!(line["latency_ms"].as_f64().unwrap() > 0.0);
     }
+    // One network of both images.
+    let (lines, _) = answers(
+        ppa(folder, &format!("predict pairs {REGIONS} --stdin")),
+        &input,
+    );
+    let pairs = evaluated(folder, "pairs");
+    assert_eq!((lines.len(), pairs.len()), (3, 3));
+    for (line, angle) in lines.iter().zip(["0.0", "45.0", "90.0"]) {
+        let (found, expected) = (
+            line["quality"].as_f64().unwrap(),
+            pairs[&image("left", angle)],
+        );
+        assert!((found - expected).abs() < 1e-5 * expected.abs(), "{line}");
+        assert!(line.get("left").is_none());
+    }
     // A network of both views, whatever the number of threads.
     let both = ["1", "2"].map(|threads| {
         let command = format!("predict unified {REGIONS} --stdin --threads {threads}");
@@ -98,9 +119,7 @@ fn pairs_of_standard_input_are_judged_as_evaluation_judges_them() {
 
 #[test]
 fn frames_that_cannot_be_used_are_named_and_skipped() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    train(folder);
+    let folder = trained();
     let good = "data/patient_1/depth/l/orig/depth_cam_left_0.0.png";
     let whole = fs::read(folder.join(good)).unwrap();
     fs::write(folder.join("half.png"), &whole[..whole.len() / 2]).unwrap();
@@ -133,7 +152,7 @@ fn frames_that_cannot_be_used_are_named_and_skipped() {
 
     contains(
         &fail(folder, &format!("predict right left {REGIONS} --stdin")),
-        &["right was trained with views", "cam_left"],
+        &["right was trained with views = Right", "left camera's"],
     );
     contains(
         &fail(folder, &format!("predict data {REGIONS} --stdin")),
@@ -147,9 +166,7 @@ fn frames_that_cannot_be_used_are_named_and_skipped() {
 #[cfg(unix)]
 #[test]
 fn a_folder_is_watched_until_ctrl_c() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    train(folder);
+    let folder = trained();
     let stream = folder.join("stream");
     fs::create_dir(&stream).unwrap();
     let frame = |view: &str| {

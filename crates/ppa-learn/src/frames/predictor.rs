@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use super::camera::Camera;
 use crate::data::{Roi, Views};
-use crate::network::{EfficientNetB0, Mode, NetworkError};
-use crate::train::{TrainError, trained};
+use crate::network::{Mode, NetworkError, QualityNetwork};
+use crate::train::{TrainConfig, TrainError, trained};
 
 /// Why frames cannot be judged.
 #[derive(Debug, thiserror::Error)]
@@ -19,13 +19,13 @@ pub enum FramesError {
     #[error(transparent)]
     Train(#[from] TrainError),
     /// A network for other images.
-    #[error("{} was trained with views = {found:?}, which is no network for the {expected} camera", run.display())]
+    #[error("{} was trained with views = {found:?}, expected {expected}", run.display())]
     Views {
         /// Folder of the training.
         run: PathBuf,
         /// What it was trained on.
         found: Views,
-        /// The camera that it shall judge.
+        /// What it could have been trained on.
         expected: &'static str,
     },
 }
@@ -33,57 +33,84 @@ pub enum FramesError {
 /// Quality of a pose from 1 (ideal) to 3 (inadequate), as networks see it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PairPrediction {
-    /// From the left camera's frame.
-    pub left: f64,
-    /// From the right camera's frame.
-    pub right: f64,
-    /// The mean of both: the paper's answer for a pose.
+    /// From the left camera's frame alone, unless one network judges both together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left: Option<f64>,
+    /// From the right camera's frame alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub right: Option<f64>,
+    /// The mean of both, which is the paper's answer for a pose, or what the network says of both together.
     pub quality: f64,
 }
 
-/// The networks of both cameras. The paper's are separate, each trained on its own view, with averaged outputs.
+/// The networks that judge the frames of both cameras.
 #[derive(Debug)]
 pub struct PairPredictor {
-    views: [ViewPredictor; 2],
+    networks: Networks,
+    cameras: [Camera; 2],
 }
 
 #[derive(Debug)]
-struct ViewPredictor {
-    network: EfficientNetB0,
+enum Networks {
+    /// One for each camera; their outputs are averaged.
+    Separate([Trained; 2]),
+    /// One that takes both images.
+    Joint(Trained),
+}
+
+#[derive(Debug)]
+struct Trained {
+    network: QualityNetwork,
     side: usize,
-    camera: Camera,
 }
 
 impl PairPredictor {
-    /// The networks in the folders of two finished trainings, for the left and for the right camera, and where each camera's
-    /// frames show the joint. A network of a unified view may be given for both.
+    /// The networks in the folders of finished trainings, and where each camera's frames show the joint: the left and the
+    /// right camera's network, as in the paper, or one network of a unified view or of pairs.
     ///
     /// # Errors
     /// [`FramesError`] naming the folder.
-    pub fn new(runs: [&Path; 2], regions: [Roi; 2]) -> Result<Self, FramesError> {
-        let view = |run: &Path, view: View, roi| {
-            let (config, network) = trained(run)?;
-            let own = match view {
-                View::Left => Views::Left,
-                View::Right => Views::Right,
-            };
-            if config.views != own && config.views != Views::Unified {
-                return Err(FramesError::Views {
-                    run: run.to_owned(),
-                    found: config.views,
-                    expected: view.name(),
-                });
+    pub fn new(left: &Path, right: Option<&Path>, regions: [Roi; 2]) -> Result<Self, FramesError> {
+        let (config, network) = trained(left)?;
+        let fits = |run: &Path, config: &TrainConfig, fine: &[Views], expected| {
+            if fine.contains(&config.views) {
+                return Ok(());
             }
-            Ok(ViewPredictor {
-                network,
-                side: config.side,
-                camera: Camera::new(view, roi),
+            Err(FramesError::Views {
+                run: run.to_owned(),
+                found: config.views,
+                expected,
             })
         };
+        let of = |config: &TrainConfig, network| Trained {
+            network,
+            side: config.side,
+        };
+        let networks = match right {
+            None => {
+                let expected = "\"unified\" or \"pairs\" for a network that stands alone";
+                fits(left, &config, &[Views::Unified, Views::Pairs], expected)?;
+                match config.views {
+                    Views::Pairs => Networks::Joint(of(&config, network)),
+                    _ => Networks::Separate([of(&config, network.clone()), of(&config, network)]),
+                }
+            }
+            Some(right) => {
+                let expected = "\"left\" or \"unified\" for the left camera's network";
+                fits(left, &config, &[Views::Left, Views::Unified], expected)?;
+                let of_left = of(&config, network);
+                let (config, network) = trained(right)?;
+                let expected = "\"right\" or \"unified\" for the right camera's network";
+                fits(right, &config, &[Views::Right, Views::Unified], expected)?;
+                Networks::Separate([of_left, of(&config, network)])
+            }
+        };
+        let [left, right] = regions;
         Ok(Self {
-            views: [
-                view(runs[0], View::Left, regions[0])?,
-                view(runs[1], View::Right, regions[1])?,
+            networks,
+            cameras: [
+                Camera::new(View::Left, left),
+                Camera::new(View::Right, right),
             ],
         })
     }
@@ -93,28 +120,45 @@ impl PairPredictor {
     /// # Errors
     /// [`FramesError`] naming the frame that cannot be used.
     pub fn predict(&self, frames: [&Path; 2]) -> Result<PairPrediction, FramesError> {
-        let [of_left, of_right] = &self.views;
-        let (left, right) = rayon::join(
-            || of_left.predict(frames[0]),
-            || of_right.predict(frames[1]),
-        );
-        let (left, right) = (left?, right?);
-        Ok(PairPrediction {
-            left,
-            right,
-            quality: (left + right) / 2.0,
-        })
+        let image = |camera: usize, side| self.cameras[camera].image(frames[camera], side);
+        match &self.networks {
+            Networks::Separate([of_left, of_right]) => {
+                let (left, right) = rayon::join(
+                    || of_left.quality(&[image(0, of_left.side)?]),
+                    || of_right.quality(&[image(1, of_right.side)?]),
+                );
+                let (left, right) = (left?, right?);
+                Ok(PairPrediction {
+                    left: Some(left),
+                    right: Some(right),
+                    quality: (left + right) / 2.0,
+                })
+            }
+            Networks::Joint(joint) => {
+                let (left, right) = rayon::join(|| image(0, joint.side), || image(1, joint.side));
+                Ok(PairPrediction {
+                    left: None,
+                    right: None,
+                    quality: joint.quality(&[left?, right?])?,
+                })
+            }
+        }
     }
 }
 
-impl ViewPredictor {
-    fn predict(&self, frame: &Path) -> Result<f64, TrainError> {
-        let side = self.side;
-        let values = self.camera.input(frame, side)?.into_values();
-        let image = Tensor::from_vec(values, (1, 1, side, side), &Device::Cpu);
-        let image = image.map_err(NetworkError::from)?;
-        let quality = self.network.forward(&image, Mode::Eval)?;
+impl Trained {
+    /// What the network says of one image of each of its cameras.
+    fn quality(&self, images: &[Tensor]) -> Result<f64, TrainError> {
+        let quality = self.network.forward(images, Mode::Eval)?;
         let quality = quality.flatten_all().and_then(|all| all.to_vec1::<f32>());
         Ok(f64::from(quality.map_err(NetworkError::from)?[0]))
+    }
+}
+
+impl Camera {
+    /// A frame as a tensor [1, 1, side, side].
+    fn image(&self, frame: &Path, side: usize) -> Result<Tensor, TrainError> {
+        let values = self.input(frame, side)?.into_values();
+        Ok(Tensor::from_vec(values, (1, 1, side, side), &Device::Cpu)?)
     }
 }

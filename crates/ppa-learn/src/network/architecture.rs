@@ -38,6 +38,12 @@ pub struct Entry {
 }
 
 impl Entry {
+    /// The part of a flat tensor, in its shape, on the way of gradients.
+    pub(super) fn view(&self, flat: &Tensor) -> candle_core::Result<Tensor> {
+        flat.narrow(0, self.range.start, self.range.len())?
+            .reshape(&self.shape[..])
+    }
+
     pub(super) fn of(&self, flat: &Tensor) -> Result<Named, NetworkError> {
         let part = flat
             .detach()
@@ -167,8 +173,8 @@ impl Builder {
 
 impl Architecture {
     /// EfficientNet-B0, whose last block is left out with the probability `stochastic_depth`.
-    pub fn new(stochastic_depth: f32) -> Self {
-        Self::of_stages(STEM, &STAGES, FEATURES, stochastic_depth)
+    pub fn new(outputs: usize, stochastic_depth: f32) -> Self {
+        Self::of_stages(STEM, &STAGES, FEATURES, outputs, stochastic_depth)
     }
 
     /// A network of the same kind. Its first stage expands nothing and changes the number of channels.
@@ -176,6 +182,7 @@ impl Architecture {
         stem_channels: usize,
         stages: &[Stage],
         features: usize,
+        outputs: usize,
         stochastic_depth: f32,
     ) -> Self {
         let mut builder = Builder::default();
@@ -227,8 +234,8 @@ impl Architecture {
             [features, channels_in, 1, 1],
         );
         let mut classifier = Names::default();
-        classifier.add("classifier.1.weight".into(), &[1, features]);
-        classifier.add("classifier.1.bias".into(), &[1]);
+        classifier.add("classifier.1.weight".into(), &[outputs, features]);
+        classifier.add("classifier.1.bias".into(), &[outputs]);
         Self {
             blocks,
             head,

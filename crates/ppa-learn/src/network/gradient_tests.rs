@@ -55,7 +55,7 @@ proptest! {
 
     #[test]
     fn outputs_and_gradients_are_those_of_the_plain_network((stem, stages, size) in shapes(), seed in 0..1000_u64) {
-        let architecture = Architecture::of_stages(stem, &stages, 16, DROP);
+        let architecture = Architecture::of_stages(stem, &stages, 16, 1, DROP);
         let (mut parameters, _) = initialise::parameters(&architecture, seed);
         // Away from the initial 0 and 1, so that every term of a gradient counts.
         let disturbance = normal(parameters.len(), seed + 1);

@@ -9,7 +9,7 @@ use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use serde::{Deserialize, Serialize};
 
-use crate::network::EfficientNetB0;
+use crate::network::QualityNetwork;
 
 use super::adam::Adam;
 use super::config::TrainConfig;
@@ -30,7 +30,7 @@ struct State {
 /// Writes all that a training needs to go on.
 pub(super) fn save(
     path: &Path,
-    network: &EfficientNetB0,
+    network: &QualityNetwork,
     adam: &Adam,
     config: &TrainConfig,
 ) -> Result<(), TrainError> {
@@ -40,7 +40,8 @@ pub(super) fn save(
         config: config.clone(),
     };
     let state = serde_json::to_string(&state).expect("names and numbers are JSON");
-    let mut tensors = by_name(network)?;
+    let named = network.tensors()?.into_iter();
+    let mut tensors: Vec<_> = named.map(|named| (named.name, named.tensor)).collect();
     for (name, moments) in [("first", &adam.first), ("second", &adam.second)] {
         for (i, moments) in moments.iter().enumerate() {
             let moments = Tensor::new(moments.as_slice(), &Device::Cpu)?;
@@ -53,7 +54,7 @@ pub(super) fn save(
 /// Puts a checkpoint's values into a network and its moments into Adam.
 pub(super) fn load(
     path: &Path,
-    network: &EfficientNetB0,
+    network: &QualityNetwork,
     config: &TrainConfig,
 ) -> Result<Adam, TrainError> {
     let wrong = |message: String| TrainError::Checkpoint {
@@ -76,7 +77,7 @@ pub(super) fn load(
     }
     let tensors = candle_core::safetensors::load_buffer(&bytes, &Device::Cpu)
         .map_err(|e| wrong(e.to_string()))?;
-    let mut adam = Adam::new(network.variables().map(|variable| variable.elem_count()));
+    let mut adam = Adam::new(network.variables().iter().map(|v| v.elem_count()));
     adam.steps = state.steps;
     for (name, moments) in [("first", &mut adam.first), ("second", &mut adam.second)] {
         for (i, moments) in moments.iter_mut().enumerate() {
@@ -96,14 +97,6 @@ pub(super) fn load(
     let assigned = network.assign(&tensors);
     assigned.map_err(|error| error.in_file(path))?;
     Ok(adam)
-}
-
-fn by_name(network: &EfficientNetB0) -> Result<Vec<(String, Tensor)>, TrainError> {
-    let named = network
-        .parameters()?
-        .into_iter()
-        .chain(network.statistics()?);
-    Ok(named.map(|named| (named.name, named.tensor)).collect())
 }
 
 fn write(

@@ -7,7 +7,7 @@ use ppa_dataset::BodyShape;
 use serde::{Deserialize, Serialize};
 
 use crate::data::{Augmentation, FRAMES_PER_POSE, Views};
-use crate::network::Options;
+use crate::network::{Fusion, Options};
 use crate::weights::FirstConvolution;
 
 use super::schedule::{Schedule, StepCounting};
@@ -50,6 +50,8 @@ pub struct TrainConfig {
     pub layers: Layers,
     /// What training leaves out at random.
     pub network: NetworkConfig,
+    /// How `views = "pairs"` joins the images of both cameras.
+    pub fusion: Fusion,
     /// How training images are changed.
     pub augmentation: Augmentation,
     /// Persons to train on.
@@ -172,6 +174,7 @@ impl TrainConfig {
                 stochastic_depth: options.stochastic_depth,
                 last_layer: LastLayer::Torchvision,
             },
+            fusion: Fusion::default(),
             augmentation: Augmentation::default(),
             training: Vec::new(),
             evaluation: Vec::new(),
@@ -335,6 +338,8 @@ impl TrainConfig {
         for (key, share) in [
             ("network.dropout", self.network.dropout),
             ("network.stochastic_depth", self.network.stochastic_depth),
+            ("fusion.branch_dropout", self.fusion.branch_dropout),
+            ("fusion.late_dropout", self.fusion.late_dropout),
         ] {
             require(
                 (0.0..1.0).contains(&share),

@@ -49,9 +49,6 @@ pub enum TrainError {
         /// Where it began.
         trouble: Trouble,
     },
-    /// Views that this network has no input for.
-    #[error("the network takes the image of one camera, views = \"pairs\" gives two")]
-    TwoCameras,
     /// candle's arithmetic.
     #[error("arithmetic failed")]
     Candle(#[from] candle_core::Error),

@@ -6,9 +6,9 @@ use candle_core::{Device, Tensor};
 
 use super::config::{Layers, TrainConfig};
 use super::error::TrainError;
-use super::run::tensor;
+use super::run::tensors;
 use crate::data::{Balanced, Images, Loader, Order};
-use crate::network::{EfficientNetB0, Mode};
+use crate::network::{Mode, QualityNetwork};
 
 /// The endless sequence of training batches.
 pub(super) enum Feed {
@@ -17,8 +17,8 @@ pub(super) enum Feed {
     /// Linear probing: features of the images as evaluation sees them, which stay what they are while only the last
     /// layer changes, so that each is computed once.
     Features {
-        /// [samples, 1280].
-        features: Tensor,
+        /// [samples, 1280] of each camera.
+        features: Vec<Tensor>,
         labels: Vec<f32>,
         balanced: Balanced,
     },
@@ -34,7 +34,7 @@ impl Feed {
     /// Batches from number `first_batch` on.
     pub fn new(
         config: &TrainConfig,
-        network: &EfficientNetB0,
+        network: &QualityNetwork,
         images: &Arc<Images>,
         first_batch: u64,
     ) -> Result<Self, TrainError> {
@@ -61,7 +61,7 @@ impl Feed {
     pub fn answers(
         &mut self,
         config: &TrainConfig,
-        network: &EfficientNetB0,
+        network: &QualityNetwork,
         step: u64,
     ) -> Result<Answers, TrainError> {
         let mode = Mode::Train { step };
@@ -69,7 +69,7 @@ impl Feed {
             Self::Images(loader) => {
                 let batch = loader.next().expect("training batches never end")?;
                 let labels = batch.labels.clone();
-                let images = tensor(batch, config.side)?;
+                let images = tensors(batch, config.side)?;
                 Ok(Answers {
                     outputs: network.forward(&images, mode)?,
                     labels,
@@ -87,7 +87,8 @@ impl Feed {
                     .collect();
                 let rows: Vec<_> = picked.iter().map(|&sample| sample as u32).collect();
                 let rows = Tensor::new(rows, &Device::Cpu)?;
-                let batch = features.index_select(&rows, 0)?;
+                let batch = features.iter().map(|camera| camera.index_select(&rows, 0));
+                let batch = batch.collect::<Result<Vec<_>, _>>()?;
                 Ok(Answers {
                     outputs: network.classify(&batch, mode)?,
                     labels: picked.iter().map(|&sample| labels[sample]).collect(),
@@ -97,18 +98,24 @@ impl Feed {
     }
 }
 
-/// Features of each sample's evaluation image.
+/// Features of each sample's evaluation images, [samples, 1280] for each camera.
 fn features(
     config: &TrainConfig,
-    network: &EfficientNetB0,
+    network: &QualityNetwork,
     images: &Arc<Images>,
-) -> Result<Tensor, TrainError> {
+) -> Result<Vec<Tensor>, TrainError> {
     let batches = Loader::new(images, &Order::Once, config.batch_size, config.workers);
     let of_batch = |batch: Result<_, _>| {
-        let images = tensor(batch?, config.side)?;
-        // Detached: the layers before have no gradient.
-        Ok(network.features(&images, Mode::Eval)?.detach())
+        let images = tensors(batch?, config.side)?;
+        network
+            .features(&images, Mode::Eval)
+            .map_err(TrainError::from)
     };
-    let features: Vec<_> = batches.map(of_batch).collect::<Result<_, TrainError>>()?;
-    Ok(Tensor::cat(&features, 0)?)
+    let batches: Vec<_> = batches.map(of_batch).collect::<Result<_, TrainError>>()?;
+    let camera = |camera: usize| {
+        let parts: Vec<_> = batches.iter().map(|batch| &batch[camera]).collect();
+        // Detached: the layers before have no gradient.
+        Ok(Tensor::cat(&parts, 0)?.detach())
+    };
+    (0..network.cameras()).map(camera).collect()
 }

@@ -3,9 +3,9 @@
 use std::fmt;
 
 use candle_core::backprop::GradStore;
-use candle_core::{Error, Storage, Tensor};
+use candle_core::{Error, Storage, Tensor, Var};
 
-use crate::network::{EfficientNetB0, Entry};
+use crate::network::{Entry, Place, QualityNetwork};
 
 /// The layer at which numbers stopped being finite.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -34,32 +34,31 @@ impl fmt::Display for Trouble {
 }
 
 /// Where it began, on a network whose loss or gradient is not finite.
-pub(super) fn trouble(network: &EfficientNetB0, gradients: &GradStore) -> Result<Trouble, Error> {
+pub(super) fn trouble(network: &QualityNetwork, gradients: &GradStore) -> Result<Trouble, Error> {
     let variables = network.variables();
-    let flat = variables.map(|variable| variable.flatten_all()?.to_vec1());
-    let [backbone, classifier] = flat;
-    let flat: [Vec<f32>; 2] = [backbone?, classifier?];
-    if let Some(entry) = network.layout().find(|&(v, entry)| is_bad(&flat[v], entry)) {
-        return Ok(Trouble::Parameter(entry.1.name.clone()));
+    let bad_in = |variables: &[&Var], layout: Vec<Place>| -> Result<Option<String>, Error> {
+        let flat = variables.iter().map(|v| v.flatten_all()?.to_vec1());
+        let flat: Vec<Vec<f32>> = flat.collect::<Result<_, Error>>()?;
+        let bad = layout
+            .into_iter()
+            .find(|p| is_bad(&flat[p.variable], &p.entry));
+        Ok(bad.map(|place| place.entry.name))
+    };
+    if let Some(name) = bad_in(&variables, network.layout())? {
+        return Ok(Trouble::Parameter(name));
     }
-    let statistics: Vec<f32> = network.statistics_variable().flatten_all()?.to_vec1()?;
-    if let Some(entry) = network
-        .statistics_layout()
-        .find(|entry| is_bad(&statistics, entry))
-    {
-        return Ok(Trouble::Forward(entry.name.clone()));
+    if let Some(name) = bad_in(&network.statistics_variables(), network.statistics_layout())? {
+        return Ok(Trouble::Forward(name));
     }
     let mut last = None;
-    for (variable, entry) in network.layout() {
+    for Place { variable, entry } in network.layout() {
         if let Some(gradient) = gradients.get(variables[variable])
-            && is_bad(&gradient.flatten_all()?.to_vec1()?, entry)
+            && is_bad(&gradient.flatten_all()?.to_vec1()?, &entry)
         {
-            last = Some(entry);
+            last = Some(entry.name);
         }
     }
-    Ok(last.map_or(Trouble::Output, |entry| {
-        Trouble::Backward(entry.name.clone())
-    }))
+    Ok(last.map_or(Trouble::Output, Trouble::Backward))
 }
 
 fn is_bad(flat: &[f32], entry: &Entry) -> bool {

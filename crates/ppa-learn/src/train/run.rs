@@ -12,7 +12,7 @@ use ppa_dataset::write_whole;
 use crate::data::{
     Balanced, Batch, Images, Loader, Order, Sample, Views, check_split, read_samples,
 };
-use crate::network::{EfficientNetB0, Mode, Options};
+use crate::network::{Mode, Options, QualityNetwork};
 
 use super::adam::Adam;
 use super::checkpoint;
@@ -63,9 +63,6 @@ pub fn train(
     mut report: impl FnMut(&Progress),
 ) -> Result<Ended, TrainError> {
     config.check()?;
-    if config.views == Views::Pairs {
-        return Err(TrainError::TwoCameras);
-    }
     let training = samples(config, &config.training)?;
     let evaluation = samples(config, &config.evaluation)?;
     check_split(&training, &evaluation)?;
@@ -83,7 +80,7 @@ pub fn train(
         if let Some(start) = &config.start {
             network.load(start, config.first_convolution)?;
         }
-        Adam::new(network.variables().map(|variable| variable.elem_count()))
+        Adam::new(network.variables().iter().map(|v| v.elem_count()))
     };
     write_whole(&folder.join("config.toml"), echoed.as_bytes())?;
     let log = Log::resume(&folder.join("log.jsonl"), adam.steps)?;
@@ -125,18 +122,15 @@ pub fn train(
     Ok(Ended::Finished)
 }
 
-fn network(config: &TrainConfig) -> Result<EfficientNetB0, TrainError> {
+fn network(config: &TrainConfig) -> Result<QualityNetwork, TrainError> {
     let options = Options {
         dropout: config.network.dropout,
         stochastic_depth: config.network.stochastic_depth,
     };
-    let network = EfficientNetB0::new(config.seed, options)?;
+    let fusion = (config.views == Views::Pairs).then_some(config.fusion);
+    let network = QualityNetwork::new(config.seed, options, fusion)?;
     if config.network.last_layer == LastLayer::Middle {
-        let [_, classifier] = network.variables();
-        let mut values = vec![0.0; classifier.elem_count()];
-        // The bias stands behind the weights.
-        *values.last_mut().expect("a layer has a bias") = MIDDLE;
-        classifier.set(&Tensor::new(values, &Device::Cpu)?)?;
+        network.begin_with(MIDDLE)?;
     }
     Ok(network)
 }
@@ -145,7 +139,7 @@ fn network(config: &TrainConfig) -> Result<EfficientNetB0, TrainError> {
 ///
 /// # Errors
 /// [`TrainError`] naming the file that is missing or is none of a training.
-pub fn trained(folder: &Path) -> Result<(TrainConfig, EfficientNetB0), TrainError> {
+pub fn trained(folder: &Path) -> Result<(TrainConfig, QualityNetwork), TrainError> {
     let config = TrainConfig::read(&folder.join("config.toml"))?;
     let network = network(&config)?;
     let weights = folder.join("weights.safetensors");
@@ -175,21 +169,18 @@ pub fn samples(config: &TrainConfig, sources: &[Source]) -> Result<Vec<Sample>, 
     Ok(samples)
 }
 
-/// Images of one camera as a tensor [samples, 1, side, side].
-pub(super) fn tensor(batch: Batch, side: usize) -> Result<Tensor, TrainError> {
-    let count = batch.samples.len();
-    let [image] = <[Vec<f32>; 1]>::try_from(batch.images).map_err(|_| TrainError::TwoCameras)?;
-    Ok(Tensor::from_vec(
-        image,
-        (count, 1, side, side),
-        &Device::Cpu,
-    )?)
+/// Images of each camera as a tensor [samples, 1, side, side].
+pub(super) fn tensors(batch: Batch, side: usize) -> Result<Vec<Tensor>, TrainError> {
+    let shape = (batch.samples.len(), 1, side, side);
+    let cameras = batch.images.into_iter();
+    let tensors = cameras.map(|images| Tensor::from_vec(images, shape, &Device::Cpu));
+    Ok(tensors.collect::<Result<_, _>>()?)
 }
 
 struct Run<'a> {
     config: &'a TrainConfig,
     folder: &'a Path,
-    network: EfficientNetB0,
+    network: QualityNetwork,
     adam: Adam,
     log: Log,
     started: Instant,
@@ -286,14 +277,14 @@ impl Run<'_> {
 /// # Errors
 /// [`TrainError`] naming the image that cannot be used.
 pub fn predict(
-    network: &EfficientNetB0,
+    network: &QualityNetwork,
     images: &Arc<Images>,
     batch_size: NonZeroUsize,
     workers: NonZeroUsize,
 ) -> Result<Vec<f64>, TrainError> {
     let mut predictions = Vec::new();
     for batch in Loader::new(images, &Order::Once, batch_size, workers) {
-        let images = tensor(batch?, images.side())?;
+        let images = tensors(batch?, images.side())?;
         let outputs = network.forward(&images, Mode::Eval)?;
         let outputs: Vec<f32> = outputs.flatten_all()?.to_vec1()?;
         predictions.extend(outputs.into_iter().map(f64::from));

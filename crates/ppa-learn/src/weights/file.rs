@@ -7,7 +7,7 @@ use candle_core::{DType, Device, Tensor, pickle};
 
 use super::names::{timm_name, without_prefix};
 use super::{FirstConvolution, Loaded, WeightsError};
-use crate::network::EfficientNetB0;
+use crate::network::{EfficientNetB0, Named};
 
 const FIRST: &str = "features.0.0.weight";
 const CLASSIFIER: [&str; 2] = ["classifier.1.weight", "classifier.1.bias"];
@@ -23,18 +23,13 @@ impl EfficientNetB0 {
     /// If the file cannot be read, or if any tensor is missing, has another shape or holds what is no weight; each is named, and
     /// the network is then as before.
     pub fn load(&self, path: &Path, first: FirstConvolution) -> Result<Loaded, WeightsError> {
-        let at = |error: Box<dyn std::error::Error + Send + Sync>| WeightsError::Read {
-            path: path.to_owned(),
-            source: error,
-        };
-        let found = read(path).map_err(at)?;
-        let (loaded, tensors) = self.fit(found, first)?;
+        let (loaded, tensors) = self.fit(read(path)?, first)?;
         self.assign(&tensors).map_err(|error| error.in_file(path))?;
         Ok(loaded)
     }
 
     /// The tensors of a file by torchvision's names, with the own values where the file has none to give.
-    fn fit(
+    pub(super) fn fit(
         &self,
         found: HashMap<String, Tensor>,
         first: FirstConvolution,
@@ -94,18 +89,34 @@ impl EfficientNetB0 {
     /// # Errors
     /// If the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), WeightsError> {
-        let named = self.parameters()?.into_iter().chain(self.statistics()?);
-        let tensors: Vec<(String, Tensor)> =
-            named.map(|named| (named.name, named.tensor)).collect();
-        let bytes = safetensors::serialize(tensors, None).map_err(|error| WeightsError::Read {
-            path: path.to_owned(),
-            source: error.into(),
-        })?;
-        Ok(ppa_dataset::write_whole(path, &bytes)?)
+        write(
+            path,
+            self.parameters()?.into_iter().chain(self.statistics()?),
+        )
     }
 }
 
-fn read(path: &Path) -> Result<HashMap<String, Tensor>, Box<dyn std::error::Error + Send + Sync>> {
+/// Writes named tensors, whole or not at all.
+pub(super) fn write(
+    path: &Path,
+    named: impl IntoIterator<Item = Named>,
+) -> Result<(), WeightsError> {
+    let tensors = named.into_iter().map(|named| (named.name, named.tensor));
+    let bytes = safetensors::serialize(tensors, None).map_err(candle_core::Error::from)?;
+    Ok(ppa_dataset::write_whole(path, &bytes)?)
+}
+
+/// The tensors of a file, by the names that they have there.
+pub(super) fn read(path: &Path) -> Result<HashMap<String, Tensor>, WeightsError> {
+    read_any(path).map_err(|source| WeightsError::Read {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+fn read_any(
+    path: &Path,
+) -> Result<HashMap<String, Tensor>, Box<dyn std::error::Error + Send + Sync>> {
     match path.extension().and_then(|extension| extension.to_str()) {
         Some("safetensors") => Ok(candle_core::safetensors::load(path, &Device::Cpu)?),
         Some("pth" | "pt") => {

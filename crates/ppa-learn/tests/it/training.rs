@@ -5,8 +5,9 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use ppa_learn::data::Augmentation;
+use ppa_learn::data::{Augmentation, Views};
 use ppa_learn::train::{Ended, Source, TrainConfig, TrainError, read_log, train};
+use ppa_learn::{Fusion, FusionKind};
 
 use crate::toy::dataset;
 
@@ -87,11 +88,9 @@ fn a_training_that_was_stopped_ends_with_the_same_bytes() {
     assert_eq!(run(&config, &parts).unwrap(), Ended::Finished);
 }
 
-#[test]
-fn one_batch_can_be_learned_by_heart() {
-    let data = dataset(1, &[0, 60, 120, 180]);
-    let folder = tempfile::tempdir().unwrap();
-    let config = TrainConfig {
+/// A training in which nothing but the place of crops is random.
+fn by_heart(data: &Path) -> TrainConfig {
+    TrainConfig {
         steps: 160,
         batch_size: n(8),
         log_every: n(10),
@@ -102,15 +101,77 @@ fn one_batch_can_be_learned_by_heart() {
             invalid_probability: 0.0,
             ..TrainConfig::quick().augmentation
         },
-        ..config(data.path())
-    };
-    run(&config, folder.path()).unwrap();
-    let log = read_log(&folder.path().join("log.jsonl")).unwrap();
+        ..config(data)
+    }
+}
+
+/// The median of the last five losses that were logged; single batches scatter, as crops stay random.
+fn last_loss(folder: &Path) -> f64 {
+    let log = read_log(&folder.join("log.jsonl")).unwrap();
     let losses: Vec<f64> = log.iter().map(|row| row.scalars["training/loss"]).collect();
-    // Labels spread by 0.55 about their mean, which a constant loses at best; single batches scatter, as crops stay random.
+    println!("{losses:?}");
     let mut last = losses[losses.len() - 5..].to_vec();
     last.sort_by(f64::total_cmp);
-    assert!(last[2] < 0.1, "{losses:?}");
+    last[2]
+}
+
+#[test]
+fn one_batch_can_be_learned_by_heart() {
+    let data = dataset(1, &[0, 60, 120, 180]);
+    let folder = tempfile::tempdir().unwrap();
+    run(&by_heart(data.path()), folder.path()).unwrap();
+    // Labels spread by 0.55 about their mean, which a constant loses at best.
+    assert!(last_loss(folder.path()) < 0.1);
+}
+
+/// Both cameras' images, to be learned without dropout.
+fn pairs(data: &Path, kind: FusionKind, shared_weights: bool) -> TrainConfig {
+    TrainConfig {
+        views: Views::Pairs,
+        fusion: Fusion {
+            kind,
+            shared_weights,
+            late_dropout: 0.0,
+            ..Fusion::default()
+        },
+        batch_size: n(4),
+        ..by_heart(data)
+    }
+}
+
+#[test]
+fn a_training_on_pairs_that_was_stopped_ends_with_the_same_bytes() {
+    let data = dataset(1, &[0, 180]);
+    let config = TrainConfig {
+        steps: 2,
+        ..pairs(data.path(), FusionKind::Late, true)
+    };
+    let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let [whole, parts] = folders.each_ref().map(|folder| folder.path());
+    run(&config, whole).unwrap();
+    assert_eq!(stop_after(&config, parts, 1), Ended::Stopped { step: 1 });
+    run(&config, parts).unwrap();
+    let [whole, parts] = [whole, parts].map(|f| fs::read(f.join("weights.safetensors")).unwrap());
+    assert!(whole == parts);
+}
+
+#[test]
+#[ignore = "a minute of processor time"]
+fn pairs_of_images_are_learned_by_heart_by_every_fusion() {
+    let data = dataset(1, &[0, 60, 120, 180]);
+    for kind in [FusionKind::Late, FusionKind::Score] {
+        for shared_weights in [false, true] {
+            let folder = tempfile::tempdir().unwrap();
+            let config = TrainConfig {
+                steps: 100,
+                ..pairs(data.path(), kind, shared_weights)
+            };
+            run(&config, folder.path()).unwrap();
+            // A constant loses 0.55 at best.
+            let loss = last_loss(folder.path());
+            assert!(loss < 0.2, "{kind:?} {shared_weights}: {loss}");
+        }
+    }
 }
 
 #[test]

@@ -1,0 +1,255 @@
+//! The network of a training: of one camera's images, or of both cameras' images of one moment.
+
+use candle_core::{Tensor, Var};
+use rand::Rng;
+
+use super::architecture::Entry;
+use super::fusion::{Fusion, FusionKind, LATE_OUTPUTS, LateFusion, branch_gains};
+use super::{EfficientNetB0, Mode, Named, NetworkError, Options};
+use crate::random::{Purpose, stream};
+
+/// A network that tells the quality of a pose, from the images of one camera or of both.
+///
+/// Its tensors bear the names of the authors' modules: torchvision's for one camera; `module.` before them where both cameras share
+/// the weights, else `cam_left_module.` and `cam_right_module.`; `fc.0` and `fc.3` for the layers of late fusion.
+#[derive(Debug, Clone)]
+pub struct QualityNetwork {
+    /// One network, or the left and the right camera's.
+    branches: Vec<EfficientNetB0>,
+    fusion: Option<Fusion>,
+    late: Option<LateFusion>,
+    seed: u64,
+}
+
+/// A parameter or a running statistic: its name, and where it lies.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// Which of the flat variables.
+    pub variable: usize,
+    /// Name, shape and place in it.
+    pub entry: Entry,
+}
+
+impl QualityNetwork {
+    /// A network with first values as [`EfficientNetB0::new`]; of both cameras if it fuses them.
+    ///
+    /// # Errors
+    /// If candle cannot make the variables.
+    pub fn new(seed: u64, options: Options, fusion: Option<Fusion>) -> Result<Self, NetworkError> {
+        let kind = fusion.map(|fusion| fusion.kind);
+        let outputs = match kind {
+            Some(FusionKind::Late) => LATE_OUTPUTS,
+            _ => 1,
+        };
+        let branch = |seed| EfficientNetB0::with_outputs(seed, options, outputs);
+        let branches = match fusion {
+            Some(fusion) if !fusion.shared_weights => [0, 1]
+                .map(|camera| branch(stream(seed, Purpose::Branches, camera).next_u64()))
+                .into_iter()
+                .collect::<Result<_, _>>()?,
+            _ => vec![branch(seed)?],
+        };
+        let late = match fusion {
+            Some(fusion) if fusion.kind == FusionKind::Late => {
+                Some(LateFusion::new(seed, fusion.late_dropout)?)
+            }
+            _ => None,
+        };
+        Ok(Self {
+            branches,
+            fusion,
+            late,
+            seed,
+        })
+    }
+
+    /// Makes the answer to everything `quality`, by last layers whose weights are 0.
+    ///
+    /// # Errors
+    /// If candle cannot set the variables.
+    pub(crate) fn begin_with(&self, quality: f32) -> Result<(), NetworkError> {
+        let branches = self
+            .branches
+            .iter()
+            .map(|branch| (branch.variables()[1], 0));
+        let last: Vec<(&Var, usize)> = match &self.late {
+            Some(late) => vec![(late.variable(), late.last_layer())],
+            None => branches.collect(),
+        };
+        for (variable, start) in last {
+            let mut values = variable.to_vec1::<f32>()?;
+            values[start..].fill(0.0);
+            // The bias stands behind the weights.
+            *values.last_mut().expect("a layer has a bias") = quality;
+            variable.set(&Tensor::new(values, variable.device())?)?;
+        }
+        Ok(())
+    }
+
+    /// Cameras whose images it takes.
+    pub fn cameras(&self) -> usize {
+        if self.fusion.is_some() { 2 } else { 1 }
+    }
+
+    /// One value for each moment [moments, 1], from each camera's images [moments, 1, height, width], left first.
+    ///
+    /// # Errors
+    /// As [`EfficientNetB0::forward`], and for another number of cameras.
+    pub fn forward(&self, images: &[Tensor], mode: Mode) -> Result<Tensor, NetworkError> {
+        self.classify(&self.features(images, mode)?, mode)
+    }
+
+    /// The features [moments, 1280] of each camera's images.
+    ///
+    /// # Errors
+    /// As [`QualityNetwork::forward`].
+    pub fn features(&self, images: &[Tensor], mode: Mode) -> Result<Vec<Tensor>, NetworkError> {
+        match (images, &self.branches[..]) {
+            ([left, right], [of_left, of_right]) => {
+                let (left, right) = rayon::join(
+                    || of_left.features(left, mode),
+                    || of_right.features(right, mode),
+                );
+                Ok(vec![left?, right?])
+            }
+            _ => self.of_all(images, |network, images| network.features(images, mode)),
+        }
+    }
+
+    /// The layers after the features of each camera.
+    ///
+    /// # Errors
+    /// If the features have another shape, or are of another number of cameras.
+    pub fn classify(&self, features: &[Tensor], mode: Mode) -> Result<Tensor, NetworkError> {
+        let outputs = match (features, &self.branches[..]) {
+            ([left, right], [of_left, of_right]) => {
+                vec![
+                    of_left.classify(left, mode)?,
+                    of_right.classify(right, mode)?,
+                ]
+            }
+            _ => self.of_all(features, |network, features| {
+                network.classify(features, mode)
+            })?,
+        };
+        let Some(fusion) = self.fusion else {
+            return Ok(outputs[0].clone());
+        };
+        let step = match mode {
+            Mode::Train { step } => step,
+            Mode::Eval => 0,
+        };
+        let mut random = stream(self.seed, Purpose::FusionDropout, step);
+        let gains = match mode {
+            Mode::Train { .. } => branch_gains(&mut random, fusion.branch_dropout),
+            Mode::Eval => [1.0; 2],
+        };
+        let [left, right] = [0, 1].map(|camera| &outputs[camera] * gains[camera]);
+        match &self.late {
+            None => Ok(((left? + right?)? / 2.0)?),
+            Some(late) => late.forward(&Tensor::cat(&[left?, right?], 1)?, mode, &mut random),
+        }
+    }
+
+    /// What the one network gives for each camera, all in one pass.
+    fn of_all(
+        &self,
+        inputs: &[Tensor],
+        run: impl Fn(&EfficientNetB0, &Tensor) -> Result<Tensor, NetworkError>,
+    ) -> Result<Vec<Tensor>, NetworkError> {
+        if inputs.len() != self.cameras() {
+            return Err(NetworkError::Cameras {
+                found: inputs.len(),
+                expected: self.cameras(),
+            });
+        }
+        let [one] = inputs else {
+            let count = inputs[0].dim(0)?;
+            let all = run(&self.branches[0], &Tensor::cat(inputs, 0)?)?;
+            return Ok(vec![all.narrow(0, 0, count)?, all.narrow(0, count, count)?]);
+        };
+        Ok(vec![run(&self.branches[0], one)?])
+    }
+
+    /// The networks that it is made of: one, or the left and the right camera's.
+    pub(crate) fn branches(&self) -> &[EfficientNetB0] {
+        &self.branches
+    }
+
+    pub(crate) fn late(&self) -> Option<&LateFusion> {
+        self.late.as_ref()
+    }
+
+    /// What stands before the names of each of the networks.
+    pub(crate) fn prefixes(&self) -> &'static [&'static str] {
+        match self.fusion {
+            None => &[""],
+            Some(fusion) if fusion.shared_weights => &["module."],
+            Some(_) => &["cam_left_module.", "cam_right_module."],
+        }
+    }
+
+    /// The flat variables that training changes.
+    pub fn variables(&self) -> Vec<&Var> {
+        let branches = self.branches.iter().flat_map(EfficientNetB0::variables);
+        branches
+            .chain(self.late.iter().map(LateFusion::variable))
+            .collect()
+    }
+
+    /// Where in [`QualityNetwork::variables`] each parameter lies.
+    pub fn layout(&self) -> Vec<Place> {
+        let mut places = Vec::new();
+        for (number, (branch, prefix)) in self.branches.iter().zip(self.prefixes()).enumerate() {
+            places.extend(branch.layout().map(|(variable, entry)| Place {
+                variable: 2 * number + variable,
+                entry: named_with(prefix, entry),
+            }));
+        }
+        let late = self.late.iter().flat_map(LateFusion::entries);
+        places.extend(late.map(|entry| Place {
+            variable: 2 * self.branches.len(),
+            entry: entry.clone(),
+        }));
+        places
+    }
+
+    /// The flat variables of running statistics, one of each network.
+    pub fn statistics_variables(&self) -> Vec<&Var> {
+        let branches = self.branches.iter();
+        branches.map(EfficientNetB0::statistics_variable).collect()
+    }
+
+    /// Where in [`QualityNetwork::statistics_variables`] each running mean and variance lies.
+    pub fn statistics_layout(&self) -> Vec<Place> {
+        let mut places = Vec::new();
+        for (number, (branch, prefix)) in self.branches.iter().zip(self.prefixes()).enumerate() {
+            places.extend(branch.statistics_layout().map(|entry| Place {
+                variable: number,
+                entry: named_with(prefix, entry),
+            }));
+        }
+        places
+    }
+
+    /// Every parameter, then every running statistic, by name.
+    ///
+    /// # Errors
+    /// If candle cannot copy.
+    pub fn tensors(&self) -> Result<Vec<Named>, NetworkError> {
+        let of = |places: Vec<Place>, variables: Vec<&Var>| -> Result<Vec<Named>, NetworkError> {
+            let named = places.iter().map(|p| p.entry.of(variables[p.variable]));
+            named.collect()
+        };
+        let mut tensors = of(self.layout(), self.variables())?;
+        tensors.extend(of(self.statistics_layout(), self.statistics_variables())?);
+        Ok(tensors)
+    }
+}
+
+fn named_with(prefix: &str, entry: &Entry) -> Entry {
+    Entry {
+        name: format!("{prefix}{}", entry.name),
+        ..entry.clone()
+    }
+}

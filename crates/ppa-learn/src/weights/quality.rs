@@ -1,0 +1,74 @@
+//! Values of networks of one camera or both, from files and to files.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use candle_core::Tensor;
+
+use super::file::{read, write};
+use super::{FirstConvolution, Loaded, WeightsError, assign};
+use crate::network::{LateFusion, QualityNetwork};
+
+impl QualityNetwork {
+    /// Takes the values of every parameter and running statistic by name; other names are not looked at.
+    ///
+    /// # Errors
+    /// If any is missing, has another shape or holds what is no weight, each named; the network is then as before.
+    pub fn assign(&self, tensors: &HashMap<String, Tensor>) -> Result<(), WeightsError> {
+        let (layout, statistics) = (self.layout(), self.statistics_layout());
+        let mut variables = self.variables();
+        let first = variables.len();
+        variables.extend(self.statistics_variables());
+        let entries = layout.iter().map(|place| (place.variable, &place.entry));
+        let statistics = statistics.iter();
+        let statistics = statistics.map(|place| (first + place.variable, &place.entry));
+        assign(&variables, entries.chain(statistics), tensors)
+    }
+
+    /// Takes weights of a file as [`EfficientNetB0::load`](crate::EfficientNetB0::load) does. A file of one network fills the
+    /// networks of both cameras, as after pretraining on a unified view; layers that fuse both then stay as they are here.
+    ///
+    /// # Errors
+    /// As [`EfficientNetB0::load`](crate::EfficientNetB0::load); the network is then as before.
+    pub fn load(&self, path: &Path, first: FirstConvolution) -> Result<Loaded, WeightsError> {
+        let mut found = read(path)?;
+        let mut tensors = HashMap::new();
+        let late = self.late().map_or(&[][..], LateFusion::entries);
+        let has_late = late.iter().any(|entry| found.contains_key(&entry.name));
+        for named in self.tensors()? {
+            if late.iter().any(|entry| entry.name == named.name) {
+                match found.remove(&named.name) {
+                    Some(tensor) => tensors.insert(named.name, tensor),
+                    None if has_late => None,
+                    None => tensors.insert(named.name, named.tensor),
+                };
+            }
+        }
+        let mut loaded = Loaded::default();
+        let by_camera = |name: &str| self.prefixes().iter().any(|p| name.starts_with(p));
+        let by_camera = self.branches().len() == 2 && found.keys().any(|name| by_camera(name));
+        for (branch, prefix) in self.branches().iter().zip(self.prefixes()) {
+            let own = |(name, tensor): (&String, &Tensor)| match by_camera {
+                true => Some((name.strip_prefix(prefix)?.to_owned(), tensor.clone())),
+                false => Some((name.clone(), tensor.clone())),
+            };
+            let (of_branch, fitting) = branch.fit(found.iter().filter_map(own).collect(), first)?;
+            loaded = of_branch;
+            tensors.extend(
+                fitting
+                    .into_iter()
+                    .map(|(name, t)| (format!("{prefix}{name}"), t)),
+            );
+        }
+        self.assign(&tensors).map_err(|error| error.in_file(path))?;
+        Ok(loaded)
+    }
+
+    /// Writes all weights and running statistics as safetensors, whole or not at all.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), WeightsError> {
+        write(path, self.tensors()?)
+    }
+}
