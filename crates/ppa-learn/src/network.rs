@@ -6,6 +6,7 @@ mod forward;
 mod fusion;
 #[cfg(test)]
 mod gradient_tests;
+mod inference;
 mod initialise;
 mod norm;
 mod operation;

@@ -1,4 +1,4 @@
-//! The forward pass, layer by layer on channels-last images.
+//! The forward pass of training, layer by layer on channels-last images.
 //!
 //! A convolution is kept before its normalisation; whoever reads it normalises and activates it on the way, a tile of
 //! pixels or a few rows at a time, so that activated images never go through memory.
@@ -15,24 +15,19 @@ use super::tape::{BlockTape, Normed, Size, Tape, by_image};
 use crate::kernels::batch_norm::{Affine, activate, add_activated, normalise};
 use crate::kernels::buffer::{Buffer, Pool};
 
-/// Whether a pass normalises by the batch, and from which random numbers it leaves out branches.
-pub enum Pass<'a> {
-    Train(&'a mut dyn rand::Rng),
-    Eval,
-}
-
 /// Everything that a pass reads, and the running statistics that it moves.
 pub struct Forward<'a> {
     pub architecture: &'a Architecture,
     pub parameters: &'a [f32],
     pub statistics: &'a mut [f32],
     pub pool: &'a Pool,
-    pub pass: Pass<'a>,
+    /// Tells which branches are left out.
+    pub random: &'a mut dyn rand::Rng,
 }
 
 impl Forward<'_> {
-    /// Features [images, 1280] of images [images, height, width], and in training what their gradient needs.
-    pub fn run(mut self, images: &[f32], image_size: Size) -> (Vec<f32>, Option<Tape>) {
+    /// Features [images, 1280] of images [images, height, width], and what their gradient needs.
+    pub fn run(mut self, images: &[f32], image_size: Size) -> (Vec<f32>, Tape) {
         let architecture = self.architecture;
         let mut tapes = Vec::new();
         let mut input = self.pool.take(images.len());
@@ -42,9 +37,7 @@ impl Forward<'_> {
             let (output, tape) = self.block(block, index == 0, input, size);
             size = tape.size_out;
             input = output;
-            if matches!(self.pass, Pass::Train(_)) {
-                tapes.push(tape);
-            }
+            tapes.push(tape);
         }
         let place = &architecture.head;
         let mut pixels = self.pool.take(size.count() * place.channels);
@@ -58,10 +51,7 @@ impl Forward<'_> {
             head_size: size,
             head,
         };
-        (
-            features,
-            matches!(self.pass, Pass::Train(_)).then_some(tape),
-        )
+        (features, tape)
     }
 
     /// Output of a block, and its tape.
@@ -111,9 +101,9 @@ impl Forward<'_> {
         let sums = self.project(place, &depthwise, &squeeze.gate, size_out, &mut pixels);
         let project = self.normed(place, pixels, &sums, size_out);
 
-        let gains = match &mut self.pass {
-            Pass::Train(random) if block.residual => gains(random, size.images, block.drop),
-            _ => vec![1.0; size.images],
+        let gains = match block.residual {
+            true => gains(&mut self.random, size.images, block.drop),
+            false => vec![1.0; size.images],
         };
         let mut output = self.pool.take(project.pixels.len());
         let per_image = size_out.pixels() * place.channels;
@@ -140,18 +130,15 @@ impl Forward<'_> {
         (output, tape)
     }
 
-    /// The normalisation of a convolution, by the batch in training.
+    /// The normalisation of a convolution by the batch.
     fn normed(&mut self, place: &ConvPlace, pixels: Buffer, sums: &[f64], size: Size) -> Normed {
-        let norm = match self.pass {
-            Pass::Train(_) => Norm::batch(
-                &place.norm,
-                self.parameters,
-                self.statistics,
-                sums,
-                size.count(),
-            ),
-            Pass::Eval => Norm::running(&place.norm, self.parameters, self.statistics),
-        };
+        let norm = Norm::batch(
+            &place.norm,
+            self.parameters,
+            self.statistics,
+            sums,
+            size.count(),
+        );
         Normed { pixels, norm }
     }
 }

@@ -5,7 +5,8 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::architecture::{Architecture, Stage};
 use super::backward::Backward;
-use super::forward::{Forward, Pass};
+use super::forward::Forward;
+use super::inference::Inference;
 use super::reference::{Maps, features};
 use super::tape::Size;
 use super::{Purpose, initialise, stream};
@@ -65,11 +66,11 @@ proptest! {
 
         let mut random = stream(seed, Purpose::Dropout, 0);
         let mut statistics = initialise::statistics(&architecture);
-        let forward = Forward { architecture: &architecture, parameters: &parameters, statistics: &mut statistics, pool: &pool, pass: Pass::Train(&mut random) };
+        let forward = Forward { architecture: &architecture, parameters: &parameters, statistics: &mut statistics, pool: &pool, random: &mut random };
         let (out, tape) = forward.run(&images, size);
         let of_features = normal(out.len(), seed + 3);
         let mut gradients = vec![f32::NAN; parameters.len()];
-        Backward { architecture: &architecture, parameters: &parameters, gradients: &mut gradients, pool: &pool }.run(tape.unwrap(), &of_features);
+        Backward { architecture: &architecture, parameters: &parameters, gradients: &mut gradients, pool: &pool }.run(tape, &of_features);
 
         let mut random = stream(seed, Purpose::Dropout, 0);
         let residual = architecture.blocks.iter().filter(|block| block.residual);
@@ -98,6 +99,37 @@ proptest! {
             let allowed = 1e-3 * dot(gradient, gradient).sqrt() + 1e-5 * dot(&gradients, &gradients).sqrt();
             let error = (dot(gradient, &direction) - expected).abs();
             prop_assert!(error < allowed, "{}: {} expected {expected}", entry.name, dot(gradient, &direction));
+        }
+    }
+
+    #[test]
+    fn inference_by_the_moments_of_a_batch_gives_what_training_on_it_gives((stem, stages, size) in shapes(), seed in 0..1000_u64) {
+        let architecture = Architecture::of_stages(stem, &stages, 16, 1, 0.0);
+        let (mut parameters, _) = initialise::parameters(&architecture, seed);
+        let disturbance = normal(parameters.len(), seed + 1);
+        parameters.iter_mut().zip(disturbance).for_each(|(x, d)| *x += 0.1 * d);
+        let images = normal(size.count(), seed + 2);
+        let pool = Pool::default();
+        let mut statistics = initialise::statistics(&architecture);
+        let mut random = stream(seed, Purpose::Dropout, 0);
+        let forward = Forward { architecture: &architecture, parameters: &parameters, statistics: &mut statistics, pool: &pool, random: &mut random };
+        let (trained, tape) = forward.run(&images, size);
+
+        let mut moments = vec![0.0; statistics.len()];
+        let of_blocks = architecture.blocks.iter().zip(&tape.blocks).flat_map(|(block, tape)| {
+            [(&block.expand, &tape.expand), (&block.depthwise, &tape.depthwise), (&block.project, &tape.project)]
+        });
+        for (place, normed) in of_blocks.chain([(&architecture.head, &tape.head)]) {
+            moments[place.norm.mean.clone()].copy_from_slice(&normed.norm.mean);
+            let weights = &parameters[place.norm.weight.clone()];
+            let variances = moments[place.norm.variance.clone()].iter_mut();
+            for ((variance, weight), scale) in variances.zip(weights).zip(&normed.norm.affine.scale) {
+                *variance = (weight / scale).powi(2) - 1e-5;
+            }
+        }
+        let inference = Inference { architecture: &architecture, parameters: &parameters, statistics: &moments, pool: &pool };
+        for (inferred, trained) in inference.run(&images, size.height, size.width).iter().zip(&trained) {
+            prop_assert!((inferred - trained).abs() < 1e-4 * (1.0 + trained.abs()), "{inferred} {trained}");
         }
     }
 }

@@ -6,7 +6,8 @@ use candle_core::{CpuStorage, CustomOp2, Error, Layout, Result, Shape, Tensor, V
 
 use super::architecture::{Architecture, FEATURES};
 use super::backward::Backward;
-use super::forward::{Forward, Pass};
+use super::forward::Forward;
+use super::inference::Inference;
 use super::tape::{Size, Tape};
 use super::{EfficientNetB0, Mode};
 use crate::kernels::buffer::Pool;
@@ -60,32 +61,37 @@ impl CustomOp2 for Backbone {
     ) -> Result<(CpuStorage, Shape)> {
         let (count, _, height, width) = images_layout.shape().dims4()?;
         let mut statistics = self.statistics.to_vec1::<f32>()?;
-        let mut random;
-        let pass = match self.mode {
+        let (images, parameters) = (values(images, images_layout)?, values(parameters, layout)?);
+        let features = match self.mode {
             Mode::Train { step } => {
-                random = stream(self.seed, Purpose::Dropout, 2 * step);
-                Pass::Train(&mut random)
+                let forward = Forward {
+                    architecture: &self.architecture,
+                    parameters,
+                    statistics: &mut statistics,
+                    pool: &self.pool,
+                    random: &mut stream(self.seed, Purpose::Dropout, 2 * step),
+                };
+                let size = Size {
+                    images: count,
+                    height,
+                    width,
+                };
+                let (features, tape) = forward.run(images, size);
+                self.statistics
+                    .set(&Tensor::new(statistics, self.statistics.device())?)?;
+                *self.tape.lock().unwrap_or_else(PoisonError::into_inner) = Some(tape);
+                features
             }
-            Mode::Eval => Pass::Eval,
+            Mode::Eval => {
+                let inference = Inference {
+                    architecture: &self.architecture,
+                    parameters,
+                    statistics: &statistics,
+                    pool: &self.pool,
+                };
+                inference.run(images, height, width)
+            }
         };
-        let forward = Forward {
-            architecture: &self.architecture,
-            parameters: values(parameters, layout)?,
-            statistics: &mut statistics,
-            pool: &self.pool,
-            pass,
-        };
-        let size = Size {
-            images: count,
-            height,
-            width,
-        };
-        let (features, tape) = forward.run(values(images, images_layout)?, size);
-        if tape.is_some() {
-            self.statistics
-                .set(&Tensor::new(statistics, self.statistics.device())?)?;
-        }
-        *self.tape.lock().unwrap_or_else(PoisonError::into_inner) = tape;
         Ok((CpuStorage::F32(features), (count, FEATURES).into()))
     }
 

@@ -4,16 +4,16 @@ use rayon::prelude::*;
 
 use super::super::architecture::ConvPlace;
 use super::super::tape::{Normed, Size, tile_pixels};
-use super::{Forward, Pass, gated, total};
+use super::{Forward, gated, total};
 use crate::kernels::batch_norm::{activate, add_moments};
 use crate::kernels::depthwise::{Rows, Window, channels_last, forward_row};
 use crate::kernels::matrix::{Matrix, Store, multiply};
 use crate::kernels::stem;
 
 impl Forward<'_> {
-    /// What moments are taken about; nothing where none are needed.
-    pub(super) fn center(&self, place: &ConvPlace) -> Option<&[f32]> {
-        matches!(self.pass, Pass::Train(_)).then(|| &self.statistics[place.norm.mean.clone()])
+    /// What moments are taken about.
+    fn center(&self, place: &ConvPlace) -> &[f32] {
+        &self.statistics[place.norm.mean.clone()]
     }
 
     pub(super) fn stem(
@@ -39,7 +39,7 @@ impl Forward<'_> {
             {
                 for (y, out) in out.chunks_mut(row).enumerate() {
                     stem::forward_row(image, size.width, y, &weights, out);
-                    moments(out, center, &mut sums);
+                    add_moments(out, center, &mut sums);
                 }
             }
             sums
@@ -74,7 +74,7 @@ impl Forward<'_> {
                     Matrix::new(weight, columns).transposed(),
                     Store::Replace,
                 );
-                moments(out, center, &mut sums);
+                add_moments(out, center, &mut sums);
             }
             sums
         }))
@@ -131,7 +131,7 @@ impl Forward<'_> {
                         .map(|ky| rows.padded(first + ky as isize))
                         .collect();
                     forward_row(window, &under, &weights, channels, out);
-                    moments(out, center, &mut sums);
+                    add_moments(out, center, &mut sums);
                 }
             }
             sums
@@ -167,15 +167,9 @@ impl Forward<'_> {
                     Matrix::new(weight, columns).transposed(),
                     Store::Replace,
                 );
-                moments(out, center, &mut sums);
+                add_moments(out, center, &mut sums);
             }
             sums
         }))
-    }
-}
-
-fn moments(pixels: &[f32], center: Option<&[f32]>, sums: &mut [f64]) {
-    if let Some(center) = center {
-        add_moments(pixels, center, sums);
     }
 }
