@@ -1,10 +1,13 @@
 //! `ppa prepare`: find skin, axis and plane of a limb and write them down as a case.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use anyhow::bail;
 use clap::{Args, ValueEnum};
-use ppa_dataset::labels::{BoneFile, BoneNumbers};
-use ppa_dataset::{Case, Found, prepare};
+use nalgebra::Point3;
+use ppa_ct::{Format, write};
+use ppa_dataset::labels::{AnkleBones, BoneFile, BoneNumbers, JointSpace, segment_bones};
+use ppa_dataset::{Case, Found, PreparedLimb, prepare};
 use ppa_mesh::{LimbSettings, VoxelBox, write_mesh_file};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
 
@@ -80,6 +83,10 @@ pub struct PrepareArgs {
     /// Which bone each voxel belongs to, for `ppa label auto`: NIfTI, NRRD or MetaImage in the scan's frame
     #[arg(long, value_name = "FILE")]
     bones: Option<PathBuf>,
+    /// Tell tibia, fibula, talus and their neighbours apart in the scan itself, for `ppa label auto`, and write their numbers here:
+    /// NIfTI, NRRD or MetaImage. Refused, with the place, where they touch
+    #[arg(long, value_name = "FILE", conflicts_with = "bones")]
+    segment_bones: Option<PathBuf>,
     /// Numbers of tibia, fibula and talus in it
     #[arg(long, value_name = "TIBIA,FIBULA,TALUS", default_value = "3,4,1", requires = "bones", value_parser = bone_numbers)]
     bone_numbers: BoneNumbers,
@@ -94,6 +101,9 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
             args.plane_points.len()
         ),
     };
+    if let Some(bones) = &args.segment_bones {
+        check_bones_name(bones, &args.scan.path)?;
+    }
     let mut surface = LimbSettings {
         inside: args.inside,
         crop: args.crop,
@@ -131,10 +141,14 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
         let bones = BoneFile {
             path: path.clone(),
             numbers: args.bone_numbers,
+            segmented: false,
         };
         // Refused now rather than after the dataset was made.
         bones.read(&prepared.landmarks.joint_centre.into())?;
         case.bones = Some(bones);
+    }
+    if let Some(path) = &args.segment_bones {
+        case.bones = Some(segmented(path, &prepared)?);
     }
     if let Some(ply) = &args.ply {
         write_mesh_file(ply, &prepared.limb.mesh)?;
@@ -142,6 +156,38 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
     case.write(&args.out)?;
     working.finish_and_clear();
     output.print(&case, |case| describe(case, args))
+}
+
+/// Writes the bones that can be told apart in a scan, once it is sure that labels can be computed from them.
+fn segmented(path: &Path, prepared: &PreparedLimb) -> anyhow::Result<BoneFile> {
+    let ct_from_patient = prepared.landmarks.patient_from_ct().inverse();
+    let ct_from_patient = ct_from_patient.isometry();
+    let bones = segment_bones(&prepared.volume, &prepared.limb.mask, ct_from_patient)?;
+    let numbers = BoneNumbers::default();
+    let joint = ct_from_patient * Point3::origin();
+    let surfaces = AnkleBones::new(&bones.grid, &bones.labels, numbers, &joint)?;
+    JointSpace::new(surfaces, ct_from_patient)?;
+    write(path, &bones.volume()?)?;
+    Ok(BoneFile {
+        path: path.to_owned(),
+        numbers,
+        segmented: true,
+    })
+}
+
+/// Refuses names under which nothing, or the scan no more, would be found later.
+fn check_bones_name(bones: &Path, scan: &Path) -> anyhow::Result<()> {
+    if Format::of_name(bones)? == Format::Dicom {
+        bail!(
+            "--segment-bones {} would be a DICOM CT, but numbers of bones are none: write NIfTI, NRRD or MetaImage",
+            bones.display()
+        );
+    }
+    let same = bones.canonicalize().ok() == scan.canonicalize().ok();
+    if bones.exists() && same {
+        bail!("--segment-bones {} is the scan itself", bones.display());
+    }
+    Ok(())
 }
 
 fn describe(case: &Case, args: &PrepareArgs) -> String {

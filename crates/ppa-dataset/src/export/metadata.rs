@@ -156,7 +156,8 @@ fn lists(root: &Path, table: &Table) -> Result<Vec<(String, &'static str)>, Tabl
         let folder = regions.trim_end_matches("roi_depth.json").to_owned();
         lists.push((regions, "application/json"));
         lists.push((folder.clone() + "labels.json", "application/json"));
-        lists.push((folder + "openness.csv", "text/csv"));
+        lists.push((folder.clone() + "openness.csv", "text/csv"));
+        lists.push((folder + "openness.json", "application/json"));
     }
     lists.retain(|(file, _)| root.join(file).is_file());
     for name in Split::names(root)? {

@@ -6,11 +6,13 @@ use nalgebra::{Isometry3, Point3};
 use ppa_depth::isometry_from_rows;
 use serde::Serialize;
 
+use super::computation::Computation;
 use super::described::Described;
 use super::file::{LabelFile, LabelFileError};
 use super::label::{LabelError, LabelRow, LabelSource};
 use super::openness::{
-    BoneFileError, Exposure, GradeThresholds, JointSpace, JointSpaceError, ThresholdError,
+    BoneFile, BoneFileError, Exposure, GradeThresholds, JointSpace, JointSpaceError, ReadBones,
+    ThresholdError,
 };
 use super::table::write_table;
 use super::tallies::TalliesError;
@@ -40,7 +42,7 @@ pub struct ComputedRow {
     pub label: f64,
     /// Half the range that other tolerances and thresholds give.
     pub std: f64,
-    /// See [`Overlaps`](super::Overlaps), as the next three.
+    /// See [`Overlaps`](super::Overlaps), as the next six.
     pub tibiofibular_overlap_mm: Option<f64>,
     /// Floor of the incisura to fibula.
     pub tibiofibular_clear_space_mm: Option<f64>,
@@ -48,6 +50,12 @@ pub struct ComputedRow {
     pub medial_clear_space_mm: Option<f64>,
     /// Trochlea to plafond.
     pub superior_clear_space_mm: Option<f64>,
+    /// Medial malleolus over talus.
+    pub medial_malleolus_overlap_mm: Option<f64>,
+    /// Lateral malleolus over talus.
+    pub lateral_malleolus_overlap_mm: Option<f64>,
+    /// Medial above lateral crest of the trochlea.
+    pub talar_crest_offset_mm: f64,
     /// How well the radiograph shows the medial gutter, see [`Visibility`](super::Visibility); as the next two.
     pub medial_visibility: f64,
     /// The superior one.
@@ -77,7 +85,9 @@ pub struct LabelledLimb {
 #[non_exhaustive]
 pub enum AutoLabelError {
     /// The case names no bones.
-    #[error("the case of {0} names no bones: write it again with `ppa prepare --bones`")]
+    #[error(
+        "the case of {0} names no bones: write it again with `ppa prepare --bones` or `--segment-bones`"
+    )]
     NoBones(LimbId),
     /// The dataset shows no radiographs of the limb.
     #[error("{} lists no radiographs of {limb}", root.display())]
@@ -126,8 +136,8 @@ pub enum AutoLabelError {
     Label(#[from] LabelError),
 }
 
-/// Grades every radiograph of a limb from the bones that its case names, and writes `openness.csv` and `labels.json`
-/// beside its regions of interest. Labels of readers, and labels that do not tell their source, stay as they are.
+/// Grades every radiograph of a limb from the bones that its case names, and writes `openness.csv`, `openness.json` (what it was
+/// computed with) and `labels.json` beside its regions of interest. Labels of readers, and labels that do not tell their source, stay as they are.
 ///
 /// # Errors
 /// [`AutoLabelError`], before anything is written.
@@ -138,17 +148,22 @@ pub fn label_limb(
     thresholds: &GradeThresholds,
 ) -> Result<LabelledLimb, AutoLabelError> {
     let before = LabelFile::read(&manifest.root, limb)?;
-    let readers_kept = before.is_some_and(|labels| labels.source != Some(LabelSource::Surrogate));
-    let rows = computed_rows(manifest, limb, case, thresholds)?;
-    let table = manifest.root.join(limb.roi_file());
-    let table = table.with_file_name("openness.csv");
+    let readers_kept =
+        before.is_some_and(|labels| !labels.source.is_some_and(LabelSource::is_computed));
+    thresholds.check()?;
+    let file = case.bones.as_ref().ok_or(AutoLabelError::NoBones(limb))?;
+    let (rows, bones_sha256) = computed_rows(manifest, limb, case, file, thresholds)?;
+    let computation = Computation::new(file, &bones_sha256, thresholds);
+    let regions = manifest.root.join(limb.roi_file());
     let labels = rows.iter().map(|row| LabelRow {
         label: row.label,
         std: row.std,
         step: row.step,
     });
-    let labels = LabelFile::new(LabelSource::Surrogate, labels)?.of_radiographs(manifest, limb);
-    write_table(&table, &rows)?;
+    let labels = LabelFile::new(computation.label_source, labels)?;
+    let labels = labels.of_radiographs(manifest, limb);
+    write_table(&regions.with_file_name("openness.csv"), &rows)?;
+    computation.write(&regions.with_file_name("openness.json"))?;
     if !readers_kept {
         labels.write(&manifest.root, limb)?;
     }
@@ -165,12 +180,9 @@ fn computed_rows(
     manifest: &Manifest,
     limb: LimbId,
     case: &Case,
+    file: &BoneFile,
     thresholds: &GradeThresholds,
-) -> Result<Vec<ComputedRow>, AutoLabelError> {
-    thresholds.check()?;
-    let Some(bones) = &case.bones else {
-        return Err(AutoLabelError::NoBones(limb));
-    };
+) -> Result<(Vec<ComputedRow>, String), AutoLabelError> {
     let radiographs: Vec<&FileRow> = manifest
         .files
         .iter()
@@ -198,13 +210,14 @@ fn computed_rows(
         .map(|device| Exposure::of_device(device, joint))
         .collect();
     let of_limb = |source| AutoLabelError::JointSpace { limb, source };
-    let space = JointSpace::new(bones.read(&joint)?, &ct_from_patient).map_err(of_limb)?;
+    let ReadBones { bones, sha256 } = file.read(&joint)?;
+    let space = JointSpace::new(bones, &ct_from_patient).map_err(of_limb)?;
     let openness = space.openness(&exposures).map_err(of_limb)?;
     let rows = radiographs
         .iter()
         .zip(&devices)
         .zip(exposures.iter().zip(&openness));
-    rows.map(|((row, device), (exposure, openness))| {
+    let rows = rows.map(|((row, device), (exposure, openness))| {
         let visibility = described.visibility(manifest, row, device, &space)?;
         let grade = thresholds.grade(openness);
         let overlaps = space.overlaps(exposure);
@@ -222,12 +235,16 @@ fn computed_rows(
             tibiofibular_clear_space_mm: overlaps.tibiofibular_clear_space_mm,
             medial_clear_space_mm: overlaps.medial_clear_space_mm,
             superior_clear_space_mm: overlaps.superior_clear_space_mm,
+            medial_malleolus_overlap_mm: overlaps.medial_malleolus_overlap_mm,
+            lateral_malleolus_overlap_mm: overlaps.lateral_malleolus_overlap_mm,
+            talar_crest_offset_mm: overlaps.talar_crest_offset_mm,
             medial_visibility: visibility.medial,
             superior_visibility: visibility.superior,
             lateral_visibility: visibility.lateral,
         })
-    })
-    .collect()
+    });
+    let rows: Result<_, AutoLabelError> = rows.collect();
+    Ok((rows?, sha256))
 }
 
 fn pose(

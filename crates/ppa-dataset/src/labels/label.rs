@@ -11,6 +11,9 @@ pub enum LabelSource {
     /// Openness of the joint space, first edition: a surrogate that no reader has confirmed.
     #[serde(rename = "surrogate-jso/1")]
     Surrogate,
+    /// The same from bones that [`segment_bones`](crate::labels) told apart in the scan.
+    #[serde(rename = "surrogate-jso/1-segmented")]
+    SegmentedSurrogate,
 }
 
 impl LabelSource {
@@ -18,7 +21,13 @@ impl LabelSource {
         match self {
             Self::Readers => "readers",
             Self::Surrogate => "surrogate-jso/1",
+            Self::SegmentedSurrogate => "surrogate-jso/1-segmented",
         }
+    }
+
+    #[cfg(feature = "generate")]
+    pub(super) fn is_computed(self) -> bool {
+        self != Self::Readers
     }
 }
 

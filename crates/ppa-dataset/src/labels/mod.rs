@@ -5,10 +5,12 @@
 //! Readers (feature `generate`): they see the radiographs of a dataset as `Showing`s on a `grading_page`; `import_grades`
 //! makes labels of what they say.
 //!
-//! Computed labels (feature `generate`) say how open the joint space of an ankle lies to the beam. `AnkleBones` tells
-//! tibia, fibula and talus apart; `JointSpace` finds the three gutters between them; its `openness` follows the rays of an
+//! Computed labels (feature `generate`) say how open the joint space of an ankle lies to the beam. `segment_bones` tells tibia,
+//! fibula and talus apart where nobody did; `AnkleBones` are their surfaces; `JointSpace` finds the three gutters between them; its `openness` follows the rays of an
 //! `Exposure`; `GradeThresholds` make a grade of it; `label_limb` does so for a dataset. What is computed here is a surrogate: no reader has confirmed it.
 
+#[cfg(feature = "generate")]
+mod computation;
 #[cfg(feature = "generate")]
 mod computed;
 #[cfg(feature = "generate")]
@@ -19,6 +21,8 @@ mod label;
 mod openness;
 #[cfg(feature = "generate")]
 mod readers;
+#[cfg(feature = "generate")]
+mod segment;
 #[cfg(feature = "generate")]
 mod table;
 #[cfg(feature = "generate")]
@@ -32,6 +36,8 @@ pub use label::{LabelError, LabelRow, LabelSource};
 pub use openness::*;
 #[cfg(feature = "generate")]
 pub use readers::*;
+#[cfg(feature = "generate")]
+pub use segment::{SegmentError, SegmentedBones, segment_bones};
 #[cfg(feature = "generate")]
 pub use table::TableError;
 #[cfg(feature = "generate")]

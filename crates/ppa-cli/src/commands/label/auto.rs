@@ -14,9 +14,9 @@ use crate::output::{Output, working};
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
 The gutters between talus, tibia and fibula are followed along the rays of every radiograph; the worst one decides. The \
-cases of the plan name the bones (`ppa prepare --bones`). Writes labels.json, with label_source surrogate-jso/1, and \
-openness.csv beside it: openness of each gutter, overlaps and clear spaces in mm, \
-and how well the radiograph itself shows each gutter. Labels of readers stay as they are. \
+cases of the plan name the bones (`ppa prepare --bones` or `--segment-bones`). Writes labels.json, with label_source \
+surrogate-jso/1 (surrogate-jso/1-segmented), and beside it openness.csv: openness of each gutter, overlaps and clear spaces \
+in mm, and how well the radiograph itself shows each gutter; and openness.json: thresholds, and the hash of the bones. Labels of readers stay as they are. \
 No reader has confirmed these labels.
 
   ppa ct phantom --out p01.nii.gz --labels p01.bones.nii.gz

@@ -6,6 +6,7 @@ use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 use super::bones::{AnkleBones, BoneNumbers, BonesError};
+use crate::prepare::volume_sha256;
 
 /// Bones of a case: NIfTI, NRRD or MetaImage with a whole number per voxel, 0 for none, in the `ct` frame of the scan; its
 /// lattice may be another one.
@@ -17,6 +18,18 @@ pub struct BoneFile {
     /// Which number is which bone.
     #[serde(default)]
     pub numbers: BoneNumbers,
+    /// Whether [`segment_bones`](crate::labels::segment_bones) told the bones apart in the scan; else somebody else did.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub segmented: bool,
+}
+
+/// Bones of a file, and which they are.
+#[derive(Debug, Clone)]
+pub struct ReadBones {
+    /// Those around the joint.
+    pub bones: AnkleBones,
+    /// SHA-256 over size, affine and numbers of the file.
+    pub sha256: String,
 }
 
 /// Why a file does not give the bones of an ankle.
@@ -49,7 +62,7 @@ impl BoneFile {
     ///
     /// # Errors
     /// [`BoneFileError`] naming the file: values that are no labels, a bone missing near the joint.
-    pub fn read(&self, joint: &Point3<f64>) -> Result<AnkleBones, BoneFileError> {
+    pub fn read(&self, joint: &Point3<f64>) -> Result<ReadBones, BoneFileError> {
         let volume = ppa_ct::read(&self.path)?.volume;
         let label = |found: f32| match (0.0..=255.0).contains(&found) && found.fract() == 0.0 {
             true => Ok(found as u8),
@@ -63,11 +76,12 @@ impl BoneFile {
             .iter()
             .map(label)
             .collect::<Result<_, _>>()?;
-        AnkleBones::new(volume.grid(), &labels, self.numbers, joint).map_err(|source| {
-            BoneFileError::Bones {
-                path: self.path.clone(),
-                source,
-            }
+        let bones = AnkleBones::new(volume.grid(), &labels, self.numbers, joint);
+        let sha256 = volume_sha256(&volume);
+        let read = bones.map(|bones| ReadBones { bones, sha256 });
+        read.map_err(|source| BoneFileError::Bones {
+            path: self.path.clone(),
+            source,
         })
     }
 }

@@ -20,7 +20,7 @@ impl AnkleBone {
     /// All three.
     pub const ALL: [Self; 3] = [Self::Tibia, Self::Fibula, Self::Talus];
 
-    fn name(self) -> &'static str {
+    pub(in crate::labels) fn name(self) -> &'static str {
         match self {
             Self::Tibia => "tibia",
             Self::Fibula => "fibula",
@@ -52,7 +52,7 @@ impl Default for BoneNumbers {
 }
 
 impl BoneNumbers {
-    fn of(&self, bone: AnkleBone) -> u8 {
+    pub(in crate::labels) fn of(&self, bone: AnkleBone) -> u8 {
         match bone {
             AnkleBone::Tibia => self.tibia,
             AnkleBone::Fibula => self.fibula,
@@ -73,6 +73,13 @@ pub enum BonesError {
         /// Voxels.
         expected: usize,
     },
+    /// Voxels in which a gutter is hardly wider than its blur.
+    #[error("voxels of {} mm, expected at most {MOST_VOXEL_MM} mm along each axis: a gutter is 2 to 3 mm wide",
+        found_mm.map(|side| format!("{side:.2}")).join(" x "))]
+    Coarse {
+        /// Sides of a voxel.
+        found_mm: [f64; 3],
+    },
     /// A bone is missing near the joint.
     #[error("no voxel of the {bone} (label {label}) lies within {reach_mm} mm of the joint")]
     Missing {
@@ -87,6 +94,8 @@ pub enum BonesError {
 
 /// Half the side of the box around the joint that is looked at, mm: the whole talus and both malleoli.
 const REACH_MM: f64 = 60.0;
+/// Longest side of a voxel, mm: the blur and the rim of a facet grow with it, and a gutter of 2.5 mm is then two voxels wide.
+const MOST_VOXEL_MM: f64 = 1.25;
 /// Blur of the labels, voxels: it turns their stairs into surfaces good to about a tenth of a voxel.
 const BLUR_VOXELS: f64 = 0.8;
 
@@ -107,7 +116,8 @@ impl AnkleBones {
     /// The bones within 60 mm of the joint, from one label per voxel, i fastest; 0 is no bone.
     ///
     /// # Errors
-    /// [`BonesError`] when a label is missing near the joint, or their number is not the lattice's.
+    /// [`BonesError`] when a label is missing near the joint, voxels are larger than 1.25 mm, or the number of labels is not
+    /// the lattice's.
     pub fn new(
         grid: &Grid,
         labels: &[u8],
@@ -118,6 +128,12 @@ impl AnkleBones {
             return Err(BonesError::Count {
                 found: labels.len(),
                 expected: grid.len(),
+            });
+        }
+        let found_mm = grid.spacing_mm();
+        if found_mm.max() > MOST_VOXEL_MM {
+            return Err(BonesError::Coarse {
+                found_mm: found_mm.into(),
             });
         }
         let (low, size) = box_around(grid, joint);
@@ -220,7 +236,7 @@ impl AnkleBones {
 
 /// First voxel and size of the box around the joint, cut to the lattice; at least 2 voxels along each axis where there
 /// are as many.
-fn box_around(grid: &Grid, joint: &Point3<f64>) -> ([usize; 3], [usize; 3]) {
+pub(in crate::labels) fn box_around(grid: &Grid, joint: &Point3<f64>) -> ([usize; 3], [usize; 3]) {
     let centre = grid.voxel_from_ct() * joint;
     let spacing = grid.spacing_mm();
     let (mut low, mut size) = ([0; 3], [0; 3]);

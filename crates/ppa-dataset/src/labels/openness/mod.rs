@@ -14,7 +14,8 @@ mod visible;
 #[cfg(test)]
 mod tests;
 
-pub use bone_file::{BoneFile, BoneFileError};
+pub use bone_file::{BoneFile, BoneFileError, ReadBones};
+pub(super) use bones::box_around;
 pub use bones::{AnkleBone, AnkleBones, BoneNumbers, BonesError};
 pub use exposure::Exposure;
 pub use grade::{ComputedLabel, GradeScale, GradeThresholds, ThresholdError};

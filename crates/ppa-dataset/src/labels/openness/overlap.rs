@@ -21,10 +21,18 @@ pub struct Overlaps {
     pub medial_clear_space_mm: Option<f64>,
     /// Width of the superior gutter where the beam runs along it.
     pub superior_clear_space_mm: Option<f64>,
+    /// How far the medial malleolus covers the talus 7 mm below the plafond; below 0 where they are apart.
+    pub medial_malleolus_overlap_mm: Option<f64>,
+    /// The same of the lateral malleolus.
+    pub lateral_malleolus_overlap_mm: Option<f64>,
+    /// How far the highest place of the trochlea's medial half lies above that of its lateral half, along the columns.
+    pub talar_crest_offset_mm: f64,
 }
 
 /// Height above the plafond, mm (Harper & Keller, Foot Ankle 1989).
 const LEVEL_MM: f64 = 10.0;
+/// Depth below the plafond at which malleoli and talus are compared, mm: below the lips of the plafond, above the tips.
+const MALLEOLI_MM: f64 = 7.0;
 /// How far beside the joint bones are looked for, and in which steps, mm.
 const REACH_MM: f64 = 50.0;
 const STEP_MM: f64 = 0.2;
@@ -40,26 +48,53 @@ impl JointSpace {
         let ends = self.superior.gaps.iter().map(Gap::end);
         let height = |p: Point3<f64>| (p - self.limb.joint).dot(&self.limb.axis);
         let plafond = ends.map(height).sum::<f64>() / self.superior.gaps.len() as f64;
-        let level = self.limb.joint + self.limb.axis.scale(plafond + LEVEL_MM);
-        let [_, along] = exposure.projected(&level);
-        let fan = Fan {
-            columns: (0..=(2.0 * REACH_MM / STEP_MM) as i32)
-                .map(|n| medial_sign * (f64::from(n) * STEP_MM - REACH_MM))
-                .map(|across| Ray::through(exposure, [across, along], &self.bones))
-                .collect(),
+        let fan = |above_mm: f64| {
+            let level = self.limb.joint + self.limb.axis.scale(plafond + above_mm);
+            let [_, along] = exposure.projected(&level);
+            Fan {
+                columns: (0..=(2.0 * REACH_MM / STEP_MM) as i32)
+                    .map(|n| medial_sign * (f64::from(n) * STEP_MM - REACH_MM))
+                    .map(|across| Ray::through(exposure, [across, along], &self.bones))
+                    .collect(),
+            }
         };
+        let (syndesmosis, malleoli) = (fan(LEVEL_MM), fan(-MALLEOLI_MM));
         let inside = |bone: AnkleBone| {
             let body = self.bones.body(bone);
             move |p: &Point3<f64>| self.bones.at(body, p) >= 0.5
         };
-        let fibula = fan.edges(inside(AnkleBone::Fibula));
-        let tibia = fan.edges(inside(AnkleBone::Tibia));
-        let incisura = fan.notch(inside(AnkleBone::Tibia));
+        let fibula = syndesmosis.edges(inside(AnkleBone::Fibula));
+        let tibia = syndesmosis.edges(inside(AnkleBone::Tibia));
+        let incisura = syndesmosis.notch(inside(AnkleBone::Tibia));
+        let [medial, lateral, talus] = [AnkleBone::Tibia, AnkleBone::Fibula, AnkleBone::Talus]
+            .map(|bone| malleoli.edges(inside(bone)));
         Overlaps {
             tibiofibular_overlap_mm: fibula.zip(tibia).map(|(f, t)| f[1] - t[0]),
             tibiofibular_clear_space_mm: fibula.zip(incisura).map(|(f, floor)| floor - f[1]),
             medial_clear_space_mm: seen_width_mm(&self.medial.gaps, exposure),
             superior_clear_space_mm: seen_width_mm(&self.superior.gaps, exposure),
+            medial_malleolus_overlap_mm: talus.zip(medial).map(|(t, m)| t[1] - m[0]),
+            lateral_malleolus_overlap_mm: talus.zip(lateral).map(|(t, l)| l[1] - t[0]),
+            talar_crest_offset_mm: self.crest_offset_mm(exposure, medial_sign),
+        }
+    }
+
+    fn crest_offset_mm(&self, exposure: &Exposure, medial_sign: f64) -> f64 {
+        let up = exposure.along.dot(&self.limb.axis).signum();
+        let feet = self.superior.gaps.iter();
+        let mut seen: Vec<[f64; 2]> = feet
+            .map(|gap| exposure.projected(&gap.foot))
+            .map(|[across, along]| [medial_sign * across, up * along])
+            .collect();
+        seen.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let highest = |half: &[[f64; 2]]| {
+            let heights = half.iter().map(|[_, height]| *height);
+            heights.fold(f64::NEG_INFINITY, f64::max)
+        };
+        let (lateral, medial) = seen.split_at(seen.len() / 2);
+        match lateral {
+            [] => 0.0,
+            _ => highest(medial) - highest(lateral),
         }
     }
 

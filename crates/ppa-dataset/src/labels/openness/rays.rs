@@ -94,10 +94,27 @@ impl Ray {
         2.0 * STEP_MM * near.step_by(2).filter(within).count() as f64
     }
 
-    /// Length inside bodies, mm; a point in two of them counts once. A chord longer than `most_mm` is not followed on.
+    /// Length inside bodies, mm; a stretch in two of them counts once. A chord longer than `most_mm` is not followed on.
+    ///
+    /// Surfaces are taken where the line between two steps passes level 1/2, so that chords do not come in whole steps.
     pub fn chord_mm(&self, bones: &AnkleBones, bodies: &[&[f32]], most_mm: f64) -> f64 {
-        let within = |p: &Point3<f64>| bodies.iter().any(|body| bones.at(body, p) >= 0.5);
-        let most = ((most_mm / STEP_MM).ceil() as usize).saturating_add(1);
-        STEP_MM * self.points().filter(within).take(most).count() as f64
+        let depth = |p: Point3<f64>| {
+            let values = bodies.iter().map(|body| bones.at(body, &p));
+            f64::from(values.fold(0.0, f32::max)) - 0.5
+        };
+        let (mut chord_mm, mut before) = (0.0, -0.5);
+        for here in self.points().map(depth) {
+            let inside = match (before >= 0.0, here >= 0.0) {
+                (true, true) => 1.0,
+                (false, false) => 0.0,
+                _ => f64::max(before, here) / (before - here).abs(),
+            };
+            chord_mm += STEP_MM * inside;
+            if chord_mm > most_mm {
+                break;
+            }
+            before = here;
+        }
+        chord_mm
     }
 }

@@ -158,7 +158,7 @@ pub fn import_grades(
     let mut labels = Vec::new();
     for (&limb, rows) in &limbs {
         if let Some(before) = LabelFile::read(&manifest.root, limb)? {
-            if before.source == Some(LabelSource::Surrogate) {
+            if before.source.is_some_and(LabelSource::is_computed) {
                 done.replaced_computed += before.labels().len();
             } else if rows_before.get(&limb) != Some(&before.labels()) {
                 let path = LabelFile::path(&manifest.root, limb);

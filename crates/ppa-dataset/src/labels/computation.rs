@@ -1,0 +1,49 @@
+//! `openness.json`: what computed labels were computed with.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::label::LabelSource;
+use super::openness::{BoneFile, BoneNumbers, FREE_CHORDS_MM, GradeThresholds};
+use crate::files::{FileError, write_whole};
+
+/// Everything that labels of the same radiographs depend on.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct Computation<'a> {
+    pub label_source: LabelSource,
+    pub thresholds: &'a GradeThresholds,
+    free_chords_mm: [f64; 3],
+    bones: ComputedFrom<'a>,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+struct ComputedFrom<'a> {
+    /// Over size, affine and numbers: the name of the file stays out of datasets.
+    sha256: &'a str,
+    numbers: BoneNumbers,
+    segmented: bool,
+}
+
+impl<'a> Computation<'a> {
+    pub fn new(file: &BoneFile, sha256: &'a str, thresholds: &'a GradeThresholds) -> Self {
+        Self {
+            label_source: match file.segmented {
+                true => LabelSource::SegmentedSurrogate,
+                false => LabelSource::Surrogate,
+            },
+            thresholds,
+            free_chords_mm: FREE_CHORDS_MM,
+            bones: ComputedFrom {
+                sha256,
+                numbers: file.numbers,
+                segmented: file.segmented,
+            },
+        }
+    }
+
+    pub fn write(&self, path: &Path) -> Result<(), FileError> {
+        let text = serde_json::to_string_pretty(self).expect("thresholds are finite numbers");
+        write_whole(path, text.as_bytes())
+    }
+}
