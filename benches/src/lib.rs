@@ -1,1 +1,5 @@
-//! Cross-crate benches live in the `benches` folder beside this file; there is nothing to link against.
+//! What the benches of the crates measure in. Benches across crates live in the `benches` folder beside this file.
+
+mod processor_time;
+
+pub use processor_time::ProcessorTime;

@@ -3,15 +3,13 @@
 //! Units of work: triangles for meshes, pixels for images and rays. The seed is the formula. Times are processor seconds of all
 //! threads, which depend less on what else the machine does than the clock on the wall.
 
-mod processor_time;
-
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
+use ppa_benches::ProcessorTime;
 use ppa_depth::{
     Backdrop, Body, Camera, CameraSpec, DepthMode, MeshBody, PlacedBody, Sensor, SensorSpec,
     SurfelBody, render,
 };
-use processor_time::ProcessorTime;
 
 /// A bent, bumpy tube of 832 x 832 quads, about 400 mm long and 100 mm thick: 1.38 million triangles.
 fn limb() -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {

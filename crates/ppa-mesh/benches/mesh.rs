@@ -1,4 +1,7 @@
-//! The hot paths: iso-surface of an analytic field, limb of the phantom, DBSCAN of a surface.
+//! The hot paths: iso-surface of an analytic field and of the leg that other programs are measured on, limb of the phantom,
+//! DBSCAN of a surface. Times are processor seconds of all threads.
+
+mod leg;
 
 use std::hint::black_box;
 
@@ -7,9 +10,11 @@ use linfa::prelude::{ParamGuard, Transformer};
 use linfa_clustering::Dbscan;
 use nalgebra::{Point3, Vector3};
 use ndarray16::Array2;
+use ppa_benches::ProcessorTime;
 use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_ct::{Grid, Volume};
 use ppa_mesh::{Border, LimbSettings, dbscan, extract_limb, iso_surface};
+use rayon::ThreadPoolBuilder;
 
 /// A torus with a wavy skin in n³ voxels.
 fn torus(n: usize) -> Volume {
@@ -26,7 +31,7 @@ fn torus(n: usize) -> Volume {
     Volume::new(grid, hu).expect("finite")
 }
 
-fn benches(c: &mut Criterion) {
+fn benches(c: &mut Criterion<ProcessorTime>) {
     let mut group = c.benchmark_group("iso_surface");
     group.sample_size(20);
     for n in [64, 128] {
@@ -34,6 +39,15 @@ fn benches(c: &mut Criterion) {
         group.throughput(Throughput::Elements(field.grid().len() as u64));
         group.bench_with_input(BenchmarkId::new("voxels", n), &field, |b, field| {
             b.iter(|| iso_surface(black_box(field), -500.0, Border::Open));
+        });
+    }
+    let leg = leg::leg();
+    group.throughput(Throughput::Elements(leg.grid().len() as u64));
+    for threads in [1, 2] {
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.expect("threads");
+        group.bench_with_input(BenchmarkId::new("leg_threads", threads), &leg, |b, leg| {
+            b.iter(|| pool.install(|| iso_surface(black_box(leg), -500.0, Border::Open)));
         });
     }
     group.finish();
@@ -67,5 +81,9 @@ fn benches(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(mesh, benches);
+criterion_group! {
+    name = mesh;
+    config = Criterion::default().with_measurement(ProcessorTime);
+    targets = benches
+}
 criterion_main!(mesh);

@@ -2,20 +2,18 @@
 //!
 //! Times are processor seconds of all threads.
 
-#[path = "../../ppa-depth/benches/processor_time/mod.rs"]
-mod processor_time;
 #[path = "../tests/it/recorded_room.rs"]
 mod recorded_room;
 
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use ppa_benches::ProcessorTime;
 use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_mesh::{Border, iso_surface};
 use ppa_scene::{
     LandmarkOverrides, PlaneSettings, Room, RoomSpec, Side, find_landmarks, place, table_plane,
 };
-use processor_time::ProcessorTime;
 
 fn scene(criterion: &mut Criterion<ProcessorTime>) {
     let room = Room::parametric(&RoomSpec::default()).expect("default room");

@@ -1,11 +1,8 @@
 //! Photon histories, rays and whole radiographs per second.
 
-use std::time::Duration;
-
-use cpu_time::ProcessTime;
-use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use ppa_benches::ProcessorTime;
 use ppa_ct::Grid;
 use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_xray::{
@@ -72,42 +69,8 @@ fn ankle(whole: bool, detector: Detector) -> (VoxelPhantom, Projection) {
     (phantom, Projection::new(pose, 1_100.0, detector))
 }
 
-/// Time of the processor over all threads, so that other work on the machine does not count.
-struct CpuTime;
-
-impl Measurement for CpuTime {
-    type Intermediate = ProcessTime;
-    type Value = Duration;
-
-    fn start(&self) -> ProcessTime {
-        ProcessTime::now()
-    }
-
-    fn end(&self, start: ProcessTime) -> Duration {
-        start.elapsed()
-    }
-
-    fn add(&self, a: &Duration, b: &Duration) -> Duration {
-        *a + *b
-    }
-
-    fn zero(&self) -> Duration {
-        Duration::ZERO
-    }
-
-    fn to_f64(&self, value: &Duration) -> f64 {
-        value.as_nanos() as f64
-    }
-
-    fn formatter(&self) -> &dyn ValueFormatter {
-        WALL.formatter()
-    }
-}
-
-const WALL: WallTime = WallTime;
-
 /// Histories per second of processor time: in one thread, and over two.
-fn histories(criterion: &mut Criterion<CpuTime>) {
+fn histories(criterion: &mut Criterion<ProcessorTime>) {
     let spectrum = spectrum();
     let (leg, before_leg) = ankle(true, Detector::centred(300, 300, 0.8));
     let mut group = criterion.benchmark_group("analog");
@@ -137,7 +100,7 @@ fn histories(criterion: &mut Criterion<CpuTime>) {
 }
 
 /// What a projection costs before its first history.
-fn preparation(criterion: &mut Criterion<CpuTime>) {
+fn preparation(criterion: &mut Criterion<ProcessorTime>) {
     let spectrum = spectrum();
     let (leg, before_leg) = ankle(true, Detector::centred(300, 300, 0.8));
     let mut group = criterion.benchmark_group("preparation");
@@ -154,7 +117,7 @@ fn preparation(criterion: &mut Criterion<CpuTime>) {
 }
 
 /// Pixels per second of processor time: the primary alone, and whole radiographs worth 2e10 histories.
-fn images(criterion: &mut Criterion<CpuTime>) {
+fn images(criterion: &mut Criterion<ProcessorTime>) {
     let spectrum = spectrum();
     let mut group = criterion.benchmark_group("image");
     group.sample_size(10);
@@ -173,7 +136,7 @@ fn images(criterion: &mut Criterion<CpuTime>) {
 
 criterion_group! {
     name = transport;
-    config = Criterion::default().with_measurement(CpuTime);
+    config = Criterion::default().with_measurement(ProcessorTime);
     targets = histories, preparation, images
 }
 criterion_main!(transport);

@@ -22,18 +22,10 @@ pub fn numbers<const N: usize>(value: &Value) -> [f64; N] {
     std::array::from_fn(|at| value[at].as_f64().expect("number"))
 }
 
-/// Uniform in [-1, 1), as the reference README defines it.
+/// The first `count` values of that seed.
 pub fn hash_noise(count: usize, seed: u64) -> Vec<f64> {
     (0..count as u64)
-        .map(|i| {
-            let mut z = i.wrapping_add(seed << 32).wrapping_add(1);
-            z = z.wrapping_mul(0x9E37_79B9_7F4A_7C15);
-            z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-            z ^= z >> 31;
-            let scale = f64::from(2.0_f32.powi(32));
-            (z & 0xFFFF_FFFF) as f64 / scale + (z >> 32) as f64 / scale - 1.0
-        })
+        .map(|index| ppa_tests::hash_noise(index, seed))
         .collect()
 }
 

@@ -2,15 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 use ppa_mesh::PointCloud;
-
-/// SplitMix64 of (index + seed · 2³²), sum of two uniforms: in [-1, 1), triangular.
-pub fn hash_noise(index: u64, seed: u64) -> f64 {
-    let mut z = (index + (seed << 32) + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^= z >> 31;
-    (z & 0xFFFF_FFFF) as f64 / 4_294_967_296.0 + (z >> 32) as f64 / 4_294_967_296.0 - 1.0
-}
+use ppa_tests::hash_noise;
 
 /// A noisy room in mm, `room_cloud` of `../shared/peers/geometry_bench.py`: table of 2.0 x 0.6 m at 900 mm, floor at 0, wall at y = 1.5 m, clutter;
 /// noise of 3 mm standard deviation. `keep` picks heights before rounding to f32.

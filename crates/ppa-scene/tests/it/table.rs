@@ -1,8 +1,9 @@
 use nalgebra::Point3;
 use ppa_mesh::PointCloud;
 use ppa_scene::{PlaneError, PlaneSettings, TablePlane, table_plane};
+use ppa_tests::hash_noise;
 
-use crate::recorded_room::{hash_noise, room_cloud};
+use crate::recorded_room::room_cloud;
 
 fn check(found: &TablePlane, height_mm: f64, centre: Point3<f64>) {
     let angle = found.plane.normal.z.acos().to_degrees();
