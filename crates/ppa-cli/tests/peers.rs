@@ -137,7 +137,7 @@ fn pyarrow_mlcroissant_rocrate_bagit_and_webdataset_take_what_is_exported() {
 import glob, json, os
 import bagit, mlcroissant, pandas, rocrate.rocrate, webdataset
 
-table = pandas.read_csv("data/manifest.csv", dtype_backend="numpy_nullable")
+table = pandas.read_csv("data/manifest.csv", dtype={"seed": "UInt64"}, dtype_backend="numpy_nullable")
 parquet = pandas.read_parquet("table.parquet", dtype_backend="numpy_nullable")
 assert list(table.columns) == list(parquet.columns) and len(table) == len(parquet)
 for column in table.columns:

@@ -7,6 +7,7 @@ use serde::Deserialize;
 use sha2::{Digest, Sha256};
 
 use super::croissant::croissant;
+use super::datasheet::datasheet;
 use super::ro_crate::ro_crate;
 use super::table::{Table, TableError};
 use crate::files::{FileError, hex, read_text, write_whole};
@@ -115,8 +116,10 @@ pub(super) const PAPER: &str = "https://doi.org/10.59275/j.melba.2026-c874";
 /// Table that the metadata describe.
 pub(super) const TABLE: &str = "manifest.csv";
 
-/// Writes `manifest.csv`, `croissant.json` (Croissant 1.1) and `ro-crate-metadata.json` (RO-Crate 1.1) into the dataset in
-/// `root`, each whole or not at all; `split` names the split that stands in the table.
+const DATASHEET: &str = "datasheet.md";
+
+/// Writes `manifest.csv`, `croissant.json` (Croissant 1.1), `ro-crate-metadata.json` (RO-Crate 1.1) and `datasheet.md` into the
+/// dataset in `root`, each whole or not at all; `split` names the split that stands in the table.
 ///
 /// # Errors
 /// [`TableError`] naming the file at fault, or what of the metadata is no name, address or day; nothing is written then.
@@ -142,6 +145,10 @@ pub fn write_metadata(
             "ro-crate-metadata.json",
             format!("{ro_crate:#}\n").into_bytes(),
         ),
+        (
+            DATASHEET,
+            datasheet(metadata, &table, &provenance).into_bytes(),
+        ),
     ] {
         write_whole(&root.join(name), &bytes)?;
     }
@@ -164,6 +171,7 @@ fn lists(root: &Path, table: &Table) -> Result<Vec<(String, &'static str)>, Tabl
         lists.push((format!("splits/{name}.json"), "application/json"));
     }
     lists.push(("croissant.json".to_owned(), "application/ld+json"));
+    lists.push((DATASHEET.to_owned(), "text/markdown"));
     Ok(lists)
 }
 

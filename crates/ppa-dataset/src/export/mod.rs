@@ -2,6 +2,7 @@
 
 mod bag;
 mod croissant;
+mod datasheet;
 mod metadata;
 mod ro_crate;
 mod table;

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::metadata::{DESCRIPTION, Metadata, PAPER, Provenance, TABLE};
-use super::table::{Table, Values};
+use super::table::Table;
 
 const RO_CRATE: &str = "https://w3id.org/ro/crate/1.1";
 const PROCESS_RUN: &str = "https://w3id.org/ro/wfrun/process/0.5";
@@ -29,7 +29,8 @@ pub(super) fn ro_crate(
         ),
     ];
     let id = |id: &str| json!({"@id": id});
-    let images = files(table);
+    let images = table.texts("file").zip(table.texts("sha256"));
+    let images: Vec<_> = images.filter_map(|(file, hash)| file.zip(hash)).collect();
     let scans = provenance.scans();
     let scan_id = |scan: &str| format!("#scan-{scan}");
     let parts: Vec<_> = lists
@@ -100,16 +101,4 @@ pub(super) fn ro_crate(
         {"sha256": "https://schema.org/sha256"},
     ]);
     json!({"@context": context, "@graph": graph})
-}
-
-/// Path and hash of every image.
-fn files(table: &Table) -> Vec<(&str, &str)> {
-    let text = |name: &str| {
-        let column = table.columns.iter().find(|column| column.name == name);
-        match column.map(|column| &column.values) {
-            Some(Values::Text(values)) => values.iter().flatten().map(String::as_str).collect(),
-            _ => Vec::new(),
-        }
-    };
-    text("file").into_iter().zip(text("sha256")).collect()
 }

@@ -173,6 +173,29 @@ impl Table {
         &self.limbs
     }
 
+    fn values(&self, name: &str) -> Option<&Values> {
+        let column = self.columns.iter().find(|column| column.name == name);
+        column.map(|column| &column.values)
+    }
+
+    /// A column of text.
+    pub(super) fn texts(&self, name: &str) -> impl Iterator<Item = Option<&str>> {
+        let texts = match self.values(name) {
+            Some(Values::Text(texts)) => texts.as_slice(),
+            _ => &[],
+        };
+        texts.iter().map(Option::as_deref)
+    }
+
+    /// A column of numbers.
+    pub(super) fn reals(&self, name: &str) -> impl Iterator<Item = Option<f64>> {
+        let reals = match self.values(name) {
+            Some(Values::Real(reals)) => reals.as_slice(),
+            _ => &[],
+        };
+        reals.iter().copied()
+    }
+
     /// Number of files.
     pub fn rows(&self) -> usize {
         self.columns.first().map_or(0, |column| column.values.len())

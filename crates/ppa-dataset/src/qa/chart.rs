@@ -36,7 +36,9 @@ pub(super) fn chart(
     let x_range = range(points().map(|p| p[0]));
     let y_range = y_range.unwrap_or_else(|| range(points().map(|p| p[1])));
     let x = |v: f64| LEFT + (v - x_range[0]) / (x_range[1] - x_range[0]) * (WIDTH - LEFT - RIGHT);
+    // Bands end at the axes.
     let y = |v: f64| {
+        let v = v.clamp(y_range[0], y_range[1]);
         HEIGHT - BOTTOM - (v - y_range[0]) / (y_range[1] - y_range[0]) * (HEIGHT - TOP - BOTTOM)
     };
     let mut svg = format!(
@@ -70,6 +72,9 @@ pub(super) fn chart(
     ));
     for (i, one) in series.iter().enumerate() {
         let colour = COLOURS[i % COLOURS.len()];
+        if one.points.is_empty() {
+            continue;
+        }
         let at = |[px, py]: [f64; 2]| format!("{:.1} {:.1}", x(px), y(py));
         if one.spread.len() == one.points.len() && one.spread.iter().any(|s| *s > 0.0) {
             let edge = |sign: f64| {

@@ -196,6 +196,7 @@ fn metadata_describe_the_table_that_is_there() {
         "patient_0/labels/r/roi_depth.json",
         "splits/mine.json",
         "croissant.json",
+        "datasheet.md",
     ] {
         assert!(graph.iter().any(|entity| entity["@id"] == list), "{list}");
     }
@@ -207,6 +208,18 @@ fn metadata_describe_the_table_that_is_there() {
             1,
             "{id}"
         );
+    }
+    let sheet = fs::read_to_string(tree.path("datasheet.md")).unwrap();
+    for told in [
+        "# Datasheet of two limbs",
+        "2 persons, 2 limbs, 2 poses; files: 2 depth, 1 radiograph, 1 radiograph_tallies.",
+        "Depth images by body shape: 1 big, 1 orig.",
+        "by source: 1 a source that is not told.",
+        "No split is recommended.",
+        "ppa 0.1.0 (sources 0123) from 2 volumes",
+        "**To answer:** Who made it",
+    ] {
+        assert!(sheet.contains(told), "{told}: {sheet}");
     }
     // A later table leaves the metadata behind.
     let stale = |tree: &Tree| {

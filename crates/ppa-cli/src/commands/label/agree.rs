@@ -22,7 +22,9 @@ One row per grade: image, reader, grade (1 ideal to 3 inadequate, in half steps)
 grade of an image is a repeat: it tells how far the reader agrees with themselves, and counts nowhere
 else. Intraclass correlations use the images that every reader graded; alpha uses all.
 
-  ppa label agree anna.csv ben.csv --json")]
+In what readers hand in, a picture that was shown twice has two names: `ppa label import` first, and take grades.csv.
+
+  ppa label agree dataset/grades.csv --json")]
 pub struct AgreeArgs {
     /// CSV files with the columns image, reader, grade
     #[arg(required = true)]
