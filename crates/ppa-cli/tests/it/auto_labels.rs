@@ -181,9 +181,11 @@ fn refusals(here: &Path) {
         );
         assert!(!here.join("x.toml").exists() && !here.join("bones.nrrd").exists());
     }
+    // The same leg without the table: another scan.
+    succeed(here, "ct phantom --out other.nii --spacing-mm 1.2");
     succeed(
         here,
-        "prepare coarse.nii --side r --bones bones.nii --out p01.toml",
+        "prepare other.nii --side r --bones bones.nii --out p01.toml",
     );
     refused("label auto plan", "were not made from the scan of the case");
     fs::write(here.join("p01.toml"), case).unwrap();
