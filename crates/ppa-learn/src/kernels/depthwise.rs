@@ -121,9 +121,13 @@ fn forward_block<S: Simd, const K: usize, const STRIDE: usize, const B: usize>(
 /// [channels, kernel, kernel] as [kernel, kernel, channels].
 pub fn channels_last(weights: &[f32], channels: usize) -> Vec<f32> {
     let taps = weights.len() / channels;
-    (0..weights.len())
-        .map(|i| weights[i % channels * taps + i / channels])
-        .collect()
+    let mut turned = vec![0.0; weights.len()];
+    for (tap, turned) in turned.chunks_exact_mut(channels).enumerate() {
+        for (turned, weights) in turned.iter_mut().zip(weights.chunks_exact(taps)) {
+            *turned = weights[tap];
+        }
+    }
+    turned
 }
 
 /// [kernel, kernel, channels] as [channels, kernel, kernel].

@@ -173,10 +173,11 @@ impl Inference<'_> {
     fn project(&self, block: &Block, input: &[f32], gate: &[f32], added: &[f32]) -> Buffer {
         let place = &block.project;
         let (channels, columns) = (place.channels, gate.len());
-        let weight = self.parameters[place.weight.clone()].chunks_exact(columns);
-        let weight: Vec<f32> = weight
-            .flat_map(|row| row.iter().zip(gate).map(|(weight, gate)| weight * gate))
-            .collect();
+        let mut weight = self.pool.take(place.weight.len());
+        weight.copy_from_slice(&self.parameters[place.weight.clone()]);
+        for row in weight.chunks_exact_mut(columns) {
+            row.iter_mut().zip(gate).for_each(|(w, gate)| *w *= gate);
+        }
         let affine = running(&place.norm, self.parameters, self.statistics);
         let mut out = self.pool.take(input.len() / columns * channels);
         let tile = tile_pixels(channels + columns);
