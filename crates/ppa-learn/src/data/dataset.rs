@@ -1,6 +1,6 @@
 //! Samples from a dataset in either published layout.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use ppa_dataset::BodyShape;
@@ -32,7 +32,8 @@ pub enum Views {
 /// some body shapes, or all.
 ///
 /// # Errors
-/// [`DataError`] for a folder that is no dataset, an image without label or region, a person that is not there, or no image.
+/// [`DataError`] for a folder that is no dataset, an image without label, without region or with one outside its camera's images, a
+/// person or body shape that is not there, or no image.
 pub fn read_samples(
     root: &Path,
     persons: Option<&[u32]>,
@@ -52,12 +53,22 @@ pub fn read_samples(
         return Err(DataError::Empty(format!("of patient {missing} in {root}")));
     }
     let chosen = |pair: &&ImagePair| {
-        let of_shape = match pair.pose {
-            Pose::Rotated { shape, .. } => shapes.is_none_or(|s| s.contains(&shape)),
-            Pose::Recorded { .. } => true,
-        };
-        of_shape && persons.is_none_or(|p| p.contains(&pair.limb.patient))
+        let of_shape = |shape| shapes.is_none_or(|s| s.contains(&shape));
+        shape_of(pair).is_none_or(of_shape)
+            && persons.is_none_or(|p| p.contains(&pair.limb.patient))
     };
+    let rotated = dataset.pairs.iter().filter(chosen);
+    let found: BTreeSet<BodyShape> = rotated.filter_map(shape_of).collect();
+    if !found.is_empty()
+        && let Some(missing) = shapes
+            .iter()
+            .copied()
+            .flatten()
+            .find(|s| !found.contains(s))
+    {
+        let (name, root) = (missing.name(), root.display());
+        return Err(DataError::Empty(format!("of body shape {name} in {root}")));
+    }
     let mut reader = Reader {
         dataset: &dataset,
         place: root.canonicalize().unwrap_or_else(|_| root.to_owned()),
@@ -147,12 +158,26 @@ impl Reader<'_> {
                 *self.sizes.entry(camera).or_insert(size)
             }
         };
+        let [width, height] = size;
+        roi.check(width, height)
+            .map_err(|source| DataError::Region {
+                path: path.clone(),
+                source: Box::new(source),
+            })?;
         Ok(SampleImage {
             path,
             camera,
             roi,
             size,
         })
+    }
+}
+
+/// The body shape of a rotated pose; recorded ones have none.
+fn shape_of(pair: &ImagePair) -> Option<BodyShape> {
+    match pair.pose {
+        Pose::Rotated { shape, .. } => Some(shape),
+        Pose::Recorded { .. } => None,
     }
 }
 

@@ -17,6 +17,26 @@ pub struct Roi {
     pub size: u32,
 }
 
+impl Roi {
+    /// Whether a pixel of it lies in an image of `width` x `height`.
+    ///
+    /// # Errors
+    /// [`DataError::RoiOutside`] if none does.
+    pub fn check(&self, width: usize, height: usize) -> Result<(), DataError> {
+        let &Self { x, y, size } = self;
+        match size > 0 && (x as usize) < width && (y as usize) < height {
+            true => Ok(()),
+            false => Err(DataError::RoiOutside {
+                x,
+                y,
+                size,
+                width,
+                height,
+            }),
+        }
+    }
+}
+
 /// Side of a prepared image for a network whose input has `side` columns and rows: 1.2 times as many, rounded down.
 pub fn prepared_side(side: usize) -> usize {
     side * 6 / 5
@@ -30,16 +50,10 @@ pub fn prepared_side(side: usize) -> usize {
 /// # Panics
 /// If `side` is 0.
 pub fn prepare(depth_mm: &Raster<u16>, roi: Roi, side: usize) -> Result<Raster<u16>, DataError> {
+    roi.check(depth_mm.width(), depth_mm.height())?;
     let [x, y, size] = [roi.x, roi.y, roi.size].map(|pixels| pixels as usize);
-    let region = depth_mm
-        .crop(x, y, size, size)
-        .ok_or(DataError::RoiOutside {
-            x: roi.x,
-            y: roi.y,
-            size: roi.size,
-            width: depth_mm.width(),
-            height: depth_mm.height(),
-        })?;
+    let region = depth_mm.crop(x, y, size, size);
+    let region = region.expect("a pixel of the region lies in the image");
     Ok(region.resized(prepared_side(side), prepared_side(side)))
 }
 

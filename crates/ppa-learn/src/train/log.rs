@@ -6,7 +6,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use ppa_dataset::{FileError, write_whole};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::error::{TrainError, at};
 
@@ -17,9 +17,16 @@ pub struct LogRow {
     pub step: u64,
     /// Seconds of training so far, all runs of it together.
     pub seconds: f64,
-    /// Values by TensorBoard's tags.
-    #[serde(flatten)]
+    /// Values by TensorBoard's tags; NaN for those that JSON cannot hold.
+    #[serde(flatten, deserialize_with = "null_is_nan")]
     pub scalars: BTreeMap<String, f64>,
+}
+
+fn null_is_nan<'de, D: Deserializer<'de>>(row: D) -> Result<BTreeMap<String, f64>, D::Error> {
+    let values = BTreeMap::<String, Option<f64>>::deserialize(row)?.into_iter();
+    Ok(values
+        .map(|(tag, x)| (tag, x.unwrap_or(f64::NAN)))
+        .collect())
 }
 
 /// The rows of a log; a line that was cut short by a crash ends it.

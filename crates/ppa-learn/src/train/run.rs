@@ -112,7 +112,8 @@ pub fn train(
             run.log_step(&progress)?;
         }
         if due(config.checkpoint_every) || stopped {
-            run.save(&checkpoint, !stopped)?;
+            // An evaluation that is due is made by a training that stops here as well: the log is that of one that does not stop.
+            run.save(&checkpoint, due(config.checkpoint_every))?;
         }
         if stopped && step < steps {
             return Ok(Ended::Stopped { step });

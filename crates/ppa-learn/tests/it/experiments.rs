@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use ppa_learn::experiment::{Event, Experiment, ExperimentError, ExperimentPlan, Runner, Table};
 use tempfile::TempDir;
 
-use crate::toy::dataset;
+use crate::toy::{add_shapes, dataset};
 
 /// A plan of a few small steps: synthetic images of four persons, preparations of two.
 fn plan(folder: &Path, synthetic: &TempDir, preparations: &TempDir, steps: u64) -> ExperimentPlan {
@@ -29,6 +29,7 @@ fn go() -> AtomicBool {
 #[test]
 fn probing_is_gathered_from_shards_and_left_as_it_is() {
     let (synthetic, preparations) = (dataset(4, &[0, 90, 180]), dataset(2, &[0, 60, 120, 180]));
+    add_shapes(&synthetic);
     let folder = tempfile::tempdir().unwrap();
     let plan = plan(folder.path(), &synthetic, &preparations, 3);
     let root = folder.path().join("runs");
@@ -74,6 +75,7 @@ fn probing_is_gathered_from_shards_and_left_as_it_is() {
 #[test]
 fn an_experiment_goes_on_where_it_was_stopped() {
     let data = dataset(4, &[0, 90, 180]);
+    add_shapes(&data);
     let folder = tempfile::tempdir().unwrap();
     let plan = plan(folder.path(), &data, &data, 3);
     let root = folder.path().join("runs");
@@ -104,6 +106,7 @@ fn an_experiment_goes_on_where_it_was_stopped() {
 #[test]
 fn nobody_is_tested_whose_images_were_pretrained_with() {
     let data = dataset(4, &[0, 90, 180]);
+    add_shapes(&data);
     let folder = tempfile::tempdir().unwrap();
     // The synthetic images stand for the preparations as well.
     let plan = plan(folder.path(), &data, &data, 3);

@@ -4,6 +4,7 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
+use ppa_dataset::BodyShape;
 use ppa_learn::data::{
     Augmentation, Balanced, Batch, DataError, Images, Loader, Order, Views, read_samples,
 };
@@ -99,6 +100,22 @@ fn what_is_missing_or_of_another_size_is_named() {
     fs::remove_file(folder.path().join("patient_1/labels/r/roi_depth.json")).unwrap();
     let error = read_samples(folder.path(), None, None, Views::Left, 5).unwrap_err();
     assert!(matches!(error, DataError::NoRoi(_)), "{error}");
+
+    let folder = dataset(2, &[0, 90, 180]);
+    let regions = folder.path().join("patient_1/labels/r/roi_depth.json");
+    let text = fs::read_to_string(&regions).unwrap();
+    fs::write(&regions, text.replace("\"x_start\":10", "\"x_start\":60")).unwrap();
+    let error = read_samples(folder.path(), None, None, Views::Left, 5).unwrap_err();
+    assert!(matches!(error, DataError::Region { .. }), "{error}");
+
+    let folder = dataset(2, &[0, 90, 180]);
+    let shapes = [BodyShape::Orig, BodyShape::BumpsA];
+    let error = read_samples(folder.path(), None, Some(&shapes), Views::Left, 5).unwrap_err();
+    let text = error.to_string();
+    assert!(
+        text.starts_with("there is no image of body shape bumps_a"),
+        "{text}"
+    );
 
     let folder = dataset(2, &[0, 90, 180]);
     let odd = folder

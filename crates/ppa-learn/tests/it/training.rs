@@ -75,15 +75,14 @@ fn a_training_that_was_stopped_ends_with_the_same_bytes() {
         let [whole, parts] = [&whole, &parts].map(|folder| fs::read(folder.join(file)).unwrap());
         assert!(whole == parts, "{file}");
     }
-    let losses = |folder: &Path| {
+    let scalars = |folder: &Path| {
         let rows = read_log(&folder.join("log.jsonl")).unwrap();
-        let of_training = rows
-            .into_iter()
-            .filter_map(|row| Some((row.step, *row.scalars.get("training/loss")?)));
-        of_training.collect::<Vec<_>>()
+        let rows = rows.into_iter().map(|row| (row.step, row.scalars));
+        rows.collect::<Vec<_>>()
     };
-    assert_eq!(losses(&whole).len(), 6);
-    assert_eq!(losses(&whole), losses(&parts));
+    // Six steps and three evaluations.
+    assert_eq!(scalars(&whole).len(), 6 + 3);
+    assert_eq!(scalars(&whole), scalars(&parts));
     // A finished training stays as it is.
     assert_eq!(run(&config, &parts).unwrap(), Ended::Finished);
 }
@@ -245,6 +244,23 @@ fn checkpoints_of_other_trainings_networks_and_files_are_refused() {
     }
     fs::write(&checkpoint, &bytes).unwrap();
     run(&config, folder.path()).unwrap();
+}
+
+#[test]
+fn a_value_that_is_not_finite_does_not_end_the_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.jsonl");
+    let lines = [(1, "0.5"), (2, "null"), (3, "0.25")].map(|(step, mae)| {
+        format!("{{\"step\":{step},\"seconds\":1.5,\"evaluation/mae\":{mae}}}\n")
+    });
+    fs::write(&path, lines.concat()).unwrap();
+    let rows = read_log(&path).unwrap();
+    let values: Vec<f64> = rows
+        .iter()
+        .map(|row| row.scalars["evaluation/mae"])
+        .collect();
+    assert!(values.len() == 3 && values[1].is_nan(), "{values:?}");
+    assert_eq!([values[0], values[2]], [0.5, 0.25]);
 }
 
 /// Bars at sixteen angles, five persons to learn from and one to judge by: a constant 2 is wrong by 0.53 on average.
