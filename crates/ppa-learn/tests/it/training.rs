@@ -155,22 +155,18 @@ fn a_training_on_pairs_that_was_stopped_ends_with_the_same_bytes() {
 }
 
 #[test]
-#[ignore = "a minute of processor time"]
-fn pairs_of_images_are_learned_by_heart_by_every_fusion() {
+#[ignore = "half a minute of processor time"]
+fn pairs_of_images_are_learned_by_heart() {
     let data = dataset(1, &[0, 60, 120, 180]);
-    for kind in [FusionKind::Late, FusionKind::Score] {
-        for shared_weights in [false, true] {
-            let folder = tempfile::tempdir().unwrap();
-            let config = TrainConfig {
-                steps: 100,
-                ..pairs(data.path(), kind, shared_weights)
-            };
-            run(&config, folder.path()).unwrap();
-            // A constant loses 0.55 at best.
-            let loss = last_loss(folder.path());
-            assert!(loss < 0.2, "{kind:?} {shared_weights}: {loss}");
-        }
-    }
+    let folder = tempfile::tempdir().unwrap();
+    let config = TrainConfig {
+        steps: 100,
+        ..pairs(data.path(), FusionKind::Late, false)
+    };
+    run(&config, folder.path()).unwrap();
+    // A constant loses 0.55 at best; a step in three goes without one of the cameras.
+    let loss = last_loss(folder.path());
+    assert!(loss < 0.2, "{loss}");
 }
 
 #[test]
