@@ -65,7 +65,7 @@ pub fn run(args: &GenerateArgs, output: Output) -> anyhow::Result<()> {
     {
         eprintln!("{outdated}");
     }
-    output.print(&summary, |s| describe(s, &out))
+    output.print(&summary, |s| describe(s, &out, "made"))
 }
 
 /// The folder beside a plan that is named after it.
@@ -91,10 +91,10 @@ pub fn with_progress(
     Ok(summary)
 }
 
-/// The summary in words.
-pub fn describe(summary: &Summary, out: &Path) -> String {
+/// The summary in words; `done` is what was done to the poses that were not there yet.
+pub fn describe(summary: &Summary, out: &Path, done: &str) -> String {
     format!(
-        "{}: {} depth images and {} radiographs of {} poses, {} of them made now",
+        "{}: {} depth images and {} radiographs of {} poses, {} of them {done} now",
         out.display(),
         summary.depth_images,
         summary.radiographs,

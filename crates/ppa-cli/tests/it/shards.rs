@@ -48,8 +48,19 @@ fn make_shards(out: &Path, count: u32, threads: u32) -> String {
 
 #[test]
 fn shards_merge_to_the_bytes_of_one_run() {
+    merged_shards_are_one_run(&[(3, 1), (7, 2)]);
+}
+
+#[test]
+#[ignore = "67 runs take a minute"]
+fn one_to_sixty_four_shards_merge_to_the_bytes_of_one_run() {
+    merged_shards_are_one_run(&[(1, 1), (2, 2), (64, 1)]);
+}
+
+/// For each number of shards and of threads.
+fn merged_shards_are_one_run(cases: &[(u32, u32)]) {
     let expected = contents(&whole().join("whole"));
-    for (count, threads) in [(1, 1), (2, 2), (3, 1), (7, 2), (64, 1)] {
+    for &(count, threads) in cases {
         let folder = tempfile::tempdir().unwrap();
         let shards = make_shards(folder.path(), count, threads);
         let said = succeed(
