@@ -1,5 +1,7 @@
 //! Parts of a surface become one mesh.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 
 use super::SurfaceError;
@@ -36,13 +38,16 @@ pub fn join(mut parts: Vec<Part>, mirrored: bool) -> Result<Mesh, SurfaceError> 
     };
     let append_triangles = || {
         let mut first = first.map(|first| first as u32);
+        let mut marked = Vec::new();
         for (at, part) in parts.iter().enumerate() {
             let number = |id: u32| first[(id >> KIND_SHIFT) as usize] + (id & (AT_VOXEL - 1));
             if at == 0 {
                 for &marked in &part.marked {
                     triangles[marked] = triangles[marked].map(number);
                 }
+                marked.extend_from_slice(&part.marked);
             } else {
+                marked.extend(part.marked.iter().map(|marked| triangles.len() + marked));
                 triangles.extend(part.triangles.iter().map(|triangle| triangle.map(number)));
             }
             let crossings = if at == 0 {
@@ -59,16 +64,51 @@ pub fn join(mut parts: Vec<Part>, mirrored: bool) -> Result<Mesh, SurfaceError> 
                 triangle.swap(1, 2);
             }
         }
-        triangles
+        (triangles, marked)
     };
-    let (points, triangles) = rayon::join(append_points, append_triangles);
+    let (points, (triangles, marked)) = rayon::join(append_points, append_triangles);
     let mut mesh = Mesh {
         vertices: points.vertices,
         normals: points.normals,
         triangles,
     };
+    drop_lone_voxels(&mut mesh, &marked, first[1]..first[2]);
     fill_flat_normals(&mut mesh);
     Ok(mesh)
+}
+
+/// Leaves out the voxels at the iso value whose triangles all shrank to nothing, as that of a single one in air.
+/// `marked` are the triangles with other vertices than crossings.
+fn drop_lone_voxels(mesh: &mut Mesh, marked: &[usize], voxels: Range<usize>) {
+    let mut is_used = vec![false; voxels.len()];
+    for id in marked.iter().flat_map(|&at| mesh.triangles[at]) {
+        if voxels.contains(&(id as usize)) {
+            is_used[id as usize - voxels.start] = true;
+        }
+    }
+    if is_used.iter().all(|&used| used) {
+        return;
+    }
+    let stays = |at: usize| !voxels.contains(&at) || is_used[at - voxels.start];
+    let mut next = voxels.start as u32;
+    let numbers: Vec<u32> = (voxels.start..mesh.vertices.len())
+        .map(|at| {
+            let number = next;
+            next += u32::from(stays(at));
+            number
+        })
+        .collect();
+    for &at in marked {
+        mesh.triangles[at] =
+            mesh.triangles[at].map(|id| match (id as usize).checked_sub(voxels.start) {
+                Some(behind) => numbers[behind],
+                None => id,
+            });
+    }
+    let mut at = 0..;
+    mesh.vertices.retain(|_| at.next().is_some_and(stays));
+    let mut at = 0..;
+    mesh.normals.retain(|_| at.next().is_some_and(stays));
 }
 
 /// Where the gradient vanishes (a plateau at the iso value) the triangles say what is outward.

@@ -167,7 +167,10 @@ fn surfaces<T: Sample>(fields: &[Field<T>], grid: &Grid) -> Result<Vec<Mesh>, Su
     // One part per thread: the first is made where the whole is to lie, the others are copied behind it. What
     // comes out is the same for any parts.
     let crossings = estimated_crossings(fields, &first_inside);
-    let layers = layers_of_parts(&crossings, rayon::current_num_threads());
+    // Comparing a voxel takes about as long as 1/256 of a crossing with its triangles.
+    let compared = field.size()[0] * field.size()[1] * fields.len() / 256;
+    let work: Vec<usize> = crossings.iter().map(|here| here + compared).collect();
+    let layers = layers_of_parts(&work, rayon::current_num_threads());
     let by_part: Vec<Vec<Part>> = (layers.into_par_iter())
         .map(|layers| {
             let room = match layers.start {
@@ -246,14 +249,14 @@ fn estimated_crossings<T: Sample>(fields: &[Field<T>], first_inside: &[T]) -> Ve
     (0..slices).map(|k| sampled[k / STRIDE] * 15 / 8).collect()
 }
 
-/// Divides the layers of cells between slices, so that each part has as many crossings as the others, as far
-/// as whole layers let it.
-fn layers_of_parts(crossings: &[usize], parts: usize) -> Vec<Range<usize>> {
-    let layers = crossings.len() - 1;
-    let all: usize = crossings[..layers].iter().sum();
+/// Divides the layers of cells between slices, so that each part has as much work as the others, as far as
+/// whole layers let it.
+fn layers_of_parts(work: &[usize], parts: usize) -> Vec<Range<usize>> {
+    let layers = work.len() - 1;
+    let all: usize = work[..layers].iter().sum();
     let mut ranges = Vec::new();
     let (mut start, mut done) = (0, 0);
-    for (k, here) in crossings[..layers].iter().enumerate() {
+    for (k, here) in work[..layers].iter().enumerate() {
         done += here;
         let is_full = ranges.len() + 1 < parts && done * parts >= all * (ranges.len() + 1);
         if is_full || k + 1 == layers {

@@ -100,6 +100,35 @@ fn a_voxel_at_the_iso_value_is_one_vertex() {
     );
 }
 
+/// A voxel at the iso value in air has no surface; beside a body it leaves no vertex and no normal behind, wherever parts begin.
+#[test]
+fn a_lone_voxel_at_the_iso_value_is_nothing() {
+    let body = |lone: &[[f64; 3]]| {
+        volume([9, 9, 30], [1.0; 3], |p| {
+            match lone.iter().any(|&at| *p == Point3::from(at)) {
+                true => -500.0,
+                // Its lower face runs through voxels at the iso value.
+                false => {
+                    (1000.0 - 250.0 * (p - Point3::new(4.0, 4.0, 15.0)).abs().max()) as f32 - 500.0
+                }
+            }
+        })
+    };
+    let alone = iso_surface(&body(&[]), -500.0, Border::Open).unwrap();
+    let lone = body(&[[1.0, 7.0, 2.0], [7.0, 1.0, 27.0], [4.0, 4.0, 5.0]]);
+    for threads in [1, 2, 5] {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        let mesh = pool
+            .install(|| iso_surface(&lone, -500.0, Border::Open))
+            .unwrap();
+        assert!(mesh == alone, "{threads} threads");
+    }
+    assert!(alone.normals.iter().all(|n| (n.norm() - 1.0).abs() < 1e-5));
+}
+
 /// A voxel a hair above the iso value 1.5 m from the origin, where f32 has steps of 0.12 µm: its six crossings stay apart.
 #[test]
 fn crossings_beside_a_voxel_stay_apart_far_from_the_origin() {
