@@ -44,8 +44,10 @@ fn sync(folder: &Path) -> Result<(), FileError> {
         if path.is_dir() {
             sync(&path)?;
         } else {
-            let synced = fs::OpenOptions::new().append(true).open(&path);
-            let synced = synced.and_then(|file| file.sync_all());
+            // A copy keeps the mode: what may only be read is opened for that.
+            let opened = fs::OpenOptions::new().append(true).open(&path);
+            let opened = opened.or_else(|_| fs::File::open(&path));
+            let synced = opened.and_then(|file| file.sync_all());
             synced.map_err(FileError::at("write", &path))?;
         }
     }

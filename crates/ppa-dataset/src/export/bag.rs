@@ -53,20 +53,20 @@ pub enum BagError {
     },
 }
 
-/// What never leaves with a dataset: it names the readers.
-const GRADES: &str = "grades.csv";
+/// How tables of grades and keys of pictures begin: they never leave with a dataset, for they name readers, or tell who graded what.
+const NOT_TO_BE_BAGGED: [&[u8]; 2] = [b"image,reader,grade", b"name,image,sha256"];
 
 /// Copies the dataset in `root`, of either published layout, into the bag `to`, whole or not at all. Hidden files and folders,
-/// among them the records of `ppa generate`, and `grades.csv`, which names readers, stay behind.
+/// among them the records of `ppa generate`, and tables of readers' grades and keys, by whatever name, stay behind.
 ///
 /// # Errors
-/// [`BagError`]; among them images that are not as in `manifest.jsonl`, and links. `to` must not exist or be empty.
+/// [`BagError`]; among them images that are not as in `manifest.jsonl`, labels of other radiographs, and links. `to` must not exist or be
+/// empty.
 pub fn bag(root: &Path, to: &Path) -> Result<Bag, BagError> {
-    Published::list(root)?;
+    Published::read(root)?;
     let mut listed = listed(root)?;
     let mut files = Vec::new();
     list(root, "", &mut files)?;
-    files.retain(|name| name != GRADES);
     write_whole_folder(to, |bag| {
         let mut bytes = 0;
         let mut manifest = String::new();
@@ -150,12 +150,25 @@ fn list(root: &Path, below: &str, files: &mut Vec<String>) -> Result<(), BagErro
         if kind.is_dir() {
             list(root, &name, files)?;
         } else if kind.is_file() {
-            files.push(name);
+            if !names_readers(&path).map_err(FileError::at("read", &path))? {
+                files.push(name);
+            }
         } else {
             return Err(BagError::Special(path));
         }
     }
     Ok(())
+}
+
+fn names_readers(path: &Path) -> io::Result<bool> {
+    if path.extension().is_none_or(|extension| extension != "csv") {
+        return Ok(false);
+    }
+    let mut start = Vec::new();
+    File::open(path)?.take(64).read_to_end(&mut start)?;
+    Ok(NOT_TO_BE_BAGGED
+        .iter()
+        .any(|header| start.starts_with(header)))
 }
 
 /// Copies a file; its size and hash as they were read.

@@ -6,7 +6,12 @@ use super::metadata::{DESCRIPTION, Metadata, PAPER, Provenance};
 use super::table::Table;
 
 /// The text, in Markdown. What only people know stands there as a question.
-pub(super) fn datasheet(metadata: &Metadata, table: &Table, provenance: &Provenance) -> String {
+pub(super) fn datasheet(
+    metadata: &Metadata,
+    table: &Table,
+    split_files: &[String],
+    provenance: &Provenance,
+) -> String {
     let persons: BTreeSet<_> = table.limbs().iter().map(|limb| limb.patient).collect();
     let (name, generator) = (&metadata.name, &provenance.settings.generator);
     let poses: BTreeSet<_> = table.texts("unit").collect();
@@ -44,7 +49,7 @@ pub(super) fn datasheet(metadata: &Metadata, table: &Table, provenance: &Provena
         kinds = counted(table.texts("kind").flatten()),
         shapes = shapes(table),
         labels = labels(table),
-        splits = splits(table),
+        splits = splits(table, split_files),
         code = provenance.settings.code,
         scans = provenance.scans().len(),
         validated = validated(table),
@@ -90,23 +95,32 @@ fn labels(table: &Table) -> String {
     )
 }
 
-fn splits(table: &Table) -> String {
+fn splits(table: &Table, files: &[String]) -> String {
     let parts = counted(table.texts("split").flatten());
-    if parts.is_empty() {
-        return "No split is recommended.".to_owned();
+    let files = files.join(", ");
+    match (parts.is_empty(), files.is_empty()) {
+        (false, _) => format!("Files by part of the split in `manifest.csv`: {parts}."),
+        (true, false) => format!("Recommended splits stand in the folder `splits`: {files}."),
+        (true, true) => "No split is recommended.".to_owned(),
     }
-    format!("Files by part of the split in `manifest.csv`: {parts}.")
 }
 
-fn validated(table: &Table) -> &'static str {
-    let sources = sources(table);
-    if sources.contains(&"surrogate-jso/1") {
-        return "Labels of the source surrogate-jso/1 are computed from how open the joint space lies to the beam; no reader has \
-                confirmed them.";
-    }
-    if sources.contains(&"readers") {
-        return "Labels are the mean of readers' grades, with their standard deviation (ddof 0).\n\n\
-                **To answer:** Who were the readers, and how were they instructed?";
-    }
-    ""
+fn validated(table: &Table) -> String {
+    let sources: BTreeSet<_> = sources(table).into_iter().collect();
+    let sentences = sources.into_iter().filter_map(|source| {
+        if source.starts_with("surrogate-") {
+            Some(format!(
+                "Labels of the source {source} are computed from how open the joint space lies to the beam; no reader has confirmed them."
+            ))
+        } else if source == "readers" {
+            Some(
+                "Labels of readers are the mean of their grades, with their standard deviation (ddof 0).\n\n\
+                 **To answer:** Who were the readers, and how were they instructed?"
+                    .to_owned(),
+            )
+        } else {
+            None
+        }
+    });
+    sentences.collect::<Vec<_>>().join("\n\n")
 }

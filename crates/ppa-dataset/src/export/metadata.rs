@@ -118,8 +118,12 @@ pub(super) const TABLE: &str = "manifest.csv";
 
 const DATASHEET: &str = "datasheet.md";
 
+/// The datasheet where another one is there already, in which people may have answered.
+const NEW_DATASHEET: &str = "datasheet.new.md";
+
 /// Writes `manifest.csv`, `croissant.json` (Croissant 1.1), `ro-crate-metadata.json` (RO-Crate 1.1) and `datasheet.md` into the
-/// dataset in `root`, each whole or not at all; `split` names the split that stands in the table.
+/// dataset in `root`, each whole or not at all; `split` names the split that stands in the table. A datasheet that is there, in
+/// which people may have answered, stays; one that differs is written beside it as `datasheet.new.md`. Names of the files written.
 ///
 /// # Errors
 /// [`TableError`] naming the file at fault, or what of the metadata is no name, address or day; nothing is written then.
@@ -127,7 +131,7 @@ pub fn write_metadata(
     root: &Path,
     metadata: &Metadata,
     split: Option<&str>,
-) -> Result<(), TableError> {
+) -> Result<[&'static str; 4], TableError> {
     metadata.check().map_err(TableError::Metadata)?;
     let table = Table::of_dataset(root, split)?;
     let path = root.join("dataset.json");
@@ -138,21 +142,23 @@ pub fn write_metadata(
     let croissant = croissant(metadata, &table, &sha256, &provenance);
     let lists = lists(root, &table)?;
     let ro_crate = ro_crate(metadata, &table, &lists, &provenance);
-    for (name, bytes) in [
+    let datasheet = datasheet(metadata, &table, &Split::names(root)?, &provenance);
+    let there = root.join(DATASHEET);
+    let is_another = there.exists() && read_text(&there)? != datasheet;
+    let sheet = if is_another { NEW_DATASHEET } else { DATASHEET };
+    let files = [
         (TABLE, csv),
         ("croissant.json", format!("{croissant:#}\n").into_bytes()),
         (
             "ro-crate-metadata.json",
             format!("{ro_crate:#}\n").into_bytes(),
         ),
-        (
-            DATASHEET,
-            datasheet(metadata, &table, &provenance).into_bytes(),
-        ),
-    ] {
-        write_whole(&root.join(name), &bytes)?;
+        (sheet, datasheet.into_bytes()),
+    ];
+    for (name, bytes) in &files {
+        write_whole(&root.join(name), bytes)?;
     }
-    Ok(())
+    Ok(files.map(|(name, _)| name))
 }
 
 /// Files beside the images, with their formats: labels, regions of interest, splits. Those that are not there are left out.

@@ -16,7 +16,12 @@ fn a_bag_holds_every_file_but_hidden_ones_with_its_hash() {
     fs::create_dir(tree.path(".ppa")).unwrap();
     fs::write(tree.path(".ppa/record.json"), "{}").unwrap();
     fs::write(tree.path("100 %.txt"), "odd name").unwrap();
-    fs::write(tree.path("grades.csv"), "names of readers").unwrap();
+    fs::write(
+        tree.path("grades_old.csv"),
+        "image,reader,grade\nx,anna,1\n",
+    )
+    .unwrap();
+    fs::write(tree.path("key.csv"), "name,image,sha256\n").unwrap();
     let folder = tempfile::tempdir().unwrap();
     let to = folder.path().join("bag");
     let made = bag(tree.root(), &to).unwrap();
@@ -33,7 +38,9 @@ fn a_bag_holds_every_file_but_hidden_ones_with_its_hash() {
         (made.files, made.bytes)
     );
     assert!(manifest.contains("data/100 %25.txt") && !manifest.contains(".ppa"));
-    assert!(!manifest.contains("grades.csv") && !to.join("data/grades.csv").exists());
+    for table in ["grades_old.csv", "key.csv"] {
+        assert!(!manifest.contains(table) && !to.join("data").join(table).exists());
+    }
     // 24 depth images, 4 radiographs, tallies, 4 lists of labels and regions, manifest, description, split, odd name.
     assert_eq!(made.files, 24 + 4 + 1 + 4 + 4);
     let tags = fs::read_to_string(to.join("tagmanifest-sha256.txt")).unwrap();

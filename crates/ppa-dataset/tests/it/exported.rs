@@ -215,12 +215,19 @@ fn metadata_describe_the_table_that_is_there() {
         "2 persons, 2 limbs, 2 poses; files: 2 depth, 1 radiograph, 1 radiograph_tallies.",
         "Depth images by body shape: 1 big, 1 orig.",
         "by source: 1 a source that is not told.",
-        "No split is recommended.",
+        "Recommended splits stand in the folder `splits`: mine.",
         "ppa 0.1.0 (sources 0123) from 2 volumes",
         "**To answer:** Who made it",
     ] {
         assert!(sheet.contains(told), "{told}: {sheet}");
     }
+    // What people answered stays.
+    let answered = sheet.replace("**To answer:** Who made it", "A university made it");
+    fs::write(tree.path("datasheet.md"), &answered).unwrap();
+    let files = write_metadata(tree.root(), &metadata, None).unwrap();
+    assert_eq!(files[3], "datasheet.new.md");
+    let read = |name: &str| fs::read_to_string(tree.path(name)).unwrap();
+    assert_eq!([read("datasheet.md"), read(files[3])], [answered, sheet]);
     // A later table leaves the metadata behind.
     let stale = |tree: &Tree| {
         let found = inspect(tree.root()).unwrap().flaws;

@@ -11,7 +11,8 @@ use crate::output::Output;
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
 Writes manifest.csv, croissant.json (Croissant 1.1), ro-crate-metadata.json (RO-Crate 1.1, Process Run profile) and datasheet.md \
-(Datasheets for Datasets; questions that no program can answer stay open) into the dataset.
+(Datasheets for Datasets; questions that no program can answer stay open) into the dataset. A datasheet.md that is there and differs stays; \
+the new one is then datasheet.new.md.
 
   ppa export metadata dataset --name ankles --license https://creativecommons.org/licenses/by/4.0/ --date 2026-11-21")]
 pub struct MetadataArgs {
@@ -37,13 +38,7 @@ pub fn run(args: &MetadataArgs, output: Output) -> anyhow::Result<()> {
         license: args.license.clone(),
         date: args.date.clone(),
     };
-    write_metadata(&args.dataset, &metadata, args.split.as_deref())?;
-    let files = [
-        "manifest.csv",
-        "croissant.json",
-        "ro-crate-metadata.json",
-        "datasheet.md",
-    ];
+    let files = write_metadata(&args.dataset, &metadata, args.split.as_deref())?;
     output.print(&json!({ "files": files }), |_| {
         format!("{}: {}", args.dataset.display(), files.join(", "))
     })

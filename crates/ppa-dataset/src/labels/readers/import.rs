@@ -160,7 +160,7 @@ pub fn import_grades(
         if let Some(before) = LabelFile::read(&manifest.root, limb)? {
             if before.source.is_some_and(LabelSource::is_computed) {
                 done.replaced_computed += before.labels().len();
-            } else if rows_before.get(&limb) != Some(&before.labels()) {
+            } else if ![rows_before.get(&limb), Some(rows)].contains(&Some(&before.labels())) {
                 let path = LabelFile::path(&manifest.root, limb);
                 return Err(ImportError::OtherLabels(path));
             }
@@ -175,11 +175,12 @@ pub fn import_grades(
     }
     done.repeats = given.len() - firsts(&given).count();
 
-    let grades: Vec<_> = given.iter().map(Given::by_radiograph).collect();
-    write_table(&path, &grades)?;
+    // Grades last: an import that was stopped finds the former grades, and labels that follow from those or from its own.
     for (limb, labels) in labels {
         labels.write(&manifest.root, limb)?;
     }
+    let grades: Vec<_> = given.iter().map(Given::by_radiograph).collect();
+    write_table(&path, &grades)?;
     Ok(done)
 }
 
