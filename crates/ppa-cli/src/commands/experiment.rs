@@ -96,7 +96,7 @@ pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
     if plan.configurations(experiment).len() < experiment.configurations().len() {
         eprintln!("the plan names no imagenet_weights: their column is left out");
     }
-    let finished = args.so_far || train(&runner, part)?;
+    let finished = !args.so_far && train(&runner, part)?;
 
     let results = runner.results()?;
     let table = match (args.so_far, finished && part == Part::WHOLE) {

@@ -21,8 +21,9 @@ const PAUSE: Duration = Duration::from_millis(5);
 #[derive(Debug, Args)]
 #[command(
     after_help = "Prints one line of JSON for each pair: `name`, `left`, `right` and `quality` (their mean; alone where one network judges pairs) from 1 (ideal) to 3 \
-(inadequate), and `latency_ms` from the moment when both frames were there to the answer. Frames that cannot be used are named on stderr and \
-skipped. The last line tells pairs per second and latencies: on stderr, or on stdout with --json."
+(inadequate), and `latency_ms` from the moment when the pair was found to the answer: how long it waited before, while others were judged, is not \
+in it. Frames that cannot be used are named on stderr and skipped. In a folder a name is judged again only after its files were gone. \
+The last line tells pairs per second and latencies: on stderr, or on stdout with --json."
 )]
 pub struct PredictArgs {
     /// Folder of the finished `ppa train` of the left camera's network
@@ -64,7 +65,9 @@ struct Summary {
     skipped: usize,
     /// Frames without the other camera's.
     alone: usize,
-    /// From the first pair that was there to the last answer.
+    /// Pairs that were found, but not judged before the end.
+    unjudged: usize,
+    /// From when the first pair was found to the last answer.
     pairs_per_s: Option<f64>,
     median_latency_ms: Option<f64>,
     /// 95 % of the latencies are not longer.
@@ -83,29 +86,37 @@ pub fn run(args: &PredictArgs, output: Output) -> anyhow::Result<()> {
         latencies_ms: Vec::new(),
         skipped: 0,
         alone: 0,
+        unjudged: 0,
     };
-    match &args.source.watch {
-        Some(folder) => judge.folder(folder)?,
-        None => judge.lines(io::stdin().lock())?,
+    let ended = match &args.source.watch {
+        Some(folder) => judge.folder(folder),
+        None => judge.lines(io::stdin().lock()),
+    };
+    if ended.is_err() && judge.first.is_none() && judge.skipped == 0 {
+        return ended; // There is nothing that a summary could tell.
     }
     let summary = judge.summary();
-    if output.json {
-        return output.print(&summary, |_| String::new());
-    }
-    eprintln!("{}", describe(&summary));
-    Ok(())
+    let told = match output.json {
+        true => output.print(&summary, |_| String::new()),
+        false => {
+            eprintln!("{}", describe(&summary));
+            Ok(())
+        }
+    };
+    ended.and(told)
 }
 
 struct Judge {
     predictor: PairPredictor,
     watch: Stopwatch,
-    /// When the first pair was there.
+    /// When the first pair was found.
     first: Option<Instant>,
     /// When the last one was answered.
     last: Instant,
     latencies_ms: Vec<f64>,
     skipped: usize,
     alone: usize,
+    unjudged: usize,
 }
 
 impl Judge {
@@ -126,8 +137,13 @@ impl Judge {
             if found.is_empty() {
                 std::thread::sleep(PAUSE);
             }
+            self.unjudged = found.len();
             for pair in found {
-                if stop.load(Ordering::Relaxed) || !self.pair(&pair)? {
+                if stop.load(Ordering::Relaxed) {
+                    return Ok(());
+                }
+                self.unjudged -= 1;
+                if !self.pair(&pair)? {
                     return Ok(());
                 }
             }
@@ -135,14 +151,17 @@ impl Judge {
         Ok(())
     }
 
-    fn lines(&mut self, lines: impl BufRead) -> anyhow::Result<()> {
-        for (number, line) in lines.lines().enumerate() {
+    fn lines(&mut self, input: impl BufRead) -> anyhow::Result<()> {
+        for (number, line) in input.split(b'\n').enumerate() {
             let line = line.context("cannot read standard input")?;
             let found = Instant::now();
-            let Some((left, right)) = line.split_once('\t') else {
+            let line = line.strip_suffix(b"\r").unwrap_or(&line);
+            let paths = std::str::from_utf8(line).ok();
+            let Some((left, right)) = paths.and_then(|paths| paths.split_once('\t')) else {
                 self.skip(&format!(
-                    "line {} is {line:?}, expected two paths with a tab between them",
-                    number + 1
+                    "line {} is {:?}, expected two paths in UTF-8 with a tab between them",
+                    number + 1,
+                    String::from_utf8_lossy(line)
                 ));
                 continue;
             };
@@ -203,6 +222,7 @@ impl Judge {
             pairs,
             skipped: self.skipped,
             alone: self.alone,
+            unjudged: self.unjudged,
             pairs_per_s: seconds.filter(|_| pairs > 0).map(|s| pairs as f64 / s),
             median_latency_ms: percentile(50),
             latency_95_ms: percentile(95),
@@ -225,6 +245,9 @@ fn describe(summary: &Summary) -> String {
     }
     if summary.skipped > 0 {
         text += &format!("; {} skipped", summary.skipped);
+    }
+    if summary.unjudged > 0 {
+        text += &format!("; {} found but not judged", summary.unjudged);
     }
     if summary.alone > 0 {
         text += &format!("; {} frames without the other camera's", summary.alone);

@@ -34,14 +34,10 @@ fn trained() -> &'static Path {
 }
 
 /// Runs a command with some input; its lines of JSON and what stands on stderr.
-fn answers(mut command: Command, input: &str) -> (Vec<Value>, String) {
+fn answers(mut command: Command, input: impl AsRef<[u8]>) -> (Vec<Value>, String) {
     let pipes = command.stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut run = pipes.stderr(Stdio::piped()).spawn().unwrap();
-    run.stdin
-        .take()
-        .unwrap()
-        .write_all(input.as_bytes())
-        .unwrap();
+    run.stdin.take().unwrap().write_all(input.as_ref()).unwrap();
     let output = run.wait_with_output().unwrap();
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success(), "{stderr}");
@@ -133,7 +129,9 @@ fn frames_that_cannot_be_used_are_named_and_skipped() {
     for bad in bad {
         input += &format!("{bad}\t{good}\n");
     }
-    input += &format!("{good}\t{good}\n");
+    let mut input = input.into_bytes();
+    input.extend(b"K\xf6ln\tbonn\n"); // Not UTF-8.
+    input.extend(format!("{good}\t{good}\r\n").bytes());
     let command = format!("predict unified {REGIONS} --stdin --json");
     let (lines, stderr) = answers(ppa(folder, &command), &input);
     let [first, last, summary] = &lines[..] else {
@@ -142,13 +140,13 @@ fn frames_that_cannot_be_used_are_named_and_skipped() {
     assert_eq!(first["quality"], last["quality"]);
     assert_eq!(
         (&summary["pairs"], &summary["skipped"]),
-        (&2.into(), &5.into())
+        (&2.into(), &6.into())
     );
     assert!(summary["pairs_per_s"].as_f64().unwrap() > 0.0);
     assert!(summary["latency_95_ms"].as_f64() >= summary["median_latency_ms"].as_f64());
-    assert_eq!(stderr.lines().count(), 5, "{stderr}");
+    assert_eq!(stderr.lines().count(), 6, "{stderr}");
     contains(&stderr, &bad);
-    contains(&stderr, &["line 2", "60x50", "expected 50x50"]);
+    contains(&stderr, &["line 2", "line 7", "60x50", "expected 50x50"]);
 
     contains(
         &fail(folder, &format!("predict right left {REGIONS} --stdin")),

@@ -155,11 +155,22 @@ fn tables_of_an_experiment_are_marked_while_results_are_missing() {
     let said: serde_json::Value = serde_json::from_str(&said).unwrap();
     // Without the column of ImageNet, for which the plan has no weights.
     assert_eq!(said["missing"], 9 * 2 * 2);
+    assert_eq!(said["finished"], false);
     assert_eq!(said["permutation_test"], serde_json::Value::Null);
     let table = fs::read_to_string(folder.join("runs/experiment_2a.md")).unwrap();
     assert!(table.contains("INCOMPLETE: 36 test sets"), "{table}");
     let refused = fail(folder, "experiment 2b plan.toml --out runs --so-far");
     assert!(refused.contains("2b needs [clinical]"), "{refused}");
+    fs::write(
+        folder.join("plan.toml"),
+        plan.replace("seeds = 2", "seeds = 41"),
+    )
+    .unwrap();
+    let refused = fail(folder, "experiment 2a plan.toml --out runs --so-far");
+    assert!(
+        refused.contains("seeds is 41, expected 1 to 40"),
+        "{refused}"
+    );
     fs::write(folder.join("plan.toml"), plan.replace("quick", "fast")).unwrap();
     let refused = fail(folder, "experiment 2a plan.toml --out runs --so-far");
     assert!(

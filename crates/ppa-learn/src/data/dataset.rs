@@ -52,13 +52,13 @@ pub fn read_samples(
         let root = root.display();
         return Err(DataError::Empty(format!("of patient {missing} in {root}")));
     }
+    let of_person = |pair: &&ImagePair| persons.is_none_or(|p| p.contains(&pair.limb.patient));
     let chosen = |pair: &&ImagePair| {
         let of_shape = |shape| shapes.is_none_or(|s| s.contains(&shape));
-        shape_of(pair).is_none_or(of_shape)
-            && persons.is_none_or(|p| p.contains(&pair.limb.patient))
+        of_person(pair) && shape_of(pair).is_none_or(of_shape)
     };
-    let rotated = dataset.pairs.iter().filter(chosen);
-    let found: BTreeSet<BodyShape> = rotated.filter_map(shape_of).collect();
+    let of_persons = dataset.pairs.iter().filter(of_person);
+    let found: BTreeSet<BodyShape> = of_persons.filter_map(shape_of).collect();
     if !found.is_empty()
         && let Some(missing) = shapes
             .iter()

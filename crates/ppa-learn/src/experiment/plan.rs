@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use ppa_dataset::published::Published;
+use ppa_metrics::MAX_PAIRS;
 use serde::{Deserialize, Serialize};
 
 use super::configuration::{Configuration, Experiment, Start};
@@ -15,7 +16,8 @@ use crate::train::{ConfigError, TrainConfig};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExperimentPlan {
-    /// Number of repetitions with different seeds; the paper's is 10.
+    /// Number of repetitions with different seeds, at most [`MAX_PAIRS`], as the permutation test takes all signs of their
+    /// differences; the paper's is 10.
     pub seeds: u64,
     /// Names the division into folds, the same for all repetitions.
     #[serde(default = "first_seed")]
@@ -86,8 +88,11 @@ impl ExperimentPlan {
         let text = std::fs::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
         let mut plan: Self =
             toml::from_str(&text).map_err(|e| wrong(e.to_string().trim_end().to_owned()))?;
-        if plan.seeds == 0 {
-            return Err(wrong("seeds is 0, expected at least 1".to_owned()));
+        if !(1..=MAX_PAIRS as u64).contains(&plan.seeds) {
+            return Err(wrong(format!(
+                "seeds is {}, expected 1 to {MAX_PAIRS}, the most that the exact permutation test takes",
+                plan.seeds
+            )));
         }
         let whole = std::path::absolute(path).map_err(|e| wrong(e.to_string()))?;
         let folder = whole.parent().unwrap_or(Path::new(""));

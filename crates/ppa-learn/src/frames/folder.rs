@@ -1,6 +1,6 @@
 //! The pairs of frames in a folder that a recorder fills.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -29,8 +29,8 @@ pub struct FramePair {
 #[derive(Debug)]
 pub struct PairFolder {
     path: PathBuf,
-    /// Names of pairs that were given out.
-    taken: HashSet<String>,
+    /// Names of pairs that were given out, and whether the last look found a file of theirs.
+    taken: HashMap<String, bool>,
     /// Files that are not whole yet, with their length and since when it stays.
     growing: HashMap<PathBuf, (u64, Instant)>,
     alone: usize,
@@ -41,7 +41,7 @@ impl PairFolder {
     pub fn new(path: &Path) -> Self {
         Self {
             path: path.to_owned(),
-            taken: HashSet::new(),
+            taken: HashMap::new(),
             growing: HashMap::new(),
             alone: 0,
         }
@@ -50,7 +50,8 @@ impl PairFolder {
     /// The pairs that became whole since the last look, in the order in which they were written.
     ///
     /// A file is whole when it ends as every PNG does. What has not grown for a second and does not is handed out as well, so
-    /// that whoever reads it tells what is wrong with it.
+    /// that whoever reads it tells what is wrong with it. A pair is given out once as long as one of its files lies there;
+    /// files of the same name that come after a look without any are a new pair.
     ///
     /// # Errors
     /// [`FileError`] if the folder cannot be read.
@@ -60,6 +61,7 @@ impl PairFolder {
             path: self.path.clone(),
             source,
         };
+        self.taken.values_mut().for_each(|there| *there = false);
         let mut halves: HashMap<String, [Option<PathBuf>; 2]> = HashMap::new();
         for entry in fs::read_dir(&self.path).map_err(unreadable)? {
             let entry = entry.map_err(unreadable)?;
@@ -67,11 +69,17 @@ impl PairFolder {
             let Some((view, name)) = file.to_str().and_then(view_and_name) else {
                 continue;
             };
-            if !self.taken.contains(name) {
-                let half = &mut halves.entry(name.to_owned()).or_default()[view as usize];
-                *half = Some(entry.path());
+            match self.taken.get_mut(name) {
+                Some(there) => *there = true,
+                None => {
+                    let half = &mut halves.entry(name.to_owned()).or_default()[view as usize];
+                    *half = Some(entry.path());
+                }
             }
         }
+        self.taken.retain(|_, there| *there);
+        // What is not looked at again is forgotten.
+        let before = std::mem::take(&mut self.growing);
         let mut pairs = Vec::new();
         self.alone = 0;
         for (name, halves) in halves {
@@ -80,9 +88,9 @@ impl PairFolder {
                 continue;
             };
             // Both are looked at, so that both clocks run.
-            let whole = [self.written(&left), self.written(&right)];
+            let whole = [self.written(&left, &before), self.written(&right, &before)];
             if let [Some(first), Some(second)] = whole {
-                self.taken.insert(name.clone());
+                self.taken.insert(name.clone(), true);
                 let files = [left, right];
                 files.iter().for_each(|file| {
                     self.growing.remove(file);
@@ -101,14 +109,19 @@ impl PairFolder {
     }
 
     /// When a file was written, if it is whole or will not become so; a file that is gone again is not.
-    fn written(&mut self, file: &Path) -> Option<SystemTime> {
+    fn written(
+        &mut self,
+        file: &Path,
+        before: &HashMap<PathBuf, (u64, Instant)>,
+    ) -> Option<SystemTime> {
         let (length, written, whole) = end_of(file).ok()?;
         let now = Instant::now();
-        let seen = self.growing.entry(file.to_owned()).or_insert((length, now));
-        if seen.0 != length {
-            *seen = (length, now);
-        }
-        (whole || now.duration_since(seen.1) >= SETTLED).then_some(written)
+        let since = match before.get(file) {
+            Some(&(same, since)) if same == length => since,
+            _ => now,
+        };
+        self.growing.insert(file.to_owned(), (length, since));
+        (whole || now.duration_since(since) >= SETTLED).then_some(written)
     }
 }
 
@@ -169,6 +182,22 @@ mod tests {
         assert_eq!(names(&mut folder), ["45.0"]);
         assert_eq!((names(&mut folder).len(), folder.alone()), (0, 0));
         assert!(folder.growing.is_empty());
+        // A name that comes again after its files were gone is a new pair.
+        let both = ["left", "right"].map(|view| format!("depth_cam_{view}_45.0.png"));
+        for file in &both {
+            fs::remove_file(root.path().join(file)).unwrap();
+        }
+        assert!(names(&mut folder).is_empty());
+        assert_eq!(folder.taken.len(), 1);
+        put(&both[0], &PNG_END[..7]);
+        put(&both[1], &PNG_END);
+        assert!(names(&mut folder).is_empty());
+        assert_eq!(folder.growing.len(), 2);
+        fs::remove_file(root.path().join(&both[0])).unwrap();
+        assert!(names(&mut folder).is_empty());
+        assert!(folder.growing.is_empty());
+        put(&both[0], &PNG_END);
+        assert_eq!(names(&mut folder), ["45.0"]);
     }
 
     #[test]

@@ -136,6 +136,9 @@ pub enum ConfigError {
         /// What stands there.
         found: String,
     },
+    /// It cannot be written as TOML, as with a path that is not UTF-8.
+    #[error("the configuration cannot be written as TOML: {0}")]
+    Write(String),
     /// A number out of range.
     #[error("{key} is {found}, expected {expected}")]
     Range {
@@ -286,11 +289,13 @@ impl TrainConfig {
             "32 to 4096",
         )?;
         require(
-            self.steps > 0,
+            (1..=1_000_000_000).contains(&self.steps),
             "steps",
             self.steps.to_string(),
-            "at least 1",
+            "1 to 1000000000",
         )?;
+        let workers = self.workers.get();
+        require(workers <= 1024, "workers", workers.to_string(), "1 to 1024")?;
         let frames = self.frames_per_pose;
         require(
             frames > 0,
@@ -431,6 +436,11 @@ mod tests {
             ("side = 8", "side is 8, expected 32 to 4096"),
             ("learning_rate = nan", "learning_rate is NaN"),
             ("steps = 0", "steps is 0"),
+            ("steps = 46000000000000000", "expected 1 to 1000000000"),
+            (
+                "workers = 1000000",
+                "workers is 1000000, expected 1 to 1024",
+            ),
             ("batch_size = 0", "nonzero"),
             (
                 "augmentation.flip_probability = 1.5",

@@ -16,7 +16,7 @@ use crate::network::{Mode, Options, QualityNetwork};
 
 use super::adam::Adam;
 use super::checkpoint;
-use super::config::{LastLayer, Source, TrainConfig};
+use super::config::{ConfigError, LastLayer, Source, TrainConfig};
 use super::error::TrainError;
 use super::feed::{Answers, Feed};
 use super::finite::{is_finite, trouble};
@@ -55,7 +55,7 @@ pub enum Ended {
 /// as a training that was never stopped.
 ///
 /// # Errors
-/// [`TrainError`]; the checkpoint then is the last whole one.
+/// [`TrainError`]. Where an image is at fault, the checkpoint holds all steps made before; else it is the last whole one.
 pub fn train(
     config: &TrainConfig,
     folder: &Path,
@@ -66,7 +66,7 @@ pub fn train(
     let training = samples(config, &config.training)?;
     let evaluation = samples(config, &config.evaluation)?;
     check_split(&training, &evaluation)?;
-    let echoed = toml::to_string(config).expect("names and numbers are TOML");
+    let echoed = toml::to_string(config).map_err(|e| ConfigError::Write(e.to_string()))?;
     Balanced::new(&training)?; // Labels outside the scale are found before training.
     if !evaluation.is_empty() {
         Balanced::new(&evaluation)?;
@@ -102,7 +102,14 @@ pub fn train(
     let mut feed = Feed::new(config, &run.network, &images, run.adam.steps)?;
     let steps = config.schedule().steps();
     while run.adam.steps < steps {
-        let answers = feed.answers(config, &run.network, run.adam.steps)?;
+        let answers = match feed.answers(config, &run.network, run.adam.steps) {
+            // An image that cannot be used costs no step that was made.
+            Err(error @ TrainError::Data(_)) if run.adam.steps > 0 => {
+                run.save(&checkpoint, false)?;
+                return Err(error);
+            }
+            answers => answers?,
+        };
         let progress = run.step(answers)?;
         report(&progress);
         let step = run.adam.steps;
@@ -238,9 +245,9 @@ impl Run<'_> {
         })
     }
 
-    /// Writes the checkpoint and, from the log, the events; evaluates before, if asked.
-    fn save(&mut self, checkpoint: &Path, evaluate: bool) -> Result<(), TrainError> {
-        if let Some(images) = self.evaluation.as_ref().filter(|_| evaluate) {
+    /// Adds a row of the evaluation to the log, if there is anybody to evaluate on.
+    fn evaluate(&mut self) -> Result<(), TrainError> {
+        if let Some(images) = &self.evaluation {
             let predictions = predict(
                 &self.network,
                 images,
@@ -262,7 +269,18 @@ impl Run<'_> {
                 scalars: scalars.into(),
             })?;
         }
+        Ok(())
+    }
+
+    /// Writes the checkpoint and, from the log, the events; evaluates before, if asked.
+    fn save(&mut self, checkpoint: &Path, evaluate: bool) -> Result<(), TrainError> {
+        let evaluated = match evaluate {
+            true => self.evaluate(),
+            false => Ok(()),
+        };
+        // An evaluation that fails costs no steps.
         checkpoint::save(checkpoint, &self.network, &self.adam, self.config)?;
+        evaluated?;
         let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
         let started = now.map_or(0.0, |now| now.as_secs_f64()) - self.seconds();
         let events = tensorboard_events(&self.log.rows, started);

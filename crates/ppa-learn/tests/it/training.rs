@@ -242,6 +242,66 @@ fn checkpoints_of_other_trainings_networks_and_files_are_refused() {
     run(&config, folder.path()).unwrap();
 }
 
+/// The first step of a training that goes on after an image, damaged behind its first step, had ended it and was mended.
+fn first_step_after(config: &TrainConfig, folder: &Path, image: &Path) -> u64 {
+    let whole = fs::read(image).unwrap();
+    let damage = |_: &ppa_learn::train::Progress| fs::write(image, "no image").unwrap();
+    let error = train(config, folder, &AtomicBool::new(false), damage).unwrap_err();
+    assert!(matches!(error, TrainError::Data(_)), "{error}");
+    fs::write(image, whole).unwrap();
+    let mut first = None;
+    let stop = AtomicBool::new(true);
+    let report = |progress: &ppa_learn::train::Progress| {
+        first.get_or_insert(progress.step);
+    };
+    train(config, folder, &stop, report).unwrap();
+    first.unwrap()
+}
+
+#[test]
+fn an_image_that_cannot_be_used_costs_no_steps() {
+    let data = dataset(2, &[90]);
+    let image = |patient: u32| {
+        let image = format!("patient_{patient}/depth/r/orig/depth_cam_left_45.0.png");
+        data.path().join(image)
+    };
+    let config = TrainConfig {
+        steps: 40,
+        workers: n(1),
+        keep_mb: 0,
+        ..config(data.path())
+    };
+    // Of the evaluation, after two steps.
+    let folder = tempfile::tempdir().unwrap();
+    let step = first_step_after(&config, folder.path(), &image(1));
+    assert_eq!(step, 3);
+    // Of the training, whose next batches are loaded before.
+    let folder = tempfile::tempdir().unwrap();
+    let config = TrainConfig {
+        checkpoint_every: n(1000),
+        ..config
+    };
+    let step = first_step_after(&config, folder.path(), &image(0));
+    let log = read_log(&folder.path().join("log.jsonl")).unwrap();
+    let steps: Vec<u64> = log.iter().map(|row| row.step).collect();
+    assert!(step > 1);
+    assert_eq!(steps, (1..=step).collect::<Vec<_>>());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_path_that_is_not_utf8_is_an_error() {
+    use std::os::unix::ffi::OsStrExt;
+    let data = dataset(2, &[90]);
+    let folder = tempfile::tempdir().unwrap();
+    let config = TrainConfig {
+        start: Some(std::ffi::OsStr::from_bytes(b"K\xf6ln").into()),
+        ..config(data.path())
+    };
+    let error = run(&config, folder.path()).unwrap_err().to_string();
+    assert!(error.contains("cannot be written as TOML"), "{error}");
+}
+
 #[test]
 fn a_value_that_is_not_finite_does_not_end_the_log() {
     let folder = tempfile::tempdir().unwrap();
