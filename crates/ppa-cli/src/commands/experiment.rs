@@ -1,8 +1,6 @@
 //! `ppa experiment`: the paper's experiments, from one plan.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
@@ -12,6 +10,7 @@ use ppa_metrics::PermutationTest;
 use ppa_xray::Part;
 use serde::Serialize;
 
+use crate::interrupt::on_interrupt;
 use crate::output::{Output, bar};
 use crate::shard::shard;
 
@@ -137,14 +136,7 @@ pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
 
 /// Carries out a share of the runs; whether it came to their end.
 fn train(runner: &Runner, part: Part) -> anyhow::Result<bool> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        if asked.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    })
-    .context("cannot listen for Ctrl-C")?;
+    let stop = on_interrupt()?;
     let bar = bar("training");
     let share = part.share(runner.runs().len() as u64);
     let finished = runner.run(

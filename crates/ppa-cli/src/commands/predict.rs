@@ -2,8 +2,7 @@
 
 use std::io::{self, BufRead, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
@@ -12,6 +11,7 @@ use ppa_learn::data::Roi;
 use ppa_learn::frames::{FramePair, PairFolder, PairPrediction, PairPredictor};
 use serde::Serialize;
 
+use crate::interrupt::on_interrupt;
 use crate::number_lists::square;
 use crate::output::{Output, Stopwatch};
 
@@ -121,15 +121,7 @@ struct Judge {
 
 impl Judge {
     fn folder(&mut self, folder: &Path) -> anyhow::Result<()> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let asked = Arc::clone(&stop);
-        // Asked a second time, the program ends at once.
-        ctrlc::set_handler(move || {
-            if asked.swap(true, Ordering::Relaxed) {
-                std::process::exit(130);
-            }
-        })
-        .context("cannot listen for Ctrl-C")?;
+        let stop = on_interrupt()?;
         let mut pairs = PairFolder::new(folder);
         while !stop.load(Ordering::Relaxed) {
             let found = pairs.look()?;

@@ -1,14 +1,12 @@
 //! `ppa train`: a network from a configuration.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use anyhow::Context;
 use clap::Args;
 use ppa_learn::train::{Ended, TrainConfig, train};
 use serde::Serialize;
 
+use crate::interrupt::on_interrupt;
 use crate::output::{Output, bar};
 
 #[derive(Debug, Args)]
@@ -33,15 +31,7 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
     let config = TrainConfig::read(&args.config)?;
     let schedule = config.schedule();
     let steps = schedule.steps();
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
-    // Asked a second time, the program ends at once.
-    ctrlc::set_handler(move || {
-        if asked.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    })
-    .context("cannot listen for Ctrl-C")?;
+    let stop = on_interrupt()?;
     let bar = bar("training");
     bar.set_length(steps);
     let mut last_loss = None;
