@@ -2,8 +2,17 @@
 
 use super::*;
 
+/// Depth of every box along the beam, mm.
+const DEPTH: f64 = 25.0;
+
 /// A talus of 10 x 25 x 15 mm between a fork of boxes: gutters of `width` mm beside it and above it, all 25 mm deep.
 fn fork(spacing: f64, width: f64) -> AnkleBones {
+    flexed_fork(spacing, width, 0.0)
+}
+
+/// The same with its talus turned about the middle of its upper face, toes down.
+fn flexed_fork(spacing: f64, width: f64, flexion_deg: f64) -> AnkleBones {
+    let (sine, cosine) = flexion_deg.to_radians().sin_cos();
     let half = 17.0;
     let n = (2.0 * half / spacing) as usize;
     // The faces of the boxes lie between voxel centres.
@@ -17,10 +26,13 @@ fn fork(spacing: f64, width: f64) -> AnkleBones {
     let labels: Vec<u8> = (0..grid.len())
         .map(|index| {
             let p = grid.centre(grid.voxel(index).map(|v| v as f64));
-            let deep = p.y.abs() <= 12.5;
+            let (y, z) = (cosine * p.y - sine * p.z, sine * p.y + cosine * p.z);
+            let deep = |y: f64| y.abs() <= 0.5 * DEPTH;
+            if p.x.abs() <= 5.0 && deep(y) && (-15.0..=0.0).contains(&z) {
+                return 1;
+            }
             match (p.x, p.z) {
-                _ if !deep => 0,
-                (x, z) if x.abs() <= 5.0 && (-15.0..=0.0).contains(&z) => 1,
+                _ if !deep(p.y) => 0,
                 (x, z) if (5.0 + width..15.0).contains(&x) && z >= -12.0 => 3,
                 (x, z) if (-15.0..=-5.0 - width).contains(&x) && z >= -12.0 => 4,
                 (x, z) if x.abs() <= 4.0 && z >= width => 3,
@@ -74,6 +86,55 @@ fn a_slab_closes_at_the_angle_whose_tangent_is_width_over_depth() {
                 );
             }
         }
+    }
+}
+
+/// A beam that meets the leg at an angle φ, because its centre is shifted along the leg or the leg is tilted, finds of a superior gutter of
+/// width w and depth L with plane faces: nothing in its way up to atan(w / L), then L / cos φ − w / sin φ of bone where
+/// L / cos φ lie above and below, so a contrast of w / (L tan φ).
+#[test]
+fn a_shifted_beam_closes_a_plane_superior_gutter_as_the_formula_tells() {
+    let width = 3.0;
+    let bones = fork(0.25, width);
+    let space = JointSpace::new(bones, &ct_from_patient(Point3::origin(), Vector3::z())).unwrap();
+    let level = Exposure::around(&space.limb, 0.0, 1e5);
+    let open = space.contrast(&level);
+    assert!(open > 0.97, "{open}");
+    for degrees in [-25.0, -20.0, -15.0, -10.0, 10.0, 15.0, 20.0, 25.0_f64] {
+        let tangent = degrees.to_radians().tan();
+        let shifted = Exposure {
+            source: level.source + space.limb.axis.scale(level.distance_mm() * tangent),
+            ..level
+        };
+        let found = space.contrast(&shifted);
+        let expected = width / (DEPTH * tangent.abs());
+        println!("{degrees}: {found:.3}, {expected:.3}");
+        assert!(
+            (found - expected).abs() < 0.04,
+            "{degrees}: {found}, {expected}"
+        );
+    }
+}
+
+/// A talus with plane faces, flexed by φ about the middle of its upper face, stands in the superior gutter with half its depth: the
+/// highest free ray, at the height w of the plafond, meets L / (2 cos φ) − w / (sin φ cos φ) of it.
+#[test]
+fn flexion_closes_a_plane_superior_gutter_as_the_formula_tells() {
+    let width = 3.0;
+    for degrees in [10.0, 15.0, 25.0_f64] {
+        let bones = flexed_fork(0.25, width, degrees);
+        let space =
+            JointSpace::new(bones, &ct_from_patient(Point3::origin(), Vector3::z())).unwrap();
+        let found = space.contrast(&Exposure::around(&space.limb, 0.0, 1e5));
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        let chord = |height: f64| 0.5 * DEPTH / cosine - height / (sine * cosine);
+        // Rows are half a millimetre apart, so that the highest free one lies up to that much below the plafond.
+        let [most, least] = [width, width - 0.5].map(|h| 1.0 - chord(h).max(0.0) / DEPTH);
+        println!("{degrees}: {found:.3}, {least:.3} to {most:.3}");
+        assert!(
+            (least - 0.02..most + 0.02).contains(&found),
+            "{degrees}: {found}, {least} to {most}"
+        );
     }
 }
 
