@@ -9,6 +9,8 @@ mod contacts;
 mod flood;
 mod solid;
 
+use std::collections::HashMap;
+
 use nalgebra::{Isometry3, Point3};
 use ppa_ct::{Grid, Volume, VolumeError};
 
@@ -22,7 +24,8 @@ use super::openness::{AnkleBone, BoneNumbers, box_around};
 pub struct SegmentedBones {
     /// The lattice of the scan within 60 mm of the joint.
     pub grid: Grid,
-    /// i fastest, 0 for no bone: tibia, fibula and talus by [`BoneNumbers::default`], others from 5, each with its own number.
+    /// i fastest, 0 for no bone: tibia, fibula and talus by [`BoneNumbers::default`], others from 5, each with its own number
+    /// (from the 251st on they share 255).
     pub labels: Vec<u8>,
 }
 
@@ -69,6 +72,8 @@ const TROCHLEA_RADIUS_MM: f64 = 6.0;
 const SHARES: [f32; 3] = [0.5, 0.6, 0.7];
 /// A piece that only separates at a higher share is a bone from this size on, mm³: the smallest of the tarsus have twice as much.
 const LEAST_BONE_MM3: f64 = 1000.0;
+/// What hangs together with nothing and is smaller is noise, mm³: a ball of 2.7 mm.
+const LEAST_PIECE_MM3: f64 = 10.0;
 /// First number of the other bones.
 const FIRST_OTHER: usize = 5;
 
@@ -123,12 +128,11 @@ pub fn segment_bones(
     seeds.plant(AnkleBone::Talus as usize, trochlea);
     let voxel_mm3 = grid.spacing_mm().product();
     for share in SHARES {
-        let least = if share == SHARES[0] {
-            0.0
-        } else {
-            LEAST_BONE_MM3 / voxel_mm3
+        let least_mm3 = match share == SHARES[0] {
+            true => LEAST_PIECE_MM3,
+            false => LEAST_BONE_MM3,
         };
-        seeds.plant_others(&density.solid(share), least);
+        seeds.plant_others(&density.solid(share), least_mm3 / voxel_mm3);
     }
     let mut bones = flood(&density, &solid, seeds);
     let contacts = Contacts::of(&grid, &bones).merged(&mut bones, MOST_CONTACT_MM2);
@@ -192,20 +196,17 @@ fn within(value: f64, [low, high]: [f64; 2]) -> bool {
 /// The numbers that stand in files: bones other than the three of the joint in order of their first voxel.
 fn numbered(bones: &[Option<u16>]) -> Vec<u8> {
     let numbers = BoneNumbers::default();
-    let mut others = Vec::new();
+    let mut others = HashMap::new();
+    let mut number = |bone: u16| match AnkleBone::ALL.get(usize::from(bone)) {
+        Some(&named) => numbers.of(named),
+        None => {
+            let next = FIRST_OTHER + others.len();
+            let number = *others.entry(bone).or_insert(next);
+            u8::try_from(number).unwrap_or(u8::MAX)
+        }
+    };
     bones
         .iter()
-        .map(|bone| match bone.map(usize::from) {
-            None => 0,
-            Some(n) if n < AnkleBone::ALL.len() => numbers.of(AnkleBone::ALL[n]),
-            Some(n) => {
-                let known = others.iter().position(|&other| other == n);
-                let place = known.unwrap_or_else(|| {
-                    others.push(n);
-                    others.len() - 1
-                });
-                u8::try_from(FIRST_OTHER + place).unwrap_or(u8::MAX)
-            }
-        })
+        .map(|bone| bone.map_or(0, &mut number))
         .collect()
 }
