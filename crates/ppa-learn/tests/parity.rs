@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use candle_core::backprop::GradStore;
 use candle_core::{DType, Device, Tensor};
+use ppa_learn::train::Adam;
 use ppa_learn::{EfficientNetB0, Mode, Options};
 
 const STILL: Options = Options {
@@ -142,7 +143,7 @@ fn four_steps_of_adam_lose_what_pytorch_loses() {
     let (network, io) = (network(), tensors("b0_seed1_io.safetensors"));
     let references = expected();
     let references = references["adam_losses_f64_lr1e-3"].as_array().unwrap();
-    let mut moments = [vec![], vec![]];
+    let mut adam = Adam::new(network.variables().map(|variable| variable.elem_count()));
     for (step, reference) in references.iter().enumerate() {
         let (loss, store) = loss(&network, &io);
         let reference = reference.as_f64().unwrap();
@@ -151,24 +152,6 @@ fn four_steps_of_adam_lose_what_pytorch_loses() {
             (loss - reference).abs() < 1e-2 * reference,
             "step {step}: {loss}, expected {reference}"
         );
-        for (variable, moments) in network.variables().into_iter().zip(&mut moments) {
-            moments.resize(variable.elem_count(), (0.0, 0.0));
-            let gradient = values(store.get(variable).unwrap());
-            let t = step as i32 + 1;
-            let next: Vec<f32> = values(variable)
-                .iter()
-                .zip(gradient)
-                .zip(moments)
-                .map(|((x, g), (m, v))| {
-                    *m = 0.9 * *m + 0.1 * g;
-                    *v = 0.999 * *v + 0.001 * g * g;
-                    let (m, v) = (*m / (1.0 - 0.9_f64.powi(t)), *v / (1.0 - 0.999_f64.powi(t)));
-                    (x - 1e-3 * m / (v.sqrt() + 1e-8)) as f32
-                })
-                .collect();
-            variable
-                .set(&Tensor::new(next, &Device::Cpu).unwrap())
-                .unwrap();
-        }
+        adam.step(&network.variables(), &store, 1e-3).unwrap();
     }
 }
