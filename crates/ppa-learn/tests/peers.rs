@@ -1,11 +1,17 @@
-//! Weights as PyTorch and onnxruntime read and write them.
+//! Weights as PyTorch and onnxruntime read and write them, and scalars as TensorBoard reads them.
 //!
-//! By hand only, with a Python that has torch, torchvision, onnx, onnxruntime, safetensors and numpy:
+//! By hand only, with a Python that has torch, torchvision, onnx, onnxruntime, safetensors, numpy and tensorboard:
 //! `PPA_PYTHON=python cargo test -p ppa-learn --features peers --test peers`.
 
+#[path = "it/toy.rs"]
+mod toy;
+
 use std::collections::HashMap;
+use std::num::NonZeroUsize;
+use std::sync::atomic::AtomicBool;
 
 use candle_core::{Device, Tensor};
+use ppa_learn::train::{Source, TrainConfig, train};
 use ppa_learn::{
     EfficientNetB0, FirstConvolution, Fusion, FusionKind, Loaded, Mode, Options, QualityNetwork,
 };
@@ -169,4 +175,50 @@ fn pytorch_says_the_same_of_pairs_by_every_fusion() {
             python(FUSED, &[&weights, &io]);
         }
     }
+}
+
+/// Every scalar of the log, by tag: its steps, its values in f32, and its seconds since the first one.
+const READ_BACK: &str = "
+import sys, json, collections, numpy
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+events = EventAccumulator(sys.argv[1])
+events.Reload()
+expected = collections.defaultdict(list)
+for line in open(sys.argv[1] + '/log.jsonl'):
+    row = json.loads(line)
+    step, seconds = row.pop('step'), row.pop('seconds')
+    for tag, value in row.items():
+        expected[tag].append((step, numpy.float32(value), seconds))
+assert len(expected) == 4, list(expected)
+assert sorted(events.Tags()['scalars']) == sorted(expected), events.Tags()
+for tag, rows in expected.items():
+    found = [(event.step, numpy.float32(event.value), event.wall_time) for event in events.Scalars(tag)]
+    assert [event[:2] for event in found] == [row[:2] for row in rows], (tag, found, rows)
+    assert all(abs(event[2] - found[0][2] - row[2] + rows[0][2]) < 1e-3 for event, row in zip(found, rows)), tag
+    print('tensorboard:', tag, len(found), 'values, the last one', found[-1][1], 'at step', found[-1][0])
+";
+
+#[test]
+fn tensorboard_reads_all_scalars_of_a_training() {
+    let data = toy::dataset(2, &[0, 90, 180]);
+    let folder = tempfile::tempdir().unwrap();
+    let of = |patient| {
+        vec![Source {
+            dataset: data.path().to_owned(),
+            patients: Some(vec![patient]),
+            shapes: None,
+        }]
+    };
+    let config = TrainConfig {
+        side: 32,
+        steps: 6,
+        batch_size: NonZeroUsize::new(4).unwrap(),
+        log_every: NonZeroUsize::MIN,
+        checkpoint_every: NonZeroUsize::new(2).unwrap(),
+        training: of(0),
+        evaluation: of(1),
+        ..TrainConfig::quick()
+    };
+    train(&config, folder.path(), &AtomicBool::new(false), |_| {}).unwrap();
+    python(READ_BACK, &[folder.path()]);
 }

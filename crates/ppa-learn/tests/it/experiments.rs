@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use ppa_learn::experiment::{Event, Experiment, ExperimentError, ExperimentPlan, Runner, Table};
 use tempfile::TempDir;
 
-use crate::toy::{add_shapes, dataset};
+use crate::toy::dataset;
 
 /// A plan of a few small steps: synthetic images of four persons, preparations of two.
 fn plan(folder: &Path, synthetic: &TempDir, preparations: &TempDir, steps: u64) -> ExperimentPlan {
@@ -20,6 +20,20 @@ fn plan(folder: &Path, synthetic: &TempDir, preparations: &TempDir, steps: u64) 
     let path = folder.join("plan.toml");
     fs::write(&path, text).unwrap();
     ExperimentPlan::read(&path).unwrap()
+}
+
+/// Gives the feet of a dataset the other body shapes as well, with the images of `orig`.
+fn add_shapes(folder: &TempDir) {
+    for patient in fs::read_dir(folder.path()).unwrap() {
+        let depth = patient.unwrap().path().join("depth/r");
+        for shape in ["big", "small", "bumps_a", "bumps_b"] {
+            fs::create_dir(depth.join(shape)).unwrap();
+            for image in fs::read_dir(depth.join("orig")).unwrap() {
+                let image = image.unwrap();
+                fs::copy(image.path(), depth.join(shape).join(image.file_name())).unwrap();
+            }
+        }
+    }
 }
 
 fn go() -> AtomicBool {

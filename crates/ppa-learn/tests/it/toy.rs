@@ -61,17 +61,3 @@ pub fn dataset(patients: u32, steps: &[u32]) -> TempDir {
     }
     folder
 }
-
-/// Gives the feet of a dataset the other body shapes as well, with the images of `orig`.
-pub fn add_shapes(folder: &TempDir) {
-    for patient in fs::read_dir(folder.path()).unwrap() {
-        let depth = patient.unwrap().path().join("depth/r");
-        for shape in ["big", "small", "bumps_a", "bumps_b"] {
-            fs::create_dir(depth.join(shape)).unwrap();
-            for image in fs::read_dir(depth.join("orig")).unwrap() {
-                let image = image.unwrap();
-                fs::copy(image.path(), depth.join(shape).join(image.file_name())).unwrap();
-            }
-        }
-    }
-}
