@@ -63,27 +63,45 @@ pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
 
 fn describe(evaluation: &Evaluation) -> String {
     let mut lines = vec![format!(
-        "{:<14}{:>6}{:>8}{:>8}{:>10}{:>10}{:>12}{:>13}{:>13}",
+        "{:<22}{:>6}{:>8}{:>8}{:>10}{:>10}{:>12}{:>13}{:>13}",
         "", "n", "MSE", "MAE", "Spearman", "Accuracy", "Diagnostic", "Sensitivity", "Specificity"
     )];
     lines.push(line("images", &evaluation.images));
     lines.push(line("poses", &evaluation.poses));
+    let several = evaluation.persons.iter().any(|person| person.dataset > 1);
     for person in &evaluation.persons {
-        lines.push(line(&format!("patient {}", person.patient), &person.scores));
+        let mut name = format!("patient {}", person.patient);
+        if several {
+            name = format!("dataset {}, {name}", person.dataset);
+        }
+        lines.push(line(&name, &person.scores));
     }
-    lines.push("Images by class of label (rows) and prediction (columns), 1 to 3:".into());
+    if let Some(spread) = evaluation.frame_spread {
+        lines.push(format!(
+            "Frames of a pose differ by {spread:.3} (standard deviation)."
+        ));
+    }
+    if let (Some(delta), Some(margin)) = (evaluation.pose_delta, evaluation.pose_margin_accuracy) {
+        let margin = percent(Some(margin));
+        lines.push(format!(
+            "Pose Delta {delta:.3}, Pose Margin Accuracy {margin}"
+        ));
+    }
+    lines.push("Images by class of the label (rows) and prediction (columns), 1 to 3:".into());
     for row in evaluation.confusion {
         lines.push(row.map(|n| format!("{n:>8}")).concat());
     }
     lines.join("\n")
 }
 
+fn percent(value: Option<f64>) -> String {
+    value.map_or("-".to_owned(), |v| format!("{:.1} %", 100.0 * v))
+}
+
 fn line(name: &str, scores: &Scores) -> String {
     let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
-    let percent =
-        |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{:.1} %", 100.0 * v));
     format!(
-        "{name:<14}{:>6}{:>8}{:>8}{:>10}{:>10}{:>12}{:>13}{:>13}",
+        "{name:<22}{:>6}{:>8}{:>8}{:>10}{:>10}{:>12}{:>13}{:>13}",
         scores.n,
         number(scores.mse),
         number(scores.mae),

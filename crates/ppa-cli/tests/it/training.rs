@@ -80,9 +80,9 @@ fn a_killed_training_goes_on_to_the_same_weights_and_is_evaluated() {
         (&3.into(), &1.into())
     );
     let files = names(&folder.join("whole/evaluation"));
-    assert_eq!(files.len(), 10, "{files:?}");
+    assert_eq!(files.len(), 15, "{files:?}");
     let table = fs::read_to_string(folder.join("whole/evaluation/predictions.csv")).unwrap();
-    let header = "id,camera,patient,side,pose,frame,angle_deg,label,prediction";
+    let header = "id,dataset,camera,patient,side,pose,frame,angle_deg,label,prediction";
     assert_eq!(table.lines().next(), Some(header));
     assert_eq!(table.lines().count(), 4);
 }

@@ -124,13 +124,12 @@ impl Reader<'_> {
         let label = pair.label.as_ref().ok_or_else(no_label)?.label;
         let images = views.iter().zip(&files);
         let images: Result<_, _> = images.map(|(&view, file)| self.image(view, file)).collect();
-        let limb = pair.limb;
         Ok(Some(Sample {
             id: files[0].file.clone(),
             images: images?,
             label,
-            person: format!("{}, patient {}", self.place.display(), limb.patient),
-            limb,
+            dataset: self.place.clone(),
+            limb: pair.limb,
             camera: views[0],
             pose,
             frame,

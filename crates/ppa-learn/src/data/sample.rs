@@ -55,8 +55,8 @@ pub struct Sample {
     pub images: Vec<SampleImage>,
     /// Quality from 1 (ideal) to 3 (inadequate).
     pub label: f64,
-    /// The person, with the dataset's folder: equal for the feet of one person only.
-    pub person: String,
+    /// Folder of the dataset, by its one path however it was spelled. Persons of different datasets are different ones.
+    pub dataset: PathBuf,
     /// N of `patient_N`, and which of the person's limbs.
     pub limb: LimbId,
     /// The camera of its first image.
@@ -74,12 +74,13 @@ pub struct Sample {
 /// # Errors
 /// [`DataError::Leak`] naming the first such person.
 pub fn check_split(training: &[Sample], evaluation: &[Sample]) -> Result<(), DataError> {
-    let persons: BTreeSet<&str> = training.iter().map(|s| s.person.as_str()).collect();
-    match evaluation
-        .iter()
-        .find(|s| persons.contains(s.person.as_str()))
-    {
-        Some(sample) => Err(DataError::Leak(sample.person.clone())),
+    let person = |sample: &'_ Sample| (sample.dataset.clone(), sample.limb.patient);
+    let persons: BTreeSet<_> = training.iter().map(person).collect();
+    match evaluation.iter().find(|s| persons.contains(&person(s))) {
+        Some(sample) => {
+            let (dataset, patient) = (sample.dataset.display(), sample.limb.patient);
+            Err(DataError::Leak(format!("{dataset}, patient {patient}")))
+        }
         None => Ok(()),
     }
 }
@@ -96,7 +97,7 @@ pub(crate) mod tests {
             id: format!("sample {number}"),
             images: Vec::new(),
             label,
-            person: format!("patient_{number}"),
+            dataset: PathBuf::from("data"),
             limb: LimbId {
                 patient: number,
                 side: Side::Left,
@@ -119,12 +120,20 @@ pub(crate) mod tests {
         };
         assert!(split(&first, &second).is_ok());
         let other_foot = Sample {
-            id: "other foot".into(),
+            limb: LimbId {
+                side: Side::Right,
+                ..first.limb
+            },
             ..first.clone()
         };
+        let elsewhere = Sample {
+            dataset: PathBuf::from("other"),
+            ..first.clone()
+        };
+        assert!(split(&first, &elsewhere).is_ok());
         let error = split(&first, &other_foot).unwrap_err().to_string();
         assert!(
-            error.starts_with("patient_1 would be in training"),
+            error.starts_with("data, patient 1 would be in training"),
             "{error}"
         );
     }

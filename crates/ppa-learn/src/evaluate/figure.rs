@@ -1,5 +1,6 @@
 //! Figures with two axes, as SVG and as PNG.
 
+mod clip;
 mod png;
 mod svg;
 
@@ -10,6 +11,8 @@ pub enum Mark {
     Dots,
     /// Straight lines from point to point.
     Line,
+    /// Both.
+    DotsAndLine,
 }
 
 /// Points that belong together.
@@ -19,8 +22,20 @@ pub struct Series {
     pub name: String,
     /// How it is drawn.
     pub mark: Mark,
-    /// Points; those outside the axes are left out.
+    /// Points. Dots beyond the axes stand at the rim and lines are cut there, which a note below the figure counts; values
+    /// that are not finite are counted as well, drawn nowhere, and interrupt a line.
     pub points: Vec<[f64; 2]>,
+}
+
+/// A tinted rectangle with a text in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tile {
+    /// Both ends along the axes, x first, within the figure's ranges.
+    pub ranges: [[f64; 2]; 2],
+    /// From 0, white, to 1, blue.
+    pub share: f64,
+    /// What stands in it.
+    pub text: String,
 }
 
 /// A figure with two linear axes.
@@ -32,6 +47,8 @@ pub struct Figure {
     pub labels: [String; 2],
     /// Both ends of the axes, x first.
     pub ranges: [[f64; 2]; 2],
+    /// What is drawn below the series.
+    pub tiles: Vec<Tile>,
     /// What is drawn, the last one on top.
     pub series: Vec<Series>,
 }
@@ -40,6 +57,8 @@ pub struct Figure {
 const SIZE: [i32; 2] = [640, 480];
 /// Left, top, right and bottom margin around the axes.
 const MARGINS: [i32; 4] = [80, 40, 20, 60];
+/// Row of the second axis' name and of those of the series.
+const LABELS_Y: f64 = 27.0;
 /// Blue, orange, green and grey of the Okabe-Ito palette, which colour-blind people tell apart.
 const COLOURS: [[u8; 3]; 4] = [[0, 114, 178], [213, 94, 0], [0, 158, 115], [110, 110, 110]];
 
@@ -47,6 +66,8 @@ const COLOURS: [[u8; 3]; 4] = [[0, 114, 178], [213, 94, 0], [0, 158, 115], [110,
 enum Shape<'a> {
     Line([f64; 2], [f64; 2], Option<usize>),
     Dot([f64; 2], usize),
+    /// Two opposite corners, and a share of the first colour on white.
+    Tile([f64; 2], [f64; 2], f64),
     Text([f64; 2], &'a str, Option<usize>),
 }
 
@@ -79,6 +100,61 @@ impl Figure {
     }
 
     fn draw(&self, draw: &mut impl FnMut(Shape)) {
+        for tile in &self.tiles {
+            let [x, y] = tile.ranges;
+            let [from, to] = [0, 1].map(|end| self.place([x[end], y[end]]));
+            draw(Shape::Tile(from, to, tile.share));
+            let middle = [0, 1].map(|axis| 0.5 * (from[axis] + to[axis]));
+            draw(Shape::Text(middle, &tile.text, None));
+        }
+        self.draw_axes(draw);
+        let [width, height] = SIZE.map(f64::from);
+        let mut beyond = 0;
+        for (i, series) in self.series.iter().enumerate() {
+            beyond += self.draw_series(series, i % COLOURS.len(), draw);
+        }
+        // Names stand above the axes, the last one at their right end.
+        let mut right = width - f64::from(MARGINS[2]);
+        for (i, series) in self.series.iter().enumerate().rev() {
+            let at = [right - half_width(&series.name), LABELS_Y];
+            draw(Shape::Text(at, &series.name, Some(i % COLOURS.len())));
+            right -= 2.0 * half_width(&series.name) + 16.0;
+        }
+        if beyond > 0 {
+            let note = format!(
+                "{beyond} {} beyond the axes: dots stand at the rim, lines are cut there",
+                if beyond == 1 {
+                    "value is"
+                } else {
+                    "values are"
+                }
+            );
+            draw(Shape::Text([width / 2.0, height - 6.0], &note, None));
+        }
+    }
+
+    /// Draws a series and counts its points that lie beyond the axes or nowhere.
+    fn draw_series(&self, series: &Series, colour: usize, draw: &mut impl FnMut(Shape)) -> usize {
+        if series.mark != Mark::Dots {
+            for pair in series.points.windows(2) {
+                if let Some([from, to]) = clip::segment([pair[0], pair[1]], self.ranges) {
+                    let [from, to] = [from, to].map(|point| self.place(point));
+                    draw(Shape::Line(from, to, Some(colour)));
+                }
+            }
+        }
+        let finite = |point: &&[f64; 2]| point.iter().all(|x| x.is_finite());
+        if series.mark != Mark::Line {
+            for &point in series.points.iter().filter(finite) {
+                let place = self.place(clip::point(point, self.ranges));
+                draw(Shape::Dot(place, colour));
+            }
+        }
+        let beyond = |point: &&[f64; 2]| clip::point(**point, self.ranges) != **point;
+        series.points.iter().filter(beyond).count()
+    }
+
+    fn draw_axes(&self, draw: &mut impl FnMut(Shape)) {
         let [x, y] = self.ranges;
         let corners = [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
         let corners = corners.map(|corner| self.place(corner));
@@ -97,33 +173,23 @@ impl Figure {
             }
         }
         let [width, height] = SIZE.map(f64::from);
-        draw(Shape::Text([width / 2.0, 14.0], &self.title, None));
-        draw(Shape::Text(
-            [width / 2.0, height - 18.0],
-            &self.labels[0],
-            None,
-        ));
-        // Beside the top of its axis, so that it need not stand upright.
-        draw(Shape::Text([90.0, 30.0], &self.labels[1], None));
-        for (i, series) in self.series.iter().enumerate() {
-            let colour = i % COLOURS.len();
-            let inside = |point: &[f64; 2]| {
-                (0..2).all(|a| (self.ranges[a][0]..=self.ranges[a][1]).contains(&point[a]))
-            };
-            let points: Vec<[f64; 2]> = series.points.iter().copied().filter(inside).collect();
-            let places: Vec<[f64; 2]> = points.iter().map(|&point| self.place(point)).collect();
-            match series.mark {
-                Mark::Dots => places.iter().for_each(|&at| draw(Shape::Dot(at, colour))),
-                Mark::Line => {
-                    for pair in places.windows(2) {
-                        draw(Shape::Line(pair[0], pair[1], Some(colour)));
-                    }
-                }
-            }
-            let at = [width - 120.0, 54.0 + 16.0 * i as f64];
-            draw(Shape::Text(at, &series.name, Some(colour)));
-        }
+        let below = [width / 2.0, height - 24.0];
+        draw(Shape::Text([width / 2.0, 10.0], &self.title, None));
+        draw(Shape::Text(below, &self.labels[0], None));
+        // Above its axis, so that it need not stand upright.
+        let left = half_width(&self.labels[1]).max(86.0) + 4.0;
+        draw(Shape::Text([left, LABELS_Y], &self.labels[1], None));
     }
+}
+
+/// Half the width of a text in the PNG's letters of 8 pixels, which are the wider ones.
+fn half_width(text: &str) -> f64 {
+    4.0 * text.chars().count() as f64
+}
+
+/// Share of the first colour on white.
+fn tint(share: f64) -> [u8; 3] {
+    COLOURS[0].map(|part| (255.0 - share * (255.0 - f64::from(part))).round() as u8)
 }
 
 /// Round numbers within a range, 4 to 10 of them, at steps of 1, 2 or 5 times a power of ten.
@@ -166,30 +232,57 @@ mod tests {
         );
     }
 
-    /// A single dot in the middle of the axes is drawn there, in its colour, in both formats.
+    /// A dot in the middle of the axes is drawn there, in its colour, in both formats; one beyond them at the rim.
     #[test]
     fn points_stand_where_the_axes_say() {
-        let figure = Figure {
+        let mut figure = Figure {
             title: "a < b".into(),
             labels: ["x".into(), "y".into()],
             ranges: [[0.0, 2.0], [1.0, 3.0]],
+            tiles: vec![Tile {
+                ranges: [[0.0, 0.5], [1.0, 1.5]],
+                share: 0.5,
+                text: "7".into(),
+            }],
             series: vec![Series {
                 name: "one".into(),
                 mark: Mark::Dots,
-                points: vec![[1.0, 2.0], [5.0, 2.0]],
+                points: vec![[1.0, 2.0], [5.0, 2.0], [1.0, f64::NAN]],
             }],
         };
         let svg = figure.to_svg();
         assert_eq!(svg.matches("<circle cx=\"350\" cy=\"230\"").count(), 1);
-        assert_eq!(
-            svg.matches("<circle").count(),
-            1,
-            "the other one lies outside"
-        );
+        assert_eq!(svg.matches("<circle cx=\"620\" cy=\"230\"").count(), 1);
+        assert_eq!(svg.matches("<circle").count(), 2, "{svg}");
+        assert!(svg.contains("2 values are beyond the axes"), "{svg}");
         assert!(svg.contains("a &lt; b") && svg.ends_with("</svg>\n"));
         let png = image::load_from_memory(&figure.to_png()).unwrap().to_rgb8();
         assert_eq!(png.dimensions(), (640, 480));
         assert_eq!(png.get_pixel(350, 230).0, COLOURS[0]);
         assert_eq!(png.get_pixel(340, 230).0, [255; 3]);
+        // The middle between white and the first colour.
+        assert_eq!(png.get_pixel(100, 400).0, [128, 185, 217]);
+        figure.series[0].points.truncate(1);
+        assert!(!figure.to_svg().contains("beyond"));
+    }
+
+    /// A line to a point beyond the axes leaves them where it crosses the rim.
+    #[test]
+    fn lines_are_cut_at_the_rim() {
+        let figure = Figure {
+            title: String::new(),
+            labels: [String::new(), String::new()],
+            ranges: [[0.0, 2.0], [0.0, 2.0]],
+            tiles: Vec::new(),
+            series: vec![Series {
+                name: String::new(),
+                mark: Mark::Line,
+                points: vec![[0.0, 0.0], [1.0, 4.0], [2.0, 4.0], [2.0, 1.0]],
+            }],
+        };
+        let svg = figure.to_svg();
+        let rim = "x1=\"80\" y1=\"420\" x2=\"215\" y2=\"40\"";
+        assert!(svg.contains(rim), "{svg}");
+        assert_eq!(svg.matches("stroke-width=\"2\"").count(), 2, "{svg}");
     }
 }

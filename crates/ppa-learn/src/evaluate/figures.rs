@@ -2,7 +2,7 @@
 
 use crate::train::LogRow;
 
-use super::figure::{Figure, Mark, Series};
+use super::figure::{Figure, Mark, Series, Tile};
 use super::report::Evaluation;
 use super::row::Row;
 
@@ -22,6 +22,7 @@ fn figure(title: &str, labels: [&str; 2], ranges: [[f64; 2]; 2], series: Vec<Ser
         title: title.to_owned(),
         labels: labels.map(str::to_owned),
         ranges,
+        tiles: Vec::new(),
         series,
     }
 }
@@ -44,12 +45,48 @@ pub fn scatter(rows: &[Row]) -> Figure {
     figure("Predictions against labels", labels, [QUALITY; 2], series)
 }
 
-/// Mean prediction against label.
+/// How many images of each class of the label were put into which class, of N classes from 1 to 3; tinted by their share of the class.
+pub fn confusion_figure<const N: usize>(table: &[[usize; N]; N]) -> Figure {
+    let half = 1.0 / (N - 1) as f64;
+    let ends = |class: usize| {
+        let middle = 1.0 + 2.0 * half * class as f64;
+        [middle - half, middle + half]
+    };
+    let tile = |label: usize, prediction: usize| {
+        let (count, all) = (table[label][prediction], table[label].iter().sum::<usize>());
+        let share = count as f64 / all.max(1) as f64;
+        Tile {
+            ranges: [ends(label), ends(prediction)],
+            share: 0.6 * share, // text stays legible on it
+            text: match count {
+                0 => String::new(),
+                _ => format!("{count} ({:.0} %)", 100.0 * share),
+            },
+        }
+    };
+    let tiles = (0..N).flat_map(|label| (0..N).map(move |prediction| tile(label, prediction)));
+    let labels = ["class of the label", "class of the prediction"];
+    let title = "Images by class (share of the label's class)";
+    Figure {
+        tiles: tiles.collect(),
+        ..figure(title, labels, [[1.0 - half, 3.0 + half]; 2], Vec::new())
+    }
+}
+
+/// Mean prediction of the images of each label, and mean label and prediction of images that are predicted alike.
 pub fn calibration_figure(evaluation: &Evaluation) -> Figure {
-    let means = evaluation.calibration.iter();
-    let means: Vec<[f64; 2]> = means.map(|&(label, mean, _)| [label, mean]).collect();
-    let series = vec![series("means", Mark::Line, means), ideal()];
-    let labels = ["label", "mean prediction"];
+    let points = |means: &[(f64, f64, usize)]| {
+        let points = means.iter().map(|&(label, mean, _)| [label, mean]);
+        points.collect::<Vec<_>>()
+    };
+    let by_label = points(&evaluation.calibration);
+    let by_prediction = points(&evaluation.calibration_by_prediction);
+    let series = vec![
+        series("by label", Mark::DotsAndLine, by_label),
+        series("by prediction", Mark::DotsAndLine, by_prediction),
+        ideal(),
+    ];
+    let labels = ["mean label", "mean prediction"];
     figure("Calibration", labels, [QUALITY; 2], series)
 }
 
@@ -62,21 +99,21 @@ pub fn error_figure(evaluation: &Evaluation) -> Figure {
         from_zero(errors.iter().map(|point| point[1])),
     ];
     let labels = ["medial rotation in degrees", "mean absolute error"];
-    let series = vec![series("images", Mark::Line, errors)];
+    let series = vec![series("images", Mark::DotsAndLine, errors)];
     figure("Errors by angle", labels, ranges, series)
 }
 
 /// Loss of training and errors of evaluation against steps.
 pub fn learning_curve(log: &[LogRow]) -> Figure {
-    let of_tag = |tag: &str, name: &str| {
+    let of_tag = |tag: &str, name: &str, mark| {
         let rows = log.iter();
         let points = rows.filter_map(|row| Some([row.step as f64, *row.scalars.get(tag)?]));
-        series(name, Mark::Line, points.collect())
+        series(name, mark, points.collect())
     };
     let curves = vec![
-        of_tag("training/loss", "training MSE"),
-        of_tag("evaluation/mse", "evaluation MSE"),
-        of_tag("evaluation/mae", "evaluation MAE"),
+        of_tag("training/loss", "training MSE", Mark::Line),
+        of_tag("evaluation/mse", "evaluation MSE", Mark::DotsAndLine),
+        of_tag("evaluation/mae", "evaluation MAE", Mark::DotsAndLine),
     ];
     // The first losses would squeeze all others: the axis ends at five times the median.
     let mut values: Vec<f64> = curves

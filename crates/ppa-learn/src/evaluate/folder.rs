@@ -3,9 +3,11 @@
 use std::path::Path;
 
 use ppa_dataset::{FileError, write_whole};
+use serde::Serialize;
 
 use super::figure::Figure;
-use super::figures::{calibration_figure, error_figure, scatter};
+use super::figures::{calibration_figure, confusion_figure, error_figure, scatter};
+use super::poses::poses;
 use super::report::Evaluation;
 use super::row::Row;
 
@@ -17,12 +19,12 @@ pub enum EvaluateError {
     #[error(transparent)]
     File(#[from] FileError),
     /// A row that is no CSV.
-    #[error("predictions cannot be written as CSV")]
+    #[error("rows cannot be written as CSV")]
     Csv(#[from] csv::Error),
 }
 
-/// Writes `predictions.csv`, `evaluation.json`, and the figures `scatter`, `calibration`, `errors_by_angle` (where angles are
-/// known) and those given, by name, each as SVG and PNG.
+/// Writes `predictions.csv` (a row per image), `poses.csv`, `evaluation.json`, and the figures `scatter`, `confusion`,
+/// `confusion_half_steps`, `calibration`, `errors_by_angle` (where angles are known) and those given, by name, each as SVG and PNG.
 ///
 /// # Errors
 /// [`EvaluateError`] naming the file that cannot be written.
@@ -33,10 +35,16 @@ pub fn write_evaluation(
     more: Vec<(&str, Figure)>,
 ) -> Result<(), EvaluateError> {
     write_predictions(&folder.join("predictions.csv"), rows)?;
+    write_csv(&folder.join("poses.csv"), &poses(rows))?;
     let json = serde_json::to_string_pretty(evaluation).expect("names and numbers are JSON");
     write_whole(&folder.join("evaluation.json"), json.as_bytes())?;
     let mut figures = vec![
         ("scatter", scatter(rows)),
+        ("confusion", confusion_figure(&evaluation.confusion)),
+        (
+            "confusion_half_steps",
+            confusion_figure(&evaluation.confusion_half_steps),
+        ),
         ("calibration", calibration_figure(evaluation)),
     ];
     if !evaluation.error_by_angle.is_empty() {
@@ -57,6 +65,10 @@ pub fn write_evaluation(
 /// # Errors
 /// [`EvaluateError`] naming the file that cannot be written.
 pub fn write_predictions(path: &Path, rows: &[Row]) -> Result<(), EvaluateError> {
+    write_csv(path, rows)
+}
+
+fn write_csv<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), EvaluateError> {
     let mut table = csv::Writer::from_writer(Vec::new());
     for row in rows {
         table.serialize(row)?;

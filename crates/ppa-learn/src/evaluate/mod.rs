@@ -3,13 +3,16 @@
 mod figure;
 mod figures;
 mod folder;
+mod poses;
 mod report;
 mod row;
 mod scores;
 
-pub use figure::{Figure, Mark, Series};
-pub use figures::{calibration_figure, error_figure, learning_curve, scatter};
+pub use figure::{Figure, Mark, Series, Tile};
+pub use figures::{calibration_figure, confusion_figure, error_figure, learning_curve, scatter};
 pub use folder::{EvaluateError, write_evaluation, write_predictions};
+pub(crate) use poses::triple;
+pub use poses::{PoseRow, frame_spread, poses};
 pub use report::{Evaluation, PersonScores};
 pub use row::Row;
 pub use scores::Scores;

@@ -4,8 +4,12 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::poses::{PoseRow, frame_spread, poses, triples};
 use super::row::Row;
 use super::scores::Scores;
+
+/// Predictions this close together are one point of the calibration by prediction.
+const BIN: f64 = 0.25;
 
 /// Metrics of a test set.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -14,12 +18,22 @@ pub struct Evaluation {
     pub images: Scores,
     /// Predictions averaged over cameras and frames of a pose.
     pub poses: Scores,
+    /// How far the predictions of a pose's frames differ: see [`frame_spread`].
+    pub frame_spread: Option<f64>,
+    /// Pose Delta; open unless every limb has one pose of label 1 and two of label 3.
+    pub pose_delta: Option<f64>,
+    /// Pose Margin Accuracy; open where Pose Delta is.
+    pub pose_margin_accuracy: Option<f64>,
     /// The poses of each person.
     pub persons: Vec<PersonScores>,
     /// Numbers of images by class of the label (row) and of the prediction (column): 1, 2 or 3, the nearest; halves go up.
     pub confusion: [[usize; 3]; 3],
+    /// The same by half steps: 1, 1.5, 2, 2.5 or 3.
+    pub confusion_half_steps: [[usize; 5]; 5],
     /// (label, mean prediction, images) of each label that occurs.
     pub calibration: Vec<(f64, f64, usize)>,
+    /// (mean label, mean prediction, images) of the images whose predictions lie within one quarter: 1 to 1.25, 1.25 to 1.5, ….
+    pub calibration_by_prediction: Vec<(f64, f64, usize)>,
     /// (degrees, mean absolute error, images) of each angle that the dataset tells.
     pub error_by_angle: Vec<(f64, f64, usize)>,
 }
@@ -27,6 +41,8 @@ pub struct Evaluation {
 /// Metrics of one person's poses.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PersonScores {
+    /// Number of the dataset, as in [`Row`].
+    pub dataset: usize,
     /// N of `patient_N`.
     pub patient: u32,
     /// Of the poses.
@@ -38,46 +54,63 @@ impl Evaluation {
     /// The metrics of some predictions.
     pub fn of(rows: &[Row]) -> Self {
         let pairs: Vec<(f64, f64)> = rows.iter().map(|row| (row.label, row.prediction)).collect();
-        let mut poses: BTreeMap<(u32, &str), Vec<&Row>> = BTreeMap::new();
-        for row in rows {
-            let pose = (row.patient, row.pose.as_str());
-            poses.entry(pose).or_default().push(row);
+        let poses = poses(rows);
+        let pose_pair = |pose: &PoseRow| (pose.label, pose.prediction);
+        let mut persons: BTreeMap<(usize, u32), Vec<(f64, f64)>> = BTreeMap::new();
+        for pose in &poses {
+            let person = (pose.dataset, pose.patient);
+            persons.entry(person).or_default().push(pose_pair(pose));
         }
-        let mut persons: BTreeMap<u32, Vec<(f64, f64)>> = BTreeMap::new();
-        for ((patient, _), rows) in &poses {
-            let mean = |value: fn(&Row) -> f64| {
-                rows.iter().map(|row| value(row)).sum::<f64>() / rows.len() as f64
-            };
-            let pair = (mean(|row| row.label), mean(|row| row.prediction));
-            persons.entry(*patient).or_default().push(pair);
-        }
-        let all_poses: Vec<(f64, f64)> = persons.values().flatten().copied().collect();
-        let mut confusion = [[0; 3]; 3];
-        for (label, prediction) in &pairs {
-            confusion[class(*label)][class(*prediction)] += 1;
-        }
-        let of_person = |(&patient, pairs): (&u32, &Vec<(f64, f64)>)| PersonScores {
+        let of_person = |(&(dataset, patient), pairs): (&_, &Vec<_>)| PersonScores {
+            dataset,
             patient,
             scores: Scores::of(pairs),
         };
+        let triples = triples(&poses).unwrap_or_default();
         let errors = rows.iter().filter_map(|row| {
             let error = (row.prediction - row.label).abs();
             Some((row.angle_deg?, error))
         });
+        let poses: Vec<_> = poses.iter().map(pose_pair).collect();
         Self {
             images: Scores::of(&pairs),
-            poses: Scores::of(&all_poses),
+            poses: Scores::of(&poses),
+            frame_spread: frame_spread(rows),
+            pose_delta: ppa_metrics::pose_delta(&triples).ok(),
+            pose_margin_accuracy: ppa_metrics::pose_margin_accuracy(&triples).ok(),
             persons: persons.iter().map(of_person).collect(),
-            confusion,
+            confusion: confusion(&pairs),
+            confusion_half_steps: confusion(&pairs),
             calibration: means(pairs.iter().copied()),
+            calibration_by_prediction: by_prediction(&pairs),
             error_by_angle: means(errors),
         }
     }
 }
 
-/// 0, 1 or 2 for qualities next to 1, 2 or 3.
-fn class(quality: f64) -> usize {
-    ((quality + 0.5).floor().clamp(1.0, 3.0) - 1.0) as usize
+/// Numbers of pairs of label (row) and prediction (column) by N classes from 1 to 3.
+fn confusion<const N: usize>(pairs: &[(f64, f64)]) -> [[usize; N]; N] {
+    let last = (N - 1) as f64;
+    let class = |quality: f64| {
+        ((quality - 1.0) * last / 2.0 + 0.5)
+            .floor()
+            .clamp(0.0, last)
+    };
+    let mut table = [[0; N]; N];
+    for &(label, prediction) in pairs {
+        table[class(label) as usize][class(prediction) as usize] += 1;
+    }
+    table
+}
+
+/// Mean label, mean prediction and number of the pairs of each bin of predictions.
+fn by_prediction(pairs: &[(f64, f64)]) -> Vec<(f64, f64, usize)> {
+    let bin = |pair: &(f64, f64)| (pair.1 / BIN).floor();
+    let labels = means(pairs.iter().map(|pair| (bin(pair), pair.0)));
+    let predictions = means(pairs.iter().map(|pair| (bin(pair), pair.1)));
+    let both = labels.into_iter().zip(predictions);
+    both.map(|((_, label, n), (_, prediction, _))| (label, prediction, n))
+        .collect()
 }
 
 /// The mean value of each key, and how many there are.
@@ -100,6 +133,7 @@ mod tests {
     fn row(patient: u32, pose: &str, label: f64, prediction: f64) -> Row {
         Row {
             id: String::new(),
+            dataset: 1,
             camera: View::Left,
             patient,
             side: Side::Left,
@@ -131,9 +165,46 @@ mod tests {
         };
         assert_eq!((first.patient, first.scores.mae), (1, Some(0.5)));
         assert_eq!((second.scores.n, second.scores.spearman), (1, None));
+        // 1 and 2: (0.5² + 0.5²) / (2 - 1).
+        assert_eq!(evaluation.frame_spread, Some(0.5_f64.sqrt()));
+        assert_eq!(evaluation.pose_delta, None);
         assert_eq!(evaluation.confusion, [[1, 1, 0], [0, 0, 0], [0, 1, 1]]);
         let calibration = [(1.0, 1.5, 2), (2.5, 1.5, 1), (3.0, 3.5, 1)];
         assert_eq!(evaluation.calibration, calibration);
+        let halves = evaluation.confusion_half_steps;
+        assert_eq!([halves[0], halves[3]], [[1, 0, 1, 0, 0], [0, 1, 0, 0, 0]]);
+        let by_prediction = [(1.0, 1.0, 1), (2.5, 1.5, 1), (1.0, 2.0, 1), (3.0, 3.5, 1)];
+        assert_eq!(evaluation.calibration_by_prediction, by_prediction);
         assert_eq!(evaluation.error_by_angle, [(10.0, 0.5, 3)]);
+    }
+
+    #[test]
+    fn patients_of_two_datasets_are_different_persons() {
+        let first = row(1, "a", 1.0, 1.0);
+        let second = Row {
+            dataset: 2,
+            ..row(1, "a", 3.0, 2.0)
+        };
+        let evaluation = Evaluation::of(&[first, second]);
+        assert_eq!((evaluation.poses.n, evaluation.frame_spread), (2, None));
+        let [first, second] = &evaluation.persons[..] else {
+            panic!("two persons")
+        };
+        assert_eq!((first.dataset, first.scores.mae), (1, Some(0.0)));
+        assert_eq!((second.dataset, second.scores.mae), (2, Some(1.0)));
+    }
+
+    #[test]
+    fn a_limb_of_one_good_and_two_bad_poses_has_a_pose_delta() {
+        let rows = [
+            row(1, "a", 1.0, 1.0),
+            row(1, "a", 1.0, 2.0),
+            row(1, "b", 3.0, 2.0),
+            row(1, "c", 3.0, 3.0),
+        ];
+        let evaluation = Evaluation::of(&rows);
+        assert_eq!(evaluation.pose_delta, Some(2.5 - 1.5));
+        assert_eq!(evaluation.pose_margin_accuracy, Some(1.0));
+        assert_eq!(Evaluation::of(&rows[..3]).pose_delta, None);
     }
 }

@@ -10,6 +10,8 @@ use crate::data::Sample;
 pub struct Row {
     /// Path of the image from the dataset's root.
     pub id: String,
+    /// Number of its dataset in the order in which datasets appear, from 1: patients of different ones are different persons.
+    pub dataset: usize,
     /// The camera.
     pub camera: View,
     /// N of `patient_N`.
@@ -39,8 +41,16 @@ impl Row {
             predictions.len(),
             "one prediction for each sample"
         );
+        let mut datasets = Vec::new();
+        for sample in samples {
+            if !datasets.contains(&&sample.dataset) {
+                datasets.push(&sample.dataset);
+            }
+        }
+        let number = |sample: &Sample| datasets.iter().position(|&d| *d == sample.dataset);
         let row = |(sample, &prediction): (&Sample, &f64)| Self {
             id: sample.id.clone(),
+            dataset: 1 + number(sample).expect("all datasets are numbered"),
             camera: sample.camera,
             patient: sample.limb.patient,
             side: sample.limb.side,

@@ -7,6 +7,8 @@ use ppa_dataset::layout::{LimbId, Side};
 use ppa_metrics::{MetricError, PoseTriple, mean_per_pose};
 use serde::{Deserialize, Serialize};
 
+use crate::evaluate::triple;
+
 /// A depth image of a test set without its camera: both cameras see the same moment.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Moment {
@@ -163,21 +165,15 @@ pub fn pose_triples(rows: &[Prediction]) -> Result<Vec<PoseTriple>, PredictionEr
     }
     let mut triples = Vec::with_capacity(limbs.len());
     for (limb, poses) in limbs {
-        let good = means(&poses, 1.0)?;
-        let bad = means(&poses, 3.0)?;
-        triples.push(match (&good[..], &bad[..]) {
-            (&[good], &[b1, b2]) if poses.len() == 3 => PoseTriple {
-                good,
-                bad: [b1, b2],
-            },
-            _ => {
-                return Err(PredictionError::NoTriple {
-                    limb,
-                    good: good.len(),
-                    bad: bad.len(),
-                });
-            }
-        });
+        let mean = |pose: &Pose| Ok((pose.label, mean_per_pose(&[&pose.frames])?[0]));
+        let poses = poses.values().map(mean);
+        let poses = poses.collect::<Result<Vec<_>, MetricError>>()?;
+        let count = |label: f64| poses.iter().filter(|pose| pose.0 == label).count();
+        triples.push(triple(&poses).ok_or_else(|| PredictionError::NoTriple {
+            limb,
+            good: count(1.0),
+            bad: count(3.0),
+        })?);
     }
     Ok(triples)
 }
@@ -185,13 +181,6 @@ pub fn pose_triples(rows: &[Prediction]) -> Result<Vec<PoseTriple>, PredictionEr
 struct Pose {
     label: f64,
     frames: Vec<f64>,
-}
-
-/// Mean predictions of the poses of a label.
-fn means(poses: &BTreeMap<&String, Pose>, label: f64) -> Result<Vec<f64>, MetricError> {
-    let poses = poses.values().filter(|pose| pose.label == label);
-    let mean = |pose: &Pose| Ok(mean_per_pose(&[&pose.frames])?[0]);
-    poses.map(mean).collect()
 }
 
 #[cfg(test)]

@@ -76,7 +76,7 @@ fn samples_are_those_of_the_views_and_persons() {
     assert_eq!(left.len(), 3);
     assert_eq!(left[1].id, "patient_1/depth/r/orig/depth_cam_left_45.0.png");
     assert_eq!((left[1].label, left[1].angle_deg), (2.0, Some(45.0)));
-    assert!(left[1].person.ends_with("patient 1"));
+    assert_eq!(left[1].limb.patient, 1);
     let error = read(Some(&[7]), Views::Left).unwrap_err().to_string();
     assert!(
         error.starts_with("there is no image of patient 7"),

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use font8x8::UnicodeFonts;
 use image::{ImageFormat, Rgb, RgbImage};
 
-use super::{COLOURS, SIZE, Shape};
+use super::{COLOURS, SIZE, Shape, tint};
 
 pub struct Page(RgbImage);
 
@@ -24,6 +24,14 @@ impl Page {
                 for i in 0..=steps as i32 {
                     let share = f64::from(i) / steps;
                     self.square([from[0] + share * dx, from[1] + share * dy], radius, of);
+                }
+            }
+            Shape::Tile(from, to, share) => {
+                let [from, to] = [from, to].map(|end| end.map(|x| x.round() as u32));
+                for y in from[1].min(to[1])..from[1].max(to[1]) {
+                    for x in from[0].min(to[0])..from[0].max(to[0]) {
+                        self.0.put_pixel(x, y, Rgb(tint(share)));
+                    }
                 }
             }
             Shape::Dot(at, of) => self.square(at, 2, Some(of)),

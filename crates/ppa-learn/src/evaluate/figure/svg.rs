@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{COLOURS, SIZE, Shape};
+use super::{COLOURS, SIZE, Shape, tint};
 
 pub struct Page(String);
 
@@ -27,6 +27,15 @@ impl Page {
                     "<line x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\" stroke=\"{colour}\" stroke-width=\"{width}\"/>"
                 )
             }
+            Shape::Tile(from, to, share) => {
+                let ([x1, y1], [x2, y2]) = (places(from), places(to));
+                let (x, y) = (x1.min(x2), y1.min(y2));
+                let (width, height) = ((x1 - x2).abs(), (y1 - y2).abs());
+                let fill = hexadecimal(tint(share));
+                format!(
+                    "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" fill=\"{fill}\"/>"
+                )
+            }
             Shape::Dot(at, of) => {
                 let ([x, y], colour) = (places(at), colour(Some(of)));
                 format!("<circle cx=\"{x}\" cy=\"{y}\" r=\"2.5\" fill=\"{colour}\"/>")
@@ -48,6 +57,9 @@ impl Page {
 }
 
 fn colour(of: Option<usize>) -> String {
-    let [r, g, b] = of.map_or([0; 3], |i| COLOURS[i]);
+    hexadecimal(of.map_or([0; 3], |i| COLOURS[i]))
+}
+
+fn hexadecimal([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }

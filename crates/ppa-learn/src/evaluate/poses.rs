@@ -1,0 +1,101 @@
+//! Poses of a test set: what all cameras and frames of each say together.
+
+use std::collections::BTreeMap;
+
+use ppa_dataset::layout::Side;
+use ppa_metrics::PoseTriple;
+use serde::Serialize;
+
+use super::row::Row;
+
+/// One pose, as `poses.csv` holds it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PoseRow {
+    /// Number of the dataset, as in [`Row`].
+    pub dataset: usize,
+    /// N of `patient_N`.
+    pub patient: u32,
+    /// Which of the person's limbs.
+    pub side: Side,
+    /// The pose, unique among those of the limb.
+    pub pose: String,
+    /// Medial rotation in degrees, where the dataset tells it.
+    pub angle_deg: Option<f64>,
+    /// Images of all cameras and frames.
+    pub images: usize,
+    /// Mean label of the images.
+    pub label: f64,
+    /// Mean prediction of the images.
+    pub prediction: f64,
+    /// How far frames of the pose differ: see [`frame_spread`].
+    pub frame_spread: Option<f64>,
+}
+
+/// The poses of some predictions, in order of dataset, person, side and name.
+pub fn poses(rows: &[Row]) -> Vec<PoseRow> {
+    let mut poses: BTreeMap<_, Vec<&Row>> = BTreeMap::new();
+    for row in rows {
+        let pose = (row.dataset, row.patient, row.side, &row.pose);
+        poses.entry(pose).or_default().push(row);
+    }
+    let of_pose = |((dataset, patient, side, pose), rows): ((_, _, _, &String), Vec<&Row>)| {
+        let mean = |value: fn(&Row) -> f64| {
+            rows.iter().map(|row| value(row)).sum::<f64>() / rows.len() as f64
+        };
+        PoseRow {
+            dataset,
+            patient,
+            side,
+            pose: pose.clone(),
+            angle_deg: rows[0].angle_deg,
+            images: rows.len(),
+            label: mean(|row| row.label),
+            prediction: mean(|row| row.prediction),
+            frame_spread: frame_spread(rows.iter().copied()),
+        }
+    };
+    poses.into_iter().map(of_pose).collect()
+}
+
+/// Standard deviation of the predictions of one pose by one camera about their mean, pooled over poses and cameras: the root
+/// of all squared deviations divided by the sum of all n - 1. None without two frames of one pose and camera.
+pub fn frame_spread<'a>(rows: impl IntoIterator<Item = &'a Row>) -> Option<f64> {
+    let mut frames: BTreeMap<_, Vec<f64>> = BTreeMap::new();
+    for row in rows {
+        let key = (row.dataset, row.patient, row.side, &row.pose, row.camera);
+        frames.entry(key).or_default().push(row.prediction);
+    }
+    let (mut squares, mut degrees) = (0.0, 0);
+    for frames in frames.values() {
+        let mean = frames.iter().sum::<f64>() / frames.len() as f64;
+        squares += frames.iter().map(|y| (y - mean).powi(2)).sum::<f64>();
+        degrees += frames.len() - 1;
+    }
+    (degrees > 0).then(|| (squares / degrees as f64).sqrt())
+}
+
+/// One good (label 1) and two bad poses (label 3) of a limb, from (label, prediction) of all its poses; none for a limb with other poses.
+pub(crate) fn triple(poses: &[(f64, f64)]) -> Option<PoseTriple> {
+    let of = |label: f64| {
+        let poses = poses.iter().filter(move |pose| pose.0 == label);
+        poses.map(|pose| pose.1).collect::<Vec<_>>()
+    };
+    match (&of(1.0)[..], &of(3.0)[..]) {
+        (&[good], &[b1, b2]) if poses.len() == 3 => Some(PoseTriple {
+            good,
+            bad: [b1, b2],
+        }),
+        _ => None,
+    }
+}
+
+/// The triples of all limbs, as in the paper's clinical dataset; none if a limb has other poses.
+pub fn triples(poses: &[PoseRow]) -> Option<Vec<PoseTriple>> {
+    let mut limbs: BTreeMap<_, Vec<(f64, f64)>> = BTreeMap::new();
+    for pose in poses {
+        let limb = (pose.dataset, pose.patient, pose.side);
+        let pair = (pose.label, pose.prediction);
+        limbs.entry(limb).or_default().push(pair);
+    }
+    limbs.values().map(|poses| triple(poses)).collect()
+}
