@@ -4,7 +4,8 @@
 //! In a checkout these are files beside this crate. A published crate cannot see its neighbours,
 //! but their versions, which stand in for their contents, are those in its manifest.
 //!
-//! What only looks at images that are there, `ONLY_READ`, is left out: it can change, and a begun dataset goes on.
+//! What only looks at images that are there, `ONLY_READ`, is left out: it can change, and a begun dataset goes on. Computed labels have a hash
+//! of their own sources.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
@@ -54,28 +55,33 @@ fn main() -> io::Result<()> {
     }
     roots.push(beside.join("../Cargo.lock"));
 
+    let read_only = |file: &Path| {
+        let of_this = file.strip_prefix(this.join("src"));
+        of_this.is_ok_and(|file| ONLY_READ.iter().any(|only| file.starts_with(only)))
+    };
+    let code = hash(&roots, |file| !read_only(file))?;
+    let labels = hash(&[this.join("src/labels")], |_| true)?;
+    println!("cargo::rustc-env=PPA_CODE={code}");
+    println!("cargo::rustc-env=PPA_LABEL_CODE={labels}");
+    println!("cargo::rustc-env=PPA_ONLY_READ={}", ONLY_READ.join(","));
+    Ok(())
+}
+
+/// The first eight bytes of a hash over the names and contents of files below some roots.
+fn hash(roots: &[PathBuf], counts: impl Fn(&Path) -> bool) -> io::Result<String> {
     let mut hasher = Sha256::new();
     for root in roots.iter().filter(|root| root.exists()) {
         println!("cargo::rerun-if-changed={}", root.display());
-        for file in files(root)? {
-            let of_this = file.strip_prefix(this.join("src"));
-            if of_this.is_ok_and(|file| ONLY_READ.iter().any(|only| file.starts_with(only))) {
-                continue;
-            }
+        for file in files(root)?.iter().filter(|file| counts(file)) {
             let name = file.strip_prefix(root).expect("found below it");
             hasher.update(name.to_string_lossy().as_bytes());
-            let bytes = fs::read(&file)?;
+            let bytes = fs::read(file)?;
             hasher.update((bytes.len() as u64).to_le_bytes());
             hasher.update(bytes);
         }
     }
-    let code: String = hasher.finalize()[..8]
-        .iter()
-        .map(|b| format!("{b:02x}"))
-        .collect();
-    println!("cargo::rustc-env=PPA_CODE={code}");
-    println!("cargo::rustc-env=PPA_ONLY_READ={}", ONLY_READ.join(","));
-    Ok(())
+    let bytes = hasher.finalize();
+    Ok(bytes[..8].iter().map(|b| format!("{b:02x}")).collect())
 }
 
 /// All files at or below a path, in the order of their names.

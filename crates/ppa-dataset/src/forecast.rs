@@ -65,6 +65,8 @@ pub struct Forecast {
     pub cpu_hours: f64,
     /// Bytes of all images.
     pub bytes: u64,
+    /// Bytes of those that are not there yet.
+    pub needed_bytes: u64,
     /// Free bytes where the dataset will lie, if the system tells.
     pub free_bytes: Option<u64>,
 }
@@ -73,10 +75,10 @@ pub struct Forecast {
 /// folder, one after the other, and tells what all will take in the folder `root`.
 ///
 /// The poses are spread evenly, and differently for every limb. What cannot work with one of them
-/// would not work in the run.
+/// would not work in the run. Whether the disk has room for all is for [`Forecast::fits`] to say.
 ///
 /// # Errors
-/// [`ForecastError`], naming the case, pose or disk that stands against the plan.
+/// [`ForecastError`], naming the case or pose that stands against the plan.
 pub fn forecast(
     plan: &Plan,
     root: &Path,
@@ -117,17 +119,6 @@ pub fn forecast(
     let measured = unit_s.len();
     let (mean, error) = mean_and_error(&unit_s);
     let bytes = (bytes as f64 / measured as f64 * units as f64) as u64;
-    let free_bytes = free_bytes(root);
-    let needed = bytes.saturating_sub(status(root).map_or(0, |status| status.bytes));
-    if let Some(free) = free_bytes
-        && free < needed
-    {
-        return Err(ForecastError::NoRoom {
-            root: root.to_owned(),
-            needed,
-            free,
-        });
-    }
     Ok(Forecast {
         limbs: limbs.len(),
         units,
@@ -139,8 +130,26 @@ pub fn forecast(
         cpu_s_per_limb: preparing_s / limbs.len() as f64,
         cpu_hours: (preparing_s + mean * units as f64) / 3600.0,
         bytes,
-        free_bytes,
+        needed_bytes: bytes.saturating_sub(status(root).map_or(0, |status| status.bytes)),
+        free_bytes: free_bytes(root),
     })
+}
+
+impl Forecast {
+    /// Whether the images will fit in the folder that the forecast was made for.
+    ///
+    /// # Errors
+    /// [`ForecastError::NoRoom`].
+    pub fn fits(&self, root: &Path) -> Result<(), ForecastError> {
+        match self.free_bytes {
+            Some(free) if free < self.needed_bytes => Err(ForecastError::NoRoom {
+                root: root.to_owned(),
+                needed: self.needed_bytes,
+                free,
+            }),
+            _ => Ok(()),
+        }
+    }
 }
 
 /// `count` poses in the middle of equal parts of the sweep, moved by `shift` (0 to 1) of a part.
@@ -193,6 +202,31 @@ mod tests {
         assert_eq!(steps(2, 0.5), [45, 135]);
         assert_eq!(steps(181, 0.5), (0..181).collect::<Vec<_>>());
         assert_eq!(steps(181, 0.999), (0..181).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn images_that_are_there_need_no_more_room() {
+        let forecast = |needed_bytes, free_bytes| Forecast {
+            limbs: 1,
+            units: 181,
+            depth_images: 1810,
+            radiographs: 181,
+            measured: 2,
+            cpu_s_per_unit: 10.0,
+            cpu_s_per_unit_error: None,
+            cpu_s_per_limb: 1.0,
+            cpu_hours: 0.5,
+            bytes: 1000,
+            needed_bytes,
+            free_bytes,
+        };
+        let fits = |needed, free| forecast(needed, free).fits(Path::new("dataset"));
+        assert!(fits(600, Some(600)).is_ok() && fits(600, None).is_ok());
+        let said = fits(600, Some(599)).unwrap_err().to_string();
+        assert!(
+            said.contains("600 more bytes in dataset, where 599"),
+            "{said}"
+        );
     }
 
     #[test]

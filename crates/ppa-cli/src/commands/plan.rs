@@ -48,7 +48,9 @@ pub fn run(args: &PlanArgs, output: Output) -> anyhow::Result<()> {
         threads,
         forecast,
     };
-    output.print(&told, describe)
+    output.print(&told, describe)?;
+    // What was measured is told even then.
+    Ok(told.forecast.fits(&root)?)
 }
 
 fn describe(told: &Told) -> String {

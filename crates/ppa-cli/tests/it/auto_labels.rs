@@ -77,6 +77,7 @@ fn a_phantom_is_graded_best_at_its_mortise_angle() {
         || json(&fs::read_to_string(here.join("plan/patient_3/labels/r/openness.json")).unwrap());
     let by_hand = with();
     assert_eq!(by_hand["label_source"], "surrogate-jso/1");
+    assert_eq!(by_hand["code"].as_str().unwrap().len(), 16);
     assert_eq!(by_hand["thresholds"]["at_least"][0], 0.75);
     assert_eq!(by_hand["bones"]["sha256"].as_str().unwrap().len(), 64);
 
@@ -181,6 +182,15 @@ fn refusals(here: &Path) {
         );
         assert!(!here.join("x.toml").exists() && !here.join("bones.nrrd").exists());
     }
+    // A second limb that the dataset lacks leaves the first without labels as well.
+    let plan = fs::read_to_string(here.join("plan.toml")).unwrap();
+    let second = "[[case]]\nfile = \"p01.toml\"\npatient = 4\n[rotation]";
+    fs::write(here.join("p01.toml"), &case).unwrap();
+    fs::write(here.join("two.toml"), plan.replace("[rotation]", second)).unwrap();
+    refused(
+        "label auto plan --plan two.toml",
+        "lists no radiographs of limb r of patient 4",
+    );
     // The same leg without the table: another scan.
     succeed(here, "ct phantom --out other.nii --spacing-mm 1.2");
     succeed(

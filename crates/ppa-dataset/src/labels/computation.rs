@@ -1,17 +1,16 @@
 //! `openness.json`: what computed labels were computed with.
 
-use std::path::Path;
-
 use serde::Serialize;
 
 use super::label::LabelSource;
 use super::openness::{BoneFile, BoneNumbers, FREE_CHORDS_MM, GradeThresholds};
-use crate::files::{FileError, write_whole};
 
 /// Everything that labels of the same radiographs depend on.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct Computation<'a> {
     pub label_source: LabelSource,
+    /// Hash of the sources that compute labels.
+    code: &'static str,
     pub thresholds: &'a GradeThresholds,
     free_chords_mm: [f64; 3],
     bones: ComputedFrom<'a>,
@@ -32,6 +31,7 @@ impl<'a> Computation<'a> {
                 true => LabelSource::SegmentedSurrogate,
                 false => LabelSource::Surrogate,
             },
+            code: env!("PPA_LABEL_CODE"),
             thresholds,
             free_chords_mm: FREE_CHORDS_MM,
             bones: ComputedFrom {
@@ -42,8 +42,7 @@ impl<'a> Computation<'a> {
         }
     }
 
-    pub fn write(&self, path: &Path) -> Result<(), FileError> {
-        let text = serde_json::to_string_pretty(self).expect("thresholds are finite numbers");
-        write_whole(path, text.as_bytes())
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).expect("thresholds are finite numbers")
     }
 }

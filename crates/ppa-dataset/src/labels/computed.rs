@@ -17,7 +17,7 @@ use super::openness::{
 use super::table::write_table;
 use super::tallies::TalliesError;
 use crate::case::Case;
-use crate::files::FileError;
+use crate::files::{FileError, write_whole};
 use crate::layout::LimbId;
 use crate::manifest::{FileKind, FileRow, Manifest, Rows};
 
@@ -136,17 +136,27 @@ pub enum AutoLabelError {
     Label(#[from] LabelError),
 }
 
-/// Grades every radiograph of a limb from the bones that its case names, and writes `openness.csv`, `openness.json` (what it was
-/// computed with) and `labels.json` beside its regions of interest. Labels of readers, and labels that do not tell their source, stay as they are.
+/// Labels of a limb that are computed and not written yet.
+#[derive(Debug, Clone)]
+pub struct ComputedLabels<'a> {
+    manifest: &'a Manifest,
+    limb: LimbId,
+    rows: Vec<ComputedRow>,
+    labels: LabelFile,
+    computation: String,
+    readers_kept: bool,
+}
+
+/// Grades every radiograph of a limb from the bones that its case names.
 ///
 /// # Errors
-/// [`AutoLabelError`], before anything is written.
-pub fn label_limb(
-    manifest: &Manifest,
+/// [`AutoLabelError`].
+pub fn compute_labels<'a>(
+    manifest: &'a Manifest,
     limb: LimbId,
     case: &Case,
     thresholds: &GradeThresholds,
-) -> Result<LabelledLimb, AutoLabelError> {
+) -> Result<ComputedLabels<'a>, AutoLabelError> {
     let before = LabelFile::read(&manifest.root, limb)?;
     let readers_kept =
         before.is_some_and(|labels| !labels.source.is_some_and(LabelSource::is_computed));
@@ -154,26 +164,47 @@ pub fn label_limb(
     let file = case.bones.as_ref().ok_or(AutoLabelError::NoBones(limb))?;
     let (rows, bones_sha256) = computed_rows(manifest, limb, case, file, thresholds)?;
     let computation = Computation::new(file, &bones_sha256, thresholds);
-    let regions = manifest.root.join(limb.roi_file());
     let labels = rows.iter().map(|row| LabelRow {
         label: row.label,
         std: row.std,
         step: row.step,
     });
     let labels = LabelFile::new(computation.label_source, labels)?;
-    let labels = labels.of_radiographs(manifest, limb);
-    write_table(&regions.with_file_name("openness.csv"), &rows)?;
-    computation.write(&regions.with_file_name("openness.json"))?;
-    if !readers_kept {
-        labels.write(&manifest.root, limb)?;
-    }
-    Ok(LabelledLimb {
+    Ok(ComputedLabels {
+        manifest,
         limb,
-        radiographs: rows.len(),
-        diagnostic: rows.iter().filter(|row| row.label < 2.5).count(),
-        best_angle_deg: best_angle_deg(&rows),
+        labels: labels.of_radiographs(manifest, limb),
+        computation: computation.to_json(),
+        rows,
         readers_kept,
     })
+}
+
+impl ComputedLabels<'_> {
+    /// Writes `openness.csv`, `openness.json` (what it was computed with) and `labels.json` beside the limb's regions of interest.
+    /// Labels of readers, and labels that do not tell their source, stay as they are.
+    ///
+    /// # Errors
+    /// [`AutoLabelError`] if a file cannot be written.
+    pub fn write(&self) -> Result<LabelledLimb, AutoLabelError> {
+        let (root, limb) = (&self.manifest.root, self.limb);
+        let regions = root.join(limb.roi_file());
+        write_table(&regions.with_file_name("openness.csv"), &self.rows)?;
+        write_whole(
+            &regions.with_file_name("openness.json"),
+            self.computation.as_bytes(),
+        )?;
+        if !self.readers_kept {
+            self.labels.write(root, limb)?;
+        }
+        Ok(LabelledLimb {
+            limb,
+            radiographs: self.rows.len(),
+            diagnostic: self.rows.iter().filter(|row| row.label < 2.5).count(),
+            best_angle_deg: best_angle_deg(&self.rows),
+            readers_kept: self.readers_kept,
+        })
+    }
 }
 
 fn computed_rows(

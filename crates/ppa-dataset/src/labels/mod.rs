@@ -7,7 +7,7 @@
 //!
 //! Computed labels (feature `generate`) say how open the joint space of an ankle lies to the beam. `segment_bones` tells tibia,
 //! fibula and talus apart where nobody did; `AnkleBones` are their surfaces; `JointSpace` finds the three gutters between them; its `openness` follows the rays of an
-//! `Exposure`; `GradeThresholds` make a grade of it; `label_limb` does so for a dataset. What is computed here is a surrogate: no reader has confirmed it.
+//! `Exposure`; `GradeThresholds` make a grade of it; `compute_labels` does so for a dataset. What is computed here is a surrogate: no reader has confirmed it.
 
 #[cfg(feature = "generate")]
 mod computation;
@@ -29,7 +29,7 @@ mod table;
 mod tallies;
 
 #[cfg(feature = "generate")]
-pub use computed::{AutoLabelError, ComputedRow, LabelledLimb, label_limb};
+pub use computed::{AutoLabelError, ComputedLabels, ComputedRow, LabelledLimb, compute_labels};
 pub use file::{LabelFile, LabelFileError};
 pub use label::{LabelError, LabelRow, LabelSource};
 #[cfg(feature = "generate")]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use ppa_dataset::labels::{GradeThresholds, LabelledLimb, label_limb};
+use ppa_dataset::labels::{ComputedLabels, GradeThresholds, LabelledLimb, compute_labels};
 use ppa_dataset::layout::LimbId;
 use ppa_dataset::{Case, Manifest, Plan};
 use serde::Serialize;
@@ -16,7 +16,7 @@ use crate::output::{Output, working};
 The gutters between talus, tibia and fibula are followed along the rays of every radiograph; the worst one decides. The \
 cases of the plan name the bones (`ppa prepare --bones` or `--segment-bones`). Writes labels.json, with label_source \
 surrogate-jso/1 (surrogate-jso/1-segmented), and beside it openness.csv: openness of each gutter, overlaps and clear spaces \
-in mm, and how well the radiograph itself shows each gutter; and openness.json: thresholds, and the hash of the bones. Labels of readers stay as they are. \
+in mm, and how well the radiograph itself shows each gutter; and openness.json: thresholds, and hashes of the bones and of the code. Labels of readers stay as they are. \
 No reader has confirmed these labels.
 
   ppa ct phantom --out p01.nii.gz --labels p01.bones.nii.gz
@@ -59,10 +59,13 @@ pub fn run(args: &AutoArgs, output: Output) -> anyhow::Result<()> {
             patient: planned.patient,
             side: case.side.into(),
         };
-        label_limb(&manifest, limb, &case, &thresholds)
+        compute_labels(&manifest, limb, &case, &thresholds)
             .with_context(|| format!("cannot label by {}", planned.file.display()))
     });
-    let limbs = limbs.collect::<anyhow::Result<_>>()?;
+    // All limbs or none: an error in a later one leaves the earlier ones as they were.
+    let computed = limbs.collect::<anyhow::Result<Vec<_>>>()?;
+    let limbs = computed.iter().map(ComputedLabels::write);
+    let limbs = limbs.collect::<Result<_, _>>()?;
     working.finish_and_clear();
     output.print(&Labelled { limbs, thresholds }, describe)
 }
