@@ -2,10 +2,14 @@
 
 mod architecture;
 mod backward;
+mod error;
 mod forward;
 mod fusion;
 #[cfg(test)]
 mod gradient_tests;
+mod graph;
+#[cfg(test)]
+mod graph_tests;
 mod inference;
 mod initialise;
 mod norm;
@@ -16,10 +20,11 @@ mod reference;
 mod squeeze;
 mod tape;
 
-use candle_core::{Tensor, Var};
+use candle_core::{Device, Tensor, Var};
 
 pub use architecture::Entry;
 pub(crate) use architecture::{Architecture, ConvPlace, SqueezePlace};
+pub use error::NetworkError;
 pub(crate) use fusion::LateFusion;
 pub use fusion::{Fusion, FusionKind};
 pub(crate) use norm::running;
@@ -62,43 +67,6 @@ pub enum Mode {
     Eval,
 }
 
-/// Why a network cannot be run.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum NetworkError {
-    /// Images of another number of cameras than the network is for.
-    #[error("the network takes images of {expected} camera(s), found those of {found}")]
-    Cameras {
-        /// Cameras whose images were given.
-        found: usize,
-        /// Cameras that the network is for.
-        expected: usize,
-    },
-    /// Images of another shape.
-    #[error(
-        "images have the shape {found:?}, expected [images, 1, height, width] with nothing empty"
-    )]
-    Shape {
-        /// The shape found.
-        found: Vec<usize>,
-    },
-    /// One value for each channel has no variance.
-    #[error(
-        "training on {images} image(s) of {height} x {width} leaves one value for each channel, which has no variance; expected more images or more than 32 pixels on a side"
-    )]
-    OneValue {
-        /// Images in the batch.
-        images: usize,
-        /// Rows of an image.
-        height: usize,
-        /// Columns of an image.
-        width: usize,
-    },
-    /// An error of candle.
-    #[error("the network's arithmetic failed")]
-    Candle(#[from] candle_core::Error),
-}
-
 /// A named tensor of the network, in torchvision's order and by its names.
 #[derive(Debug, Clone)]
 pub struct Named {
@@ -108,7 +76,7 @@ pub struct Named {
     pub tensor: Tensor,
 }
 
-/// EfficientNet-B0 with 4,008,253 parameters for one output, all f32 on the CPU.
+/// EfficientNet-B0 with 4,008,253 parameters for one output, all f32; made on the CPU, see [`EfficientNetB0::to_device`].
 ///
 /// The parameters are two flat variables, one of the backbone and one of the classifier, so that a whole backbone is a
 /// single operation to candle: `loss.backward()` gives one gradient for each of the two. [`EfficientNetB0::parameters`] names their parts.
@@ -186,6 +154,10 @@ impl EfficientNetB0 {
                 width,
             });
         }
+        // Our kernels know the CPU only.
+        if !self.device().is_cpu() {
+            return Ok(graph::features(self, images, mode)?);
+        }
         let operation = Backbone::new(self, mode);
         Ok(images.contiguous()?.apply_op2(&self.backbone, operation)?)
     }
@@ -213,6 +185,26 @@ impl EfficientNetB0 {
 
     pub(crate) fn architecture(&self) -> &Architecture {
         &self.architecture
+    }
+
+    /// Where it computes, and where its images have to be.
+    pub fn device(&self) -> &Device {
+        self.backbone.device()
+    }
+
+    /// A copy on another device; on the CPU with our kernels, elsewhere with operations of candle.
+    ///
+    /// # Errors
+    /// If candle cannot copy.
+    pub fn to_device(&self, device: &Device) -> Result<Self, NetworkError> {
+        Ok(Self {
+            architecture: self.architecture.clone(),
+            backbone: on_device(&self.backbone, device)?,
+            classifier: on_device(&self.classifier, device)?,
+            statistics: on_device(&self.statistics, device)?,
+            pool: Pool::default(),
+            ..*self
+        })
     }
 
     /// The two flat variables that training changes: the backbone's and the classifier's.
@@ -268,6 +260,13 @@ impl EfficientNetB0 {
 }
 
 pub(crate) fn variable(values: Vec<f32>) -> Result<Var, NetworkError> {
-    let tensor = Tensor::new(values, &candle_core::Device::Cpu)?;
+    let tensor = Tensor::new(values, &Device::Cpu)?;
     Ok(Var::from_tensor(&tensor)?)
+}
+
+/// A copy of a variable on a device.
+fn on_device(variable: &Var, device: &Device) -> Result<Var, NetworkError> {
+    // Of what is a variable already, `from_tensor` would make no copy.
+    let values = variable.as_detached_tensor().to_device(device)?;
+    Ok(Var::from_tensor(&values)?)
 }

@@ -1,14 +1,14 @@
 //! How the images of both cameras become one answer, as the authors' repository offers it besides separate networks
 //! (github.com/INB-KI-SIGS/patient-pose-assessment, commit 3bbf3e9).
 
-use candle_core::{Tensor, Var};
+use candle_core::{Device, Tensor, Var};
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, Uniform};
 use serde::{Deserialize, Serialize};
 
 use super::architecture::Entry;
 use super::initialise::gains;
-use super::{Mode, NetworkError, variable};
+use super::{Mode, NetworkError, on_device, variable};
 use crate::random::{Purpose, stream};
 
 /// Values that each camera's network gives to late fusion.
@@ -99,6 +99,15 @@ impl LateFusion {
         })
     }
 
+    /// A copy on another device.
+    pub fn to_device(&self, device: &Device) -> Result<Self, NetworkError> {
+        Ok(Self {
+            variable: on_device(&self.variable, device)?,
+            entries: self.entries.clone(),
+            dropout: self.dropout,
+        })
+    }
+
     pub fn variable(&self) -> &Var {
         &self.variable
     }
@@ -139,7 +148,6 @@ impl LateFusion {
 
 #[cfg(test)]
 mod tests {
-    use candle_core::Device;
     use rand_distr::StandardNormal;
 
     use super::*;

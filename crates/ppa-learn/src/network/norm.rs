@@ -5,9 +5,9 @@ use crate::kernels::batch_norm::Affine;
 use crate::kernels::gradient::Linear;
 
 /// torch's default, added to a variance.
-const EPSILON: f64 = 1e-5;
+pub const EPSILON: f64 = 1e-5;
 /// torch's default: how much of a batch enters the running statistics.
-const MOMENTUM: f64 = 0.1;
+pub const MOMENTUM: f64 = 0.1;
 
 /// A normalisation as it was applied.
 #[derive(Debug)]

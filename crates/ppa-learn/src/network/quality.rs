@@ -1,6 +1,6 @@
 //! The network of a training: of one camera's images, or of both cameras' images of one moment.
 
-use candle_core::{Tensor, Var};
+use candle_core::{Device, Tensor, Var};
 use rand::Rng;
 
 use super::architecture::Entry;
@@ -84,6 +84,25 @@ impl QualityNetwork {
             variable.set(&Tensor::new(values, variable.device())?)?;
         }
         Ok(())
+    }
+
+    /// Where it computes, and where its images have to be.
+    pub fn device(&self) -> &Device {
+        self.branches[0].device()
+    }
+
+    /// A copy on another device, as [`EfficientNetB0::to_device`].
+    ///
+    /// # Errors
+    /// If candle cannot copy.
+    pub fn to_device(&self, device: &Device) -> Result<Self, NetworkError> {
+        let branches = self.branches.iter().map(|branch| branch.to_device(device));
+        let late = self.late.as_ref().map(|late| late.to_device(device));
+        Ok(Self {
+            branches: branches.collect::<Result<_, _>>()?,
+            late: late.transpose()?,
+            ..*self
+        })
     }
 
     /// Cameras whose images it takes.

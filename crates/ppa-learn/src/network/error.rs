@@ -1,0 +1,38 @@
+//! Why a network cannot be run.
+
+/// Why a network cannot be run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NetworkError {
+    /// Images of another number of cameras than the network is for.
+    #[error("the network takes images of {expected} camera(s), found those of {found}")]
+    Cameras {
+        /// Cameras whose images were given.
+        found: usize,
+        /// Cameras that the network is for.
+        expected: usize,
+    },
+    /// Images of another shape.
+    #[error(
+        "images have the shape {found:?}, expected [images, 1, height, width] with nothing empty"
+    )]
+    Shape {
+        /// The shape found.
+        found: Vec<usize>,
+    },
+    /// One value for each channel has no variance.
+    #[error(
+        "training on {images} image(s) of {height} x {width} leaves one value for each channel, which has no variance; expected more images or more than 32 pixels on a side"
+    )]
+    OneValue {
+        /// Images in the batch.
+        images: usize,
+        /// Rows of an image.
+        height: usize,
+        /// Columns of an image.
+        width: usize,
+    },
+    /// An error of candle.
+    #[error("the network's arithmetic failed")]
+    Candle(#[from] candle_core::Error),
+}

@@ -1,0 +1,191 @@
+//! The backbone in operations of candle, for devices that our kernels do not know.
+//!
+//! candle keeps every tensor that a gradient may need, for a depthwise convolution alone two for each weight of its window. A pass
+//! therefore keeps the inputs of the blocks only, and computes each block again when its gradient is asked for
+//! (Chen et al. 2016, arXiv:1604.06174).
+
+mod part;
+
+use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use candle_core::backend::BackendStorage;
+use candle_core::{
+    CpuStorage, CudaStorage, CustomOp2, Error, Layout, Result, Shape, Storage, Tensor, Var,
+};
+
+use super::architecture::{Architecture, ConvPlace};
+use super::initialise::gains;
+use super::norm::MOMENTUM;
+use super::{EfficientNetB0, Mode};
+use crate::random::{Purpose, stream};
+use part::{Moments, Part};
+
+/// The features [images, 1280] of images [images, 1, height, width]; after a pass in training, with a gradient.
+pub fn features(network: &EfficientNetB0, images: &Tensor, mode: Mode) -> Result<Tensor> {
+    let (count, _, height, width) = images.dims4()?;
+    let input = images.detach().reshape((count, height, width, 1))?;
+    let architecture = &*network.architecture;
+    let parameters = network.backbone.as_detached_tensor();
+    let statistics = network.statistics.as_detached_tensor();
+    let Mode::Train { step } = mode else {
+        let mut moments = Moments::Running(statistics);
+        let mut x = input;
+        for number in 0..=architecture.blocks.len() {
+            x = run(architecture, number, &parameters, 0, &x, None, &mut moments)?;
+        }
+        return Ok(x);
+    };
+
+    // Drawn block by block as our kernels draw them.
+    let mut random = stream(network.seed, Purpose::Dropout, 2 * step);
+    let mut moments = Moments::Batch(Vec::new());
+    let mut tape = Vec::new();
+    let mut x = input;
+    for number in 0..=architecture.blocks.len() {
+        let residual = architecture.blocks.get(number).filter(|b| b.residual);
+        let gains = residual.map(|block| {
+            let gains = gains(&mut random, count, block.drop);
+            Tensor::from_vec(gains, (count, 1, 1, 1), x.device())
+        });
+        let gains = gains.transpose()?;
+        let output = run(
+            architecture,
+            number,
+            &parameters,
+            0,
+            &x,
+            gains.as_ref(),
+            &mut moments,
+        )?;
+        tape.push(Given { input: x, gains });
+        x = output;
+    }
+    if let Moments::Batch(found) = moments {
+        let found = Tensor::cat(&found, 0)?;
+        let moved = ((statistics * (1.0 - MOMENTUM))? + (found * MOMENTUM)?)?;
+        network.statistics.set(&moved)?;
+    }
+    let pass = Pass {
+        architecture: Arc::clone(&network.architecture),
+        features: x.force_contiguous()?,
+        tape: Mutex::new(Some(tape)),
+    };
+    images.apply_op2(&network.backbone, pass)
+}
+
+/// Output of a block, or of the head behind the last one, by parameters that begin at `start`.
+fn run(
+    architecture: &Architecture,
+    number: usize,
+    parameters: &Tensor,
+    start: usize,
+    input: &Tensor,
+    gains: Option<&Tensor>,
+    moments: &mut Moments,
+) -> Result<Tensor> {
+    let mut part = Part {
+        parameters,
+        start,
+        moments,
+    };
+    match architecture.blocks.get(number) {
+        Some(block) => part.block(block, number == 0, input, gains),
+        None => part.head(&architecture.head, input),
+    }
+}
+
+/// Where the parameters of a block or of the head lie, which is one after the other.
+fn place(architecture: &Architecture, number: usize) -> Range<usize> {
+    let of = |first: &ConvPlace, last: &ConvPlace| first.weight.start..last.norm.bias.end;
+    match architecture.blocks.get(number) {
+        Some(block) => of(&block.expand, &block.project),
+        None => of(&architecture.head, &architecture.head),
+    }
+}
+
+/// What a block, or the head, was given; the head has no gains.
+struct Given {
+    input: Tensor,
+    gains: Option<Tensor>,
+}
+
+/// A pass that was made, as one operation from (images, parameters) to features.
+struct Pass {
+    architecture: Arc<Architecture>,
+    features: Tensor,
+    /// Of each block in turn and of the head.
+    tape: Mutex<Option<Vec<Given>>>,
+}
+
+impl CustomOp2 for Pass {
+    fn name(&self) -> &'static str {
+        "efficientnet-b0-graph"
+    }
+
+    fn cpu_fwd(
+        &self,
+        _: &CpuStorage,
+        _: &Layout,
+        _: &CpuStorage,
+        _: &Layout,
+    ) -> Result<(CpuStorage, Shape)> {
+        match &*self.features.storage_and_layout().0 {
+            Storage::Cpu(features) => Ok((features.clone(), self.features.shape().clone())),
+            _ => Err(Error::msg("features and images lie on different devices").bt()),
+        }
+    }
+
+    fn cuda_fwd(
+        &self,
+        _: &CudaStorage,
+        _: &Layout,
+        _: &CudaStorage,
+        _: &Layout,
+    ) -> Result<(CudaStorage, Shape)> {
+        let (storage, layout) = self.features.storage_and_layout();
+        match &*storage {
+            Storage::Cuda(features) => Ok((features.try_clone(layout)?, layout.shape().clone())),
+            _ => Err(Error::msg("features and images lie on different devices").bt()),
+        }
+    }
+
+    /// The gradient of the parameters, each block computed again from its input. Images have none.
+    fn bwd(
+        &self,
+        _: &Tensor,
+        parameters: &Tensor,
+        _: &Tensor,
+        of_features: &Tensor,
+    ) -> Result<(Option<Tensor>, Option<Tensor>)> {
+        let tape = self.tape.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(tape) = { tape }.take() else {
+            return Err(Error::msg("a pass of efficientnet-b0 has a gradient once").bt());
+        };
+        let mut of_parameters = Vec::new();
+        let mut of_output = of_features.detach();
+        for (number, Given { input, gains }) in tape.into_iter().enumerate().rev() {
+            let place = place(&self.architecture, number);
+            let own = parameters.detach().narrow(0, place.start, place.len())?;
+            let (own, input) = (Var::from_tensor(&own)?, Var::from_tensor(&input)?);
+            let output = run(
+                &self.architecture,
+                number,
+                &own,
+                place.start,
+                &input,
+                gains.as_ref(),
+                &mut Moments::Batch(Vec::new()),
+            )?;
+            let mut gradients = (output * of_output)?.sum_all()?.backward()?;
+            let mut take = |of: &Var| {
+                let missing = || Error::msg("a block does not depend on its input").bt();
+                gradients.remove(of).ok_or_else(missing)
+            };
+            of_parameters.push(take(&own)?);
+            of_output = take(&input)?;
+        }
+        of_parameters.reverse();
+        Ok((None, Some(Tensor::cat(&of_parameters, 0)?)))
+    }
+}
