@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod device;
 mod kernels;
 mod network;
 mod parity;
@@ -12,6 +13,7 @@ pub mod experiment;
 pub mod frames;
 pub mod train;
 
+pub use device::{DeviceError, DeviceName};
 pub use network::{
     EfficientNetB0, Entry, Fusion, FusionKind, Mode, Named, NetworkError, Options, Place,
     QualityNetwork,

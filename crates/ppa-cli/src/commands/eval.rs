@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use anyhow::Context;
 use clap::Args;
+use ppa_learn::DeviceName;
 use ppa_learn::data::{Images, check_split};
 use ppa_learn::evaluate::{Evaluation, Row, Scores, learning_curve, write_evaluation};
 use ppa_learn::train::{Source, predict, read_log, samples, trained};
@@ -26,6 +27,9 @@ pub struct EvalArgs {
         requires = "dataset"
     )]
     patients: Option<Vec<u32>>,
+    /// Where the network computes: cpu, cuda or cuda:N
+    #[arg(long, default_value_t)]
+    device: DeviceName,
     /// Folder for predictions, metrics and figures [default: evaluation, in the run's folder]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -33,6 +37,7 @@ pub struct EvalArgs {
 
 pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
     let (config, network) = trained(&args.run)?;
+    let network = network.to_device(&args.device.open()?)?;
     let sources = match &args.dataset {
         Some(dataset) => vec![Source {
             dataset: dataset.clone(),

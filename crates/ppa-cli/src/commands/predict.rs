@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::Args;
+use ppa_learn::DeviceName;
 use ppa_learn::data::Roi;
 use ppa_learn::frames::{FramePair, PairFolder, PairPrediction, PairPredictor};
 use serde::Serialize;
@@ -36,6 +37,9 @@ pub struct PredictArgs {
     /// The same in the right camera's frames
     #[arg(long, value_name = "X,Y,SIZE", value_parser = square)]
     roi_right: Roi,
+    /// Where the networks compute: cpu, cuda or cuda:N
+    #[arg(long, default_value_t)]
+    device: DeviceName,
     #[command(flatten)]
     source: Source,
 }
@@ -77,7 +81,7 @@ struct Summary {
 
 pub fn run(args: &PredictArgs, output: Output) -> anyhow::Result<()> {
     let regions = [args.roi_left, args.roi_right];
-    let predictor = PairPredictor::new(&args.left, args.right.as_deref(), regions)?;
+    let predictor = PairPredictor::new(&args.left, args.right.as_deref(), regions, args.device)?;
     let mut judge = Judge {
         predictor,
         watch: Stopwatch::start(),

@@ -306,6 +306,7 @@ fn without_paths(config: &TrainConfig) -> TrainConfig {
 /// What the network of a finished training says of its test set.
 fn test(folder: &Path, config: &TrainConfig) -> Result<Vec<Row>, TrainError> {
     let (_, network) = trained(folder)?;
+    let network = network.to_device(&config.device.open()?)?;
     let tested = samples(config, &config.evaluation)?;
     let images = Arc::new(Images::new(tested, config.side, 0)?);
     let predictions = predict(&network, &images, config.batch_size, config.workers)?;

@@ -7,6 +7,7 @@ use ppa_dataset::layout::View;
 use serde::Serialize;
 
 use super::camera::Camera;
+use crate::DeviceName;
 use crate::data::{Roi, Views};
 use crate::network::{Mode, NetworkError, QualityNetwork};
 use crate::train::{TrainConfig, TrainError, trained};
@@ -69,8 +70,18 @@ impl PairPredictor {
     /// right camera's network, as in the paper, or one network of a unified view or of pairs.
     ///
     /// # Errors
-    /// [`FramesError`] naming the folder.
-    pub fn new(left: &Path, right: Option<&Path>, regions: [Roi; 2]) -> Result<Self, FramesError> {
+    /// [`FramesError`] naming the folder, or the device that cannot be used.
+    pub fn new(
+        left: &Path,
+        right: Option<&Path>,
+        regions: [Roi; 2],
+        device: DeviceName,
+    ) -> Result<Self, FramesError> {
+        let device = device.open().map_err(TrainError::from)?;
+        let trained = |run: &Path| -> Result<_, TrainError> {
+            let (config, network) = trained(run)?;
+            Ok((config, network.to_device(&device)?))
+        };
         let (config, network) = trained(left)?;
         let fits = |run: &Path, config: &TrainConfig, fine: &[Views], expected| {
             if fine.contains(&config.views) {
@@ -120,12 +131,14 @@ impl PairPredictor {
     /// # Errors
     /// [`FramesError`] naming the frame that cannot be used.
     pub fn predict(&self, frames: [&Path; 2]) -> Result<PairPrediction, FramesError> {
-        let image = |camera: usize, side| self.cameras[camera].image(frames[camera], side);
+        let image = |camera: usize, of: &Trained| {
+            self.cameras[camera].image(frames[camera], of.side, of.network.device())
+        };
         match &self.networks {
             Networks::Separate([of_left, of_right]) => {
                 let (left, right) = rayon::join(
-                    || of_left.quality(&[image(0, of_left.side)?]),
-                    || of_right.quality(&[image(1, of_right.side)?]),
+                    || of_left.quality(&[image(0, of_left)?]),
+                    || of_right.quality(&[image(1, of_right)?]),
                 );
                 let (left, right) = (left?, right?);
                 Ok(PairPrediction {
@@ -135,7 +148,7 @@ impl PairPredictor {
                 })
             }
             Networks::Joint(joint) => {
-                let (left, right) = rayon::join(|| image(0, joint.side), || image(1, joint.side));
+                let (left, right) = rayon::join(|| image(0, joint), || image(1, joint));
                 Ok(PairPrediction {
                     left: None,
                     right: None,
@@ -156,9 +169,9 @@ impl Trained {
 }
 
 impl Camera {
-    /// A frame as a tensor [1, 1, side, side].
-    fn image(&self, frame: &Path, side: usize) -> Result<Tensor, TrainError> {
+    /// A frame as a tensor [1, 1, side, side] on a device.
+    fn image(&self, frame: &Path, side: usize, device: &Device) -> Result<Tensor, TrainError> {
         let values = self.input(frame, side)?.into_values();
-        Ok(Tensor::from_vec(values, (1, 1, side, side), &Device::Cpu)?)
+        Ok(Tensor::from_vec(values, (1, 1, side, side), device)?)
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use candle_core::backprop::GradStore;
-use candle_core::{CpuStorage, Error, InplaceOp2, Layout, Var};
+use candle_core::{CpuStorage, Device, Error, InplaceOp2, Layout, Var};
 
 const BETA_1: f64 = 0.9;
 const BETA_2: f64 = 0.999;
@@ -31,7 +31,9 @@ impl Adam {
         }
     }
 
-    /// Moves flat variables against their gradients; what has no gradient stays.
+    /// Moves flat variables against their gradients, which are on the CPU; what has no gradient stays.
+    ///
+    /// A variable on another device is moved as a copy here, so that moments and their arithmetic are the same everywhere.
     ///
     /// # Errors
     /// If a variable has another length than its moments.
@@ -54,7 +56,15 @@ impl Adam {
                 scale: (rate / (1.0 - BETA_1.powi(t))) as f32,
                 correction: (1.0 - BETA_2.powi(t)).sqrt() as f32,
             };
-            variable.inplace_op2(&gradient.contiguous()?, &update)?;
+            let gradient = gradient.contiguous()?;
+            match variable.device() {
+                Device::Cpu => variable.inplace_op2(&gradient, &update)?,
+                device => {
+                    let moved = variable.as_detached_tensor().to_device(&Device::Cpu)?;
+                    moved.inplace_op2(&gradient, &update)?;
+                    variable.set(&moved.to_device(device)?)?;
+                }
+            }
         }
         Ok(())
     }
@@ -113,8 +123,6 @@ impl InplaceOp2 for Update<'_> {
 
 #[cfg(test)]
 mod tests {
-    use candle_core::Device;
-
     use super::*;
 
     #[test]

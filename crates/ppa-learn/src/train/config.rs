@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use ppa_dataset::BodyShape;
 use serde::{Deserialize, Serialize};
 
+use crate::DeviceName;
 use crate::data::{Augmentation, FRAMES_PER_POSE, Views};
 use crate::network::{Fusion, Options};
 use crate::weights::FirstConvolution;
@@ -34,6 +35,9 @@ pub struct TrainConfig {
     pub frames_per_pose: usize,
     /// Threads that load images.
     pub workers: NonZeroUsize,
+    /// Where the network computes.
+    #[serde(default)]
+    pub device: DeviceName,
     /// Prepared images that may stay in memory, in MB (10⁶ bytes).
     pub keep_mb: usize,
     /// Steps between two rows of the log.
@@ -166,6 +170,7 @@ impl TrainConfig {
             learning_rate: 1e-3,
             frames_per_pose: FRAMES_PER_POSE,
             workers: number(2),
+            device: DeviceName::Cpu,
             keep_mb: 2000,
             log_every: number(50),
             checkpoint_every: number(1000),
@@ -369,11 +374,12 @@ impl TrainConfig {
         )
     }
 
-    /// What must be equal for a training to go on; threads, memory and intervals may change.
+    /// What must be equal for a training to go on; threads, device, memory and intervals may change.
     pub(crate) fn of_results(&self) -> Self {
         let paper = Self::paper();
         Self {
             workers: paper.workers,
+            device: paper.device,
             keep_mb: paper.keep_mb,
             log_every: paper.log_every,
             checkpoint_every: paper.checkpoint_every,
@@ -448,6 +454,7 @@ mod tests {
             ),
             ("", "training is empty"),
             ("seed = -1", "invalid value"),
+            ("device = \"gpu\"", "there is no device \"gpu\""),
         ] {
             let data = if text.is_empty() { "" } else { DATA };
             let error = read(&format!("{text}\n{data}")).unwrap_err();

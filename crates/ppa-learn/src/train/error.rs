@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use ppa_dataset::FileError;
 
+use crate::DeviceError;
 use crate::data::DataError;
 use crate::network::NetworkError;
 use crate::weights::WeightsError;
@@ -19,6 +20,9 @@ pub enum TrainError {
     /// The configuration.
     #[error(transparent)]
     Config(#[from] ConfigError),
+    /// A device that cannot be used.
+    #[error(transparent)]
+    Device(#[from] DeviceError),
     /// Images, labels or the split.
     #[error(transparent)]
     Data(#[from] DataError),

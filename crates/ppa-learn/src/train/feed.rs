@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use candle_core::{Device, Tensor};
+use candle_core::Tensor;
 
 use super::config::{Layers, TrainConfig};
 use super::error::TrainError;
@@ -69,7 +69,7 @@ impl Feed {
             Self::Images(loader) => {
                 let batch = loader.next().expect("training batches never end")?;
                 let labels = batch.labels.clone();
-                let images = tensors(batch, config.side)?;
+                let images = tensors(batch, config.side, network.device())?;
                 Ok(Answers {
                     outputs: network.forward(&images, mode)?,
                     labels,
@@ -86,7 +86,7 @@ impl Feed {
                     .map(|place| balanced.pick(config.seed, place))
                     .collect();
                 let rows: Vec<_> = picked.iter().map(|&sample| sample as u32).collect();
-                let rows = Tensor::new(rows, &Device::Cpu)?;
+                let rows = Tensor::new(rows, network.device())?;
                 let batch = features.iter().map(|camera| camera.index_select(&rows, 0));
                 let batch = batch.collect::<Result<Vec<_>, _>>()?;
                 Ok(Answers {
@@ -106,7 +106,7 @@ fn features(
 ) -> Result<Vec<Tensor>, TrainError> {
     let batches = Loader::new(images, &Order::Once, config.batch_size, config.workers);
     let of_batch = |batch: Result<_, _>| {
-        let images = tensors(batch?, config.side)?;
+        let images = tensors(batch?, config.side, network.device())?;
         network
             .features(&images, Mode::Eval)
             .map_err(TrainError::from)

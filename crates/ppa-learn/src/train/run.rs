@@ -63,6 +63,7 @@ pub fn train(
     mut report: impl FnMut(&Progress),
 ) -> Result<Ended, TrainError> {
     config.check()?;
+    let device = config.device.open()?;
     let training = samples(config, &config.training)?;
     let evaluation = samples(config, &config.evaluation)?;
     check_split(&training, &evaluation)?;
@@ -72,7 +73,7 @@ pub fn train(
         Balanced::new(&evaluation)?;
     }
 
-    let network = network(config)?;
+    let network = network(config)?.to_device(&device)?;
     let checkpoint = folder.join("checkpoint.safetensors");
     let adam = if checkpoint.exists() {
         checkpoint::load(&checkpoint, &network, config)?
@@ -143,7 +144,7 @@ fn network(config: &TrainConfig) -> Result<QualityNetwork, TrainError> {
     Ok(network)
 }
 
-/// The network of a finished training: its configuration and its weights, from its folder.
+/// The network of a finished training on the CPU: its configuration and its weights, from its folder.
 ///
 /// # Errors
 /// [`TrainError`] naming the file that is missing or is none of a training.
@@ -177,11 +178,15 @@ pub fn samples(config: &TrainConfig, sources: &[Source]) -> Result<Vec<Sample>, 
     Ok(samples)
 }
 
-/// Images of each camera as a tensor [samples, 1, side, side].
-pub(super) fn tensors(batch: Batch, side: usize) -> Result<Vec<Tensor>, TrainError> {
+/// Images of each camera as a tensor [samples, 1, side, side] on a device.
+pub(super) fn tensors(
+    batch: Batch,
+    side: usize,
+    device: &Device,
+) -> Result<Vec<Tensor>, TrainError> {
     let shape = (batch.samples.len(), 1, side, side);
     let cameras = batch.images.into_iter();
-    let tensors = cameras.map(|images| Tensor::from_vec(images, shape, &Device::Cpu));
+    let tensors = cameras.map(|images| Tensor::from_vec(images, shape, device));
     Ok(tensors.collect::<Result<_, _>>()?)
 }
 
@@ -200,9 +205,15 @@ struct Run<'a> {
 impl Run<'_> {
     fn step(&mut self, answers: Answers) -> Result<Progress, TrainError> {
         let step = self.adam.steps;
-        let labels = Tensor::new(answers.labels, &Device::Cpu)?.unsqueeze(1)?;
+        let labels = Tensor::new(answers.labels, self.network.device())?.unsqueeze(1)?;
         let loss = (answers.outputs - labels)?.sqr()?.mean_all()?;
-        let gradients = loss.backward()?;
+        let mut gradients = loss.backward()?;
+        for variable in self.network.variables() {
+            // Adam's moments are on the CPU wherever the network is.
+            if let Some(gradient) = gradients.remove(variable) {
+                gradients.insert(variable, gradient.to_device(&Device::Cpu)?);
+            }
+        }
         let loss = loss.to_scalar::<f32>()?;
         let mut finite = loss.is_finite();
         for variable in self.network.variables() {
@@ -303,7 +314,7 @@ pub fn predict(
 ) -> Result<Vec<f64>, TrainError> {
     let mut predictions = Vec::new();
     for batch in Loader::new(images, &Order::Once, batch_size, workers) {
-        let images = tensors(batch?, images.side())?;
+        let images = tensors(batch?, images.side(), network.device())?;
         let outputs = network.forward(&images, Mode::Eval)?;
         let outputs: Vec<f32> = outputs.flatten_all()?.to_vec1()?;
         predictions.extend(outputs.into_iter().map(f64::from));

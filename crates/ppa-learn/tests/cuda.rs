@@ -1,0 +1,127 @@
+//! The network on an NVIDIA device beside our kernels on the CPU, and its images per second:
+//! `cargo test --release -p ppa-learn --features cuda --test cuda -- --ignored --nocapture`.
+
+use std::time::Instant;
+
+use candle_core::{DType, Device, Tensor};
+use ppa_learn::{DeviceName, EfficientNetB0, Mode, Options};
+
+fn device() -> Device {
+    DeviceName::Cuda(0).open().unwrap()
+}
+
+/// Images or targets that are the same on every run.
+fn waves(shape: &[usize], device: &Device) -> Tensor {
+    let count: usize = shape.iter().product();
+    let values: Vec<f32> = (0..count).map(|i| (i as f32 * 0.37).sin()).collect();
+    Tensor::from_vec(values, shape, device).unwrap()
+}
+
+fn values(tensor: &Tensor) -> Vec<f64> {
+    let flat = tensor.to_dtype(DType::F64).unwrap().flatten_all();
+    flat.unwrap().to_vec1().unwrap()
+}
+
+fn length(values: &[f64]) -> f64 {
+    values.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Length of the difference.
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+    length(&differences)
+}
+
+/// What a step gives, and the output in evaluation after it.
+struct Step {
+    output: Vec<f64>,
+    gradients: Vec<(String, Vec<f64>)>,
+    statistics: Vec<f64>,
+    evaluated: Vec<f64>,
+}
+
+fn step(network: &EfficientNetB0) -> Step {
+    let images = waves(&[4, 1, 97, 65], network.device());
+    let targets = waves(&[4, 1], network.device());
+    let output = network.forward(&images, Mode::Train { step: 3 }).unwrap();
+    let loss = (&output - targets).unwrap().sqr().unwrap();
+    let store = loss.mean_all().unwrap().backward().unwrap();
+    let flat = network.variables().map(|v| store.get(v).unwrap());
+    let gradients = network.named(flat).unwrap().into_iter();
+    let evaluated = network.forward(&images, Mode::Eval).unwrap();
+    Step {
+        output: values(&output),
+        gradients: gradients.map(|n| (n.name, values(&n.tensor))).collect(),
+        statistics: values(network.statistics_variable()),
+        evaluated: values(&evaluated),
+    }
+}
+
+#[test]
+#[ignore = "needs an NVIDIA device"]
+fn a_step_on_the_device_is_that_of_the_cpu() {
+    let network = EfficientNetB0::new(5, Options::default()).unwrap();
+    let on_device = network.to_device(&device()).unwrap();
+    let (found, expected) = (step(&on_device), step(&network));
+    for (what, found, expected) in [
+        ("output in training", &found.output, &expected.output),
+        (
+            "running statistics",
+            &found.statistics,
+            &expected.statistics,
+        ),
+        (
+            "output in evaluation",
+            &found.evaluated,
+            &expected.evaluated,
+        ),
+    ] {
+        let error = distance(found, expected) / length(expected);
+        println!("{what}: {error:.1e}");
+        assert!(error < 1e-4, "{what}: {error:.1e}");
+    }
+    let all = expected.gradients.iter().flat_map(|(_, g)| g.clone());
+    let whole = length(&all.collect::<Vec<f64>>());
+    for ((name, found), (_, expected)) in found.gradients.iter().zip(&expected.gradients) {
+        // Sums that cancel in f32 err by the gradient of the whole.
+        let allowed = 1e-3 * length(expected) + 1e-5 * whole;
+        let error = distance(found, expected);
+        assert!(
+            error < allowed,
+            "{name}: {error:.1e}, allowed {allowed:.1e}"
+        );
+    }
+}
+
+#[test]
+#[ignore = "needs an NVIDIA device; measures"]
+fn images_per_second_on_the_device() {
+    let network = EfficientNetB0::new(5, Options::default()).unwrap();
+    let device = device();
+    let network = network.to_device(&device).unwrap();
+    let images = waves(&[16, 1, 336, 336], network.device());
+    // A loss that has come back to the CPU has been computed.
+    let train = |step| {
+        let output = network.forward(&images, Mode::Train { step }).unwrap();
+        let loss = output.sqr().unwrap().mean_all().unwrap();
+        loss.backward().unwrap();
+        loss.to_scalar::<f32>().unwrap()
+    };
+    let infer = |_| {
+        let output = network.forward(&images, Mode::Eval).unwrap();
+        output.sum_all().unwrap().to_scalar::<f32>().unwrap()
+    };
+    let measure = |what: &str, run: &dyn Fn(u64) -> f32| {
+        run(0);
+        device.synchronize().unwrap();
+        let (steps, started) = (10, Instant::now());
+        for step in 1..=steps {
+            assert!(run(step).is_finite());
+        }
+        device.synchronize().unwrap();
+        let rate = (16 * steps) as f64 / started.elapsed().as_secs_f64();
+        println!("{what}: {rate:.1} images per second of 336 x 336 in batches of 16");
+    };
+    measure("forward and backward", &train);
+    measure("inference", &infer);
+}
