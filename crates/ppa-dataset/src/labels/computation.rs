@@ -42,7 +42,7 @@ impl<'a> Computation<'a> {
         }
     }
 
-    pub fn to_json(&self) -> String {
-        serde_json::to_string_pretty(self).expect("thresholds are finite numbers")
+    pub fn to_json(self) -> String {
+        serde_json::to_string_pretty(&self).expect("thresholds are finite numbers")
     }
 }

@@ -64,7 +64,7 @@ pub struct ComputedRow {
     pub lateral_visibility: f64,
 }
 
-/// What [`label_limb`] did.
+/// What [`ComputedLabels::write`] did.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LabelledLimb {
     /// The limb.
