@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 
 use ppa_dataset::BodyShape;
 use ppa_dataset::layout::View;
-use ppa_dataset::published::{DepthFile, GrayImage16, ImagePair, Pose, Published};
+use ppa_dataset::published::{DepthFile, ImagePair, Pose, Published};
 
 use super::error::DataError;
 use super::prepare::Roi;
 use super::sample::{Sample, SampleImage};
+use super::size::size_of;
 
-/// Frames that are used of a recorded pose, the first ones in time: the paper's number.
+/// Frames that are used of a recorded pose, the first ones in time that both cameras have: the paper's number.
 pub const FRAMES_PER_POSE: usize = 5;
 
 /// Which images make a sample.
@@ -32,8 +33,9 @@ pub enum Views {
 /// some body shapes, or all.
 ///
 /// # Errors
-/// [`DataError`] for a folder that is no dataset, an image without label, without region or with one outside its camera's images, a
-/// person or body shape that is not there, or no image.
+/// [`DataError`] for a folder that is no dataset, an image without label, without region or with one outside its camera's images, one
+/// that is no 16-bit PNG of the size of the others of its camera, as far as headers tell, a person or body shape that is not there, or
+/// no image.
 pub fn read_samples(
     root: &Path,
     persons: Option<&[u32]>,
@@ -72,20 +74,25 @@ pub fn read_samples(
     let mut reader = Reader {
         dataset: &dataset,
         place: root.canonicalize().unwrap_or_else(|_| root.to_owned()),
-        frames_per_pose,
         sizes: BTreeMap::new(),
-        frames: BTreeMap::new(),
+    };
+    let cameras: &[&[View]] = match views {
+        Views::Left => &[&[View::Left]],
+        Views::Right => &[&[View::Right]],
+        Views::Unified => &[&[View::Left], &[View::Right]],
+        Views::Pairs => &[&View::ALL],
     };
     let mut samples = Vec::new();
-    for pair in dataset.pairs.iter().filter(chosen) {
-        match views {
-            Views::Left => samples.extend(reader.sample(pair, &[View::Left])?),
-            Views::Right => samples.extend(reader.sample(pair, &[View::Right])?),
-            Views::Unified => {
-                samples.extend(reader.sample(pair, &[View::Left])?);
-                samples.extend(reader.sample(pair, &[View::Right])?);
+    let pairs: Vec<&ImagePair> = dataset.pairs.iter().filter(chosen).collect();
+    for pose in pairs.chunk_by(|a, b| pose_name(a) == pose_name(b)) {
+        let mut taken = vec![0; cameras.len()];
+        for &pair in moments(pose) {
+            for (&cameras, taken) in cameras.iter().zip(&mut taken) {
+                if *taken < frames_per_pose && cameras.iter().all(|&v| pair.depth(v).is_some()) {
+                    samples.push(reader.sample(pair, cameras, *taken as u32)?);
+                    *taken += 1;
+                }
             }
-            Views::Pairs => samples.extend(reader.sample(pair, &View::ALL)?),
         }
     }
     if samples.is_empty() {
@@ -94,50 +101,51 @@ pub fn read_samples(
     Ok(samples)
 }
 
+/// The moments of a pose to take frames from, in order of time: those that both cameras have, so that frames of equal numbers
+/// show one moment; all of them where there is none, as with a single camera.
+fn moments<'a>(pose: &'a [&ImagePair]) -> impl Iterator<Item = &'a &'a ImagePair> {
+    let both = |pair: &ImagePair| View::ALL.iter().all(|&view| pair.depth(view).is_some());
+    let any = pose.iter().any(|pair| both(pair));
+    pose.iter().filter(move |pair| !any || both(pair))
+}
+
 struct Reader<'a> {
     dataset: &'a Published,
     /// The one path of the dataset's folder, however it was spelled: persons of one dataset must be known again.
     place: PathBuf,
-    frames_per_pose: usize,
     /// Columns and rows of each camera's first image.
     sizes: BTreeMap<View, [usize; 2]>,
-    /// Frames taken so far, by pose and first camera.
-    frames: BTreeMap<(String, View), usize>,
 }
 
 impl Reader<'_> {
-    /// The sample of some cameras; None if the pair lacks one of them or enough frames of the pose were taken.
-    fn sample(&mut self, pair: &ImagePair, views: &[View]) -> Result<Option<Sample>, DataError> {
-        let files: Option<Vec<&DepthFile>> = views.iter().map(|&v| pair.depth(v)).collect();
-        let Some(files) = files else {
-            return Ok(None);
-        };
-        let pose = pose_name(pair);
-        let taken = self.frames.entry((pose.clone(), views[0])).or_default();
-        if *taken == self.frames_per_pose {
-            return Ok(None);
-        }
-        let frame = *taken as u32;
-        *taken += 1;
+    /// The sample of some cameras, all of which the pair has.
+    fn sample(
+        &mut self,
+        pair: &ImagePair,
+        views: &[View],
+        frame: u32,
+    ) -> Result<Sample, DataError> {
+        let files = views.iter().filter_map(|&view| pair.depth(view));
+        let files: Vec<&DepthFile> = files.collect();
         let path = |file: &DepthFile| self.dataset.root.join(&file.file);
         let no_label = || DataError::NoLabel(path(files[0]));
         let label = pair.label.as_ref().ok_or_else(no_label)?.label;
         let images = views.iter().zip(&files);
         let images: Result<_, _> = images.map(|(&view, file)| self.image(view, file)).collect();
-        Ok(Some(Sample {
+        Ok(Sample {
             id: files[0].file.clone(),
             images: images?,
             label,
             dataset: self.place.clone(),
             limb: pair.limb,
             camera: views[0],
-            pose,
+            pose: pose_name(pair),
             frame,
             angle_deg: match pair.pose {
                 Pose::Rotated { step, .. } => Some(f64::from(step) / 2.0),
                 Pose::Recorded { .. } => None,
             },
-        }))
+        })
     }
 
     fn image(&mut self, camera: View, file: &DepthFile) -> Result<SampleImage, DataError> {
@@ -149,14 +157,15 @@ impl Reader<'_> {
             y: roi.y_start,
             size: roi.size,
         };
-        let size = match self.sizes.get(&camera) {
-            Some(&size) => size,
-            None => {
-                let first = GrayImage16::read(&path)?;
-                let size = [first.width as usize, first.height as usize];
-                *self.sizes.entry(camera).or_insert(size)
-            }
-        };
+        let found = size_of(&path)?;
+        let size = *self.sizes.entry(camera).or_insert(found);
+        if found != size {
+            return Err(DataError::Size {
+                path,
+                found,
+                expected: size,
+            });
+        }
         let [width, height] = size;
         roi.check(width, height)
             .map_err(|source| DataError::Region {

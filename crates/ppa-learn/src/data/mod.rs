@@ -19,6 +19,7 @@ mod prepare;
 mod raster;
 mod rotate;
 mod sample;
+mod size;
 
 pub use augment::Augmentation;
 pub use balance::{BUCKETS, Balanced, bucket};

@@ -5,8 +5,9 @@ use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 use ppa_dataset::BodyShape;
+use ppa_dataset::layout::View;
 use ppa_learn::data::{
-    Augmentation, Balanced, Batch, DataError, Images, Loader, Order, Views, read_samples,
+    Augmentation, Balanced, Batch, DataError, Images, Loader, Order, Sample, Views, read_samples,
 };
 use tempfile::TempDir;
 
@@ -126,54 +127,100 @@ fn what_is_missing_or_of_another_size_is_named() {
         .path()
         .join("patient_1/depth/r/orig/depth_cam_left_90.0.png");
     png(&odd, 59, |_, _| 900);
+    let read = || read_samples(folder.path(), None, None, Views::Left, 5);
+    let error = read().unwrap_err().to_string();
+    assert!(
+        error.ends_with(
+            "depth_cam_left_90.0.png has 59x59 pixels, expected 60x60 as in the other images of its camera"
+        ),
+        "{error}"
+    );
+    fs::write(&odd, "no image").unwrap();
+    let error = read().unwrap_err().to_string();
+    assert!(error.ends_with("is not a whole PNG"), "{error}");
+    let grey = image::GrayImage::from_pixel(60, 60, image::Luma([9]));
+    grey.save(&odd).unwrap();
+    let error = read().unwrap_err().to_string();
+    assert!(error.contains("holds pixels of type L8"), "{error}");
+}
+
+#[test]
+fn an_image_that_changed_since_is_named_and_ends_the_batches() {
+    let folder = dataset(2, &[0, 90, 180]);
     let images = images(&folder, Views::Left, 0);
+    let odd = folder
+        .path()
+        .join("patient_1/depth/r/orig/depth_cam_left_90.0.png");
+    png(&odd, 59, |_, _| 900);
     let loader = Loader::new(&images, &Order::Once, n(2), n(2));
     let batches: Vec<_> = loader.collect();
     assert!(batches[0].is_ok() && batches[1].is_ok());
     let error = batches[2].as_ref().unwrap_err().to_string();
-    assert!(
-        error.ends_with("has 59x59 pixels, expected 60x60 as in the other images of its camera"),
-        "{error}"
-    );
+    assert!(error.contains("has 59x59 pixels"), "{error}");
     assert_eq!(batches.len(), 3, "nothing follows an error");
 }
 
-#[test]
-fn five_frames_of_a_recorded_pose_are_used_the_first_ones() {
+/// A recorded pose with some time stamps of the left and of the right camera.
+fn recorded(left: &[u32], right: &[u32]) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let recorded = folder.path().join("patient_3_l/min/data/dataset");
-    for time in 0..7 {
-        let name = format!("depth/depth_cam_left_orig_0_{}.png", 1000 + 10 * time);
-        png(&recorded.join(name), 20, |_, _| 800);
+    let mut regions = serde_json::Map::new();
+    for (view, times) in [("left", left), ("right", right)] {
+        for time in times {
+            let name = format!("depth_cam_{view}_orig_0_{time}.png");
+            png(&recorded.join("depth").join(&name), 20, |_, _| 800);
+            let region = serde_json::json!({
+                "camera": format!("cam_{view}"), "image_number": 0, "x_start": 1, "y_start": 2, "size": 15
+            });
+            regions.insert(name, region);
+        }
     }
+    regions.retain(|name, _| name.ends_with("_1000.png"));
     let quality = recorded.join("label/quality");
     let roi = recorded.join("label/roi");
     fs::create_dir_all(&quality).unwrap();
     fs::create_dir_all(&roi).unwrap();
-    fs::write(
-        quality.join("labels.json"),
-        r#"{"xray_0.png": {"label": 1.5, "std": 0.35, "image_number": 0}}"#,
-    )
-    .unwrap();
-    fs::write(
-        roi.join("roi_depth.json"),
-        r#"{"depth_cam_left_orig_0_1000.png": {"camera": "cam_left", "image_number": 0, "x_start": 1, "y_start": 2, "size": 15}}"#,
-    )
-    .unwrap();
-    let samples = read_samples(folder.path(), None, None, Views::Unified, 5).unwrap();
-    let names: Vec<&str> = samples
-        .iter()
-        .map(|s| s.id.rsplit('_').next().unwrap())
-        .collect();
-    assert_eq!(
-        names,
-        ["1000.png", "1010.png", "1020.png", "1030.png", "1040.png"]
-    );
-    assert!(
-        samples
-            .iter()
-            .all(|s| s.pose == samples[0].pose && s.label == 1.5)
-    );
+    let label = r#"{"xray_0.png": {"label": 1.5, "std": 0.35, "image_number": 0}}"#;
+    fs::write(quality.join("labels.json"), label).unwrap();
+    let regions = serde_json::to_string(&regions).unwrap();
+    fs::write(roi.join("roi_depth.json"), regions).unwrap();
+    folder
+}
+
+/// Camera, frame and time stamp of each sample.
+fn frames(folder: &TempDir, views: Views, frames_per_pose: usize) -> Vec<(View, u32, String)> {
+    let samples = read_samples(folder.path(), None, None, views, frames_per_pose).unwrap();
+    let same = |s: &Sample| s.pose == samples[0].pose && s.label == 1.5;
+    assert!(samples.iter().all(same));
+    let time = |s: &Sample| s.id.rsplit(['_', '.']).nth(1).unwrap().to_owned();
+    let frames = samples.iter().map(|s| (s.camera, s.frame, time(s)));
+    frames.collect()
+}
+
+#[test]
+fn five_frames_of_a_recorded_pose_are_used_the_first_ones() {
+    let times: Vec<u32> = (0..7).map(|i| 1000 + 10 * i).collect();
+    let found = frames(&recorded(&times, &[]), Views::Unified, 5);
+    let expected = (0..5).map(|i| (View::Left, i, (1000 + 10 * i).to_string()));
+    assert_eq!(found, expected.collect::<Vec<_>>());
+}
+
+#[test]
+fn frames_of_equal_number_show_one_moment() {
+    // The right camera lacks the second moment, the left one the last.
+    let folder = recorded(&[1000, 1010, 1020, 1030], &[1000, 1020, 1030, 1040]);
+    let times = ["1000", "1020", "1030"];
+    let of = |view| (0..3).map(move |i| (view, i as u32, times[i].to_owned()));
+    for views in [Views::Left, Views::Pairs] {
+        let expected: Vec<_> = of(View::Left).collect();
+        assert_eq!(frames(&folder, views, 5), expected);
+        assert_eq!(frames(&folder, views, 2), expected[..2]);
+    }
+    let right: Vec<_> = of(View::Right).collect();
+    assert_eq!(frames(&folder, Views::Right, 5), right);
+    let mut both = frames(&folder, Views::Unified, 5);
+    both.sort();
+    assert_eq!(both, of(View::Left).chain(right).collect::<Vec<_>>());
 }
 
 #[test]
