@@ -13,6 +13,7 @@ use crate::network::QualityNetwork;
 
 use super::adam::Adam;
 use super::config::TrainConfig;
+use super::data_state::DataState;
 use super::error::{TrainError, at};
 
 /// Name of the network in checkpoints.
@@ -25,6 +26,7 @@ struct State {
     architecture: String,
     steps: u64,
     config: TrainConfig,
+    data: DataState,
 }
 
 /// Writes all that a training needs to go on.
@@ -33,11 +35,13 @@ pub(super) fn save(
     network: &QualityNetwork,
     adam: &Adam,
     config: &TrainConfig,
+    data: &DataState,
 ) -> Result<(), TrainError> {
     let state = State {
         architecture: ARCHITECTURE.to_owned(),
         steps: adam.steps,
         config: config.clone(),
+        data: data.clone(),
     };
     let state = serde_json::to_string(&state).expect("names and numbers are JSON");
     let named = network.tensors()?.into_iter();
@@ -56,6 +60,7 @@ pub(super) fn load(
     path: &Path,
     network: &QualityNetwork,
     config: &TrainConfig,
+    data: &DataState,
 ) -> Result<Adam, TrainError> {
     let wrong = |message: String| TrainError::Checkpoint {
         path: path.to_owned(),
@@ -74,6 +79,9 @@ pub(super) fn load(
         return Err(wrong(
             "its configuration is another one; take another folder".into(),
         ));
+    }
+    if let Some(difference) = data.differs(&state.data) {
+        return Err(wrong(difference + "; take another folder"));
     }
     let tensors = candle_core::safetensors::load_buffer(&bytes, &Device::Cpu)
         .map_err(|e| wrong(e.to_string()))?;

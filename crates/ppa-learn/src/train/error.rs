@@ -43,6 +43,9 @@ pub enum TrainError {
         /// What was found and what expected.
         message: String,
     },
+    /// A folder with weights, but nothing to go on from.
+    #[error("{} is there, but no checkpoint beside it to go on from; take another folder", .0.display())]
+    WeightsAlone(PathBuf),
     /// Numbers that are not finite.
     #[error("step {step}: the loss is {loss}; {trouble}")]
     NotFinite {

@@ -8,6 +8,7 @@ mod adam;
 mod checkpoint;
 mod config;
 mod crc32c;
+mod data_state;
 mod error;
 mod feed;
 mod finite;

@@ -17,6 +17,7 @@ use crate::network::{Mode, Options, QualityNetwork};
 use super::adam::Adam;
 use super::checkpoint;
 use super::config::{ConfigError, LastLayer, Source, TrainConfig};
+use super::data_state::DataState;
 use super::error::TrainError;
 use super::feed::{Answers, Feed};
 use super::finite::{is_finite, trouble};
@@ -75,9 +76,14 @@ pub fn train(
 
     let network = network(config)?.to_device(&device)?;
     let checkpoint = folder.join("checkpoint.safetensors");
+    let data = DataState::of(&training);
     let adam = if checkpoint.exists() {
-        checkpoint::load(&checkpoint, &network, config)?
+        checkpoint::load(&checkpoint, &network, config, &data)?
     } else {
+        let weights = folder.join("weights.safetensors");
+        if weights.exists() {
+            return Err(TrainError::WeightsAlone(weights));
+        }
         if let Some(start) = &config.start {
             network.load(start, config.first_convolution)?;
         }
@@ -89,6 +95,7 @@ pub fn train(
     let mut run = Run {
         config,
         folder,
+        data,
         network,
         adam,
         seconds_before: log.rows.last().map_or(0.0, |row| row.seconds),
@@ -193,6 +200,7 @@ pub(super) fn tensors(
 struct Run<'a> {
     config: &'a TrainConfig,
     folder: &'a Path,
+    data: DataState,
     network: QualityNetwork,
     adam: Adam,
     log: Log,
@@ -290,7 +298,14 @@ impl Run<'_> {
             false => Ok(()),
         };
         // An evaluation that fails costs no steps.
-        checkpoint::save(checkpoint, &self.network, &self.adam, self.config)?;
+        let Self {
+            network,
+            adam,
+            config,
+            data,
+            ..
+        } = &*self;
+        checkpoint::save(checkpoint, network, adam, config, data)?;
         evaluated?;
         let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
         let started = now.map_or(0.0, |now| now.as_secs_f64()) - self.seconds();

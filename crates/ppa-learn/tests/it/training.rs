@@ -242,6 +242,51 @@ fn checkpoints_of_other_trainings_networks_and_files_are_refused() {
     run(&config, folder.path()).unwrap();
 }
 
+#[test]
+fn a_training_goes_on_with_the_data_it_began_with_only() {
+    let data = dataset(2, &[0, 90, 180]);
+    let folder = tempfile::tempdir().unwrap();
+    let config = config(data.path());
+    stop_after(&config, folder.path(), 1);
+    let error = || run(&config, folder.path()).unwrap_err().to_string();
+    let lists = data.path().join("patient_0/labels/r");
+    let replaced = |file: &str, from: &str, to: &str| {
+        let text = fs::read_to_string(lists.join(file)).unwrap();
+        assert!(text.contains(from), "{text}");
+        fs::write(lists.join(file), text.replace(from, to)).unwrap();
+        text
+    };
+    let labels = replaced("labels.json", "\"label\":2.0", "\"label\":2.5");
+    assert!(error().contains("since: labels differ; take another folder"));
+    let regions = replaced("roi_depth.json", "\"size\":48", "\"size\":47");
+    assert!(error().contains("since: labels, regions of interest differ"));
+    fs::write(lists.join("labels.json"), labels).unwrap();
+    fs::write(lists.join("roi_depth.json"), regions).unwrap();
+    let image = data.path();
+    let image = image.join("patient_0/depth/r/orig/depth_cam_left_45.0.png");
+    let away = image.with_extension("away");
+    fs::rename(&image, &away).unwrap();
+    assert!(error().contains("there are 2 training samples, it had 3"));
+    fs::rename(&away, &image).unwrap();
+    assert_eq!(run(&config, folder.path()).unwrap(), Ended::Finished);
+}
+
+#[test]
+fn weights_without_a_checkpoint_are_not_written_over() {
+    let data = dataset(2, &[0, 90, 180]);
+    let folder = tempfile::tempdir().unwrap();
+    let weights = folder.path().join("weights.safetensors");
+    fs::write(&weights, "of another training").unwrap();
+    let error = run(&config(data.path()), folder.path()).unwrap_err();
+    let error = error.to_string();
+    assert!(
+        error.ends_with("weights.safetensors is there, but no checkpoint beside it to go on from; take another folder"),
+        "{error}"
+    );
+    assert_eq!(fs::read(&weights).unwrap(), b"of another training");
+    assert!(!folder.path().join("config.toml").exists());
+}
+
 /// The first step of a training that goes on after an image, damaged behind its first step, had ended it and was mended.
 fn first_step_after(config: &TrainConfig, folder: &Path, image: &Path) -> u64 {
     let whole = fs::read(image).unwrap();

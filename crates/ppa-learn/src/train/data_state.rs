@@ -1,0 +1,61 @@
+//! What a checkpoint remembers of the samples that it was trained with.
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::data::{Sample, SampleImage};
+
+/// Number of samples and hashes of what is known of them before any image is decoded; not where the dataset lies.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct DataState {
+    samples: usize,
+    names: String,
+    labels: String,
+    regions: String,
+    sizes: String,
+}
+
+impl DataState {
+    /// Of training samples in their order, which batches depend on.
+    pub fn of(samples: &[Sample]) -> Self {
+        let each = |image: fn(&SampleImage) -> String| {
+            hash(samples.iter().flat_map(|s| &s.images).map(image))
+        };
+        Self {
+            samples: samples.len(),
+            names: hash(samples.iter().map(|sample| {
+                let files = sample.images.iter().map(|image| image.path.file_name());
+                format!("{} {:?}", sample.id, files.collect::<Vec<_>>())
+            })),
+            labels: hash(samples.iter().map(|sample| sample.label.to_string())),
+            regions: each(|image| format!("{:?}", image.roi)),
+            sizes: each(|image| format!("{:?}", image.size)),
+        }
+    }
+
+    /// What differs from the samples of a checkpoint; none if nothing does.
+    pub fn differs(&self, before: &Self) -> Option<String> {
+        if self.samples != before.samples {
+            let (now, then) = (self.samples, before.samples);
+            return Some(format!("there are {now} training samples, it had {then}"));
+        }
+        let different = [
+            ("files", self.names != before.names),
+            ("labels", self.labels != before.labels),
+            ("regions of interest", self.regions != before.regions),
+            ("sizes of images", self.sizes != before.sizes),
+        ];
+        let different = different.iter().filter(|part| part.1).map(|part| part.0);
+        let different = different.collect::<Vec<_>>().join(", ");
+        (!different.is_empty()).then(|| format!("other training data since: {different} differ"))
+    }
+}
+
+fn hash(parts: impl Iterator<Item = String>) -> String {
+    let mut hash = Sha256::new();
+    for part in parts {
+        hash.update(part + "\n");
+    }
+    let bytes = hash.finalize();
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
