@@ -57,7 +57,7 @@ pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
     let predictions = predict(&network, &images, config.batch_size, config.workers)?;
     spinner.finish_and_clear();
     let rows = Row::of(images.samples(), &predictions);
-    let evaluation = Evaluation::of(&rows);
+    let evaluation = Evaluation::of(&rows)?;
     let log = read_log(&args.run.join("log.jsonl"))?;
     let out = args.out.clone().unwrap_or(args.run.join("evaluation"));
     let figures = vec![("learning_curve", learning_curve(&log))];

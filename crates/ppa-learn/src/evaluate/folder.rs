@@ -2,26 +2,15 @@
 
 use std::path::Path;
 
-use ppa_dataset::{FileError, write_whole};
+use ppa_dataset::write_whole;
 use serde::Serialize;
 
+use super::error::EvaluateError;
 use super::figure::Figure;
 use super::figures::{calibration_figure, confusion_figure, error_figure, scatter};
 use super::poses::poses;
 use super::report::Evaluation;
 use super::row::Row;
-
-/// Why an evaluation cannot be written.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum EvaluateError {
-    /// A file.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// A row that is no CSV.
-    #[error("rows cannot be written as CSV")]
-    Csv(#[from] csv::Error),
-}
 
 /// Writes `predictions.csv` (a row per image), `poses.csv`, `evaluation.json`, and the figures `scatter`, `confusion`,
 /// `confusion_half_steps`, `calibration`, `errors_by_angle` (where angles are known) and those given, by name, each as SVG and PNG.

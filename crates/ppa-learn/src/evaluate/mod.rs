@@ -1,5 +1,6 @@
 //! What predictions are worth: metrics by image, pose and person, confusion, calibration, errors by angle, and figures.
 
+mod error;
 mod figure;
 mod figures;
 mod folder;
@@ -8,9 +9,10 @@ mod report;
 mod row;
 mod scores;
 
+pub use error::EvaluateError;
 pub use figure::{Figure, Mark, Series, Tile};
 pub use figures::{calibration_figure, confusion_figure, error_figure, learning_curve, scatter};
-pub use folder::{EvaluateError, write_evaluation, write_predictions};
+pub use folder::{write_evaluation, write_predictions};
 pub(crate) use poses::triple;
 pub use poses::{PoseRow, frame_spread, poses};
 pub use report::{Evaluation, PersonScores};

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::error::EvaluateError;
 use super::poses::{PoseRow, frame_spread, poses, triples};
 use super::row::Row;
 use super::scores::Scores;
@@ -52,7 +53,16 @@ pub struct PersonScores {
 
 impl Evaluation {
     /// The metrics of some predictions.
-    pub fn of(rows: &[Row]) -> Self {
+    ///
+    /// # Errors
+    /// [`EvaluateError::NotFinite`] naming the first image whose prediction is not finite.
+    pub fn of(rows: &[Row]) -> Result<Self, EvaluateError> {
+        if let Some(row) = rows.iter().find(|row| !row.prediction.is_finite()) {
+            return Err(EvaluateError::NotFinite {
+                image: row.id.clone(),
+                prediction: row.prediction,
+            });
+        }
         let pairs: Vec<(f64, f64)> = rows.iter().map(|row| (row.label, row.prediction)).collect();
         let poses = poses(rows);
         let pose_pair = |pose: &PoseRow| (pose.label, pose.prediction);
@@ -72,7 +82,7 @@ impl Evaluation {
             Some((row.angle_deg?, error))
         });
         let poses: Vec<_> = poses.iter().map(pose_pair).collect();
-        Self {
+        Ok(Self {
             images: Scores::of(&pairs),
             poses: Scores::of(&poses),
             frame_spread: frame_spread(rows),
@@ -84,7 +94,7 @@ impl Evaluation {
             calibration: means(pairs.iter().copied()),
             calibration_by_prediction: by_prediction(&pairs),
             error_by_angle: means(errors),
-        }
+        })
     }
 }
 
@@ -153,7 +163,7 @@ mod tests {
             row(1, "b", 3.0, 3.5),
             row(2, "a", 2.5, 1.5),
         ];
-        let evaluation = Evaluation::of(&rows);
+        let evaluation = Evaluation::of(&rows).unwrap();
         assert_eq!(evaluation.images.n, 4);
         assert_eq!(evaluation.images.mae, Some((0.0 + 1.0 + 0.5 + 1.0) / 4.0));
         // Pose a of person 1 is 1.5 on average; pose a of person 2 is another one.
@@ -185,7 +195,7 @@ mod tests {
             dataset: 2,
             ..row(1, "a", 3.0, 2.0)
         };
-        let evaluation = Evaluation::of(&[first, second]);
+        let evaluation = Evaluation::of(&[first, second]).unwrap();
         assert_eq!((evaluation.poses.n, evaluation.frame_spread), (2, None));
         let [first, second] = &evaluation.persons[..] else {
             panic!("two persons")
@@ -202,9 +212,16 @@ mod tests {
             row(1, "b", 3.0, 2.0),
             row(1, "c", 3.0, 3.0),
         ];
-        let evaluation = Evaluation::of(&rows);
+        let evaluation = Evaluation::of(&rows).unwrap();
         assert_eq!(evaluation.pose_delta, Some(2.5 - 1.5));
         assert_eq!(evaluation.pose_margin_accuracy, Some(1.0));
-        assert_eq!(Evaluation::of(&rows[..3]).pose_delta, None);
+        assert_eq!(Evaluation::of(&rows[..3]).unwrap().pose_delta, None);
+    }
+
+    #[test]
+    fn a_prediction_that_is_not_finite_is_named() {
+        let rows = [row(1, "a", 1.0, 1.0), row(1, "b", 1.0, f64::NAN)];
+        let error = Evaluation::of(&rows).unwrap_err().to_string();
+        assert!(error.ends_with("the prediction is NaN, expected a finite number"));
     }
 }

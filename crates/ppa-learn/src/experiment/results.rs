@@ -1,6 +1,6 @@
 //! Metrics of an experiment's runs, brought together over views, folds and seeds.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use ppa_metrics::{MetricError, PermutationTest, sign_flip_permutation};
@@ -20,10 +20,11 @@ pub struct Results {
     folds: usize,
     seeds: Vec<u64>,
     values: BTreeMap<(Configuration, u64, usize), BTreeMap<Metric, Option<f64>>>,
+    not_finite: BTreeSet<Missing>,
 }
 
-/// A test set that has not been predicted yet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A test set without predictions that can be judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Missing {
     /// The column.
     pub configuration: Configuration,
@@ -75,10 +76,12 @@ impl Results {
             folds,
             seeds: seeds.to_vec(),
             values: BTreeMap::new(),
+            not_finite: BTreeSet::new(),
         }
     }
 
-    /// Adds the predictions of one test set, the views joined.
+    /// Adds the predictions of one test set, the views joined. One with a prediction that is not finite stays missing, and
+    /// [`Results::not_finite`] names it.
     ///
     /// # Errors
     /// [`PredictionError`] for predictions that cannot be judged.
@@ -87,6 +90,10 @@ impl Results {
         place: Missing,
         predictions: &[Prediction],
     ) -> Result<(), PredictionError> {
+        if predictions.iter().any(|row| !row.prediction.is_finite()) {
+            self.not_finite.insert(place);
+            return Ok(());
+        }
         let values = Metric::of(self.experiment).into_iter();
         let values = values.map(|metric| Ok((metric, metric.value(predictions)?)));
         let values = values.collect::<Result<_, PredictionError>>()?;
@@ -110,7 +117,12 @@ impl Results {
         self.seeds.len()
     }
 
-    /// Test sets without predictions.
+    /// Test sets that were predicted, but not with finite numbers: a training that diverged.
+    pub fn not_finite(&self) -> &BTreeSet<Missing> {
+        &self.not_finite
+    }
+
+    /// Test sets without predictions that can be judged.
     pub fn missing(&self) -> Vec<Missing> {
         let mut missing = Vec::new();
         for &configuration in &self.columns {
@@ -184,6 +196,7 @@ mod tests {
     use approx::assert_relative_eq;
     use ppa_dataset::layout::Side;
 
+    use super::super::table::Table;
     use super::*;
 
     fn test_set(error: f64) -> Vec<Prediction> {
@@ -246,5 +259,26 @@ mod tests {
         assert_eq!(results.summary(configuration, Metric::Correlation), None);
         let mae = results.summary(configuration, Metric::Mae).unwrap();
         assert_eq!((mae.mean, mae.std), (1.0, None));
+    }
+
+    #[test]
+    fn a_run_that_is_not_finite_is_named_and_stays_missing() {
+        let columns = Experiment::TwoC.configurations();
+        let mut results = Results::new(Experiment::TwoC, columns, 1, &[1]);
+        let missing = results.missing();
+        for &place in &missing[1..] {
+            results.insert(place, &test_set(0.25)).unwrap();
+        }
+        results.insert(missing[0], &test_set(f64::NAN)).unwrap();
+        assert_eq!(results.missing(), [missing[0]]);
+        let refused = Table::complete(&results).unwrap_err().to_string();
+        let place = missing[0].to_string();
+        let expected = format!(
+            "1 test sets are missing, the first is {place}; not all predictions of {place} are finite"
+        );
+        assert_eq!(refused, expected);
+        let table = Table::so_far(&results).to_markdown();
+        let note = format!("Left out: {place}, whose predictions are not all finite.");
+        assert!(table.contains(&note) && table.contains("0.25"), "{table}");
     }
 }

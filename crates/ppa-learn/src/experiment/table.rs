@@ -24,12 +24,20 @@ struct Cell {
 
 /// Why there is no table.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{count} test sets are not predicted yet, the first is {first}")]
+#[error("{count} test sets are missing, the first is {first}{}", diverged(*.not_finite))]
 pub struct Incomplete {
     /// How many are missing.
     pub count: usize,
     /// One of them.
     pub first: Missing,
+    /// One that was predicted, but not with finite numbers.
+    pub not_finite: Option<Missing>,
+}
+
+fn diverged(place: Option<Missing>) -> String {
+    place.map_or(String::new(), |place| {
+        format!("; not all predictions of {place} are finite")
+    })
 }
 
 impl Table {
@@ -43,6 +51,7 @@ impl Table {
             Some(&first) => Err(Incomplete {
                 count: missing.len(),
                 first,
+                not_finite: results.not_finite().first().copied(),
             }),
             None => Ok(Self::so_far(results)),
         }
@@ -69,6 +78,11 @@ impl Table {
             notes.push(format!(
                 "Left out: the column {}, since the plan names no such weights.",
                 column.headings().join(", ")
+            ));
+        }
+        for place in results.not_finite() {
+            notes.push(format!(
+                "Left out: {place}, whose predictions are not all finite."
             ));
         }
         if missing > 0 {
@@ -300,7 +314,7 @@ mod tests {
         let refused = Table::complete(&results).unwrap_err();
         assert_eq!(
             refused.to_string(),
-            "1 test sets are not predicted yet, the first is experiment 2c, column scratch, seed 1, fold 0"
+            "1 test sets are missing, the first is experiment 2c, column scratch, seed 1, fold 0"
         );
         let markdown = Table::so_far(&results).to_markdown();
         assert!(
