@@ -5,8 +5,9 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use cpu_time::ProcessTime;
 use ppa_learn::data::{Augmentation, Views};
-use ppa_learn::train::{Ended, Source, TrainConfig, TrainError, read_log, train};
+use ppa_learn::train::{Ended, Layers, Source, TrainConfig, TrainError, read_log, train};
 use ppa_learn::{Fusion, FusionKind};
 
 use crate::toy::dataset;
@@ -167,6 +168,30 @@ fn pairs_of_images_are_learned_by_heart() {
     // A constant loses 0.55 at best; a step in three goes without one of the cameras.
     let loss = last_loss(folder.path());
     assert!(loss < 0.2, "{loss}");
+}
+
+#[test]
+#[ignore = "measures processor time, alone: five seconds of it"]
+fn probing_takes_less_than_a_tenth_of_the_time_of_training() {
+    let steps: Vec<u32> = (0..=180).step_by(12).collect();
+    let data = dataset(2, &steps);
+    let seconds = |layers| {
+        let config = TrainConfig {
+            layers,
+            steps: 40,
+            training: source(data.path(), &[0, 1]),
+            evaluation: Vec::new(),
+            checkpoint_every: n(1000),
+            ..TrainConfig::quick()
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let start = ProcessTime::now();
+        run(&config, folder.path()).unwrap();
+        start.elapsed().as_secs_f64()
+    };
+    let [all, last] = [Layers::All, Layers::Last].map(seconds);
+    println!("40 steps of 16 images, 32 of them: {all:.2} s, probing {last:.2} s");
+    assert!(10.0 * last < all, "{all} s, probing {last} s");
 }
 
 #[test]
