@@ -1,19 +1,29 @@
-//! Images per second of training or inference: `speed train|infer THREADS BATCH SIZE STEPS`.
+//! Images per second of training, inference or loading: `speed train|infer|load|augment THREADS BATCH SIZE STEPS`.
+//!
+//! `load` makes training batches with the paper's augmentation from depth images of 640 x 576 pixels on disk, read anew each time;
+//! `augment` from those that were read before. THREADS are the loader's then.
 //!
 //! Prints one JSON object with the images, wall and processor seconds after one step to warm up, for benches beside other programs.
 
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Context;
 use candle_core::{Device, Tensor};
 use candle_nn::{AdamW, Optimizer, ParamsAdamW};
 use cpu_time::ProcessTime;
+use ppa_dataset::layout::{LimbId, Side, View};
+use ppa_learn::data::{Augmentation, Balanced, Images, Loader, Order, Roi, Sample, SampleImage};
 use ppa_learn::{EfficientNetB0, Mode, Options};
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [what, numbers @ ..] = &arguments[..] else {
-        anyhow::bail!("expected train or infer, then threads, batch, size and steps");
+        anyhow::bail!(
+            "expected train, infer, load or augment, then threads, batch, size and steps"
+        );
     };
     let numbers: Vec<usize> = numbers
         .iter()
@@ -25,6 +35,10 @@ fn main() -> anyhow::Result<()> {
             numbers.len()
         );
     };
+    if let "load" | "augment" = what.as_str() {
+        let keep_bytes = if what == "load" { 0 } else { usize::MAX };
+        return load(threads, batch, size, steps, keep_bytes);
+    }
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build_global()?;
@@ -72,13 +86,84 @@ fn main() -> anyhow::Result<()> {
         last = step(number)?;
     }
     let (wall_s, cpu_s) = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
-    let images = batch * steps;
+    report(batch * steps, (wall_s, cpu_s), f64::from(last))
+}
+
+fn report(images: usize, (wall_s, cpu_s): (f64, f64), last: f64) -> anyhow::Result<()> {
     let peak_gib = peak_gib().context("reading the peak memory")?;
     println!(
         "{{\"images\": {images}, \"wall_s\": {wall_s:.3}, \"cpu_s\": {cpu_s:.3}, \"images_per_cpu_s\": {:.3}, \"peak_gib\": {peak_gib:.2}, \"last\": {last}}}",
         images as f64 / cpu_s
     );
     Ok(())
+}
+
+/// Depth images of a limb-like ridge before a tilted table, with noise of a few mm.
+fn depth_images(folder: &Path, count: u32) -> anyhow::Result<Vec<Sample>> {
+    let mut samples = Vec::new();
+    for number in 0..count {
+        let path = folder.join(format!("{number}.png"));
+        let depth = |x: u32, y: u32| {
+            let across = (f64::from(x) - 320.0 - f64::from(number)) / 60.0;
+            let ridge = 120.0 * (1.0 - across * across).max(0.0).sqrt();
+            let noise = (x * 7919 + y * 104_729 + number * 31).wrapping_mul(2_654_435_761) >> 29;
+            image::Luma([(1100.0 - 0.1 * f64::from(y) - ridge) as u16 + noise as u16])
+        };
+        image::ImageBuffer::from_fn(640, 576, depth).save(&path)?;
+        samples.push(Sample {
+            id: number.to_string(),
+            images: vec![SampleImage {
+                path,
+                camera: View::Left,
+                roi: Roi {
+                    x: 150,
+                    y: 120,
+                    size: 340,
+                },
+                size: [640, 576],
+            }],
+            label: 1.0 + 2.0 * f64::from(number) / f64::from(count),
+            dataset: folder.to_owned(),
+            limb: LimbId {
+                patient: number,
+                side: Side::Left,
+            },
+            camera: View::Left,
+            pose: number.to_string(),
+            frame: 0,
+            angle_deg: None,
+        });
+    }
+    Ok(samples)
+}
+
+fn load(
+    workers: usize,
+    batch: usize,
+    size: usize,
+    steps: usize,
+    keep_bytes: usize,
+) -> anyhow::Result<()> {
+    let folder = tempfile::tempdir()?;
+    let images = Images::new(depth_images(folder.path(), 64)?, size, keep_bytes)?;
+    let number = |n: usize| NonZeroUsize::new(n).context("expected at least 1 worker and image");
+    for sample in 0..images.samples().len() {
+        images.get(sample)?; // Those that are kept are read before the clock starts.
+    }
+    let order = Order::Training {
+        balanced: Balanced::new(images.samples())?,
+        augmentation: Augmentation::default(),
+        seed: 1,
+        first_batch: 0,
+    };
+    let (wall, cpu) = (Instant::now(), ProcessTime::now());
+    let mut last = 0.0;
+    for made in Loader::new(&Arc::new(images), &order, number(batch)?, number(workers)?).take(steps)
+    {
+        last = f64::from(made?.images[0][0]);
+    }
+    let seconds = (wall.elapsed().as_secs_f64(), cpu.elapsed().as_secs_f64());
+    report(batch * steps, seconds, last)
 }
 
 /// Peak resident memory, from Linux.
