@@ -31,9 +31,11 @@ use serde::de::DeserializeOwned;
 
 /// Reads the rows of a CSV file with a header line.
 fn read_csv<T: DeserializeOwned>(path: &Path) -> anyhow::Result<Vec<T>> {
-    let mut reader =
-        csv::Reader::from_path(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let rows = reader.deserialize().collect::<Result<_, _>>();
+    // Read whole: to `csv` a header that cannot be read is an empty table.
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let rows = csv::Reader::from_reader(&bytes[..])
+        .into_deserialize()
+        .collect::<Result<_, _>>();
     rows.with_context(|| format!("{} is not the expected table", path.display()))
 }
 

@@ -71,6 +71,8 @@ fn agreement_of_readers_from_their_files() {
     .unwrap();
     let thrice = fail(folder.path(), "label agree d.csv f.csv");
     assert!(thrice.contains("d grades x0.png a third time"), "{thrice}");
+    let folder_given = fail(folder.path(), "label agree .");
+    assert!(folder_given.contains("cannot read ."), "{folder_given}");
     let alone = fail(folder.path(), "label agree a.csv");
     assert!(alone.contains("1 readers, expected at least 2"), "{alone}");
 }

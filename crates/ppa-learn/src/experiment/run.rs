@@ -255,8 +255,10 @@ impl<'a> Runner<'a> {
             path: path.clone(),
             message: error.to_string(),
         };
-        let mut rows = csv::Reader::from_path(&path).map_err(wrong)?;
-        let rows = rows.deserialize().collect::<Result<_, _>>();
+        // Read whole: to `csv` a header that cannot be read is an empty table.
+        let bytes = std::fs::read(&path).map_err(|error| wrong(error.into()))?;
+        let rows = csv::Reader::from_reader(&bytes[..]).into_deserialize();
+        let rows = rows.collect::<Result<_, _>>();
         Ok(Some(rows.map_err(wrong)?))
     }
 
