@@ -1,18 +1,20 @@
-//! The backbone in operations of candle, for devices that our kernels do not know.
+//! The backbone on devices: products of matrices and sums by candle, convolutions of windows and normalisation by `kernels.cu`.
 //!
-//! candle keeps every tensor that a gradient may need, for a depthwise convolution alone two for each weight of its window. A pass
-//! therefore keeps the inputs of the blocks only, and computes each block again when its gradient is asked for
-//! (Chen et al. 2016, arXiv:1604.06174).
+//! candle keeps every tensor that a gradient may need. A pass therefore keeps the inputs of the blocks only, and computes each
+//! block again when its gradient is asked for (Chen et al. 2016, arXiv:1604.06174).
 
+mod depthwise;
+#[cfg(test)]
+mod gradient_tests;
+mod launch;
+mod made;
+mod normalise;
 mod part;
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use candle_core::backend::BackendStorage;
-use candle_core::{
-    CpuStorage, CudaStorage, CustomOp2, Error, Layout, Result, Shape, Storage, Tensor, Var,
-};
+use candle_core::{CpuStorage, CudaStorage, CustomOp2, Error, Layout, Result, Shape, Tensor, Var};
 
 use super::architecture::{Architecture, ConvPlace};
 use super::initialise::gains;
@@ -130,10 +132,7 @@ impl CustomOp2 for Pass {
         _: &CpuStorage,
         _: &Layout,
     ) -> Result<(CpuStorage, Shape)> {
-        match &*self.features.storage_and_layout().0 {
-            Storage::Cpu(features) => Ok((features.clone(), self.features.shape().clone())),
-            _ => Err(Error::msg("features and images lie on different devices").bt()),
-        }
+        made::cpu(&self.features)
     }
 
     fn cuda_fwd(
@@ -143,11 +142,7 @@ impl CustomOp2 for Pass {
         _: &CudaStorage,
         _: &Layout,
     ) -> Result<(CudaStorage, Shape)> {
-        let (storage, layout) = self.features.storage_and_layout();
-        match &*storage {
-            Storage::Cuda(features) => Ok((features.try_clone(layout)?, layout.shape().clone())),
-            _ => Err(Error::msg("features and images lie on different devices").bt()),
-        }
+        made::cuda(&self.features)
     }
 
     /// The gradient of the parameters, each block computed again from its input. Images have none.
@@ -178,12 +173,13 @@ impl CustomOp2 for Pass {
                 &mut Moments::Batch(Vec::new()),
             )?;
             let mut gradients = (output * of_output)?.sum_all()?.backward()?;
-            let mut take = |of: &Var| {
-                let missing = || Error::msg("a block does not depend on its input").bt();
-                gradients.remove(of).ok_or_else(missing)
-            };
-            of_parameters.push(take(&own)?);
-            of_output = take(&input)?;
+            let missing = || Error::msg("a block does not depend on its parameters").bt();
+            of_parameters.push(gradients.remove(&own).ok_or_else(missing)?);
+            match gradients.remove(&input) {
+                Some(of_input) => of_output = of_input,
+                // Images have none.
+                None => break,
+            }
         }
         of_parameters.reverse();
         Ok((None, Some(Tensor::cat(&of_parameters, 0)?)))

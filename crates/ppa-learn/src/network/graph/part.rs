@@ -1,4 +1,4 @@
-//! Blocks of the network as operations of candle, on channels-last images [images, height, width, channels].
+//! Blocks of the network as operations of candle and of ours, on channels-last images [images, height, width, channels].
 
 use std::ops::Range;
 
@@ -7,6 +7,8 @@ use candle_nn::ops::sigmoid;
 
 use super::super::architecture::{Block, ConvPlace, NormPlace, SqueezePlace};
 use super::super::norm::EPSILON;
+use super::depthwise::depthwise;
+use super::normalise::{moments, normalise};
 use crate::kernels::depthwise::Window;
 
 /// The first convolution.
@@ -40,16 +42,15 @@ impl Part<'_> {
         gains: Option<&Tensor>,
     ) -> Result<Tensor> {
         let x = match first {
-            // With one channel in, a convolution is a pointwise one of what lies under its window.
-            true => self.pointwise(&block.expand, &Tensor::cat(&taps(input, STEM)?, 3)?)?,
+            true => self.depthwise(&block.expand, STEM, input)?,
             false => self.pointwise(&block.expand, input)?,
         };
-        let x = self.normalise(&block.expand.norm, &x)?.silu()?;
+        let x = self.normalise(&block.expand.norm, &x, true)?;
         let x = self.depthwise(&block.depthwise, block.window, &x)?;
-        let x = self.normalise(&block.depthwise.norm, &x)?.silu()?;
+        let x = self.normalise(&block.depthwise.norm, &x, true)?;
         let x = x.broadcast_mul(&self.gates(&block.squeeze, &x)?)?;
         let x = self.pointwise(&block.project, &x)?;
-        let x = self.normalise(&block.project.norm, &x)?;
+        let x = self.normalise(&block.project.norm, &x, false)?;
         match (block.residual, gains) {
             (true, Some(gains)) => x.broadcast_mul(gains)? + input,
             (true, None) => x + input,
@@ -60,7 +61,7 @@ impl Part<'_> {
     /// Features [images, features] of the last block's output.
     pub fn head(&mut self, head: &ConvPlace, input: &Tensor) -> Result<Tensor> {
         let x = self.pointwise(head, input)?;
-        self.normalise(&head.norm, &x)?.silu()?.mean((1, 2))
+        self.normalise(&head.norm, &x, true)?.mean((1, 2))
     }
 
     fn values(&self, range: &Range<usize>) -> Result<Tensor> {
@@ -75,42 +76,29 @@ impl Part<'_> {
         out.reshape((images, height, width, place.channels))
     }
 
-    /// The sum over the window of shifted images times one weight for each channel: candle's own convolution of groups
-    /// would take every channel by itself.
     fn depthwise(&self, place: &ConvPlace, window: Window, x: &Tensor) -> Result<Tensor> {
-        let weight = self.values(&place.weight)?.reshape((place.channels, ()))?;
-        let weights = weight.t()?.contiguous()?;
-        let mut sum: Option<Tensor> = None;
-        for (index, tap) in taps(x, window)?.iter().enumerate() {
-            let product = tap.broadcast_mul(&weights.get(index)?)?;
-            sum = Some(match sum {
-                Some(sum) => (sum + product)?,
-                None => product,
-            });
-        }
-        Ok(sum.expect("a window is not empty"))
+        let weights = self.values(&place.weight)?;
+        depthwise(x, &weights.reshape((place.channels, ()))?, window)
     }
 
-    fn normalise(&mut self, place: &NormPlace, x: &Tensor) -> Result<Tensor> {
-        let (centred, variance) = match &mut *self.moments {
+    fn normalise(&mut self, place: &NormPlace, x: &Tensor, activated: bool) -> Result<Tensor> {
+        let (mean, variance) = match &mut *self.moments {
             Moments::Running(statistics) => {
                 let of = |range: &Range<usize>| statistics.narrow(0, range.start, range.len());
-                (x.broadcast_sub(&of(&place.mean)?)?, of(&place.variance)?)
+                (of(&place.mean)?, of(&place.variance)?)
             }
             Moments::Batch(found) => {
                 let count = x.dims()[..3].iter().product::<usize>() as f64;
-                let mean = self::mean(x)?;
-                let centred = x.broadcast_sub(&mean)?;
-                let variance = self::mean(&centred.sqr()?)?;
+                let moments = moments(x)?;
+                let (mean, variance) = (moments.get(0)?, moments.get(1)?);
                 found.push(mean.detach());
                 found.push((variance.detach() * (count / (count - 1.0)))?);
-                (centred, variance)
+                (mean, variance)
             }
         };
         let scale = (self.values(&place.weight)? / (variance + EPSILON)?.sqrt()?)?;
-        centred
-            .broadcast_mul(&scale)?
-            .broadcast_add(&self.values(&place.bias)?)
+        let norm = Tensor::stack(&[mean, scale, self.values(&place.bias)?], 0)?;
+        normalise(x, &norm, activated)
     }
 
     /// Gates [images, 1, 1, channels] of a squeeze-and-excitation.
@@ -124,55 +112,4 @@ impl Part<'_> {
         let gates = sigmoid(&layer(&hidden, &place.expand_weight, &place.expand_bias)?)?;
         gates.unsqueeze(1)?.unsqueeze(1)
     }
-}
-
-/// Mean of each channel: over columns first, as long sums in f32 lose digits.
-fn mean(x: &Tensor) -> Result<Tensor> {
-    x.mean(2)?.mean(1)?.mean(0)
-}
-
-/// For each place of a window, row by row, what lies there under each pixel of the output: [images, height out, width out, channels].
-fn taps(x: &Tensor, window: Window) -> Result<Vec<Tensor>> {
-    let Window { kernel, stride } = window;
-    let (images, height, width, channels) = x.dims4()?;
-    let (rows, columns) = (window.output(height), window.output(width));
-    // Row y * stride + k is row y + k / stride of every stride-th one from k % stride on.
-    let steps = (kernel - 1) / stride;
-    let padded = |x: &Tensor, dim: usize, len: usize| {
-        let whole = (window.output(len) + steps) * stride;
-        let padding = window.padding();
-        x.pad_with_zeros(dim, padding, whole - len - padding)
-    };
-    let x = padded(&padded(x, 1, height)?, 2, width)?;
-    let split = (
-        images,
-        rows + steps,
-        stride,
-        columns + steps,
-        stride,
-        channels,
-    );
-    let x = x.reshape(split)?;
-    let mut phases = Vec::new();
-    for y in 0..stride {
-        for x_ in 0..stride {
-            phases.push(
-                x.narrow(2, y, 1)?
-                    .narrow(4, x_, 1)?
-                    .squeeze(4)?
-                    .squeeze(2)?,
-            );
-        }
-    }
-    let mut taps = Vec::new();
-    for place in 0..kernel * kernel {
-        let (y, x) = (place / kernel, place % kernel);
-        let phase = &phases[y % stride * stride + x % stride];
-        taps.push(
-            phase
-                .narrow(1, y / stride, rows)?
-                .narrow(2, x / stride, columns)?,
-        );
-    }
-    Ok(taps)
 }

@@ -1,0 +1,134 @@
+//! Runs of the kernels in `kernels.cu`.
+
+#[cfg(feature = "cuda")]
+mod cuda;
+#[cfg(test)]
+mod emulated;
+#[cfg(not(all(feature = "cuda", test)))]
+mod nowhere;
+
+use std::ops::Range;
+
+use candle_core::op::BackpropOp;
+use candle_core::{CpuStorage, CudaStorage, Error, Layout, Result, Shape, Storage, Tensor};
+
+#[cfg(feature = "cuda")]
+use cuda::run as on_cuda;
+#[cfg(test)]
+use emulated::run as on_cpu;
+#[cfg(not(test))]
+use nowhere::run as on_cpu;
+#[cfg(not(feature = "cuda"))]
+use nowhere::run as on_cuda;
+
+/// The text of the kernels.
+#[cfg(any(feature = "cuda", test))]
+const KERNELS: &str = include_str!("kernels.cu");
+
+/// Values of a tensor: indices are of 32 bits with their sign, and may run past the end by a step before they are compared.
+const MOST_VALUES: usize = 1 << 30;
+
+/// One run of a kernel, which takes (out, inputs, threads, sizes).
+#[derive(Debug)]
+pub struct Launch {
+    /// Its name.
+    pub kernel: &'static str,
+    pub threads: usize,
+    /// What it takes behind the number of threads, in its order.
+    pub sizes: Vec<usize>,
+    /// The shape of what it writes.
+    pub out: Shape,
+}
+
+/// What a kernel is given, checked.
+#[cfg_attr(
+    not(any(feature = "cuda", test)),
+    expect(dead_code, reason = "what runs nowhere reads nothing")
+)]
+struct Given<'a, S> {
+    /// Where the values of each input lie.
+    inputs: Vec<(&'a S, Range<usize>)>,
+    /// Threads and sizes.
+    integers: Vec<i32>,
+}
+
+impl Launch {
+    /// What the kernel makes of contiguous inputs, without a gradient.
+    pub fn run(&self, inputs: &[&Tensor]) -> Result<Tensor> {
+        let given: Vec<_> = inputs.iter().map(|x| x.storage_and_layout()).collect();
+        let (mut cpu, mut cuda) = (Vec::new(), Vec::new());
+        for (storage, layout) in &given {
+            match &**storage {
+                Storage::Cpu(storage) => cpu.push((storage, *layout)),
+                Storage::Cuda(storage) => cuda.push((storage, *layout)),
+                Storage::Metal(_) => {}
+            }
+        }
+        let storage = if cuda.len() == inputs.len() {
+            Storage::Cuda(self.cuda(&cuda)?.0)
+        } else if cpu.len() == inputs.len() {
+            Storage::Cpu(self.cpu(&cpu)?.0)
+        } else {
+            return Err(Error::msg("inputs of a kernel lie on different devices").bt());
+        };
+        let untracked = BackpropOp::none();
+        Ok(Tensor::from_storage(
+            storage,
+            self.out.clone(),
+            untracked,
+            false,
+        ))
+    }
+
+    /// The same of storages on an NVIDIA device.
+    pub fn cuda(&self, inputs: &[(&CudaStorage, &Layout)]) -> Result<(CudaStorage, Shape)> {
+        Ok((on_cuda(self, &self.given(inputs)?)?, self.out.clone()))
+    }
+
+    /// The same on the CPU, which only tests do: there the network has kernels of its own.
+    pub fn cpu(&self, inputs: &[(&CpuStorage, &Layout)]) -> Result<(CpuStorage, Shape)> {
+        Ok((on_cpu(self, &self.given(inputs)?)?, self.out.clone()))
+    }
+
+    /// What the kernel takes, if it can address all of it.
+    fn given<'a, S>(&self, inputs: &[(&'a S, &Layout)]) -> Result<Given<'a, S>> {
+        let lengths = inputs.iter().map(|(_, layout)| layout.shape().elem_count());
+        let mut lengths = lengths.chain([self.out.elem_count(), self.threads]);
+        if let Some(length) = lengths.find(|&length| MOST_VALUES < length) {
+            let Self { kernel, .. } = self;
+            let error = format!("{kernel} takes at most {MOST_VALUES} values, found {length}");
+            return Err(Error::msg(error).bt());
+        }
+        let place = |(storage, layout): &(&'a S, &Layout)| {
+            let (start, end) = layout
+                .contiguous_offsets()
+                .ok_or_else(|| Error::RequiresContiguous { op: self.kernel }.bt())?;
+            Ok((*storage, start..end))
+        };
+        let integers = [self.threads].into_iter().chain(self.sizes.clone());
+        Ok(Given {
+            inputs: inputs.iter().map(place).collect::<Result<_>>()?,
+            integers: integers.map(|integer| integer as i32).collect(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_kernels_cannot_address_is_refused() {
+        let of = |images: usize| Launch {
+            kernel: "depthwise",
+            threads: 1,
+            sizes: vec![336, 336],
+            out: (images, 168, 168, 96).into(),
+        };
+        let given = |images| of(images).given::<CpuStorage>(&[]);
+        assert_eq!(given(396).unwrap().integers, [1, 336, 336]);
+        let error = given(397).err().unwrap().to_string();
+        let expected = "at most 1073741824 values, found 1075673088";
+        assert!(error.contains(expected), "{error}");
+    }
+}

@@ -1,0 +1,73 @@
+//! Kernels on NVIDIA devices, compiled for the device when the first one runs.
+#![allow(unsafe_code)]
+
+use std::sync::OnceLock;
+
+use candle_core::backend::BackendStorage;
+use candle_core::cuda_backend::WrapErr;
+use candle_core::cuda_backend::cudarc::driver::{LaunchConfig, PushKernelArg};
+use candle_core::cuda_backend::cudarc::nvrtc::compile_ptx;
+use candle_core::{CudaStorage, Error, Result};
+
+use super::{Given, KERNELS, Launch};
+
+/// Threads of a block.
+const BLOCK: u32 = 256;
+
+pub fn run(launch: &Launch, given: &Given<CudaStorage>) -> Result<CudaStorage> {
+    let device = given.inputs[0].0.device().clone();
+    let mut views = Vec::new();
+    for (storage, place) in &given.inputs {
+        views.push(storage.as_cuda_slice::<f32>()?.slice(place.clone()));
+    }
+    let function = device.get_or_load_custom_func(launch.kernel, "ppa-learn", ptx()?)?;
+    // SAFETY: every kernel writes each value of `out` before anything reads it.
+    let mut out = unsafe { device.alloc::<f32>(launch.out.elem_count()) }?;
+    let mut builder = function.builder();
+    builder.arg(&mut out);
+    for view in &views {
+        builder.arg(view);
+    }
+    for integer in &given.integers {
+        builder.arg(integer);
+    }
+    let config = LaunchConfig {
+        grid_dim: ((launch.threads as u32).div_ceil(BLOCK), 1, 1),
+        block_dim: (BLOCK, 1, 1),
+        shared_mem_bytes: 0,
+    };
+    // SAFETY: the arguments are in the order of the kernel's own, and all inputs are of f32. That a kernel stays within
+    // them is tested: the same launches run on the CPU with every access checked (`emulated.rs`).
+    unsafe { builder.launch(config) }.w()?;
+    Ok(CudaStorage::wrap_cuda_slice(out, device))
+}
+
+/// The kernels for the driver.
+fn ptx() -> Result<&'static str> {
+    static PTX: OnceLock<std::result::Result<String, String>> = OnceLock::new();
+    let compile = || match compile_ptx(KERNELS) {
+        Ok(ptx) => Ok(ptx.to_src()),
+        Err(error) => Err(format!("the kernels do not compile: {error}")),
+    };
+    let compiled = PTX.get_or_init(compile).as_deref();
+    compiled.map_err(|error| Error::msg(error).bt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kernel_compiles() {
+        let ptx = ptx().unwrap();
+        let names = KERNELS.lines().filter_map(|line| {
+            let declared = line.strip_prefix("KERNEL ")?;
+            declared.split_once('(').map(|(name, _)| name)
+        });
+        let names: Vec<&str> = names.collect();
+        assert_eq!(names.len(), 8);
+        for name in names {
+            assert!(ptx.contains(&format!(".visible .entry {name}(")), "{name}");
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! What stands in for a device that the program was not built for.
+
+use candle_core::{Error, Result};
+
+use super::{Given, Launch};
+
+pub fn run<S>(launch: &Launch, _: &Given<S>) -> Result<S> {
+    let Launch { kernel, .. } = launch;
+    Err(Error::msg(format!("{kernel} runs on NVIDIA devices only")).bt())
+}
