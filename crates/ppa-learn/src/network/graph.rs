@@ -7,20 +7,23 @@ mod depthwise;
 #[cfg(test)]
 mod gradient_tests;
 mod launch;
-mod made;
 mod normalise;
 mod part;
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use candle_core::{CpuStorage, CudaStorage, CustomOp2, Error, Layout, Result, Shape, Tensor, Var};
+use candle_core::backend::BackendStorage;
+use candle_core::{
+    CpuStorage, CudaStorage, CustomOp2, Error, Layout, Result, Shape, Storage, Tensor, Var,
+};
 
 use super::architecture::{Architecture, ConvPlace};
 use super::initialise::gains;
 use super::norm::MOMENTUM;
 use super::{EfficientNetB0, Mode};
 use crate::random::{Purpose, stream};
+use launch::elsewhere;
 use part::{Moments, Part};
 
 /// The features [images, 1280] of images [images, 1, height, width]; after a pass in training, with a gradient.
@@ -132,7 +135,11 @@ impl CustomOp2 for Pass {
         _: &CpuStorage,
         _: &Layout,
     ) -> Result<(CpuStorage, Shape)> {
-        made::cpu(&self.features)
+        let (storage, layout) = self.features.storage_and_layout();
+        match &*storage {
+            Storage::Cpu(features) => Ok((features.try_clone(layout)?, layout.shape().clone())),
+            _ => Err(elsewhere()),
+        }
     }
 
     fn cuda_fwd(
@@ -142,7 +149,11 @@ impl CustomOp2 for Pass {
         _: &CudaStorage,
         _: &Layout,
     ) -> Result<(CudaStorage, Shape)> {
-        made::cuda(&self.features)
+        let (storage, layout) = self.features.storage_and_layout();
+        match &*storage {
+            Storage::Cuda(features) => Ok((features.try_clone(layout)?, layout.shape().clone())),
+            _ => Err(elsewhere()),
+        }
     }
 
     /// The gradient of the parameters, each block computed again from its input. Images have none.

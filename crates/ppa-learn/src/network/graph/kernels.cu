@@ -120,8 +120,8 @@ KERNEL activate_of_normed(float *out, const float *x, const float *gradient, con
 }
 
 // out [parts, 2, channels]: the sums of the gradient of z, and of it times x - mean; parts as for the moments.
-KERNEL normalise_of_norm(float *out, const float *x, const float *gradient, const float *norm, int threads, int pixels,
-                         int channels, int parts) {
+KERNEL normalise_of_affine(float *out, const float *x, const float *gradient, const float *mean, int threads, int pixels,
+                           int channels, int parts) {
     const int thread = THREAD;
     if (thread >= threads) return;
     const int channel = thread % channels, part = thread / channels;
@@ -129,8 +129,17 @@ KERNEL normalise_of_norm(float *out, const float *x, const float *gradient, cons
     for (int pixel = part; pixel < pixels; pixel += parts) {
         const float g = gradient[pixel * channels + channel];
         first += g;
-        second += g * (x[pixel * channels + channel] - norm[channel]);
+        second += g * (x[pixel * channels + channel] - mean[channel]);
     }
     out[2 * part * channels + channel] = first;
     out[(2 * part + 1) * channels + channel] = second;
+}
+
+// out [pixels, channels]: the gradient of x, a g + b (x - mean) + c for the gradient g of z and `linear` [mean, a, b and c, channels].
+KERNEL normalise_of_input(float *out, const float *x, const float *gradient, const float *linear, int threads, int channels) {
+    const int thread = THREAD;
+    if (thread >= threads) return;
+    const int channel = thread % channels;
+    out[thread] = linear[channels + channel] * gradient[thread] +
+                  linear[2 * channels + channel] * (x[thread] - linear[channel]) + linear[3 * channels + channel];
 }

@@ -69,7 +69,7 @@ impl Launch {
         } else if cpu.len() == inputs.len() {
             Storage::Cpu(self.cpu(&cpu)?.0)
         } else {
-            return Err(Error::msg("inputs of a kernel lie on different devices").bt());
+            return Err(elsewhere());
         };
         let untracked = BackpropOp::none();
         Ok(Tensor::from_storage(
@@ -111,6 +111,11 @@ impl Launch {
             integers: integers.map(|integer| integer as i32).collect(),
         })
     }
+}
+
+/// What is said of inputs and outputs that lie on different devices.
+pub fn elsewhere() -> Error {
+    Error::msg("inputs and outputs of an operation lie on different devices").bt()
 }
 
 #[cfg(test)]

@@ -1,16 +1,14 @@
 //! Batch normalisation and the activation behind it, with their gradients.
 
-use candle_core::{
-    CpuStorage, CudaStorage, CustomOp1, CustomOp2, D, Layout, Result, Shape, Tensor,
-};
+use candle_core::{CpuStorage, CudaStorage, CustomOp2, D, Layout, Result, Shape, Storage, Tensor};
 
+use super::super::norm::EPSILON;
 use super::depthwise::THREADS;
-use super::launch::Launch;
-use super::made;
+use super::launch::{Launch, elsewhere};
 
-/// Mean and biased variance [2, channels] of each channel of x [.., channels].
-pub fn moments(x: &Tensor) -> Result<Tensor> {
-    let x = x.contiguous()?;
+/// Mean and biased variance, both [channels], of each channel of x [.., channels].
+pub fn moments(x: &Tensor) -> Result<(Tensor, Tensor)> {
+    let x = x.detach().contiguous()?;
     let channels = x.dim(D::Minus1)?;
     let pixels = x.elem_count() / channels;
     let about = |center: &Tensor| {
@@ -19,20 +17,39 @@ pub fn moments(x: &Tensor) -> Result<Tensor> {
     };
     // About the mean itself, as sums of large squares lose digits in f32.
     let zero = Tensor::zeros(channels, x.dtype(), x.device())?;
-    let mean = about(&zero)?.get(0)?;
+    let mean = about(&zero)?.get(0)?.contiguous()?;
     let about_mean = about(&mean)?;
     let rest = about_mean.get(0)?;
     let variance = (about_mean.get(1)? - rest.sqr()?)?;
-    let found = Tensor::stack(&[(mean + rest)?, variance], 0)?;
-    x.apply_op1(Moments { pixels, found })
+    Ok(((mean + rest)?, variance))
 }
 
-/// SiLU(z), or z itself, where z = scale (x - mean) + bias for each channel of x [.., channels]; `norm` [3, channels] holds
-/// mean, scale and bias.
-pub fn normalise(x: &Tensor, norm: &Tensor, activated: bool) -> Result<Tensor> {
-    let shape = x.shape().clone();
-    let operation = Normalise { shape, activated };
-    x.contiguous()?.apply_op2(&norm.contiguous()?, operation)
+/// A normalisation of x [.., channels] by moments [channels] that do not depend on it: SiLU(z), or z itself where it is not
+/// `activated`, with z = weight (x - mean) / sigma + bias for `affine` [weight and bias, channels].
+pub fn by_constants(
+    x: &Tensor,
+    affine: &Tensor,
+    moments: (&Tensor, &Tensor),
+    activated: bool,
+) -> Result<Tensor> {
+    let norm = Norm::new(affine, moments)?;
+    let launch = of_values(forward(activated), x.shape());
+    launch.run(&[&x.contiguous()?, &norm.coefficients])
+}
+
+/// The same by the moments of x, with gradients of x and of `affine`.
+pub fn by_batch(
+    x: &Tensor,
+    affine: &Tensor,
+    moments: (&Tensor, &Tensor),
+    activated: bool,
+) -> Result<Tensor> {
+    let operation = Normalise {
+        shape: x.shape().clone(),
+        norm: Norm::new(affine, moments)?,
+        activated,
+    };
+    x.contiguous()?.apply_op2(affine, operation)
 }
 
 /// A kernel that sums over pixels to [parts, 2, channels].
@@ -56,49 +73,42 @@ fn of_values(kernel: &'static str, shape: &Shape) -> Launch {
     }
 }
 
-/// From x to its moments, which were found.
-struct Moments {
-    pixels: usize,
-    found: Tensor,
+/// The kernel of z, or of SiLU(z).
+fn forward(activated: bool) -> &'static str {
+    if activated { "activate" } else { "normalise" }
 }
 
-impl CustomOp1 for Moments {
-    fn name(&self) -> &'static str {
-        "moments"
-    }
+/// What a normalisation multiplies by and adds.
+struct Norm {
+    mean: Tensor,
+    /// 1 / sigma
+    inverse: Tensor,
+    /// weight / sigma
+    scale: Tensor,
+    /// [mean, scale and bias, channels]
+    coefficients: Tensor,
+}
 
-    fn cpu_fwd(&self, _: &CpuStorage, _: &Layout) -> Result<(CpuStorage, Shape)> {
-        made::cpu(&self.found)
-    }
-
-    fn cuda_fwd(&self, _: &CudaStorage, _: &Layout) -> Result<(CudaStorage, Shape)> {
-        made::cuda(&self.found)
-    }
-
-    /// 2 (x - mean) / pixels of the variance's gradient, and 1 / pixels of the mean's.
-    fn bwd(&self, x: &Tensor, found: &Tensor, gradient: &Tensor) -> Result<Option<Tensor>> {
-        let each = (gradient / self.pixels as f64)?;
-        let linear = Tensor::stack(&[found.get(0)?, (each.get(1)? * 2.0)?, each.get(0)?], 0)?;
-        let of_x = of_values("normalise", x.shape()).run(&[x, &linear.detach()])?;
-        Ok(Some(of_x))
+impl Norm {
+    fn new(affine: &Tensor, (mean, variance): (&Tensor, &Tensor)) -> Result<Self> {
+        let affine = affine.detach();
+        let inverse = (variance + EPSILON)?.sqrt()?.recip()?;
+        let scale = (affine.get(0)? * &inverse)?;
+        let coefficients = Tensor::stack(&[mean, &scale, &affine.get(1)?], 0)?;
+        Ok(Self {
+            mean: mean.clone(),
+            inverse,
+            scale,
+            coefficients,
+        })
     }
 }
 
-/// From (x, norm) to z or SiLU(z).
+/// From (x, affine) to z or SiLU(z).
 struct Normalise {
     shape: Shape,
+    norm: Norm,
     activated: bool,
-}
-
-impl Normalise {
-    fn forward(&self) -> Launch {
-        let kernel = if self.activated {
-            "activate"
-        } else {
-            "normalise"
-        };
-        of_values(kernel, &self.shape)
-    }
 }
 
 impl CustomOp2 for Normalise {
@@ -110,41 +120,64 @@ impl CustomOp2 for Normalise {
         &self,
         x: &CpuStorage,
         x_layout: &Layout,
-        norm: &CpuStorage,
-        layout: &Layout,
+        _: &CpuStorage,
+        _: &Layout,
     ) -> Result<(CpuStorage, Shape)> {
-        self.forward().cpu(&[(x, x_layout), (norm, layout)])
+        let (norm, layout) = self.norm.coefficients.storage_and_layout();
+        let Storage::Cpu(norm) = &*norm else {
+            return Err(elsewhere());
+        };
+        of_values(forward(self.activated), &self.shape).cpu(&[(x, x_layout), (norm, layout)])
     }
 
     fn cuda_fwd(
         &self,
         x: &CudaStorage,
         x_layout: &Layout,
-        norm: &CudaStorage,
-        layout: &Layout,
+        _: &CudaStorage,
+        _: &Layout,
     ) -> Result<(CudaStorage, Shape)> {
-        self.forward().cuda(&[(x, x_layout), (norm, layout)])
+        let (norm, layout) = self.norm.coefficients.storage_and_layout();
+        let Storage::Cuda(norm) = &*norm else {
+            return Err(elsewhere());
+        };
+        of_values(forward(self.activated), &self.shape).cuda(&[(x, x_layout), (norm, layout)])
     }
 
+    /// Ioffe and Szegedy 2015 (arXiv:1502.03167), section 3, with the sums over a channel taken first.
     fn bwd(
         &self,
         x: &Tensor,
-        norm: &Tensor,
+        _: &Tensor,
         _: &Tensor,
         gradient: &Tensor,
     ) -> Result<(Option<Tensor>, Option<Tensor>)> {
+        let Norm {
+            mean,
+            inverse,
+            scale,
+            coefficients,
+        } = &self.norm;
         let gradient = gradient.contiguous()?;
         let of_z = match self.activated {
-            true => of_values("activate_of_normed", &self.shape).run(&[x, &gradient, norm])?,
+            true => {
+                let launch = of_values("activate_of_normed", &self.shape);
+                launch.run(&[x, &gradient, coefficients])?
+            }
             false => gradient,
         };
-        let channels = norm.dim(1)?;
-        let sums = of_parts("normalise_of_norm", x.elem_count() / channels, channels);
-        let sums = sums.run(&[x, &of_z, norm])?.sum(0)?;
-        let (of_bias, of_scale) = (sums.get(0)?, sums.get(1)?);
-        let scale = norm.get(1)?.detach();
-        let of_mean = (&of_bias * &scale)?.neg()?;
-        let of_norm = Tensor::stack(&[of_mean, of_scale, of_bias], 0)?;
-        Ok((Some(of_z.broadcast_mul(&scale)?), Some(of_norm)))
+        let channels = mean.dim(0)?;
+        let pixels = self.shape.elem_count() / channels;
+        let sums = of_parts("normalise_of_affine", pixels, channels);
+        let sums = sums.run(&[x, &of_z, mean])?.sum(0)?;
+        let (of_bias, of_weight) = (sums.get(0)?, (sums.get(1)? * inverse)?);
+        let each = (scale / -(pixels as f64))?;
+        let of_input = ((&each * inverse)? * &of_weight)?;
+        let constant = (each * &of_bias)?;
+        let linear = Tensor::stack(&[mean, scale, &of_input, &constant], 0)?;
+        let launch = of_values("normalise_of_input", &self.shape);
+        let of_x = launch.run(&[x, &of_z, &linear])?;
+        let of_affine = Tensor::stack(&[of_weight, of_bias], 0)?;
+        Ok((Some(of_x), Some(of_affine)))
     }
 }

@@ -6,9 +6,8 @@ use candle_core::{Result, Tensor};
 use candle_nn::ops::sigmoid;
 
 use super::super::architecture::{Block, ConvPlace, NormPlace, SqueezePlace};
-use super::super::norm::EPSILON;
 use super::depthwise::depthwise;
-use super::normalise::{moments, normalise};
+use super::normalise::{by_batch, by_constants, moments};
 use crate::kernels::depthwise::Window;
 
 /// The first convolution.
@@ -82,23 +81,24 @@ impl Part<'_> {
     }
 
     fn normalise(&mut self, place: &NormPlace, x: &Tensor, activated: bool) -> Result<Tensor> {
-        let (mean, variance) = match &mut *self.moments {
+        // A bias lies behind its weight.
+        let affine = self.values(&(place.weight.start..place.bias.end))?;
+        let affine = affine.reshape((2, ()))?;
+        match &mut *self.moments {
             Moments::Running(statistics) => {
                 let of = |range: &Range<usize>| statistics.narrow(0, range.start, range.len());
-                (of(&place.mean)?, of(&place.variance)?)
+                let (mean, variance) = (of(&place.mean)?, of(&place.variance)?);
+                by_constants(x, &affine, (&mean, &variance), activated)
             }
             Moments::Batch(found) => {
                 let count = x.dims()[..3].iter().product::<usize>() as f64;
-                let moments = moments(x)?;
-                let (mean, variance) = (moments.get(0)?, moments.get(1)?);
-                found.push(mean.detach());
-                found.push((variance.detach() * (count / (count - 1.0)))?);
-                (mean, variance)
+                let (mean, variance) = moments(x)?;
+                let x = by_batch(x, &affine, (&mean, &variance), activated)?;
+                found.push(mean);
+                found.push((variance * (count / (count - 1.0)))?);
+                Ok(x)
             }
-        };
-        let scale = (self.values(&place.weight)? / (variance + EPSILON)?.sqrt()?)?;
-        let norm = Tensor::stack(&[mean, scale, self.values(&place.bias)?], 0)?;
-        normalise(x, &norm, activated)
+        }
     }
 
     /// Gates [images, 1, 1, channels] of a squeeze-and-excitation.

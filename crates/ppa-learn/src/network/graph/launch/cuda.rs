@@ -65,7 +65,7 @@ mod tests {
             declared.split_once('(').map(|(name, _)| name)
         });
         let names: Vec<&str> = names.collect();
-        assert_eq!(names.len(), 8);
+        assert_eq!(names.len(), 9);
         for name in names {
             assert!(ptx.contains(&format!(".visible .entry {name}(")), "{name}");
         }
