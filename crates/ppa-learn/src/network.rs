@@ -29,6 +29,7 @@ pub(crate) use fusion::LateFusion;
 pub use fusion::{Fusion, FusionKind};
 pub(crate) use norm::running;
 use operation::Backbone;
+pub(crate) use quality::CAMERA_PREFIXES;
 pub use quality::{Place, QualityNetwork};
 
 use crate::kernels::buffer::Pool;

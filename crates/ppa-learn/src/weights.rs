@@ -4,6 +4,9 @@ mod file;
 mod names;
 mod onnx;
 mod onnx_messages;
+mod onnx_network;
+#[cfg(test)]
+mod onnx_tests;
 mod quality;
 
 use std::collections::HashMap;

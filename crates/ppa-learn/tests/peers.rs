@@ -78,6 +78,66 @@ assert error < 1e-4
     python(script, &[&path, &io]);
 }
 
+/// The left and the right camera's images may differ in size where the networks are separate.
+#[test]
+fn onnxruntime_says_the_same_of_pairs_by_every_fusion() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, io] = ["network.onnx", "io.safetensors"].map(|name| folder.path().join(name));
+    let script = "
+import sys, numpy, onnx, onnxruntime
+from safetensors.numpy import load_file
+model = onnx.load(sys.argv[1])
+onnx.checker.check_model(model, full_check=True)
+assert not any(node.op_type == 'BatchNormalization' for node in model.graph.node)
+io = load_file(sys.argv[2])
+expected = io.pop('quality')
+quality, = onnxruntime.InferenceSession(sys.argv[1]).run(None, io)
+assert quality.shape == expected.shape == (3, 1)
+assert numpy.ptp(expected) > 1e-2, expected
+error = numpy.abs(quality - expected).max() / numpy.abs(expected).max()
+print('onnxruntime: largest relative error', error, 'of', expected.ravel(), len(model.graph.node), 'nodes')
+assert error < 1e-4
+";
+    let image = |side: usize| Tensor::rand(-0.5_f32, 0.5, (3, 1, 64, side), &Device::Cpu).unwrap();
+    // Running statistics of such images, so that answers follow the images.
+    let moved = |network: &QualityNetwork| {
+        for step in 0..150 {
+            let images: Vec<_> = (0..network.cameras()).map(|_| image(64)).collect();
+            network.forward(&images, Mode::Train { step }).unwrap();
+        }
+    };
+    let check = |network: &QualityNetwork, sides: [usize; 2]| {
+        let [left, right] = sides.map(image);
+        let quality = network.forward(&[left.clone(), right.clone()], Mode::Eval);
+        let tensors = [
+            ("left", left),
+            ("right", right),
+            ("quality", quality.unwrap()),
+        ];
+        candle_core::safetensors::save(&HashMap::from(tensors), &io).unwrap();
+        network.save_onnx(&path).unwrap();
+        python(script, &[&path, &io]);
+    };
+    for kind in [FusionKind::Score, FusionKind::Late] {
+        for (shared_weights, right) in [(false, 77), (true, 64)] {
+            let fusion = Fusion {
+                kind,
+                shared_weights,
+                ..Fusion::default()
+            };
+            let network = QualityNetwork::new(5, Options::default(), Some(fusion)).unwrap();
+            moved(&network);
+            check(&network, [64, right]);
+        }
+    }
+    let [left, right] = [1, 2].map(|seed| {
+        let network = QualityNetwork::new(seed, Options::default(), None).unwrap();
+        moved(&network);
+        network
+    });
+    check(&QualityNetwork::averaged(&left, &right).unwrap(), [64, 77]);
+}
+
 #[test]
 fn pytorch_loads_what_is_saved_and_the_network_loads_what_pytorch_saves() {
     let folder = tempfile::tempdir().unwrap();

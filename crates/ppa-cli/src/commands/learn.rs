@@ -1,10 +1,13 @@
 //! `ppa learn`: the network beside reference values, and its weight files.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
-use ppa_learn::{EfficientNetB0, FirstConvolution, Loaded, Options, parity};
+use ppa_dataset::layout::View;
+use ppa_learn::frames::of_camera;
+use ppa_learn::train::trained;
+use ppa_learn::{FirstConvolution, Loaded, QualityNetwork, parity};
 use serde::Serialize;
 
 use crate::output::{Output, working};
@@ -13,7 +16,7 @@ use crate::output::{Output, working};
 pub enum LearnCommand {
     /// Outputs, loss and gradients of the network beside reference values of another program
     Parity(ParityArgs),
-    /// Turn weights of torchvision or timm into safetensors with torchvision's names, or into ONNX
+    /// Turn a training, or weights of torchvision or timm, into safetensors with torchvision's names, or into ONNX
     Export(ExportArgs),
 }
 
@@ -26,9 +29,15 @@ pub struct ParityArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(
+    after_help = "An ONNX model takes `images` [N, 1, H, W], or `left` and `right` where the network is one of pairs, and gives `quality` [N, 1]. Which \
+network a weight file is of follows from its names; score fusion with shared weights is told from a single network by its training's folder only."
+)]
 pub struct ExportArgs {
-    /// Weights of `efficientnet_b0`: .safetensors, .pth or .pt
+    /// Folder of a finished `ppa train`, or weights: .safetensors, .pth or .pt
     weights: PathBuf,
+    /// The right camera's network, where the first one is the left camera's: both in one, with averaged outputs
+    right: Option<PathBuf>,
     /// Where they go: .safetensors or .onnx
     #[arg(long)]
     out: PathBuf,
@@ -75,6 +84,42 @@ pub fn run(command: &LearnCommand, output: Output) -> anyhow::Result<()> {
     }
 }
 
+/// The network in a training's folder or of a weight file; refused if it is for the other camera than `camera`.
+fn open(
+    path: &Path,
+    camera: Option<View>,
+    args: &ExportArgs,
+) -> anyhow::Result<(QualityNetwork, Loaded)> {
+    if path.is_dir() {
+        let (config, network) = trained(path)?;
+        if let Some(camera) = camera {
+            of_camera(path, config.views, camera)?;
+        }
+        return Ok((network, Loaded::default()));
+    }
+    let first = match args.first_conv {
+        First::Fresh => FirstConvolution::Fresh,
+        First::Sum => FirstConvolution::Sum,
+        First::Mean => FirstConvolution::Mean,
+    };
+    Ok(QualityNetwork::open(path, args.seed, first)?)
+}
+
+/// What was not taken from two files as it stood.
+fn both(left: Loaded, right: Loaded) -> Loaded {
+    let named = |camera: &str, names: Vec<String>| -> Vec<String> {
+        let names = names.into_iter();
+        names.map(|name| format!("{camera}: {name}")).collect()
+    };
+    let mut unused = named("left", left.unused);
+    unused.extend(named("right", right.unused));
+    Loaded {
+        first_convolution: left.first_convolution.or(right.first_convolution),
+        fresh_classifier: left.fresh_classifier || right.fresh_classifier,
+        unused,
+    }
+}
+
 fn export(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
     let onnx = match args
         .out
@@ -88,17 +133,18 @@ fn export(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
             args.out.display()
         ),
     };
-    let network = EfficientNetB0::new(args.seed, Options::default())?;
-    let first = match args.first_conv {
-        First::Fresh => FirstConvolution::Fresh,
-        First::Sum => FirstConvolution::Sum,
-        First::Mean => FirstConvolution::Mean,
-    };
+    let camera = args.right.is_some().then_some(View::Left);
+    let (mut network, mut loaded) = open(&args.weights, camera, args)?;
+    if let Some(right) = &args.right {
+        let (of_right, more) = open(right, Some(View::Right), args)?;
+        network = QualityNetwork::averaged(&network, &of_right)?;
+        loaded = both(loaded, more);
+    }
     let Loaded {
         first_convolution,
         fresh_classifier,
         unused,
-    } = network.load(&args.weights, first)?;
+    } = loaded;
     let written = if onnx {
         network.save_onnx(&args.out)
     } else {

@@ -14,6 +14,7 @@ mod identity;
 mod json;
 mod labels;
 mod mcgpu;
+mod network_files;
 mod phantoms;
 mod planted_series;
 mod prediction;

@@ -15,7 +15,7 @@ use crate::{contains, fail, ppa, succeed};
 const REGIONS: &str = "--roi-left 1,2,45 --roi-right 1,2,45";
 
 /// A folder with data and networks of the left camera, the right one, each of both, and pairs of both, after a step each.
-fn trained() -> &'static Path {
+pub fn trained() -> &'static Path {
     static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();

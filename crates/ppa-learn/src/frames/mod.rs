@@ -8,4 +8,4 @@ mod folder;
 mod predictor;
 
 pub use folder::{FramePair, PairFolder};
-pub use predictor::{FramesError, PairPrediction, PairPredictor};
+pub use predictor::{FramesError, PairPrediction, PairPredictor, of_camera};

@@ -31,6 +31,31 @@ pub enum FramesError {
     },
 }
 
+/// Refuses the training in the folder `run`, on images of `views`, if its network is none for one camera's images.
+///
+/// # Errors
+/// [`FramesError::Views`].
+pub fn of_camera(run: &Path, views: Views, camera: View) -> Result<(), FramesError> {
+    let (own, expected) = match camera {
+        View::Left => (
+            Views::Left,
+            "\"left\" or \"unified\" for the left camera's network",
+        ),
+        View::Right => (
+            Views::Right,
+            "\"right\" or \"unified\" for the right camera's network",
+        ),
+    };
+    if views == own || views == Views::Unified {
+        return Ok(());
+    }
+    Err(FramesError::Views {
+        run: run.to_owned(),
+        found: views,
+        expected,
+    })
+}
+
 /// Quality of a pose from 1 (ideal) to 3 (inadequate), as networks see it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PairPrediction {
@@ -83,36 +108,29 @@ impl PairPredictor {
             Ok((config, network.to_device(&device)?))
         };
         let (config, network) = trained(left)?;
-        let fits = |run: &Path, config: &TrainConfig, fine: &[Views], expected| {
-            if fine.contains(&config.views) {
-                return Ok(());
-            }
-            Err(FramesError::Views {
-                run: run.to_owned(),
-                found: config.views,
-                expected,
-            })
-        };
         let of = |config: &TrainConfig, network| Trained {
             network,
             side: config.side,
         };
         let networks = match right {
-            None => {
-                let expected = "\"unified\" or \"pairs\" for a network that stands alone";
-                fits(left, &config, &[Views::Unified, Views::Pairs], expected)?;
-                match config.views {
-                    Views::Pairs => Networks::Joint(of(&config, network)),
-                    _ => Networks::Separate([of(&config, network.clone()), of(&config, network)]),
+            None => match config.views {
+                Views::Pairs => Networks::Joint(of(&config, network)),
+                Views::Unified => {
+                    Networks::Separate([of(&config, network.clone()), of(&config, network)])
                 }
-            }
+                found => {
+                    return Err(FramesError::Views {
+                        run: left.to_owned(),
+                        found,
+                        expected: "\"unified\" or \"pairs\" for a network that stands alone",
+                    });
+                }
+            },
             Some(right) => {
-                let expected = "\"left\" or \"unified\" for the left camera's network";
-                fits(left, &config, &[Views::Left, Views::Unified], expected)?;
+                of_camera(left, config.views, View::Left)?;
                 let of_left = of(&config, network);
                 let (config, network) = trained(right)?;
-                let expected = "\"right\" or \"unified\" for the right camera's network";
-                fits(right, &config, &[Views::Right, Views::Unified], expected)?;
+                of_camera(right, config.views, View::Right)?;
                 Networks::Separate([of_left, of(&config, network)])
             }
         };

@@ -21,6 +21,9 @@ pub struct QualityNetwork {
     seed: u64,
 }
 
+/// What stands before the names of each camera's network.
+pub(crate) const CAMERA_PREFIXES: [&str; 2] = ["cam_left_module.", "cam_right_module."];
+
 /// A parameter or a running statistic: its name, and where it lies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
@@ -60,6 +63,28 @@ impl QualityNetwork {
             fusion,
             late,
             seed,
+        })
+    }
+
+    /// The networks of the left and the right camera as one, whose answer is the mean of theirs: the paper's answer for a pose. It
+    /// shares its variables with them.
+    ///
+    /// # Errors
+    /// If one of them takes the images of both cameras.
+    pub fn averaged(left: &Self, right: &Self) -> Result<Self, NetworkError> {
+        let mut branches = Vec::new();
+        for network in [left, right] {
+            let (found, expected) = (1, network.cameras());
+            if expected != found {
+                return Err(NetworkError::Cameras { found, expected });
+            }
+            branches.extend(network.branches.iter().cloned());
+        }
+        Ok(Self {
+            branches,
+            fusion: Some(Fusion::default()),
+            late: None,
+            seed: left.seed,
         })
     }
 
@@ -204,7 +229,7 @@ impl QualityNetwork {
         match self.fusion {
             None => &[""],
             Some(fusion) if fusion.shared_weights => &["module."],
-            Some(_) => &["cam_left_module.", "cam_right_module."],
+            Some(_) => &CAMERA_PREFIXES,
         }
     }
 

@@ -140,7 +140,7 @@ impl Value {
                 value: Some(dimension::Value::Named("N".into())),
             },
             None => Dimension {
-                value: Some(dimension::Value::Named(format!("side{index}"))),
+                value: Some(dimension::Value::Named(format!("{name}_side{index}"))),
             },
         });
         let shape = Shape { dim: dim.collect() };

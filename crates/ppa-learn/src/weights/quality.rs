@@ -7,7 +7,7 @@ use candle_core::Tensor;
 
 use super::file::{read, write};
 use super::{FirstConvolution, Loaded, WeightsError, assign};
-use crate::network::{LateFusion, QualityNetwork};
+use crate::network::{CAMERA_PREFIXES, Fusion, FusionKind, LateFusion, Options, QualityNetwork};
 
 impl QualityNetwork {
     /// Takes the values of every parameter and running statistic by name; other names are not looked at.
@@ -25,13 +25,51 @@ impl QualityNetwork {
         assign(&variables, entries.chain(statistics), tensors)
     }
 
+    /// The network that a weight file is of, with its weights; values of `seed` where the file has none to give.
+    ///
+    /// Names tell which one: layers that fuse both cameras' values are those of late fusion, and networks of each camera are separate
+    /// ones. Score fusion with shared weights bears the names of a single network behind a wrapper's `module.`, and is taken for
+    /// that; only the configuration of its training knows.
+    ///
+    /// # Errors
+    /// As [`EfficientNetB0::load`](crate::EfficientNetB0::load).
+    pub fn open(
+        path: &Path,
+        seed: u64,
+        first: FirstConvolution,
+    ) -> Result<(Self, Loaded), WeightsError> {
+        let found = read(path)?;
+        let by_camera = found.keys().any(|name| of_a_camera(name));
+        let kind = match found.contains_key("fc.0.weight") {
+            true => FusionKind::Late,
+            false => FusionKind::Score,
+        };
+        let fusion = (by_camera || kind == FusionKind::Late).then_some(Fusion {
+            kind,
+            shared_weights: !by_camera,
+            ..Fusion::default()
+        });
+        let network = Self::new(seed, Options::default(), fusion)?;
+        let loaded = network.fill(found, path, first)?;
+        Ok((network, loaded))
+    }
+
     /// Takes weights of a file as [`EfficientNetB0::load`](crate::EfficientNetB0::load) does. A file of one network fills the
     /// networks of both cameras, as after pretraining on a unified view; layers that fuse both then stay as they are here.
     ///
     /// # Errors
     /// As [`EfficientNetB0::load`](crate::EfficientNetB0::load); the network is then as before.
     pub fn load(&self, path: &Path, first: FirstConvolution) -> Result<Loaded, WeightsError> {
-        let mut found = read(path)?;
+        self.fill(read(path)?, path, first)
+    }
+
+    /// Takes the tensors of the file `path`.
+    fn fill(
+        &self,
+        mut found: HashMap<String, Tensor>,
+        path: &Path,
+        first: FirstConvolution,
+    ) -> Result<Loaded, WeightsError> {
         let mut tensors = HashMap::new();
         let late = self.late().map_or(&[][..], LateFusion::entries);
         let has_late = late.iter().any(|entry| found.contains_key(&entry.name));
@@ -45,8 +83,7 @@ impl QualityNetwork {
             }
         }
         let mut loaded = Loaded::default();
-        let by_camera = |name: &str| self.prefixes().iter().any(|p| name.starts_with(p));
-        let by_camera = self.branches().len() == 2 && found.keys().any(|name| by_camera(name));
+        let by_camera = self.branches().len() == 2 && found.keys().any(|name| of_a_camera(name));
         for (branch, prefix) in self.branches().iter().zip(self.prefixes()) {
             let own = |(name, tensor): (&String, &Tensor)| match by_camera {
                 true => Some((name.strip_prefix(prefix)?.to_owned(), tensor.clone())),
@@ -71,4 +108,10 @@ impl QualityNetwork {
     pub fn save(&self, path: &Path) -> Result<(), WeightsError> {
         write(path, self.tensors()?)
     }
+}
+
+/// Whether a tensor is of the left or of the right camera's network.
+fn of_a_camera(name: &str) -> bool {
+    let mut prefixes = CAMERA_PREFIXES.iter();
+    prefixes.any(|prefix| name.starts_with(prefix))
 }

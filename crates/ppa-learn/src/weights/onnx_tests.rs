@@ -1,0 +1,206 @@
+//! Models as any reader finds them: what each node needs is there before it, normalisations are gone, and what the nodes say by
+//! candle's own operations is what the network says.
+
+use std::collections::{HashMap, HashSet};
+
+use candle_core::{Device, Tensor};
+use candle_nn::ops::sigmoid;
+use prost::Message;
+use rand_distr::{Distribution, Uniform};
+
+use super::onnx_messages::{Graph, Model, Node};
+use crate::network::{Fusion, FusionKind, Mode, Options, QualityNetwork};
+use crate::random::{Purpose, stream};
+
+/// A network whose normalisations keep values of the size that they have, so that answers follow images; of both cameras if it
+/// fuses them.
+fn network(seed: u64, fusion: Option<Fusion>) -> QualityNetwork {
+    let network = QualityNetwork::new(seed, Options::default(), fusion).unwrap();
+    let tensors = network.tensors().unwrap().into_iter();
+    let mut tensors: HashMap<String, Tensor> = tensors.map(|t| (t.name, t.tensor)).collect();
+    let variances = tensors.keys().filter(|name| name.ends_with("running_var"));
+    for variance in variances.cloned().collect::<Vec<_>>() {
+        let weight = &tensors[&variance.replace(".1.running_var", ".0.weight")];
+        // About the mean square of what comes in, so that values neither fade nor grow.
+        let squares = weight.sqr().and_then(|w| w.flatten_from(1)?.sum(1)? * 0.4);
+        tensors.insert(variance, squares.unwrap());
+    }
+    for (name, mean) in tensors.iter_mut() {
+        if name.ends_with("running_mean") {
+            *mean = random(0.1, mean.dims(), seed);
+        }
+    }
+    network.assign(&tensors).unwrap();
+    network
+}
+
+/// Values uniform in ± `limit`.
+fn random(limit: f32, shape: &[usize], index: u64) -> Tensor {
+    let uniform = Uniform::new(-limit, limit).unwrap();
+    let values = uniform.sample_iter(stream(5, Purpose::Sampling, index));
+    let values: Vec<f32> = values.take(shape.iter().product()).collect();
+    Tensor::from_vec(values, shape, &Device::Cpu).unwrap()
+}
+
+/// Two images of each camera, of equal size.
+fn images(network: &QualityNetwork) -> Vec<Tensor> {
+    let image = |camera| random(0.5, &[2, 1, 39, 33], camera as u64);
+    (0..network.cameras()).map(image).collect()
+}
+
+/// The graph as it stands in a file.
+fn written(network: &QualityNetwork) -> Graph {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("network.onnx");
+    network.save_onnx(&path).unwrap();
+    let bytes = std::fs::read(path).unwrap();
+    Model::decode(&bytes[..]).unwrap().graph.unwrap()
+}
+
+fn names(values: &[super::onnx_messages::Value]) -> Vec<&str> {
+    values.iter().map(|value| value.name.as_str()).collect()
+}
+
+fn number(node: &Node, name: &str) -> usize {
+    let attribute = node.attribute.iter().find(|a| a.name == name).unwrap();
+    (attribute.ints.first().unwrap_or(&attribute.i)).to_owned() as usize
+}
+
+/// What a node makes of its inputs.
+fn run(node: &Node, inputs: &[&Tensor]) -> candle_core::Result<Tensor> {
+    match (node.op_type.as_str(), inputs) {
+        ("Conv", [x, weight, bias]) if node.attribute.is_empty() => {
+            let bias = bias.reshape((1, (), 1, 1))?;
+            x.conv2d(weight, 0, 1, 1, 1)?.broadcast_add(&bias)
+        }
+        ("Conv", [x, weight, bias]) => {
+            let [padding, stride, groups] =
+                ["pads", "strides", "group"].map(|name| number(node, name));
+            let bias = bias.reshape((1, (), 1, 1))?;
+            x.conv2d(weight, padding, stride, 1, groups)?
+                .broadcast_add(&bias)
+        }
+        ("Sigmoid", [x]) => sigmoid(x),
+        ("Mul", [x, y]) => x.broadcast_mul(y),
+        ("Add", [x, y]) => *x + *y,
+        ("GlobalAveragePool", [x]) => x.mean_keepdim((2, 3)),
+        ("Flatten", [x]) => x.flatten_from(1),
+        ("Gemm", [x, weight, bias]) if number(node, "transB") == 1 => {
+            x.matmul(&weight.t()?)?.broadcast_add(bias)
+        }
+        ("Concat", values) => Tensor::cat(values, number(node, "axis")),
+        ("Mean", [x, y]) => (*x + *y)? / 2.0,
+        (other, _) => panic!("a node {other} of {} inputs", inputs.len()),
+    }
+}
+
+/// What a graph says of images, each node after those that it needs.
+fn evaluate(graph: &Graph, images: Vec<Tensor>) -> Tensor {
+    let weights = graph.initializer.iter().map(|weight| {
+        let values = weight.raw_data.as_chunks().0.iter();
+        let values: Vec<f32> = values.map(|&bytes| f32::from_le_bytes(bytes)).collect();
+        let shape: Vec<usize> = weight.dims.iter().map(|&side| side as usize).collect();
+        let tensor = Tensor::from_vec(values, shape, &Device::Cpu).unwrap();
+        (weight.name.as_str(), tensor)
+    });
+    let mut values: HashMap<&str, Tensor> = weights.collect();
+    values.extend(names(&graph.input).into_iter().zip(images));
+    for node in &graph.node {
+        let inputs = node.input.iter().map(|name| match values.get(&name[..]) {
+            Some(value) => value,
+            None => panic!("{} needs {name}, which is not there", node.name),
+        });
+        let output = run(node, &inputs.collect::<Vec<_>>()).unwrap();
+        let replaced = values.insert(&node.output[0], output);
+        assert!(replaced.is_none(), "{} is there twice", node.output[0]);
+    }
+    values["quality"].clone()
+}
+
+/// Checks a model, and gives its number of nodes and of values in weights.
+fn checked(network: &QualityNetwork, cameras: &[&str]) -> (usize, usize) {
+    let graph = written(network);
+    assert_eq!(names(&graph.input), cameras);
+    assert_eq!(names(&graph.output), ["quality"]);
+    let needed: HashSet<&String> = graph.node.iter().flat_map(|node| &node.input).collect();
+    for weight in &graph.initializer {
+        assert!(
+            needed.contains(&weight.name),
+            "nothing needs {}",
+            weight.name
+        );
+    }
+    let images = images(network);
+    let expected = network.forward(&images, Mode::Eval).unwrap();
+    let found = evaluate(&graph, images);
+    assert_eq!(found.dims(), [2, 1]);
+    let [found, expected] = [found, expected].map(|t| t.flatten_all().unwrap().to_vec1().unwrap());
+    for (found, expected) in found.iter().zip(&expected) {
+        let (found, expected): (&f32, &f32) = (found, expected);
+        assert!(
+            (found - expected).abs() < 1e-4 * expected.abs(),
+            "{found}, the network says {expected}"
+        );
+    }
+    let spread: f32 = expected[0] - expected[1];
+    assert!(
+        1e-3 * expected[0].abs() < spread.abs(),
+        "equal answers tell nothing: {expected:?}"
+    );
+    let values = graph.initializer.iter().map(|w| w.raw_data.len() / 4);
+    (graph.node.len(), values.sum())
+}
+
+/// Values of a single network: 4,008,253 parameters, of which 42,016 scale and shift normalisations; the shifts remain, as biases.
+const ONE: usize = 4_008_253 - 42_016 / 2;
+
+#[test]
+fn every_node_has_what_it_needs_and_says_what_the_network_says() {
+    assert_eq!(checked(&network(3, None), &["images"]).1, ONE);
+}
+
+/// Checks the models of separate and shared weights: `extra` nodes join both cameras, each network of `each` values.
+fn check_pairs(kind: FusionKind, extra: usize, each: usize, joining: usize) {
+    let nodes = written(&network(3, None)).node.len();
+    for (shared_weights, networks) in [(false, 2), (true, 1)] {
+        let fusion = Fusion {
+            kind,
+            shared_weights,
+            ..Fusion::default()
+        };
+        let found = checked(&network(3, Some(fusion)), &["left", "right"]);
+        let expected = (2 * nodes + extra, networks * each + joining);
+        assert_eq!(found, expected, "shared weights: {shared_weights}");
+    }
+}
+
+#[test]
+fn a_model_of_score_fusion_holds_shared_weights_once_and_averages() {
+    check_pairs(FusionKind::Score, 1, ONE, 0);
+}
+
+/// With 511 more outputs of each network, and layers of 1024 to 256 values to one.
+#[test]
+fn a_model_of_late_fusion_holds_shared_weights_once_and_all_its_layers() {
+    check_pairs(FusionKind::Late, 7, ONE + 511 * 1281, 1025 * 256 + 257);
+}
+
+#[test]
+fn networks_of_two_cameras_are_averaged_in_one_model() {
+    let [left, right] = [1, 2].map(|seed| network(seed, None));
+    let pair = QualityNetwork::averaged(&left, &right).unwrap();
+    checked(&pair, &["left", "right"]);
+    let images = images(&pair);
+    let say = |network: &QualityNetwork, images: &[Tensor]| -> Vec<f32> {
+        let quality = network.forward(images, Mode::Eval).unwrap();
+        quality.flatten_all().unwrap().to_vec1().unwrap()
+    };
+    let [of_left, of_right] = [(&left, 0), (&right, 1)].map(|(n, i)| say(n, &images[i..=i]));
+    for (both, (left, right)) in say(&pair, &images)
+        .iter()
+        .zip(of_left.iter().zip(&of_right))
+    {
+        assert!((both - (left + right) / 2.0).abs() < 1e-6);
+    }
+    assert!(QualityNetwork::averaged(&pair, &right).is_err());
+}
