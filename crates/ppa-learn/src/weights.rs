@@ -31,13 +31,15 @@ pub enum FirstConvolution {
 }
 
 /// What was not taken from a weight file as it stood.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Loaded {
     /// How a first convolution of several channels became one of one channel.
     pub first_convolution: Option<FirstConvolution>,
     /// The file's classifier has another number of outputs; the network kept its own.
     pub fresh_classifier: bool,
-    /// Names that the network does not have.
+    /// One clause for each tensor that is missing or has another shape, and that the network kept as it was.
+    pub kept: Vec<String>,
+    /// Names in the file that the network does not have, without PyTorch's counters of batches.
     pub unused: Vec<String>,
 }
 
@@ -46,12 +48,14 @@ pub struct Loaded {
 #[non_exhaustive]
 pub enum WeightsError {
     /// Tensors that are not there, have another shape or hold what is no weight.
-    #[error("{} not fit EfficientNet-B0 with one channel: {}", place(.path), .misfits.join("; "))]
+    #[error("{} not fit EfficientNet-B0 with one channel: {}{}", place(.path), .misfits.join("; "), beyond(.unused))]
     Misfit {
         /// The file, if the values came from one.
         path: Option<PathBuf>,
         /// One clause for each tensor.
         misfits: Vec<String>,
+        /// Names in the file that the network does not have.
+        unused: Vec<String>,
     },
     /// A file that cannot be read.
     #[error("cannot read weights from {}", path.display())]
@@ -79,12 +83,21 @@ fn place(path: &Option<PathBuf>) -> String {
     )
 }
 
+fn beyond(unused: &[String]) -> String {
+    match unused {
+        [] => String::new(),
+        names => format!("; not of the network: {}", names.join(", ")),
+    }
+}
+
 impl WeightsError {
-    pub(crate) fn in_file(self, file: &Path) -> Self {
+    /// Names the file, and what it holds beyond the network.
+    pub(crate) fn in_file(self, file: &Path, unused: &[String]) -> Self {
         match self {
             Self::Misfit { misfits, .. } => Self::Misfit {
                 path: Some(file.to_owned()),
                 misfits,
+                unused: unused.to_vec(),
             },
             other => other,
         }
@@ -122,6 +135,7 @@ fn assign<'a>(
         return Err(WeightsError::Misfit {
             path: None,
             misfits,
+            unused: Vec::new(),
         });
     }
     for (variable, values) in variables.iter().zip(flat) {
@@ -130,18 +144,20 @@ fn assign<'a>(
     Ok(())
 }
 
+fn other_shape(name: &str, found: &[usize], expected: &[usize]) -> String {
+    format!("{name} has the shape {found:?}, expected {expected:?}")
+}
+
+fn missing(name: &str) -> String {
+    format!("{name} is missing")
+}
+
 /// The values of an entry, or a clause on why there are none.
 fn fitting(tensors: &HashMap<String, Tensor>, entry: &Entry) -> Result<Vec<f32>, String> {
     let name = &entry.name;
-    let tensor = tensors
-        .get(name)
-        .ok_or_else(|| format!("{name} is missing"))?;
+    let tensor = tensors.get(name).ok_or_else(|| missing(name))?;
     if tensor.dims() != entry.shape {
-        return Err(format!(
-            "{name} has the shape {:?}, expected {:?}",
-            tensor.dims(),
-            entry.shape
-        ));
+        return Err(other_shape(name, tensor.dims(), &entry.shape));
     }
     let values = tensor
         .to_dtype(DType::F32)

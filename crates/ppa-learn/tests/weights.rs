@@ -85,6 +85,18 @@ fn networks_of_both_cameras_are_read_again_and_begin_with_those_of_one() {
 
         let loaded = other.load(&single, FirstConvolution::Fresh).unwrap();
         assert_eq!(loaded.fresh_classifier, kind == FusionKind::Late);
+        let kept = match kind {
+            FusionKind::Score => vec![],
+            FusionKind::Late => vec![
+                "fc.0.weight is missing",
+                "fc.0.bias is missing",
+                "fc.3.weight is missing",
+                "fc.3.bias is missing",
+                "classifier.1.weight has the shape [1, 1280], expected [512, 1280]",
+                "classifier.1.bias has the shape [1], expected [512]",
+            ],
+        };
+        assert_eq!(loaded.kept, kept);
         let alone = network(7);
         let features = alone.features(&images[1], Mode::Eval).unwrap();
         let found = &other.features(&images, Mode::Eval).unwrap()[1];
@@ -98,15 +110,27 @@ fn networks_of_both_cameras_are_read_again_and_begin_with_those_of_one() {
         } else {
             "cam_right_module.features.0.0.weight"
         };
-        tensors.remove(name).unwrap();
+        let of_it = tensors.remove(name).unwrap();
+        tensors.insert(format!("{name}s"), of_it);
         let (_folder, path) = write(&tensors);
         let before = say(&other);
         let error = other
             .load(&path, FirstConvolution::Fresh)
             .unwrap_err()
             .to_string();
-        assert!(error.contains(&format!("{name} is missing")), "{error}");
+        let expected = format!("{name} is missing; not of the network: {name}s");
+        assert!(error.ends_with(&expected), "{error}");
         assert_eq!(say(&other), before);
+        // Beyond the network, behind a camera's prefix and without one.
+        let of_it = tensors.remove(&format!("{name}s")).unwrap();
+        tensors.insert(name.to_owned(), of_it);
+        for more in ["cam_right_module.more", "more"] {
+            let zero = Tensor::zeros(1, DType::F32, &Device::Cpu).unwrap();
+            tensors.insert(more.to_owned(), zero);
+        }
+        let (_folder, path) = write(&tensors);
+        let loaded = other.load(&path, FirstConvolution::Fresh).unwrap();
+        assert_eq!(loaded.unused, ["cam_right_module.more", "more"]);
     }
 }
 
@@ -150,12 +174,22 @@ fn colour_and_classes_of_a_pretrained_file_give_way() {
         (FirstConvolution::Mean, Some(2.0)),
     ] {
         let loaded = other.load(&path, choice).unwrap();
+        let mut kept = vec![
+            "module.model.classifier.1.weight has the shape [1000, 1280], expected [1, 1280]"
+                .to_owned(),
+            "module.model.classifier.1.bias has the shape [1000], expected [1]".to_owned(),
+        ];
+        if choice == FirstConvolution::Fresh {
+            let first = "module.model.features.0.0.weight has the shape [32, 3, 3, 3], expected [32, 1, 3, 3]";
+            kept.insert(0, first.to_owned());
+        }
         assert_eq!(
             loaded,
             Loaded {
                 first_convolution: Some(choice),
                 fresh_classifier: true,
-                unused: vec!["ema.decay".into()]
+                kept,
+                unused: vec!["module.model.ema.decay".into()]
             }
         );
         let (ours, theirs) = (values(&other), values(&one));
@@ -186,6 +220,10 @@ fn everything_that_does_not_fit_is_named_and_changes_nothing() {
         "features.8.1.running_var".into(),
         Tensor::full(-1.0_f32, 1280, &Device::Cpu).unwrap(),
     );
+    tensors.insert(
+        "features.9.weight".into(),
+        Tensor::zeros(1, DType::F32, &Device::Cpu).unwrap(),
+    );
     let (_folder, path) = write(&tensors);
     let before = values(&other);
     let error = other
@@ -197,7 +235,7 @@ fn everything_that_does_not_fit_is_named_and_changes_nothing() {
         "features.3.1.block.2.fc1.bias is missing",
         "features.8.0.weight has the shape [1280, 320], expected [1280, 320, 1, 1]",
         "features.0.1.bias holds NaN",
-        "features.8.1.running_var holds -1",
+        "features.8.1.running_var holds -1; not of the network: features.9.weight",
     ] {
         assert!(error.contains(part), "{error}");
     }

@@ -64,6 +64,7 @@ struct Exported {
     out: PathBuf,
     fresh_first_convolution: bool,
     fresh_classifier: bool,
+    kept: Vec<String>,
     unused: Vec<String>,
 }
 
@@ -111,11 +112,14 @@ fn both(left: Loaded, right: Loaded) -> Loaded {
         let names = names.into_iter();
         names.map(|name| format!("{camera}: {name}")).collect()
     };
+    let mut kept = named("left", left.kept);
+    kept.extend(named("right", right.kept));
     let mut unused = named("left", left.unused);
     unused.extend(named("right", right.unused));
     Loaded {
         first_convolution: left.first_convolution.or(right.first_convolution),
         fresh_classifier: left.fresh_classifier || right.fresh_classifier,
+        kept,
         unused,
     }
 }
@@ -143,6 +147,7 @@ fn export(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
     let Loaded {
         first_convolution,
         fresh_classifier,
+        kept,
         unused,
     } = loaded;
     let written = if onnx {
@@ -155,6 +160,7 @@ fn export(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
         out: args.out.clone(),
         fresh_first_convolution: first_convolution == Some(FirstConvolution::Fresh),
         fresh_classifier,
+        kept,
         unused,
     };
     output.print(&exported, |exported| {
@@ -165,9 +171,17 @@ fn export(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
         if exported.fresh_classifier {
             text += "; its classifier is new, as the file's has another number of outputs";
         }
-        if !exported.unused.is_empty() {
-            text += &format!("; not used: {}", exported.unused.join(", "));
-        }
-        text
+        text + &not_taken(&exported.kept, &exported.unused)
     })
+}
+
+/// By name, what was not taken from a weight file, or nothing.
+pub fn not_taken(kept: &[String], unused: &[String]) -> String {
+    let mut text = String::new();
+    for (what, names) in [("new instead", kept), ("not used", unused)] {
+        if !names.is_empty() {
+            text += &format!("; {what}: {}", names.join(", "));
+        }
+    }
+    text
 }

@@ -3,8 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use ppa_learn::train::{Ended, TrainConfig, train};
+use ppa_learn::Loaded;
+use ppa_learn::train::{Ended, TrainConfig, read_start, train};
 use serde::Serialize;
+
+use super::learn::not_taken;
 
 use crate::interrupt::on_interrupt;
 use crate::output::{Output, bar};
@@ -25,6 +28,8 @@ struct Trained {
     step: u64,
     steps: u64,
     last_loss: Option<f32>,
+    /// What of the `start` file was not taken as it stood.
+    start: Option<Loaded>,
 }
 
 pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
@@ -43,6 +48,10 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
                     "{steps} steps of the optimiser (steps = {}, counted as {:?}), {} samples each",
                     config.steps, config.step_counting, config.batch_size
                 );
+                if let Ok(Some(loaded)) = read_start(&args.out) {
+                    let text = not_taken(&loaded.kept, &loaded.unused);
+                    eprintln!("the file of `start` is taken{text}");
+                }
             });
             bar.set_position(progress.step - 1);
             bar.reset_eta();
@@ -62,6 +71,7 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
         step,
         steps,
         last_loss,
+        start: read_start(&args.out)?,
     };
     output.print(&trained, |trained| {
         let out = trained.out.display();

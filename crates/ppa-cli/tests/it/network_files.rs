@@ -39,3 +39,17 @@ fn pairs_are_exported_from_trainings_and_from_their_weight_files() {
     );
     assert!(!folder.join("no.onnx").exists());
 }
+
+#[test]
+fn what_a_start_file_has_beyond_the_network_is_told_by_name() {
+    let folder = trained();
+    let config = fs::read_to_string(folder.join("left.toml")).unwrap();
+    let config = format!("start = \"right/checkpoint.safetensors\"\n{config}");
+    fs::write(folder.join("begun.toml"), config).unwrap();
+    let said = succeed(folder, "train begun.toml --out begun --json");
+    let said: serde_json::Value = serde_json::from_str(&said).unwrap();
+    assert_eq!(said["start"]["kept"], serde_json::json!([]));
+    let unused = &said["start"]["unused"];
+    assert_eq!(unused.as_array().unwrap().len(), 4, "{unused}");
+    assert_eq!(unused[0], "adam.first.0");
+}

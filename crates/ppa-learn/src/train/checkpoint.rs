@@ -103,7 +103,7 @@ pub(super) fn load(
         }
     }
     let assigned = network.assign(&tensors);
-    assigned.map_err(|error| error.in_file(path))?;
+    assigned.map_err(|error| error.in_file(path, &[]))?;
     Ok(adam)
 }
 

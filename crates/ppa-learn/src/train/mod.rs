@@ -1,7 +1,7 @@
 //! Training of a network, from a configuration to weights: resumable, and the same bytes whenever it was stopped.
 //!
 //! [`train`] follows a [`TrainConfig`] and fills a run folder: `config.toml` (what was resolved), `log.jsonl` and TensorBoard
-//! events (the same scalars), `checkpoint.safetensors` (weights by torchvision's names, running statistics, Adam's moments,
+//! events (the same scalars), `start.json` (what of the `start` file was not taken as it stood), `checkpoint.safetensors` (weights by torchvision's names, running statistics, Adam's moments,
 //! step), and at the end `weights.safetensors`. Data position and random numbers follow from seed and step.
 
 mod adam;
@@ -15,6 +15,7 @@ mod finite;
 mod log;
 mod run;
 mod schedule;
+mod start_file;
 mod tensorboard;
 
 pub use adam::Adam;
@@ -24,4 +25,5 @@ pub use finite::Trouble;
 pub use log::{LogRow, read_log};
 pub use run::{Ended, Progress, predict, samples, train, trained};
 pub use schedule::{Schedule, StepCounting};
+pub use start_file::read_start;
 pub use tensorboard::tensorboard_events;

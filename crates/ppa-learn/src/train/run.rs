@@ -22,10 +22,14 @@ use super::error::TrainError;
 use super::feed::{Answers, Feed};
 use super::finite::{is_finite, trouble};
 use super::log::{Log, LogRow};
+use super::start_file;
 use super::tensorboard::tensorboard_events;
 
 /// The middle of the labels, 1 to 3.
 const MIDDLE: f32 = 2.0;
+
+/// The scalar that every evaluation has in the log.
+const EVALUATION: &str = "evaluation/mae";
 
 /// How far a training is; told after every step.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,7 +89,8 @@ pub fn train(
             return Err(TrainError::WeightsAlone(weights));
         }
         if let Some(start) = &config.start {
-            network.load(start, config.first_convolution)?;
+            let loaded = network.load(start, config.first_convolution)?;
+            start_file::write(folder, &loaded)?;
         }
         Adam::new(network.variables().iter().map(|v| v.elem_count()))
     };
@@ -109,6 +114,7 @@ pub fn train(
     let images = Arc::new(Images::new(training, config.side, keep_bytes)?);
     let mut feed = Feed::new(config, &run.network, &images, run.adam.steps)?;
     let steps = config.schedule().steps();
+    run.make_up_evaluation()?;
     while run.adam.steps < steps {
         let answers = match feed.answers(config, &run.network, run.adam.steps) {
             // An image that cannot be used costs no step that was made.
@@ -121,7 +127,7 @@ pub fn train(
         let progress = run.step(answers)?;
         report(&progress);
         let step = run.adam.steps;
-        let due = |every: NonZeroUsize| step.is_multiple_of(every.get() as u64) || step == steps;
+        let due = |every| is_due(every, step, steps);
         let stopped = stop.load(Ordering::Relaxed);
         if due(config.log_every) {
             run.log_step(&progress)?;
@@ -136,6 +142,11 @@ pub fn train(
     }
     run.network.save(&folder.join("weights.safetensors"))?;
     Ok(Ended::Finished)
+}
+
+/// Whether what is done `every` so many steps is done after `step`; all is after the last one.
+fn is_due(every: NonZeroUsize, step: u64, steps: u64) -> bool {
+    step.is_multiple_of(every.get() as u64) || step == steps
 }
 
 fn network(config: &TrainConfig) -> Result<QualityNetwork, TrainError> {
@@ -264,6 +275,23 @@ impl Run<'_> {
         })
     }
 
+    /// Evaluates after the step of the checkpoint, if that was due and failed when the step was made.
+    fn make_up_evaluation(&mut self) -> Result<(), TrainError> {
+        let step = self.adam.steps;
+        let due = is_due(
+            self.config.checkpoint_every,
+            step,
+            self.config.schedule().steps(),
+        );
+        let mut rows = self.log.rows.iter().rev();
+        let done = rows.any(|row| row.step == step && row.scalars.contains_key(EVALUATION));
+        if step == 0 || !due || done || self.evaluation.is_none() {
+            return Ok(());
+        }
+        self.evaluate()?;
+        self.write_events()
+    }
+
     /// Adds a row of the evaluation to the log, if there is anybody to evaluate on.
     fn evaluate(&mut self) -> Result<(), TrainError> {
         if let Some(images) = &self.evaluation {
@@ -279,7 +307,7 @@ impl Run<'_> {
                 errors.iter().map(score).sum::<f64>() / errors.len() as f64
             };
             let scalars = [
-                ("evaluation/mae".to_owned(), mean(|e| e.abs())),
+                (EVALUATION.to_owned(), mean(|e| e.abs())),
                 ("evaluation/mse".to_owned(), mean(|e| e * e)),
             ];
             self.log.push(LogRow {
@@ -307,6 +335,11 @@ impl Run<'_> {
         } = &*self;
         checkpoint::save(checkpoint, network, adam, config, data)?;
         evaluated?;
+        self.write_events()
+    }
+
+    /// Writes TensorBoard's events from the log.
+    fn write_events(&self) -> Result<(), TrainError> {
         let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
         let started = now.map_or(0.0, |now| now.as_secs_f64()) - self.seconds();
         let events = tensorboard_events(&self.log.rows, started);

@@ -1,12 +1,13 @@
 //! Weight files: safetensors and PyTorch's zip files in, safetensors out.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry::{Occupied, Vacant};
 use std::path::Path;
 
 use candle_core::{DType, Device, Tensor, pickle};
 
 use super::names::{timm_name, without_prefix};
-use super::{FirstConvolution, Loaded, WeightsError};
+use super::{FirstConvolution, Loaded, WeightsError, missing, other_shape};
 use crate::network::{EfficientNetB0, Named};
 
 const FIRST: &str = "features.0.0.weight";
@@ -24,7 +25,8 @@ impl EfficientNetB0 {
     /// the network is then as before.
     pub fn load(&self, path: &Path, first: FirstConvolution) -> Result<Loaded, WeightsError> {
         let (loaded, tensors) = self.fit(read(path)?, first)?;
-        self.assign(&tensors).map_err(|error| error.in_file(path))?;
+        let assigned = self.assign(&tensors);
+        assigned.map_err(|error| error.in_file(path, &loaded.unused))?;
         Ok(loaded)
     }
 
@@ -34,24 +36,34 @@ impl EfficientNetB0 {
         found: HashMap<String, Tensor>,
         first: FirstConvolution,
     ) -> Result<(Loaded, HashMap<String, Tensor>), WeightsError> {
-        let mut found: HashMap<String, Tensor> = found
-            .into_iter()
-            .map(|(name, tensor)| (without_prefix(&name).to_owned(), tensor))
-            .collect();
+        let mut all: Vec<(String, Tensor)> = found.into_iter().collect();
+        all.sort_by(|(one, _), (other, _)| one.cmp(other));
+        let mut loaded = Loaded::default();
+        let mut found: HashMap<String, (String, Tensor)> = HashMap::new();
+        for (name, tensor) in all {
+            match found.entry(without_prefix(&name).to_owned()) {
+                Vacant(place) => drop(place.insert((name, tensor))),
+                // The same tensor behind another prefix.
+                Occupied(_) => loaded.unused.push(name),
+            }
+        }
         let timm = found.contains_key("conv_stem.weight");
         let mut tensors = HashMap::new();
-        let mut loaded = Loaded::default();
         for own in self.parameters()?.into_iter().chain(self.statistics()?) {
             let name =
                 if timm { timm_name(&own.name) } else { None }.unwrap_or_else(|| own.name.clone());
-            let Some(tensor) = found.remove(&name) else {
+            let Some((given, tensor)) = found.remove(&name) else {
                 continue;
             };
             let several = own.name == FIRST
                 && matches!(tensor.dims(), [32, channels, 3, 3] if *channels != 1);
             let outputs = CLASSIFIER.contains(&own.name.as_str())
                 && tensor.dims()[..] != own.tensor.dims()[..];
+            let differs = || other_shape(&given, tensor.dims(), own.tensor.dims());
             let taken = if several {
+                if first == FirstConvolution::Fresh {
+                    loaded.kept.push(differs());
+                }
                 loaded.first_convolution = Some(first);
                 match first {
                     FirstConvolution::Fresh => own.tensor,
@@ -60,16 +72,18 @@ impl EfficientNetB0 {
                 }
             } else if outputs {
                 loaded.fresh_classifier = true;
+                loaded.kept.push(differs());
                 own.tensor
             } else {
                 tensor
             };
             tensors.insert(own.name, taken);
         }
-        loaded.unused = found
-            .into_keys()
-            .filter(|name| !name.ends_with("num_batches_tracked"))
-            .collect();
+        loaded
+            .unused
+            .extend(found.into_values().map(|(name, _)| name));
+        let counter = |name: &String| name.ends_with("num_batches_tracked");
+        loaded.unused.retain(|name| !counter(name));
         loaded.unused.sort();
         if loaded.fresh_classifier {
             // A weight without its bias, or the other way round, is no classifier.
@@ -78,6 +92,9 @@ impl EfficientNetB0 {
                 .into_iter()
                 .filter(|own| CLASSIFIER.contains(&own.name.as_str()))
             {
+                if !tensors.contains_key(&own.name) {
+                    loaded.kept.push(missing(&own.name));
+                }
                 tensors.insert(own.name, own.tensor);
             }
         }

@@ -6,7 +6,7 @@ use std::path::Path;
 use candle_core::Tensor;
 
 use super::file::{read, write};
-use super::{FirstConvolution, Loaded, WeightsError, assign};
+use super::{FirstConvolution, Loaded, WeightsError, assign, missing};
 use crate::network::{CAMERA_PREFIXES, Fusion, FusionKind, LateFusion, Options, QualityNetwork};
 
 impl QualityNetwork {
@@ -71,6 +71,7 @@ impl QualityNetwork {
         first: FirstConvolution,
     ) -> Result<Loaded, WeightsError> {
         let mut tensors = HashMap::new();
+        let mut loaded = Loaded::default();
         let late = self.late().map_or(&[][..], LateFusion::entries);
         let has_late = late.iter().any(|entry| found.contains_key(&entry.name));
         for named in self.tensors()? {
@@ -78,26 +79,40 @@ impl QualityNetwork {
                 match found.remove(&named.name) {
                     Some(tensor) => tensors.insert(named.name, tensor),
                     None if has_late => None,
-                    None => tensors.insert(named.name, named.tensor),
+                    None => {
+                        loaded.kept.push(missing(&named.name));
+                        tensors.insert(named.name, named.tensor)
+                    }
                 };
             }
         }
-        let mut loaded = Loaded::default();
         let by_camera = self.branches().len() == 2 && found.keys().any(|name| of_a_camera(name));
-        for (branch, prefix) in self.branches().iter().zip(self.prefixes()) {
-            let own = |(name, tensor): (&String, &Tensor)| match by_camera {
-                true => Some((name.strip_prefix(prefix)?.to_owned(), tensor.clone())),
-                false => Some((name.clone(), tensor.clone())),
+        for (number, (branch, prefix)) in self.branches().iter().zip(self.prefixes()).enumerate() {
+            let of_branch = match by_camera {
+                true => of_network(&mut found, prefix),
+                false => found.clone(),
             };
-            let (of_branch, fitting) = branch.fit(found.iter().filter_map(own).collect(), first)?;
-            loaded = of_branch;
-            tensors.extend(
-                fitting
-                    .into_iter()
-                    .map(|(name, t)| (format!("{prefix}{name}"), t)),
-            );
+            let (of_branch, fitting) = branch.fit(of_branch, first)?;
+            // Both cameras' networks say the same of a file of one network.
+            if by_camera || number == 0 {
+                let prefix = if by_camera { prefix } else { "" };
+                let whole = |name| format!("{prefix}{name}");
+                loaded.kept.extend(of_branch.kept.into_iter().map(whole));
+                loaded
+                    .unused
+                    .extend(of_branch.unused.into_iter().map(whole));
+                loaded.first_convolution = loaded.first_convolution.or(of_branch.first_convolution);
+                loaded.fresh_classifier |= of_branch.fresh_classifier;
+            }
+            let fitting = fitting.into_iter();
+            tensors.extend(fitting.map(|(name, tensor)| (format!("{prefix}{name}"), tensor)));
         }
-        self.assign(&tensors).map_err(|error| error.in_file(path))?;
+        if by_camera {
+            loaded.unused.extend(found.into_keys());
+            loaded.unused.sort();
+        }
+        let assigned = self.assign(&tensors);
+        assigned.map_err(|error| error.in_file(path, &loaded.unused))?;
         Ok(loaded)
     }
 
@@ -114,4 +129,11 @@ impl QualityNetwork {
 fn of_a_camera(name: &str) -> bool {
     let mut prefixes = CAMERA_PREFIXES.iter();
     prefixes.any(|prefix| name.starts_with(prefix))
+}
+
+/// Takes out the tensors of the network whose names begin with `prefix`, by the names that they have in it.
+fn of_network(found: &mut HashMap<String, Tensor>, prefix: &str) -> HashMap<String, Tensor> {
+    let own = found.extract_if(|name, _| name.starts_with(prefix));
+    own.map(|(name, tensor)| (name[prefix.len()..].to_owned(), tensor))
+        .collect()
 }

@@ -7,7 +7,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use cpu_time::ProcessTime;
 use ppa_learn::data::{Augmentation, Views};
-use ppa_learn::train::{Ended, Layers, Source, TrainConfig, TrainError, read_log, train};
+use ppa_learn::train::{
+    Ended, Layers, Source, TrainConfig, TrainError, read_log, read_start, train,
+};
 use ppa_learn::{Fusion, FusionKind};
 
 use crate::toy::dataset;
@@ -356,6 +358,74 @@ fn an_image_that_cannot_be_used_costs_no_steps() {
     let steps: Vec<u64> = log.iter().map(|row| row.step).collect();
     assert!(step > 1);
     assert_eq!(steps, (1..=step).collect::<Vec<_>>());
+}
+
+#[test]
+fn an_evaluation_that_failed_is_made_up_when_the_training_goes_on() {
+    let data = dataset(2, &[90]);
+    let image = data
+        .path()
+        .join("patient_1/depth/r/orig/depth_cam_left_45.0.png");
+    let whole = fs::read(&image).unwrap();
+    for steps in [2, 3] {
+        // After the last step, and after one before.
+        let config = TrainConfig {
+            steps,
+            ..config(data.path())
+        };
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(&image, "no image").unwrap();
+        let error = run(&config, folder.path()).unwrap_err();
+        assert!(matches!(error, TrainError::Data(_)), "{error}");
+        fs::write(&image, &whole).unwrap();
+        assert_eq!(run(&config, folder.path()).unwrap(), Ended::Finished);
+        let evaluated = |folder: &Path| {
+            let rows = read_log(&folder.join("log.jsonl")).unwrap().into_iter();
+            let rows = rows.filter(|row| row.scalars.contains_key("evaluation/mae"));
+            rows.map(|row| (row.step, row.scalars)).collect::<Vec<_>>()
+        };
+        let events = fs::read(folder.path().join("events.out.tfevents.ppa")).unwrap();
+        assert!(events.windows(14).any(|bytes| bytes == b"evaluation/mae"));
+        let other = tempfile::tempdir().unwrap();
+        run(&config, other.path()).unwrap();
+        assert_eq!(evaluated(folder.path()), evaluated(other.path()));
+        assert_eq!(evaluated(folder.path())[0].0, 2);
+    }
+}
+
+#[test]
+fn what_a_start_file_lacks_or_has_beyond_the_network_is_told_by_name() {
+    let data = dataset(2, &[90]);
+    let folder = tempfile::tempdir().unwrap();
+    let before = folder.path().join("before");
+    let config = TrainConfig {
+        steps: 1,
+        ..config(data.path())
+    };
+    run(&config, &before).unwrap();
+    assert_eq!(read_start(&before).unwrap(), None);
+    let config = TrainConfig {
+        start: Some(before.join("checkpoint.safetensors")),
+        ..pairs(data.path(), FusionKind::Late, true)
+    };
+    let after = folder.path().join("after");
+    stop_after(&config, &after, 1);
+    let told = read_start(&after).unwrap().unwrap();
+    let moments = [
+        "adam.first.0",
+        "adam.first.1",
+        "adam.second.0",
+        "adam.second.1",
+    ];
+    assert_eq!(told.unused, moments);
+    let kept: Vec<&str> = told
+        .kept
+        .iter()
+        .map(|c| c.split(' ').next().unwrap())
+        .collect();
+    let layers = ["fc.0.weight", "fc.0.bias", "fc.3.weight", "fc.3.bias"];
+    assert_eq!(kept[..4], layers);
+    assert_eq!(kept[4..], ["classifier.1.weight", "classifier.1.bias"]);
 }
 
 #[cfg(unix)]

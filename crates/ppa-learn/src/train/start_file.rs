@@ -1,0 +1,32 @@
+//! What a training did not take from its `start` file as it stood, for whoever looks at the run later.
+
+use std::path::{Path, PathBuf};
+
+use ppa_dataset::write_whole;
+
+use super::error::{TrainError, at};
+use crate::weights::Loaded;
+
+fn path(folder: &Path) -> PathBuf {
+    folder.join("start.json")
+}
+
+/// Writes `start.json` into a run's folder.
+pub(super) fn write(folder: &Path, loaded: &Loaded) -> Result<(), TrainError> {
+    let json = serde_json::to_string_pretty(loaded).expect("names are JSON");
+    Ok(write_whole(&path(folder), json.as_bytes())?)
+}
+
+/// What the training in a folder did not take from its `start` file as it stood; none without such a file.
+///
+/// # Errors
+/// [`TrainError::File`] if `start.json` is there but cannot be read.
+pub fn read_start(folder: &Path) -> Result<Option<Loaded>, TrainError> {
+    let path = path(folder);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let text = std::fs::read_to_string(&path).map_err(at("read", &path))?;
+    let loaded = serde_json::from_str(&text).map_err(std::io::Error::from);
+    Ok(Some(loaded.map_err(at("read", &path))?))
+}
