@@ -15,6 +15,7 @@ mod error;
 mod gradient;
 mod images;
 mod loader;
+mod lost_pixels;
 mod prepare;
 mod raster;
 mod rotate;

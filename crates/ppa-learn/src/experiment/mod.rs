@@ -4,12 +4,14 @@
 //! top of a pretraining that several runs share ([`Unit::needs`]). The predictions of the two views are joined
 //! ([`join_views`]), their metrics brought together ([`Results`]) and printed as the paper does ([`Table`]). A [`Runner`] carries all that out for an [`ExperimentPlan`].
 
+mod cell;
 mod configuration;
 mod error;
 mod folds;
 mod metric;
 mod plan;
 mod predictions;
+mod record;
 mod results;
 mod run;
 mod table;

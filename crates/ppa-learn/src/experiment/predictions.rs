@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::path::Path;
 
 use ppa_dataset::layout::{LimbId, Side};
 use ppa_metrics::{MetricError, PoseTriple, mean_per_pose};
 use serde::{Deserialize, Serialize};
 
+use super::error::ExperimentError;
 use crate::evaluate::triple;
 
 /// A depth image of a test set without its camera: both cameras see the same moment.
@@ -181,6 +183,21 @@ pub fn pose_triples(rows: &[Prediction]) -> Result<Vec<PoseTriple>, PredictionEr
 struct Pose {
     label: f64,
     frames: Vec<f64>,
+}
+
+/// The rows of a `predictions.csv`.
+///
+/// # Errors
+/// [`ExperimentError::Unreadable`] naming the file.
+pub(super) fn read_predictions(path: &Path) -> Result<Vec<Prediction>, ExperimentError> {
+    let wrong = |error: csv::Error| ExperimentError::Unreadable {
+        path: path.to_owned(),
+        message: error.to_string(),
+    };
+    // Read whole: to `csv` a header that cannot be read is an empty table.
+    let bytes = std::fs::read(path).map_err(|error| wrong(error.into()))?;
+    let rows = csv::Reader::from_reader(&bytes[..]).into_deserialize();
+    rows.collect::<Result<_, _>>().map_err(wrong)
 }
 
 #[cfg(test)]

@@ -6,17 +6,16 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use ppa_dataset::layout::View;
-use ppa_dataset::{BodyShape, FileError, sha256_of_file, write_whole};
-use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
+use ppa_dataset::{BodyShape, sha256_of_file, write_whole};
 
 use super::configuration::{Experiment, Start};
 use super::error::ExperimentError;
 use super::plan::{ExperimentPlan, Fold};
-use super::predictions::{Prediction, join_views};
+use super::predictions::{Prediction, join_views, read_predictions};
+use super::record::{Record, file, fingerprint, read_json, without_paths};
 use super::results::Results;
 use super::unit::{Unit, runs};
-use crate::data::{Images, Sample, Views, check_split};
+use crate::data::{Images, Views, check_split};
 use crate::evaluate::{Row, write_predictions};
 use crate::train::{
     Ended, Layers, Progress, Source, TrainConfig, TrainError, predict, samples, train, trained,
@@ -45,14 +44,6 @@ pub struct Runner<'a> {
     experiment: Experiment,
     root: &'a Path,
     folds: Vec<Fold>,
-}
-
-/// What a finished training was: its settings without paths, and what it began with and saw.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
-struct Record {
-    config: TrainConfig,
-    start_sha256: Option<String>,
-    data_sha256: String,
 }
 
 impl<'a> Runner<'a> {
@@ -251,15 +242,7 @@ impl<'a> Runner<'a> {
             return Err(ExperimentError::OtherSettings(folder));
         }
         let path = folder.join("predictions.csv");
-        let wrong = |error: csv::Error| ExperimentError::Unreadable {
-            path: path.clone(),
-            message: error.to_string(),
-        };
-        // Read whole: to `csv` a header that cannot be read is an empty table.
-        let bytes = std::fs::read(&path).map_err(|error| wrong(error.into()))?;
-        let rows = csv::Reader::from_reader(&bytes[..]).into_deserialize();
-        let rows = rows.collect::<Result<_, _>>();
-        Ok(Some(rows.map_err(wrong)?))
+        Ok(Some(read_predictions(&path)?))
     }
 
     /// What is known so far: the results of all test sets of which both views are finished.
@@ -295,16 +278,6 @@ impl<'a> Runner<'a> {
     }
 }
 
-/// The settings that the results of a training depend on.
-fn without_paths(config: &TrainConfig) -> TrainConfig {
-    TrainConfig {
-        start: None,
-        training: vec![],
-        evaluation: vec![],
-        ..config.of_results()
-    }
-}
-
 /// What the network of a finished training says of its test set.
 fn test(folder: &Path, config: &TrainConfig) -> Result<Vec<Row>, TrainError> {
     let (_, network) = trained(folder)?;
@@ -315,41 +288,9 @@ fn test(folder: &Path, config: &TrainConfig) -> Result<Vec<Row>, TrainError> {
     Ok(Row::of(images.samples(), &predictions))
 }
 
-/// A hash of what training and test sets hold, but not where they lie.
-fn fingerprint(sets: &[Vec<Sample>; 2]) -> String {
-    let mut hash = Sha256::new();
-    for set in sets {
-        for sample in set {
-            let regions: Vec<_> = sample.images.iter().map(|image| image.roi).collect();
-            hash.update(format!("{} {} {regions:?}\n", sample.id, sample.label));
-        }
-        hash.update("end\n");
-    }
-    hash.finalize()
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect()
-}
-
-fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, ExperimentError> {
-    let text = std::fs::read_to_string(path).map_err(file("read", path))?;
-    serde_json::from_str(&text).map_err(|error| ExperimentError::Unreadable {
-        path: path.to_owned(),
-        message: error.to_string(),
-    })
-}
-
 fn of_view(view: View) -> Views {
     match view {
         View::Left => Views::Left,
         View::Right => Views::Right,
-    }
-}
-
-fn file<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(std::io::Error) -> FileError + 'a {
-    move |source| FileError {
-        action,
-        path: path.to_owned(),
-        source,
     }
 }

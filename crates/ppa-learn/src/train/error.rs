@@ -10,7 +10,7 @@ use crate::data::DataError;
 use crate::network::NetworkError;
 use crate::weights::WeightsError;
 
-use super::config::ConfigError;
+use super::config_error::ConfigError;
 use super::finite::Trouble;
 
 /// Why a training cannot begin, go on or be evaluated.

@@ -6,7 +6,7 @@ use candle_core::Tensor;
 
 use super::config::{Layers, TrainConfig};
 use super::error::TrainError;
-use super::run::tensors;
+use super::trained::tensors;
 use crate::data::{Balanced, Images, Loader, Order};
 use crate::network::{Mode, QualityNetwork};
 

@@ -3,5 +3,8 @@
 mod augmentation;
 mod experiments;
 mod loading;
+mod refusing;
+mod resuming;
+mod runs;
 mod toy;
 mod training;

@@ -1,0 +1,74 @@
+//! The cells of a table.
+
+use super::metric::Metric;
+use super::results::{Results, Summary};
+
+/// A number of a table as it is printed.
+#[derive(Debug, Clone)]
+pub struct Cell {
+    /// What is printed; none if there is nothing yet.
+    pub summary: Option<Summary>,
+    mean: String,
+    std: Option<String>,
+    best: bool,
+    /// Seeds that count, where they are fewer than planned.
+    of_seeds: Option<usize>,
+}
+
+impl Cell {
+    pub fn new(summary: Option<Summary>, metric: Metric, results: &Results) -> Self {
+        let print = |value: f64| format!("{:.2}", value * metric.scale());
+        let seeds = summary.map_or(0, |summary| summary.seeds);
+        Self {
+            summary,
+            mean: summary.map_or("–".to_owned(), |summary| print(summary.mean)),
+            std: summary.and_then(|summary| summary.std).map(print),
+            best: false,
+            of_seeds: (0 < seeds && seeds < results.planned_seeds()).then_some(seeds),
+        }
+    }
+
+    pub fn to_markdown(&self) -> String {
+        let mean = match self.best {
+            true => format!("**{}**", self.mean),
+            false => self.mean.clone(),
+        };
+        let std = self
+            .std
+            .as_ref()
+            .map_or(String::new(), |std| format!("±{std}"));
+        let n = self.of_seeds.map_or(String::new(), |n| format!(" (n={n})"));
+        mean + &std + &n
+    }
+
+    pub fn to_latex(&self) -> String {
+        let mean = match (self.best, self.summary) {
+            (true, _) => format!("\\textbf{{{}}}", self.mean),
+            (false, Some(_)) => self.mean.clone(),
+            (false, None) => "--".to_owned(),
+        };
+        let std = self.std.as_ref();
+        let std = std.map_or(String::new(), |std| format!("{{\\scriptsize$\\pm${std}}}"));
+        let n = self
+            .of_seeds
+            .map_or(String::new(), |n| format!(" ($n={n}$)"));
+        mean + &std + &n
+    }
+}
+
+/// Marks the best cells; those that print the same number are equally good.
+pub fn with_best(mut cells: Vec<Cell>, metric: Metric) -> Vec<Cell> {
+    let means = cells.iter().filter_map(|cell| Some(cell.summary?.mean));
+    let best = match metric.lower_is_better() {
+        true => means.reduce(f64::min),
+        false => means.reduce(f64::max),
+    };
+    let best = cells
+        .iter()
+        .find(|cell| best.is_some() && cell.summary.map(|summary| summary.mean) == best)
+        .map(|cell| cell.mean.clone());
+    for cell in &mut cells {
+        cell.best = Some(&cell.mean) == best.as_ref();
+    }
+    cells
+}

@@ -1,0 +1,46 @@
+//! Why a configuration cannot be.
+
+use std::path::PathBuf;
+
+/// A configuration that cannot be.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("cannot read {}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// It is no TOML, or lacks or has too many keys.
+    #[error("{}: {message}", path.display())]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// What and where.
+        message: String,
+    },
+    /// No such preset.
+    #[error("{}: there is no preset {found:?}; expected \"paper\" or \"quick\"", path.display())]
+    Preset {
+        /// The file.
+        path: PathBuf,
+        /// What stands there.
+        found: String,
+    },
+    /// It cannot be written as TOML, as with a path that is not UTF-8.
+    #[error("the configuration cannot be written as TOML: {0}")]
+    Write(String),
+    /// A number out of range.
+    #[error("{key} is {found}, expected {expected}")]
+    Range {
+        /// The key.
+        key: &'static str,
+        /// Its value.
+        found: String,
+        /// What it could be.
+        expected: &'static str,
+    },
+}

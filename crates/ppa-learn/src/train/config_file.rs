@@ -1,0 +1,127 @@
+//! Configurations from TOML files.
+
+use std::path::Path;
+
+use super::config::TrainConfig;
+use super::config_error::ConfigError;
+
+impl TrainConfig {
+    /// Reads a TOML file: `preset = "paper"` or `"quick"`, and every key that shall differ from it.
+    ///
+    /// # Errors
+    /// [`ConfigError`] naming file and key.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let unreadable = |source| ConfigError::Read {
+            path: path.to_owned(),
+            source,
+        };
+        let text = std::fs::read_to_string(path).map_err(unreadable)?;
+        let given = toml::from_str(&text).map_err(|error| wrong(path, &error))?;
+        let mut config = Self::from_table(given, path)?;
+        // Whole paths, so that the echo in another folder says the same.
+        let whole = std::path::absolute(path).map_err(unreadable)?;
+        let folder = whole.parent().unwrap_or(Path::new(""));
+        for source in config.training.iter_mut().chain(&mut config.evaluation) {
+            source.dataset = folder.join(&source.dataset);
+        }
+        config.start = config.start.map(|start| folder.join(start));
+        config.check()?;
+        Ok(config)
+    }
+
+    /// The configuration that a table of the file `path` says: its preset and every key that differs.
+    ///
+    /// # Errors
+    /// [`ConfigError`] naming file and key.
+    pub(crate) fn from_table(mut given: toml::Table, path: &Path) -> Result<Self, ConfigError> {
+        let preset = match given.remove("preset") {
+            None => Self::paper(),
+            Some(toml::Value::String(name)) if name == "paper" => Self::paper(),
+            Some(toml::Value::String(name)) if name == "quick" => Self::quick(),
+            Some(other) => {
+                return Err(ConfigError::Preset {
+                    path: path.to_owned(),
+                    found: other.as_str().map_or(other.to_string(), str::to_owned),
+                });
+            }
+        };
+        let mut all = toml::Table::try_from(&preset).map_err(|e| wrong(path, &e))?;
+        merge(&mut all, given);
+        all.try_into().map_err(|e: toml::de::Error| wrong(path, &e))
+    }
+}
+
+fn wrong(path: &Path, error: &dyn std::fmt::Display) -> ConfigError {
+    ConfigError::Parse {
+        path: path.to_owned(),
+        message: error.to_string().trim_end().to_owned(),
+    }
+}
+
+/// Puts every value that is given over the one that stands there; tables are merged key by key.
+fn merge(all: &mut toml::Table, given: toml::Table) {
+    for (key, value) in given {
+        match (all.get_mut(&key), value) {
+            (Some(toml::Value::Table(all)), toml::Value::Table(given)) => merge(all, given),
+            (_, value) => {
+                all.insert(key, value);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<TrainConfig, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("train.toml");
+        std::fs::write(&path, text).unwrap();
+        TrainConfig::read(&path).map_err(|error| error.to_string())
+    }
+
+    const DATA: &str = "[[training]]\ndataset = \"data\"\npatients = [1, 2]\n";
+
+    #[test]
+    fn a_preset_is_changed_key_by_key_and_written_whole() {
+        let text = format!(
+            "preset = \"quick\"\nsteps = 70\n[augmentation]\nblur_probability = 0.0\n{DATA}"
+        );
+        let config = read(&text).unwrap();
+        assert_eq!((config.side, config.steps), (48, 70));
+        assert_eq!(config.augmentation.blur_probability, 0.0);
+        assert_eq!(config.augmentation.rotate_limit_deg, 15.0);
+        assert!(config.training[0].dataset.ends_with("data"));
+        let echoed = toml::to_string(&config).unwrap();
+        assert_eq!(read(&echoed).unwrap(), config);
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        for (text, expected) in [
+            ("preset = \"fast\"", "there is no preset \"fast\""),
+            ("stepz = 3", "unknown field `stepz`"),
+            ("side = 8", "side is 8, expected 32 to 4096"),
+            ("learning_rate = nan", "learning_rate is NaN"),
+            ("steps = 0", "steps is 0"),
+            ("steps = 46000000000000000", "expected 1 to 1000000000"),
+            (
+                "workers = 1000000",
+                "workers is 1000000, expected 1 to 1024",
+            ),
+            ("batch_size = 0", "nonzero"),
+            (
+                "augmentation.flip_probability = 1.5",
+                "flip_probability is 1.5, expected 0 to 1",
+            ),
+            ("", "training is empty"),
+            ("seed = -1", "invalid value"),
+            ("device = \"gpu\"", "there is no device \"gpu\""),
+        ] {
+            let data = if text.is_empty() { "" } else { DATA };
+            let error = read(&format!("{text}\n{data}")).unwrap_err();
+            assert!(error.contains(expected), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! The network and the samples of a configuration, and what such a network says.
+
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::sync::Arc;
+
+use candle_core::{Device, Tensor};
+
+use crate::data::{Batch, Images, Loader, Order, Sample, Views, read_samples};
+use crate::network::{Mode, Options, QualityNetwork};
+
+use super::config::{LastLayer, Source, TrainConfig};
+use super::error::TrainError;
+
+/// The middle of the labels, 1 to 3.
+const MIDDLE: f32 = 2.0;
+
+/// The network that a configuration begins with.
+pub(super) fn network(config: &TrainConfig) -> Result<QualityNetwork, TrainError> {
+    let options = Options {
+        dropout: config.network.dropout,
+        stochastic_depth: config.network.stochastic_depth,
+    };
+    let fusion = (config.views == Views::Pairs).then_some(config.fusion);
+    let network = QualityNetwork::new(config.seed, options, fusion)?;
+    if config.network.last_layer == LastLayer::Middle {
+        network.begin_with(MIDDLE)?;
+    }
+    Ok(network)
+}
+
+/// The network of a finished training on the CPU: its configuration and its weights, from its folder.
+///
+/// # Errors
+/// [`TrainError`] naming the file that is missing or is none of a training.
+pub fn trained(folder: &Path) -> Result<(TrainConfig, QualityNetwork), TrainError> {
+    let config = TrainConfig::read(&folder.join("config.toml"))?;
+    let network = network(&config)?;
+    let weights = folder.join("weights.safetensors");
+    network.load(&weights, config.first_convolution)?;
+    Ok((config, network))
+}
+
+/// The labelled samples of some sources, as a training reads them.
+///
+/// # Errors
+/// [`TrainError`] for data that cannot be used.
+pub fn samples(config: &TrainConfig, sources: &[Source]) -> Result<Vec<Sample>, TrainError> {
+    let mut samples = Vec::new();
+    for source in sources {
+        let persons = source.patients.as_deref();
+        let frames = config.frames_per_pose;
+        let shapes = source.shapes.as_deref();
+        let dataset = &source.dataset;
+        samples.extend(read_samples(
+            dataset,
+            persons,
+            shapes,
+            config.views,
+            frames,
+        )?);
+    }
+    Ok(samples)
+}
+
+/// Images of each camera as a tensor [samples, 1, side, side] on a device.
+pub(super) fn tensors(
+    batch: Batch,
+    side: usize,
+    device: &Device,
+) -> Result<Vec<Tensor>, TrainError> {
+    let shape = (batch.samples.len(), 1, side, side);
+    let cameras = batch.images.into_iter();
+    let tensors = cameras.map(|images| Tensor::from_vec(images, shape, device));
+    Ok(tensors.collect::<Result<_, _>>()?)
+}
+
+/// What a network says of each sample, in order, from its evaluation images.
+///
+/// # Errors
+/// [`TrainError`] naming the image that cannot be used.
+pub fn predict(
+    network: &QualityNetwork,
+    images: &Arc<Images>,
+    batch_size: NonZeroUsize,
+    workers: NonZeroUsize,
+) -> Result<Vec<f64>, TrainError> {
+    let mut predictions = Vec::new();
+    for batch in Loader::new(images, &Order::Once, batch_size, workers) {
+        let images = tensors(batch?, images.side(), network.device())?;
+        let outputs = network.forward(&images, Mode::Eval)?;
+        let outputs: Vec<f32> = outputs.flatten_all()?.to_vec1()?;
+        predictions.extend(outputs.into_iter().map(f64::from));
+    }
+    Ok(predictions)
+}
