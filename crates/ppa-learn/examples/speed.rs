@@ -16,7 +16,7 @@ use candle_nn::{AdamW, Optimizer, ParamsAdamW};
 use cpu_time::ProcessTime;
 use ppa_dataset::layout::{LimbId, Side, View};
 use ppa_learn::data::{Augmentation, Balanced, Images, Loader, Order, Roi, Sample, SampleImage};
-use ppa_learn::{EfficientNetB0, Mode, Options};
+use ppa_learn::{EfficientNetB0, InferenceNetwork, Mode, Options, QualityNetwork};
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -52,6 +52,7 @@ fn main() -> anyhow::Result<()> {
         .collect();
     let targets = Tensor::from_vec(targets, (batch, 1), &Device::Cpu)?;
     let network = EfficientNetB0::new(0, Options::default())?;
+    let inference = InferenceNetwork::new(&QualityNetwork::new(0, Options::default(), None)?)?;
     let variables = network.variables().into_iter().cloned().collect();
     let mut adam = AdamW::new(
         variables,
@@ -64,10 +65,8 @@ fn main() -> anyhow::Result<()> {
 
     let mut step = |number: usize| -> anyhow::Result<f32> {
         if what == "infer" {
-            return Ok(network
-                .forward(&images, Mode::Eval)?
-                .sum_all()?
-                .to_scalar()?);
+            let output = inference.forward(std::slice::from_ref(&images))?;
+            return Ok(output.sum_all()?.to_scalar()?);
         }
         let outputs = network.forward(
             &images,

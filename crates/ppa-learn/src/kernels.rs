@@ -8,5 +8,7 @@ pub(crate) mod depthwise;
 pub(crate) mod depthwise_backward;
 pub(crate) mod gradient;
 pub(crate) mod matrix;
+pub(crate) mod panels;
+pub(crate) mod pointwise;
 pub(crate) mod simd;
 pub(crate) mod stem;

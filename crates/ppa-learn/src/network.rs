@@ -3,6 +3,7 @@
 mod architecture;
 mod backward;
 mod error;
+mod folded;
 mod forward;
 mod fusion;
 #[cfg(test)]
@@ -11,6 +12,7 @@ mod graph;
 #[cfg(test)]
 mod graph_tests;
 mod inference;
+mod inference_network;
 mod initialise;
 mod norm;
 mod operation;
@@ -25,8 +27,10 @@ use candle_core::{Device, Tensor, Var};
 pub use architecture::Entry;
 pub(crate) use architecture::{Architecture, ConvPlace, SqueezePlace};
 pub use error::NetworkError;
+use folded::Folded;
 pub(crate) use fusion::LateFusion;
 pub use fusion::{Fusion, FusionKind};
+pub use inference_network::InferenceNetwork;
 pub(crate) use norm::running;
 use operation::Backbone;
 pub(crate) use quality::CAMERA_PREFIXES;
@@ -88,6 +92,8 @@ pub struct EfficientNetB0 {
     classifier: Var,
     statistics: Var,
     pool: Pool,
+    /// The convolutions laid out, of a network whose variables stay as they are.
+    folded: Option<std::sync::Arc<Folded>>,
     seed: u64,
     options: Options,
 }
@@ -120,6 +126,7 @@ impl EfficientNetB0 {
             statistics: variable(statistics)?,
             architecture: std::sync::Arc::new(architecture),
             pool: Pool::default(),
+            folded: None,
             seed,
             options,
         })
@@ -204,6 +211,7 @@ impl EfficientNetB0 {
             classifier: on_device(&self.classifier, device)?,
             statistics: on_device(&self.statistics, device)?,
             pool: Pool::default(),
+            folded: None,
             ..*self
         })
     }

@@ -1,7 +1,7 @@
 //! What a new network is and does.
 
 use candle_core::{Device, Storage, Tensor};
-use ppa_learn::{EfficientNetB0, Mode, NetworkError, Options};
+use ppa_learn::{EfficientNetB0, InferenceNetwork, Mode, NetworkError, Options, QualityNetwork};
 
 /// Images of smooth waves, different for each number.
 fn images(count: usize, height: usize, width: usize) -> Tensor {
@@ -107,6 +107,32 @@ fn seed_and_step_fix_every_byte_for_any_number_of_threads() {
     assert_eq!(one, run(2, 0));
     assert_eq!(one, run(3, 0));
     assert_ne!(one, run(1, 1), "another step leaves out the same");
+}
+
+#[test]
+fn inference_gives_the_same_bytes_for_any_number_of_threads_whatever_becomes_of_its_network() {
+    let network = QualityNetwork::new(5, Options::default(), None).unwrap();
+    let inference = InferenceNetwork::new(&network).unwrap();
+    let images = [images(3, 97, 65)];
+    let expected = column(&network.forward(&images, Mode::Eval).unwrap());
+    for variable in network.variables() {
+        variable
+            .set(&(variable.as_tensor() * 2.0).unwrap())
+            .unwrap();
+    }
+    assert_ne!(
+        expected,
+        column(&network.forward(&images, Mode::Eval).unwrap())
+    );
+    for threads in 1..4 {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let run = || column(&inference.forward(&images).unwrap());
+        assert_eq!(
+            expected,
+            pool.build().unwrap().install(run),
+            "{threads} threads"
+        );
+    }
 }
 
 #[test]

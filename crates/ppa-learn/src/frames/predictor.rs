@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::camera::Camera;
 use crate::DeviceName;
 use crate::data::{Roi, Views};
-use crate::network::{Mode, NetworkError, QualityNetwork};
+use crate::network::{InferenceNetwork, NetworkError};
 use crate::train::{TrainConfig, TrainError, trained};
 
 /// Why frames cannot be judged.
@@ -86,7 +86,7 @@ enum Networks {
 
 #[derive(Debug)]
 struct Trained {
-    network: QualityNetwork,
+    network: InferenceNetwork,
     side: usize,
 }
 
@@ -105,7 +105,7 @@ impl PairPredictor {
         let device = device.open().map_err(TrainError::from)?;
         let trained = |run: &Path| -> Result<_, TrainError> {
             let (config, network) = trained(run)?;
-            Ok((config, network.to_device(&device)?))
+            Ok((config, InferenceNetwork::new(&network.to_device(&device)?)?))
         };
         let (config, network) = trained(left)?;
         let of = |config: &TrainConfig, network| Trained {
@@ -180,7 +180,7 @@ impl PairPredictor {
 impl Trained {
     /// What the network says of one image of each of its cameras.
     fn quality(&self, images: &[Tensor]) -> Result<f64, TrainError> {
-        let quality = self.network.forward(images, Mode::Eval)?;
+        let quality = self.network.forward(images)?;
         let quality = quality.flatten_all().and_then(|all| all.to_vec1::<f32>());
         Ok(f64::from(quality.map_err(NetworkError::from)?[0]))
     }

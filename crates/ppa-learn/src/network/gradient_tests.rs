@@ -5,6 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::architecture::{Architecture, Stage};
 use super::backward::Backward;
+use super::folded::Folded;
 use super::forward::Forward;
 use super::inference::Inference;
 use super::reference::{Maps, features};
@@ -127,7 +128,8 @@ proptest! {
                 *variance = (weight / scale).powi(2) - 1e-5;
             }
         }
-        let inference = Inference { architecture: &architecture, parameters: &parameters, statistics: &moments, pool: &pool };
+        let folded = Folded::new(&architecture, &parameters, &moments, &pool);
+        let inference = Inference { architecture: &architecture, folded: &folded, parameters: &parameters, pool: &pool };
         for (inferred, trained) in inference.run(&images, size.height, size.width).iter().zip(&trained) {
             prop_assert!((inferred - trained).abs() < 1e-4 * (1.0 + trained.abs()), "{inferred} {trained}");
         }

@@ -6,6 +6,7 @@ use candle_core::{CpuStorage, CustomOp2, Error, Layout, Result, Shape, Tensor, V
 
 use super::architecture::{Architecture, FEATURES};
 use super::backward::Backward;
+use super::folded::Folded;
 use super::forward::Forward;
 use super::inference::Inference;
 use super::tape::{Size, Tape};
@@ -18,6 +19,7 @@ pub struct Backbone {
     architecture: Arc<Architecture>,
     statistics: Var,
     pool: Pool,
+    folded: Option<Arc<Folded>>,
     seed: u64,
     mode: Mode,
     tape: Mutex<Option<Tape>>,
@@ -29,6 +31,7 @@ impl Backbone {
             architecture: network.architecture.clone(),
             statistics: network.statistics.clone(),
             pool: network.pool.clone(),
+            folded: network.folded.clone(),
             seed: network.seed,
             mode,
             tape: Mutex::new(None),
@@ -83,11 +86,16 @@ impl CustomOp2 for Backbone {
                 features
             }
             Mode::Eval => {
+                let (architecture, pool) = (&self.architecture, &self.pool);
+                let folded = match &self.folded {
+                    Some(folded) => folded.clone(),
+                    None => Folded::new(architecture, parameters, &statistics, pool).into(),
+                };
                 let inference = Inference {
-                    architecture: &self.architecture,
+                    architecture,
+                    folded: &folded,
                     parameters,
-                    statistics: &statistics,
-                    pool: &self.pool,
+                    pool,
                 };
                 inference.run(images, height, width)
             }

@@ -220,6 +220,10 @@ impl QualityNetwork {
         &self.branches
     }
 
+    pub(super) fn branches_mut(&mut self) -> &mut [EfficientNetB0] {
+        &mut self.branches
+    }
+
     pub(crate) fn late(&self) -> Option<&LateFusion> {
         self.late.as_ref()
     }

@@ -1,0 +1,215 @@
+//! Pointwise convolution in inference: a product with weights that were laid out beforehand, activated before it leaves the registers.
+
+use pulp::{Simd, WithSimd};
+
+use super::panels::{PANEL, Panels, groups, widest};
+use super::simd::{dispatch, fma, lanes, lanes_mut, sigmoid};
+
+/// Pixels that meet one group of channels after the other, so that they stay in the second-level cache.
+const BLOCK: usize = 64;
+
+/// out = SiLU(convolution), pixel `p` of which begins at `place(p)`, of pixels [pixels, columns].
+pub fn activated(input: &[f32], panels: &Panels, place: impl Fn(usize) -> usize, out: &mut [f32]) {
+    let added = None;
+    dispatch(
+        PANEL,
+        Forward::<true, _> {
+            input,
+            panels,
+            place,
+            added,
+            out,
+        },
+    );
+}
+
+/// out = convolution of pixels [pixels, columns], plus what the block was given where it adds it.
+pub fn normalised(input: &[f32], panels: &Panels, added: Option<&[f32]>, out: &mut [f32]) {
+    let place = |pixel| pixel * panels.channels();
+    dispatch(
+        PANEL,
+        Forward::<false, _> {
+            input,
+            panels,
+            place,
+            added,
+            out,
+        },
+    );
+}
+
+struct Forward<'a, const ACTIVATE: bool, P> {
+    input: &'a [f32],
+    panels: &'a Panels,
+    place: P,
+    added: Option<&'a [f32]>,
+    out: &'a mut [f32],
+}
+
+impl<const ACTIVATE: bool, P: Fn(usize) -> usize> WithSimd for Forward<'_, ACTIVATE, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let columns = self.panels.columns();
+        let pixels = self.input.len() / columns;
+        for start in (0..pixels).step_by(BLOCK) {
+            let block = start..pixels.min(start + BLOCK);
+            for (first, width) in groups(self.panels.channels(), widest::<S>()) {
+                // As many sums as registers hold beside the weights.
+                match width / S::F32_LANES {
+                    1 => self.group::<S, 8, 1>(simd, block.clone(), first),
+                    2 if S::F32_LANES == PANEL => self.group::<S, 8, 2>(simd, block.clone(), first),
+                    2 => self.group::<S, 6, 2>(simd, block.clone(), first),
+                    3 => self.group::<S, 8, 3>(simd, block.clone(), first),
+                    4 => self.group::<S, 6, 4>(simd, block.clone(), first),
+                    _ => self.group::<S, 1, PANEL>(simd, block.clone(), first),
+                }
+            }
+        }
+    }
+}
+
+impl<const ACTIVATE: bool, P: Fn(usize) -> usize> Forward<'_, ACTIVATE, P> {
+    /// The channels of one group, from the first one on, of a run of pixels.
+    #[inline(always)]
+    fn group<S: Simd, const M: usize, const V: usize>(
+        &mut self,
+        simd: S,
+        pixels: std::ops::Range<usize>,
+        first: usize,
+    ) {
+        let columns = self.panels.columns();
+        let width = V * S::F32_LANES;
+        let weights = lanes::<S>(&self.panels.values[first * columns..][..width * columns]);
+        let shift = lanes::<S>(&self.panels.shift[first..][..width]);
+        let shift: [S::f32s; V] = std::array::from_fn(|v| shift[v]);
+        let channels = width.min(self.panels.channels() - first);
+        for start in pixels.clone().step_by(M) {
+            // The last pixel stands in for those beyond it.
+            let row =
+                |m: usize| &self.input[(start + m).min(pixels.end - 1) * columns..][..columns];
+            let sums = tile::<S, M, V>(simd, std::array::from_fn(row), weights, shift);
+            for (m, sums) in sums.into_iter().enumerate() {
+                if start + m < pixels.end {
+                    let at = (self.place)(start + m) + first;
+                    self.store(simd, at..at + channels, sums);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn store<S: Simd, const V: usize>(
+        &mut self,
+        simd: S,
+        at: std::ops::Range<usize>,
+        sums: [S::f32s; V],
+    ) {
+        for (v, sum) in sums.into_iter().enumerate() {
+            let from = (at.start + v * S::F32_LANES).min(at.end);
+            let at = from..at.end.min(from + S::F32_LANES);
+            let y = match self.added {
+                Some(added) => simd.add_f32s(sum, simd.partial_load_f32s(&added[at.clone()])),
+                None => sum,
+            };
+            let y = if ACTIVATE {
+                simd.mul_f32s(y, sigmoid(simd, y))
+            } else {
+                y
+            };
+            match &mut self.out[at] {
+                out if out.len() == S::F32_LANES => lanes_mut::<S>(out)[0] = y,
+                out => simd.partial_store_f32s(out, y),
+            }
+        }
+    }
+}
+
+/// Sums over all columns of M pixels and V vectors of channels, from `shift` on.
+#[inline(always)]
+fn tile<S: Simd, const M: usize, const V: usize>(
+    simd: S,
+    rows: [&[f32]; M],
+    weights: &[S::f32s],
+    shift: [S::f32s; V],
+) -> [[S::f32s; V]; M] {
+    let mut sums = [shift; M];
+    // Four columns at a time, so that bounds are checked once for all of them.
+    let (weights, _) = weights.as_chunks::<V>();
+    let (fours, rest) = weights.as_chunks::<4>();
+    for (number, weights) in fours.iter().enumerate() {
+        let mut x = [&[0.0; 4]; M];
+        for m in 0..M {
+            x[m] = &rows[m].as_chunks::<4>().0[number];
+        }
+        for k in 0..4 {
+            for m in 0..M {
+                let x = simd.splat_f32s(x[m][k]);
+                for v in 0..V {
+                    sums[m][v] = fma(simd, x, weights[k][v], sums[m][v]);
+                }
+            }
+        }
+    }
+    for (k, weights) in rest.iter().enumerate() {
+        for m in 0..M {
+            let x = simd.splat_f32s(rows[m][4 * fours.len() + k]);
+            for v in 0..V {
+                sums[m][v] = fma(simd, x, weights[v], sums[m][v]);
+            }
+        }
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernels::batch_norm::Affine;
+    use crate::kernels::buffer::Pool;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn convolutions_are_those_of_the_definition(
+            (pixels, channels, columns) in (1_usize..80, 1_usize..70, 1_usize..40),
+            gated in any::<bool>(),
+            seed in 0_u32..1000,
+        ) {
+            let value = |i: usize| ((i as u32 * 7919 + seed * 31) % 17) as f32 - 8.0;
+            let values = |count: usize| -> Vec<f32> { (0..count).map(value).collect() };
+            let (input, weight, added) = (values(pixels * columns), values(channels * columns), values(pixels * channels));
+            let affine = Affine { scale: values(channels), shift: values(channels) };
+            let gate: Vec<f32> = if gated { values(columns) } else { vec![1.0; columns] };
+            let pool = Pool::default();
+            let panels = Panels::new(&weight, &affine, &pool);
+            let panels = if gated { panels.gated(&gate, &pool) } else { panels };
+            let expected: Vec<f32> = (0..pixels * channels)
+                .map(|i| {
+                    let (pixel, c) = (i / channels, i % channels);
+                    let products = (0..columns).map(|k| input[pixel * columns + k] * gate[k] * weight[c * columns + k]);
+                    affine.shift[c] + affine.scale[c] * products.sum::<f32>()
+                })
+                .collect();
+
+            let mut out = vec![0.0; pixels * channels];
+            normalised(&input, &panels, None, &mut out);
+            prop_assert_eq!(&out, &expected); // whole numbers below 2^24: exact
+            normalised(&input, &panels, Some(&added), &mut out);
+            let sums: Vec<f32> = expected.iter().zip(&added).map(|(x, added)| x + added).collect();
+            prop_assert_eq!(&out, &sums);
+
+            // With a gap of three values after each pixel, which stays as it is.
+            let mut out = vec![9.0; pixels * (channels + 3)];
+            activated(&input, &panels, |pixel| pixel * (channels + 3), &mut out);
+            for (out, expected) in out.chunks(channels + 3).zip(expected.chunks(channels)) {
+                prop_assert_eq!(&out[channels..], &[9.0; 3]);
+                for (out, x) in out.iter().zip(expected) {
+                    let silu = x / (1.0 + (-x).exp());
+                    prop_assert!((out - silu).abs() <= 1e-6 * silu.abs() + 1e-6, "{out} {silu}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! What inference needs of the parameters, made ready once for as many images as follow.
+
+use super::architecture::{Architecture, ConvPlace};
+use super::norm::running;
+use crate::kernels::batch_norm::Affine;
+use crate::kernels::buffer::Pool;
+use crate::kernels::depthwise::channels_last;
+use crate::kernels::panels::Panels;
+
+/// Every convolution of a backbone, with the normalisation after it where that can be folded in.
+#[derive(Debug)]
+pub struct Folded {
+    pub stem: Taps,
+    pub blocks: Vec<FoldedBlock>,
+    pub head: Panels,
+}
+
+/// The convolutions of a block; the first one's expansion is the stem.
+#[derive(Debug)]
+pub struct FoldedBlock {
+    pub expand: Option<Panels>,
+    pub depthwise: Taps,
+    pub project: Panels,
+}
+
+/// A convolution of each channel by itself [kernel, kernel, channels], and the normalisation after it.
+#[derive(Debug)]
+pub struct Taps {
+    pub weights: Vec<f32>,
+    pub affine: Affine,
+}
+
+impl Folded {
+    pub fn new(
+        architecture: &Architecture,
+        parameters: &[f32],
+        statistics: &[f32],
+        pool: &Pool,
+    ) -> Self {
+        let affine = |place: &ConvPlace| running(&place.norm, parameters, statistics);
+        let weight = |place: &ConvPlace| &parameters[place.weight.clone()];
+        let panels = |place: &ConvPlace| Panels::new(weight(place), &affine(place), pool);
+        let taps = |place: &ConvPlace| Taps {
+            weights: channels_last(weight(place), place.channels),
+            affine: affine(place),
+        };
+        let blocks = architecture.blocks.iter().enumerate();
+        let blocks = blocks.map(|(index, block)| FoldedBlock {
+            expand: (index > 0).then(|| panels(&block.expand)),
+            depthwise: taps(&block.depthwise),
+            project: panels(&block.project),
+        });
+        Self {
+            stem: taps(&architecture.blocks[0].expand),
+            blocks: blocks.collect(),
+            head: panels(&architecture.head),
+        }
+    }
+}
