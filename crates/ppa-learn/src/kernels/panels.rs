@@ -96,10 +96,10 @@ impl Panels {
     }
 }
 
-struct LayOut<'a> {
-    weight: &'a [f32],
-    scale: &'a [f32],
-    values: &'a mut [f32],
+pub(super) struct LayOut<'a> {
+    pub weight: &'a [f32],
+    pub scale: &'a [f32],
+    pub values: &'a mut [f32],
 }
 
 impl WithSimd for LayOut<'_> {

@@ -5,10 +5,7 @@ use pulp::{Simd, WithSimd};
 use super::panels::{PANEL, Panels, groups, widest};
 use super::simd::{dispatch, fma, lanes, lanes_mut, sigmoid};
 
-/// Pixels that meet one group of channels after the other, so that they stay in the second-level cache.
-const BLOCK: usize = 64;
-
-/// out = SiLU(convolution), pixel `p` of which begins at `place(p)`, of pixels [pixels, columns].
+/// out = SiLU(convolution), pixel `p` of which begins at `place(p)`, of pixels [pixels, columns], few enough for the second-level cache.
 pub fn activated(input: &[f32], panels: &Panels, place: impl Fn(usize) -> usize, out: &mut [f32]) {
     let added = None;
     dispatch(
@@ -51,47 +48,38 @@ impl<const ACTIVATE: bool, P: Fn(usize) -> usize> WithSimd for Forward<'_, ACTIV
 
     #[inline(always)]
     fn with_simd<S: Simd>(mut self, simd: S) {
-        let columns = self.panels.columns();
-        let pixels = self.input.len() / columns;
-        for start in (0..pixels).step_by(BLOCK) {
-            let block = start..pixels.min(start + BLOCK);
-            for (first, width) in groups(self.panels.channels(), widest::<S>()) {
-                // As many sums as registers hold beside the weights.
-                match width / S::F32_LANES {
-                    1 => self.group::<S, 8, 1>(simd, block.clone(), first),
-                    2 if S::F32_LANES == PANEL => self.group::<S, 8, 2>(simd, block.clone(), first),
-                    2 => self.group::<S, 6, 2>(simd, block.clone(), first),
-                    3 => self.group::<S, 8, 3>(simd, block.clone(), first),
-                    4 => self.group::<S, 6, 4>(simd, block.clone(), first),
-                    _ => self.group::<S, 1, PANEL>(simd, block.clone(), first),
-                }
+        // All pixels meet one group of channels, whose weights stay in the cache, after the other.
+        for (first, width) in groups(self.panels.channels(), widest::<S>()) {
+            // As many sums as registers hold beside the weights.
+            match width / S::F32_LANES {
+                1 => self.group::<S, 8, 1>(simd, first),
+                2 if S::F32_LANES == PANEL => self.group::<S, 8, 2>(simd, first),
+                2 => self.group::<S, 6, 2>(simd, first),
+                3 => self.group::<S, 8, 3>(simd, first),
+                4 => self.group::<S, 6, 4>(simd, first),
+                _ => self.group::<S, 1, PANEL>(simd, first),
             }
         }
     }
 }
 
 impl<const ACTIVATE: bool, P: Fn(usize) -> usize> Forward<'_, ACTIVATE, P> {
-    /// The channels of one group, from the first one on, of a run of pixels.
+    /// The channels of one group, from the first one on, of all pixels.
     #[inline(always)]
-    fn group<S: Simd, const M: usize, const V: usize>(
-        &mut self,
-        simd: S,
-        pixels: std::ops::Range<usize>,
-        first: usize,
-    ) {
+    fn group<S: Simd, const M: usize, const V: usize>(&mut self, simd: S, first: usize) {
         let columns = self.panels.columns();
+        let pixels = self.input.len() / columns;
         let width = V * S::F32_LANES;
         let weights = lanes::<S>(&self.panels.values[first * columns..][..width * columns]);
         let shift = lanes::<S>(&self.panels.shift[first..][..width]);
         let shift: [S::f32s; V] = std::array::from_fn(|v| shift[v]);
         let channels = width.min(self.panels.channels() - first);
-        for start in pixels.clone().step_by(M) {
+        for start in (0..pixels).step_by(M) {
             // The last pixel stands in for those beyond it.
-            let row =
-                |m: usize| &self.input[(start + m).min(pixels.end - 1) * columns..][..columns];
+            let row = |m: usize| &self.input[(start + m).min(pixels - 1) * columns..][..columns];
             let sums = tile::<S, M, V>(simd, std::array::from_fn(row), weights, shift);
             for (m, sums) in sums.into_iter().enumerate() {
-                if start + m < pixels.end {
+                if start + m < pixels {
                     let at = (self.place)(start + m) + first;
                     self.store(simd, at..at + channels, sums);
                 }
@@ -168,7 +156,31 @@ mod tests {
     use super::*;
     use crate::kernels::batch_norm::Affine;
     use crate::kernels::buffer::Pool;
+    use crate::kernels::panels::LayOut;
     use proptest::prelude::*;
+
+    /// The convolution with other vectors than the widest.
+    fn by<S: Simd>(simd: S, input: &[f32], weight: &[f32], affine: &Affine) -> Vec<f32> {
+        let mut panels = Panels::new(weight, affine, &Pool::default());
+        let (scale, values) = (&affine.scale[..], &mut panels.values[..]);
+        let lay_out = LayOut {
+            weight,
+            scale,
+            values,
+        };
+        simd.vectorize(lay_out);
+        let mut out = vec![0.0; input.len() / panels.columns() * panels.channels()];
+        let place = |pixel| pixel * panels.channels();
+        let (panels, out_of) = (&panels, &mut out[..]);
+        simd.vectorize(Forward::<false, _> {
+            input,
+            panels,
+            place,
+            added: None,
+            out: out_of,
+        });
+        out
+    }
 
     proptest! {
         #[test]
@@ -196,6 +208,13 @@ mod tests {
             let mut out = vec![0.0; pixels * channels];
             normalised(&input, &panels, None, &mut out);
             prop_assert_eq!(&out, &expected); // whole numbers below 2^24: exact
+            if !gated {
+                prop_assert_eq!(&by(pulp::Scalar, &input, &weight, &affine), &expected);
+                #[cfg(target_arch = "x86_64")]
+                if let Some(simd) = pulp::x86::V3::try_new() {
+                    prop_assert_eq!(&by(simd, &input, &weight, &affine), &expected);
+                }
+            }
             normalised(&input, &panels, Some(&added), &mut out);
             let sums: Vec<f32> = expected.iter().zip(&added).map(|(x, added)| x + added).collect();
             prop_assert_eq!(&out, &sums);
