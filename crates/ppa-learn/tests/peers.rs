@@ -15,6 +15,9 @@ use ppa_learn::train::{Source, TrainConfig, train};
 use ppa_learn::{
     EfficientNetB0, FirstConvolution, Fusion, FusionKind, Loaded, Mode, Options, QualityNetwork,
 };
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 
 fn values(network: &EfficientNetB0) -> Vec<Vec<f32>> {
     let named = network.parameters().unwrap().into_iter();
@@ -41,14 +44,28 @@ fn python(script: &str, arguments: &[&std::path::Path]) {
     );
 }
 
+/// Passes in training after which running statistics are those of [`images`], so that answers follow the image.
+const PASSES: u64 = 150;
+
+/// Noise [count, 1, height, width], the same for the same number; each image of a batch has more contrast than the one before.
+fn images(number: u64, (count, height, width): (usize, usize, usize)) -> Tensor {
+    let random = ChaCha8Rng::seed_from_u64(number);
+    let pixels = height * width;
+    let noise = StandardNormal.sample_iter(random).take(count * pixels);
+    let contrast = |index: usize| 0.1 * (1 + index / pixels) as f32;
+    let values = noise.enumerate().map(|(i, x): (_, f32)| contrast(i) * x);
+    let values: Vec<f32> = values.collect();
+    Tensor::from_vec(values, (count, 1, height, width), &Device::Cpu).unwrap()
+}
+
 /// A network whose running statistics are not the first ones, with what it gives for images of odd sides.
 fn exported(folder: &std::path::Path) -> (EfficientNetB0, std::path::PathBuf) {
     let one = EfficientNetB0::new(1, Options::default()).unwrap();
-    for step in 0..3 {
-        let images = Tensor::rand(-0.5_f32, 0.5, (4, 1, 64, 64), &Device::Cpu).unwrap();
+    for step in 0..PASSES {
+        let images = images(step, (4, 64, 64));
         one.forward(&images, Mode::Train { step }).unwrap();
     }
-    let images = Tensor::rand(-0.5_f32, 0.5, (2, 1, 77, 64), &Device::Cpu).unwrap();
+    let images = images(PASSES, (3, 77, 64));
     let output = one.forward(&images, Mode::Eval).unwrap();
     let path = folder.join("io.safetensors");
     let io = HashMap::from([
@@ -72,10 +89,28 @@ onnx.checker.check_model(onnx.load(sys.argv[1]), full_check=True)
 io = load_file(sys.argv[2])
 quality, = onnxruntime.InferenceSession(sys.argv[1]).run(None, {'images': io['images']})
 error = numpy.abs(quality - io['quality']).max() / numpy.abs(io['quality']).max()
+assert numpy.ptp(io['quality']) > 1e-2, io['quality']
 print('onnxruntime: largest relative error', error, 'of', io['quality'].ravel())
 assert error < 1e-4
 ";
     python(script, &[&path, &io]);
+}
+
+/// Three images of each camera, of some widths.
+fn pair(number: u64, [left, right]: [usize; 2]) -> [Tensor; 2] {
+    [
+        images(number, (3, 64, left)),
+        images(number + 1, (3, 64, right)),
+    ]
+}
+
+/// Gives a network the running statistics of pairs or of single images.
+fn follow_images(network: &QualityNetwork) {
+    for step in 0..PASSES {
+        let both = pair(2 * step, [64, 64]);
+        let images = &both[..network.cameras()];
+        network.forward(images, Mode::Train { step }).unwrap();
+    }
 }
 
 /// The left and the right camera's images may differ in size where the networks are separate.
@@ -98,16 +133,8 @@ error = numpy.abs(quality - expected).max() / numpy.abs(expected).max()
 print('onnxruntime: largest relative error', error, 'of', expected.ravel(), len(model.graph.node), 'nodes')
 assert error < 1e-4
 ";
-    let image = |side: usize| Tensor::rand(-0.5_f32, 0.5, (3, 1, 64, side), &Device::Cpu).unwrap();
-    // Running statistics of such images, so that answers follow the images.
-    let moved = |network: &QualityNetwork| {
-        for step in 0..150 {
-            let images: Vec<_> = (0..network.cameras()).map(|_| image(64)).collect();
-            network.forward(&images, Mode::Train { step }).unwrap();
-        }
-    };
     let check = |network: &QualityNetwork, sides: [usize; 2]| {
-        let [left, right] = sides.map(image);
+        let [left, right] = pair(2 * PASSES, sides);
         let quality = network.forward(&[left.clone(), right.clone()], Mode::Eval);
         let tensors = [
             ("left", left),
@@ -126,13 +153,13 @@ assert error < 1e-4
                 ..Fusion::default()
             };
             let network = QualityNetwork::new(5, Options::default(), Some(fusion)).unwrap();
-            moved(&network);
+            follow_images(&network);
             check(&network, [64, right]);
         }
     }
     let [left, right] = [1, 2].map(|seed| {
         let network = QualityNetwork::new(seed, Options::default(), None).unwrap();
-        moved(&network);
+        follow_images(&network);
         network
     });
     check(&QualityNetwork::averaged(&left, &right).unwrap(), [64, 77]);
@@ -157,7 +184,8 @@ io = load_file(sys.argv[2])
 with torch.no_grad():
     quality = model.eval()(io['images'])
 error = ((quality - io['quality']).abs().max() / io['quality'].abs().max()).item()
-print('torch: largest relative error', error)
+print('torch: largest relative error', error, 'of', io['quality'].ravel())
+assert io['quality'].max() - io['quality'].min() > 1e-2
 assert error < 1e-4
 torch.save(model.state_dict(), sys.argv[3])
 ";
@@ -203,6 +231,7 @@ with torch.no_grad():
     quality = model.eval()(io['left'], io['right'])
 error = ((quality - io['quality']).abs().max() / io['quality'].abs().max()).item()
 print('torch: largest relative error', error, 'of', io['quality'].ravel())
+assert io['quality'].max() - io['quality'].min() > 1e-2
 assert error < 1e-4
 ";
 
@@ -217,13 +246,8 @@ fn pytorch_says_the_same_of_pairs_by_every_fusion() {
                 ..Fusion::default()
             };
             let network = QualityNetwork::new(5, Options::default(), Some(fusion)).unwrap();
-            let images = || Tensor::rand(-0.5_f32, 0.5, (3, 1, 64, 64), &Device::Cpu).unwrap();
-            for step in 0..3 {
-                network
-                    .forward(&[images(), images()], Mode::Train { step })
-                    .unwrap();
-            }
-            let [left, right] = [images(), images()];
+            follow_images(&network);
+            let [left, right] = pair(2 * PASSES, [64, 64]);
             let quality = network
                 .forward(&[left.clone(), right.clone()], Mode::Eval)
                 .unwrap();
