@@ -1,6 +1,6 @@
 //! `dataset.json`: what all images of a dataset share, free of paths and identities.
 
-use ppa_depth::{CameraSpec, RigSpec, SensorSpec, rows_from_isometry};
+use ppa_depth::{CameraSpec, RigSpec, SensorSpec, WallDepth, rows_from_isometry};
 use ppa_mesh::LimbSettings;
 use ppa_scene::{LandmarkOverrides, PlaneSettings, RoomSpec, SoftTissue, Sweep};
 use serde::Serialize;
@@ -36,6 +36,7 @@ pub(crate) struct Settings {
     roi_mm: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     sensor: Option<SensorSpec>,
+    cut_faces: WallDepth,
     xray: XraySettings,
 }
 
@@ -57,7 +58,12 @@ impl Settings {
             cameras: plan.depth.cameras.clone(),
             roi_mm: plan.depth.roi_mm,
             sensor: plan.depth.sensor.clone(),
-            xray: plan.xray.clone(),
+            cut_faces: plan.depth.cut_faces,
+            // Limits decide which images there are, not what is in them.
+            xray: XraySettings {
+                max_cut_share: XraySettings::default().max_cut_share,
+                ..plan.xray.clone()
+            },
         })
     }
 

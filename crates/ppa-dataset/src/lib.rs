@@ -28,6 +28,8 @@ mod contact_sheet;
 #[cfg(feature = "generate")]
 mod coverage_plot;
 #[cfg(feature = "generate")]
+mod cut_share;
+#[cfg(feature = "generate")]
 mod description;
 #[cfg(feature = "generate")]
 mod drawing;
@@ -95,6 +97,8 @@ pub use claim::FolderError;
 pub use contact_sheet::{ContactSheetError, contact_sheet};
 #[cfg(feature = "generate")]
 pub use coverage_plot::{RankedView, coverage_plot};
+#[cfg(feature = "generate")]
+pub use cut_share::{CutError, PoseImage};
 pub use files::{FileError, sha256_of_file, write_whole};
 #[cfg(feature = "generate")]
 pub use forecast::{Forecast, ForecastError, forecast};

@@ -51,6 +51,10 @@ pub struct FileRow {
     /// Depth images: pixels that see something beyond the 65.535 m that 16 bits hold, 0 in the file.
     #[serde(skip_serializing_if = "is_zero", default)]
     pub too_far_pixels: usize,
+    /// Share of the image's region of interest that lies where the field of view of the scan cuts the limb off: pixels of a depth image that
+    /// see the cut, rays of a radiograph that pass through it. Left out where it is 0.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub cut_share: Option<f64>,
     /// The limb's frame in the scan: T^P_CT.
     pub patient_from_ct: Rows,
     /// Pose of the limb: T^ToF_P = T_opt · T_mat · T_rot.

@@ -3,12 +3,17 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Point3};
-use ppa_depth::{Body, DepthImage, MeshBody, PlacedBody, roi_around, rows_from_isometry};
-use ppa_mesh::{Displacement, Mesh};
+use ppa_depth::{
+    Body, BodyError, MeshBody, PlacedBody, Roi, WallDepth, WalledImage, render_before, roi_around,
+    rows_from_isometry,
+};
+use ppa_mesh::{CutWalls, Displacement, Mesh};
 use ppa_scene::{Placement, PoseAngle, place_soft};
-use ppa_xray::{FastSettings, VoxelPhantom};
+use ppa_xray::{FastSettings, Projection, VoxelPhantom};
+use rayon::prelude::*;
 
 use crate::body_shape::BodyShape;
+use crate::cut_share::{self, CutError, CutFaces, PoseCuts, PoseImage};
 use crate::files::{FileError, sha256_of_file};
 use crate::layout::LimbId;
 use crate::manifest::{FileKind, FileRow, RoiFile, RoiRow};
@@ -38,6 +43,15 @@ pub enum UnitError {
     /// A region of interest.
     #[error(transparent)]
     Roi(#[from] ppa_depth::RoiError),
+    /// More of a region is cut than the plan allows.
+    #[error(transparent)]
+    Cut(#[from] CutError),
+    /// The x-ray tube as a camera that looks for cuts.
+    #[error("the x-ray tube cannot be looked through")]
+    Tube(#[from] ppa_depth::CameraError),
+    /// The rotations of the plan.
+    #[error(transparent)]
+    Rotation(#[from] ppa_scene::SweepError),
     /// The voxels of the joint.
     #[error(transparent)]
     Joint(#[from] JointError),
@@ -76,6 +90,7 @@ pub(crate) struct PosableLimb<'a> {
     prepared: PreparedLimb,
     shapes: Vec<ShapedSkin>,
     phantom: VoxelPhantom,
+    cuts: CutFaces,
 }
 
 impl<'a> PosableLimb<'a> {
@@ -85,11 +100,11 @@ impl<'a> PosableLimb<'a> {
         stage: &'a Stage,
         prepared: PreparedLimb,
     ) -> Result<Self, UnitError> {
-        let skin = &prepared.limb.mesh;
+        let (skin, walls) = (&prepared.limb.mesh, &prepared.limb.walls);
         let shaped = |&shape: &BodyShape| {
             let (landmarks, settings) = (&prepared.landmarks, &plan.shapes);
             let mesh = body_shape(skin, landmarks, shape, settings, id, plan.seed)?;
-            let body = Body::Mesh(MeshBody::new(&mesh.vertices, &mesh.triangles)?);
+            let body = closed_body(&walls.vertices(&mesh), &mesh, walls)?;
             let change = || Displacement::between(skin, &mesh).volume_mm3;
             let volume_change_mm3 = (shape != BodyShape::Orig).then(change);
             Ok::<_, UnitError>(ShapedSkin {
@@ -99,15 +114,62 @@ impl<'a> PosableLimb<'a> {
                 volume_change_mm3,
             })
         };
+        let cuts = CutFaces::new(walls, skin)?;
         let shapes = plan.shapes.variants.iter().map(shaped);
-        Ok(Self {
+        let posable = Self {
             id,
             plan,
             stage,
             shapes: shapes.collect::<Result<_, _>>()?,
             phantom: joint_phantom(&prepared, &plan.xray)?,
+            cuts,
             prepared,
+        };
+        posable.check_cuts()?;
+        Ok(posable)
+    }
+
+    /// Looks at all poses of the plan, before the first of them is made.
+    fn check_cuts(&self) -> Result<(), UnitError> {
+        if self.cuts.is_empty() {
+            return Ok(());
+        }
+        let (skin, walls) = (&self.prepared.limb.mesh, &self.prepared.limb.walls);
+        let rigid = closed_body(&walls.vertices(skin), skin, walls)?;
+        let poses = self.plan.rotation.poses()?;
+        let cuts: Vec<PoseCuts> = poses
+            .par_iter()
+            .map(|&pose| self.pose_cuts(pose, &rigid))
+            .collect::<Result<_, _>>()?;
+        let limits = [self.plan.depth.max_cut_share, self.plan.xray.max_cut_share];
+        Ok(cut_share::check(self.id, &cuts, limits)?)
+    }
+
+    /// How much of each image is cut; `rigid` is the closed skin of the scan.
+    fn pose_cuts(&self, pose: PoseAngle, rigid: &Body) -> Result<PoseCuts, UnitError> {
+        let skin = &self.prepared.limb.mesh;
+        let placement = self.place(skin, pose)?;
+        let flattened = self.flattened(skin, &placement)?;
+        let in_room = |points: &[Point3<f32>]| placement.in_room(points, &self.prepared.landmarks);
+        let mut shares = Vec::new();
+        for camera in &self.stage.cameras {
+            let roi = self.roi(camera, &placement)?;
+            let limb = self.placed(camera, &placement, flattened.as_ref(), rigid);
+            let share = self.cuts.in_region(camera, &roi, limb, in_room)?;
+            shares.push((PoseImage::Depth(camera.view), share));
+        }
+        let share = self.radiograph_cut(&self.projection(&placement))?;
+        shares.push((PoseImage::Radiograph, share));
+        Ok(PoseCuts {
+            step: pose.step,
+            shares,
         })
+    }
+
+    fn radiograph_cut(&self, projection: &Projection) -> Result<f64, UnitError> {
+        let joint = Point3::from(self.prepared.landmarks.joint_centre);
+        let roi_mm = self.plan.depth.roi_mm;
+        Ok(self.cuts.in_radiograph(projection, &joint, roi_mm)?)
     }
 
     /// Makes all images of one pose under `root`.
@@ -116,25 +178,23 @@ impl<'a> PosableLimb<'a> {
         let noise_seed = item_seed(self.plan.seed, Purpose::DepthNoise, self.id, pose.step);
         // The skin of the scan decides the pose of the radiograph and the regions of interest.
         let placement = self.place(&self.prepared.limb.mesh, pose)?;
+        let cameras = self.stage.cameras.iter();
+        let rois: Vec<Roi> = cameras
+            .map(|camera| self.roi(camera, &placement))
+            .collect::<Result<_, _>>()?;
         for shaped in &self.shapes {
             let placement = match shaped.shape {
                 BodyShape::Orig => placement,
                 _ => self.place(&shaped.mesh, pose)?,
             };
             let flattened = self.flattened(&shaped.mesh, &placement)?;
-            for camera in &self.stage.cameras {
+            for (camera, roi) in self.stage.cameras.iter().zip(&rois) {
                 let file = self.id.depth(shaped.shape, camera.view, pose.step);
-                let placed = match &flattened {
-                    Some(body) => PlacedBody {
-                        body,
-                        camera_from_body: camera.camera_from_room,
-                    },
-                    None => PlacedBody {
-                        body: &shaped.body,
-                        camera_from_body: self.camera_from_ct(camera, &placement),
-                    },
-                };
-                let image = depth_image(shaped.shape, placed, camera, noise_seed)?;
+                let placed = self.placed(camera, &placement, flattened.as_ref(), &shaped.body);
+                let walls = self.plan.depth.cut_faces;
+                let WalledImage { image, wall_pixels } =
+                    depth_image(shaped.shape, placed, camera, noise_seed, walls)?;
+                let cut = cut_share::share(roi, image.width, &wall_pixels);
                 let path = prepare_folder(root, &file)?;
                 let too_far_pixels = image.write_png(&path)?;
                 files.push(FileRow {
@@ -143,18 +203,18 @@ impl<'a> PosableLimb<'a> {
                     shape: shaped.shape,
                     volume_change_mm3: shaped.volume_change_mm3,
                     too_far_pixels,
+                    cut_share: (cut > 0.0).then_some(cut),
                     ..self.row(root, file, FileKind::Depth, pose, &placement)?
                 });
             }
         }
         files.extend(self.radiograph(pose, &placement, root)?);
-        let rois = self
-            .stage
-            .cameras
-            .iter()
-            .map(|camera| self.roi(camera, &placement, pose));
-        let rois = rois.collect::<Result<_, _>>()?;
-        Ok(Images { files, rois })
+        let rows = self.stage.cameras.iter().zip(&rois);
+        let rows = rows.map(|(camera, roi)| roi_row(camera, roi, pose));
+        Ok(Images {
+            files,
+            rois: rows.collect(),
+        })
     }
 
     fn place(&self, skin: &Mesh, pose: PoseAngle) -> Result<Placement, UnitError> {
@@ -180,27 +240,44 @@ impl<'a> PosableLimb<'a> {
         if placement.flattening.is_none() {
             return Ok(None);
         }
-        let in_room = placement.in_room(&skin.vertices, &self.prepared.landmarks);
-        Ok(Some(Body::Mesh(MeshBody::new(&in_room, &skin.triangles)?)))
+        let walls = &self.prepared.limb.walls;
+        let in_room = placement.in_room(&walls.vertices(skin), &self.prepared.landmarks);
+        Ok(Some(closed_body(&in_room, skin, walls)?))
     }
 
-    fn roi(
+    /// A skin before a camera: flattened in the room, or rigid in the scan.
+    fn placed<'b>(
         &self,
         camera: &PlacedCamera,
         placement: &Placement,
-        pose: PoseAngle,
-    ) -> Result<(String, RoiRow), UnitError> {
+        flattened: Option<&'b Body>,
+        rigid: &'b Body,
+    ) -> PlacedBody<'b> {
+        match flattened {
+            Some(body) => PlacedBody {
+                body,
+                camera_from_body: camera.camera_from_room,
+            },
+            None => PlacedBody {
+                body: rigid,
+                camera_from_body: self.camera_from_ct(camera, placement),
+            },
+        }
+    }
+
+    fn roi(&self, camera: &PlacedCamera, placement: &Placement) -> Result<Roi, UnitError> {
         let joint = Point3::from(self.prepared.landmarks.joint_centre);
         let joint_in_camera = self.camera_from_ct(camera, placement) * joint;
-        let roi = roi_around(&camera.camera, &joint_in_camera, self.plan.depth.roi_mm)?;
-        let row = RoiRow {
-            camera: camera.view,
-            image_number: pose.step,
-            x_start: roi.x_start,
-            y_start: roi.y_start,
-            size: roi.size,
-        };
-        Ok((LimbId::depth_name(camera.view, pose.step), row))
+        Ok(roi_around(
+            &camera.camera,
+            &joint_in_camera,
+            self.plan.depth.roi_mm,
+        )?)
+    }
+
+    fn projection(&self, placement: &Placement) -> Projection {
+        let device = &self.stage.table.room.device;
+        projection(placement, &self.prepared.landmarks, device, &self.plan.xray)
     }
 
     fn radiograph(
@@ -210,8 +287,8 @@ impl<'a> PosableLimb<'a> {
         root: &Path,
     ) -> Result<[FileRow; 2], UnitError> {
         let settings = &self.plan.xray;
-        let device = &self.stage.table.room.device;
-        let projection = projection(placement, &self.prepared.landmarks, device, settings);
+        let projection = self.projection(placement);
+        let cut = self.radiograph_cut(&projection)?;
         let seed = item_seed(self.plan.seed, Purpose::Radiograph, self.id, pose.step);
         let engine = FastSettings {
             seed,
@@ -226,6 +303,7 @@ impl<'a> PosableLimb<'a> {
             Ok::<_, UnitError>(FileRow {
                 ct_from_device: Some(rows_from_isometry(&projection.ct_from_device)),
                 seed: Some(seed),
+                cut_share: (cut > 0.0).then_some(cut),
                 ..self.row(root, file, kind, pose, placement)?
             })
         };
@@ -254,6 +332,7 @@ impl<'a> PosableLimb<'a> {
             shape: BodyShape::Orig,
             volume_change_mm3: None,
             too_far_pixels: 0,
+            cut_share: None,
             patient_from_ct: self
                 .prepared
                 .landmarks
@@ -266,23 +345,48 @@ impl<'a> PosableLimb<'a> {
     }
 }
 
+fn roi_row(camera: &PlacedCamera, roi: &Roi, pose: PoseAngle) -> (String, RoiRow) {
+    let row = RoiRow {
+        camera: camera.view,
+        image_number: pose.step,
+        x_start: roi.x_start,
+        y_start: roi.y_start,
+        size: roi.size,
+    };
+    (LimbId::depth_name(camera.view, pose.step), row)
+}
+
+/// A skin with its walls; `vertices` are those of the skin, wherever it was moved, and the corners of the walls.
+fn closed_body(vertices: &[Point3<f32>], skin: &Mesh, walls: &CutWalls) -> Result<Body, BodyError> {
+    let body = MeshBody::new(vertices, &skin.triangles)?;
+    Ok(body.with_walls(&walls.triangles)?.into())
+}
+
 fn depth_image(
     shape: BodyShape,
     placed: PlacedBody,
     camera: &PlacedCamera,
     noise_seed: u64,
-) -> Result<DepthImage, UnitError> {
+    walls: WallDepth,
+) -> Result<WalledImage, UnitError> {
     placed.require_camera_outside()?;
     if let Some((sensor, backdrop)) = &camera.sensor {
-        let seen = backdrop.before(&camera.camera, &[placed])?;
+        let seen = backdrop.before_with_walls(&camera.camera, &[placed], walls)?;
         // One frame per body shape and camera.
         let frame = 2 * shape as u64 + camera.view as u64;
         let image = sensor.observe(&camera.camera, &seen, noise_seed, frame);
         image.require_measured(seen.image.valid_pixels())?;
-        return Ok(image);
+        return Ok(WalledImage {
+            image,
+            wall_pixels: seen.wall_pixels,
+        });
     }
-    let limb = ppa_depth::render(&camera.camera, &[placed]);
-    Ok(limb.before(&camera.background)?)
+    Ok(render_before(
+        &camera.camera,
+        &[placed],
+        &camera.background,
+        walls,
+    )?)
 }
 
 fn prepare_folder(root: &Path, file: &str) -> Result<std::path::PathBuf, FileError> {

@@ -8,7 +8,8 @@ use crate::mesh_body::MeshBody;
 use crate::triangle::Triangle;
 
 impl PlacedBody<'_> {
-    /// Refuses a camera that stands inside a closed mesh: it would see the mesh from within. Open meshes and discs have no inside.
+    /// Refuses a camera that stands inside a closed mesh: it would see the mesh from within. Walls close a mesh; open meshes and discs
+    /// have no inside.
     ///
     /// # Errors
     /// [`BodyError::CameraInside`]; [`BodyError::Pose`] for a pose that is not finite.
@@ -54,6 +55,7 @@ impl MeshBody {
         let odd = self
             .triangles
             .par_iter()
+            .chain(&self.walls)
             .map(met)
             .reduce(|| 0, |a, b| a ^ b);
         odd == (1 << (2 * DIRECTIONS.len())) - 1

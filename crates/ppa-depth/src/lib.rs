@@ -2,7 +2,8 @@
 //!
 //! A [`CameraSpec`] is what a user writes down (JSON); [`Camera`] is the checked camera, with the exact inverse of its
 //! lens distortion. A [`Body`] is a triangle mesh ([`MeshBody`]) or a cloud of oriented discs ([`SurfelBody`]), made
-//! once and then placed in as many poses as needed ([`PlacedBody`]). [`render`] gives a [`DepthImage`]; [`roi_around`]
+//! once and then placed in as many poses as needed ([`PlacedBody`]). A mesh whose source was cut off has walls there
+//! ([`MeshBody::with_walls`]). [`render`] gives a [`DepthImage`]; [`roi_around`]
 //! the square around a joint. A [`RigSpec`] holds the two cameras on an x-ray device; [`JointSurface`] tells how much of a joint
 //! a camera at a [`Viewpoint`] would see.
 //!
@@ -85,6 +86,7 @@ mod triangle;
 
 mod sampled;
 mod surface;
+mod walls;
 
 mod fit_noise;
 mod multipath;
@@ -126,3 +128,4 @@ pub use spec::{CameraError, CameraModel, CameraSpec};
 pub use surfel_body::SurfelBody;
 pub use tremor::Tremor;
 pub use viewpoint::Viewpoint;
+pub use walls::{WallDepth, WalledImage, render_before};

@@ -112,6 +112,13 @@ impl<'a> SeenMesh<'a> {
         self.extents.get_or_init(|| extents);
     }
 
+    /// Offers the depth of every wall, as [`draw`](Self::draw) does that of the other triangles.
+    pub(crate) fn draw_walls(&self, buffer: &DepthBuffer) {
+        self.mesh.walls.par_iter().for_each(|wall| {
+            self.draw_triangle(wall, buffer);
+        });
+    }
+
     /// The part of the image that a triangle may cover, each pixel widened by `reach` on all sides.
     #[inline(always)] // a call per triangle would take as long as the work
     pub(crate) fn outline(&self, triangle: &[u32; 3], reach: f32) -> Outline {

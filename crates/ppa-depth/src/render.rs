@@ -15,7 +15,7 @@ use crate::surfel_body::SurfelBody;
 /// through the pixel's centre, or 0.
 ///
 /// Rays follow the exact inverse of the lens distortion ([`Camera::rays`]); pixels without a ray stay 0. Bodies occlude
-/// each other and themselves. An image of nothing is all 0: see [`DepthImage::require_visible`]. A body whose pose is not finite or
+/// each other and themselves, and walls are surfaces as any. An image of nothing is all 0: see [`DepthImage::require_visible`]. A body whose pose is not finite or
 /// further than 1e9 mm is not seen.
 pub fn render(camera: &Camera, bodies: &[PlacedBody]) -> DepthImage {
     draw(camera, &SeenBody::all(camera, bodies))
@@ -38,17 +38,57 @@ impl<'a> SeenBody<'a> {
         let somewhere = |placed: &&PlacedBody| placed.is_somewhere();
         bodies.iter().filter(somewhere).map(seen).collect()
     }
+
+    fn draw_open(&self, camera: &Camera, buffer: &DepthBuffer) {
+        match self {
+            Self::Mesh(mesh) => mesh.draw(buffer),
+            Self::Surfels(surfels) => surfels.cast(camera.rays(), buffer),
+        }
+    }
+
+    fn draw_walls(&self, buffer: &DepthBuffer) {
+        if let Self::Mesh(mesh) = self {
+            mesh.draw_walls(buffer);
+        }
+    }
+
+    pub(crate) fn has_walls(&self) -> bool {
+        matches!(self, Self::Mesh(seen) if !seen.mesh.walls.is_empty())
+    }
 }
 
 /// Depths at the centres of the pixels.
 pub(crate) fn draw(camera: &Camera, bodies: &[SeenBody]) -> DepthImage {
     let buffer = DepthBuffer::empty(camera.rays().len());
     for body in bodies {
-        match body {
-            SeenBody::Mesh(mesh) => mesh.draw(&buffer),
-            SeenBody::Surfels(surfels) => surfels.cast(camera.rays(), &buffer),
-        }
+        body.draw_open(camera, &buffer);
+        body.draw_walls(&buffer);
     }
+    image_of(camera, buffer)
+}
+
+/// [`draw`] without walls.
+pub(crate) fn draw_open(camera: &Camera, bodies: &[SeenBody]) -> DepthImage {
+    let buffer = DepthBuffer::empty(camera.rays().len());
+    for body in bodies {
+        body.draw_open(camera, &buffer);
+    }
+    image_of(camera, buffer)
+}
+
+/// [`draw`] of walls alone; `None` if there are none.
+pub(crate) fn draw_walls(camera: &Camera, bodies: &[SeenBody]) -> Option<DepthImage> {
+    if !bodies.iter().any(SeenBody::has_walls) {
+        return None;
+    }
+    let buffer = DepthBuffer::empty(camera.rays().len());
+    for body in bodies {
+        body.draw_walls(&buffer);
+    }
+    Some(image_of(camera, buffer))
+}
+
+fn image_of(camera: &Camera, buffer: DepthBuffer) -> DepthImage {
     DepthImage {
         width: camera.width(),
         height: camera.height(),

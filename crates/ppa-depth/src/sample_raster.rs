@@ -3,6 +3,7 @@
 use nalgebra::Point2;
 use rayon::prelude::*;
 
+use crate::depth_buffer::DepthBuffer;
 use crate::raster::{CHUNK, Outline, SeenMesh, centres, misses};
 use crate::sampled::{SAMPLES, Sites};
 use crate::single_lens::Corner;
@@ -34,14 +35,20 @@ impl SeenMesh<'_> {
             let small = is_small(chunk);
             for triangle in triangles {
                 if !small || near[triangle[0] as usize] {
-                    self.sample_triangle(triangle, sites);
+                    self.sample_triangle(triangle, sites, &sites.buffer);
                 }
             }
         });
     }
 
+    /// Offers the depth of every wall at all samples of the sites it covers.
+    pub(crate) fn draw_wall_samples(&self, sites: &Sites, buffer: &DepthBuffer) {
+        let walls = self.mesh.walls.par_iter();
+        walls.for_each(|wall| self.sample_triangle(wall, sites, buffer));
+    }
+
     #[inline]
-    fn sample_triangle(&self, triangle: &[u32; 3], sites: &Sites) {
+    fn sample_triangle(&self, triangle: &[u32; 3], sites: &Sites, buffer: &DepthBuffer) {
         let Outline::Within {
             corners,
             slack,
@@ -56,7 +63,7 @@ impl SeenMesh<'_> {
             let rays = all.flat_map(|(i, site)| {
                 (0..SAMPLES).map(move |k| (i * SAMPLES + k, site.sample(k).1))
             });
-            return self.draw_anywhere(triangle, &sites.buffer, rays);
+            return self.draw_anywhere(triangle, buffer, rays);
         };
         // The rays of samples follow the lens to first order only.
         let slack = slack + SAMPLE_SLACK_PX;
@@ -74,12 +81,12 @@ impl SeenMesh<'_> {
                     let index = site as usize * SAMPLES + k;
                     let ([du, dv], ray) = seen.sample(k);
                     let at = [column as f32 + du as f32, row as f32 + dv as f32];
-                    if sites.buffer.nearest(index) <= nearest || misses(corners, at, slack) {
+                    if buffer.nearest(index) <= nearest || misses(corners, at, slack) {
                         continue;
                     }
                     let exact = exact.get_or_insert_with(|| self.exact(triangle));
                     if let Some(z_mm) = exact.depth(&ray) {
-                        sites.buffer.offer(index, z_mm as f32);
+                        buffer.offer(index, z_mm as f32);
                     }
                 }
             }

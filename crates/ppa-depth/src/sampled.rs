@@ -7,6 +7,7 @@ use crate::camera::Camera;
 use crate::depth_buffer::DepthBuffer;
 use crate::image::{DepthError, DepthImage};
 use crate::render::{SeenBody, draw};
+use crate::walls::{WallDepth, WalledImage, is_first, seen_before};
 
 /// Samples per pixel at an edge.
 pub(crate) const SAMPLES: usize = 8;
@@ -42,6 +43,8 @@ pub struct SampledImage {
     pub image: DepthImage,
     /// Pixels at edges in rising order, and the depths inside them, 0 for nothing.
     pub(crate) edges: Vec<(u32, [f32; SAMPLES])>,
+    /// Pixels (row-major index, rising) at whose centre a wall is the nearest surface.
+    pub wall_pixels: Vec<u32>,
 }
 
 /// A pixel that is sampled.
@@ -143,6 +146,20 @@ impl Sites {
         }
     }
 
+    /// Depths of the walls at all samples, a row per site; `None` if there are no walls.
+    fn draw_walls(&self, bodies: &[SeenBody]) -> Option<Vec<f32>> {
+        if !bodies.iter().any(SeenBody::has_walls) {
+            return None;
+        }
+        let buffer = DepthBuffer::empty(self.sites.len() * SAMPLES);
+        for body in bodies {
+            if let SeenBody::Mesh(mesh) = body {
+                mesh.draw_wall_samples(self, &buffer);
+            }
+        }
+        Some(buffer.into_depths())
+    }
+
     /// Pixels and the depths inside them.
     fn into_depths(self) -> impl Iterator<Item = (u32, [f32; SAMPLES])> {
         let depths = self.buffer.into_depths();
@@ -161,9 +178,11 @@ impl Backdrop {
         let sites = Sites::new(camera, 0..pixels as u32);
         let bodies = SeenBody::all(camera, bodies);
         sites.draw(&bodies);
+        let walls = sites.draw_walls(&bodies);
         let mut samples = vec![[0.0; SAMPLES]; pixels];
-        for (pixel, depths) in sites.into_depths() {
-            samples[pixel as usize] = depths;
+        for (site, (pixel, depths)) in sites.into_depths().enumerate() {
+            let walls = row_of(walls.as_ref(), site);
+            samples[pixel as usize] = std::array::from_fn(|k| nearer(depths[k], walls[k]));
         }
         Self {
             image: draw(camera, &bodies),
@@ -171,7 +190,7 @@ impl Backdrop {
         }
     }
 
-    /// The bodies before the backdrop, with samples inside the pixels at edges.
+    /// The bodies before the backdrop, with samples inside the pixels at edges; walls are surfaces as any.
     ///
     /// # Errors
     /// [`DepthError::SizeMismatch`] if the backdrop is another camera's, [`DepthError::NothingVisible`] or [`DepthError::Hidden`] if
@@ -181,19 +200,58 @@ impl Backdrop {
         camera: &Camera,
         bodies: &[PlacedBody],
     ) -> Result<SampledImage, DepthError> {
+        self.before_with_walls(camera, bodies, WallDepth::Flat)
+    }
+
+    /// [`before`](Self::before), where `walls` says what becomes of the bodies' walls. If they are to be invalid, no pixel has a depth of
+    /// which the centre or, at an edge, any sample sees a wall; walls send no light to other pixels either.
+    ///
+    /// # Errors
+    /// As [`before`](Self::before).
+    pub fn before_with_walls(
+        &self,
+        camera: &Camera,
+        bodies: &[PlacedBody],
+        walls: WallDepth,
+    ) -> Result<SampledImage, DepthError> {
         let bodies = SeenBody::all(camera, bodies);
-        let image = draw(camera, &bodies).before(&self.image)?;
+        let WalledImage {
+            mut image,
+            wall_pixels,
+        } = seen_before(camera, &bodies, &self.image, walls)?;
         let sites = Sites::new(camera, edges(&image).into_iter());
         sites.draw(&bodies);
-        let merged = |(pixel, depths): (u32, [f32; SAMPLES])| {
+        let of_walls = sites.draw_walls(&bodies);
+        let mut at_edges = Vec::with_capacity(sites.sites.len());
+        for (site, (pixel, depths)) in sites.into_depths().enumerate() {
             let behind = &self.samples[pixel as usize];
-            (pixel, std::array::from_fn(|k| nearer(depths[k], behind[k])))
-        };
+            let samples: [f32; SAMPLES] = std::array::from_fn(|k| nearer(depths[k], behind[k]));
+            let walled = row_of(of_walls.as_ref(), site);
+            let sees_wall = (0..SAMPLES).any(|k| is_first(walled[k], samples[k]));
+            if walls == WallDepth::Invalid
+                && (sees_wall || wall_pixels.binary_search(&pixel).is_ok())
+            {
+                image.z_mm[pixel as usize] = 0.0;
+                continue;
+            }
+            at_edges.push((
+                pixel,
+                std::array::from_fn(|k| nearer(samples[k], walled[k])),
+            ));
+        }
         Ok(SampledImage {
             image,
-            edges: sites.into_depths().map(merged).collect(),
+            edges: at_edges,
+            wall_pixels,
         })
     }
+}
+
+/// Depths of the walls at the samples of a site.
+fn row_of(walls: Option<&Vec<f32>>, site: usize) -> [f32; SAMPLES] {
+    walls.map_or([0.0; SAMPLES], |walls| {
+        std::array::from_fn(|k| walls[site * SAMPLES + k])
+    })
 }
 
 fn nearer(a: f32, b: f32) -> f32 {

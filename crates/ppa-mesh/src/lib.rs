@@ -29,7 +29,10 @@ pub use body_shape::{Bump, BumpSite, ShapeError, add_bumps, offset, seeded_bumps
 pub use dbscan::{Clusters, dbscan};
 pub use displacement::Displacement;
 pub use estimate_normals::{CloudError, estimate_normals, mean_spacing_mm};
-pub use limb::{Body, CutFace, Limb, LimbError, LimbReport, LimbSettings, VoxelBox, extract_limb};
+pub use limb::{
+    Body, CutFace, CutWalls, Limb, LimbError, LimbReport, LimbSettings, VoxelBox, WallMeasure,
+    extract_limb,
+};
 pub use mesh::{Mesh, PointCloud};
 pub use mesh_file::{
     MeshContents, MeshFileError, read_mesh_file, write_cloud_file, write_mesh_file,

@@ -33,6 +33,14 @@ impl Plan {
                 return Err(format!("{name} is {value}, expected a length above 0 mm"));
             }
         }
+        for (name, share) in [
+            ("depth.max_cut_share", self.depth.max_cut_share),
+            ("xray.max_cut_share", self.xray.max_cut_share),
+        ] {
+            if !(0.0..=1.0).contains(&share) {
+                return Err(format!("{name} is {share}, expected a share from 0 to 1"));
+            }
+        }
         if self.depth.rig.is_some() && self.depth.cameras.is_some() {
             return Err("depth.rig and depth.cameras are both given".to_owned());
         }

@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 
-use ppa_depth::{RigSpec, SensorSpec};
+use ppa_depth::{RigSpec, SensorSpec, WallDepth};
 use ppa_scene::{PlaneSettings, RoomSpec};
 use ppa_xray::{Detector, FastSettings, HuCalibration, Presentation, Receptor, Source};
 use serde::{Deserialize, Serialize};
 
+use crate::cut_share::MAX_CUT_SHARE;
 use crate::manifest::Rows;
 
 /// The x-ray room: built in, or a recorded one.
@@ -38,6 +39,11 @@ pub struct DepthSettings {
     pub roi_mm: f64,
     /// Errors of the cameras' sensors; ideal images when absent.
     pub sensor: Option<SensorSpec>,
+    /// What a camera sees where the field of view of the scan cuts the limb off: nothing (`invalid`), or a flat wall (`flat`).
+    pub cut_faces: WallDepth,
+    /// Largest share of a region of interest that may see such a cut, 0 to 1, counted on the skin of the scan; a limb with
+    /// a pose above it is refused.
+    pub max_cut_share: f64,
 }
 
 impl Default for DepthSettings {
@@ -47,6 +53,8 @@ impl Default for DepthSettings {
             cameras: None,
             roi_mm: 260.0,
             sensor: None,
+            cut_faces: WallDepth::default(),
+            max_cut_share: MAX_CUT_SHARE,
         }
     }
 }
@@ -95,6 +103,10 @@ pub struct XraySettings {
     pub engine: FastSettings,
     /// The mapping to a radiograph for viewing.
     pub presentation: Presentation,
+    /// Largest share of the rays around the joint that may enter or leave the scan where its field of view cuts the limb off, 0 to 1; a
+    /// limb with a pose above it is refused.
+    #[serde(skip_serializing_if = "is_default_share")]
+    pub max_cut_share: f64,
 }
 
 impl Default for XraySettings {
@@ -112,6 +124,15 @@ impl Default for XraySettings {
             calibration_file: None,
             engine: FastSettings::default(),
             presentation: Presentation::default(),
+            max_cut_share: MAX_CUT_SHARE,
         }
     }
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde calls it with a reference"
+)]
+fn is_default_share(share: &f64) -> bool {
+    *share == MAX_CUT_SHARE
 }

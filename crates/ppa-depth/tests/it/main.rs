@@ -14,4 +14,5 @@ mod sensor;
 mod shapes;
 mod surfels;
 mod tremor;
+mod walls;
 mod watertight;

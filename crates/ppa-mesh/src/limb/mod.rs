@@ -19,6 +19,7 @@ mod pieces;
 mod report;
 mod settings;
 mod tissue;
+mod walls;
 
 use nalgebra::Vector3;
 use ppa_ct::{Grid, Values, Volume, VolumeError};
@@ -36,6 +37,7 @@ use lattice::Lattice;
 pub use report::{Body, CutFace, LimbReport};
 pub use settings::{LimbSettings, VoxelBox};
 use tissue::{ENCLOSED, Tissue};
+pub use walls::{CutWalls, WallMeasure};
 
 /// Hounsfield units in a type that a volume keeps them in.
 trait Hu: Copy + Into<f32> + Send + Sync {}
@@ -47,6 +49,8 @@ impl Hu for f32 {}
 pub struct Limb {
     /// Skin in the `ct` frame with outward normals; open where a face of the volume cuts the limb.
     pub mesh: Mesh,
+    /// Walls that close the skin there, apart from it: they are no skin, and a limb does not rest on them.
+    pub walls: CutWalls,
     /// Whether each voxel of the volume belongs to the limb, interior included; grid order.
     pub mask: Vec<bool>,
     /// What was found and cut.
@@ -99,8 +103,8 @@ pub enum LimbError {
 
 /// Finds the limb of a scan.
 ///
-/// The mesh is open where the volume (or the crop) cuts the limb: a lid would be seen by a depth
-/// camera as skin. The mask says what to keep when everything else is to be blanked to air.
+/// The mesh is open where the volume (or the crop) cuts the limb, since a wall there is no skin; the walls
+/// are given beside it. The mask says what to keep when everything else is to be blanked to air.
 ///
 /// Where two limbs are pressed together HU do not tell whose skin is whose: there the border is found by
 /// depth, in a scan of two hands up to 4 voxels from where an eye puts it. A hollow that the end of the
@@ -253,7 +257,13 @@ fn within_values<T: Hu>(grid: &Grid, hu: &[T], settings: &LimbSettings) -> Resul
     let values = cleaned(&part, hu, &mask, iso);
     let surface = surface_of_part(grid, part.low, part.size, &values, iso)?;
     let mesh = one_piece(&surface, settings, &mut report);
-    Ok(Limb { mesh, mask, report })
+    let walls = CutWalls::of(grid, &mesh);
+    Ok(Limb {
+        mesh,
+        walls,
+        mask,
+        report,
+    })
 }
 
 fn count(mask: &[bool]) -> usize {

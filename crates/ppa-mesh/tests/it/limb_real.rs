@@ -6,6 +6,7 @@ use ppa_ct::{Grid, Volume};
 use ppa_mesh::{Limb, LimbSettings, extract_limb};
 
 use crate::fields::shared;
+use crate::walls::check_closed;
 
 struct Scan {
     /// Folder and file.
@@ -96,6 +97,7 @@ fn six_limbs_keep_their_skin_and_lose_couch_sheet_and_neighbour() {
         let within = (scan.litres[0]..scan.litres[1]).contains(&found);
         assert!(within, "{}: {found} litres", scan.name);
         assert_eq!(limb.mesh.components(), 1, "{}", scan.name);
+        check_closed(volume.grid(), &limb, scan.name);
 
         // In one slice at a time, without couch finding, erosion or watershed: the dense tissue that
         // hangs together is limb, and the limb goes hardly beyond it.

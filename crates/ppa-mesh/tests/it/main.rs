@@ -8,3 +8,4 @@ mod limb_real;
 mod mesh_file;
 mod reference;
 mod surface;
+mod walls;

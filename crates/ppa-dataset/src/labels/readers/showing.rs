@@ -104,6 +104,7 @@ mod tests {
             shape: BodyShape::Orig,
             volume_change_mm3: None,
             too_far_pixels: 0,
+            cut_share: None,
             patient_from_ct: [[0.0; 4]; 4],
             room_from_patient: [[0.0; 4]; 4],
             ct_from_device: None,
