@@ -4,14 +4,16 @@ use std::fmt;
 
 use nalgebra::{Isometry3, Point3};
 use ppa_depth::{
-    Body, BodyError, Camera, CameraError, CameraModel, CameraSpec, DepthError, DepthMode, MeshBody,
+    Body, Camera, CameraError, CameraModel, CameraSpec, DepthError, DepthMode, MeshBody,
     PlacedBody, Roi, WallDepth, render, render_before, roi_around,
 };
-use ppa_mesh::{CutWalls, Mesh};
-use ppa_xray::{Detector, Projection};
+use ppa_mesh::{CutWalls, Mesh, WallMeasure};
+use ppa_xray::Detector;
 
+use crate::findings::{Finding, FindingCode, Severity};
 use crate::layout::{LimbId, View, angle_text};
 use crate::stage::PlacedCamera;
+use crate::unit::UnitError;
 
 /// Largest share of a region that may be cut unless the plan says otherwise; above it, the pose has a finding.
 pub(crate) const MAX_CUT_SHARE: f64 = 0.01;
@@ -23,29 +25,38 @@ const MOST_RAYS: u32 = 512;
 pub(crate) struct CutFaces {
     /// Corners of the walls in the `ct` frame.
     corners: Vec<Point3<f32>>,
-    /// The walls alone; `None` if no face of the scan cuts the limb.
-    alone: Option<Body>,
+    /// The walls alone, and the tube as a camera; `None` if no face of the scan cuts the limb.
+    from_tube: Option<(Body, Camera)>,
 }
 
 impl CutFaces {
-    pub fn new(walls: &CutWalls, skin: &Mesh) -> Result<Self, BodyError> {
+    /// For the walls of a skin and the detector of all its radiographs.
+    pub fn new(
+        walls: &CutWalls,
+        skin: &Mesh,
+        detector: &Detector,
+        source_detector_mm: f64,
+    ) -> Result<Self, UnitError> {
+        if walls.is_empty() {
+            return Ok(Self {
+                corners: Vec::new(),
+                from_tube: None,
+            });
+        }
         let vertices = walls.vertices(skin);
         let mut used = walls.triangles.as_flattened().to_vec();
         used.sort_unstable();
         used.dedup();
-        let alone = match walls.is_empty() {
-            true => None,
-            false => Some(MeshBody::new(&vertices, &walls.triangles)?.into()),
-        };
+        let alone = MeshBody::new(&vertices, &walls.triangles)?.into();
         Ok(Self {
             corners: used.iter().map(|&id| vertices[id as usize]).collect(),
-            alone,
+            from_tube: Some((alone, tube(detector, source_detector_mm)?)),
         })
     }
 
     /// Whether no face of the scan cuts the limb.
     pub fn is_empty(&self) -> bool {
-        self.alone.is_none()
+        self.from_tube.is_none()
     }
 
     /// Share of the region's pixels at whose centre the camera sees a wall, and nothing before it. `in_room` moves points
@@ -70,30 +81,25 @@ impl CutFaces {
     /// detector, or the whole detector where that misses it.
     pub fn in_radiograph(
         &self,
-        projection: &Projection,
+        ct_from_device: &Isometry3<f64>,
         joint: &Point3<f64>,
         roi_mm: f64,
-    ) -> Result<f64, CameraError> {
-        let Some(walls) = &self.alone else {
-            return Ok(0.0);
+    ) -> f64 {
+        let Some((walls, tube)) = &self.from_tube else {
+            return 0.0;
         };
-        let camera = tube(&projection.detector, projection.source_detector_mm)?;
-        let device_from_ct: Isometry3<f64> = projection.ct_from_device.inverse();
-        let image = render(
-            &camera,
-            &[PlacedBody {
-                body: walls,
-                camera_from_body: device_from_ct,
-            }],
-        );
+        let device_from_ct = ct_from_device.inverse();
+        let walls = PlacedBody {
+            body: walls,
+            camera_from_body: device_from_ct,
+        };
+        let image = render(tube, &[walls]);
         let crossed = (0..).zip(&image.z_mm).filter(|(_, z_mm)| **z_mm > 0.0);
         let crossed: Vec<u32> = crossed.map(|(pixel, _)| pixel).collect();
-        Ok(
-            match roi_around(&camera, &(device_from_ct * joint), roi_mm) {
-                Ok(roi) => share(&roi, image.width, &crossed),
-                Err(_) => crossed.len() as f64 / image.z_mm.len() as f64,
-            },
-        )
+        match roi_around(tube, &(device_from_ct * joint), roi_mm) {
+            Ok(roi) => share(&roi, image.width, &crossed),
+            Err(_) => crossed.len() as f64 / image.z_mm.len() as f64,
+        }
     }
 }
 
@@ -229,6 +235,41 @@ pub(crate) struct PoseCuts {
     pub shares: Vec<(PoseImage, f64)>,
 }
 
+impl PoseCuts {
+    /// Share of the radiograph's region.
+    pub fn of_radiograph(&self) -> f64 {
+        let of =
+            |(image, share): &(PoseImage, f64)| (*image == PoseImage::Radiograph).then_some(*share);
+        self.shares.iter().find_map(of).unwrap_or_default()
+    }
+
+    /// The image of which most is cut, if that is more than [`MAX_CUT_SHARE`]; shares in whole percent, so that poses
+    /// alike have one finding. The place is the centre of the cut nearest to the joint.
+    pub fn finding(&self, walls: &CutWalls, skin: &Mesh, joint: &Point3<f64>) -> Option<Finding> {
+        let worse = |a: (PoseImage, f64), b: (PoseImage, f64)| if b.1 > a.1 { b } else { a };
+        let (image, share) = self.shares.iter().copied().reduce(worse)?;
+        if share <= MAX_CUT_SHARE {
+            return None;
+        }
+        let percent = (100.0 * share).round();
+        let far = |wall: &WallMeasure| (wall.centre - joint).norm();
+        let nearest = walls
+            .measured(skin)
+            .into_iter()
+            .min_by(|a, b| far(a).total_cmp(&far(b)));
+        Some(Finding {
+            code: FindingCode::CutInRegion,
+            severity: Severity::Severe,
+            text: format!(
+                "about {percent} % of the {image} lies where the field of view of the scan cuts the limb off, expected at most {} %",
+                100.0 * MAX_CUT_SHARE
+            ),
+            value: Some(percent / 100.0),
+            place_mm: nearest.map(|wall| wall.centre.into()),
+        })
+    }
+}
+
 /// Refuses a limb of which a region is cut by more than its limit: depth images, radiographs.
 pub(crate) fn check(limb: LimbId, poses: &[PoseCuts], limits: [f64; 2]) -> Result<(), CutError> {
     let limit = |image: PoseImage| match image {
@@ -325,8 +366,6 @@ mod tests {
             triangles: vec![[0, 1, 2], [0, 2, 3]],
             ..CutWalls::default()
         };
-        let cut = CutFaces::new(&walls, &skin).unwrap();
-        let ct_from_device = Isometry3::translation(0.0, 0.0, -500.0);
         // 200 x 160 mm, moved along with what it shows; in one image the pixels are many, in the other few.
         for (columns, rows, pixel_mm) in [(2000, 1600, 0.1), (100, 80, 2.0)] {
             let detector = Detector {
@@ -335,11 +374,9 @@ mod tests {
                 pixel_mm,
                 centre_mm: [20.0, 0.0],
             };
-            let exposure = Projection::new(ct_from_device, 1000.0, detector);
-            let of = |roi_mm, x| {
-                cut.in_radiograph(&exposure, &Point3::new(x, 0.0, 0.0), roi_mm)
-                    .unwrap()
-            };
+            let cut = CutFaces::new(&walls, &skin, &detector, 1000.0).unwrap();
+            let before = Isometry3::translation(0.0, 0.0, -500.0);
+            let of = |roi_mm, x| cut.in_radiograph(&before, &Point3::new(x, 0.0, 0.0), roi_mm);
             let close = |share: f64, expected: f64| {
                 assert!((share - expected).abs() < 0.01, "{share} {expected}")
             };
@@ -348,12 +385,9 @@ mod tests {
             close(of(40.0, 30.0), 0.5);
             // Beside the detector: all of it counts.
             close(of(40.0, 500.0), 80.0 * 80.0 / (200.0 * 160.0));
-            let behind = Projection::new(Isometry3::translation(0.0, 0.0, 100.0), 1000.0, detector);
-            assert_eq!(
-                cut.in_radiograph(&behind, &Point3::new(0.0, 0.0, 700.0), 40.0)
-                    .unwrap(),
-                0.0
-            );
+            let behind = Isometry3::translation(0.0, 0.0, 100.0);
+            let joint = Point3::new(0.0, 0.0, 700.0);
+            assert_eq!(cut.in_radiograph(&behind, &joint, 40.0), 0.0);
         }
     }
 }

@@ -24,9 +24,13 @@ mod check;
 #[cfg(feature = "generate")]
 mod claim;
 #[cfg(feature = "generate")]
+mod closed_skin;
+#[cfg(feature = "generate")]
 mod contact_sheet;
 #[cfg(feature = "generate")]
 mod coverage_plot;
+#[cfg(feature = "generate")]
+mod cut_findings;
 #[cfg(feature = "generate")]
 mod cut_share;
 #[cfg(feature = "generate")]
@@ -35,6 +39,7 @@ mod description;
 mod drawing;
 pub mod export;
 mod files;
+mod findings;
 #[cfg(feature = "generate")]
 mod forecast;
 #[cfg(feature = "generate")]
@@ -94,12 +99,15 @@ pub use check::{Check, Problem, check};
 #[cfg(feature = "generate")]
 pub use claim::FolderError;
 #[cfg(feature = "generate")]
+pub use closed_skin::closed_skin;
+#[cfg(feature = "generate")]
 pub use contact_sheet::{ContactSheetError, contact_sheet};
 #[cfg(feature = "generate")]
 pub use coverage_plot::{RankedView, coverage_plot};
 #[cfg(feature = "generate")]
 pub use cut_share::{CutError, PoseImage};
 pub use files::{FileError, sha256_of_file, write_whole};
+pub use findings::{Finding, FindingCode, Findings, LimbFinding, Severity};
 #[cfg(feature = "generate")]
 pub use forecast::{Forecast, ForecastError, forecast};
 #[cfg(feature = "generate")]

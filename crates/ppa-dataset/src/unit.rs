@@ -4,17 +4,18 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Point3};
 use ppa_depth::{
-    Body, BodyError, MeshBody, PlacedBody, Roi, WallDepth, WalledImage, render_before, roi_around,
-    rows_from_isometry,
+    Body, PlacedBody, Roi, WallDepth, WalledImage, render_before, roi_around, rows_from_isometry,
 };
-use ppa_mesh::{CutWalls, Displacement, Mesh};
+use ppa_mesh::{Displacement, Mesh};
 use ppa_scene::{Placement, PoseAngle, place_soft};
 use ppa_xray::{FastSettings, Projection, VoxelPhantom};
 use rayon::prelude::*;
 
 use crate::body_shape::BodyShape;
+use crate::closed_skin::closed_skin;
 use crate::cut_share::{self, CutError, CutFaces, PoseCuts, PoseImage};
 use crate::files::{FileError, sha256_of_file};
+use crate::findings::Finding;
 use crate::layout::LimbId;
 use crate::manifest::{FileKind, FileRow, RoiFile, RoiRow};
 use crate::plan::Plan;
@@ -80,6 +81,8 @@ pub(crate) struct Images {
     pub files: Vec<FileRow>,
     /// Regions of interest in them.
     pub rois: RoiFile,
+    /// Doubts about the limb and about this pose.
+    pub findings: Vec<Finding>,
 }
 
 /// A limb with everything that all its poses share.
@@ -90,7 +93,9 @@ pub(crate) struct PosableLimb<'a> {
     prepared: PreparedLimb,
     shapes: Vec<ShapedSkin>,
     phantom: VoxelPhantom,
-    cuts: CutFaces,
+    cut_faces: CutFaces,
+    /// How much of each image is cut, by pose of the plan; empty if no face of the scan cuts the limb.
+    cuts: Vec<PoseCuts>,
 }
 
 impl<'a> PosableLimb<'a> {
@@ -104,7 +109,7 @@ impl<'a> PosableLimb<'a> {
         let shaped = |&shape: &BodyShape| {
             let (landmarks, settings) = (&prepared.landmarks, &plan.shapes);
             let mesh = body_shape(skin, landmarks, shape, settings, id, plan.seed)?;
-            let body = closed_body(&walls.vertices(&mesh), &mesh, walls)?;
+            let body = closed_skin(&walls.vertices(&mesh), &mesh, walls)?;
             let change = || Displacement::between(skin, &mesh).volume_mm3;
             let volume_change_mm3 = (shape != BodyShape::Orig).then(change);
             Ok::<_, UnitError>(ShapedSkin {
@@ -114,35 +119,39 @@ impl<'a> PosableLimb<'a> {
                 volume_change_mm3,
             })
         };
-        let cuts = CutFaces::new(walls, skin)?;
+        let source_detector_mm = stage.table.room.device.source_detector_mm;
+        let cut_faces = CutFaces::new(walls, skin, &plan.xray.detector, source_detector_mm)?;
         let shapes = plan.shapes.variants.iter().map(shaped);
-        let posable = Self {
+        let mut posable = Self {
             id,
             plan,
             stage,
             shapes: shapes.collect::<Result<_, _>>()?,
             phantom: joint_phantom(&prepared, &plan.xray)?,
-            cuts,
+            cut_faces,
+            cuts: Vec::new(),
             prepared,
         };
-        posable.check_cuts()?;
+        posable.cuts = posable.checked_cuts()?;
         Ok(posable)
     }
 
-    /// Looks at all poses of the plan, before the first of them is made.
-    fn check_cuts(&self) -> Result<(), UnitError> {
-        if self.cuts.is_empty() {
-            return Ok(());
+    /// Looks at all poses of the plan, before the first of them is made, and refuses those cut too much.
+    fn checked_cuts(&self) -> Result<Vec<PoseCuts>, UnitError> {
+        if self.cut_faces.is_empty() {
+            return Ok(Vec::new());
         }
         let (skin, walls) = (&self.prepared.limb.mesh, &self.prepared.limb.walls);
-        let rigid = closed_body(&walls.vertices(skin), skin, walls)?;
+        let rigid = closed_skin(&walls.vertices(skin), skin, walls)?;
         let poses = self.plan.rotation.poses()?;
+        // A pose that cannot be made is told with its angle when its turn comes.
         let cuts: Vec<PoseCuts> = poses
             .par_iter()
-            .map(|&pose| self.pose_cuts(pose, &rigid))
-            .collect::<Result<_, _>>()?;
+            .filter_map(|&pose| self.pose_cuts(pose, &rigid).ok())
+            .collect();
         let limits = [self.plan.depth.max_cut_share, self.plan.xray.max_cut_share];
-        Ok(cut_share::check(self.id, &cuts, limits)?)
+        cut_share::check(self.id, &cuts, limits)?;
+        Ok(cuts)
     }
 
     /// How much of each image is cut; `rigid` is the closed skin of the scan.
@@ -155,10 +164,12 @@ impl<'a> PosableLimb<'a> {
         for camera in &self.stage.cameras {
             let roi = self.roi(camera, &placement)?;
             let limb = self.placed(camera, &placement, flattened.as_ref(), rigid);
-            let share = self.cuts.in_region(camera, &roi, limb, in_room)?;
+            let share = self.cut_faces.in_region(camera, &roi, limb, in_room)?;
             shares.push((PoseImage::Depth(camera.view), share));
         }
-        let share = self.radiograph_cut(&self.projection(&placement))?;
+        let (projection, roi_mm) = (self.projection(&placement), self.plan.depth.roi_mm);
+        let share =
+            (self.cut_faces).in_radiograph(&projection.ct_from_device, &self.joint(), roi_mm);
         shares.push((PoseImage::Radiograph, share));
         Ok(PoseCuts {
             step: pose.step,
@@ -166,10 +177,13 @@ impl<'a> PosableLimb<'a> {
         })
     }
 
-    fn radiograph_cut(&self, projection: &Projection) -> Result<f64, UnitError> {
-        let joint = Point3::from(self.prepared.landmarks.joint_centre);
-        let roi_mm = self.plan.depth.roi_mm;
-        Ok(self.cuts.in_radiograph(projection, &joint, roi_mm)?)
+    fn cuts_at(&self, pose: PoseAngle) -> Option<&PoseCuts> {
+        self.cuts.iter().find(|cuts| cuts.step == pose.step)
+    }
+
+    /// Centre of the joint in the `ct` frame.
+    fn joint(&self) -> Point3<f64> {
+        self.prepared.landmarks.joint_centre.into()
     }
 
     /// Makes all images of one pose under `root`.
@@ -209,11 +223,17 @@ impl<'a> PosableLimb<'a> {
             }
         }
         files.extend(self.radiograph(pose, &placement, root)?);
+        let mut findings = self.prepared.findings.clone();
+        findings.extend(self.cuts_at(pose).and_then(|cuts| {
+            let (skin, joint) = (&self.prepared.limb.mesh, self.joint());
+            cuts.finding(&self.prepared.limb.walls, skin, &joint)
+        }));
         let rows = self.stage.cameras.iter().zip(&rois);
         let rows = rows.map(|(camera, roi)| roi_row(camera, roi, pose));
         Ok(Images {
             files,
             rois: rows.collect(),
+            findings,
         })
     }
 
@@ -242,7 +262,7 @@ impl<'a> PosableLimb<'a> {
         }
         let walls = &self.prepared.limb.walls;
         let in_room = placement.in_room(&walls.vertices(skin), &self.prepared.landmarks);
-        Ok(Some(closed_body(&in_room, skin, walls)?))
+        Ok(Some(closed_skin(&in_room, skin, walls)?))
     }
 
     /// A skin before a camera: flattened in the room, or rigid in the scan.
@@ -266,8 +286,7 @@ impl<'a> PosableLimb<'a> {
     }
 
     fn roi(&self, camera: &PlacedCamera, placement: &Placement) -> Result<Roi, UnitError> {
-        let joint = Point3::from(self.prepared.landmarks.joint_centre);
-        let joint_in_camera = self.camera_from_ct(camera, placement) * joint;
+        let joint_in_camera = self.camera_from_ct(camera, placement) * self.joint();
         Ok(roi_around(
             &camera.camera,
             &joint_in_camera,
@@ -288,7 +307,7 @@ impl<'a> PosableLimb<'a> {
     ) -> Result<[FileRow; 2], UnitError> {
         let settings = &self.plan.xray;
         let projection = self.projection(placement);
-        let cut = self.radiograph_cut(&projection)?;
+        let cut = self.cuts_at(pose).map_or(0.0, PoseCuts::of_radiograph);
         let seed = item_seed(self.plan.seed, Purpose::Radiograph, self.id, pose.step);
         let engine = FastSettings {
             seed,
@@ -354,12 +373,6 @@ fn roi_row(camera: &PlacedCamera, roi: &Roi, pose: PoseAngle) -> (String, RoiRow
         size: roi.size,
     };
     (LimbId::depth_name(camera.view, pose.step), row)
-}
-
-/// A skin with its walls; `vertices` are those of the skin, wherever it was moved, and the corners of the walls.
-fn closed_body(vertices: &[Point3<f32>], skin: &Mesh, walls: &CutWalls) -> Result<Body, BodyError> {
-    let body = MeshBody::new(vertices, &skin.triangles)?;
-    Ok(body.with_walls(&walls.triangles)?.into())
 }
 
 fn depth_image(

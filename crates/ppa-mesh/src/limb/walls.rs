@@ -42,6 +42,8 @@ pub struct WallMeasure {
     pub area_mm2: f64,
     /// Centre of area, in the frame of the skin, mm.
     pub centre: Point3<f64>,
+    /// Unit normal, away from the limb.
+    pub outward: Vector3<f64>,
 }
 
 impl CutWalls {
@@ -130,10 +132,12 @@ impl CutWalls {
                 .cast::<f64>()
         };
         let measure = |(face, triangles): &(&'static str, Range<usize>)| {
-            let (mut area_mm2, mut moment) = (0.0, Vector3::zeros());
+            let (mut area_mm2, mut moment, mut outward) = (0.0, Vector3::zeros(), Vector3::zeros());
             for triangle in &self.triangles[triangles.clone()] {
                 let [a, b, c] = triangle.map(vertex);
-                let area = 0.5 * (b - a).cross(&(c - a)).norm();
+                let across = (b - a).cross(&(c - a));
+                let area = 0.5 * across.norm();
+                outward += across;
                 area_mm2 += area;
                 moment += (a.coords + b.coords + c.coords) * (area / 3.0);
             }
@@ -141,6 +145,7 @@ impl CutWalls {
                 face,
                 area_mm2,
                 centre: Point3::from(moment / area_mm2.max(f64::MIN_POSITIVE)),
+                outward: outward.try_normalize(0.0).unwrap_or_default(),
             }
         };
         self.faces.iter().map(measure).collect()

@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Args;
 use nalgebra::{Isometry3, Point3};
-use ppa_dataset::{Case, Plan, PreparedLimb, RankedView, Stage, coverage_plot, write_whole};
+use ppa_dataset::{
+    Case, Plan, PreparedLimb, RankedView, Stage, closed_skin, coverage_plot, write_whole,
+};
 use ppa_depth::{
-    Body, Camera, CoverageSettings, JointSurface, MeshBody, PlacedBody, Viewpoint,
-    isometry_from_rows, rows_from_isometry,
+    Camera, CoverageSettings, JointSurface, MeshBody, PlacedBody, Viewpoint, isometry_from_rows,
+    rows_from_isometry,
 };
 use ppa_scene::place;
 use serde::Deserialize;
@@ -100,10 +102,12 @@ pub fn run(args: &CoverageArgs, output: Output) -> anyhow::Result<()> {
         radius_mm: args.radius_mm,
         max_angle_deg: args.max_angle_deg,
     };
-    let skin = &prepared.limb.mesh;
+    let (skin, walls) = (&prepared.limb.mesh, &prepared.limb.walls);
     let mesh = MeshBody::new(&skin.vertices, &skin.triangles)?;
     let surface = JointSurface::new(&mesh, &joint_in_ct, &settings)?;
-    let (limb, furniture) = (Body::Mesh(mesh), table.furniture()?);
+    // Where the scan cuts the limb no skin is to be seen, but what is behind is hidden.
+    let limb = closed_skin(&walls.vertices(skin), skin, walls)?;
+    let furniture = table.furniture()?;
     let see = |candidate: &Candidate| {
         let camera_from_room = candidate.room_from_camera.inverse();
         let scene = [
