@@ -3,6 +3,7 @@
 //! Parses, calls the libraries, prints. Results go to stdout, everything else to stderr.
 
 mod commands;
+mod findings;
 mod interrupt;
 mod number_lists;
 mod output;

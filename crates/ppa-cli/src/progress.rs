@@ -9,6 +9,7 @@ use indicatif::{HumanDuration, ProgressBar};
 use ppa_dataset::Progress;
 use serde::Serialize;
 
+use crate::findings::repeat;
 use crate::output::{Output, bar};
 
 /// Time between two lines, when progress is not a bar.
@@ -103,11 +104,16 @@ impl State {
 impl Watch {
     /// Counts what a run reports.
     pub fn report(&self, progress: Progress) {
+        if let Progress::Findings(findings) = progress {
+            self.bar.suspend(|| repeat(findings, ""));
+            return;
+        }
         let mut state = self.state.lock().unwrap_or_else(|e| e.into_inner());
         match progress {
             Progress::Total(units) => state.units = units,
             Progress::Found => state.found += 1,
             Progress::Made => state.made += 1,
+            Progress::Findings(_) => {}
         }
         let now = Instant::now();
         let remaining = state.remaining(now);

@@ -3,6 +3,7 @@
 //! `ppa prepare` writes them into the case, a dataset lists those of all its limbs in `findings.json`. A person who has
 //! looked at a severe one names its code in `acknowledged` of the case; until then every command repeats it.
 
+use std::fmt;
 use std::fs;
 use std::io;
 use std::path::Path;
@@ -35,8 +36,10 @@ pub enum FindingCode {
     SeveralLimbs,
     /// Another limb, cut by the image, lies on the side that was asked for.
     OtherLimbOnSide,
-    /// The limb is too small or too short for one.
+    /// The limb is too thin or too short for one.
     LimbTooSmall,
+    /// The limb is too thick for one: a trunk.
+    LimbTooLarge,
     /// A part of another limb is fused to the skin.
     FusedLimb,
     /// The field of view cuts the limb where it does not go on.
@@ -49,12 +52,40 @@ pub enum FindingCode {
     PlaneAlongImage,
     /// Distal and proximal contact with the table are too near to each other to tell the pitch.
     ContactsTooNear,
+    /// A person gave the supporting plane.
+    PlaneGiven,
     /// The axis of rotation is inclined to the bone's shaft.
     AxisOffShaft,
+    /// The axis of a lower leg passes through centres of the skin.
+    AxisWithoutBone,
+    /// The regions that give the axis lie closer together than in a scan that is long enough.
+    RegionsCloser,
     /// The fibula lies where that of the other side would.
     SideMismatch,
+    /// The anterior direction points to the patient's back.
+    AnteriorReversed,
     /// Neither an ankle nor a knee was found.
     NoJoint,
+    /// The joint centre lies outside the limb.
+    JointOutside,
+    /// The joint lies elsewhere than the ankle that the scan shows.
+    JointOffAnkle,
+    /// The limb lies the other way round than the scan's orientation says.
+    ProximalIsInferior,
+}
+
+impl fmt::Display for Severity {
+    /// As in files.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.serialize(f)
+    }
+}
+
+impl fmt::Display for FindingCode {
+    /// As in files.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.serialize(f)
+    }
 }
 
 /// One doubt about a limb or a pose.
@@ -102,6 +133,11 @@ pub struct Findings(pub Vec<LimbFinding>);
 impl Findings {
     /// Its file in a dataset.
     pub const FILE: &str = "findings.json";
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
 
     /// Reads the findings of the dataset in `root`; none where the file is absent.
     ///

@@ -8,6 +8,7 @@ use ppa_xray::Part;
 use serde::Serialize;
 
 use crate::files::{FileError, remove_if_there};
+use crate::findings::Findings;
 use crate::generate::{GenerateError, Work};
 use crate::job::{Progress, units_of_part};
 use crate::layout::View;
@@ -69,6 +70,9 @@ pub struct Forecast {
     pub needed_bytes: u64,
     /// Free bytes where the dataset will lie, if the system tells.
     pub free_bytes: Option<u64>,
+    /// Doubts about the limbs.
+    #[serde(skip_serializing_if = "Findings::is_empty")]
+    pub findings: Findings,
 }
 
 /// Prepares every limb of the plan, makes `fraction` of its poses, at least one, in a temporary
@@ -91,6 +95,8 @@ pub fn forecast(
     let work = Work::of_plan(plan)?;
     let poses = plan.rotation.poses().map_err(GenerateError::from)?;
     let limbs = units_of_part(work.planned(), &poses, Part::WHOLE);
+    let findings = work.findings(&limbs, root)?;
+    progress(Progress::Findings(&findings));
     let of_limb = ((poses.len() as f64 * fraction).round() as usize).max(1);
     progress(Progress::Total(limbs.len() * of_limb));
 
@@ -132,6 +138,7 @@ pub fn forecast(
         bytes,
         needed_bytes: bytes.saturating_sub(status(root).map_or(0, |status| status.bytes)),
         free_bytes: free_bytes(root),
+        findings,
     })
 }
 
@@ -219,6 +226,7 @@ mod tests {
             bytes: 1000,
             needed_bytes,
             free_bytes,
+            findings: Findings::default(),
         };
         let fits = |needed, free| forecast(needed, free).fits(Path::new("dataset"));
         assert!(fits(600, Some(600)).is_ok() && fits(600, None).is_ok());

@@ -8,10 +8,14 @@ use ppa_xray::Part;
 use crate::case::{Case, CaseError};
 use crate::description::{Description, Settings};
 use crate::files::FileError;
-use crate::job::{Job, JobError, MakeUnit, PlannedLimb, Progress, Summary, units_of_part};
+use crate::findings::Findings;
+use crate::job::{
+    Job, JobError, LimbUnits, MakeUnit, PlannedLimb, Progress, Summary, units_of_part,
+};
 use crate::layout::LimbId;
 use crate::plan::Plan;
 use crate::prepare::{PrepareError, PreparedLimb};
+use crate::record::Record;
 use crate::stage::{Stage, StageError};
 use crate::unit::{PosableLimb, UnitError};
 
@@ -129,11 +133,13 @@ pub fn generate(
 ) -> Result<Summary, GenerateError> {
     let work = Work::of_plan(plan)?;
     let poses = plan.rotation.poses()?;
+    let limbs = units_of_part(work.planned(), &poses, settings.part);
+    progress(Progress::Findings(&work.findings(&limbs, root)?));
     let job = Job {
         root,
         description: &work.description,
         part: settings.part,
-        limbs: units_of_part(work.planned(), &poses, settings.part),
+        limbs,
         disk_limit: settings.disk_limit,
         progress,
     };
@@ -181,19 +187,38 @@ impl<'a> Work<'a> {
         })
     }
 
+    /// What is doubted about limbs, before any pose of them is made. Limbs that have a pose in the folder `root` are not
+    /// prepared for it.
+    pub fn findings(&self, limbs: &[LimbUnits], root: &Path) -> Result<Findings, GenerateError> {
+        let mut findings = Findings::default();
+        for limb in limbs {
+            let made = limb.units().find_map(|unit| {
+                let record = Record::read(root, &unit).ok()?;
+                (record.key == unit.key()).then_some(record.findings)
+            });
+            let of_limb = match made {
+                Some(findings) => findings,
+                None => self.limb(limb.limb).prepared()?.findings,
+            };
+            findings.add(limb.limb, &limb.acknowledged, &of_limb);
+        }
+        Ok(findings)
+    }
+
+    fn limb(&self, id: LimbId) -> &CasedLimb {
+        let limb = self.limbs.iter().find(|limb| limb.id == id);
+        limb.expect("only limbs of the plan are asked for")
+    }
+
     /// Reads, skins and shapes a limb; the result makes its poses below `root`.
     pub fn prepare<'m>(
         &'m self,
         id: LimbId,
         root: &'m Path,
     ) -> Result<MakeUnit<'m, GenerateError>, GenerateError> {
-        let limb = self.limbs.iter().find(|limb| limb.id == id);
-        let limb = limb.expect("only limbs of the plan are asked for");
+        let limb = self.limb(id);
         let case = || limb.file.clone();
-        let prepared = PreparedLimb::of_case(&limb.case).map_err(|error| GenerateError::Limb {
-            case: case(),
-            source: Box::new(error),
-        })?;
+        let prepared = limb.prepared()?;
         let posable = PosableLimb::new(id, self.plan, &self.stage, prepared).map_err(|source| {
             GenerateError::Posable {
                 case: case(),
@@ -209,6 +234,15 @@ impl<'a> Work<'a> {
                     source,
                 })
         }))
+    }
+}
+
+impl CasedLimb {
+    fn prepared(&self) -> Result<PreparedLimb, GenerateError> {
+        PreparedLimb::of_case(&self.case).map_err(|error| GenerateError::Limb {
+            case: self.file.clone(),
+            source: Box::new(error),
+        })
     }
 }
 

@@ -21,7 +21,7 @@ use crate::record::{Record, Unit};
 use crate::unit::Images;
 
 /// What a run did.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// Poses of the plan, or of the shard.
     pub units: usize,
@@ -31,12 +31,17 @@ pub struct Summary {
     pub depth_images: usize,
     /// Radiographs in the folder.
     pub radiographs: usize,
+    /// Doubts about its limbs and poses.
+    #[serde(skip_serializing_if = "Findings::is_empty")]
+    pub findings: Findings,
 }
 
 /// What a run reports while it goes on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Progress {
-    /// The number of poses, first of all.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Progress<'a> {
+    /// What is doubted about the limbs, first of all.
+    Findings(&'a Findings),
+    /// The number of poses, before the first of them.
     Total(usize),
     /// Another pose was found complete.
     Found,
@@ -283,6 +288,7 @@ impl Job<'_> {
             made,
             depth_images: count(FileKind::Depth),
             radiographs: count(FileKind::Radiograph),
+            findings,
         })
     }
 }

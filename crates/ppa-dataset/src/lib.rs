@@ -45,6 +45,8 @@ mod forecast;
 #[cfg(feature = "generate")]
 mod frames;
 #[cfg(feature = "generate")]
+mod gates;
+#[cfg(feature = "generate")]
 mod generate;
 #[cfg(feature = "generate")]
 mod job;
@@ -112,6 +114,8 @@ pub use findings::{Finding, FindingCode, Findings, LimbFinding, Severity};
 pub use forecast::{Forecast, ForecastError, forecast};
 #[cfg(feature = "generate")]
 pub use frames::Frames;
+#[cfg(feature = "generate")]
+pub use gates::NotALimb;
 #[cfg(feature = "generate")]
 pub use generate::{GenerateError, GenerateSettings, generate};
 #[cfg(feature = "generate")]

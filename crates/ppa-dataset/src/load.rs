@@ -41,7 +41,7 @@ fn a_hundred_thousand_units_do_not_slow_down() {
         progress,
     };
     let begun = Instant::now();
-    let tell = |progress| {
+    let tell = |progress: Progress| {
         if progress == Progress::Made {
             times.lock().unwrap().push(begun.elapsed());
         }

@@ -11,6 +11,7 @@ use crate::case::{Case, Found, Source};
 use crate::cut_findings::cuts;
 use crate::files::hex;
 use crate::findings::{Finding, FindingCode, Severity};
+use crate::gates::{self, NotALimb, require_limb};
 
 /// Why a limb could not be prepared.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +26,9 @@ pub enum PrepareError {
     /// No limb was found in it.
     #[error(transparent)]
     Limb(#[from] ppa_mesh::LimbError),
+    /// What was found is far too small for one.
+    #[error(transparent)]
+    NotALimb(#[from] NotALimb),
     /// Its landmarks were not found.
     #[error(transparent)]
     Landmarks(#[from] ppa_scene::LandmarkError),
@@ -51,7 +55,7 @@ pub struct PreparedLimb {
     pub limb: Limb,
     /// Axis, joint and plane.
     pub landmarks: Landmarks,
-    /// Doubts about scan and limb.
+    /// Doubts about scan and limb, severe ones first.
     pub findings: Vec<Finding>,
 }
 
@@ -71,19 +75,29 @@ impl PreparedLimb {
             ..surface.clone()
         };
         let limb = extract_limb(&volume, &surface)?;
+        require_limb(&limb.report, volume.grid().spacing_mm().into())?;
         let landmarks = find_landmarks(&volume, &limb.mesh, &limb.mask, side, choices)?;
-        let findings = warnings
+        let mut findings: Vec<Finding> = warnings
             .into_iter()
             .map(of_warning)
             .chain(several_limbs(&limb.report))
             .chain(other_on_side(&limb.report, side, given))
             .chain(cuts(&limb.walls, &limb.mesh, &landmarks))
+            .chain(gates::findings(&volume, &limb, &landmarks)?)
             .collect();
+        findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
         Ok(Self {
             volume,
             limb,
             landmarks,
             findings,
+        })
+    }
+
+    /// Severe findings that are not acknowledged.
+    pub fn open_findings(&self, acknowledged: &[FindingCode]) -> impl Iterator<Item = &Finding> {
+        self.findings.iter().filter(|finding| {
+            finding.severity == Severity::Severe && !acknowledged.contains(&finding.code)
         })
     }
 

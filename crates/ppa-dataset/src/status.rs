@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use crate::claim::{FolderError, claim_existing};
 use crate::files::FileError;
+use crate::findings::Findings;
 use crate::job::LimbUnits;
 use crate::layout::LimbId;
 use crate::manifest::Manifest;
@@ -31,6 +32,10 @@ pub struct Status {
     pub running: bool,
     /// Whether all poses are made and listed in the manifest.
     pub complete: bool,
+    /// Doubts about limbs and poses.
+    pub findings: usize,
+    /// Those of them that are severe and not acknowledged.
+    pub open_findings: usize,
     /// The same, limb by limb.
     pub limbs: Vec<LimbStatus>,
 }
@@ -89,7 +94,10 @@ pub fn status(root: &Path) -> Result<Status, FolderError> {
     let made = limbs.iter().map(|limb| limb.made).sum();
     let manifest = root.join(Manifest::FILE);
     let listed = fs::exists(&manifest).map_err(FileError::at("read", &manifest))?;
+    let findings = Findings::read(root)?;
     Ok(Status {
+        findings: findings.0.len(),
+        open_findings: findings.0.iter().filter(|found| found.is_open()).count(),
         part: part.to_string(),
         units,
         made,

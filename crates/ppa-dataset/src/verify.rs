@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::check::{Check, Problem, Recorded};
 use crate::claim::FolderError;
 use crate::files::FileError;
+use crate::findings::Findings;
 use crate::generate::{GenerateError, Work};
 use crate::job::{LimbUnits, MakeUnit, Progress};
 use crate::plan::Plan;
@@ -42,7 +43,7 @@ pub enum VerifyError {
 }
 
 /// What [`verify`] found.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Verification {
     /// All files against their records.
     pub check: Check,
@@ -50,6 +51,8 @@ pub struct Verification {
     pub remade: usize,
     /// Images among these whose bytes came out otherwise.
     pub different: Vec<Problem>,
+    /// Doubts about its limbs and poses.
+    pub findings: Findings,
 }
 
 /// Checks the dataset in `root` as [`check`](crate::check) does, then makes a share of its poses
@@ -77,6 +80,8 @@ pub fn verify(
             key,
         });
     }
+    let findings = Findings::read(root)?;
+    progress(Progress::Findings(&findings));
     let check = recorded.check();
     let sample = sample(&recorded.limbs, fraction, seed);
     let remade = sample.iter().map(|(_, poses)| poses.len()).sum();
@@ -97,6 +102,7 @@ pub fn verify(
         check,
         remade,
         different,
+        findings,
     })
 }
 

@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::landmark_notes::LandmarkNote;
 use crate::limb_sections::Sections;
 
 /// The ankle of a lower leg.
@@ -11,6 +12,16 @@ pub(crate) struct Ankle {
     pub(crate) level_mm: f64,
     /// How much less dense the gap is than the bone on either side of it.
     pub(crate) depth_hu: f64,
+}
+
+impl Ankle {
+    /// What is told about it when the joint is taken to lie at a level.
+    pub(crate) fn note(&self, joint_mm: f64) -> LandmarkNote {
+        LandmarkNote::AnkleFound {
+            depth_hu: self.depth_hu,
+            joint_above_mm: joint_mm - self.level_mm,
+        }
+    }
 }
 
 /// The tibia flares when its outline is this much larger than at its thinnest.

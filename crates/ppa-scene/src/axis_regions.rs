@@ -5,10 +5,9 @@ use ppa_ct::Volume;
 
 use crate::ankle::{find_ankle, shaft_direction};
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
+use crate::landmark_notes::LandmarkNote;
 use crate::landmarks::{AxisRegion, AxisSource, LimbKind};
 use crate::limb_sections::Sections;
-
-const REVERSED: &str = "the ankle lies superior to the calf: proximal is inferior";
 
 /// Slices across the tibia: the scan's own, or interpolated ones if it leans by more than 3 degrees.
 fn across_the_shaft<'a>(
@@ -44,18 +43,16 @@ impl<'a> Reference<'a> {
         volume: &'a Volume,
         mask: &'a [bool],
         overrides: &LandmarkOverrides,
-        notes: &mut Vec<String>,
+        notes: &mut Vec<LandmarkNote>,
     ) -> Result<Self, LandmarkError> {
         let mut sections = Sections::along(volume, mask, &Vector3::z());
         let mut ankle = None;
         if overrides.limb != Some(LimbKind::Other) {
-            for (towards_proximal, note) in [(Vector3::z(), None), (-Vector3::z(), Some(REVERSED))]
-            {
+            for towards_proximal in [Vector3::z(), -Vector3::z()] {
                 let tried = across_the_shaft(volume, mask, &towards_proximal)?;
                 ankle = find_ankle(&tried);
                 if ankle.is_some() {
                     sections = tried;
-                    notes.extend(note.map(str::to_owned));
                     break;
                 }
             }
@@ -65,29 +62,17 @@ impl<'a> Reference<'a> {
         let (high, low) = (level(slices.first()), level(slices.last()));
         let (kind, level_mm) = match (overrides.joint_centre, ankle, overrides.limb) {
             (Some(centre), ankle, limb) => {
-                notes.push("joint level: given".into());
                 let guess = ankle.map_or(LimbKind::Other, |_| LimbKind::LowerLeg);
                 let level = sections.direction.dot(&Vector3::from(centre));
+                notes.extend(ankle.map(|ankle| ankle.note(level)));
                 (limb.unwrap_or(guess), level)
             }
             (None, Some(ankle), _) => {
-                notes.push(format!(
-                    "joint level: gap between plafond and talar dome, {:.0} HU darker than the \
-                     bone on either side",
-                    ankle.depth_hu
-                ));
+                notes.push(ankle.note(ankle.level_mm));
                 (LimbKind::LowerLeg, ankle.level_mm)
             }
             (None, None, Some(LimbKind::LowerLeg)) => return Err(LandmarkError::NoAnkle),
-            (None, None, limb) => {
-                let why = if limb.is_none() {
-                    "no ankle found"
-                } else {
-                    "other limb"
-                };
-                notes.push(format!("joint level: middle of the limb ({why})"));
-                (LimbKind::Other, 0.5 * (low + high))
-            }
+            (None, None, _) => (LimbKind::Other, 0.5 * (low + high)),
         };
         Ok(Self {
             kind,
@@ -101,9 +86,8 @@ impl<'a> Reference<'a> {
     pub(crate) fn regions(
         &self,
         overrides: &LandmarkOverrides,
-        notes: &mut Vec<String>,
     ) -> Result<(AxisRegion, AxisRegion, AxisSource), LandmarkError> {
-        let (joint, calf) = self.default_ranges(overrides, notes)?;
+        let (joint, calf) = self.default_ranges(overrides)?;
         if calf[0] < joint[1] {
             return Err(LandmarkError::Region {
                 name: "calf region",
@@ -122,10 +106,7 @@ impl<'a> Reference<'a> {
             Ok((joint, calf, source))
         };
         match (both(wanted), overrides.axis_source) {
-            (Err(_), None) if wanted == AxisSource::Bone => {
-                notes.push("axis: no bone in the regions, centres of the limb instead".into());
-                both(AxisSource::Limb)
-            }
+            (Err(_), None) if wanted == AxisSource::Bone => both(AxisSource::Limb),
             (found, _) => found,
         }
     }
@@ -133,7 +114,6 @@ impl<'a> Reference<'a> {
     fn default_ranges(
         &self,
         overrides: &LandmarkOverrides,
-        notes: &mut Vec<String>,
     ) -> Result<([f64; 2], [f64; 2]), LandmarkError> {
         // Below 50 mm tibia and fibula can touch: the syndesmosis is thinner than two voxels.
         const JOINT_MM: [f64; 2] = [50.0, 90.0];
@@ -150,12 +130,6 @@ impl<'a> Reference<'a> {
                     });
                 }
                 let scale = (reach / CALF_MM[1]).min(1.0);
-                if scale < 1.0 && !given {
-                    notes.push(format!(
-                        "axis regions: drawn closer together, the scan reaches {reach:.0} mm \
-                         proximal of the joint"
-                    ));
-                }
                 (JOINT_MM.map(|d| d * scale), CALF_MM.map(|d| d * scale))
             }
             LimbKind::Other => {

@@ -5,6 +5,7 @@ use ppa_ct::Volume;
 use ppa_mesh::Mesh;
 
 use crate::axis_regions::Reference;
+use crate::given_choices::{check_anterior, check_joint};
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
 use crate::landmarks::{Landmarks, Side};
 use crate::plane::first_not_finite;
@@ -14,7 +15,7 @@ use crate::supporting_plane::{check_plane, plane_under};
 ///
 /// `limb` is the skin in the `ct` frame, `mask` one value per voxel of `volume`: whether it
 /// belongs to the limb. Scans are patient scans (LPS), so proximal is superior; only when a lower
-/// leg shows its ankle the other way round is it turned, with a note.
+/// leg shows its ankle the other way round is it turned.
 ///
 /// * Slices: the scan's own; where the tibia leans in them by more than 3 degrees, interpolated ones
 ///   across it.
@@ -56,9 +57,13 @@ pub fn find_landmarks(
         return Err(LandmarkError::NotFinite { vertex });
     }
     overrides.check()?;
+    if let Some(joint) = overrides.joint_centre {
+        // Before the regions, which would not be found around it.
+        check_joint(&joint.into(), volume, mask)?;
+    }
     let mut notes = Vec::new();
     let reference = Reference::find(volume, mask, overrides, &mut notes)?;
-    let (joint_region, calf_region, axis_source) = reference.regions(overrides, &mut notes)?;
+    let (joint_region, calf_region, axis_source) = reference.regions(overrides)?;
     let [low, high] = [joint_region, calf_region].map(|region| Point3::from(region.centre_mm));
     let direction = reference.sections.direction;
     let axis = (high - low)
@@ -78,17 +83,12 @@ pub fn find_landmarks(
             (low, low + axis * (rise / axis.dot(&direction)))
         }
     };
+    notes.extend(check_joint(&joint_centre, volume, mask)?);
     let anterior = match overrides.anterior {
         Some(given) => Vector3::from(given),
         None => -Vector3::y(),
     };
-    if anterior.cross(&axis).norm() < 0.1 * anterior.norm() {
-        return Err(LandmarkError::Override {
-            name: "anterior",
-            found: anterior.into(),
-            expected: "a direction across the limb's axis",
-        });
-    }
+    notes.extend(check_anterior(&anterior, &axis, overrides)?);
     let across = anterior - axis * axis.dot(&anterior);
     let mut landmarks = Landmarks {
         side,

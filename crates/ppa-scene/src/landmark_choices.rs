@@ -158,6 +158,36 @@ pub enum LandmarkError {
         /// What it should be.
         expected: &'static str,
     },
+    /// A joint centre given by a person lies far from the limb.
+    #[error(
+        "joint_centre is {found:?}, {distance_mm:.0} mm outside the limb, expected at most {most_mm:.0} mm; the limb \
+         reaches from {low:.0?} to {high:.0?} mm"
+    )]
+    JointFar {
+        /// The point, `ct` frame, mm.
+        found: [f64; 3],
+        /// Distance to the nearest voxel of the limb, mm.
+        distance_mm: f64,
+        /// Largest distance that is accepted, mm.
+        most_mm: f64,
+        /// Low corner of the box around the limb, mm.
+        low: [f64; 3],
+        /// High corner of the box around the limb, mm.
+        high: [f64; 3],
+    },
+    /// An anterior direction given by a person runs along the limb.
+    #[error(
+        "anterior is {found:?}, {angle_deg:.0} degrees from the limb's axis, expected at least {least_deg:.0}: it is the \
+         direction that faces up at angle 0, across the limb"
+    )]
+    AnteriorAlongAxis {
+        /// The direction.
+        found: [f64; 3],
+        /// Angle to the axis, whichever way it points, degrees.
+        angle_deg: f64,
+        /// Smallest angle that is accepted, degrees.
+        least_deg: f64,
+    },
     /// Three points given by a person make no plane under the limb.
     #[error("plane_points are {found:?}, expected {expected}")]
     Plane {

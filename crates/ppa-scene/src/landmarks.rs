@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::frames::{Ct, Patient, Rigid};
+use crate::landmark_notes::LandmarkNote;
 use crate::plane::Plane;
 
 /// The patient's left or right; "l" or "r" in files.
@@ -74,8 +75,9 @@ pub struct Landmarks {
     pub joint_centre: [f64; 3],
     /// One distal and two proximal points of the plane Π_P under the limb.
     pub plane_points: [[f64; 3]; 3],
-    /// What was decided on the way and why.
-    pub notes: Vec<String>,
+    /// What was decided on the way and why; files have it as findings of the limb.
+    #[serde(skip)]
+    pub notes: Vec<LandmarkNote>,
 }
 
 impl Landmarks {

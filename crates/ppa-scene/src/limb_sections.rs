@@ -109,6 +109,12 @@ impl<'a> Sections<'a> {
         self.mean(slice, self.limb_pixels(slice))
     }
 
+    /// Area of the limb in a slice, mm², and its centre; `None` where there is no limb.
+    pub(crate) fn limb_section(&self, slice: usize) -> Option<(f64, Point3<f64>)> {
+        let pixels = self.limb_pixels(slice).count();
+        Some((pixels as f64 * self.pixel_mm2(), self.limb_centre(slice)?))
+    }
+
     /// The bones of a slice, largest outline first.
     pub(crate) fn bones(&self, slice: usize) -> Vec<BoneSection> {
         let (nu, nv) = self.extent();

@@ -5,6 +5,7 @@ use ppa_mesh::Mesh;
 
 use crate::contact::Profile;
 use crate::landmark_choices::LandmarkError;
+use crate::landmark_notes::LandmarkNote;
 use crate::landmarks::Landmarks;
 
 /// The three points of the plane that touches the limb from behind.
@@ -60,10 +61,9 @@ pub(crate) fn check_plane(limb: &Mesh, landmarks: &mut Landmarks) -> Result<(), 
     if behind_percent >= 50.0 {
         return Err(LandmarkError::PlaneThroughLimb { behind_percent });
     }
-    landmarks.notes.push(format!(
-        "plane points: given; {behind_percent:.1} % of the surface lies behind their plane, up to \
-         {:.1} mm",
-        -deepest
-    ));
+    landmarks.notes.push(LandmarkNote::PlaneGiven {
+        behind_percent,
+        deepest_mm: -deepest,
+    });
     Ok(())
 }

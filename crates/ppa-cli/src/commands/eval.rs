@@ -10,6 +10,7 @@ use ppa_learn::data::{Images, check_split};
 use ppa_learn::evaluate::{Evaluation, Row, Scores, learning_curve, write_evaluation};
 use ppa_learn::train::{Source, predict, read_log, samples, trained};
 
+use crate::findings::repeat_of_datasets;
 use crate::output::{Output, working};
 
 #[derive(Debug, Args)]
@@ -46,6 +47,8 @@ pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
         }],
         None => config.evaluation.clone(),
     };
+    let used = config.training.iter().chain(&sources);
+    repeat_of_datasets(used.map(|source| &*source.dataset))?;
     let tested = samples(&config, &sources)?;
     anyhow::ensure!(
         !tested.is_empty(),

@@ -10,6 +10,7 @@ use ppa_metrics::PermutationTest;
 use ppa_xray::Part;
 use serde::Serialize;
 
+use crate::findings::repeat_of_datasets;
 use crate::interrupt::on_interrupt;
 use crate::output::{Output, bar};
 use crate::shard::shard;
@@ -88,6 +89,8 @@ pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
         Which::TwoB => Experiment::TwoB,
         Which::TwoC => Experiment::TwoC,
     };
+    let datasets = [&plan.synthetic.dataset, plan.target(experiment)?];
+    repeat_of_datasets(datasets.into_iter())?;
     // A whole path: begun trainings compare the paths of the weights that they began with.
     let out = std::path::absolute(&args.out)?;
     let runner = Runner::new(&plan, experiment, &out)?;

@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use ppa_dataset::{BodyShape, Case, PreparedLimb, ShapeSettings, body_shape, layout::LimbId};
+use ppa_dataset::{BodyShape, Case, ShapeSettings, body_shape, layout::LimbId};
 use ppa_mesh::{
     Border, Bump, Displacement, Mesh, add_bumps, dbscan, iso_surface, read_mesh_file,
     write_mesh_file,
 };
 use serde::Serialize;
 
+use crate::findings::prepared;
 use crate::number_lists::bump;
 use crate::output::{Output, Seconds, Stopwatch};
 use crate::scan_args::ScanArgs;
@@ -172,7 +173,7 @@ fn extract(args: &ExtractArgs, output: Output) -> anyhow::Result<()> {
 
 fn augment(args: &AugmentArgs, output: Output) -> anyhow::Result<()> {
     let case = Case::read(&args.case)?;
-    let prepared = PreparedLimb::of_case(&case)?;
+    let prepared = prepared(&case, &args.case)?;
     let mut settings = ShapeSettings::default();
     settings.offset_mm = args.offset_mm.unwrap_or(settings.offset_mm);
     anyhow::ensure!(

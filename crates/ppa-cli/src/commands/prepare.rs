@@ -11,6 +11,7 @@ use ppa_dataset::{Case, Found, PreparedLimb, Severity, prepare};
 use ppa_mesh::{LimbSettings, VoxelBox, write_mesh_file};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
 
+use crate::findings::severity_name;
 use crate::number_lists::{bone_numbers, point, range, voxel_box};
 use crate::output::{Output, working};
 use crate::scan_args::ScanArgs;
@@ -207,19 +208,22 @@ fn describe_found(found: &Found) -> Vec<String> {
     for [x, y, z] in landmarks.plane_points {
         lines.push(format!("plane      {x:.1} {y:.1} {z:.1} mm"));
     }
-    lines.extend(
-        landmarks
-            .notes
-            .iter()
-            .map(|note| format!("note       {note}")),
-    );
     lines.extend(found.findings.iter().map(|finding| {
-        let severity = match finding.severity {
-            Severity::Note => "note",
-            Severity::Caution => "caution",
-            Severity::Severe => "severe",
-        };
-        format!("{severity:10} {}", finding.text)
+        let severity = severity_name(finding.severity);
+        format!("{severity:10} [{}] {}", finding.code, finding.text)
     }));
+    let mut severe: Vec<String> = found
+        .findings
+        .iter()
+        .filter(|finding| finding.severity == Severity::Severe)
+        .map(|finding| format!("\"{}\"", finding.code))
+        .collect();
+    severe.dedup();
+    if !severe.is_empty() {
+        lines.push(format!(
+            "Every command repeats severe findings; once you have looked, add to the case: acknowledged = [{}]",
+            severe.join(", ")
+        ));
+    }
     lines
 }

@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
-use ppa_dataset::{Case, Frames, Plan, PreparedLimb, RoomFile, Table, write_whole};
+use ppa_dataset::{Case, Frames, Plan, RoomFile, Table, write_whole};
 use ppa_mesh::{read_mesh_file, write_cloud_file, write_mesh_file};
 use ppa_scene::{Contact, PlaneSettings, SoftTissue, TablePlane, place_soft, table_plane};
 use serde::Serialize;
 
+use crate::findings::prepared;
 use crate::number_lists::range;
 use crate::output::{Output, working};
 
@@ -188,8 +189,7 @@ fn place_limb(args: &PlaceArgs, output: Output) -> anyhow::Result<()> {
     };
     let case = Case::read(&args.case)?;
     let working = working("preparing the limb");
-    let prepared = PreparedLimb::of_case(&case)
-        .with_context(|| format!("cannot prepare the limb of {}", args.case.display()))?;
+    let prepared = prepared(&case, &args.case)?;
     let table = Table::of_plan(&plan)?;
     let skin = &prepared.limb.mesh;
     let placement = place_soft(

@@ -31,6 +31,12 @@ fn describe(status: &Status) -> String {
             (false, false) => ", to be continued",
         }
     )];
+    if status.findings > 0 {
+        lines.push(format!(
+            "findings   {}, of which severe and not acknowledged: {}",
+            status.findings, status.open_findings
+        ));
+    }
     for limb in &status.limbs {
         let (patient, side) = (limb.limb.patient, limb.limb.side_letter());
         lines.push(format!(

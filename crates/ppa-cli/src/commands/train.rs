@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::learn::not_taken;
 
+use crate::findings::repeat_of_datasets;
 use crate::interrupt::on_interrupt;
 use crate::output::{Output, bar};
 
@@ -36,6 +37,8 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
     let config = TrainConfig::read(&args.config)?;
     let schedule = config.schedule();
     let steps = schedule.steps();
+    let sources = config.training.iter().chain(&config.evaluation);
+    repeat_of_datasets(sources.map(|source| &*source.dataset))?;
     let stop = on_interrupt()?;
     let bar = bar("training");
     bar.set_length(steps);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::Args;
-use ppa_dataset::{Plan, verify};
+use ppa_dataset::{Findings, Plan, verify};
 use serde::Serialize;
 
 use crate::output::Output;
@@ -32,6 +32,8 @@ struct Verified {
     units: usize,
     images: usize,
     remade: usize,
+    #[serde(skip_serializing_if = "Findings::is_empty")]
+    findings: Findings,
 }
 
 pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
@@ -52,6 +54,7 @@ pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
         units: found.check.units,
         images: found.check.images,
         remade: found.remade,
+        findings: found.findings,
     };
     output.print(&verified, |v| {
         format!(

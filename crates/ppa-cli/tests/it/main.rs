@@ -9,6 +9,8 @@ mod damaged;
 mod datasets;
 mod depth;
 mod faults;
+mod gates;
+mod gates_carried;
 mod grading;
 mod identity;
 mod json;

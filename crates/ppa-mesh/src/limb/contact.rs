@@ -5,6 +5,39 @@ use super::lattice::Lattice;
 /// Rounds of voting; a ripple of the border as long as this many voxels is gone afterwards.
 const ROUNDS: usize = 4;
 
+/// The border between a limb and the bodies that touch it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touching {
+    /// Area of the faces of voxels between both, mm².
+    pub area_mm2: f64,
+    /// Mean of the limb's voxels at it, voxel indices within the box.
+    pub voxel: [f64; 3],
+}
+
+impl Touching {
+    /// `None` where nothing touches the limb; `flesh` is the limb and what may touch it.
+    pub fn of(lattice: &Lattice, flesh: &[bool], inside: &[bool]) -> Option<Self> {
+        let strides = lattice.strides();
+        let (mut area_mm2, mut faces, mut sum) = (0.0, 0_usize, [0.0; 3]);
+        for at in (0..inside.len()).filter(|at| inside[*at]) {
+            let voxel = lattice.voxel(at);
+            for axis in 0..3 {
+                let below = (voxel[axis] > 0).then(|| at - strides[axis]);
+                let above = (voxel[axis] + 1 < lattice.size[axis]).then(|| at + strides[axis]);
+                let others = below.into_iter().chain(above);
+                let touching = others.filter(|next| flesh[*next] && !inside[*next]).count();
+                area_mm2 += touching as f64 * lattice.face_mm2[axis];
+                faces += touching;
+                (0..3).for_each(|x| sum[x] += (touching * voxel[x]) as f64);
+            }
+        }
+        (faces > 0).then(|| Self {
+            area_mm2,
+            voxel: sum.map(|sum| sum / faces as f64),
+        })
+    }
+}
+
 /// Smooths the border between `inside` and the rest of `flesh`; that towards air stays.
 ///
 /// In a contact HU say nothing about where one body ends, and the watershed's border follows the lattice

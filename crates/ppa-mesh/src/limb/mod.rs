@@ -29,7 +29,7 @@ use crate::mesh::Mesh;
 use crate::surface::{SurfaceError, surface_of_part};
 use bodies::{NO_BODY, bodies};
 use cleaned::cleaned;
-use contact::smooth_contacts;
+use contact::{Touching, smooth_contacts};
 use couch::couch_columns;
 use distance::{FAR_MM2, spread};
 use growth::{farthest_sq, fill_enclosed, grown_back, keep_largest};
@@ -236,6 +236,7 @@ fn within_values<T: Hu>(grid: &Grid, hu: &[T], settings: &LimbSettings) -> Resul
         .collect();
     drop(found);
     smooth_contacts(lattice, &grown, &mut inside);
+    report.describe_contact(grid, lattice, Touching::of(lattice, &grown, &inside));
     drop(grown);
     report.island_voxels = keep_largest(lattice, &mut inside);
     let tissue_voxels = columns.tissue.iter().map(|&n| n as usize).sum::<usize>();

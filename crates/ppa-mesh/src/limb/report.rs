@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bodies::Bodies;
 use super::choice::alike;
+use super::contact::Touching;
 use super::lattice::Lattice;
 
 /// A body found in the volume, before one was chosen.
@@ -39,6 +40,12 @@ pub struct CutFace {
 pub struct LimbReport {
     /// Solid bodies, the one with the most bone first.
     pub bodies: Vec<Body>,
+    /// Area in which other bodies touch the limb, mm²; the skin there is a guess.
+    #[serde(default)]
+    pub contact_mm2: f64,
+    /// Middle of that contact in the `ct` frame, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact_centre_mm: Option<[f64; 3]>,
     /// Columns along the scan axis that are couch.
     pub couch_columns: usize,
     /// Voxels of couch removed.
@@ -91,6 +98,20 @@ impl LimbReport {
             b.bone_mm3
                 .total_cmp(&a.bone_mm3)
                 .then(b.core_mm3.total_cmp(&a.core_mm3))
+        });
+    }
+
+    /// Where other bodies touch the limb.
+    pub(super) fn describe_contact(
+        &mut self,
+        grid: &Grid,
+        lattice: &Lattice,
+        touching: Option<Touching>,
+    ) {
+        self.contact_mm2 = touching.map_or(0.0, |touching| touching.area_mm2);
+        self.contact_centre_mm = touching.map(|touching| {
+            let voxel = [0, 1, 2].map(|x| touching.voxel[x] + lattice.low[x] as f64);
+            grid.centre(voxel).into()
         });
     }
 

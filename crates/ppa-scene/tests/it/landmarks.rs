@@ -252,11 +252,16 @@ fn unusable_input_is_refused() {
     };
     assert!(matches!(
         find(&scan.mask, &along),
-        LandmarkError::Override {
-            name: "anterior",
-            ..
-        }
+        LandmarkError::AnteriorAlongAxis { angle_deg, .. } if angle_deg < 5.0
     ));
+    let [x, y, z] = P01.find(Side::Right, &automatic()).unwrap().joint_centre;
+    let far = LandmarkOverrides {
+        joint_centre: Some([x, y, z - 440.0]),
+        ..automatic()
+    };
+    let error = find(&scan.mask, &far);
+    let told = matches!(error, LandmarkError::JointFar { distance_mm, .. } if (300.0..440.0).contains(&distance_mm));
+    assert!(told, "{error}");
     for (name, joint_region, calf_region) in [
         ("joint region", [90.0, 50.0], [130.0, 200.0]),
         ("calf region", [50.0, 90.0], [130.0, f64::NAN]),

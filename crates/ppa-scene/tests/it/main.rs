@@ -4,6 +4,7 @@ mod boot;
 mod family;
 mod frames;
 mod landmarks;
+mod measures;
 mod placement;
 mod real_scans;
 mod recorded_room;

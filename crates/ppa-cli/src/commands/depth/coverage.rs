@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Args;
 use nalgebra::{Isometry3, Point3};
-use ppa_dataset::{
-    Case, Plan, PreparedLimb, RankedView, Stage, closed_skin, coverage_plot, write_whole,
-};
+use ppa_dataset::{Case, Plan, RankedView, Stage, closed_skin, coverage_plot, write_whole};
 use ppa_depth::{
     Camera, CoverageSettings, JointSurface, MeshBody, PlacedBody, Viewpoint, isometry_from_rows,
     rows_from_isometry,
@@ -16,6 +14,7 @@ use ppa_scene::place;
 use serde::Deserialize;
 
 use super::coverage_table::{Row, Study, table_csv};
+use crate::findings::prepared;
 use crate::output::{Output, working};
 
 #[derive(Debug, Args)]
@@ -81,8 +80,7 @@ pub fn run(args: &CoverageArgs, output: Output) -> anyhow::Result<()> {
     };
     let case = Case::read(&args.case)?;
     let working = working("looking at the joint from all places");
-    let prepared = PreparedLimb::of_case(&case)
-        .with_context(|| format!("cannot prepare the limb of {}", args.case.display()))?;
+    let prepared = prepared(&case, &args.case)?;
     let stage = Stage::of_plan(&plan)?;
     let table = &stage.table;
     let placement = place(

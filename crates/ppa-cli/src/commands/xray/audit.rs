@@ -3,12 +3,12 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::Args;
 use ppa_ct::ReadOptions;
-use ppa_dataset::{Case, PreparedLimb};
+use ppa_dataset::Case;
 use ppa_xray::{Audit, HuBin, HuCalibration};
 
+use crate::findings::prepared;
 use crate::output::{Output, working};
 use crate::scan_args::ScanArgs;
 
@@ -35,8 +35,7 @@ pub fn run(args: &AuditArgs, output: Output) -> anyhow::Result<()> {
             path.display()
         );
         let case = Case::read(path)?;
-        let prepared = PreparedLimb::of_case(&case)
-            .with_context(|| format!("cannot prepare the limb of {}", path.display()))?;
+        let prepared = prepared(&case, path)?;
         calibration.audit(&prepared.volume, Some(&prepared.limb.mask))?
     } else {
         calibration.audit(&args.scan.read()?.volume, None)?

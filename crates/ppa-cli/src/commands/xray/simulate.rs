@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use ppa_ct::{Volume, write_nifti};
-use ppa_dataset::{Case, Plan, PreparedLimb, Table, joint_phantom, projection, spectrum};
+use ppa_dataset::{Case, Plan, Table, joint_phantom, projection, spectrum};
 use ppa_scene::{Contact, place_soft};
 use ppa_xray::{Dose, FastSettings, VoxelPhantom, fast};
 use serde::Serialize;
@@ -14,6 +14,7 @@ use super::BeamArgs;
 use super::follow::AnalogArgs;
 use super::pictures::{Exposure, PictureArgs};
 use super::report::Report;
+use crate::findings::prepared;
 use crate::output::{Output, Stopwatch, working};
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -77,8 +78,7 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
     args.beam.apply(&mut plan.xray);
     let case = Case::read(&args.case)?;
     let working = working("preparing the limb");
-    let prepared = PreparedLimb::of_case(&case)
-        .with_context(|| format!("cannot prepare the limb of {}", args.case.display()))?;
+    let prepared = prepared(&case, &args.case)?;
     let table = Table::of_plan(&plan)?;
     let placement = place_soft(
         &prepared.limb.mesh.vertices,

@@ -1,0 +1,130 @@
+//! Findings from the case to the training: repeated until they are acknowledged.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::{contains, fail, phantom, ppa, succeed, training};
+
+const OPEN: &str = "severe [side-mismatch] limb l of patient 0";
+
+/// Runs `ppa`, expects success, and returns stdout and stderr.
+fn both(folder: &Path, arguments: &str) -> (String, String) {
+    let output = ppa(folder, arguments).output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "ppa {arguments}: {stderr}");
+    (String::from_utf8(output.stdout).unwrap(), stderr)
+}
+
+/// A plan of one pose of a right leg that is said to be a left one.
+fn write_wrong_side(folder: &Path) -> String {
+    let scan = phantom().join("p01.nii");
+    let prepare = format!("prepare {} --side l --out leg.toml", scan.display());
+    let told = succeed(folder, &prepare);
+    let plan = "version = 1\n[[case]]\nfile = \"leg.toml\"\npatient = 0\n\
+         [rotation]\nfrom_deg = 0.0\nto_deg = 0.0\nstep_deg = 2.5\n\
+         [xray]\ndetector = { columns = 50, rows = 50, pixel_mm = 4.0 }\n\
+         engine = { scatter_histories = 20000 }\n";
+    fs::write(folder.join("plan.toml"), plan).unwrap();
+    told
+}
+
+fn acknowledge(folder: &Path, codes: &str) {
+    let case = folder.join("leg.toml");
+    let text = fs::read_to_string(&case).unwrap();
+    let text = text.replacen("side = ", &format!("acknowledged = [{codes}]\nside = "), 1);
+    fs::write(case, text).unwrap();
+}
+
+#[test]
+fn a_severe_finding_is_repeated_until_it_is_acknowledged() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let told = write_wrong_side(folder);
+    contains(
+        &told,
+        &[
+            "severe     [side-mismatch]",
+            "acknowledged = [\"side-mismatch\"]",
+        ],
+    );
+    for command in [
+        "plan plan.toml",
+        "generate plan.toml --out data",
+        "verify data --plan plan.toml",
+    ] {
+        let (_, said) = both(folder, command);
+        assert_eq!(said.matches(OPEN).count(), 1, "{command}: {said}");
+        contains(&said, &["acknowledge it in the case once you have looked"]);
+    }
+    let status = succeed(folder, "status data");
+    contains(
+        &status,
+        &["findings   1, of which severe and not acknowledged: 1"],
+    );
+    let (_, said) = both(folder, "scene place leg.toml");
+    contains(&said, &["severe [side-mismatch] limb l of leg.toml"]);
+
+    acknowledge(folder, "\"side-mismatch\"");
+    let (made, said) = both(folder, "generate plan.toml --out data --json");
+    let made: Value = serde_json::from_str(&made).unwrap();
+    assert_eq!(made["made"], 0);
+    assert_eq!(made["findings"][0]["code"], "side-mismatch");
+    assert_eq!(made["findings"][0]["acknowledged"], true);
+    assert!(!said.contains(OPEN), "{said}");
+    let listed = fs::read_to_string(folder.join("data/findings.json")).unwrap();
+    contains(&listed, &["\"acknowledged\": true", "side-mismatch"]);
+    for command in [
+        "plan plan.toml",
+        "verify data --plan plan.toml",
+        "scene place leg.toml",
+    ] {
+        let (_, said) = both(folder, command);
+        assert!(!said.contains("severe"), "{command}: {said}");
+    }
+}
+
+#[test]
+fn an_edited_case_gets_new_findings() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_wrong_side(folder);
+    let case = folder.join("leg.toml");
+    let text = fs::read_to_string(&case).unwrap();
+    fs::write(case, text.replacen("side = \"l\"", "side = \"r\"", 1)).unwrap();
+    let (_, said) = both(folder, "scene place leg.toml");
+    assert!(!said.contains("severe"), "{said}");
+}
+
+#[test]
+fn an_unknown_code_is_refused_with_the_known_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_wrong_side(folder);
+    acknowledge(folder, "\"wrong-side\"");
+    let output = ppa(folder, "scene place leg.toml").output().unwrap();
+    assert!(!output.status.success());
+    let said = String::from_utf8(output.stderr).unwrap();
+    contains(
+        &said,
+        &["leg.toml", "wrong-side", "side-mismatch", "limb-too-small"],
+    );
+}
+
+/// Training reads `findings.json` of its datasets.
+#[test]
+fn training_and_evaluation_repeat_findings_of_their_data() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    training::write_data(folder);
+    let findings = r#"[{"patient": 0, "side": "l", "acknowledged": false, "code": "side-mismatch", "severity": "severe",
+        "text": "the fibula lies medially"}]"#;
+    fs::write(folder.join("data/findings.json"), findings).unwrap();
+    for command in ["train train.toml --out run", "eval run"] {
+        let (_, said) = both(folder, command);
+        assert_eq!(said.matches(OPEN).count(), 1, "{command}: {said}");
+    }
+    fs::write(folder.join("data/findings.json"), "[{").unwrap();
+    contains(&fail(folder, "eval run"), &["findings.json"]);
+}

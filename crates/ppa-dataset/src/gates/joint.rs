@@ -1,0 +1,115 @@
+//! Whether the joint is one, and lies where it can.
+
+use nalgebra::{Point3, Vector3};
+use ppa_ct::Volume;
+use ppa_mesh::LimbReport;
+use ppa_scene::{LandmarkNote, Landmarks, LimbKind};
+
+use super::at;
+use crate::findings::{Finding, FindingCode, Severity};
+
+/// A joint given this far from the ankle that the scan shows is doubted, mm: the talar dome has a radius of about 20.
+const OFF_ANKLE_MM: f64 = 10.0;
+
+pub(super) fn findings(
+    volume: &Volume,
+    report: &LimbReport,
+    landmarks: &Landmarks,
+) -> Vec<Finding> {
+    let place = landmarks.joint_centre;
+    let mut found = Vec::new();
+    found.extend(no_joint(volume, report, landmarks));
+    if landmarks.scan_direction[2] < 0.0 {
+        found.push(at(
+            place,
+            FindingCode::ProximalIsInferior,
+            Severity::Caution,
+            landmarks.scan_direction[2],
+            "the ankle lies superior to the calf, so that proximal was taken to be inferior: is the scan's orientation right, \
+             and with it left and right?"
+                .to_owned(),
+        ));
+    }
+    for note in &landmarks.notes {
+        found.extend(match *note {
+            LandmarkNote::AnkleFound {
+                depth_hu,
+                joint_above_mm,
+            } => off_ankle(place, depth_hu, joint_above_mm),
+            LandmarkNote::JointOutside { distance_mm } => Some(at(
+                place,
+                FindingCode::JointOutside,
+                Severity::Caution,
+                distance_mm,
+                format!("the joint centre lies {distance_mm:.1} mm outside the limb"),
+            )),
+            LandmarkNote::AnteriorReversed { angle_deg } => Some(at(
+                place,
+                FindingCode::AnteriorReversed,
+                Severity::Caution,
+                angle_deg,
+                format!(
+                    "the anterior direction is {angle_deg:.0} degrees from the patient's own in the scan, expected at most \
+                     90: at angle 0 the limb lies on its front"
+                ),
+            )),
+            _ => None,
+        });
+    }
+    found
+}
+
+fn off_ankle(place: [f64; 3], depth_hu: f64, joint_above_mm: f64) -> Option<Finding> {
+    let towards = match joint_above_mm > 0.0 {
+        true => "proximal",
+        false => "distal",
+    };
+    let distance_mm = joint_above_mm.abs();
+    (distance_mm > OFF_ANKLE_MM).then(|| {
+        at(
+            place,
+            FindingCode::JointOffAnkle,
+            Severity::Caution,
+            joint_above_mm,
+            format!(
+                "the joint lies {distance_mm:.0} mm {towards} of the ankle that the scan shows (a gap {depth_hu:.0} HU darker \
+                 than the bone on either side)"
+            ),
+        )
+    })
+}
+
+/// The middle of a limb in which no joint was recognised is no joint.
+///
+/// Told from the joint itself: a case records what was found as a choice.
+fn no_joint(volume: &Volume, report: &LimbReport, landmarks: &Landmarks) -> Option<Finding> {
+    if landmarks.limb != LimbKind::Other {
+        return None;
+    }
+    let direction = Vector3::from(landmarks.scan_direction);
+    let corners = (0..8).map(|corner: usize| {
+        let end = |axis: usize| match corner >> axis & 1 {
+            0 => report.low[axis] as f64,
+            _ => (report.high[axis] - 1) as f64,
+        };
+        let place: Point3<f64> = volume.grid().centre([0, 1, 2].map(end));
+        direction.dot(&place.coords)
+    });
+    let (low, high) = corners.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), level| {
+        (low.min(level), high.max(level))
+    });
+    let joint_mm = direction.dot(&Vector3::from(landmarks.joint_centre));
+    let off_mm = joint_mm - 0.5 * (low + high);
+    let is_middle = off_mm.abs() < 2.0;
+    is_middle.then(|| {
+        at(
+            landmarks.joint_centre,
+            FindingCode::NoJoint,
+            Severity::Severe,
+            off_mm,
+            "no joint was recognised: the limb turns about the middle of what the scan shows, and regions of interest and \
+             beam are centred there (--joint gives its centre)"
+                .to_owned(),
+        )
+    })
+}
