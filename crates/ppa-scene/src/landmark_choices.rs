@@ -19,6 +19,10 @@ pub struct LandmarkOverrides {
     pub calf_region: Option<[f64; 2]>,
     /// What the region centres are centres of.
     pub axis_source: Option<AxisSource>,
+    /// Two points that the axis runs through, `ct` frame, mm, instead of the regions' centres. The joint
+    /// is then the point of this axis nearest to [`Self::joint_centre`], or at the joint's level.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[[f64; 3]; 2]>,
     /// The direction that faces up at angle 0, `ct` frame.
     pub anterior: Option<[f64; 3]>,
     /// One distal and two proximal points of Π_P, `ct` frame, mm.
@@ -29,14 +33,17 @@ impl Landmarks {
     /// These landmarks as choices, so that a person finds every decision in one place and edits
     /// it: found again with the result, the patient frame is the same.
     ///
-    /// The plane points stay open unless `given` has them, as they follow from axis and front.
+    /// The plane points stay open unless `given` has them, as they follow from axis and front. Regions and
+    /// their source stay open if `given` has the axis.
     pub fn as_choices(&self, given: &LandmarkOverrides) -> LandmarkOverrides {
+        let by_regions = given.axis.is_none();
         LandmarkOverrides {
             limb: Some(self.limb),
             joint_centre: Some(self.joint_centre),
-            joint_region: Some(self.joint_region.range_mm),
-            calf_region: Some(self.calf_region.range_mm),
-            axis_source: Some(self.axis_source),
+            joint_region: by_regions.then_some(self.joint_region.range_mm),
+            calf_region: by_regions.then_some(self.calf_region.range_mm),
+            axis_source: by_regions.then_some(self.axis_source),
+            axis: given.axis,
             anterior: Some(self.anterior),
             plane_points: given.plane_points,
         }
@@ -47,8 +54,23 @@ impl LandmarkOverrides {
     /// Refuses numbers that are not finite, regions that run backwards and a front without
     /// direction.
     pub(crate) fn check(&self) -> Result<(), LandmarkError> {
+        let by_regions = [
+            ("joint_region", self.joint_region.is_some()),
+            ("calf_region", self.calf_region.is_some()),
+            ("axis_source", self.axis_source.is_some()),
+        ];
+        match (self.axis, by_regions.into_iter().find(|(_, given)| *given)) {
+            (Some(_), Some((other, _))) => return Err(LandmarkError::AxisTwice { other }),
+            (None, _) if self.axis_source == Some(AxisSource::Given) => {
+                return Err(LandmarkError::NoAxis);
+            }
+            _ => {}
+        }
         let [a, b, c] = self.plane_points.unwrap_or_default().map(Some);
+        let [from, to] = self.axis.unwrap_or_default().map(Some);
         let points = [
+            ("axis", from),
+            ("axis", to),
             ("joint_centre", self.joint_centre),
             ("anterior", self.anterior),
             ("plane_points", a),
@@ -156,6 +178,25 @@ pub enum LandmarkError {
         /// Its value.
         found: [f64; 3],
         /// What it should be.
+        expected: &'static str,
+    },
+    /// The axis is given by two points and by regions.
+    #[error("axis and {other} are both given, expected one of them")]
+    AxisTwice {
+        /// Field of [`LandmarkOverrides`].
+        other: &'static str,
+    },
+    /// The axis is said to be given, but is not.
+    #[error("axis_source is \"given\", but axis is missing: give its two points")]
+    NoAxis,
+    /// Two points given by a person make no axis along the limb.
+    #[error("axis runs from {from:?} to {to:?}, expected {expected}")]
+    Axis {
+        /// The first point.
+        from: [f64; 3],
+        /// The second point.
+        to: [f64; 3],
+        /// What they should be.
         expected: &'static str,
     },
     /// Three points given by a person make no plane under the limb.

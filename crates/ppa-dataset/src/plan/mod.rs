@@ -1,6 +1,7 @@
 //! `plan.toml`: what a dataset is made of.
 
 mod check;
+mod commented;
 mod error;
 mod settings;
 #[cfg(test)]

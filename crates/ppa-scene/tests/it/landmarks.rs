@@ -137,6 +137,7 @@ fn a_person_overrules_every_choice() {
         joint_region: Some([20.0, 50.0]),
         calf_region: Some([100.0, 120.0]),
         axis_source: Some(AxisSource::Limb),
+        axis: None,
         anterior: Some([0.3, -1.0, 0.0]),
         plane_points: Some(plane_points),
     };
