@@ -64,10 +64,10 @@ fn of_the_calves_of_sts032_the_whole_one_is_taken_and_doubted_where_the_other_wa
         // By eye, the calves touch where x is about 4 mm.
         assert!(end < 8.0, "{side:?}: the limb reaches to x = {end} mm");
         let told = found
-            .warnings
+            .findings
             .iter()
-            .filter(|text| text.contains("patient's left"));
-        assert_eq!(told.count(), doubts, "{side:?}: {:?}", found.warnings);
+            .filter(|finding| finding.text.contains("patient's left"));
+        assert_eq!(told.count(), doubts, "{side:?}: {:?}", found.findings);
     }
 }
 

@@ -9,6 +9,7 @@ use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
 use crate::files::{FileError, read_text, write_whole};
+use crate::findings::{Finding, FindingCode};
 use crate::labels::BoneFile;
 use crate::toml_file::{other_version, relative_to, to_toml};
 
@@ -20,6 +21,9 @@ pub struct Case {
     pub version: u32,
     /// Left or right limb.
     pub side: Side,
+    /// Codes of findings that a person has looked at and accepts.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub acknowledged: Vec<FindingCode>,
     /// The scan.
     pub source: Source,
     /// How the skin is found and freed from the couch.
@@ -41,6 +45,8 @@ pub struct Case {
 struct CaseFile {
     version: u32,
     side: Side,
+    #[serde(default)]
+    acknowledged: Vec<FindingCode>,
     source: Source,
     surface: LimbSettings,
     choices: LandmarkOverrides,
@@ -83,8 +89,8 @@ impl Source {
 /// Results of the preparation, recorded for a person to read.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Found {
-    /// What was odd about the scan, but did not stop its reading.
-    pub warnings: Vec<String>,
+    /// Doubts about the scan and the limb.
+    pub findings: Vec<Finding>,
     /// Axis, joint and plane in the ct frame, mm.
     pub landmarks: Landmarks,
     /// What was cut away to free the skin.
@@ -135,6 +141,7 @@ impl Case {
         Ok(Self {
             version: case.version,
             side: case.side,
+            acknowledged: case.acknowledged,
             source: Source {
                 path: folder.join(&case.source.path),
                 ..case.source
@@ -170,6 +177,7 @@ impl Case {
 const HEADER: &str = "\
 # One limb of one CT, prepared for ppa. Lengths in mm, positions in the scan's LPS frame.
 # Change `side`, [surface] or [choices]; leave a key of [choices] out to have it found again.
-# [found] tells what followed; it is computed again whenever the case is used.
+# [found] shows what followed; it is computed again whenever the case is used. Its severe findings are repeated
+# by every command until `acknowledged` names their codes.
 
 ";

@@ -8,6 +8,7 @@ use sha2::{Digest, Sha256};
 
 use crate::case::Case;
 use crate::files::{FileError, hex, sha256_of_file};
+use crate::findings::FindingCode;
 use crate::layout::{LimbId, View};
 use crate::manifest::Rows;
 use crate::plan::{Plan, XraySettings};
@@ -110,6 +111,8 @@ struct LimbRow<'a> {
     volume_sha256: &'a str,
     surface: &'a LimbSettings,
     choices: &'a LandmarkOverrides,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    acknowledged: &'a [FindingCode],
 }
 
 impl<'a> Description<'a> {
@@ -130,6 +133,7 @@ impl<'a> Description<'a> {
             volume_sha256: &case.source.volume_sha256,
             surface: &case.surface,
             choices: &case.choices,
+            acknowledged: &case.acknowledged,
         });
         Self {
             version: 1,

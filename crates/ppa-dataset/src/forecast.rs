@@ -90,7 +90,7 @@ pub fn forecast(
     }
     let work = Work::of_plan(plan)?;
     let poses = plan.rotation.poses().map_err(GenerateError::from)?;
-    let limbs = units_of_part(work.keys(), &poses, Part::WHOLE);
+    let limbs = units_of_part(work.planned(), &poses, Part::WHOLE);
     let of_limb = ((poses.len() as f64 * fraction).round() as usize).max(1);
     progress(Progress::Total(limbs.len() * of_limb));
 

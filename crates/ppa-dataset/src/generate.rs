@@ -8,7 +8,7 @@ use ppa_xray::Part;
 use crate::case::{Case, CaseError};
 use crate::description::{Description, Settings};
 use crate::files::FileError;
-use crate::job::{Job, JobError, MakeUnit, Progress, Summary, units_of_part};
+use crate::job::{Job, JobError, MakeUnit, PlannedLimb, Progress, Summary, units_of_part};
 use crate::layout::LimbId;
 use crate::plan::Plan;
 use crate::prepare::{PrepareError, PreparedLimb};
@@ -133,7 +133,7 @@ pub fn generate(
         root,
         description: &work.description,
         part: settings.part,
-        limbs: units_of_part(work.keys(), &poses, settings.part),
+        limbs: units_of_part(work.planned(), &poses, settings.part),
         disk_limit: settings.disk_limit,
         progress,
     };
@@ -143,13 +143,13 @@ pub fn generate(
 /// A plan with its cases and its stage: all that units are made from.
 pub(crate) struct Work<'a> {
     plan: &'a Plan,
-    limbs: Vec<PlannedLimb>,
+    limbs: Vec<CasedLimb>,
     stage: Stage,
     /// `dataset.json`.
     pub description: String,
 }
 
-struct PlannedLimb {
+struct CasedLimb {
     id: LimbId,
     key: String,
     case: Case,
@@ -172,9 +172,13 @@ impl<'a> Work<'a> {
         })
     }
 
-    /// The limbs, each with the hash of what its images follow from.
-    pub fn keys(&self) -> impl ExactSizeIterator<Item = (LimbId, String)> {
-        self.limbs.iter().map(|limb| (limb.id, limb.key.clone()))
+    /// The limbs, as `dataset.json` lists them.
+    pub fn planned(&self) -> impl ExactSizeIterator<Item = PlannedLimb> {
+        self.limbs.iter().map(|limb| PlannedLimb {
+            limb: limb.id,
+            key: limb.key.clone(),
+            acknowledged: limb.case.acknowledged.clone(),
+        })
     }
 
     /// Reads, skins and shapes a limb; the result makes its poses below `root`.
@@ -208,8 +212,8 @@ impl<'a> Work<'a> {
     }
 }
 
-fn planned_limbs(plan: &Plan, settings: &Settings) -> Result<Vec<PlannedLimb>, GenerateError> {
-    let mut limbs: Vec<PlannedLimb> = Vec::new();
+fn planned_limbs(plan: &Plan, settings: &Settings) -> Result<Vec<CasedLimb>, GenerateError> {
+    let mut limbs: Vec<CasedLimb> = Vec::new();
     for planned in &plan.cases {
         let case = Case::read(&planned.file)?;
         let id = LimbId {
@@ -225,7 +229,7 @@ fn planned_limbs(plan: &Plan, settings: &Settings) -> Result<Vec<PlannedLimb>, G
             });
         }
         let scan = &case.source.volume_sha256;
-        let of_another = |other: &&PlannedLimb| {
+        let of_another = |other: &&CasedLimb| {
             other.case.source.volume_sha256 == *scan && other.id.patient != id.patient
         };
         if let Some(other) = limbs.iter().find(of_another) {
@@ -235,7 +239,7 @@ fn planned_limbs(plan: &Plan, settings: &Settings) -> Result<Vec<PlannedLimb>, G
                 patients: [other.id.patient, id.patient],
             });
         }
-        limbs.push(PlannedLimb {
+        limbs.push(CasedLimb {
             id,
             key: settings.limb_key(id, &case),
             case,

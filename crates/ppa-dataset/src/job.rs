@@ -7,12 +7,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use ppa_scene::PoseAngle;
 use ppa_xray::Part;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::body_shape::BodyShape;
 use crate::claim::{FolderError, claim};
 use crate::description::DESCRIPTION_FILE;
 use crate::files::{FileError, remove_if_there, write_whole};
+use crate::findings::{FindingCode, Findings};
 use crate::layout::{LimbId, View};
 use crate::manifest::{FileKind, Manifest, RoiFile, roi_text};
 use crate::part_file::write_part;
@@ -69,10 +70,22 @@ pub enum JobError {
     },
 }
 
+/// A limb of a dataset, as `dataset.json` lists it.
+#[derive(Debug, Clone, Deserialize)]
+pub(crate) struct PlannedLimb {
+    #[serde(flatten)]
+    pub limb: LimbId,
+    pub key: String,
+    #[serde(default)]
+    pub acknowledged: Vec<FindingCode>,
+}
+
 /// All poses of one limb that belong to a job.
 pub(crate) struct LimbUnits {
     pub limb: LimbId,
     pub key: String,
+    /// Codes of the findings that its case acknowledges.
+    pub acknowledged: Vec<FindingCode>,
     pub poses: Vec<PoseAngle>,
 }
 
@@ -93,18 +106,19 @@ impl LimbUnits {
 /// The units of one part of a dataset. Parts are runs of neighbours, limb by limb, so that few
 /// of them prepare the same limb.
 pub(crate) fn units_of_part(
-    limbs: impl ExactSizeIterator<Item = (LimbId, String)>,
+    limbs: impl ExactSizeIterator<Item = PlannedLimb>,
     poses: &[PoseAngle],
     part: Part,
 ) -> Vec<LimbUnits> {
     let share = part.share((limbs.len() * poses.len()) as u64);
     let within = |index: usize| share.contains(&(index as u64));
-    let of_limb = |(i, (limb, key))| {
+    let of_limb = |(i, limb): (usize, PlannedLimb)| {
         let planned = poses.iter().enumerate();
         let mine = planned.filter(|(j, _)| within(i * poses.len() + j));
         LimbUnits {
-            limb,
-            key,
+            limb: limb.limb,
+            key: limb.key,
+            acknowledged: limb.acknowledged,
             poses: mine.map(|(_, pose)| *pose).collect(),
         }
     };
@@ -200,11 +214,16 @@ impl Job<'_> {
         make: &MakeUnit<E>,
         used: &AtomicU64,
     ) -> Result<(), E> {
-        let Images { files, rois } = make(*unit)?;
+        let Images {
+            files,
+            rois,
+            findings,
+        } = make(*unit)?;
         let record = Record {
             key: unit.key(),
             files,
             rois,
+            findings,
         };
         self.keep(unit, &record, used)?;
         (self.progress)(Progress::Made);
@@ -231,23 +250,31 @@ impl Job<'_> {
         Ok(record.write(self.root, unit)?)
     }
 
-    /// Writes what lists all units: regions of interest and manifest.
+    /// Writes what lists all units: regions of interest, findings and manifest.
     fn finish(&self, made: usize) -> Result<Summary, FileError> {
         let mut manifest = Manifest {
             root: self.root.to_owned(),
             files: Vec::new(),
         };
+        let mut findings = Findings::default();
         for limb in &self.limbs {
             let mut rois = RoiFile::new();
             for unit in limb.units() {
                 let record = Record::read(self.root, &unit)?;
                 manifest.files.extend(record.files);
                 rois.extend(record.rois);
+                findings.add(limb.limb, &limb.acknowledged, &record.findings);
             }
             write_whole(
                 &self.root.join(limb.limb.roi_file()),
                 roi_text(&rois).as_bytes(),
             )?;
+        }
+        let path = self.root.join(Findings::FILE);
+        if findings.0.is_empty() {
+            remove_if_there(&path)?;
+        } else {
+            write_whole(&path, findings.to_text().as_bytes())?;
         }
         manifest.write()?;
         let count = |kind| manifest.files.iter().filter(|row| row.kind == kind).count();

@@ -33,6 +33,7 @@ mod description;
 mod drawing;
 pub mod export;
 mod files;
+mod findings;
 #[cfg(feature = "generate")]
 mod forecast;
 #[cfg(feature = "generate")]
@@ -96,6 +97,7 @@ pub use contact_sheet::{ContactSheetError, contact_sheet};
 #[cfg(feature = "generate")]
 pub use coverage_plot::{RankedView, coverage_plot};
 pub use files::{FileError, sha256_of_file, write_whole};
+pub use findings::{Finding, FindingCode, Findings, LimbFinding, Severity};
 #[cfg(feature = "generate")]
 pub use forecast::{Forecast, ForecastError, forecast};
 #[cfg(feature = "generate")]

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use ppa_scene::Sweep;
 use ppa_xray::Part;
 
-use crate::job::{Job, JobError, LimbUnits, MakeUnit, Progress, units_of_part};
+use crate::job::{Job, JobError, LimbUnits, MakeUnit, PlannedLimb, Progress, units_of_part};
 use crate::layout::{LimbId, Side};
 use crate::manifest::RoiFile;
 use crate::unit::Images;
@@ -24,7 +24,11 @@ fn a_hundred_thousand_units_do_not_slow_down() {
     let poses = poses.poses().unwrap();
     let limb = |patient| {
         let side = Side::Left;
-        (LimbId { patient, side }, "key".to_owned())
+        PlannedLimb {
+            limb: LimbId { patient, side },
+            key: "key".to_owned(),
+            acknowledged: Vec::new(),
+        }
     };
     let limbs: Vec<_> = (0..278).map(limb).collect();
     let times = Mutex::new(Vec::new());
@@ -47,6 +51,7 @@ fn a_hundred_thousand_units_do_not_slow_down() {
             Ok(Images {
                 files: Vec::new(),
                 rois: RoiFile::new(),
+                findings: Vec::new(),
             })
         }))
     };

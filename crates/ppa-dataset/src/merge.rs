@@ -167,7 +167,12 @@ impl<'a> Shards<'a> {
     /// Copies the images of one pose from the shard that holds it.
     fn copy(&self, unit: &Unit, root: &Path) -> Result<Images, MergeError> {
         let shard = self.holder[&unit.record_name()];
-        let Record { key, files, rois } = Record::read(shard, unit)?;
+        let Record {
+            key,
+            files,
+            rois,
+            findings,
+        } = Record::read(shard, unit)?;
         if key != unit.key() {
             return Err(MergeError::Stale {
                 shard: shard.to_owned(),
@@ -182,7 +187,11 @@ impl<'a> Shards<'a> {
             }
             write_whole(&root.join(&row.file), &bytes)?;
         }
-        Ok(Images { files, rois })
+        Ok(Images {
+            files,
+            rois,
+            findings,
+        })
     }
 }
 

@@ -8,8 +8,7 @@ use serde::Deserialize;
 
 use crate::description::DESCRIPTION_FILE;
 use crate::files::{FileError, read_text};
-use crate::job::{LimbUnits, units_of_part};
-use crate::layout::LimbId;
+use crate::job::{LimbUnits, PlannedLimb, units_of_part};
 
 /// Which units a dataset is made of, and what they follow from.
 pub(crate) struct Planned {
@@ -22,13 +21,6 @@ pub(crate) struct Planned {
 struct PlannedUnits {
     rotation: Sweep,
     limbs: Vec<PlannedLimb>,
-}
-
-#[derive(Deserialize)]
-struct PlannedLimb {
-    #[serde(flatten)]
-    limb: LimbId,
-    key: String,
 }
 
 impl Planned {
@@ -48,8 +40,7 @@ impl Planned {
     pub fn part(&self, part: Part) -> Vec<LimbUnits> {
         let poses = self.units.rotation.poses();
         let poses = poses.expect("the rotation was checked when it was read");
-        let limbs = self.units.limbs.iter();
-        units_of_part(limbs.map(|l| (l.limb, l.key.clone())), &poses, part)
+        units_of_part(self.units.limbs.iter().cloned(), &poses, part)
     }
 }
 

@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use ppa_ct::{ReadOptions, Scan, Volume};
+use ppa_ct::{ReadOptions, Scan, Volume, Warning, WarningCode};
 use ppa_mesh::{Limb, LimbReport, LimbSettings, extract_limb};
 use ppa_scene::{LandmarkOverrides, Landmarks, Side, find_landmarks};
 use sha2::{Digest, Sha256};
 
 use crate::case::{Case, Found, Source};
 use crate::files::hex;
+use crate::findings::{Finding, FindingCode, Severity};
 
 /// Why a limb could not be prepared.
 #[derive(Debug, thiserror::Error)]
@@ -49,25 +50,38 @@ pub struct PreparedLimb {
     pub limb: Limb,
     /// Axis, joint and plane.
     pub landmarks: Landmarks,
+    /// Doubts about scan and limb.
+    pub findings: Vec<Finding>,
 }
 
 impl PreparedLimb {
     fn new(
-        volume: Volume,
+        scan: Scan,
         side: Side,
         surface: &LimbSettings,
         choices: &LandmarkOverrides,
     ) -> Result<Self, PrepareError> {
+        let Scan {
+            volume, warnings, ..
+        } = scan;
+        let given = surface;
         let surface = LimbSettings {
             towards: surface.towards.or(Some([towards_left(side), 0.0, 0.0])),
             ..surface.clone()
         };
         let limb = extract_limb(&volume, &surface)?;
         let landmarks = find_landmarks(&volume, &limb.mesh, &limb.mask, side, choices)?;
+        let findings = warnings
+            .into_iter()
+            .map(of_warning)
+            .chain(several_limbs(&limb.report))
+            .chain(other_on_side(&limb.report, side, given))
+            .collect();
         Ok(Self {
             volume,
             limb,
             landmarks,
+            findings,
         })
     }
 
@@ -85,7 +99,7 @@ impl PreparedLimb {
                 expected: case.source.volume_sha256.clone(),
             });
         }
-        Self::new(scan.volume, case.side, &case.surface, &case.choices)
+        Self::new(scan, case.side, &case.surface, &case.choices)
     }
 }
 
@@ -111,14 +125,12 @@ pub fn prepare(
                 .ok_or_else(|| PrepareError::SeriesWithoutNumber(path.to_owned()))?,
         ),
     };
-    let Scan {
-        volume, warnings, ..
-    } = scan;
-    let volume_sha256 = volume_sha256(&volume);
-    let prepared = PreparedLimb::new(volume, side, surface, choices)?;
+    let volume_sha256 = volume_sha256(&scan.volume);
+    let prepared = PreparedLimb::new(scan, side, surface, choices)?;
     let case = Case {
         version: 1,
         side,
+        acknowledged: Vec::new(),
         source: Source {
             path: path.to_owned(),
             volume_sha256,
@@ -130,17 +142,30 @@ pub fn prepare(
         choices: prepared.landmarks.as_choices(choices),
         bones: None,
         found: Some(Found {
-            warnings: warnings
-                .into_iter()
-                .map(|warning| warning.text)
-                .chain(several_limbs(&prepared.limb.report))
-                .chain(other_on_side(&prepared.limb.report, side, surface))
-                .collect(),
+            findings: prepared.findings.clone(),
             landmarks: prepared.landmarks.clone(),
             surface: prepared.limb.report.clone(),
         }),
     };
     Ok((case, prepared))
+}
+
+/// A reader's warning as a finding.
+fn of_warning(warning: Warning) -> Finding {
+    let severity = match warning.code {
+        WarningCode::LocalizersDropped
+        | WarningCode::NonImagesDropped
+        | WarningCode::PixelPadding => Severity::Note,
+        WarningCode::NotHu | WarningCode::NotCt | WarningCode::SingleSlice => Severity::Severe,
+        _ => Severity::Caution,
+    };
+    Finding {
+        code: FindingCode::ScanWarning,
+        severity,
+        text: warning.text,
+        value: None,
+        place_mm: None,
+    }
 }
 
 /// 1 for the left, -1 for the right: in LPS, x grows towards the patient's left.
@@ -156,7 +181,7 @@ const LEAST_OF_LIMB: f64 = 0.1;
 
 /// That beside the limb, on the side which was asked for, another one lies of which the scan shows too little to be
 /// taken; nothing when a person said where the limb is.
-fn other_on_side(report: &LimbReport, side: Side, settings: &LimbSettings) -> Option<String> {
+fn other_on_side(report: &LimbReport, side: Side, settings: &LimbSettings) -> Option<Finding> {
     if settings.inside.is_some() || settings.towards.is_some() {
         return None;
     }
@@ -174,21 +199,32 @@ fn other_on_side(report: &LimbReport, side: Side, settings: &LimbSettings) -> Op
     };
     let [x, y, z] = chosen.centre_mm;
     let millilitres = beside.core_mm3 * 1e-3;
-    Some(format!(
+    let text = format!(
         "the limb around {x:.0}, {y:.0}, {z:.0} mm was taken, but towards the patient's {name} lies another one, cut by the \
          image ({millilitres:.0} ml with little bone): is it the {other} limb that was taken? (--inside takes the other)"
-    ))
+    );
+    Some(Finding {
+        code: FindingCode::OtherLimbOnSide,
+        severity: Severity::Severe,
+        text,
+        value: Some(beside.core_mm3),
+        place_mm: Some(beside.centre_mm),
+    })
 }
 
 /// Which of several limbs was taken.
-fn several_limbs(report: &LimbReport) -> Option<String> {
+fn several_limbs(report: &LimbReport) -> Option<Finding> {
     let alike = report.bodies.iter().filter(|body| body.alike).count();
     let chosen = report.bodies.iter().find(|body| body.chosen)?;
     let [x, y, z] = chosen.centre_mm;
-    (alike > 1).then(|| {
-        format!(
+    (alike > 1).then(|| Finding {
+        code: FindingCode::SeveralLimbs,
+        severity: Severity::Caution,
+        text: format!(
             "the scan shows {alike} limbs; the one around {x:.0}, {y:.0}, {z:.0} mm was taken (--inside takes another)"
-        )
+        ),
+        value: Some(alike as f64),
+        place_mm: Some(chosen.centre_mm),
     })
 }
 
@@ -245,8 +281,8 @@ mod tests {
         };
         let told = with(body(false, 4e5, 31.0), Side::Left, &settings).unwrap();
         assert!(
-            told.contains("patient's left") && told.contains("-67, 80, 400"),
-            "{told}"
+            told.text.contains("patient's left") && told.text.contains("-67, 80, 400"),
+            "{told:?}"
         );
         assert_eq!(with(body(false, 4e5, 31.0), Side::Right, &settings), None);
         assert_eq!(with(body(false, 1e5, 31.0), Side::Left, &settings), None);

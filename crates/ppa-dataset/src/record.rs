@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::files::{FileError, hex, read_text, sha256_of_file, write_whole};
+use crate::findings::Finding;
 use crate::layout::{LimbId, angle_text};
 use crate::manifest::{FileRow, RoiFile};
 
@@ -60,6 +61,9 @@ pub(crate) struct Record {
     pub files: Vec<FileRow>,
     /// Its regions of interest.
     pub rois: RoiFile,
+    /// Doubts about the limb and about this pose.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub findings: Vec<Finding>,
 }
 
 impl Record {

@@ -10,6 +10,7 @@ use ppa_xray::{FastSettings, VoxelPhantom};
 
 use crate::body_shape::BodyShape;
 use crate::files::{FileError, sha256_of_file};
+use crate::findings::Finding;
 use crate::layout::LimbId;
 use crate::manifest::{FileKind, FileRow, RoiFile, RoiRow};
 use crate::plan::Plan;
@@ -66,6 +67,8 @@ pub(crate) struct Images {
     pub files: Vec<FileRow>,
     /// Regions of interest in them.
     pub rois: RoiFile,
+    /// Doubts about the limb and about this pose.
+    pub findings: Vec<Finding>,
 }
 
 /// A limb with everything that all its poses share.
@@ -154,7 +157,11 @@ impl<'a> PosableLimb<'a> {
             .iter()
             .map(|camera| self.roi(camera, &placement, pose));
         let rois = rois.collect::<Result<_, _>>()?;
-        Ok(Images { files, rois })
+        Ok(Images {
+            files,
+            rois,
+            findings: self.prepared.findings.clone(),
+        })
     }
 
     fn place(&self, skin: &Mesh, pose: PoseAngle) -> Result<Placement, UnitError> {

@@ -162,6 +162,7 @@ mod tests {
                 side: Side::Left,
             },
             key: String::new(),
+            acknowledged: Vec::new(),
             poses: Sweep::default().poses().unwrap(),
         };
         let limbs: Vec<_> = (0..17).map(limb).collect();

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use nalgebra::Point3;
 use ppa_ct::{Format, write};
 use ppa_dataset::labels::{AnkleBones, BoneFile, BoneNumbers, JointSpace, segment_bones};
-use ppa_dataset::{Case, Found, PreparedLimb, prepare};
+use ppa_dataset::{Case, Found, PreparedLimb, Severity, prepare};
 use ppa_mesh::{LimbSettings, VoxelBox, write_mesh_file};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
 
@@ -213,11 +213,13 @@ fn describe_found(found: &Found) -> Vec<String> {
             .iter()
             .map(|note| format!("note       {note}")),
     );
-    lines.extend(
-        found
-            .warnings
-            .iter()
-            .map(|warning| format!("warning    {warning}")),
-    );
+    lines.extend(found.findings.iter().map(|finding| {
+        let severity = match finding.severity {
+            Severity::Note => "note",
+            Severity::Caution => "caution",
+            Severity::Severe => "severe",
+        };
+        format!("{severity:10} {}", finding.text)
+    }));
     lines
 }

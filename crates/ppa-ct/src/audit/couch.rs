@@ -148,7 +148,7 @@ impl Couch {
         match stated {
             Some(stated) if stated != lying => Finding::new(
                 FindingCode::CouchMisplaced,
-                Severity::Serious,
+                Severity::Severe,
                 format!(
                     "{plate}, but the patient is said to lie {stated}: the volume may be flipped"
                 ),

@@ -29,7 +29,7 @@ pub enum Severity {
     /// Look at the scan before using it.
     Caution,
     /// Do not use the scan as it is.
-    Serious,
+    Severe,
 }
 
 /// Kinds of [`Finding`]; written in kebab-case, e.g. `metal`.
@@ -100,7 +100,7 @@ impl Finding {
             WarningCode::LocalizersDropped
             | WarningCode::NonImagesDropped
             | WarningCode::PixelPadding => Severity::Note,
-            WarningCode::NotHu | WarningCode::NotCt | WarningCode::SingleSlice => Severity::Serious,
+            WarningCode::NotHu | WarningCode::NotCt | WarningCode::SingleSlice => Severity::Severe,
             _ => Severity::Caution,
         };
         Self::new(

@@ -36,7 +36,7 @@ const HEAD: &str = r#"<!DOCTYPE html>
 body { font: 15px/1.45 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.1rem; margin-top: 2rem; }
 table { border-collapse: collapse; width: 100%; } td, th { text-align: left; vertical-align: top; padding: .35rem .7rem .35rem 0; border-bottom: 1px solid #ddd; }
-.serious { color: #b00020; font-weight: 600; } .caution { color: #9a5b00; font-weight: 600; } .note { color: #556; }
+.severe { color: #b00020; font-weight: 600; } .caution { color: #9a5b00; font-weight: 600; } .note { color: #556; }
 figure { display: inline-block; margin: 0 1rem 1rem 0; vertical-align: top; } figcaption { font-size: .85rem; color: #556; }
 .frame { position: relative; background: #000; } .frame img { display: block; }
 .frame span { position: absolute; color: #ffd75e; font-size: 13px; text-shadow: 0 0 3px #000; }
@@ -59,7 +59,7 @@ fn findings(audit: &Audit) -> String {
         let severity = match finding.severity {
             Severity::Note => "note",
             Severity::Caution => "caution",
-            Severity::Serious => "serious",
+            Severity::Severe => "severe",
         };
         let cells = [&*finding.text, finding.depth_images, finding.radiographs].map(escaped);
         let _ = writeln!(

@@ -97,13 +97,13 @@ pub(super) fn scale(peaks: &Peaks) -> Vec<Finding> {
             "air seems to lie at {air:.0} and tissue at {tissue:.0}: all values are about {:.0} too high",
             air + 1000.0
         );
-        return vec![Finding::new(ShiftedValues, Severity::Serious, text)];
+        return vec![Finding::new(ShiftedValues, Severity::Severe, text)];
     }
     let mut found = Vec::new();
     match peaks.air_hu {
         None => found.push(Finding::new(
             NoAir,
-            Severity::Serious,
+            Severity::Severe,
             "no air near -1000 HU".to_owned(),
         )),
         Some(air) if (air + 1000.0).abs() > AIR_SLACK_HU => found.push(Finding::new(
@@ -116,7 +116,7 @@ pub(super) fn scale(peaks: &Peaks) -> Vec<Finding> {
     match peaks.tissue_hu {
         None => found.push(Finding::new(
             NoTissue,
-            Severity::Serious,
+            Severity::Severe,
             "no soft tissue from -300 to 400 HU".to_owned(),
         )),
         // Fat, then water to muscle with contrast agent.

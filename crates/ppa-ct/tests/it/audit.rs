@@ -121,7 +121,7 @@ fn a_couch_is_found_where_it_is() {
     );
     assert_eq!(
         with(Some(130.0), Some("FFP")),
-        Some((CouchMisplaced, Severity::Serious))
+        Some((CouchMisplaced, Severity::Severe))
     );
     assert_eq!(
         with(Some(12.0), None),
@@ -130,7 +130,7 @@ fn a_couch_is_found_where_it_is() {
     assert_eq!(with(Some(12.0), Some("HFP")), Some((Couch, Severity::Note)));
     assert_eq!(
         with(Some(12.0), Some("HFS")),
-        Some((CouchMisplaced, Severity::Serious))
+        Some((CouchMisplaced, Severity::Severe))
     );
 }
 
@@ -168,7 +168,7 @@ fn values_that_are_not_hounsfield_units_are_told() {
     let shifted = first(|hu| hu + 1024.0);
     assert_eq!(
         (shifted.code, shifted.severity),
-        (ShiftedValues, Severity::Serious)
+        (ShiftedValues, Severity::Severe)
     );
     assert!(
         shifted.text.contains("1024") || shifted.text.contains("102"),
@@ -183,9 +183,9 @@ fn values_that_are_not_hounsfield_units_are_told() {
         (TissueOffScale, Severity::Caution)
     );
     let no_air = first(|hu| hu.max(-400.0));
-    assert_eq!((no_air.code, no_air.severity), (NoAir, Severity::Serious));
+    assert_eq!((no_air.code, no_air.severity), (NoAir, Severity::Severe));
     let empty = first(|hu| hu.min(-900.0));
-    assert_eq!((empty.code, empty.severity), (NoTissue, Severity::Serious));
+    assert_eq!((empty.code, empty.severity), (NoTissue, Severity::Severe));
     let boneless = first(|hu| hu.min(120.0));
     assert_eq!(
         (boneless.code, boneless.severity),

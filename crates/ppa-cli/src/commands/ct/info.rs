@@ -54,7 +54,7 @@ fn describe(audited: &Audited) -> String {
         let severity = match finding.severity {
             Severity::Note => "note",
             Severity::Caution => "caution",
-            Severity::Serious => "serious",
+            Severity::Severe => "severe",
         };
         lines.push(format!("{severity:<10} {}", finding.text));
         if finding.severity > Severity::Note {

@@ -1,0 +1,139 @@
+//! Findings: doubts about a limb or a pose, which travel with the data from the case to the training.
+//!
+//! `ppa prepare` writes them into the case, a dataset lists those of all its limbs in `findings.json`. A person who has
+//! looked at a severe one names its code in `acknowledged` of the case; until then every command repeats it.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::files::{FileError, read_text};
+use crate::layout::LimbId;
+
+/// How much a finding matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Severity {
+    /// Good to know; nothing to do.
+    Note,
+    /// Look at the limb before using its images.
+    Caution,
+    /// The images are probably wrong.
+    Severe,
+}
+
+/// Kinds of [`Finding`]; written in kebab-case, e.g. `limb-too-small`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum FindingCode {
+    /// A warning of the reader of the scan.
+    ScanWarning,
+    /// The scan shows several limbs.
+    SeveralLimbs,
+    /// Another limb, cut by the image, lies on the side that was asked for.
+    OtherLimbOnSide,
+    /// The limb is too small or too short for one.
+    LimbTooSmall,
+    /// A part of another limb is fused to the skin.
+    FusedLimb,
+    /// The field of view cuts the limb within a region of interest.
+    CutInRegion,
+    /// The supporting plane lies on a face where the field of view cuts the limb.
+    PlaneOnCut,
+    /// The normal of the supporting plane is an axis of the image.
+    PlaneAlongImage,
+    /// Distal and proximal contact with the table are too near to each other to tell the pitch.
+    ContactsTooNear,
+    /// The axis of rotation is inclined to the bone's shaft.
+    AxisOffShaft,
+    /// The fibula lies where that of the other side would.
+    SideMismatch,
+    /// Neither an ankle nor a knee was found.
+    NoJoint,
+}
+
+/// One doubt about a limb or a pose.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Finding {
+    /// Stable code for scripts and for `acknowledged` in a case.
+    pub code: FindingCode,
+    /// How much it matters.
+    pub severity: Severity,
+    /// What was found and expected, in one sentence with units.
+    pub text: String,
+    /// The number that was compared with a limit; its unit stands in `text`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// Where it is: a point in the ct frame (LPS), mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub place_mm: Option<[f64; 3]>,
+}
+
+/// A finding about one limb of a dataset.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LimbFinding {
+    /// The limb.
+    #[serde(flatten)]
+    pub limb: LimbId,
+    /// Whether the case acknowledges it by name.
+    pub acknowledged: bool,
+    /// What was found.
+    #[serde(flatten)]
+    pub finding: Finding,
+}
+
+impl LimbFinding {
+    /// Whether commands have to repeat it: severe, and not acknowledged.
+    pub fn is_open(&self) -> bool {
+        self.finding.severity == Severity::Severe && !self.acknowledged
+    }
+}
+
+/// The findings of a dataset: `findings.json`, absent where there are none.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Findings(pub Vec<LimbFinding>);
+
+impl Findings {
+    /// Its file in a dataset.
+    pub const FILE: &str = "findings.json";
+
+    /// Reads the findings of the dataset in `root`; none where the file is absent.
+    ///
+    /// # Errors
+    /// [`FileError`] when the file cannot be read or is malformed.
+    pub fn read(root: &Path) -> Result<Self, FileError> {
+        let path = root.join(Self::FILE);
+        match fs::exists(&path) {
+            Ok(false) => return Ok(Self::default()),
+            Err(error) => return Err(FileError::at("read", &path)(error)),
+            Ok(true) => {}
+        }
+        serde_json::from_str(&read_text(&path)?)
+            .map_err(|e| FileError::at("parse", &path)(io::Error::from(e)))
+    }
+
+    /// `findings.json` as text.
+    #[cfg(feature = "generate")]
+    pub(crate) fn to_text(&self) -> String {
+        serde_json::to_string_pretty(self).expect("findings hold only JSON values")
+    }
+
+    /// Adds the findings of one pose of `limb`, but those that stand here already.
+    #[cfg(feature = "generate")]
+    pub(crate) fn add(&mut self, limb: LimbId, acknowledged: &[FindingCode], of_pose: &[Finding]) {
+        for finding in of_pose {
+            let same = |known: &LimbFinding| known.limb == limb && known.finding == *finding;
+            if !self.0.iter().any(same) {
+                self.0.push(LimbFinding {
+                    limb,
+                    acknowledged: acknowledged.contains(&finding.code),
+                    finding: finding.clone(),
+                });
+            }
+        }
+    }
+}
