@@ -273,7 +273,7 @@ impl<'a> PosableLimb<'a> {
     }
 }
 
-fn depth_image(
+pub(crate) fn depth_image(
     shape: BodyShape,
     placed: PlacedBody,
     camera: &PlacedCamera,

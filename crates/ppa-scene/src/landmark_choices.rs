@@ -30,24 +30,32 @@ pub struct LandmarkOverrides {
 }
 
 impl Landmarks {
-    /// These landmarks as choices, so that a person finds every decision in one place and edits
-    /// it: found again with the result, the patient frame is the same.
-    ///
-    /// The plane points stay open unless `given` has them, as they follow from axis and front. Regions and
-    /// their source stay open if `given` has the axis.
-    pub fn as_choices(&self, given: &LandmarkOverrides) -> LandmarkOverrides {
+    /// What a person may still choose beside what is `given`, as it was found: keys that exclude a given one are left out.
+    pub fn open_choices(&self, given: &LandmarkOverrides) -> LandmarkOverrides {
         let by_regions = given.axis.is_none();
+        let by_axis = given.joint_region.is_none()
+            && given.calf_region.is_none()
+            && given.axis_source.is_none();
+        let joint = Vector3::from(self.joint_centre);
+        let along = Vector3::from(self.axis_direction);
+        let axis = [joint, joint + along * 100.0].map(Into::into);
         LandmarkOverrides {
-            limb: Some(self.limb),
-            joint_centre: Some(self.joint_centre),
-            joint_region: by_regions.then_some(self.joint_region.range_mm),
-            calf_region: by_regions.then_some(self.calf_region.range_mm),
-            axis_source: by_regions.then_some(self.axis_source),
-            axis: given.axis,
-            anterior: Some(self.anterior),
-            plane_points: given.plane_points,
+            limb: open(given.limb, self.limb),
+            joint_centre: open(given.joint_centre, self.joint_centre),
+            joint_region: open(given.joint_region, self.joint_region.range_mm)
+                .filter(|_| by_regions),
+            calf_region: open(given.calf_region, self.calf_region.range_mm).filter(|_| by_regions),
+            axis_source: open(given.axis_source, self.axis_source).filter(|_| by_regions),
+            axis: open(given.axis, axis).filter(|_| by_axis),
+            anterior: open(given.anterior, self.anterior),
+            plane_points: open(given.plane_points, self.plane_points),
         }
     }
+}
+
+/// What was found, where nothing is given.
+fn open<T>(given: Option<T>, found: T) -> Option<T> {
+    given.is_none().then_some(found)
 }
 
 impl LandmarkOverrides {

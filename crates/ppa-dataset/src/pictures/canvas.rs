@@ -28,7 +28,10 @@ impl Rect {
 
     /// Its first and one past its last column and row.
     pub(super) fn ends(self) -> [[u32; 2]; 2] {
-        [[self.x, self.x + self.width], [self.y, self.y + self.height]]
+        [
+            [self.x, self.x + self.width],
+            [self.y, self.y + self.height],
+        ]
     }
 }
 
@@ -115,12 +118,19 @@ impl Canvas {
         };
         // Half the length of the line's cut across the minor axis.
         let half = reach * length / along[major].abs();
-        let (low, high) = (a[major].min(b[major]) - reach, a[major].max(b[major]) + reach);
+        let (low, high) = (
+            a[major].min(b[major]) - reach,
+            a[major].max(b[major]) + reach,
+        );
         for step in pixels(low, high) {
-            let middle = from[minor]
-                + (f64::from(step) + 0.5 - from[major]) * along[minor] / along[major];
+            let middle =
+                from[minor] + (f64::from(step) + 0.5 - from[major]) * along[minor] / along[major];
             for side in pixels(middle - half, middle + half) {
-                let (x, y) = if major == 0 { (step, side) } else { (side, step) };
+                let (x, y) = if major == 0 {
+                    (step, side)
+                } else {
+                    (side, step)
+                };
                 let away = [f64::from(x) + 0.5 - from[0], f64::from(y) + 0.5 - from[1]];
                 let t = (away[0] * along[0] + away[1] * along[1]) / (length * length);
                 let nearest = at(t.clamp(0.0, 1.0));

@@ -7,12 +7,11 @@ use ppa_scene::{AxisSource, Landmarks, LimbKind, Side};
 use super::canvas::{Rect, mixed};
 use super::cut_faces::cut_faces;
 use super::limb_marks::LimbMarks;
-use super::palette::{
-    AXIS, CALF_REGION, CUT, JOINT, JOINT_REGION, OUTLINE, PANEL, PLANE, SKIN,
-};
+use super::palette::{AXIS, CALF_REGION, CUT, JOINT, JOINT_REGION, OUTLINE, PANEL, PLANE, SKIN};
 use super::sheet::{Frame, GAP, HEADER, PANELS_END, Remark, Swatch, WIDTH};
 use super::skin::draw_skin;
 use super::slice::draw_slice;
+use crate::findings::{Finding, FindingCode, Severity};
 use crate::prepare::PreparedLimb;
 
 /// Width of a panel, pixels.
@@ -22,11 +21,13 @@ const PANEL_HEIGHT: u32 = (PANELS_END - HEADER - GAP) / 2;
 /// Draws a prepared limb: slices through the joint (axial, coronal, sagittal) above, the skin from the front, its lateral side
 /// and behind below, with axis, joint, axis regions, supporting plane and cut faces.
 ///
-/// `name` heads the sheet: a file's name without folders. `warnings` are those of the scan. At least 1600 x 1000 pixels; the same
+/// `name` heads the sheet: a file's name without folders. Severe findings that are `acknowledged` no longer count as severe. Those
+/// with a place are numbered, and so are their places on the skin. At least 1600 x 1000 pixels; the same
 /// limb gives the same pixels.
-pub fn case_picture(name: &str, limb: &PreparedLimb, warnings: &[String]) -> RgbImage {
+pub fn case_picture(name: &str, limb: &PreparedLimb, acknowledged: &[FindingCode]) -> RgbImage {
     let landmarks = &limb.landmarks;
-    let marks = LimbMarks::new(landmarks);
+    let places = placed_findings(limb).filter_map(|f| f.place_mm);
+    let marks = LimbMarks::new(landmarks, places.map(Into::into).collect());
     let cuts = cut_faces(&limb.limb, limb.volume.grid());
     let legend = Rect {
         x: 4 * GAP + 3 * PANEL_WIDTH,
@@ -34,7 +35,7 @@ pub fn case_picture(name: &str, limb: &PreparedLimb, warnings: &[String]) -> Rgb
         width: WIDTH - 5 * GAP - 3 * PANEL_WIDTH,
         height: PANELS_END - HEADER,
     };
-    let mut canvas = frame(name, limb, warnings).canvas(legend);
+    let mut canvas = frame(name, limb, acknowledged).canvas(legend);
     let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()];
     // Radiological convention: seen from the feet, from the front, and with the front to the left.
     let slices = [("axial", x, -y), ("coronal", x, z), ("sagittal", y, z)];
@@ -48,7 +49,8 @@ pub fn case_picture(name: &str, limb: &PreparedLimb, warnings: &[String]) -> Rgb
     canvas.into_image()
 }
 
-fn panel(column: usize, row: u32) -> Rect {
+/// Where a panel stands.
+pub(super) fn panel(column: usize, row: u32) -> Rect {
     Rect {
         x: GAP + column as u32 * (PANEL_WIDTH + GAP),
         y: HEADER + row * (PANEL_HEIGHT + GAP),
@@ -73,6 +75,37 @@ fn skin_views(landmarks: &Landmarks) -> [(&'static str, Vector3<f64>, Vector3<f6
     ]
 }
 
+/// Findings at a place that a person should look at, the severest first: their numbers are their places in this list, from 1.
+fn placed_findings(limb: &PreparedLimb) -> impl Iterator<Item = &Finding> {
+    let of = |severity| {
+        let findings = limb.findings.iter();
+        findings.filter(move |f| f.severity == severity && f.place_mm.is_some())
+    };
+    of(Severity::Severe).chain(of(Severity::Caution))
+}
+
+/// Findings and notes about a limb.
+pub(super) fn remarks(limb: &PreparedLimb, acknowledged: &[FindingCode]) -> Vec<Remark> {
+    let found = limb.findings.iter().map(|finding| {
+        let number = placed_findings(limb).position(|placed| placed == finding);
+        let number = number.map_or(String::new(), |at| format!("({}) ", at + 1));
+        let is_known = acknowledged.contains(&finding.code);
+        let (severity, known) = match finding.severity {
+            Severity::Severe if is_known => (Severity::Caution, " [acknowledged]"),
+            severity => (severity, ""),
+        };
+        Remark {
+            severity,
+            text: format!("{number}{}{known}", finding.text),
+        }
+    });
+    let noted = limb.landmarks.notes.iter().map(|note| Remark {
+        severity: Severity::Note,
+        text: note.clone(),
+    });
+    found.chain(noted).collect()
+}
+
 /// The limb in two words.
 pub(super) fn limb_name(landmarks: &Landmarks) -> String {
     let side = match landmarks.side {
@@ -86,12 +119,15 @@ pub(super) fn limb_name(landmarks: &Landmarks) -> String {
     format!("{side} {kind}")
 }
 
-fn frame(name: &str, limb: &PreparedLimb, warnings: &[String]) -> Frame {
+fn frame(name: &str, limb: &PreparedLimb, acknowledged: &[FindingCode]) -> Frame {
     let landmarks = &limb.landmarks;
     let range = |[from, to]: [f64; 2]| format!("{from:.0} to {to:.0} mm");
     let legend = [
         (Swatch::Line(OUTLINE), "skin in the slice".to_owned()),
-        (Swatch::Area(mixed([128; 3], PANEL, 0.55)), "not the limb".to_owned()),
+        (
+            Swatch::Area(mixed([128; 3], PANEL, 0.55)),
+            "not the limb".to_owned(),
+        ),
         (Swatch::Line(AXIS), "axis".to_owned()),
         (Swatch::Dot(JOINT), "joint".to_owned()),
         (
@@ -112,6 +148,7 @@ fn frame(name: &str, limb: &PreparedLimb, warnings: &[String]) -> Frame {
     let axis_of = match landmarks.axis_source {
         AxisSource::Bone => "axis of the bone",
         AxisSource::Limb => "axis of the whole limb",
+        AxisSource::Given => "axis given",
     };
     let report = &limb.limb.report;
     let spacing = limb.volume.grid().spacing_mm();
@@ -125,20 +162,16 @@ fn frame(name: &str, limb: &PreparedLimb, warnings: &[String]) -> Frame {
         ),
     ];
     for cut in &report.cut_faces {
-        facts.push(format!("cut at {}: {:.1} cm2", cut.face, cut.area_mm2 * 1e-2));
+        facts.push(format!(
+            "cut at {}: {:.1} cm2",
+            cut.face,
+            cut.area_mm2 * 1e-2
+        ));
     }
-    let noted = landmarks.notes.iter().map(|note| Remark {
-        gravity: super::sheet::Gravity::Note,
-        text: note.clone(),
-    });
-    let warned = warnings.iter().map(|warning| Remark {
-        gravity: super::sheet::Gravity::Warning,
-        text: warning.clone(),
-    });
     Frame {
         title: format!("{name}   {}", limb_name(landmarks)),
         legend: legend.to_vec(),
         facts,
-        remarks: warned.chain(noted).collect(),
+        remarks: remarks(limb, acknowledged),
     }
 }

@@ -32,7 +32,9 @@ pub(super) fn cut_faces(limb: &Limb, grid: &Grid) -> Mesh {
 /// `+j` is axis 1 at its upper end.
 fn axis_and_end(face: &str) -> Option<(usize, f64)> {
     let end = if face.starts_with('-') { -1.0 } else { 1.0 };
-    let axis = ["i", "j", "k"].iter().position(|axis| face.ends_with(axis))?;
+    let axis = ["i", "j", "k"]
+        .iter()
+        .position(|axis| face.ends_with(*axis))?;
     Some((axis, end))
 }
 
@@ -92,7 +94,11 @@ mod tests {
         let mesh = cut_faces(&limb, &grid);
         let expected = 4.0 * 6.0 * 3.0 + 4.0 * 5.0 * 2.0;
         assert!((mesh.area_mm2() - expected).abs() < 1e-3);
-        let lowest = mesh.vertices.iter().zip(&mesh.normals).find(|(_, n)| n.y != 0.0);
+        let lowest = mesh
+            .vertices
+            .iter()
+            .zip(&mesh.normals)
+            .find(|(_, n)| n.y != 0.0);
         let (vertex, normal) = lowest.unwrap();
         assert!((normal.y + 1.0).abs() < 1e-6 && (vertex.y + 0.05).abs() < 1e-6);
     }

@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 use ppa_scene::{AxisRegion, Landmarks, Plane};
 
-use super::canvas::{Canvas, Colour, mixed};
-use super::palette::{AXIS, CALF_REGION, INK, JOINT, JOINT_REGION, PLANE};
+use super::canvas::{Canvas, Colour, mixed, text_width};
+use super::palette::{AXIS, CALF_REGION, INK, JOINT, JOINT_REGION, PLANE, SEVERE};
 use super::view::View;
 
 /// Half the length to which lines are drawn, mm: beyond any panel.
@@ -19,10 +19,12 @@ pub(super) struct LimbMarks<'a> {
     joint: Point3<f64>,
     scan_direction: Vector3<f64>,
     plane: Plane,
+    /// Places of findings, numbered from 1.
+    findings: Vec<Point3<f64>>,
 }
 
 impl<'a> LimbMarks<'a> {
-    pub(super) fn new(landmarks: &'a Landmarks) -> Self {
+    pub(super) fn new(landmarks: &'a Landmarks, findings: Vec<Point3<f64>>) -> Self {
         let ct_from_patient = landmarks.patient_from_ct().inverse();
         Self {
             landmarks,
@@ -31,6 +33,7 @@ impl<'a> LimbMarks<'a> {
             plane: landmarks
                 .plane_patient()
                 .transformed(ct_from_patient.isometry()),
+            findings,
         }
     }
 
@@ -98,6 +101,23 @@ impl<'a> LimbMarks<'a> {
             let inner = if hides(&point) { 4.0 } else { 0.0 };
             canvas.ring(at, inner, 7.0, [0; 3]);
             canvas.ring(at, if inner > 0.0 { 4.5 } else { 0.0 }, 6.0, PLANE);
+        }
+    }
+
+    /// Numbers where the findings are.
+    pub(super) fn draw_findings(&self, canvas: &mut Canvas, view: &View) {
+        for (point, number) in self.findings.iter().zip(1..) {
+            let [x, y] = view.pixel(point);
+            // Elsewhere than in the picture, or nowhere.
+            if ![x, y].iter().all(|pixel| (0.0..1e4).contains(pixel)) {
+                continue;
+            }
+            canvas.ring([x, y], 0.0, 13.0, [0; 3]);
+            canvas.ring([x, y], 10.5, 12.5, SEVERE);
+            let text = format!("{number}");
+            let half = 0.5 * f64::from(text_width(&text, 2));
+            let corner = [x - half, y - 8.0].map(|pixel| pixel.max(0.0) as u32);
+            canvas.text(&text, corner, 2, INK);
         }
     }
 }

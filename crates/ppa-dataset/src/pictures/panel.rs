@@ -43,7 +43,10 @@ pub(super) fn scale_bar(canvas: &mut Canvas, rect: Rect, view: &View) {
     let Some(mm) = BARS_MM.iter().rev().find(fits) else {
         return;
     };
-    let (x, y) = (f64::from(rect.x + MARGIN), f64::from(rect.y + rect.height - 14));
+    let (x, y) = (
+        f64::from(rect.x + MARGIN),
+        f64::from(rect.y + rect.height - 14),
+    );
     let end = x + mm * view.pixels_per_mm;
     for (width, colour) in [(6.0, [0; 3]), (3.0, INK)] {
         canvas.line([x, y], [end, y], width, colour);

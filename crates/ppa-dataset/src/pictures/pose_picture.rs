@@ -7,15 +7,14 @@ use ppa_mesh::{PointCloud, mean_spacing_mm};
 use ppa_scene::Placement;
 
 use super::canvas::{Canvas, Colour, Rect};
-use super::case_picture::limb_name;
-use super::palette::{
-    AXIS, BEAM, CAMERAS, CUT, DETECTOR, FAINT, INK, JOINT, SKIN, TABLE,
-};
+use super::case_picture::{limb_name, remarks};
+use super::palette::{AXIS, BEAM, CAMERAS, CUT, DETECTOR, FAINT, INK, JOINT, SKIN, TABLE};
 use super::panel;
 use super::pose_scene::PoseScene;
 use super::raster::Raster;
-use super::sheet::{Frame, GAP, Gravity, HEADER, PANELS_END, Remark, Swatch, WIDTH};
+use super::sheet::{Frame, GAP, HEADER, PANELS_END, Swatch, WIDTH};
 use super::view::View;
+use crate::findings::FindingCode;
 use crate::plan::Plan;
 use crate::prepare::PreparedLimb;
 use crate::stage::Table;
@@ -51,6 +50,8 @@ pub struct PosedLimb<'a> {
     pub table: &'a Table,
     /// Cameras and detector.
     pub plan: &'a Plan,
+    /// Findings that its case acknowledges.
+    pub acknowledged: &'a [FindingCode],
 }
 
 /// Draws a placed limb: the room with table, device, detector, beam and both cameras' fields of view, and the limb from its side,
@@ -110,7 +111,7 @@ fn draw_overview(canvas: &mut Canvas, rect: Rect, scene: &PoseScene) {
     let up = scene.axes.column(2).into_owned();
     let up = (up - towards_viewer * towards_viewer.dot(&up)).normalize();
     let right = up.cross(&towards_viewer);
-    let skin = scene.skin.vertices.iter().map(Point3::cast::<f64>);
+    let skin = scene.skin.vertices.iter().map(|p| p.cast::<f64>());
     let cones = scene.cones.iter().flat_map(|cone| {
         let ends = cone.corners.into_iter();
         ends.chain([cone.eye])
@@ -124,7 +125,8 @@ fn draw_overview(canvas: &mut Canvas, rect: Rect, scene: &PoseScene) {
     let raster = rasterised(rect, view, scene, &around, AROUND_MM[0]);
     canvas.within(rect, |canvas| {
         paint(canvas, &raster, scene);
-        let mut line = |from, to, width, colour| stroke(canvas, &raster, &view, [from, to], width, colour);
+        let mut line =
+            |from, to, width, colour| stroke(canvas, &raster, &view, [from, to], width, colour);
         for corner in scene.detector {
             line(scene.source, corner, 1.0, BEAM);
         }
@@ -157,7 +159,12 @@ fn draw_side(
     (title, right, up): (&str, Vector3<f64>, Vector3<f64>),
 ) {
     panel::ground(canvas, rect);
-    let skin: Vec<_> = scene.skin.vertices.iter().map(Point3::cast::<f64>).collect();
+    let skin: Vec<_> = scene
+        .skin
+        .vertices
+        .iter()
+        .map(|p| p.cast::<f64>())
+        .collect();
     let table = &scene.table.plane.plane;
     let below = skin.iter().map(|point| table.project(point));
     let view = View::fitting(rect, [right, up], skin.iter().copied().chain(below));
@@ -260,6 +267,16 @@ fn stroke(
     });
 }
 
+/// How far a part of the limb is above the table, in hundredths of a millimetre.
+fn above(part: &str, height_mm: f64) -> String {
+    let hundredths = (100.0 * height_mm).round();
+    let place = if hundredths < 0.0 { "inside" } else { "above" };
+    format!(
+        "{part} part {:.2} mm {place} the table",
+        0.01 * hundredths.abs()
+    )
+}
+
 /// The sides of a quadrilateral.
 fn sides(corners: &[Point3<f64>; 4]) -> impl Iterator<Item = (Point3<f64>, Point3<f64>)> {
     let corners = *corners;
@@ -285,21 +302,19 @@ fn frame(name: &str, posed: &PosedLimb) -> Frame {
         format!("rotation {:.1} deg", posed.angle_deg),
         format!("tilt {:.1} deg", contact.tilt_rad.to_degrees()),
         format!("contacts {:.0} mm apart", contact.apart_mm),
-        format!("distal {:.2} mm above the table", contact.distal_mm.abs()),
-        format!("proximal {:.2} mm above the table", contact.proximal_mm.abs()),
+        above("distal", contact.distal_mm),
+        above("proximal", contact.proximal_mm),
     ];
-    let notes = posed.limb.landmarks.notes.iter().map(|note| Remark {
-        gravity: Gravity::Note,
-        text: note.clone(),
-    });
     Frame {
         title: format!(
             "{name}   {}   {:.1} degrees medial",
             limb_name(&posed.limb.landmarks),
             posed.angle_deg
         ),
-        legend: legend.map(|(swatch, text)| (swatch, text.to_owned())).to_vec(),
+        legend: legend
+            .map(|(swatch, text)| (swatch, text.to_owned()))
+            .to_vec(),
         facts,
-        remarks: notes.collect(),
+        remarks: remarks(posed.limb, posed.acknowledged),
     }
 }

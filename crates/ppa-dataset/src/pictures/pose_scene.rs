@@ -1,7 +1,7 @@
 //! What stands around a placed limb, as points and lines in the room: device, detector, cameras, contacts.
 
-use nalgebra::{Matrix3, Point3, Vector3};
-use ppa_depth::{Camera, RigError, RigSpec};
+use nalgebra::{Matrix3, Point2, Point3, Vector3};
+use ppa_depth::{Camera, MountedCamera, RigError, RigSpec};
 use ppa_mesh::Mesh;
 use ppa_scene::{Landmarks, Placement};
 use ppa_xray::Detector;
@@ -67,8 +67,9 @@ impl<'a> PoseScene<'a> {
         let [half_x, half_y] = [detector.columns, detector.rows]
             .map(|pixels| 0.5 * f64::from(pixels) * detector.pixel_mm);
         let [centre_x, centre_y] = detector.centre_mm;
-        let corner = |[x, y]: [f64; 2]| in_room(centre_x + x * half_x, centre_y + y * half_y, distance);
-        let cone = |name, mounted: &ppa_depth::MountedCamera| {
+        let corner =
+            |[x, y]: [f64; 2]| in_room(centre_x + x * half_x, centre_y + y * half_y, distance);
+        let cone = |name: &'static str, mounted: &MountedCamera| {
             let pose = mounted
                 .pose()
                 .map_err(|source| RigError::Pose { side: name, source })?;
@@ -107,7 +108,7 @@ fn corner_rays(camera: &Camera) -> [Vector3<f64>; 4] {
         let inward = (0..50).map(|step| 0.01 * f64::from(step));
         let ray = inward
             .map(|t| [u + t * (1.0 - 2.0 * u), v + t * (1.0 - 2.0 * v)])
-            .find_map(|[u, v]| camera.unproject(&nalgebra::Point2::new(u * width, v * height)));
+            .find_map(|[u, v]| camera.unproject(&Point2::new(u * width, v * height)));
         let ray = ray.unwrap_or_default();
         Vector3::new(ray.x, ray.y, 1.0)
     })
@@ -133,7 +134,7 @@ fn contacts(
         half.filter(|(in_ct, _)| is_distal(in_ct) == distal)
             .map(|(_, placed)| placed.cast::<f64>())
             .min_by(|a, b| {
-                let height = |p| table.plane.plane.signed_distance(p);
+                let height = |p: &Point3<f64>| table.plane.plane.signed_distance(p);
                 height(a).total_cmp(&height(b))
             })
     };

@@ -96,7 +96,11 @@ impl Raster {
 
     /// Adds a mesh; triangles with a corner that is not finite are left out.
     pub(super) fn mesh(&mut self, mesh: &Mesh, layer: u8) {
-        let places: Vec<_> = mesh.vertices.iter().map(|v| self.place(&v.cast())).collect();
+        let places: Vec<_> = mesh
+            .vertices
+            .iter()
+            .map(|v| self.place(&v.cast()))
+            .collect();
         let [width, height] = self.size();
         for triangle in &mesh.triangles {
             let corners = triangle.map(|corner| places[corner as usize]);
@@ -174,8 +178,8 @@ impl Raster {
         let at = |pixel: f64, first: u32| ((pixel - f64::from(first)) * scale).floor();
         let (column, row) = (at(x, self.rect.x), at(y, self.rect.y));
         let [width, height] = self.size();
-        let inside = (0.0..f64::from(width)).contains(&column)
-            && (0.0..f64::from(height)).contains(&row);
+        let inside =
+            (0.0..f64::from(width)).contains(&column) && (0.0..f64::from(height)).contains(&row);
         if !inside {
             return None;
         }
@@ -253,7 +257,9 @@ mod tests {
         raster.mesh(&square(10.0, 20.0), 1);
         raster.mesh(&square(0.0, 40.0), 0);
         let mut canvas = Canvas::new(110, 110, [9; 3]);
-        raster.paint(&mut canvas, |seen| [[0, 255, 0], [255, 0, 0]][usize::from(seen.layer)]);
+        raster.paint(&mut canvas, |seen| {
+            [[0, 255, 0], [255, 0, 0]][usize::from(seen.layer)]
+        });
         assert!((raster.nearness(view.pixel(&Point3::origin())).unwrap() - 10.0).abs() < 1e-5);
         let image = canvas.into_image();
         let count = |colour| image.pixels().filter(|p| p.0 == colour).count() as f64;

@@ -2,6 +2,7 @@
 
 use super::canvas::{Canvas, Colour, GLYPH, Rect, text_width, wrapped};
 use super::palette::{FAINT, GOOD, INK, PAGE, SEVERE, WARNING};
+use crate::findings::Severity;
 
 /// Width of every picture, pixels.
 pub(super) const WIDTH: u32 = 1600;
@@ -16,36 +17,27 @@ const LINE: u32 = 22;
 /// Most lines of remarks.
 const MOST_LINES: usize = 24;
 
-/// How grave a remark is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Gravity {
-    Severe,
-    Warning,
-    Note,
+/// Colour of remarks.
+fn colour(severity: Severity) -> Colour {
+    match severity {
+        Severity::Severe => SEVERE,
+        Severity::Caution => WARNING,
+        Severity::Note => FAINT,
+    }
 }
 
-impl Gravity {
-    fn colour(self) -> Colour {
-        match self {
-            Self::Severe => SEVERE,
-            Self::Warning => WARNING,
-            Self::Note => FAINT,
-        }
-    }
-
-    fn word(self) -> &'static str {
-        match self {
-            Self::Severe => "severe",
-            Self::Warning => "warning",
-            Self::Note => "note",
-        }
+fn word(severity: Severity) -> &'static str {
+    match severity {
+        Severity::Severe => "severe",
+        Severity::Caution => "caution",
+        Severity::Note => "note",
     }
 }
 
 /// Something a person should know, in one sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Remark {
-    pub(super) gravity: Gravity,
+    pub(super) severity: Severity,
     pub(super) text: String,
 }
 
@@ -91,20 +83,18 @@ impl Frame {
         }
     }
 
-    /// How many remarks of each gravity there are.
+    /// How many remarks there are that a person has to look at.
     fn verdict(&self) -> Vec<(String, Colour)> {
-        let count = |gravity| self.remarks.iter().filter(|r| r.gravity == gravity).count();
-        let graves = [Gravity::Severe, Gravity::Warning];
-        let told = graves.into_iter().filter(|gravity| count(*gravity) > 0);
+        let count = |severity| {
+            let remarks = self.remarks.iter();
+            remarks.filter(|r| r.severity == severity).count()
+        };
+        let told = [Severity::Severe, Severity::Caution].into_iter();
         let told: Vec<_> = told
-            .map(|gravity| {
-                let count = count(gravity);
-                let plural = if gravity == Gravity::Warning && count > 1 {
-                    "s"
-                } else {
-                    ""
-                };
-                (format!("{count} {}{plural}", gravity.word()), gravity.colour())
+            .filter(|severity| count(*severity) > 0)
+            .map(|severity| {
+                let (count, word) = (count(severity), word(severity));
+                (format!("{count} {word}"), colour(severity))
             })
             .collect();
         if told.is_empty() {
@@ -116,18 +106,24 @@ impl Frame {
     fn remark_lines(&self) -> Vec<(String, Colour)> {
         let most = ((WIDTH - 2 * GAP) / (2 * GLYPH)) as usize;
         let mut remarks: Vec<_> = self.remarks.iter().collect();
-        remarks.sort_by_key(|remark| remark.gravity);
+        remarks.sort_by_key(|remark| std::cmp::Reverse(remark.severity));
         let mut lines = Vec::new();
         for (index, remark) in remarks.iter().enumerate() {
-            let text = format!("{}: {}", remark.gravity.word(), remark.text);
+            let text = format!("{}: {}", word(remark.severity), remark.text);
             let mut parts = wrapped(&text, most - 2);
-            parts[1..].iter_mut().for_each(|part| part.insert_str(0, "  "));
+            parts[1..]
+                .iter_mut()
+                .for_each(|part| part.insert_str(0, "  "));
             if lines.len() + parts.len() > MOST_LINES {
                 let more = format!("... and {} more, in the case file", remarks.len() - index);
                 lines.push((more, INK));
                 break;
             }
-            lines.extend(parts.into_iter().map(|part| (part, remark.gravity.colour())));
+            lines.extend(
+                parts
+                    .into_iter()
+                    .map(|part| (part, colour(remark.severity))),
+            );
         }
         lines
     }
@@ -149,7 +145,12 @@ impl Frame {
                     *colour,
                 ),
                 Swatch::Line(colour) => {
-                    canvas.line([left, middle], [left + f64::from(SWATCH), middle], 3.0, *colour);
+                    canvas.line(
+                        [left, middle],
+                        [left + f64::from(SWATCH), middle],
+                        3.0,
+                        *colour,
+                    );
                 }
                 Swatch::Dot(colour) => {
                     canvas.ring([left + 0.5 * f64::from(SWATCH), middle], 0.0, 6.0, *colour);
@@ -194,22 +195,26 @@ mod tests {
     };
 
     #[test]
-    fn grave_remarks_come_first_and_many_make_the_picture_higher() {
-        let remark = |gravity, text: &str| Remark {
-            gravity,
+    fn severe_remarks_come_first_and_many_make_the_picture_higher() {
+        let remark = |severity, text: &str| Remark {
+            severity,
             text: text.to_owned(),
         };
         let few = frame(vec![
-            remark(Gravity::Note, "n"),
-            remark(Gravity::Severe, "s"),
-            remark(Gravity::Warning, "w"),
+            remark(Severity::Note, "n"),
+            remark(Severity::Severe, "s"),
+            remark(Severity::Caution, "w"),
         ]);
-        let lines: Vec<_> = few.remark_lines().into_iter().map(|(text, _)| text).collect();
-        assert_eq!(lines, ["severe: s", "warning: w", "note: n"]);
+        let lines: Vec<_> = few
+            .remark_lines()
+            .into_iter()
+            .map(|(text, _)| text)
+            .collect();
+        assert_eq!(lines, ["severe: s", "caution: w", "note: n"]);
         assert_eq!(few.verdict()[0].0, "1 severe");
         let image = few.canvas(LEGEND).into_image();
         assert_eq!(image.dimensions(), (WIDTH, HEIGHT));
-        let many = frame(vec![remark(Gravity::Warning, &"word ".repeat(60)); 40]);
+        let many = frame(vec![remark(Severity::Caution, &"word ".repeat(60)); 40]);
         let lines = many.remark_lines();
         assert!(lines.len() <= MOST_LINES + 1);
         assert!(lines.last().unwrap().0.ends_with("more, in the case file"));

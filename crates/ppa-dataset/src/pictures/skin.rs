@@ -25,7 +25,7 @@ pub(super) fn draw_skin(
     (title, right, up): (&str, Vector3<f64>, Vector3<f64>),
 ) {
     panel::ground(canvas, rect);
-    let points = skin.vertices.iter().map(Point3::cast::<f64>);
+    let points = skin.vertices.iter().map(|p| p.cast::<f64>());
     let view = View::fitting(rect, [right, up], points).through(&marks.joint());
     let mut raster = Raster::new(rect, view);
     raster.mesh(skin, SKIN_LAYER);
@@ -47,6 +47,7 @@ pub(super) fn draw_skin(
             nearest.is_some_and(|near| near > view.nearness(point) + ON_SKIN_MM)
         });
         marks.draw_joint(canvas, &view);
+        marks.draw_findings(canvas, &view);
     });
     panel::title(canvas, rect, title);
     panel::orientation(canvas, rect, &view);

@@ -27,7 +27,7 @@ pub(super) fn draw_slice(
 ) {
     panel::ground(canvas, rect);
     let skin = &limb.limb.mesh;
-    let points = skin.vertices.iter().map(Point3::cast::<f64>);
+    let points = skin.vertices.iter().map(|p| p.cast::<f64>());
     let view = View::fitting(rect, [right, up], points).through(&marks.joint());
     canvas.within(rect, |canvas| {
         draw_voxels(canvas, rect, limb, marks, &view);
@@ -43,7 +43,13 @@ pub(super) fn draw_slice(
     panel::scale_bar(canvas, rect, &view);
 }
 
-fn draw_voxels(canvas: &mut Canvas, rect: Rect, limb: &PreparedLimb, marks: &LimbMarks, view: &View) {
+fn draw_voxels(
+    canvas: &mut Canvas,
+    rect: Rect,
+    limb: &PreparedLimb,
+    marks: &LimbMarks,
+    view: &View,
+) {
     let grid = limb.volume.grid();
     let voxel_from_ct = grid.voxel_from_ct();
     let [black, white] = WINDOW_HU;
@@ -72,7 +78,11 @@ fn nearest_voxel(grid: &Grid, voxel_from_ct: &Affine3<f64>, point: &Point3<f64>)
 
 /// Where the plane of nearness 0 cuts a mesh.
 fn outline(mesh: &Mesh, view: &View) -> Vec<[Point3<f64>; 2]> {
-    let nearness: Vec<f64> = mesh.vertices.iter().map(|v| view.nearness(&v.cast())).collect();
+    let nearness: Vec<f64> = mesh
+        .vertices
+        .iter()
+        .map(|v| view.nearness(&v.cast()))
+        .collect();
     let mut pieces = Vec::new();
     for triangle in &mesh.triangles {
         let at = triangle.map(|corner| nearness[corner as usize]);
@@ -99,9 +109,14 @@ mod tests {
     #[test]
     fn the_outline_of_a_tetrahedron_is_a_closed_triangle() {
         let mesh = Mesh {
-            vertices: [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]]
-                .map(|[x, y, z]: [f32; 3]| Point3::new(x, y, z))
-                .to_vec(),
+            vertices: [
+                [0.0, 0.0, 0.0],
+                [4.0, 0.0, 0.0],
+                [0.0, 4.0, 0.0],
+                [0.0, 0.0, 4.0],
+            ]
+            .map(|[x, y, z]: [f32; 3]| Point3::new(x, y, z))
+            .to_vec(),
             normals: vec![Vector3::z(); 4],
             triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
         };
@@ -111,7 +126,7 @@ mod tests {
             width: 50,
             height: 50,
         };
-        let corners = mesh.vertices.iter().map(Point3::cast::<f64>);
+        let corners = mesh.vertices.iter().map(|p| p.cast::<f64>());
         let view = View::fitting(rect, [Vector3::x(), Vector3::y()], corners);
         let pieces = outline(&mesh, &view.through(&Point3::new(0.0, 0.0, 1.0)));
         assert_eq!(pieces.len(), 3);

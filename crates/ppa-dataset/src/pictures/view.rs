@@ -121,7 +121,10 @@ mod tests {
         let view = View::fitting(PANEL, [Vector3::x(), Vector3::z()], points);
         for point in points {
             let [x, y] = view.pixel(&point);
-            assert!((100.0..300.0).contains(&x) && (50.0..150.0).contains(&y), "{x} {y}");
+            assert!(
+                (100.0..300.0).contains(&x) && (50.0..150.0).contains(&y),
+                "{x} {y}"
+            );
             let again = view.point([x, y], view.nearness(&point));
             assert!((again - point).norm() < 1e-9);
         }

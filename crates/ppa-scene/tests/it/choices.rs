@@ -25,21 +25,30 @@ fn assert_consistent(landmarks: &Landmarks, what: &str) {
     let [axis, front] = [landmarks.axis_direction, landmarks.anterior].map(Vector3::from);
     assert!(axis.dot(&front).abs() < 1e-9, "{what}");
     let [distal, proximal] = [landmarks.joint_region, landmarks.calf_region];
-    assert!(distal.range_mm[1] <= proximal.range_mm[0], "{what}: {distal:?} {proximal:?}");
+    assert!(
+        distal.range_mm[1] <= proximal.range_mm[0],
+        "{what}: {distal:?} {proximal:?}"
+    );
     let patient_from_ct = landmarks.patient_from_ct();
     let plane = landmarks.plane_patient();
     let skin = &P01.skin.vertices;
     let behind = skin
         .iter()
         .filter(|p| plane.signed_distance(&(patient_from_ct * p.cast::<f64>())) < -0.1);
-    assert!(behind.count() * 50 < skin.len(), "{what}: the plane cuts the limb");
+    assert!(
+        behind.count() * 50 < skin.len(),
+        "{what}: the plane cuts the limb"
+    );
     let table = Plane {
         normal: Vector3::z_axis(),
         offset_mm: 0.0,
     };
     let device = XrayDevice::overhead(1040.0, 1100.0);
     let placed = place(skin, landmarks, 0.3, &table, &device).unwrap();
-    assert!(placed.contact.penetration_mm < 1e-6 && placed.contact.gap_mm < 1e-6, "{what}");
+    assert!(
+        placed.contact.penetration_mm < 1e-6 && placed.contact.gap_mm < 1e-6,
+        "{what}"
+    );
 }
 
 #[test]
@@ -53,29 +62,59 @@ fn any_choice_alone_gives_landmarks_that_fit_it() {
     };
     let alone: [(&str, LandmarkOverrides); 12] = [
         ("limb", choose(|c, _| c.limb = Some(LimbKind::Other))),
-        ("joint_centre", choose(|c, l| {
-            let [x, y, z] = l.joint_centre;
-            c.joint_centre = Some([x + 3.0, y - 2.0, z + 15.0]);
-        })),
-        ("joint_region", choose(|c, _| c.joint_region = Some([20.0, 40.0]))),
-        ("joint_region beyond the calf region's beginning", choose(|c, _| {
-            c.joint_region = Some([60.0, 145.0]);
-        })),
-        ("calf_region", choose(|c, _| c.calf_region = Some([150.0, 180.0]))),
-        ("calf_region before the joint region's end", choose(|c, _| {
-            c.calf_region = Some([70.0, 110.0]);
-        })),
-        ("axis_source", choose(|c, _| c.axis_source = Some(AxisSource::Limb))),
-        ("anterior", choose(|c, _| c.anterior = Some([0.5, -1.0, 0.2]))),
-        ("plane_points", choose(|c, l| c.plane_points = Some(l.plane_points))),
-        ("axis", choose(|c, l| {
-            let [x, y, z] = l.joint_centre;
-            c.axis = Some([[x + 2.0, y, z], [x - 5.0, y + 4.0, z + 150.0]]);
-        })),
-        ("axis from proximal to distal", choose(|c, l| {
-            let [x, y, z] = l.joint_centre;
-            c.axis = Some([[x - 5.0, y + 4.0, z + 150.0], [x + 2.0, y, z]]);
-        })),
+        (
+            "joint_centre",
+            choose(|c, l| {
+                let [x, y, z] = l.joint_centre;
+                c.joint_centre = Some([x + 3.0, y - 2.0, z + 15.0]);
+            }),
+        ),
+        (
+            "joint_region",
+            choose(|c, _| c.joint_region = Some([20.0, 40.0])),
+        ),
+        (
+            "joint_region beyond the calf region's beginning",
+            choose(|c, _| {
+                c.joint_region = Some([60.0, 145.0]);
+            }),
+        ),
+        (
+            "calf_region",
+            choose(|c, _| c.calf_region = Some([150.0, 180.0])),
+        ),
+        (
+            "calf_region before the joint region's end",
+            choose(|c, _| {
+                c.calf_region = Some([70.0, 110.0]);
+            }),
+        ),
+        (
+            "axis_source",
+            choose(|c, _| c.axis_source = Some(AxisSource::Limb)),
+        ),
+        (
+            "anterior",
+            choose(|c, _| c.anterior = Some([0.5, -1.0, 0.2])),
+        ),
+        (
+            "plane_points",
+            choose(|c, l| c.plane_points = Some(l.plane_points)),
+        ),
+        (
+            "axis",
+            choose(|c, l| {
+                let [x, y, z] = l.joint_centre;
+                c.axis = Some([[x + 2.0, y, z], [x - 5.0, y + 4.0, z + 150.0]]);
+            }),
+        ),
+        (
+            "axis from proximal to distal",
+            choose(|c, l| {
+                let [x, y, z] = l.joint_centre;
+                c.axis = Some([[x - 5.0, y + 4.0, z + 150.0], [x + 2.0, y, z]]);
+            }),
+        ),
         ("nothing", automatic()),
     ];
     for (what, choices) in &alone {
@@ -120,11 +159,28 @@ fn a_given_axis_and_joint_meet_at_the_point_nearest_to_the_joint() {
     let got = P01.find(Side::Right, &choices).unwrap();
     let off = Point3::from(got.joint_centre) - Point3::new(x, y, z + 7.0);
     assert!(off.norm() < 1e-6, "{off:?}");
-    assert!(got.notes.iter().any(|note| note.contains("10.0 mm")), "{:?}", got.notes);
-    let again = P01.find(Side::Right, &got.as_choices(&choices)).unwrap();
-    let difference = got.patient_from_ct().isometry().to_homogeneous()
-        - again.patient_from_ct().isometry().to_homogeneous();
-    assert!(difference.amax() < 1e-9);
+    assert!(
+        got.notes.iter().any(|note| note.contains("10.0 mm")),
+        "{:?}",
+        got.notes
+    );
+    let open = got.open_choices(&choices);
+    assert!(open.axis.is_none() && open.joint_centre.is_none() && open.joint_region.is_none());
+    assert_eq!(open.limb, Some(LimbKind::LowerLeg));
+}
+
+/// The axis that is shown as a choice is the one that was found.
+#[test]
+fn the_axis_found_is_the_axis_when_it_is_chosen() {
+    let found = P01.find(Side::Right, &automatic()).unwrap();
+    let choices = LandmarkOverrides {
+        axis: found.open_choices(&automatic()).axis,
+        ..automatic()
+    };
+    let got = P01.find(Side::Right, &choices).unwrap();
+    let difference = found.patient_from_ct().isometry().to_homogeneous()
+        - got.patient_from_ct().isometry().to_homogeneous();
+    assert!(difference.amax() < 1e-9, "{difference}");
 }
 
 #[test]
@@ -147,7 +203,12 @@ fn an_axis_that_cannot_be_is_refused() {
         ..axis([0.0; 3], [0.0, 0.0, 100.0])
     };
     let error = refused(twice);
-    assert_eq!(error, LandmarkError::AxisTwice { other: "joint_region" });
+    assert_eq!(
+        error,
+        LandmarkError::AxisTwice {
+            other: "joint_region"
+        }
+    );
     let without = LandmarkOverrides {
         axis_source: Some(AxisSource::Given),
         ..automatic()

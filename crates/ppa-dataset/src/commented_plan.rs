@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::{Plan, PlanCase, PlanError};
 use crate::case::{Case, CaseError};
 use crate::files::write_whole;
+use crate::plan::{Plan, PlanCase, PlanError};
 use crate::toml_file::{relative_to, to_toml};
 
 const HEADER: &str = "\
@@ -18,18 +18,36 @@ const HEADER: &str = "\
 /// What a table is for; the key is its name in the file.
 const TABLES: &[(&str, &str)] = &[
     ("[[case]]", "The limbs. Cases come from `ppa prepare`."),
-    ("[rotation]", "Medial rotations about the limb's axis, multiples of 0.5 between 0 and 180."),
-    ("[shapes]", "Body shapes: the skin of the scan and changed ones."),
-    ("[soft_tissue]", "How far heel and calf sink in where they rest; 0 is a rigid skin."),
-    ("[room]", "The x-ray room. `ppa scene room --toml room.toml` writes a room file instead."),
-    ("[room.parametric]", "The built-in room; source_detector_mm also holds for a recorded one."),
+    (
+        "[rotation]",
+        "Medial rotations about the limb's axis, multiples of 0.5 between 0 and 180.",
+    ),
+    (
+        "[shapes]",
+        "Body shapes: the skin of the scan and changed ones.",
+    ),
+    (
+        "[soft_tissue]",
+        "How far heel and calf sink in where they rest; 0 is a rigid skin.",
+    ),
+    (
+        "[room]",
+        "The x-ray room. `ppa scene room --toml room.toml` writes a room file instead.",
+    ),
+    (
+        "[room.parametric]",
+        "The built-in room; source_detector_mm also holds for a recorded one.",
+    ),
     ("[depth]", "Depth images of both cameras."),
     ("[xray]", "Radiographs."),
     ("[xray.source]", "Where photons leave from, and where to."),
     ("[xray.source.focal_spot]", ""),
     ("[xray.detector]", "Pixels of the radiograph."),
     ("[xray.receptor]", "What the detector makes of photons."),
-    ("[xray.engine]", "How much is computed; the plan's seed decides, not this one."),
+    (
+        "[xray.engine]",
+        "How much is computed; the plan's seed decides, not this one.",
+    ),
     ("[xray.presentation]", "The look of the 16-bit radiograph."),
     ("[xray.calibration]", ""),
 ];
@@ -39,37 +57,125 @@ const KEYS: &[(&str, &str, &str)] = &[
     ("", "version", "format of this file"),
     ("", "seed", "everything random follows from it"),
     ("case", "file", "what `ppa prepare` wrote"),
-    ("case", "patient", "N of the folder patient_N; both limbs of a person share it"),
+    (
+        "case",
+        "patient",
+        "N of the folder patient_N; both limbs of a person share it",
+    ),
     ("shapes", "variants", "orig is the skin of the scan"),
-    ("shapes", "offset_mm", "big is the skin moved out by this, small in"),
+    (
+        "shapes",
+        "offset_mm",
+        "big is the skin moved out by this, small in",
+    ),
     ("shapes", "bumps", "bumps of bumps_a and of bumps_b"),
-    ("room.parametric", "table_foot_mm", "table beyond the central beam on the feet's side"),
-    ("room.parametric", "source_detector_mm", "from the x-ray source to the detector"),
-    ("room.parametric", "table_detector_mm", "from the table top down to the detector"),
-    ("room.parametric", "column_distance_mm", "from the central beam towards -x, as back_wall_mm"),
-    ("room.parametric", "head_wall_mm", "from the central beam towards +y"),
-    ("room.parametric", "point_spacing_mm", "of the room's point cloud"),
-    ("depth", "roi_mm", "side of the square around the joint, at the joint"),
+    (
+        "room.parametric",
+        "table_foot_mm",
+        "table beyond the central beam on the feet's side",
+    ),
+    (
+        "room.parametric",
+        "source_detector_mm",
+        "from the x-ray source to the detector",
+    ),
+    (
+        "room.parametric",
+        "table_detector_mm",
+        "from the table top down to the detector",
+    ),
+    (
+        "room.parametric",
+        "column_distance_mm",
+        "from the central beam towards -x, as back_wall_mm",
+    ),
+    (
+        "room.parametric",
+        "head_wall_mm",
+        "from the central beam towards +y",
+    ),
+    (
+        "room.parametric",
+        "point_spacing_mm",
+        "of the room's point cloud",
+    ),
+    (
+        "depth",
+        "roi_mm",
+        "side of the square around the joint, at the joint",
+    ),
     ("xray", "kvp", "tube voltage"),
     ("xray", "anode_angle_deg", "of the tungsten anode"),
     ("xray", "filters", "MATERIAL:mm"),
-    ("xray", "half_length_mm", "limb kept on either side of the joint"),
-    ("xray", "max_voxel_mm", "thicker slices are interpolated to this"),
-    ("xray.source", "collimation", "or { rectangle = { size_mm = [180, 240] } }"),
+    (
+        "xray",
+        "half_length_mm",
+        "limb kept on either side of the joint",
+    ),
+    (
+        "xray",
+        "max_voxel_mm",
+        "thicker slices are interpolated to this",
+    ),
+    (
+        "xray.source",
+        "collimation",
+        "or { rectangle = { size_mm = [180, 240] } }",
+    ),
     ("xray.source.focal_spot", "size_mm", "0 is a point"),
     ("xray.source.focal_spot", "shape", "or \"gaussian\""),
-    ("xray.detector", "centre_mm", "from the central beam, device x and y"),
-    ("xray.receptor", "model", "or { csi = { thickness_um = 600 } }"),
-    ("xray.receptor", "electronic_noise_kev", "standard deviation per pixel"),
-    ("xray.engine", "dose_histories", "whose quantum noise the image carries; inf: no noise"),
+    (
+        "xray.detector",
+        "centre_mm",
+        "from the central beam, device x and y",
+    ),
+    (
+        "xray.receptor",
+        "model",
+        "or { csi = { thickness_um = 600 } }",
+    ),
+    (
+        "xray.receptor",
+        "electronic_noise_kev",
+        "standard deviation per pixel",
+    ),
+    (
+        "xray.engine",
+        "dose_histories",
+        "whose quantum noise the image carries; inf: no noise",
+    ),
     ("xray.engine", "scatter_histories", "followed for scatter"),
-    ("xray.engine", "scatter_pixel_mm", "distance of the points where scatter is computed"),
-    ("xray.engine", "samples_per_side", "rays per pixel side at edges, at most"),
-    ("xray.engine", "compton_model", "how photons scatter off electrons"),
+    (
+        "xray.engine",
+        "scatter_pixel_mm",
+        "distance of the points where scatter is computed",
+    ),
+    (
+        "xray.engine",
+        "samples_per_side",
+        "rays per pixel side at edges, at most",
+    ),
+    (
+        "xray.engine",
+        "compton_model",
+        "how photons scatter off electrons",
+    ),
     ("xray.engine", "seed", "stays 0"),
-    ("xray.presentation", "centre", "log exposure shown as middle grey"),
-    ("xray.presentation", "width", "of the window in log exposure"),
-    ("xray.presentation", "detail", "contrast of faint detail that is added"),
+    (
+        "xray.presentation",
+        "centre",
+        "log exposure shown as middle grey",
+    ),
+    (
+        "xray.presentation",
+        "width",
+        "of the window in log exposure",
+    ),
+    (
+        "xray.presentation",
+        "detail",
+        "contrast of faint detail that is added",
+    ),
 ];
 
 /// Settings that are off by default, as they are written below the keys of their table.
@@ -87,15 +193,21 @@ const OFF: &[(&str, &[&str])] = &[
     ),
     (
         "depth",
-        &["#rig = \"rig.json\"    # other cameras; or both written out as [depth.cameras], as in a room file"],
+        &[
+            "#rig = \"rig.json\"    # other cameras; or both written out as [depth.cameras], as in a room file",
+        ],
     ),
     (
         "xray",
-        &["#calibration_file = \"hu.toml\"    # HU to material and density from a file, instead of the table below"],
+        &[
+            "#calibration_file = \"hu.toml\"    # HU to material and density from a file, instead of the table below",
+        ],
     ),
     (
         "xray.source",
-        &["#heel_effect = { anode_towards_deg = -90 }    # from the device's x towards its y; -90 is the head's side"],
+        &[
+            "#heel_effect = { anode_towards_deg = -90 }    # from the device's x towards its y; -90 is the head's side",
+        ],
     ),
     (
         "xray.receptor",
@@ -131,7 +243,8 @@ const OFF_TABLES: &str = "
 ";
 
 /// What is written before the table of materials, which is long and rarely changed.
-const CALIBRATION: &str = "# HU to material and density, the built-in table: remove all # below to change it.\n";
+const CALIBRATION: &str =
+    "# HU to material and density, the built-in table: remove all # below to change it.\n";
 
 impl Plan {
     /// A plan with the defaults for cases in files. Cases of one scan are limbs of one patient; patients are numbered from 0.
@@ -195,9 +308,15 @@ fn commented(toml: &str) -> String {
             }
         }
         let key = line.split(" = ").next().unwrap_or_default();
-        let means = KEYS.iter().find(|(of, name, _)| *of == table && *name == key);
+        let means = KEYS
+            .iter()
+            .find(|(of, name, _)| *of == table && *name == key);
         let comment = means.map_or(String::new(), |(.., meaning)| format!("    # {meaning}"));
-        let switched_off = if is_calibration && !line.is_empty() { "#" } else { "" };
+        let switched_off = if is_calibration && !line.is_empty() {
+            "#"
+        } else {
+            ""
+        };
         text.push_str(&format!("{switched_off}{line}{comment}\n"));
     }
     text.truncate(text.trim_end().len());
@@ -283,7 +402,9 @@ mod tests {
                 text.replacen(&header, &format!("{header}no_such_key = 1\n"), 1)
             };
             let error = toml::from_str::<Plan>(&odd).unwrap_err().to_string();
-            let (_, expected) = error.split_once("expected").unwrap_or_else(|| panic!("{error}"));
+            let (_, expected) = error
+                .split_once("expected")
+                .unwrap_or_else(|| panic!("{error}"));
             let keys: Vec<&str> = expected.split('`').skip(1).step_by(2).collect();
             assert!(!keys.is_empty(), "{error}");
             for key in keys {
@@ -297,9 +418,14 @@ mod tests {
                 } else {
                     text.find(&header).unwrap() + header.len()
                 };
-                let end = text[begin..].find("\n[").map_or(text.len(), |at| begin + at);
-                let here = text[begin..end].lines().any(|line| line.starts_with(&format!("{key} = ")));
-                let as_table = text.contains(&format!("[{path}]")) || text.contains(&format!("[{path}."));
+                let end = text[begin..]
+                    .find("\n[")
+                    .map_or(text.len(), |at| begin + at);
+                let here = text[begin..end]
+                    .lines()
+                    .any(|line| line.starts_with(&format!("{key} = ")));
+                let as_table =
+                    text.contains(&format!("[{path}]")) || text.contains(&format!("[{path}."));
                 assert!(
                     here || as_table || elsewhere.contains(&&*path),
                     "{path} is missing"
