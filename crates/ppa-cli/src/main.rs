@@ -43,6 +43,9 @@ enum Command {
     Ct(commands::ct::CtCommand),
     /// Find skin, axis and plane of a limb and write them down as a case
     Prepare(Box<commands::prepare::PrepareArgs>),
+    /// Check a case
+    #[command(subcommand)]
+    Case(commands::case::CaseCommand),
     /// Surfaces of a CT
     #[command(subcommand)]
     Mesh(commands::mesh::MeshCommand),
@@ -105,6 +108,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Demo(args) => commands::demo::run(&args, output),
         Command::Ct(command) => commands::ct::run(&command, output),
         Command::Prepare(args) => commands::prepare::run(&args, output),
+        Command::Case(command) => commands::case::run(&command, output),
         Command::Mesh(command) => commands::mesh::run(&command, output),
         Command::Scene(command) => commands::scene::run(&command, output),
         Command::Depth(command) => commands::depth::run(&command, output),

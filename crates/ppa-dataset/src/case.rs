@@ -28,7 +28,7 @@ pub struct Case {
     pub source: Source,
     /// How the skin is found and freed from the couch.
     pub surface: LimbSettings,
-    /// Landmark decisions, filled in with what was found; edit them to overrule it.
+    /// Landmark decisions of a person; what is left open is found again.
     pub choices: LandmarkOverrides,
     /// Which bone each voxel belongs to, for computed labels.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -169,14 +169,36 @@ impl Case {
         if let Some(bones) = &mut case.bones {
             bones.path = relative_to(&bones.path, folder)?;
         }
-        let text = to_toml(&case, path)?;
+        let text = with_open_choices(to_toml(&case, path)?, &case);
         Ok(write_whole(path, format!("{HEADER}{text}").as_bytes())?)
     }
 }
 
+/// Adds to `[choices]` the keys that a person may still choose, switched off, with the values that were found.
+fn with_open_choices(mut text: String, case: &Case) -> String {
+    const TABLE: &str = "\n[choices]\n";
+    let (Some(found), Some(table)) = (&case.found, text.find(TABLE)) else {
+        return text;
+    };
+    let begin = table + TABLE.len();
+    let end = text[begin - 1..]
+        .find("\n[")
+        .map_or(text.len(), |end| begin - 1 + end);
+    let open = found.landmarks.open_choices(&case.choices);
+    let keys = toml::to_string(&open).unwrap_or_default();
+    let lines: String = keys.lines().map(|line| format!("#{line}\n")).collect();
+    text.insert_str(end, &format!("{OPEN_CHOICES}{lines}"));
+    text
+}
+
+const OPEN_CHOICES: &str = "\
+# A line below shows what was found: remove its # and change the value to choose it; the rest is found again
+# to fit it. axis stands instead of the regions and axis_source.
+";
+
 const HEADER: &str = "\
 # One limb of one CT, prepared for ppa. Lengths in mm, positions in the scan's LPS frame.
-# Change `side`, [surface] or [choices]; leave a key of [choices] out to have it found again.
+# Change `side`, [surface] or [choices]. [choices] holds what a person chose; everything else is found.
 # [found] shows what followed; it is computed again whenever the case is used. Its severe findings are repeated
 # by every command until `acknowledged` names their codes.
 

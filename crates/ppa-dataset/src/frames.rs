@@ -12,7 +12,8 @@ use crate::stage::{StageError, Table};
 /// Rigid motions by name, `target_from_source`: row-major 4x4, mm.
 ///
 /// A point p of the source frame lies at M · (x, y, z, 1) of the target frame. Frames: `ct` (LPS),
-/// `patient`, `room`, `device`, `left` and `right` (cameras, OpenCV axes).
+/// `patient`, `room`, `device`, `left` and `right` (cameras, OpenCV axes). `left_from_room` takes what lies in the room to the left
+/// camera, `left_from_ct` a skin in the scan: what `ppa depth render` wants as `--camera-from-mesh`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Frames {
     /// What the numbers are.
@@ -35,9 +36,19 @@ impl Frames {
         let mut motions =
             BTreeMap::from([("room_from_device", room_from_device.to_homogeneous_rows())]);
         rig.check()?;
-        for (in_device, in_room, mounted) in [
-            ("device_from_left", "room_from_left", &rig.left),
-            ("device_from_right", "room_from_right", &rig.right),
+        for (in_device, in_room, of_room, mounted) in [
+            (
+                "device_from_left",
+                "room_from_left",
+                "left_from_room",
+                &rig.left,
+            ),
+            (
+                "device_from_right",
+                "room_from_right",
+                "right_from_room",
+                &rig.right,
+            ),
         ] {
             let device_from_camera = mounted.pose().map_err(|source| {
                 let side = in_device.trim_start_matches("device_from_");
@@ -46,6 +57,7 @@ impl Frames {
             motions.insert(in_device, rows_from_isometry(&device_from_camera));
             let room_from_camera = room_from_device.isometry() * device_from_camera;
             motions.insert(in_room, rows_from_isometry(&room_from_camera));
+            motions.insert(of_room, rows_from_isometry(&room_from_camera.inverse()));
         }
         let plane = &table.plane.plane;
         let [x, y, z] = plane.normal.into_inner().into();
@@ -65,6 +77,16 @@ impl Frames {
         table: &Table,
     ) -> Self {
         let ct_from_device = ct_from_device(placement, landmarks, &table.room.device);
+        let room_from_ct = placement.room_from_patient * landmarks.patient_from_ct();
+        for (of_ct, of_room) in [
+            ("left_from_ct", "left_from_room"),
+            ("right_from_ct", "right_from_room"),
+        ] {
+            if let Some(camera_from_room) = self.motions.get(of_room) {
+                let camera_from_ct = product(camera_from_room, &room_from_ct.to_homogeneous_rows());
+                self.motions.insert(of_ct, camera_from_ct);
+            }
+        }
         self.motions.extend([
             (
                 "patient_from_ct",
@@ -81,4 +103,10 @@ impl Frames {
         ]);
         self
     }
+}
+
+fn product(a: &Rows, b: &Rows) -> Rows {
+    std::array::from_fn(|row| {
+        std::array::from_fn(|column| (0..4).map(|k| a[row][k] * b[k][column]).sum())
+    })
 }

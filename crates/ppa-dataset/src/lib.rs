@@ -20,11 +20,15 @@ mod body_shape;
 #[cfg(feature = "generate")]
 mod case;
 #[cfg(feature = "generate")]
+mod case_check;
+#[cfg(feature = "generate")]
 mod check;
 #[cfg(feature = "generate")]
 mod claim;
 #[cfg(feature = "generate")]
 mod closed_skin;
+#[cfg(feature = "generate")]
+mod commented_plan;
 #[cfg(feature = "generate")]
 mod contact_sheet;
 #[cfg(feature = "generate")]
@@ -33,6 +37,8 @@ mod coverage_plot;
 mod cut_findings;
 #[cfg(feature = "generate")]
 mod cut_share;
+#[cfg(feature = "generate")]
+mod depth_views;
 #[cfg(feature = "generate")]
 mod description;
 #[cfg(feature = "generate")]
@@ -61,6 +67,8 @@ mod merge;
 mod only_read;
 #[cfg(feature = "generate")]
 mod part_file;
+#[cfg(feature = "generate")]
+mod pictures;
 #[cfg(feature = "generate")]
 mod plan;
 #[cfg(feature = "generate")]
@@ -97,6 +105,8 @@ pub use body_shape::BodyShape;
 #[cfg(feature = "generate")]
 pub use case::{Case, CaseError, Found, Source};
 #[cfg(feature = "generate")]
+pub use case_check::{CaseCheck, CaseCheckError, Drift};
+#[cfg(feature = "generate")]
 pub use check::{Check, Problem, check};
 #[cfg(feature = "generate")]
 pub use claim::FolderError;
@@ -108,6 +118,8 @@ pub use contact_sheet::{ContactSheetError, contact_sheet};
 pub use coverage_plot::{RankedView, coverage_plot};
 #[cfg(feature = "generate")]
 pub use cut_share::{CutError, PoseImage};
+#[cfg(feature = "generate")]
+pub use depth_views::{DepthView, depth_views};
 pub use files::{FileError, sha256_of_file, write_whole};
 pub use findings::{Finding, FindingCode, Findings, LimbFinding, Severity};
 #[cfg(feature = "generate")]
@@ -124,6 +136,8 @@ pub use manifest::{FileKind, FileRow, Manifest, RoiFile, RoiRow, Rows};
 #[cfg(feature = "generate")]
 pub use merge::{MergeError, merge};
 #[cfg(feature = "generate")]
+pub use pictures::{PosedLimb, case_picture, is_own_picture, pose_picture, write_picture};
+#[cfg(feature = "generate")]
 pub use plan::{DepthSettings, Plan, PlanCase, PlanError, PlanRoom, XraySettings};
 #[cfg(feature = "generate")]
 pub use prepare::{PrepareError, PreparedLimb, prepare, volume_sha256};
@@ -137,7 +151,7 @@ pub use room_file::RoomFile;
 pub use shaped_skin::{ShapeSettings, body_shape};
 pub use split::{Split, SplitError};
 #[cfg(feature = "generate")]
-pub use stage::{PlacedCamera, Stage, StageError, Table, spectrum, tube};
+pub use stage::{PlacedCamera, Stage, StageError, Table, body_of_cloud, spectrum, tube};
 #[cfg(feature = "generate")]
 pub use status::{LimbStatus, Status, status};
 #[cfg(feature = "generate")]

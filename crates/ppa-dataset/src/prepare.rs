@@ -155,7 +155,7 @@ pub fn prepare(
             force: reading.force,
         },
         surface: surface.clone(),
-        choices: prepared.landmarks.as_choices(choices),
+        choices: choices.clone(),
         bones: None,
         found: Some(Found {
             findings: prepared.findings.clone(),

@@ -7,7 +7,7 @@ use ppa_depth::{
     Backdrop, Body, Camera, DepthImage, MeshBody, MountedCamera, PlacedBody, RigError, Sensor,
     SensorError, SurfelBody,
 };
-use ppa_mesh::{CloudError, estimate_normals, mean_spacing_mm};
+use ppa_mesh::{CloudError, PointCloud, estimate_normals, mean_spacing_mm};
 use ppa_scene::{PlaneSettings, Rigid, Room, RoomError, TablePlane, XrayDevice, table_plane};
 use ppa_xray::{Spectrum, TubeSpec};
 
@@ -97,18 +97,25 @@ impl Table {
         if let Some(mesh) = &self.room.mesh {
             return Ok(Body::Mesh(MeshBody::new(&mesh.vertices, &mesh.triangles)?));
         }
-        let cloud = &self.room.cloud;
-        let points = &cloud.points;
-        let estimated;
-        let normals = if cloud.normals.len() == points.len() {
-            &cloud.normals
-        } else {
-            estimated = estimate_normals(points, NORMAL_NEIGHBOURS)?;
-            &estimated
-        };
-        let radius_mm = DISC_RADIUS * mean_spacing_mm(points)?;
-        Ok(Body::Surfels(SurfelBody::new(points, normals, radius_mm)?))
+        body_of_cloud(&self.room.cloud)
     }
+}
+
+/// Discs at the points of a recorded room, for the cameras.
+///
+/// # Errors
+/// [`StageError`] for points whose normals cannot be told or that cannot be rendered.
+pub fn body_of_cloud(cloud: &PointCloud) -> Result<Body, StageError> {
+    let points = &cloud.points;
+    let estimated;
+    let normals = if cloud.normals.len() == points.len() {
+        &cloud.normals
+    } else {
+        estimated = estimate_normals(points, NORMAL_NEIGHBOURS)?;
+        &estimated
+    };
+    let radius_mm = DISC_RADIUS * mean_spacing_mm(points)?;
+    Ok(Body::Surfels(SurfelBody::new(points, normals, radius_mm)?))
 }
 
 /// Everything that stands still while the limb turns.

@@ -375,7 +375,7 @@ fn roi_row(camera: &PlacedCamera, roi: &Roi, pose: PoseAngle) -> (String, RoiRow
     (LimbId::depth_name(camera.view, pose.step), row)
 }
 
-fn depth_image(
+pub(crate) fn depth_image(
     shape: BodyShape,
     placed: PlacedBody,
     camera: &PlacedCamera,

@@ -27,6 +27,18 @@ fn across_the_shaft<'a>(
     Ok(sections)
 }
 
+/// A region that is left open ends or begins this far from the one that is given, at least, mm.
+const APART_MM: f64 = 10.0;
+
+/// The calf region, moved so that it begins beyond a joint region that is given, and ends with the limb.
+fn proximal_of(joint_ends: f64, [from, to]: [f64; 2], limb_ends: f64) -> [f64; 2] {
+    let moved = (joint_ends + APART_MM - from).max(0.0);
+    if moved == 0.0 {
+        return [from, to];
+    }
+    [from + moved, (to + moved).min(limb_ends).max(from + moved)]
+}
+
 /// What region ranges are measured from.
 pub(crate) struct Reference<'a> {
     pub(crate) kind: LimbKind,
@@ -111,6 +123,36 @@ impl<'a> Reference<'a> {
         }
     }
 
+    /// Two points of a given axis as regions of no length, the distal one first.
+    pub(crate) fn given_axis(
+        &self,
+        points: [[f64; 3]; 2],
+    ) -> Result<(AxisRegion, AxisRegion), LandmarkError> {
+        const LEAST_APART_MM: f64 = 10.0;
+        let refused = |expected| LandmarkError::Axis {
+            from: points[0],
+            to: points[1],
+            expected,
+        };
+        let [from, to] = points.map(Vector3::from);
+        let length = (to - from).norm();
+        if length < LEAST_APART_MM {
+            return Err(refused("two points at least 10 mm apart"));
+        }
+        let rise = self.sections.direction.dot(&(to - from));
+        if rise.abs() < length * std::f64::consts::FRAC_1_SQRT_2 {
+            return Err(refused(
+                "a line within 45 degrees of the scan's limb direction",
+            ));
+        }
+        let region = |point: Vector3<f64>| AxisRegion {
+            range_mm: [self.sections.direction.dot(&point) - self.level_mm; 2],
+            centre_mm: point.into(),
+        };
+        let (low, high) = if rise > 0.0 { (from, to) } else { (to, from) };
+        Ok((region(low), region(high)))
+    }
+
     fn default_ranges(
         &self,
         overrides: &LandmarkOverrides,
@@ -138,10 +180,29 @@ impl<'a> Reference<'a> {
                 ([at(0.15), at(0.35)], [at(0.65), at(0.85)])
             }
         };
-        Ok((
-            overrides.joint_region.unwrap_or(joint),
-            overrides.calf_region.unwrap_or(calf),
-        ))
+        // A region that is left open makes room for the one that is given.
+        Ok(match (overrides.joint_region, overrides.calf_region) {
+            (None, None) => (joint, calf),
+            (Some(joint), Some(calf)) => (joint, calf),
+            (Some(joint), None) => (joint, proximal_of(joint[1], calf, self.extent_mm[1])),
+            (None, Some(calf)) => (self.distal_of(calf[0], joint), calf),
+        })
+    }
+
+    /// The joint region, moved or drawn together so that it ends before a calf region that is given.
+    fn distal_of(&self, calf_begins: f64, [from, to]: [f64; 2]) -> [f64; 2] {
+        // Drawn together any further, both regions would lie in the joint.
+        const LEAST_SCALE: f64 = 0.3;
+        let scale = (calf_begins - APART_MM) / to;
+        match self.kind {
+            _ if to + APART_MM <= calf_begins => [from, to],
+            LimbKind::LowerLeg if scale >= LEAST_SCALE => [from * scale, to * scale],
+            LimbKind::LowerLeg => [from, to],
+            LimbKind::Other => {
+                let end = calf_begins - APART_MM;
+                [(end - (to - from)).max(self.extent_mm[0]), end]
+            }
+        }
     }
 
     fn centre(
@@ -160,8 +221,8 @@ impl<'a> Reference<'a> {
                 continue;
             }
             let centre = match source {
-                AxisSource::Limb => self.sections.limb_centre(slice),
                 AxisSource::Bone => self.sections.bones(slice).first().map(|b| b.centre),
+                AxisSource::Limb | AxisSource::Given => self.sections.limb_centre(slice),
             };
             if let Some(centre) = centre {
                 sum += centre.coords;
@@ -174,8 +235,8 @@ impl<'a> Reference<'a> {
                 from_mm,
                 to_mm,
                 problem: match source {
-                    AxisSource::Limb => "holds no part of the limb",
                     AxisSource::Bone => "holds no bone",
+                    AxisSource::Limb | AxisSource::Given => "holds no part of the limb",
                 },
             });
         }

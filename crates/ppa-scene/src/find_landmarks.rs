@@ -7,7 +7,7 @@ use ppa_mesh::Mesh;
 use crate::axis_regions::Reference;
 use crate::given_choices::{check_anterior, check_joint};
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
-use crate::landmarks::{Landmarks, Side};
+use crate::landmarks::{AxisSource, Landmarks, Side};
 use crate::plane::first_not_finite;
 use crate::supporting_plane::{check_plane, plane_under};
 
@@ -25,7 +25,7 @@ use crate::supporting_plane::{check_plane, plane_under};
 ///   level, closer together when the scan is short; of other limbs around a quarter and three
 ///   quarters of the length. The centres are those of the tibia, because the paper wants the axis
 ///   to pass through the joint and a swelling moves the centre of the skin; without bone, or on
-///   request, they are those of the limb's cross-sections.
+///   request, they are those of the limb's cross-sections. Two given points replace them.
 /// * Anterior: −y of the scan across the axis, so that angle 0 is the pose in the scan.
 /// * Π_P: the plane that touches the limb from behind at its lowest distal and proximal points
 ///   and is level from left to right. Its three points are the distal contact and two points 20 mm
@@ -63,7 +63,13 @@ pub fn find_landmarks(
     }
     let mut notes = Vec::new();
     let reference = Reference::find(volume, mask, overrides, &mut notes)?;
-    let (joint_region, calf_region, axis_source) = reference.regions(overrides)?;
+    let (joint_region, calf_region, axis_source) = match overrides.axis {
+        Some(points) => {
+            let (low, high) = reference.given_axis(points)?;
+            (low, high, AxisSource::Given)
+        }
+        None => reference.regions(overrides)?,
+    };
     let [low, high] = [joint_region, calf_region].map(|region| Point3::from(region.centre_mm));
     let direction = reference.sections.direction;
     let axis = (high - low)
@@ -76,9 +82,18 @@ pub fn find_landmarks(
             problem: "has the same centre as the joint region, or one that gives an axis more \
                       than 45 degrees off the scan's limb direction",
         })?;
-    let (axis_point, joint_centre) = match overrides.joint_centre {
-        Some(centre) => (Point3::from(centre), Point3::from(centre)),
-        None => {
+    let (axis_point, joint_centre) = match (overrides.joint_centre, overrides.axis) {
+        (Some(centre), None) => (Point3::from(centre), Point3::from(centre)),
+        (Some(centre), Some(_)) => {
+            let centre = Point3::from(centre);
+            let foot = low + axis * axis.dot(&(centre - low));
+            let aside = (centre - foot).norm();
+            notes.push(format!(
+                "joint: the point of the given axis nearest to the given joint, {aside:.1} mm from it"
+            ));
+            (low, foot)
+        }
+        (None, _) => {
             let rise = reference.level_mm - direction.dot(&low.coords);
             (low, low + axis * (rise / axis.dot(&direction)))
         }

@@ -19,6 +19,10 @@ pub struct LandmarkOverrides {
     pub calf_region: Option<[f64; 2]>,
     /// What the region centres are centres of.
     pub axis_source: Option<AxisSource>,
+    /// Two points that the axis runs through, `ct` frame, mm, instead of the regions' centres. The joint
+    /// is then the point of this axis nearest to [`Self::joint_centre`], or at the joint's level.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis: Option<[[f64; 3]; 2]>,
     /// The direction that faces up at angle 0, `ct` frame.
     pub anterior: Option<[f64; 3]>,
     /// One distal and two proximal points of Π_P, `ct` frame, mm.
@@ -26,29 +30,55 @@ pub struct LandmarkOverrides {
 }
 
 impl Landmarks {
-    /// These landmarks as choices, so that a person finds every decision in one place and edits
-    /// it: found again with the result, the patient frame is the same.
-    ///
-    /// The plane points stay open unless `given` has them, as they follow from axis and front.
-    pub fn as_choices(&self, given: &LandmarkOverrides) -> LandmarkOverrides {
+    /// What a person may still choose beside what is `given`, as it was found: keys that exclude a given one are left out.
+    pub fn open_choices(&self, given: &LandmarkOverrides) -> LandmarkOverrides {
+        let by_regions = given.axis.is_none();
+        let by_axis = given.joint_region.is_none()
+            && given.calf_region.is_none()
+            && given.axis_source.is_none();
+        let joint = Vector3::from(self.joint_centre);
+        let along = Vector3::from(self.axis_direction);
+        let axis = [joint, joint + along * 100.0].map(Into::into);
         LandmarkOverrides {
-            limb: Some(self.limb),
-            joint_centre: Some(self.joint_centre),
-            joint_region: Some(self.joint_region.range_mm),
-            calf_region: Some(self.calf_region.range_mm),
-            axis_source: Some(self.axis_source),
-            anterior: Some(self.anterior),
-            plane_points: given.plane_points,
+            limb: open(given.limb, self.limb),
+            joint_centre: open(given.joint_centre, self.joint_centre),
+            joint_region: open(given.joint_region, self.joint_region.range_mm)
+                .filter(|_| by_regions),
+            calf_region: open(given.calf_region, self.calf_region.range_mm).filter(|_| by_regions),
+            axis_source: open(given.axis_source, self.axis_source).filter(|_| by_regions),
+            axis: open(given.axis, axis).filter(|_| by_axis),
+            anterior: open(given.anterior, self.anterior),
+            plane_points: open(given.plane_points, self.plane_points),
         }
     }
+}
+
+/// What was found, where nothing is given.
+fn open<T>(given: Option<T>, found: T) -> Option<T> {
+    given.is_none().then_some(found)
 }
 
 impl LandmarkOverrides {
     /// Refuses numbers that are not finite, regions that run backwards and a front without
     /// direction.
     pub(crate) fn check(&self) -> Result<(), LandmarkError> {
+        let by_regions = [
+            ("joint_region", self.joint_region.is_some()),
+            ("calf_region", self.calf_region.is_some()),
+            ("axis_source", self.axis_source.is_some()),
+        ];
+        match (self.axis, by_regions.into_iter().find(|(_, given)| *given)) {
+            (Some(_), Some((other, _))) => return Err(LandmarkError::AxisTwice { other }),
+            (None, _) if self.axis_source == Some(AxisSource::Given) => {
+                return Err(LandmarkError::NoAxis);
+            }
+            _ => {}
+        }
         let [a, b, c] = self.plane_points.unwrap_or_default().map(Some);
+        let [from, to] = self.axis.unwrap_or_default().map(Some);
         let points = [
+            ("axis", from),
+            ("axis", to),
             ("joint_centre", self.joint_centre),
             ("anterior", self.anterior),
             ("plane_points", a),
@@ -187,6 +217,25 @@ pub enum LandmarkError {
         angle_deg: f64,
         /// Smallest angle that is accepted, degrees.
         least_deg: f64,
+    },
+    /// The axis is given by two points and by regions.
+    #[error("axis and {other} are both given, expected one of them")]
+    AxisTwice {
+        /// Field of [`LandmarkOverrides`].
+        other: &'static str,
+    },
+    /// The axis is said to be given, but is not.
+    #[error("axis_source is \"given\", but axis is missing: give its two points")]
+    NoAxis,
+    /// Two points given by a person make no axis along the limb.
+    #[error("axis runs from {from:?} to {to:?}, expected {expected}")]
+    Axis {
+        /// The first point.
+        from: [f64; 3],
+        /// The second point.
+        to: [f64; 3],
+        /// What they should be.
+        expected: &'static str,
     },
     /// Three points given by a person make no plane under the limb.
     #[error("plane_points are {found:?}, expected {expected}")]

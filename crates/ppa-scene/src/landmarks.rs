@@ -36,6 +36,8 @@ pub enum AxisSource {
     Bone,
     /// The whole cross-section inside the skin.
     Limb,
+    /// Two points that a person gave.
+    Given,
 }
 
 /// A stretch of the limb and the centre of its cross-sections.
@@ -44,7 +46,7 @@ pub enum AxisSource {
 pub struct AxisRegion {
     /// First and last distance proximal of the joint level along the scan's limb direction, mm.
     pub range_mm: [f64; 2],
-    /// Mean of the cross-section centres, `ct` frame, mm.
+    /// Mean of the cross-section centres, or the given point of the axis, `ct` frame, mm.
     pub centre_mm: [f64; 3],
 }
 

@@ -65,6 +65,24 @@ impl Room {
         })
     }
 
+    /// The room's points and triangles in one mesh, so that one file holds both: points first, which no triangle of the
+    /// built-in room uses. `None` without triangles.
+    pub fn points_and_triangles(&self) -> Option<Mesh> {
+        let triangles = self.mesh.as_ref()?;
+        let cloud = &self.cloud;
+        // The points of a recorded room are the corners of its triangles.
+        if triangles.vertices == cloud.points {
+            return Some(triangles.clone());
+        }
+        let first = cloud.points.len() as u32;
+        let moved = |corners: &[u32; 3]| corners.map(|corner| corner + first);
+        Some(Mesh {
+            vertices: [&cloud.points[..], &triangles.vertices].concat(),
+            normals: [&cloud.normals[..], &triangles.normals].concat(),
+            triangles: triangles.triangles.iter().map(moved).collect(),
+        })
+    }
+
     /// Reads a recorded room from a PLY, OBJ or STL file in mm; its frame becomes the room frame.
     ///
     /// Triangles are kept if the file has any. The device is given, as no cloud tells it.

@@ -6,6 +6,7 @@ mod coverage_table;
 mod fit_noise;
 mod project;
 mod render;
+mod render_case;
 
 use std::path::PathBuf;
 
@@ -17,8 +18,8 @@ use crate::output::Output;
 
 #[derive(Debug, Subcommand)]
 pub enum DepthCommand {
-    /// Depth image of triangle meshes
-    Render(render::RenderArgs),
+    /// Depth image of meshes or of a room, or of a case's limb on the table as both cameras see it
+    Render(Box<render::RenderArgs>),
     /// Noise of a camera from a recording of a scene that stands still
     FitNoise(fit_noise::FitNoiseArgs),
     /// Camera JSON from the calibration file of a device

@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub mod case;
 pub mod ct;
 pub mod dataset;
 pub mod demo;
@@ -13,6 +14,7 @@ pub mod learn;
 pub mod merge;
 pub mod mesh;
 pub mod metrics;
+mod pictures;
 pub mod plan;
 pub mod predict;
 pub mod prepare;

@@ -1,8 +1,9 @@
 //! `ppa plan`: what a plan will take, before anything runs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use clap::Args;
+use anyhow::{bail, ensure};
+use clap::{Args, Subcommand};
 use ppa_dataset::{Forecast, Plan, forecast};
 use serde::Serialize;
 
@@ -11,9 +12,13 @@ use crate::output::{Output, bytes};
 use crate::progress::ProgressArgs;
 
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub struct PlanArgs {
+    #[command(subcommand)]
+    command: Option<PlanCommand>,
     /// Plan file
-    plan: PathBuf,
+    #[arg(required = true)]
+    plan: Option<PathBuf>,
     /// Folder where the dataset will lie [default: as of ppa generate]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -22,6 +27,22 @@ pub struct PlanArgs {
     fraction: f64,
     #[command(flatten)]
     progress: ProgressArgs,
+}
+
+#[derive(Debug, Subcommand)]
+enum PlanCommand {
+    /// Write a plan for cases: every key with its default and what it means
+    Init(InitArgs),
+}
+
+#[derive(Debug, Args)]
+struct InitArgs {
+    /// Cases written by `ppa prepare`; those of one scan become limbs of one patient
+    #[arg(required = true)]
+    cases: Vec<PathBuf>,
+    /// Plan file to write
+    #[arg(long, default_value = "plan.toml")]
+    out: PathBuf,
 }
 
 #[derive(Debug, Serialize)]
@@ -33,11 +54,47 @@ struct Told {
     wall_hours: f64,
 }
 
+#[derive(Debug, Serialize)]
+struct Begun {
+    plan: PathBuf,
+    limbs: usize,
+}
+
 pub fn run(args: &PlanArgs, output: Output) -> anyhow::Result<()> {
-    let plan = Plan::read(&args.plan)?;
+    match (&args.command, &args.plan) {
+        (Some(PlanCommand::Init(args)), _) => init(args, output),
+        (None, Some(plan)) => tell(plan, args, output),
+        (None, None) => bail!("a plan file is missing"),
+    }
+}
+
+fn init(args: &InitArgs, output: Output) -> anyhow::Result<()> {
+    ensure!(
+        !args.out.try_exists()?,
+        "{} exists: --out writes another file",
+        args.out.display()
+    );
+    let plan = Plan::of_cases(args.cases.iter().map(PathBuf::as_path))?;
+    plan.write_commented(&args.out)?;
+    let begun = Begun {
+        plan: args.out.clone(),
+        limbs: plan.cases.len(),
+    };
+    output.print(&begun, |begun| {
+        let plan = begun.plan.display();
+        let limbs = if begun.limbs == 1 { "limb" } else { "limbs" };
+        format!(
+            "{plan}: {} {limbs}, all settings at their defaults; ppa plan {plan} tells what they take",
+            begun.limbs
+        )
+    })
+}
+
+fn tell(file: &Path, args: &PlanArgs, output: Output) -> anyhow::Result<()> {
+    let plan = Plan::read(file)?;
     let root = match &args.out {
         Some(out) => out.clone(),
-        None => dataset_folder(&args.plan)?,
+        None => dataset_folder(file)?,
     };
     let watch = args.progress.watch("poses measured", output);
     let forecast = forecast(&plan, &root, args.fraction, &|p| watch.report(p))?;

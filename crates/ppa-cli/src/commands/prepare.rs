@@ -7,10 +7,11 @@ use clap::{Args, ValueEnum};
 use nalgebra::Point3;
 use ppa_ct::{Format, write};
 use ppa_dataset::labels::{AnkleBones, BoneFile, BoneNumbers, JointSpace, segment_bones};
-use ppa_dataset::{Case, Found, PreparedLimb, Severity, prepare};
+use ppa_dataset::{Case, Found, PreparedLimb, Severity, case_picture, prepare, write_picture};
 use ppa_mesh::{LimbSettings, VoxelBox, write_mesh_file};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
 
+use crate::commands::pictures::{picture_beside, require_new_picture, shown_name};
 use crate::findings::severity_name;
 use crate::number_lists::{bone_numbers, point, range, voxel_box};
 use crate::output::{Output, working};
@@ -75,12 +76,28 @@ pub struct PrepareArgs {
     /// Region around the calf, mm from the joint towards proximal
     #[arg(long, value_name = "FROM,TO", value_parser = range, allow_hyphen_values = true)]
     calf_region: Option<[f64; 2]>,
+    /// Two points that the axis runs through, ct frame, instead of the centres of two regions
+    #[arg(
+        long,
+        num_args = 2,
+        value_names = ["X,Y,Z", "X,Y,Z"],
+        value_parser = point,
+        allow_hyphen_values = true,
+        conflicts_with_all = ["axis_source", "joint_region", "calf_region"]
+    )]
+    axis: Option<Vec<[f64; 3]>>,
     /// Direction that faces up at angle 0, ct frame
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     anterior: Option<[f64; 3]>,
     /// A point of the plane under the limb, ct frame; give three: one distal, two proximal
     #[arg(long = "plane-point", value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     plane_points: Vec<[f64; 3]>,
+    /// Picture to check the case with, PNG: slices and skin with axis, joint, plane and cuts [default: beside the case]
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+    /// Draw no picture
+    #[arg(long, conflicts_with = "picture")]
+    no_picture: bool,
     /// Which bone each voxel belongs to, for `ppa label auto`: NIfTI, NRRD or MetaImage in the scan's frame
     #[arg(long, value_name = "FILE")]
     bones: Option<PathBuf>,
@@ -101,6 +118,14 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
             "--plane-point was given {} times, expected 3",
             args.plane_points.len()
         ),
+    };
+    let picture = match (&args.picture, args.no_picture) {
+        (_, true) => None,
+        (Some(path), _) => {
+            require_new_picture(path)?;
+            Some(path.clone())
+        }
+        (None, _) => Some(picture_beside(&args.out)?),
     };
     if let Some(bones) = &args.segment_bones {
         check_bones_name(bones, &args.scan.path)?;
@@ -125,6 +150,7 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
             AxisName::Bone => AxisSource::Bone,
             AxisName::Limb => AxisSource::Limb,
         }),
+        axis: args.axis.as_ref().map(|points| [points[0], points[1]]),
     };
     let side = match args.side {
         SideName::L => Side::Left,
@@ -155,6 +181,10 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
         write_mesh_file(ply, &prepared.limb.mesh)?;
     }
     case.write(&args.out)?;
+    if let Some(path) = &picture {
+        let drawn = case_picture(&shown_name(&args.out), &prepared, &case.acknowledged);
+        write_picture(path, &drawn)?;
+    }
     working.finish_and_clear();
     output.print(&case, |case| describe(case, args))
 }

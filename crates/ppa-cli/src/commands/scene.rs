@@ -4,18 +4,21 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
-use ppa_dataset::{Case, Frames, Plan, RoomFile, Table, write_whole};
+use ppa_dataset::{
+    Case, Frames, Plan, PosedLimb, RoomFile, Table, pose_picture, write_picture, write_whole,
+};
 use ppa_mesh::{read_mesh_file, write_cloud_file, write_mesh_file};
 use ppa_scene::{Contact, PlaneSettings, SoftTissue, TablePlane, place_soft, table_plane};
 use serde::Serialize;
 
+use crate::commands::pictures::{require_new_picture, shown_name};
 use crate::findings::prepared;
 use crate::number_lists::range;
 use crate::output::{Output, working};
 
 #[derive(Debug, Subcommand)]
 pub enum SceneCommand {
-    /// Point cloud of the x-ray room
+    /// Points and triangles of the x-ray room
     Room(RoomArgs),
     /// Table plane of a point cloud
     Plane(PlaneArgs),
@@ -25,7 +28,7 @@ pub enum SceneCommand {
 
 #[derive(Debug, Args)]
 #[group(multiple = false)]
-struct WhichRoom {
+pub struct WhichRoom {
     /// Take the room, and soft tissue, from this plan instead of the built-in one
     #[arg(long)]
     plan: Option<PathBuf>,
@@ -35,7 +38,12 @@ struct WhichRoom {
 }
 
 impl WhichRoom {
-    fn plan(&self) -> anyhow::Result<Plan> {
+    /// Whether one was chosen.
+    pub fn is_given(&self) -> bool {
+        self.plan.is_some() || self.file.is_some()
+    }
+
+    pub fn plan(&self) -> anyhow::Result<Plan> {
         Ok(match (&self.plan, &self.file) {
             (Some(plan), _) => Plan::read(plan)?,
             (None, Some(file)) => Plan::in_room(file)?,
@@ -46,7 +54,7 @@ impl WhichRoom {
 
 #[derive(Debug, Args)]
 pub struct RoomArgs {
-    /// Cloud to write, mm: .ply or .obj
+    /// Room to write, mm: .ply or .obj; points as of a scanner, and triangles where they are known, as `ppa depth render` wants them
     #[arg(long)]
     out: PathBuf,
     #[command(flatten)]
@@ -86,6 +94,9 @@ pub struct PlaceArgs {
     /// Write the placed skin in room coordinates: .ply, .obj or .stl
     #[arg(long)]
     ply: Option<PathBuf>,
+    /// Picture of the limb in the room, PNG: table, device, detector, both cameras' views and the points it rests on
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
 }
 
 pub fn run(command: &SceneCommand, output: Output) -> anyhow::Result<()> {
@@ -142,7 +153,11 @@ fn room(args: &RoomArgs, output: Output) -> anyhow::Result<()> {
         RoomFile::of_plan(&plan)?.write(path)?;
     }
     let Table { room, plane } = table;
-    write_cloud_file(&args.out, &room.cloud)?;
+    match room.points_and_triangles() {
+        // An STL file has no points beside its triangles: refused as for a cloud.
+        Some(mesh) if !is_stl(&args.out) => write_mesh_file(&args.out, &mesh)?,
+        _ => write_cloud_file(&args.out, &room.cloud)?,
+    }
     let facts = RoomFacts {
         points: room.cloud.points.len(),
         table: FoundPlane::from(&plane),
@@ -156,6 +171,11 @@ fn room(args: &RoomArgs, output: Output) -> anyhow::Result<()> {
             facts.points
         )
     })
+}
+
+fn is_stl(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("stl"))
 }
 
 fn write_frames(path: &Path, frames: &Frames) -> anyhow::Result<()> {
@@ -179,6 +199,9 @@ struct Placed {
 }
 
 fn place_limb(args: &PlaceArgs, output: Output) -> anyhow::Result<()> {
+    if let Some(path) = &args.picture {
+        require_new_picture(path)?;
+    }
     let plan = args.room.plan()?;
     let soft_tissue = match args.soft_tissue_mm {
         Some([distal_mm, proximal_mm]) => SoftTissue {
@@ -216,6 +239,17 @@ fn place_limb(args: &PlaceArgs, output: Output) -> anyhow::Result<()> {
             path,
             &frames.with_limb(&placement, &prepared.landmarks, &table),
         )?;
+    }
+    if let Some(path) = &args.picture {
+        let posed = PosedLimb {
+            limb: &prepared,
+            placement: &placement,
+            angle_deg: args.angle,
+            table: &table,
+            plan: &plan,
+            acknowledged: &case.acknowledged,
+        };
+        write_picture(path, &pose_picture(&shown_name(&args.case), &posed)?)?;
     }
     working.finish_and_clear();
     let placed = Placed {

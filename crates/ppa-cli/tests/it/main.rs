@@ -3,6 +3,7 @@
 mod auto_labels;
 mod bad_geometry;
 mod bad_input;
+mod case_files;
 mod conversion;
 mod coverage;
 mod damaged;
@@ -27,6 +28,7 @@ mod shards;
 mod soft_tissue;
 mod tallies;
 mod training;
+mod views;
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -140,7 +140,7 @@ impl Plan {
     }
 
     /// The files that it names.
-    fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+    pub(crate) fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let cases = self.cases.iter_mut().map(|case| &mut case.file);
         let others = [
             &mut self.room_file,

@@ -1,6 +1,7 @@
 //! Tests across the modules of ppa-scene.
 
 mod boot;
+mod choices;
 mod family;
 mod frames;
 mod landmarks;

@@ -1,33 +1,44 @@
 //! `ppa depth render`: what a camera sees of meshes, ideally or through a sensor.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Args;
 use nalgebra::{Isometry3, Point3};
+use ppa_dataset::body_of_cloud;
+use ppa_dataset::layout::View;
 use ppa_depth::{
     Backdrop, Body, Camera, DepthImage, MeshBody, PlacedBody, Sensor, SensorSpec, Tremor,
     isometry_from_rows, render,
 };
-use ppa_mesh::read_mesh_file;
+use ppa_mesh::{MeshContents, read_mesh_file};
 use serde::{Deserialize, Serialize};
 
+use super::render_case::{OfCase, is_case, of_view, render_case};
 use crate::output::{Output, Seconds, Stopwatch};
 
 #[derive(Debug, Args)]
 pub struct RenderArgs {
-    /// Meshes in one frame, mm: .ply, .obj or .stl
-    #[arg(required = true)]
+    /// Meshes or rooms in one frame, mm: .ply, .obj or .stl; or one case of `ppa prepare`, .toml, with --angle
+    #[arg(required = true, value_name = "MESH|CASE")]
     meshes: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(super) of_case: OfCase,
     /// Camera JSON [default: an Azure Kinect, 640 x 576]
     #[arg(long)]
-    camera: Option<PathBuf>,
-    /// JSON with the row-major 4x4 motion from the meshes' frame to the camera's, mm [default: identity]
+    pub(super) camera: Option<PathBuf>,
+    /// JSON with the row-major 4x4 motion from the meshes' frame to the camera's, mm, or what `ppa scene --frames` wrote, with
+    /// --motion [default: identity]
     #[arg(long)]
-    camera_from_mesh: Option<PathBuf>,
-    /// Image to write: 16-bit PNG, Z in mm, 0 invalid; of several frames name_0000.png, name_0001.png …
+    pub(super) camera_from_mesh: Option<PathBuf>,
+    /// Which motion of such a file: left_from_room for a room or a placed skin, left_from_ct for a skin in the scan
+    #[arg(long, value_name = "NAME", requires = "camera_from_mesh")]
+    motion: Option<String>,
+    /// Image to write: 16-bit PNG, Z in mm, 0 invalid; of several frames name_0000.png, name_0001.png …; of a case
+    /// name_left.png and name_right.png unless --view chooses one
     #[arg(long)]
-    out: PathBuf,
+    pub(super) out: PathBuf,
     /// Also write the depths as floats, OpenEXR
     #[arg(long)]
     exr: Option<PathBuf>,
@@ -39,30 +50,33 @@ pub struct RenderArgs {
     points: Option<PathBuf>,
     /// See through a sensor: JSON as `fit-noise` writes it, or the word default
     #[arg(long)]
-    sensor: Option<PathBuf>,
+    pub(super) sensor: Option<PathBuf>,
     /// Seed of the sensor's noise and of the tremor
     #[arg(long, default_value_t = 0)]
-    seed: u64,
+    pub(super) seed: u64,
     /// Frames of a recording
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=10_000))]
-    frames: u64,
+    pub(super) frames: u64,
     /// Size of the meshes' motion between frames along each axis, mm (standard deviation)
     #[arg(long, default_value_t = 0.0)]
-    tremor_mm: f64,
+    pub(super) tremor_mm: f64,
     /// Size of their rotation about each axis, degrees (standard deviation)
     #[arg(long, default_value_t = 0.0)]
-    tremor_deg: f64,
+    pub(super) tremor_deg: f64,
 }
 
 /// Frames over which a tremor remembers: a third of a second at 30 frames per second.
 const TREMOR_FRAMES: f64 = 10.0;
 
-/// A row-major 4x4 matrix, as four rows or as 16 numbers.
+/// A row-major 4x4 matrix, as four rows or as 16 numbers, or several of them by name.
 #[derive(Debug, Deserialize)]
 #[serde(untagged)]
 enum Pose {
     Rows([[f64; 4]; 4]),
     Flat([f64; 16]),
+    Named {
+        motions: BTreeMap<String, [[f64; 4]; 4]>,
+    },
 }
 
 #[derive(Debug, Serialize)]
@@ -89,15 +103,29 @@ enum Eye {
 }
 
 pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
+    if let [case] = &args.meshes[..]
+        && is_case(case)
+    {
+        return render_case(case, args, output);
+    }
+    if let Some(case) = args.meshes.iter().find(|path| is_case(path)) {
+        bail!("{} is a case: render it alone", case.display());
+    }
+    if let Some(option) = args.of_case.given() {
+        bail!(
+            "{option} belongs to a case, but {} is a mesh",
+            args.meshes[0].display()
+        );
+    }
     let camera = super::read_camera(args.camera.as_ref())?;
     let camera_from_body = match &args.camera_from_mesh {
-        Some(path) => read_pose(path)?,
+        Some(path) => read_pose(path, args.motion.as_deref())?,
         None => Isometry3::identity(),
     };
-    let meshes = args
+    let contents = args
         .meshes
         .iter()
-        .map(|path| read_mesh_file(path).map(ppa_mesh::MeshContents::into_mesh))
+        .map(|path| read_mesh_file(path))
         .collect::<Result<Vec<_>, _>>()?;
     let eye = eye(args, &camera)?;
     let tremor = Tremor {
@@ -106,7 +134,7 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
         correlation_frames: TREMOR_FRAMES,
     };
     tremor.check()?;
-    let corners = meshes.iter().flat_map(|mesh| &mesh.vertices);
+    let corners = contents.iter().flat_map(|contents| &contents.cloud.points);
     let (sum, count) = corners.fold((nalgebra::Vector3::zeros(), 0), |(sum, n), corner| {
         (sum + corner.coords.cast::<f64>(), n + 1)
     });
@@ -114,10 +142,8 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
     camera.rays();
     let watch = Stopwatch::start();
     let mut bodies = Vec::new();
-    for (path, mesh) in args.meshes.iter().zip(&meshes) {
-        let body = MeshBody::new(&mesh.vertices, &mesh.triangles)
-            .with_context(|| path.display().to_string())?;
-        bodies.push(Body::Mesh(body));
+    for (path, contents) in args.meshes.iter().zip(&contents) {
+        bodies.push(body(contents).with_context(|| path.display().to_string())?);
     }
     let see = |frame: u64| {
         let camera_from_body = tremor.motion(&pivot, args.seed, frame) * camera_from_body;
@@ -156,7 +182,7 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
     for frame in 1..args.frames {
         see(frame)?.write_png(&numbered(&args.out, frame))?;
     }
-    write_others(args, &camera, &image)?;
+    write_others(args, None, &camera, &image)?;
     let rendered = Rendered {
         width: image.width,
         height: image.height,
@@ -187,23 +213,55 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
     })
 }
 
-fn read_pose(path: &Path) -> anyhow::Result<Isometry3<f64>> {
-    let rows = match crate::commands::read_json(path)? {
-        Pose::Rows(rows) => rows,
-        Pose::Flat(flat) => std::array::from_fn(|r| std::array::from_fn(|c| flat[4 * r + c])),
+/// Triangles, or discs at the points of a cloud.
+fn body(contents: &MeshContents) -> anyhow::Result<Body> {
+    if contents.triangles.is_empty() {
+        return Ok(body_of_cloud(&contents.cloud)?);
+    }
+    let mesh = MeshBody::new(&contents.cloud.points, &contents.triangles)?;
+    Ok(Body::Mesh(mesh))
+}
+
+fn read_pose(path: &Path, name: Option<&str>) -> anyhow::Result<Isometry3<f64>> {
+    let rows = match (crate::commands::read_json(path)?, name) {
+        (Pose::Rows(rows), None) => rows,
+        (Pose::Flat(flat), None) => {
+            std::array::from_fn(|r| std::array::from_fn(|c| flat[4 * r + c]))
+        }
+        (Pose::Named { motions }, name) => {
+            let known = || motions.keys().cloned().collect::<Vec<_>>().join(", ");
+            let name = name.with_context(|| {
+                format!(
+                    "{} holds several motions; --motion chooses one of {}",
+                    path.display(),
+                    known()
+                )
+            })?;
+            *motions.get(name).with_context(|| {
+                format!("{} holds no motion {name}, but {}", path.display(), known())
+            })?
+        }
+        (_, Some(name)) => bail!(
+            "{} holds one matrix without a name, not the motion {name}",
+            path.display()
+        ),
     };
     isometry_from_rows(&rows).with_context(|| path.display().to_string())
+}
+
+/// A sensor from a file, or the default one.
+pub(super) fn read_sensor(path: &Path) -> anyhow::Result<SensorSpec> {
+    if path.as_os_str() == "default" {
+        return Ok(SensorSpec::default());
+    }
+    crate::commands::read_json(path)
 }
 
 fn eye(args: &RenderArgs, camera: &Camera) -> anyhow::Result<Eye> {
     let Some(path) = &args.sensor else {
         return Ok(Eye::Ideal);
     };
-    let spec = if path.as_os_str() == "default" {
-        SensorSpec::default()
-    } else {
-        crate::commands::read_json(path)?
-    };
+    let spec = read_sensor(path)?;
     let sensor = Sensor::new(spec, args.seed).with_context(|| path.display().to_string())?;
     Ok(Eye::Sensor(
         Box::new(sensor),
@@ -216,15 +274,21 @@ fn numbered(path: &Path, frame: u64) -> PathBuf {
     path.with_file_name(format!("{stem}_{frame:04}.png"))
 }
 
-fn write_others(args: &RenderArgs, camera: &Camera, image: &DepthImage) -> anyhow::Result<()> {
+/// Writes the other files of an image, with the camera's name if there are several.
+pub(super) fn write_others(
+    args: &RenderArgs,
+    view: Option<View>,
+    camera: &Camera,
+    image: &DepthImage,
+) -> anyhow::Result<()> {
     if let Some(path) = &args.exr {
-        image.write_exr(path)?;
+        image.write_exr(&of_view(path, view))?;
     }
     if let Some(path) = &args.preview {
-        image.write_preview(path)?;
+        image.write_preview(&of_view(path, view))?;
     }
     if let Some(path) = &args.points {
-        image.write_points(camera, path)?;
+        image.write_points(camera, &of_view(path, view))?;
     }
     Ok(())
 }

@@ -1,0 +1,118 @@
+//! `ppa case`: what has become of a case.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use clap::{Args, Subcommand};
+use ppa_dataset::{CaseCheck, Drift, Finding, Severity, case_picture, write_picture};
+use serde::Serialize;
+
+use crate::commands::pictures::{require_new_picture, shown_name};
+use crate::output::{Output, working};
+
+#[derive(Debug, Subcommand)]
+pub enum CaseCommand {
+    /// Carry a case out again: is the scan the same, what is found, what has changed since the case was written?
+    Check(CheckArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Case written by `ppa prepare`, edited or not
+    case: PathBuf,
+    /// Picture to check it with, PNG
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+}
+
+#[derive(Debug, Serialize)]
+struct Checked {
+    /// Whether the case can be used: it can be carried out, and no severe finding is open.
+    usable: bool,
+    joint_mm: [f64; 3],
+    axis: [f64; 3],
+    notes: Vec<String>,
+    findings: Vec<Finding>,
+    /// Since the case was written; null if the file holds no landmarks that can be compared.
+    changed: Option<Drift>,
+}
+
+pub fn run(command: &CaseCommand, output: Output) -> anyhow::Result<()> {
+    match command {
+        CaseCommand::Check(args) => check(args, output),
+    }
+}
+
+fn check(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
+    if let Some(path) = &args.picture {
+        require_new_picture(path)?;
+    }
+    let working = working("carrying out the case");
+    let checked = CaseCheck::of(&args.case)
+        .with_context(|| format!("{} cannot be used", args.case.display()))?;
+    if let Some(path) = &args.picture {
+        let name = shown_name(&args.case);
+        let drawn = case_picture(&name, &checked.limb, &checked.case.acknowledged);
+        write_picture(path, &drawn)?;
+    }
+    working.finish_and_clear();
+    let open: Vec<&Finding> = checked.open().collect();
+    let landmarks = &checked.limb.landmarks;
+    let told = Checked {
+        usable: open.is_empty(),
+        joint_mm: landmarks.joint_centre,
+        axis: landmarks.axis_direction,
+        notes: landmarks.notes.clone(),
+        findings: checked.limb.findings.clone(),
+        changed: checked.drift,
+    };
+    output.print(&told, describe)?;
+    if !open.is_empty() {
+        let number = open.len();
+        let findings = if number == 1 { "finding" } else { "findings" };
+        bail!(
+            "{} has {number} severe {findings}; look at them, then change the case or name their codes in `acknowledged`",
+            args.case.display()
+        );
+    }
+    Ok(())
+}
+
+fn describe(told: &Checked) -> String {
+    let [x, y, z] = told.joint_mm;
+    let [dx, dy, dz] = told.axis;
+    let mut lines = vec![
+        "scan       the one that the case was made from".to_owned(),
+        format!("joint      {x:.1} {y:.1} {z:.1} mm (LPS)"),
+        format!("axis       {dx:.4} {dy:.4} {dz:.4}"),
+        format!("changed    {}", changes(told.changed.as_ref())),
+    ];
+    lines.extend(told.notes.iter().map(|note| format!("note       {note}")));
+    lines.extend(told.findings.iter().map(|finding| {
+        let severity = match finding.severity {
+            Severity::Note => "note",
+            Severity::Caution => "caution",
+            Severity::Severe => "severe",
+        };
+        format!("{severity:10} {}", finding.text)
+    }));
+    lines.join("\n")
+}
+
+fn changes(drift: Option<&Drift>) -> String {
+    let Some(drift) = drift else {
+        return "unknown: the file holds no landmarks that can be compared".to_owned();
+    };
+    if drift.is_none() {
+        return "nothing since the case was written".to_owned();
+    }
+    let other = if drift.other_limb {
+        "another side or kind of limb; "
+    } else {
+        ""
+    };
+    format!(
+        "{other}since the case was written: joint by {:.1} mm, axis by {:.2} degrees, front by {:.2} degrees, plane by {:.2} degrees",
+        drift.joint_mm, drift.axis_deg, drift.anterior_deg, drift.plane_deg
+    )
+}

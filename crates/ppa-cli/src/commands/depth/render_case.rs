@@ -1,0 +1,178 @@
+//! `ppa depth render CASE`: what the cameras of a room see of a case's limb on the table.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+use ppa_dataset::layout::View;
+use ppa_dataset::{Case, DepthView, PreparedLimb, Stage, depth_views};
+use serde::Serialize;
+
+use super::render::{RenderArgs, read_sensor, write_others};
+use crate::commands::scene::WhichRoom;
+use crate::output::{Output, working};
+
+#[derive(Debug, Args)]
+pub struct OfCase {
+    /// Medial rotation of a case's limb, degrees [default: 0]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    angle: Option<f64>,
+    /// One of the two cameras of a case's room [default: both]
+    #[arg(long, value_enum)]
+    view: Option<ViewName>,
+    #[command(flatten)]
+    room: WhichRoom,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum ViewName {
+    Left,
+    Right,
+}
+
+impl OfCase {
+    /// The first option that only a case has.
+    pub fn given(&self) -> Option<&'static str> {
+        let given = [
+            ("--angle", self.angle.is_some()),
+            ("--view", self.view.is_some()),
+            ("--plan or --room", self.room.is_given()),
+        ];
+        given
+            .into_iter()
+            .find(|(_, given)| *given)
+            .map(|(name, _)| name)
+    }
+
+    fn view(&self) -> Option<View> {
+        self.view.map(|view| match view {
+            ViewName::Left => View::Left,
+            ViewName::Right => View::Right,
+        })
+    }
+}
+
+/// Whether a file is a case and no mesh.
+pub fn is_case(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
+
+/// `name.png` as `name_left.png`, if a view is named.
+pub fn of_view(path: &Path, view: Option<View>) -> PathBuf {
+    let Some(view) = view else {
+        return path.to_owned();
+    };
+    let [stem, extension] = [path.file_stem(), path.extension()]
+        .map(|part| part.unwrap_or_default().to_string_lossy().into_owned());
+    path.with_file_name(format!("{stem}_{}.{extension}", name(view)))
+}
+
+fn name(view: View) -> &'static str {
+    match view {
+        View::Left => "left",
+        View::Right => "right",
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct RenderedCase {
+    angle_deg: f64,
+    views: Vec<RenderedView>,
+}
+
+#[derive(Debug, Serialize)]
+struct RenderedView {
+    view: &'static str,
+    file: PathBuf,
+    width: u32,
+    height: u32,
+    valid_pixels: usize,
+    too_far_pixels: usize,
+    min_mm: Option<f32>,
+    max_mm: Option<f32>,
+}
+
+pub fn render_case(path: &Path, args: &RenderArgs, output: Output) -> anyhow::Result<()> {
+    refuse_options_of_meshes(path, args)?;
+    let mut plan = args.of_case.room.plan()?;
+    if let Some(sensor) = &args.sensor {
+        plan.depth.sensor = Some(read_sensor(sensor)?);
+    }
+    let case = Case::read(path)?;
+    let working = working("preparing the limb");
+    let stage = Stage::of_plan(&plan)?;
+    let limb = PreparedLimb::of_case(&case)
+        .with_context(|| format!("cannot prepare the limb of {}", path.display()))?;
+    let angle_deg = args.of_case.angle.unwrap_or_default();
+    let mut views = depth_views(&stage, &plan, &limb, angle_deg, args.seed)?;
+    let wanted = args.of_case.view();
+    views.retain(|seen| wanted.is_none_or(|view| view == seen.view));
+    let mut written = Vec::new();
+    for seen in &views {
+        // One image has the name as it was given.
+        let named = wanted.is_none().then_some(seen.view);
+        written.push(write_view(args, named, seen)?);
+    }
+    working.finish_and_clear();
+    let rendered = RenderedCase {
+        angle_deg,
+        views: written,
+    };
+    output.print(&rendered, |rendered| {
+        let line = |seen: &RenderedView| {
+            let range = match (seen.min_mm, seen.max_mm) {
+                (Some(min), Some(max)) => format!(", {min:.0} to {max:.0} mm away"),
+                _ => String::new(),
+            };
+            format!(
+                "{}: {} of {} x {} pixels see a surface{range}",
+                seen.file.display(),
+                seen.valid_pixels,
+                seen.width,
+                seen.height
+            )
+        };
+        let lines: Vec<_> = rendered.views.iter().map(line).collect();
+        lines.join("\n")
+    })
+}
+
+fn write_view(
+    args: &RenderArgs,
+    named: Option<View>,
+    seen: &DepthView,
+) -> anyhow::Result<RenderedView> {
+    let file = of_view(&args.out, named);
+    let image = &seen.image;
+    let too_far_pixels = image.write_png(&file)?;
+    write_others(args, named, &seen.camera, image)?;
+    Ok(RenderedView {
+        view: name(seen.view),
+        file,
+        width: image.width,
+        height: image.height,
+        valid_pixels: image.valid_pixels(),
+        too_far_pixels,
+        min_mm: image.min_mm(),
+        max_mm: image.max_mm(),
+    })
+}
+
+/// A case's cameras stand where its room says.
+fn refuse_options_of_meshes(path: &Path, args: &RenderArgs) -> anyhow::Result<()> {
+    let given = [
+        ("--camera", args.camera.is_some()),
+        ("--camera-from-mesh", args.camera_from_mesh.is_some()),
+        ("--frames", args.frames != 1),
+        ("--tremor-mm", args.tremor_mm != 0.0),
+        ("--tremor-deg", args.tremor_deg != 0.0),
+    ];
+    if let Some((option, _)) = given.into_iter().find(|(_, given)| *given) {
+        bail!(
+            "{option} belongs to meshes, but {} is a case: its cameras are those of --plan or --room",
+            path.display()
+        );
+    }
+    Ok(())
+}
