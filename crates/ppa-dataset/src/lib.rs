@@ -24,6 +24,8 @@ mod check;
 #[cfg(feature = "generate")]
 mod claim;
 #[cfg(feature = "generate")]
+mod compiled;
+#[cfg(feature = "generate")]
 mod contact_sheet;
 #[cfg(feature = "generate")]
 mod coverage_plot;
@@ -72,6 +74,7 @@ mod seed;
 #[cfg(feature = "generate")]
 mod shaped_skin;
 mod split;
+mod spreadsheet;
 #[cfg(feature = "generate")]
 mod stage;
 #[cfg(feature = "generate")]
@@ -120,6 +123,7 @@ pub use room_file::RoomFile;
 #[cfg(feature = "generate")]
 pub use shaped_skin::{ShapeSettings, body_shape};
 pub use split::{Split, SplitError};
+pub use spreadsheet::is_formula;
 #[cfg(feature = "generate")]
 pub use stage::{PlacedCamera, Stage, StageError, Table, spectrum, tube};
 #[cfg(feature = "generate")]
