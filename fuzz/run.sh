@@ -17,17 +17,20 @@ fi
 coverage="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
 -Cllvm-args=-sanitizer-coverage-trace-compares --cfg fuzzing -Ccodegen-units=16"
-RUSTFLAGS=$coverage cargo build --release --locked --bins
+# For a named target: build scripts run without the fuzzer.
+host=$(rustc -vV | sed -n 's/^host: //p')
+RUSTFLAGS=$coverage cargo build --release --locked --bins --target "$host"
+bin=target/$host/release
 
 corpus=$(mktemp -d)
 trap 'rm -rf "$corpus"' EXIT
 export TMPDIR=$corpus/files
 mkdir -p "$TMPDIR" artifacts
-target/release/seeds "$corpus"
+"$bin/seeds" "$corpus"
 for target in "${targets[@]}"; do
     mkdir -p "$corpus/$target"
     # One thread each: threads of a pool would be waited for with every file.
-    RAYON_NUM_THREADS=1 "target/release/$target" "$corpus/$target" -max_total_time="$seconds" -timeout=20 \
+    RAYON_NUM_THREADS=1 "$bin/$target" "$corpus/$target" -max_total_time="$seconds" -timeout=20 \
         -rss_limit_mb=1024 -malloc_limit_mb=1024 -max_len=4096 -artifact_prefix="artifacts/$target-" -print_final_stats=1 \
         >"$corpus/log" 2>&1 || { tail -n 60 "$corpus/log"; exit 1; }
     awk -v target="$target" '/number_of_executed_units/ { runs = $2 } /peak_rss_mb/ { rss = $2 }

@@ -17,10 +17,18 @@ fn write_workspace(root: &Path, version_of_lowest: &str, features: &str) {
         fs::write(folder.join("Cargo.toml"), manifest).unwrap();
         fs::write(folder.join("src").join(source), code).unwrap();
     };
-    let members = "[workspace]\nresolver = \"3\"\nmembers = [\"program\", \"middle\", \"lowest\"]\n";
+    let members =
+        "[workspace]\nresolver = \"3\"\nmembers = [\"program\", \"middle\", \"lowest\"]\n";
     fs::write(root.join("Cargo.toml"), members).unwrap();
-    package("lowest", version_of_lowest, "[features]\nmore = []\n", "lib.rs", "");
-    let needs = format!("[dependencies]\nlowest = {{ path = \"../lowest\", features = [{features}] }}\n");
+    package(
+        "lowest",
+        version_of_lowest,
+        "[features]\nmore = []\n",
+        "lib.rs",
+        "",
+    );
+    let needs =
+        format!("[dependencies]\nlowest = {{ path = \"../lowest\", features = [{features}] }}\n");
     package("middle", "0.1.0", &needs, "lib.rs", "pub struct Here;\n");
     let needs = "[dependencies]\nmiddle = { path = \"../middle\" }\n";
     let code = "fn main() { println!(\"{:?}\", std::any::TypeId::of::<middle::Here>()); }\n";

@@ -119,10 +119,7 @@ mod tests {
     fn refused(path: &Path) -> String {
         let error = open(path).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::InvalidInput, "{error}");
-        for error in [
-            read(path).unwrap_err(),
-            read_to_string(path).unwrap_err(),
-        ] {
+        for error in [read(path).unwrap_err(), read_to_string(path).unwrap_err()] {
             assert_eq!(error.kind(), io::ErrorKind::InvalidInput, "{error}");
         }
         error.to_string()

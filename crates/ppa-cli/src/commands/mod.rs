@@ -41,8 +41,8 @@ fn read_csv<T: DeserializeOwned>(path: &Path) -> anyhow::Result<Vec<T>> {
 
 /// Reads a JSON file.
 fn read_json<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
-    let text =
-        ppa_files::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let text = ppa_files::read_to_string(path)
+        .with_context(|| format!("cannot read {}", path.display()))?;
     serde_json::from_str(&text)
         .with_context(|| format!("{} is not the expected JSON", path.display()))
 }

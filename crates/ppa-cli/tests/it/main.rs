@@ -10,6 +10,7 @@ mod datasets;
 mod depth;
 mod faults;
 mod grading;
+mod hostile;
 mod identity;
 mod json;
 mod labels;

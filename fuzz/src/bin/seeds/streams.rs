@@ -30,7 +30,7 @@ pub fn jpeg_2000(side: u32) -> Vec<u8> {
         segment(0x51, &[&[0; 2], sizes.as_flattened(), &[0, 1, 7, 1, 1]].concat()),
         segment(0x52, &[0, 0, 0, 1, 0, 0, 4, 4, 0, 1]),
         segment(0x5c, &[0x40, 0x40]),
-        segment(0x90, &[0, 0, 0, 0, 0, 0, 0, 1]),
+        segment(0x90, &[0, 0, 0, 0, 0, 15, 0, 1]),
         vec![0xff, 0x93, 0, 0xff, 0xd9],
     ]
     .concat()

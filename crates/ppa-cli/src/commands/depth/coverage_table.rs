@@ -67,7 +67,11 @@ impl Study {
 
 /// A cell that spreadsheets do not run.
 fn as_text(name: &str) -> String {
-    let mark = if ppa_dataset::is_formula(name) { "'" } else { "" };
+    let mark = if ppa_dataset::is_formula(name) {
+        "'"
+    } else {
+        ""
+    };
     format!("{mark}{name}")
 }
 

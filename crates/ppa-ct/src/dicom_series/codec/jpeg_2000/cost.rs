@@ -145,7 +145,8 @@ impl Size {
         let place = [index % across, index / across];
         let end = |n: usize, along: u64| {
             let edge = self.tile_start[n] + along * self.tile[n];
-            edge.clamp(self.start[n], self.end[n]).div_ceil(self.step[n])
+            edge.clamp(self.start[n], self.end[n])
+                .div_ceil(self.step[n])
         };
         [
             end(0, place[0]),
