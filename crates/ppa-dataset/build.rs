@@ -1,8 +1,8 @@
 //! Hashes what the bytes of a dataset follow from besides plan and scans: the sources and the
-//! physics data of the crates that make it, and the versions of what they depend on.
+//! physics data of the crates that make it, and the machine that they are compiled for.
 //!
-//! In a checkout these are files beside this crate. A published crate cannot see its neighbours,
-//! but their versions, which stand in for their contents, are those in its manifest.
+//! In a checkout these are files beside this crate. A published crate cannot see its neighbours; their versions, which stand
+//! in for their contents, and those of all other crates are added by `src/compiled.rs`.
 //!
 //! What only looks at images that are there, `ONLY_READ`, is left out: it can change, and a begun dataset goes on. Computed labels have a hash
 //! of their own sources.
@@ -23,7 +23,7 @@ const CRATES: [&str; 6] = [
 ];
 
 /// Files and folders in `src` that no image follows from; `src/only_read.rs` tests that none of the others uses them.
-const ONLY_READ: [&str; 20] = [
+const ONLY_READ: [&str; 21] = [
     "case_check.rs",
     "check.rs",
     "commented_plan.rs",
@@ -41,6 +41,7 @@ const ONLY_READ: [&str; 20] = [
     "qa",
     "split",
     "split.rs",
+    "spreadsheet.rs",
     "status.rs",
     "verify.rs",
     "whole_folder.rs",
@@ -57,18 +58,25 @@ fn main() -> io::Result<()> {
     if !beside.join("ppa-ct").is_dir() {
         roots = PARTS.map(|part| this.join(part)).into();
     }
-    roots.push(beside.join("../Cargo.lock"));
 
     let read_only = |file: &Path| {
         let of_this = file.strip_prefix(this.join("src"));
         of_this.is_ok_and(|file| ONLY_READ.iter().any(|only| file.starts_with(only)))
     };
-    let code = hash(&roots, |file| !read_only(file))?;
+    let code = hash(&roots, |file| !read_only(file))? + &machine();
     let labels = hash(&[this.join("src/labels")], |_| true)?;
     println!("cargo::rustc-env=PPA_CODE={code}");
     println!("cargo::rustc-env=PPA_LABEL_CODE={labels}");
     println!("cargo::rustc-env=PPA_ONLY_READ={}", ONLY_READ.join(","));
     Ok(())
+}
+
+/// The target and its instructions, which `-C target-cpu` adds to.
+fn machine() -> String {
+    println!("cargo::rerun-if-env-changed=CARGO_ENCODED_RUSTFLAGS");
+    let told = ["TARGET", "CARGO_CFG_TARGET_FEATURE"].map(env::var);
+    let told = told.map(|value| value.unwrap_or_default());
+    format!(" {} {}", told[0], told[1])
 }
 
 /// The first eight bytes of a hash over the names and contents of files below some roots.

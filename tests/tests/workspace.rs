@@ -6,20 +6,29 @@ use std::path::{Path, PathBuf};
 
 /// Crates of the workspace and the crates each may depend on outside its tests.
 const ARROWS: &[(&str, &[&str])] = &[
-    ("ppa-ct", &[]),
-    ("ppa-mesh", &["ppa-ct"]),
+    ("ppa-files", &[]),
+    ("ppa-ct", &["ppa-files"]),
+    ("ppa-mesh", &["ppa-files", "ppa-ct"]),
     ("ppa-scene", &["ppa-ct", "ppa-mesh"]),
-    ("ppa-depth", &[]),
-    ("ppa-xray", &["ppa-ct"]),
+    ("ppa-depth", &["ppa-files"]),
+    ("ppa-xray", &["ppa-files", "ppa-ct"]),
     (
         "ppa-dataset",
-        &["ppa-ct", "ppa-mesh", "ppa-scene", "ppa-depth", "ppa-xray"],
+        &[
+            "ppa-files",
+            "ppa-ct",
+            "ppa-mesh",
+            "ppa-scene",
+            "ppa-depth",
+            "ppa-xray",
+        ],
     ),
     ("ppa-metrics", &[]),
-    ("ppa-learn", &["ppa-dataset", "ppa-metrics"]),
+    ("ppa-learn", &["ppa-files", "ppa-dataset", "ppa-metrics"]),
     (
         "ppa-cli",
         &[
+            "ppa-files",
             "ppa-ct",
             "ppa-mesh",
             "ppa-scene",
@@ -106,7 +115,8 @@ fn libraries_used_alone_pull_in_no_reader_network_or_frontend() {
 #[test]
 fn datasets_are_read_without_the_crates_that_make_them() {
     for line in tree(&["--package", "ppa-dataset", "--no-default-features"]) {
-        let ours = line.starts_with("ppa-") && !line.starts_with("ppa-dataset ");
+        let may = ["ppa-dataset ", "ppa-files "];
+        let ours = line.starts_with("ppa-") && !may.iter().any(|name| line.starts_with(name));
         assert!(!ours, "reading a dataset pulls in {line}");
     }
 }

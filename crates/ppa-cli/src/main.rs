@@ -13,6 +13,7 @@ mod shard;
 
 use std::process::ExitCode;
 
+use anyhow::Context;
 use clap::{Parser, Subcommand};
 
 use crate::output::Output;
@@ -98,11 +99,11 @@ enum Command {
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
-    if let Some(threads) = cli.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads.get())
-            .build_global()?;
-    }
+    // Started here: where they are first needed, threads that cannot start would end the program.
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(cli.threads.map_or(0, std::num::NonZeroUsize::get))
+        .build_global()
+        .context("cannot start threads; `--threads 1` needs the least memory")?;
     let output = Output { json: cli.json };
     match cli.command {
         Command::Demo(args) => commands::demo::run(&args, output),

@@ -3,6 +3,7 @@
 mod attributes;
 mod codec;
 mod defined_terms;
+mod directory;
 mod element;
 mod file;
 mod fragments;
@@ -15,6 +16,7 @@ mod stated;
 mod stored;
 mod syntax;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -30,49 +32,91 @@ use series::Sorted;
 use stack::{Between, Stack};
 use stored::StoredFormat;
 
-/// Reads one series in a folder, or below it when the folder itself has no DICOM image.
+/// Reads one series in a folder, or below it when the folder itself has no DICOM image, and of the files that a DICOMDIR
+/// in it names.
 pub(crate) fn read_folder(folder: &Path, options: &ReadOptions) -> Result<Scan, ReadError> {
-    let (found, looked_at) = search(folder, options)?;
+    let mut seen = BTreeSet::new();
+    let (found, looked_at) = search(folder, &mut seen, options)?;
     assemble(folder, found, looked_at, options)
 }
 
-/// Reads a single file of one or more slices.
+/// Reads a single file of one or more slices, or the files that a DICOMDIR names.
 pub(crate) fn read_file(file: &Path, options: &ReadOptions) -> Result<Scan, ReadError> {
-    assemble(file, scan_headers([file.to_owned()], options)?, 1, options)
+    let mut seen = BTreeSet::from([file.to_owned()]);
+    let mut found = scan_headers(seen.clone(), options)?;
+    let listed = listed(&found, &mut seen, options)?;
+    if let ([Found::Directory(directory)], []) = (&found[..], &listed[..]) {
+        return Err(ReadError::EmptyDirectory {
+            path: file.to_owned(),
+            missing: directory.missing,
+        });
+    }
+    found.extend(listed);
+    assemble(file, found, seen.len(), options)
 }
 
 /// What the DICOM files of a folder are, in the order of their names, and how many files there are; where none is an
 /// image, those of its subfolders too, since series are often handed over in a folder of their own beside a licence,
-/// a viewer or a DICOMDIR.
-fn search(folder: &Path, options: &ReadOptions) -> Result<(Vec<Found>, usize), ReadError> {
+/// a viewer or a DICOMDIR. Files that were `seen` are left out.
+fn search(
+    folder: &Path,
+    seen: &mut BTreeSet<PathBuf>,
+    options: &ReadOptions,
+) -> Result<(Vec<Found>, usize), ReadError> {
     let io = |path: &Path, source| ReadError::Io {
         path: path.to_owned(),
         source,
     };
-    let (mut files, mut dicom, mut subfolders) = (0, Vec::new(), Vec::new());
+    let (mut files, mut dicom, mut subfolders) = (0, BTreeSet::new(), Vec::new());
     for entry in std::fs::read_dir(folder).map_err(|e| io(folder, e))? {
         let entry = entry.map_err(|e| io(folder, e))?;
         let path = entry.path();
         if path.is_file() {
             files += 1;
-            if starts_as_dicom(&path).map_err(|e| io(&path, e))? {
-                dicom.push(path);
+            if !seen.contains(&path) && starts_as_dicom(&path).map_err(|e| io(&path, e))? {
+                dicom.insert(path);
             }
         } else if entry.file_type().map_err(|e| io(&path, e))?.is_dir() {
             subfolders.push(path);
         }
     }
-    dicom.sort();
     subfolders.sort();
+    seen.extend(dicom.iter().cloned());
     let mut found = scan_headers(dicom, options)?;
-    if found.iter().all(|f| matches!(f, Found::NotAnImage)) {
+    let no_image = |f: &Found| matches!(f, Found::NotAnImage | Found::Directory(_));
+    let go_on = found.iter().all(no_image);
+    found.extend(listed(&found, seen, options)?);
+    if go_on {
         for subfolder in subfolders {
-            let (below, more) = search(&subfolder, options)?;
+            let (below, more) = search(&subfolder, seen, options)?;
             found.extend(below);
             files += more;
         }
     }
     Ok((found, files))
+}
+
+/// What the files are that directories among those found name, but for those that were `seen`.
+fn listed(
+    found: &[Found],
+    seen: &mut BTreeSet<PathBuf>,
+    options: &ReadOptions,
+) -> Result<Vec<Found>, ReadError> {
+    let directories = found.iter().filter_map(|found| match found {
+        Found::Directory(listed) => Some(listed),
+        _ => None,
+    });
+    let mut files = BTreeSet::new();
+    for file in directories.flat_map(|directory| &directory.files) {
+        let dicom = starts_as_dicom(file).map_err(|source| ReadError::Io {
+            path: file.clone(),
+            source,
+        })?;
+        if dicom && seen.insert(file.clone()) {
+            files.insert(file.clone());
+        }
+    }
+    scan_headers(files, options)
 }
 
 /// Reads all headers in parallel; of several errors, the first file's is reported.

@@ -125,20 +125,27 @@ fn stored(header: &NiftiHeader) -> Result<Stored, String> {
             ));
         }
     };
-    // A slope of 0 or NaN means that values are stored as they are.
-    let slope = f64::from(header.scl_slope);
-    let scaled = slope.is_finite() && slope != 0.0;
-    let intercept = f64::from(header.scl_inter);
+    let [slope, intercept] = scaling(header)?;
     Ok(Stored {
         number,
         big_endian: header.endianness == Endianness::Big,
-        slope: if scaled { slope } else { 1.0 },
-        intercept: if scaled && intercept.is_finite() {
-            intercept
-        } else {
-            0.0
-        },
+        slope,
+        intercept,
     })
+}
+
+/// Slope and intercept from stored numbers to HU; a slope of 0, or NaN as some programs write it, means none.
+fn scaling(header: &NiftiHeader) -> Result<[f64; 2], String> {
+    let [slope, intercept] = [header.scl_slope, header.scl_inter].map(f64::from);
+    if slope == 0.0 || slope.is_nan() {
+        return Ok([1.0, 0.0]);
+    }
+    if slope.is_finite() && intercept.is_finite() {
+        return Ok([slope, intercept]);
+    }
+    Err(format!(
+        "scl_slope {slope} and scl_inter {intercept}, expected finite numbers, or a slope of 0 or NaN for none"
+    ))
 }
 
 /// Bytes between header and voxels, which extensions fill.

@@ -99,6 +99,8 @@ pub enum WarningCode {
     LocalizersDropped,
     /// DICOM objects that are no images were left out.
     NonImagesDropped,
+    /// A DICOMDIR names files that are not there.
+    FilesMissing,
     /// No rescale slope and intercept: stored values are taken as HU.
     NoRescale,
     /// The values do not look like Hounsfield units, or were said to be none.
@@ -113,7 +115,7 @@ pub enum WarningCode {
     NoOrientation,
 }
 
-/// Reads a CT: a folder with one DICOM series, a single DICOM file, NIfTI (`.nii`, `.nii.gz`),
+/// Reads a CT: a folder with one DICOM series, a single DICOM file, a DICOMDIR, NIfTI (`.nii`, `.nii.gz`),
 /// NRRD (`.nrrd`, `.nhdr`) or MetaImage (`.mha`, `.mhd`).
 ///
 /// As [`read_with`] without any option.
@@ -169,9 +171,7 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<Scan, ReadError> 
 pub(crate) fn starts_as_dicom(path: &Path) -> std::io::Result<bool> {
     use std::io::Read;
     let mut start = Vec::with_capacity(132);
-    std::fs::File::open(path)?
-        .take(132)
-        .read_to_end(&mut start)?;
+    ppa_files::open(path)?.take(132).read_to_end(&mut start)?;
     Ok(start.get(128..) == Some(b"DICM"))
 }
 

@@ -1,6 +1,5 @@
 //! A file that holds a scan: its bytes from the first to the last, and errors that name it.
 
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::mem;
 use std::path::{Component, Path, PathBuf};
@@ -30,6 +29,15 @@ pub(crate) enum Packing {
     Zlib,
 }
 
+/// Whether a file is a link that leads out of the folder it lies in.
+fn leads_out(path: &Path) -> io::Result<bool> {
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    Ok(!path.canonicalize()?.starts_with(folder.canonicalize()?))
+}
+
 /// A file being read from front to back.
 pub(crate) struct ScanFile {
     path: PathBuf,
@@ -42,7 +50,7 @@ pub(crate) struct ScanFile {
 impl ScanFile {
     pub(crate) fn open(path: &Path) -> Result<Self, ReadError> {
         let opened = || -> io::Result<_> {
-            let file = File::open(path)?;
+            let file = ppa_files::open(path)?;
             let most = file.metadata()?.len();
             Ok((file, most))
         };
@@ -71,7 +79,16 @@ impl ScanFile {
                 "the voxels are said to lie in another folder; expected a file beside the header",
             ));
         }
-        Self::open(&self.path.with_file_name(name))
+        let path = self.path.with_file_name(name);
+        if leads_out(&path).map_err(|source| ReadError::Io {
+            path: path.clone(),
+            source,
+        })? {
+            return Err(self.header(
+                "the file of its voxels is a link to another folder; expected a file beside the header",
+            ));
+        }
+        Self::open(&path)
     }
 
     /// What is wrong with the header.

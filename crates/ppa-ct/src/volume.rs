@@ -6,7 +6,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::grid::{Grid, GridError};
-use crate::values::{Values, Voxels};
+use crate::values::{Values, Voxels, with_room};
 
 /// Why a volume cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -57,7 +57,7 @@ pub enum VolumeError {
         to_mm: f64,
     },
     /// More voxels than there is memory for.
-    #[error("no memory for {voxels} voxels")]
+    #[error("memory does not hold {voxels} voxels and what is computed of them")]
     Memory {
         /// Voxels asked for.
         voxels: usize,
@@ -130,6 +130,22 @@ impl Volume {
         self.voxels.values()
     }
 
+    /// Whether memory holds `bytes` more for each voxel, and some for all that is small.
+    ///
+    /// The memory is asked for and given back: an allocation that fails later ends the program.
+    ///
+    /// # Errors
+    /// [`VolumeError::Memory`].
+    pub fn expect_room(&self, bytes: usize) -> Result<(), VolumeError> {
+        const SMALL_BYTES: usize = 1 << 24;
+        let voxels = self.grid.len();
+        let wanted = voxels.saturating_mul(bytes).saturating_add(SMALL_BYTES);
+        match with_room::<u8>(wanted) {
+            Ok(_) => Ok(()),
+            Err(_) => Err(VolumeError::Memory { voxels }),
+        }
+    }
+
     /// The value of voxel (i, j, k).
     ///
     /// # Panics
@@ -172,12 +188,12 @@ impl Volume {
     /// The voxels `low..high` (half-open on every axis), at the same world place.
     ///
     /// # Errors
-    /// [`VolumeError::Grid`] when the range is empty or leaves the volume.
+    /// [`VolumeError::Grid`] when the range is empty or leaves the volume, [`VolumeError::Memory`].
     pub fn crop(&self, low: [usize; 3], high: [usize; 3]) -> Result<Self, VolumeError> {
         let grid = self.grid.crop(low, high)?;
         let voxels = match &self.voxels {
-            Voxels::I16(hu) => Voxels::I16(cut(hu, &self.grid, low, high)),
-            Voxels::F32(hu) => Voxels::F32(cut(hu, &self.grid, low, high)),
+            Voxels::I16(hu) => Voxels::I16(cut(hu, &self.grid, low, high)?),
+            Voxels::F32(hu) => Voxels::F32(cut(hu, &self.grid, low, high)?),
         };
         Ok(Self { grid, voxels })
     }
@@ -231,16 +247,21 @@ impl Volume {
 }
 
 /// The values of the voxels `low..high`.
-fn cut<T: Copy>(values: &[T], grid: &Grid, low: [usize; 3], high: [usize; 3]) -> Vec<T> {
+fn cut<T: Copy>(
+    values: &[T],
+    grid: &Grid,
+    low: [usize; 3],
+    high: [usize; 3],
+) -> Result<Vec<T>, VolumeError> {
     let length = high[0] - low[0];
-    let mut cut = Vec::with_capacity(length * (high[1] - low[1]) * (high[2] - low[2]));
+    let mut cut = with_room(length * (high[1] - low[1]) * (high[2] - low[2]))?;
     for k in low[2]..high[2] {
         for j in low[1]..high[1] {
             let start = grid.index([low[0], j, k]);
             cut.extend_from_slice(&values[start..start + length]);
         }
     }
-    cut
+    Ok(cut)
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::case::Case;
+use crate::compiled::code;
 use crate::files::{FileError, hex, sha256_of_file};
 use crate::findings::FindingCode;
 use crate::layout::{LimbId, View};
@@ -22,7 +23,7 @@ pub(crate) const DESCRIPTION_FILE: &str = "dataset.json";
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Settings {
     generator: &'static str,
-    /// Hash of sources and physics data, see `build.rs`.
+    /// Hash of sources, physics data and compiled crates, see `compiled.rs`.
     code: &'static str,
     seed: u64,
     shapes: ShapeSettings,
@@ -47,7 +48,7 @@ impl Settings {
             |path: &Option<std::path::PathBuf>| path.as_deref().map(sha256_of_file).transpose();
         Ok(Self {
             generator: concat!("ppa ", env!("CARGO_PKG_VERSION")),
-            code: env!("PPA_CODE"),
+            code: code(),
             seed: plan.seed,
             shapes: plan.shapes.clone(),
             soft_tissue: plan.soft_tissue,

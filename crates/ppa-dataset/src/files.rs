@@ -67,7 +67,7 @@ pub(crate) fn remove_if_there(path: &Path) -> Result<(), FileError> {
 
 /// Reads a text file.
 pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
-    fs::read_to_string(path).map_err(FileError::at("read", path))
+    ppa_files::read_to_string(path).map_err(FileError::at("read", path))
 }
 
 /// SHA-256 of a file's bytes as lower-case hexadecimal.
@@ -75,7 +75,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
 /// # Errors
 /// [`FileError`] when the file cannot be read.
 pub fn sha256_of_file(path: &Path) -> Result<String, FileError> {
-    let bytes = fs::read(path).map_err(FileError::at("read", path))?;
+    let bytes = ppa_files::read(path).map_err(FileError::at("read", path))?;
     Ok(hex(&Sha256::digest(bytes)))
 }
 

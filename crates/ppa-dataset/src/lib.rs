@@ -30,6 +30,8 @@ mod closed_skin;
 #[cfg(feature = "generate")]
 mod commented_plan;
 #[cfg(feature = "generate")]
+mod compiled;
+#[cfg(feature = "generate")]
 mod contact_sheet;
 #[cfg(feature = "generate")]
 mod coverage_plot;
@@ -89,6 +91,7 @@ mod seed;
 #[cfg(feature = "generate")]
 mod shaped_skin;
 mod split;
+mod spreadsheet;
 #[cfg(feature = "generate")]
 mod stage;
 #[cfg(feature = "generate")]
@@ -150,6 +153,7 @@ pub use room_file::RoomFile;
 #[cfg(feature = "generate")]
 pub use shaped_skin::{ShapeSettings, body_shape};
 pub use split::{Split, SplitError};
+pub use spreadsheet::is_formula;
 #[cfg(feature = "generate")]
 pub use stage::{PlacedCamera, Stage, StageError, Table, body_of_cloud, spectrum, tube};
 #[cfg(feature = "generate")]

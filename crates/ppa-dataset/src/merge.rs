@@ -181,7 +181,7 @@ impl<'a> Shards<'a> {
         }
         for row in &files {
             let path = shard.join(&row.file);
-            let bytes = std::fs::read(&path).map_err(FileError::at("read", &path))?;
+            let bytes = ppa_files::read(&path).map_err(FileError::at("read", &path))?;
             if hex(&Sha256::digest(&bytes)) != row.sha256 {
                 return Err(MergeError::Altered(path));
             }

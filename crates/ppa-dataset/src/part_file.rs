@@ -1,6 +1,5 @@
 //! Which part of a plan a folder is to hold: `.ppa/part`, absent where it is the whole.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -23,7 +22,7 @@ pub(crate) fn write_part(root: &Path, part: Part) -> Result<(), FileError> {
 
 pub(crate) fn read_part(root: &Path) -> Result<Part, FileError> {
     let path = path(root);
-    match fs::read_to_string(&path) {
+    match ppa_files::read_to_string(&path) {
         Ok(text) => text
             .parse()
             .map_err(|e| FileError::at("parse", &path)(io::Error::other(e))),

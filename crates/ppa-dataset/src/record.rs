@@ -69,7 +69,7 @@ pub(crate) struct Record {
 impl Record {
     /// The record of a pose when key and every file still agree with it, else `None`.
     pub fn of_complete(root: &Path, unit: &Unit) -> Option<Self> {
-        let text = fs::read_to_string(unit.path(root)).ok()?;
+        let text = ppa_files::read_to_string(unit.path(root)).ok()?;
         let record: Self = serde_json::from_str(&text).ok()?;
         let intact = |row: &FileRow| {
             sha256_of_file(&root.join(&row.file)).is_ok_and(|found| found == row.sha256)

@@ -60,7 +60,7 @@ pub enum SplitError {
         part: String,
     },
     /// A part whose name could not be that of a file everywhere.
-    #[error("a part is called {0:?}, expected letters, digits, _ and -")]
+    #[error("a part is called {0:?}, expected letters, digits, _ and -, the last not in front")]
     Name(String),
     /// Shares that cannot be drawn.
     #[error("{0}")]
@@ -192,10 +192,10 @@ impl Split {
     }
 }
 
-/// Archives are named after parts: a name must not lead out of their folder.
+/// Archives are named after parts: a name must not lead out of their folder, nor look like an option or a formula.
 fn check_name(name: &str) -> Result<(), SplitError> {
     let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    match !name.is_empty() && name.chars().all(plain) {
+    match !name.is_empty() && !name.starts_with('-') && name.chars().all(plain) {
         true => Ok(()),
         false => Err(SplitError::Name(name.to_owned())),
     }

@@ -94,7 +94,7 @@ impl CameraSpec {
     /// # Errors
     /// [`CameraError`] names the file and what is missing in it.
     pub fn import(path: &Path, mode: DepthMode) -> Result<Self, CameraError> {
-        let text = std::fs::read_to_string(path).map_err(|source| CameraError::Read {
+        let text = ppa_files::read_to_string(path).map_err(|source| CameraError::Read {
             path: path.into(),
             source,
         })?;

@@ -1,6 +1,5 @@
 //! 16-bit grey PNG in millimetres.
 
-use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::Path;
 
@@ -56,7 +55,7 @@ impl DepthImage {
             path: path.into(),
             source,
         };
-        let file = File::open(path).map_err(broken)?;
+        let file = ppa_files::open(path).map_err(broken)?;
         let mut reader = png::Decoder::new(BufReader::new(file))
             .read_info()
             .map_err(|e| broken(e.into()))?;
@@ -131,7 +130,7 @@ mod tests {
     fn bad_files_and_folders_are_named() {
         let folder = tempfile::tempdir().unwrap();
         let grey8 = folder.path().join("grey8.png");
-        let mut encoder = png::Encoder::new(File::create(&grey8).unwrap(), 1, 1);
+        let mut encoder = png::Encoder::new(std::fs::File::create(&grey8).unwrap(), 1, 1);
         encoder.set_color(png::ColorType::Grayscale);
         encoder
             .write_header()
@@ -149,7 +148,7 @@ mod tests {
         ));
         // What a header claims is looked at before memory is asked for.
         let wide = folder.path().join("wide.png");
-        let mut encoder = png::Encoder::new(File::create(&wide).unwrap(), 20_000, 1);
+        let mut encoder = png::Encoder::new(std::fs::File::create(&wide).unwrap(), 20_000, 1);
         encoder.set_depth(png::BitDepth::Sixteen);
         let mut row = encoder.write_header().unwrap();
         row.write_image_data(&[0; 40_000]).unwrap();

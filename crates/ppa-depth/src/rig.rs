@@ -126,7 +126,7 @@ impl RigSpec {
     /// # Errors
     /// [`RigError`] names the file, or the camera and the number at fault.
     pub fn read(path: &Path) -> Result<Self, RigError> {
-        let text = std::fs::read_to_string(path).map_err(|source| RigError::Read {
+        let text = ppa_files::read_to_string(path).map_err(|source| RigError::Read {
             path: path.into(),
             source,
         })?;

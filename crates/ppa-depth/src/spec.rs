@@ -191,7 +191,7 @@ impl CameraSpec {
     /// # Errors
     /// [`CameraError::Read`] or [`CameraError::Json`].
     pub fn read(path: &Path) -> Result<Self, CameraError> {
-        let text = std::fs::read_to_string(path).map_err(|source| CameraError::Read {
+        let text = ppa_files::read_to_string(path).map_err(|source| CameraError::Read {
             path: path.into(),
             source,
         })?;

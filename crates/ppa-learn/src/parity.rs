@@ -38,7 +38,8 @@ pub fn parity(weights: &Path, io: &Path) -> Result<Parity, WeightsError> {
         path: io.to_owned(),
         source,
     };
-    let tensors = candle_core::safetensors::load(io, &Device::Cpu)
+    let bytes = ppa_files::read(io).map_err(|error| unreadable(error.into()))?;
+    let tensors = candle_core::safetensors::load_buffer(&bytes, &Device::Cpu)
         .map_err(|error| unreadable(error.into()))?;
     let tensor = |name: &str| {
         tensors

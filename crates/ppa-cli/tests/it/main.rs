@@ -13,6 +13,7 @@ mod faults;
 mod gates;
 mod gates_carried;
 mod grading;
+mod hostile;
 mod identity;
 mod json;
 mod labels;

@@ -104,6 +104,10 @@ fn of_warning(code: WarningCode) -> (&'static str, &'static str) {
             "The radiograph shows a slab of constant cross-section.",
         ),
         WarningCode::LocalizersDropped | WarningCode::NonImagesDropped => ("None.", "None."),
+        WarningCode::FilesMissing => (
+            "If slices are missing at an end, the limb is cut there.",
+            "If slices are missing at an end, tissue there does not attenuate.",
+        ),
         WarningCode::NoRescale => (
             "If stored values are not HU, the skin threshold finds the wrong surface.",
             "If stored values are not HU, every density is wrong.",

@@ -9,6 +9,8 @@ mod jpeg_ls;
 mod rle;
 
 use super::header::Image;
+use crate::values::{with_room, zeros};
+use crate::volume::VolumeError;
 
 /// A family of encodings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,14 +28,20 @@ pub(super) enum CodecError {
     Damaged(String),
     #[error("the compressed stream holds {found}, expected {expected}")]
     Unexpected { found: String, expected: String },
+    #[error(transparent)]
+    Memory(#[from] VolumeError),
 }
 
 impl Codec {
     /// Unpacks one frame into `image.native_bytes()` bytes.
     pub fn unpack(self, packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError> {
         match self {
-            Self::Rle => rle::unpack(packed, image.pixels(), image.stored.bytes())
-                .ok_or_else(|| CodecError::Damaged("run lengths".to_owned())),
+            Self::Rle => {
+                let mut values = zeros(image.native_bytes())?;
+                rle::unpack(packed, image.stored.bytes(), &mut values)
+                    .ok_or_else(|| CodecError::Damaged("run lengths".to_owned()))?;
+                Ok(values)
+            }
             Self::Jpeg => jpeg::unpack(packed, image),
             Self::JpegLs => jpeg_ls::unpack(packed, image),
             Self::Jpeg2000 => jpeg_2000::unpack(packed, image),
@@ -88,7 +96,7 @@ fn contain(
             expected: format!("{} (one per pixel)", image.pixels()),
         });
     }
-    let mut bytes = vec![0; image.native_bytes()];
+    let mut bytes = zeros(image.native_bytes())?;
     match image.stored.bytes() {
         1 => {
             let places = bytes.iter_mut().zip(samples);
@@ -104,6 +112,13 @@ fn contain(
         }
     }
     Ok(bytes)
+}
+
+/// Refuses an image for which a decoder, that would end the program where memory does, finds too little on any thread.
+fn expect_memory(image: &Image, bytes_per_pixel: usize) -> Result<(), CodecError> {
+    let bytes = image.pixels().saturating_mul(bytes_per_pixel);
+    with_room::<u8>(bytes.saturating_mul(rayon::current_num_threads()))?;
+    Ok(())
 }
 
 /// Refuses samples of more bits than a container has.

@@ -3,7 +3,6 @@
 mod open;
 
 use std::borrow::Cow;
-use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -129,7 +128,7 @@ impl DicomFile {
                 Err(short())
             };
         }
-        let mut file = File::open(&self.path).map_err(|e| self.io(e))?;
+        let mut file = ppa_files::open(&self.path).map_err(|e| self.io(e))?;
         file.seek(SeekFrom::Start(at)).map_err(|e| self.io(e))?;
         // The length was there when the header was read.
         bytes.resize(length as usize, 0);
@@ -141,7 +140,7 @@ impl DicomFile {
 
     /// The data set of a deflated file, from its start.
     fn inflated(&self) -> Result<impl Read + use<>, ReadError> {
-        let mut file = File::open(&self.path).map_err(|e| self.io(e))?;
+        let mut file = ppa_files::open(&self.path).map_err(|e| self.io(e))?;
         let at = SeekFrom::Start(self.deflated_at.unwrap_or_default());
         file.seek(at).map_err(|e| self.io(e))?;
         Ok(DeflateDecoder::new(BufReader::new(file)))

@@ -7,6 +7,7 @@ use dicom_dictionary_std::{tags, uids};
 
 use super::attributes::{Attributes, Groups};
 use super::defined_terms;
+use super::directory::{Listed, listed};
 use super::file::{DicomFile, damaged, open};
 use super::frame::Frame;
 use super::stated::stated;
@@ -24,7 +25,9 @@ pub(super) enum Found {
     OtherModality(Series),
     /// A scout view.
     Localizer,
-    /// A report, a plan, a directory.
+    /// A DICOMDIR.
+    Directory(Listed),
+    /// A report, a plan.
     NotAnImage,
 }
 
@@ -80,6 +83,9 @@ impl Image {
 pub(super) fn scan(path: &Path, force: bool) -> Result<Found, ReadError> {
     let opened = open(path)?;
     let data_set = opened.data_set()?;
+    if opened.file.sop_class == uids::MEDIA_STORAGE_DIRECTORY_STORAGE {
+        return Ok(Found::Directory(listed(path, &data_set)?));
+    }
     let top = Attributes::of(path, &data_set);
     let series = match kind(&top, &opened.file.sop_class, force) {
         Kind::Slices(series) => series,

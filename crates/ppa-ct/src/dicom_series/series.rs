@@ -13,6 +13,8 @@ pub(super) struct Sorted {
     series: Vec<Member>,
     localizers: usize,
     others: usize,
+    /// Files that a DICOMDIR names and that are not there.
+    missing: usize,
 }
 
 struct Member {
@@ -56,11 +58,16 @@ impl Sorted {
     /// Groups files by series.
     pub fn of(found: Vec<Found>) -> Self {
         let mut by_uid = BTreeMap::<String, (usize, Member)>::new();
-        let (mut localizers, mut others) = (0, 0);
+        let (mut localizers, mut others, mut missing) = (0, 0, 0);
         for (order, item) in found.into_iter().enumerate() {
             let (series, slices, refused) = match item {
                 Found::Localizer => {
                     localizers += 1;
+                    continue;
+                }
+                Found::Directory(listed) => {
+                    others += 1;
+                    missing += listed.missing;
                     continue;
                 }
                 Found::NotAnImage => {
@@ -87,6 +94,7 @@ impl Sorted {
             series: series.into_iter().map(|(_, member)| member).collect(),
             localizers,
             others,
+            missing,
         }
     }
 
@@ -108,6 +116,15 @@ impl Sorted {
                 text: format!(
                     "{} DICOM objects that are no images were left out",
                     self.others
+                ),
+            });
+        }
+        if self.missing > 0 {
+            warnings.push(Warning {
+                code: WarningCode::FilesMissing,
+                text: format!(
+                    "the DICOMDIR names {} files that are not there",
+                    self.missing
                 ),
             });
         }

@@ -42,6 +42,14 @@ pub enum ReadError {
         /// Files in it.
         files: usize,
     },
+    /// A DICOMDIR whose files are not there.
+    #[error("{} is a DICOM directory; none of the {missing} files that it names lies below it", path.display())]
+    EmptyDirectory {
+        /// The directory.
+        path: PathBuf,
+        /// Files that it names.
+        missing: usize,
+    },
     /// A file that starts as DICOM cannot be parsed to the end.
     #[error("{} is damaged or no valid DICOM file", path.display())]
     Dicom {

@@ -273,11 +273,12 @@ pub(super) fn is_data_file(name: &str) -> bool {
     name.trim() == name && !name.starts_with("LIST") && !name.contains(special)
 }
 
-/// `N` numbers parted by blanks.
+/// `N` finite numbers parted by blanks.
 fn numbers<const N: usize>(key: &str, text: &str) -> Result<[f64; N], String> {
-    let found = text.split_whitespace().map(|n| n.parse().ok());
+    let finite = |n: &str| n.parse().ok().filter(|v: &f64| v.is_finite());
+    let found = text.split_whitespace().map(finite);
     found
         .collect::<Option<Vec<f64>>>()
         .and_then(|numbers| numbers.try_into().ok())
-        .ok_or_else(|| format!("{key} is {text}, expected {N} numbers"))
+        .ok_or_else(|| format!("{key} is {text}, expected {N} finite numbers"))
 }

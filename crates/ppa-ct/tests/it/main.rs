@@ -8,6 +8,8 @@ mod damaged_volumes;
 mod dicom;
 mod dicom_odd;
 mod dicom_write;
+mod hostile_jpeg_2000;
+mod hostile_places;
 mod meta_image;
 mod meta_image_write;
 mod nifti;

@@ -205,3 +205,35 @@ fn a_failed_write_leaves_nothing() {
     std::fs::remove_dir(&taken).unwrap();
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
+
+/// `scl_slope` at byte 112, `scl_inter` at 116: values of the format's authors, and of programs in use.
+#[test]
+fn scalings_that_are_no_numbers_are_refused_unless_they_mean_none() {
+    let scaled = |slope: f32, intercept: f32| {
+        patched(&[(112, &slope.to_le_bytes()), (116, &intercept.to_le_bytes())])
+    };
+    for (slope, intercept) in [
+        (0.0, 0.0),
+        (f32::NAN, f32::NAN),
+        (f32::NAN, 5.0),
+        (0.0, f32::INFINITY),
+    ] {
+        assert_eq!(
+            scaled(slope, intercept).unwrap().volume,
+            small(),
+            "{slope} {intercept}"
+        );
+    }
+    let half = scaled(-0.5, 3.0).unwrap().volume;
+    assert_eq!(half.at([0, 0, 0]), 503.0);
+    for (slope, intercept) in [
+        (f32::INFINITY, 0.0),
+        (f32::NEG_INFINITY, 0.0),
+        (1.0, f32::NAN),
+        (2.0, f32::INFINITY),
+    ] {
+        let error = scaled(slope, intercept).unwrap_err();
+        assert!(matches!(error, ReadError::Header { .. }), "{error}");
+        assert!(error.to_string().contains("scl_slope"), "{error}");
+    }
+}

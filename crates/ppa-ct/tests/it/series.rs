@@ -54,6 +54,11 @@ impl SliceSpec {
     }
 
     pub fn write(&self, path: &Path) {
+        self.write_changed(path, self.change);
+    }
+
+    /// Writes it with a change of the data set that is made last.
+    pub fn write_changed(&self, path: &Path, change: impl FnOnce(&mut InMemDicomObject)) {
         let decimal = |values: &[f64]| {
             let texts = values.iter().map(|v| format!("{v:.10}"));
             PrimitiveValue::from(texts.collect::<Vec<_>>().join("\\"))
@@ -120,7 +125,7 @@ impl SliceSpec {
             VR::OW,
             PrimitiveValue::U16(self.stored.iter().copied().collect()),
         ));
-        (self.change)(&mut object);
+        change(&mut object);
         object
             .with_meta(
                 FileMetaTableBuilder::new()

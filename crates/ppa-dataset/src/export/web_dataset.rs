@@ -114,7 +114,7 @@ fn write_shard(root: &Path, path: &Path, pairs: &[&ImagePair]) -> Result<(), Fil
         let name = sample_name(pair);
         for (kind, file) in images(pair) {
             let image: PathBuf = root.join(file);
-            let bytes = std::fs::read(&image).map_err(FileError::at("read", &image))?;
+            let bytes = ppa_files::read(&image).map_err(FileError::at("read", &image))?;
             add(format!("{name}.{kind}.png"), &bytes)?;
         }
         let text = serde_json::to_string(pair).expect("rows hold only JSON values");

@@ -1,5 +1,6 @@
 //! Readings and their standard errors from the tallies of a radiograph.
 
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use exr::prelude::{ReadChannels, ReadLayers, read};
@@ -25,13 +26,14 @@ impl Tallies {
             path: path.to_owned(),
             message,
         };
+        let file = ppa_files::open(path).map_err(|error| wrong(error.to_string()))?;
         let layer = read()
             .no_deep_data()
             .largest_resolution_level()
             .all_channels()
             .first_valid_layer()
             .all_attributes()
-            .from_file(path)
+            .from_buffered(BufReader::new(file))
             .map_err(|error| wrong(error.to_string()))?
             .layer_data;
         let found = [layer.size.x(), layer.size.y()];

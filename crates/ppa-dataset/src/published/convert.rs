@@ -203,6 +203,8 @@ impl Copy<'_> {
         let (from, to) = (self.from.root.join(from), self.root.join(to));
         let folder = to.parent().expect("files lie in folders of the dataset");
         fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
+        // `fs::copy` would wait for ever for somebody to write into a named pipe.
+        drop(ppa_files::open(&from).map_err(FileError::at("copy", &from))?);
         fs::copy(&from, &to).map_err(FileError::at("copy", &from))?;
         Ok(())
     }

@@ -127,7 +127,7 @@ pub fn inspect(root: &Path) -> Result<Inspection, PublishedError> {
 /// Hash of an image, if it can be read, and what is wrong with it.
 fn look(root: &Path, file: &str, roi: Option<&RoiRow>) -> (Option<String>, Option<Flaw>) {
     let path = root.join(file);
-    let bytes = match std::fs::read(&path).map_err(FileError::at("read", &path)) {
+    let bytes = match ppa_files::read(&path).map_err(FileError::at("read", &path)) {
         Ok(bytes) => bytes,
         Err(error) => return (None, Some(damaged(&error.into()))),
     };

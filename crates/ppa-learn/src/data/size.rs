@@ -1,6 +1,5 @@
 //! Columns and rows of an image, from its header.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
@@ -18,7 +17,7 @@ pub fn size_of(path: &Path) -> Result<[usize; 2], DataError> {
         path: path.to_owned(),
         source,
     };
-    let file = File::open(path).map_err(|source| ImageFileError::File(unreadable(source)))?;
+    let file = ppa_files::open(path).map_err(|source| ImageFileError::File(unreadable(source)))?;
     let header = PngDecoder::new(BufReader::new(file));
     let header = header.map_err(|source| ImageFileError::Damaged {
         path: path.to_owned(),

@@ -1,7 +1,7 @@
 //! The pairs of frames in a folder that a recorder fills.
 
 use std::collections::HashMap;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
@@ -127,7 +127,7 @@ impl PairFolder {
 
 /// Length of a file, when it was written, and whether it ends as a PNG.
 fn end_of(file: &Path) -> io::Result<(u64, SystemTime, bool)> {
-    let mut file = File::open(file)?;
+    let mut file = ppa_files::open(file)?;
     let metadata = file.metadata()?;
     let mut end = [0; PNG_END.len()];
     if metadata.len() >= end.len() as u64 {
@@ -223,7 +223,7 @@ mod tests {
             for view in ["left", "right"] {
                 let path = root.path().join(format!("depth_cam_{view}_{name}.png"));
                 fs::write(&path, PNG_END).unwrap();
-                let file = File::options().write(true).open(&path).unwrap();
+                let file = fs::File::options().write(true).open(&path).unwrap();
                 file.set_modified(start + Duration::from_secs(seconds))
                     .unwrap();
             }

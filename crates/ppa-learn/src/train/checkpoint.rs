@@ -66,7 +66,7 @@ pub(super) fn load(
         path: path.to_owned(),
         message,
     };
-    let bytes = std::fs::read(path).map_err(at("read", path))?;
+    let bytes = ppa_files::read(path).map_err(at("read", path))?;
     let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|e| wrong(e.to_string()))?;
     let state = header.metadata().as_ref().and_then(|m| m.get(METADATA));
     let state = state.ok_or_else(|| wrong("it tells neither step nor configuration".into()))?;

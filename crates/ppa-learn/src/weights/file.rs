@@ -135,8 +135,13 @@ fn read_any(
     path: &Path,
 ) -> Result<HashMap<String, Tensor>, Box<dyn std::error::Error + Send + Sync>> {
     match path.extension().and_then(|extension| extension.to_str()) {
-        Some("safetensors") => Ok(candle_core::safetensors::load(path, &Device::Cpu)?),
+        Some("safetensors") => Ok(candle_core::safetensors::load_buffer(
+            &ppa_files::read(path)?,
+            &Device::Cpu,
+        )?),
         Some("pth" | "pt") => {
+            // The archive is opened by its path: what would block is refused before.
+            drop(ppa_files::open(path)?);
             let tensors = pickle::read_all(path)?;
             // Training scripts put the weights beside other things.
             let tensors = if tensors.is_empty() {

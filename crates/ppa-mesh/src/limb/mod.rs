@@ -81,6 +81,9 @@ pub enum LimbError {
         /// What would do.
         expected: &'static str,
     },
+    /// More voxels than there is memory to work on.
+    #[error("the limb cannot be looked for")]
+    Memory(#[source] VolumeError),
     /// Nothing solid is in the volume.
     #[error(
         "no limb: nothing above {core_hu} HU is thicker than {thickness_mm} mm (values reach {max_hu} HU)"
@@ -101,6 +104,9 @@ pub enum LimbError {
     Surface(#[from] SurfaceError),
 }
 
+/// Working memory for each voxel: 5.4 times those of 16 bits where a limb fills the scan, and the mask.
+const WORKING_BYTES: usize = 12;
+
 /// Finds the limb of a scan.
 ///
 /// The mesh is open where the volume (or the crop) cuts the limb, since a wall there is no skin; the walls
@@ -113,9 +119,12 @@ pub enum LimbError {
 /// four times where limbs fill it.
 ///
 /// # Errors
-/// [`LimbError`] when the settings do not fit or nothing solid is there.
+/// [`LimbError`] when the settings do not fit, memory does not suffice or nothing solid is there.
 pub fn extract_limb(volume: &Volume, settings: &LimbSettings) -> Result<Limb, LimbError> {
     check(settings)?;
+    volume
+        .expect_room(WORKING_BYTES)
+        .map_err(LimbError::Memory)?;
     let Some(crop) = settings.crop else {
         return within(volume, settings);
     };

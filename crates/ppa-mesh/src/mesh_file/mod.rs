@@ -6,7 +6,6 @@ mod ply;
 mod polygons;
 mod stl;
 
-use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Write};
 use std::path::Path;
 
@@ -76,9 +75,9 @@ pub fn read_mesh_file(path: &Path) -> Result<MeshContents, MeshFileError> {
         source,
     };
     let contents = match format {
-        Format::Ply => ply::read(BufReader::new(File::open(path).map_err(open)?)),
-        Format::Obj => obj::read(&std::fs::read(path).map_err(open)?),
-        Format::Stl => stl::read(&std::fs::read(path).map_err(open)?),
+        Format::Ply => ply::read(BufReader::new(ppa_files::open(path).map_err(open)?)),
+        Format::Obj => obj::read(&ppa_files::read(path).map_err(open)?),
+        Format::Stl => stl::read(&ppa_files::read(path).map_err(open)?),
     };
     let checked = contents.and_then(|mut contents| {
         let points = &contents.cloud.points;

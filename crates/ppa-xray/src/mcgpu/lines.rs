@@ -1,6 +1,5 @@
 //! Lines of a text file, plain or gzip, one at a time.
 
-use std::fs::File;
 use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
@@ -30,7 +29,7 @@ pub(crate) struct Lines {
 impl Lines {
     pub fn open(path: &Path) -> Result<Self, McgpuError> {
         let open = || -> std::io::Result<_> {
-            let mut file = File::open(path)?;
+            let mut file = ppa_files::open(path)?;
             let metadata = file.metadata()?;
             if metadata.is_dir() {
                 return Err(std::io::ErrorKind::IsADirectory.into());

@@ -87,7 +87,7 @@ impl AnalogTally {
             what: what.to_owned(),
         };
         let foreign = || TallyError::Foreign { path: path.into() };
-        let mut file = std::fs::File::open(path).map_err(failed)?;
+        let mut file = ppa_files::open(path).map_err(failed)?;
         let found = file.metadata().map_err(failed)?.len();
         let mut start = [0; 16];
         // Whatever is too short for the first numbers is no tally.

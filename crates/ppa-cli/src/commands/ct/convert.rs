@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, anyhow};
 use clap::Args;
 use nalgebra::{Point3, Vector3};
-use ppa_ct::{Info, Interpolation, Volume, WarningCode, read};
+use ppa_ct::{Info, Interpolation, Volume, VolumeError, WarningCode, read};
 use ppa_mesh::VoxelBox;
 
 use crate::number_lists::{along_axes, voxel_box, world_box};
@@ -46,8 +46,9 @@ impl ConvertArgs {
     fn changed(&self, mut volume: Volume) -> anyhow::Result<Volume> {
         if let Some(VoxelBox { low, high }) = self.crop {
             let [nx, ny, nz] = volume.grid().size();
-            volume = volume.crop(low, high).map_err(|_| {
-                anyhow!("--crop is no box inside the scan's {nx} x {ny} x {nz} voxels")
+            volume = volume.crop(low, high).map_err(|error| match error {
+                VolumeError::Memory { .. } => error.into(),
+                _ => anyhow!("--crop is no box inside the scan's {nx} x {ny} x {nz} voxels"),
             })?;
         }
         if self.upright {
@@ -58,7 +59,10 @@ impl ConvertArgs {
         if let Some([min, max]) = self.crop_mm {
             volume = volume
                 .crop_world(&Point3::from(min), &Point3::from(max))
-                .map_err(|_| anyhow!("no voxel centre lies in the box of --crop-mm"))?;
+                .map_err(|error| match error {
+                    VolumeError::Memory { .. } => error.into(),
+                    _ => anyhow!("no voxel centre lies in the box of --crop-mm"),
+                })?;
         }
         if let Some(spacing) = self.spacing_mm {
             volume = volume

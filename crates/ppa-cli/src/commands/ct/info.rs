@@ -32,6 +32,8 @@ struct Audited {
 
 pub fn run(args: &InfoArgs, output: Output) -> anyhow::Result<()> {
     let scan = args.scan.read()?;
+    // Blocks of voxels as real numbers, and which of them are tissue.
+    scan.volume.expect_room(8)?;
     let audited = Audited {
         info: Info::of(&scan),
         acquisition: scan.acquisition.clone(),

@@ -65,6 +65,16 @@ impl Study {
     }
 }
 
+/// A cell that spreadsheets do not run.
+fn as_text(name: &str) -> String {
+    let mark = if ppa_dataset::is_formula(name) {
+        "'"
+    } else {
+        ""
+    };
+    format!("{mark}{name}")
+}
+
 /// All places as CSV.
 pub fn table_csv(rows: &[Row]) -> anyhow::Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
@@ -118,7 +128,7 @@ pub fn table_csv(rows: &[Row]) -> anyhow::Result<Vec<u8>> {
         .map(|value| (1000.0 * value).round() / 1000.0);
         writer.serialize((
             row.rank,
-            &row.name,
+            &as_text(&row.name),
             (azimuth, elevation, distance),
             (x, y, z),
             (area, share),

@@ -20,11 +20,11 @@ pub struct ProjectArgs {
 
 /// Reads rows of x, y, z; a first row of three words of which none is a number is a header.
 fn read_points(path: &Path) -> anyhow::Result<Vec<[f64; 3]>> {
+    let file = ppa_files::open(path).with_context(|| format!("cannot read {}", path.display()))?;
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .trim(csv::Trim::All)
-        .from_path(path)
-        .with_context(|| format!("cannot read {}", path.display()))?;
+        .from_reader(file);
     let mut points = Vec::new();
     for (row, record) in reader.records().enumerate() {
         let record = record.with_context(|| format!("cannot read {}", path.display()))?;

@@ -105,6 +105,11 @@ fn check(row: &Row) -> anyhow::Result<()> {
         row.image,
         row.grade
     );
+    ensure!(
+        !ppa_dataset::is_formula(&row.reader),
+        "a reader is called {:?}, which spreadsheets take for a formula",
+        row.reader
+    );
     Ok(())
 }
 

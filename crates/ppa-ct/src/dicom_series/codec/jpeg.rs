@@ -3,8 +3,11 @@
 use libjpeg_turbo_rs::precision::{decompress_12bit, decompress_lossless_arbitrary};
 use libjpeg_turbo_rs::{Decoder, JpegError, PixelFormat};
 
-use super::{CodecError, contain, expect_depth, expect_grey, expect_size};
+use super::{CodecError, contain, expect_depth, expect_grey, expect_memory, expect_size};
 use crate::dicom_series::header::Image;
+
+/// What the decoder holds of a pixel: coefficients and samples.
+const BYTES_PER_PIXEL: usize = 12;
 
 /// What the start of a frame tells.
 struct Frame {
@@ -15,6 +18,7 @@ struct Frame {
 pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError> {
     let frame = frame(packed, image)?;
     expect_depth(frame.bits.into(), image)?;
+    expect_memory(image, BYTES_PER_PIXEL)?;
     match frame {
         Frame { lossless: true, .. } => {
             let decoded = decompress_lossless_arbitrary(packed).map_err(damaged)?;

@@ -1,30 +1,40 @@
 //! JPEG 2000, reversible and irreversible (ISO/IEC 15444-1).
 
+mod boxes;
+mod cost;
+mod segments;
+
 use hayro_jpeg2000::{DecodeSettings, DecoderContext, Image as Jp2};
 
-use super::{CodecError, contain, expect_depth, expect_grey, expect_size};
+use super::{CodecError, contain, expect_depth, expect_grey, expect_memory, expect_size};
 use crate::dicom_series::header::Image;
 
+/// What the decoder holds of a pixel: coefficients, their transform, samples, and bytes of its code-block.
+const BYTES_PER_PIXEL: usize = 24;
+
 pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError> {
+    let codestream = boxes::codestream(packed)?;
+    cost::check(codestream)?;
     let damaged = |error: &dyn std::fmt::Display| CodecError::Damaged(error.to_string());
     let settings = DecodeSettings {
         strict: true,
         ..DecodeSettings::default()
     };
-    let stream = Jp2::new(packed, &settings).map_err(|e| damaged(&e))?;
+    // Without the boxes: what they may say of colours is no matter of grey images.
+    let stream = Jp2::new(codestream, &settings).map_err(|e| damaged(&e))?;
     expect_size([stream.width() as usize, stream.height() as usize], image)?;
     let components = u32::from(stream.color_space().num_channels()) + u32::from(stream.has_alpha());
     expect_grey(components as usize)?;
     let bits = u32::from(stream.original_bit_depth());
     expect_depth(bits, image)?;
+    expect_memory(image, BYTES_PER_PIXEL)?;
     let mut context = DecoderContext::default();
     let decoded = stream.decode(&mut context).map_err(|e| damaged(&e))?;
-    // A palette makes several of one.
     let components = decoded.components();
     expect_grey(components.len())?;
     // The decoder hands out samples above the lowest possible one; f32 holds up to 24 bits exactly.
     let (lowest, most) = (1_u32 << (bits - 1), (1_u64 << bits) as f32 - 1.0);
-    let signed = is_signed(packed);
+    let signed = is_signed(codestream);
     let sample = |&v: &f32| {
         let above_lowest = v.round().clamp(0.0, most) as u32;
         if signed {
@@ -37,14 +47,10 @@ pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError
 }
 
 /// Whether the codestream itself says that its samples are signed; headers are known to disagree (section A.5.1).
-fn is_signed(packed: &[u8]) -> bool {
-    /// Start of codestream, and of the segment that holds sizes.
-    const START: [u8; 4] = [0xff, 0x4f, 0xff, 0x51];
+fn is_signed(codestream: &[u8]) -> bool {
     /// Depth of the first component.
     const DEPTH_AT: usize = 42;
-    let start = packed.windows(START.len()).position(|w| w == START);
-    let depth = start.and_then(|start| packed.get(start + DEPTH_AT));
-    depth.is_some_and(|depth| depth & 0x80 != 0)
+    codestream.get(DEPTH_AT).is_some_and(|d| d & 0x80 != 0)
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ mod scan;
 
 use super::{CodecError, contain, expect_depth, expect_size};
 use crate::dicom_series::header::Image;
+use crate::values::with_room;
 use scan::{Coding, Thresholds};
 
 pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError> {
@@ -70,8 +71,9 @@ pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError
                 }
                 let coding = Coding::new(bits, i32::from(*near), thresholds)
                     .ok_or_else(|| damaged("impossible coding parameters"))?;
+                let room = with_room(image.pixels())?;
                 let samples = coding
-                    .decode(rest, image.columns, image.rows)
+                    .decode(rest, image.columns, image.rows, room)
                     .ok_or_else(|| damaged("it ends early or holds an impossible code"))?;
                 return contain(samples.iter().map(|&v| v.into()), image);
             }

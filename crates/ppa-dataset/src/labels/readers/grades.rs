@@ -9,6 +9,7 @@ use super::import::ImportError;
 use super::showing::Showing;
 use crate::labels::table::read_table;
 use crate::manifest::{FileKind, FileRow, Manifest};
+use crate::spreadsheet::is_formula;
 
 /// What a reader says of a radiograph; a row of `grades.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -153,6 +154,12 @@ impl<'a> Pictures<'a> {
 fn read_grades(path: &Path) -> Result<Vec<Grade>, ImportError> {
     let grades: Vec<Grade> = read_table(path)?;
     let on_scale = |grade: f64| (1.0..=3.0).contains(&grade) && (2.0 * grade).fract() == 0.0;
+    if let Some(row) = grades.iter().find(|row| is_formula(&row.reader)) {
+        return Err(ImportError::Formula {
+            path: path.to_owned(),
+            reader: row.reader.clone(),
+        });
+    }
     match grades.iter().find(|row| !on_scale(row.grade)) {
         None => Ok(grades),
         Some(wrong) => Err(ImportError::Grade {

@@ -54,6 +54,14 @@ pub enum ImportError {
         /// The grade.
         grade: f64,
     },
+    /// A reader's name that spreadsheet programs would run.
+    #[error("{}: a reader is called {reader:?}, which spreadsheets take for a formula; expected a name that does not begin with = + - @, a tab or a carriage return", path.display())]
+    Formula {
+        /// The file.
+        path: PathBuf,
+        /// The name.
+        reader: String,
+    },
     /// A picture that neither key nor dataset know.
     #[error("{}: {image} is neither a picture of the key nor a radiograph of the dataset", path.display())]
     Unknown {

@@ -68,9 +68,15 @@ impl Coding {
         })
     }
 
-    /// Decodes a scan of `columns` by `rows` samples; `None` if it ends early or makes no sense.
-    pub fn decode(&self, scan: &[u8], columns: usize, rows: usize) -> Option<Vec<u16>> {
-        let mut samples = Vec::with_capacity(columns * rows);
+    /// Decodes a scan of `columns` by `rows` samples into `samples`, which has room for them; `None` if it ends early or
+    /// makes no sense.
+    pub fn decode(
+        &self,
+        scan: &[u8],
+        columns: usize,
+        rows: usize,
+        mut samples: Vec<u16>,
+    ) -> Option<Vec<u16>> {
         let mut state = State {
             coding: self,
             bits: Bits::new(scan),

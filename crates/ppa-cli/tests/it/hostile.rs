@@ -1,0 +1,194 @@
+//! Input that would hang the program or end it without a word: pipes, devices, and less memory than a scan takes.
+#![cfg(unix)]
+
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use crate::{contains, fail, names, phantom, ppa, shared};
+
+/// What a command says that must end by itself; it is ended after a minute.
+fn ended(mut command: Command) -> Output {
+    let mut child = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let start = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if start.elapsed() > Duration::from_secs(60) {
+            child.kill().unwrap();
+            panic!("still running: {command:?}");
+        }
+        sleep(Duration::from_millis(5));
+    }
+    child.wait_with_output().unwrap()
+}
+
+/// A failure that is told in one sentence.
+fn sentence(output: &Output) -> String {
+    let said = String::from_utf8(output.stderr.clone()).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+    said
+}
+
+fn make_pipe(path: &Path) {
+    assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
+}
+
+#[test]
+fn named_pipes_are_refused_wherever_a_file_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    make_pipe(&here.join("pipe"));
+    let pipes = [
+        "s.nii",
+        "s.nii.gz",
+        "s.nrrd",
+        "s.mha",
+        "s.dcm",
+        "v.raw",
+        "m.ply",
+        "m.obj",
+        "m.stl",
+        "t.toml",
+        "c.csv",
+        "i.in",
+        "t.tally",
+        "w.safetensors",
+        "w.pth",
+    ];
+    for name in pipes {
+        symlink("pipe", here.join(name)).unwrap();
+    }
+    let nrrd = "NRRD0004\ntype: short\ndimension: 3\nsizes: 2 2 2\nspace: left-posterior-superior\n\
+        space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\nendian: little\nencoding: raw\ndata file: v.raw\n";
+    fs::write(here.join("h.nhdr"), nrrd).unwrap();
+    let meta = "ObjectType = Image\nNDims = 3\nDimSize = 2 2 2\nElementSpacing = 1 1 1\nElementType = MET_SHORT\n\
+        ElementDataFile = v.raw\n";
+    fs::write(here.join("h.mhd"), meta).unwrap();
+    let before = names(here);
+    for command in [
+        "ct info pipe",
+        "ct info s.nii",
+        "ct info s.nii.gz",
+        "ct info s.nrrd",
+        "ct info s.mha",
+        "ct info s.dcm",
+        "ct convert s.nii out.nrrd",
+        "prepare s.nii --side r --out case.toml",
+        "xray audit t.toml",
+        "xray mcgpu i.in --out out",
+        "xray merge t.tally --out x.png",
+        "plan t.toml",
+        "generate t.toml --out data",
+        "scene plane m.ply",
+        "depth render m.obj --out depth.png",
+        "depth render m.stl --out depth.png",
+        "depth project c.csv",
+        "metrics c.csv",
+        "label agree c.csv",
+        "train t.toml --out run",
+        "experiment 2a t.toml --out runs",
+        "learn export w.safetensors --out n.onnx",
+        "learn export w.pth --out n.onnx",
+    ] {
+        let said = sentence(&ended(ppa(here, command)));
+        contains(&said, &["found a named pipe, expected a regular file"]);
+    }
+    for (command, pipe) in [("ct info h.nhdr", "v.raw"), ("ct info h.mhd", "v.raw")] {
+        // A link that stays beside the header leads to the pipe.
+        contains(
+            &sentence(&ended(ppa(here, command))),
+            &[pipe, "a named pipe"],
+        );
+    }
+    contains(&fail(here, "ct info /dev/zero"), &["/dev/zero", "a device"]);
+    assert_eq!(names(here), before, "nothing was written");
+}
+
+/// Runs `ppa` with an address space of so many megabytes, which stand for N in its arguments; a success, or one sentence.
+fn with_memory(folder: &Path, megabytes: usize, arguments: &str) -> Option<String> {
+    let mut command = Command::new("sh");
+    let arguments = arguments.replace('N', &megabytes.to_string());
+    let script = format!("ulimit -v {}; exec \"$0\" {arguments}", 1024 * megabytes);
+    command
+        .current_dir(folder)
+        .args(["-c", &script, env!("CARGO_BIN_EXE_ppa")]);
+    let output = ended(command);
+    (!output.status.success()).then(|| sentence(&output))
+}
+
+/// Every limit from one at which the program barely starts to one that suffices.
+fn every_limit_ends_in_words(folder: &Path, commands: &[&str]) {
+    for command in commands {
+        let limits = (60..900).step_by(40);
+        let failed = limits.map(|megabytes| with_memory(folder, megabytes, command).is_some());
+        let failed: Vec<_> = failed.collect();
+        assert!(
+            failed[0] && !failed[failed.len() - 1],
+            "{command}: {failed:?}"
+        );
+    }
+}
+
+#[test]
+fn too_little_memory_is_told_in_a_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    // 256^3 voxels of a phantom's header: 34 MB of zeros that take no room on the disk.
+    let mut bytes = fs::read(phantom().join("p01.nii")).unwrap();
+    bytes.truncate(352);
+    for at in [42, 44, 46] {
+        bytes[at..at + 2].copy_from_slice(&256_i16.to_le_bytes());
+    }
+    let path = here.join("zeros.nii");
+    fs::write(&path, bytes).unwrap();
+    let file = fs::File::options().write(true).open(&path).unwrap();
+    file.set_len(352 + 2 * 256 * 256 * 256).unwrap();
+    every_limit_ends_in_words(
+        here,
+        &[
+            "--threads 2 ct info zeros.nii",
+            "--threads 2 ct convert zeros.nii N.nrrd",
+        ],
+    );
+}
+
+#[test]
+#[ignore = "needs ../shared/data"]
+fn too_little_memory_for_a_real_limb_is_told_in_a_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = shared().join("data/lower-leg-ankle-sts049/dicom");
+    let scan = scan.canonicalize().unwrap();
+    let scan = scan.display();
+    every_limit_ends_in_words(
+        folder.path(),
+        &[
+            &format!("--threads 2 ct info {scan}"),
+            &format!("--threads 2 prepare {scan} --side r --out N.toml"),
+        ],
+    );
+}
+
+/// Spreadsheets run such cells when they open `grades.csv`.
+#[test]
+fn readers_whose_names_are_formulas_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    for reader in ["=cmd|calc!A1", "+1", "-1", "@SUM(A1)"] {
+        fs::write(
+            here.join("g.csv"),
+            format!("image,reader,grade\nx.png,{reader},1.5\n"),
+        )
+        .unwrap();
+        contains(
+            &fail(here, "label agree g.csv"),
+            &["g.csv", reader, "formula"],
+        );
+    }
+}

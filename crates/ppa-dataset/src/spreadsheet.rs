@@ -1,0 +1,24 @@
+//! What spreadsheet programs do with a cell of a CSV file.
+
+/// Whether spreadsheet programs run a text as a formula when they open a CSV file: quoting does not stop them.
+///
+/// Names that come from outside and go into a table that is read back are refused where this holds; where a table is only
+/// for people, an apostrophe in front keeps the cell a text.
+pub fn is_formula(text: &str) -> bool {
+    text.starts_with(['=', '+', '-', '@', '\t', '\r'])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formulas_are_told_from_names() {
+        for formula in ["=cmd|calc!A1", "+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1"] {
+            assert!(is_formula(formula), "{formula:?}");
+        }
+        for name in ["", "Anna", "A=1", "1-2", "'=1", "ß"] {
+            assert!(!is_formula(name), "{name:?}");
+        }
+    }
+}

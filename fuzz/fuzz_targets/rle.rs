@@ -1,0 +1,9 @@
+//! A frame packed with RLE.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    ppa_fuzz::read_frame("1.2.840.10008.1.2.5", data);
+});

@@ -1,0 +1,11 @@
+//! A room file.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    ppa_fuzz::with_file("room.toml", data, |path| {
+        let _ = ppa_dataset::RoomFile::read(path);
+    });
+});

@@ -1,0 +1,38 @@
+#!/usr/bin/env bash
+# Runs every fuzz target for some seconds (5 unless told: fuzz/run.sh 60), or those named after: fuzz/run.sh 60 nifti ply.
+#
+# As `cargo fuzz run -s none TARGET` builds and runs them, but with the stable compiler and without cargo-fuzz. What makes a target
+# crash lies in fuzz/artifacts. Needs a C++ compiler for libFuzzer.
+set -euo pipefail
+cd "$(dirname "$0")"
+
+seconds=${1:-5}
+shift || true
+targets=("$@")
+if [ ${#targets[@]} -eq 0 ]; then
+    for file in fuzz_targets/*.rs; do targets+=("$(basename "$file" .rs)"); done
+fi
+
+# Coverage of edges, with what is compared, as cargo-fuzz asks for it.
+coverage="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
+-Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
+-Cllvm-args=-sanitizer-coverage-trace-compares --cfg fuzzing -Ccodegen-units=16"
+# For a named target: build scripts run without the fuzzer.
+host=$(rustc -vV | sed -n 's/^host: //p')
+RUSTFLAGS=$coverage cargo build --release --locked --bins --target "$host"
+bin=target/$host/release
+
+corpus=$(mktemp -d)
+trap 'rm -rf "$corpus"' EXIT
+export TMPDIR=$corpus/files
+mkdir -p "$TMPDIR" artifacts
+"$bin/seeds" "$corpus"
+for target in "${targets[@]}"; do
+    mkdir -p "$corpus/$target"
+    # One thread each: threads of a pool would be waited for with every file.
+    RAYON_NUM_THREADS=1 "$bin/$target" "$corpus/$target" -max_total_time="$seconds" -timeout=20 \
+        -rss_limit_mb=1024 -malloc_limit_mb=1024 -max_len=4096 -artifact_prefix="artifacts/$target-" -print_final_stats=1 \
+        >"$corpus/log" 2>&1 || { tail -n 60 "$corpus/log"; exit 1; }
+    awk -v target="$target" '/number_of_executed_units/ { runs = $2 } /peak_rss_mb/ { rss = $2 }
+        END { printf "%-12s %8d files, at most %d MiB\n", target, runs, rss }' "$corpus/log"
+done

@@ -1,0 +1,73 @@
+//! What the fuzz targets share: bytes become the file that a reader of ppa opens.
+
+mod dicom;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use ppa_ct::ReadOptions;
+use ppa_dataset::labels::LabelFile;
+use ppa_dataset::layout::{LimbId, Side};
+use ppa_dataset::published::Published;
+use ppa_dataset::{Manifest, Split};
+
+pub use dicom::{dicom_file, frame};
+
+/// One folder for each process: a file is written again and again.
+static FOLDER: LazyLock<PathBuf> =
+    LazyLock::new(|| tempfile::tempdir().expect("a folder for files").keep());
+
+/// Calls a reader with the path of a file that holds `bytes`.
+pub fn with_file(name: &str, bytes: &[u8], read: impl FnOnce(&Path)) {
+    let path = FOLDER.join(name);
+    fs::write(&path, bytes).expect("room for a file");
+    read(&path);
+}
+
+/// Whatever can be read is.
+pub fn forced() -> ReadOptions {
+    ReadOptions {
+        series: None,
+        fill_gaps: true,
+        force: true,
+    }
+}
+
+/// Reads a DICOM file with one compressed frame: two bytes of columns and rows, one of its bits, then the frame.
+pub fn read_frame(syntax: &str, data: &[u8]) {
+    let [columns, rows, bits, frame @ ..] = data else {
+        return;
+    };
+    let file = dicom_file(syntax, [*columns, *rows], *bits, frame);
+    with_file("frame.dcm", &file, |path| {
+        let _ = ppa_ct::read(path);
+    });
+}
+
+/// Reads the lists of a dataset, of which one holds `data`.
+pub fn read_dataset(kind: u8, data: &[u8]) {
+    let limb = LimbId {
+        patient: 0,
+        side: Side::Right,
+    };
+    let names = [
+        "manifest.jsonl",
+        "patient_0/labels/r/labels.json",
+        "patient_0/labels/r/roi_depth.json",
+        "splits/default.json",
+    ];
+    let root = FOLDER.join("dataset");
+    let name = names[usize::from(kind) % names.len()];
+    let path = root.join(name);
+    let folder = path.parent().expect("a file lies in a folder");
+    fs::create_dir_all(folder).expect("room for a folder");
+    fs::write(&path, data).expect("room for a file");
+    if let Ok(manifest) = Manifest::read(&root) {
+        let _ = manifest.rois(limb);
+    }
+    let _ = LabelFile::read(&root, limb);
+    let _ = Split::read(&path);
+    let _ = Published::read(&root);
+    fs::remove_file(&path).expect("the file is there");
+}
