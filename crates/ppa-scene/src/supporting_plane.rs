@@ -63,7 +63,7 @@ pub(crate) fn check_plane(limb: &Mesh, landmarks: &mut Landmarks) -> Result<(), 
     landmarks.notes.push(format!(
         "plane points: given; {behind_percent:.1} % of the surface lies behind their plane, up to \
          {:.1} mm",
-        -deepest
+        ppa_text::number(-deepest)
     ));
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub mod completions;
 pub mod ct;
 pub mod dataset;
 pub mod demo;
@@ -10,6 +11,7 @@ pub mod export;
 pub mod generate;
 pub mod label;
 pub mod learn;
+pub mod man;
 pub mod merge;
 pub mod mesh;
 pub mod metrics;
