@@ -4,19 +4,22 @@
 
 mod commands;
 mod findings;
+mod help;
 mod interrupt;
 mod number_lists;
 mod output;
 mod progress;
 mod scan_args;
 mod shard;
+mod stderr;
 
 use std::process::ExitCode;
 
 use anyhow::Context;
-use clap::{Parser, Subcommand};
+use clap::{ColorChoice, FromArgMatches, Parser, Subcommand};
 
 use crate::output::Output;
+use crate::stderr::Early;
 
 /// Paired Time-of-Flight depth images and radiographs of posed limbs, made from CT scans.
 ///
@@ -27,9 +30,19 @@ use crate::output::Output;
 struct Cli {
     #[command(subcommand)]
     command: Command,
-    /// Print one JSON object instead of text
+    /// Print one JSON object instead of text, and JSON lines on stderr
+    ///
+    /// Each line on stderr is then one object: {"warning": "…"}, {"note": "…"}, progress with the keys done and units, and where
+    /// the command fails {"error": "…", "causes": ["…"], "exit_code": 1}. The exit code is 2 where the command line cannot be
+    /// used, else 1.
     #[arg(long, global = true)]
     json: bool,
+    /// When to colour messages, help and progress
+    ///
+    /// `auto` colours what goes to a terminal, unless NO_COLOR, CLICOLOR=0 or TERM=dumb forbid it; CLICOLOR_FORCE=1 asks for
+    /// colours elsewhere as well.
+    #[arg(long, global = true, value_name = "WHEN", value_enum, default_value_t = ColorChoice::Auto)]
+    color: ColorChoice,
     /// Worker threads [default: one per core]
     #[arg(long, global = true, value_name = "N")]
     threads: Option<std::num::NonZeroUsize>,
@@ -37,12 +50,12 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// From the built-in phantom to a small dataset and a contact sheet, in minutes
+    /// Make a small dataset and a contact sheet of the built-in phantom
     Demo(commands::demo::DemoArgs),
     /// Look at, convert or make a CT
     #[command(subcommand)]
     Ct(commands::ct::CtCommand),
-    /// Find skin, axis and plane of a limb and write them down as a case
+    /// Find skin, axis and plane of a limb, and write them as a case
     Prepare(Box<commands::prepare::PrepareArgs>),
     /// Check a case
     #[command(subcommand)]
@@ -59,11 +72,11 @@ enum Command {
     /// Radiographs, spectra and materials
     #[command(subcommand)]
     Xray(commands::xray::XrayCommand),
-    /// Tell what the dataset of a plan will take, and whether it can be made
+    /// Estimate time and disk of a plan, and check that it can be made
     Plan(commands::plan::PlanArgs),
     /// Make, or go on with, the dataset of a plan
     Generate(commands::generate::GenerateArgs),
-    /// Tell how far a dataset has come
+    /// Show the progress of a dataset
     Status(commands::status::StatusArgs),
     /// Join the shards of a plan
     Merge(commands::merge::MergeArgs),
@@ -72,15 +85,15 @@ enum Command {
     /// Check, split or convert a dataset, ours or the authors'
     #[command(subcommand)]
     Dataset(commands::dataset::DatasetCommand),
-    /// A dataset on one page of HTML, to look through before anything is trained on it
+    /// Show a dataset on one page of HTML, to inspect before training
     Qa(commands::qa::QaArgs),
     /// Tables, metadata and archives of a dataset for other programs
     #[command(subcommand)]
     Export(commands::export::ExportCommand),
-    /// The quality of poses, as readers grade it
+    /// Labels of pose quality: by readers or computed from bones
     #[command(subcommand)]
     Label(commands::label::LabelCommand),
-    /// The network's weights, and the network beside reference values
+    /// Export weights, and compare the network with reference values
     #[command(subcommand)]
     Learn(commands::learn::LearnCommand),
     /// Train a network on depth images and labels, or go on with it
@@ -96,6 +109,10 @@ enum Command {
     /// Statistical tests
     #[command(subcommand)]
     Stats(commands::stats::StatsCommand),
+    /// Print the completions of commands and options for a shell
+    Completions(commands::completions::CompletionsArgs),
+    /// Write the manual pages of all commands
+    Man(commands::man::ManArgs),
 }
 
 fn run(cli: Cli) -> anyhow::Result<()> {
@@ -130,15 +147,26 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Experiment(args) => commands::experiment::run(&args, output),
         Command::Metrics(args) => commands::metrics::run(&args, output),
         Command::Stats(command) => commands::stats::run(&command, output),
+        Command::Completions(args) => commands::completions::run(&args, output),
+        Command::Man(args) => commands::man::run(&args, output),
     }
 }
 
 fn main() -> ExitCode {
-    match run(Cli::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
+    let early = Early::of(std::env::args_os());
+    let mut command = help::command().color(early.color);
+    let parsed = command.try_get_matches_from_mut(std::env::args_os());
+    let cli = parsed
+        .and_then(|matches| Cli::from_arg_matches(&matches))
+        .map_err(|error| error.format(&mut command));
+    match cli {
+        Ok(cli) => {
+            stderr::set_up(cli.json, cli.color);
+            run(cli).map_or_else(|error| stderr::failure(&error), |()| ExitCode::SUCCESS)
+        }
         Err(error) => {
-            eprintln!("ppa: {error:#}");
-            ExitCode::FAILURE
+            stderr::set_up(early.json, early.color);
+            stderr::usage(&error)
         }
     }
 }

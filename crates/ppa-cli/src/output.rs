@@ -7,6 +7,8 @@ use cpu_time::ProcessTime;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
+use crate::stderr;
+
 /// How results are printed.
 #[derive(Debug, Clone, Copy)]
 pub struct Output {
@@ -36,14 +38,23 @@ impl Output {
 
 /// A step that may take more than a second: says on stderr that it runs.
 pub fn working(what: &str) -> ProgressBar {
-    let spinner = ProgressBar::new_spinner().with_message(what.to_owned());
+    if stderr::is_json() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{spinner:.cyan} {msg}");
+    let spinner = ProgressBar::new_spinner()
+        .with_style(style.expect("the template is a constant"))
+        .with_message(what.to_owned());
     spinner.enable_steady_tick(std::time::Duration::from_millis(120));
     spinner
 }
 
 /// A progress bar on stderr with the remaining time.
 pub fn bar(what: &str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{msg} [{bar:30}] {pos}/{len} {eta} left")
+    if stderr::is_json() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{msg} [{bar:30.cyan}] {pos}/{len} {eta} left")
         .expect("the template is a constant");
     ProgressBar::new(0)
         .with_style(style)
@@ -57,7 +68,7 @@ pub fn bytes(bytes: u64) -> String {
 
 /// Bytes from `800`, `1.5MB`, `20 GB`, `2TB`; units are powers of 1000.
 pub fn parse_bytes(text: &str) -> Result<u64, String> {
-    let wrong = || format!("{text:?} is no size; write a number with kB, MB, GB or TB");
+    let wrong = || format!("{text:?} is not a size; write a number with kB, MB, GB or TB");
     let text = text.trim();
     let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let unit = match text[digits.len()..].to_ascii_lowercase().as_str() {
@@ -115,7 +126,7 @@ mod tests {
         for bad in [
             "", "GB", "-1MB", "nan", "inf GB", "0", "5 XB", "1e9TB", "5 Ω",
         ] {
-            assert!(parse_bytes(bad).unwrap_err().contains("no size"), "{bad}");
+            assert!(parse_bytes(bad).unwrap_err().contains("not a size"), "{bad}");
         }
     }
 }

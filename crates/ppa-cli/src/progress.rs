@@ -1,19 +1,22 @@
-//! How far a dataset has come, on stderr: as a bar, as lines, as JSON, or not at all.
+//! Progress of a dataset on stderr: as a bar, as lines, as JSON, or not at all.
 
 use std::io::IsTerminal;
-use std::sync::Mutex;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
 use indicatif::{HumanDuration, ProgressBar};
 use ppa_dataset::Progress;
+use ppa_text::count;
 use serde::Serialize;
 
 use crate::findings::repeat;
 use crate::output::{Output, bar};
 
 /// Time between two lines, when progress is not a bar.
-const TELL_EVERY: Duration = Duration::from_secs(10);
+const INTERVAL: Duration = Duration::from_secs(10);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Style {
@@ -21,7 +24,7 @@ enum Style {
     Bar,
     /// A line of text every ten seconds
     Plain,
-    /// A line of JSON every ten seconds: done, units, made, remaining_s
+    /// A line of JSON every ten seconds: done, units, made, elapsed_s, remaining_s
     Json,
     /// Nothing
     Quiet,
@@ -29,13 +32,13 @@ enum Style {
 
 #[derive(Debug, Args)]
 pub struct ProgressArgs {
-    /// How progress is told on stderr [default: a bar in a terminal, else plain; json with --json]
+    /// How progress is shown on stderr [default: a bar in a terminal, else plain; json with --json]
     #[arg(long, value_enum, value_name = "HOW")]
     progress: Option<Style>,
 }
 
 impl ProgressArgs {
-    /// Begins to tell.
+    /// Starts to show the progress; `what` is one of the units that are counted.
     pub fn watch(&self, what: &'static str, output: Output) -> Watch {
         let style =
             self.progress
@@ -44,25 +47,16 @@ impl ProgressArgs {
                     (false, true) => Style::Bar,
                     (false, false) => Style::Plain,
                 });
-        Watch {
-            style,
-            what,
-            bar: if style == Style::Bar {
-                bar(what)
-            } else {
-                ProgressBar::hidden()
-            },
-            state: Mutex::new(State::new(Instant::now())),
-        }
+        Watch::new(style, what, INTERVAL, |line| eprintln!("{line}"))
     }
 }
 
-/// Progress of one run.
+/// Progress of one run. Lines are printed at fixed intervals, also while a single unit takes long.
 pub struct Watch {
-    style: Style,
     what: &'static str,
     bar: ProgressBar,
-    state: Mutex<State>,
+    state: Arc<Mutex<State>>,
+    ticker: Mutex<Option<Ticker>>,
 }
 
 struct State {
@@ -70,7 +64,6 @@ struct State {
     found: usize,
     made: usize,
     started: Instant,
-    told: Instant,
 }
 
 #[derive(Debug, Serialize)]
@@ -78,6 +71,7 @@ struct Line {
     done: usize,
     units: usize,
     made: usize,
+    elapsed_s: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     remaining_s: Option<f64>,
 }
@@ -89,7 +83,6 @@ impl State {
             found: 0,
             made: 0,
             started: now,
-            told: now,
         }
     }
 
@@ -99,57 +92,126 @@ impl State {
         let each = now.duration_since(self.started).as_secs_f64() / self.made as f64;
         Duration::try_from_secs_f64(each * left as f64).ok()
     }
+
+    fn json(&self, now: Instant) -> String {
+        let line = Line {
+            done: self.found + self.made,
+            units: self.units,
+            made: self.made,
+            elapsed_s: now.duration_since(self.started).as_secs_f64().round(),
+            remaining_s: self.remaining(now).map(|left| left.as_secs_f64().round()),
+        };
+        serde_json::to_string(&line).expect("numbers are JSON values")
+    }
+
+    fn text(&self, what: &str, now: Instant) -> String {
+        let elapsed = HumanDuration(now.duration_since(self.started));
+        if self.units == 0 {
+            return format!("{what}s are being counted, {elapsed} so far");
+        }
+        let time = match self.remaining(now) {
+            Some(left) => format!("{} left", HumanDuration(left)),
+            None => format!("{elapsed} so far"),
+        };
+        let done = self.found + self.made;
+        format!("{done} of {}, {time}", count(self.units, what))
+    }
+}
+
+fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
+    state.lock().unwrap_or_else(|e| e.into_inner())
 }
 
 impl Watch {
+    fn new(
+        style: Style,
+        what: &'static str,
+        interval: Duration,
+        print: impl Fn(&str) + Send + 'static,
+    ) -> Self {
+        let state = Arc::new(Mutex::new(State::new(Instant::now())));
+        let shown = Arc::clone(&state);
+        let ticker = match style {
+            Style::Bar | Style::Quiet => None,
+            Style::Plain => Some(Ticker::start(interval, move || {
+                print(&locked(&shown).text(what, Instant::now()));
+            })),
+            Style::Json => Some(Ticker::start(interval, move || {
+                print(&locked(&shown).json(Instant::now()));
+            })),
+        };
+        let bar = match style {
+            Style::Bar => bar(&format!("{what}s")),
+            _ => ProgressBar::hidden(),
+        };
+        if style == Style::Bar {
+            bar.enable_steady_tick(Duration::from_secs(1));
+        }
+        Self {
+            what,
+            bar,
+            state,
+            ticker: Mutex::new(ticker),
+        }
+    }
+
     /// Counts what a run reports.
     pub fn report(&self, progress: Progress) {
         if let Progress::Findings(findings) = progress {
             self.bar.suspend(|| repeat(findings, ""));
             return;
         }
-        let mut state = self.state.lock().unwrap_or_else(|e| e.into_inner());
+        let mut state = locked(&self.state);
         match progress {
             Progress::Total(units) => state.units = units,
             Progress::Found => state.found += 1,
             Progress::Made => state.made += 1,
             Progress::Findings(_) => {}
         }
-        let now = Instant::now();
-        let remaining = state.remaining(now);
-        let line = Line {
-            done: state.found + state.made,
-            units: state.units,
-            made: state.made,
-            remaining_s: remaining.map(|left| left.as_secs_f64().round()),
-        };
-        let left = remaining.map_or(String::new(), |left| {
+        let left = state.remaining(Instant::now());
+        let left = left.map_or(String::new(), |left| {
             format!(", {} left", HumanDuration(left))
         });
-        let due = now.duration_since(state.told) >= TELL_EVERY;
-        if due {
-            state.told = now;
-        }
-        match self.style {
-            Style::Bar => {
-                self.bar.set_length(line.units as u64);
-                self.bar.set_position(line.done as u64);
-                self.bar.set_message(format!("{}{left}", self.what));
-            }
-            Style::Plain if due => {
-                eprintln!("{} of {} {}{left}", line.done, line.units, self.what);
-            }
-            Style::Json if due => {
-                let line = serde_json::to_string(&line).expect("numbers are JSON values");
-                eprintln!("{line}");
-            }
-            _ => {}
-        }
+        self.bar.set_length(state.units as u64);
+        self.bar.set_position((state.found + state.made) as u64);
+        self.bar.set_message(format!("{}s{left}", self.what));
     }
 
-    /// Ends the bar.
+    /// Ends the bar or the lines.
     pub fn finish(&self) {
+        let mut ticker = self.ticker.lock().unwrap_or_else(|e| e.into_inner());
+        drop(ticker.take());
         self.bar.finish_and_clear();
+    }
+}
+
+/// A thread that does something at fixed intervals until it is dropped.
+struct Ticker {
+    stop: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Ticker {
+    fn start(interval: Duration, mut tick: impl FnMut() + Send + 'static) -> Self {
+        let (stop, stopped) = channel();
+        let thread = std::thread::spawn(move || {
+            while stopped.recv_timeout(interval) == Err(RecvTimeoutError::Timeout) {
+                tick();
+            }
+        });
+        Self {
+            stop: Some(stop),
+            thread: Some(thread),
+        }
+    }
+}
+
+impl Drop for Ticker {
+    fn drop(&mut self) {
+        drop(self.stop.take()); // the thread sees that the other end is gone
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
     }
 }
 
@@ -166,8 +228,33 @@ mod tests {
             made: 10,
             ..State::new(start)
         };
-        let left = state.remaining(start + Duration::from_secs(20)).unwrap();
-        assert_eq!(left, Duration::from_secs(80));
+        let now = start + Duration::from_secs(20);
+        assert_eq!(state.remaining(now).unwrap(), Duration::from_secs(80));
+        assert_eq!(state.text("pose", now), "60 of 100 poses, 80 seconds left");
         assert_eq!(State::new(start).remaining(start), None);
+    }
+
+    #[test]
+    fn lines_come_while_nothing_is_reported() {
+        let (send, lines) = channel();
+        let interval = Duration::from_millis(20);
+        let print = move |line: &str| send.send(line.to_owned()).unwrap();
+        let watch = Watch::new(Style::Plain, "pose", interval, print);
+        watch.report(Progress::Total(1));
+        for _ in 0..3 {
+            let line = lines.recv_timeout(Duration::from_secs(60)).unwrap();
+            assert!(line.starts_with("0 of 1 pose, ") && line.ends_with(" so far"), "{line}");
+        }
+        watch.finish();
+        while lines.try_recv().is_ok() {}
+        // The thread has ended, and with it the only sender.
+        assert!(lines.recv().is_err());
+    }
+
+    #[test]
+    fn lines_of_json_have_their_keys_before_anything_is_made() {
+        let start = Instant::now();
+        let line = State::new(start).json(start + Duration::from_secs(10));
+        assert_eq!(line, r#"{"done":0,"units":0,"made":0,"elapsed_s":10.0}"#);
     }
 }

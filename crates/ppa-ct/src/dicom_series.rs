@@ -21,6 +21,8 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
+use ppa_text::count;
+
 use crate::acquisition::Acquisition;
 use crate::error::ReadError;
 use crate::scan::{ReadOptions, Scan, Warning, WarningCode, hu_plausibility, starts_as_dicom};
@@ -185,8 +187,8 @@ fn meaning_warnings(slices: &[Slice], force: bool) -> Result<Vec<Warning>, ReadE
         warnings.push(Warning {
             code: WarningCode::NoRescale,
             text: format!(
-                "{bare} of {} slices have no rescale slope and intercept; stored values are taken as HU",
-                slices.len()
+                "no rescale slope and intercept in {bare} of {}; stored values are taken as HU",
+                count(slices.len(), "slice")
             ),
         });
     }
@@ -206,7 +208,8 @@ fn padding_warning(padded: usize, pixels: usize) -> Option<Warning> {
     (padded > 0).then(|| Warning {
         code: WarningCode::PixelPadding,
         text: format!(
-            "{padded} pixels ({:.1} %) pad the images and hold no measurement; they were taken for air, -1000 HU",
+            "padding without a measurement in {} ({:.1} %), taken as air, -1000 HU",
+            count(padded, "pixel"),
             100.0 * padded as f64 / pixels as f64
         ),
     })

@@ -7,10 +7,10 @@ use nalgebra::{Affine3, Matrix3, Matrix4, Point3, Vector3};
 #[non_exhaustive]
 pub enum GridError {
     /// At least one side has no voxels.
-    #[error("a volume of {0:?} voxels is empty; every side needs at least one")]
+    #[error("a volume of {} x {} x {} voxels is empty; every side needs at least one", .0[0], .0[1], .0[2])]
     Empty([usize; 3]),
     /// More voxels than the machine can count.
-    #[error("a volume of {0:?} voxels, expected at most {most} of them", most = usize::MAX)]
+    #[error("a volume of {} x {} x {} voxels, expected at most {most} of them", .0[0], .0[1], .0[2], most = usize::MAX)]
     TooMany([usize; 3]),
     /// The axes lie in a plane to rounding, or the affine or its inverse is not finite.
     #[error("the voxel-to-world affine is singular or not finite (determinant {determinant})")]

@@ -101,8 +101,8 @@ fn size(header: &NiftiHeader) -> Result<[usize; 3], String> {
         return Ok([0, 1, 2].map(|axis| usize::from(dim[axis])));
     }
     Err(format!(
-        "dimensions {:?}, expected a volume with three axes",
-        &dim[..axes.min(7)]
+        "dimensions {}, expected a volume with three axes",
+        ppa_text::numbers(dim[..axes.min(7)].iter().copied())
     ))
 }
 

@@ -16,7 +16,7 @@ pub enum VolumeError {
     #[error(transparent)]
     Grid(#[from] GridError),
     /// Number of values and number of voxels differ.
-    #[error("{found} values for {expected} voxels")]
+    #[error("{} for {}", ppa_text::count(*found, "value"), ppa_text::count(*expected, "voxel"))]
     Length {
         /// Values given.
         found: usize,
@@ -57,13 +57,13 @@ pub enum VolumeError {
         to_mm: f64,
     },
     /// More voxels than there is memory for.
-    #[error("memory does not hold {voxels} voxels and what is computed of them")]
+    #[error("memory does not hold {} and what is computed of them", ppa_text::count(*voxels, "voxel"))]
     Memory {
         /// Voxels asked for.
         voxels: usize,
     },
     /// A value is NaN or infinite.
-    #[error("voxel {0:?} holds a value that is not a number")]
+    #[error("voxel ({}, {}, {}) holds a value that is not a number", .0[0], .0[1], .0[2])]
     NotFinite([usize; 3]),
 }
 

@@ -16,7 +16,12 @@ use crate::published::{GrayImage16, ImageFileError};
 const TILE: u32 = 208;
 const GAP: u32 = 6;
 const CAPTION: u32 = 22;
-const MARGIN: u32 = 96;
+/// Left of the rows: ten letters of 16 pixels, with a gap on both sides.
+const MARGIN: u32 = 172;
+/// Height of the colour scale below the rows, and length of its bar.
+const SCALE: [u32; 2] = [28, 420];
+/// Size of text: pixels per dot of the 8 x 8 font.
+const TEXT: u32 = 2;
 
 /// Why a contact sheet could not be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -26,7 +31,7 @@ pub enum ContactSheetError {
     #[error(transparent)]
     File(#[from] FileError),
     /// The dataset shows no poses of this limb.
-    #[error("{} holds no depth images of {limb:?}", root.display())]
+    #[error("{} holds no depth images of {limb}", root.display())]
     Empty {
         /// The dataset.
         root: PathBuf,
@@ -39,7 +44,7 @@ pub enum ContactSheetError {
 /// row, the radiographs below.
 ///
 /// Depth images are cropped to their region of interest and share one colour scale: the 1st to
-/// the 99th percentile of all depths shown, near red, far blue, invalid black. A cross stands for an image that cannot be read
+/// the 99th percentile of all depths shown, near red, far blue, invalid black; it stands below in mm. A cross stands for an image that cannot be read
 /// or has no region of interest.
 ///
 /// # Errors
@@ -49,6 +54,21 @@ pub fn contact_sheet(
     limb: LimbId,
     columns: usize,
 ) -> Result<RgbImage, ContactSheetError> {
+    Ok(draw(&tiles(root, limb, columns)?))
+}
+
+/// Evenly chosen poses of one limb as rows of small pictures.
+pub(crate) struct Tiles {
+    /// Half degrees of rotation, one per column.
+    pub steps: Vec<u32>,
+    /// Depths of the ends of the colour scale, mm.
+    pub range_mm: [f64; 2],
+    /// Name of each row and its pictures, one per column.
+    pub rows: Vec<(String, Vec<RgbImage>)>,
+}
+
+/// What [`contact_sheet`] shows.
+pub(crate) fn tiles(root: &Path, limb: LimbId, columns: usize) -> Result<Tiles, ContactSheetError> {
     let manifest = Manifest::read(root)?;
     let rois = manifest.rois(limb)?;
     let of_limb = |kind| {
@@ -88,7 +108,19 @@ pub fn contact_sheet(
         });
         rows.push(("radiograph".to_owned(), tiles.collect()));
     }
-    Ok(draw(&rows, &steps))
+    let range_mm = depth_range(&rows);
+    let picture = |tile: &Tile| match tile {
+        Tile::Depth(depth) => coloured(depth, range_mm),
+        Tile::Radiograph(image) => fit(image),
+        Tile::Unreadable => cross(),
+    };
+    let rows = rows.iter();
+    let rows = rows.map(|(caption, tiles)| (caption.clone(), tiles.iter().map(picture).collect()));
+    Ok(Tiles {
+        steps,
+        range_mm,
+        rows: rows.collect(),
+    })
 }
 
 type Gray16 = ImageBuffer<Luma<u16>, Vec<u16>>;
@@ -146,34 +178,52 @@ fn depth_range(rows: &[(String, Vec<Tile>)]) -> [f64; 2] {
     [at(0.01), at(0.99)]
 }
 
-fn draw(rows: &[(String, Vec<Tile>)], steps: &[u32]) -> RgbImage {
-    let range = depth_range(rows);
-    let width = MARGIN + steps.len() as u32 * (TILE + GAP) + GAP;
-    let height = rows.len() as u32 * (TILE + CAPTION + GAP) + GAP;
-    let mut sheet = RgbImage::from_pixel(width, height, Rgb([24; 3]));
-    for (r, (caption, tiles)) in rows.iter().enumerate() {
-        let y = GAP + r as u32 * (TILE + CAPTION + GAP);
-        for (line, word) in caption.split(' ').enumerate() {
-            write_text(&mut sheet, word, GAP, y + 12 * line as u32, 1);
+fn draw(tiles: &Tiles) -> RgbImage {
+    let (columns, rows) = (tiles.steps.len() as u32, tiles.rows.len() as u32);
+    let width = MARGIN + columns.max(4) * (TILE + GAP) + GAP;
+    let below = GAP + rows * (TILE + CAPTION + GAP);
+    let mut sheet = RgbImage::from_pixel(width, below + SCALE[0], Rgb([24; 3]));
+    for (r, (caption, pictures)) in (0..).zip(&tiles.rows) {
+        let y = GAP + r * (TILE + CAPTION + GAP);
+        for (line, word) in (0..).zip(caption.split(' ')) {
+            write_text(&mut sheet, word, GAP, y + 20 * line, TEXT);
         }
-        for (c, tile) in tiles.iter().enumerate() {
-            let x = MARGIN + c as u32 * (TILE + GAP);
-            let picture = match tile {
-                Tile::Depth(depth) => {
-                    let small = resize(depth, TILE, TILE, FilterType::Nearest);
-                    RgbImage::from_fn(TILE, TILE, |x, y| {
-                        Rgb(false_colour(small.get_pixel(x, y).0[0].into(), range))
-                    })
-                }
-                Tile::Radiograph(image) => fit(image),
-                Tile::Unreadable => cross(),
-            };
-            image::imageops::replace(&mut sheet, &picture, i64::from(x), i64::from(y));
-            let angle = format!("{} deg", angle_text(steps[c]));
-            write_text(&mut sheet, &angle, x + 4, y + TILE + 4, 2);
+        for (c, (picture, &step)) in (0..).zip(pictures.iter().zip(&tiles.steps)) {
+            let x = MARGIN + c * (TILE + GAP);
+            image::imageops::replace(&mut sheet, picture, i64::from(x), i64::from(y));
+            let angle = format!("{} deg", angle_text(step));
+            write_text(&mut sheet, &angle, x + 4, y + TILE + 4, TEXT);
         }
     }
+    draw_scale(&mut sheet, tiles.range_mm, below);
     sheet
+}
+
+/// The colours of depths from near to far, with both ends in mm.
+fn draw_scale(sheet: &mut RgbImage, range_mm: [f64; 2], y: u32) {
+    let [near, far] = range_mm.map(|mm| format!("{mm:.0} mm"));
+    let letters = |text: &str| 8 * TEXT * text.len() as u32;
+    write_text(sheet, "depth", GAP, y, TEXT);
+    write_text(sheet, &near, MARGIN, y, TEXT);
+    let start = MARGIN + letters(&near) + 2 * GAP;
+    for x in 0..SCALE[1] {
+        let share = f64::from(x) / f64::from(SCALE[1] - 1);
+        let depth = range_mm[0] + share * (range_mm[1] - range_mm[0]);
+        for dy in 0..8 * TEXT {
+            if let Some(pixel) = sheet.get_pixel_mut_checked(start + x, y + dy) {
+                *pixel = Rgb(false_colour(depth, range_mm));
+            }
+        }
+    }
+    write_text(sheet, &far, start + SCALE[1] + 2 * GAP, y, TEXT);
+}
+
+/// A region of a depth image as a tile in false colour.
+fn coloured(depth: &Gray16, range_mm: [f64; 2]) -> RgbImage {
+    let small = resize(depth, TILE, TILE, FilterType::Nearest);
+    RgbImage::from_fn(TILE, TILE, |x, y| {
+        Rgb(false_colour(small.get_pixel(x, y).0[0].into(), range_mm))
+    })
 }
 
 /// What stands for an image that cannot be read.

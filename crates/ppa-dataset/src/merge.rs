@@ -53,7 +53,7 @@ pub enum MergeError {
         unit: String,
     },
     /// Poses that no shard holds.
-    #[error("no shard holds {unit}; {missing} of {units} poses are missing")]
+    #[error("no shard holds {unit}; missing are {missing} of {}", ppa_text::count(*units, "pose"))]
     Hole {
         /// The first of them.
         unit: String,

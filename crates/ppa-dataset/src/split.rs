@@ -235,7 +235,8 @@ fn counts(patients: usize, shares: &[(String, f64)]) -> Result<Vec<usize>, Split
         None if !counts.is_empty() => Ok(counts),
         None => wrong("no part to draw".to_owned()),
         Some(i) => wrong(format!(
-            "{patients} persons leave the part {} empty; give it a larger share or name fewer parts",
+            "with {} the part {} stays empty; give it a larger share or name fewer parts",
+            ppa_text::count(patients, "person"),
             shares[i].0
         )),
     }

@@ -46,7 +46,7 @@ pub enum BodyError {
     #[error("the surface is empty: no {0}")]
     Empty(&'static str),
     /// A coordinate is infinite, NaN, or beyond 1e6 mm.
-    #[error("point {index} is at {found:?}, expected finite coordinates within 1e6 mm")]
+    #[error("point {index} is at ({}, {}, {}), expected finite coordinates within 1e6 mm", found[0], found[1], found[2])]
     Coordinate {
         /// Which vertex or point.
         index: usize,
@@ -75,7 +75,7 @@ pub enum BodyError {
         normals: usize,
     },
     /// A normal has no direction.
-    #[error("normal {index} is {found:?}, expected a vector with a direction")]
+    #[error("normal {index} is ({}, {}, {}), expected a vector with a direction", found[0], found[1], found[2])]
     Normal {
         /// Which normal.
         index: usize,
@@ -83,13 +83,13 @@ pub enum BodyError {
         found: [f32; 3],
     },
     /// A closed mesh surrounds the camera.
-    #[error("the camera stands inside the surface, at {eye:?} mm in its frame (check the pose)")]
+    #[error("the camera stands inside the surface, at ({}, {}, {}) mm in its frame (check the pose)", eye[0], eye[1], eye[2])]
     CameraInside {
         /// Where, in the frame of the body, mm.
         eye: [f64; 3],
     },
     /// A pose that is not finite or too far away.
-    #[error("the surface is moved by {0:?} mm, expected finite numbers within 1e9 mm")]
+    #[error("the surface is moved by ({}, {}, {}) mm, expected finite numbers within 1e9 mm", .0[0], .0[1], .0[2])]
     Pose([f64; 3]),
     /// The disc radius is zero, negative, not finite or beyond 1e6 mm.
     #[error("disc radius {0} mm, expected a positive number up to 1e6")]

@@ -44,7 +44,7 @@ pub enum CoverageError {
     #[error("largest angle of incidence is {0} degrees, expected more than 0 and less than 90")]
     Angle(f64),
     /// The mesh has no triangle there.
-    #[error("no surface within {radius_mm} mm of the joint at {joint:?} mm")]
+    #[error("no surface within {radius_mm} mm of the joint at ({}, {}, {}) mm", joint[0], joint[1], joint[2])]
     NoSurface {
         /// The radius.
         radius_mm: f64,

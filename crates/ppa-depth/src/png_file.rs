@@ -7,6 +7,17 @@ use crate::atomic::write_whole;
 use crate::image::{DepthError, DepthImage};
 use crate::spec::CameraSpec;
 
+/// A colour type in words.
+fn name(colour: png::ColorType) -> &'static str {
+    match colour {
+        png::ColorType::Grayscale => "grey",
+        png::ColorType::GrayscaleAlpha => "grey with alpha",
+        png::ColorType::Rgb => "RGB",
+        png::ColorType::Rgba => "RGB with alpha",
+        png::ColorType::Indexed => "palette",
+    }
+}
+
 impl DepthImage {
     /// Writes a 16-bit grey PNG in whole millimetres, 0 for nothing; whole or not at all.
     ///
@@ -63,7 +74,7 @@ impl DepthImage {
         if (colour, depth) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
             return Err(DepthError::PixelFormat {
                 path: path.into(),
-                found: format!("{depth:?}-bit {colour:?}"),
+                found: format!("{}-bit {}", depth as u8, name(colour)),
             });
         }
         let (width, height) = reader.info().size();

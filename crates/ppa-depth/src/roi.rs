@@ -26,7 +26,8 @@ pub enum RoiError {
     Side(f64),
     /// The joint is behind the camera or outside its field of view.
     #[error(
-        "the joint at {found_mm:?} mm in the camera frame is behind the camera or outside its field of view"
+        "the joint at ({}, {}, {}) mm in the camera frame is behind the camera or outside its field of view",
+        found_mm[0], found_mm[1], found_mm[2]
     )]
     NotInView {
         /// Where it is.

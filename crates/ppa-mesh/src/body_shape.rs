@@ -49,13 +49,13 @@ pub struct BumpSite {
 #[non_exhaustive]
 pub enum ShapeError {
     /// Bumps are wanted but there is nowhere to put them.
-    #[error("{count} bumps are wanted but no site is given")]
+    #[error("no site is given for bumps, of which {count} are wanted")]
     NoSite {
         /// Bumps wanted.
         count: usize,
     },
     /// More bumps than a skin has room for.
-    #[error("{count} bumps are wanted, expected at most {MOST_BUMPS}")]
+    #[error("the number of bumps is {count}, expected at most {MOST_BUMPS}")]
     TooMany {
         /// Bumps wanted.
         count: usize,

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 #[non_exhaustive]
 pub enum CloudError {
     /// Too few points.
-    #[error("a cloud of {found} points, expected at least {expected}")]
+    #[error("the cloud's number of points is {found}, expected at least {expected}")]
     TooFewPoints {
         /// Points given.
         found: usize,

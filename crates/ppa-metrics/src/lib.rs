@@ -3,7 +3,8 @@
 //! A *label* x is the quality radiologists gave a pose, from 1 (ideal) to 3 (inadequate), in steps of 0.5; a
 //! *prediction* y is what a network says, continuous. From [`NON_DIAGNOSTIC`] = 2.5 on, a pose is non-diagnostic, which
 //! is what "positive" means here. [`evaluate`] gives the whole [`Report`]; each metric stands alone as well. Two
-//! cameras or several frames are averaged first ([`mean_per_pose`], [`mean_of_views`]).
+//! cameras or several frames are averaged first ([`mean_per_pose`], [`mean_of_views`]). [`constant_prediction`] finds predictions
+//! that hardly differ, whose metrics mislead.
 //!
 //! [`pose_delta`] and [`pose_margin_accuracy`] rank one good against two bad poses ([`PoseTriple`]).
 //! [`sign_flip_permutation`] is the exact paired test on seeds, whose folds [`mean_per_seed`] averages first.
@@ -17,7 +18,7 @@
 //! let predictions = [1.2, 1.4, 2.1, 2.9];
 //! let report = ppa_metrics::evaluate(&labels, &predictions)?;
 //! assert_eq!((report.accuracy, report.diagnostic_accuracy), (1.0, 0.75));
-//! assert_eq!((report.sensitivity, report.specificity), (0.5, 1.0));
+//! assert_eq!((report.sensitivity, report.specificity), (Some(0.5), Some(1.0)));
 //! # Ok::<(), ppa_metrics::MetricError>(())
 //! ```
 
@@ -28,6 +29,7 @@ mod regression;
 mod spearman;
 
 mod poses;
+mod constant;
 mod report;
 
 mod permutation;
@@ -35,6 +37,7 @@ mod seeds;
 
 pub mod agreement;
 
+pub use constant::{ConstantPrediction, LEAST_SPREAD, constant_prediction};
 pub use diagnostic::{NON_DIAGNOSTIC, diagnostic_accuracy, sensitivity, specificity};
 pub use error::MetricError;
 pub use permutation::{MAX_PAIRS, PermutationTest, sign_flip_permutation};

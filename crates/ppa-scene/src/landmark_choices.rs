@@ -137,7 +137,10 @@ pub enum LandmarkError {
         expected: usize,
     },
     /// There is no limb.
-    #[error("the limb has {voxels} voxels and {vertices} surface points, expected both above 0")]
+    #[error(
+        "the limb has {} and {}, expected both above 0",
+        ppa_text::count(*voxels, "voxel"), ppa_text::count(*vertices, "surface point")
+    )]
     Empty {
         /// Voxels in the mask.
         voxels: usize,
@@ -158,7 +161,8 @@ pub enum LandmarkError {
     NoAnkle,
     /// The scan ends too close to the joint.
     #[error(
-        "the limb reaches {found_mm:.0} mm proximal of the joint, expected at least {expected_mm:.0} mm"
+        "the limb reaches {:.0} mm proximal of the joint, expected at least {expected_mm:.0} mm",
+        ppa_text::number(*found_mm)
     )]
     TooShort {
         /// Length above the joint level.
@@ -167,7 +171,10 @@ pub enum LandmarkError {
         expected_mm: f64,
     },
     /// A region has no limb in it, or the two are in the wrong order.
-    #[error("the {name} from {from_mm:.1} to {to_mm:.1} mm proximal of the joint {problem}")]
+    #[error(
+        "the {name} from {:.1} to {:.1} mm proximal of the joint {problem}",
+        ppa_text::number(*from_mm), ppa_text::number(*to_mm)
+    )]
     Region {
         /// "joint region" or "calf region".
         name: &'static str,
@@ -179,7 +186,7 @@ pub enum LandmarkError {
         problem: &'static str,
     },
     /// A direction or point given by a person cannot be used.
-    #[error("{name} is {found:?}, expected {expected}")]
+    #[error("{name} is {}, expected {expected}", ppa_text::numbers(*found))]
     Override {
         /// Field of [`LandmarkOverrides`].
         name: &'static str,
@@ -238,7 +245,10 @@ pub enum LandmarkError {
         expected: &'static str,
     },
     /// Three points given by a person make no plane under the limb.
-    #[error("plane_points are {found:?}, expected {expected}")]
+    #[error(
+        "plane_points are ({}), ({}) and ({}), expected {expected}",
+        ppa_text::numbers(found[0]), ppa_text::numbers(found[1]), ppa_text::numbers(found[2])
+    )]
     Plane {
         /// The points.
         found: [[f64; 3]; 3],

@@ -6,6 +6,7 @@ mod phantom;
 
 use clap::Subcommand;
 use ppa_ct::Info;
+use ppa_text::{count, number};
 
 use crate::output::Output;
 
@@ -34,19 +35,21 @@ fn describe(info: &Info) -> String {
     let mut lines = vec![
         format!("size       {nx} x {ny} x {nz} voxels"),
         format!("spacing    {sx:.4} x {sy:.4} x {sz:.4} mm"),
-        format!("origin     {ox:.3} {oy:.3} {oz:.3} mm (LPS)"),
+        format!("origin     {:.3} {:.3} {:.3} mm (LPS)", number(ox), number(oy), number(oz)),
     ];
     for (row, name) in info.direction.iter().zip(["direction", "", ""]) {
         lines.push(format!(
             "{name:<10} {:>9.6} {:>9.6} {:>9.6}",
-            row[0], row[1], row[2]
+            number(row[0]),
+            number(row[1]),
+            number(row[2])
         ));
     }
     lines.push(format!("HU         {} to {}", info.hu_min, info.hu_max));
     let modality = info.modality.as_deref().unwrap_or("not stated");
     lines.push(format!("modality   {modality}"));
     for series in &info.series {
-        let number = series
+        let name = series
             .number
             .map_or("without number".to_owned(), |n| n.to_string());
         let left = match &series.refused {
@@ -55,8 +58,8 @@ fn describe(info: &Info) -> String {
             None => ", not read".to_owned(),
         };
         lines.push(format!(
-            "series     {number}: {} slices{left}",
-            series.slices
+            "series     {name}: {}{left}",
+            count(series.slices, "slice")
         ));
     }
     for warning in &info.warnings {

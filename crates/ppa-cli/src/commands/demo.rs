@@ -10,6 +10,7 @@ use ppa_dataset::layout::{self, LimbId};
 use ppa_dataset::{GenerateSettings, Plan, PlanCase, Summary, contact_sheet, prepare, write_whole};
 use ppa_mesh::LimbSettings;
 use ppa_scene::{LandmarkOverrides, Side, Sweep};
+use ppa_text::count;
 use serde::Serialize;
 
 use super::generate::with_progress;
@@ -61,7 +62,7 @@ pub fn run(args: &DemoArgs, output: Output) -> anyhow::Result<()> {
         &plan,
         &out.join("dataset"),
         &GenerateSettings::default(),
-        &args.progress.watch("poses", output),
+        &args.progress.watch("pose", output),
     )?;
     let limb = LimbId {
         patient: 0,
@@ -80,9 +81,9 @@ pub fn run(args: &DemoArgs, output: Output) -> anyhow::Result<()> {
     };
     output.print(&demo, |demo| {
         format!(
-            "{} depth images and {} radiographs in {} ({:.0} s)\nLook at {}",
-            demo.dataset.depth_images,
-            demo.dataset.radiographs,
+            "{} and {} in {} ({:.0} s)\nLook at {}",
+            count(demo.dataset.depth_images, "depth image"),
+            count(demo.dataset.radiographs, "radiograph"),
             out.join("dataset").display(),
             demo.seconds.wall_s,
             demo.contact_sheet.display()

@@ -10,6 +10,8 @@ use ppa_learn::data::{Images, check_split};
 use ppa_learn::evaluate::{Evaluation, Row, Scores, learning_curve, write_evaluation};
 use ppa_learn::train::{Source, predict, read_log, samples, trained};
 
+use ppa_text::number;
+
 use crate::findings::repeat_of_datasets;
 use crate::output::{Output, working};
 
@@ -70,10 +72,12 @@ pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
 }
 
 fn describe(evaluation: &Evaluation) -> String {
-    let mut lines = vec![format!(
+    let constant = evaluation.constant_prediction;
+    let mut lines: Vec<String> = constant.iter().map(ToString::to_string).collect();
+    lines.push(format!(
         "{:<22}{:>6}{:>8}{:>8}{:>10}{:>10}{:>12}{:>13}{:>13}",
         "", "n", "MSE", "MAE", "Spearman", "Accuracy", "Diagnostic", "Sensitivity", "Specificity"
-    )];
+    ));
     lines.push(line("images", &evaluation.images));
     lines.push(line("poses", &evaluation.poses));
     let several = evaluation.persons.iter().any(|person| person.dataset > 1);
@@ -92,7 +96,8 @@ fn describe(evaluation: &Evaluation) -> String {
     if let (Some(delta), Some(margin)) = (evaluation.pose_delta, evaluation.pose_margin_accuracy) {
         let margin = percent(Some(margin));
         lines.push(format!(
-            "Pose Delta {delta:.3}, Pose Margin Accuracy {margin}"
+            "Pose Delta {:.3}, Pose Margin Accuracy {margin}",
+            number(delta)
         ));
     }
     lines.push("Images by class of the label (rows) and prediction (columns), 1 to 3:".into());
@@ -107,13 +112,13 @@ fn percent(value: Option<f64>) -> String {
 }
 
 fn line(name: &str, scores: &Scores) -> String {
-    let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
+    let score = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{:.3}", number(v)));
     format!(
         "{name:<22}{:>6}{:>8}{:>8}{:>10}{:>10}{:>12}{:>13}{:>13}",
         scores.n,
-        number(scores.mse),
-        number(scores.mae),
-        number(scores.spearman),
+        score(scores.mse),
+        score(scores.mae),
+        score(scores.spearman),
         percent(scores.accuracy),
         percent(scores.diagnostic_accuracy),
         percent(scores.sensitivity),

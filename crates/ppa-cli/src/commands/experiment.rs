@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use ppa_dataset::write_whole;
-use ppa_learn::experiment::{Event, Experiment, ExperimentPlan, Runner, Table};
-use ppa_metrics::PermutationTest;
+use ppa_learn::experiment::{Begun, Event, Experiment, ExperimentPlan, Runner, Table};
+use ppa_metrics::{ConstantPrediction, PermutationTest};
+use ppa_text::{count, number};
 use ppa_xray::Part;
 use serde::Serialize;
 
@@ -14,6 +15,7 @@ use crate::findings::repeat_of_datasets;
 use crate::interrupt::on_interrupt;
 use crate::output::{Output, bar};
 use crate::shard::shard;
+use crate::stderr;
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Which {
@@ -75,10 +77,21 @@ pub struct ExperimentArgs {
 #[derive(Debug, Serialize)]
 struct Outcome {
     experiment: &'static str,
+    /// Test sets on which the network answers with a constant.
+    constant_prediction: Vec<ConstantTestSet>,
     finished: bool,
     missing: usize,
+    /// Trainings that are begun and not finished.
+    begun: Vec<Begun>,
     permutation_test: Option<PermutationTest>,
     table: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct ConstantTestSet {
+    test_set: String,
+    #[serde(flatten)]
+    constant: ConstantPrediction,
 }
 
 pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
@@ -96,7 +109,7 @@ pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
     let runner = Runner::new(&plan, experiment, &out)?;
     let part = shard(args.shard)?;
     if plan.configurations(experiment).len() < experiment.configurations().len() {
-        eprintln!("the plan names no imagenet_weights: their column is left out");
+        stderr::warning("the plan names no imagenet_weights: their column is left out");
     }
     let finished = !args.so_far && train(&runner, part)?;
 
@@ -115,9 +128,16 @@ pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
         (Some(_), Some(test)) => Some(test?),
         _ => None,
     };
+    let constant = results.constant().iter();
+    let constant = constant.map(|(place, &constant)| ConstantTestSet {
+        test_set: place.to_string(),
+        constant,
+    });
     let outcome = Outcome {
         experiment: experiment.name(),
+        constant_prediction: constant.collect(),
         finished,
+        begun: runner.begun()?,
         missing: results.missing().len(),
         permutation_test,
         table: table.as_ref().map(Table::to_markdown),
@@ -147,7 +167,7 @@ fn train(runner: &Runner, part: Part) -> anyhow::Result<bool> {
         &stop,
         |event| match event {
             Event::Begins { unit, number, of } => {
-                bar.suspend(|| eprintln!("{number} of {of}: {unit}"));
+                bar.suspend(|| stderr::note(&format!("{number} of {of}: {unit}")));
                 bar.reset();
             }
             Event::Step(progress) => {
@@ -164,15 +184,26 @@ fn describe(outcome: &Outcome) -> String {
     let mut lines = vec![match (&outcome.table, outcome.finished) {
         (Some(table), _) => table.trim_end().to_owned(),
         (None, true) => format!(
-            "this shard is finished; {} test sets of the whole experiment are missing",
-            outcome.missing
+            "this shard is finished; of the whole experiment {} missing",
+            match outcome.missing {
+                1 => "1 test set is".to_owned(),
+                n => format!("{n} test sets are"),
+            }
         ),
         (None, false) => "stopped; the same command goes on".to_owned(),
     }];
+    let begun = outcome.begun.iter();
+    lines.extend(begun.map(|begun| {
+        let steps = count(begun.steps, "step");
+        format!("not finished: {} with {} of {steps}", begun.training, begun.step)
+    }));
     if let Some(test) = &outcome.permutation_test {
         lines.push(format!(
-            "\nMAE from scratch minus pretrained over {} seeds: {:.3}, exact one-sided p = {:.4} ({} sign patterns)",
-            test.patterns.ilog2(), test.mean_difference, test.p_one_sided, test.patterns
+            "\nMAE from scratch minus pretrained over {}: {:.3}, exact one-sided p = {:.4} ({})",
+            count(test.patterns.ilog2(), "seed"),
+            number(test.mean_difference),
+            test.p_one_sided,
+            count(test.patterns, "sign pattern")
         ));
     }
     lines.join("\n")

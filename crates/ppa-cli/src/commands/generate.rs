@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use ppa_dataset::published::{Published, PublishedError};
 use ppa_dataset::{GenerateSettings, Plan, Summary, generate};
+use ppa_text::count;
 use ppa_xray::Part;
 
 use crate::output::Output;
 use crate::progress::{ProgressArgs, Watch};
 use crate::shard::shard;
+use crate::stderr;
 
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
@@ -58,12 +60,12 @@ pub fn run(args: &GenerateArgs, output: Output) -> anyhow::Result<()> {
             folder.into()
         }
     };
-    let watch = args.progress.watch("poses", output);
+    let watch = args.progress.watch("pose", output);
     let summary = with_progress(&plan, &out, &settings, &watch)?;
     if summary.made > 0
         && let Err(outdated @ PublishedError::Outdated { .. }) = Published::read(&out)
     {
-        eprintln!("{outdated}");
+        stderr::warning(&outdated.to_string());
     }
     output.print(&summary, |s| describe(s, &out, "made"))
 }
@@ -94,11 +96,11 @@ pub fn with_progress(
 /// The summary in words; `done` is what was done to the poses that were not there yet.
 pub fn describe(summary: &Summary, out: &Path, done: &str) -> String {
     format!(
-        "{}: {} depth images and {} radiographs of {} poses, {} of them {done} now",
+        "{}: {} and {} of {}, {} of them {done} now",
         out.display(),
-        summary.depth_images,
-        summary.radiographs,
-        summary.units,
+        count(summary.depth_images, "depth image"),
+        count(summary.radiographs, "radiograph"),
+        count(summary.units, "pose"),
         summary.made
     )
 }

@@ -26,7 +26,7 @@ pub struct MergeArgs {
 }
 
 pub fn run(args: &MergeArgs, output: Output) -> anyhow::Result<()> {
-    let watch = args.progress.watch("poses", output);
+    let watch = args.progress.watch("pose", output);
     let summary = merge(&args.shards, &args.out, &|progress| watch.report(progress))?;
     watch.finish();
     if args.verify {

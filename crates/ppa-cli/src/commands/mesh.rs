@@ -8,6 +8,7 @@ use ppa_mesh::{
     Border, Bump, Displacement, Mesh, add_bumps, dbscan, iso_surface, read_mesh_file,
     write_mesh_file,
 };
+use ppa_text::{count, count_as, number};
 use serde::Serialize;
 
 use crate::findings::prepared;
@@ -121,13 +122,13 @@ impl Surface {
 
     fn describe(&self) -> String {
         format!(
-            "{} vertices, {} triangles, {:.1} mm², {:.1} mm³, {} components, {} boundary edges, Euler number {}",
-            self.vertices,
-            self.triangles,
+            "{}, {}, {:.1} mm², {:.1} mm³, {}, {}, Euler number {}",
+            count_as(self.vertices, "vertex", "vertices"),
+            count(self.triangles, "triangle"),
             self.area_mm2,
-            self.volume_mm3,
-            self.components,
-            self.boundary_edges,
+            number(self.volume_mm3),
+            count(self.components, "component"),
+            count(self.boundary_edges, "boundary edge"),
             self.euler
         )
     }
@@ -149,10 +150,10 @@ impl Variant {
         format!(
             "{}\nmoved by {:.2} to {:.2} mm, {:.2} on average; volume changed by {:.1} mm³",
             self.surface.describe(),
-            self.least_shift_mm,
-            self.most_shift_mm,
-            self.mean_shift_mm,
-            self.volume_change_mm3
+            number(self.least_shift_mm),
+            number(self.most_shift_mm),
+            number(self.mean_shift_mm),
+            number(self.volume_change_mm3)
         )
     }
 }
@@ -239,9 +240,12 @@ fn cluster(args: &ClusterArgs, output: Output) -> anyhow::Result<()> {
         sizes: clusters.sizes,
     };
     output.print(&clustering, |c| {
-        format!(
-            "{} clusters of {:?} points, {} noise",
-            c.clusters, c.sizes, c.noise
-        )
+        let sizes: Vec<_> = c.sizes.iter().map(ToString::to_string).collect();
+        let of = match sizes.is_empty() {
+            true => String::new(),
+            false => format!(" of {} points", sizes.join(", ")),
+        };
+        let noise = count(c.noise, "point");
+        format!("{}{of}; {noise} of noise", count(c.clusters, "cluster"))
     })
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use ppa_metrics::{Report, evaluate};
+use ppa_text::number;
 use serde::Deserialize;
 
 use crate::output::Output;
@@ -30,18 +31,26 @@ pub fn run(args: &MetricsArgs, output: Output) -> anyhow::Result<()> {
 }
 
 fn describe(report: &Report) -> String {
-    [
+    let percent = |share: Option<f64>| {
+        share.map_or("not defined".to_owned(), |share| format!("{:.2} %", 100.0 * share))
+    };
+    let spearman = report.spearman.map_or("not defined".to_owned(), |rho| {
+        format!("{:.4}", number(rho))
+    });
+    let constant = report.constant_prediction;
+    let mut lines: Vec<String> = constant.iter().map(ToString::to_string).collect();
+    lines.extend([
         format!("n                    {}", report.n),
         format!("MSE                  {:.4}", report.mse),
         format!("MAE                  {:.4}", report.mae),
-        format!("Spearman             {:.4}", report.spearman),
+        format!("Spearman             {spearman}"),
         format!("Accuracy             {:.2} %", 100.0 * report.accuracy),
         format!(
             "Diagnostic Accuracy  {:.2} %",
             100.0 * report.diagnostic_accuracy
         ),
-        format!("Sensitivity          {:.2} %", 100.0 * report.sensitivity),
-        format!("Specificity          {:.2} %", 100.0 * report.specificity),
-    ]
-    .join("\n")
+        format!("Sensitivity          {}", percent(report.sensitivity)),
+        format!("Specificity          {}", percent(report.specificity)),
+    ]);
+    lines.join("\n")
 }

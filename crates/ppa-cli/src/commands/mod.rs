@@ -1,6 +1,7 @@
 //! One file per command.
 
 pub mod case;
+pub mod completions;
 pub mod ct;
 pub mod dataset;
 pub mod demo;
@@ -11,6 +12,7 @@ pub mod export;
 pub mod generate;
 pub mod label;
 pub mod learn;
+pub mod man;
 pub mod merge;
 pub mod mesh;
 pub mod metrics;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{bail, ensure};
 use clap::{Args, Subcommand};
 use ppa_dataset::{Forecast, Plan, forecast};
+use ppa_text::count;
 use serde::Serialize;
 
 use super::generate::dataset_folder;
@@ -96,7 +97,7 @@ fn tell(file: &Path, args: &PlanArgs, output: Output) -> anyhow::Result<()> {
         Some(out) => out.clone(),
         None => dataset_folder(file)?,
     };
-    let watch = args.progress.watch("poses measured", output);
+    let watch = args.progress.watch("pose", output);
     let forecast = forecast(&plan, &root, args.fraction, &|p| watch.report(p))?;
     watch.finish();
     let threads = rayon::current_num_threads();
@@ -117,19 +118,19 @@ fn describe(told: &Told) -> String {
     let free = f.free_bytes;
     let free = free.map_or(String::new(), |free| format!(", {} are free", bytes(free)));
     format!(
-        "plan       {} limbs, {} poses, {} depth images, {} radiographs\n\
-         measured   {} poses: {:.2}{error} s of processor time each; {:.1} s to prepare a limb\n\
-         forecast   {:.2} CPU hours, {:.2} hours on {} threads; {} of disk{free}",
-        f.limbs,
-        f.units,
-        f.depth_images,
-        f.radiographs,
-        f.measured,
+        "plan       {}, {}, {}, {}\n\
+         measured   {}: {:.2}{error} s of processor time each; {:.1} s to prepare a limb\n\
+         forecast   {:.2} CPU hours, {:.2} hours on {}; {} of disk{free}",
+        count(f.limbs, "limb"),
+        count(f.units, "pose"),
+        count(f.depth_images, "depth image"),
+        count(f.radiographs, "radiograph"),
+        count(f.measured, "pose"),
         f.cpu_s_per_unit,
         f.cpu_s_per_limb,
         f.cpu_hours,
         told.wall_hours,
-        told.threads,
+        count(told.threads, "thread"),
         bytes(f.bytes)
     )
 }

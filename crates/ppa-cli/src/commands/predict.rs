@@ -10,11 +10,13 @@ use clap::Args;
 use ppa_learn::DeviceName;
 use ppa_learn::data::Roi;
 use ppa_learn::frames::{FramePair, PairFolder, PairPrediction, PairPredictor};
+use ppa_text::count;
 use serde::Serialize;
 
 use crate::interrupt::on_interrupt;
 use crate::number_lists::square;
 use crate::output::{Output, Stopwatch};
+use crate::stderr;
 
 /// Between two looks into a folder.
 const PAUSE: Duration = Duration::from_millis(5);
@@ -103,7 +105,7 @@ pub fn run(args: &PredictArgs, output: Output) -> anyhow::Result<()> {
     let told = match output.json {
         true => output.print(&summary, |_| String::new()),
         false => {
-            eprintln!("{}", describe(&summary));
+            stderr::note(&describe(&summary));
             Ok(())
         }
     };
@@ -175,7 +177,7 @@ impl Judge {
 
     fn skip(&mut self, why: &str) {
         self.skipped += 1;
-        eprintln!("skipped: {why}");
+        stderr::warning(&format!("skipped: {why}"));
     }
 
     /// Judges a pair and prints the answer; false once nobody listens any more.
@@ -228,7 +230,7 @@ impl Judge {
 }
 
 fn describe(summary: &Summary) -> String {
-    let mut text = format!("{} pairs", summary.pairs);
+    let mut text = count(summary.pairs, "pair");
     if let (Some(rate), Some(median), Some(most)) = (
         summary.pairs_per_s,
         summary.median_latency_ms,
@@ -246,7 +248,8 @@ fn describe(summary: &Summary) -> String {
         text += &format!("; {} found but not judged", summary.unjudged);
     }
     if summary.alone > 0 {
-        text += &format!("; {} frames without the other camera's", summary.alone);
+        text += &format!("; {} without the other camera's",
+            count(summary.alone, "frame"));
     }
     text
 }

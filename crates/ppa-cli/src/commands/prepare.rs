@@ -10,6 +10,7 @@ use ppa_dataset::labels::{AnkleBones, BoneFile, BoneNumbers, JointSpace, segment
 use ppa_dataset::{Case, Found, PreparedLimb, Severity, case_picture, prepare, write_picture};
 use ppa_mesh::{LimbSettings, VoxelBox, write_mesh_file};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
+use ppa_text::number;
 
 use crate::commands::pictures::{picture_beside, require_new_picture, shown_name};
 use crate::findings::severity_name;
@@ -232,10 +233,11 @@ fn describe_found(found: &Found) -> Vec<String> {
     let [x, y, z] = landmarks.joint_centre;
     let [dx, dy, dz] = landmarks.axis_direction;
     let mut lines = vec![
-        format!("joint      {x:.1} {y:.1} {z:.1} mm (LPS)"),
-        format!("axis       {dx:.4} {dy:.4} {dz:.4}"),
+        format!("joint      {:.1} {:.1} {:.1} mm (LPS)", number(x), number(y), number(z)),
+        format!("axis       {:.4} {:.4} {:.4}", number(dx), number(dy), number(dz)),
     ];
     for [x, y, z] in landmarks.plane_points {
+        let [x, y, z] = [x, y, z].map(number);
         lines.push(format!("plane      {x:.1} {y:.1} {z:.1} mm"));
     }
     lines.extend(found.findings.iter().map(|finding| {

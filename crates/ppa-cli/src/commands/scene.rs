@@ -9,6 +9,7 @@ use ppa_dataset::{
 };
 use ppa_mesh::{read_mesh_file, write_cloud_file, write_mesh_file};
 use ppa_scene::{Contact, PlaneSettings, SoftTissue, TablePlane, place_soft, table_plane};
+use ppa_text::{count, number};
 use serde::Serialize;
 
 use crate::commands::pictures::{require_new_picture, shown_name};
@@ -117,10 +118,12 @@ struct FoundPlane {
 
 impl FoundPlane {
     fn describe(&self) -> String {
-        let [x, y, z] = self.normal;
+        let [x, y, z] = self.normal.map(number);
         format!(
-            "normal ({x:.6}, {y:.6}, {z:.6}), offset {:.3} mm, {} inliers, rms {:.3} mm",
-            self.offset_mm, self.inliers, self.rms_mm
+            "normal ({x:.6}, {y:.6}, {z:.6}), offset {:.3} mm, {}, rms {:.3} mm",
+            number(self.offset_mm),
+            count(self.inliers, "inlier"),
+            self.rms_mm
         )
     }
 }
@@ -166,9 +169,9 @@ fn room(args: &RoomArgs, output: Output) -> anyhow::Result<()> {
     output.print(&facts, |facts| {
         let table = facts.table.describe();
         format!(
-            "{}: {} points; table {table}",
+            "{}: {}; table {table}",
             args.out.display(),
-            facts.points
+            count(facts.points, "point")
         )
     })
 }
@@ -260,8 +263,11 @@ fn place_limb(args: &PlaceArgs, output: Output) -> anyhow::Result<()> {
     output.print(&placed, |placed| {
         let c = &placed.contact;
         format!(
-            "distal part {:.3} mm, proximal part {:.3} mm above the table; penetration {:.3} mm; {} iterations",
-            c.distal_mm, c.proximal_mm, c.penetration_mm, c.iterations
+            "distal part {:.3} mm, proximal part {:.3} mm above the table; penetration {:.3} mm; {}",
+            number(c.distal_mm),
+            number(c.proximal_mm),
+            number(c.penetration_mm),
+            count(c.iterations, "iteration")
         )
     })
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use ppa_metrics::{mean_per_seed, sign_flip_permutation};
+use ppa_text::{count, number};
 use serde::Deserialize;
 
 use crate::output::Output;
@@ -40,8 +41,11 @@ pub fn run(command: &StatsCommand, output: Output) -> anyhow::Result<()> {
     let test = sign_flip_permutation(&a, &b).with_context(file)?;
     output.print(&test, |test| {
         format!(
-            "mean difference {:.6}, p one-sided {:.6}, p two-sided {:.6}, {} sign patterns",
-            test.mean_difference, test.p_one_sided, test.p_two_sided, test.patterns
+            "mean difference {:.6}, p one-sided {:.6}, p two-sided {:.6}, {}",
+            number(test.mean_difference),
+            test.p_one_sided,
+            test.p_two_sided,
+            count(test.patterns, "sign pattern")
         )
     })
 }

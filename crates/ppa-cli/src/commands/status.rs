@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use ppa_dataset::{Status, status};
+use ppa_text::count;
 
 use crate::output::{Output, bytes};
 
@@ -19,11 +20,11 @@ pub fn run(args: &StatusArgs, output: Output) -> anyhow::Result<()> {
 
 fn describe(status: &Status) -> String {
     let mut lines = vec![format!(
-        "shard {}: {} of {} poses made, {} images, {}{}",
+        "shard {}: {} of {} made, {}, {}{}",
         status.part,
         status.made,
-        status.units,
-        status.images,
+        count(status.units, "pose"),
+        count(status.images, "image"),
         bytes(status.bytes),
         match (status.running, status.complete) {
             (true, _) => ", being written now",

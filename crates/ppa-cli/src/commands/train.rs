@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use ppa_learn::Loaded;
 use ppa_learn::train::{Ended, TrainConfig, read_start, train};
+use ppa_text::count;
 use serde::Serialize;
 
 use super::learn::not_taken;
@@ -12,6 +13,7 @@ use super::learn::not_taken;
 use crate::findings::repeat_of_datasets;
 use crate::interrupt::on_interrupt;
 use crate::output::{Output, bar};
+use crate::stderr::note;
 
 #[derive(Debug, Args)]
 pub struct TrainArgs {
@@ -47,13 +49,20 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
         // Steps that an earlier run made took no time of this one.
         if last_loss.is_none() {
             bar.suspend(|| {
-                eprintln!(
-                    "{steps} steps of the optimiser (steps = {}, counted as {:?}), {} samples each",
-                    config.steps, config.step_counting, config.batch_size
-                );
+                note(&format!(
+                    "{} of the optimiser (steps = {}, step_counting = \"{}\"), {} each",
+                    count(steps, "step"),
+                    config.steps,
+                    config.step_counting,
+                    count(config.batch_size.get(), "sample")
+                ));
+                if progress.step > 1 {
+                    let made = progress.step - 1;
+                    note(&format!("going on after {made} of {}", count(steps, "step")));
+                }
                 if let Ok(Some(loaded)) = read_start(&args.out) {
                     let text = not_taken(&loaded.kept, &loaded.unused);
-                    eprintln!("the file of `start` is taken{text}");
+                    note(&format!("the file of `start` is taken{text}"));
                 }
             });
             bar.set_position(progress.step - 1);
@@ -79,8 +88,11 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
     output.print(&trained, |trained| {
         let out = trained.out.display();
         match trained.finished {
-            true => format!("{out}/weights.safetensors after {steps} steps"),
-            false => format!("stopped after {step} of {steps} steps; the same command goes on"),
+            true => format!("{out}/weights.safetensors after {}", count(steps, "step")),
+            false => format!(
+                "stopped after {step} of {}; the same command goes on",
+                count(steps, "step")
+            ),
         }
     })
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::Args;
 use ppa_dataset::{Findings, Plan, verify};
+use ppa_text::count;
 use serde::Serialize;
 
 use crate::output::Output;
@@ -39,7 +40,7 @@ struct Verified {
 pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
     let beside = || args.dataset.with_extension("toml");
     let plan = Plan::read(&args.plan.clone().unwrap_or_else(beside))?;
-    let watch = args.progress.watch("poses made again", output);
+    let watch = args.progress.watch("pose", output);
     let found = verify(
         &plan,
         &args.dataset,
@@ -58,11 +59,11 @@ pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
     };
     output.print(&verified, |v| {
         format!(
-            "{}: {} images of {} poses are as they were made; {} poses came out the same again",
+            "{}: {} of {} as they were made; {} made again with the same result",
             args.dataset.display(),
-            v.images,
-            v.units,
-            v.remade
+            count(v.images, "image"),
+            count(v.units, "pose"),
+            count(v.remade, "pose")
         )
     })
 }

@@ -87,7 +87,7 @@ fn a_volume_of_one_slice_has_no_surface() {
         "prepare slice.nii --side r --out case.toml --ply skin.ply",
         "mesh extract slice.nii --out skin.ply",
     ] {
-        contains(&fail(folder.path(), command), &["[32, 32, 1]"]);
+        contains(&fail(folder.path(), command), &["32 x 32 x 1 voxels"]);
     }
     assert_eq!(names(folder.path()), ["slice.nii"]);
 }

@@ -127,7 +127,7 @@ fn persons_are_split_and_leaks_refused() {
     let data = folder.path().join("data");
     let said = fail(folder.path(), "dataset split data");
     assert!(
-        said.contains("1 persons leave the part val empty"),
+        said.contains("with 1 person the part val stays empty"),
         "{said}"
     );
     succeed(folder.path(), "dataset split data --part train=1");
@@ -189,6 +189,14 @@ fn tables_and_archives_are_written_from_a_generated_dataset() {
         files
     };
     assert!(contents(&folder.path().join("bag/data")) == images(&folder.path().join("data")));
+    if cfg!(feature = "parquet") {
+        succeed(folder.path(), "export table data --out t.parquet");
+        let bytes = fs::read(folder.path().join("t.parquet")).unwrap();
+        assert!(bytes.starts_with(b"PAR1") && bytes.ends_with(b"PAR1"));
+    } else {
+        let said = fail(folder.path(), "export table data --out t.parquet");
+        assert!(said.contains("the feature parquet"), "{said}");
+    }
     let said = fail(folder.path(), "export table specimen --out t.csv");
     assert!(said.contains("manifest.jsonl"), "{said}");
 }
@@ -213,8 +221,13 @@ fn the_page_of_a_dataset_stands_by_itself() {
             );
         }
     }
-    // A contact sheet, and three poses of two cameras.
-    assert_eq!(page.matches("src=\"data:image/png").count(), 1 + 6);
+    // Rows of both cameras and of radiographs, and three poses of two cameras.
+    let rows = ["orig left", "orig right", "big left", "radiograph"];
+    assert_eq!(page.matches("src=\"data:image/png").count(), rows.len() + 6);
+    for row in rows {
+        assert!(page.contains(&format!("<tr><th>{row}</th>")), "{row}");
+    }
+    assert!(page.contains("aria-label=\"colours of depths from "));
     assert!(page.contains("Fewer than 9 poses") && page.contains("is as in manifest.jsonl"));
     // What is damaged is told, and where it would stand is a cross: there is a page when one is needed.
     let images = [
@@ -230,7 +243,12 @@ fn the_page_of_a_dataset_stands_by_itself() {
     for image in images {
         assert!(page.contains(&format!("{image} is not a whole PNG")));
     }
-    assert_eq!(page.matches("src=\"data:image/png").count(), 1 + 5);
+    assert_eq!(page.matches("src=\"data:image/png").count(), rows.len() + 5);
+    assert!(page.contains("verdict bad") && !page.contains("\"verdict good"));
+    fs::remove_file(folder.path().join("data/manifest.jsonl")).unwrap();
+    let said = fail(folder.path(), "qa data --out third.html");
+    assert!(said.contains("has no manifest.jsonl, which the page needs"), "{said}");
+    assert!(!folder.path().join("third.html").exists());
     assert!(page.contains("cannot be read"));
     assert!(!page.contains("/tmp"));
 }

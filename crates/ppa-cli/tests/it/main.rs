@@ -4,6 +4,7 @@ mod auto_labels;
 mod bad_geometry;
 mod bad_input;
 mod case_files;
+mod constants;
 mod conversion;
 mod coverage;
 mod damaged;
@@ -28,6 +29,7 @@ mod room_file;
 mod shards;
 mod soft_tissue;
 mod tallies;
+mod terminal;
 mod training;
 mod views;
 
@@ -62,7 +64,32 @@ fn fail(folder: &Path, arguments: &str) -> String {
     assert!(output.stdout.is_empty(), "ppa {arguments} printed a result");
     assert!(!stderr.contains("panicked"), "{stderr}");
     assert_eq!(stderr.trim_end().lines().count(), 1, "{stderr}");
+    assert!(!shows_debug(&stderr), "a message for programmers: {stderr}");
     stderr
+}
+
+/// Whether a message shows a value as Rust's `{:?}` does: an option, a struct, or a list of numbers with decimals.
+fn shows_debug(message: &str) -> bool {
+    let is_type = |word: &str| {
+        word.starts_with(|c: char| c.is_ascii_uppercase())
+            && word.contains(|c: char| c.is_ascii_lowercase())
+            && word.chars().all(char::is_alphanumeric)
+    };
+    let words: Vec<&str> = message.split(' ').collect();
+    let is_struct = |pair: &[&str]| is_type(pair[0]) && pair[1] == "{";
+    message.contains("Some(")
+        || words.iter().any(|word| word.trim_end_matches([',', ';', ':', '\n']) == "None")
+        || words.windows(2).any(is_struct)
+}
+
+#[test]
+fn debug_values_are_told_from_text() {
+    for message in ["found Some(3)", "side is None, expected", "crop Box { low: 3 }"] {
+        assert!(shows_debug(message), "{message}");
+    }
+    for message in ["material \"Nonesuch\"", "expected {\"a\": 1}", "CT { and }"] {
+        assert!(!shows_debug(message), "{message}");
+    }
 }
 
 /// Asserts that all parts stand in a text.

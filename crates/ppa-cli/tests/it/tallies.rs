@@ -66,12 +66,12 @@ fn parts_and_sittings_end_in_the_bytes_of_one_run() {
 
     let said = fail(folder, "xray merge 1of3.tally 3of3.tally --out hole.png");
     assert!(
-        said.contains("6666..13333") && said.contains("none of the tallies"),
+        said.contains("6666 to 13333") && said.contains("none of the tallies"),
         "{said}"
     );
     let said = fail(folder, "xray merge one.tally 3of3.tally --out overlap.png");
     assert!(
-        said.contains("overlap") && said.contains("13333..20000"),
+        said.contains("overlap") && said.contains("13333 to 20000"),
         "{said}"
     );
 

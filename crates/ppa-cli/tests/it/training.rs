@@ -58,8 +58,20 @@ fn a_killed_training_goes_on_to_the_same_weights_and_is_evaluated() {
     run.kill().unwrap(); // SIGKILL: the program gets no chance to tidy up
     run.wait().unwrap();
     assert!(!folder.join("killed/weights.safetensors").exists());
-    let said = succeed(folder, "train train.toml --out killed --threads 2 --json");
-    let said: serde_json::Value = serde_json::from_str(&said).unwrap();
+    let refused = fail(folder, "eval killed");
+    assert!(
+        refused.contains("is not finished: ") && refused.contains(" of 8 steps are made"),
+        "{refused}"
+    );
+    let said = ppa(folder, "train train.toml --out killed --threads 2 --json")
+        .output()
+        .unwrap();
+    let notes = String::from_utf8(said.stderr).unwrap();
+    assert!(
+        notes.contains("{\"note\":\"going on after ") && notes.contains(" of 8 steps\"}"),
+        "{notes}"
+    );
+    let said: serde_json::Value = serde_json::from_slice(&said.stdout).unwrap();
     assert_eq!(
         (&said["finished"], &said["step"]),
         (&true.into(), &8.into())

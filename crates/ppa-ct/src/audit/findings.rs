@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use ppa_text::count;
+
 use crate::acquisition::Acquisition;
 use crate::scan::{Warning, WarningCode};
 
@@ -130,8 +132,8 @@ pub(super) fn identifiers(acquisition: &Acquisition) -> Option<Finding> {
             FindingCode::Identifiers,
             Severity::Note,
             format!(
-                "{} attributes of the source can identify a person, a place, a date or an instance: {list}",
-                names.len()
+                "the source identifies a person, a place, a date or an instance by {}: {list}",
+                count(names.len(), "attribute")
             ),
         )
     })

@@ -5,6 +5,8 @@ use std::fmt::Write;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
+use ppa_text::number;
+
 use super::histogram::Histogram;
 use super::{Audit, Severity};
 use crate::info::Info;
@@ -76,13 +78,13 @@ fn facts(info: &Info, scan: &Scan, audit: &Audit) -> String {
     let [sx, sy, sz] = info.spacing_mm;
     let measures = &audit.measures;
     let stated = &scan.acquisition;
-    let peak = |hu: Option<f64>| hu.map_or("none".to_owned(), |hu| format!("{hu:.0} HU"));
+    let peak = |hu: Option<f64>| hu.map_or("none".to_owned(), |hu| format!("{:.0} HU", number(hu)));
     let mm = |mm: Option<f64>| mm.map_or("not stated".to_owned(), |mm| format!("{mm:.2} mm"));
     let rows = [
         ("Voxels", format!("{nx} × {ny} × {nz}")),
         ("Spacing", format!("{sx:.4} × {sy:.4} × {sz:.4} mm")),
         ("Axes run to", measures.axes.clone()),
-        ("Tilt", format!("{:.2}°", measures.tilt_deg)),
+        ("Tilt", format!("{:.2}°", number(measures.tilt_deg))),
         ("Values", format!("{} to {} HU", info.hu_min, info.hu_max)),
         ("Air", peak(measures.air_peak_hu)),
         ("Soft tissue", peak(measures.tissue_peak_hu)),

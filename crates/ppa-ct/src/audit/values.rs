@@ -1,5 +1,7 @@
 //! Are these Hounsfield units, whole and of a limb?
 
+use ppa_text::{count, number};
+
 use super::Measures;
 use super::findings::{Finding, FindingCode, Severity};
 use super::histogram::Histogram;
@@ -94,8 +96,10 @@ pub(super) fn scale(peaks: &Peaks) -> Vec<Finding> {
     use FindingCode::{AirOffScale, NoAir, NoTissue, ShiftedValues, TissueOffScale};
     if let Some([air, tissue]) = peaks.shifted {
         let text = format!(
-            "air seems to lie at {air:.0} and tissue at {tissue:.0}: all values are about {:.0} too high",
-            air + 1000.0
+            "air seems to lie at {:.0} and tissue at {:.0}: all values are about {:.0} too high",
+            number(air),
+            number(tissue),
+            number(air + 1000.0)
         );
         return vec![Finding::new(ShiftedValues, Severity::Severe, text)];
     }
@@ -146,8 +150,8 @@ fn clipping(histogram: &Histogram, acquisition: &Acquisition) -> Vec<Finding> {
             FindingCode::ClippedAbove,
             Severity::Caution,
             format!(
-                "{} voxels have exactly the highest value, {max} HU: clipped",
-                histogram.at_max
+                "exactly the highest value, {max} HU, in {}: clipped",
+                count(histogram.at_max, "voxel")
             ),
         ));
     }

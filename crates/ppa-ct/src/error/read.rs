@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use ppa_text::{count, number};
+
 use super::Cause;
 use crate::scan::SeriesSummary;
 use crate::volume::VolumeError;
@@ -111,7 +113,7 @@ pub enum ReadError {
         series: Vec<SeriesSummary>,
     },
     /// Nothing but localizers (scout views).
-    #[error("{} holds {localizers} localizer images and no slices", path.display())]
+    #[error("{} holds {} and no slices", path.display(), count(*localizers, "localizer image"))]
     OnlyLocalizers {
         /// The folder.
         path: PathBuf,
@@ -119,7 +121,7 @@ pub enum ReadError {
         localizers: usize,
     },
     /// A multi-frame object that does not tell where its frames lie.
-    #[error("{} holds {frames} frames and places for {described} of them", path.display())]
+    #[error("{} holds {} and places for {described} of them", path.display(), count(*frames, "frame"))]
     MultiFrame {
         /// The file.
         path: PathBuf,
@@ -165,7 +167,7 @@ pub enum ReadError {
     /// Several slices in one place, as in a series with phases or without true positions.
     #[error(
         "{}: {slices} slices share the position ({:.3}, {:.3}, {:.3}) mm; distinct positions of all {total}: {positions}",
-        path.display(), position_mm[0], position_mm[1], position_mm[2]
+        path.display(), number(position_mm[0]), number(position_mm[1]), number(position_mm[2])
     )]
     SamePosition {
         /// The folder.
@@ -252,7 +254,7 @@ impl ReadError {
             } => format!("{tag} is {found}, expected {expected}"),
             Self::MultiFrame {
                 frames, described, ..
-            } => format!("{frames} frames and places for {described} of them"),
+            } => format!("{} and places for {described} of them", count(*frames, "frame")),
             _ => "damaged".to_owned(),
         }
     }
@@ -266,8 +268,8 @@ fn list_series(series: &[SeriesSummary]) -> String {
         let refused = s.refused.as_ref();
         let refused = refused.map_or(String::new(), |reason| format!(", refused: {reason}"));
         format!(
-            "number {number} ({modality}, {} images of {columns} x {rows}{refused})",
-            s.slices
+            "number {number} ({modality}, {} of {columns} x {rows}{refused})",
+            count(s.slices, "image")
         )
     });
     match series {

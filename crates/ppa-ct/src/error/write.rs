@@ -41,7 +41,7 @@ pub enum WriteError {
         feature: &'static str,
     },
     /// The format cannot hold so many voxels along one axis.
-    #[error("a volume of {size:?} voxels does not fit {format}, which holds {most} along an axis")]
+    #[error("a volume of {} x {} x {} voxels does not fit {format}, which holds {most} along an axis", size[0], size[1], size[2])]
     TooLarge {
         /// Voxels along i, j, k.
         size: [usize; 3],

@@ -218,7 +218,8 @@ impl Header {
         let spacing = numbers::<3>("ElementSpacing", self.need("ElementSpacing")?)?;
         if spacing.iter().any(|s| *s <= 0.0) {
             return Err(format!(
-                "ElementSpacing is {spacing:?}, expected positive numbers"
+                "ElementSpacing is {}, expected positive numbers",
+                ppa_text::numbers(spacing)
             ));
         }
         let matrix = self.get(&["TransformMatrix", "Rotation", "Orientation"]);

@@ -54,8 +54,8 @@ fn spacing(header: &NiftiHeader) -> Result<Vector3<f64>, String> {
         return Ok(spacing);
     }
     Err(format!(
-        "voxel spacing {:?}, expected positive numbers",
-        spacing.as_slice()
+        "voxel spacing {}, expected positive numbers",
+        ppa_text::numbers(spacing.iter().copied())
     ))
 }
 

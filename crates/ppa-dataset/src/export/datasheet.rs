@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use ppa_text::count;
+
 use super::metadata::{DESCRIPTION, Metadata, PAPER, Provenance};
 use super::table::Table;
 
@@ -25,13 +27,13 @@ pub(super) fn datasheet(
          **To answer:** Who made it, for whom, and who paid for it?\n\n\
          ## Composition\n\n\
          {DESCRIPTION}\n\n\
-         {persons} persons, {limbs} limbs, {poses} poses; files: {kinds}. Depth images by body shape: {shapes}. \
+         {persons}, {limbs}, {poses}; files: {kinds}. Depth images by body shape: {shapes}. \
          {labels} {splits} The images of a pose belong together, those of a limb differ by pose, shape and noise only, and both \
          limbs of a person are alike: split by person.\n\n\
          Limbs keep the shape of skin and bones of the scan. No name, date, number or other text of a scan is in the dataset; scans \
          stand by the hash of their voxels.\n\n\
          ## Collection\n\n\
-         No image was taken for this dataset. All were simulated by {generator} (sources {code}) from {scans} volumes of computed \
+         No image was taken for this dataset. All were simulated by {generator} (sources {code}) from {scans} of computed \
          tomography, of persons or phantoms.\n\n\
          **To answer:** Where do the volumes come from? Did the persons consent to this use, and which board agreed?\n\n\
          ## Preprocessing and labels\n\n\
@@ -43,15 +45,15 @@ pub(super) fn datasheet(
          Licence: <{license}>. Published on {date}.\n\n\
          ## Maintenance\n\n\
          **To answer:** Who keeps it, how are they reached, and how are errors corrected?\n",
-        persons = persons.len(),
-        limbs = table.limbs().len(),
-        poses = poses.len(),
+        persons = count(persons.len(), "person"),
+        limbs = count(table.limbs().len(), "limb"),
+        poses = count(poses.len(), "pose"),
         kinds = counted(table.texts("kind").flatten()),
         shapes = shapes(table),
         labels = labels(table),
         splits = splits(table, split_files),
         code = provenance.settings.code,
-        scans = provenance.scans().len(),
+        scans = count(provenance.scans().len(), "volume"),
         validated = validated(table),
         license = metadata.license,
         date = metadata.date,

@@ -38,7 +38,10 @@ impl Tallies {
             .layer_data;
         let found = [layer.size.x(), layer.size.y()];
         if found != pixels.map(|n| n as usize) {
-            return Err(wrong(format!("{found:?} pixels, expected {pixels:?}")));
+            return Err(wrong(format!(
+                "{} x {} pixels, expected {} x {}",
+                found[0], found[1], pixels[0], pixels[1]
+            )));
         }
         let mut value = None;
         let mut variance = vec![0.0_f32; found[0] * found[1]];

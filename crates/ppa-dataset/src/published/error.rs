@@ -52,9 +52,9 @@ pub enum PublishedError {
     },
     /// Labels of radiographs that were made anew since.
     #[error(
-        "{}: {count} labels, the first of step {step}, were given to other radiographs than those there now; make them again \
+        "{}: labels of other radiographs than those there now: {}, the first of step {step}; make them again \
          (`ppa label auto` or `ppa label import`) or remove the file",
-        path.display()
+        path.display(), ppa_text::count(*count, "label")
     )]
     Outdated {
         /// `labels.json` of the limb.

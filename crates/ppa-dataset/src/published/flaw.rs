@@ -50,8 +50,8 @@ pub enum Flaw {
     #[error("{0}")]
     Unpaired(Unpaired),
     /// Labels of radiographs that were made anew since.
-    #[error("limb {} of patient {}: {count} labels, the first of step {step}, were given to other radiographs than those there now",
-        limb.side_letter(), limb.patient)]
+    #[error("limb {} of patient {}: labels of other radiographs than those there now: {}, the first of step {step}",
+        limb.side_letter(), limb.patient, ppa_text::count(*count, "label"))]
     Outdated {
         /// The limb.
         limb: LimbId,

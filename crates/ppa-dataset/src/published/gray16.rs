@@ -3,7 +3,7 @@
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use image::{DynamicImage, ImageFormat, ImageReader};
+use image::{ColorType, DynamicImage, ImageFormat, ImageReader};
 
 use crate::files::FileError;
 
@@ -23,13 +23,30 @@ pub enum ImageFileError {
         source: image::ImageError,
     },
     /// Its pixels are of another kind.
-    #[error("{} holds pixels of type {found}, expected one channel with 16 bits", path.display())]
+    #[error("{} holds {found} pixels, expected 16-bit grey", path.display())]
     Pixels {
         /// The image.
         path: PathBuf,
-        /// Channels and bits, as `Rgb8`.
+        /// Channels and bits, as `8-bit RGB`.
         found: String,
     },
+}
+
+impl ImageFileError {
+    /// The error of an image whose pixels are not 16-bit grey.
+    pub fn pixels(path: &Path, found: ColorType) -> Self {
+        let channels = match found.channel_count() {
+            1 => "grey",
+            2 => "grey with alpha",
+            3 => "RGB",
+            _ => "RGB with alpha",
+        };
+        let bits = 8 * found.bytes_per_pixel() / found.channel_count();
+        Self::Pixels {
+            path: path.to_owned(),
+            found: format!("{bits}-bit {channels}"),
+        }
+    }
 }
 
 /// A depth image (mm, 0 invalid) or a radiograph for viewing.
@@ -66,10 +83,7 @@ impl GrayImage16 {
                 height: image.height(),
                 pixels: image.into_raw(),
             }),
-            other => Err(ImageFileError::Pixels {
-                path: path.to_owned(),
-                found: format!("{:?}", other.color()),
-            }),
+            other => Err(ImageFileError::pixels(path, other.color())),
         }
     }
 }

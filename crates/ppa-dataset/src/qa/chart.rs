@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use ppa_text::number;
+
 const WIDTH: f64 = 460.0;
 const HEIGHT: f64 = 240.0;
 const LEFT: f64 = 52.0;
@@ -47,18 +49,20 @@ pub(super) fn chart(
     let mut add = |text: std::fmt::Arguments| svg.write_fmt(text).expect("memory takes all");
     for v in ticks(x_range) {
         add(format_args!(
-            "<path class=\"grid\" d=\"M{0:.1} {TOP}V{1}\"/><text x=\"{0:.1}\" y=\"{2}\" text-anchor=\"middle\">{v}</text>",
+            "<path class=\"grid\" d=\"M{0:.1} {TOP}V{1}\"/><text x=\"{0:.1}\" y=\"{2}\" text-anchor=\"middle\">{3}</text>",
             x(v),
             HEIGHT - BOTTOM,
-            HEIGHT - BOTTOM + 14.0
+            HEIGHT - BOTTOM + 14.0,
+            number(v)
         ));
     }
     for v in ticks(y_range) {
         add(format_args!(
-            "<path class=\"grid\" d=\"M{LEFT} {0:.1}H{1}\"/><text x=\"{2}\" y=\"{0:.1}\" dy=\"4\" text-anchor=\"end\">{v}</text>",
+            "<path class=\"grid\" d=\"M{LEFT} {0:.1}H{1}\"/><text x=\"{2}\" y=\"{0:.1}\" dy=\"4\" text-anchor=\"end\">{3}</text>",
             y(v),
             WIDTH - RIGHT,
-            LEFT - 5.0
+            LEFT - 5.0,
+            number(v)
         ));
     }
     add(format_args!(
@@ -126,7 +130,7 @@ fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
 }
 
 /// Round numbers within a range, four to nine of them.
-fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
+pub(super) fn ticks([low, high]: [f64; 2]) -> Vec<f64> {
     let rough = (high - low) / 5.0;
     let power = 10_f64.powf(rough.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0]

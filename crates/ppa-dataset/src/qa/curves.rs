@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use ppa_text::number;
+
 use super::chart::{Series, chart};
 use super::histogram::Depths;
 use super::outliers::{LEAST_POSES, outliers};
@@ -88,11 +90,21 @@ pub(super) fn histograms<'a>(
     chart("depth, mm", "pixels, %", &series, None)
 }
 
-/// Two charts, and a sentence on every pose that does not follow from its neighbours.
+/// What heights and tilts show.
+pub(super) struct Told {
+    /// Two charts.
+    pub charts: String,
+    /// A sentence on every pose that does not follow from its neighbours.
+    pub html: String,
+    /// Their number.
+    pub outliers: usize,
+}
+
+/// How height and tilt of a limb change from pose to pose.
 pub(super) fn heights_and_tilts(
     scene: &Scene,
     sweeps: &[(BodyShape, Vec<&FileRow>)],
-) -> (String, String) {
+) -> Told {
     let (mut charts, mut told) = (String::new(), Vec::new());
     for (i, [what, unit]) in [
         ["height of the joint", "mm"],
@@ -120,9 +132,9 @@ pub(super) fn heights_and_tilts(
             told.extend(odd.iter().map(|&at| {
                 let angle = angle_text(rows[at].step);
                 format!(
-                    "<li>{}, {angle} degrees: {what} {:.2} {unit} is off those beside it</li>",
+                    "<li>{}, {angle} degrees: {what} {:.2} {unit} does not follow from the poses beside it</li>",
                     shape.name(),
-                    values[at]
+                    number(values[at])
                 )
             }));
             let marked = odd.iter().map(|&at| points[at]).collect();
@@ -145,15 +157,19 @@ pub(super) fn heights_and_tilts(
         );
     }
     let longest = sweeps.iter().map(|(_, rows)| rows.len()).max();
-    let told = match told.len() {
+    let html = match told.len() {
         0 if longest.is_none_or(|poses| poses < LEAST_POSES) => {
             format!("<p>Fewer than {LEAST_POSES} poses: too few to tell which stands out.</p>")
         }
-        0 => "<p class=\"good\">No pose stands out from those beside it.</p>".to_owned(),
+        0 => "<p>No pose stands out from those beside it.</p>".to_owned(),
         _ => format!(
-            "<div class=\"bad\"><p>Poses that stand out:</p><ul>{}</ul></div>",
+            "<div class=\"caution\"><p>Poses that stand out:</p><ul>{}</ul></div>",
             told.concat()
         ),
     };
-    (charts, told)
+    Told {
+        charts,
+        html,
+        outliers: told.len(),
+    }
 }

@@ -3,41 +3,71 @@
 //! A limb that turns step by step rises and tilts smoothly. A value whose distance from the line between its two neighbours is
 //! much larger than the bend usual in its sweep explains is told. Where poses are missing, that line is longer: a smooth curve
 //! leaves it by half its second derivative times the product of the steps on both sides.
+//!
+//! The first and the last pose have neighbours on one side only. Such an end must lie off two lines, through the first and second and
+//! through the third and fourth pose from it: if one of these four is the outlier, one of the lines does not know it. The pose
+//! beside an end that stands out is compared with the line through the two poses after it.
 
 /// How far beyond the usual bend a pose must be.
 const FACTOR: f64 = 8.0;
 
+/// How much more than in the middle a pose at an end must be off: noise of two points is up to four times as large where their
+/// line is prolonged to four steps from the nearer one.
+const AT_ENDS: f64 = 4.0;
+
 /// In shorter sweeps a pose that stands out spoils what is usual: it moves three of the distances.
 pub(super) const LEAST_POSES: usize = 9;
+
+/// A distance from a line, and the product of the steps to both its points.
+#[derive(Clone, Copy)]
+struct Off {
+    distance: f64,
+    steps: f64,
+}
+
+/// How far a point lies from the line through two others.
+fn off(point: [f64; 2], [a, b]: [[f64; 2]; 2]) -> Off {
+    let [from_a, from_b] = [point[0] - a[0], point[0] - b[0]];
+    let line = (b[1] * from_a - a[1] * from_b) / (b[0] - a[0]);
+    Off {
+        distance: (point[1] - line).abs(),
+        steps: (from_a * from_b).abs(),
+    }
+}
 
 /// Positions of the points (a rising parameter with a value each) that lie off the line between their neighbours by more than
 /// `floor` and [`FACTOR`] times what the median bend of the sweep explains.
 ///
 /// An outlier pulls the lines of both its neighbours as well, but by less: only the largest of adjacent ones counts.
 pub(super) fn outliers(points: &[[f64; 2]], floor: f64) -> Vec<usize> {
-    // Distance from the line, and the product of the steps on both sides.
-    let off: Vec<[f64; 2]> = points
-        .windows(3)
-        .map(|p| {
-            let [before, after] = [p[1][0] - p[0][0], p[2][0] - p[1][0]];
-            let line = (p[0][1] * after + p[2][1] * before) / (before + after);
-            [(p[1][1] - line).abs(), before * after]
-        })
-        .collect();
-    let mut bends: Vec<f64> = off.iter().map(|[off, steps]| off / steps).collect();
+    let inner = points.windows(3).map(|p| off(p[1], [p[0], p[2]]));
+    let mut inner: Vec<Off> = inner.collect();
+    let mut bends: Vec<f64> = inner.iter().map(|off| off.distance / off.steps).collect();
     bends.sort_unstable_by(f64::total_cmp);
     let Some(&median) = bends.get(bends.len() / 2) else {
         return Vec::new();
     };
-    let excess = |i: usize| {
-        let [off, steps] = off[i];
-        off - floor.max(FACTOR * median * steps)
-    };
-    let at = |i: usize| off.get(i).map_or(0.0, |[off, _]| *off);
+    let stands_out = |off: Off, floor: f64| off.distance > floor.max(FACTOR * median * off.steps);
+    let last = points.len() - 1;
+    let mut found = Vec::new();
+    if points.len() >= LEAST_POSES {
+        for end in [0, last] {
+            let [first, second, third, fourth] = [1, 2, 3, 4].map(|n| points[end.abs_diff(n)]);
+            let lines = [[first, second], [third, fourth]];
+            let is_off = |line| stands_out(off(points[end], line), AT_ENDS * floor);
+            if lines.into_iter().all(is_off) {
+                found.push(end);
+                inner[end.abs_diff(1) - 1] = off(first, [second, third]);
+            }
+        }
+    }
+    let at = |i: usize| inner.get(i).map_or(0.0, |off| off.distance);
     let largest = |&i: &usize| {
-        excess(i) > 0.0 && off[i][0] >= at(i + 1) && (i == 0 || off[i][0] >= at(i - 1))
+        stands_out(inner[i], floor) && at(i) >= at(i + 1) && (i == 0 || at(i) >= at(i - 1))
     };
-    (0..off.len()).filter(largest).map(|i| i + 1).collect()
+    found.extend((0..inner.len()).filter(largest).map(|i| i + 1));
+    found.sort_unstable();
+    found
 }
 
 #[cfg(test)]
@@ -56,11 +86,17 @@ mod tests {
     fn a_jump_is_found_in_a_smooth_sweep_and_none_without() {
         let smooth = sweep(0..181);
         assert!(outliers(&smooth, 0.5).is_empty());
-        for at in [1, 90, 179] {
-            let mut jump = smooth.clone();
-            jump[at][1] += 3.0;
-            assert_eq!(outliers(&jump, 0.5), [at]);
+        for at in [0, 1, 2, 90, 178, 179, 180] {
+            for jump_mm in [3.0, -3.0] {
+                let mut jump = smooth.clone();
+                jump[at][1] += jump_mm;
+                assert_eq!(outliers(&jump, 0.5), [at]);
+            }
         }
+        let mut both = smooth.clone();
+        both[0][1] -= 4.0;
+        both[180][1] += 4.0;
+        assert_eq!(outliers(&both, 0.5), [0, 180]);
         assert!(outliers(&[[0.0, 1.0], [1.0, 2.0]], 0.5).is_empty());
     }
 

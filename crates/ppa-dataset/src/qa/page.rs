@@ -1,25 +1,33 @@
 //! The page: what stands on it, and in which order.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::curves::{heights_and_tilts, histograms, labels};
+use ppa_text::{count, numbers};
+
+use super::cuts::CutShares;
+use super::findings;
+use super::limb::{LimbPart, limb_part};
 use super::scene::Scene;
-use super::views::{depth_view, embedded};
-use crate::body_shape::BodyShape;
-use crate::contact_sheet::{ContactSheetError, contact_sheet, evenly_chosen};
+use super::verdict::Tally;
+use crate::contact_sheet::ContactSheetError;
 use crate::files::FileError;
-use crate::layout::{LimbId, View, angle_text};
-use crate::manifest::{FileKind, FileRow, Manifest, RoiFile};
-use crate::published::{Flaw, GrayImage16, Published, PublishedError, inspect};
+use crate::findings::{Findings, Severity};
+use crate::layout::LimbId;
+use crate::manifest::Manifest;
+use crate::published::{Flaw, Published, PublishedError, inspect};
 use crate::split::{Split, SplitError};
-
-/// Poses on the contact sheet of a limb.
-const COLUMNS: usize = 7;
 
 /// Why there is no page.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum QaError {
+    /// The list of images that the page follows is missing.
+    #[error(
+        "{} has no manifest.jsonl, which the page needs: `ppa generate` and `ppa merge` write it once all poses are made, \
+         datasets of other programs have none",
+        .0.display()
+    )]
+    NoManifest(PathBuf),
     /// A file of the dataset.
     #[error(transparent)]
     File(#[from] FileError),
@@ -34,38 +42,67 @@ pub enum QaError {
     ContactSheet(#[from] ContactSheetError),
 }
 
-/// The dataset in `root`, which `ppa generate` finished, as one page of HTML without any address outside of it: checks of all
+/// The dataset in `root`, which `ppa generate` finished, as one page of HTML without any address outside of it: verdict, findings, checks of all
 /// files, contact sheets, regions and joints in whole images, labels against angle, depths, heights and tilts with outliers, origin.
 ///
 /// # Errors
 /// [`QaError`] naming the file at fault. Flaws of single images stand on the page, and a cross in their place.
 pub fn qa_page(root: &Path) -> Result<String, QaError> {
+    if root.is_dir() && !root.join(Manifest::FILE).exists() {
+        return Err(QaError::NoManifest(root.to_owned()));
+    }
     let inspection = inspect(root)?;
     let manifest = Manifest::read(root)?;
     let dataset = Published::list(root)?;
     let scene = Scene::read(root)?;
-    let mut page = String::from(HEAD);
-    page += &format!(
-        "<h1>Dataset of {} persons</h1><p>{} limbs, {} image pairs, {} depth images, {} radiographs, {} pairs with a label.</p>",
-        inspection.patients,
-        inspection.limbs,
-        inspection.pairs,
-        inspection.depth_images,
-        inspection.radiographs,
-        inspection.labelled
-    );
-    page += &checks(root, &inspection.flaws);
-    page += &splits(root, &dataset.patients())?;
+    let cuts = CutShares::read(root)?;
+    let findings = Findings::read(root)?;
+    let severe = findings.0.iter().filter(|finding| finding.is_open()).count();
+    let doubts = findings.0.iter();
+    let doubts = doubts.filter(|finding| finding.finding.severity > Severity::Note).count();
+    let mut tally = Tally {
+        flaws: inspection.flaws.len(),
+        severe,
+        other_findings: doubts - severe,
+        ..Tally::default()
+    };
+    let mut limbs = String::new();
     for limb in manifest.limbs() {
-        page += &limb_section(root, &manifest, &dataset, &scene, limb)?;
+        let LimbPart {
+            html,
+            outliers,
+            is_empty,
+        } = limb_part(root, &manifest, &dataset, &scene, &cuts, limb)?;
+        tally.outliers += outliers;
+        tally.empty_limbs += usize::from(is_empty);
+        limbs += &html;
     }
-    page += &provenance(&scene);
-    Ok(page + "</main></body></html>\n")
+    let head = format!(
+        "<h1>Dataset of {}</h1><p>{}, {}, {}, {}, {} with a label.</p>",
+        count(inspection.patients, "person"),
+        count(inspection.limbs, "limb"),
+        count(inspection.pairs, "image pair"),
+        count(inspection.depth_images, "depth image"),
+        count(inspection.radiographs, "radiograph"),
+        count(inspection.labelled, "pair")
+    );
+    let parts = [
+        HEAD.to_owned(),
+        head,
+        tally.html(),
+        findings::table(&findings),
+        checks(root, &inspection.flaws),
+        splits(root, &dataset.patients())?,
+        limbs,
+        provenance(&scene),
+        "</main></body></html>\n".to_owned(),
+    ];
+    Ok(parts.concat())
 }
 
 const HEAD: &str = concat!(
     "<!DOCTYPE html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">",
-    "<title>Dataset, looked over</title><style>",
+    "<title>Quality report of a dataset</title><style>",
     include_str!("page.css"),
     "</style></head><body><main>"
 );
@@ -73,13 +110,17 @@ const HEAD: &str = concat!(
 fn checks(root: &Path, flaws: &[Flaw]) -> String {
     const TOLD: usize = 50;
     if flaws.is_empty() {
-        return "<p class=\"good\">Every image could be decoded and is as in manifest.jsonl; no region reaches beyond its image.</p>".to_owned();
+        return "<p>Every image could be decoded and is as in manifest.jsonl; no region reaches beyond its image.</p>".to_owned();
     }
     let told = flaws.iter().take(TOLD);
     let told = told.map(|flaw| format!("<li>{}</li>", escaped(&without_folder(flaw, root))));
     format!(
-        "<div class=\"bad\"><p>{} flaws:</p><ul>{}</ul></div>",
-        flaws.len(),
+        "<div class=\"bad\"><p>{}{}:</p><ul>{}</ul></div>",
+        count(flaws.len(), "flaw"),
+        match flaws.len() > TOLD {
+            true => format!(", the first {TOLD}"),
+            false => String::new(),
+        },
         told.collect::<String>()
     )
 }
@@ -111,7 +152,7 @@ fn splits(root: &Path, patients: &[u32]) -> Result<String, QaError> {
                 let parts = split
                     .parts
                     .iter()
-                    .map(|(part, of)| format!("{}: {of:?}", escaped(part)));
+                    .map(|(part, of)| format!("{}: {}", escaped(part), numbers(of.iter().copied())));
                 format!(
                     "<tr><td>{}</td><td>{}</td></tr>",
                     escaped(&name),
@@ -126,80 +167,7 @@ fn splits(root: &Path, patients: &[u32]) -> Result<String, QaError> {
     Ok(format!("<h2>Splits by person</h2><table>{rows}</table>"))
 }
 
-fn limb_section(
-    root: &Path,
-    manifest: &Manifest,
-    dataset: &Published,
-    scene: &Scene,
-    limb: LimbId,
-) -> Result<String, QaError> {
-    let rois = manifest.rois(limb)?;
-    let rows: Vec<_> = manifest
-        .files
-        .iter()
-        .filter(|row| row.limb == limb)
-        .collect();
-    let depth = |shape: BodyShape, view: View| {
-        let of = rows
-            .iter()
-            .copied()
-            .filter(move |row| row.shape == shape && row.camera == Some(view));
-        let mut of: Vec<&FileRow> = of.collect();
-        of.sort_by_key(|row| row.step);
-        of
-    };
-    let mut shapes: Vec<_> = rows
-        .iter()
-        .filter(|row| row.kind == FileKind::Depth)
-        .map(|row| row.shape)
-        .collect();
-    shapes.sort_unstable();
-    shapes.dedup();
-    let mut section = format!("<h2>Patient {}, {}</h2>", limb.patient, side(limb));
-    if shapes.is_empty() {
-        return Ok(section + "<p class=\"bad\">No depth images.</p>");
-    }
-    section += "<h3>Poses</h3>";
-    let sheet = contact_sheet(root, limb, COLUMNS)?;
-    section += &embedded(
-        &sheet,
-        "Depth images in false colour and radiographs by rotation",
-        root,
-    )?;
-    section += "<div class=\"charts\">";
-    section += &figure(
-        "Label of each pose; the band is its spread.",
-        labels(dataset, limb),
-    );
-    section += &figure(
-        "Depths in the regions of interest, share of the valid pixels per 10 mm.",
-        histograms(root, &rois, |view| depth(shapes[0], view)),
-    );
-    let sweeps: Vec<_> = shapes
-        .iter()
-        .map(|&shape| (shape, depth(shape, View::Left)))
-        .collect();
-    let (charts, told) = heights_and_tilts(scene, &sweeps);
-    section += &charts;
-    section += "</div>";
-    section += &told;
-    section += "<h3>Regions of interest and the joint in whole images</h3><div class=\"views\">";
-    for view in View::ALL {
-        let of_view = depth(shapes[0], view);
-        let steps: Vec<_> = of_view.iter().map(|row| row.step).collect();
-        let chosen = if steps.is_empty() {
-            Vec::new()
-        } else {
-            evenly_chosen(&steps, 3)
-        };
-        for row in of_view.into_iter().filter(|row| chosen.contains(&row.step)) {
-            section += &whole_view(root, row, &rois, scene, view)?;
-        }
-    }
-    Ok(section + "</div>")
-}
-
-fn side(limb: LimbId) -> &'static str {
+pub(super) fn side(limb: LimbId) -> &'static str {
     if limb.side_letter() == "l" {
         "left"
     } else {
@@ -212,30 +180,6 @@ pub(super) fn figure(caption: &str, content: String) -> String {
         return String::new();
     }
     format!("<figure>{content}<figcaption>{caption}</figcaption></figure>")
-}
-
-fn whole_view(
-    root: &Path,
-    row: &FileRow,
-    rois: &RoiFile,
-    scene: &Scene,
-    view: View,
-) -> Result<String, QaError> {
-    let text = format!(
-        "{}, {} degrees",
-        view.name().replace('_', " "),
-        angle_text(row.step)
-    );
-    // What is wrong with it stands among the flaws.
-    let Ok(image) = GrayImage16::read(&root.join(&row.file)) else {
-        return Ok(figure(
-            &text,
-            "<p class=\"bad\">cannot be read</p>".to_owned(),
-        ));
-    };
-    let roi = rois.get(&LimbId::depth_name(view, row.step));
-    let picture = depth_view(&image, roi, scene.joint_pixel(row));
-    Ok(figure(&text, embedded(&picture, &text, root)?))
 }
 
 fn provenance(scene: &Scene) -> String {
@@ -256,7 +200,7 @@ fn provenance(scene: &Scene) -> String {
     )
 }
 
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

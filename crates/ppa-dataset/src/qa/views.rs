@@ -13,25 +13,17 @@ use crate::files::FileError;
 use crate::manifest::RoiRow;
 use crate::published::GrayImage16;
 
-/// A whole depth image in false colour, with its region of interest framed and the joint as a dot in a ring.
+/// A whole depth image in false colour over a range of depths, mm, with its region of interest framed and the joint as a dot in
+/// a ring.
 pub(super) fn depth_view(
     image: &GrayImage16,
+    range_mm: [f64; 2],
     roi: Option<&RoiRow>,
     joint: Option<[f64; 2]>,
 ) -> RgbImage {
-    // The limb is what the colours shall tell apart, not the room.
-    let inside = |x: u32, y: u32| {
-        roi.is_none_or(|roi| within(x, roi.x_start, roi) && within(y, roi.y_start, roi))
-    };
     let pixel = |x: u32, y: u32| image.pixels[(y * image.width + x) as usize];
-    let all = (0..image.height).flat_map(|y| (0..image.width).map(move |x| (x, y)));
-    let of_limb = all.filter(|&(x, y)| inside(x, y)).map(|(x, y)| pixel(x, y));
-    let mut depths: Vec<u16> = of_limb.filter(|z| *z > 0).collect();
-    depths.sort_unstable();
-    let at = |share: f64| depths.get(((depths.len().max(1) - 1) as f64 * share) as usize);
-    let range = [0.01, 0.99].map(|share| at(share).map_or(0.0, |z| f64::from(*z)));
     let mut view = RgbImage::from_fn(image.width, image.height, |x, y| {
-        Rgb(false_colour(pixel(x, y).into(), range))
+        Rgb(false_colour(pixel(x, y).into(), range_mm))
     });
     if let Some(roi) = roi {
         frame(&mut view, roi);
@@ -60,6 +52,20 @@ fn frame(view: &mut RgbImage, roi: &RoiRow) {
             *pixel = INK;
         }
     }
+}
+
+/// Pictures beside each other, each in the middle of a part of the same width.
+pub(super) fn strip(pictures: &[RgbImage]) -> RgbImage {
+    const GAP: u32 = 6;
+    let [width, height] = pictures.iter().fold([0, 0], |[width, height], one| {
+        [width.max(one.width() + GAP), height.max(one.height())]
+    });
+    let mut strip = RgbImage::from_pixel(width * pictures.len() as u32, height, Rgb([255; 3]));
+    for (place, picture) in (0_i64..).zip(pictures) {
+        let x = place * i64::from(width) + i64::from(GAP / 2);
+        image::imageops::replace(&mut strip, picture, x, 0);
+    }
+    strip
 }
 
 /// A picture as part of the page.
@@ -93,7 +99,7 @@ mod tests {
             y_start: 4,
             size: 14,
         };
-        let view = depth_view(&image, Some(&roi), Some([15.0, 20.0]));
+        let view = depth_view(&image, [800.0, 1000.0], Some(&roi), Some([15.0, 20.0]));
         let is_ink = |x, y| *view.get_pixel(x, y) == INK;
         assert!(
             is_ink(30, 4) && is_ink(35, 4) && is_ink(31, 17) && is_ink(39, 5),

@@ -228,7 +228,7 @@ fn images_that_are_damaged_or_of_other_pixels_are_told() {
     image::GrayImage::new(12, 9).save(&path).unwrap();
     assert_says(
         &chain(&GrayImage16::read(&path).unwrap_err()),
-        &[name, "L8", "16 bits"],
+        &[name, "8-bit grey", "16-bit"],
     );
 }
 

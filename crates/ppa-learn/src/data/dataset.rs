@@ -1,5 +1,6 @@
 //! Samples from a dataset in either published layout.
 
+use std::fmt;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -27,6 +28,18 @@ pub enum Views {
     Unified,
     /// The images of both cameras of one moment together: for networks that fuse both.
     Pairs,
+}
+
+impl fmt::Display for Views {
+    /// As in configurations.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Left => "left",
+            Self::Right => "right",
+            Self::Unified => "unified",
+            Self::Pairs => "pairs",
+        })
+    }
 }
 
 /// The labelled samples of some persons of a dataset, or of all persons, in the order of the dataset. Of rotated poses only

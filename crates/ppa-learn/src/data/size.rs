@@ -28,9 +28,6 @@ pub fn size_of(path: &Path) -> Result<[usize; 2], DataError> {
             let (width, height) = header.dimensions();
             Ok([width as usize, height as usize])
         }
-        other => Err(DataError::Image(ImageFileError::Pixels {
-            path: path.to_owned(),
-            found: format!("{other:?}"),
-        })),
+        other => Err(DataError::Image(ImageFileError::pixels(path, other))),
     }
 }

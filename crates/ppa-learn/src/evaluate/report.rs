@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use ppa_metrics::ConstantPrediction;
 use serde::Serialize;
 
 use super::error::EvaluateError;
@@ -15,6 +16,8 @@ const BIN: f64 = 0.25;
 /// Metrics of a test set.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Evaluation {
+    /// Set where the predictions of the images hardly differ: all metrics are then those of a constant.
+    pub constant_prediction: Option<ConstantPrediction>,
     /// Every image by itself.
     pub images: Scores,
     /// Predictions averaged over cameras and frames of a pose.
@@ -82,7 +85,11 @@ impl Evaluation {
             Some((row.angle_deg?, error))
         });
         let poses: Vec<_> = poses.iter().map(pose_pair).collect();
+        let (labels, predictions): (Vec<_>, Vec<_>) = pairs.iter().copied().unzip();
         Ok(Self {
+            constant_prediction: ppa_metrics::constant_prediction(&labels, &predictions)
+                .ok()
+                .flatten(),
             images: Scores::of(&pairs),
             poses: Scores::of(&poses),
             frame_spread: frame_spread(rows),
@@ -216,6 +223,16 @@ mod tests {
         assert_eq!(evaluation.pose_delta, Some(2.5 - 1.5));
         assert_eq!(evaluation.pose_margin_accuracy, Some(1.0));
         assert_eq!(Evaluation::of(&rows[..3]).unwrap().pose_delta, None);
+    }
+
+    #[test]
+    fn a_network_that_answers_with_a_constant_is_reported() {
+        let rows = [row(1, "a", 1.0, 1.999), row(1, "b", 3.0, 2.001)];
+        let evaluation = Evaluation::of(&rows).unwrap();
+        assert_eq!(evaluation.constant_prediction.unwrap().mean, 2.0);
+        let rows = [row(1, "a", 1.0, 1.9), row(1, "b", 3.0, 2.1)];
+        assert_eq!(Evaluation::of(&rows).unwrap().constant_prediction, None);
+        assert_eq!(Evaluation::of(&[]).unwrap().constant_prediction, None);
     }
 
     #[test]

@@ -56,7 +56,7 @@ impl Cell {
     }
 }
 
-/// Marks the best cells; those that print the same number are equally good.
+/// Marks the best cells. Those that print the same number are equally good; where all print the same, none is the best.
 pub fn with_best(mut cells: Vec<Cell>, metric: Metric) -> Vec<Cell> {
     let means = cells.iter().filter_map(|cell| Some(cell.summary?.mean));
     let best = match metric.lower_is_better() {
@@ -67,8 +67,13 @@ pub fn with_best(mut cells: Vec<Cell>, metric: Metric) -> Vec<Cell> {
         .iter()
         .find(|cell| best.is_some() && cell.summary.map(|summary| summary.mean) == best)
         .map(|cell| cell.mean.clone());
+    let is_best = |cell: &Cell| cell.summary.is_some() && Some(&cell.mean) == best.as_ref();
+    let mut filled = cells.iter().filter(|cell| cell.summary.is_some());
+    if filled.all(is_best) {
+        return cells;
+    }
     for cell in &mut cells {
-        cell.best = Some(&cell.mean) == best.as_ref();
+        cell.best = is_best(cell);
     }
     cells
 }

@@ -22,7 +22,8 @@ pub enum FoldError {
     },
     /// No choice of persons gives every fold the limbs asked for.
     #[error(
-        "no {folds} sets of persons have {limbs} limbs each and leave somebody to train with; the persons have {counts:?} limbs"
+        "no {folds} sets of persons have {limbs} limbs each and leave somebody to train with; the limbs of each person number {}",
+        ppa_text::numbers(counts.iter().map(|&n| n as f64))
     )]
     NoSuchLimbs {
         /// Folds asked for.

@@ -24,6 +24,6 @@ pub use metric::Metric;
 pub use plan::{ExperimentPlan, Fold, Synthetic, Target};
 pub use predictions::{Moment, Prediction, PredictionError, join_views, pose_triples};
 pub use results::{Missing, Results, Summary};
-pub use run::{Event, Runner};
+pub use run::{Begun, Event, Runner};
 pub use table::{Incomplete, Table};
 pub use unit::{Unit, runs};

@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use ppa_metrics::{MetricError, PermutationTest, sign_flip_permutation};
+use ppa_metrics::{
+    ConstantPrediction, MetricError, PermutationTest, constant_prediction, sign_flip_permutation,
+};
 use serde::Serialize;
 
 use super::configuration::{Configuration, Experiment};
@@ -21,6 +23,7 @@ pub struct Results {
     seeds: Vec<u64>,
     values: BTreeMap<(Configuration, u64, usize), BTreeMap<Metric, Option<f64>>>,
     not_finite: BTreeSet<Missing>,
+    constant: BTreeMap<Missing, ConstantPrediction>,
 }
 
 /// A test set without predictions that can be judged.
@@ -77,6 +80,7 @@ impl Results {
             seeds: seeds.to_vec(),
             values: BTreeMap::new(),
             not_finite: BTreeSet::new(),
+            constant: BTreeMap::new(),
         }
     }
 
@@ -97,6 +101,11 @@ impl Results {
         let values = Metric::of(self.experiment).into_iter();
         let values = values.map(|metric| Ok((metric, metric.value(predictions)?)));
         let values = values.collect::<Result<_, PredictionError>>()?;
+        let labels: Vec<_> = predictions.iter().map(|row| row.label).collect();
+        let answers: Vec<_> = predictions.iter().map(|row| row.prediction).collect();
+        if let Some(constant) = constant_prediction(&labels, &answers)? {
+            self.constant.insert(place, constant);
+        }
         let key = (place.configuration, place.seed, place.fold);
         self.values.insert(key, values);
         Ok(())
@@ -120,6 +129,16 @@ impl Results {
     /// Test sets that were predicted, but not with finite numbers: a training that diverged.
     pub fn not_finite(&self) -> &BTreeSet<Missing> {
         &self.not_finite
+    }
+
+    /// Test sets on which the network answers with a constant, and that constant.
+    pub fn constant(&self) -> &BTreeMap<Missing, ConstantPrediction> {
+        &self.constant
+    }
+
+    /// Number of folds of each seed.
+    pub fn folds(&self) -> usize {
+        self.folds
     }
 
     /// Test sets without predictions that can be judged.
@@ -259,6 +278,14 @@ mod tests {
         assert_eq!(results.summary(configuration, Metric::Correlation), None);
         let mae = results.summary(configuration, Metric::Mae).unwrap();
         assert_eq!((mae.mean, mae.std), (1.0, None));
+        assert_eq!(results.constant()[&place].mean, 2.0);
+        let table = Table::so_far(&results).to_markdown();
+        let first = table.lines().next().unwrap();
+        assert!(
+            first.starts_with("Constant predictions: on 1 of 1 test set "),
+            "{table}"
+        );
+        assert!(first.contains("column scratch 1 of 1"), "{table}");
     }
 
     #[test]
@@ -274,7 +301,7 @@ mod tests {
         let refused = Table::complete(&results).unwrap_err().to_string();
         let place = missing[0].to_string();
         let expected = format!(
-            "1 test sets are missing, the first is {place}; not all predictions of {place} are finite"
+            "1 test set is missing, the first is {place}; not all predictions of {place} are finite"
         );
         assert_eq!(refused, expected);
         let table = Table::so_far(&results).to_markdown();

@@ -1,5 +1,6 @@
 //! Carries out the trainings of an experiment, each in a folder of its own, and gathers their results.
 
+use std::collections::BTreeSet;
 use std::fs::{File, create_dir_all, remove_file};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -7,6 +8,8 @@ use std::sync::atomic::AtomicBool;
 
 use ppa_dataset::layout::View;
 use ppa_dataset::{BodyShape, sha256_of_file, write_whole};
+
+use serde::{Serialize, Serializer};
 
 use super::configuration::{Experiment, Start};
 use super::error::ExperimentError;
@@ -18,7 +21,8 @@ use super::unit::{Unit, runs};
 use crate::data::{Images, Views, check_split};
 use crate::evaluate::{Row, write_predictions};
 use crate::train::{
-    Ended, Layers, Progress, Source, TrainConfig, TrainError, predict, samples, train, trained,
+    Ended, Layers, Progress, Source, TrainConfig, TrainError, predict, samples, steps_made, train,
+    trained,
 };
 
 /// What is told while an experiment runs.
@@ -35,6 +39,22 @@ pub enum Event<'a> {
     },
     /// It made a step.
     Step(&'a Progress),
+}
+
+/// A training that is begun and not finished.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Begun {
+    /// Which one; its folder's name.
+    #[serde(serialize_with = "as_text")]
+    pub training: Unit,
+    /// Steps that its checkpoint holds.
+    pub step: u64,
+    /// Steps of the whole training.
+    pub steps: u64,
+}
+
+fn as_text<S: Serializer>(unit: &Unit, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(unit)
 }
 
 /// One experiment of a plan, in a folder that holds a folder for each training.
@@ -243,6 +263,35 @@ impl<'a> Runner<'a> {
         }
         let path = folder.join("predictions.csv");
         Ok(Some(read_predictions(&path)?))
+    }
+
+    /// The trainings that are begun and not finished, pretrainings among them.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] naming the checkpoint that cannot be read.
+    pub fn begun(&self) -> Result<Vec<Begun>, ExperimentError> {
+        let steps = self.plan.training_config()?.schedule().steps();
+        let runs = self.runs().into_iter();
+        let all: BTreeSet<Unit> = runs.flat_map(|run| run.needs().into_iter().chain([run])).collect();
+        let mut begun = Vec::new();
+        for training in all {
+            let folder = self.folder(training);
+            if folder.join("finished.json").exists() {
+                continue;
+            }
+            let step = steps_made(&folder).map_err(|source| ExperimentError::Training {
+                unit: training.to_string(),
+                source: Box::new(source),
+            })?;
+            if step > 0 {
+                begun.push(Begun {
+                    training,
+                    step,
+                    steps,
+                });
+            }
+        }
+        Ok(begun)
     }
 
     /// What is known so far: the results of all test sets of which both views are finished.

@@ -1,5 +1,8 @@
 //! Tables of results in the paper's form: mean ± standard deviation of the seeds, the best of each row in bold.
 
+use ppa_metrics::LEAST_SPREAD;
+use ppa_text::count;
+
 use super::cell::{Cell, with_best};
 use super::configuration::Configuration;
 use super::metric::Metric;
@@ -10,12 +13,14 @@ use super::results::{Missing, Results, Summary};
 pub struct Table {
     columns: Vec<Configuration>,
     rows: Vec<(Metric, Vec<Cell>)>,
+    /// What stands above the table, as it makes its numbers misleading.
+    warning: Option<String>,
     notes: Vec<String>,
 }
 
 /// Why there is no table.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{count} test sets are missing, the first is {first}{}", diverged(*.not_finite))]
+#[error("{} missing, the first is {first}{}", test_sets_are(*.count), diverged(*.not_finite))]
 pub struct Incomplete {
     /// How many are missing.
     pub count: usize,
@@ -23,6 +28,10 @@ pub struct Incomplete {
     pub first: Missing,
     /// One that was predicted, but not with finite numbers.
     pub not_finite: Option<Missing>,
+}
+
+fn test_sets_are(n: usize) -> String {
+    format!("{} {}", count(n, "test set"), if n == 1 { "is" } else { "are" })
 }
 
 fn diverged(place: Option<Missing>) -> String {
@@ -60,8 +69,8 @@ impl Table {
         let rows: Vec<_> = rows.collect();
         let missing = results.missing().len();
         let mut notes = vec![format!(
-            "Mean ± standard deviation over {} seeds, the folds of a seed averaged first; the best of a row in bold.",
-            results.planned_seeds()
+            "Mean ± standard deviation over {}, the folds of a seed averaged first; the best of a row in bold, unless all are equal.",
+            count(results.planned_seeds(), "seed")
         )];
         let left_out = results.experiment().configurations();
         let left_out = left_out.into_iter().filter(|c| !columns.contains(c));
@@ -78,7 +87,8 @@ impl Table {
         }
         if missing > 0 {
             notes.push(format!(
-                "INCOMPLETE: {missing} test sets are missing; n is the number of seeds in a cell where some are."
+                "INCOMPLETE: {} missing; n is the number of seeds in a cell where some are.",
+                test_sets_are(missing)
             ));
         }
         let undefined = |cell: &Cell| cell.summary.is_none_or(|summary| summary.undefined > 0);
@@ -91,6 +101,7 @@ impl Table {
         Self {
             columns,
             rows,
+            warning: constant(results),
             notes,
         }
     }
@@ -101,10 +112,12 @@ impl Table {
             .columns
             .iter()
             .map(|column| column.headings().join(", "));
-        let mut lines = vec![
+        let warning = self.warning.iter().flat_map(|text| [text.clone(), String::new()]);
+        let mut lines: Vec<String> = warning.collect();
+        lines.extend([
             format!("| Metric | {} |", headings.collect::<Vec<_>>().join(" | ")),
             format!("|---|{}", "---|".repeat(self.columns.len())),
-        ];
+        ]);
         for (metric, cells) in &self.rows {
             let cells: Vec<_> = cells.iter().map(Cell::to_markdown).collect();
             lines.push(format!("| {} | {} |", metric.name(), cells.join(" | ")));
@@ -153,7 +166,7 @@ impl Table {
         }
         lines.push("\\bottomrule".to_owned());
         lines.push("\\end{tabular}".to_owned());
-        let notes = self.notes.iter().map(|note| format!("% {note}"));
+        let notes = self.warning.iter().chain(&self.notes).map(|note| format!("% {note}"));
         notes.chain(lines).collect::<Vec<_>>().join("\n") + "\n"
     }
 
@@ -183,6 +196,29 @@ impl Table {
         };
         (0..levels).map(line).collect()
     }
+}
+
+/// On how many test sets of which columns the network answers with a constant.
+fn constant(results: &Results) -> Option<String> {
+    let found = results.constant();
+    let of = |column: Configuration| found.keys().filter(move |place| place.configuration == column);
+    let each = results.planned_seeds() * results.folds();
+    let columns = results.columns().iter();
+    let columns = columns.filter(|column| of(**column).count() > 0);
+    let columns: Vec<_> = columns
+        .map(|&column| format!("column {} {} of {each}", column.name(), of(column).count()))
+        .collect();
+    let all = each * results.columns().len() - results.missing().len();
+    (!found.is_empty()).then(|| {
+        format!(
+            "Constant predictions: on {} of {} the network gives the same answer for every pose (standard deviation below {} % \
+             of the labels' range), and the metrics are those of a constant: {}.",
+            found.len(),
+            count(all, "test set"),
+            100.0 * LEAST_SPREAD,
+            columns.join(", ")
+        )
+    })
 }
 
 #[cfg(test)]
@@ -227,10 +263,14 @@ mod tests {
             .unwrap();
         assert_eq!(
             mae,
-            "| MAE | 1.00±0.00 | 0.81±0.09 | **0.31**±0.09 | **0.31**±0.09 |"
+            "| MAE | 1.00±0.00 | 0.81±0.09 | **0.31**±0.09 | **0.31**±0.09 |",
+            "two are the best of four"
         );
         let correlation = markdown.lines().find(|line| line.contains("r_s")).unwrap();
-        assert!(correlation.starts_with("| Correlation r_s | – | **1.00**±0.00"));
+        assert!(
+            correlation.starts_with("| Correlation r_s | – | 1.00±0.00"),
+            "where all are equal none is the best: {correlation}"
+        );
         let latex = table.to_latex();
         let headings = "Metric & from scratch & pretrained on ImageNet & \\multicolumn{2}{c}{pretrained on synthetic dataset} \\\\\n";
         assert!(latex.contains(headings), "{latex}");
@@ -247,14 +287,14 @@ mod tests {
         let refused = Table::complete(&results).unwrap_err();
         assert_eq!(
             refused.to_string(),
-            "1 test sets are missing, the first is experiment 2c, column scratch, seed 1, fold 0"
+            "1 test set is missing, the first is experiment 2c, column scratch, seed 1, fold 0"
         );
         let markdown = Table::so_far(&results).to_markdown();
         assert!(
             markdown.contains("| MAE | 1.00 (n=1) | 0.81±0.09"),
             "{markdown}"
         );
-        assert!(markdown.contains("INCOMPLETE: 1 test sets"), "{markdown}");
+        assert!(markdown.contains("INCOMPLETE: 1 test set is missing"), "{markdown}");
         let latex = Table::so_far(&results).to_latex();
         assert!(latex.starts_with("% ") && latex.contains("% INCOMPLETE"));
     }

@@ -20,7 +20,7 @@ pub enum FramesError {
     #[error(transparent)]
     Train(#[from] TrainError),
     /// A network for other images.
-    #[error("{} was trained with views = {found:?}, expected {expected}", run.display())]
+    #[error("{} was trained with views = \"{found}\", expected {expected}", run.display())]
     Views {
         /// Folder of the training.
         run: PathBuf,

@@ -55,6 +55,24 @@ pub(super) fn save(
     write(path, tensors, Some([(METADATA.to_owned(), state)].into()))
 }
 
+/// Steps that the training of a checkpoint has made.
+pub(super) fn steps(path: &Path) -> Result<u64, TrainError> {
+    let bytes = std::fs::read(path).map_err(at("read", path))?;
+    let wrong = |message: String| TrainError::Checkpoint {
+        path: path.to_owned(),
+        message,
+    };
+    Ok(state(&bytes).map_err(wrong)?.steps)
+}
+
+/// What of a checkpoint is not a tensor, or why that cannot be read.
+fn state(bytes: &[u8]) -> Result<State, String> {
+    let (_, header) = SafeTensors::read_metadata(bytes).map_err(|e| e.to_string())?;
+    let state = header.metadata().as_ref().and_then(|m| m.get(METADATA));
+    let state = state.ok_or("it holds neither steps nor a configuration")?;
+    serde_json::from_str(state).map_err(|e| e.to_string())
+}
+
 /// Puts a checkpoint's values into a network and its moments into Adam.
 pub(super) fn load(
     path: &Path,
@@ -67,10 +85,7 @@ pub(super) fn load(
         message,
     };
     let bytes = ppa_files::read(path).map_err(at("read", path))?;
-    let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|e| wrong(e.to_string()))?;
-    let state = header.metadata().as_ref().and_then(|m| m.get(METADATA));
-    let state = state.ok_or_else(|| wrong("it tells neither step nor configuration".into()))?;
-    let state: State = serde_json::from_str(state).map_err(|e| wrong(e.to_string()))?;
+    let state = state(&bytes).map_err(wrong)?;
     if state.architecture != ARCHITECTURE {
         let found = state.architecture;
         return Err(wrong(format!("it is of {found}, expected {ARCHITECTURE}")));

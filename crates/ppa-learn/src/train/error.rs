@@ -46,6 +46,16 @@ pub enum TrainError {
     /// A folder with weights, but nothing to go on from.
     #[error("{} is there, but no checkpoint beside it to go on from; take another folder", .0.display())]
     WeightsAlone(PathBuf),
+    /// A training that is not finished, where a finished one is needed.
+    #[error("the training in {} is not finished: {step} of {} are made; the same `ppa train` goes on with it", folder.display(), ppa_text::count(*steps, "step"))]
+    Unfinished {
+        /// The folder.
+        folder: PathBuf,
+        /// Steps that its checkpoint holds.
+        step: u64,
+        /// Steps of the whole training.
+        steps: u64,
+    },
     /// Numbers that are not finite.
     #[error("step {step}: the loss is {loss}; {trouble}")]
     NotFinite {

@@ -34,4 +34,4 @@ pub use run::{Ended, Progress, train};
 pub use schedule::{Schedule, StepCounting};
 pub use start_file::read_start;
 pub use tensorboard::tensorboard_events;
-pub use trained::{predict, samples, trained};
+pub use trained::{predict, samples, steps_made, trained};

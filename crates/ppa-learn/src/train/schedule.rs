@@ -1,5 +1,7 @@
 //! How many steps are made, and how far each goes.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 /// Of [`DROPS_OF`]: where the rate is divided by ten, 190 000, 195 000, 199 000 and 199 500 of the paper's 200 000 steps.
@@ -19,6 +21,16 @@ pub enum StepCounting {
     /// Batches of training and test together, 440 and 60 in turn, as the authors' code counts: 176 000 steps of the
     /// optimiser for 200 000. Only training batches are computed here; evaluation has its own interval.
     Batches,
+}
+
+impl fmt::Display for StepCounting {
+    /// As in configurations.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Optimiser => "optimiser",
+            Self::Batches => "batches",
+        })
+    }
 }
 
 /// Learning rates by step of the optimiser.

@@ -9,6 +9,7 @@ use candle_core::{Device, Tensor};
 use crate::data::{Batch, Images, Loader, Order, Sample, Views, read_samples};
 use crate::network::{Mode, Options, QualityNetwork};
 
+use super::checkpoint;
 use super::config::{LastLayer, Source, TrainConfig};
 use super::error::TrainError;
 
@@ -32,13 +33,32 @@ pub(super) fn network(config: &TrainConfig) -> Result<QualityNetwork, TrainError
 /// The network of a finished training on the CPU: its configuration and its weights, from its folder.
 ///
 /// # Errors
-/// [`TrainError`] naming the file that is missing or is none of a training.
+/// [`TrainError`] naming the file that is missing or is none of a training; [`TrainError::Unfinished`] with the steps made so far.
 pub fn trained(folder: &Path) -> Result<(TrainConfig, QualityNetwork), TrainError> {
     let config = TrainConfig::read(&folder.join("config.toml"))?;
-    let network = network(&config)?;
     let weights = folder.join("weights.safetensors");
+    if !weights.exists() {
+        return Err(TrainError::Unfinished {
+            folder: folder.to_owned(),
+            step: steps_made(folder)?,
+            steps: config.schedule().steps(),
+        });
+    }
+    let network = network(&config)?;
     network.load(&weights, config.first_convolution)?;
     Ok((config, network))
+}
+
+/// Steps of the optimiser that the checkpoint of a training holds; 0 without one.
+///
+/// # Errors
+/// [`TrainError`] naming a checkpoint that cannot be read.
+pub fn steps_made(folder: &Path) -> Result<u64, TrainError> {
+    let path = folder.join("checkpoint.safetensors");
+    match path.exists() {
+        true => checkpoint::steps(&path),
+        false => Ok(0),
+    }
 }
 
 /// The labelled samples of some sources, as a training reads them.

@@ -62,7 +62,10 @@ pub struct Limb {
 #[non_exhaustive]
 pub enum LimbError {
     /// The crop box leaves the volume or is empty.
-    #[error("the crop {crop:?} does not fit into a volume of {size:?} voxels")]
+    #[error(
+        "the crop from voxel ({}, {}, {}) to ({}, {}, {}) does not fit into a volume of {} x {} x {} voxels",
+        crop.low[0], crop.low[1], crop.low[2], crop.high[0], crop.high[1], crop.high[2], size[0], size[1], size[2]
+    )]
     Crop {
         /// Box asked for.
         crop: VoxelBox,
@@ -97,7 +100,7 @@ pub enum LimbError {
         max_hu: f32,
     },
     /// The chosen point lies outside the volume or in air.
-    #[error("the point {0:?} mm, said to be inside the limb, is not in solid tissue of the volume")]
+    #[error("the point ({}, {}, {}) mm, said to be inside the limb, is not in solid tissue of the volume", .0[0], .0[1], .0[2])]
     Inside([f64; 3]),
     /// No surface could be made.
     #[error("the limb has no surface")]

@@ -56,14 +56,15 @@ pub enum ProjectionError {
         source_detector_mm: f64,
     },
     /// Opening angles of the fan.
-    #[error("the x-ray field opens by {found_deg:?} degrees, expected above 0 and below 170")]
+    #[error("the x-ray field opens by {} x {} degrees, expected above 0 and below 170", found_deg[0], found_deg[1])]
     FanAngle {
         /// Angles along device x and y, degrees.
         found_deg: [f64; 2],
     },
     /// Sides of the field.
     #[error(
-        "the x-ray field measures {size_mm:?} mm on the detector plane, expected sides of 0.001 to 10000000 mm"
+        "the x-ray field measures {} x {} mm on the detector plane, expected sides of 0.001 to 10000000 mm",
+        size_mm[0], size_mm[1]
     )]
     Field {
         /// Sides along device x and y.
@@ -124,7 +125,8 @@ pub enum ProjectionError {
     FieldMissesPhantom,
     /// Tissue would lie behind the detector plane.
     #[error(
-        "the detector cuts through the patient: voxel {voxel:?} of {density_g_cm3} g/cm³ lies {depth_mm:.1} mm behind its plane"
+        "the detector cuts through the patient: voxel ({}, {}, {}) of {density_g_cm3} g/cm³ lies {depth_mm:.1} mm behind its plane",
+        voxel[0], voxel[1], voxel[2]
     )]
     DetectorInsidePhantom {
         /// The offending voxel (i, j, k).
@@ -135,7 +137,7 @@ pub enum ProjectionError {
         depth_mm: f64,
     },
     /// The focal spot would lie in tissue.
-    #[error("the x-ray source lies inside voxel {voxel:?} of {density_g_cm3} g/cm³")]
+    #[error("the x-ray source lies inside voxel ({}, {}, {}) of {density_g_cm3} g/cm³", voxel[0], voxel[1], voxel[2])]
     SourceInsidePhantom {
         /// The offending voxel (i, j, k).
         voxel: [usize; 3],

@@ -29,7 +29,8 @@ pub struct VoxelBox {
 pub enum DoseError {
     /// A box is empty or leaves the phantom.
     #[error(
-        "the dose region of voxels {low:?} to {high:?} (exclusive) is empty or leaves the phantom of {size:?} voxels"
+        "the dose region of voxels ({}, {}, {}) to ({}, {}, {}), exclusive, is empty or leaves the phantom of {} x {} x {} voxels",
+        low[0], low[1], low[2], high[0], high[1], high[2], size[0], size[1], size[2]
     )]
     Box {
         /// First voxel.

@@ -76,8 +76,8 @@ pub enum McgpuError {
     },
     /// The header promises more voxels than the file can hold.
     #[error(
-        "{}: the header names {size:?} voxels, but {bytes} bytes hold {most} at most",
-        path.display()
+        "{}: the header names {} x {} x {} voxels, but {bytes} bytes hold {most} at most",
+        path.display(), size[0], size[1], size[2]
     )]
     VoxelsMissing {
         /// The voxel file.
@@ -91,8 +91,8 @@ pub enum McgpuError {
     },
     /// The voxels do not fit into the memory.
     #[error(
-        "{}: {size:?} voxels need at least {needed_mb} MB of memory, and {available_mb} MB are to be had",
-        path.display()
+        "{}: {} x {} x {} voxels need at least {needed_mb} MB of memory, but {available_mb} MB are available",
+        path.display(), size[0], size[1], size[2]
     )]
     Memory {
         /// The voxel file.
@@ -118,8 +118,8 @@ pub enum McgpuError {
     },
     /// The voxels whose dose is asked for are not there.
     #[error(
-        "{}: the dose region begins at voxel {first:?}, outside the geometry of {size:?} voxels",
-        path.display()
+        "{}: the dose region begins at voxel ({}, {}, {}), outside the geometry of {} x {} x {} voxels",
+        path.display(), first[0], first[1], first[2], size[0], size[1], size[2]
     )]
     DoseRegion {
         /// The input file.

@@ -51,7 +51,8 @@ pub enum CalibrationError {
     },
     /// The density curve must rise in HU and never fall in density.
     #[error(
-        "segment {segment:?}: knot {knot} of the density, {found:?} (HU, g/cm³), is not positive or does not continue the curve upwards"
+        "segment {segment:?}: knot {knot} of the density, {} HU and {} g/cm³, is not positive or does not continue the curve upwards",
+        found[0], found[1]
     )]
     Curve {
         /// The segment.

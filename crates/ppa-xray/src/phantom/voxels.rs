@@ -27,7 +27,7 @@ pub enum PhantomError {
     #[error("{0} materials; a phantom holds 1 to 256")]
     MaterialCount(usize),
     /// A voxel names a material that does not exist.
-    #[error("voxel {voxel:?} names material {found}, but there are {materials}")]
+    #[error("voxel ({}, {}, {}) names material {found}, but there are {materials}", voxel[0], voxel[1], voxel[2])]
     MaterialIndex {
         /// The voxel (i, j, k).
         voxel: [usize; 3],
@@ -37,7 +37,7 @@ pub enum PhantomError {
         materials: usize,
     },
     /// A density is NaN, negative or infinite.
-    #[error("voxel {voxel:?} has a density of {found} g/cm³, expected zero or more")]
+    #[error("voxel ({}, {}, {}) has a density of {found} g/cm³, expected zero or more", voxel[0], voxel[1], voxel[2])]
     Density {
         /// The voxel (i, j, k).
         voxel: [usize; 3],

@@ -82,8 +82,8 @@ pub enum TallyError {
     },
     /// A part was not finished.
     #[error(
-        "{} holds the histories {done:?} of its part {part:?}: resume it first",
-        path.display()
+        "{} holds the histories {} to {} of its part, {} to {}: resume it first",
+        path.display(), done.start, done.end, part.start, part.end
     )]
     Unfinished {
         /// The file.
@@ -94,7 +94,10 @@ pub enum TallyError {
         part: Range<u64>,
     },
     /// A part is another one than asked for.
-    #[error("{} is the part {found:?} of its run, expected {expected:?}", path.display())]
+    #[error(
+        "{} is the part of the histories {} to {} of its run, expected {} to {}",
+        path.display(), found.start, found.end, expected.start, expected.end
+    )]
     Part {
         /// The file.
         path: PathBuf,
@@ -105,9 +108,9 @@ pub enum TallyError {
     },
     /// Two parts hold the same histories.
     #[error(
-        "{} (histories {first:?}) and {} (histories {second:?}) overlap",
-        first_path.display(),
-        second_path.display()
+        "{} (histories {} to {}) and {} (histories {} to {}) overlap",
+        first_path.display(), first.start, first.end,
+        second_path.display(), second.start, second.end
     )]
     Overlap {
         /// The part that begins first.
@@ -120,7 +123,7 @@ pub enum TallyError {
         second: Range<u64>,
     },
     /// Histories are missing.
-    #[error("the histories {missing:?} of {histories} are in none of the tallies")]
+    #[error("the histories {} to {} of {histories} are in none of the tallies", missing.start, missing.end)]
     Hole {
         /// Histories that no part holds.
         missing: Range<u64>,

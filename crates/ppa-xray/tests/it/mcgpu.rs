@@ -291,7 +291,7 @@ fn what_an_input_file_names_must_fit() {
         ..SCAN
     });
     assert!(
-        found.contains("begins at voxel [1, 7, 1], outside the geometry of [8, 6, 4]"),
+        found.contains("begins at voxel (1, 7, 1), outside the geometry of 8 x 6 x 4"),
         "{found}"
     );
 }

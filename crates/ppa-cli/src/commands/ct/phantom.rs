@@ -6,6 +6,7 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use ppa_ct::phantom::{Limb, LowerLeg, Scanner, Side, TableTop, Truth};
 use ppa_ct::{Format, Info, Volume, write};
+use ppa_text::number;
 use serde::Serialize;
 
 use super::describe;
@@ -164,7 +165,8 @@ pub fn run(args: &PhantomArgs, output: Output) -> anyhow::Result<()> {
         if let Some(truth) = &made.truth {
             let angle = truth.mortise_angle_rad.to_degrees();
             lines.push(format!(
-                "mortise    {angle:.1} degrees of internal rotation"
+                "mortise    {:.1} degrees of internal rotation",
+                number(angle)
             ));
         }
         for (number, name) in (1..).zip(&made.labels) {

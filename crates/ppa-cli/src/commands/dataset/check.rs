@@ -6,6 +6,7 @@ use anyhow::Context;
 use clap::Args;
 use ppa_dataset::Split;
 use ppa_dataset::published::{Inspection, Published, inspect};
+use ppa_text::count;
 use serde::Serialize;
 
 use super::super::verify::require_none;
@@ -48,14 +49,14 @@ pub fn run(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
 fn describe(checked: &Checked) -> String {
     let found = &checked.found;
     format!(
-        "{} persons, {} limbs, {} image pairs: {} depth images ({} with region), {} radiographs, {} pairs labelled; {}; {}",
-        found.patients,
-        found.limbs,
-        found.pairs,
-        found.depth_images,
+        "{}, {}, {}: {} ({} with region), {}, {} labelled; {}; {}",
+        count(found.patients, "person"),
+        count(found.limbs, "limb"),
+        count(found.pairs, "image pair"),
+        count(found.depth_images, "depth image"),
         found.regions,
-        found.radiographs,
-        found.labelled,
+        count(found.radiographs, "radiograph"),
+        count(found.labelled, "pair"),
         if found.manifest {
             "all as in manifest.jsonl"
         } else {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use ppa_dataset::published::{Flexion, Layout, Published, convert};
+use ppa_text::count;
 
 use crate::output::{Output, working};
 
@@ -48,14 +49,14 @@ pub fn run(args: &ConvertArgs, output: Output) -> anyhow::Result<()> {
             Layout::Specimen => "synthetic",
         };
         format!(
-            "{}: {} depth images, {} radiographs and {} labels in the {layout} layout; left out: {} depth images, {} radiographs, {} labels",
+            "{}: {}, {} and {} in the {layout} layout; left out: {}, {}, {}",
             args.out.display(),
-            done.depth_images,
-            done.radiographs,
-            done.labels,
-            done.left_out,
-            done.radiographs_left_out,
-            done.labels_left_out
+            count(done.depth_images, "depth image"),
+            count(done.radiographs, "radiograph"),
+            count(done.labels, "label"),
+            count(done.left_out, "depth image"),
+            count(done.radiographs_left_out, "radiograph"),
+            count(done.labels_left_out, "label")
         )
     })
 }

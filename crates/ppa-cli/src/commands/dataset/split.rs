@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use ppa_dataset::Split;
 use ppa_dataset::published::Published;
+use ppa_text::numbers;
 
 use crate::output::Output;
 
@@ -33,7 +34,7 @@ fn part(text: &str) -> Result<(String, f64), String> {
         .ok_or("expected NAME=SHARE, as train=0.7")?;
     let share = share
         .parse()
-        .map_err(|_| format!("{share:?} is no number"))?;
+        .map_err(|_| format!("{share:?} is not a number"))?;
     Ok((name.to_owned(), share))
 }
 
@@ -54,8 +55,10 @@ pub fn run(args: &SplitArgs, output: Output) -> anyhow::Result<()> {
     let split = Split::draw(&patients, &args.parts, args.seed)?;
     split.write(&path)?;
     output.print(&split, |split| {
-        let part = |(name, patients): (&String, &Vec<u32>)| format!("{name} {patients:?}");
+        let part = |(name, patients): (&String, &Vec<u32>)| {
+            format!("{name}: {}", numbers(patients.iter().copied()))
+        };
         let parts: Vec<_> = split.parts.iter().map(part).collect();
-        format!("{}: {}", path.display(), parts.join(", "))
+        format!("{}: {}", path.display(), parts.join("; "))
     })
 }

@@ -1,6 +1,7 @@
 //! What `ppa depth coverage` finds, as JSON, CSV and text.
 
 use ppa_depth::{Coverage, Viewpoint};
+use ppa_text::{count, number};
 use serde::Serialize;
 
 #[derive(Debug, Serialize)]
@@ -50,16 +51,16 @@ impl Study {
                 "{:>4}  {:<15} {:>7.0}°  {:>8.0}°  {:>5.0} mm  {:>5.1} %  {:>10.1}  {side:>8}",
                 row.rank,
                 row.name,
-                v.azimuth_deg,
-                v.elevation_deg,
+                number(v.azimuth_deg),
+                number(v.elevation_deg),
                 v.distance_mm,
                 100.0 * c.visible_share,
                 c.pixels_per_cm2,
             ));
         }
         lines.push(format!(
-            "{} places; --csv and --json give all",
-            self.places.len()
+            "{}; --csv and --json give all",
+            count(self.places.len(), "place")
         ));
         lines.join("\n")
     }

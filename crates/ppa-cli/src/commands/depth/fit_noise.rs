@@ -6,6 +6,7 @@ use anyhow::Context;
 use clap::Args;
 use ppa_dataset::write_whole;
 use ppa_depth::{DepthImage, Invalidation, SensorSpec, fit_noise};
+use ppa_text::count;
 
 use crate::output::Output;
 
@@ -40,11 +41,11 @@ pub fn run(args: &FitNoiseArgs, output: Output) -> anyhow::Result<()> {
     write_whole(&args.out, &json)?;
     output.print(&fit, |fit| {
         format!(
-            "{}: {} frames, {} pixels: {:.2} mm at unit signal, {:.2} mm floor; misfit {:.0} %; other parts are not \
+            "{}: {}, {}: {:.2} mm at unit signal, {:.2} mm floor; misfit {:.0} %; other parts are not \
              from the recording",
             args.out.display(),
-            fit.frames,
-            fit.pixels,
+            count(fit.frames, "frame"),
+            count(fit.pixels, "pixel"),
             fit.random.at_unit_signal_mm,
             fit.random.floor_mm,
             100.0 * fit.relative_misfit

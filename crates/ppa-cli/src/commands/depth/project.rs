@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Args;
 use nalgebra::Point3;
+use ppa_text::number;
 use serde::Serialize;
 
 use crate::output::Output;
@@ -63,7 +64,7 @@ pub fn run(args: &ProjectArgs, output: Output) -> anyhow::Result<()> {
         .collect();
     output.print(&Projected { pixels }, |projected| {
         let line = |pixel: &Option<[f64; 2]>| match pixel {
-            Some([u, v]) => format!("{u:.6} {v:.6}"),
+            Some([u, v]) => format!("{:.6} {:.6}", number(*u), number(*v)),
             None => "not seen".to_owned(),
         };
         projected

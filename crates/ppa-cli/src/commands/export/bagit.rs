@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use ppa_dataset::export::bag;
+use ppa_text::count;
 
 use crate::output::{Output, bytes, working};
 
@@ -24,9 +25,9 @@ pub fn run(args: &BagitArgs, output: Output) -> anyhow::Result<()> {
     working.finish_and_clear();
     output.print(&bag, |bag| {
         format!(
-            "{}: {} files, {}",
+            "{}: {}, {}",
             args.out.display(),
-            bag.files,
+            count(bag.files, "file"),
             bytes(bag.bytes)
         )
     })

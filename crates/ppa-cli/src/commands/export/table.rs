@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use ppa_dataset::export::Table;
+use ppa_text::count;
 use serde::Serialize;
 
 use crate::output::Output;
@@ -12,7 +13,7 @@ use crate::output::Output;
 pub struct TableArgs {
     /// Dataset that `ppa generate` finished
     dataset: PathBuf,
-    /// File to write: .csv, or .parquet in a program built with the feature parquet
+    /// File to write: .csv or .parquet
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Split whose parts stand in the column split
@@ -35,10 +36,10 @@ pub fn run(args: &TableArgs, output: Output) -> anyhow::Result<()> {
     };
     output.print(&written, |w| {
         format!(
-            "{}: {} files, {} columns",
+            "{}: {}, {}",
             args.out.display(),
-            w.rows,
-            w.columns
+            count(w.rows, "file"),
+            count(w.columns, "column")
         )
     })
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use ppa_dataset::export::web_dataset;
+use ppa_text::count;
 
 use crate::output::{Output, working};
 
@@ -33,10 +34,10 @@ pub fn run(args: &WebdatasetArgs, output: Output) -> anyhow::Result<()> {
     working.finish_and_clear();
     output.print(&shards, |s| {
         format!(
-            "{}: {} image pairs in {} archives",
+            "{}: {} in {}",
             args.out.display(),
-            s.samples,
-            s.shards
+            count(s.samples, "image pair"),
+            count(s.shards, "archive")
         )
     })
 }

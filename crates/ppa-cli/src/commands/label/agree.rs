@@ -9,6 +9,7 @@ use ppa_metrics::agreement::{
     IccForms, KappaWeights, Measurement, Ratings, ReaderError, RepeatAgreement, disagreements, icc,
     krippendorff_alpha, reader_errors, repeat_agreement, weighted_kappa,
 };
+use ppa_text::{count, number};
 use serde::{Deserialize, Serialize};
 
 use crate::output::Output;
@@ -221,14 +222,14 @@ fn repeats(
 
 fn describe(report: &Report) -> String {
     let mut lines = vec![format!(
-        "{} images, {} readers",
-        report.images,
-        report.readers.len()
+        "{}, {}",
+        count(report.images, "image"),
+        count(report.readers.len(), "reader")
     )];
     if let Some(icc) = &report.icc {
         lines.push(format!(
-            "intraclass correlations of {} images graded by all",
-            icc.subjects
+            "intraclass correlations of {} graded by all",
+            count(icc.subjects, "image")
         ));
         for (name, form) in [
             ("ICC(1,1)", icc.one_way_single),
@@ -240,7 +241,9 @@ fn describe(report: &Report) -> String {
         ] {
             lines.push(format!(
                 "  {name}  {:.4}  95 % from {:.4} to {:.4}",
-                form.value, form.low, form.high
+                number(form.value),
+                number(form.low),
+                number(form.high)
             ));
         }
     }
@@ -248,7 +251,7 @@ fn describe(report: &Report) -> String {
         ("ordinal", report.alpha_ordinal),
         ("interval", report.alpha_interval),
     ] {
-        lines.extend(alpha.map(|alpha| format!("Krippendorff's alpha, {name}  {alpha:.4}")));
+        lines.extend(alpha.map(|alpha| format!("Krippendorff's alpha, {name}  {:.4}", number(alpha))));
     }
     for Pair {
         readers: [a, b],
@@ -260,25 +263,27 @@ fn describe(report: &Report) -> String {
         let kappas = [("linear", kappa_linear), ("quadratic", kappa_quadratic)];
         let kappas: Vec<String> = kappas
             .iter()
-            .filter_map(|(name, kappa)| kappa.map(|kappa| format!("{name} {kappa:.4}")))
+            .filter_map(|(name, kappa)| kappa.map(|kappa| format!("{name} {:.4}", number(kappa))))
             .collect();
         lines.push(format!(
-            "kappa of {a} and {b} ({images} images)  {}",
+            "kappa of {a} and {b} ({})  {}",
+            count(*images, "image"),
             kappas.join(", ")
         ));
     }
     for reader in &report.readers {
-        let mut line = format!("{} ({} images)", reader.name, reader.images);
+        let mut line = format!("{} ({})", reader.name, count(reader.images, "image"));
         if let Some(others) = &reader.against_others {
             line += &format!(
                 "  bias {:+.3}, mean error {:.3} against the others",
-                others.bias, others.mae
+                number(others.bias),
+                others.mae
             );
         }
         if let Some(own) = &reader.against_self {
             line += &format!(
-                "; {} repeats: {:.0} % the same, mean error {:.3}",
-                own.images,
+                "; {}: {:.0} % the same, mean error {:.3}",
+                count(own.images, "repeat"),
                 100.0 * own.equal,
                 own.mae
             );

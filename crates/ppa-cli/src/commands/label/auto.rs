@@ -7,6 +7,7 @@ use clap::Args;
 use ppa_dataset::labels::{ComputedLabels, GradeThresholds, LabelledLimb, compute_labels};
 use ppa_dataset::layout::LimbId;
 use ppa_dataset::{Case, Manifest, Plan};
+use ppa_text::{count, number};
 use serde::Serialize;
 
 use crate::output::{Output, working};
@@ -78,8 +79,11 @@ fn describe(labelled: &Labelled) -> String {
             ""
         };
         format!(
-            "{}: {} radiographs, {} diagnostic, most open at {:.1} degrees{kept}",
-            limb.limb, limb.radiographs, limb.diagnostic, limb.best_angle_deg
+            "{}: {}, {} diagnostic, most open at {:.1} degrees{kept}",
+            limb.limb,
+            count(limb.radiographs, "radiograph"),
+            limb.diagnostic,
+            number(limb.best_angle_deg)
         )
     };
     let mut lines: Vec<String> = labelled.limbs.iter().map(line).collect();

@@ -6,6 +6,7 @@ use anyhow::ensure;
 use clap::Args;
 use ppa_dataset::labels::{PICTURES_PER_PAGE, PageNumber, Showing, grading_page, write_key};
 use ppa_dataset::{Manifest, write_whole};
+use ppa_text::count;
 use serde::Serialize;
 
 use crate::output::{Output, bytes, working};
@@ -90,10 +91,10 @@ pub fn run(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
     };
     output.print(&exported, |done| {
         format!(
-            "{}: {} pages with {} pictures, {} of them repeats ({})\nkeep the key to yourself: {}",
+            "{}: {} with {}, {} of them repeats ({})\nkeep the key to yourself: {}",
             args.out.display(),
-            done.pages.len(),
-            done.pictures,
+            count(done.pages.len(), "page"),
+            count(done.pictures, "picture"),
             done.repeats,
             bytes(done.bytes),
             done.key.display()

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use ppa_dataset::Manifest;
 use ppa_dataset::labels::{Imported, import_grades, read_key};
+use ppa_text::count;
 
 use crate::output::Output;
 
@@ -40,19 +41,21 @@ pub fn run(args: &ImportArgs, output: Output) -> anyhow::Result<()> {
 
 fn describe(done: &Imported) -> String {
     let mut lines = vec![format!(
-        "{} radiographs labelled by {} readers; {} repeats kept aside",
-        done.labelled, done.readers, done.repeats
+        "{} labelled by {}; {} kept aside",
+        count(done.labelled, "radiograph"),
+        count(done.readers, "reader"),
+        count(done.repeats, "repeat")
     )];
     if done.replaced_computed > 0 {
         lines.push(format!(
-            "{} computed labels gave way",
-            done.replaced_computed
+            "{} gave way",
+            count(done.replaced_computed, "computed label")
         ));
     }
     if done.without_label > 0 {
         lines.push(format!(
-            "{} radiographs of the same limbs were not graded and have no label",
-            done.without_label
+            "without a label, as they were not graded: {} of the same limbs",
+            count(done.without_label, "radiograph")
         ));
     }
     lines.join("\n")

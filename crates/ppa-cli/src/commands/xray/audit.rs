@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use ppa_ct::ReadOptions;
 use ppa_dataset::Case;
+use ppa_text::{count, number};
 use ppa_xray::{Audit, HuBin, HuCalibration};
 
 use crate::findings::prepared;
@@ -64,7 +65,7 @@ fn describe(audit: &Audit) -> String {
             .expect("a String takes everything");
     };
     for segment in &audit.segments {
-        let hu = |hu: Option<f32>| hu.map_or("-".to_owned(), |hu| format!("{hu:.0}"));
+        let hu = |hu: Option<f32>| hu.map_or("-".to_owned(), |hu| format!("{:.0}", number(hu)));
         line(format_args!(
             "{:<16}{:>10}{:>12.2}{:>10.2}{:>9}{:>8}  {}\n",
             segment.name,
@@ -77,8 +78,9 @@ fn describe(audit: &Audit) -> String {
         ));
         if segment.below_curve + segment.above_curve > 0 {
             line(format_args!(
-                "  beyond its density curve: {} voxels below, {} above\n",
-                segment.below_curve, segment.above_curve
+                "  beyond its density curve: {} below, {} above\n",
+                count(segment.below_curve, "voxel"),
+                segment.above_curve
             ));
         }
     }
@@ -88,19 +90,18 @@ fn describe(audit: &Audit) -> String {
         audit.metal_cm3,
         match audit.outside_mask {
             0 => String::new(),
-            1 => ", 1 voxel outside the limb".to_owned(),
-            outside => format!(", {outside} voxels outside the limb"),
+            outside => format!(", {} outside the limb", count(outside, "voxel")),
         }
     ));
     line(format_args!(
-        "lowest {:.0} HU in {} voxels{}, highest {:.0} HU in {}{}",
-        audit.lowest_hu,
-        audit.voxels_at_lowest,
+        "lowest {:.0} HU in {}{}, highest {:.0} HU in {}{}",
+        number(audit.lowest_hu),
+        count(audit.voxels_at_lowest, "voxel"),
         match audit.clipped_below {
             0 => "",
             _ => " (clipped, or filled in outside the field of view)",
         },
-        audit.highest_hu,
+        number(audit.highest_hu),
         audit.voxels_at_highest,
         match audit.clipped_above {
             0 => "",

@@ -66,7 +66,7 @@ impl BoneNumbers {
 #[non_exhaustive]
 pub enum BonesError {
     /// Labels and lattice disagree.
-    #[error("{found} labels, expected {expected}, one per voxel")]
+    #[error("{}, expected {expected}, one per voxel", ppa_text::count(*found, "label"))]
     Count {
         /// Labels.
         found: usize,

@@ -1,5 +1,7 @@
 //! The gutters of an ankle, and how open they lie to the beam.
 
+use std::fmt;
+
 use nalgebra::Isometry3;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -25,19 +27,29 @@ impl Gutter {
     pub const ALL: [Self; 3] = [Self::Medial, Self::Superior, Self::Lateral];
 }
 
+impl fmt::Display for Gutter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Medial => "medial",
+            Self::Superior => "superior",
+            Self::Lateral => "lateral",
+        })
+    }
+}
+
 /// Why bones have no joint space that could be seen.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum JointSpaceError {
     /// A gutter was not found.
     #[error(
-        "no {0:?} gutter: talus and {opposite} face each other nowhere across at most 6 mm",
+        "no {0} gutter: talus and {opposite} face each other nowhere across at most 6 mm",
         opposite = if *.0 == Gutter::Lateral { "fibula" } else { "tibia" }
     )]
     NoGutter(Gutter),
     /// No direction of the beam opens a gutter.
     #[error(
-        "the {0:?} gutter is open from no direction around the limb: the bones may not be separated"
+        "the {0} gutter is open from no direction around the limb: the bones may not be separated"
     )]
     NeverOpen(Gutter),
     /// No direction of the beam opens all of them.

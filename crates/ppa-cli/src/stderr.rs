@@ -1,0 +1,187 @@
+//! What is said on stderr besides progress: warnings, notes, and the error that ends the program.
+//!
+//! With `--json` each is one line of JSON.
+
+use std::ffi::OsStr;
+use std::process::ExitCode;
+use std::sync::OnceLock;
+
+use anstream::AutoStream;
+use clap::ColorChoice;
+use clap::builder::styling::{AnsiColor, Style};
+use clap::error::ErrorKind;
+use serde::Serialize;
+use serde_json::json;
+
+/// Exit code of a command that failed; clap's own is 2.
+const FAILED: u8 = 1;
+
+static AS_JSON: OnceLock<bool> = OnceLock::new();
+
+/// What has to be known before the command line is parsed, as parsing may fail.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Early {
+    /// Whether `--json` was given.
+    pub json: bool,
+    /// The last `--color`; `Auto` without one.
+    pub color: ColorChoice,
+}
+
+impl Early {
+    /// Looks for both options among the arguments before `--`.
+    pub fn of<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Self {
+        let mut early = Self {
+            json: false,
+            color: ColorChoice::Auto,
+        };
+        let mut arguments = arguments.into_iter();
+        while let Some(argument) = arguments.next() {
+            let value = match argument.as_ref().to_str() {
+                Some("--") => break,
+                Some("--json") => {
+                    early.json = true;
+                    continue;
+                }
+                Some("--color") => arguments.next().map(|value| value.as_ref().to_owned()),
+                Some(text) => text.strip_prefix("--color=").map(Into::into),
+                None => None,
+            };
+            let choice = value.as_ref().and_then(|value| value.to_str()?.parse().ok());
+            early.color = choice.unwrap_or(early.color);
+        }
+        early
+    }
+}
+
+/// Settles the colours of all output, and whether stderr holds lines of JSON. To be called once, before anything is said.
+pub fn set_up(json: bool, color: ColorChoice) {
+    let choice = match color {
+        ColorChoice::Auto => anstream::ColorChoice::Auto,
+        ColorChoice::Always => anstream::ColorChoice::Always,
+        ColorChoice::Never => anstream::ColorChoice::Never,
+    };
+    choice.write_global();
+    let resolved = AutoStream::choice(&std::io::stderr());
+    console::set_colors_enabled_stderr(resolved != anstream::ColorChoice::Never);
+    AS_JSON.get_or_init(|| json);
+}
+
+/// Whether stderr holds lines of JSON.
+pub fn is_json() -> bool {
+    AS_JSON.get().copied().unwrap_or(false)
+}
+
+/// Says something that may make a result wrong or incomplete.
+pub fn warning(text: &str) {
+    say("warning", AnsiColor::Yellow.on_default().bold(), text);
+}
+
+/// Says something worth knowing.
+pub fn note(text: &str) {
+    say("note", Style::new(), text);
+}
+
+fn say(kind: &str, style: Style, text: &str) {
+    match (is_json(), kind) {
+        (true, _) => anstream::eprintln!("{}", json!({ kind: text })),
+        (false, "note") => anstream::eprintln!("{text}"),
+        (false, _) => anstream::eprintln!("{style}{kind}:{style:#} {text}"),
+    }
+}
+
+/// The error that ends the program, as `--json` prints it.
+#[derive(Debug, PartialEq, Serialize)]
+struct Failure {
+    error: String,
+    causes: Vec<String>,
+    exit_code: u8,
+}
+
+/// Says why a command failed.
+pub fn failure(error: &anyhow::Error) -> ExitCode {
+    if is_json() {
+        let causes = error.chain().skip(1).map(ToString::to_string);
+        end(&Failure {
+            error: error.to_string(),
+            causes: causes.collect(),
+            exit_code: FAILED,
+        });
+    } else {
+        let style = AnsiColor::Red.on_default().bold();
+        anstream::eprintln!("{style}ppa:{style:#} {error:#}");
+    }
+    ExitCode::from(FAILED)
+}
+
+/// Says why the command line cannot be used, or prints the help or version it asks for.
+pub fn usage(error: &clap::Error) -> ExitCode {
+    let exit_code = u8::try_from(error.exit_code()).unwrap_or(FAILED);
+    if is_json() && error.use_stderr() {
+        end(&Failure {
+            error: in_one_line(error),
+            causes: Vec::new(),
+            exit_code,
+        });
+    } else {
+        // Nobody may be there any more to read the help, as after `ppa --help | head`.
+        let _ = error.print();
+    }
+    ExitCode::from(exit_code)
+}
+
+fn end(failure: &Failure) {
+    let line = serde_json::to_string(failure).expect("text and numbers are JSON");
+    anstream::eprintln!("{line}");
+}
+
+/// clap's message without its usage: lines joined by spaces, tips after semicolons.
+fn in_one_line(error: &clap::Error) -> String {
+    if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        return "a command is missing; --help lists them".to_owned();
+    }
+    let text = error.render().to_string();
+    let text = text.strip_prefix("error: ").unwrap_or(&text);
+    let paragraphs = text.split("\n\n").take_while(|paragraph| {
+        !paragraph.starts_with("Usage:") && !paragraph.starts_with("For more information")
+    });
+    let words = |paragraph: &str| paragraph.split_whitespace().collect::<Vec<_>>().join(" ");
+    paragraphs.map(words).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn json_and_color_are_found_before_parsing() {
+        let of = |text: &str| Early::of(text.split(' '));
+        let plain = Early {
+            json: false,
+            color: ColorChoice::Auto,
+        };
+        assert_eq!(of("ppa ct info a -- --json --color=always"), plain);
+        assert_eq!(of("ppa --color sideways status"), plain);
+        let both = Early {
+            json: true,
+            color: ColorChoice::Never,
+        };
+        assert_eq!(of("ppa --color always status --json --color=never"), both);
+    }
+
+    #[test]
+    fn usage_errors_are_one_line_without_the_usage() {
+        let error = |text: &str| {
+            let parsed = crate::help::command().try_get_matches_from(text.split(' '));
+            in_one_line(&parsed.unwrap_err())
+        };
+        assert_eq!(
+            error("ppa qa data --outt x"),
+            "unexpected argument '--outt' found; tip: a similar argument exists: '--out'"
+        );
+        assert_eq!(
+            error("ppa ct convert"),
+            "the following required arguments were not provided: <SCAN> <OUT>"
+        );
+        assert_eq!(error("ppa"), "a command is missing; --help lists them");
+    }
+}

@@ -1,0 +1,79 @@
+//! The verdict at the top of the page, from all that was found.
+
+use ppa_text::count;
+
+/// What was found in a dataset, in numbers.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Tally {
+    /// Damaged or missing images and lists.
+    pub flaws: usize,
+    /// Severe findings that nobody acknowledged.
+    pub severe: usize,
+    /// Severe findings that were acknowledged, and cautions; notes count nowhere.
+    pub other_findings: usize,
+    /// Poses that do not follow from those beside them.
+    pub outliers: usize,
+    /// Limbs without depth images.
+    pub empty_limbs: usize,
+}
+
+impl Tally {
+    /// One bar: red where the dataset should not be used as it is, yellow where something should be looked at, else green.
+    pub fn html(&self) -> String {
+        let list = |counts: &[(usize, &str, &str)]| {
+            let there = counts.iter().filter(|(n, ..)| *n > 0);
+            let texts: Vec<_> = there
+                .map(|(n, what, place)| count(*n, what) + place)
+                .collect();
+            texts.join(", ")
+        };
+        let bad = list(&[
+            (self.severe, "severe finding", ""),
+            (self.flaws, "flaw", " of files"),
+            (self.empty_limbs, "limb", " without depth images"),
+        ]);
+        let doubts = list(&[
+            (self.other_findings, "other finding", ""),
+            (self.outliers, "outlier", " among the poses"),
+        ]);
+        let (class, text) = match (bad.is_empty(), doubts.is_empty()) {
+            (false, true) => ("bad", format!("Do not use this dataset as it is: {bad}.")),
+            (false, false) => (
+                "bad",
+                format!("Do not use this dataset as it is: {bad}. Also: {doubts}."),
+            ),
+            (true, false) => ("caution", format!("Look at this before use: {doubts}.")),
+            (true, true) => ("good", "No severe or cautioning finding, no flaw of files, no outlier among the poses.".to_owned()),
+        };
+        format!("<p class=\"verdict {class}\">{text}</p>")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CLEAN: Tally = Tally {
+        flaws: 0,
+        severe: 0,
+        other_findings: 0,
+        outliers: 0,
+        empty_limbs: 0,
+    };
+
+    #[test]
+    fn only_a_dataset_without_any_finding_gets_a_green_bar() {
+        assert!(CLEAN.html().contains("verdict good"));
+        let severe = Tally { severe: 1, ..CLEAN }.html();
+        assert!(severe.contains("verdict bad") && severe.contains(": 1 severe finding."), "{severe}");
+        let flaws = Tally { flaws: 2, outliers: 1, ..CLEAN }.html();
+        assert!(flaws.contains("verdict bad") && flaws.contains("2 flaws of files. Also: 1 outlier among"), "{flaws}");
+        for doubtful in [
+            Tally { other_findings: 3, ..CLEAN },
+            Tally { outliers: 1, ..CLEAN },
+        ] {
+            let html = doubtful.html();
+            assert!(html.contains("verdict caution"), "{html}");
+        }
+    }
+}
