@@ -76,6 +76,7 @@ mod split;
 mod stage;
 #[cfg(feature = "generate")]
 mod status;
+mod stop;
 #[cfg(feature = "generate")]
 mod toml_file;
 #[cfg(feature = "generate")]
@@ -97,7 +98,7 @@ pub use contact_sheet::{ContactSheetError, contact_sheet};
 pub use coverage_plot::{RankedView, coverage_plot};
 pub use files::{FileError, sha256_of_file, write_whole};
 #[cfg(feature = "generate")]
-pub use forecast::{Forecast, ForecastError, forecast};
+pub use forecast::{Forecast, ForecastError, forecast, free_bytes};
 #[cfg(feature = "generate")]
 pub use frames::Frames;
 #[cfg(feature = "generate")]
@@ -124,6 +125,7 @@ pub use split::{Split, SplitError};
 pub use stage::{PlacedCamera, Stage, StageError, Table, spectrum, tube};
 #[cfg(feature = "generate")]
 pub use status::{LimbStatus, Status, status};
+pub use stop::Stopped;
 #[cfg(feature = "generate")]
 pub use unit::UnitError;
 #[cfg(feature = "generate")]
