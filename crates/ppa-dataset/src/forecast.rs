@@ -1,6 +1,7 @@
 //! What a plan will take, from a sample of its poses, before anything of it is made.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use cpu_time::ProcessTime;
 use ppa_scene::PoseAngle;
@@ -14,6 +15,7 @@ use crate::job::{Progress, units_of_part};
 use crate::layout::View;
 use crate::plan::Plan;
 use crate::status::status;
+use crate::stop::{Stopped, go_on};
 
 /// Why a plan cannot be carried out, or what it takes not be told.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +27,9 @@ pub enum ForecastError {
     /// The temporary folder of the sample.
     #[error(transparent)]
     File(#[from] FileError),
+    /// It was asked to stop.
+    #[error("not all poses of the sample were measured")]
+    Stopped(#[from] Stopped),
     /// A share that is none.
     #[error("the fraction is {0}, expected a number from 0 to 1")]
     Fraction(f64),
@@ -79,7 +84,7 @@ pub struct Forecast {
 /// folder, one after the other, and tells what all will take in the folder `root`.
 ///
 /// The poses are spread evenly, and differently for every limb. What cannot work with one of them
-/// would not work in the run. Whether the disk has room for all is for [`Forecast::fits`] to say.
+/// would not work in the run. Once `stop` is true no other pose begins. Whether the disk has room for all is for [`Forecast::fits`] to say.
 ///
 /// # Errors
 /// [`ForecastError`], naming the case or pose that stands against the plan.
@@ -87,6 +92,7 @@ pub fn forecast(
     plan: &Plan,
     root: &Path,
     fraction: f64,
+    stop: &AtomicBool,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Forecast, ForecastError> {
     if !(0.0..=1.0).contains(&fraction) {
@@ -108,6 +114,7 @@ pub fn forecast(
         preparing_s += begun.elapsed().as_secs_f64();
         let shift = (i as f64 + 0.5) / limbs.len() as f64;
         for pose in spread(&poses, of_limb, shift) {
+            go_on(stop)?;
             let begun = ProcessTime::now();
             let images = make(limb.unit(pose))?;
             unit_s.push(begun.elapsed().as_secs_f64());
@@ -178,7 +185,7 @@ fn mean_and_error(values: &[f64]) -> (f64, Option<f64>) {
 
 /// Free bytes of the file system that holds `root`, or its nearest folder that exists.
 #[cfg(unix)]
-fn free_bytes(root: &Path) -> Option<u64> {
+pub fn free_bytes(root: &Path) -> Option<u64> {
     let root = std::path::absolute(root).ok()?;
     let disk = root
         .ancestors()
@@ -188,7 +195,7 @@ fn free_bytes(root: &Path) -> Option<u64> {
 
 /// Other systems are not asked.
 #[cfg(not(unix))]
-fn free_bytes(_: &Path) -> Option<u64> {
+pub fn free_bytes(_: &Path) -> Option<u64> {
     None
 }
 

@@ -1,6 +1,7 @@
 //! From a plan to a dataset: resumable, and the same bytes for any number of threads.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use ppa_scene::SweepError;
 use ppa_xray::Part;
@@ -17,6 +18,7 @@ use crate::plan::Plan;
 use crate::prepare::{PrepareError, PreparedLimb};
 use crate::record::Record;
 use crate::stage::{Stage, StageError};
+use crate::stop::{Stopped, go_on};
 use crate::unit::{PosableLimb, UnitError};
 
 /// Why a dataset could not be made. What was finished before stays and is not made again.
@@ -64,6 +66,9 @@ pub enum GenerateError {
     /// A file that the plan names.
     #[error(transparent)]
     File(#[from] FileError),
+    /// [`GenerateSettings::stop`] became true.
+    #[error("the run ended before its last pose")]
+    Stopped(#[from] Stopped),
     /// A plan that was not read from a file, and that reading would have refused.
     #[error("the plan cannot be used: {0}")]
     Unusable(String),
@@ -97,21 +102,24 @@ pub enum GenerateError {
     },
 }
 
-/// Which poses of a plan are made, and how much disk they may take.
+/// Which poses of a plan are made, how much disk they may take, and what ends the run early.
 #[derive(Debug, Clone, Copy)]
-pub struct GenerateSettings {
+pub struct GenerateSettings<'a> {
     /// One of several equal parts of the plan; each goes into a folder of its own.
     pub part: Part,
     /// Bytes that the images may take; poses that are being made may exceed it for a moment.
     pub disk_limit: Option<u64>,
+    /// Once true, poses under way are finished and no other begins.
+    pub stop: Option<&'a AtomicBool>,
 }
 
-impl Default for GenerateSettings {
-    /// All poses, as much disk as there is.
+impl Default for GenerateSettings<'_> {
+    /// All poses, as much disk as there is, to the end.
     fn default() -> Self {
         Self {
             part: Part::WHOLE,
             disk_limit: None,
+            stop: None,
         }
     }
 }
@@ -143,7 +151,14 @@ pub fn generate(
         disk_limit: settings.disk_limit,
         progress,
     };
-    job.complete(|limb| work.prepare(limb.limb, root))
+    job.complete(|limb| {
+        let make = work.prepare(limb.limb, root)?;
+        let make: MakeUnit<GenerateError> = Box::new(move |unit| {
+            settings.stop.map_or(Ok(()), go_on)?;
+            make(unit)
+        });
+        Ok(make)
+    })
 }
 
 /// A plan with its cases and its stage: all that units are made from.

@@ -96,6 +96,7 @@ mod spreadsheet;
 mod stage;
 #[cfg(feature = "generate")]
 mod status;
+mod stop;
 #[cfg(feature = "generate")]
 mod toml_file;
 #[cfg(feature = "generate")]
@@ -126,7 +127,7 @@ pub use depth_views::{DepthView, depth_views};
 pub use files::{FileError, sha256_of_file, write_whole};
 pub use findings::{Finding, FindingCode, Findings, LimbFinding, Severity};
 #[cfg(feature = "generate")]
-pub use forecast::{Forecast, ForecastError, forecast};
+pub use forecast::{Forecast, ForecastError, forecast, free_bytes};
 #[cfg(feature = "generate")]
 pub use frames::Frames;
 #[cfg(feature = "generate")]
@@ -158,6 +159,7 @@ pub use spreadsheet::is_formula;
 pub use stage::{PlacedCamera, Stage, StageError, Table, body_of_cloud, spectrum, tube};
 #[cfg(feature = "generate")]
 pub use status::{LimbStatus, Status, status};
+pub use stop::Stopped;
 #[cfg(feature = "generate")]
 pub use unit::UnitError;
 #[cfg(feature = "generate")]

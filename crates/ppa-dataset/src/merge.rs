@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use ppa_xray::Part;
 use sha2::{Digest, Sha256};
@@ -11,6 +12,7 @@ use crate::files::{FileError, hex, write_whole};
 use crate::job::{Job, JobError, LimbUnits, Progress, Summary};
 use crate::planned::{Planned, difference};
 use crate::record::{Record, Unit};
+use crate::stop::{Stopped, go_on};
 use crate::unit::Images;
 
 /// Why shards could not be joined.
@@ -26,6 +28,9 @@ pub enum MergeError {
     /// The merged dataset.
     #[error(transparent)]
     Job(#[from] JobError),
+    /// It was asked to stop.
+    #[error("the merge ended before its last pose")]
+    Stopped(#[from] Stopped),
     /// No folder was given.
     #[error("no shard to merge: name at least one folder")]
     NoShard,
@@ -78,7 +83,7 @@ pub enum MergeError {
 /// Joins the shards of one plan in the folder `root`, copying their images.
 ///
 /// Every image is compared with its recorded hash before it is written. What is there already is
-/// kept, so a merge that was killed goes on.
+/// kept, so a merge that was killed goes on. Once `stop` is true no other pose begins.
 ///
 /// # Errors
 /// [`MergeError`]; shards of different plans, overlaps and holes are refused before anything is
@@ -86,6 +91,7 @@ pub enum MergeError {
 pub fn merge(
     shards: &[PathBuf],
     root: &Path,
+    stop: &AtomicBool,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Summary, MergeError> {
     let shards = Shards::open(shards, root)?;
@@ -99,7 +105,12 @@ pub fn merge(
         disk_limit: None,
         progress,
     };
-    job.complete(|_| Ok(Box::new(|unit: Unit| shards.copy(&unit, root))))
+    job.complete(|_| {
+        Ok(Box::new(|unit: Unit| {
+            go_on(stop)?;
+            shards.copy(&unit, root)
+        }))
+    })
 }
 
 struct Shards<'a> {

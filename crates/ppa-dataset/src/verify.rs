@@ -1,6 +1,7 @@
 //! A sample of a dataset made again and compared, byte by byte.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use ppa_scene::PoseAngle;
 use rayon::prelude::*;
@@ -15,6 +16,7 @@ use crate::plan::Plan;
 use crate::planned::difference;
 use crate::record::{Record, Unit};
 use crate::seed::{Purpose, item_seed};
+use crate::stop::{Stopped, go_on};
 
 /// Why a dataset could not be verified.
 #[derive(Debug, thiserror::Error)]
@@ -26,6 +28,9 @@ pub enum VerifyError {
     /// A file.
     #[error(transparent)]
     File(#[from] FileError),
+    /// It was asked to stop.
+    #[error("not all poses of the sample were made again")]
+    Stopped(#[from] Stopped),
     /// Making a pose again.
     #[error(transparent)]
     Generate(#[from] GenerateError),
@@ -58,7 +63,7 @@ pub struct Verification {
 /// Checks the dataset in `root` as [`check`](crate::check) does, then makes a share of its poses
 /// again, at least one, in a temporary folder, and compares hashes, poses and regions of interest.
 ///
-/// `seed` decides which poses: another seed looks at others.
+/// `seed` decides which poses: another seed looks at others. Once `stop` is true no other pose begins.
 ///
 /// # Errors
 /// [`VerifyError`] when the dataset is not that of `plan` or a pose cannot be made.
@@ -67,6 +72,7 @@ pub fn verify(
     root: &Path,
     fraction: f64,
     seed: u64,
+    stop: &AtomicBool,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Verification, VerifyError> {
     if !(0.0..=1.0).contains(&fraction) {
@@ -89,8 +95,10 @@ pub fn verify(
     let scratch = tempfile::tempdir().map_err(FileError::at("create", &std::env::temp_dir()))?;
     let mut different = Vec::new();
     for (limb, poses) in sample {
+        go_on(stop)?;
         let make = work.prepare(limb.limb, scratch.path())?;
         let compare = |&pose: &PoseAngle| {
+            go_on(stop)?;
             let found = compare(&limb.unit(pose), &make, root, scratch.path())?;
             progress(Progress::Made);
             Ok::<_, VerifyError>(found)

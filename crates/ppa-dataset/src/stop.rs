@@ -1,0 +1,16 @@
+//! Long work that ends early because it was asked to.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Work was asked to stop and did so before its next step. What was finished before stays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("stopped on request")]
+pub struct Stopped;
+
+/// Fails once `stop` is true.
+pub(crate) fn go_on(stop: &AtomicBool) -> Result<(), Stopped> {
+    match stop.load(Ordering::Relaxed) {
+        true => Err(Stopped),
+        false => Ok(()),
+    }
+}
