@@ -6,10 +6,12 @@ use anyhow::Context;
 use ppa_dataset::layout::LimbId;
 use ppa_dataset::{Case, Finding, Findings, LimbFinding, PreparedLimb, Severity};
 
+use crate::stderr::warning;
+
 /// Repeats the open findings of a dataset or plan, one line for each code and limb; `of` follows the limb's name.
 pub fn repeat(findings: &Findings, of: &str) {
     for line in lines(findings, of) {
-        eprintln!("{line}");
+        warning(&line);
     }
 }
 
@@ -34,7 +36,7 @@ pub fn prepared(case: &Case, file: &Path) -> anyhow::Result<PreparedLimb> {
     let side = ppa_dataset::layout::Side::from(case.side).letter();
     for finding in prepared.open_findings(&case.acknowledged) {
         let limb = format!("limb {side} of {}", file.display());
-        eprintln!("{}", line(finding, &limb, 0));
+        warning(&line(finding, &limb, 0));
     }
     Ok(prepared)
 }
