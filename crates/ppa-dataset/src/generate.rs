@@ -13,6 +13,7 @@ use crate::layout::LimbId;
 use crate::plan::Plan;
 use crate::prepare::{PrepareError, PreparedLimb};
 use crate::stage::{Stage, StageError};
+use crate::staging::staging_folder;
 use crate::unit::{PosableLimb, UnitError};
 
 /// Why a dataset could not be made. What was finished before stays and is not made again.
@@ -100,14 +101,17 @@ pub struct GenerateSettings {
     pub part: Part,
     /// Bytes that the images may take; poses that are being made may exceed it for a moment.
     pub disk_limit: Option<u64>,
+    /// Whether poses of other settings, scans or sources are made anew, and those that the plan does not have removed.
+    pub replace: bool,
 }
 
 impl Default for GenerateSettings {
-    /// All poses, as much disk as there is.
+    /// All poses, as much disk as there is, and nothing that is there is replaced.
     fn default() -> Self {
         Self {
             part: Part::WHOLE,
             disk_limit: None,
+            replace: false,
         }
     }
 }
@@ -115,9 +119,12 @@ impl Default for GenerateSettings {
 /// Makes what is missing of the plan's dataset in the folder `root`.
 ///
 /// Every pose is a unit of its own: its files appear whole, its record last, so a run that was
-/// killed goes on where it stopped. A pose is made again when its record is missing, when what
-/// it follows from (plan settings, case, code and physics data) has changed, or when one of its
-/// files is missing or altered.
+/// killed goes on where it stopped. A pose is made again when its record is missing or damaged, or when one of its files
+/// is missing or altered; files that were altered are moved to `.ppa/altered`.
+///
+/// A folder with poses that follow from something else (plan settings, case, code and physics data) or that the plan does
+/// not have is refused, unless `settings` ask to replace them. Then each of them stays until its successor is whole, and
+/// those without a successor until all others are.
 ///
 /// # Errors
 /// [`GenerateError`], naming the file or pose at fault.
@@ -129,15 +136,17 @@ pub fn generate(
 ) -> Result<Summary, GenerateError> {
     let work = Work::of_plan(plan)?;
     let poses = plan.rotation.poses()?;
+    let staging = staging_folder(root);
     let job = Job {
         root,
         description: &work.description,
         part: settings.part,
         limbs: units_of_part(work.planned(), &poses, settings.part),
         disk_limit: settings.disk_limit,
+        replace: settings.replace,
         progress,
     };
-    job.complete(|limb| work.prepare(limb.limb, root))
+    job.complete(|limb| work.prepare(limb.limb, &staging))
 }
 
 /// A plan with its cases and its stage: all that units are made from.

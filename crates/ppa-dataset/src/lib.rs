@@ -21,6 +21,7 @@ mod body_shape;
 mod case;
 #[cfg(feature = "generate")]
 mod check;
+mod checksums;
 #[cfg(feature = "generate")]
 mod claim;
 #[cfg(feature = "generate")]
@@ -29,6 +30,8 @@ mod contact_sheet;
 mod coverage_plot;
 #[cfg(feature = "generate")]
 mod description;
+#[cfg(feature = "generate")]
+mod differences;
 #[cfg(feature = "generate")]
 mod drawing;
 pub mod export;
@@ -42,8 +45,12 @@ mod frames;
 mod generate;
 #[cfg(feature = "generate")]
 mod job;
+#[cfg(all(test, feature = "generate"))]
+mod job_trials;
 pub mod labels;
 pub mod layout;
+#[cfg(feature = "generate")]
+mod lists;
 #[cfg(all(test, feature = "generate"))]
 mod load;
 mod manifest;
@@ -51,6 +58,8 @@ mod manifest;
 mod merge;
 #[cfg(all(test, feature = "generate"))]
 mod only_read;
+#[cfg(feature = "generate")]
+mod overview;
 #[cfg(feature = "generate")]
 mod part_file;
 #[cfg(feature = "generate")]
@@ -69,14 +78,22 @@ mod record;
 #[cfg(feature = "generate")]
 mod room_file;
 #[cfg(feature = "generate")]
+mod seal;
+#[cfg(feature = "generate")]
 mod seed;
+#[cfg(feature = "generate")]
+mod set_aside;
 #[cfg(feature = "generate")]
 mod shaped_skin;
 mod split;
 #[cfg(feature = "generate")]
 mod stage;
 #[cfg(feature = "generate")]
+mod staging;
+#[cfg(feature = "generate")]
 mod status;
+#[cfg(feature = "generate")]
+mod survey;
 #[cfg(feature = "generate")]
 mod toml_file;
 #[cfg(feature = "generate")]
@@ -96,6 +113,8 @@ pub use claim::FolderError;
 pub use contact_sheet::{ContactSheetError, contact_sheet};
 #[cfg(feature = "generate")]
 pub use coverage_plot::{RankedView, coverage_plot};
+#[cfg(feature = "generate")]
+pub use differences::KeyDifference;
 pub use files::{FileError, sha256_of_file, write_whole};
 pub use findings::{Finding, FindingCode, Findings, LimbFinding, Severity};
 #[cfg(feature = "generate")]
@@ -109,6 +128,8 @@ pub use job::{JobError, Progress, Summary};
 pub use manifest::{FileKind, FileRow, Manifest, RoiFile, RoiRow, Rows};
 #[cfg(feature = "generate")]
 pub use merge::{MergeError, merge};
+#[cfg(feature = "generate")]
+pub use part_file::held_part;
 #[cfg(feature = "generate")]
 pub use plan::{DepthSettings, Plan, PlanCase, PlanError, PlanRoom, XraySettings};
 #[cfg(feature = "generate")]
@@ -126,6 +147,8 @@ pub use split::{Split, SplitError};
 pub use stage::{PlacedCamera, Stage, StageError, Table, spectrum, tube};
 #[cfg(feature = "generate")]
 pub use status::{LimbStatus, Status, status};
+#[cfg(feature = "generate")]
+pub use survey::DatasetDiffers;
 #[cfg(feature = "generate")]
 pub use unit::UnitError;
 #[cfg(feature = "generate")]
