@@ -94,7 +94,7 @@ fn a_flipped_bit_in_a_shard_reaches_no_merged_dataset() {
     let files = files(&folders[1]);
     let mut draw = Draw(13);
     let mut refused = 0;
-    for _ in 0..200 {
+    for _ in 0..60 {
         let (file, before, _) = flip(&folders[1], &files, &mut draw);
         let merged = tempfile::tempdir().unwrap();
         match merge(&folders, merged.path(), false, &|_: Progress| {}) {
@@ -104,5 +104,5 @@ fn a_flipped_bit_in_a_shard_reaches_no_merged_dataset() {
         fs::write(folders[1].join(file), before).unwrap();
     }
     // All but the lists, which a merge does not read.
-    assert!(refused > 100, "{refused}");
+    assert!(refused > 30, "{refused}");
 }
