@@ -75,6 +75,19 @@ fn run(plan: &Plan, root: &Path, threads: usize) -> Summary {
         .unwrap()
 }
 
+fn replace(plan: &Plan, root: &Path, threads: usize) -> Summary {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .unwrap();
+    let settings = GenerateSettings {
+        replace: true,
+        ..GenerateSettings::default()
+    };
+    pool.install(|| generate(plan, root, &settings, &|_| {}))
+        .unwrap()
+}
+
 /// A dataset made once by one thread, for tests that only look.
 fn dataset() -> &'static Path {
     static DATASET: OnceLock<tempfile::TempDir> = OnceLock::new();
@@ -149,16 +162,17 @@ fn a_run_makes_only_what_is_missing_or_damaged() {
     let first = contents(root.path());
 
     assert_eq!(run(&plan(), root.path(), 2).made, 0, "nothing is missing");
-    let image = root
+    let image = LIMB.depth(BodyShape::Small, View::Right, 36);
+    fs::write(root.path().join(&image), b"damaged").unwrap();
+    let left = root
         .path()
-        .join(LIMB.depth(BodyShape::Small, View::Right, 36));
-    fs::write(&image, b"damaged").unwrap();
-    fs::write(
-        root.path().join("patient_0/.depth_cam_left_0.0.png.x7Gh2k"),
-        b"by a killed run",
-    )
-    .unwrap();
-    assert_eq!(run(&plan(), root.path(), 2).made, 1, "one pose is damaged");
+        .join(".ppa/new/patient_0/.depth_cam_left_0.0.png.x7Gh2k");
+    fs::create_dir_all(left.parent().unwrap()).unwrap();
+    fs::write(left, b"by a killed run").unwrap();
+    let healed = run(&plan(), root.path(), 2);
+    assert_eq!(healed.made, 1, "one pose is damaged");
+    assert_eq!(healed.healed, [image]);
+    fs::remove_dir_all(root.path().join(".ppa/altered")).unwrap();
     assert!(
         contents(root.path()) == first,
         "the repaired dataset is the first one"
@@ -166,8 +180,16 @@ fn a_run_makes_only_what_is_missing_or_damaged() {
 
     let mut other = plan();
     other.xray.kvp = 70.0;
+    let refused = generate(&other, root.path(), &GenerateSettings::default(), &|_| {}).unwrap_err();
+    let said = refused.to_string();
+    assert!(
+        said.contains("2 of its 2 poses")
+            && said.contains("settings.xray.kvp is 60.0 there and 70.0 here"),
+        "{said}"
+    );
+    assert!(contents(root.path()) == first, "nothing was changed");
     assert_eq!(
-        run(&other, root.path(), 2).made,
+        replace(&other, root.path(), 2).made,
         2,
         "all follow from the tube voltage"
     );
@@ -180,7 +202,7 @@ fn images_of_an_earlier_plan_do_not_stay() {
     run(&plan(), edited.path(), 2);
     let mut fewer = plan();
     fewer.shapes.variants = vec![BodyShape::Orig];
-    run(&fewer, edited.path(), 2);
+    replace(&fewer, edited.path(), 2);
     run(&fewer, fresh.path(), 2);
     let (edited, fresh) = (contents(edited.path()), contents(fresh.path()));
     let (edited, fresh) = (edited.iter(), fresh.iter());
@@ -206,7 +228,7 @@ fn a_folder_of_something_else_is_refused() {
     assert!(
         matches!(
             error,
-            GenerateError::Job(JobError::Folder(FolderError::OtherPlan { .. }))
+            GenerateError::Job(JobError::Folder(FolderError::Differs(_)))
         ),
         "{error}"
     );

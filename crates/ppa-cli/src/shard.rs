@@ -11,17 +11,55 @@ struct Told {
     by: &'static str,
 }
 
-/// The shard of `--shard`, of a Slurm job array, of `mpirun`, or of an indexed Kubernetes job.
+/// Which part of a plan a process is to make.
+#[derive(Debug)]
+pub enum Asked {
+    /// This one.
+    Part(Part),
+    /// That of one task of a Slurm array which is not all of the array, as when a task is run again.
+    Task {
+        /// Number of the task.
+        id: u64,
+        /// What the environment says of it.
+        told: String,
+    },
+}
+
+impl Asked {
+    /// The part; `held` is that of the folder it goes into, where one was begun.
+    pub fn part(
+        &self,
+        held: impl FnOnce() -> anyhow::Result<Option<Part>>,
+    ) -> anyhow::Result<Part> {
+        match self {
+            Self::Part(part) => Ok(*part),
+            Self::Task { id, told } => match held()? {
+                // Arrays count from 0 or from 1.
+                Some(part) if part != Part::WHOLE && [id + 1, *id].contains(&part.index()) => {
+                    Ok(part)
+                }
+                Some(part) if part != Part::WHOLE => {
+                    bail!("{told}, which is not shard {part} that the folder holds; give --shard")
+                }
+                _ => bail!(
+                    "{told}, which leaves its shard open; give --shard, or run the whole array from 0 or 1 on"
+                ),
+            },
+        }
+    }
+}
+
+/// The shard of `--shard`, of a Slurm job array or job step, of `mpirun`, or of an indexed Kubernetes job.
 ///
 /// Two that disagree are an error: half of a plan would be made twice, or not at all.
-pub fn shard(option: Option<Part>) -> anyhow::Result<Part> {
+pub fn shard(option: Option<Part>) -> anyhow::Result<Asked> {
     shard_told(option, &|name| env::var(name).ok())
 }
 
 fn shard_told(
     option: Option<Part>,
     variable: &dyn Fn(&str) -> Option<String>,
-) -> anyhow::Result<Part> {
+) -> anyhow::Result<Asked> {
     let number = |name: &str| {
         let text = variable(name).with_context(|| format!("{name} is not set"))?;
         let number: u64 = text
@@ -43,6 +81,7 @@ fn shard_told(
             by: "--shard",
         });
     }
+    let mut task = None;
     if variable("SLURM_ARRAY_TASK_ID").is_some() {
         let (id, count) = (
             number("SLURM_ARRAY_TASK_ID")?,
@@ -53,17 +92,30 @@ fn shard_told(
             number("SLURM_ARRAY_TASK_MAX")?,
         );
         let step = number("SLURM_ARRAY_TASK_STEP")?;
-        // A list with gaps, such as 1-3,7, leaves it open which of its tasks this is.
         let even = step > 0
             && (first..=last).contains(&id)
             && (id - first) % step == 0
             && (last - first) / step + 1 == count;
-        ensure!(
-            even,
-            "SLURM_ARRAY_TASK_ID is {id} of {count} tasks from {first} to {last} in steps of {step}, which leaves its \
-             shard open; give --shard, or --array as a range"
-        );
-        told.push(part((id - first) / step, count, "SLURM_ARRAY_TASK_ID")?);
+        // A list with gaps leaves it open which shard this is, and a single task or a range that begins later looks like
+        // tasks of a larger array that are run again.
+        if even && count > 1 && first <= 1 {
+            told.push(part((id - first) / step, count, "SLURM_ARRAY_TASK_ID")?);
+        } else {
+            let told = format!(
+                "SLURM_ARRAY_TASK_ID is {id} in an array of {count} (from {first} to {last} in steps of {step})"
+            );
+            task = Some(Asked::Task { id, told });
+        }
+    }
+    // Processes of mpirun inherit the step of Slurm that started mpirun's daemons, which is not theirs.
+    if variable("OMPI_COMM_WORLD_RANK").is_none() && variable("SLURM_STEP_ID").is_some() {
+        let count = match variable("SLURM_STEP_NUM_TASKS") {
+            Some(_) => number("SLURM_STEP_NUM_TASKS")?,
+            None => number("SLURM_NTASKS")?,
+        };
+        if number("SLURM_STEP_ID")? < FIRST_SPECIAL_STEP && count > 1 {
+            told.push(part(number("SLURM_PROCID")?, count, "SLURM_PROCID")?);
+        }
     }
     if variable("OMPI_COMM_WORLD_RANK").is_some() {
         let (rank, size) = (
@@ -82,10 +134,20 @@ fn shard_told(
             "JOB_COMPLETION_INDEX",
         )?);
     }
+    if let (Some(task), None) = (task, option) {
+        if let (Asked::Task { told: array, .. }, Some(other)) = (&task, told.first()) {
+            bail!(
+                "{array}, and {} tells shard {}; give --shard and unset one of them",
+                other.by,
+                other.part
+            );
+        }
+        return Ok(task);
+    }
     match told.as_slice() {
-        [] => Ok(Part::WHOLE),
+        [] => Ok(Asked::Part(Part::WHOLE)),
         [first, others @ ..] => match others.iter().find(|other| other.part != first.part) {
-            None => Ok(first.part),
+            None => Ok(Asked::Part(first.part)),
             Some(other) => bail!(
                 "{} tells shard {}, but {} tells {}; unset one of them",
                 first.by,
@@ -97,11 +159,23 @@ fn shard_told(
     }
 }
 
+/// From here on Slurm numbers steps that `srun` did not start: batch scripts, interactive steps, external processes.
+const FIRST_SPECIAL_STEP: u64 = 0xffff_fff0;
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn told(option: Option<&str>, variables: &str) -> Result<String, String> {
+        told_in(None, option, variables)
+    }
+
+    /// The part for a folder that holds a part already.
+    fn told_in(
+        held: Option<&str>,
+        option: Option<&str>,
+        variables: &str,
+    ) -> Result<String, String> {
         let variable = |name: &str| {
             let mut pairs = variables
                 .split_whitespace()
@@ -111,7 +185,8 @@ mod tests {
                 .map(|(_, value)| value.to_owned())
         };
         let option = option.map(|text| text.parse().unwrap());
-        match shard_told(option, &variable) {
+        let held = || Ok(held.map(|text| text.parse().unwrap()));
+        match shard_told(option, &variable).and_then(|asked| asked.part(held)) {
             Ok(part) => Ok(part.to_string()),
             Err(error) => Err(format!("{error:#}")),
         }
@@ -136,6 +211,72 @@ mod tests {
         let kubernetes = "JOB_COMPLETION_INDEX=2 JOB_COMPLETIONS=3";
         assert_eq!(told(None, kubernetes), Ok("3/3".into()));
         assert_eq!(told(Some("2/4"), mpi), Ok("2/4".into()));
+    }
+
+    #[test]
+    fn a_task_run_again_takes_the_shard_of_its_folder() {
+        let again = slurm(2, 1, 2, 2, 1);
+        for variables in [
+            &again,
+            &slurm(1, 1, 1, 1, 1),
+            &slurm(0, 1, 0, 0, 1),
+            &slurm(3, 2, 2, 3, 1),
+        ] {
+            for held in [None, Some("1/1")] {
+                let refused = told_in(held, None, variables).unwrap_err();
+                assert!(refused.contains("open; give --shard"), "{refused}");
+            }
+        }
+        // Arrays that count from 1, and from 0.
+        assert_eq!(told_in(Some("2/7"), None, &again), Ok("2/7".into()));
+        assert_eq!(told_in(Some("3/7"), None, &again), Ok("3/7".into()));
+        assert_eq!(
+            told_in(Some("1/7"), None, &slurm(0, 1, 0, 0, 1)),
+            Ok("1/7".into())
+        );
+        let refused = told_in(Some("5/7"), None, &again).unwrap_err();
+        assert!(refused.contains("not shard 5/7"), "{refused}");
+        assert_eq!(told_in(Some("5/7"), Some("4/7"), &again), Ok("4/7".into()));
+    }
+
+    #[test]
+    fn each_task_of_a_job_step_makes_a_shard() {
+        let step =
+            |rank: u32, id: u64| format!("SLURM_STEP_ID={id} SLURM_PROCID={rank} SLURM_NTASKS=3");
+        assert_eq!(told(None, &step(0, 0)), Ok("1/3".into()));
+        assert_eq!(told(None, &step(2, 4)), Ok("3/3".into()));
+        // A step of fewer tasks than its job.
+        let fewer = format!("{} SLURM_STEP_NUM_TASKS=2", step(1, 0));
+        assert_eq!(told(None, &fewer), Ok("2/2".into()));
+        let one = format!("{} SLURM_STEP_NUM_TASKS=1", step(0, 0));
+        assert_eq!(told(None, &one), Ok("1/1".into()));
+        // A batch script is no task of a step.
+        assert_eq!(
+            told(None, "SLURM_PROCID=0 SLURM_NTASKS=3"),
+            Ok("1/1".into())
+        );
+        assert_eq!(told(None, &step(0, 0xffff_fffb)), Ok("1/1".into()));
+        // Under mpirun the step is that of its daemons.
+        let mpi = format!(
+            "{} OMPI_COMM_WORLD_RANK=4 OMPI_COMM_WORLD_SIZE=8",
+            step(1, 0)
+        );
+        assert_eq!(told(None, &mpi), Ok("5/8".into()));
+        // One task within each task of an array.
+        let array = format!("{} {one}", slurm(5, 7, 1, 7, 1));
+        assert_eq!(told(None, &array), Ok("5/7".into()));
+        let refused = told(None, &format!("{} {}", slurm(5, 7, 1, 7, 1), step(0, 0))).unwrap_err();
+        assert!(
+            refused.contains("tells shard 5/7, but SLURM_PROCID tells 1/3"),
+            "{refused}"
+        );
+        let refused = told(None, &format!("{} {}", slurm(2, 1, 2, 2, 1), step(0, 0))).unwrap_err();
+        assert!(
+            refused.contains("SLURM_PROCID tells shard 1/3"),
+            "{refused}"
+        );
+        let refused = told(Some("2/7"), &step(0, 0)).unwrap_err();
+        assert!(refused.contains("--shard tells shard 2/7"), "{refused}");
     }
 
     #[test]

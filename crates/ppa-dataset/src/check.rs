@@ -4,21 +4,39 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
+use crate::checksums::Checksums;
 use crate::claim::{Claim, FolderError, claim_existing};
 use crate::files::{read_text, sha256_of_file};
+use crate::findings::Findings;
 use crate::job::LimbUnits;
-use crate::manifest::{FileRow, Manifest, RoiFile, roi_text};
+use crate::lists::{Lists, stands};
+use crate::manifest::{FileRow, Manifest};
 use crate::part_file::read_part;
 use crate::planned::Planned;
-use crate::record::{Record, Unit};
+use crate::record::{FoundRecord, Record, Unit};
+use crate::staging::is_interrupted;
 
 /// Something in a dataset that is not as it was made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Problem {
-    /// A pose was never made, or its record is gone or unreadable.
+    /// A pose was never made, or its record is gone.
     #[error("{unit} is missing")]
     Missing {
+        /// The pose.
+        unit: String,
+    },
+    /// The record of a pose is not as it was written.
+    #[error("the record of {unit} is damaged")]
+    Record {
+        /// The pose.
+        unit: String,
+    },
+    /// A run was killed while it put the files of a pose in their place.
+    #[error(
+        "{unit} is half replaced, as the run that did it was interrupted; the next run completes it"
+    )]
+    Interrupted {
         /// The pose.
         unit: String,
     },
@@ -60,6 +78,19 @@ pub enum Problem {
         /// Path from the dataset's root.
         file: String,
     },
+}
+
+impl Problem {
+    /// The image or list that is not as it was made: its path from the dataset's root.
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            Self::Unreadable { file }
+            | Self::Altered { file }
+            | Self::Differs { file }
+            | Self::List { file } => Some(file),
+            _ => None,
+        }
+    }
 }
 
 /// What [`check`] found.
@@ -116,13 +147,19 @@ impl Recorded {
     }
 
     fn unit(&self, unit: &Unit) -> (Option<Record>, Vec<Problem>) {
-        let Ok(record) = Record::read(&self.root, unit) else {
-            let unit = unit.to_string();
-            return (None, vec![Problem::Missing { unit }]);
+        let path = self.root.join(unit.id().record_file());
+        let found = Record::look(&path, unit.id()).unwrap_or(FoundRecord::Damaged);
+        let unit_name = unit.to_string();
+        if is_interrupted(&self.root, unit.id()) {
+            return (None, vec![Problem::Interrupted { unit: unit_name }]);
+        }
+        let record = match found {
+            FoundRecord::Whole(record) => record,
+            FoundRecord::Absent => return (None, vec![Problem::Missing { unit: unit_name }]),
+            FoundRecord::Damaged => return (None, vec![Problem::Record { unit: unit_name }]),
         };
         if record.key != unit.key() {
-            let unit = unit.to_string();
-            return (None, vec![Problem::Stale { unit }]);
+            return (None, vec![Problem::Stale { unit: unit_name }]);
         }
         let of_image = |row: &FileRow| {
             let file = row.file.clone();
@@ -135,56 +172,49 @@ impl Recorded {
         (Some(record), problems)
     }
 
-    /// Manifest and regions of interest against the records, which are in the order of the plan.
+    /// The lists against the records, which are in the order of the plan.
     fn lists(&self, records: Vec<Record>) -> Vec<Problem> {
-        let mut problems = Vec::new();
-        let mut files = Vec::new();
         let mut records = records.into_iter();
-        for limb in &self.limbs {
-            let mut rois = RoiFile::new();
-            for record in records.by_ref().take(limb.poses.len()) {
-                files.extend(record.files);
-                rois.extend(record.rois);
-            }
-            let file = limb.limb.roi_file();
-            if !self.holds(&file, &roi_text(&rois)) {
-                problems.push(Problem::List { file });
+        let record = |_: &Unit| records.next().ok_or(());
+        let lists = Lists::of(&self.limbs, &self.planned.text, record);
+        let lists = lists.expect("all poses have a record");
+        let mut problems = Vec::new();
+        for list @ (file, text) in &lists.files {
+            let is_sealed = self.planned.sealed || file != Checksums::FILE;
+            if file == Manifest::FILE {
+                problems.extend(self.manifest(text, &lists.rows));
+            } else if is_sealed && !stands(&self.root, list) {
+                problems.push(Problem::List { file: file.clone() });
             }
         }
-        let manifest = Manifest {
-            root: self.root.clone(),
-            files,
-        };
-        problems.extend(self.manifest(&manifest));
+        if !lists.holds(Findings::FILE) && self.root.join(Findings::FILE).exists() {
+            let file = Findings::FILE.to_owned();
+            problems.push(Problem::List { file });
+        }
         problems
     }
 
-    fn manifest(&self, expected: &Manifest) -> Option<Problem> {
+    fn manifest(&self, text: &str, rows: &[FileRow]) -> Option<Problem> {
         let file = Manifest::FILE.to_owned();
         let Ok(found) = read_text(&self.root.join(&file)) else {
             return Some(Problem::List { file });
         };
-        let text = expected.to_text();
         if found == text {
             return None;
         }
         let (mut found, mut lines) = (found.lines(), text.lines());
         let same = |_: &usize| matches!((found.next(), lines.next()), (Some(a), Some(b)) if a == b);
         let line = (0..).take_while(same).count();
-        let row = expected.files.get(line).map(|row| row.file.clone());
+        let row = rows.get(line).map(|row| row.file.clone());
         Some(Problem::ManifestLine {
             line: line + 1,
             expected: row.unwrap_or_else(|| "no further image".to_owned()),
         })
     }
-
-    fn holds(&self, file: &str, text: &str) -> bool {
-        read_text(&self.root.join(file)).is_ok_and(|found| found == text)
-    }
 }
 
-/// Reads every image of the dataset in `root` and compares it with its hash, and manifest and
-/// regions of interest with the records they were made from. Changes nothing.
+/// Reads every image of the dataset in `root` and compares it with its hash, and the lists with the records they were made
+/// from. Changes nothing.
 ///
 /// # Errors
 /// [`FolderError`] when `root` holds no dataset or is being written.

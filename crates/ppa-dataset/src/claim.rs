@@ -1,12 +1,17 @@
-//! A dataset's folder, claimed by one run at a time.
+//! A dataset's folder, claimed by one run that writes, or by any number of readers.
 
-use std::collections::HashSet;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use ppa_xray::Part;
+
+use crate::checksums::Checksums;
+use crate::description::DESCRIPTION_FILE;
 use crate::files::FileError;
+use crate::manifest::Manifest;
 use crate::record::FOLDER;
+use crate::survey::DatasetDiffers;
 
 /// Why a folder cannot take the images of a run.
 #[derive(Debug, thiserror::Error)]
@@ -23,102 +28,128 @@ pub enum FolderError {
         /// The record of a pose that is not in the run.
         record: String,
     },
+    /// The folder holds what the run would replace.
+    #[error("{0}")]
+    Differs(Box<DatasetDiffers>),
+    /// The folder holds another part of the plan.
+    #[error(
+        "{} holds {}, but this run is to make {}; {} goes on with it, another folder takes this run",
+        root.display(), part_name(*held), part_name(*asked), how_to_ask(*held)
+    )]
+    OtherPart {
+        /// The dataset's folder.
+        root: PathBuf,
+        /// The part that it holds.
+        held: Part,
+        /// The part that was asked for.
+        asked: Part,
+    },
     /// The folder holds something else.
     #[error("{} is neither empty nor a dataset that ppa generate began", .0.display())]
     NotADataset(PathBuf),
-    /// Another process writes here.
-    #[error("{} is being written by another process", .0.display())]
+    /// The folder holds files of a dataset, but not the records that tell what they are.
+    #[error(
+        "{} holds {found}, but not the folder .ppa with the records of its poses, as a dataset that was copied in part; \
+         copy .ppa as well, or choose another folder",
+        root.display()
+    )]
+    WithoutRecords {
+        /// The dataset's folder.
+        root: PathBuf,
+        /// What it holds.
+        found: String,
+    },
+    /// Another process relies on its files.
+    #[error("{} is in use by another process that writes or checks it", .0.display())]
     Busy(PathBuf),
     /// A file of the dataset.
     #[error(transparent)]
     File(#[from] FileError),
 }
 
-/// Held while a process relies on a dataset's files; released when dropped or when the process dies.
-pub(crate) struct Claim(#[expect(dead_code, reason = "holds the lock")] fs::File);
-
-/// Claims a folder that holds a dataset, finished or not, and changes nothing in it.
-pub(crate) fn claim_existing(root: &Path) -> Result<Claim, FolderError> {
-    let folder = root.join(FOLDER);
-    if !folder.is_dir() {
-        return Err(FolderError::NotADataset(root.to_owned()));
-    }
-    let path = folder.join("lock");
-    let lock = fs::File::create(&path).map_err(FileError::at("create", &path))?;
-    match lock.try_lock() {
-        Ok(()) => Ok(Claim(lock)),
-        Err(fs::TryLockError::WouldBlock) => Err(FolderError::Busy(root.to_owned())),
-        Err(fs::TryLockError::Error(e)) => Err(FileError::at("lock", &path)(e).into()),
+fn part_name(part: Part) -> String {
+    match part {
+        Part::WHOLE => "the whole plan".to_owned(),
+        part => format!("shard {part} of its plan"),
     }
 }
 
-/// Claims the folder `root` for a run that makes the records `planned`, and clears what a killed
-/// run left.
-///
-/// Refuses a folder that another run writes to, that holds something else, or that holds records
-/// which are not planned.
-pub(crate) fn claim(root: &Path, planned: &HashSet<String>) -> Result<Claim, FolderError> {
+fn how_to_ask(part: Part) -> String {
+    match part {
+        Part::WHOLE => "a run without --shard".to_owned(),
+        part => format!("--shard {part}"),
+    }
+}
+
+/// Held while a process relies on a dataset's files; released when dropped or when the process dies.
+pub(crate) struct Claim(#[expect(dead_code, reason = "holds the lock")] Option<fs::File>);
+
+/// Claims a folder that holds a dataset, finished or not, for reading. Writes nothing, and several readers may do so.
+pub(crate) fn claim_existing(root: &Path) -> Result<Claim, FolderError> {
+    if !root.join(FOLDER).is_dir() {
+        return Err(not_a_dataset(root)?);
+    }
+    let path = lock_file(root);
+    match fs::File::open(&path) {
+        Ok(lock) => {
+            locked(root, lock.try_lock_shared())?;
+            Ok(Claim(Some(lock)))
+        }
+        // Nobody has written here since the folder was copied.
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Claim(None)),
+        Err(error) => Err(FileError::at("read", &path)(error).into()),
+    }
+}
+
+/// Claims the folder `root` for a run that writes. Refuses a folder that is in use or holds something else.
+pub(crate) fn claim(root: &Path) -> Result<Claim, FolderError> {
     let folder = root.join(FOLDER);
     let occupied = root.exists() && {
         let mut entries = fs::read_dir(root).map_err(FileError::at("read", root))?;
         entries.next().is_some()
     };
     if occupied && !folder.is_dir() {
-        return Err(FolderError::NotADataset(root.to_owned()));
+        return Err(not_a_dataset(root)?);
     }
     fs::create_dir_all(&folder).map_err(FileError::at("create folder", &folder))?;
-    let claim = claim_existing(root)?;
-    for record in record_names(root)? {
-        if !planned.contains(&record) {
-            return Err(FolderError::OtherPlan {
-                root: root.to_owned(),
-                record,
-            });
-        }
-    }
-    remove_unfinished(root).map_err(FileError::at("clear", root))?;
-    Ok(claim)
+    let path = lock_file(root);
+    let mut options = fs::OpenOptions::new();
+    let options = options.write(true).create(true).truncate(false);
+    let lock = options
+        .open(&path)
+        .map_err(FileError::at("create", &path))?;
+    locked(root, lock.try_lock())?;
+    Ok(Claim(Some(lock)))
 }
 
-/// Names of the records in a dataset.
-pub(crate) fn record_names(root: &Path) -> Result<Vec<String>, FileError> {
-    let folder = root.join(FOLDER);
-    let read = FileError::at("read", &folder);
-    let names = fs::read_dir(&folder).and_then(|entries| {
-        let names = entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
-        names.collect::<io::Result<Vec<_>>>()
-    });
-    let is_record = |name: &String| name.ends_with(".json") && !name.starts_with('.');
-    Ok(names.map_err(read)?.into_iter().filter(is_record).collect())
+fn lock_file(root: &Path) -> PathBuf {
+    root.join(FOLDER).join("lock")
 }
 
-/// Removes temporary files (`.name.random`) that a killed run left behind.
-fn remove_unfinished(root: &Path) -> io::Result<()> {
-    for entry in fs::read_dir(root)? {
-        let entry = entry?;
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if entry.file_type()?.is_dir() {
-            if name == FOLDER || name.starts_with("patient_") {
-                remove_hidden(&entry.path())?;
-            }
-        } else if [".manifest.jsonl.", ".dataset.json."]
-            .iter()
-            .any(|p| name.starts_with(p))
-        {
-            fs::remove_file(entry.path())?;
-        }
-    }
-    Ok(())
+fn locked(root: &Path, tried: Result<(), fs::TryLockError>) -> Result<(), FolderError> {
+    tried.map_err(|error| match error {
+        fs::TryLockError::WouldBlock => FolderError::Busy(root.to_owned()),
+        fs::TryLockError::Error(e) => FileError::at("lock", &lock_file(root))(e).into(),
+    })
 }
 
-fn remove_hidden(folder: &Path) -> io::Result<()> {
-    for entry in fs::read_dir(folder)? {
-        let entry = entry?;
-        if entry.file_type()?.is_dir() {
-            remove_hidden(&entry.path())?;
-        } else if entry.file_name().to_string_lossy().starts_with('.') {
-            fs::remove_file(entry.path())?;
-        }
+/// What a folder without records is.
+fn not_a_dataset(root: &Path) -> Result<FolderError, FileError> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(root).map_err(FileError::at("read", root))? {
+        let entry = entry.map_err(FileError::at("read", root))?;
+        names.push(entry.file_name().to_string_lossy().into_owned());
     }
-    Ok(())
+    names.sort();
+    let lists = [DESCRIPTION_FILE, Manifest::FILE, Checksums::FILE];
+    let of_dataset =
+        |name: &&String| lists.contains(&name.as_str()) || name.starts_with("patient_");
+    let root = root.to_owned();
+    Ok(match names.iter().find(of_dataset) {
+        None => FolderError::NotADataset(root),
+        Some(found) => FolderError::WithoutRecords {
+            root,
+            found: found.clone(),
+        },
+    })
 }

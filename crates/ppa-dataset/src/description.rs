@@ -13,6 +13,7 @@ use crate::findings::FindingCode;
 use crate::layout::{LimbId, View};
 use crate::manifest::Rows;
 use crate::plan::{Plan, XraySettings};
+use crate::seal::sealed;
 use crate::shaped_skin::ShapeSettings;
 use crate::stage::Stage;
 
@@ -143,7 +144,7 @@ impl<'a> Description<'a> {
             acknowledged: &case.acknowledged,
         });
         Self {
-            version: 1,
+            version: 2,
             units: "mm; depth images: Z in mm, 0 invalid; tallies: eV/cm2 per history; \
                     transforms: row-major target_from_source; ct frame: LPS; dose_histories: null \
                     where the radiographs carry no noise",
@@ -165,7 +166,8 @@ impl<'a> Description<'a> {
         }
     }
 
+    /// The file's text, with its seal.
     pub fn to_text(&self) -> String {
-        serde_json::to_string_pretty(self).expect("settings hold only JSON values")
+        sealed(&serde_json::to_string_pretty(self).expect("settings hold only JSON values"))
     }
 }

@@ -19,6 +19,7 @@ use crate::prepare::{PrepareError, PreparedLimb};
 use crate::record::Record;
 use crate::stage::{Stage, StageError};
 use crate::stop::{Stopped, go_on};
+use crate::staging::staging_folder;
 use crate::unit::{PosableLimb, UnitError};
 
 /// Why a dataset could not be made. What was finished before stays and is not made again.
@@ -111,15 +112,18 @@ pub struct GenerateSettings<'a> {
     pub disk_limit: Option<u64>,
     /// Once true, poses under way are finished and no other begins.
     pub stop: Option<&'a AtomicBool>,
+    /// Whether poses of other settings, scans or sources are made anew, and those that the plan does not have removed.
+    pub replace: bool,
 }
 
 impl Default for GenerateSettings<'_> {
-    /// All poses, as much disk as there is, to the end.
+    /// All poses, as much disk as there is, to the end, and nothing that is there is replaced.
     fn default() -> Self {
         Self {
             part: Part::WHOLE,
             disk_limit: None,
             stop: None,
+            replace: false,
         }
     }
 }
@@ -127,9 +131,12 @@ impl Default for GenerateSettings<'_> {
 /// Makes what is missing of the plan's dataset in the folder `root`.
 ///
 /// Every pose is a unit of its own: its files appear whole, its record last, so a run that was
-/// killed goes on where it stopped. A pose is made again when its record is missing, when what
-/// it follows from (plan settings, case, code and physics data) has changed, or when one of its
-/// files is missing or altered.
+/// killed goes on where it stopped. A pose is made again when its record is missing or damaged, or when one of its files
+/// is missing or altered; files that were altered are moved to `.ppa/altered`.
+///
+/// A folder with poses that follow from something else (plan settings, case, code and physics data) or that the plan does
+/// not have is refused, unless `settings` ask to replace them. Then each of them stays until its successor is whole, and
+/// those without a successor until all others are.
 ///
 /// # Errors
 /// [`GenerateError`], naming the file or pose at fault.
@@ -143,16 +150,18 @@ pub fn generate(
     let poses = plan.rotation.poses()?;
     let limbs = units_of_part(work.planned(), &poses, settings.part);
     progress(Progress::Findings(&work.findings(&limbs, root)?));
+    let staging = staging_folder(root);
     let job = Job {
         root,
         description: &work.description,
         part: settings.part,
         limbs,
         disk_limit: settings.disk_limit,
+        replace: settings.replace,
         progress,
     };
     job.complete(|limb| {
-        let make = work.prepare(limb.limb, root)?;
+        let make = work.prepare(limb.limb, &staging)?;
         let make: MakeUnit<GenerateError> = Box::new(move |unit| {
             settings.stop.map_or(Ok(()), go_on)?;
             make(unit)

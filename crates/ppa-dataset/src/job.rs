@@ -1,6 +1,5 @@
 //! The units of a dataset carried through: what is there is kept, what is missing is made.
 
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -9,15 +8,18 @@ use ppa_xray::Part;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::body_shape::BodyShape;
-use crate::claim::{FolderError, claim};
+use crate::claim::{Claim, FolderError, claim};
 use crate::description::DESCRIPTION_FILE;
-use crate::files::{FileError, remove_if_there, write_whole};
-use crate::findings::{FindingCode, Findings};
-use crate::layout::{LimbId, View};
-use crate::manifest::{FileKind, Manifest, RoiFile, roi_text};
-use crate::part_file::write_part;
-use crate::record::{Record, Unit};
+use crate::files::FileError;
+use crate::findings::FindingCode;
+use crate::layout::LimbId;
+use crate::lists::Lists;
+use crate::manifest::FileKind;
+use crate::overview::Overview;
+use crate::part_file::require_part;
+use crate::record::{FoundRecord, Record, Unit};
+use crate::staging::{Staging, staging_folder};
+use crate::survey::Survey;
 use crate::unit::Images;
 
 /// What a run did.
@@ -34,6 +36,14 @@ pub struct Summary {
     /// Doubts about its limbs and poses.
     #[serde(skip_serializing_if = "Findings::is_empty")]
     pub findings: Findings,
+    /// Poses of other settings that were made anew.
+    pub replaced: usize,
+    /// Poses that were removed because they are not in the plan, or the shard.
+    pub removed: usize,
+    /// Files that were missing or altered and were made again, as paths from the root.
+    pub healed: Vec<String>,
+    /// Where files lie now that stood in the place of others and were not written by ppa, or altered since.
+    pub set_aside: Vec<String>,
 }
 
 /// What a run reports while it goes on.
@@ -131,7 +141,7 @@ pub(crate) fn units_of_part(
     limbs.filter(|limb| !limb.poses.is_empty()).collect()
 }
 
-/// Makes one pose of a limb: its files whole, in the dataset's folder.
+/// Makes one pose of a limb: its files whole, in the staging folder of the dataset.
 pub(crate) type MakeUnit<'a, E> = Box<dyn Fn(Unit) -> Result<Images, E> + Sync + 'a>;
 
 /// Units, the folder they belong to, and how much of it they may fill.
@@ -142,6 +152,8 @@ pub(crate) struct Job<'a> {
     pub part: Part,
     pub limbs: Vec<LimbUnits>,
     pub disk_limit: Option<u64>,
+    /// Whether poses of other settings are made anew, and those of other plans removed.
+    pub replace: bool,
     pub progress: &'a (dyn Fn(Progress) + Sync),
 }
 
@@ -151,72 +163,100 @@ impl Job<'_> {
         &self,
         prepare: impl Fn(&LimbUnits) -> Result<MakeUnit<'m, E>, E>,
     ) -> Result<Summary, E> {
-        let units = || self.limbs.iter().flat_map(LimbUnits::units);
-        let names: HashSet<_> = units().map(|unit| unit.record_name()).collect();
-        let _claim = claim(self.root, &names).map_err(JobError::from)?;
-        self.begin().map_err(JobError::from)?;
-        (self.progress)(Progress::Total(names.len()));
+        let staging = Staging::new(self.root);
+        let overview = Overview::new(self.root, self.description, self.part, &staging);
+        let (_claim, survey) = self.begin(&overview).map_err(JobError::from)?;
+        let units = self.limbs.iter().map(|limb| limb.poses.len()).sum();
+        (self.progress)(Progress::Total(units));
 
         let used = AtomicU64::new(0);
         let mut made = 0;
         for limb in &self.limbs {
-            let missing = self.missing(limb, &used).map_err(JobError::from)?;
+            let missing = self.missing(limb, &overview, &used);
+            let missing = missing.map_err(JobError::from)?;
             if missing.is_empty() {
                 continue;
             }
-            self.make_room(limb, &missing).map_err(JobError::from)?;
             let make = prepare(limb)?;
             missing
                 .par_iter()
-                .try_for_each(|&pose| self.make(&limb.unit(pose), &make, &used))?;
+                .try_for_each(|&pose| self.make(&limb.unit(pose), &make, &overview, &used))?;
             made += missing.len();
         }
-        Ok(self.finish(made).map_err(JobError::from)?)
+        self.remove_others(&survey, &overview)
+            .map_err(JobError::from)?;
+        let lists = self.finish(&overview).map_err(JobError::from)?;
+        let count = |kind| lists.rows.iter().filter(|row| row.kind == kind).count();
+        let healed = overview.into_healed();
+        Ok(Summary {
+            units,
+            made,
+            depth_images: count(FileKind::Depth),
+            radiographs: count(FileKind::Radiograph),
+            replaced: survey.stale.len(),
+            removed: survey.beyond.len(),
+            healed,
+            set_aside: staging.aside.into_kept(),
+            findings: lists.findings,
+        })
     }
 
-    /// Leaves in the folder what it is to hold, so that its state can be told from then on.
-    fn begin(&self) -> Result<(), FileError> {
-        write_part(self.root, self.part)?;
-        let path = self.root.join(DESCRIPTION_FILE);
-        write_whole(&path, self.description.as_bytes())
+    /// Claims the folder, completes what a killed run left, and refuses what only a run that replaces may change.
+    fn begin(&self, overview: &Overview) -> Result<(Claim, Survey), FolderError> {
+        let claim = claim(self.root)?;
+        require_part(self.root, self.part)?;
+        overview.staging.recover()?;
+        let survey = Survey::of(self.root, &self.limbs)?;
+        if let Some(differs) = survey.differs(self.root, self.description)
+            && !self.replace
+        {
+            return Err(FolderError::Differs(Box::new(differs)));
+        }
+        if !survey.replaces() && !self.root.join(DESCRIPTION_FILE).exists() {
+            overview.describe()?;
+        }
+        Ok((claim, survey))
     }
 
-    /// The poses that are not complete; adds the bytes of the others to `used`.
-    fn missing(&self, limb: &LimbUnits, used: &AtomicU64) -> Result<Vec<PoseAngle>, FileError> {
-        let lacks = |&pose: &PoseAngle| match Record::of_complete(self.root, &limb.unit(pose)) {
-            None => Ok(Some(pose)),
-            Some(record) => {
-                used.fetch_add(record.size(self.root)?, Ordering::Relaxed);
-                (self.progress)(Progress::Found);
-                Ok(None)
+    /// The poses that are not complete; adds the bytes of all that are there to `used`.
+    fn missing(
+        &self,
+        limb: &LimbUnits,
+        overview: &Overview,
+        used: &AtomicU64,
+    ) -> Result<Vec<PoseAngle>, FileError> {
+        let lacks = |&pose: &PoseAngle| {
+            let unit = limb.unit(pose);
+            match self.look(&unit)? {
+                FoundRecord::Absent => {}
+                FoundRecord::Damaged => overview.add_healed([unit.id().record_file()]),
+                FoundRecord::Whole(record) => {
+                    used.fetch_add(record.size_of_rest(self.root), Ordering::Relaxed);
+                    if record.key == unit.key() {
+                        let damaged = record.damaged_images(self.root);
+                        if damaged.is_empty() {
+                            (self.progress)(Progress::Found);
+                            return Ok(None);
+                        }
+                        overview.add_healed(damaged);
+                    }
+                }
             }
+            Ok(Some(pose))
         };
         let poses = limb.poses.par_iter();
         poses.filter_map(|pose| lacks(pose).transpose()).collect()
     }
 
-    /// Removes what stands in the place of poses that are to be made: the manifest, which would
-    /// list images that are gone, and the images that an earlier plan, code or kill left, of which
-    /// this plan may make fewer.
-    fn make_room(&self, limb: &LimbUnits, missing: &[PoseAngle]) -> Result<(), FileError> {
-        remove_if_there(&self.root.join(Manifest::FILE))?;
-        remove_if_there(&self.root.join(limb.limb.roi_file()))?;
-        for &pose in missing {
-            for shape in BodyShape::ALL {
-                for view in View::ALL {
-                    remove_if_there(&self.root.join(limb.limb.depth(shape, view, pose.step)))?;
-                }
-            }
-            remove_if_there(&self.root.join(limb.limb.radiograph_png(pose.step)))?;
-            remove_if_there(&self.root.join(limb.limb.radiograph_exr(pose.step)))?;
-        }
-        Ok(())
+    fn look(&self, unit: &Unit) -> Result<FoundRecord, FileError> {
+        Record::look(&self.root.join(unit.id().record_file()), unit.id())
     }
 
     fn make<E: From<JobError>>(
         &self,
         unit: &Unit,
         make: &MakeUnit<E>,
+        overview: &Overview,
         used: &AtomicU64,
     ) -> Result<(), E> {
         let Images {
@@ -230,65 +270,61 @@ impl Job<'_> {
             rois,
             findings,
         };
-        self.keep(unit, &record, used)?;
+        self.keep(unit, &record, overview, used)?;
         (self.progress)(Progress::Made);
         Ok(())
     }
 
-    /// Writes the record of a unit, or removes its images where they are too many bytes.
-    fn keep(&self, unit: &Unit, record: &Record, used: &AtomicU64) -> Result<(), JobError> {
-        let size = record.size(self.root)?;
+    /// Puts a unit in its place, or removes its images where they are too many bytes.
+    fn keep(
+        &self,
+        unit: &Unit,
+        record: &Record,
+        overview: &Overview,
+        used: &AtomicU64,
+    ) -> Result<(), JobError> {
+        let earlier = self.look(unit)?;
+        let earlier = earlier.whole().map_or(0, |old| old.size_of_rest(self.root));
+        let size = record.size(&staging_folder(self.root))?;
         let before = used.fetch_add(size, Ordering::Relaxed);
         if let Some(limit) = self.disk_limit
-            && before + size > limit
+            && (before + size).saturating_sub(earlier) > limit
         {
             used.fetch_sub(size, Ordering::Relaxed);
-            for row in &record.files {
-                remove_if_there(&self.root.join(&row.file))?;
-            }
+            overview.staging.discard(record)?;
             return Err(JobError::DiskLimit {
                 root: self.root.to_owned(),
                 limit,
                 used: before,
             });
         }
-        Ok(record.write(self.root, unit)?)
+        overview.open(&self.limbs)?;
+        overview.staging.put(unit.id(), record)?;
+        used.fetch_sub(earlier, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Removes the poses that the run does not have, once all others are whole.
+    fn remove_others(&self, survey: &Survey, overview: &Overview) -> Result<(), FileError> {
+        if !survey.beyond.is_empty() {
+            overview.open(&self.limbs)?;
+        }
+        for &pose in &survey.beyond {
+            overview.staging.remove(pose)?;
+        }
+        // A plan of fewer body shapes leaves folders without images.
+        for file in survey.stale.iter().flat_map(|pose| pose.images()) {
+            overview.staging.remove_empty_folders(&file);
+        }
+        Ok(())
     }
 
     /// Writes what lists all units: regions of interest, findings and manifest.
-    fn finish(&self, made: usize) -> Result<Summary, FileError> {
-        let mut manifest = Manifest {
-            root: self.root.to_owned(),
-            files: Vec::new(),
-        };
-        let mut findings = Findings::default();
-        for limb in &self.limbs {
-            let mut rois = RoiFile::new();
-            for unit in limb.units() {
-                let record = Record::read(self.root, &unit)?;
-                manifest.files.extend(record.files);
-                rois.extend(record.rois);
-                findings.add(limb.limb, &limb.acknowledged, &record.findings);
-            }
-            write_whole(
-                &self.root.join(limb.limb.roi_file()),
-                roi_text(&rois).as_bytes(),
-            )?;
-        }
-        let path = self.root.join(Findings::FILE);
-        if findings.0.is_empty() {
-            remove_if_there(&path)?;
-        } else {
-            write_whole(&path, findings.to_text().as_bytes())?;
-        }
-        manifest.write()?;
-        let count = |kind| manifest.files.iter().filter(|row| row.kind == kind).count();
-        Ok(Summary {
-            units: self.limbs.iter().map(|limb| limb.poses.len()).sum(),
-            made,
-            depth_images: count(FileKind::Depth),
-            radiographs: count(FileKind::Radiograph),
-            findings,
-        })
+    fn finish(&self, overview: &Overview) -> Result<Lists, FileError> {
+        let record = |unit: &Unit| Record::read(self.root, unit);
+        let lists = Lists::of(&self.limbs, self.description, record)?;
+        overview.close(&lists)?;
+        overview.staging.clear()?;
+        Ok(lists)
     }
 }

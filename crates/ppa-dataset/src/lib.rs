@@ -23,6 +23,7 @@ mod case;
 mod case_check;
 #[cfg(feature = "generate")]
 mod check;
+mod checksums;
 #[cfg(feature = "generate")]
 mod claim;
 #[cfg(feature = "generate")]
@@ -44,6 +45,8 @@ mod depth_views;
 #[cfg(feature = "generate")]
 mod description;
 #[cfg(feature = "generate")]
+mod differences;
+#[cfg(feature = "generate")]
 mod drawing;
 pub mod export;
 mod files;
@@ -58,8 +61,12 @@ mod gates;
 mod generate;
 #[cfg(feature = "generate")]
 mod job;
+#[cfg(all(test, feature = "generate"))]
+mod job_trials;
 pub mod labels;
 pub mod layout;
+#[cfg(feature = "generate")]
+mod lists;
 #[cfg(all(test, feature = "generate"))]
 mod load;
 mod manifest;
@@ -67,6 +74,8 @@ mod manifest;
 mod merge;
 #[cfg(all(test, feature = "generate"))]
 mod only_read;
+#[cfg(feature = "generate")]
+mod overview;
 #[cfg(feature = "generate")]
 mod part_file;
 #[cfg(feature = "generate")]
@@ -87,7 +96,11 @@ mod record;
 #[cfg(feature = "generate")]
 mod room_file;
 #[cfg(feature = "generate")]
+mod seal;
+#[cfg(feature = "generate")]
 mod seed;
+#[cfg(feature = "generate")]
+mod set_aside;
 #[cfg(feature = "generate")]
 mod shaped_skin;
 mod split;
@@ -95,8 +108,12 @@ mod spreadsheet;
 #[cfg(feature = "generate")]
 mod stage;
 #[cfg(feature = "generate")]
+mod staging;
+#[cfg(feature = "generate")]
 mod status;
 mod stop;
+#[cfg(feature = "generate")]
+mod survey;
 #[cfg(feature = "generate")]
 mod toml_file;
 #[cfg(feature = "generate")]
@@ -124,6 +141,8 @@ pub use coverage_plot::{RankedView, coverage_plot};
 pub use cut_share::{CutError, PoseImage};
 #[cfg(feature = "generate")]
 pub use depth_views::{DepthView, depth_views};
+#[cfg(feature = "generate")]
+pub use differences::KeyDifference;
 pub use files::{FileError, sha256_of_file, write_whole};
 pub use findings::{Finding, FindingCode, Findings, LimbFinding, Severity};
 #[cfg(feature = "generate")]
@@ -139,6 +158,8 @@ pub use job::{JobError, Progress, Summary};
 pub use manifest::{FileKind, FileRow, Manifest, RoiFile, RoiRow, Rows};
 #[cfg(feature = "generate")]
 pub use merge::{MergeError, merge};
+#[cfg(feature = "generate")]
+pub use part_file::held_part;
 #[cfg(feature = "generate")]
 pub use pictures::{PosedLimb, case_picture, is_own_picture, pose_picture, write_picture};
 #[cfg(feature = "generate")]
@@ -160,6 +181,8 @@ pub use stage::{PlacedCamera, Stage, StageError, Table, body_of_cloud, spectrum,
 #[cfg(feature = "generate")]
 pub use status::{LimbStatus, Status, status};
 pub use stop::Stopped;
+#[cfg(feature = "generate")]
+pub use survey::DatasetDiffers;
 #[cfg(feature = "generate")]
 pub use unit::UnitError;
 #[cfg(feature = "generate")]

@@ -38,6 +38,7 @@ fn a_hundred_thousand_units_do_not_slow_down() {
         part: Part::WHOLE,
         limbs: units_of_part(limbs.clone().into_iter(), &poses, Part::WHOLE),
         disk_limit: Some(1),
+        replace: false,
         progress,
     };
     let begun = Instant::now();

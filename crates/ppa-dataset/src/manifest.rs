@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::body_shape::BodyShape;
-use crate::files::{FileError, read_text, write_whole};
+use crate::files::{FileError, read_text};
 use crate::layout::{LimbId, View};
 
 /// A rigid motion as four rows of a homogeneous matrix, mm.
@@ -77,7 +77,7 @@ fn is_zero(count: &usize) -> bool {
 
 impl FileRow {
     /// Whether the row fits the layout: its angle on the grid, its file where such an image lies.
-    fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         let (step, angle) = (self.step, self.angle_deg);
         if angle != f64::from(step) / 2.0 {
             return Err(format!(
@@ -154,17 +154,10 @@ impl Manifest {
     }
 
     /// One line of JSON per row.
+    #[cfg(feature = "generate")]
     pub(crate) fn to_text(&self) -> String {
         let line = |row| serde_json::to_string(row).expect("rows hold only JSON values") + "\n";
         self.files.iter().map(line).collect()
-    }
-
-    /// Writes `manifest.jsonl`, whole or not at all.
-    ///
-    /// # Errors
-    /// [`FileError`] when it cannot be written.
-    pub fn write(&self) -> Result<(), FileError> {
-        write_whole(&self.root.join(Self::FILE), self.to_text().as_bytes())
     }
 
     /// The regions of interest of one limb.

@@ -7,11 +7,14 @@ use std::sync::atomic::AtomicBool;
 use ppa_xray::Part;
 use sha2::{Digest, Sha256};
 
-use crate::claim::{Claim, FolderError, claim_existing, record_names};
+use crate::claim::{Claim, FolderError, claim_existing};
+use crate::differences::differences;
 use crate::files::{FileError, hex, write_whole};
 use crate::job::{Job, JobError, LimbUnits, Progress, Summary};
-use crate::planned::{Planned, difference};
-use crate::record::{Record, Unit};
+use crate::layout::PoseId;
+use crate::planned::Planned;
+use crate::record::{FOLDER, FoundRecord, Record, Unit, record_names};
+use crate::staging::staging_folder;
 use crate::stop::{Stopped, go_on};
 use crate::unit::Images;
 
@@ -75,6 +78,14 @@ pub enum MergeError {
         /// The pose.
         unit: String,
     },
+    /// A record of a shard is not as it was written.
+    #[error("the record of {unit} in {} is damaged; run ppa generate for this shard again", shard.display())]
+    Damaged {
+        /// The shard.
+        shard: PathBuf,
+        /// The pose.
+        unit: String,
+    },
     /// An image of a shard is not the one that was made.
     #[error("{} is altered: its hash is not the recorded one", .0.display())]
     Altered(PathBuf),
@@ -83,7 +94,8 @@ pub enum MergeError {
 /// Joins the shards of one plan in the folder `root`, copying their images.
 ///
 /// Every image is compared with its recorded hash before it is written. What is there already is
-/// kept, so a merge that was killed goes on. Once `stop` is true no other pose begins.
+/// kept, so a merge that was killed goes on. Another dataset in `root` is refused, or made this one where `replace` is
+/// set, as by [`generate`](crate::generate). Once `stop` is true no other pose begins.
 ///
 /// # Errors
 /// [`MergeError`]; shards of different plans, overlaps and holes are refused before anything is
@@ -91,6 +103,7 @@ pub enum MergeError {
 pub fn merge(
     shards: &[PathBuf],
     root: &Path,
+    replace: bool,
     stop: &AtomicBool,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Summary, MergeError> {
@@ -103,12 +116,14 @@ pub fn merge(
         part: Part::WHOLE,
         limbs,
         disk_limit: None,
+        replace,
         progress,
     };
+    let staging = staging_folder(root);
     job.complete(|_| {
         Ok(Box::new(|unit: Unit| {
             go_on(stop)?;
-            shards.copy(&unit, root)
+            shards.copy(&unit, &staging)
         }))
     })
 }
@@ -116,8 +131,8 @@ pub fn merge(
 struct Shards<'a> {
     _claims: Vec<Claim>,
     planned: Planned,
-    /// The folder that holds the record of a name.
-    holder: HashMap<String, &'a Path>,
+    /// The folder that holds the record of a pose.
+    holder: HashMap<PoseId, &'a Path>,
 }
 
 impl<'a> Shards<'a> {
@@ -126,26 +141,28 @@ impl<'a> Shards<'a> {
         let planned = Planned::read(first)?;
         let of_dataset = planned.part(Part::WHOLE);
         let units = of_dataset.iter().flat_map(LimbUnits::units);
-        let units: HashMap<_, _> = units.map(|unit| (unit.record_name(), unit)).collect();
+        let units: HashMap<_, _> = units.map(|unit| (unit.id(), unit)).collect();
         let mut claims = Vec::new();
         let mut holder = HashMap::new();
         for folder in folders {
             if same_folder(folder, root) {
                 return Err(MergeError::IntoShard(root.to_owned()));
             }
-            if let Some(key) = difference(&planned.text, &Planned::read(folder)?.text) {
+            let other = Planned::read(folder)?;
+            if planned.text != other.text {
+                let key = differences(&planned.text, &other.text).into_iter().next();
                 return Err(MergeError::OtherDataset {
                     first: first.clone(),
                     second: folder.clone(),
-                    key,
+                    key: key.map_or("the text of dataset.json".to_owned(), |key| key.key),
                 });
             }
-            for record in record_names(folder)? {
-                let Some(unit) = units.get(&record) else {
-                    let root = folder.clone();
+            for pose in record_names(&folder.join(FOLDER))? {
+                let Some(unit) = units.get(&pose) else {
+                    let (root, record) = (folder.clone(), pose.record_name());
                     return Err(FolderError::OtherPlan { root, record }.into());
                 };
-                if let Some(first) = holder.insert(record, folder.as_path()) {
+                if let Some(first) = holder.insert(pose, folder.as_path()) {
                     return Err(MergeError::Overlap {
                         first: first.to_owned(),
                         second: folder.clone(),
@@ -164,7 +181,7 @@ impl<'a> Shards<'a> {
 
     fn require_all(&self, limbs: &[LimbUnits]) -> Result<(), MergeError> {
         let units = || limbs.iter().flat_map(LimbUnits::units);
-        let missing = || units().filter(|unit| !self.holder.contains_key(&unit.record_name()));
+        let missing = || units().filter(|unit| !self.holder.contains_key(&unit.id()));
         match missing().next() {
             None => Ok(()),
             Some(unit) => Err(MergeError::Hole {
@@ -175,15 +192,22 @@ impl<'a> Shards<'a> {
         }
     }
 
-    /// Copies the images of one pose from the shard that holds it.
-    fn copy(&self, unit: &Unit, root: &Path) -> Result<Images, MergeError> {
-        let shard = self.holder[&unit.record_name()];
-        let Record {
+    /// Copies the images of one pose from the shard that holds it below `to`.
+    fn copy(&self, unit: &Unit, to: &Path) -> Result<Images, MergeError> {
+        let shard = self.holder[&unit.id()];
+        let found = Record::look(&shard.join(unit.id().record_file()), unit.id())?;
+        let FoundRecord::Whole(Record {
             key,
             files,
             rois,
             findings,
-        } = Record::read(shard, unit)?;
+        }) = found
+        else {
+            return Err(MergeError::Damaged {
+                shard: shard.to_owned(),
+                unit: unit.to_string(),
+            });
+        };
         if key != unit.key() {
             return Err(MergeError::Stale {
                 shard: shard.to_owned(),
@@ -196,7 +220,7 @@ impl<'a> Shards<'a> {
             if hex(&Sha256::digest(&bytes)) != row.sha256 {
                 return Err(MergeError::Altered(path));
             }
-            write_whole(&root.join(&row.file), &bytes)?;
+            write_whole(&to.join(&row.file), &bytes)?;
         }
         Ok(Images {
             files,

@@ -2,16 +2,18 @@
 
 use std::fmt;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::io;
+use std::path::Path;
 
 use ppa_scene::PoseAngle;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::files::{FileError, hex, read_text, sha256_of_file, write_whole};
+use crate::files::{FileError, hex, sha256_of_file};
 use crate::findings::Finding;
-use crate::layout::{LimbId, angle_text};
+use crate::layout::{LimbId, PoseId};
 use crate::manifest::{FileRow, RoiFile};
+use crate::seal::{Opened, opened, sealed};
 
 /// Folder inside a dataset that holds the records.
 pub(crate) const FOLDER: &str = ".ppa";
@@ -28,13 +30,12 @@ pub(crate) struct Unit<'a> {
 }
 
 impl Unit<'_> {
-    /// File name of its record.
-    pub fn record_name(&self) -> String {
-        self.limb.unit_name(self.pose.step) + ".json"
-    }
-
-    fn path(&self, root: &Path) -> PathBuf {
-        root.join(FOLDER).join(self.record_name())
+    /// Which pose it is.
+    pub fn id(&self) -> PoseId {
+        PoseId {
+            limb: self.limb,
+            step: self.pose.step,
+        }
     }
 
     /// Hash of everything its images follow from.
@@ -46,14 +47,45 @@ impl Unit<'_> {
 
 impl fmt::Display for Unit<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (patient, side) = (self.limb.patient, self.limb.side_letter());
-        let angle = angle_text(self.pose.step);
-        write!(f, "limb {side} of patient {patient} at {angle} degrees")
+        self.id().fmt(f)
     }
 }
 
-/// A finished pose: written after all its files, so its presence proves them.
+impl PoseId {
+    /// File name of its record.
+    pub fn record_name(self) -> String {
+        self.limb.unit_name(self.step) + ".json"
+    }
+
+    /// Path of its record from the dataset's root.
+    pub fn record_file(self) -> String {
+        format!("{FOLDER}/{}", self.record_name())
+    }
+
+    /// The pose whose record has the given file name.
+    fn of_record(name: &str) -> Option<Self> {
+        Self::of_unit_name(name.strip_suffix(".json")?)
+    }
+}
+
+/// The poses whose records stand in a folder, in order.
+pub(crate) fn record_names(folder: &Path) -> Result<Vec<PoseId>, FileError> {
+    let names = fs::read_dir(folder).and_then(|entries| {
+        let names = entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
+        names.collect::<io::Result<Vec<_>>>()
+    });
+    let names = names.map_err(FileError::at("read", folder))?;
+    let mut poses: Vec<_> = names
+        .iter()
+        .filter_map(|name| PoseId::of_record(name))
+        .collect();
+    poses.sort_unstable();
+    Ok(poses)
+}
+
+/// A finished pose: put in its place after all its files, so its presence proves them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub(crate) struct Record {
     /// Hash of everything the pose's bytes follow from.
     pub key: String,
@@ -66,37 +98,100 @@ pub(crate) struct Record {
     pub findings: Vec<Finding>,
 }
 
+/// What stands in the place of a record.
+#[derive(Debug)]
+pub(crate) enum FoundRecord {
+    /// Nothing.
+    Absent,
+    /// A record whose seal fits, or one of an earlier version, which had none.
+    Whole(Record),
+    /// A file that is no record of this pose, or not as it was written.
+    Damaged,
+}
+
+impl FoundRecord {
+    /// The record, if there is one.
+    pub fn whole(&self) -> Option<&Record> {
+        match self {
+            Self::Whole(record) => Some(record),
+            _ => None,
+        }
+    }
+}
+
 impl Record {
-    /// The record of a pose when key and every file still agree with it, else `None`.
-    pub fn of_complete(root: &Path, unit: &Unit) -> Option<Self> {
-        let text = ppa_files::read_to_string(unit.path(root)).ok()?;
-        let record: Self = serde_json::from_str(&text).ok()?;
-        let intact = |row: &FileRow| {
-            sha256_of_file(&root.join(&row.file)).is_ok_and(|found| found == row.sha256)
+    /// Reads what stands in the file of a pose's record.
+    pub fn look(path: &Path, pose: PoseId) -> Result<FoundRecord, FileError> {
+        match ppa_files::read(path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(FoundRecord::Absent),
+            Err(error) => Err(FileError::at("read", path)(error)),
+            Ok(bytes) => {
+                let text = String::from_utf8(bytes).ok();
+                let record = text.and_then(|text| Self::parse(&text, pose));
+                Ok(record.map_or(FoundRecord::Damaged, FoundRecord::Whole))
+            }
+        }
+    }
+
+    /// The record in a text, when it is as it was written and of the given pose.
+    fn parse(text: &str, pose: PoseId) -> Option<Self> {
+        let record: Self = match opened(text) {
+            Opened::Sealed(text) => serde_json::from_str(&text).ok()?,
+            Opened::Unsealed => serde_json::from_str(text).ok()?,
+            Opened::Broken => return None,
         };
-        (record.key == unit.key() && record.files.iter().all(intact)).then_some(record)
+        let is_of_pose =
+            |row: &FileRow| (row.limb, row.step) == (pose.limb, pose.step) && row.check().is_ok();
+        record.files.iter().all(is_of_pose).then_some(record)
     }
 
     /// Reads the record of a pose.
     pub fn read(root: &Path, unit: &Unit) -> Result<Self, FileError> {
-        let path = unit.path(root);
-        serde_json::from_str(&read_text(&path)?)
-            .map_err(|e| FileError::at("parse", &path)(e.into()))
+        let path = root.join(unit.id().record_file());
+        let because = |kind, what| FileError::at("read", &path)(io::Error::new(kind, what));
+        match Self::look(&path, unit.id())? {
+            FoundRecord::Whole(record) => Ok(record),
+            FoundRecord::Absent => Err(because(io::ErrorKind::NotFound, "there is no such record")),
+            FoundRecord::Damaged => {
+                Err(because(io::ErrorKind::InvalidData, "the record is damaged"))
+            }
+        }
     }
 
-    /// Writes it: the last step of a pose.
-    pub fn write(&self, root: &Path, unit: &Unit) -> Result<(), FileError> {
-        let text = serde_json::to_string(self).expect("records hold only JSON values");
-        write_whole(&unit.path(root), text.as_bytes())
+    /// The record with its seal.
+    pub fn to_text(&self) -> String {
+        sealed(&serde_json::to_string(self).expect("records hold only JSON values"))
     }
 
-    /// Bytes of its images on disk.
+    /// The recorded hash of an image.
+    pub fn hash_of(&self, file: &str) -> Option<&str> {
+        let row = self.files.iter().find(|row| row.file == file);
+        row.map(|row| row.sha256.as_str())
+    }
+
+    /// Its images that are missing or have another hash.
+    pub fn damaged_images(&self, root: &Path) -> Vec<String> {
+        let intact = |row: &&FileRow| {
+            sha256_of_file(&root.join(&row.file)).is_ok_and(|found| found == row.sha256)
+        };
+        let damaged = self.files.iter().filter(|row| !intact(row));
+        damaged.map(|row| row.file.clone()).collect()
+    }
+
+    /// Bytes of its images below a folder.
     pub fn size(&self, root: &Path) -> Result<u64, FileError> {
         let size = |row: &FileRow| {
             let path = root.join(&row.file);
             let metadata = fs::metadata(&path).map_err(FileError::at("read", &path))?;
             Ok(metadata.len())
         };
+        self.files.iter().map(size).sum()
+    }
+
+    /// Bytes of those of its images that are there.
+    pub fn size_of_rest(&self, root: &Path) -> u64 {
+        let size =
+            |row: &FileRow| fs::metadata(root.join(&row.file)).map_or(0, |found| found.len());
         self.files.iter().map(size).sum()
     }
 }

@@ -8,12 +8,12 @@ use rayon::prelude::*;
 
 use crate::check::{Check, Problem, Recorded};
 use crate::claim::FolderError;
+use crate::differences::differences;
 use crate::files::FileError;
 use crate::findings::Findings;
 use crate::generate::{GenerateError, Work};
 use crate::job::{LimbUnits, MakeUnit, Progress};
 use crate::plan::Plan;
-use crate::planned::difference;
 use crate::record::{Record, Unit};
 use crate::seed::{Purpose, item_seed};
 use crate::stop::{Stopped, go_on};
@@ -80,10 +80,12 @@ pub fn verify(
     }
     let recorded = Recorded::open(root)?;
     let work = Work::of_plan(plan)?;
-    if let Some(key) = difference(&recorded.planned.text, &work.description) {
+    let there = &recorded.planned.text;
+    if *there != work.description {
+        let key = differences(there, &work.description).into_iter().next();
         return Err(VerifyError::OtherPlan {
             root: root.to_owned(),
-            key,
+            key: key.map_or("the text of dataset.json".to_owned(), |key| key.key),
         });
     }
     let findings = Findings::read(root)?;
@@ -155,7 +157,7 @@ fn compare(
         }
     }
     if record.files.len() > images.files.len() || record.rois != images.rois {
-        different.push(format!(".ppa/{}", unit.record_name()));
+        different.push(unit.id().record_file());
     }
     let problem = |file| Problem::Differs { file };
     Ok(different.into_iter().map(problem).collect())

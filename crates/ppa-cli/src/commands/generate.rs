@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use ppa_dataset::published::{Published, PublishedError};
-use ppa_dataset::{GenerateSettings, Plan, Summary, generate};
+use ppa_dataset::{GenerateSettings, Plan, Summary, generate, held_part};
 use ppa_text::count;
 use ppa_xray::Part;
 
@@ -22,9 +22,14 @@ shard, into a folder of its own; `ppa merge` joins them to the same bytes as one
   ppa generate plan.toml --shard 2/7 --out shard_2 --disk-limit 20GB
   ppa merge shard_1 shard_2 ... --out dataset --verify
 
-The shard is also taken from a Slurm job array (SLURM_ARRAY_TASK_ID, _COUNT, _MIN, _MAX, _STEP), from mpirun \
-(OMPI_COMM_WORLD_RANK, _SIZE) and from an indexed Kubernetes job (JOB_COMPLETION_INDEX, and JOB_COMPLETIONS, which you \
-set). Where two of them disagree, nothing is made.")]
+The shard is also taken from a Slurm job array (SLURM_ARRAY_TASK_ID, _COUNT, _MIN, _MAX, _STEP), from the tasks of srun \
+(SLURM_PROCID, SLURM_STEP_NUM_TASKS), from mpirun (OMPI_COMM_WORLD_RANK, _SIZE) and from an indexed Kubernetes job \
+(JOB_COMPLETION_INDEX, and JOB_COMPLETIONS, which you set). Where two of them disagree, nothing is made. A folder keeps its \
+shard: another one is refused there, and a single task of a Slurm array that runs again goes on with that of its folder.
+
+A folder that holds poses of other settings, scans or sources, or poses that the plan does not have, is refused as well. \
+With --replace they are made anew, pose by pose: each stays until the new one is whole, and what the plan does not have is \
+removed at the end. Files that ppa did not write, or that were altered since, are never overwritten but moved to .ppa/altered.")]
 pub struct GenerateArgs {
     /// Plan file
     plan: PathBuf,
@@ -37,6 +42,9 @@ pub struct GenerateArgs {
     /// Make only shard k of n
     #[arg(long, value_name = "K/N")]
     shard: Option<Part>,
+    /// Make anew what differs from the plan; old images stay until the new ones are whole
+    #[arg(long)]
+    replace: bool,
     /// Stop before the images take more than this, as 500MB or 20GB
     #[arg(long, value_name = "SIZE", value_parser = crate::output::parse_bytes)]
     disk_limit: Option<u64>,
@@ -47,9 +55,14 @@ pub struct GenerateArgs {
 pub fn run(args: &GenerateArgs, output: Output) -> anyhow::Result<()> {
     let mut plan = Plan::read(&args.plan)?;
     plan.seed = args.seed.unwrap_or(plan.seed);
+    let held = || match &args.out {
+        Some(out) => Ok(held_part(out)?),
+        None => Ok(None),
+    };
     let settings = GenerateSettings {
-        part: shard(args.shard)?,
+        part: shard(args.shard)?.part(held)?,
         disk_limit: args.disk_limit,
+        replace: args.replace,
     };
     let out = match &args.out {
         Some(out) => out.clone(),
@@ -95,12 +108,44 @@ pub fn with_progress(
 
 /// The summary in words; `done` is what was done to the poses that were not there yet.
 pub fn describe(summary: &Summary, out: &Path, done: &str) -> String {
-    format!(
+    let mut text = format!(
         "{}: {} and {} of {}, {} of them {done} now",
         out.display(),
         count(summary.depth_images, "depth image"),
         count(summary.radiographs, "radiograph"),
         count(summary.units, "pose"),
         summary.made
-    )
+    );
+    if summary.replaced > 0 {
+        text += &format!(", {} in place of others", summary.replaced);
+    }
+    if summary.removed > 0 {
+        text += &format!(
+            "; removed {} that the plan does not have",
+            count(summary.removed, "pose")
+        );
+    }
+    text += &listed("healed", &summary.healed);
+    text + &listed("set aside", &summary.set_aside)
+}
+
+/// What was done to files, with the first of them.
+fn listed(done: &str, files: &[String]) -> String {
+    const TOLD: usize = 5;
+    if files.is_empty() {
+        return String::new();
+    }
+    let more = files.len().saturating_sub(TOLD);
+    let more = if more == 0 {
+        String::new()
+    } else {
+        format!(" and {more} more")
+    };
+    let first = files
+        .iter()
+        .take(TOLD)
+        .cloned()
+        .collect::<Vec<_>>()
+        .join(", ");
+    format!("\n{done}: {first}{more}")
 }

@@ -18,6 +18,9 @@ pub struct MergeArgs {
     /// Folder of the whole dataset: the same bytes as one run would have left
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Make anew what differs from the plan; old images stay until the new ones are whole
+    #[arg(long)]
+    replace: bool,
     /// Read the merged dataset back and compare every file with what was made
     #[arg(long)]
     verify: bool,
@@ -27,7 +30,9 @@ pub struct MergeArgs {
 
 pub fn run(args: &MergeArgs, output: Output) -> anyhow::Result<()> {
     let watch = args.progress.watch("pose", output);
-    let summary = merge(&args.shards, &args.out, &|progress| watch.report(progress))?;
+    let summary = merge(&args.shards, &args.out, args.replace, &|progress| {
+        watch.report(progress);
+    })?;
     watch.finish();
     if args.verify {
         let working = working("reading back");

@@ -38,8 +38,20 @@ struct Verified {
 }
 
 pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
-    let beside = || args.dataset.with_extension("toml");
-    let plan = Plan::read(&args.plan.clone().unwrap_or_else(beside))?;
+    let path = match &args.plan {
+        Some(path) => path.clone(),
+        None => {
+            let beside = args.dataset.with_extension("toml");
+            anyhow::ensure!(
+                beside.exists(),
+                "{} is not there; name the plan that {} was made from with --plan",
+                beside.display(),
+                args.dataset.display()
+            );
+            beside
+        }
+    };
+    let plan = Plan::read(&path)?;
     let watch = args.progress.watch("pose", output);
     let found = verify(
         &plan,

@@ -30,6 +30,13 @@ fn a_dataset_is_verified_by_making_a_part_of_it_again() {
 
     let said = fail(folder.path(), "verify plan --fraction 1.5");
     assert!(said.contains("fraction is 1.5"), "{said}");
+    fs::rename(folder.path().join("plan"), folder.path().join("moved")).unwrap();
+    let said = fail(folder.path(), "verify moved");
+    assert!(
+        said.contains("moved.toml is not there; name the plan") && said.contains("--plan"),
+        "{said}"
+    );
+    fs::rename(folder.path().join("moved"), folder.path().join("plan")).unwrap();
     let plan = fs::read_to_string(folder.path().join("plan.toml")).unwrap();
     let other = plan.replace("pixel_mm = 25.0", "pixel_mm = 24.0");
     fs::write(folder.path().join("other.toml"), other).unwrap();
@@ -50,10 +57,33 @@ fn a_forged_image_is_found_when_its_pose_is_made_again() {
     let of = |name: &str| ppa_dataset::sha256_of_file(&root.join(name)).unwrap();
     let (old, new) = (of(&image), of(&another));
     fs::copy(root.join(&another), root.join(&image)).unwrap();
-    for list in ["manifest.jsonl", ".ppa/patient_3_r_000.json"] {
+    let replaced = |list: &str, old: &str, new: &str| {
         let text = fs::read_to_string(root.join(list)).unwrap();
-        fs::write(root.join(list), text.replace(&old, &new)).unwrap();
-    }
+        let text = text.replace(old, new);
+        fs::write(root.join(list), &text).unwrap();
+        text
+    };
+    // The forger computes all hashes anew.
+    let sum = |text: &str| {
+        let file = folder.path().join("text");
+        fs::write(&file, text).unwrap();
+        ppa_dataset::sha256_of_file(&file).unwrap()
+    };
+    let before = of("manifest.jsonl");
+    let manifest = replaced("manifest.jsonl", &old, &new);
+    let sums = replaced("checksums.sha256", &before, &sum(&manifest));
+    let (lines, own) = sums
+        .trim_end()
+        .rsplit_once("# sha256 of the lines above: ")
+        .unwrap();
+    replaced("checksums.sha256", own, &sum(lines));
+    let record = replaced(".ppa/patient_3_r_000.json", &old, &new);
+    let (head, seal) = record.split_once(",\n\"seal\": \"").unwrap();
+    replaced(
+        ".ppa/patient_3_r_000.json",
+        seal.trim_end_matches("\"}"),
+        &sum(head),
+    );
     let said = fail(folder.path(), "verify plan --fraction 1 --progress quiet");
     assert!(
         said.contains("depth_cam_left_0.0.png comes out otherwise"),
@@ -96,6 +126,12 @@ fn what_was_altered_is_named_and_nothing_is_lost() {
     let said = succeed(folder.path(), "generate plan.toml --json");
     let summary: Value = serde_json::from_str(&said).unwrap();
     assert_eq!(summary["made"], 1, "both damaged images are of one pose");
+    let healed = summary["healed"].as_array().unwrap();
+    assert_eq!(healed.len(), 4, "two images and two lists: {summary}");
+    let kept = |name: &str| fs::read(root.join(".ppa/altered").join(name)).unwrap();
+    assert!(kept("patient_3/depth/r/bumps_a/depth_cam_right_5.0.png") == bytes[..bytes.len() - 20]);
+    assert!(kept("patient_3/labels/r/roi_depth.json") == b"{}");
+    fs::remove_dir_all(root.join(".ppa/altered")).unwrap();
     assert!(contents(&root) == before);
 }
 

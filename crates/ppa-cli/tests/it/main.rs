@@ -24,6 +24,7 @@ mod phantoms;
 mod planted_series;
 mod prediction;
 mod reading;
+mod replacing;
 mod resume;
 mod room_file;
 mod shards;

@@ -118,7 +118,11 @@ fn overlaps_holes_and_strangers_are_refused() {
         &["different datasets", "settings.seed"],
     );
     let second = format!("generate {} --shard 2/2 --out s1", plan.display());
-    refused(&second, &["s1", "another plan or shard"]);
+    refused(&second, &["s1 holds shard 1/2", "shard 2/2", "--shard 1/2"]);
+    refused(
+        &format!("generate {} --replace --out s1", plan.display()),
+        &["s1 holds shard 1/2", "the whole plan"],
+    );
 
     // A damaged image stops the merge, which goes on once the shard is made whole again.
     let image = "patient_3/depth/r/orig/depth_cam_left_10.0.png";
@@ -165,6 +169,50 @@ fn the_shard_is_taken_from_the_environment_and_must_agree() {
         (&status["part"], &status["made"]),
         (&"3/3".into(), &2.into())
     );
+}
+
+/// `sbatch --array=2` after one of seven tasks was lost.
+#[test]
+fn a_task_of_an_array_that_runs_again_keeps_its_shard() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = whole().join("plan.toml");
+    let run = |out: &str| {
+        let arguments = format!(
+            "generate {} --json --progress quiet --out {out}",
+            plan.display()
+        );
+        let mut command = ppa(folder.path(), &arguments);
+        for (name, value) in [
+            ("ID", "2"),
+            ("COUNT", "1"),
+            ("MIN", "2"),
+            ("MAX", "2"),
+            ("STEP", "1"),
+        ] {
+            command.env(format!("SLURM_ARRAY_TASK_{name}"), value);
+        }
+        command.output().unwrap()
+    };
+    let refused = run("shard_2");
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(
+        !refused.status.success() && said.contains("open; give --shard"),
+        "{said}"
+    );
+    assert!(!folder.path().join("shard_2").exists());
+    succeed(
+        folder.path(),
+        &format!("generate {} --shard 2/7 --out shard_2", plan.display()),
+    );
+    let before = contents(&folder.path().join("shard_2"));
+    fs::remove_file(folder.path().join("shard_2/manifest.jsonl")).unwrap();
+    let again = run("shard_2");
+    assert!(
+        again.status.success(),
+        "{}",
+        String::from_utf8_lossy(&again.stderr)
+    );
+    assert!(contents(&folder.path().join("shard_2")) == before);
 }
 
 #[test]

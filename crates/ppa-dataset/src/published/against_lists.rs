@@ -8,6 +8,7 @@ use serde::Deserialize;
 
 use super::outdated::outdated;
 use super::{Flaw, Published, PublishedError};
+use crate::checksums::{Checksums, FoundChecksums};
 use crate::files::{FileError, read_text, sha256_of_file};
 use crate::manifest::{FileKind, FileRow, Manifest};
 
@@ -16,6 +17,7 @@ pub(super) fn against_lists(dataset: &Published, hashes: BTreeMap<&str, String>)
     let root = &dataset.root;
     let mut flaws = same_scans(root);
     flaws.extend(stale_metadata(root));
+    flaws.extend(against_checksums(root));
     if !root.join(Manifest::FILE).exists() {
         return flaws;
     }
@@ -47,6 +49,19 @@ pub(super) fn told(error: &dyn std::error::Error) -> String {
         cause = source.source();
     }
     text
+}
+
+/// Lists that are not as `checksums.sha256` tells, where there is one.
+fn against_checksums(root: &Path) -> Vec<Flaw> {
+    match Checksums::look(root) {
+        Err(error) => vec![Flaw::Manifest(told(&error))],
+        Ok(FoundChecksums::Absent) => Vec::new(),
+        Ok(FoundChecksums::Damaged) => vec![Flaw::Checksums],
+        Ok(FoundChecksums::Whole(sums)) => {
+            let altered = sums.altered(root).into_iter();
+            altered.map(|file| Flaw::List { file }).collect()
+        }
+    }
 }
 
 fn against_manifest<'a>(

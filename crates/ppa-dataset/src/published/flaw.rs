@@ -70,6 +70,15 @@ pub enum Flaw {
         /// That of its row.
         expected: String,
     },
+    /// A list that is not the one in `checksums.sha256`.
+    #[error("{file} is missing or altered: its hash is not that in checksums.sha256")]
+    List {
+        /// The list.
+        file: String,
+    },
+    /// `checksums.sha256` is not as it was written.
+    #[error("checksums.sha256 is altered: its hash is not that in its last line")]
+    Checksums,
     /// An image without a row, or a row without an image.
     #[error("{file} stands {where}")]
     Unlisted {

@@ -39,7 +39,7 @@ pub struct Inspection {
 }
 
 /// Reads the dataset in `root` in either layout, decodes all PNG files, and compares them with regions of interest, with each
-/// other and, where they are there, with `manifest.jsonl` (tallies too) and `dataset.json`. Changes nothing.
+/// other and, where they are there, with `manifest.jsonl` (tallies too), `dataset.json` and `checksums.sha256`. Changes nothing.
 ///
 /// # Errors
 /// [`PublishedError`] for what fits no layout; single images are told as [`Flaw`]s.

@@ -22,6 +22,11 @@ impl Part {
     /// The only part of a run.
     pub const WHOLE: Self = Self { index: 1, count: 1 };
 
+    /// Its number, counted from 1.
+    pub fn index(&self) -> u64 {
+        self.index
+    }
+
     /// Its share of `total` items; the parts of one run follow each other without gap.
     pub fn share(&self, total: u64) -> Range<u64> {
         let bound =

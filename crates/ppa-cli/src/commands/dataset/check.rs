@@ -1,11 +1,11 @@
 //! `ppa dataset check`: whether a training program can use a dataset.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
-use ppa_dataset::Split;
-use ppa_dataset::published::{Inspection, Published, inspect};
+use ppa_dataset::published::{Flaw, Inspection, Published, inspect};
+use ppa_dataset::{FolderError, Problem, Split};
 use ppa_text::count;
 use serde::Serialize;
 
@@ -15,7 +15,8 @@ use crate::output::{Output, working};
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
 Every PNG is decoded and compared with its region of interest, with the images of other persons and, where there is one, with \
-manifest.jsonl, as are tallies. Labels must be those of the radiographs that are there now; scans may not stand under two patients; \
+manifest.jsonl, as are tallies. Lists are compared with checksums.sha256 and, where the folder .ppa is there, everything that ppa wrote \
+with its records. Labels must be those of the radiographs that are there now; scans may not stand under two patients; \
 radiographs, labels and regions of poses without depth images are told. Splits are those in the dataset's folder splits: each person in exactly one part.
 
 `ppa verify` makes a sample again and compares; this command needs no plan and takes datasets of others as well.")]
@@ -33,9 +34,22 @@ struct Checked {
 
 pub fn run(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
     let working = working("reading all images");
-    let found = inspect(&args.dataset)?;
+    let recorded = against_records(&args.dataset)?;
+    let found = inspect(&args.dataset);
     working.finish_and_clear();
-    require_none(&args.dataset, &found.flaws)?;
+    let mut told: Vec<_> = match &found {
+        Ok(found) => found.flaws.iter().map(Flaw::to_string).collect(),
+        // What does not fit the layout may do so because of what is damaged.
+        Err(_) => Vec::new(),
+    };
+    for (file, problem) in recorded {
+        let known = file.is_some_and(|file| told.iter().any(|flaw| flaw.contains(&file)));
+        if !known {
+            told.push(problem);
+        }
+    }
+    require_none(&args.dataset, &told)?;
+    let found = found?;
     let patients = Published::read(&args.dataset)?.patients();
     let splits = Split::names(&args.dataset)?;
     for name in &splits {
@@ -44,6 +58,20 @@ pub fn run(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
         checked.with_context(|| path.display().to_string())?;
     }
     output.print(&Checked { found, splits }, describe)
+}
+
+/// What differs from the records of the dataset, where there are any, with the file at fault.
+fn against_records(dataset: &Path) -> anyhow::Result<Vec<(Option<String>, String)>> {
+    if !dataset.join(".ppa").is_dir() {
+        return Ok(Vec::new());
+    }
+    let told = |problem: &Problem| (problem.file().map(str::to_owned), problem.to_string());
+    match ppa_dataset::check(dataset) {
+        Ok(check) => Ok(check.problems.iter().map(told).collect()),
+        Err(error @ FolderError::Busy(_)) => Err(error.into()),
+        // A file without which the others cannot be compared.
+        Err(error) => Ok(vec![(None, format!("{:#}", anyhow::Error::from(error)))]),
+    }
 }
 
 fn describe(checked: &Checked) -> String {
