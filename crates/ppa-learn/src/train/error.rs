@@ -46,6 +46,9 @@ pub enum TrainError {
     /// A folder with weights, but nothing to go on from.
     #[error("{} is there, but no checkpoint beside it to go on from; take another folder", .0.display())]
     WeightsAlone(PathBuf),
+    /// A folder of another training, or of something else.
+    #[error("{} is another configuration, with no checkpoint beside it to go on from; take another folder", .0.display())]
+    OtherConfig(PathBuf),
     /// Numbers that are not finite.
     #[error("step {step}: the loss is {loss}; {trouble}")]
     NotFinite {
