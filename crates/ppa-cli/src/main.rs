@@ -6,6 +6,7 @@ mod commands;
 mod interrupt;
 mod number_lists;
 mod output;
+mod output_files;
 mod progress;
 mod scan_args;
 mod shard;
@@ -14,6 +15,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::interrupt::Interrupted;
 use crate::output::Output;
 
 /// Paired Time-of-Flight depth images and radiographs of posed limbs, made from CT scans.
@@ -132,7 +134,10 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("ppa: {error:#}");
-            ExitCode::FAILURE
+            match error.downcast_ref::<Interrupted>() {
+                Some(stopped) => stopped.exit_code().into(),
+                None => ExitCode::FAILURE,
+            }
         }
     }
 }

@@ -141,6 +141,17 @@ impl Watch {
         }
     }
 
+    /// Says how far a run came that was stopped and can go on.
+    pub fn how_to_go_on(&self) -> String {
+        let state = self.state.lock().unwrap_or_else(|e| e.into_inner());
+        format!(
+            "after {} of {} {}; the same command goes on",
+            state.found + state.made,
+            state.units,
+            self.what
+        )
+    }
+
     /// Ends the bar.
     pub fn finish(&self) {
         self.bar.finish_and_clear();

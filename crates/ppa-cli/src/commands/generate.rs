@@ -7,6 +7,7 @@ use ppa_dataset::published::{Published, PublishedError};
 use ppa_dataset::{GenerateSettings, Plan, Summary, generate};
 use ppa_xray::Part;
 
+use crate::interrupt::Interrupt;
 use crate::output::Output;
 use crate::progress::{ProgressArgs, Watch};
 use crate::shard::shard;
@@ -45,9 +46,11 @@ pub struct GenerateArgs {
 pub fn run(args: &GenerateArgs, output: Output) -> anyhow::Result<()> {
     let mut plan = Plan::read(&args.plan)?;
     plan.seed = args.seed.unwrap_or(plan.seed);
+    let interrupt = Interrupt::listen()?;
     let settings = GenerateSettings {
         part: shard(args.shard)?,
         disk_limit: args.disk_limit,
+        stop: Some(interrupt.flag()),
     };
     let out = match &args.out {
         Some(out) => out.clone(),
@@ -59,7 +62,7 @@ pub fn run(args: &GenerateArgs, output: Output) -> anyhow::Result<()> {
         }
     };
     let watch = args.progress.watch("poses", output);
-    let summary = with_progress(&plan, &out, &settings, &watch)?;
+    let summary = with_progress(&plan, &out, &settings, &watch, &interrupt)?;
     if summary.made > 0
         && let Err(outdated @ PublishedError::Outdated { .. }) = Published::read(&out)
     {
@@ -85,10 +88,11 @@ pub fn with_progress(
     out: &Path,
     settings: &GenerateSettings,
     watch: &Watch,
+    interrupt: &Interrupt,
 ) -> anyhow::Result<Summary> {
-    let summary = generate(plan, out, settings, &|progress| watch.report(progress))?;
+    let summary = generate(plan, out, settings, &|progress| watch.report(progress));
     watch.finish();
-    Ok(summary)
+    interrupt.or_how(summary, || watch.how_to_go_on())
 }
 
 /// The summary in words; `done` is what was done to the poses that were not there yet.

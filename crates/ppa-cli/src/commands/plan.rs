@@ -7,6 +7,7 @@ use ppa_dataset::{Forecast, Plan, forecast};
 use serde::Serialize;
 
 use super::generate::dataset_folder;
+use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::{Output, bytes};
 use crate::progress::ProgressArgs;
 
@@ -40,7 +41,10 @@ pub fn run(args: &PlanArgs, output: Output) -> anyhow::Result<()> {
         None => dataset_folder(&args.plan)?,
     };
     let watch = args.progress.watch("poses measured", output);
-    let forecast = forecast(&plan, &root, args.fraction, &|p| watch.report(p))?;
+    let interrupt = Interrupt::listen()?;
+    let stop = interrupt.flag();
+    let forecast = forecast(&plan, &root, args.fraction, stop, &|p| watch.report(p));
+    let forecast = interrupt.or_how(forecast, || NOTHING_WRITTEN.to_owned())?;
     watch.finish();
     let threads = rayon::current_num_threads();
     let told = Told {

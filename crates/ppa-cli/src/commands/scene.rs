@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use crate::number_lists::range;
 use crate::output::{Output, working};
+use crate::output_files::{CLOUD, MESH, ReplaceArgs};
 
 #[derive(Debug, Subcommand)]
 pub enum SceneCommand {
@@ -56,6 +57,8 @@ pub struct RoomArgs {
     /// Write the poses of device and cameras as JSON: named 4x4, mm
     #[arg(long)]
     frames: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 #[derive(Debug, Args)]
@@ -85,6 +88,8 @@ pub struct PlaceArgs {
     /// Write the placed skin in room coordinates: .ply, .obj or .stl
     #[arg(long)]
     ply: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 pub fn run(command: &SceneCommand, output: Output) -> anyhow::Result<()> {
@@ -132,6 +137,10 @@ struct RoomFacts {
 }
 
 fn room(args: &RoomArgs, output: Output) -> anyhow::Result<()> {
+    let mut outputs = args.replace.outputs();
+    outputs.file("--out", &args.out, CLOUD)?;
+    outputs.optional("--toml", args.toml.as_ref(), &[".toml"])?;
+    outputs.optional("--frames", args.frames.as_ref(), &[".json"])?;
     let plan = args.room.plan()?;
     let table = Table::of_plan(&plan)?;
     if let Some(path) = &args.frames {
@@ -178,6 +187,9 @@ struct Placed {
 }
 
 fn place_limb(args: &PlaceArgs, output: Output) -> anyhow::Result<()> {
+    let mut outputs = args.replace.outputs();
+    outputs.optional("--ply", args.ply.as_ref(), MESH)?;
+    outputs.optional("--frames", args.frames.as_ref(), &[".json"])?;
     let plan = args.room.plan()?;
     let soft_tissue = match args.soft_tissue_mm {
         Some([distal_mm, proximal_mm]) => SoftTissue {

@@ -9,8 +9,9 @@ use serde::Serialize;
 
 use super::learn::not_taken;
 
-use crate::interrupt::on_interrupt;
+use crate::interrupt::Interrupt;
 use crate::output::{Output, bar};
+use crate::output_files::require_writable;
 
 #[derive(Debug, Args)]
 pub struct TrainArgs {
@@ -36,11 +37,12 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
     let config = TrainConfig::read(&args.config)?;
     let schedule = config.schedule();
     let steps = schedule.steps();
-    let stop = on_interrupt()?;
+    require_writable("--out", &args.out)?;
+    let interrupt = Interrupt::listen()?;
     let bar = bar("training");
     bar.set_length(steps);
     let mut last_loss = None;
-    let ended = train(&config, &args.out, &stop, |progress| {
+    let ended = train(&config, &args.out, interrupt.flag(), |progress| {
         // Steps that an earlier run made took no time of this one.
         if last_loss.is_none() {
             bar.suspend(|| {
@@ -73,11 +75,16 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
         last_loss,
         start: read_start(&args.out)?,
     };
-    output.print(&trained, |trained| {
-        let out = trained.out.display();
-        match trained.finished {
-            true => format!("{out}/weights.safetensors after {steps} steps"),
-            false => format!("stopped after {step} of {steps} steps; the same command goes on"),
-        }
-    })
+    if trained.finished || output.json {
+        output.print(&trained, |trained| {
+            let out = trained.out.display();
+            format!("{out}/weights.safetensors after {steps} steps")
+        })?;
+    }
+    match trained.finished {
+        true => Ok(()),
+        false => Err(interrupt.stopped(format!(
+            "after {step} of {steps} steps; the same command goes on"
+        ))),
+    }
 }

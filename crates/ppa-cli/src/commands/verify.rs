@@ -7,6 +7,7 @@ use clap::Args;
 use ppa_dataset::{Plan, verify};
 use serde::Serialize;
 
+use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::Output;
 use crate::progress::ProgressArgs;
 
@@ -38,14 +39,17 @@ pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
     let beside = || args.dataset.with_extension("toml");
     let plan = Plan::read(&args.plan.clone().unwrap_or_else(beside))?;
     let watch = args.progress.watch("poses made again", output);
+    let interrupt = Interrupt::listen()?;
     let found = verify(
         &plan,
         &args.dataset,
         args.fraction,
         args.sample_seed,
+        interrupt.flag(),
         &|progress| watch.report(progress),
-    )?;
+    );
     watch.finish();
+    let found = interrupt.or_how(found, || NOTHING_WRITTEN.to_owned())?;
     let problems: Vec<_> = [found.check.problems, found.different].concat();
     require_none(&args.dataset, &problems)?;
     let verified = Verified {

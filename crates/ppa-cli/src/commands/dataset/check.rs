@@ -9,6 +9,7 @@ use ppa_dataset::published::{Inspection, Published, inspect};
 use serde::Serialize;
 
 use super::super::verify::require_none;
+use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::output::{Output, working};
 
 #[derive(Debug, Args)]
@@ -31,6 +32,7 @@ struct Checked {
 }
 
 pub fn run(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
+    let _stoppable = ends_at_once(NOTHING_WRITTEN)?;
     let working = working("reading all images");
     let found = inspect(&args.dataset)?;
     working.finish_and_clear();

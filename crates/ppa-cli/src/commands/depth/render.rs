@@ -12,7 +12,9 @@ use ppa_depth::{
 use ppa_mesh::read_mesh_file;
 use serde::{Deserialize, Serialize};
 
+use crate::interrupt::Interrupt;
 use crate::output::{Output, Seconds, Stopwatch};
+use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Args)]
 pub struct RenderArgs {
@@ -52,6 +54,8 @@ pub struct RenderArgs {
     /// Size of their rotation about each axis, degrees (standard deviation)
     #[arg(long, default_value_t = 0.0)]
     tremor_deg: f64,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 /// Frames over which a tremor remembers: a third of a second at 30 frames per second.
@@ -89,6 +93,7 @@ enum Eye {
 }
 
 pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
+    declare(args)?;
     let camera = super::read_camera(args.camera.as_ref())?;
     let camera_from_body = match &args.camera_from_mesh {
         Some(path) => read_pose(path)?,
@@ -146,15 +151,18 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
         };
         anyhow::Ok(image)
     };
+    let interrupt = Interrupt::listen()?;
     let image = see(0)?;
     let seconds = watch.read();
-    let first = match args.frames {
-        1 => args.out.clone(),
-        _ => numbered(&args.out, 0),
-    };
-    let too_far_pixels = image.write_png(&first)?;
+    let too_far_pixels = image.write_png(&args.frame(0))?;
     for frame in 1..args.frames {
-        see(frame)?.write_png(&numbered(&args.out, frame))?;
+        if interrupt.is_asked() {
+            return Err(interrupt.stopped(format!(
+                "after {frame} of {} frames; the same command with --replace begins again",
+                args.frames
+            )));
+        }
+        see(frame)?.write_png(&args.frame(frame))?;
     }
     write_others(args, &camera, &image)?;
     let rendered = Rendered {
@@ -211,9 +219,25 @@ fn eye(args: &RenderArgs, camera: &Camera) -> anyhow::Result<Eye> {
     ))
 }
 
-fn numbered(path: &Path, frame: u64) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!("{stem}_{frame:04}.png"))
+impl RenderArgs {
+    /// The file of a frame.
+    fn frame(&self, frame: u64) -> PathBuf {
+        if self.frames == 1 {
+            return self.out.clone();
+        }
+        let stem = self.out.file_stem().unwrap_or_default().to_string_lossy();
+        self.out.with_file_name(format!("{stem}_{frame:04}.png"))
+    }
+}
+
+fn declare(args: &RenderArgs) -> anyhow::Result<()> {
+    let mut outputs = args.replace.outputs();
+    for frame in 0..args.frames {
+        outputs.file("--out", &args.frame(frame), &[".png"])?;
+    }
+    outputs.optional("--exr", args.exr.as_ref(), &[".exr"])?;
+    outputs.optional("--preview", args.preview.as_ref(), &[".png"])?;
+    outputs.optional("--points", args.points.as_ref(), &[".ply"])
 }
 
 fn write_others(args: &RenderArgs, camera: &Camera, image: &DepthImage) -> anyhow::Result<()> {

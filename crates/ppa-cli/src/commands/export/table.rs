@@ -7,6 +7,7 @@ use ppa_dataset::export::Table;
 use serde::Serialize;
 
 use crate::output::Output;
+use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Args)]
 pub struct TableArgs {
@@ -18,6 +19,8 @@ pub struct TableArgs {
     /// Split whose parts stand in the column split
     #[arg(long, value_name = "NAME")]
     split: Option<String>,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 #[derive(Debug, Serialize)]
@@ -27,6 +30,12 @@ struct Written {
 }
 
 pub fn run(args: &TableArgs, output: Output) -> anyhow::Result<()> {
+    let mut outputs = args.replace.outputs();
+    let endings: &[&str] = match cfg!(feature = "parquet") {
+        true => &[".csv", ".parquet"],
+        false => &[".csv"],
+    };
+    outputs.file_in_new_folder("--out", &args.out, endings)?;
     let table = Table::of_dataset(&args.dataset, args.split.as_deref())?;
     table.write(&args.out)?;
     let written = Written {
