@@ -9,7 +9,8 @@ cd "$1"
 # A foot: its number, side, noise and blur of the scanner.
 foot() {
     [ -e "p$1.case.toml" ] && return
-    ppa ct phantom --name "P$1" --side "$2" --spacing-mm 1 --table --noise-hu "$3" --blur-mm "$4" --out "p$1.nii.gz" --labels "p$1.bones.nii.gz"
+    # A scan without a case is one whose case was not finished.
+    ppa ct phantom --replace --name "P$1" --side "$2" --spacing-mm 1 --table --noise-hu "$3" --blur-mm "$4" --out "p$1.nii.gz" --labels "p$1.bones.nii.gz"
     ppa prepare "p$1.nii.gz" --side "$2" --bones "p$1.bones.nii.gz" --out "p$1.case.toml"
 }
 for i in 01 02 03 04 05 06; do foot $i r 0 0; done      # synthetic

@@ -1,19 +1,134 @@
-//! Ctrl-C as a wish to stop at the next safe place.
+//! Ctrl-C and TERM end a command at its next whole step. A second one ends it at once.
 
+use std::fmt;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::thread;
+use std::time::Duration;
 
 use anyhow::Context;
+use ppa_dataset::Stopped;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 
-/// What becomes true once Ctrl-C was pressed. Pressed a second time, it ends the program at once.
-pub fn on_interrupt() -> anyhow::Result<Arc<AtomicBool>> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
-    ctrlc::set_handler(move || {
-        if asked.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
+use crate::stderr;
+
+const SIGNALS: [i32; 2] = [SIGINT, SIGTERM];
+
+/// How long a signal waits until it is seen, at most.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+
+/// What a shell adds to a signal's number in an exit status.
+const BY_SIGNAL: i32 = 128;
+
+/// Whether Ctrl-C was pressed or TERM was sent since [`Interrupt::listen`].
+#[derive(Debug)]
+pub struct Interrupt {
+    asked: Arc<AtomicBool>,
+    signal: Arc<AtomicUsize>,
+}
+
+impl Interrupt {
+    /// Begins to listen.
+    pub fn listen() -> anyhow::Result<Self> {
+        let asked = Arc::new(AtomicBool::new(false));
+        let signal = Arc::new(AtomicUsize::new(0));
+        for number in SIGNALS {
+            // In this order: the first signal finds the flag down and raises it, the second finds it up.
+            flag::register_conditional_shutdown(number, BY_SIGNAL + number, Arc::clone(&asked))
+                .and_then(|_| flag::register_usize(number, Arc::clone(&signal), number as usize))
+                .and_then(|_| flag::register(number, Arc::clone(&asked)))
+                .context("cannot listen for Ctrl-C")?;
         }
-    })
-    .context("cannot listen for Ctrl-C")?;
-    Ok(stop)
+        Ok(Self { asked, signal })
+    }
+
+    /// True once the command shall stop.
+    pub fn flag(&self) -> &AtomicBool {
+        &self.asked
+    }
+
+    /// Whether the command shall stop.
+    pub fn is_asked(&self) -> bool {
+        self.asked.load(Ordering::Relaxed)
+    }
+
+    /// The error of a command that stopped; `how` says what is kept and how to go on.
+    pub fn stopped(&self, how: impl Into<String>) -> anyhow::Error {
+        Interrupted {
+            signal: self.signal.load(Ordering::Relaxed) as i32,
+            how: how.into(),
+        }
+        .into()
+    }
+
+    /// Tells how to go on where a library stopped because it was asked to.
+    pub fn or_how<T, E>(
+        &self,
+        result: Result<T, E>,
+        how: impl FnOnce() -> String,
+    ) -> anyhow::Result<T>
+    where
+        E: Into<anyhow::Error>,
+    {
+        result.map_err(|error| {
+            let error = error.into();
+            match error.chain().any(|cause| cause.is::<Stopped>()) {
+                true => self.stopped(how()),
+                false => error,
+            }
+        })
+    }
+}
+
+/// A command was stopped by a signal.
+#[derive(Debug)]
+pub struct Interrupted {
+    signal: i32,
+    how: String,
+}
+
+impl Interrupted {
+    /// What the program ends with: 130 after Ctrl-C, 143 after TERM.
+    pub fn exit_code(&self) -> u8 {
+        u8::try_from(BY_SIGNAL + self.signal).unwrap_or(1)
+    }
+}
+
+impl fmt::Display for Interrupted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "stopped {}", self.how)
+    }
+}
+
+impl std::error::Error for Interrupted {}
+
+/// What a command that wrote nothing says.
+pub const NOTHING_WRITTEN: &str = "before anything was written; the same command begins again";
+
+/// While it lives, Ctrl-C and TERM end the program at once, with a line that says how to go on.
+#[derive(Debug)]
+pub struct EndsAtOnce(Arc<AtomicBool>);
+
+/// For work that writes nothing before its end. Drop the result before anything is written.
+pub fn ends_at_once(how: &'static str) -> anyhow::Result<EndsAtOnce> {
+    let interrupt = Interrupt::listen()?;
+    let over = Arc::new(AtomicBool::new(false));
+    let ends = EndsAtOnce(Arc::clone(&over));
+    thread::spawn(move || {
+        while !over.load(Ordering::Relaxed) {
+            if interrupt.is_asked() {
+                let exit_code = stderr::failure(&interrupt.stopped(how));
+                std::process::exit(exit_code.into());
+            }
+            thread::sleep(LOOK_EVERY);
+        }
+    });
+    Ok(ends)
+}
+
+impl Drop for EndsAtOnce {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
 }

@@ -8,6 +8,7 @@ mod help;
 mod interrupt;
 mod number_lists;
 mod output;
+mod output_files;
 mod progress;
 mod scan_args;
 mod shard;
@@ -162,7 +163,7 @@ fn main() -> ExitCode {
     match cli {
         Ok(cli) => {
             stderr::set_up(cli.json, cli.color);
-            run(cli).map_or_else(|error| stderr::failure(&error), |()| ExitCode::SUCCESS)
+            run(cli).map_or_else(|error| stderr::failure(&error).into(), |()| ExitCode::SUCCESS)
         }
         Err(error) => {
             stderr::set_up(early.json, early.color);

@@ -177,6 +177,16 @@ impl Watch {
         self.bar.set_message(format!("{}s{left}", self.what));
     }
 
+    /// Says how far a run came that was stopped and can go on.
+    pub fn how_to_go_on(&self) -> String {
+        let state = locked(&self.state);
+        format!(
+            "after {} of {}; the same command goes on",
+            state.found + state.made,
+            count(state.units, self.what)
+        )
+    }
+
     /// Ends the bar or the lines.
     pub fn finish(&self) {
         let mut ticker = self.ticker.lock().unwrap_or_else(|e| e.into_inner());

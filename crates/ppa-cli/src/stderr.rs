@@ -13,6 +13,8 @@ use clap::error::ErrorKind;
 use serde::Serialize;
 use serde_json::json;
 
+use crate::interrupt::Interrupted;
+
 /// Exit code of a command that failed; clap's own is 2.
 const FAILED: u8 = 1;
 
@@ -97,20 +99,22 @@ struct Failure {
     exit_code: u8,
 }
 
-/// Says why a command failed.
-pub fn failure(error: &anyhow::Error) -> ExitCode {
+/// Says why a command failed or was stopped, and what the program ends with.
+pub fn failure(error: &anyhow::Error) -> u8 {
+    let stopped = error.downcast_ref::<Interrupted>();
+    let exit_code = stopped.map_or(FAILED, Interrupted::exit_code);
     if is_json() {
         let causes = error.chain().skip(1).map(ToString::to_string);
         end(&Failure {
             error: error.to_string(),
             causes: causes.collect(),
-            exit_code: FAILED,
+            exit_code,
         });
     } else {
         let style = AnsiColor::Red.on_default().bold();
         anstream::eprintln!("{style}ppa:{style:#} {error:#}");
     }
-    ExitCode::from(FAILED)
+    exit_code
 }
 
 /// Says why the command line cannot be used, or prints the help or version it asks for.

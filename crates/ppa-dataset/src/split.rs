@@ -113,8 +113,13 @@ impl Split {
     /// # Errors
     /// [`FileError`] when it cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), FileError> {
+        write_whole(path, self.to_text().as_bytes())
+    }
+
+    /// The bytes of the file.
+    pub fn to_text(&self) -> String {
         let text = serde_json::to_string_pretty(self).expect("splits hold only JSON values");
-        write_whole(path, format!("{text}\n").as_bytes())
+        format!("{text}\n")
     }
 
     /// The file of a split in a dataset: `splits/NAME.json`.

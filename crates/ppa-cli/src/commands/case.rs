@@ -5,10 +5,12 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 use ppa_dataset::{CaseCheck, Drift, Finding, Severity, case_picture, write_picture};
+use ppa_text::count;
 use serde::Serialize;
 
-use crate::commands::pictures::{require_new_picture, shown_name};
+use crate::commands::pictures::shown_name;
 use crate::output::{Output, working};
+use crate::output_files::{PICTURE, ReplaceArgs};
 
 #[derive(Debug, Subcommand)]
 pub enum CaseCommand {
@@ -23,6 +25,8 @@ pub struct CheckArgs {
     /// Picture to check it with, PNG
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 #[derive(Debug, Serialize)]
@@ -31,7 +35,6 @@ struct Checked {
     usable: bool,
     joint_mm: [f64; 3],
     axis: [f64; 3],
-    notes: Vec<String>,
     findings: Vec<Finding>,
     /// Since the case was written; null if the file holds no landmarks that can be compared.
     changed: Option<Drift>,
@@ -44,9 +47,8 @@ pub fn run(command: &CaseCommand, output: Output) -> anyhow::Result<()> {
 }
 
 fn check(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
-    if let Some(path) = &args.picture {
-        require_new_picture(path)?;
-    }
+    let mut outputs = args.replace.outputs();
+    outputs.optional("--picture", args.picture.as_ref(), PICTURE)?;
     let working = working("carrying out the case");
     let checked = CaseCheck::of(&args.case)
         .with_context(|| format!("{} cannot be used", args.case.display()))?;
@@ -62,17 +64,15 @@ fn check(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
         usable: open.is_empty(),
         joint_mm: landmarks.joint_centre,
         axis: landmarks.axis_direction,
-        notes: landmarks.notes.clone(),
         findings: checked.limb.findings.clone(),
         changed: checked.drift,
     };
     output.print(&told, describe)?;
     if !open.is_empty() {
-        let number = open.len();
-        let findings = if number == 1 { "finding" } else { "findings" };
         bail!(
-            "{} has {number} severe {findings}; look at them, then change the case or name their codes in `acknowledged`",
-            args.case.display()
+            "{} has {}; look at them, then change the case or name their codes in `acknowledged`",
+            args.case.display(),
+            count(open.len(), "severe finding")
         );
     }
     Ok(())
@@ -87,7 +87,6 @@ fn describe(told: &Checked) -> String {
         format!("axis       {dx:.4} {dy:.4} {dz:.4}"),
         format!("changed    {}", changes(told.changed.as_ref())),
     ];
-    lines.extend(told.notes.iter().map(|note| format!("note       {note}")));
     lines.extend(told.findings.iter().map(|finding| {
         let severity = match finding.severity {
             Severity::Note => "note",

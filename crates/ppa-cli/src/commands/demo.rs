@@ -1,6 +1,6 @@
 //! `ppa demo`: from the built-in phantom to a small dataset and a contact sheet.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
@@ -14,7 +14,9 @@ use ppa_text::count;
 use serde::Serialize;
 
 use super::generate::with_progress;
+use crate::interrupt::Interrupt;
 use crate::output::{Output, Seconds, Stopwatch, working};
+use crate::output_files::{ReplaceArgs, require_same, require_writable};
 use crate::progress::ProgressArgs;
 
 #[derive(Debug, Args)]
@@ -28,6 +30,8 @@ pub struct DemoArgs {
     /// Right lower leg to take: P01 to P17
     #[arg(long, value_name = "NAME", default_value = "P01")]
     phantom: String,
+    #[command(flatten)]
+    replace: ReplaceArgs,
     #[command(flatten)]
     progress: ProgressArgs,
 }
@@ -55,14 +59,21 @@ pub fn run(args: &DemoArgs, output: Output) -> anyhow::Result<()> {
     let watch = Stopwatch::start();
     let leg = LowerLeg::family(&args.phantom, phantom::Side::Right)?;
     let out = &args.out;
+    require_writable("--out", out)?;
     std::fs::create_dir_all(out)
         .with_context(|| format!("cannot create folder {}", out.display()))?;
     let plan = write_inputs(args, &leg)?;
+    let interrupt = Interrupt::listen()?;
+    let settings = GenerateSettings {
+        stop: Some(interrupt.flag()),
+        ..GenerateSettings::default()
+    };
     let dataset = with_progress(
         &plan,
         &out.join("dataset"),
-        &GenerateSettings::default(),
+        &settings,
         &args.progress.watch("pose", output),
+        &interrupt,
     )?;
     let limb = LimbId {
         patient: 0,
@@ -73,6 +84,7 @@ pub fn run(args: &DemoArgs, output: Output) -> anyhow::Result<()> {
     let path = out.join("contact_sheet.png");
     let mut png = std::io::Cursor::new(Vec::new());
     sheet.write_to(&mut png, image::ImageFormat::Png)?;
+    require_same(&path, png.get_ref(), args.replace)?;
     write_whole(&path, png.get_ref())?;
     let demo = Demo {
         contact_sheet: path,
@@ -97,7 +109,7 @@ fn write_inputs(args: &DemoArgs, leg: &LowerLeg) -> anyhow::Result<Plan> {
     let volume = leg.voxelise(SPACING_MM, TableTop::Present)?;
     let (out, name) = (&args.out, args.phantom.to_ascii_lowercase());
     let scan = out.join(format!("{name}.nii.gz"));
-    write_nifti(&scan, &volume)?;
+    keep_or_write(&scan, args.replace, |path| Ok(write_nifti(path, &volume)?))?;
     working.set_message("finding the limb");
     let (surface, choices) = (LimbSettings::default(), LandmarkOverrides::default());
     let (case, _) = prepare(
@@ -108,7 +120,9 @@ fn write_inputs(args: &DemoArgs, leg: &LowerLeg) -> anyhow::Result<Plan> {
         &choices,
     )?;
     let case_file = PathBuf::from(format!("{name}.case.toml"));
-    case.write(&out.join(&case_file))?;
+    keep_or_write(&out.join(&case_file), args.replace, |path| {
+        Ok(case.write(path)?)
+    })?;
     let mut plan = Plan::new(vec![PlanCase {
         file: out.join(case_file),
         patient: 0,
@@ -116,7 +130,54 @@ fn write_inputs(args: &DemoArgs, leg: &LowerLeg) -> anyhow::Result<Plan> {
     plan.seed = args.seed;
     plan.rotation = POSES;
     let file = out.join("dataset.toml");
-    plan.write(&file)?;
+    keep_or_write(&file, args.replace, |path| Ok(plan.write(path)?))?;
     working.finish_and_clear();
     Ok(Plan::read(&file)?)
+}
+
+/// Writes a file, unless it is there with the same bytes. Other bytes are kept, and refused, without `--replace`.
+fn keep_or_write(
+    path: &Path,
+    replace: ReplaceArgs,
+    write: impl FnOnce(&Path) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    // In the same folder, since a case names its scan from there.
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let new = path.with_file_name(format!(".new.{name}"));
+    let written = write(&new).and_then(|()| {
+        let bytes =
+            std::fs::read(&new).with_context(|| format!("cannot read {}", new.display()))?;
+        require_same(path, &bytes, replace)?;
+        std::fs::rename(&new, path).with_context(|| format!("cannot write {}", path.display()))
+    });
+    if written.is_err() {
+        // What failed first is what counts.
+        let _ = std::fs::remove_file(&new);
+    }
+    written
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edited_input_of_the_demo_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p01.case.toml");
+        let put = |text: &'static str, replace: bool| {
+            let replace = ReplaceArgs::default().or(replace);
+            keep_or_write(&path, replace, |new| Ok(std::fs::write(new, text)?))
+        };
+        let read = || std::fs::read_to_string(&path).unwrap();
+        put("made", false).unwrap();
+        put("made", false).unwrap();
+        std::fs::write(&path, "edited").unwrap();
+        let refused = put("made", false).unwrap_err().to_string();
+        assert!(refused.contains("give --replace"), "{refused}");
+        assert_eq!(read(), "edited");
+        put("made", true).unwrap();
+        assert_eq!(read(), "made");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
 }

@@ -7,13 +7,17 @@ use anyhow::Context;
 use clap::Args;
 use ppa_learn::DeviceName;
 use ppa_learn::data::{Images, check_split};
-use ppa_learn::evaluate::{Evaluation, Row, Scores, learning_curve, write_evaluation};
+use ppa_learn::evaluate::{
+    Evaluation, Row, Scores, evaluation_files, learning_curve, write_evaluation,
+};
 use ppa_learn::train::{Source, predict, read_log, samples, trained};
 
 use ppa_text::number;
 
 use crate::findings::repeat_of_datasets;
+use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::output::{Output, working};
+use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Args)]
 pub struct EvalArgs {
@@ -36,9 +40,20 @@ pub struct EvalArgs {
     /// Folder for predictions, metrics and figures [default: evaluation, in the run's folder]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
+/// Name of the figure.
+const LEARNING_CURVE: &str = "learning_curve";
+
 pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
+    let out = args.out.clone().unwrap_or(args.run.join("evaluation"));
+    let mut outputs = args.replace.outputs();
+    for name in evaluation_files(&[LEARNING_CURVE]) {
+        outputs.file_in_new_folder("--out", &out.join(name), &[])?;
+    }
+    let stoppable = ends_at_once(NOTHING_WRITTEN)?;
     let (config, network) = trained(&args.run)?;
     let network = network.to_device(&args.device.open()?)?;
     let sources = match &args.dataset {
@@ -64,8 +79,8 @@ pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
     let rows = Row::of(images.samples(), &predictions);
     let evaluation = Evaluation::of(&rows)?;
     let log = read_log(&args.run.join("log.jsonl"))?;
-    let out = args.out.clone().unwrap_or(args.run.join("evaluation"));
-    let figures = vec![("learning_curve", learning_curve(&log))];
+    let figures = vec![(LEARNING_CURVE, learning_curve(&log))];
+    drop(stoppable);
     write_evaluation(&out, &rows, &evaluation, figures)
         .with_context(|| format!("writing into {}", out.display()))?;
     output.print(&evaluation, describe)

@@ -12,8 +12,9 @@ use ppa_xray::Part;
 use serde::Serialize;
 
 use crate::findings::repeat_of_datasets;
-use crate::interrupt::on_interrupt;
+use crate::interrupt::Interrupt;
 use crate::output::{Output, bar};
+use crate::output_files::{ReplaceArgs, require_same, require_writable};
 use crate::shard::shard;
 use crate::stderr;
 
@@ -72,7 +73,12 @@ pub struct ExperimentArgs {
     /// Write tables of what there is, marked as incomplete, and train nothing
     #[arg(long, conflicts_with = "shard")]
     so_far: bool,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
+
+/// Endings of the tables of an experiment.
+const TABLES: [&str; 4] = ["md", "csv", "tex", "json"];
 
 #[derive(Debug, Serialize)]
 struct Outcome {
@@ -111,7 +117,19 @@ pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
     if plan.configurations(experiment).len() < experiment.configurations().len() {
         stderr::warning("the plan names no imagenet_weights: their column is left out");
     }
-    let finished = !args.so_far && train(&runner, part)?;
+    require_writable("--out", &out)?;
+    let tables = TABLES.map(|ending| {
+        let name = format!("experiment_{}.{ending}", experiment.name());
+        out.join(name)
+    });
+    if !args.so_far {
+        if part == Part::WHOLE && !runner.results()?.missing().is_empty() {
+            require_no_tables(&tables, args.replace)?;
+        }
+        runner.check_data()?;
+    }
+    let interrupt = Interrupt::listen()?;
+    let finished = !args.so_far && train(&runner, part, &interrupt)?;
 
     let results = runner.results()?;
     let table = match (args.so_far, finished && part == Part::WHOLE) {
@@ -144,27 +162,45 @@ pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
     };
     if let Some(table) = &table {
         let json = serde_json::to_string_pretty(&outcome)?;
-        for (ending, text) in [
-            ("md", table.to_markdown()),
-            ("csv", table.to_csv()),
-            ("tex", table.to_latex()),
-            ("json", json),
-        ] {
-            let name = format!("experiment_{}.{ending}", experiment.name());
-            write_whole(&out.join(name), text.as_bytes())?;
+        let texts = [table.to_markdown(), table.to_csv(), table.to_latex(), json];
+        for (path, text) in tables.iter().zip(&texts) {
+            require_same(path, text.as_bytes(), args.replace)?;
+        }
+        for (path, text) in tables.iter().zip(&texts) {
+            write_whole(path, text.as_bytes())?;
         }
     }
-    output.print(&outcome, describe)
+    let stopped = !finished && !args.so_far;
+    if !stopped || output.json {
+        output.print(&outcome, describe)?;
+    }
+    match stopped {
+        true => {
+            Err(interrupt.stopped("; the same command goes on with the training that was begun"))
+        }
+        false => Ok(()),
+    }
+}
+
+/// Refuses tables that are there before they would be replaced after the trainings.
+fn require_no_tables(tables: &[PathBuf], replace: ReplaceArgs) -> anyhow::Result<()> {
+    let there = tables.iter().find(|path| path.exists());
+    match there {
+        Some(path) if !replace.is_given() => anyhow::bail!(
+            "{} exists and would be replaced after the trainings: give --replace, or move it away",
+            path.display()
+        ),
+        _ => Ok(()),
+    }
 }
 
 /// Carries out a share of the runs; whether it came to their end.
-fn train(runner: &Runner, part: Part) -> anyhow::Result<bool> {
-    let stop = on_interrupt()?;
+fn train(runner: &Runner, part: Part, interrupt: &Interrupt) -> anyhow::Result<bool> {
     let bar = bar("training");
     let share = part.share(runner.runs().len() as u64);
     let finished = runner.run(
         |n| share.contains(&(n as u64)),
-        &stop,
+        interrupt.flag(),
         |event| match event {
             Event::Begins { unit, number, of } => {
                 bar.suspend(|| stderr::note(&format!("{number} of {of}: {unit}")));

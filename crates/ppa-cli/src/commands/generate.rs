@@ -8,6 +8,7 @@ use ppa_dataset::{GenerateSettings, Plan, Summary, generate, held_part};
 use ppa_text::count;
 use ppa_xray::Part;
 
+use crate::interrupt::Interrupt;
 use crate::output::Output;
 use crate::progress::{ProgressArgs, Watch};
 use crate::shard::shard;
@@ -59,10 +60,12 @@ pub fn run(args: &GenerateArgs, output: Output) -> anyhow::Result<()> {
         Some(out) => Ok(held_part(out)?),
         None => Ok(None),
     };
+    let interrupt = Interrupt::listen()?;
     let settings = GenerateSettings {
         part: shard(args.shard)?.part(held)?,
         disk_limit: args.disk_limit,
         replace: args.replace,
+        stop: Some(interrupt.flag()),
     };
     let out = match &args.out {
         Some(out) => out.clone(),
@@ -74,7 +77,7 @@ pub fn run(args: &GenerateArgs, output: Output) -> anyhow::Result<()> {
         }
     };
     let watch = args.progress.watch("pose", output);
-    let summary = with_progress(&plan, &out, &settings, &watch)?;
+    let summary = with_progress(&plan, &out, &settings, &watch, &interrupt)?;
     if summary.made > 0
         && let Err(outdated @ PublishedError::Outdated { .. }) = Published::read(&out)
     {
@@ -100,10 +103,11 @@ pub fn with_progress(
     out: &Path,
     settings: &GenerateSettings,
     watch: &Watch,
+    interrupt: &Interrupt,
 ) -> anyhow::Result<Summary> {
-    let summary = generate(plan, out, settings, &|progress| watch.report(progress))?;
+    let summary = generate(plan, out, settings, &|progress| watch.report(progress));
     watch.finish();
-    Ok(summary)
+    interrupt.or_how(summary, || watch.how_to_go_on())
 }
 
 /// The summary in words; `done` is what was done to the poses that were not there yet.

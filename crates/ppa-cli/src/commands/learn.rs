@@ -11,6 +11,7 @@ use ppa_learn::{FirstConvolution, Loaded, QualityNetwork, parity};
 use serde::Serialize;
 
 use crate::output::{Output, working};
+use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Subcommand)]
 pub enum LearnCommand {
@@ -47,6 +48,8 @@ pub struct ExportArgs {
     /// Seed of what the file does not give
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -137,6 +140,8 @@ fn export(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
             args.out.display()
         ),
     };
+    let mut outputs = args.replace.outputs();
+    outputs.file_in_new_folder("--out", &args.out, &[])?;
     let camera = args.right.is_some().then_some(View::Left);
     let (mut network, mut loaded) = open(&args.weights, camera, args)?;
     if let Some(right) = &args.right {

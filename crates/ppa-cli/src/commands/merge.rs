@@ -7,6 +7,7 @@ use ppa_dataset::{check, merge};
 
 use super::generate::describe;
 use super::verify::require_none;
+use crate::interrupt::{Interrupt, ends_at_once};
 use crate::output::{Output, working};
 use crate::progress::ProgressArgs;
 
@@ -30,11 +31,21 @@ pub struct MergeArgs {
 
 pub fn run(args: &MergeArgs, output: Output) -> anyhow::Result<()> {
     let watch = args.progress.watch("pose", output);
-    let summary = merge(&args.shards, &args.out, args.replace, &|progress| {
-        watch.report(progress);
-    })?;
+    let interrupt = Interrupt::listen()?;
+    let report = |progress: Progress<'_>| watch.report(progress);
+    let summary = merge(
+        &args.shards,
+        &args.out,
+        args.replace,
+        interrupt.flag(),
+        &report,
+    );
     watch.finish();
+    let summary = interrupt.or_how(summary, || watch.how_to_go_on())?;
     if args.verify {
+        let _stoppable = ends_at_once(
+            "while the merged dataset was read back; the same command reads it again",
+        )?;
         let working = working("reading back");
         let problems = check(&args.out)?.problems;
         working.finish_and_clear();

@@ -14,6 +14,7 @@ use serde::Serialize;
 use crate::findings::prepared;
 use crate::number_lists::bump;
 use crate::output::{Output, Seconds, Stopwatch};
+use crate::output_files::{MESH, ReplaceArgs};
 use crate::scan_args::ScanArgs;
 
 #[derive(Debug, Subcommand)]
@@ -39,6 +40,8 @@ pub struct ExtractArgs {
     /// File to write: .ply, .obj or .stl
     #[arg(long)]
     out: PathBuf,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 #[derive(Debug, Args)]
@@ -60,6 +63,8 @@ pub struct AugmentArgs {
     /// File to write: .ply, .obj or .stl
     #[arg(long)]
     out: PathBuf,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 fn body_shape_named(name: &str) -> Result<BodyShape, String> {
@@ -159,6 +164,7 @@ impl Variant {
 }
 
 fn extract(args: &ExtractArgs, output: Output) -> anyhow::Result<()> {
+    args.replace.outputs().file("--out", &args.out, MESH)?;
     let volume = args.scan.read()?.volume;
     let border = if args.close {
         Border::Closed
@@ -173,6 +179,7 @@ fn extract(args: &ExtractArgs, output: Output) -> anyhow::Result<()> {
 }
 
 fn augment(args: &AugmentArgs, output: Output) -> anyhow::Result<()> {
+    args.replace.outputs().file("--out", &args.out, MESH)?;
     let case = Case::read(&args.case)?;
     let prepared = prepared(&case, &args.case)?;
     let mut settings = ShapeSettings::default();

@@ -2,14 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{bail, ensure};
+use anyhow::bail;
 use clap::{Args, Subcommand};
 use ppa_dataset::{Forecast, Plan, forecast};
 use ppa_text::count;
 use serde::Serialize;
 
 use super::generate::dataset_folder;
+use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::{Output, bytes};
+use crate::output_files::ReplaceArgs;
 use crate::progress::ProgressArgs;
 
 #[derive(Debug, Args)]
@@ -44,6 +46,8 @@ struct InitArgs {
     /// Plan file to write
     #[arg(long, default_value = "plan.toml")]
     out: PathBuf,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 #[derive(Debug, Serialize)]
@@ -70,11 +74,8 @@ pub fn run(args: &PlanArgs, output: Output) -> anyhow::Result<()> {
 }
 
 fn init(args: &InitArgs, output: Output) -> anyhow::Result<()> {
-    ensure!(
-        !args.out.try_exists()?,
-        "{} exists: --out writes another file",
-        args.out.display()
-    );
+    let mut outputs = args.replace.outputs();
+    outputs.file("--out", &args.out, &[".toml"])?;
     let plan = Plan::of_cases(args.cases.iter().map(PathBuf::as_path))?;
     plan.write_commented(&args.out)?;
     let begun = Begun {
@@ -83,10 +84,9 @@ fn init(args: &InitArgs, output: Output) -> anyhow::Result<()> {
     };
     output.print(&begun, |begun| {
         let plan = begun.plan.display();
-        let limbs = if begun.limbs == 1 { "limb" } else { "limbs" };
         format!(
-            "{plan}: {} {limbs}, all settings at their defaults; ppa plan {plan} tells what they take",
-            begun.limbs
+            "{plan}: {}, all settings at their defaults; ppa plan {plan} forecasts what they take",
+            count(begun.limbs, "limb")
         )
     })
 }
@@ -98,7 +98,10 @@ fn tell(file: &Path, args: &PlanArgs, output: Output) -> anyhow::Result<()> {
         None => dataset_folder(file)?,
     };
     let watch = args.progress.watch("pose", output);
-    let forecast = forecast(&plan, &root, args.fraction, &|p| watch.report(p))?;
+    let interrupt = Interrupt::listen()?;
+    let stop = interrupt.flag();
+    let forecast = forecast(&plan, &root, args.fraction, stop, &|p| watch.report(p));
+    let forecast = interrupt.or_how(forecast, || NOTHING_WRITTEN.to_owned())?;
     watch.finish();
     let threads = rayon::current_num_threads();
     let told = Told {

@@ -2,7 +2,6 @@
 
 use std::io::{self, BufRead, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
@@ -13,7 +12,7 @@ use ppa_learn::frames::{FramePair, PairFolder, PairPrediction, PairPredictor};
 use ppa_text::count;
 use serde::Serialize;
 
-use crate::interrupt::on_interrupt;
+use crate::interrupt::{Interrupt, ends_at_once};
 use crate::number_lists::square;
 use crate::output::{Output, Stopwatch};
 use crate::stderr;
@@ -96,7 +95,12 @@ pub fn run(args: &PredictArgs, output: Output) -> anyhow::Result<()> {
     };
     let ended = match &args.source.watch {
         Some(folder) => judge.folder(folder),
-        None => judge.lines(io::stdin().lock()),
+        None => {
+            let _stoppable = ends_at_once(
+                "; the answers above are whole, and the pairs after them were not judged",
+            )?;
+            judge.lines(io::stdin().lock())
+        }
     };
     if ended.is_err() && judge.first.is_none() && judge.skipped == 0 {
         return ended; // There is nothing that a summary could tell.
@@ -127,9 +131,9 @@ struct Judge {
 
 impl Judge {
     fn folder(&mut self, folder: &Path) -> anyhow::Result<()> {
-        let stop = on_interrupt()?;
+        let interrupt = Interrupt::listen()?;
         let mut pairs = PairFolder::new(folder);
-        while !stop.load(Ordering::Relaxed) {
+        while !interrupt.is_asked() {
             let found = pairs.look()?;
             self.alone = pairs.alone();
             if found.is_empty() {
@@ -137,7 +141,7 @@ impl Judge {
             }
             self.unjudged = found.len();
             for pair in found {
-                if stop.load(Ordering::Relaxed) {
+                if interrupt.is_asked() {
                     return Ok(());
                 }
                 self.unjudged -= 1;

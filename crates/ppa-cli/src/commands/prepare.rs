@@ -5,17 +5,19 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::{Args, ValueEnum};
 use nalgebra::Point3;
-use ppa_ct::{Format, write};
+use ppa_ct::{Format, Volume, write};
 use ppa_dataset::labels::{AnkleBones, BoneFile, BoneNumbers, JointSpace, segment_bones};
 use ppa_dataset::{Case, Found, PreparedLimb, Severity, case_picture, prepare, write_picture};
 use ppa_mesh::{LimbSettings, VoxelBox, write_mesh_file};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
 use ppa_text::number;
 
-use crate::commands::pictures::{picture_beside, require_new_picture, shown_name};
+use crate::commands::pictures::shown_name;
 use crate::findings::severity_name;
+use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::number_lists::{bone_numbers, point, range, voxel_box};
 use crate::output::{Output, working};
+use crate::output_files::{MESH, NUMBERS, PICTURE, ReplaceArgs};
 use crate::scan_args::ScanArgs;
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -109,6 +111,8 @@ pub struct PrepareArgs {
     /// Numbers of tibia, fibula and talus in it
     #[arg(long, value_name = "TIBIA,FIBULA,TALUS", default_value = "3,4,1", requires = "bones", value_parser = bone_numbers)]
     bone_numbers: BoneNumbers,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
@@ -120,17 +124,25 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
             args.plane_points.len()
         ),
     };
+    let mut outputs = args.replace.outputs();
+    if let Some(bones) = &args.segment_bones {
+        check_bones_name(bones, &args.scan.path)?;
+        outputs.file("--segment-bones", bones, NUMBERS)?;
+    }
+    outputs.file_in_new_folder("--out", &args.out, &[".toml"])?;
+    outputs.optional("--ply", args.ply.as_ref(), MESH)?;
     let picture = match (&args.picture, args.no_picture) {
         (_, true) => None,
         (Some(path), _) => {
-            require_new_picture(path)?;
+            outputs.file("--picture", path, PICTURE)?;
             Some(path.clone())
         }
-        (None, _) => Some(picture_beside(&args.out)?),
+        (None, _) => {
+            let path = args.out.with_extension("png");
+            outputs.file_in_new_folder("the picture beside the case,", &path, PICTURE)?;
+            Some(path)
+        }
     };
-    if let Some(bones) = &args.segment_bones {
-        check_bones_name(bones, &args.scan.path)?;
-    }
     let mut surface = LimbSettings {
         inside: args.inside,
         crop: args.crop,
@@ -157,6 +169,7 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
         SideName::L => Side::Left,
         SideName::R => Side::Right,
     };
+    let stoppable = ends_at_once(NOTHING_WRITTEN)?;
     let working = working("finding the limb");
     let (mut case, prepared) = prepare(
         &args.scan.path,
@@ -175,8 +188,14 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
         bones.read(&prepared.landmarks.joint_centre.into())?;
         case.bones = Some(bones);
     }
-    if let Some(path) = &args.segment_bones {
-        case.bones = Some(segmented(path, &prepared)?);
+    let segmented = match &args.segment_bones {
+        Some(path) => Some((path, segmented(path, &prepared)?)),
+        None => None,
+    };
+    drop(stoppable);
+    if let Some((path, (volume, bones))) = segmented {
+        write(path, &volume)?;
+        case.bones = Some(bones);
     }
     if let Some(ply) = &args.ply {
         write_mesh_file(ply, &prepared.limb.mesh)?;
@@ -190,8 +209,8 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
     output.print(&case, |case| describe(case, args))
 }
 
-/// Writes the bones that can be told apart in a scan, once it is sure that labels can be computed from them.
-fn segmented(path: &Path, prepared: &PreparedLimb) -> anyhow::Result<BoneFile> {
+/// The bones that can be told apart in a scan, once it is sure that labels can be computed from them.
+fn segmented(path: &Path, prepared: &PreparedLimb) -> anyhow::Result<(Volume, BoneFile)> {
     let ct_from_patient = prepared.landmarks.patient_from_ct().inverse();
     let ct_from_patient = ct_from_patient.isometry();
     let bones = segment_bones(&prepared.volume, &prepared.limb.mask, ct_from_patient)?;
@@ -199,12 +218,12 @@ fn segmented(path: &Path, prepared: &PreparedLimb) -> anyhow::Result<BoneFile> {
     let joint = ct_from_patient * Point3::origin();
     let surfaces = AnkleBones::new(&bones.grid, &bones.labels, numbers, &joint)?;
     JointSpace::new(surfaces, ct_from_patient)?;
-    write(path, &bones.volume()?)?;
-    Ok(BoneFile {
+    let file = BoneFile {
         path: path.to_owned(),
         numbers,
         segmented: true,
-    })
+    };
+    Ok((bones.volume()?, file))
 }
 
 /// Refuses names under which nothing, or the scan no more, would be found later.

@@ -12,10 +12,11 @@ use ppa_scene::{Contact, PlaneSettings, SoftTissue, TablePlane, place_soft, tabl
 use ppa_text::{count, number};
 use serde::Serialize;
 
-use crate::commands::pictures::{require_new_picture, shown_name};
+use crate::commands::pictures::shown_name;
 use crate::findings::prepared;
 use crate::number_lists::range;
 use crate::output::{Output, working};
+use crate::output_files::{CLOUD, MESH, PICTURE, ReplaceArgs};
 
 #[derive(Debug, Subcommand)]
 pub enum SceneCommand {
@@ -66,6 +67,8 @@ pub struct RoomArgs {
     /// Write the poses of device and cameras as JSON: named 4x4, mm
     #[arg(long)]
     frames: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 #[derive(Debug, Args)]
@@ -98,6 +101,8 @@ pub struct PlaceArgs {
     /// Picture of the limb in the room, PNG: table, device, detector, both cameras' views and the points it rests on
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 pub fn run(command: &SceneCommand, output: Output) -> anyhow::Result<()> {
@@ -147,6 +152,11 @@ struct RoomFacts {
 }
 
 fn room(args: &RoomArgs, output: Output) -> anyhow::Result<()> {
+    let mut outputs = args.replace.outputs();
+    outputs.file("--out", &args.out, CLOUD)?;
+    outputs.optional("--toml", args.toml.as_ref(), &[".toml"])?;
+    outputs.optional("--frames", args.frames.as_ref(), &[".json"])?;
+    outputs.optional("--picture", args.picture.as_ref(), PICTURE)?;
     let plan = args.room.plan()?;
     let table = Table::of_plan(&plan)?;
     if let Some(path) = &args.frames {
@@ -202,9 +212,10 @@ struct Placed {
 }
 
 fn place_limb(args: &PlaceArgs, output: Output) -> anyhow::Result<()> {
-    if let Some(path) = &args.picture {
-        require_new_picture(path)?;
-    }
+    let mut outputs = args.replace.outputs();
+    outputs.optional("--ply", args.ply.as_ref(), MESH)?;
+    outputs.optional("--frames", args.frames.as_ref(), &[".json"])?;
+    outputs.optional("--picture", args.picture.as_ref(), PICTURE)?;
     let plan = args.room.plan()?;
     let soft_tissue = match args.soft_tissue_mm {
         Some([distal_mm, proximal_mm]) => SoftTissue {

@@ -11,8 +11,9 @@ use serde::Serialize;
 use super::learn::not_taken;
 
 use crate::findings::repeat_of_datasets;
-use crate::interrupt::on_interrupt;
+use crate::interrupt::Interrupt;
 use crate::output::{Output, bar};
+use crate::output_files::require_writable;
 use crate::stderr::note;
 
 #[derive(Debug, Args)]
@@ -41,11 +42,12 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
     let steps = schedule.steps();
     let sources = config.training.iter().chain(&config.evaluation);
     repeat_of_datasets(sources.map(|source| &*source.dataset))?;
-    let stop = on_interrupt()?;
+    require_writable("--out", &args.out)?;
+    let interrupt = Interrupt::listen()?;
     let bar = bar("training");
     bar.set_length(steps);
     let mut last_loss = None;
-    let ended = train(&config, &args.out, &stop, |progress| {
+    let ended = train(&config, &args.out, interrupt.flag(), |progress| {
         // Steps that an earlier run made took no time of this one.
         if last_loss.is_none() {
             bar.suspend(|| {
@@ -85,14 +87,17 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
         last_loss,
         start: read_start(&args.out)?,
     };
-    output.print(&trained, |trained| {
-        let out = trained.out.display();
-        match trained.finished {
-            true => format!("{out}/weights.safetensors after {}", count(steps, "step")),
-            false => format!(
-                "stopped after {step} of {}; the same command goes on",
-                count(steps, "step")
-            ),
-        }
-    })
+    if trained.finished || output.json {
+        output.print(&trained, |trained| {
+            let out = trained.out.display();
+            format!("{out}/weights.safetensors after {}", count(steps, "step"))
+        })?;
+    }
+    match trained.finished {
+        true => Ok(()),
+        false => Err(interrupt.stopped(format!(
+            "after {step} of {}; the same command goes on",
+            count(steps, "step")
+        ))),
+    }
 }

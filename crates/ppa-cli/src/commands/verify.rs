@@ -8,6 +8,7 @@ use ppa_dataset::{Findings, Plan, verify};
 use ppa_text::count;
 use serde::Serialize;
 
+use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::Output;
 use crate::progress::ProgressArgs;
 
@@ -53,14 +54,17 @@ pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
     };
     let plan = Plan::read(&path)?;
     let watch = args.progress.watch("pose", output);
+    let interrupt = Interrupt::listen()?;
     let found = verify(
         &plan,
         &args.dataset,
         args.fraction,
         args.sample_seed,
+        interrupt.flag(),
         &|progress| watch.report(progress),
-    )?;
+    );
     watch.finish();
+    let found = interrupt.or_how(found, || NOTHING_WRITTEN.to_owned())?;
     let problems: Vec<_> = [found.check.problems, found.different].concat();
     require_none(&args.dataset, &problems)?;
     let verified = Verified {

@@ -81,22 +81,76 @@ fn a_phantom_is_graded_best_at_its_mortise_angle() {
     assert_eq!(by_hand["thresholds"]["at_least"][0], 0.75);
     assert_eq!(by_hand["bones"]["sha256"].as_str().unwrap().len(), 64);
 
-    // Readers' labels win, whichever comes first, and whoever told the bones apart.
+    // The same labels again are no others.
+    succeed(here, "label auto plan");
+
+    // Readers' labels win, whichever comes first, and whoever told the bones apart; computed ones stay beside them.
+    let folder_of_labels = here.join("plan/patient_3/labels/r");
+    let computed =
+        || json(&fs::read_to_string(folder_of_labels.join("labels.computed.json")).unwrap());
+    let of_hand = computed();
+    assert_eq!(of_hand, found);
     succeed(
         here,
-        "prepare p01.nii --side r --segment-bones segmented.nii --out p01.toml",
+        "prepare p01.nii --side r --segment-bones segmented.nii --out p01.toml --replace",
     );
     let graded = "image,reader,grade\npatient_3/xray/r/xray_image_36.png,a,2.5\n";
     fs::write(here.join("a.csv"), graded).unwrap();
     let said = json(&succeed(here, "label import plan a.csv --json"));
     assert_eq!(
-        (&said["replaced_computed"], &said["without_label"]),
-        (&9.into(), &8.into())
+        (
+            &said["replaced_computed"],
+            &said["kept_computed"],
+            &said["without_label"]
+        ),
+        (&1.into(), &8.into(), &0.into())
     );
-    let by_reader = labels(here);
-    let said = json(&succeed(here, "label auto plan --json"));
-    assert_eq!(said["limbs"][0]["readers_kept"], true);
-    assert_eq!(labels(here), by_reader);
+    assert_eq!(computed(), of_hand);
+    let mut expected = of_hand.clone();
+    let by_reader = labels(here)["xray_image_36.png"].clone();
+    assert_eq!(
+        (&by_reader["label"], &by_reader["label_source"]),
+        (&2.5.into(), &"readers".into())
+    );
+    expected["xray_image_36.png"] = by_reader.clone();
+    assert_eq!(labels(here), expected);
+    // All that reads labels takes the mixture.
+    let checked = json(&succeed(here, "dataset check plan --json"));
+    assert_eq!(checked["labelled"], 9);
+    succeed(here, "export table plan --out labels.csv");
+    let table = fs::read_to_string(here.join("labels.csv")).unwrap();
+    let radiographs = |source: &str| {
+        let rows = table.lines().filter(|line| line.contains(",radiograph,"));
+        rows.filter(|line| line.contains(source)).count()
+    };
+    assert_eq!(
+        (radiographs("readers"), radiographs("surrogate-jso/1")),
+        (1, 8)
+    );
+    succeed(here, "qa plan");
+    let page = fs::read_to_string(here.join("plan/qa.html")).unwrap();
+    assert!(page.contains("readers") && page.contains("surrogate-jso/1"));
+    fs::remove_file(here.join("plan/qa.html")).unwrap();
+    succeed(here, "dataset convert plan --out specimen");
+    succeed(here, "dataset convert specimen --out back");
+    let back = fs::read_to_string(here.join("back/patient_3/labels/r/labels.json")).unwrap();
+    let back = json(&back);
+    assert_eq!(back["xray_image_36.png"]["label_source"], "readers");
+    assert_eq!(back["xray_image_0.png"]["label_source"], "surrogate-jso/1");
+
+    // Other computed labels replace these on request only.
+    let said = fail(here, "label auto plan");
+    assert!(said.contains("give --replace"), "{said}");
+    assert_eq!(labels(here), expected);
+    let said = json(&succeed(here, "label auto plan --replace --json"));
+    assert_eq!(said["limbs"][0]["of_readers"], 1);
+    let after = labels(here);
+    assert_eq!(after["xray_image_36.png"], by_reader);
+    assert_eq!(
+        after["xray_image_0.png"]["label_source"],
+        "surrogate-jso/1-segmented"
+    );
+    assert_eq!(after["xray_image_0.png"], computed()["xray_image_0.png"]);
     let segmented = with();
     assert_eq!(segmented["label_source"], "surrogate-jso/1-segmented");
     assert_ne!(segmented["bones"]["sha256"], by_hand["bones"]["sha256"]);
@@ -158,7 +212,7 @@ fn refusals(here: &Path) {
         "prepare p01.nii --side r --bones bones.nii --bone-numbers 3,4,99 --out x.toml",
         "no voxel of the talus (label 99)",
     );
-    succeed(here, "prepare p01.nii --side r --out p01.toml");
+    succeed(here, "prepare p01.nii --side r --out p01.toml --replace");
     refused(
         "label auto plan",
         "names no bones: write it again with `ppa prepare --bones`",
@@ -195,7 +249,7 @@ fn refusals(here: &Path) {
     succeed(here, "ct phantom --out other.nii --spacing-mm 1.2");
     succeed(
         here,
-        "prepare other.nii --side r --bones bones.nii --out p01.toml",
+        "prepare other.nii --side r --bones bones.nii --out p01.toml --replace",
     );
     refused("label auto plan", "were not made from the scan of the case");
     fs::write(here.join("p01.toml"), case).unwrap();

@@ -61,7 +61,7 @@ fn a_mesh_that_is_none_is_refused() {
         ),
         (
             "scene room --out room.stl",
-            ["room.stl", "cannot hold a cloud"],
+            ["room.stl", "ends in .ply or .obj"],
         ),
     ] {
         contains(&fail(folder.path(), command), &parts);

@@ -111,7 +111,7 @@ fn a_conversion_that_cannot_be_done_leaves_nothing() {
         (format!("ct convert {scan} full"), "not an empty folder"),
         (
             format!("ct convert {scan} missing/out.nrrd"),
-            "cannot write",
+            "the folder missing does not exist",
         ),
         ("ct convert bad.mha out.nii".to_owned(), "ElementDataFile"),
         ("ct convert nothing.nrrd out.nii".to_owned(), "nothing.nrrd"),

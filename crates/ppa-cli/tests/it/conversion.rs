@@ -21,7 +21,7 @@ fn volume(lean_mm: f64) -> Volume {
 fn converted(folder: &Path, arguments: &str) -> (Volume, Value) {
     let said = succeed(
         folder,
-        &format!("ct convert scan.nrrd out.nrrd {arguments} --json"),
+        &format!("ct convert scan.nrrd out.nrrd --replace {arguments} --json"),
     );
     let volume = read(&folder.join("out.nrrd")).unwrap().volume;
     (volume, serde_json::from_str(&said).unwrap())

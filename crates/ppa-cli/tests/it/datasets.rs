@@ -131,6 +131,8 @@ fn persons_are_split_and_leaks_refused() {
         "{said}"
     );
     succeed(folder.path(), "dataset split data --part train=1");
+    // The same split again is no other.
+    succeed(folder.path(), "dataset split data --part train=1");
     let path = data.join("splits/default.json");
     let split: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
     assert_eq!(split["parts"]["train"], serde_json::json!([3]));
@@ -144,7 +146,10 @@ fn persons_are_split_and_leaks_refused() {
     }
     for (command, part) in [
         ("dataset split data --name ../x", "--name"),
-        ("dataset split data", "is there already"),
+        (
+            "dataset split data --part train=1 --seed 1",
+            "give --replace",
+        ),
     ] {
         let said = fail(folder.path(), command);
         assert!(said.contains(part), "{said}");
@@ -173,6 +178,15 @@ fn tables_and_archives_are_written_from_a_generated_dataset() {
         .unwrap();
     assert!(String::from_utf8_lossy(&said.stderr).contains("YYYY-MM-DD"));
     succeed(folder.path(), &format!("{metadata} 2026-11-21"));
+    succeed(folder.path(), &format!("{metadata} 2026-11-21"));
+    let croissant = folder.path().join("data/croissant.json");
+    let made = fs::read(&croissant).unwrap();
+    let refused = fail(folder.path(), &format!("{metadata} 2026-11-22"));
+    assert!(
+        refused.contains("croissant.json exists and differs"),
+        "{refused}"
+    );
+    assert_eq!(fs::read(&croissant).unwrap(), made);
     succeed(folder.path(), "dataset check data");
     succeed(
         folder.path(),

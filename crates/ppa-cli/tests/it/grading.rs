@@ -92,7 +92,7 @@ fn grades_become_labels_and_are_kept() {
     );
     let said: Value = serde_json::from_str(&said).unwrap();
     let expected = serde_json::json!({
-        "readers": 4, "labelled": 5, "repeats": 4, "replaced_computed": 1, "without_label": 0
+        "readers": 4, "labelled": 5, "repeats": 4, "replaced_computed": 1, "kept_computed": 0, "without_label": 0
     });
     assert_eq!(said, expected);
     let found = labels(here);

@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::{fail, names, succeed};
 
 /// A water box before a small detector, two projections, doses.
-fn write_input(folder: &Path) {
+pub fn write_input(folder: &Path) {
     let header =
         "[SECTION VOXELS HEADER v.2008-04-13]\n4 4 4\n1 1 1\n1\n2\n0\n[END OF VXH SECTION]\n";
     fs::write(
@@ -153,7 +153,9 @@ fn a_time_limits_the_run_and_the_fast_engine_makes_an_image_without_dose() {
     let analog = run("");
     assert!(analog["histories"].as_f64().unwrap() > 1_000.0, "{analog}");
     assert!(analog.get("material_dose_ev_per_history").is_none());
-    let fast = run("--engine fast --histories 1e9");
+    let again = fail(folder.path(), "xray mcgpu short.in --out results");
+    assert!(again.contains("--replace"), "{again}");
+    let fast = run("--engine fast --histories 1e9 --replace");
     assert_eq!(fast["engine"], "fast");
     assert_eq!(fast["histories"], 1e9);
     let primary = |run: &Value| {

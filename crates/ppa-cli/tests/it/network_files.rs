@@ -9,7 +9,10 @@ use crate::{fail, succeed};
 fn pairs_are_exported_from_trainings_and_from_their_weight_files() {
     let folder = trained();
     let export = |what: &str, to: &str| -> Vec<u8> {
-        let said = succeed(folder, &format!("learn export {what} --out {to} --json"));
+        let said = succeed(
+            folder,
+            &format!("learn export {what} --replace --out {to} --json"),
+        );
         let said: serde_json::Value = serde_json::from_str(&said).unwrap();
         assert_eq!(said["unused"], serde_json::json!([]));
         fs::read(folder.join(to)).unwrap()

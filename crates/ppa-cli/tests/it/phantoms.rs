@@ -14,9 +14,10 @@ fn made(folder: &std::path::Path, arguments: &str) -> Value {
 fn the_joint_that_prepare_finds_is_that_of_the_phantom() {
     let folder = tempfile::tempdir().unwrap();
     for (name, side) in [("--name P07", "l"), ("--name P12", "r")] {
-        let arguments = format!("{name} --side {side} --table --spacing-mm 2 --out leg.nii");
+        let arguments =
+            format!("{name} --side {side} --table --spacing-mm 2 --replace --out leg.nii");
         let truth = &made(folder.path(), &arguments)["truth"];
-        let prepare = format!("prepare leg.nii --side {side} --out leg.toml --json");
+        let prepare = format!("prepare leg.nii --side {side} --replace --out leg.toml --json");
         let case: Value = serde_json::from_str(&succeed(folder.path(), &prepare)).unwrap();
         let found = &case["found"]["landmarks"]["joint_centre"];
         for axis in 0..3 {

@@ -90,6 +90,14 @@ fn parts_and_sittings_end_in_the_bytes_of_one_run() {
         "--histories 20000 --dose --tally go_on.tally --resume",
     );
     assert!(read(folder, "go_on.tally") == read(folder, "one.tally"));
+    // A finished run that goes on finds nothing to do and replaces its image by the same one.
+    for _ in 0..2 {
+        simulate(
+            folder,
+            "--histories 20000 --dose --tally go_on.tally --resume --out go_on.png",
+        );
+        assert!(read(folder, "go_on.png") == read(folder, "one.png"));
+    }
     let said = fail(
         folder,
         &command("--histories 20000 --kvp 70 --dose --tally go_on.tally --resume"),

@@ -97,6 +97,29 @@ fn a_killed_training_goes_on_to_the_same_weights_and_is_evaluated() {
     let header = "id,dataset,camera,patient,side,pose,frame,angle_deg,label,prediction";
     assert_eq!(table.lines().next(), Some(header));
     assert_eq!(table.lines().count(), 4);
+    let refused = fail(folder, "eval whole");
+    assert!(refused.contains("--replace"), "{refused}");
+    fs::write(folder.join("whole/evaluation/predictions.csv"), "old").unwrap();
+    succeed(folder, "eval whole --replace");
+    let again = fs::read_to_string(folder.join("whole/evaluation/predictions.csv")).unwrap();
+    assert_eq!(again, table);
+}
+
+#[test]
+fn an_experiment_names_all_missing_data_before_it_trains() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_data(folder);
+    let plan = "seeds = 2\n[training]\npreset = \"quick\"\n[synthetic]\ndataset = \"data\"\nfolds = 2\ntest_limbs = 1\n";
+    fs::write(folder.join("plan.toml"), plan).unwrap();
+    let said = fail(folder, "experiment 1 plan.toml --out runs");
+    // Without variants of the skin one column of four can be made, of each fold and view.
+    assert!(said.contains("12 of 16 trainings of each seed"), "{said}");
+    for shape in ["big", "small", "bumps_a", "bumps_b"] {
+        let missing = format!("there is no image of body shape {shape}");
+        assert!(said.contains(&missing), "{said}");
+    }
+    assert!(!folder.join("runs").exists());
 }
 
 #[test]
@@ -112,6 +135,15 @@ fn what_cannot_be_trained_or_evaluated_is_told_in_one_sentence() {
     assert!(fail(folder, "train nobody.toml --out run").contains("patient 5"));
     fs::write(folder.join("typo.toml"), config.replace("steps", "stepz")).unwrap();
     assert!(fail(folder, "train typo.toml --out run").contains("stepz"));
+    fs::create_dir(folder.join("own")).unwrap();
+    fs::write(folder.join("own/config.toml"), "# mine").unwrap();
+    let said = fail(folder, "train train.toml --out own");
+    assert!(
+        said.contains("own/config.toml is another configuration"),
+        "{said}"
+    );
+    assert_eq!(names(&folder.join("own")), ["config.toml"]);
+    assert_eq!(fs::read(folder.join("own/config.toml")).unwrap(), b"# mine");
     assert!(!folder.join("run").exists());
     assert!(fail(folder, "eval run").contains("config.toml"));
 }
@@ -130,7 +162,7 @@ fn an_interrupted_training_saves_its_step() {
     fs::write(folder.join("train.toml"), config).unwrap();
     let mut run = ppa(folder, "train train.toml --out run --json");
     let mut run = run
-        .stderr(std::process::Stdio::null())
+        .stderr(std::process::Stdio::piped())
         .stdout(std::process::Stdio::piped())
         .spawn()
         .unwrap();
@@ -147,7 +179,16 @@ fn an_interrupted_training_saves_its_step() {
         .status();
     assert!(interrupt.unwrap().success());
     let said = run.wait_with_output().unwrap();
-    assert!(said.status.success());
+    assert_eq!(said.status.code(), Some(130));
+    let told = String::from_utf8(said.stderr).unwrap();
+    let lines: Vec<&str> = told
+        .lines()
+        .filter(|line| line.starts_with("ppa"))
+        .collect();
+    assert!(
+        lines.len() == 1 && lines[0].ends_with("of 5000 steps; the same command goes on"),
+        "{told}"
+    );
     let said: serde_json::Value = serde_json::from_slice(&said.stdout).unwrap();
     assert_eq!(said["finished"], false);
     let text = fs::read_to_string(log).unwrap();
@@ -171,6 +212,22 @@ fn tables_of_an_experiment_are_marked_while_results_are_missing() {
     assert_eq!(said["permutation_test"], serde_json::Value::Null);
     let table = fs::read_to_string(folder.join("runs/experiment_2a.md")).unwrap();
     assert!(table.contains("INCOMPLETE: 36 test sets"), "{table}");
+    // A table that differs is kept; the same one is no other.
+    succeed(folder, "experiment 2a plan.toml --out runs --so-far");
+    fs::write(folder.join("runs/experiment_2a.md"), "notes").unwrap();
+    for so_far in ["--so-far", ""] {
+        let refused = fail(
+            folder,
+            &format!("experiment 2a plan.toml --out runs {so_far}"),
+        );
+        assert!(refused.contains("experiment_2a.md exists"), "{refused}");
+    }
+    succeed(
+        folder,
+        "experiment 2a plan.toml --out runs --so-far --replace",
+    );
+    let again = fs::read_to_string(folder.join("runs/experiment_2a.md")).unwrap();
+    assert_eq!(again, table);
     let refused = fail(folder, "experiment 2b plan.toml --out runs --so-far");
     assert!(refused.contains("2b needs [clinical]"), "{refused}");
     fs::write(

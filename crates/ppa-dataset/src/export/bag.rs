@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -11,6 +12,7 @@ use sha2::{Digest, Sha256};
 use crate::files::{FileError, hex};
 use crate::manifest::Manifest;
 use crate::published::{Published, PublishedError};
+use crate::stop::{Stopped, go_on};
 use crate::whole_folder::write_whole_folder;
 
 const MANIFEST: &str = "manifest-sha256.txt";
@@ -41,6 +43,9 @@ pub enum BagError {
     /// A link or device, whose contents are no part of the dataset.
     #[error("{} is neither a file nor a folder, and a bag holds nothing else", .0.display())]
     Special(PathBuf),
+    /// It was asked to stop.
+    #[error("the bag was not finished")]
+    Stopped(#[from] Stopped),
     /// An image that is not the one in `manifest.jsonl`.
     #[error("{} is altered or missing: its hash is {found}, that in manifest.jsonl {expected}", path.display())]
     Altered {
@@ -57,12 +62,13 @@ pub enum BagError {
 const NOT_TO_BE_BAGGED: [&[u8]; 2] = [b"image,reader,grade", b"name,image,sha256"];
 
 /// Copies the dataset in `root`, of either published layout, into the bag `to`, whole or not at all. Hidden files and folders,
-/// among them the records of `ppa generate`, and tables of readers' grades and keys, by whatever name, stay behind.
+/// among them the records of `ppa generate`, and tables of readers' grades and keys, by whatever name, stay behind. Once `stop` is
+/// true it ends before the next file, and leaves nothing.
 ///
 /// # Errors
 /// [`BagError`]; among them images that are not as in `manifest.jsonl`, labels of other radiographs, and links. `to` must not exist or be
 /// empty.
-pub fn bag(root: &Path, to: &Path) -> Result<Bag, BagError> {
+pub fn bag(root: &Path, to: &Path, stop: &AtomicBool) -> Result<Bag, BagError> {
     Published::read(root)?;
     let mut listed = listed(root)?;
     let mut files = Vec::new();
@@ -71,6 +77,7 @@ pub fn bag(root: &Path, to: &Path) -> Result<Bag, BagError> {
         let mut bytes = 0;
         let mut manifest = String::new();
         for name in &files {
+            go_on(stop)?;
             let (size, hash) = copy(&root.join(name), &bag.join("data").join(name))?;
             if let Some(expected) = listed.remove(name)
                 && hash != expected

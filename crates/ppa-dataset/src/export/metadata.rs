@@ -126,11 +126,13 @@ const NEW_DATASHEET: &str = "datasheet.new.md";
 /// which people may have answered, stays; one that differs is written beside it as `datasheet.new.md`. Names of the files written.
 ///
 /// # Errors
-/// [`TableError`] naming the file at fault, or what of the metadata is no name, address or day; nothing is written then.
+/// [`TableError`] naming the file at fault, among them one that is there and differs without `replace`, or what of the metadata is no
+/// name, address or day; nothing is written then.
 pub fn write_metadata(
     root: &Path,
     metadata: &Metadata,
     split: Option<&str>,
+    replace: bool,
 ) -> Result<[&'static str; 4], TableError> {
     metadata.check().map_err(TableError::Metadata)?;
     let table = Table::of_dataset(root, split)?;
@@ -156,6 +158,13 @@ pub fn write_metadata(
         (sheet, datasheet.into_bytes()),
     ];
     for (name, bytes) in &files {
+        let path = root.join(name);
+        let differs = || std::fs::read(&path).map(|found| found != *bytes);
+        if !replace && path.exists() && differs().map_err(FileError::at("read", &path))? {
+            return Err(TableError::Differs(path));
+        }
+    }
+    for (name, bytes) in &files {
         write_whole(&root.join(name), bytes)?;
     }
     Ok(files.map(|(name, _)| name))
@@ -169,6 +178,7 @@ fn lists(root: &Path, table: &Table) -> Result<Vec<(String, &'static str)>, Tabl
         let folder = regions.trim_end_matches("roi_depth.json").to_owned();
         lists.push((regions, "application/json"));
         lists.push((folder.clone() + "labels.json", "application/json"));
+        lists.push((folder.clone() + "labels.computed.json", "application/json"));
         lists.push((folder.clone() + "openness.csv", "text/csv"));
         lists.push((folder + "openness.json", "application/json"));
     }

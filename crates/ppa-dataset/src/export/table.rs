@@ -30,6 +30,9 @@ pub enum TableError {
         /// Half degrees of rotation.
         step: u32,
     },
+    /// A file that is there, and not as it would be written.
+    #[error("{} exists and differs from what would be written: give --replace to replace it", .0.display())]
+    Differs(PathBuf),
     /// Name, licence or date.
     #[error("{0}")]
     Metadata(String),
@@ -284,7 +287,9 @@ fn columns(
         }),
         real("label", &|row| Some(label(row)?.label)),
         real("label_std", &|row| Some(label(row)?.std)),
-        text("label_source", &|row| name(&labels.get(&row.limb)?.source?)),
+        text("label_source", &|row| {
+            name(&labels.get(&row.limb)?.source_of_step(row.step)?)
+        }),
         text("split", &|row| {
             Some(split?.part_of(row.limb.patient)?.to_owned())
         }),

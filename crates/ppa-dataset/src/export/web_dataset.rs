@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
 
@@ -10,6 +11,7 @@ use crate::files::FileError;
 use crate::layout::View;
 use crate::published::{ImagePair, Pose, Published, PublishedError};
 use crate::split::{Split, SplitError};
+use crate::stop::{Stopped, go_on};
 use crate::whole_folder::write_whole_folder;
 
 /// Why a dataset cannot be written as archives.
@@ -25,6 +27,9 @@ pub enum WebDatasetError {
     /// A file.
     #[error(transparent)]
     File(#[from] FileError),
+    /// It was asked to stop.
+    #[error("not all archives were written")]
+    Stopped(#[from] Stopped),
 }
 
 /// What was written.
@@ -43,6 +48,8 @@ pub struct Shards {
 /// regions and label; `NAME` is `patient_0_r_036_orig` or `patient_1_l_min_0_1000`. With a split, each part has archives of its own,
 /// `train-000000.tar`; without one they are `all-000000.tar`. Order, sizes and bytes are always the same.
 ///
+/// Once `stop` is true it ends before the next sample, and leaves nothing.
+///
 /// # Errors
 /// [`WebDatasetError`]; `to` must not exist or be empty.
 pub fn web_dataset(
@@ -50,6 +57,7 @@ pub fn web_dataset(
     to: &Path,
     per_shard: usize,
     split: Option<&str>,
+    stop: &AtomicBool,
 ) -> Result<Shards, WebDatasetError> {
     let dataset = Published::read(root)?;
     let split = split
@@ -72,7 +80,7 @@ pub fn web_dataset(
                 .collect()
         }
     };
-    write(root, to, per_shard, &parts)
+    write(root, to, per_shard, &parts, stop)
 }
 
 fn write(
@@ -80,6 +88,7 @@ fn write(
     to: &Path,
     per_shard: usize,
     parts: &[(&str, Vec<&ImagePair>)],
+    stop: &AtomicBool,
 ) -> Result<Shards, WebDatasetError> {
     write_whole_folder(to, |folder| {
         let mut written = Shards {
@@ -89,7 +98,7 @@ fn write(
         for (part, pairs) in parts {
             for (number, shard) in pairs.chunks(per_shard.max(1)).enumerate() {
                 let path = folder.join(format!("{part}-{number:06}.tar"));
-                write_shard(root, &path, shard)?;
+                write_shard(root, &path, shard, stop)?;
                 written.shards += 1;
                 written.samples += shard.len();
             }
@@ -98,7 +107,12 @@ fn write(
     })
 }
 
-fn write_shard(root: &Path, path: &Path, pairs: &[&ImagePair]) -> Result<(), FileError> {
+fn write_shard(
+    root: &Path,
+    path: &Path,
+    pairs: &[&ImagePair],
+    stop: &AtomicBool,
+) -> Result<(), WebDatasetError> {
     let file = File::create(path).map_err(FileError::at("write", path))?;
     let mut archive = tar::Builder::new(BufWriter::new(file));
     let mut add = |name: String, bytes: &[u8]| {
@@ -111,6 +125,7 @@ fn write_shard(root: &Path, path: &Path, pairs: &[&ImagePair]) -> Result<(), Fil
             .map_err(FileError::at("write", path))
     };
     for pair in pairs {
+        go_on(stop)?;
         let name = sample_name(pair);
         for (kind, file) in images(pair) {
             let image: PathBuf = root.join(file);
@@ -124,9 +139,8 @@ fn write_shard(root: &Path, path: &Path, pairs: &[&ImagePair]) -> Result<(), Fil
     let flushed = buffer
         .into_inner()
         .map_err(std::io::IntoInnerError::into_error);
-    flushed
-        .and_then(|mut file| file.flush())
-        .map_err(FileError::at("write", path))
+    let flushed = flushed.and_then(|mut file| file.flush());
+    Ok(flushed.map_err(FileError::at("write", path))?)
 }
 
 fn images(pair: &ImagePair) -> impl Iterator<Item = (&'static str, &str)> {

@@ -9,12 +9,12 @@ use serde::Serialize;
 use super::computation::Computation;
 use super::described::Described;
 use super::file::{LabelFile, LabelFileError};
-use super::label::{LabelError, LabelRow, LabelSource};
+use super::label::{LabelError, LabelRow};
 use super::openness::{
     BoneFile, BoneFileError, Exposure, GradeThresholds, JointSpace, JointSpaceError, ReadBones,
     ThresholdError,
 };
-use super::table::write_table;
+use super::table::table_bytes;
 use super::tallies::TalliesError;
 use crate::case::Case;
 use crate::files::{FileError, write_whole};
@@ -76,8 +76,10 @@ pub struct LabelledLimb {
     pub diagnostic: usize,
     /// Rotation at which the worst gutter is most open: the middle of what reaches nine tenths of the best.
     pub best_angle_deg: f64,
-    /// Whether `labels.json` holds readers' labels and was left as it is.
-    pub readers_kept: bool,
+    /// Radiographs whose label in `labels.json` is that of readers.
+    pub of_readers: usize,
+    /// Whether `labels.json` holds labels that do not tell their source, and was left as it is.
+    pub unnamed_kept: bool,
 }
 
 /// Why a limb cannot be labelled.
@@ -108,6 +110,12 @@ pub enum AutoLabelError {
         /// `ct_from_device` or `patient_from_ct`.
         what: &'static str,
     },
+    /// Results of an earlier computation that differ from the new ones.
+    #[error(
+        "{} holds other computed labels, or was computed otherwise: give --replace to replace it",
+        .0.display()
+    )]
+    Differs(PathBuf),
     /// The bones.
     #[error(transparent)]
     Bones(#[from] BoneFileError),
@@ -144,7 +152,8 @@ pub struct ComputedLabels<'a> {
     rows: Vec<ComputedRow>,
     labels: LabelFile,
     computation: String,
-    readers_kept: bool,
+    /// `labels.json` as it was found.
+    before: LabelFile,
 }
 
 /// Grades every radiograph of a limb from the bones that its case names.
@@ -157,9 +166,7 @@ pub fn compute_labels<'a>(
     case: &Case,
     thresholds: &GradeThresholds,
 ) -> Result<ComputedLabels<'a>, AutoLabelError> {
-    let before = LabelFile::read(&manifest.root, limb)?;
-    let readers_kept =
-        before.is_some_and(|labels| !labels.source.is_some_and(LabelSource::is_computed));
+    let before = LabelFile::read(&manifest.root, limb)?.unwrap_or_default();
     thresholds.check()?;
     let file = case.bones.as_ref().ok_or(AutoLabelError::NoBones(limb))?;
     let (rows, bones_sha256) = computed_rows(manifest, limb, case, file, thresholds)?;
@@ -176,34 +183,82 @@ pub fn compute_labels<'a>(
         labels: labels.of_radiographs(manifest, limb),
         computation: computation.to_json(),
         rows,
-        readers_kept,
+        before,
     })
 }
 
 impl ComputedLabels<'_> {
-    /// Writes `openness.csv`, `openness.json` (what it was computed with) and `labels.json` beside the limb's regions of interest.
-    /// Labels of readers, and labels that do not tell their source, stay as they are.
+    /// Refuses to replace results of an earlier computation that differ from these.
+    ///
+    /// # Errors
+    /// [`AutoLabelError::Differs`] naming the file.
+    pub fn require_same(&self) -> Result<(), AutoLabelError> {
+        for (path, bytes) in self.own_files() {
+            if path.exists() && std::fs::read(&path).map_err(FileError::at("read", &path))? != bytes
+            {
+                return Err(AutoLabelError::Differs(path));
+            }
+        }
+        // Computed labels had no file of their own in earlier versions.
+        let before = self.before.computed();
+        let same = |row: &LabelRow| {
+            self.labels.of_step(row.step) == Some(row)
+                && self.labels.source_of_step(row.step) == before.source_of_step(row.step)
+        };
+        match before.labels().iter().all(same) {
+            true => Ok(()),
+            false => Err(AutoLabelError::Differs(LabelFile::path(
+                &self.manifest.root,
+                self.limb,
+            ))),
+        }
+    }
+
+    /// Writes `openness.csv`, `openness.json` (what it was computed with), `labels.computed.json` (all labels) and `labels.json`
+    /// beside the limb's regions of interest. In `labels.json` labels of readers stay, and computed ones stand where there are none; a
+    /// file of labels that do not tell their source stays as it is.
     ///
     /// # Errors
     /// [`AutoLabelError`] if a file cannot be written.
     pub fn write(&self) -> Result<LabelledLimb, AutoLabelError> {
         let (root, limb) = (&self.manifest.root, self.limb);
-        let regions = root.join(limb.roi_file());
-        write_table(&regions.with_file_name("openness.csv"), &self.rows)?;
-        write_whole(
-            &regions.with_file_name("openness.json"),
-            self.computation.as_bytes(),
-        )?;
-        if !self.readers_kept {
-            self.labels.write(root, limb)?;
+        for (path, bytes) in self.own_files() {
+            write_whole(&path, &bytes)?;
+        }
+        let unnamed_kept = self.before.has_unnamed();
+        let readers = self.before.not_computed();
+        let of_readers = match unnamed_kept {
+            true => 0,
+            false => readers.labels().len(),
+        };
+        if !unnamed_kept {
+            readers.over(&self.labels).write(root, limb)?;
         }
         Ok(LabelledLimb {
             limb,
             radiographs: self.rows.len(),
             diagnostic: self.rows.iter().filter(|row| row.label < 2.5).count(),
             best_angle_deg: best_angle_deg(&self.rows),
-            readers_kept: self.readers_kept,
+            of_readers,
+            unnamed_kept,
         })
+    }
+
+    /// The files that hold nothing but what was computed.
+    fn own_files(&self) -> [(PathBuf, Vec<u8>); 3] {
+        let (root, limb) = (&self.manifest.root, self.limb);
+        let beside = |name: &str| root.join(limb.roi_file()).with_file_name(name);
+        [
+            (beside("openness.csv"), table_bytes(&self.rows)),
+            (
+                beside("openness.json"),
+                self.computation.clone().into_bytes(),
+            ),
+            (
+                LabelFile::computed_path(root, limb),
+                self.labels.to_text().into_bytes(),
+            ),
+        ]
     }
 }
 

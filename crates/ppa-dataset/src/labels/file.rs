@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::label::{LabelError, LabelRow, LabelSource, radiograph_name};
+use super::label::{LabelError, LabelRow, LabelSource, Sources, name_of, radiograph_name};
 use crate::files::{FileError, read_text, write_whole};
 use crate::layout::LimbId;
 use crate::manifest::{FileKind, Manifest};
@@ -29,21 +29,21 @@ pub enum LabelFileError {
     },
 }
 
-/// The labels of one limb's radiographs, all from one source.
+/// The labels of one limb's radiographs.
 ///
-/// Readers' labels and computed ones never stand in one file.
-#[derive(Debug, Clone, PartialEq)]
+/// A radiograph has one label: that of readers where there is one, else a computed one. All computed labels stand in a
+/// file of their own as well, [`LabelFile::computed_path`].
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct LabelFile {
-    /// Who made them; `None` for a file that does not tell, as the published ones.
-    pub source: Option<LabelSource>,
     /// By name of the radiograph, `xray_image_STEP.png`.
     rows: BTreeMap<String, Labelled>,
 }
 
-/// A label, and which bytes its radiograph had if that is known.
+/// A label, who made it, and which bytes its radiograph had, as far as that is known.
 #[derive(Debug, Clone, PartialEq)]
 struct Labelled {
     row: LabelRow,
+    source: Option<LabelSource>,
     sha256: Option<String>,
 }
 
@@ -53,7 +53,13 @@ impl LabelFile {
         root.join(limb.roi_file()).with_file_name("labels.json")
     }
 
-    /// Labels, in any order.
+    /// Where computed labels lie, those included that gave way to readers' in [`LabelFile::path`].
+    pub fn computed_path(root: &Path, limb: LimbId) -> PathBuf {
+        root.join(limb.roi_file())
+            .with_file_name("labels.computed.json")
+    }
+
+    /// Labels of one source, in any order.
     ///
     /// # Errors
     /// [`LabelError`] for labels outside 1 to 3, spreads outside 0 to 1, and steps beyond 360.
@@ -61,16 +67,31 @@ impl LabelFile {
         source: LabelSource,
         labels: impl IntoIterator<Item = LabelRow>,
     ) -> Result<Self, LabelError> {
-        let named = labels.into_iter().map(|row| {
+        Self::with_sources(labels.into_iter().map(|row| (row, Some(source))))
+    }
+
+    /// Labels with their sources, in any order.
+    pub(crate) fn with_sources(
+        labels: impl IntoIterator<Item = (LabelRow, Option<LabelSource>)>,
+    ) -> Result<Self, LabelError> {
+        let named = labels.into_iter().map(|(row, source)| {
             let image = radiograph_name(row.step);
-            let sha256 = None;
-            row.check(&image)
-                .map(|()| (image, Labelled { row, sha256 }))
+            row.check(&image)?;
+            let labelled = Labelled {
+                row,
+                source,
+                sha256: None,
+            };
+            Ok((image, labelled))
         });
         Ok(Self {
-            source: Some(source),
             rows: named.collect::<Result<_, _>>()?,
         })
+    }
+
+    /// Who made the label of a step; `None` where there is none, or where the file does not tell, as the published ones.
+    pub fn source_of_step(&self, step: u32) -> Option<LabelSource> {
+        self.rows.get(&radiograph_name(step))?.source
     }
 
     /// Labels by step, lowest first.
@@ -97,6 +118,43 @@ impl LabelFile {
         self
     }
 
+    /// The computed labels in it.
+    #[cfg(feature = "generate")]
+    pub(super) fn computed(&self) -> Self {
+        self.only(|source| source.is_some_and(LabelSource::is_computed))
+    }
+
+    /// The labels in it that are not computed: readers', and those without a source.
+    #[cfg(feature = "generate")]
+    pub(super) fn not_computed(&self) -> Self {
+        self.only(|source| !source.is_some_and(LabelSource::is_computed))
+    }
+
+    #[cfg(feature = "generate")]
+    fn only(&self, keep: impl Fn(Option<LabelSource>) -> bool) -> Self {
+        let rows = self.rows.iter();
+        let rows = rows.filter(|(_, labelled)| keep(labelled.source));
+        Self {
+            rows: rows
+                .map(|(image, labelled)| (image.clone(), labelled.clone()))
+                .collect(),
+        }
+    }
+
+    /// These labels, and those of `others` for radiographs that have none here.
+    #[cfg(feature = "generate")]
+    pub(super) fn over(self, others: &Self) -> Self {
+        let mut rows = others.rows.clone();
+        rows.extend(self.rows);
+        Self { rows }
+    }
+
+    /// Whether any label does not tell its source.
+    #[cfg(feature = "generate")]
+    pub(super) fn has_unnamed(&self) -> bool {
+        self.rows.values().any(|labelled| labelled.source.is_none())
+    }
+
     /// Whether any label knows which bytes its radiograph had.
     pub(crate) fn is_bound(&self) -> bool {
         self.rows.values().any(|labelled| labelled.sha256.is_some())
@@ -120,9 +178,18 @@ impl LabelFile {
     ///
     /// # Errors
     /// [`LabelFileError`] naming the file and the radiograph at fault: labels outside 1 to 3, angles off the grid of half
-    /// degrees from 0 to 180, a radiograph twice, labels of two sources.
+    /// degrees from 0 to 180, a radiograph twice, labels of sources that do not go together.
     pub fn read(root: &Path, limb: LimbId) -> Result<Option<Self>, LabelFileError> {
-        let path = Self::path(root, limb);
+        Self::read_file(Self::path(root, limb))
+    }
+
+    /// Reads the computed labels of a limb; `None` if there is no file of them.
+    #[cfg(feature = "generate")]
+    pub(super) fn read_computed(root: &Path, limb: LimbId) -> Result<Option<Self>, LabelFileError> {
+        Self::read_file(Self::computed_path(root, limb))
+    }
+
+    fn read_file(path: PathBuf) -> Result<Option<Self>, LabelFileError> {
         if !path.try_exists().map_err(FileError::at("read", &path))? {
             return Ok(None);
         }
@@ -138,8 +205,12 @@ impl LabelFile {
     /// # Errors
     /// [`FileError`] when it cannot be written.
     pub fn write(&self, root: &Path, limb: LimbId) -> Result<(), FileError> {
-        let text = serde_json::to_string_pretty(self).expect("labels are finite numbers");
-        write_whole(&Self::path(root, limb), text.as_bytes())
+        write_whole(&Self::path(root, limb), self.to_text().as_bytes())
+    }
+
+    /// The bytes of the file.
+    pub(super) fn to_text(&self) -> String {
+        serde_json::to_string_pretty(self).expect("labels are finite numbers")
     }
 }
 
@@ -168,10 +239,9 @@ struct Entry {
 
 impl Serialize for LabelFile {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let label_source = self.source;
         let entry = |labelled: &Labelled| Entry {
             row: labelled.row,
-            label_source,
+            label_source: labelled.source,
             radiograph_sha256: labelled.sha256.clone(),
         };
         let rows = self.rows.iter();
@@ -196,16 +266,14 @@ impl<'de> Visitor<'de> for Rows {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<LabelFile, A::Error> {
-        let mut source: Option<Option<LabelSource>> = None;
+        let mut sources = Sources::default();
         let mut rows = BTreeMap::new();
         while let Some((image, entry)) = map.next_entry::<String, Entry>()? {
             entry.row.check(&image).map_err(A::Error::custom)?;
-            let expected = *source.get_or_insert(entry.label_source);
-            if entry.label_source != expected {
-                let name = |s: Option<LabelSource>| s.map_or("nobody named", LabelSource::name);
+            if let Err(expected) = sources.take(entry.label_source) {
                 return Err(A::Error::custom(LabelError::Mixed {
-                    found: name(entry.label_source),
-                    expected: name(expected),
+                    found: name_of(entry.label_source),
+                    expected,
                     image,
                 }));
             }
@@ -214,14 +282,12 @@ impl<'de> Visitor<'de> for Rows {
             }
             let labelled = Labelled {
                 row: entry.row,
+                source: entry.label_source,
                 sha256: entry.radiograph_sha256,
             };
             rows.insert(image, labelled);
         }
-        Ok(LabelFile {
-            source: source.flatten(),
-            rows,
-        })
+        Ok(LabelFile { rows })
     }
 }
 

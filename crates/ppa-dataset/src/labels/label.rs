@@ -25,10 +25,35 @@ impl LabelSource {
         }
     }
 
-    #[cfg(feature = "generate")]
     pub(super) fn is_computed(self) -> bool {
         self != Self::Readers
     }
+}
+
+/// The sources of the labels in one file: readers beside one kind of computed labels, or none that is told.
+#[derive(Debug, Default)]
+pub(crate) struct Sources(Vec<Option<LabelSource>>);
+
+impl Sources {
+    /// Takes the source of another label, or says in words beside which one it may not stand.
+    pub fn take(&mut self, source: Option<LabelSource>) -> Result<(), &'static str> {
+        let beside = |other: &&Option<LabelSource>| match (source, **other) {
+            (Some(a), Some(b)) => a == b || (a.is_computed() != b.is_computed()),
+            (a, b) => a == b,
+        };
+        if let Some(other) = self.0.iter().find(|other| !beside(other)) {
+            return Err(name_of(*other));
+        }
+        if !self.0.contains(&source) {
+            self.0.push(source);
+        }
+        Ok(())
+    }
+}
+
+/// A source in words.
+pub(crate) fn name_of(source: Option<LabelSource>) -> &'static str {
+    source.map_or("nobody named", LabelSource::name)
 }
 
 /// The label of one radiograph.
@@ -99,14 +124,16 @@ pub enum LabelError {
     /// Beyond the rotations of the layout.
     #[error("{0} lies at {1} degrees, expected half degrees from 0 to 180")]
     Angle(String, f64),
-    /// Labels of several sources.
-    #[error("{image} is labelled by {found}, others by {expected}; one file has one source")]
+    /// Labels of sources that do not go together.
+    #[error(
+        "{image} is labelled by {found}, others by {expected}; only readers and one kind of computed labels stand in one file"
+    )]
     Mixed {
         /// The radiograph.
         image: String,
         /// Its source.
         found: &'static str,
-        /// That of the first.
+        /// That of an earlier one.
         expected: &'static str,
     },
 }

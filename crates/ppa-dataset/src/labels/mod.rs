@@ -1,6 +1,6 @@
 //! Labels of poses: those of readers and computed ones.
 //!
-//! [`LabelFile`] is `labels.json`, in which the two never mix.
+//! [`LabelFile`] is `labels.json`, in which a reader's label wins over a computed one.
 //!
 //! Readers (feature `generate`): they see the radiographs of a dataset as `Showing`s on a `grading_page`; `import_grades`
 //! makes labels of what they say.
@@ -32,6 +32,7 @@ mod tallies;
 pub use computed::{AutoLabelError, ComputedLabels, ComputedRow, LabelledLimb, compute_labels};
 pub use file::{LabelFile, LabelFileError};
 pub use label::{LabelError, LabelRow, LabelSource};
+pub(crate) use label::{Sources, name_of};
 #[cfg(feature = "generate")]
 pub use openness::*;
 #[cfg(feature = "generate")]

@@ -35,10 +35,14 @@ pub(super) fn read_table<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Tab
 }
 
 pub(super) fn write_table<T: Serialize>(path: &Path, rows: &[T]) -> Result<(), FileError> {
+    write_whole(path, &table_bytes(rows))
+}
+
+/// The bytes of a table.
+pub(super) fn table_bytes<T: Serialize>(rows: &[T]) -> Vec<u8> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for row in rows {
         writer.serialize(row).expect("rows are flat");
     }
-    let bytes = writer.into_inner().expect("memory takes every row");
-    write_whole(path, &bytes)
+    writer.into_inner().expect("memory takes every row")
 }

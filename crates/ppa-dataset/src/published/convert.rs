@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
 
@@ -12,6 +13,7 @@ use crate::body_shape::BodyShape;
 use crate::files::FileError;
 use crate::labels::LabelError;
 use crate::layout::{LimbId, View};
+use crate::stop::{Stopped, go_on};
 use crate::whole_folder::write_whole_folder;
 
 /// Why a dataset cannot be converted.
@@ -31,6 +33,9 @@ pub enum ConvertError {
         /// What is wrong.
         source: LabelError,
     },
+    /// It was asked to stop.
+    #[error("the dataset was not converted")]
+    Stopped(#[from] Stopped),
     /// No pose of the flexion that was asked for.
     #[error("{0} holds no images of flexion {1}")]
     NoFlexion(String, &'static str),
@@ -63,11 +68,18 @@ pub struct Converted {
 /// only half its number. Time stamps are body shapes if all are 0 to 4, else the earliest image of a pose becomes `orig` and the
 /// later ones are left out.
 ///
+/// Once `stop` is true it ends before the next image, and leaves nothing.
+///
 /// Tallies (EXR), `manifest.jsonl` and `dataset.json` are not carried over.
 ///
 /// # Errors
 /// [`ConvertError`]; `to` must not exist or be empty.
-pub fn convert(from: &Published, to: &Path, flexion: Flexion) -> Result<Converted, ConvertError> {
+pub fn convert(
+    from: &Published,
+    to: &Path,
+    flexion: Flexion,
+    stop: &AtomicBool,
+) -> Result<Converted, ConvertError> {
     write_whole_folder(to, |root| {
         let mut limbs: BTreeMap<LimbId, Vec<Moved>> = BTreeMap::new();
         let of_other_layout = match from.layout {
@@ -79,7 +91,12 @@ pub fn convert(from: &Published, to: &Path, flexion: Flexion) -> Result<Converte
         }
         let mut converted = Converted::default();
         for (&limb, moved) in &limbs {
-            let copy = Copy { from, root, limb };
+            let copy = Copy {
+                from,
+                root,
+                limb,
+                stop,
+            };
             converted.radiographs += copy.radiographs(moved)?;
             converted.depth_images += copy.depth_images(moved)?;
             converted.labels += match from.layout {
@@ -196,10 +213,12 @@ pub(super) struct Copy<'a> {
     pub from: &'a Published,
     pub root: &'a Path,
     pub limb: LimbId,
+    pub stop: &'a AtomicBool,
 }
 
 impl Copy<'_> {
-    fn file(&self, from: &str, to: &str) -> Result<(), FileError> {
+    fn file(&self, from: &str, to: &str) -> Result<(), ConvertError> {
+        go_on(self.stop)?;
         let (from, to) = (self.from.root.join(from), self.root.join(to));
         let folder = to.parent().expect("files lie in folders of the dataset");
         fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
@@ -209,7 +228,7 @@ impl Copy<'_> {
         Ok(())
     }
 
-    fn radiographs(&self, moved: &[Moved]) -> Result<usize, FileError> {
+    fn radiographs(&self, moved: &[Moved]) -> Result<usize, ConvertError> {
         let mut copied = BTreeSet::new();
         for Moved { pair, pose } in moved {
             let to = match *pose {
@@ -233,7 +252,7 @@ impl Copy<'_> {
         Ok(copied.len())
     }
 
-    fn depth_images(&self, moved: &[Moved]) -> Result<usize, FileError> {
+    fn depth_images(&self, moved: &[Moved]) -> Result<usize, ConvertError> {
         let mut copied = 0;
         for Moved { pair, pose } in moved {
             for (view, depth) in depth_files(pair) {

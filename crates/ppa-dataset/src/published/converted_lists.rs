@@ -8,7 +8,7 @@ use super::convert::{ConvertError, Copy, Moved, depth_files};
 use super::specimen::{depth_file_name, flexion_folder, radiograph_name};
 use super::{Flexion, Label, Pose};
 use crate::files::{FileError, write_whole};
-use crate::labels::{LabelFile, LabelRow, LabelSource};
+use crate::labels::{LabelFile, LabelRow};
 use crate::layout::LimbId;
 use crate::manifest::{RoiFile, roi_text};
 
@@ -64,19 +64,12 @@ impl Copy<'_> {
     /// Lists of a limb; the number of labels.
     pub fn synthetic_lists(&self, moved: &[Moved]) -> Result<usize, ConvertError> {
         let (mut labels, mut rois) = (BTreeMap::new(), RoiFile::new());
-        let mut source = None;
         for Moved { pair, pose } in moved {
             let Pose::Rotated { step, .. } = *pose else {
                 continue;
             };
-            if let Some(Label {
-                label,
-                std,
-                source: by,
-            }) = pair.label
-            {
-                source = by;
-                labels.insert(step, LabelRow { label, std, step });
+            if let Some(Label { label, std, source }) = pair.label {
+                labels.insert(step, (LabelRow { label, std, step }, source));
             }
             for (view, depth) in depth_files(pair) {
                 if let Some(roi) = &depth.roi {
@@ -94,13 +87,12 @@ impl Copy<'_> {
         if count == 0 {
             return Ok(0);
         }
-        let file = LabelFile::new(LabelSource::Readers, labels.into_values());
-        let mut file = file.map_err(|source| ConvertError::Label {
+        let file = LabelFile::with_sources(labels.into_values());
+        let file = file.map_err(|source| ConvertError::Label {
             patient: self.limb.patient,
             side: self.limb.side_letter(),
             source,
         })?;
-        file.source = source;
         file.write(self.root, self.limb)?;
         Ok(count)
     }

@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 
 use super::{Label, PublishedError};
 use crate::files::{FileError, read_text};
-use crate::labels::LabelSource;
+use crate::labels::{LabelSource, Sources, name_of};
 use crate::layout::View;
 use crate::manifest::RoiRow;
 
@@ -36,7 +36,7 @@ pub(super) fn labels(
     of_key: impl Fn(&str) -> Option<u32>,
 ) -> Result<BTreeMap<u32, Label>, PublishedError> {
     let mut labels = BTreeMap::new();
-    let mut source = None;
+    let mut sources = Sources::default();
     for (key, entry) in entries::<LabelEntry>(path)? {
         let wrong = |message| PublishedError::Entry {
             path: path.to_owned(),
@@ -44,10 +44,8 @@ pub(super) fn labels(
             message,
         };
         let number = one_number(entry.image_number, of_key(&key)).map_err(wrong)?;
-        let expected = *source.get_or_insert(entry.label_source);
-        if entry.label_source != expected {
-            let name = |s: Option<LabelSource>| s.map_or("nobody named", LabelSource::name);
-            let (found, expected) = (name(entry.label_source), name(expected));
+        if let Err(expected) = sources.take(entry.label_source) {
+            let found = name_of(entry.label_source);
             return Err(wrong(format!(
                 "the label comes from {found}, those before it from {expected}"
             )));

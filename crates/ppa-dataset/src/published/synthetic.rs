@@ -100,7 +100,7 @@ fn label(labels: &LabelFile, step: u32) -> Option<Label> {
     labels.of_step(step).map(|row| Label {
         label: row.label,
         std: row.std,
-        source: labels.source,
+        source: labels.source_of_step(step),
     })
 }
 

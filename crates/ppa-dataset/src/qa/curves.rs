@@ -11,6 +11,7 @@ use super::page::figure;
 use super::scene::Scene;
 use crate::body_shape::BodyShape;
 use crate::contact_sheet::evenly_chosen;
+use crate::labels::LabelSource;
 use crate::layout::{LimbId, View, angle_text};
 use crate::manifest::{FileRow, RoiFile};
 use crate::published::{GrayImage16, Pose, Published};
@@ -32,29 +33,31 @@ pub(super) fn labels(dataset: &Published, limb: LimbId) -> String {
         })
         .collect();
     labels.dedup_by_key(|(step, _)| *step);
-    let Some((_, first)) = labels.first() else {
+    if labels.is_empty() {
         return String::new();
-    };
-    let source = first
-        .source
-        .and_then(|source| serde_json::to_value(source).ok());
-    let name = source
-        .as_ref()
-        .and_then(|source| source.as_str())
-        .unwrap_or("source not told");
-    let series = Series {
-        name: name.to_owned(),
-        points: labels
-            .iter()
-            .map(|(step, label)| [f64::from(*step) / 2.0, label.label])
-            .collect(),
-        spread: labels.iter().map(|(_, label)| label.std).collect(),
-        marked: Vec::new(),
-    };
+    }
+    let mut series: Vec<Series> = Vec::new();
+    for (step, label) in labels {
+        let name = label.source.map_or("source not told", LabelSource::name);
+        let place = series.iter().position(|series| series.name == name);
+        let place = place.unwrap_or_else(|| {
+            series.push(Series {
+                name: name.to_owned(),
+                points: Vec::new(),
+                spread: Vec::new(),
+                marked: Vec::new(),
+            });
+            series.len() - 1
+        });
+        series[place]
+            .points
+            .push([f64::from(step) / 2.0, label.label]);
+        series[place].spread.push(label.std);
+    }
     chart(
         "medial rotation, degrees",
         "label: 1 ideal, 3 inadequate",
-        &[series],
+        &series,
         Some([0.8, 3.2]),
     )
 }

@@ -3,12 +3,17 @@
 use std::fs;
 use std::io::Read;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use ppa_dataset::export::{Shards, bag, web_dataset};
+use ppa_dataset::published::{Flexion, Published, convert};
 use ppa_dataset::sha256_of_file;
 use serde_json::Value;
 
 use crate::trees::Tree;
+
+/// Nobody stops what is tested here.
+static GO_ON: AtomicBool = AtomicBool::new(false);
 
 #[test]
 fn a_bag_holds_every_file_but_hidden_ones_with_its_hash() {
@@ -24,7 +29,7 @@ fn a_bag_holds_every_file_but_hidden_ones_with_its_hash() {
     fs::write(tree.path("key.csv"), "name,image,sha256\n").unwrap();
     let folder = tempfile::tempdir().unwrap();
     let to = folder.path().join("bag");
-    let made = bag(tree.root(), &to).unwrap();
+    let made = bag(tree.root(), &to, &GO_ON).unwrap();
     let manifest = fs::read_to_string(to.join("manifest-sha256.txt")).unwrap();
     let mut bytes = 0;
     for line in manifest.lines() {
@@ -48,7 +53,10 @@ fn a_bag_holds_every_file_but_hidden_ones_with_its_hash() {
         let (hash, name) = line.split_once("  ").unwrap();
         assert_eq!(sha256_of_file(&to.join(name)).unwrap(), hash);
     }
-    assert!(bag(tree.root(), &to).is_err(), "a bag is not written over");
+    assert!(
+        bag(tree.root(), &to, &GO_ON).is_err(),
+        "a bag is not written over"
+    );
 }
 
 #[test]
@@ -56,7 +64,7 @@ fn no_bag_is_made_of_what_is_altered_unfinished_or_no_dataset() {
     let folder = tempfile::tempdir().unwrap();
     let to = folder.path().join("bag");
     let refused = |root: &Path, expected: &str| {
-        let said = bag(root, &to).unwrap_err().to_string();
+        let said = bag(root, &to, &GO_ON).unwrap_err().to_string();
         assert!(said.contains(expected), "{said}");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     };
@@ -79,7 +87,33 @@ fn no_bag_is_made_of_what_is_altered_unfinished_or_no_dataset() {
     let empty = tempfile::tempdir().unwrap();
     refused(empty.path(), "holds no images of patients");
     // Datasets of others have no manifest.
-    bag(Tree::specimen().root(), &to).unwrap();
+    bag(Tree::specimen().root(), &to, &GO_ON).unwrap();
+}
+
+#[test]
+fn what_is_stopped_leaves_nothing() {
+    let stop = AtomicBool::new(true);
+    let tree = Tree::generated();
+    let folder = tempfile::tempdir().unwrap();
+    let to = folder.path().join("out");
+    let errors = [
+        bag(tree.root(), &to, &stop).unwrap_err().to_string(),
+        web_dataset(tree.root(), &to, 3, None, &stop)
+            .unwrap_err()
+            .to_string(),
+        convert(
+            &Published::read(tree.root()).unwrap(),
+            &to,
+            Flexion::Min,
+            &stop,
+        )
+        .unwrap_err()
+        .to_string(),
+    ];
+    for error in errors {
+        assert!(error.contains("not"), "{error}");
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
 /// Names and bytes of the files of an archive, in their order.
@@ -99,7 +133,7 @@ fn archives_hold_the_samples_of_one_part_in_order() {
     let tree = Tree::generated();
     let folder = tempfile::tempdir().unwrap();
     let [to, again] = ["shards", "again"].map(|name| folder.path().join(name));
-    let made = web_dataset(tree.root(), &to, 3, Some("mine")).unwrap();
+    let made = web_dataset(tree.root(), &to, 3, Some("mine"), &GO_ON).unwrap();
     // Person 0: 8 pairs, person 12: 4.
     assert_eq!(
         made,
@@ -136,12 +170,19 @@ fn archives_hold_the_samples_of_one_part_in_order() {
             .iter()
             .all(|(name, _)| name.starts_with("patient_12_r_"))
     );
-    web_dataset(tree.root(), &again, 3, Some("mine")).unwrap();
+    web_dataset(tree.root(), &again, 3, Some("mine"), &GO_ON).unwrap();
     for name in ["test-000002.tar", "train-000001.tar"] {
         assert!(fs::read(to.join(name)).unwrap() == fs::read(again.join(name)).unwrap());
     }
     let specimen = Tree::specimen();
-    let made = web_dataset(specimen.root(), &folder.path().join("specimen"), 1000, None).unwrap();
+    let made = web_dataset(
+        specimen.root(),
+        &folder.path().join("specimen"),
+        1000,
+        None,
+        &GO_ON,
+    )
+    .unwrap();
     assert_eq!(
         made,
         Shards {

@@ -2,11 +2,15 @@
 
 use std::fs;
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use ppa_dataset::published::{Converted, Flexion, Layout, Published, convert};
 
 use crate::authors_loader;
 use crate::trees::Tree;
+
+/// Nobody stops what is tested here.
+static GO_ON: AtomicBool = AtomicBool::new(false);
 
 /// Everything a reader learns of a dataset but its paths, with the bytes of its images.
 fn contents(root: &Path) -> Vec<String> {
@@ -40,6 +44,7 @@ fn a_synthetic_dataset_comes_back_from_the_specimen_layout_as_it_was() {
         &Published::read(tree.root()).unwrap(),
         &specimen,
         Flexion::Medium,
+        &GO_ON,
     )
     .unwrap();
     let expected = Converted {
@@ -55,7 +60,10 @@ fn a_synthetic_dataset_comes_back_from_the_specimen_layout_as_it_was() {
     let theirs = authors_loader::rows(&specimen, usize::MAX);
     assert_eq!(theirs.len(), 2 * 2 * 2 * 2);
     assert_eq!(authors_loader::our_rows(&specimen), theirs);
-    assert_eq!(convert(&read, &back, Flexion::Medium).unwrap(), expected);
+    assert_eq!(
+        convert(&read, &back, Flexion::Medium, &GO_ON).unwrap(),
+        expected
+    );
     assert!(contents(&back) == contents(tree.root()));
 }
 
@@ -66,7 +74,13 @@ fn the_earliest_image_of_each_recorded_pose_is_taken() {
     tree.image("patient_1_l/max/data/dataset/xray/xray_7.png", 9000);
     let folder = tempfile::tempdir().unwrap();
     let to = folder.path().join("synthetic");
-    let done = convert(&Published::read(tree.root()).unwrap(), &to, Flexion::Max).unwrap();
+    let done = convert(
+        &Published::read(tree.root()).unwrap(),
+        &to,
+        Flexion::Max,
+        &GO_ON,
+    )
+    .unwrap();
     // Three feet, two poses and cameras; 3 · 3 · 2 · 4 images in all.
     let expected = Converted {
         depth_images: 12,
@@ -105,7 +119,7 @@ fn what_cannot_be_converted_leaves_nothing() {
     fs::create_dir(&full).unwrap();
     fs::write(full.join("notes.txt"), "kept").unwrap();
     let read = Published::read(tree.root()).unwrap();
-    convert(&read, &full, Flexion::Min).unwrap_err();
+    convert(&read, &full, Flexion::Min, &GO_ON).unwrap_err();
     let far = "patient_1_l/min/data/dataset";
     tree.image(&format!("{far}/depth/depth_cam_left_orig_400_1.png"), 800);
     tree.edit(
@@ -119,7 +133,7 @@ fn what_cannot_be_converted_leaves_nothing() {
         "\"image_number\": 400",
     );
     let read = Published::read(tree.root()).unwrap();
-    let error = convert(&read, &folder.path().join("out"), Flexion::Min).unwrap_err();
+    let error = convert(&read, &folder.path().join("out"), Flexion::Min, &GO_ON).unwrap_err();
     let cause = std::error::Error::source(&error).unwrap().to_string();
     assert!(
         cause.contains("xray_image_400.png lies at 200 degrees"),

@@ -167,7 +167,7 @@ fn metadata_describe_the_table_that_is_there() {
         license: "https://creativecommons.org/licenses/by/4.0/".to_owned(),
         date: "2026-11-21".to_owned(),
     };
-    write_metadata(tree.root(), &metadata, None).unwrap();
+    write_metadata(tree.root(), &metadata, None, false).unwrap();
     let json = |name: &str| -> Value {
         serde_json::from_slice(&fs::read(tree.path(name)).unwrap()).unwrap()
     };
@@ -224,10 +224,24 @@ fn metadata_describe_the_table_that_is_there() {
     // What people answered stays.
     let answered = sheet.replace("**To answer:** Who made it", "A university made it");
     fs::write(tree.path("datasheet.md"), &answered).unwrap();
-    let files = write_metadata(tree.root(), &metadata, None).unwrap();
+    let files = write_metadata(tree.root(), &metadata, None, false).unwrap();
     assert_eq!(files[3], "datasheet.new.md");
     let read = |name: &str| fs::read_to_string(tree.path(name)).unwrap();
     assert_eq!([read("datasheet.md"), read(files[3])], [answered, sheet]);
+    // What is there and differs is written over only on request.
+    let table = tree.path("manifest.csv");
+    let csv = fs::read(&table).unwrap();
+    fs::write(&table, "edited").unwrap();
+    let refused = write_metadata(tree.root(), &metadata, None, false).unwrap_err();
+    assert!(
+        refused
+            .to_string()
+            .contains("manifest.csv exists and differs"),
+        "{refused}"
+    );
+    assert_eq!(fs::read(&table).unwrap(), b"edited");
+    write_metadata(tree.root(), &metadata, None, true).unwrap();
+    assert_eq!(fs::read(&table).unwrap(), csv);
     // A later table leaves the metadata behind.
     let stale = |tree: &Tree| {
         let found = inspect(tree.root()).unwrap().flaws;
@@ -247,13 +261,13 @@ fn metadata_that_are_none_and_labels_of_other_radiographs_are_refused() {
         license: "https://creativecommons.org/licenses/by/4.0/".to_owned(),
         date: "2026-02-29".to_owned(),
     };
-    let refused = write_metadata(tree.root(), &metadata, None).unwrap_err();
+    let refused = write_metadata(tree.root(), &metadata, None, false).unwrap_err();
     assert!(refused.to_string().contains("2026-02-29"), "{refused}");
     let other = "\"radiograph_sha256\": \"0123\", \"step\": 91";
     tree.edit("patient_0/labels/r/labels.json", "\"step\": 91", other);
     let date = "2024-02-29".to_owned();
     let metadata = Metadata { date, ..metadata };
-    let refused = write_metadata(tree.root(), &metadata, None).unwrap_err();
+    let refused = write_metadata(tree.root(), &metadata, None, false).unwrap_err();
     assert!(
         refused.to_string().contains("the label of step 91"),
         "{refused}"

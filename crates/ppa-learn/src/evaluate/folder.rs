@@ -12,6 +12,26 @@ use super::poses::poses;
 use super::report::Evaluation;
 use super::row::Row;
 
+const TABLES: [&str; 3] = ["predictions.csv", "poses.csv", "evaluation.json"];
+const FIGURES: [&str; 5] = [
+    "scatter",
+    "confusion",
+    "confusion_half_steps",
+    "calibration",
+    "errors_by_angle",
+];
+
+/// Names of the files that [`write_evaluation`] may write, with further figures.
+pub fn evaluation_files(more: &[&str]) -> Vec<String> {
+    let figures = FIGURES.iter().chain(more);
+    let figures = figures.flat_map(|name| [format!("{name}.svg"), format!("{name}.png")]);
+    TABLES
+        .map(str::to_owned)
+        .into_iter()
+        .chain(figures)
+        .collect()
+}
+
 /// Writes `predictions.csv` (a row per image), `poses.csv`, `evaluation.json`, and the figures `scatter`, `confusion`,
 /// `confusion_half_steps`, `calibration`, `errors_by_angle` (where angles are known) and those given, by name, each as SVG and PNG.
 ///
@@ -23,23 +43,21 @@ pub fn write_evaluation(
     evaluation: &Evaluation,
     more: Vec<(&str, Figure)>,
 ) -> Result<(), EvaluateError> {
-    write_predictions(&folder.join("predictions.csv"), rows)?;
-    write_csv(&folder.join("poses.csv"), &poses(rows))?;
+    let [by_image, by_pose, all] = TABLES.map(|name| folder.join(name));
+    write_predictions(&by_image, rows)?;
+    write_csv(&by_pose, &poses(rows))?;
     let json = serde_json::to_string_pretty(evaluation).expect("names and numbers are JSON");
-    write_whole(&folder.join("evaluation.json"), json.as_bytes())?;
+    write_whole(&all, json.as_bytes())?;
     let mut figures = vec![
-        ("scatter", scatter(rows)),
-        ("confusion", confusion_figure(&evaluation.confusion)),
-        (
-            "confusion_half_steps",
-            confusion_figure(&evaluation.confusion_half_steps),
-        ),
-        ("calibration", calibration_figure(evaluation)),
+        scatter(rows),
+        confusion_figure(&evaluation.confusion),
+        confusion_figure(&evaluation.confusion_half_steps),
+        calibration_figure(evaluation),
     ];
     if !evaluation.error_by_angle.is_empty() {
-        figures.push(("errors_by_angle", error_figure(evaluation)));
+        figures.push(error_figure(evaluation));
     }
-    for (name, figure) in figures.into_iter().chain(more) {
+    for (name, figure) in FIGURES.into_iter().zip(figures).chain(more) {
         write_whole(
             &folder.join(format!("{name}.svg")),
             figure.to_svg().as_bytes(),

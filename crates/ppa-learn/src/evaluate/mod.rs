@@ -12,7 +12,7 @@ mod scores;
 pub use error::EvaluateError;
 pub use figure::{Figure, Mark, Series, Tile};
 pub use figures::{calibration_figure, confusion_figure, error_figure, learning_curve, scatter};
-pub use folder::{write_evaluation, write_predictions};
+pub use folder::{evaluation_files, write_evaluation, write_predictions};
 pub(crate) use poses::triple;
 pub use poses::{PoseRow, frame_spread, poses};
 pub use report::{Evaluation, PersonScores};

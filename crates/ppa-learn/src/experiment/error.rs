@@ -49,6 +49,16 @@ pub enum ExperimentError {
         /// What was wrong.
         source: Box<TrainError>,
     },
+    /// Data that trainings need and that cannot be used.
+    #[error("{unusable} of {trainings} trainings of each seed cannot begin: {problems}")]
+    Unusable {
+        /// Trainings of one seed that cannot begin.
+        unusable: usize,
+        /// Trainings of one seed.
+        trainings: usize,
+        /// What is wrong with their data.
+        problems: String,
+    },
     /// Results of other settings or data where those of a unit should go.
     #[error("{} was made with other settings or data; choose another folder", .0.display())]
     OtherSettings(PathBuf),

@@ -5,6 +5,7 @@
 //! ([`join_views`]), their metrics brought together ([`Results`]) and printed as the paper does ([`Table`]). A [`Runner`] carries all that out for an [`ExperimentPlan`].
 
 mod cell;
+mod check_data;
 mod configuration;
 mod error;
 mod folds;

@@ -176,7 +176,7 @@ impl<'a> Runner<'a> {
     }
 
     /// The whole configuration of a training.
-    fn config(&self, unit: Unit) -> Result<TrainConfig, ExperimentError> {
+    pub(super) fn config(&self, unit: Unit) -> Result<TrainConfig, ExperimentError> {
         let all = |shapes: &[BodyShape]| Source {
             dataset: self.plan.synthetic.dataset.clone(),
             patients: None,

@@ -56,6 +56,9 @@ pub enum TrainError {
         /// Steps of the whole training.
         steps: u64,
     },
+    /// A folder of another training, or of something else.
+    #[error("{} is another configuration, with no checkpoint beside it to go on from; take another folder", .0.display())]
+    OtherConfig(PathBuf),
     /// Numbers that are not finite.
     #[error("step {step}: the loss is {loss}; {trouble}")]
     NotFinite {

@@ -14,7 +14,7 @@ use super::checkpoint;
 use super::config::TrainConfig;
 use super::config_error::ConfigError;
 use super::data_state::DataState;
-use super::error::TrainError;
+use super::error::{TrainError, at};
 use super::feed::Feed;
 use super::log::Log;
 use super::start_file;
@@ -77,6 +77,10 @@ pub fn train(
         let weights = folder.join("weights.safetensors");
         if weights.exists() {
             return Err(TrainError::WeightsAlone(weights));
+        }
+        let path = folder.join("config.toml");
+        if path.exists() && std::fs::read(&path).map_err(at("read", &path))? != echoed.as_bytes() {
+            return Err(TrainError::OtherConfig(path));
         }
         if let Some(start) = &config.start {
             let loaded = network.load(start, config.first_convolution)?;

@@ -18,7 +18,8 @@ use crate::transport::tracking::TransportError;
 impl Simulation {
     /// Follows the photons of a projection one by one, and counts the doses that the input file asks for.
     ///
-    /// `observe` hears of the progress a few times per second. The result depends on seed and number of histories only;
+    /// `observe` hears of the progress a few times per second and ends the run early by [`ControlFlow::Break`]; what was counted
+    /// until then is the result. Otherwise the result depends on seed and number of histories only;
     /// how many fit into a time depends on the machine.
     ///
     /// # Errors
@@ -27,7 +28,7 @@ impl Simulation {
         &self,
         station: &Station,
         length: RunLength,
-        mut observe: impl FnMut(&Progress),
+        mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<(Radiograph, Option<Dose>), TransportError> {
         let (histories, stop) = match length {
             RunLength::Histories(histories) => (histories, Stop::default()),
@@ -55,10 +56,7 @@ impl Simulation {
                 .expect("the dose region lies in the geometry");
         }
         let mut tally = run.tally(Part::WHOLE);
-        run.follow(&mut tally, &stop, |_, progress| {
-            observe(progress);
-            ControlFlow::Continue(())
-        });
+        run.follow(&mut tally, &stop, |_, progress| observe(progress));
         Ok((tally.radiograph(), tally.dose()))
     }
 }
@@ -120,7 +118,9 @@ mod tests {
                 return Ok(());
             };
             if small && let Some(station) = simulation.input().stations().first() {
-                let _ = simulation.analog(station, RunLength::Histories(300), |_| {});
+                let _ = simulation.analog(station, RunLength::Histories(300), |_| {
+                    ControlFlow::Continue(())
+                });
             }
         }
     }

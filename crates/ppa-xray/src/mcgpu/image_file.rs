@@ -98,6 +98,23 @@ impl Simulation {
         }
     }
 
+    /// Names of all files that a scan of these projections leaves: images, and voxel doses if the input file asks for them.
+    pub fn file_names(&self, stations: &[Station]) -> Vec<String> {
+        let images = stations.iter().map(|station| self.image_name(station));
+        let mut names: Vec<String> = images
+            .flat_map(|name| [format!("{name}.raw"), name])
+            .collect();
+        if let (Some(asked), Some(_)) = (&self.input().voxel_dose, self.dose_box()) {
+            let name = &asked.file;
+            names.extend([
+                name.clone(),
+                format!("{name}.raw"),
+                format!("{name}_PercentRelError2sigma.raw"),
+            ]);
+        }
+        names
+    }
+
     /// Writes the image of a projection into `folder`, as text under [`Simulation::image_name`] and as 32-bit floats
     /// with `.raw` behind that. Both appear whole or not at all.
     ///

@@ -27,13 +27,14 @@ const NARROWEST_MM: f64 = 1e-3;
 /// An input file of MC-GPU v1.3 with its geometry, materials and spectrum, ready to run.
 ///
 /// ```no_run
+/// use std::ops::ControlFlow;
 /// use ppa_xray::mcgpu::{ScanDose, Simulation};
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let simulation = Simulation::read("scan.in")?;
 /// let mut scan_dose = ScanDose::new(&simulation);
 /// for station in simulation.input().stations() {
 ///     let length = simulation.input().run_length;
-///     let (radiograph, dose) = simulation.analog(&station, length, |_| {})?;
+///     let (radiograph, dose) = simulation.analog(&station, length, |_| ControlFlow::Continue(()))?;
 ///     simulation.write_image("results".as_ref(), &station, &radiograph)?;
 ///     if let Some(dose) = dose {
 ///         scan_dose.add(&simulation, &dose);

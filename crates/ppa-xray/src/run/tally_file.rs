@@ -51,6 +51,11 @@ impl AnalogTally {
         })
     }
 
+    /// Bytes that [`Self::write`] would write now; they hardly change while histories are counted.
+    pub fn file_bytes(&self) -> u64 {
+        self.to_bytes().len() as u64
+    }
+
     fn to_bytes(&self) -> Vec<u8> {
         let header = Header {
             part: self.part.clone(),

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Vector3};
@@ -75,7 +76,10 @@ fn simulation(folder: &Path, sections: &Sections) -> Result<Simulation, McgpuErr
 
 fn photons(simulation: &Simulation, station: &Station, histories: u64) -> Radiograph {
     let length = RunLength::Histories(histories);
-    simulation.analog(station, length, |_| {}).unwrap().0
+    simulation
+        .analog(station, length, |_| ControlFlow::Continue(()))
+        .unwrap()
+        .0
 }
 
 /// The shadow of the bone turns as the source does: it lies at low x, y and z.
@@ -123,7 +127,9 @@ fn images_and_doses_are_written_as_mcgpu_does() {
     let mut imparted_kev = 0.0;
     for station in stations {
         let length = RunLength::Histories(5_000);
-        let (radiograph, dose) = simulation.analog(station, length, |_| {}).unwrap();
+        let (radiograph, dose) = simulation
+            .analog(station, length, |_| ControlFlow::Continue(()))
+            .unwrap();
         let dose = dose.unwrap();
         imparted_kev += 0.5e-3 * dose.phantom.ev_per_history.value;
         scan_dose.add(&simulation, &dose);
@@ -374,7 +380,9 @@ fn case_a_from_its_input_file_agrees_with_mcgpu() {
     let simulation = Simulation::read(path).unwrap();
     let run_length = simulation.input().run_length;
     let station = simulation.input().stations()[0];
-    let (image, dose) = simulation.analog(&station, run_length, |_| {}).unwrap();
+    let (image, dose) = simulation
+        .analog(&station, run_length, |_| ControlFlow::Continue(()))
+        .unwrap();
     let text = fs::read_to_string(reference.join("case_a_mcgpu.json")).unwrap();
     let mcgpu: Value = serde_json::from_str(&text).unwrap();
     for (category, tolerance) in Category::ALL.into_iter().zip([0.01, 0.02, 0.03, 0.02]) {

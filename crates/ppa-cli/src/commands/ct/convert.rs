@@ -8,8 +8,10 @@ use nalgebra::{Point3, Vector3};
 use ppa_ct::{Info, Interpolation, Volume, VolumeError, WarningCode, read};
 use ppa_mesh::VoxelBox;
 
+use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::number_lists::{along_axes, voxel_box, world_box};
 use crate::output::{Output, working};
+use crate::output_files::ReplaceArgs;
 use crate::scan_args::ScanArgs;
 
 /// What lies outside a tilted stack that was set upright.
@@ -40,6 +42,8 @@ pub struct ConvertArgs {
     /// Distance of the new voxels' centres: one number, or three for i, j and k
     #[arg(long, value_name = "MM", value_parser = along_axes, allow_hyphen_values = true)]
     spacing_mm: Option<[f64; 3]>,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 impl ConvertArgs {
@@ -74,9 +78,12 @@ impl ConvertArgs {
 }
 
 pub fn run(args: &ConvertArgs, output: Output) -> anyhow::Result<()> {
+    args.replace.outputs().volume("OUTPUT", &args.output)?;
+    let stoppable = ends_at_once(NOTHING_WRITTEN)?;
     let _working = working("converting");
     let mut source = args.input.read()?;
     source.volume = args.changed(source.volume)?;
+    drop(stoppable);
     source.write(&args.output)?;
     // Told from the file, so that what is printed is what others will read.
     let mut info = Info::of(&read(&args.output)?);

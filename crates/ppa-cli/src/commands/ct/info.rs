@@ -9,6 +9,7 @@ use ppa_dataset::write_whole;
 use serde::Serialize;
 
 use crate::output::Output;
+use crate::output_files::ReplaceArgs;
 use crate::scan_args::ScanArgs;
 
 #[derive(Debug, Args)]
@@ -18,6 +19,8 @@ pub struct InfoArgs {
     /// Write the audit as an HTML page with slices and a histogram
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 /// What is printed.
@@ -31,6 +34,10 @@ struct Audited {
 }
 
 pub fn run(args: &InfoArgs, output: Output) -> anyhow::Result<()> {
+    if let Some(report) = &args.report {
+        let mut outputs = args.replace.outputs();
+        outputs.file_in_new_folder("--report", report, &[".html", ".htm"])?;
+    }
     let scan = args.scan.read()?;
     // Blocks of voxels as real numbers, and which of them are tissue.
     scan.volume.expect_room(8)?;

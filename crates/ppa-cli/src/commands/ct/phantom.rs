@@ -1,6 +1,6 @@
 //! `ppa ct phantom`: a CT of a limb whose true shape is known.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::describe;
 use crate::output::{Output, working};
+use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum SideName {
@@ -76,6 +77,8 @@ pub struct PhantomArgs {
     /// Seed of the noise
     #[arg(long, default_value_t = 0)]
     noise_seed: u64,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 #[derive(Debug, Serialize)]
@@ -90,22 +93,10 @@ struct Made {
     labels: Vec<&'static str>,
 }
 
-/// Whether two names are those of one file, which need not exist yet.
-fn same_file(a: &Path, b: &Path) -> bool {
-    let resolved = |path: &Path| {
-        let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
-        let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
-        Some(
-            path.canonicalize()
-                .unwrap_or(folder.join(path.file_name()?)),
-        )
-    };
-    resolved(a).is_some_and(|a| Some(a) == resolved(b))
-}
-
 /// Refuses names under which nothing, or the wrong thing, would be found later.
 fn check_outputs(args: &PhantomArgs) -> anyhow::Result<()> {
-    Format::of_name(&args.out)?;
+    let mut outputs = args.replace.outputs();
+    outputs.volume("--out", &args.out)?;
     let Some(labels) = &args.labels else {
         return Ok(());
     };
@@ -116,13 +107,7 @@ fn check_outputs(args: &PhantomArgs) -> anyhow::Result<()> {
              NRRD or MetaImage"
         );
     }
-    if same_file(labels, &args.out) {
-        bail!(
-            "--labels and --out are both {}: expected two files",
-            labels.display()
-        );
-    }
-    Ok(())
+    outputs.volume("--labels", labels)
 }
 
 pub fn run(args: &PhantomArgs, output: Output) -> anyhow::Result<()> {

@@ -10,6 +10,7 @@ use ppa_text::count;
 use serde::Serialize;
 
 use super::super::verify::require_none;
+use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::output::{Output, working};
 
 #[derive(Debug, Args)]
@@ -33,6 +34,7 @@ struct Checked {
 }
 
 pub fn run(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
+    let _stoppable = ends_at_once(NOTHING_WRITTEN)?;
     let working = working("reading all images");
     let recorded = against_records(&args.dataset)?;
     let found = inspect(&args.dataset);

@@ -6,7 +6,9 @@ use clap::{Args, ValueEnum};
 use ppa_dataset::published::{Flexion, Layout, Published, convert};
 use ppa_text::count;
 
+use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::{Output, working};
+use crate::output_files::OutputFiles;
 
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
@@ -34,6 +36,7 @@ enum FlexionName {
 }
 
 pub fn run(args: &ConvertArgs, output: Output) -> anyhow::Result<()> {
+    OutputFiles::new().folder("--out", &args.out)?;
     let from = Published::read(&args.dataset)?;
     let flexion = match args.flexion {
         FlexionName::Min => Flexion::Min,
@@ -41,7 +44,9 @@ pub fn run(args: &ConvertArgs, output: Output) -> anyhow::Result<()> {
         FlexionName::Max => Flexion::Max,
     };
     let working = working("copying images");
-    let done = convert(&from, &args.out, flexion)?;
+    let interrupt = Interrupt::listen()?;
+    let done = convert(&from, &args.out, flexion, interrupt.flag());
+    let done = interrupt.or_how(done, || NOTHING_WRITTEN.to_owned())?;
     working.finish_and_clear();
     output.print(&done, |done| {
         let layout = match from.layout {

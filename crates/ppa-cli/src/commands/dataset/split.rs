@@ -8,6 +8,7 @@ use ppa_dataset::published::Published;
 use ppa_text::numbers;
 
 use crate::output::Output;
+use crate::output_files::{ReplaceArgs, require_same};
 
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
@@ -26,6 +27,8 @@ pub struct SplitArgs {
     /// Another seed draws other persons
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 fn part(text: &str) -> Result<(String, f64), String> {
@@ -46,13 +49,9 @@ pub fn run(args: &SplitArgs, output: Output) -> anyhow::Result<()> {
         "--name is {name:?}, expected letters, digits, _ and -"
     );
     let path = Split::path(&args.dataset, name);
-    anyhow::ensure!(
-        !path.exists(),
-        "{} is there already; remove it or choose another --name",
-        path.display()
-    );
     let patients = Published::read(&args.dataset)?.patients();
     let split = Split::draw(&patients, &args.parts, args.seed)?;
+    require_same(&path, split.to_text().as_bytes(), args.replace)?;
     split.write(&path)?;
     output.print(&split, |split| {
         let part = |(name, patients): (&String, &Vec<u32>)| {

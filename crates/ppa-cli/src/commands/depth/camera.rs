@@ -8,6 +8,7 @@ use ppa_dataset::write_whole;
 use ppa_depth::{Camera, CameraSpec, DepthMode};
 
 use crate::output::Output;
+use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Args)]
 pub struct CameraArgs {
@@ -23,6 +24,8 @@ pub struct CameraArgs {
     /// Camera JSON to write
     #[arg(long)]
     out: PathBuf,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -45,6 +48,8 @@ impl From<Mode> for DepthMode {
 }
 
 pub fn run(args: &CameraArgs, output: Output) -> anyhow::Result<()> {
+    let mut outputs = args.replace.outputs();
+    outputs.file_in_new_folder("--out", &args.out, &[".json"])?;
     let mode = args.mode.into();
     let mut spec = match &args.calibration {
         Some(path) => CameraSpec::import(path, mode)?,

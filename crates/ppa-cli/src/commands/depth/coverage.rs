@@ -15,7 +15,9 @@ use serde::Deserialize;
 
 use super::coverage_table::{Row, Study, table_csv};
 use crate::findings::prepared;
+use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::output::{Output, working};
+use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Args)]
 pub struct CoverageArgs {
@@ -54,6 +56,8 @@ pub struct CoverageArgs {
     /// Also draw the places and what they see, PNG
     #[arg(long)]
     plot: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 /// Most places that are tried: each is an image.
@@ -74,6 +78,10 @@ struct Candidate {
 }
 
 pub fn run(args: &CoverageArgs, output: Output) -> anyhow::Result<()> {
+    let mut outputs = args.replace.outputs();
+    outputs.optional("--csv", args.csv.as_ref(), &[".csv"])?;
+    outputs.optional("--plot", args.plot.as_ref(), &[".png"])?;
+    let stoppable = ends_at_once(NOTHING_WRITTEN)?;
     let plan = match &args.plan {
         Some(path) => Plan::read(path)?,
         None => Plan::new(Vec::new()),
@@ -132,6 +140,7 @@ pub fn run(args: &CoverageArgs, output: Output) -> anyhow::Result<()> {
     for (i, row) in rows.iter_mut().enumerate() {
         row.rank = i + 1;
     }
+    drop(stoppable);
     working.finish_and_clear();
     if let Some(path) = &args.csv {
         write_whole(path, &table_csv(&rows)?)?;

@@ -9,6 +9,7 @@ use ppa_depth::{DepthImage, Invalidation, SensorSpec, fit_noise};
 use ppa_text::count;
 
 use crate::output::Output;
+use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Args)]
 pub struct FitNoiseArgs {
@@ -20,9 +21,13 @@ pub struct FitNoiseArgs {
     /// Sensor JSON to write: the random error as fitted, the other parts as in the default sensor
     #[arg(long)]
     out: PathBuf,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 pub fn run(args: &FitNoiseArgs, output: Output) -> anyhow::Result<()> {
+    let mut outputs = args.replace.outputs();
+    outputs.file_in_new_folder("--out", &args.out, &[".json"])?;
     let camera = super::read_camera(args.camera.as_ref())?;
     let frames = read_frames(&args.frames)?;
     let fit = fit_noise(&camera, &frames, true)

@@ -15,8 +15,10 @@ use ppa_depth::{
 use ppa_mesh::{MeshContents, read_mesh_file};
 use serde::{Deserialize, Serialize};
 
+use crate::interrupt::Interrupt;
 use super::render_case::{OfCase, is_case, of_view, render_case};
 use crate::output::{Output, Seconds, Stopwatch};
+use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Args)]
 pub struct RenderArgs {
@@ -63,6 +65,8 @@ pub struct RenderArgs {
     /// Size of their rotation about each axis, degrees (standard deviation)
     #[arg(long, default_value_t = 0.0)]
     pub(super) tremor_deg: f64,
+    #[command(flatten)]
+    pub(super) replace: ReplaceArgs,
 }
 
 /// Frames over which a tremor remembers: a third of a second at 30 frames per second.
@@ -117,6 +121,7 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
             args.meshes[0].display()
         );
     }
+    declare(args)?;
     let camera = super::read_camera(args.camera.as_ref())?;
     let camera_from_body = match &args.camera_from_mesh {
         Some(path) => read_pose(path, args.motion.as_deref())?,
@@ -172,15 +177,18 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
         };
         anyhow::Ok(image)
     };
+    let interrupt = Interrupt::listen()?;
     let image = see(0)?;
     let seconds = watch.read();
-    let first = match args.frames {
-        1 => args.out.clone(),
-        _ => numbered(&args.out, 0),
-    };
-    let too_far_pixels = image.write_png(&first)?;
+    let too_far_pixels = image.write_png(&args.frame(0))?;
     for frame in 1..args.frames {
-        see(frame)?.write_png(&numbered(&args.out, frame))?;
+        if interrupt.is_asked() {
+            return Err(interrupt.stopped(format!(
+                "after {frame} of {} frames; the same command with --replace begins again",
+                args.frames
+            )));
+        }
+        see(frame)?.write_png(&args.frame(frame))?;
     }
     write_others(args, None, &camera, &image)?;
     let rendered = Rendered {
@@ -269,9 +277,25 @@ fn eye(args: &RenderArgs, camera: &Camera) -> anyhow::Result<Eye> {
     ))
 }
 
-fn numbered(path: &Path, frame: u64) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!("{stem}_{frame:04}.png"))
+impl RenderArgs {
+    /// The file of a frame.
+    fn frame(&self, frame: u64) -> PathBuf {
+        if self.frames == 1 {
+            return self.out.clone();
+        }
+        let stem = self.out.file_stem().unwrap_or_default().to_string_lossy();
+        self.out.with_file_name(format!("{stem}_{frame:04}.png"))
+    }
+}
+
+fn declare(args: &RenderArgs) -> anyhow::Result<()> {
+    let mut outputs = args.replace.outputs();
+    for frame in 0..args.frames {
+        outputs.file("--out", &args.frame(frame), &[".png"])?;
+    }
+    outputs.optional("--exr", args.exr.as_ref(), &[".exr"])?;
+    outputs.optional("--preview", args.preview.as_ref(), &[".png"])?;
+    outputs.optional("--points", args.points.as_ref(), &[".ply"])
 }
 
 /// Writes the other files of an image, with the camera's name if there are several.

@@ -75,6 +75,23 @@ fn name(view: View) -> &'static str {
     }
 }
 
+/// Tries the files that the images of a case go to.
+fn declare(args: &RenderArgs) -> anyhow::Result<()> {
+    let mut outputs = args.replace.outputs();
+    let views: &[Option<View>] = match args.of_case.view() {
+        Some(_) => &[None],
+        None => &[Some(View::Left), Some(View::Right)],
+    };
+    for &view in views {
+        let of = |path: &PathBuf| of_view(path, view);
+        outputs.file("--out", &of(&args.out), &[".png"])?;
+        outputs.optional("--exr", args.exr.as_ref().map(of).as_ref(), &[".exr"])?;
+        outputs.optional("--preview", args.preview.as_ref().map(of).as_ref(), &[".png"])?;
+        outputs.optional("--points", args.points.as_ref().map(of).as_ref(), &[".ply"])?;
+    }
+    Ok(())
+}
+
 #[derive(Debug, Serialize)]
 struct RenderedCase {
     angle_deg: f64,
@@ -95,6 +112,7 @@ struct RenderedView {
 
 pub fn render_case(path: &Path, args: &RenderArgs, output: Output) -> anyhow::Result<()> {
     refuse_options_of_meshes(path, args)?;
+    declare(args)?;
     let mut plan = args.of_case.room.plan()?;
     if let Some(sensor) = &args.sensor {
         plan.depth.sensor = Some(read_sensor(sensor)?);

@@ -6,7 +6,9 @@ use clap::Args;
 use ppa_dataset::export::bag;
 use ppa_text::count;
 
+use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::{Output, bytes, working};
+use crate::output_files::{OutputFiles, bytes_below, require_room};
 
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
@@ -20,8 +22,12 @@ pub struct BagitArgs {
 }
 
 pub fn run(args: &BagitArgs, output: Output) -> anyhow::Result<()> {
+    OutputFiles::new().folder("--out", &args.out)?;
+    require_room(&args.out, bytes_below(&args.dataset))?;
+    let interrupt = Interrupt::listen()?;
     let working = working("copying files");
-    let bag = bag(&args.dataset, &args.out)?;
+    let bag = bag(&args.dataset, &args.out, interrupt.flag());
+    let bag = interrupt.or_how(bag, || NOTHING_WRITTEN.to_owned())?;
     working.finish_and_clear();
     output.print(&bag, |bag| {
         format!(

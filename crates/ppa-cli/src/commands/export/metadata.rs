@@ -7,6 +7,7 @@ use ppa_dataset::export::{Metadata, write_metadata};
 use serde_json::json;
 
 use crate::output::Output;
+use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
@@ -30,6 +31,8 @@ pub struct MetadataArgs {
     /// Split whose parts stand in the table
     #[arg(long, value_name = "NAME")]
     split: Option<String>,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 pub fn run(args: &MetadataArgs, output: Output) -> anyhow::Result<()> {
@@ -38,7 +41,8 @@ pub fn run(args: &MetadataArgs, output: Output) -> anyhow::Result<()> {
         license: args.license.clone(),
         date: args.date.clone(),
     };
-    let files = write_metadata(&args.dataset, &metadata, args.split.as_deref())?;
+    let (split, replace) = (args.split.as_deref(), args.replace.is_given());
+    let files = write_metadata(&args.dataset, &metadata, split, replace)?;
     output.print(&json!({ "files": files }), |_| {
         format!("{}: {}", args.dataset.display(), files.join(", "))
     })

@@ -8,6 +8,7 @@ use ppa_text::count;
 use serde::Serialize;
 
 use crate::output::Output;
+use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Args)]
 pub struct TableArgs {
@@ -19,6 +20,8 @@ pub struct TableArgs {
     /// Split whose parts stand in the column split
     #[arg(long, value_name = "NAME")]
     split: Option<String>,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 #[derive(Debug, Serialize)]
@@ -28,6 +31,12 @@ struct Written {
 }
 
 pub fn run(args: &TableArgs, output: Output) -> anyhow::Result<()> {
+    let mut outputs = args.replace.outputs();
+    let endings: &[&str] = match cfg!(feature = "parquet") {
+        true => &[".csv", ".parquet"],
+        false => &[".csv"],
+    };
+    outputs.file_in_new_folder("--out", &args.out, endings)?;
     let table = Table::of_dataset(&args.dataset, args.split.as_deref())?;
     table.write(&args.out)?;
     let written = Written {

@@ -7,7 +7,9 @@ use clap::Args;
 use ppa_dataset::export::web_dataset;
 use ppa_text::count;
 
+use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::{Output, working};
+use crate::output_files::OutputFiles;
 
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
@@ -28,9 +30,13 @@ pub struct WebdatasetArgs {
 }
 
 pub fn run(args: &WebdatasetArgs, output: Output) -> anyhow::Result<()> {
+    OutputFiles::new().folder("--out", &args.out)?;
+    let interrupt = Interrupt::listen()?;
     let working = working("writing archives");
     let per_shard = args.per_shard.get();
-    let shards = web_dataset(&args.dataset, &args.out, per_shard, args.split.as_deref())?;
+    let (split, stop) = (args.split.as_deref(), interrupt.flag());
+    let shards = web_dataset(&args.dataset, &args.out, per_shard, split, stop);
+    let shards = interrupt.or_how(shards, || NOTHING_WRITTEN.to_owned())?;
     working.finish_and_clear();
     output.print(&shards, |s| {
         format!(

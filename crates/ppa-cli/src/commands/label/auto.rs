@@ -10,14 +10,17 @@ use ppa_dataset::{Case, Manifest, Plan};
 use ppa_text::{count, number};
 use serde::Serialize;
 
+use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::output::{Output, working};
+use crate::output_files::{ReplaceArgs, require_writable};
 
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
 The gutters between talus, tibia and fibula are followed along the rays of every radiograph; the worst one decides. The \
 cases of the plan name the bones (`ppa prepare --bones` or `--segment-bones`). Writes labels.json, with label_source \
-surrogate-jso/1 (surrogate-jso/1-segmented), and beside it openness.csv: openness of each gutter, overlaps and clear spaces \
-in mm, and how well the radiograph itself shows each gutter; and openness.json: thresholds, and hashes of the bones and of the code. Labels of readers stay as they are. \
+surrogate-jso/1 (surrogate-jso/1-segmented), labels.computed.json with the same labels, and beside them openness.csv: openness of each gutter, overlaps and clear spaces \
+in mm, and how well the radiograph itself shows each gutter; and openness.json: thresholds, and hashes of the bones and of the code. Labels of readers stay in labels.json; there, \
+computed ones stand where no reader graded. Other results than those of an earlier run need --replace. \
 No reader has confirmed these labels.
 
   ppa ct phantom --out p01.nii.gz --labels p01.bones.nii.gz
@@ -37,6 +40,8 @@ pub struct AutoArgs {
     /// Thresholds of openness, TOML
     #[arg(long, value_name = "FILE")]
     thresholds: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 #[derive(Debug, Serialize)]
@@ -53,6 +58,8 @@ pub fn run(args: &AutoArgs, output: Output) -> anyhow::Result<()> {
     let manifest = Manifest::read(&args.dataset)?;
     let beside = || args.dataset.with_extension("toml");
     let plan = Plan::read(&args.plan.clone().unwrap_or_else(beside))?;
+    require_writable("the dataset", &args.dataset)?;
+    let stoppable = ends_at_once(NOTHING_WRITTEN)?;
     let working = working("following rays through the joint");
     let limbs = plan.cases.iter().map(|planned| {
         let case = Case::read(&planned.file)?;
@@ -65,6 +72,10 @@ pub fn run(args: &AutoArgs, output: Output) -> anyhow::Result<()> {
     });
     // All limbs or none: an error in a later one leaves the earlier ones as they were.
     let computed = limbs.collect::<anyhow::Result<Vec<_>>>()?;
+    if !args.replace.is_given() {
+        computed.iter().try_for_each(ComputedLabels::require_same)?;
+    }
+    drop(stoppable);
     let limbs = computed.iter().map(ComputedLabels::write);
     let limbs = limbs.collect::<Result<_, _>>()?;
     working.finish_and_clear();
@@ -73,10 +84,13 @@ pub fn run(args: &AutoArgs, output: Output) -> anyhow::Result<()> {
 
 fn describe(labelled: &Labelled) -> String {
     let line = |limb: &LabelledLimb| {
-        let kept = if limb.readers_kept {
-            "; labels of readers kept, see openness.csv"
-        } else {
-            ""
+        let kept = match (limb.unnamed_kept, limb.of_readers) {
+            (true, _) => {
+                "; labels.json does not tell who made its labels and was kept, see labels.computed.json"
+                    .to_owned()
+            }
+            (false, 0) => String::new(),
+            (false, kept) => format!("; labels of readers kept for {kept} of them"),
         };
         format!(
             "{}: {}, {} diagnostic, most open at {:.1} degrees{kept}",

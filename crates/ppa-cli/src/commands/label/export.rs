@@ -2,14 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::ensure;
+use anyhow::{Context, ensure};
 use clap::Args;
 use ppa_dataset::labels::{PICTURES_PER_PAGE, PageNumber, Showing, grading_page, write_key};
 use ppa_dataset::{Manifest, write_whole};
 use ppa_text::count;
 use serde::Serialize;
 
+use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::{Output, bytes, working};
+use crate::output_files::OutputFiles;
 
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
@@ -69,9 +71,22 @@ pub fn run(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
             path.display()
         );
     }
+    let mut outputs = OutputFiles::new();
+    outputs.file_in_new_folder("--key", &key, &[".csv"])?;
+    for page in &pages {
+        outputs.file_in_new_folder("--out", page, &[".html"])?;
+    }
+    let interrupt = Interrupt::listen()?;
     let mut size = 0;
     let of = pages.len();
     for (i, path) in pages.iter().enumerate() {
+        if interrupt.is_asked() {
+            for written in &pages[..i] {
+                std::fs::remove_file(written)
+                    .with_context(|| format!("cannot remove {}", written.display()))?;
+            }
+            return Err(interrupt.stopped(NOTHING_WRITTEN));
+        }
         let number = PageNumber { page: i + 1, of };
         let first = (i * PICTURES_PER_PAGE).min(shown.len());
         let last = (first + PICTURES_PER_PAGE).min(shown.len());

@@ -13,7 +13,8 @@ use crate::output::Output;
 #[command(after_long_help = "\
 Writes labels.json of every limb that was graded: mean and standard deviation (dividing by the number of readers) over \
 the readers' first grades. All grades are kept in grades.csv of the dataset: give that file as well to add \
-further readers, and to `ppa label agree`. Readers' labels take the place of computed ones.
+further readers, and to `ppa label agree`. In labels.json readers' labels take the place of computed ones, all of which stay in \
+labels.computed.json; radiographs that no reader graded keep their computed label.
 
   ppa label import dataset --key for_readers.key.csv grades_anna.csv grades_ben.csv
   ppa label import dataset --key second.key.csv dataset/grades.csv grades_carl.csv
@@ -48,8 +49,14 @@ fn describe(done: &Imported) -> String {
     )];
     if done.replaced_computed > 0 {
         lines.push(format!(
-            "{} gave way",
+            "{} gave way to readers' and stay in labels.computed.json",
             count(done.replaced_computed, "computed label")
+        ));
+    }
+    if done.kept_computed > 0 {
+        lines.push(format!(
+            "{} of the same limbs without a grade: the computed label stays",
+            count(done.kept_computed, "radiograph")
         ));
     }
     if done.without_label > 0 {

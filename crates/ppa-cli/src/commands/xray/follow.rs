@@ -1,17 +1,19 @@
 //! The analog engine at work: until when, in which part, with which doses.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::Args;
 use ppa_xray::{
     AnalogRun, AnalogSettings, AnalogTally, DoseSettings, Part, Projection, Spectrum, Stop,
-    VoxelBox, VoxelPhantom,
+    Stopped, VoxelBox, VoxelPhantom,
 };
 
+use crate::interrupt::Interrupt;
 use crate::output::bar;
+use crate::output_files::{OutputFiles, ReplaceArgs, require_room};
 
 /// Time between two saved states of a run, at most what an interruption costs.
 const SAVE_EVERY: Duration = Duration::from_secs(60);
@@ -28,10 +30,11 @@ pub struct AnalogArgs {
     /// Follow part k of n only; `ppa xray merge` joins the tallies of all parts
     #[arg(long, value_name = "K/N", requires = "tally", conflicts_with_all = ["time", "target_error"])]
     part: Option<Part>,
-    /// Keep the sums in this file: saved every minute and at the end, to resume from and to merge
+    /// Keep the sums in this file: saved every minute and at the end, to resume from and to merge. Without it, a run that is
+    /// stopped by Ctrl-C or TERM leaves them beside the first image, as x.png.tally
     #[arg(long, value_name = "FILE")]
     pub tally: Option<PathBuf>,
-    /// Go on from the tally file, if it is there
+    /// Go on from the tally file, if it is there, and replace the images of the sitting before
     #[arg(long, requires = "tally")]
     resume: bool,
     /// Tell the energy imparted to every material and the air kerma
@@ -42,7 +45,71 @@ pub struct AnalogArgs {
     pub dose_map: Option<PathBuf>,
 }
 
+/// Where the sums of a run are kept.
+pub struct Keep {
+    path: PathBuf,
+    /// Asked for by `--tally`; else they are kept only if the run is stopped.
+    named: bool,
+}
+
+impl Keep {
+    fn folder(&self) -> &Path {
+        match self.path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        }
+    }
+}
+
 impl AnalogArgs {
+    /// Declares tally and dose map, and says where the sums are kept if the run is stopped; `image` is the first of its images.
+    pub fn declare(
+        &self,
+        outputs: &mut OutputFiles,
+        image: Option<&Path>,
+        replace: ReplaceArgs,
+    ) -> anyhow::Result<Keep> {
+        outputs.optional("--dose-map", self.dose_map.as_ref(), &[".nii", ".nii.gz"])?;
+        let replace = replace.is_given();
+        if let Some(path) = &self.tally {
+            let exists = path
+                .try_exists()
+                .with_context(|| format!("cannot read {}", path.display()))?;
+            if exists && !self.resume {
+                anyhow::ensure!(
+                    replace,
+                    "{} exists: go on from it with --resume, or give --replace to begin again",
+                    path.display()
+                );
+            }
+            if !exists || !self.resume {
+                outputs.file("--tally", path, &[])?;
+            }
+            return Ok(Keep {
+                path: path.clone(),
+                named: true,
+            });
+        }
+        let beside = image.or(self.dose_map.as_deref());
+        let beside = beside.context("no output was named")?;
+        let mut path = beside.as_os_str().to_owned();
+        path.push(".tally");
+        let path = PathBuf::from(path);
+        anyhow::ensure!(
+            replace || !path.exists(),
+            "{0} holds the histories of a run that was stopped: go on from it with --tally {0} --resume, or give --replace to \
+             begin again",
+            path.display()
+        );
+        outputs.file("the tally", &path, &[])?;
+        Ok(Keep { path, named: false })
+    }
+
+    /// Whether there is an earlier sitting to go on from.
+    pub fn goes_on(&self) -> bool {
+        self.resume && self.tally.as_ref().is_some_and(|tally| tally.exists())
+    }
+
     /// The first option that only the analog engine knows.
     pub fn given(&self) -> Option<&'static str> {
         let options = [
@@ -60,7 +127,7 @@ impl AnalogArgs {
             .map(|(_, name)| name)
     }
 
-    /// Follows photons under a progress bar.
+    /// Follows photons under a progress bar. Ctrl-C and TERM keep what was counted and end the command.
     pub fn follow(
         &self,
         phantom: &VoxelPhantom,
@@ -68,6 +135,7 @@ impl AnalogArgs {
         projection: &Projection,
         histories: Option<f64>,
         seed: u64,
+        keep: &Keep,
     ) -> anyhow::Result<AnalogTally> {
         let stop = self.stop()?;
         let settings = AnalogSettings {
@@ -87,18 +155,22 @@ impl AnalogArgs {
                 voxels: self.dose_map.is_some().then_some(whole),
             })?;
         }
-        let mut tally = self.start(&run)?;
+        let mut tally = self.start(&run, keep)?;
+        let interrupt = Interrupt::listen()?;
         let bar = bar("following photons");
         let mut saved = Instant::now();
         let mut failed = None;
-        run.follow(&mut tally, &stop, |tally, progress| {
+        let mut counted = 0;
+        let ended = run.follow(&mut tally, &stop, |tally, progress| {
             bar.set_length(progress.expected_histories);
             bar.set_position(progress.histories);
-            if let Some(path) = &self.tally
-                && saved.elapsed() > SAVE_EVERY
-            {
+            counted = progress.histories;
+            if interrupt.is_asked() {
+                return ControlFlow::Break(());
+            }
+            if keep.named && saved.elapsed() > SAVE_EVERY {
                 saved = Instant::now();
-                if let Err(error) = tally.write(path) {
+                if let Err(error) = tally.write(&keep.path) {
                     failed = Some(error);
                     return ControlFlow::Break(());
                 }
@@ -109,33 +181,37 @@ impl AnalogArgs {
         if let Some(error) = failed {
             return Err(error.into());
         }
-        if let Some(path) = &self.tally {
-            tally.write(path)?;
+        if keep.named || ended == Stopped::Interrupted {
+            tally.write(&keep.path)?;
+        }
+        if ended == Stopped::Interrupted {
+            let path = keep.path.display();
+            let more = match (keep.named, self.resume) {
+                (false, _) => format!(" with --tally {path} --resume"),
+                (true, false) => " with --resume".to_owned(),
+                (true, true) => String::new(),
+            };
+            return Err(interrupt.stopped(format!(
+                "after {counted} histories, which are kept in {path}; the same command{more} goes on"
+            )));
         }
         Ok(tally)
     }
 
     /// The tally to begin with.
-    fn start(&self, run: &AnalogRun) -> anyhow::Result<AnalogTally> {
+    fn start(&self, run: &AnalogRun, keep: &Keep) -> anyhow::Result<AnalogTally> {
         let part = self.part.unwrap_or(Part::WHOLE);
-        let Some(path) = &self.tally else {
-            return Ok(run.tally(part));
-        };
-        let exists = path
-            .try_exists()
-            .with_context(|| format!("cannot read {}", path.display()))?;
-        if !exists {
-            let tally = run.tally(part);
-            // Rather now than after hours.
-            tally.write(path)?;
-            return Ok(tally);
+        let there = keep.named && keep.path.exists();
+        if there && self.resume {
+            return Ok(run.read(&keep.path, part)?);
         }
-        anyhow::ensure!(
-            self.resume,
-            "{} exists: go on from it with --resume, or remove it",
-            path.display()
-        );
-        Ok(run.read(path, part)?)
+        let tally = run.tally(part);
+        require_room(keep.folder(), tally.file_bytes())?;
+        if keep.named && !there {
+            // What cannot be written is found now rather than after hours.
+            tally.write(&keep.path)?;
+        }
+        Ok(tally)
     }
 
     fn stop(&self) -> anyhow::Result<Stop> {

@@ -1,6 +1,7 @@
 //! `ppa xray mcgpu`: runs an input file of MC-GPU v1.3 as it is.
 
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use anyhow::Context;
@@ -11,7 +12,9 @@ use ppa_xray::{CategorySums, Dose, Engine, FastSettings, Imparted, Radiograph, f
 use serde::Serialize;
 
 use super::simulate::EngineName;
+use crate::interrupt::Interrupt;
 use crate::output::{Output, Seconds, Stopwatch, working};
+use crate::output_files::{ReplaceArgs, require_room};
 
 #[derive(Debug, Args)]
 pub struct McgpuArgs {
@@ -29,7 +32,12 @@ pub struct McgpuArgs {
     /// Folder for images and doses; they get the names that the file gives them
     #[arg(long)]
     out: PathBuf,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
+
+/// Five numbers in the raw image, and at least four digits with their spaces as text.
+const LEAST_PIXEL_BYTES: u64 = 5 * 4 + 8;
 
 #[derive(Debug, Serialize)]
 struct Simulated {
@@ -75,12 +83,14 @@ pub fn run(args: &McgpuArgs, output: Output) -> anyhow::Result<()> {
         "{}: no projection has an angle of interest",
         args.input.display()
     );
+    args.declare(&simulation, &stations)?;
+    let interrupt = Interrupt::listen()?;
     let is_new = !args.out.exists();
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
 
     let watch = Stopwatch::start();
-    let scan = args.scan(&simulation, &stations, length, &working);
+    let scan = args.scan(&simulation, &stations, length, &working, &interrupt);
     if scan.is_err() && is_new {
         // Goes only if nothing is in it.
         let _ = fs::remove_dir(&args.out);
@@ -109,6 +119,7 @@ impl McgpuArgs {
         stations: &[Station],
         length: RunLength,
         working: &ProgressBar,
+        interrupt: &Interrupt,
     ) -> anyhow::Result<(Vec<Projected>, Option<ScanDose>)> {
         let mut dose = simulation
             .dose_settings()
@@ -122,9 +133,19 @@ impl McgpuArgs {
                     if let Some(left) = progress.remaining {
                         working.set_message(format!("{which}, {:.0} s left", left.as_secs_f64()));
                     }
+                    match interrupt.is_asked() {
+                        true => ControlFlow::Break(()),
+                        false => ControlFlow::Continue(()),
+                    }
                 })?,
                 EngineName::Fast => self.fast(simulation, station, length)?,
             };
+            if interrupt.is_asked() {
+                return Err(interrupt.stopped(format!(
+                    "in {which}; the images of {done} are whole in {}; the same command with --replace begins again",
+                    self.out.display()
+                )));
+            }
             if let (Some(dose), Some(left)) = (&mut dose, &left) {
                 dose.add(simulation, left);
             }
@@ -141,6 +162,24 @@ impl McgpuArgs {
             dose.write(&self.out, simulation)?;
         }
         Ok((projections, dose))
+    }
+
+    /// Declares all files of the scan.
+    fn declare(&self, simulation: &Simulation, stations: &[Station]) -> anyhow::Result<()> {
+        let mut outputs = self.replace.outputs();
+        for name in simulation.file_names(stations) {
+            let path = self.out.join(name);
+            if path.parent() == Some(&self.out) {
+                outputs.file_in_new_folder("--out", &path, &[])?;
+            } else {
+                outputs.file("--out", &path, &[])?;
+            }
+        }
+        let pixels: u64 = simulation.input().pixels.map(u64::from).iter().product();
+        require_room(
+            &self.out,
+            LEAST_PIXEL_BYTES * pixels * stations.len() as u64,
+        )
     }
 
     fn length(&self, in_file: RunLength) -> anyhow::Result<RunLength> {

@@ -7,7 +7,9 @@ use ppa_dataset::Plan;
 use ppa_xray::AnalogTally;
 
 use super::report::Report;
+use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::output::{Output, Stopwatch, working};
+use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Args)]
 pub struct MergeArgs {
@@ -26,9 +28,16 @@ pub struct MergeArgs {
     /// Take the presentation from this plan
     #[arg(long)]
     plan: Option<PathBuf>,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 pub fn run(args: &MergeArgs, output: Output) -> anyhow::Result<()> {
+    let mut outputs = args.replace.outputs();
+    outputs.file("--out", &args.out, &[".png"])?;
+    outputs.optional("--exr", args.exr.as_ref(), &[".exr"])?;
+    outputs.optional("--tally", args.tally.as_ref(), &[])?;
+    let stoppable = ends_at_once(NOTHING_WRITTEN)?;
     let watch = Stopwatch::start();
     let plan = match &args.plan {
         Some(path) => Plan::read(path)?,
@@ -37,6 +46,7 @@ pub fn run(args: &MergeArgs, output: Output) -> anyhow::Result<()> {
     let working = working("merging");
     let tally = AnalogTally::merge(&args.tallies)?;
     let radiograph = tally.radiograph();
+    drop(stoppable);
     radiograph.write_png(&args.out, &plan.xray.presentation)?;
     let mut written: Vec<&Path> = vec![&args.out];
     if let Some(exr) = &args.exr {

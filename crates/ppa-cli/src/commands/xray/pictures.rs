@@ -10,6 +10,8 @@ use ppa_xray::{
     View,
 };
 
+use crate::output_files::OutputFiles;
+
 #[derive(Debug, Args)]
 pub struct PictureArgs {
     /// Fixed window and contrast by name, in place of the plan's: limb, ankle_ap, ankle_mortise or ankle_lateral
@@ -46,6 +48,19 @@ impl PictureArgs {
         } else {
             fixed
         })
+    }
+
+    /// Declares the DICOM image.
+    pub fn declare(&self, outputs: &mut OutputFiles) -> anyhow::Result<()> {
+        let Some(path) = &self.dicom else {
+            return Ok(());
+        };
+        // DICOM files often have no ending at all.
+        let endings: &[&str] = match path.extension() {
+            Some(_) => &[".dcm", ".dicom"],
+            None => &[],
+        };
+        outputs.file("--dicom", path, endings)
     }
 
     /// Writes the DICOM image if one was asked for.

@@ -15,7 +15,9 @@ use super::follow::AnalogArgs;
 use super::pictures::{Exposure, PictureArgs};
 use super::report::Report;
 use crate::findings::prepared;
+use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::output::{Output, Stopwatch, working};
+use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(super) enum EngineName {
@@ -56,6 +58,8 @@ pub struct SimulateArgs {
     pictures: PictureArgs,
     #[command(flatten)]
     analog: AnalogArgs,
+    #[command(flatten)]
+    replace: ReplaceArgs,
 }
 
 #[derive(Debug, Serialize)]
@@ -71,6 +75,17 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
     {
         anyhow::bail!("{option} needs --engine analog");
     }
+    // A sitting that goes on replaces the images of the one before.
+    let mut outputs = args.replace.or(args.analog.goes_on()).outputs();
+    outputs.optional("--out", args.out.as_ref(), &[".png"])?;
+    outputs.optional("--exr", args.exr.as_ref(), &[".exr"])?;
+    args.pictures.declare(&mut outputs)?;
+    let images = [&args.out, &args.exr, &args.pictures.dicom];
+    let image = images.into_iter().flatten().next().map(PathBuf::as_path);
+    let keep = match args.engine {
+        EngineName::Fast => None,
+        EngineName::Analog => Some(args.analog.declare(&mut outputs, image, args.replace)?),
+    };
     let mut plan = match &args.plan {
         Some(path) => Plan::read(path)?,
         None => Plan::new(Vec::new()),
@@ -95,21 +110,22 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
 
     working.set_message("following photons");
     let watch = Stopwatch::start();
-    let (radiograph, dose) = match args.engine {
-        EngineName::Fast => {
+    let (radiograph, dose) = match &keep {
+        None => {
             let settings = FastSettings {
                 dose_histories: args.histories.unwrap_or(plan.xray.engine.dose_histories),
                 seed: args.seed,
                 ..plan.xray.engine
             };
+            let _stoppable = ends_at_once(NOTHING_WRITTEN)?;
             (fast(&phantom, &spectrum, &projection, &settings)?, None)
         }
-        EngineName::Analog => {
+        Some(keep) => {
             working.finish_and_clear();
             let (histories, seed) = (args.histories, args.seed);
-            let tally = args
-                .analog
-                .follow(&phantom, &spectrum, &projection, histories, seed)?;
+            let tally =
+                args.analog
+                    .follow(&phantom, &spectrum, &projection, histories, seed, keep)?;
             (tally.radiograph(), tally.dose())
         }
     };

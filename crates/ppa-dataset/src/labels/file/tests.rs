@@ -15,7 +15,7 @@ fn read(text: &str) -> Result<LabelFile, String> {
 fn published_labels_are_read() {
     let text = r#"{"xray_image_180.png": {"label": 3.0, "std": 0.0, "step": 180}}"#;
     let found = read(text).unwrap();
-    assert_eq!(found.source, None);
+    assert_eq!(found.source_of_step(180), None);
     let expected = LabelRow {
         label: 3.0,
         std: 0.0,
@@ -122,18 +122,52 @@ fn what_is_no_label_is_named() {
 }
 
 #[test]
-fn readers_and_computed_labels_do_not_mix() {
+fn readers_stand_beside_one_kind_of_computed_labels() {
     let by = |source: &str, step: u32| {
         format!(r#""xray_image_{step}.png": {{"label": 1.0, "std": 0.0, "step": {step}{source}}}"#)
     };
     let readers = r#", "label_source": "readers""#;
     let surrogate = r#", "label_source": "surrogate-jso/1""#;
-    let said = read(&format!("{{{}, {}}}", by(readers, 1), by(surrogate, 2))).unwrap_err();
+    let segmented = r#", "label_source": "surrogate-jso/1-segmented""#;
+    let said = read(&format!("{{{}, {}}}", by(segmented, 1), by(surrogate, 2))).unwrap_err();
     assert!(
-        said.contains("xray_image_2.png is labelled by surrogate-jso/1, others by readers"),
+        said.contains(
+            "xray_image_2.png is labelled by surrogate-jso/1, others by surrogate-jso/1-segmented"
+        ),
         "{said}"
     );
     assert!(read(&format!("{{{}, {}}}", by(readers, 1), by("", 2))).is_err());
-    let found = read(&format!("{{{}, {}}}", by(readers, 1), by(readers, 2))).unwrap();
-    assert_eq!(found.source, Some(LabelSource::Readers));
+    assert!(read(&format!("{{{}, {}}}", by("", 1), by(surrogate, 2))).is_err());
+    let three = [by(readers, 1), by(surrogate, 2), by(readers, 3)].join(", ");
+    let found = read(&format!("{{{three}}}")).unwrap();
+    assert_eq!(found.source_of_step(1), Some(LabelSource::Readers));
+    assert_eq!(found.source_of_step(2), Some(LabelSource::Surrogate));
+    assert_eq!(found.source_of_step(4), None);
+}
+
+#[cfg(feature = "generate")]
+#[test]
+fn a_readers_label_wins_over_a_computed_one() {
+    let row = |step, label| LabelRow {
+        label,
+        std: 0.0,
+        step,
+    };
+    let computed = LabelFile::new(
+        LabelSource::Surrogate,
+        [row(1, 1.0), row(2, 1.5), row(3, 2.0)],
+    )
+    .unwrap();
+    let readers = LabelFile::new(LabelSource::Readers, [row(2, 3.0), row(5, 2.5)]).unwrap();
+    let both = readers.clone().over(&computed);
+    assert_eq!(
+        both.labels(),
+        [row(1, 1.0), row(2, 3.0), row(3, 2.0), row(5, 2.5)]
+    );
+    assert_eq!(both.not_computed(), readers);
+    assert_eq!(both.computed().labels(), [row(1, 1.0), row(3, 2.0)]);
+    assert_eq!(
+        serde_json::from_str::<LabelFile>(&both.to_text()).unwrap(),
+        both
+    );
 }

@@ -7,12 +7,12 @@ use serde::Serialize;
 
 use super::grades::{Given, Pictures};
 use super::showing::Showing;
-use crate::files::FileError;
+use crate::files::{FileError, write_whole};
 use crate::labels::file::{LabelFile, LabelFileError};
 use crate::labels::label::{LabelError, LabelRow, LabelSource};
 use crate::labels::table::{TableError, write_table};
 use crate::layout::LimbId;
-use crate::manifest::{FileKind, Manifest};
+use crate::manifest::{FileKind, FileRow, Manifest};
 
 /// All grades of a dataset, as they were given.
 const GRADES_FILE: &str = "grades.csv";
@@ -26,9 +26,11 @@ pub struct Imported {
     pub labelled: usize,
     /// Second grades of a radiograph by one reader: kept, but without influence on the label.
     pub repeats: usize,
-    /// Computed labels that gave way.
+    /// Computed labels in whose place readers' stand in `labels.json`; they stay in `labels.computed.json`.
     pub replaced_computed: usize,
-    /// Radiographs of the graded limbs that no reader graded; they have no label.
+    /// Radiographs of the graded limbs that no reader graded and that keep their computed label.
+    pub kept_computed: usize,
+    /// Radiographs of the graded limbs without any label.
     pub without_label: usize,
 }
 
@@ -136,8 +138,8 @@ pub enum ImportError {
 ///
 /// `files` are tables with the columns image, reader, grade, where image is a name of the key `shown` or a radiograph
 /// of the dataset. All grades are kept in `grades.csv` with the hash of their radiograph, so that further ones can be added by
-/// giving that file as well. Readers' labels take the place of computed ones, for whole limbs: the two never stand in one
-/// `labels.json`.
+/// giving that file as well. Readers' labels take the place of computed ones, which stay in `labels.computed.json`; radiographs that no
+/// reader graded keep their computed label.
 ///
 /// # Errors
 /// [`ImportError`], before anything is written: grades off the scale, unknown pictures, radiographs that changed since
@@ -165,26 +167,43 @@ pub fn import_grades(
     let rows_before = label_rows(&before);
     let mut labels = Vec::new();
     for (&limb, rows) in &limbs {
-        if let Some(before) = LabelFile::read(&manifest.root, limb)? {
-            if before.source.is_some_and(LabelSource::is_computed) {
-                done.replaced_computed += before.labels().len();
-            } else if ![rows_before.get(&limb), Some(rows)].contains(&Some(&before.labels())) {
-                let path = LabelFile::path(&manifest.root, limb);
-                return Err(ImportError::OtherLabels(path));
-            }
+        let root = &manifest.root;
+        let before = LabelFile::read(root, limb)?.unwrap_or_default();
+        let of_readers = before.not_computed().labels();
+        if !of_readers.is_empty()
+            && ![rows_before.get(&limb), Some(rows)].contains(&Some(&of_readers))
+        {
+            return Err(ImportError::OtherLabels(LabelFile::path(root, limb)));
         }
+        let file = LabelFile::new(LabelSource::Readers, rows.iter().copied())?;
+        let file = file.of_radiographs(manifest, limb);
+        // Computed labels had no file of their own in earlier versions.
+        let (computed, has_file) = match LabelFile::read_computed(root, limb)? {
+            Some(computed) => (computed, true),
+            None => (before.computed(), false),
+        };
+        let graded = |row: &&LabelRow| file.of_step(row.step).is_some();
+        let given_way = computed.labels().iter().filter(graded).count();
+        let file = file.over(&computed);
+        let bare = |row: &&FileRow| file.of_step(row.step).is_none();
         let radiographs = manifest.files.iter();
         let radiographs =
             radiographs.filter(|row| row.kind == FileKind::Radiograph && row.limb == limb);
-        done.without_label += radiographs.count() - rows.len();
+        done.without_label += radiographs.filter(bare).count();
         done.labelled += rows.len();
-        let file = LabelFile::new(LabelSource::Readers, rows.iter().copied())?;
-        labels.push((limb, file.of_radiographs(manifest, limb)));
+        done.replaced_computed += given_way;
+        done.kept_computed += computed.labels().len() - given_way;
+        let computed = (!has_file && !computed.labels().is_empty()).then_some(computed);
+        labels.push((limb, file, computed));
     }
     done.repeats = given.len() - firsts(&given).count();
 
     // Grades last: an import that was stopped finds the former grades, and labels that follow from those or from its own.
-    for (limb, labels) in labels {
+    for (limb, labels, computed) in labels {
+        if let Some(computed) = computed {
+            let path = LabelFile::computed_path(&manifest.root, limb);
+            write_whole(&path, computed.to_text().as_bytes())?;
+        }
         labels.write(&manifest.root, limb)?;
     }
     let grades: Vec<_> = given.iter().map(Given::by_radiograph).collect();

@@ -1,0 +1,213 @@
+//! Ctrl-C and TERM: the next whole step, one line that says how to go on, and an exit status that tells.
+#![cfg(unix)]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::shards::write_quick_plan;
+use crate::{contains, contents, names, phantom, ppa, succeed, write_plan};
+
+fn start(folder: &Path, arguments: &str) -> Child {
+    let mut command = ppa(folder, arguments);
+    let command = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.spawn().unwrap()
+}
+
+fn send(run: &Child, signal: &str) {
+    let sent = Command::new("kill")
+        .args([&format!("-{signal}"), &run.id().to_string()])
+        .status();
+    assert!(sent.unwrap().success());
+}
+
+/// Waits for the end of a run; its exit status and what it said on stderr. It must have printed no result.
+fn ended(run: Child) -> (Option<i32>, String) {
+    let output = run.wait_with_output().unwrap();
+    assert!(output.stdout.is_empty(), "{output:?}");
+    let said = String::from_utf8(output.stderr).unwrap();
+    (output.status.code(), said)
+}
+
+fn wait_for(run: &mut Child, mut what: impl FnMut() -> bool) {
+    let began = Instant::now();
+    while !what() {
+        assert!(run.try_wait().unwrap().is_none(), "the run ended before");
+        assert!(began.elapsed() < Duration::from_secs(120));
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Sends a signal some time after the start, later if it came before the program listened.
+fn interrupted(folder: &Path, arguments: &str, signal: &str) -> (i32, String) {
+    for seconds in [1, 2, 4, 8, 16, 32] {
+        let mut run = start(folder, arguments);
+        std::thread::sleep(Duration::from_secs(seconds));
+        assert!(run.try_wait().unwrap().is_none(), "ppa {arguments} ended");
+        send(&run, signal);
+        if let (Some(code), said) = ended(run) {
+            return (code, said);
+        }
+    }
+    panic!("ppa {arguments} never listened");
+}
+
+fn poses(root: &Path) -> usize {
+    let Ok(records) = fs::read_dir(root.join(".ppa")) else {
+        return 0;
+    };
+    let names = records.map(|entry| entry.unwrap().file_name());
+    names
+        .filter(|name| name.to_string_lossy().starts_with("patient"))
+        .count()
+}
+
+#[test]
+fn a_stopped_dataset_goes_on_to_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_plan(here, "");
+    let run = "generate plan.toml --threads 1 --progress quiet --out";
+    for (signal, code, name) in [("INT", 130, "int"), ("TERM", 143, "term")] {
+        let root = here.join(name);
+        let mut stopped = start(here, &format!("{run} {name}"));
+        wait_for(&mut stopped, || poses(&root) > 0);
+        send(&stopped, signal);
+        let (ended, said) = ended(stopped);
+        assert_eq!(ended, Some(code), "{said}");
+        assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+        let made = poses(&root);
+        let how = format!("stopped after {made} of 5 poses; the same command goes on");
+        contains(&said, &[&how]);
+        succeed(here, &format!("{run} {name}"));
+    }
+    assert!(contents(&here.join("int")) == contents(&here.join("term")));
+}
+
+#[test]
+fn a_second_ctrl_c_ends_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let plan = write_plan(here, "");
+    let text = fs::read_to_string(&plan).unwrap();
+    let endless = text.replace(
+        "scatter_histories = 20000",
+        "scatter_histories = 20000000000",
+    );
+    fs::write(&plan, endless).unwrap();
+    let mut run = start(here, "generate plan.toml --out data --progress quiet");
+    wait_for(&mut run, || here.join("data/dataset.json").exists());
+    send(&run, "INT");
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(run.try_wait().unwrap().is_none(), "the pose is under way");
+    send(&run, "INT");
+    let began = Instant::now();
+    let (code, said) = ended(run);
+    assert_eq!((code, said.as_str()), (Some(130), ""));
+    assert!(began.elapsed() < Duration::from_secs(5));
+}
+
+#[test]
+fn histories_of_a_stopped_run_are_kept_without_tally() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_plan(here, "");
+    let case = phantom().join("p01.toml");
+    let run = format!(
+        "xray simulate {} --plan plan.toml --engine analog --seed 5",
+        case.display()
+    );
+    let endless = format!("{run} --histories 5e11 --out x.png");
+    let (code, said) = interrupted(here, &endless, "TERM");
+    assert_eq!(code, 143, "{said}");
+    let more = "the same command with --tally x.png.tally --resume goes on";
+    contains(&said, &["histories, which are kept in x.png.tally", more]);
+    assert_eq!(names(here), ["plan.toml", "x.png.tally"]);
+
+    // Begun again they would be lost.
+    let again = ppa(here, &endless).output().unwrap();
+    let again = String::from_utf8(again.stderr).unwrap();
+    contains(&again, &["x.png.tally", "--resume", "--replace"]);
+    let number = said.split("after ").nth(1).unwrap();
+    let counted: u64 = number.split(' ').next().unwrap().parse().unwrap();
+    let histories = counted + 10_000;
+    succeed(
+        here,
+        &format!("{run} --histories {histories} --out x.png --tally x.png.tally --resume"),
+    );
+    succeed(here, &format!("{run} --histories {histories} --out y.png"));
+    let read = |name: &str| fs::read(here.join(name)).unwrap();
+    assert!(read("x.png") == read("y.png"));
+    assert!(!here.join("y.png.tally").exists());
+}
+
+#[test]
+fn a_named_tally_holds_what_was_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_plan(here, "");
+    let case = phantom().join("p01.toml");
+    let run = format!(
+        "xray simulate {} --plan plan.toml --engine analog --histories 5e11 --out x.png --tally x.tally --resume",
+        case.display()
+    );
+    let (code, said) = interrupted(here, &run, "INT");
+    assert_eq!(code, 130, "{said}");
+    contains(&said, &["kept in x.tally; the same command goes on"]);
+    assert_eq!(names(here), ["plan.toml", "x.tally"]);
+}
+
+#[test]
+fn a_scan_of_mcgpu_stops_within_a_projection() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    crate::mcgpu::write_input(here);
+    let run = "xray mcgpu box.in --histories 1e12 --out images";
+    let (code, said) = interrupted(here, run, "INT");
+    assert_eq!(code, 130, "{said}");
+    contains(&said, &["in projection 1 of 2", "images of 0 are whole"]);
+}
+
+#[test]
+fn work_that_writes_at_its_end_stops_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let case = phantom().join("p01.toml");
+    let run = format!(
+        "depth coverage {} --step-deg 2 --distances-mm 700 --csv places.csv",
+        case.display()
+    );
+    let (code, said) = interrupted(here, &run, "TERM");
+    assert_eq!(code, 143, "{said}");
+    contains(&said, &["stopped before anything was written"]);
+    assert!(contents(here).is_empty());
+}
+
+#[test]
+fn a_stopped_verification_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_quick_plan(here);
+    succeed(here, "generate plan.toml --out data --progress quiet");
+    let before = contents(&here.join("data"));
+    let scratch = here.join("scratch");
+    fs::create_dir(&scratch).unwrap();
+    let mut command = ppa(
+        here,
+        "verify data --plan plan.toml --fraction 1 --threads 1 --progress quiet",
+    );
+    command.env("TMPDIR", &scratch);
+    let mut run = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    wait_for(&mut run, || fs::read_dir(&scratch).unwrap().count() > 0);
+    send(&run, "INT");
+    let (code, said) = ended(run);
+    assert_eq!(code, Some(130), "{said}");
+    contains(&said, &["stopped", "the same command begins again"]);
+    assert_eq!(fs::read_dir(&scratch).unwrap().count(), 0);
+    assert!(contents(&here.join("data")) == before);
+}

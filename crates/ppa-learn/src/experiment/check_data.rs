@@ -1,0 +1,138 @@
+//! The data of all trainings, looked at before the first one begins.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use super::error::ExperimentError;
+use super::run::Runner;
+use super::unit::Unit;
+use crate::data::{Balanced, DataError};
+use crate::train::{Source, TrainConfig, TrainError, samples};
+
+/// Persons of some images: dataset and number.
+type Persons = BTreeSet<(PathBuf, u32)>;
+
+/// What was found of the images of some sources, by how the sources are written.
+type Seen = BTreeMap<String, Result<Persons, BTreeSet<String>>>;
+
+impl Runner<'_> {
+    /// Looks at images, labels, regions, body shapes and persons of all trainings and tests as the trainings will, and at the
+    /// weights that some begin with.
+    ///
+    /// # Errors
+    /// [`ExperimentError::Unusable`] with all that stands against a training.
+    pub fn check_data(&self) -> Result<(), ExperimentError> {
+        // Seeds draw from the same images: one of them stands for all.
+        let Some(first) = self.runs().iter().map(|unit| seed(*unit)).min() else {
+            return Ok(());
+        };
+        let runs = self.runs().into_iter().filter(|run| seed(*run) == first);
+        let (mut seen, mut problems) = (Seen::new(), BTreeSet::new());
+        let (mut trainings, mut unusable) = (0, 0);
+        for run in runs {
+            let found = self.problems(run, &mut seen)?;
+            trainings += 1;
+            unusable += usize::from(!found.is_empty());
+            problems.extend(found);
+        }
+        match problems.is_empty() {
+            true => Ok(()),
+            false => Err(ExperimentError::Unusable {
+                unusable,
+                trainings,
+                problems: problems.into_iter().collect::<Vec<_>>().join("; "),
+            }),
+        }
+    }
+
+    /// What stands against a run and the pretraining it needs.
+    fn problems(&self, run: Unit, seen: &mut Seen) -> Result<BTreeSet<String>, ExperimentError> {
+        let config = self.config(run)?;
+        let mut problems = BTreeSet::new();
+        let tested = persons(&config, &config.evaluation, seen, &mut problems);
+        let mut trained = vec![persons(&config, &config.training, seen, &mut problems)];
+        match run.needs() {
+            Some(pretraining) => {
+                let config = self.config(pretraining)?;
+                trained.push(persons(&config, &config.training, seen, &mut problems));
+            }
+            None => {
+                let missing = config.start.iter().filter(|start| !start.is_file());
+                problems.extend(missing.map(|start| format!("{} is no file", start.display())));
+            }
+        }
+        for trained in &trained {
+            if let Some((dataset, patient)) = trained.intersection(&tested).next() {
+                let person = format!("{}, patient {patient}", dataset.display());
+                problems.insert(DataError::Leak(person).to_string());
+            }
+        }
+        Ok(problems)
+    }
+}
+
+fn seed(unit: Unit) -> u64 {
+    match unit {
+        Unit::Pretraining { seed, .. } | Unit::Run { seed, .. } => seed,
+    }
+}
+
+/// Persons of the images of some sources; adds what is wrong with them.
+fn persons(
+    config: &TrainConfig,
+    sources: &[Source],
+    seen: &mut Seen,
+    problems: &mut BTreeSet<String>,
+) -> Persons {
+    let name = format!("{sources:?} {:?} {}", config.views, config.frames_per_pose);
+    let found = seen.entry(name).or_insert_with(|| look(config, sources));
+    match found {
+        Ok(persons) => persons.clone(),
+        Err(wrong) => {
+            problems.extend(wrong.iter().cloned());
+            Persons::new()
+        }
+    }
+}
+
+fn look(config: &TrainConfig, sources: &[Source]) -> Result<Persons, BTreeSet<String>> {
+    let error = match persons_of(config, sources) {
+        Ok(persons) => return Ok(persons),
+        Err(error) => error,
+    };
+    // The error names the first body shape that is missing; each by itself tells of all of them.
+    let one_shape = |source: &Source| -> Vec<Source> {
+        let shapes = source.shapes.iter().flatten();
+        let only = |&shape| Source {
+            shapes: Some(vec![shape]),
+            ..source.clone()
+        };
+        shapes.map(only).collect()
+    };
+    let alone = sources.iter().flat_map(one_shape);
+    let mut wrong: BTreeSet<String> = alone
+        .filter_map(|source| persons_of(config, &[source]).err())
+        .collect();
+    if wrong.is_empty() {
+        wrong.insert(error);
+    }
+    Err(wrong)
+}
+
+fn persons_of(config: &TrainConfig, sources: &[Source]) -> Result<Persons, String> {
+    let samples = samples(config, sources).map_err(|error| in_words(&error))?;
+    Balanced::new(&samples).map_err(|error| in_words(&error.into()))?;
+    let person = |sample: &crate::data::Sample| (sample.dataset.clone(), sample.limb.patient);
+    Ok(samples.iter().map(person).collect())
+}
+
+/// An error with its causes.
+fn in_words(error: &TrainError) -> String {
+    let mut text = error.to_string();
+    let mut cause = std::error::Error::source(error);
+    while let Some(source) = cause {
+        text += &format!(": {source}");
+        cause = source.source();
+    }
+    text
+}
