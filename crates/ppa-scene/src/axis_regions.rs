@@ -3,30 +3,16 @@
 use nalgebra::Vector3;
 use ppa_ct::Volume;
 
-use crate::ankle::{find_ankle, shaft_direction};
+use crate::bone_spans::bone_centre;
+use crate::joints::{Joints, joint_notes, kind_of_limb};
+use crate::knee::Knee;
+use crate::knee_regions::knee_ranges;
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
-use crate::landmarks::{AxisRegion, AxisSource, LimbKind};
+use crate::landmarks::{AxisRegion, AxisSource, FoundJoint, LimbKind};
 use crate::limb_sections::Sections;
 
-const REVERSED: &str = "the ankle lies superior to the calf: proximal is inferior";
-
-/// Slices across the tibia: the scan's own, or interpolated ones if it leans by more than 3 degrees.
-fn across_the_shaft<'a>(
-    volume: &'a Volume,
-    mask: &'a [bool],
-    towards_proximal: &Vector3<f64>,
-) -> Result<Sections<'a>, LandmarkError> {
-    const LEAN: f64 = 0.9986; // cos 3°
-    const STEEPEST: f64 = 0.82; // cos 35°
-    let mut sections = Sections::along(volume, mask, towards_proximal);
-    for _ in 0..2 {
-        let aslant = shaft_direction(&sections)
-            .filter(|shaft| (STEEPEST..LEAN).contains(&shaft.dot(&sections.direction)));
-        let Some(shaft) = aslant else { break };
-        sections = Sections::across(volume, mask, &shaft)?;
-    }
-    Ok(sections)
-}
+const REVERSED: &str =
+    "the joint lies superior to the calf, or the thigh inferior to it: proximal is inferior";
 
 /// What region ranges are measured from.
 pub(crate) struct Reference<'a> {
@@ -34,65 +20,64 @@ pub(crate) struct Reference<'a> {
     pub(crate) sections: Sections<'a>,
     /// Joint level along the scan's limb direction, mm.
     pub(crate) level_mm: f64,
+    /// The knee of a limb that is posed about it.
+    pub(crate) knee: Option<Knee>,
+    /// Every joint that was found.
+    pub(crate) joints: Vec<FoundJoint>,
     /// Lowest and highest level with limb in it, from the joint level, mm.
     extent_mm: [f64; 2],
 }
 
 impl<'a> Reference<'a> {
-    /// Finds the joint level, or takes the middle of the limb.
+    /// Finds the joint level, or takes the middle of a limb that was said to be another one.
     pub(crate) fn find(
         volume: &'a Volume,
         mask: &'a [bool],
         overrides: &LandmarkOverrides,
         notes: &mut Vec<String>,
     ) -> Result<Self, LandmarkError> {
-        let mut sections = Sections::along(volume, mask, &Vector3::z());
-        let mut ankle = None;
-        if overrides.limb != Some(LimbKind::Other) {
-            for (towards_proximal, note) in [(Vector3::z(), None), (-Vector3::z(), Some(REVERSED))]
-            {
-                let tried = across_the_shaft(volume, mask, &towards_proximal)?;
-                ankle = find_ankle(&tried);
-                if ankle.is_some() {
-                    sections = tried;
-                    notes.extend(note.map(str::to_owned));
-                    break;
-                }
-            }
+        let joints = match overrides.limb {
+            Some(LimbKind::Other) => Joints::none(),
+            _ => Joints::find(volume, mask)?,
+        };
+        let found = joints.found();
+        let kind = kind_of_limb(overrides, &found)?;
+        if joints.is_reversed {
+            notes.push(REVERSED.into());
         }
+        let (shown, knee) = match kind {
+            LimbKind::LowerLeg => (joints.ankle.map(|(s, ankle)| (s, ankle.level_mm)), None),
+            LimbKind::Knee => {
+                let knee = joints.knee.as_ref().map(|(_, knee)| *knee);
+                let at = |s: &Sections, knee: &Knee| s.direction.dot(&knee.centre.coords);
+                let shown = joints.knee.map(|(s, knee)| {
+                    let level = at(&s, &knee);
+                    (s, level)
+                });
+                (shown, knee)
+            }
+            LimbKind::Other => (None, None),
+        };
+        let (sections, joint_mm) = match shown {
+            Some((sections, level)) => (sections, Some(level)),
+            None => (Sections::along(volume, mask, &Vector3::z()), None),
+        };
         let slices = sections.proximal_to_distal();
         let level = |slice: Option<&usize>| slice.map_or(0.0, |s| sections.level(*s));
         let (high, low) = (level(slices.first()), level(slices.last()));
-        let (kind, level_mm) = match (overrides.joint_centre, ankle, overrides.limb) {
-            (Some(centre), ankle, limb) => {
-                notes.push("joint level: given".into());
-                let guess = ankle.map_or(LimbKind::Other, |_| LimbKind::LowerLeg);
-                let level = sections.direction.dot(&Vector3::from(centre));
-                (limb.unwrap_or(guess), level)
-            }
-            (None, Some(ankle), _) => {
-                notes.push(format!(
-                    "joint level: gap between plafond and talar dome, {:.0} HU darker than the \
-                     bone on either side",
-                    ankle.depth_hu
-                ));
-                (LimbKind::LowerLeg, ankle.level_mm)
-            }
-            (None, None, Some(LimbKind::LowerLeg)) => return Err(LandmarkError::NoAnkle),
-            (None, None, limb) => {
-                let why = if limb.is_none() {
-                    "no ankle found"
-                } else {
-                    "other limb"
-                };
-                notes.push(format!("joint level: middle of the limb ({why})"));
-                (LimbKind::Other, 0.5 * (low + high))
-            }
+        let given = overrides.joint_centre.map(Vector3::from);
+        let level_mm = match (given, joint_mm) {
+            (Some(centre), _) => sections.direction.dot(&centre),
+            (None, Some(level)) => level,
+            (None, None) => 0.5 * (low + high),
         };
+        notes.extend(joint_notes(kind, given.is_some(), &found));
         Ok(Self {
             kind,
             sections,
             level_mm,
+            knee,
+            joints: found,
             extent_mm: [low - level_mm, high - level_mm],
         })
     }
@@ -104,16 +89,20 @@ impl<'a> Reference<'a> {
         notes: &mut Vec<String>,
     ) -> Result<(AxisRegion, AxisRegion, AxisSource), LandmarkError> {
         let (joint, calf) = self.default_ranges(overrides, notes)?;
-        if calf[0] < joint[1] {
+        let may_be_distal = self.kind == LimbKind::Knee;
+        if calf[0] < joint[1] && !(may_be_distal && calf[1] <= joint[0]) {
             return Err(LandmarkError::Region {
                 name: "calf region",
                 from_mm: calf[0],
                 to_mm: calf[1],
-                problem: "does not lie proximal of the joint region",
+                problem: match may_be_distal {
+                    true => "overlaps the joint region",
+                    false => "does not lie proximal of the joint region",
+                },
             });
         }
         let wanted = overrides.axis_source.unwrap_or(match self.kind {
-            LimbKind::LowerLeg => AxisSource::Bone,
+            LimbKind::LowerLeg | LimbKind::Knee => AxisSource::Bone,
             LimbKind::Other => AxisSource::Limb,
         });
         let both = |source| {
@@ -158,6 +147,24 @@ impl<'a> Reference<'a> {
                 }
                 (JOINT_MM.map(|d| d * scale), CALF_MM.map(|d| d * scale))
             }
+            LimbKind::Knee => match (overrides.joint_region, overrides.calf_region) {
+                (Some(joint), Some(calf)) => (joint, calf),
+                _ => {
+                    let [joint, calf] = knee_ranges(self.extent_mm)?;
+                    notes.push(format!(
+                        "axis: {}",
+                        match (joint[1] <= 0.0, calf[1] <= 0.0) {
+                            (true, true) => "along the tibia's shaft",
+                            (false, false) => {
+                                "along the femur's shaft, which leans from the leg's long axis by about 6 \
+                                 degrees: the scan shows too little of the tibia"
+                            }
+                            _ => "through tibia and femur: the scan shows too little of either shaft",
+                        }
+                    ));
+                    (joint, calf)
+                }
+            },
             LimbKind::Other => {
                 let [low, high] = self.extent_mm;
                 let at = |share: f64| low + share * (high - low);
@@ -187,6 +194,9 @@ impl<'a> Reference<'a> {
             }
             let centre = match source {
                 AxisSource::Limb => self.sections.limb_centre(slice),
+                AxisSource::Bone if self.kind == LimbKind::Knee => {
+                    bone_centre(&self.sections, slice)
+                }
                 AxisSource::Bone => self.sections.bones(slice).first().map(|b| b.centre),
             };
             if let Some(centre) = centre {

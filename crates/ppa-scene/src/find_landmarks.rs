@@ -5,6 +5,7 @@ use ppa_ct::Volume;
 use ppa_mesh::Mesh;
 
 use crate::axis_regions::Reference;
+use crate::knee::Knee;
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
 use crate::landmarks::{Landmarks, Side};
 use crate::plane::first_not_finite;
@@ -13,19 +14,29 @@ use crate::supporting_plane::{check_plane, plane_under};
 /// Finds joint level, rotation axis and supporting plane of a limb.
 ///
 /// `limb` is the skin in the `ct` frame, `mask` one value per voxel of `volume`: whether it
-/// belongs to the limb. Scans are patient scans (LPS), so proximal is superior; only when a lower
-/// leg shows its ankle the other way round is it turned, with a note.
+/// belongs to the limb. Scans are patient scans (LPS), so proximal is superior; only when a leg
+/// shows its joint the other way round is it turned, with a note.
 ///
-/// * Slices: the scan's own; where the tibia leans in them by more than 3 degrees, interpolated ones
+/// * Kind: a lower leg where an ankle is found, else a knee where one is; every joint found is in
+///   [`Landmarks::joints`]. Another limb only on request, or about a given joint centre.
+/// * Slices: the scan's own; where the shaft leans in them by more than 3 degrees, interpolated ones
 ///   across it.
 /// * Joint level of a lower leg: the gap between plafond and talar dome in a column along the
-///   tibia's shaft. Other limbs: the middle of the limb.
-/// * Axis: through the centres of two regions, 50 to 90 mm and 130 to 200 mm proximal of the joint
+///   tibia's shaft. Of a knee: the gap between condyles and plateau, half-way between its two
+///   compartments. Other limbs: the middle of the limb.
+/// * Axis of a lower leg: through the centres of two regions, 50 to 90 mm and 130 to 200 mm proximal of the joint
 ///   level, closer together when the scan is short; of other limbs around a quarter and three
 ///   quarters of the length. The centres are those of the tibia, because the paper wants the axis
 ///   to pass through the joint and a swelling moves the centre of the skin; without bone, or on
 ///   request, they are those of the limb's cross-sections.
-/// * Anterior: −y of the scan across the axis, so that angle 0 is the pose in the scan.
+/// * Axis of a knee: through the centre of the tibial plateau, along the tibia's shaft, 65 to 95 mm and
+///   110 to 150 mm distal of the joint. For an AP radiograph of the knee the leg is turned about its
+///   long axis from hip to ankle, along which the tibia runs; the femur's shaft, which leans from it
+///   by about 6 degrees, takes its place where less than 100 mm of tibia are seen, and both together where too
+///   little of either is.
+/// * Anterior: −y of the scan across the axis, so that angle 0 is the pose in the scan. Of a knee: square to the
+///   posterior condylar line, so that at angle 0 both condyles are equally far from the table; ±y of the scan
+///   where the scan cuts a condyle.
 /// * Π_P: the plane that touches the limb from behind at its lowest distal and proximal points
 ///   and is level from left to right. Its three points are the distal contact and two points 20 mm
 ///   left and right of the proximal contact, so that no part of the limb lies behind the plane.
@@ -59,7 +70,9 @@ pub fn find_landmarks(
     let mut notes = Vec::new();
     let reference = Reference::find(volume, mask, overrides, &mut notes)?;
     let (joint_region, calf_region, axis_source) = reference.regions(overrides, &mut notes)?;
-    let [low, high] = [joint_region, calf_region].map(|region| Point3::from(region.centre_mm));
+    let mut regions = [joint_region, calf_region];
+    regions.sort_by(|a, b| a.range_mm[0].total_cmp(&b.range_mm[0]));
+    let [low, high] = regions.map(|region| Point3::from(region.centre_mm));
     let direction = reference.sections.direction;
     let axis = (high - low)
         .try_normalize(1e-3)
@@ -71,16 +84,18 @@ pub fn find_landmarks(
             problem: "has the same centre as the joint region, or one that gives an axis more \
                       than 45 degrees off the scan's limb direction",
         })?;
-    let (axis_point, joint_centre) = match overrides.joint_centre {
-        Some(centre) => (Point3::from(centre), Point3::from(centre)),
+    let centre = overrides.joint_centre.map(Point3::from);
+    let (axis_point, joint_centre) = match centre.or(reference.knee.map(|knee| knee.centre)) {
+        Some(centre) => (centre, centre),
         None => {
             let rise = reference.level_mm - direction.dot(&low.coords);
             (low, low + axis * (rise / axis.dot(&direction)))
         }
     };
-    let anterior = match overrides.anterior {
-        Some(given) => Vector3::from(given),
-        None => -Vector3::y(),
+    let anterior = match (overrides.anterior, reference.knee) {
+        (Some(given), _) => Vector3::from(given),
+        (None, Some(knee)) => front_of(&knee, &mut notes),
+        (None, None) => -Vector3::y(),
     };
     if anterior.cross(&axis).norm() < 0.1 * anterior.norm() {
         return Err(LandmarkError::Override {
@@ -103,6 +118,7 @@ pub fn find_landmarks(
         joint_centre: joint_centre.coords.into(),
         plane_points: [[0.0; 3]; 3],
         notes,
+        joints: reference.joints,
     };
     match overrides.plane_points {
         Some(points) => {
@@ -112,4 +128,19 @@ pub fn find_landmarks(
         None => landmarks.plane_points = plane_under(limb, &landmarks)?,
     }
     Ok(landmarks)
+}
+
+/// The front of a knee: square to the line behind its condyles; the scan's where that line is not seen.
+fn front_of(knee: &Knee, notes: &mut Vec<String>) -> Vector3<f64> {
+    let front = Vector3::y() * knee.anterior.y.signum();
+    if !knee.by_condyles {
+        notes
+            .push("anterior: as in the scan, which does not show the back of both condyles".into());
+        return front;
+    }
+    let turned_deg = knee.anterior.angle(&front).to_degrees();
+    notes.push(format!(
+        "anterior: square to the posterior condylar line, {turned_deg:.0} degrees from the scan's"
+    ));
+    knee.anterior
 }

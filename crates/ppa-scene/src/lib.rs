@@ -11,11 +11,18 @@
 
 mod ankle;
 mod axis_regions;
+mod bone_spans;
 mod bump_sites;
+mod condyles;
 mod contact;
 mod device;
 mod find_landmarks;
 mod frames;
+mod hull;
+mod joints;
+mod knee;
+mod knee_gap;
+mod knee_regions;
 mod landmark_choices;
 mod landmarks;
 mod limb_sections;
@@ -40,7 +47,9 @@ pub use device::XrayDevice;
 pub use find_landmarks::find_landmarks;
 pub use frames::{Camera, Ct, Device, NotRigid, Patient, Rigid};
 pub use landmark_choices::{LandmarkError, LandmarkOverrides};
-pub use landmarks::{AxisRegion, AxisSource, Landmarks, LimbKind, Side};
+pub use landmarks::{
+    AxisRegion, AxisSource, FoundJoint, Joint, KneeLines, Landmarks, LimbKind, Side,
+};
 pub use place_error::PlaceError;
 pub use placement::{Contact, Placement, ct_from_device, medial_rotation, place, place_soft};
 pub use plane::Plane;

@@ -3,6 +3,7 @@
 mod boot;
 mod family;
 mod frames;
+mod knee;
 mod landmarks;
 mod placement;
 mod real_scans;
