@@ -1,9 +1,8 @@
 //! The joint level, and the two regions whose centres give the axis.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use ppa_ct::Volume;
 
-use crate::bone_spans::bone_centre;
 use crate::joints::{Joints, joint_notes, kind_of_limb};
 use crate::knee::Knee;
 use crate::knee_regions::knee_ranges;
@@ -22,6 +21,8 @@ pub(crate) struct Reference<'a> {
     pub(crate) level_mm: f64,
     /// The knee of a limb that is posed about it.
     pub(crate) knee: Option<Knee>,
+    /// Bone centres of such a limb, from proximal to distal.
+    bones: Vec<Point3<f64>>,
     /// Every joint that was found.
     pub(crate) joints: Vec<FoundJoint>,
     /// Lowest and highest level with limb in it, from the joint level, mm.
@@ -45,14 +46,15 @@ impl<'a> Reference<'a> {
         if joints.is_reversed {
             notes.push(REVERSED.into());
         }
+        let mut bones = Vec::new();
         let (shown, knee) = match kind {
             LimbKind::LowerLeg => (joints.ankle.map(|(s, ankle)| (s, ankle.level_mm)), None),
             LimbKind::Knee => {
-                let knee = joints.knee.as_ref().map(|(_, knee)| *knee);
-                let at = |s: &Sections, knee: &Knee| s.direction.dot(&knee.centre.coords);
-                let shown = joints.knee.map(|(s, knee)| {
-                    let level = at(&s, &knee);
-                    (s, level)
+                let knee = joints.knee.as_ref().map(|found| found.knee);
+                let shown = joints.knee.map(|found| {
+                    bones = found.bones;
+                    let level = found.sections.direction.dot(&found.knee.centre.coords);
+                    (found.sections, level)
                 });
                 (shown, knee)
             }
@@ -63,8 +65,17 @@ impl<'a> Reference<'a> {
             None => (Sections::along(volume, mask, &Vector3::z()), None),
         };
         let slices = sections.proximal_to_distal();
-        let level = |slice: Option<&usize>| slice.map_or(0.0, |s| sections.level(*s));
-        let (high, low) = (level(slices.first()), level(slices.last()));
+        let levels: Vec<f64> = match bones.is_empty() {
+            true => slices.iter().map(|slice| sections.level(*slice)).collect(),
+            false => bones
+                .iter()
+                .map(|bone| sections.direction.dot(&bone.coords))
+                .collect(),
+        };
+        let (high, low) = (
+            levels.first().copied().unwrap_or(0.0),
+            levels.last().copied().unwrap_or(0.0),
+        );
         let given = overrides.joint_centre.map(Vector3::from);
         let level_mm = match (given, joint_mm) {
             (Some(centre), _) => sections.direction.dot(&centre),
@@ -77,6 +88,7 @@ impl<'a> Reference<'a> {
             sections,
             level_mm,
             knee,
+            bones,
             joints: found,
             extent_mm: [low - level_mm, high - level_mm],
         })
@@ -184,19 +196,23 @@ impl<'a> Reference<'a> {
         source: AxisSource,
     ) -> Result<AxisRegion, LandmarkError> {
         let [from_mm, to_mm] = range_mm;
+        // A level that went through a file and back may have lost its last bit.
+        let there = |level: f64| (from_mm - 1e-6..=to_mm + 1e-6).contains(&(level - self.level_mm));
         let (mut sum, mut count) = (Vector3::zeros(), 0_u32);
+        if source == AxisSource::Bone && !self.bones.is_empty() {
+            let level = |bone: &Point3<f64>| self.sections.direction.dot(&bone.coords);
+            for bone in self.bones.iter().filter(|bone| there(level(bone))) {
+                sum += bone.coords;
+                count += 1;
+            }
+            return region(name, range_mm, source, sum, count);
+        }
         for slice in 0..self.sections.count() {
-            let above = self.sections.level(slice) - self.level_mm;
-            // A level that went through a file and back may have lost its last bit.
-            let there = (from_mm - 1e-6..=to_mm + 1e-6).contains(&above);
-            if !there || !self.sections.is_whole(slice) {
+            if !there(self.sections.level(slice)) || !self.sections.is_whole(slice) {
                 continue;
             }
             let centre = match source {
                 AxisSource::Limb => self.sections.limb_centre(slice),
-                AxisSource::Bone if self.kind == LimbKind::Knee => {
-                    bone_centre(&self.sections, slice)
-                }
                 AxisSource::Bone => self.sections.bones(slice).first().map(|b| b.centre),
             };
             if let Some(centre) = centre {
@@ -204,20 +220,32 @@ impl<'a> Reference<'a> {
                 count += 1;
             }
         }
-        if count == 0 {
-            return Err(LandmarkError::Region {
-                name,
-                from_mm,
-                to_mm,
-                problem: match source {
-                    AxisSource::Limb => "holds no part of the limb",
-                    AxisSource::Bone => "holds no bone",
-                },
-            });
-        }
-        Ok(AxisRegion {
-            range_mm,
-            centre_mm: (sum / f64::from(count)).into(),
-        })
+        region(name, range_mm, source, sum, count)
     }
+}
+
+/// The mean of `count` centres with this sum.
+fn region(
+    name: &'static str,
+    range_mm: [f64; 2],
+    source: AxisSource,
+    sum: Vector3<f64>,
+    count: u32,
+) -> Result<AxisRegion, LandmarkError> {
+    let [from_mm, to_mm] = range_mm;
+    if count == 0 {
+        return Err(LandmarkError::Region {
+            name,
+            from_mm,
+            to_mm,
+            problem: match source {
+                AxisSource::Limb => "holds no part of the limb",
+                AxisSource::Bone => "holds no bone",
+            },
+        });
+    }
+    Ok(AxisRegion {
+        range_mm,
+        centre_mm: (sum / f64::from(count)).into(),
+    })
 }

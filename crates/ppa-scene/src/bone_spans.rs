@@ -1,6 +1,7 @@
 //! What the largest bone of each slice spans, and where it is as broad as a knee.
 
 use nalgebra::{Point3, Vector2, Vector3};
+use ppa_ct::Volume;
 
 use crate::hull::Hull;
 use crate::limb_sections::Sections;
@@ -48,13 +49,21 @@ pub(crate) struct Span {
     pub(crate) hull: Hull,
     /// Whether a second bone as thick as a fibula lies beside it.
     pub(crate) has_fibula: bool,
+    /// Whether it reaches a face of the scan, so that part of it may be missing.
+    pub(crate) is_cut: bool,
 }
 
 impl Span {
-    /// `None` for a slice without bone.
-    pub(crate) fn of_slice(sections: &Sections, slice: usize, frame: &Lengthwise) -> Option<Self> {
-        /// Vessels with contrast agent are thinner.
-        const FIBULA: std::ops::Range<f64> = 0.12..0.7;
+    /// `None` for a slice without bone; `volume` is the scan that the slices were cut from.
+    fn of_slice(
+        volume: &Volume,
+        sections: &Sections,
+        slice: usize,
+        frame: &Lengthwise,
+    ) -> Option<Self> {
+        /// Vessels with contrast agent are thinner than a fibula.
+        const FIBULA_MM2: f64 = 65.0;
+        const MOST_OF_TIBIA: f64 = 0.7;
         let pieces = sections.bone_pieces(slice);
         let hulls = pieces.into_iter().filter_map(|piece| {
             Hull::around(piece.iter().map(|p| frame.flat(&p.coords)).collect())
@@ -63,26 +72,41 @@ impl Span {
         hulls.sort_by(|a, b| b.area_mm2.total_cmp(&a.area_mm2));
         let second_mm2 = hulls.get(1).map_or(0.0, |second| second.area_mm2);
         let hull = hulls.into_iter().next()?;
+        let level_mm = sections.level(slice);
         Some(Self {
-            level_mm: sections.level(slice),
-            has_fibula: FIBULA.contains(&(second_mm2 / hull.area_mm2)),
+            level_mm,
+            has_fibula: (FIBULA_MM2..MOST_OF_TIBIA * hull.area_mm2).contains(&second_mm2),
+            is_cut: [Vector2::x(), Vector2::y()]
+                .iter()
+                .any(|along| hull_is_cut(volume, frame, &hull, level_mm, along)),
             hull,
         })
     }
 }
 
-/// The largest bone of every slice that shows one, from proximal to distal.
-pub(crate) fn spans(sections: &Sections, frame: &Lengthwise) -> Vec<Span> {
-    let slices = sections.proximal_to_distal();
-    let span = |slice| Span::of_slice(sections, slice, frame);
-    slices.into_iter().filter_map(span).collect()
+/// Whether the scan ends where a bone does along a direction of its slice.
+pub(crate) fn hull_is_cut(
+    volume: &Volume,
+    frame: &Lengthwise,
+    hull: &Hull,
+    level_mm: f64,
+    along: &Vector2<f64>,
+) -> bool {
+    const MARGIN_MM: f64 = 3.0;
+    let [low, high] = hull.extent(along);
+    [low - MARGIN_MM, high + MARGIN_MM].into_iter().any(|end| {
+        let place = hull.centre + along * (end - hull.centre.dot(along));
+        volume.sample(&frame.point(&place, level_mm)).is_none()
+    })
 }
 
-/// Centre of the convex hull of a slice's largest bone.
-pub(crate) fn bone_centre(sections: &Sections, slice: usize) -> Option<Point3<f64>> {
-    let frame = Lengthwise::along(&sections.direction);
-    let span = Span::of_slice(sections, slice, &frame)?;
-    Some(frame.point(&span.hull.centre, span.level_mm))
+/// The largest bone of every slice that shows one, from proximal to distal; `volume` is the scan that the slices were cut
+/// from.
+pub(crate) fn spans(volume: &Volume, sections: &Sections, frame: &Lengthwise) -> Vec<Span> {
+    let span = |slice| Span::of_slice(volume, sections, slice, frame);
+    let mut spans: Vec<Span> = (0..sections.count()).filter_map(span).collect();
+    spans.sort_by(|a, b| b.level_mm.total_cmp(&a.level_mm));
+    spans
 }
 
 /// A stretch of the limb in which a bone is as broad as a knee.
@@ -134,7 +158,7 @@ pub(crate) struct Shafts {
 }
 
 impl BroadZone {
-    /// Slices within a distance from the end of the stretch: `side` is 1 for above, −1 for below.
+    /// Slices that show the whole bone within a distance from the end of the stretch: `side` is 1 for above, −1 for below.
     fn beyond<'a>(&self, spans: &'a [Span], side: f64, far_mm: [f64; 2]) -> Vec<&'a Span> {
         let end = if side > 0.0 {
             self.range_mm[1]

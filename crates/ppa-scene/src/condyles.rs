@@ -189,16 +189,21 @@ impl Condyles<'_> {
         let rows = |levels: &[f64]| {
             let mut holes = Vec::new();
             for above in levels {
-                for forward in [10.0, 14.0, 18.0] {
-                    let back = rear_mm - forward - centre.dot(posterior);
-                    let solid: Vec<f64> = steps(-45.0, 45.0, 1.0)
-                        .filter(|aside| {
-                            let place = centre + side * *aside + posterior * back;
-                            let hu = density(self.volume, self.frame, &place, self.gap_mm + above);
-                            hu.is_some_and(|hu| hu >= SOLID_HU)
-                        })
-                        .collect();
-                    holes.push(widest_hole(&solid));
+                for forward in [12.0, 16.0, 20.0] {
+                    let level_mm = self.gap_mm + above;
+                    let is_solid = |aside: f64, forward: f64| {
+                        let back = rear_mm - forward - centre.dot(posterior);
+                        let place = centre + side * aside + posterior * back;
+                        let hu = density(self.volume, self.frame, &place, level_mm);
+                        hu.is_some_and(|hu| hu >= SOLID_HU)
+                    };
+                    let row = steps(-45.0, 45.0, 1.0).filter(|aside| is_solid(*aside, forward));
+                    let hole = widest_hole(&row.collect::<Vec<f64>>());
+                    // A notch opens to the back, unlike marrow inside a shell.
+                    let is_open = |aside: &f64| {
+                        !steps(-2.0, forward, 1.0).any(|ahead| is_solid(*aside, ahead))
+                    };
+                    holes.push(hole.filter(is_open));
                 }
             }
             holes
@@ -207,7 +212,7 @@ impl Condyles<'_> {
             holes.iter().flatten().count() as f64 / holes.len().max(1) as f64
         };
         let above = rows(&[6.0, 9.0, 12.0, 15.0, 18.0]);
-        let below = rows(&[-4.0, -6.0, -8.0, -10.0]);
+        let below = rows(&[-8.0, -10.0, -12.0, -14.0]);
         let (above_share, below_share) = (share(&above), share(&below));
         if above_share < 0.5 || below_share > above_share - 0.3 {
             return None;

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use ppa_ct::Volume;
 
 use crate::ankle::{Ankle, find_ankle, shaft_direction};
-use crate::knee::{Knee, find_knee};
+use crate::knee::{FoundKnee, Knee, find_knee};
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
 use crate::landmarks::{FoundJoint, Joint, KneeLines, LimbKind};
 use crate::limb_sections::Sections;
@@ -12,7 +12,7 @@ use crate::limb_sections::Sections;
 /// What was found, each with slices across the shaft beside it.
 pub(crate) struct Joints<'a> {
     pub(crate) ankle: Option<(Sections<'a>, Ankle)>,
-    pub(crate) knee: Option<(Sections<'a>, Knee)>,
+    pub(crate) knee: Option<FoundKnee<'a>>,
     /// Whether proximal is inferior in the scan.
     pub(crate) is_reversed: bool,
 }
@@ -27,8 +27,10 @@ impl<'a> Joints<'a> {
         for (towards_proximal, is_reversed) in [(up, false), (-up, true)] {
             let knee = find_knee(volume, mask, &towards_proximal)?;
             let sections = across_the_shaft(volume, mask, &towards_proximal)?;
-            let ankle = find_ankle(&sections)
-                .filter(|ankle| knee.as_ref().is_none_or(|(_, knee)| !is_at(ankle, knee)));
+            let is_knee =
+                |ankle: &Ankle| knee.as_ref().is_some_and(|found| is_at(ankle, &found.knee));
+            let ankle =
+                find_ankle(&sections).filter(|ankle| is_leg(&sections, ankle) && !is_knee(ankle));
             if ankle.is_some() || knee.is_some() {
                 return Ok(Self {
                     ankle: ankle.map(|ankle| (sections, ankle)),
@@ -57,7 +59,7 @@ impl<'a> Joints<'a> {
             gap_depth_hu: ankle.depth_hu,
             lines: None,
         });
-        let knee = self.knee.iter().map(|(_, knee)| FoundJoint {
+        let knee = self.knee.iter().map(|FoundKnee { knee, .. }| FoundJoint {
             joint: Joint::Knee,
             centre_mm: knee.centre.into(),
             gap_depth_hu: knee.depth_hu,
@@ -87,6 +89,21 @@ fn across_the_shaft<'a>(
         sections = Sections::across(volume, mask, &shaft)?;
     }
     Ok(sections)
+}
+
+/// Whether the limb above an ankle is no thicker than a lower leg: in a trunk, spine and pelvis may narrow and widen as
+/// a tibia does.
+fn is_leg(sections: &Sections, ankle: &Ankle) -> bool {
+    const ABOVE_MM: std::ops::Range<f64> = 5.0..60.0;
+    /// A girth of 60 cm.
+    const MOST_MM2: f64 = 28_600.0;
+    let above = |slice: &usize| ABOVE_MM.contains(&(sections.level(*slice) - ankle.level_mm));
+    let slices = sections.proximal_to_distal().into_iter().filter(above);
+    let mut areas: Vec<f64> = slices.map(|slice| sections.limb_mm2(slice)).collect();
+    areas.sort_unstable_by(f64::total_cmp);
+    areas
+        .get(areas.len() / 2)
+        .is_none_or(|median| *median <= MOST_MM2)
 }
 
 /// Whether an ankle was found where a knee is.

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector2, Vector3};
 use ppa_ct::{Volume, VolumeError};
 
-use crate::bone_spans::{BroadZone, Lengthwise, Span, broad_zones, spans};
+use crate::bone_spans::{BroadZone, Lengthwise, Span, broad_zones, hull_is_cut, spans};
 use crate::condyles::Condyles;
 use crate::knee_gap::Gap;
 use crate::limb_sections::Sections;
@@ -26,6 +26,15 @@ pub(crate) struct Knee {
     pub(crate) is_cut: bool,
 }
 
+/// A knee with what its axis follows from.
+pub(crate) struct FoundKnee<'a> {
+    pub(crate) knee: Knee,
+    /// Slices across the shaft.
+    pub(crate) sections: Sections<'a>,
+    /// Centres of femur and tibia in the slices that show them whole, from proximal to distal.
+    pub(crate) bones: Vec<Point3<f64>>,
+}
+
 /// Looks for a knee in a limb: a stretch of bone as broad as condyles and plateau, a single shaft above or one with a
 /// fibula below, a gap through most of its columns, and a notch that opens to the back above that gap only.
 ///
@@ -38,23 +47,28 @@ pub(crate) fn find_knee<'a>(
     volume: &'a Volume,
     mask: &'a [bool],
     towards_proximal: &Vector3<f64>,
-) -> Result<Option<(Sections<'a>, Knee)>, VolumeError> {
+) -> Result<Option<FoundKnee<'a>>, VolumeError> {
     let first = Sections::along(volume, mask, towards_proximal);
     let frame = Lengthwise::along(&first.direction);
-    let first_spans = spans(&first, &frame);
+    let first_spans = spans(volume, &first, &frame);
     for zone in broad_zones(&first_spans) {
-        let view = View {
+        let in_the_scan = || View {
             sections: None,
             direction: first.direction,
             frame,
             spans: first_spans.clone(),
-            zone,
+            zone: zone.clone(),
         };
-        let Some(view) = view.across_the_shaft(volume, mask)? else {
+        let Some(view) = in_the_scan().across_the_shaft(volume, mask)? else {
             continue;
         };
-        if let Some(knee) = view.knee(volume) {
-            return Ok(Some((view.sections.unwrap_or(first), knee)));
+        // A plateau that slopes far to the back may lie level in the scan, though not across the shaft.
+        if let Some(knee) = view.knee(volume).or_else(|| in_the_scan().knee(volume)) {
+            return Ok(Some(FoundKnee {
+                knee,
+                bones: view.bones(),
+                sections: view.sections.unwrap_or(first),
+            }));
         }
     }
     Ok(None)
@@ -89,7 +103,7 @@ impl<'a> View<'a> {
             let Some(shaft) = aslant else { break };
             let sections = Sections::across(volume, mask, &shaft)?;
             let frame = Lengthwise::along(&shaft);
-            let spans = spans(&sections, &frame);
+            let spans = spans(volume, &sections, &frame);
             let level = shaft.dot(&self.middle().coords);
             let here = |zone: &BroadZone| (zone.range_mm[0]..=zone.range_mm[1]).contains(&level);
             let Some(zone) = broad_zones(&spans).into_iter().find(here) else {
@@ -118,6 +132,14 @@ impl View<'_> {
         let mut spans = self.within(low_mm, high_mm);
         spans.retain(|span| 2.0 * span.hull.area_mm2 >= self.zone.most_mm2);
         spans
+    }
+
+    /// Centres of the bones that slices show whole.
+    fn bones(&self) -> Vec<Point3<f64>> {
+        let whole = self.spans.iter().filter(|span| !span.is_cut);
+        whole
+            .map(|span| self.frame.point(&span.hull.centre, span.level_mm))
+            .collect()
     }
 
     /// A point in the middle of the stretch.
@@ -192,8 +214,6 @@ impl View<'_> {
     ) -> Option<(Vector2<f64>, bool)> {
         /// Above the head of the fibula.
         const BELOW_MM: [f64; 2] = [4.0, 12.0];
-        /// From the bone to the face of the scan.
-        const MARGIN_MM: f64 = 3.0;
         let (gap_place, gap_mm) = gap.centre()?;
         let side = Vector2::new(-posterior.y, posterior.x);
         let slices = self.large(gap_mm - BELOW_MM[1], gap_mm - BELOW_MM[0]);
@@ -207,14 +227,9 @@ impl View<'_> {
             .sum::<Vector2<f64>>()
             / n;
         let cut = |along: &Vector2<f64>| {
-            slices.iter().any(|span| {
-                let ends = span.hull.extent(along);
-                let beyond = [ends[0] - MARGIN_MM, ends[1] + MARGIN_MM];
-                let place =
-                    |end: f64| span.hull.centre + along * (end - span.hull.centre.dot(along));
-                let shown = |end: f64| volume.sample(&self.frame.point(&place(end), span.level_mm));
-                beyond.into_iter().any(|end| shown(end).is_none())
-            })
+            let cut =
+                |span: &&Span| hull_is_cut(volume, &self.frame, &span.hull, span.level_mm, along);
+            slices.iter().any(cut)
         };
         let (cut_aside, cut_along) = (cut(&side), cut(posterior));
         let aside = if cut_aside {

@@ -109,6 +109,11 @@ impl<'a> Sections<'a> {
         self.mean(slice, self.limb_pixels(slice))
     }
 
+    /// Area of the limb in a slice, mm².
+    pub(crate) fn limb_mm2(&self, slice: usize) -> f64 {
+        self.limb_pixels(slice).count() as f64 * self.pixel_mm2()
+    }
+
     /// The bones of a slice, largest outline first.
     pub(crate) fn bones(&self, slice: usize) -> Vec<BoneSection> {
         let (nu, nv) = self.extent();

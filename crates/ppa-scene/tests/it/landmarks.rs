@@ -223,8 +223,12 @@ fn a_single_slice_is_refused() {
     for (index, inside) in mask.iter_mut().enumerate() {
         *inside &= index / (ni * nj) == nk / 2;
     }
+    let other = LandmarkOverrides {
+        limb: Some(LimbKind::Other),
+        ..automatic()
+    };
     let side = Side::Right;
-    let error = find_landmarks(&P01.volume, &P01.skin, &mask, side, &automatic()).unwrap_err();
+    let error = find_landmarks(&P01.volume, &P01.skin, &mask, side, &other).unwrap_err();
     assert!(matches!(error, LandmarkError::Region { .. }), "{error}");
 }
 

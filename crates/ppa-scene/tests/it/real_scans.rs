@@ -95,7 +95,9 @@ fn knee_above_a_calf() {
         assert!(turned < 4.0, "front {turned:.1} degrees off");
         // Through the middle of the tibia in slices 10 and 35.
         let shaft = Vector3::new(9.1, -32.5, 81.75).normalize();
-        let lean = shaft.angle(&landmarks.axis_direction.into()).to_degrees();
+        let lean = shaft
+            .angle(&Vector3::from(landmarks.axis_direction))
+            .to_degrees();
         assert!(lean < 2.5, "axis {lean:.1} degrees from the tibia's");
         rests_at_every_angle(&limb, &landmarks);
     }
@@ -119,7 +121,9 @@ fn knee_below_a_thigh() {
     assert!(found.lines.as_ref().unwrap().plateau_is_cut);
     // Through the middle of the femur in slices 30 and 46.
     let shaft = Vector3::new(3.0, -6.0, 52.3).normalize();
-    let lean = shaft.angle(&landmarks.axis_direction.into()).to_degrees();
+    let lean = shaft
+        .angle(&Vector3::from(landmarks.axis_direction))
+        .to_degrees();
     assert!(lean < 3.0, "axis {lean:.1} degrees from the femur's");
     rests_at_every_angle(&limb, &landmarks);
 }

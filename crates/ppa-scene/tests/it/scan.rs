@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use nalgebra::{Affine3, Matrix4, Point3, Rotation3, Translation3, Vector3};
 use ppa_ct::phantom::{LowerLeg, TableTop};
-use ppa_ct::{Grid, Volume};
+use ppa_ct::{Grid, Interpolation, Volume};
 use ppa_mesh::{Border, Mesh, iso_surface};
 use ppa_scene::{LandmarkError, LandmarkOverrides, Landmarks, Side, find_landmarks};
 
