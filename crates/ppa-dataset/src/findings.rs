@@ -70,6 +70,16 @@ pub enum FindingCode {
     JointOutside,
     /// The joint lies elsewhere than the ankle that the scan shows.
     JointOffAnkle,
+    /// The joint lay beside the axis that a person gave.
+    JointOffAxis,
+    /// The scan shows another joint than the one the limb is posed about.
+    OtherJoint,
+    /// The scan cuts the tibial plateau of a knee.
+    PlateauCut,
+    /// The axis of a knee runs along the femur, or through femur and tibia.
+    KneeAxis,
+    /// The scan does not show the back of both condyles of a knee.
+    CondylesNotSeen,
     /// The limb lies the other way round than the scan's orientation says.
     ProximalIsInferior,
 }

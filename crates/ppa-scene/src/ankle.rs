@@ -10,6 +10,8 @@ use crate::limb_sections::Sections;
 pub(crate) struct Ankle {
     /// Level of the joint gap along the scan's limb direction, mm.
     pub(crate) level_mm: f64,
+    /// The point of the tibia's shaft at that level.
+    pub(crate) centre: Point3<f64>,
     /// How much less dense the gap is than the bone on either side of it.
     pub(crate) depth_hu: f64,
 }
@@ -76,8 +78,10 @@ pub(crate) fn find_ankle(sections: &Sections) -> Option<Ankle> {
     let (i, depth_hu) = dips
         .into_iter()
         .find(|(_, depth)| *depth >= MIN_DEPTH_HU.max(0.5 * deepest))?;
+    let level_mm = vertex(&column, i);
     Some(Ankle {
-        level_mm: vertex(&column, i),
+        level_mm,
+        centre: line.at(level_mm),
         depth_hu,
     })
 }

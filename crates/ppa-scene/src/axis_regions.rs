@@ -1,31 +1,15 @@
 //! The joint level, and the two regions whose centres give the axis.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use ppa_ct::Volume;
 
-use crate::ankle::{find_ankle, shaft_direction};
+use crate::joints::{Joints, joint_notes, kind_of_limb};
+use crate::knee::Knee;
+use crate::knee_regions::knee_ranges;
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
 use crate::landmark_notes::LandmarkNote;
-use crate::landmarks::{AxisRegion, AxisSource, LimbKind};
+use crate::landmarks::{AxisRegion, AxisSource, FoundJoint, LimbKind};
 use crate::limb_sections::Sections;
-
-/// Slices across the tibia: the scan's own, or interpolated ones if it leans by more than 3 degrees.
-fn across_the_shaft<'a>(
-    volume: &'a Volume,
-    mask: &'a [bool],
-    towards_proximal: &Vector3<f64>,
-) -> Result<Sections<'a>, LandmarkError> {
-    const LEAN: f64 = 0.9986; // cos 3°
-    const STEEPEST: f64 = 0.82; // cos 35°
-    let mut sections = Sections::along(volume, mask, towards_proximal);
-    for _ in 0..2 {
-        let aslant = shaft_direction(&sections)
-            .filter(|shaft| (STEEPEST..LEAN).contains(&shaft.dot(&sections.direction)));
-        let Some(shaft) = aslant else { break };
-        sections = Sections::across(volume, mask, &shaft)?;
-    }
-    Ok(sections)
-}
 
 /// A region that is left open ends or begins this far from the one that is given, at least, mm.
 const APART_MM: f64 = 10.0;
@@ -45,51 +29,78 @@ pub(crate) struct Reference<'a> {
     pub(crate) sections: Sections<'a>,
     /// Joint level along the scan's limb direction, mm.
     pub(crate) level_mm: f64,
+    /// The knee of a limb that is posed about it.
+    pub(crate) knee: Option<Knee>,
+    /// Bone centres of such a limb, from proximal to distal.
+    bones: Vec<Point3<f64>>,
+    /// Every joint that was found.
+    pub(crate) joints: Vec<FoundJoint>,
     /// Lowest and highest level with limb in it, from the joint level, mm.
     extent_mm: [f64; 2],
 }
 
 impl<'a> Reference<'a> {
-    /// Finds the joint level, or takes the middle of the limb.
+    /// Finds the joint level, or takes the middle of a limb that was said to be another one.
     pub(crate) fn find(
         volume: &'a Volume,
         mask: &'a [bool],
         overrides: &LandmarkOverrides,
         notes: &mut Vec<LandmarkNote>,
     ) -> Result<Self, LandmarkError> {
-        let mut sections = Sections::along(volume, mask, &Vector3::z());
-        let mut ankle = None;
-        if overrides.limb != Some(LimbKind::Other) {
-            for towards_proximal in [Vector3::z(), -Vector3::z()] {
-                let tried = across_the_shaft(volume, mask, &towards_proximal)?;
-                ankle = find_ankle(&tried);
-                if ankle.is_some() {
-                    sections = tried;
-                    break;
-                }
-            }
-        }
-        let slices = sections.proximal_to_distal();
-        let level = |slice: Option<&usize>| slice.map_or(0.0, |s| sections.level(*s));
-        let (high, low) = (level(slices.first()), level(slices.last()));
-        let (kind, level_mm) = match (overrides.joint_centre, ankle, overrides.limb) {
-            (Some(centre), ankle, limb) => {
-                let guess = ankle.map_or(LimbKind::Other, |_| LimbKind::LowerLeg);
-                let level = sections.direction.dot(&Vector3::from(centre));
-                notes.extend(ankle.map(|ankle| ankle.note(level)));
-                (limb.unwrap_or(guess), level)
-            }
-            (None, Some(ankle), _) => {
-                notes.push(ankle.note(ankle.level_mm));
-                (LimbKind::LowerLeg, ankle.level_mm)
-            }
-            (None, None, Some(LimbKind::LowerLeg)) => return Err(LandmarkError::NoAnkle),
-            (None, None, _) => (LimbKind::Other, 0.5 * (low + high)),
+        let joints = match overrides.limb {
+            Some(LimbKind::Other) => Joints::none(),
+            _ => Joints::find(volume, mask)?,
         };
+        let found = joints.found();
+        let kind = kind_of_limb(overrides, &found)?;
+        let ankle = joints.ankle.as_ref().map(|(_, ankle)| *ankle);
+        let mut bones = Vec::new();
+        let (shown, knee) = match kind {
+            LimbKind::LowerLeg => (joints.ankle.map(|(s, ankle)| (s, ankle.level_mm)), None),
+            LimbKind::Knee => {
+                let knee = joints.knee.as_ref().map(|found| found.knee);
+                let shown = joints.knee.map(|found| {
+                    bones = found.bones;
+                    let level = found.sections.direction.dot(&found.knee.centre.coords);
+                    (found.sections, level)
+                });
+                (shown, knee)
+            }
+            LimbKind::Other => (None, None),
+        };
+        let (sections, joint_mm) = match shown {
+            Some((sections, level)) => (sections, Some(level)),
+            None => (Sections::along(volume, mask, &Vector3::z()), None),
+        };
+        let slices = sections.proximal_to_distal();
+        let levels: Vec<f64> = match bones.is_empty() {
+            true => slices.iter().map(|slice| sections.level(*slice)).collect(),
+            false => bones
+                .iter()
+                .map(|bone| sections.direction.dot(&bone.coords))
+                .collect(),
+        };
+        let (high, low) = (
+            levels.first().copied().unwrap_or(0.0),
+            levels.last().copied().unwrap_or(0.0),
+        );
+        let given = overrides.joint_centre.map(Vector3::from);
+        let level_mm = match (given, joint_mm) {
+            (Some(centre), _) => sections.direction.dot(&centre),
+            (None, Some(level)) => level,
+            (None, None) => 0.5 * (low + high),
+        };
+        notes.extend(joint_notes(kind, &found));
+        if kind == LimbKind::LowerLeg {
+            notes.extend(ankle.map(|ankle| ankle.note(level_mm)));
+        }
         Ok(Self {
             kind,
             sections,
             level_mm,
+            knee,
+            bones,
+            joints: found,
             extent_mm: [low - level_mm, high - level_mm],
         })
     }
@@ -100,16 +111,20 @@ impl<'a> Reference<'a> {
         overrides: &LandmarkOverrides,
     ) -> Result<(AxisRegion, AxisRegion, AxisSource), LandmarkError> {
         let (joint, calf) = self.default_ranges(overrides)?;
-        if calf[0] < joint[1] {
+        let may_be_distal = self.kind == LimbKind::Knee;
+        if calf[0] < joint[1] && !(may_be_distal && calf[1] <= joint[0]) {
             return Err(LandmarkError::Region {
                 name: "calf region",
                 from_mm: calf[0],
                 to_mm: calf[1],
-                problem: "does not lie proximal of the joint region",
+                problem: match may_be_distal {
+                    true => "overlaps the joint region",
+                    false => "does not lie proximal of the joint region",
+                },
             });
         }
         let wanted = overrides.axis_source.unwrap_or(match self.kind {
-            LimbKind::LowerLeg => AxisSource::Bone,
+            LimbKind::LowerLeg | LimbKind::Knee => AxisSource::Bone,
             LimbKind::Other => AxisSource::Limb,
         });
         let both = |source| {
@@ -174,6 +189,13 @@ impl<'a> Reference<'a> {
                 let scale = (reach / CALF_MM[1]).min(1.0);
                 (JOINT_MM.map(|d| d * scale), CALF_MM.map(|d| d * scale))
             }
+            LimbKind::Knee => match (overrides.joint_region, overrides.calf_region) {
+                (Some(joint), Some(calf)) => (joint, calf),
+                (joint, calf) => {
+                    let [near, far] = knee_ranges(self.extent_mm)?;
+                    return Ok((joint.unwrap_or(near), calf.unwrap_or(far)));
+                }
+            },
             LimbKind::Other => {
                 let [low, high] = self.extent_mm;
                 let at = |share: f64| low + share * (high - low);
@@ -197,7 +219,7 @@ impl<'a> Reference<'a> {
         match self.kind {
             _ if to + APART_MM <= calf_begins => [from, to],
             LimbKind::LowerLeg if scale >= LEAST_SCALE => [from * scale, to * scale],
-            LimbKind::LowerLeg => [from, to],
+            LimbKind::LowerLeg | LimbKind::Knee => [from, to],
             LimbKind::Other => {
                 let end = calf_begins - APART_MM;
                 [(end - (to - from)).max(self.extent_mm[0]), end]
@@ -212,12 +234,19 @@ impl<'a> Reference<'a> {
         source: AxisSource,
     ) -> Result<AxisRegion, LandmarkError> {
         let [from_mm, to_mm] = range_mm;
+        // A level that went through a file and back may have lost its last bit.
+        let there = |level: f64| (from_mm - 1e-6..=to_mm + 1e-6).contains(&(level - self.level_mm));
         let (mut sum, mut count) = (Vector3::zeros(), 0_u32);
+        if source == AxisSource::Bone && !self.bones.is_empty() {
+            let level = |bone: &Point3<f64>| self.sections.direction.dot(&bone.coords);
+            for bone in self.bones.iter().filter(|bone| there(level(bone))) {
+                sum += bone.coords;
+                count += 1;
+            }
+            return region(name, range_mm, source, sum, count);
+        }
         for slice in 0..self.sections.count() {
-            let above = self.sections.level(slice) - self.level_mm;
-            // A level that went through a file and back may have lost its last bit.
-            let there = (from_mm - 1e-6..=to_mm + 1e-6).contains(&above);
-            if !there || !self.sections.is_whole(slice) {
+            if !there(self.sections.level(slice)) || !self.sections.is_whole(slice) {
                 continue;
             }
             let centre = match source {
@@ -229,20 +258,32 @@ impl<'a> Reference<'a> {
                 count += 1;
             }
         }
-        if count == 0 {
-            return Err(LandmarkError::Region {
-                name,
-                from_mm,
-                to_mm,
-                problem: match source {
-                    AxisSource::Bone => "holds no bone",
-                    AxisSource::Limb | AxisSource::Given => "holds no part of the limb",
-                },
-            });
-        }
-        Ok(AxisRegion {
-            range_mm,
-            centre_mm: (sum / f64::from(count)).into(),
-        })
+        region(name, range_mm, source, sum, count)
     }
+}
+
+/// The mean of `count` centres with this sum.
+fn region(
+    name: &'static str,
+    range_mm: [f64; 2],
+    source: AxisSource,
+    sum: Vector3<f64>,
+    count: u32,
+) -> Result<AxisRegion, LandmarkError> {
+    let [from_mm, to_mm] = range_mm;
+    if count == 0 {
+        return Err(LandmarkError::Region {
+            name,
+            from_mm,
+            to_mm,
+            problem: match source {
+                AxisSource::Limb | AxisSource::Given => "holds no part of the limb",
+                AxisSource::Bone => "holds no bone",
+            },
+        });
+    }
+    Ok(AxisRegion {
+        range_mm,
+        centre_mm: (sum / f64::from(count)).into(),
+    })
 }

@@ -3,17 +3,17 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::landmarks::{AxisSource, Landmarks, LimbKind};
+use crate::landmarks::{AxisSource, Joint, Landmarks, LimbKind};
 
 /// Choices of a person that replace the automatic ones; what is `None` stays automatic.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LandmarkOverrides {
-    /// What the scan shows; by default a lower leg if an ankle is found.
+    /// What the scan shows; by default a lower leg if an ankle is found, else a knee if one is.
     pub limb: Option<LimbKind>,
     /// The joint centre, `ct` frame, mm; the axis is moved parallel to itself to pass through it.
     pub joint_centre: Option<[f64; 3]>,
-    /// Distances proximal of the joint level where the joint region begins and ends, mm.
+    /// Distances proximal of the joint level where the joint region begins and ends, mm; below 0 distal of a knee.
     pub joint_region: Option<[f64; 2]>,
     /// The same for the calf region.
     pub calf_region: Option<[f64; 2]>,
@@ -159,6 +159,44 @@ pub enum LandmarkError {
          or the limb kind \"other\""
     )]
     NoAnkle,
+    /// A knee was asked for but none is seen.
+    #[error(
+        "no knee found: no femoral condyles with a notch between them above a joint gap and a tibial plateau; give the \
+         joint centre, or the limb kind \"other\""
+    )]
+    NoKnee,
+    /// One joint was asked for, the limb shows the other one.
+    #[error(
+        "no {asked} found, but a {found} around {:.0}, {:.0}, {:.0} mm (LPS): give --limb {}, or the centre of the \
+         {asked} with --joint", at_mm[0], at_mm[1], at_mm[2], limb_of(*found)
+    )]
+    OtherJoint {
+        /// What was asked for.
+        asked: Joint,
+        /// What is there.
+        found: Joint,
+        /// Its centre, `ct` frame.
+        at_mm: [f64; 3],
+    },
+    /// Nothing was asked for and neither joint is seen.
+    #[error(
+        "neither an ankle (tibia and fibula that widen to a gap above the talus) nor a knee (condyles, gap and tibial \
+         plateau) found: give the joint centre with --joint, or --limb other to turn the limb about the middle of its length"
+    )]
+    NoJoint,
+    /// The scan ends too close to a knee on both sides.
+    #[error(
+        "the limb reaches {distal_mm:.0} mm distal and {proximal_mm:.0} mm proximal of the knee, expected at least \
+         {expected_mm:.0} mm of a shaft on one side, or half of that on both; give joint region and calf region"
+    )]
+    ShortKnee {
+        /// Length below the joint level.
+        distal_mm: f64,
+        /// Length above it.
+        proximal_mm: f64,
+        /// Length needed on one side.
+        expected_mm: f64,
+    },
     /// The scan ends too close to the joint.
     #[error(
         "the limb reaches {:.0} mm proximal of the joint, expected at least {expected_mm:.0} mm",
@@ -266,4 +304,12 @@ pub enum LandmarkError {
         /// Share of the surface behind the plane.
         behind_percent: f64,
     },
+}
+
+/// The value of `--limb` that takes a joint.
+fn limb_of(joint: Joint) -> &'static str {
+    match joint {
+        Joint::Ankle => "lower-leg",
+        Joint::Knee => "knee",
+    }
 }

@@ -24,15 +24,64 @@ pub enum Side {
 pub enum LimbKind {
     /// Lower leg with its ankle.
     LowerLeg,
+    /// Knee with parts of thigh or lower leg.
+    Knee,
     /// Anything else: the reference level is the middle of the limb unless it is given.
     Other,
+}
+
+/// A joint that is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Joint {
+    /// Tibia above talus.
+    Ankle,
+    /// Femur above tibia.
+    Knee,
+}
+
+impl std::fmt::Display for Joint {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Ankle => "ankle",
+            Self::Knee => "knee",
+        })
+    }
+}
+
+/// A joint that the limb shows, whether it is the one it is posed about or not; `ct` frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FoundJoint {
+    /// Which one.
+    pub joint: Joint,
+    /// Where, mm: the point of the tibia's shaft in the gap of an ankle, the middle of the plateau in that of a knee.
+    pub centre_mm: [f64; 3],
+    /// How clear its gap is: how much less dense than the thinner plate of bone beside it, HU.
+    pub gap_depth_hu: f64,
+    /// What else is known of a knee.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lines: Option<KneeLines>,
+}
+
+/// Directions of a knee and how far the scan shows it; `ct` frame, unit vectors.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct KneeLines {
+    /// Through the middle of the gaps of both compartments, seen from the front, towards the patient's right.
+    pub joint_line: [f64; 3],
+    /// To the front, square to the posterior condylar line; `None` when the scan cuts the back of a condyle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub anterior: Option<[f64; 3]>,
+    /// Whether the scan cuts the tibial plateau: the joint centre is less certain then.
+    pub plateau_is_cut: bool,
 }
 
 /// Whose cross-sections give the longitudinal axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AxisSource {
-    /// The tibia: swelling and calf muscle do not move the axis off the joint.
+    /// The tibia, or a knee's femur: swelling and calf muscle do not move the axis off the joint.
     Bone,
     /// The whole cross-section inside the skin.
     Limb,
@@ -44,7 +93,7 @@ pub enum AxisSource {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AxisRegion {
-    /// First and last distance proximal of the joint level along the scan's limb direction, mm.
+    /// First and last distance proximal of the joint level along the scan's limb direction, mm; distal of it below 0.
     pub range_mm: [f64; 2],
     /// Mean of the cross-section centres, or the given point of the axis, `ct` frame, mm.
     pub centre_mm: [f64; 3],
@@ -63,9 +112,9 @@ pub struct Landmarks {
     /// Unit direction across the slices, towards proximal: the scan's own, or across a shaft that
     /// leans in them by more than 3 degrees; region ranges run along it.
     pub scan_direction: [f64; 3],
-    /// The distal region, just proximal to the joint.
+    /// The region next to the joint: proximal of an ankle, on either side of a knee.
     pub joint_region: AxisRegion,
-    /// The proximal region, around the calf.
+    /// The region farther away: around the calf, or in the thigh.
     pub calf_region: AxisRegion,
     /// A point of the rotation axis.
     pub axis_point: [f64; 3],
@@ -80,6 +129,9 @@ pub struct Landmarks {
     /// What was decided on the way and why; files have it as findings of the limb.
     #[serde(skip)]
     pub notes: Vec<LandmarkNote>,
+    /// The joints that were found, from distal to proximal; none were looked for in another limb.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joints: Vec<FoundJoint>,
 }
 
 impl Landmarks {

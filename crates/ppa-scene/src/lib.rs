@@ -11,12 +11,19 @@
 
 mod ankle;
 mod axis_regions;
+mod bone_spans;
 mod bump_sites;
+mod condyles;
 mod contact;
 mod device;
 mod find_landmarks;
 mod frames;
 mod given_choices;
+mod hull;
+mod joints;
+mod knee;
+mod knee_gap;
+mod knee_regions;
 mod landmark_choices;
 mod landmark_notes;
 mod landmarks;
@@ -43,8 +50,11 @@ pub use device::XrayDevice;
 pub use find_landmarks::find_landmarks;
 pub use frames::{Camera, Ct, Device, NotRigid, Patient, Rigid};
 pub use landmark_choices::{LandmarkError, LandmarkOverrides};
+pub use knee_regions::KneeAxis;
 pub use landmark_notes::LandmarkNote;
-pub use landmarks::{AxisRegion, AxisSource, Landmarks, LimbKind, Side};
+pub use landmarks::{
+    AxisRegion, AxisSource, FoundJoint, Joint, KneeLines, Landmarks, LimbKind, Side,
+};
 pub use measures::{Fibula, LimbMeasures, LimbSize, Neighbour, Shaft, Support};
 pub use place_error::PlaceError;
 pub use placement::{Contact, Placement, ct_from_device, medial_rotation, place, place_soft};

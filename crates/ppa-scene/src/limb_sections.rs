@@ -111,17 +111,18 @@ impl<'a> Sections<'a> {
 
     /// Area of the limb in a slice, mm², and its centre; `None` where there is no limb.
     pub(crate) fn limb_section(&self, slice: usize) -> Option<(f64, Point3<f64>)> {
-        let pixels = self.limb_pixels(slice).count();
-        Some((pixels as f64 * self.pixel_mm2(), self.limb_centre(slice)?))
+        Some((self.limb_mm2(slice), self.limb_centre(slice)?))
+    }
+
+    /// Area of the limb in a slice, mm².
+    pub(crate) fn limb_mm2(&self, slice: usize) -> f64 {
+        self.limb_pixels(slice).count() as f64 * self.pixel_mm2()
     }
 
     /// The bones of a slice, largest outline first.
     pub(crate) fn bones(&self, slice: usize) -> Vec<BoneSection> {
         let (nu, nv) = self.extent();
-        let mut open = vec![false; nu * nv];
-        for (u, v) in self.limb_pixels(slice) {
-            open[u + nu * v] = self.volume.at(self.voxel(slice, u, v)) >= BONE_HU;
-        }
+        let mut open = self.bone_pixels(slice);
         let mut bones = Vec::new();
         for start in 0..open.len() {
             if !open[start] {
@@ -138,6 +139,24 @@ impl<'a> Sections<'a> {
         }
         bones.sort_by(|a, b| b.area_mm2.total_cmp(&a.area_mm2));
         bones
+    }
+
+    /// Voxels with bone of a slice, apart where nothing joins them; centres in the `ct` frame.
+    pub(crate) fn bone_pieces(&self, slice: usize) -> Vec<Vec<Point3<f64>>> {
+        let (nu, nv) = self.extent();
+        let mut open = self.bone_pixels(slice);
+        let mut pieces = Vec::new();
+        for start in 0..open.len() {
+            if open[start] {
+                let pixels = flood(start, (nu, nv), true, |p| std::mem::take(&mut open[p]));
+                let centre = |(u, v)| {
+                    let voxel = self.voxel(slice, u, v);
+                    self.volume.grid().centre(voxel.map(|v| v as f64))
+                };
+                pieces.push(pixels.into_iter().map(centre).collect());
+            }
+        }
+        pieces
     }
 
     /// Mean HU of the limb's voxels of a slice within `radius_mm` of a point of that slice.
@@ -158,6 +177,16 @@ impl<'a> Sections<'a> {
             }
         }
         (count > 0).then(|| sum / f64::from(count))
+    }
+
+    /// Which pixels (u, v) of a slice, at u + nu · v, hold bone of the limb.
+    fn bone_pixels(&self, slice: usize) -> Vec<bool> {
+        let (nu, nv) = self.extent();
+        let mut bone = vec![false; nu * nv];
+        for (u, v) in self.limb_pixels(slice) {
+            bone[u + nu * v] = self.volume.at(self.voxel(slice, u, v)) >= BONE_HU;
+        }
+        bone
     }
 
     fn extent(&self) -> (usize, usize) {

@@ -30,6 +30,8 @@ enum SideName {
 enum LimbName {
     /// Lower leg with its ankle
     LowerLeg,
+    /// Knee with parts of thigh or lower leg
+    Knee,
     /// Anything else: turned about its axis at the middle of its length
     Other,
 }
@@ -55,7 +57,7 @@ pub struct PrepareArgs {
     /// Save the skin, ct frame: .ply, .obj or .stl
     #[arg(long)]
     ply: Option<PathBuf>,
-    /// Kind of limb
+    /// Kind of limb [default: lower-leg where an ankle is found, else knee where one is]
     #[arg(long, value_enum)]
     limb: Option<LimbName>,
     /// Hounsfield units of the skin [default: -500]
@@ -152,6 +154,7 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
     let choices = LandmarkOverrides {
         limb: args.limb.map(|limb| match limb {
             LimbName::LowerLeg => LimbKind::LowerLeg,
+            LimbName::Knee => LimbKind::Knee,
             LimbName::Other => LimbKind::Other,
         }),
         joint_centre: args.joint,
@@ -178,6 +181,12 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
         &surface,
         &choices,
     )?;
+    let names_bones = args.bones.is_some() || args.segment_bones.is_some();
+    if names_bones && prepared.landmarks.limb == LimbKind::Knee {
+        bail!(
+            "the scan was prepared as a knee, but bones are for the labels of ankles: leave out --bones and --segment-bones"
+        );
+    }
     if let Some(path) = &args.bones {
         let bones = BoneFile {
             path: path.clone(),

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use nalgebra::{Isometry3, Point3};
 use ppa_depth::isometry_from_rows;
+use ppa_scene::LimbKind;
 use serde::Serialize;
 
 use super::computation::Computation;
@@ -86,6 +87,9 @@ pub struct LabelledLimb {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AutoLabelError {
+    /// The case is one of a knee.
+    #[error("the case of {0} is a knee, but computed labels grade the joint space of ankles")]
+    Knee(LimbId),
     /// The case names no bones.
     #[error(
         "the case of {0} names no bones: write it again with `ppa prepare --bones` or `--segment-bones`"
@@ -168,6 +172,9 @@ pub fn compute_labels<'a>(
 ) -> Result<ComputedLabels<'a>, AutoLabelError> {
     let before = LabelFile::read(&manifest.root, limb)?.unwrap_or_default();
     thresholds.check()?;
+    if case.choices.limb == Some(LimbKind::Knee) {
+        return Err(AutoLabelError::Knee(limb));
+    }
     let file = case.bones.as_ref().ok_or(AutoLabelError::NoBones(limb))?;
     let (rows, bones_sha256) = computed_rows(manifest, limb, case, file, thresholds)?;
     let computation = Computation::new(file, &bones_sha256, thresholds);

@@ -84,7 +84,7 @@ fn placed_findings(limb: &PreparedLimb) -> impl Iterator<Item = &Finding> {
     of(Severity::Severe).chain(of(Severity::Caution))
 }
 
-/// Findings and notes about a limb.
+/// Findings about a limb.
 pub(super) fn remarks(limb: &PreparedLimb, acknowledged: &[FindingCode]) -> Vec<Remark> {
     let found = limb.findings.iter().map(|finding| {
         let number = placed_findings(limb).position(|placed| placed == finding);
@@ -99,11 +99,7 @@ pub(super) fn remarks(limb: &PreparedLimb, acknowledged: &[FindingCode]) -> Vec<
             text: format!("{number}{}{known}", finding.text),
         }
     });
-    let noted = limb.landmarks.notes.iter().map(|note| Remark {
-        severity: Severity::Note,
-        text: note.clone(),
-    });
-    found.chain(noted).collect()
+    found.collect()
 }
 
 /// The limb in two words.
@@ -114,7 +110,8 @@ pub(super) fn limb_name(landmarks: &Landmarks) -> String {
     };
     let kind = match landmarks.limb {
         LimbKind::LowerLeg => "lower leg",
-        LimbKind::Other => "limb (no ankle)",
+        LimbKind::Knee => "knee",
+        LimbKind::Other => "limb (neither ankle nor knee)",
     };
     format!("{side} {kind}")
 }

@@ -55,6 +55,7 @@ pub fn boot_landmarks(side: Side) -> Landmarks {
             [20.0, 50.0, 250.0],
         ],
         notes: Vec::new(),
+        joints: Vec::new(),
     }
 }
 

@@ -1,10 +1,10 @@
 //! Landmarks of the seventeen phantoms, however they lie in the scan.
 
-use nalgebra::{Affine3, Matrix4, Point3, Rotation3, Translation3, Vector3};
+use nalgebra::{Point3, Rotation3, Vector3};
+use ppa_ct::Volume;
 use ppa_ct::phantom::{LowerLeg, Side as PhantomSide, TableTop, Truth};
-use ppa_ct::{Grid, Interpolation, Volume};
 use ppa_mesh::{Border, iso_surface};
-use ppa_scene::{LandmarkOverrides, LimbKind, Side};
+use ppa_scene::{Joint, LandmarkOverrides, LimbKind, Side};
 
 use crate::scan::Scan;
 
@@ -62,27 +62,7 @@ impl Subject {
 
     /// The leg turned in the world while the scanner's slices stay level.
     fn turned(&self, turn: &Rotation3<f64>) -> Scan {
-        let (low, high) = self.skin.iter().fold(
-            (
-                Point3::from(Vector3::repeat(f64::INFINITY)),
-                Point3::from(Vector3::repeat(f64::NEG_INFINITY)),
-            ),
-            |(low, high), p| {
-                let p = turn * p;
-                (low.inf(&p), high.sup(&p))
-            },
-        );
-        let origin = low - Vector3::repeat(5.0 * SPACING_MM);
-        let size = (high - low).map(|d| (d / SPACING_MM).ceil() as usize + 10);
-        let level = Translation3::from(origin.coords).to_homogeneous()
-            * Matrix4::new_nonuniform_scaling(&Vector3::repeat(SPACING_MM));
-        let grid = |matrix| Grid::new(size.into(), Affine3::from_matrix_unchecked(matrix)).unwrap();
-        let in_the_leg = grid(turn.inverse().to_homogeneous() * level);
-        let sampled = self
-            .volume
-            .resampled_to(&in_the_leg, Interpolation::Linear, -1000.0)
-            .unwrap();
-        Scan::of(Volume::new(grid(level), sampled.hu().to_vec()).unwrap())
+        Scan::under_the_scanner(&self.volume, self.skin.iter(), turn)
     }
 
     /// Normal of the plane that touches the exact skin from behind, and how far the joint lies above.
@@ -132,6 +112,8 @@ fn check(subject: &Subject, turn: &Rotation3<f64>) {
     let found = scan.find(subject.side, &LandmarkOverrides::default());
     let landmarks = found.unwrap_or_else(|error| panic!("{name}: {error}"));
     assert_eq!(landmarks.limb, LimbKind::LowerLeg, "{name}");
+    let joints: Vec<Joint> = landmarks.joints.iter().map(|found| found.joint).collect();
+    assert_eq!(joints, [Joint::Ankle], "{name}");
     let axis = turn * subject.truth.axis_direction.into_inner();
     let joint = turn * subject.joint;
     let axis_deg = degrees_between(&landmarks.axis_direction.into(), &axis);

@@ -155,12 +155,23 @@ fn a_person_overrules_every_choice() {
     assert!(got.anterior[0] > 0.2 && found.anterior[0].abs() < 0.05);
 }
 
-/// Without an ankle the reference level is the middle of the limb; it can still be placed.
+/// Without a joint the reference level is the middle of the limb, if a person says that it shall be.
 #[test]
-fn a_calf_alone_is_another_limb() {
+fn a_calf_alone_is_another_limb_on_request() {
     let [.., nk] = P01.volume.grid().size();
     let calf = P01.slices(nk - 70..nk);
-    let landmarks = calf.find(Side::Right, &automatic()).unwrap();
+    let error = calf.find(Side::Right, &automatic()).unwrap_err();
+    assert_eq!(error, LandmarkError::NoJoint);
+    let text = error.to_string();
+    assert!(
+        text.contains("neither an ankle") && text.contains("--limb other"),
+        "{text}"
+    );
+    let other = LandmarkOverrides {
+        limb: Some(LimbKind::Other),
+        ..automatic()
+    };
+    let landmarks = calf.find(Side::Right, &other).unwrap();
     assert_eq!(landmarks.limb, LimbKind::Other);
     let ends = [0, 69].map(|k| calf.volume.grid().centre([0.0, 0.0, f64::from(k)]).z);
     assert!((landmarks.joint_centre[2] - 0.5 * (ends[0] + ends[1])).abs() < 2.0);
@@ -179,6 +190,13 @@ fn a_calf_alone_is_another_limb() {
         calf.find(Side::Right, &asked).unwrap_err(),
         LandmarkError::NoAnkle
     );
+    let about = LandmarkOverrides {
+        joint_centre: Some(landmarks.joint_centre),
+        ..automatic()
+    };
+    let given = calf.find(Side::Right, &about).unwrap();
+    assert_eq!(given.limb, LimbKind::Other);
+    assert_eq!(given.joint_centre, landmarks.joint_centre);
 }
 
 /// Bumps have skin to sit on: every site holds vertices, and medial is towards the other leg.
@@ -209,8 +227,12 @@ fn a_single_slice_is_refused() {
     for (index, inside) in mask.iter_mut().enumerate() {
         *inside &= index / (ni * nj) == nk / 2;
     }
+    let other = LandmarkOverrides {
+        limb: Some(LimbKind::Other),
+        ..automatic()
+    };
     let side = Side::Right;
-    let error = find_landmarks(&P01.volume, &P01.skin, &mask, side, &automatic()).unwrap_err();
+    let error = find_landmarks(&P01.volume, &P01.skin, &mask, side, &other).unwrap_err();
     assert!(matches!(error, LandmarkError::Region { .. }), "{error}");
 }
 

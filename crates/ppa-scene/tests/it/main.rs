@@ -4,6 +4,7 @@ mod boot;
 mod choices;
 mod family;
 mod frames;
+mod knee;
 mod landmarks;
 mod measures;
 mod placement;

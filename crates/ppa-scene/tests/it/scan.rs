@@ -2,9 +2,9 @@
 
 use std::sync::LazyLock;
 
-use nalgebra::{Affine3, Rotation3};
+use nalgebra::{Affine3, Matrix4, Point3, Rotation3, Translation3, Vector3};
 use ppa_ct::phantom::{LowerLeg, TableTop};
-use ppa_ct::{Grid, Volume};
+use ppa_ct::{Grid, Interpolation, Volume};
 use ppa_mesh::{Border, Mesh, iso_surface};
 use ppa_scene::{LandmarkError, LandmarkOverrides, Landmarks, Side, find_landmarks};
 
@@ -28,6 +28,31 @@ impl Scan {
         overrides: &LandmarkOverrides,
     ) -> Result<Landmarks, LandmarkError> {
         find_landmarks(&self.volume, &self.skin, &self.mask, side, overrides)
+    }
+
+    /// A limb turned in the world while the scanner's slices stay level; `points` lie on its skin.
+    pub fn under_the_scanner<'a>(
+        volume: &Volume,
+        points: impl Iterator<Item = &'a Point3<f64>>,
+        turn: &Rotation3<f64>,
+    ) -> Self {
+        let spacing_mm = volume.grid().spacing_mm().min();
+        let mut low = Point3::from(Vector3::repeat(f64::INFINITY));
+        let mut high = -low;
+        for p in points {
+            let p = turn * p;
+            (low, high) = (low.inf(&p), high.sup(&p));
+        }
+        let origin = low - Vector3::repeat(5.0 * spacing_mm);
+        let size = (high - low).map(|d| (d / spacing_mm).ceil() as usize + 10);
+        let level = Translation3::from(origin.coords).to_homogeneous()
+            * Matrix4::new_nonuniform_scaling(&Vector3::repeat(spacing_mm));
+        let grid = |matrix| Grid::new(size.into(), Affine3::from_matrix_unchecked(matrix)).unwrap();
+        let in_the_limb = grid(turn.inverse().to_homogeneous() * level);
+        let sampled = volume
+            .resampled_to(&in_the_limb, Interpolation::Linear, -1000.0)
+            .unwrap();
+        Self::of(Volume::new(grid(level), sampled.hu().to_vec()).unwrap())
     }
 
     /// The same voxels in a turned world.

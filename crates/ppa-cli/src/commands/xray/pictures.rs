@@ -112,6 +112,7 @@ impl Exposure<'_> {
         Examination {
             region: match self.prepared.landmarks.limb {
                 LimbKind::LowerLeg => Region::Ankle,
+                LimbKind::Knee => Region::Knee,
                 LimbKind::Other => Region::Extremity,
             },
             side: match self.case.side {
