@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use ppa_ct::ReadOptions;
-use ppa_dataset::labels::LabelFile;
+use ppa_dataset::labels::{LabelFile, import_grades, read_key};
 use ppa_dataset::layout::{LimbId, Side};
 use ppa_dataset::published::Published;
 use ppa_dataset::{Manifest, Split};
@@ -42,6 +42,20 @@ pub fn read_frame(syntax: &str, data: &[u8]) {
     let file = dicom_file(syntax, [*columns, *rows], *bits, frame);
     with_file("frame.dcm", &file, |path| {
         let _ = ppa_ct::read(path);
+    });
+}
+
+/// Reads a table as grades and as a key, for a dataset without a radiograph.
+pub fn read_grades(data: &[u8]) {
+    let root = FOLDER.join("graded");
+    fs::create_dir_all(&root).expect("room for a folder");
+    let manifest = Manifest {
+        root,
+        files: Vec::new(),
+    };
+    with_file("grades.csv", data, |path| {
+        let _ = read_key(path);
+        let _ = import_grades(&manifest, &[], &[path.to_owned()]);
     });
 }
 

@@ -1,6 +1,6 @@
 //! Spectra from files: two-column CSV and MC-GPU's `.spc`.
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use crate::{beam::spectrum::Spectrum, beam::spectrum_error::SpectrumError};
 

@@ -8,8 +8,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Point3, Vector3};
-use ppa_ct::{Format, Grid, Volume};
-use ppa_depth::CameraSpec;
+use ppa_ct::{Grid, Volume};
+use ppa_depth::{CameraSpec, DepthMode};
 use ppa_fuzz::{dicom_file, frame};
 
 /// What takes a file's kind from its first byte.
@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     volumes(&corpus, work.path())?;
     frames(&corpus)?;
     meshes(&corpus)?;
-    let camera = serde_text(&CameraSpec::default());
+    let camera = serde_text(&CameraSpec::azure_kinect(DepthMode::NfovUnbinned));
     corpus.put("camera", "camera.json", tagged(0, camera))?;
     for (target, name, kind, text) in texts::TEXTS {
         match kind {
@@ -61,7 +61,7 @@ fn volumes(corpus: &Corpus, work: &Path) -> Result<(), Box<dyn Error>> {
         ("meta_image", "scan.mha"),
     ] {
         let path = work.join(name);
-        ppa_ct::write(&path, &volume, Format::of(&path)?)?;
+        ppa_ct::write(&path, &volume)?;
         corpus.put(target, name, fs::read(&path)?)?;
     }
     let folder = work.join("slices");
@@ -81,7 +81,7 @@ fn frames(corpus: &Corpus) -> Result<(), Box<dyn Error>> {
     let grey = libjpeg_turbo_rs::PixelFormat::Grayscale;
     let sampling = libjpeg_turbo_rs::Subsampling::S444;
     let baseline = libjpeg_turbo_rs::compress(&pixels, 8, 8, grey, 90, sampling)?;
-    let lossless = libjpeg_turbo_rs::compress_lossless(&pixels, 8, 8, grey, 1, 0)?;
+    let lossless = libjpeg_turbo_rs::compress_lossless(&pixels, 8, 8, grey)?;
     for (target, name, bits, stream) in [
         ("jpeg", "baseline", 8, baseline),
         ("jpeg", "lossless", 8, lossless),

@@ -27,7 +27,10 @@ pub fn jpeg_2000(side: u32) -> Vec<u8> {
     let sizes = [side, side, 0, 0, side, side, 0, 0].map(u32::to_be_bytes);
     [
         vec![0xff, 0x4f],
-        segment(0x51, &[&[0; 2], sizes.as_flattened(), &[0, 1, 7, 1, 1]].concat()),
+        segment(
+            0x51,
+            &[&[0; 2], sizes.as_flattened(), &[0, 1, 7, 1, 1]].concat(),
+        ),
         segment(0x52, &[0, 0, 0, 1, 0, 0, 4, 4, 0, 1]),
         segment(0x5c, &[0x40, 0x40]),
         segment(0x90, &[0, 0, 0, 0, 0, 15, 0, 1]),

@@ -59,12 +59,10 @@ const INPUT: &str = "#[SECTION SIMULATION CONFIG v.2009-05-12]\n2e5\n1\n0\n128\n
     #[SECTION VOXELIZED GEOMETRY FILE v.2009-11-30]\nbox.vox\n\
     #[SECTION MATERIAL FILE LIST v.2009-11-30]\nppa:water\n";
 
-const VOXELS: &str =
-    "[SECTION VOXELS HEADER v.2008-04-13]\n2 1 1\n1 1 1\n1\n2\n0\n[END OF VXH SECTION]\n1 1.0\n2 0.5\n";
+const VOXELS: &str = "[SECTION VOXELS HEADER v.2008-04-13]\n2 1 1\n1 1 1\n1\n2\n0\n[END OF VXH SECTION]\n1 1.0\n2 0.5\n";
 
 const LABELS: &str = r#"{"0": {"label": 1.5, "label_std": 0.2, "label_source": "readers"}}"#;
-const REGIONS: &str =
-    r#"{"depth_cam_left_0.0.png": {"camera": "cam_left", "image_number": 0, "x_start": 1, "y_start": 2, "size": 3}}"#;
+const REGIONS: &str = r#"{"depth_cam_left_0.0.png": {"camera": "cam_left", "image_number": 0, "x_start": 1, "y_start": 2, "size": 3}}"#;
 const SPLIT: &str = r#"{"version": 1, "seed": 1, "parts": {"train": [0, 1], "test": [2]}}"#;
 
 pub const TEXTS: &[(&str, &str, Option<u8>, &str)] = &[
@@ -72,16 +70,36 @@ pub const TEXTS: &[(&str, &str, Option<u8>, &str)] = &[
     ("camera", "opencv.yml", Some(1), OPENCV),
     ("case", "case.toml", None, CASE),
     ("plan", "plan.toml", None, PLAN),
-    ("room", "room.toml", None, "version = 1\n[room.parametric]\ntable_width_mm = 700.0\n"),
+    (
+        "room",
+        "room.toml",
+        None,
+        "version = 1\n[room.parametric]\ntable_width_mm = 700.0\n",
+    ),
     ("dataset", "labels.json", Some(1), LABELS),
     ("dataset", "roi_depth.json", Some(2), REGIONS),
     ("dataset", "split.json", Some(3), SPLIT),
-    ("grades", "grades.csv", None, "image,reader,grade\nx.png,Anna,1.5\n"),
+    (
+        "grades",
+        "grades.csv",
+        None,
+        "image,reader,grade\nx.png,Anna,1.5\n",
+    ),
     ("grades", "key.csv", None, "name,image,sha256\na,x.png,00\n"),
-    ("spectrum", "spectrum.csv", None, "energy_kev,weight\n20,1\n30,2\n40,0.5\n"),
+    (
+        "spectrum",
+        "spectrum.csv",
+        None,
+        "energy_kev,weight\n20,1\n30,2\n40,0.5\n",
+    ),
     ("spectrum", "beam.spc", None, "20e3 1\n30e3 2\n40e3 -1\n"),
     ("spectrum", "filter", None, "Al:2.5"),
-    ("calibration", "calibration.toml", None, include_str!("../../../../crates/ppa-xray/data/hu_calibration.toml")),
+    (
+        "calibration",
+        "calibration.toml",
+        None,
+        include_str!("../../../../crates/ppa-xray/data/hu_calibration.toml"),
+    ),
     ("calibration", "composition", None, "H:0.112 O:0.888"),
     ("mcgpu", "run.in", Some(0), INPUT),
     ("mcgpu", "phantom.vox", Some(2), VOXELS),
