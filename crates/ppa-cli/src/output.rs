@@ -126,7 +126,10 @@ mod tests {
         for bad in [
             "", "GB", "-1MB", "nan", "inf GB", "0", "5 XB", "1e9TB", "5 Ω",
         ] {
-            assert!(parse_bytes(bad).unwrap_err().contains("not a size"), "{bad}");
+            assert!(
+                parse_bytes(bad).unwrap_err().contains("not a size"),
+                "{bad}"
+            );
         }
     }
 }

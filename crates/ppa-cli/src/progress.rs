@@ -253,7 +253,10 @@ mod tests {
         watch.report(Progress::Total(1));
         for _ in 0..3 {
             let line = lines.recv_timeout(Duration::from_secs(60)).unwrap();
-            assert!(line.starts_with("0 of 1 pose, ") && line.ends_with(" so far"), "{line}");
+            assert!(
+                line.starts_with("0 of 1 pose, ") && line.ends_with(" so far"),
+                "{line}"
+            );
         }
         watch.finish();
         while lines.try_recv().is_ok() {}

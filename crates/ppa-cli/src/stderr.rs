@@ -48,7 +48,9 @@ impl Early {
                 Some(text) => text.strip_prefix("--color=").map(Into::into),
                 None => None,
             };
-            let choice = value.as_ref().and_then(|value| value.to_str()?.parse().ok());
+            let choice = value
+                .as_ref()
+                .and_then(|value| value.to_str()?.parse().ok());
             early.color = choice.unwrap_or(early.color);
         }
         early

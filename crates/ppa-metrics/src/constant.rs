@@ -40,12 +40,14 @@ pub fn constant_prediction(
     let most = labels.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let least = labels.iter().copied().fold(f64::INFINITY, f64::min);
     let label_range = most - least;
-    Ok((std < LEAST_SPREAD * label_range).then_some(ConstantPrediction {
-        n,
-        mean,
-        std,
-        label_range,
-    }))
+    Ok(
+        (std < LEAST_SPREAD * label_range).then_some(ConstantPrediction {
+            n,
+            mean,
+            std,
+            label_range,
+        }),
+    )
 }
 
 impl fmt::Display for ConstantPrediction {
@@ -79,8 +81,16 @@ mod tests {
         assert!(found.to_string().contains("1.750"), "{found}");
         // 2 ± 0.019 and 2 ± 0.021: below and above 1 % of 2.
         let spread = |half: f64| [2.0 - half, 2.0 + half, 2.0 - half, 2.0 + half];
-        assert!(constant_prediction(&labels, &spread(0.019)).unwrap().is_some());
-        assert!(constant_prediction(&labels, &spread(0.021)).unwrap().is_none());
+        assert!(
+            constant_prediction(&labels, &spread(0.019))
+                .unwrap()
+                .is_some()
+        );
+        assert!(
+            constant_prediction(&labels, &spread(0.021))
+                .unwrap()
+                .is_none()
+        );
     }
 
     #[test]

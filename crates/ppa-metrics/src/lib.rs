@@ -28,8 +28,8 @@ mod diagnostic;
 mod regression;
 mod spearman;
 
-mod poses;
 mod constant;
+mod poses;
 mod report;
 
 mod permutation;

@@ -70,7 +70,10 @@ mod tests {
         assert_eq!((constant.mae, constant.spearman), (1.0, None));
         assert_eq!(constant.constant_prediction.unwrap().mean, 2.0);
         let diagnostic = evaluate(&[1.0, 2.0], &[1.0, 2.0]).unwrap();
-        assert_eq!((diagnostic.sensitivity, diagnostic.specificity), (None, Some(1.0)));
+        assert_eq!(
+            (diagnostic.sensitivity, diagnostic.specificity),
+            (None, Some(1.0))
+        );
         let bad = evaluate(&[3.0, 2.5], &[1.0, 2.0]).unwrap();
         assert_eq!((bad.sensitivity, bad.specificity), (Some(0.0), None));
         assert_eq!(evaluate(&[], &[]), Err(MetricError::Empty("labels")));

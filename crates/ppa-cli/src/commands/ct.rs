@@ -35,7 +35,12 @@ fn describe(info: &Info) -> String {
     let mut lines = vec![
         format!("size       {nx} x {ny} x {nz} voxels"),
         format!("spacing    {sx:.4} x {sy:.4} x {sz:.4} mm"),
-        format!("origin     {:.3} {:.3} {:.3} mm (LPS)", number(ox), number(oy), number(oz)),
+        format!(
+            "origin     {:.3} {:.3} {:.3} mm (LPS)",
+            number(ox),
+            number(oy),
+            number(oz)
+        ),
     ];
     for (row, name) in info.direction.iter().zip(["direction", "", ""]) {
         lines.push(format!(

@@ -231,7 +231,10 @@ fn describe(outcome: &Outcome) -> String {
     let begun = outcome.begun.iter();
     lines.extend(begun.map(|begun| {
         let steps = count(begun.steps, "step");
-        format!("not finished: {} with {} of {steps}", begun.training, begun.step)
+        format!(
+            "not finished: {} with {} of {steps}",
+            begun.training, begun.step
+        )
     }));
     if let Some(test) = &outcome.permutation_test {
         lines.push(format!(

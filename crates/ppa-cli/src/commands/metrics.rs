@@ -32,7 +32,9 @@ pub fn run(args: &MetricsArgs, output: Output) -> anyhow::Result<()> {
 
 fn describe(report: &Report) -> String {
     let percent = |share: Option<f64>| {
-        share.map_or("not defined".to_owned(), |share| format!("{:.2} %", 100.0 * share))
+        share.map_or("not defined".to_owned(), |share| {
+            format!("{:.2} %", 100.0 * share)
+        })
     };
     let spearman = report.spearman.map_or("not defined".to_owned(), |rho| {
         format!("{:.4}", number(rho))

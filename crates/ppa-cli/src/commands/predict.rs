@@ -252,8 +252,10 @@ fn describe(summary: &Summary) -> String {
         text += &format!("; {} found but not judged", summary.unjudged);
     }
     if summary.alone > 0 {
-        text += &format!("; {} without the other camera's",
-            count(summary.alone, "frame"));
+        text += &format!(
+            "; {} without the other camera's",
+            count(summary.alone, "frame")
+        );
     }
     text
 }

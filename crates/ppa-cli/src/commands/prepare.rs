@@ -261,8 +261,18 @@ fn describe_found(found: &Found) -> Vec<String> {
     let [x, y, z] = landmarks.joint_centre;
     let [dx, dy, dz] = landmarks.axis_direction;
     let mut lines = vec![
-        format!("joint      {:.1} {:.1} {:.1} mm (LPS)", number(x), number(y), number(z)),
-        format!("axis       {:.4} {:.4} {:.4}", number(dx), number(dy), number(dz)),
+        format!(
+            "joint      {:.1} {:.1} {:.1} mm (LPS)",
+            number(x),
+            number(y),
+            number(z)
+        ),
+        format!(
+            "axis       {:.4} {:.4} {:.4}",
+            number(dx),
+            number(dy),
+            number(dz)
+        ),
     ];
     for [x, y, z] in landmarks.plane_points {
         let [x, y, z] = [x, y, z].map(number);

@@ -60,7 +60,10 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
                 ));
                 if progress.step > 1 {
                     let made = progress.step - 1;
-                    note(&format!("going on after {made} of {}", count(steps, "step")));
+                    note(&format!(
+                        "going on after {made} of {}",
+                        count(steps, "step")
+                    ));
                 }
                 if let Ok(Some(loaded)) = read_start(&args.out) {
                     let text = not_taken(&loaded.kept, &loaded.unused);

@@ -261,7 +261,10 @@ fn the_page_of_a_dataset_stands_by_itself() {
     assert!(page.contains("verdict bad") && !page.contains("\"verdict good"));
     fs::remove_file(folder.path().join("data/manifest.jsonl")).unwrap();
     let said = fail(folder.path(), "qa data --out third.html");
-    assert!(said.contains("has no manifest.jsonl, which the page needs"), "{said}");
+    assert!(
+        said.contains("has no manifest.jsonl, which the page needs"),
+        "{said}"
+    );
     assert!(!folder.path().join("third.html").exists());
     assert!(page.contains("cannot be read"));
     assert!(!page.contains("/tmp"));

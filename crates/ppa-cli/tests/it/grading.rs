@@ -227,7 +227,8 @@ fn no_grade_and_no_label_of_readers_is_lost() {
     let done = ppa(here, "generate plan.toml --out data").output().unwrap();
     let told = String::from_utf8(done.stderr).unwrap();
     assert!(
-        done.status.success() && told.contains("than those there now: 5 labels, the first of step 0"),
+        done.status.success()
+            && told.contains("than those there now: 5 labels, the first of step 0"),
         "{told}"
     );
     for command in ["dataset check data", "export table data --out t.csv"] {

@@ -81,13 +81,19 @@ fn shows_debug(message: &str) -> bool {
     let words: Vec<&str> = message.split(' ').collect();
     let is_struct = |pair: &[&str]| is_type(pair[0]) && pair[1] == "{";
     message.contains("Some(")
-        || words.iter().any(|word| word.trim_end_matches([',', ';', ':', '\n']) == "None")
+        || words
+            .iter()
+            .any(|word| word.trim_end_matches([',', ';', ':', '\n']) == "None")
         || words.windows(2).any(is_struct)
 }
 
 #[test]
 fn debug_values_are_told_from_text() {
-    for message in ["found Some(3)", "side is None, expected", "crop Box { low: 3 }"] {
+    for message in [
+        "found Some(3)",
+        "side is None, expected",
+        "crop Box { low: 3 }",
+    ] {
         assert!(shows_debug(message), "{message}");
     }
     for message in ["material \"Nonesuch\"", "expected {\"a\": 1}", "CT { and }"] {

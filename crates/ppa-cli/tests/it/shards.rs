@@ -96,10 +96,7 @@ fn overlaps_holes_and_strangers_are_refused() {
         }
         assert!(!here.join("merged").exists(), "{arguments} wrote something");
     };
-    refused(
-        "merge s1 --out merged",
-        &["no shard holds", " of 5 poses"],
-    );
+    refused("merge s1 --out merged", &["no shard holds", " of 5 poses"]);
     refused("merge s1 s1 s2 --out merged", &["both s1 and s1 hold"]);
     refused("merge s1 s2 --out s1", &["s1 is one of the shards"]);
     refused("merge s1 nowhere --out merged", &["nowhere"]);

@@ -19,7 +19,10 @@ fn output(arguments: &str, environment: &[(&str, &str)]) -> Output {
 #[test]
 fn help_lists_commands_under_headings() {
     let help = succeed(phantom(), "--help");
-    let at = |text: &str| help.find(text).unwrap_or_else(|| panic!("{text} in {help}"));
+    let at = |text: &str| {
+        help.find(text)
+            .unwrap_or_else(|| panic!("{text} in {help}"))
+    };
     let order = [
         "Scan and case:",
         "  prepare ",
@@ -30,7 +33,10 @@ fn help_lists_commands_under_headings() {
         "Options:",
         "--json",
     ];
-    assert!(order.windows(2).all(|pair| at(pair[0]) < at(pair[1])), "{help}");
+    assert!(
+        order.windows(2).all(|pair| at(pair[0]) < at(pair[1])),
+        "{help}"
+    );
     assert!(succeed(phantom(), "ct --help").contains("Commands:"));
 }
 
@@ -46,13 +52,21 @@ fn colours_follow_the_option_then_the_environment() {
         ("--help --color never", &[always], false),
     ] {
         let said = output(arguments, environment);
-        assert_eq!(escape(&said.stdout), expected, "{arguments} {environment:?}");
+        assert_eq!(
+            escape(&said.stdout),
+            expected,
+            "{arguments} {environment:?}"
+        );
     }
-    let said = |arguments: &str, environment: &[(&str, &str)]| output(arguments, environment).stderr;
+    let said =
+        |arguments: &str, environment: &[(&str, &str)]| output(arguments, environment).stderr;
     assert!(escape(&said("ct info nowhere --color always", &[])));
     assert!(escape(&said("ct info nowhere", &[always])));
     assert!(!escape(&said("ct info nowhere --color never", &[always])));
-    assert!(escape(&said("ct info --color always", &[])), "errors of usage");
+    assert!(
+        escape(&said("ct info --color always", &[])),
+        "errors of usage"
+    );
     let text = said("ct info nowhere", &[]);
     assert!(text.starts_with(b"ppa: ") && !escape(&text));
 }
@@ -80,7 +94,10 @@ fn errors_of_json_runs_are_objects() {
     for (arguments, part) in [
         ("metrics --json", "<CSV>"),
         ("--json metrics a.csv b.csv", "unexpected argument 'b.csv'"),
-        ("statuss data --json", "tip: a similar subcommand exists: 'status'"),
+        (
+            "statuss data --json",
+            "tip: a similar subcommand exists: 'status'",
+        ),
         ("--json", "a command is missing"),
         ("ct --json", "a command is missing"),
         ("depth coverage x --json --color sideways", "'sideways'"),
@@ -126,7 +143,10 @@ fn every_command_has_a_manual_page() {
     }
     let read = |name: &str| fs::read_to_string(folder.path().join("pages").join(name)).unwrap();
     let page = read("ppa-ct-info.1");
-    assert!(page.contains(".TH ppa-ct-info 1") && page.contains("fill\\-gaps"), "{page}");
+    assert!(
+        page.contains(".TH ppa-ct-info 1") && page.contains("fill\\-gaps"),
+        "{page}"
+    );
     assert!(read("ppa.1").contains("ppa\\-generate(1)"));
 
     // The same pages again are no loss, changed ones are kept.

@@ -254,7 +254,10 @@ impl ReadError {
             } => format!("{tag} is {found}, expected {expected}"),
             Self::MultiFrame {
                 frames, described, ..
-            } => format!("{} and places for {described} of them", count(*frames, "frame")),
+            } => format!(
+                "{} and places for {described} of them",
+                count(*frames, "frame")
+            ),
             _ => "damaged".to_owned(),
         }
     }

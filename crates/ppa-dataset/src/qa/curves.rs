@@ -104,10 +104,7 @@ pub(super) struct Told {
 }
 
 /// How height and tilt of a limb change from pose to pose.
-pub(super) fn heights_and_tilts(
-    scene: &Scene,
-    sweeps: &[(BodyShape, Vec<&FileRow>)],
-) -> Told {
+pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRow>)]) -> Told {
     let (mut charts, mut told) = (String::new(), Vec::new());
     for (i, [what, unit]) in [
         ["height of the joint", "mm"],

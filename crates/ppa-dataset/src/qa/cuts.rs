@@ -65,7 +65,8 @@ impl CutShares {
             let name = view.name().replace('_', " ");
             curve(&name, &move |row: &FileRow| row.camera == Some(view))
         };
-        let radiograph = |row: &FileRow| row.kind == FileKind::Radiograph && row.shape == BodyShape::Orig;
+        let radiograph =
+            |row: &FileRow| row.kind == FileKind::Radiograph && row.shape == BodyShape::Orig;
         let mut series = Vec::from(View::ALL.map(camera));
         series.push(curve("radiograph", &radiograph));
         series.retain(|series| !series.points.is_empty());
@@ -88,7 +89,12 @@ mod tests {
     #[test]
     fn the_largest_share_of_a_pose_is_drawn() {
         let folder = tempfile::tempdir().unwrap();
-        let pose = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+        let pose = [
+            [1.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ];
         let row = |file: &str, step: u32, shape: &str, cut: Option<f64>| {
             let mut row = json!({
                 "file": file, "sha256": "", "kind": "depth", "patient": 0, "side": "l", "step": step,
@@ -108,13 +114,18 @@ mod tests {
         let text: String = rows.iter().map(|row| format!("{row}\n")).collect();
         std::fs::write(folder.path().join("manifest.jsonl"), text).unwrap();
         let shares = CutShares::read(folder.path()).unwrap();
-        let rows: Vec<FileRow> =
-            rows.into_iter().map(|row| serde_json::from_value(row).unwrap()).collect();
+        let rows: Vec<FileRow> = rows
+            .into_iter()
+            .map(|row| serde_json::from_value(row).unwrap())
+            .collect();
         let (svg, largest) = shares.chart(&rows.iter().collect::<Vec<_>>()).unwrap();
         assert_eq!(largest, 20.0);
         // From 0 at the left bottom to 20 of 22 % at the right.
         assert!(svg.contains("d=\"M52.0 200.0L448.0 30.9\""), "{svg}");
-        assert!(svg.contains("cam left") && !svg.contains("radiograph"), "{svg}");
+        assert!(
+            svg.contains("cam left") && !svg.contains("radiograph"),
+            "{svg}"
+        );
         assert!(shares.chart(&[&rows[0]]).is_none());
     }
 }

@@ -11,7 +11,13 @@ pub(super) fn table(findings: &Findings) -> String {
         return String::new();
     }
     let mut rows: Vec<&LimbFinding> = findings.0.iter().collect();
-    rows.sort_by_key(|row| (!row.is_open(), std::cmp::Reverse(row.finding.severity), row.limb));
+    rows.sort_by_key(|row| {
+        (
+            !row.is_open(),
+            std::cmp::Reverse(row.finding.severity),
+            row.limb,
+        )
+    });
     let rows: String = rows.into_iter().map(row).collect();
     format!(
         "<h2>Findings</h2><table class=\"findings\"><tr><th>limb</th><th>severity</th><th>code</th><th>finding</th>\
@@ -30,7 +36,9 @@ fn row(row: &LimbFinding) -> String {
     // The code as scripts and `acknowledged` in a case know it.
     let code = serde_json::to_value(finding.code).ok();
     let code = code.as_ref().and_then(|code| code.as_str()).unwrap_or("");
-    let place = finding.place_mm.map_or(String::new(), |place| format!("{:.1}", numbers(place)));
+    let place = finding
+        .place_mm
+        .map_or(String::new(), |place| format!("{:.1}", numbers(place)));
     let acknowledged = match (finding.severity, row.acknowledged) {
         (_, true) => "yes",
         (Severity::Severe, false) => "<b>no</b>",
@@ -69,11 +77,19 @@ mod tests {
     #[test]
     fn open_severe_findings_come_first_with_code_and_place() {
         let html = table(&findings());
-        let at = |text: &str| html.find(text).unwrap_or_else(|| panic!("{text} in {html}"));
+        let at = |text: &str| {
+            html.find(text)
+                .unwrap_or_else(|| panic!("{text} in {html}"))
+        };
         assert!(at("plane-on-cut") < at("contacts-too-near"));
         assert!(at("contacts-too-near") < at("several-limbs"));
-        assert!(html.contains("<tr class=\"bad\"><td>patient 2 right</td><td>severe</td><td><code>plane-on-cut"));
-        assert!(html.contains("3 &lt; 5 mm</td><td>1.0, 0.0, 25.1</td><td><b>no</b>"), "{html}");
+        assert!(html.contains(
+            "<tr class=\"bad\"><td>patient 2 right</td><td>severe</td><td><code>plane-on-cut"
+        ));
+        assert!(
+            html.contains("3 &lt; 5 mm</td><td>1.0, 0.0, 25.1</td><td><b>no</b>"),
+            "{html}"
+        );
         assert_eq!(html.matches("<td>yes</td>").count(), 1);
         assert_eq!(table(&Findings::default()), "");
     }

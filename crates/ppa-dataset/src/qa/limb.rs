@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::cuts::CutShares;
 use super::curves::{Told, heights_and_tilts, histograms, labels};
+use super::cuts::CutShares;
 use super::page::{QaError, figure, side};
 use super::scale::colour_scale;
 use super::scene::Scene;
@@ -156,4 +156,3 @@ fn whole_view(
     let picture = depth_view(&image, range_mm, roi, scene.joint_pixel(row));
     Ok(figure(&text, embedded(&picture, &text, root)?))
 }
-

@@ -57,9 +57,15 @@ pub fn qa_page(root: &Path) -> Result<String, QaError> {
     let scene = Scene::read(root)?;
     let cuts = CutShares::read(root)?;
     let findings = Findings::read(root)?;
-    let severe = findings.0.iter().filter(|finding| finding.is_open()).count();
+    let severe = findings
+        .0
+        .iter()
+        .filter(|finding| finding.is_open())
+        .count();
     let doubts = findings.0.iter();
-    let doubts = doubts.filter(|finding| finding.finding.severity > Severity::Note).count();
+    let doubts = doubts
+        .filter(|finding| finding.finding.severity > Severity::Note)
+        .count();
     let mut tally = Tally {
         flaws: inspection.flaws.len(),
         severe,
@@ -149,10 +155,9 @@ fn splits(root: &Path, patients: &[u32]) -> Result<String, QaError> {
                 escaped(&without_folder(&error, root))
             ),
             Ok(split) => {
-                let parts = split
-                    .parts
-                    .iter()
-                    .map(|(part, of)| format!("{}: {}", escaped(part), numbers(of.iter().copied())));
+                let parts = split.parts.iter().map(|(part, of)| {
+                    format!("{}: {}", escaped(part), numbers(of.iter().copied()))
+                });
                 format!(
                     "<tr><td>{}</td><td>{}</td></tr>",
                     escaped(&name),

@@ -60,10 +60,16 @@ mod tests {
     fn colours_and_ticks_are_those_of_the_images() {
         let svg = colour_scale([700.0, 1000.0]);
         let [r, g, b] = false_colour(700.0 + 150.0 / 68.0, [700.0, 1000.0]);
-        assert!(svg.contains(&format!("fill=\"#{r:02x}{g:02x}{b:02x}\"")), "{svg}");
+        assert!(
+            svg.contains(&format!("fill=\"#{r:02x}{g:02x}{b:02x}\"")),
+            "{svg}"
+        );
         // 850 is in the middle of the bar, from 12 to 352.
         let at = |tick: &str| format!("x=\"{tick}\" y=\"35\"");
-        assert!(svg.contains(&format!("{} text-anchor=\"middle\">900<", at("238.7"))), "{svg}");
+        assert!(
+            svg.contains(&format!("{} text-anchor=\"middle\">900<", at("238.7"))),
+            "{svg}"
+        );
         assert!(svg.contains("no depth"));
     }
 }

@@ -43,7 +43,11 @@ impl Tally {
                 format!("Do not use this dataset as it is: {bad}. Also: {doubts}."),
             ),
             (true, false) => ("caution", format!("Look at this before use: {doubts}.")),
-            (true, true) => ("good", "No severe or cautioning finding, no flaw of files, no outlier among the poses.".to_owned()),
+            (true, true) => (
+                "good",
+                "No severe or cautioning finding, no flaw of files, no outlier among the poses."
+                    .to_owned(),
+            ),
         };
         format!("<p class=\"verdict {class}\">{text}</p>")
     }
@@ -65,12 +69,30 @@ mod tests {
     fn only_a_dataset_without_any_finding_gets_a_green_bar() {
         assert!(CLEAN.html().contains("verdict good"));
         let severe = Tally { severe: 1, ..CLEAN }.html();
-        assert!(severe.contains("verdict bad") && severe.contains(": 1 severe finding."), "{severe}");
-        let flaws = Tally { flaws: 2, outliers: 1, ..CLEAN }.html();
-        assert!(flaws.contains("verdict bad") && flaws.contains("2 flaws of files. Also: 1 outlier among"), "{flaws}");
+        assert!(
+            severe.contains("verdict bad") && severe.contains(": 1 severe finding."),
+            "{severe}"
+        );
+        let flaws = Tally {
+            flaws: 2,
+            outliers: 1,
+            ..CLEAN
+        }
+        .html();
+        assert!(
+            flaws.contains("verdict bad")
+                && flaws.contains("2 flaws of files. Also: 1 outlier among"),
+            "{flaws}"
+        );
         for doubtful in [
-            Tally { other_findings: 3, ..CLEAN },
-            Tally { outliers: 1, ..CLEAN },
+            Tally {
+                other_findings: 3,
+                ..CLEAN
+            },
+            Tally {
+                outliers: 1,
+                ..CLEAN
+            },
         ] {
             let html = doubtful.html();
             assert!(html.contains("verdict caution"), "{html}");

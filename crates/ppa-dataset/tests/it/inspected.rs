@@ -152,7 +152,8 @@ fn tallies_scans_and_labels_are_compared_with_the_lists() {
     assert_eq!(flaws(&tree), unlisted(&tree));
     Published::read(tree.root()).unwrap();
     tree.edit(labels, &bound(&hash), &bound("0123"));
-    let outdated = "labels of other radiographs than those there now: 1 label, the first of step 91";
+    let outdated =
+        "labels of other radiographs than those there now: 1 label, the first of step 91";
     assert!(flaws(&tree).iter().any(|flaw| flaw.contains(outdated)));
     let refused = Published::read(tree.root()).unwrap_err().to_string();
     assert!(

@@ -1,7 +1,7 @@
 //! Samples from a dataset in either published layout.
 
-use std::fmt;
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 use std::path::{Path, PathBuf};
 
 use ppa_dataset::BodyShape;

@@ -272,7 +272,9 @@ impl<'a> Runner<'a> {
     pub fn begun(&self) -> Result<Vec<Begun>, ExperimentError> {
         let steps = self.plan.training_config()?.schedule().steps();
         let runs = self.runs().into_iter();
-        let all: BTreeSet<Unit> = runs.flat_map(|run| run.needs().into_iter().chain([run])).collect();
+        let all: BTreeSet<Unit> = runs
+            .flat_map(|run| run.needs().into_iter().chain([run]))
+            .collect();
         let mut begun = Vec::new();
         for training in all {
             let folder = self.folder(training);

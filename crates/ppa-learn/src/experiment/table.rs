@@ -31,7 +31,11 @@ pub struct Incomplete {
 }
 
 fn test_sets_are(n: usize) -> String {
-    format!("{} {}", count(n, "test set"), if n == 1 { "is" } else { "are" })
+    format!(
+        "{} {}",
+        count(n, "test set"),
+        if n == 1 { "is" } else { "are" }
+    )
 }
 
 fn diverged(place: Option<Missing>) -> String {
@@ -112,7 +116,10 @@ impl Table {
             .columns
             .iter()
             .map(|column| column.headings().join(", "));
-        let warning = self.warning.iter().flat_map(|text| [text.clone(), String::new()]);
+        let warning = self
+            .warning
+            .iter()
+            .flat_map(|text| [text.clone(), String::new()]);
         let mut lines: Vec<String> = warning.collect();
         lines.extend([
             format!("| Metric | {} |", headings.collect::<Vec<_>>().join(" | ")),
@@ -166,7 +173,11 @@ impl Table {
         }
         lines.push("\\bottomrule".to_owned());
         lines.push("\\end{tabular}".to_owned());
-        let notes = self.warning.iter().chain(&self.notes).map(|note| format!("% {note}"));
+        let notes = self
+            .warning
+            .iter()
+            .chain(&self.notes)
+            .map(|note| format!("% {note}"));
         notes.chain(lines).collect::<Vec<_>>().join("\n") + "\n"
     }
 
@@ -201,7 +212,11 @@ impl Table {
 /// On how many test sets of which columns the network answers with a constant.
 fn constant(results: &Results) -> Option<String> {
     let found = results.constant();
-    let of = |column: Configuration| found.keys().filter(move |place| place.configuration == column);
+    let of = |column: Configuration| {
+        found
+            .keys()
+            .filter(move |place| place.configuration == column)
+    };
     let each = results.planned_seeds() * results.folds();
     let columns = results.columns().iter();
     let columns = columns.filter(|column| of(**column).count() > 0);
@@ -262,8 +277,7 @@ mod tests {
             .find(|line| line.starts_with("| MAE"))
             .unwrap();
         assert_eq!(
-            mae,
-            "| MAE | 1.00±0.00 | 0.81±0.09 | **0.31**±0.09 | **0.31**±0.09 |",
+            mae, "| MAE | 1.00±0.00 | 0.81±0.09 | **0.31**±0.09 | **0.31**±0.09 |",
             "two are the best of four"
         );
         let correlation = markdown.lines().find(|line| line.contains("r_s")).unwrap();
@@ -294,7 +308,10 @@ mod tests {
             markdown.contains("| MAE | 1.00 (n=1) | 0.81±0.09"),
             "{markdown}"
         );
-        assert!(markdown.contains("INCOMPLETE: 1 test set is missing"), "{markdown}");
+        assert!(
+            markdown.contains("INCOMPLETE: 1 test set is missing"),
+            "{markdown}"
+        );
         let latex = Table::so_far(&results).to_latex();
         assert!(latex.starts_with("% ") && latex.contains("% INCOMPLETE"));
     }

@@ -211,7 +211,8 @@ fn regions_outside_the_phantom_are_refused() {
         };
         let error = run.with_dose(&doses).err().unwrap();
         assert!(
-            matches!(error, DoseError::Box { .. }) && error.to_string().contains("30 x 30 x 10 voxels")
+            matches!(error, DoseError::Box { .. })
+                && error.to_string().contains("30 x 30 x 10 voxels")
         );
     }
 }

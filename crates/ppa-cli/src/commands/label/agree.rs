@@ -251,7 +251,9 @@ fn describe(report: &Report) -> String {
         ("ordinal", report.alpha_ordinal),
         ("interval", report.alpha_interval),
     ] {
-        lines.extend(alpha.map(|alpha| format!("Krippendorff's alpha, {name}  {:.4}", number(alpha))));
+        lines.extend(
+            alpha.map(|alpha| format!("Krippendorff's alpha, {name}  {:.4}", number(alpha))),
+        );
     }
     for Pair {
         readers: [a, b],
