@@ -67,7 +67,7 @@ fn a_flipped_bit_is_healed_and_its_file_kept() {
         let root = folder.path();
         let expected = contents(root);
         let files = files(root);
-        for _ in 0..100 {
+        for _ in 0..50 {
             let (file, _, after) = flip(root, &files, &mut draw);
             let summary = trial.run(root).unwrap();
             assert!(in_place(root) == expected, "{}", file.display());
