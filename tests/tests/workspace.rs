@@ -26,7 +26,10 @@ const ARROWS: &[(&str, &[&str])] = &[
         ],
     ),
     ("ppa-metrics", &[]),
-    ("ppa-learn", &["ppa-files", "ppa-text", "ppa-dataset", "ppa-metrics"]),
+    (
+        "ppa-learn",
+        &["ppa-files", "ppa-text", "ppa-dataset", "ppa-metrics"],
+    ),
     (
         "ppa-cli",
         &[

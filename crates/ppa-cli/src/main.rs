@@ -163,7 +163,10 @@ fn main() -> ExitCode {
     match cli {
         Ok(cli) => {
             stderr::set_up(cli.json, cli.color);
-            run(cli).map_or_else(|error| stderr::failure(&error).into(), |()| ExitCode::SUCCESS)
+            run(cli).map_or_else(
+                |error| stderr::failure(&error).into(),
+                |()| ExitCode::SUCCESS,
+            )
         }
         Err(error) => {
             stderr::set_up(early.json, early.color);

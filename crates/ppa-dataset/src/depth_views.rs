@@ -50,7 +50,11 @@ pub fn depth_views(
     let is_soft = placement.flattening.is_some();
     let vertices = limb.limb.walls.vertices(skin);
     let body = if is_soft {
-        closed_skin(&placement.in_room(&vertices, landmarks), skin, &limb.limb.walls)?
+        closed_skin(
+            &placement.in_room(&vertices, landmarks),
+            skin,
+            &limb.limb.walls,
+        )?
     } else {
         closed_skin(&vertices, skin, &limb.limb.walls)?
     };

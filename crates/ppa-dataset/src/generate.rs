@@ -18,8 +18,8 @@ use crate::plan::Plan;
 use crate::prepare::{PrepareError, PreparedLimb};
 use crate::record::Record;
 use crate::stage::{Stage, StageError};
-use crate::stop::{Stopped, go_on};
 use crate::staging::staging_folder;
+use crate::stop::{Stopped, go_on};
 use crate::unit::{PosableLimb, UnitError};
 
 /// Why a dataset could not be made. What was finished before stays and is not made again.

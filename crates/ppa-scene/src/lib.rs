@@ -49,8 +49,8 @@ pub use bump_sites::bump_sites;
 pub use device::XrayDevice;
 pub use find_landmarks::find_landmarks;
 pub use frames::{Camera, Ct, Device, NotRigid, Patient, Rigid};
-pub use landmark_choices::{LandmarkError, LandmarkOverrides};
 pub use knee_regions::KneeAxis;
+pub use landmark_choices::{LandmarkError, LandmarkOverrides};
 pub use landmark_notes::LandmarkNote;
 pub use landmarks::{
     AxisRegion, AxisSource, FoundJoint, Joint, KneeLines, Landmarks, LimbKind, Side,

@@ -6,8 +6,8 @@ use nalgebra::{Matrix4, Point3, Rotation3, Vector3};
 use ppa_ct::phantom::{Limb, LowerLeg, Scanner, Side as PhantomSide, TableTop};
 use ppa_ct::{Grid, Interpolation, Volume};
 use ppa_scene::{
-    Joint, KneeAxis, LandmarkError, LandmarkNote, LandmarkOverrides, Landmarks, LimbKind, Plane, Side, XrayDevice,
-    bump_sites, place,
+    Joint, KneeAxis, LandmarkError, LandmarkNote, LandmarkOverrides, Landmarks, LimbKind, Plane,
+    Side, XrayDevice, bump_sites, place,
 };
 
 use crate::scan::{P01, Scan};
@@ -328,7 +328,15 @@ fn a_whole_leg_shows_both_joints() {
     assert!((Point3::from(landmarks.joint_centre) - ankle).norm() < 6.0);
     let joints: Vec<Joint> = landmarks.joints.iter().map(|found| found.joint).collect();
     assert_eq!(joints, [Joint::Ankle, Joint::Knee]);
-    let told = |note: &LandmarkNote| matches!(note, LandmarkNote::OtherJoint { joint: Joint::Knee, .. });
+    let told = |note: &LandmarkNote| {
+        matches!(
+            note,
+            LandmarkNote::OtherJoint {
+                joint: Joint::Knee,
+                ..
+            }
+        )
+    };
     assert!(landmarks.notes.iter().any(told), "{:?}", landmarks.notes);
     let knee = leg.find(Side::Right, &asked(LimbKind::Knee)).unwrap();
     assert_eq!(knee.joint_centre, landmarks.joints[1].centre_mm);

@@ -15,8 +15,8 @@ use ppa_depth::{
 use ppa_mesh::{MeshContents, read_mesh_file};
 use serde::{Deserialize, Serialize};
 
-use crate::interrupt::Interrupt;
 use super::render_case::{OfCase, is_case, of_view, render_case};
+use crate::interrupt::Interrupt;
 use crate::output::{Output, Seconds, Stopwatch};
 use crate::output_files::ReplaceArgs;
 

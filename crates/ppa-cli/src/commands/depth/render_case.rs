@@ -86,7 +86,11 @@ fn declare(args: &RenderArgs) -> anyhow::Result<()> {
         let of = |path: &PathBuf| of_view(path, view);
         outputs.file("--out", &of(&args.out), &[".png"])?;
         outputs.optional("--exr", args.exr.as_ref().map(of).as_ref(), &[".exr"])?;
-        outputs.optional("--preview", args.preview.as_ref().map(of).as_ref(), &[".png"])?;
+        outputs.optional(
+            "--preview",
+            args.preview.as_ref().map(of).as_ref(),
+            &[".png"],
+        )?;
         outputs.optional("--points", args.points.as_ref().map(of).as_ref(), &[".ply"])?;
     }
     Ok(())
