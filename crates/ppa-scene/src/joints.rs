@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use ppa_ct::Volume;
 
 use crate::ankle::{Ankle, find_ankle, shaft_direction};
+use crate::bone_spans::{Lengthwise, broad_zones, spans};
 use crate::knee::{FoundKnee, Knee, find_knee};
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
 use crate::landmarks::{FoundJoint, Joint, KneeLines, LimbKind};
@@ -104,6 +105,16 @@ fn is_leg(sections: &Sections, ankle: &Ankle) -> bool {
     areas
         .get(areas.len() / 2)
         .is_none_or(|median| *median <= MOST_MM2)
+}
+
+/// Whether bone on both sides of an ankle is as broad as a knee.
+fn is_amid_broad_bone(volume: &Volume, sections: &Sections, ankle: &Ankle) -> bool {
+    const LEAST_MM: f64 = 12.0;
+    let spans = spans(volume, sections, &Lengthwise::along(&sections.direction));
+    broad_zones(&spans).iter().any(|zone| {
+        let [low, high] = zone.range_mm;
+        (low + LEAST_MM..high - LEAST_MM).contains(&ankle.level_mm)
+    })
 }
 
 /// Whether an ankle was found where a knee is.
