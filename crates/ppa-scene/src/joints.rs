@@ -30,8 +30,11 @@ impl<'a> Joints<'a> {
             let sections = across_the_shaft(volume, mask, &towards_proximal)?;
             let is_knee =
                 |ankle: &Ankle| knee.as_ref().is_some_and(|found| is_at(ankle, &found.knee));
-            let ankle =
-                find_ankle(&sections).filter(|ankle| is_leg(&sections, ankle) && !is_knee(ankle));
+            let is_upside_down_knee =
+                |ankle: &Ankle| is_reversed && is_amid_broad_bone(volume, &sections, ankle);
+            let ankle = find_ankle(&sections)
+                .filter(|ankle| is_leg(&sections, ankle) && !is_knee(ankle))
+                .filter(|ankle| !is_upside_down_knee(ankle));
             if ankle.is_some() || knee.is_some() {
                 return Ok(Self {
                     ankle: ankle.map(|ankle| (sections, ankle)),

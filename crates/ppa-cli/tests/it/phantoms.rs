@@ -1,5 +1,7 @@
 //! `ppa ct phantom`: the family, sides, plate, labels, scanner and knee.
 
+use std::fs;
+
 use serde_json::Value;
 
 use crate::{fail, names, succeed};
