@@ -20,8 +20,12 @@ fn data(name: &str) -> PathBuf {
     shared.join("data").join(name)
 }
 
-fn prepared(scan: &Path, side: Side) -> (Case, PreparedLimb) {
-    let (surface, choices) = (LimbSettings::default(), LandmarkOverrides::default());
+fn prepared(scan: &Path, side: Side, limb: LimbKind) -> (Case, PreparedLimb) {
+    let surface = LimbSettings::default();
+    let choices = LandmarkOverrides {
+        limb: Some(limb),
+        ..LandmarkOverrides::default()
+    };
     prepare(scan, &Default::default(), side, &surface, &choices).unwrap()
 }
 
@@ -65,7 +69,7 @@ fn dataset(case: &Case) -> tempfile::TempDir {
 fn of_the_calves_of_sts032_the_whole_one_is_taken_and_doubted_where_the_other_was_meant() {
     let scan = data("two-calves-sts032/CT_image.nii.gz");
     for (side, doubts) in [(Side::Right, 0), (Side::Left, 1)] {
-        let (case, limb) = prepared(&scan, side);
+        let (case, limb) = prepared(&scan, side, LimbKind::Other);
         let found = case.found.as_ref().unwrap();
         let litres = 1e-6 * found.surface.limb_mm3;
         assert!((1.5..1.6).contains(&litres), "{side:?}: {litres} litres");
@@ -86,7 +90,7 @@ fn of_the_calves_of_sts032_the_whole_one_is_taken_and_doubted_where_the_other_wa
 #[ignore = "needs ../shared/data"]
 fn the_right_leg_of_sts049_is_freed_from_couch_and_other_leg() {
     let scan = data("lower-leg-ankle-sts049");
-    let (case, limb) = prepared(&scan, Side::Right);
+    let (case, limb) = prepared(&scan, Side::Right, LimbKind::LowerLeg);
     let found = case.found.as_ref().unwrap();
     let [x, _, z] = found.landmarks.joint_centre;
     assert_eq!(found.landmarks.limb, LimbKind::LowerLeg);
@@ -123,7 +127,7 @@ fn both_containers_of_sts028_give_the_same_images() {
     assert!(volumes[0].hu() == volumes[1].hu());
     let made = scans
         .each_ref()
-        .map(|scan| dataset(&prepared(scan, Side::Left).0));
+        .map(|scan| dataset(&prepared(scan, Side::Left, LimbKind::Knee).0));
     let limb = LimbId {
         patient: 0,
         side: layout::Side::Left,

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::claim::{Claim, FolderError, claim};
 use crate::description::DESCRIPTION_FILE;
 use crate::files::FileError;
-use crate::findings::FindingCode;
+use crate::findings::{FindingCode, Findings};
 use crate::layout::LimbId;
 use crate::lists::Lists;
 use crate::manifest::FileKind;

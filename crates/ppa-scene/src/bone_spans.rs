@@ -151,7 +151,7 @@ pub(crate) fn broad_zones(spans: &[Span]) -> Vec<BroadZone> {
     zones
 }
 
-/// The shafts above and below a broad stretch.
+/// Directions of the shafts above and below a broad stretch, where enough of them is seen; unit vectors towards proximal.
 pub(crate) struct Shafts {
     pub(crate) femur: Option<Vector3<f64>>,
     pub(crate) tibia: Option<Vector3<f64>>,
@@ -176,6 +176,8 @@ impl BroadZone {
         /// The fibula of a lower leg above an ankle hangs together with the tibia for some 40 mm in coarse voxels.
         const FEMUR_MM: [f64; 2] = [20.0, 100.0];
         const TIBIA_MM: [f64; 2] = [15.0, 75.0];
+        /// Enough to tell a shaft, and to measure how it leans.
+        const SEEN_MM: f64 = 12.0;
         const ENOUGH_MM: f64 = 25.0;
         let share = |spans: &[&Span]| {
             let with = spans.iter().filter(|span| span.has_fibula).count();
@@ -193,19 +195,19 @@ impl BroadZone {
         if is_leg_below || is_leg_above {
             return None;
         }
-        let shaft = |spans: &[&Span], length_mm: f64| {
-            let thin = spans
-                .iter()
-                .filter(|s| s.hull.area_mm2 < 0.6 * self.most_mm2);
-            let thin: Vec<&Span> = thin.copied().collect();
-            (length_mm >= ENOUGH_MM && 10 * thin.len() >= 8 * spans.len())
-                .then(|| slope(&thin, frame))?
+        let thin = |spans: &[&Span]| {
+            let most_mm2 = 0.6 * self.most_mm2;
+            let thin = spans.iter().filter(|span| span.hull.area_mm2 < most_mm2);
+            10 * thin.count() >= 8 * spans.len()
         };
-        let shafts = Shafts {
-            femur: shaft(&femur, above_mm),
-            tibia: shaft(&tibia, below_mm),
-        };
-        (shafts.femur.is_some() || shafts.tibia.is_some()).then_some(shafts)
+        let [above, below] = [thin(&femur), thin(&tibia)];
+        let is_shaft = above && above_mm >= SEEN_MM || below && below_mm >= SEEN_MM;
+        let shaft =
+            |spans: &[&Span], is_measured: bool| is_measured.then(|| slope(spans, frame))?;
+        is_shaft.then(|| Shafts {
+            femur: shaft(&femur, above && above_mm >= ENOUGH_MM),
+            tibia: shaft(&tibia, below && below_mm >= ENOUGH_MM),
+        })
     }
 }
 

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use ppa_ct::Volume;
 
 use crate::ankle::{Ankle, find_ankle, shaft_direction};
+use crate::bone_spans::{Lengthwise, broad_zones, spans};
 use crate::knee::{FoundKnee, Knee, find_knee};
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
 use crate::landmark_notes::LandmarkNote;
@@ -14,8 +15,6 @@ use crate::limb_sections::Sections;
 pub(crate) struct Joints<'a> {
     pub(crate) ankle: Option<(Sections<'a>, Ankle)>,
     pub(crate) knee: Option<FoundKnee<'a>>,
-    /// Whether proximal is inferior in the scan.
-    pub(crate) is_reversed: bool,
 }
 
 impl<'a> Joints<'a> {
@@ -30,13 +29,15 @@ impl<'a> Joints<'a> {
             let sections = across_the_shaft(volume, mask, &towards_proximal)?;
             let is_knee =
                 |ankle: &Ankle| knee.as_ref().is_some_and(|found| is_at(ankle, &found.knee));
-            let ankle =
-                find_ankle(&sections).filter(|ankle| is_leg(&sections, ankle) && !is_knee(ankle));
+            let is_upside_down_knee =
+                |ankle: &Ankle| is_reversed && is_amid_broad_bone(volume, &sections, ankle);
+            let ankle = find_ankle(&sections)
+                .filter(|ankle| is_leg(&sections, ankle) && !is_knee(ankle))
+                .filter(|ankle| !is_upside_down_knee(ankle));
             if ankle.is_some() || knee.is_some() {
                 return Ok(Self {
                     ankle: ankle.map(|ankle| (sections, ankle)),
                     knee,
-                    is_reversed,
                 });
             }
         }
@@ -48,7 +49,6 @@ impl<'a> Joints<'a> {
         Self {
             ankle: None,
             knee: None,
-            is_reversed: false,
         }
     }
 
@@ -105,6 +105,16 @@ fn is_leg(sections: &Sections, ankle: &Ankle) -> bool {
     areas
         .get(areas.len() / 2)
         .is_none_or(|median| *median <= MOST_MM2)
+}
+
+/// Whether bone on both sides of an ankle is as broad as a knee.
+fn is_amid_broad_bone(volume: &Volume, sections: &Sections, ankle: &Ankle) -> bool {
+    const LEAST_MM: f64 = 12.0;
+    let spans = spans(volume, sections, &Lengthwise::along(&sections.direction));
+    broad_zones(&spans).iter().any(|zone| {
+        let [low, high] = zone.range_mm;
+        (low + LEAST_MM..high - LEAST_MM).contains(&ankle.level_mm)
+    })
 }
 
 /// Whether an ankle was found where a knee is.

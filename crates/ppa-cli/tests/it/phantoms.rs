@@ -1,5 +1,7 @@
 //! `ppa ct phantom`: the family, sides, plate, labels, scanner and knee.
 
+use std::fs;
+
 use serde_json::Value;
 
 use crate::{fail, names, succeed};
@@ -66,10 +68,40 @@ fn a_knee_can_be_prepared() {
     );
     assert_eq!(knee["phantom"], "left knee");
     assert!(knee.get("truth").is_none());
-    succeed(
+    let case = succeed(
         folder.path(),
-        "prepare knee.nii --side l --limb other --out knee.toml",
+        "prepare knee.nii --side l --out knee.toml --json",
     );
+    let case: Value = serde_json::from_str(&case).unwrap();
+    let found = &case["found"]["landmarks"];
+    assert_eq!(found["limb"], "knee");
+    let joint = [0, 1, 2].map(|axis| found["joint_centre"][axis].as_f64().unwrap());
+    // Middle of the plateau of the phantom.
+    let off = [95.0, 12.0, -151.0]
+        .into_iter()
+        .zip(joint)
+        .map(|(a, b)| (a - b).powi(2));
+    assert!(off.sum::<f64>().sqrt() < 2.0, "{joint:?}");
+    assert!(
+        fs::read_to_string(folder.path().join("knee.toml"))
+            .unwrap()
+            .contains("limb = \"knee\"")
+    );
+    let said = fail(
+        folder.path(),
+        "prepare knee.nii --side l --limb lower-leg --out leg.toml",
+    );
+    assert!(
+        said.contains("no ankle found, but a knee around 95, 1"),
+        "{said}"
+    );
+    assert!(said.contains("--limb knee"), "{said}");
+    let said = fail(
+        folder.path(),
+        "prepare knee.nii --side l --segment-bones b.nii --out leg.toml",
+    );
+    assert!(said.contains("labels of ankles"), "{said}");
+    assert!(!folder.path().join("leg.toml").exists() && !folder.path().join("b.nii").exists());
 }
 
 #[test]

@@ -26,7 +26,7 @@ pub(super) fn findings(landmarks: &Landmarks, shaft: Option<&Shaft>) -> Vec<Find
             AxisSource::Limb => {
                 " (the axis passes through centres of the skin; --axis-source bone takes those of the bone)"
             }
-            AxisSource::Bone => "",
+            AxisSource::Bone | AxisSource::Given => "",
         };
         found.push(at(
             shaft.centre_mm,
