@@ -93,7 +93,7 @@ fn a_second_ctrl_c_ends_at_once() {
     let text = fs::read_to_string(&plan).unwrap();
     let endless = text.replace(
         "scatter_histories = 20000",
-        "scatter_histories = 20000000000",
+        "scatter_histories = 100000000",
     );
     fs::write(&plan, endless).unwrap();
     let mut run = start(here, "generate plan.toml --out data --progress quiet");
@@ -163,7 +163,7 @@ fn a_scan_of_mcgpu_stops_within_a_projection() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     crate::mcgpu::write_input(here);
-    let run = "xray mcgpu box.in --histories 1e12 --out images";
+    let run = "xray mcgpu box.in --histories 4e11 --out images";
     let (code, said) = interrupted(here, run, "INT");
     assert_eq!(code, 130, "{said}");
     contains(&said, &["in projection 1 of 2", "images of 0 are whole"]);
