@@ -142,7 +142,9 @@ fn end(failure: &Failure) {
 
 /// clap's message without its usage: lines joined by spaces, tips after semicolons.
 fn in_one_line(error: &clap::Error) -> String {
-    if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+    if let ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand | ErrorKind::MissingSubcommand =
+        error.kind()
+    {
         return "a command is missing; --help lists them".to_owned();
     }
     let text = error.render().to_string();

@@ -8,7 +8,7 @@ pub enum MetricError {
     #[error("no {0}: a metric needs at least one")]
     Empty(&'static str),
     /// Two lists that belong together differ in length.
-    #[error("{first_count} {first} but {second_count} {second}, expected as many")]
+    #[error("expected as many {first} as {second}, found {first_count} and {second_count}")]
     Length {
         /// What the first list holds.
         first: &'static str,
@@ -20,7 +20,7 @@ pub enum MetricError {
         second_count: usize,
     },
     /// Too few of something.
-    #[error("{found} {what}, expected at least {expected}")]
+    #[error("the number of {what} is {found}, expected at least {expected}")]
     TooFew {
         /// Of what.
         what: &'static str,
@@ -62,7 +62,7 @@ pub enum MetricError {
     #[error("no label is diagnostic (below 2.5), so specificity is not defined")]
     NoNegatives,
     /// A seed with more or fewer folds than the first.
-    #[error("seed {seed} has {found} rows, expected {expected} as the first seed has")]
+    #[error("the number of rows of seed {seed} is {found}, expected {expected} as of the first seed")]
     UnequalFolds {
         /// The seed.
         seed: u64,

@@ -74,5 +74,8 @@ fn agreement_of_readers_from_their_files() {
     let folder_given = fail(folder.path(), "label agree .");
     assert!(folder_given.contains("cannot read ."), "{folder_given}");
     let alone = fail(folder.path(), "label agree a.csv");
-    assert!(alone.contains("1 readers, expected at least 2"), "{alone}");
+    assert!(
+        alone.contains("the number of readers is 1, expected at least 2"),
+        "{alone}"
+    );
 }

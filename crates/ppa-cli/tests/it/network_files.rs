@@ -33,11 +33,11 @@ fn pairs_are_exported_from_trainings_and_from_their_weight_files() {
     assert!(fs::read(folder.join("pairs.safetensors")).unwrap() == same);
 
     let refused = fail(folder, "learn export right left --out no.onnx");
-    let expected = "right was trained with views = Right, expected \"left\" or \"unified\"";
+    let expected = "right was trained with views = \"right\", expected \"left\" or \"unified\"";
     assert!(refused.contains(expected), "{refused}");
     let refused = fail(folder, "learn export pairs.safetensors right --out no.onnx");
     assert!(
-        refused.contains("takes images of 2 camera(s), found those of 1"),
+        refused.contains("takes images of 2 cameras, found those of 1"),
         "{refused}"
     );
     assert!(!folder.join("no.onnx").exists());

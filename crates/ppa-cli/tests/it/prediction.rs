@@ -150,7 +150,7 @@ fn frames_that_cannot_be_used_are_named_and_skipped() {
 
     contains(
         &fail(folder, &format!("predict right left {REGIONS} --stdin")),
-        &["right was trained with views = Right", "left camera's"],
+        &["right was trained with views = \"right\"", "left camera's"],
     );
     contains(
         &fail(folder, &format!("predict data {REGIONS} --stdin")),

@@ -95,8 +95,8 @@ fn errors_of_json_runs_are_objects() {
         ("metrics --json", "<CSV>"),
         ("--json metrics a.csv b.csv", "unexpected argument 'b.csv'"),
         (
-            "statuss data --json",
-            "tip: a similar subcommand exists: 'status'",
+            "generat plan --json",
+            "tip: a similar subcommand exists: 'generate'",
         ),
         ("--json", "a command is missing"),
         ("ct --json", "a command is missing"),

@@ -105,8 +105,8 @@ impl Sorted {
             warnings.push(Warning {
                 code: WarningCode::LocalizersDropped,
                 text: format!(
-                    "{} localizer images (scout views) were left out",
-                    self.localizers
+                    "left out: {} (scout views)",
+                    ppa_text::count(self.localizers, "localizer image")
                 ),
             });
         }
@@ -114,8 +114,8 @@ impl Sorted {
             warnings.push(Warning {
                 code: WarningCode::NonImagesDropped,
                 text: format!(
-                    "{} DICOM objects that are no images were left out",
-                    self.others
+                    "left out: {} without an image",
+                    ppa_text::count(self.others, "DICOM object")
                 ),
             });
         }

@@ -240,7 +240,7 @@ fn localizers_reports_and_strangers_are_left_out_but_a_second_series_is_not() {
     let error = read(folder.path()).unwrap_err();
     let text = error.to_string();
     assert!(
-        text.contains("number 1 (CT, 1 images of 4 x 3); number 3 (CT, 3 images of 4 x 3)"),
+        text.contains("number 1 (CT, 1 image of 4 x 3); number 3 (CT, 3 images of 4 x 3)"),
         "{text}"
     );
 }

@@ -34,7 +34,7 @@ fn each_flaw_is_told_with_its_file() {
             let bytes = fs::read(tree.path(file)).unwrap();
             fs::write(tree.path(file), &bytes[..bytes.len() / 2]).unwrap();
         }),
-        ("expected one channel with 16 bits", &|tree| {
+        ("expected 16-bit grey", &|tree| {
             image::RgbImage::new(12, 9).save(tree.path(file)).unwrap();
         }),
         (

@@ -141,7 +141,7 @@ fn what_is_missing_or_of_another_size_is_named() {
     let grey = image::GrayImage::from_pixel(60, 60, image::Luma([9]));
     grey.save(&odd).unwrap();
     let error = read().unwrap_err().to_string();
-    assert!(error.contains("holds pixels of type L8"), "{error}");
+    assert!(error.contains("holds 8-bit grey pixels"), "{error}");
 }
 
 #[test]

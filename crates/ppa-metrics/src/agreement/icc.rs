@@ -312,7 +312,7 @@ mod tests {
         let one_by_all = of(vec![vec![Some(2.0), None], vec![Some(1.0), Some(2.0)]]);
         assert_eq!(
             one_by_all.unwrap_err().to_string(),
-            "1 subjects graded by every reader, expected at least 2"
+            "the number of subjects graded by every reader is 1, expected at least 2"
         );
     }
 }

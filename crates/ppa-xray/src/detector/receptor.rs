@@ -143,7 +143,7 @@ pub enum ReceptorError {
     },
     /// A table of an MTF without pairs.
     #[error(
-        "the MTF table has {frequencies} frequencies and {values} values, expected as many of both, at least one"
+        "the numbers of frequencies and values of the MTF table are {frequencies} and {values}, expected the same, at least 1"
     )]
     MtfTable {
         /// Number of frequencies.

@@ -242,11 +242,11 @@ mod tests {
         let (header, _) = SAMPLE.split_once("1 0.0012").unwrap();
         let huge = header.replacen("3 2 2", "2000 2000 2500", 1);
         let found = read(huge.as_bytes()).unwrap_err().to_string();
-        assert!(found.contains("[2000, 2000, 2500] voxels, but "), "{found}");
+        assert!(found.contains("2000 x 2000 x 2500 voxels, but "), "{found}");
         let text = header.replacen("3 2 2", "50 50 50", 1) + &"1 1\n".repeat(125_000);
         assert!(mangled::read(text.as_bytes(), |path| VoxelFile::read_into(path, 1 << 30)).is_ok());
         let found = read(text.as_bytes()).unwrap_err().to_string();
-        let expected = "[50, 50, 50] voxels need at least 1 MB of memory, and 1 MB are to be had";
+        let expected = "50 x 50 x 50 voxels need at least 1 MB of memory, but 1 MB are available";
         assert!(found.contains(expected), "{found}");
     }
 
