@@ -2,7 +2,7 @@
 
 use std::env;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, bail};
 use ppa_xray::Part;
 
 /// Where a shard was told.

@@ -113,7 +113,7 @@ pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
     // A whole path: begun trainings compare the paths of the weights that they began with.
     let out = std::path::absolute(&args.out)?;
     let runner = Runner::new(&plan, experiment, &out)?;
-    let part = shard(args.shard)?;
+    let part = shard(args.shard)?.part(|| Ok(None))?;
     if plan.configurations(experiment).len() < experiment.configurations().len() {
         stderr::warning("the plan names no imagenet_weights: their column is left out");
     }
