@@ -6,8 +6,8 @@ pub fn dicom_file(syntax: &str, size: [u8; 2], bits: u8, fragment: &[u8]) -> Vec
     let bits = if bits % 2 == 0 { 16_u16 } else { 8 };
     let number = |n: u16| n.to_le_bytes();
     let mut file = [&[0; 128], &b"DICM"[..]].concat();
-    for (group, element, kind, value) in [
-        (0x0002, 0x0002, b"UI", &b"1.2.840.10008.5.1.4.1.1.2"[..]),
+    let elements: [(u16, u16, &[u8; 2], &[u8]); 16] = [
+        (0x0002, 0x0002, b"UI", b"1.2.840.10008.5.1.4.1.1.2"),
         (0x0002, 0x0010, b"UI", syntax.as_bytes()),
         (0x0008, 0x0060, b"CS", b"CT"),
         (0x0018, 0x0050, b"DS", b"1"),
@@ -23,7 +23,8 @@ pub fn dicom_file(syntax: &str, size: [u8; 2], bits: u8, fragment: &[u8]) -> Vec
         (0x0028, 0x0101, b"US", &number(bits)),
         (0x0028, 0x0102, b"US", &number(bits - 1)),
         (0x0028, 0x0103, b"US", &number(0)),
-    ] {
+    ];
+    for (group, element, kind, value) in elements {
         put(&mut file, group, element, kind, value);
     }
     file.extend(b"\xe0\x7f\x10\x00OB\0\0\xff\xff\xff\xff\xfe\xff\x00\xe0\0\0\0\0");
@@ -44,9 +45,4 @@ fn put(file: &mut Vec<u8>, group: u16, element: u16, kind: &[u8; 2], value: &[u8
     if padded > value.len() {
         file.push(if kind == b"UI" { 0 } else { b' ' });
     }
-}
-
-/// What the targets of the codecs take: size, bits and frame.
-pub fn frame(size: [u8; 2], bits: u8, frame: &[u8]) -> Vec<u8> {
-    [&[size[0], size[1], u8::from(bits == 8)], frame].concat()
 }

@@ -6,13 +6,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
+use dicom::dicom_file;
 use ppa_ct::ReadOptions;
 use ppa_dataset::labels::{LabelFile, import_grades, read_key};
 use ppa_dataset::layout::{LimbId, Side};
 use ppa_dataset::published::Published;
 use ppa_dataset::{Manifest, Split};
-
-pub use dicom::{dicom_file, frame};
 
 /// One folder for each process: a file is written again and again.
 static FOLDER: LazyLock<PathBuf> =

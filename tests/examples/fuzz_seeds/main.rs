@@ -1,4 +1,6 @@
-//! Writes the corpus that fuzzing begins with: `seeds FOLDER` makes a folder for each target, with a few right files each.
+//! Writes the corpus that fuzzing begins with: `fuzz_seeds FOLDER` makes a folder for each target, with a few valid files each.
+//!
+//! Not a program of `fuzz/`, where everything is compiled for the fuzzer.
 
 mod streams;
 mod texts;
@@ -10,7 +12,11 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Point3, Vector3};
 use ppa_ct::{Grid, Volume};
 use ppa_depth::{CameraSpec, DepthMode};
-use ppa_fuzz::{dicom_file, frame};
+
+/// What the targets of codecs take: columns, rows, 1 for 8 bits, and the frame.
+fn frame(size: [u8; 2], bits: u8, frame: &[u8]) -> Vec<u8> {
+    [&[size[0], size[1], u8::from(bits == 8)], frame].concat()
+}
 
 /// What takes a file's kind from its first byte.
 fn tagged(kind: u8, bytes: impl AsRef<[u8]>) -> Vec<u8> {
@@ -71,8 +77,7 @@ fn volumes(corpus: &Corpus, work: &Path) -> Result<(), Box<dyn Error>> {
         let name = slice.file_name().expect("a file has a name");
         corpus.put("dicom", &name.to_string_lossy(), fs::read(&slice)?)?;
     }
-    let deflated = dicom_file("1.2.840.10008.1.2.1.99", [2, 2], 16, &[]);
-    Ok(corpus.put("dicom", "deflated.dcm", deflated)?)
+    Ok(())
 }
 
 /// A frame of 8 x 8 pixels by every codec.

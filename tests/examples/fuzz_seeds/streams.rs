@@ -2,7 +2,7 @@
 
 /// 8 x 8 pixels of 16 bits in two runs for each byte.
 pub fn rle() -> Vec<u8> {
-    let segment = [0xc1, 3, 0xff & 0x80]; // 64 times 3, and a code without meaning
+    let segment = [0xc1, 3, 0x80]; // 64 times 3, and a code without meaning
     let starts = [2_u32, 64, 64 + segment.len() as u32];
     let mut stream: Vec<u8> = starts.iter().flat_map(|n| n.to_le_bytes()).collect();
     stream.resize(64, 0);
