@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::{contains, fail, phantom, ppa, succeed, training};
+use crate::{contains, fail, ppa, succeed, training};
 
 const OPEN: &str = "severe [side-mismatch] limb l of patient 0";
 
@@ -19,9 +19,8 @@ fn both(folder: &Path, arguments: &str) -> (String, String) {
 
 /// A plan of one pose of a right leg that is said to be a left one.
 fn write_wrong_side(folder: &Path) -> String {
-    let scan = phantom().join("p01.nii");
-    let prepare = format!("prepare {} --side l --out leg.toml", scan.display());
-    let told = succeed(folder, &prepare);
+    succeed(folder, "ct phantom --out p01.nii --spacing-mm 2 --table");
+    let told = succeed(folder, "prepare p01.nii --side l --out leg.toml");
     let plan = "version = 1\n[[case]]\nfile = \"leg.toml\"\npatient = 0\n\
          [rotation]\nfrom_deg = 0.0\nto_deg = 0.0\nstep_deg = 2.5\n\
          [xray]\ndetector = { columns = 50, rows = 50, pixel_mm = 4.0 }\n\
