@@ -121,9 +121,9 @@ fn two_legs(pressed_mm: f64) -> Volume {
     Volume::new(grid, hu).unwrap()
 }
 
-/// Apart they are two limbs of which one is taken; pressed together their skin is a guess where they touch.
+/// Apart they are two limbs of which one is taken; pressed together by 12 mm they are one body with two tibiae.
 #[test]
-fn legs_pressed_together_are_told_by_their_contact() {
+fn legs_pressed_together_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let found = |pressed_mm: f64| {
         let scan = folder.path().join("legs.nii");
@@ -134,17 +134,11 @@ fn legs_pressed_together_are_told_by_their_contact() {
     assert_eq!(codes(&apart, Severity::Severe), [], "{:#?}", apart.findings);
     assert!(!codes(&apart, Severity::Note).contains(&FindingCode::FusedLimb));
     let pressed = found(12.0);
-    let contact = pressed
-        .findings
-        .iter()
-        .find(|f| f.code == FindingCode::FusedLimb);
-    let contact = contact.unwrap_or_else(|| panic!("{:#?}", pressed.findings));
-    assert_eq!(contact.severity, Severity::Severe, "{contact:?}");
-    // The contact lies medial of the right leg's axis.
-    let axis = pressed.landmarks.axis_point[0];
+    let severe = codes(&pressed, Severity::Severe);
     assert!(
-        contact.place_mm.unwrap()[0] > axis + 20.0,
-        "{contact:?} {axis}"
+        severe.contains(&FindingCode::FusedLimb),
+        "{:#?}",
+        pressed.findings
     );
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::{contains, fail, phantom, ppa, succeed, training};
+use crate::{contains, fail, ppa, succeed, training};
 
 const OPEN: &str = "severe [side-mismatch] limb l of patient 0";
 
@@ -17,13 +17,15 @@ fn both(folder: &Path, arguments: &str) -> (String, String) {
     (String::from_utf8(output.stdout).unwrap(), stderr)
 }
 
-/// A plan of one pose of a right leg that is said to be a left one.
+/// A plan of two poses of a right leg that is said to be a left one.
 fn write_wrong_side(folder: &Path) -> String {
-    let scan = phantom().join("p01.nii");
-    let prepare = format!("prepare {} --side l --out leg.toml", scan.display());
-    let told = succeed(folder, &prepare);
+    succeed(
+        folder,
+        "ct phantom --name P07 --spacing-mm 2 --table --out leg.nii",
+    );
+    let told = succeed(folder, "prepare leg.nii --side l --out leg.toml");
     let plan = "version = 1\n[[case]]\nfile = \"leg.toml\"\npatient = 0\n\
-         [rotation]\nfrom_deg = 0.0\nto_deg = 0.0\nstep_deg = 2.5\n\
+         [rotation]\nfrom_deg = 0.0\nto_deg = 2.5\nstep_deg = 2.5\n\
          [xray]\ndetector = { columns = 50, rows = 50, pixel_mm = 4.0 }\n\
          engine = { scatter_histories = 20000 }\n";
     fs::write(folder.join("plan.toml"), plan).unwrap();
@@ -59,10 +61,7 @@ fn a_severe_finding_is_repeated_until_it_is_acknowledged() {
         contains(&said, &["acknowledge it in the case once you have looked"]);
     }
     let status = succeed(folder, "status data");
-    contains(
-        &status,
-        &["findings   1, of which severe and not acknowledged: 1"],
-    );
+    contains(&status, &["of which severe and not acknowledged: 1"]);
     let (_, said) = both(folder, "scene place leg.toml");
     contains(&said, &["severe [side-mismatch] limb l of leg.toml"]);
 

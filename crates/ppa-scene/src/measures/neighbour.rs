@@ -2,7 +2,7 @@
 
 use super::sections::{LimbSection, LimbSections, MIN_TIBIA_MM2};
 
-/// What of another limb may hang on this one, between the ends of the regions that give the axis.
+/// What of another limb may hang on this one, along the shaft of its largest bone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Neighbour {
     /// Largest change of the cross-section from one place to another 3 mm along the limb, percent per mm.
@@ -20,9 +20,16 @@ const OVER_MM: f64 = 3.0;
 const FAR_MM: f64 = 70.0;
 
 impl Neighbour {
-    /// `None` for limbs shorter than 3 mm between the regions.
+    /// `None` where no shaft is seen.
     pub(super) fn of(sections: &LimbSections) -> Option<Self> {
-        let sections: Vec<&LimbSection> = sections.0.iter().filter(|s| s.in_regions).collect();
+        // A foot or a hand changes its cross-section as fast as a sliver does.
+        let shaft = sections.through_shaft();
+        let (first, last) = (shaft.first()?.above_mm, shaft.last()?.above_mm);
+        let sections: Vec<&LimbSection> = sections
+            .0
+            .iter()
+            .filter(|section| (first..=last).contains(&section.above_mm))
+            .collect();
         let mut jump: Option<(f64, &LimbSection)> = None;
         for (i, from) in sections.iter().enumerate() {
             let to = sections[i..]
@@ -81,7 +88,6 @@ mod tests {
                 above_mm: f64::from(mm),
                 area_mm2: 7000.0 + 20.0 * f64::from(mm) + grown,
                 centre: Point3::new(0.0, 0.0, f64::from(mm)),
-                in_regions: true,
                 bones: bones.to_vec(),
             }
         };

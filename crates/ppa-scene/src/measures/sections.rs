@@ -20,8 +20,6 @@ pub(super) struct LimbSection {
     pub above_mm: f64,
     pub area_mm2: f64,
     pub centre: Point3<f64>,
-    /// Whether it lies between the ends of the regions that give the axis.
-    pub in_regions: bool,
     /// Bones, largest first; empty outside the regions, and where they were not looked for.
     pub bones: Vec<BoneSection>,
 }
@@ -63,7 +61,6 @@ impl LimbSections {
                 above_mm: above(slice),
                 area_mm2,
                 centre,
-                in_regions: within(slice),
                 bones,
             })
         });
