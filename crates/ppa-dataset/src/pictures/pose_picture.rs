@@ -146,7 +146,7 @@ fn draw_overview(canvas: &mut Canvas, rect: Rect, scene: &PoseScene) {
             let below = [at[0].max(0.0) as u32 + 12, at[1].max(0.0) as u32];
             canvas.text(cone.name, below, 2, colour);
         }
-        draw_limb_marks(canvas, &raster, &view, scene);
+        draw_limb_marks(canvas, &view, scene);
     });
     panel::title(canvas, rect, "the room");
     panel::scale_bar(canvas, rect, &view);
@@ -172,7 +172,7 @@ fn draw_side(
     canvas.within(rect, |canvas| {
         paint(canvas, &raster, scene);
         draw_device(canvas, &raster, &view, scene);
-        draw_limb_marks(canvas, &raster, &view, scene);
+        draw_limb_marks(canvas, &view, scene);
     });
     panel::title(canvas, rect, title);
     panel::scale_bar(canvas, rect, &view);
@@ -235,7 +235,7 @@ fn draw_device(canvas: &mut Canvas, raster: &Raster, view: &View, scene: &PoseSc
 }
 
 /// Axis, joint and contacts.
-fn draw_limb_marks(canvas: &mut Canvas, raster: &Raster, view: &View, scene: &PoseScene) {
+fn draw_limb_marks(canvas: &mut Canvas, view: &View, scene: &PoseScene) {
     let [from, to] = scene.axis.map(|end| view.pixel(&end));
     canvas.line(from, to, 1.5, AXIS);
     for contact in &scene.contacts {

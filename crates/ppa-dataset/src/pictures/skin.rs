@@ -1,6 +1,6 @@
 //! A view of a limb's skin as it lies in the scan.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use ppa_mesh::Mesh;
 
 use super::canvas::{Canvas, Rect, mixed};

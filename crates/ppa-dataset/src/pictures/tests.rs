@@ -269,3 +269,37 @@ fn a_posed_limb_rests_on_the_points_that_are_marked() {
         assert!(picture == pose_picture("leg.case.toml", &posed).unwrap());
     }
 }
+
+#[test]
+#[ignore = "temporary look"]
+fn look() {
+    use crate::prepare::prepare;
+    let shared = std::path::Path::new("/work/shared/data");
+    let whole = |surface: LimbSettings| surface;
+    for (name, path, side) in [
+        ("ankle", shared.join("lower-leg-ankle-sts049/dicom"), Side::Right),
+        ("knee", shared.join("knee-calf-sts028/CT_image.nii.gz"), Side::Right),
+        ("wrist", shared.join("wrist-hand-sts019/CT_image.nii.gz"), Side::Left),
+    ] {
+        let prepared = prepare(&path, &ppa_ct::ReadOptions::default(), side, &whole(LimbSettings::default()), &LandmarkOverrides::default());
+        match prepared {
+            Ok((_, limb)) => {
+                let out = format!("/tmp/look_{name}.png");
+                super::write_picture(out.as_ref(), &case_picture(&format!("{name}.case.toml"), &limb, &[])).unwrap();
+                if name == "ankle" { pose(&limb, "/tmp/look_ankle_pose.png"); }
+            }
+            Err(e) => println!("{name}: {e}"),
+        }
+    }
+    let p01 = prepared(LowerLeg::p01().voxelise(1.5, TableTop::Absent).unwrap(), &LandmarkOverrides::default());
+    super::write_picture("/tmp/look_p01.png".as_ref(), &case_picture("p01.case.toml", &p01, &[])).unwrap();
+    pose(&p01, "/tmp/look_p01_pose.png");
+}
+
+fn pose(limb: &PreparedLimb, out: &str) {
+    let plan = Plan::new(Vec::new());
+    let table = Table::of_plan(&plan).unwrap();
+    let placement = place(&limb.limb.mesh.vertices, &limb.landmarks, 0.314, &table.plane.plane, &table.room.device).unwrap();
+    let posed = PosedLimb { limb, placement: &placement, angle_deg: 18.0, table: &table, plan: &plan, acknowledged: &[] };
+    super::write_picture(out.as_ref(), &pose_picture("leg.case.toml", &posed).unwrap()).unwrap();
+}
