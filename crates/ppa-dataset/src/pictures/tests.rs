@@ -87,7 +87,7 @@ fn a_picture_has_its_size_and_the_same_bytes_every_time() {
 #[test]
 fn the_skin_is_outlined_and_its_cut_is_shown() {
     for column in 0..3 {
-        assert!(coloured(&PICTURE, panel(column, 0), OUTLINE).len() > 200);
+        assert!(coloured(&PICTURE, panel(column, 0), OUTLINE).len() > 60);
     }
     assert_eq!(LEG.limb.report.cut_faces.len(), 1);
     // A wedge off the front makes a cut that the front view looks at.
@@ -231,9 +231,8 @@ fn a_posed_limb_rests_on_the_points_that_are_marked() {
         let angle = f64::to_radians(angle_deg);
         let placement = place(skin, landmarks, angle, plane, &table.room.device).unwrap();
         let rig = plan.depth.cameras().unwrap();
-        let mesh = &limb.limb.mesh;
         let detector = &plan.xray.detector;
-        let scene = PoseScene::new(mesh, landmarks, &placement, &table, &rig, detector).unwrap();
+        let scene = PoseScene::new(limb, &placement, &table, &rig, detector).unwrap();
         let [distal, proximal] = scene.contacts[..] else {
             panic!("{:?}", scene.contacts);
         };
@@ -246,15 +245,22 @@ fn a_posed_limb_rests_on_the_points_that_are_marked() {
         }
         let head = scene.axes.column(1);
         assert!(head.dot(&(proximal - distal)) > 0.0);
-        // Both cameras stand above the table and see the joint within their cones.
+        // Both cameras stand above the table, and the joint lies inside what they see of it.
         for cone in &scene.cones {
-            let middle = cone.corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / 4.0;
+            assert!(plane.signed_distance(&cone.eye) > 500.0);
+            let [across, head] = [0, 1].map(|i| scene.axes.column(i).into_owned());
+            let flat = cone.corners.map(|c| c - scene.joint);
+            let flat = flat.map(|c| [across.dot(&c), head.dot(&c)]);
+            let turns = (0..4).map(|i| {
+                let ([ax, ay], [bx, by]) = (flat[i], flat[(i + 1) % 4]);
+                ax * by - ay * bx > 0.0
+            });
+            let turns: Vec<bool> = turns.collect();
             assert!(
-                (middle - scene.joint.coords).norm() < 150.0,
-                "{}",
+                turns.iter().all(|t| *t == turns[0]),
+                "{}: {flat:?}",
                 cone.name
             );
-            assert!(plane.signed_distance(&cone.eye) > 500.0);
         }
         let posed = PosedLimb {
             limb,
@@ -268,38 +274,4 @@ fn a_posed_limb_rests_on_the_points_that_are_marked() {
         assert_eq!(picture.dimensions(), (WIDTH, HEIGHT));
         assert!(picture == pose_picture("leg.case.toml", &posed).unwrap());
     }
-}
-
-#[test]
-#[ignore = "temporary look"]
-fn look() {
-    use crate::prepare::prepare;
-    let shared = std::path::Path::new("/work/shared/data");
-    let whole = |surface: LimbSettings| surface;
-    for (name, path, side) in [
-        ("ankle", shared.join("lower-leg-ankle-sts049/dicom"), Side::Right),
-        ("knee", shared.join("knee-calf-sts028/CT_image.nii.gz"), Side::Right),
-        ("wrist", shared.join("wrist-hand-sts019/CT_image.nii.gz"), Side::Left),
-    ] {
-        let prepared = prepare(&path, &ppa_ct::ReadOptions::default(), side, &whole(LimbSettings::default()), &LandmarkOverrides::default());
-        match prepared {
-            Ok((_, limb)) => {
-                let out = format!("/tmp/look_{name}.png");
-                super::write_picture(out.as_ref(), &case_picture(&format!("{name}.case.toml"), &limb, &[])).unwrap();
-                if name == "ankle" { pose(&limb, "/tmp/look_ankle_pose.png"); }
-            }
-            Err(e) => println!("{name}: {e}"),
-        }
-    }
-    let p01 = prepared(LowerLeg::p01().voxelise(1.5, TableTop::Absent).unwrap(), &LandmarkOverrides::default());
-    super::write_picture("/tmp/look_p01.png".as_ref(), &case_picture("p01.case.toml", &p01, &[])).unwrap();
-    pose(&p01, "/tmp/look_p01_pose.png");
-}
-
-fn pose(limb: &PreparedLimb, out: &str) {
-    let plan = Plan::new(Vec::new());
-    let table = Table::of_plan(&plan).unwrap();
-    let placement = place(&limb.limb.mesh.vertices, &limb.landmarks, 0.314, &table.plane.plane, &table.room.device).unwrap();
-    let posed = PosedLimb { limb, placement: &placement, angle_deg: 18.0, table: &table, plan: &plan, acknowledged: &[] };
-    super::write_picture(out.as_ref(), &pose_picture("leg.case.toml", &posed).unwrap()).unwrap();
 }
