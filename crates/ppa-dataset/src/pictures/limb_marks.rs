@@ -13,6 +13,9 @@ const FAR_MM: f64 = 5000.0;
 /// A plane is drawn as a line where the view's line of sight leaves it by at most this angle's sine.
 const EDGE_ON: f64 = 0.35;
 
+/// The view looks along the axis where the cosine of their angle is above this.
+const ALONG: f64 = 0.8;
+
 /// Landmarks, ready to be drawn.
 pub(super) struct LimbMarks<'a> {
     landmarks: &'a Landmarks,
@@ -73,10 +76,13 @@ impl<'a> LimbMarks<'a> {
         canvas.line(ends[0], ends[1], 2.0, PLANE);
     }
 
-    /// The axis, seen through everything.
+    /// The axis, seen through everything; not where the view looks along it, since the joint then marks it.
     pub(super) fn draw_axis(&self, canvas: &mut Canvas, view: &View) {
         let at = Point3::from(self.landmarks.axis_point);
         let along = Vector3::from(self.landmarks.axis_direction);
+        if view.towards_viewer().dot(&along).abs() > ALONG {
+            return;
+        }
         let ends = [-FAR_MM, FAR_MM].map(|far| view.pixel(&(at + along * far)));
         canvas.line(ends[0], ends[1], 2.0, AXIS);
     }

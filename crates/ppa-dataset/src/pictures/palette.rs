@@ -16,6 +16,8 @@ pub(super) const CALF_REGION: Colour = [80, 130, 255];
 pub(super) const PLANE: Colour = [255, 140, 30];
 /// What the field of view cuts.
 pub(super) const CUT: Colour = [255, 0, 200];
+/// Where the limb lies on the table.
+pub(super) const CONTACT: Colour = [90, 235, 90];
 pub(super) const TABLE: Colour = [120, 132, 150];
 pub(super) const DETECTOR: Colour = [90, 200, 190];
 pub(super) const BEAM: Colour = [255, 240, 150];

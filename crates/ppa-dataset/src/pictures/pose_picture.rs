@@ -6,9 +6,9 @@ use ppa_depth::RigError;
 use ppa_mesh::{PointCloud, mean_spacing_mm};
 use ppa_scene::Placement;
 
-use super::canvas::{Canvas, Colour, Rect};
+use super::canvas::{Canvas, Colour, Rect, mixed};
 use super::case_picture::{limb_name, remarks};
-use super::palette::{AXIS, BEAM, CAMERAS, CUT, DETECTOR, FAINT, INK, JOINT, SKIN, TABLE};
+use super::palette::{AXIS, BEAM, CAMERAS, CONTACT, CUT, DETECTOR, FAINT, INK, JOINT, SKIN, TABLE};
 use super::panel;
 use super::pose_scene::PoseScene;
 use super::raster::Raster;
@@ -25,7 +25,10 @@ const SIDE_HEIGHT: u32 = (PANELS_END - HEADER - 2 * GAP) / 3;
 
 const ROOM_LAYER: u8 = 0;
 const SKIN_LAYER: u8 = 1;
+const CUT_LAYER: u8 = 2;
 
+/// What is shown below the table top beside the limb, mm.
+const BELOW_MM: f64 = 40.0;
 /// Skin this close to the table counts as lying on it, mm.
 const TOUCHING_MM: f64 = 1.0;
 /// What is shown of the room around limb, device and cameras in the overview, and around the limb beside it, mm.
@@ -64,8 +67,7 @@ pub struct PosedLimb<'a> {
 pub fn pose_picture(name: &str, posed: &PosedLimb) -> Result<RgbImage, RigError> {
     let rig = posed.plan.depth.cameras()?;
     let scene = PoseScene::new(
-        &posed.limb.limb.mesh,
-        &posed.limb.landmarks,
+        posed.limb,
         posed.placement,
         posed.table,
         &rig,
@@ -166,7 +168,8 @@ fn draw_side(
         .map(|p| p.cast::<f64>())
         .collect();
     let table = &scene.table.plane.plane;
-    let below = skin.iter().map(|point| table.project(point));
+    let up_mm = scene.axes.column(2) * BELOW_MM;
+    let below = skin.iter().map(|point| table.project(point) - up_mm);
     let view = View::fitting(rect, [right, up], skin.iter().copied().chain(below));
     let raster = rasterised(rect, view, scene, &skin, AROUND_MM[1]);
     canvas.within(rect, |canvas| {
@@ -200,6 +203,7 @@ fn rasterised(
         None => draw_cloud(&mut raster, &room.cloud),
     }
     raster.mesh(&scene.skin, SKIN_LAYER);
+    raster.mesh(&scene.cuts, CUT_LAYER);
     raster
 }
 
@@ -215,7 +219,9 @@ fn paint(canvas: &mut Canvas, raster: &Raster, scene: &PoseScene) {
         let touches = table.signed_distance(&seen.point) < TOUCHING_MM;
         let colour = match seen.layer {
             ROOM_LAYER => TABLE,
-            _ if touches => CUT,
+            CUT_LAYER => CUT,
+            _ if seen.from_behind => mixed(CUT, [0; 3], 0.4),
+            _ if touches => CONTACT,
             _ => SKIN,
         };
         raster.lit(colour, &seen.normal)
@@ -242,7 +248,7 @@ fn draw_limb_marks(canvas: &mut Canvas, view: &View, scene: &PoseScene) {
         let at = view.pixel(contact);
         canvas.ring(at, 5.0, 9.0, [0; 3]);
         canvas.ring(at, 6.0, 8.0, INK);
-        canvas.ring(at, 0.0, 4.0, CUT);
+        canvas.ring(at, 0.0, 4.0, CONTACT);
     }
     let at = view.pixel(&scene.joint);
     canvas.ring(at, 0.0, 6.0, [0; 3]);
@@ -294,8 +300,9 @@ fn frame(name: &str, posed: &PosedLimb) -> Frame {
         (Swatch::Line(CAMERAS[1]), "right camera's view"),
         (Swatch::Line(AXIS), "limb's axis"),
         (Swatch::Dot(JOINT), "joint"),
-        (Swatch::Area(CUT), "touches the table"),
-        (Swatch::Dot(CUT), "lowest points"),
+        (Swatch::Area(CONTACT), "touches the table"),
+        (Swatch::Dot(CONTACT), "lowest points"),
+        (Swatch::Area(CUT), "cut by the field of view"),
         (Swatch::Line(FAINT), "fainter: hidden"),
     ];
     let facts = vec![

@@ -6,6 +6,8 @@ use ppa_mesh::Mesh;
 use ppa_scene::{Landmarks, Placement};
 use ppa_xray::Detector;
 
+use super::cut_faces::cut_faces;
+use crate::prepare::PreparedLimb;
 use crate::stage::Table;
 
 /// A camera and the part of the table that it sees.
@@ -22,6 +24,8 @@ pub(super) struct PoseScene<'a> {
     /// Across the table, towards the head, up.
     pub(super) axes: Matrix3<f64>,
     pub(super) skin: Mesh,
+    /// Where the field of view cuts the limb.
+    pub(super) cuts: Mesh,
     pub(super) joint: Point3<f64>,
     /// Two points of the limb's axis, far apart.
     pub(super) axis: [Point3<f64>; 2],
@@ -37,18 +41,18 @@ pub(super) struct PoseScene<'a> {
 /// Length of rays that do not meet the table, mm.
 const IN_THE_AIR_MM: f64 = 1500.0;
 
-/// Half the length to which the limb's axis is drawn beyond the joint, mm.
-const AXIS_MM: f64 = 5000.0;
+/// Length to which the limb's axis is drawn on either side of the joint, mm.
+const AXIS_MM: f64 = 350.0;
 
 impl<'a> PoseScene<'a> {
     pub(super) fn new(
-        skin_ct: &Mesh,
-        landmarks: &Landmarks,
+        limb: &PreparedLimb,
         placement: &Placement,
         table: &'a Table,
         rig: &RigSpec,
         detector: &Detector,
     ) -> Result<Self, RigError> {
+        let (skin_ct, landmarks) = (&limb.limb.mesh, &limb.landmarks);
         let device = &table.room.device;
         let up = table.plane.plane.normal.into_inner();
         let head = device.head_direction();
@@ -60,8 +64,10 @@ impl<'a> PoseScene<'a> {
             skin.vertices = placement.in_room(&skin_ct.vertices, landmarks);
             skin.normals = skin.geometric_normals();
         }
+        let cuts = cut_faces(&limb.limb, limb.volume.grid());
+        let cuts = cuts.transformed(room_from_ct.isometry());
         let along = room_from_ct.rotate(&Vector3::from(landmarks.axis_direction));
-        let on_axis = room_from_ct * Point3::from(landmarks.axis_point);
+        let joint = room_from_ct * Point3::from(landmarks.joint_centre);
         let in_room = |x: f64, y: f64, z: f64| device.room_from_device * Point3::new(x, y, z);
         let distance = device.source_detector_mm;
         let [half_x, half_y] = [detector.columns, detector.rows]
@@ -88,14 +94,15 @@ impl<'a> PoseScene<'a> {
         Ok(Self {
             table,
             axes,
-            joint: room_from_ct * Point3::from(landmarks.joint_centre),
-            axis: [on_axis - along * AXIS_MM, on_axis + along * AXIS_MM],
+            joint,
+            axis: [joint - along * AXIS_MM, joint + along * AXIS_MM],
             source: device.source(),
             beam_end: in_room(0.0, 0.0, distance),
             detector: [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(corner),
             cones: [cone("left", &rig.left)?, cone("right", &rig.right)?],
             contacts: contacts(&skin, skin_ct, landmarks, placement, table, &head),
             skin,
+            cuts,
         })
     }
 }
