@@ -62,7 +62,9 @@ pub enum MetricError {
     #[error("no label is diagnostic (below 2.5), so specificity is not defined")]
     NoNegatives,
     /// A seed with more or fewer folds than the first.
-    #[error("the number of rows of seed {seed} is {found}, expected {expected} as of the first seed")]
+    #[error(
+        "the number of rows of seed {seed} is {found}, expected {expected} as of the first seed"
+    )]
     UnequalFolds {
         /// The seed.
         seed: u64,

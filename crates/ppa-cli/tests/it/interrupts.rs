@@ -91,10 +91,7 @@ fn a_second_ctrl_c_ends_at_once() {
     let here = folder.path();
     let plan = write_plan(here, "");
     let text = fs::read_to_string(&plan).unwrap();
-    let endless = text.replace(
-        "scatter_histories = 20000",
-        "scatter_histories = 100000000",
-    );
+    let endless = text.replace("scatter_histories = 20000", "scatter_histories = 100000000");
     fs::write(&plan, endless).unwrap();
     let mut run = start(here, "generate plan.toml --out data --progress quiet");
     wait_for(&mut run, || here.join("data/dataset.json").exists());

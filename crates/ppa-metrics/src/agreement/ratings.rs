@@ -100,9 +100,15 @@ mod tests {
             })
         );
         let few = |rows| Ratings::new(rows).unwrap_err().to_string();
-        assert_eq!(few(vec![]), "the number of subjects is 0, expected at least 2");
+        assert_eq!(
+            few(vec![]),
+            "the number of subjects is 0, expected at least 2"
+        );
         let one_reader = vec![vec![Some(1.0)], vec![Some(2.0)]];
-        assert_eq!(few(one_reader), "the number of readers is 1, expected at least 2");
+        assert_eq!(
+            few(one_reader),
+            "the number of readers is 1, expected at least 2"
+        );
     }
 
     #[test]
