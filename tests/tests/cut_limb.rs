@@ -1,6 +1,7 @@
 //! A leg whose foot is cut by the field of view within the regions of interest, through the whole chain.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_dataset::layout::{self, LimbId, View};
@@ -108,7 +109,7 @@ fn a_foot_cut_in_the_region_is_refused_until_the_plan_allows_it() {
         assert_eq!((cut.limb, cut.exceeding, cut.poses), (LIMB, 1, 1));
         assert!(!root.join("patient_0").exists(), "nothing was begun");
         assert!(
-            forecast(plan, &root, 0.0, &|_| {}).is_err(),
+            forecast(plan, &root, 0.0, &AtomicBool::new(false), &|_| {}).is_err(),
             "a plan is refused as early"
         );
         cut.share

@@ -150,11 +150,15 @@ fn both_containers_of_sts028_give_the_same_images() {
 #[ignore = "needs ../shared/data"]
 fn cuts_of_sts049_and_sts028_are_refused_and_told() {
     let scans = [
-        ("lower-leg-ankle-sts049", Side::Right),
-        ("knee-calf-sts028/CT_image.nii.gz", Side::Left),
+        ("lower-leg-ankle-sts049", Side::Right, LimbKind::LowerLeg),
+        (
+            "knee-calf-sts028/CT_image.nii.gz",
+            Side::Left,
+            LimbKind::Knee,
+        ),
     ];
-    for (scan, side) in scans {
-        let (case, limb) = prepared(&data(scan), side);
+    for (scan, side, kind) in scans {
+        let (case, limb) = prepared(&data(scan), side, kind);
         let front = |finding: &&Finding| {
             finding.code == FindingCode::CutLimb && finding.text.contains("-j")
         };

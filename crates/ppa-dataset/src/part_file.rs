@@ -84,6 +84,8 @@ pub(crate) fn require_part(root: &Path, asked: Part) -> Result<(), FolderError> 
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]

@@ -87,9 +87,10 @@ pub fn find_landmarks(
     regions.sort_by(|a, b| a.range_mm[0].total_cmp(&b.range_mm[0]));
     let [low, high] = regions.map(|region| Point3::from(region.centre_mm));
     if reference.kind == LimbKind::Knee && overrides.axis.is_none() {
-        notes.push(LandmarkNote::KneeAxis(KneeAxis::of(
-            [joint_region, calf_region].map(|region| region.range_mm),
-        )));
+        let axis = KneeAxis::of([joint_region, calf_region].map(|region| region.range_mm));
+        if axis != KneeAxis::Tibia {
+            notes.push(LandmarkNote::KneeAxis(axis));
+        }
     }
     let direction = reference.sections.direction;
     let axis = (high - low)

@@ -66,6 +66,7 @@ pub fn run(args: &DemoArgs, output: Output) -> anyhow::Result<()> {
     let interrupt = Interrupt::listen()?;
     let settings = GenerateSettings {
         stop: Some(interrupt.flag()),
+        replace: args.replace.is_given(),
         ..GenerateSettings::default()
     };
     let dataset = with_progress(

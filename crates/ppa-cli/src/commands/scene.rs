@@ -156,7 +156,6 @@ fn room(args: &RoomArgs, output: Output) -> anyhow::Result<()> {
     outputs.file("--out", &args.out, CLOUD)?;
     outputs.optional("--toml", args.toml.as_ref(), &[".toml"])?;
     outputs.optional("--frames", args.frames.as_ref(), &[".json"])?;
-    outputs.optional("--picture", args.picture.as_ref(), PICTURE)?;
     let plan = args.room.plan()?;
     let table = Table::of_plan(&plan)?;
     if let Some(path) = &args.frames {

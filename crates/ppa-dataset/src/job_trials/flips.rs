@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use super::{Draw, Trial, contents, in_place};
 use crate::check::check;
@@ -93,11 +94,12 @@ fn a_flipped_bit_in_a_shard_reaches_no_merged_dataset() {
     let folders = shards.each_ref().map(|shard| shard.path().to_owned());
     let files = files(&folders[1]);
     let mut draw = Draw(13);
+    let go = AtomicBool::new(false);
     let mut refused = 0;
     for _ in 0..60 {
         let (file, before, _) = flip(&folders[1], &files, &mut draw);
         let merged = tempfile::tempdir().unwrap();
-        match merge(&folders, merged.path(), false, &|_: Progress| {}) {
+        match merge(&folders, merged.path(), false, &go, &|_: Progress| {}) {
             Err(_) => refused += 1,
             Ok(_) => assert!(contents(merged.path()) == expected, "{}", file.display()),
         }

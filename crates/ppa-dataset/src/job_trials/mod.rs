@@ -217,6 +217,7 @@ fn row(unit: &Unit, file: String, kind: FileKind, shape: BodyShape, to: &Path) -
         shape,
         volume_change_mm3: None,
         too_far_pixels: 0,
+        cut_share: None,
         patient_from_ct: POSE,
         room_from_patient: POSE,
         ct_from_device: None,

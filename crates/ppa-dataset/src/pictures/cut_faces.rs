@@ -68,7 +68,7 @@ fn rectangle(
 
 #[cfg(test)]
 mod tests {
-    use ppa_mesh::{CutFace, LimbReport};
+    use ppa_mesh::{CutFace, CutWalls, LimbReport};
 
     use super::*;
 
@@ -78,6 +78,7 @@ mod tests {
         let grid = grid.unwrap();
         let limb = Limb {
             mesh: Mesh::default(),
+            walls: CutWalls::default(),
             mask: vec![true; grid.len()],
             report: LimbReport {
                 low: [0; 3],

@@ -2,8 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 use ppa_scene::{
-    AxisSource, LandmarkError, LandmarkOverrides, Landmarks, LimbKind, Plane, Side, XrayDevice,
-    place,
+    AxisSource, LandmarkError, LandmarkNote, LandmarkOverrides, Landmarks, LimbKind, Plane, Side,
+    XrayDevice, place,
 };
 
 use crate::scan::P01;
@@ -160,7 +160,10 @@ fn a_given_axis_and_joint_meet_at_the_point_nearest_to_the_joint() {
     let off = Point3::from(got.joint_centre) - Point3::new(x, y, z + 7.0);
     assert!(off.norm() < 1e-6, "{off:?}");
     assert!(
-        got.notes.iter().any(|note| note.contains("10.0 mm")),
+        got.notes.iter().any(|note| matches!(
+            note,
+            LandmarkNote::JointMovedToAxis { aside_mm } if (aside_mm - 10.0).abs() < 1e-6
+        )),
         "{:?}",
         got.notes
     );

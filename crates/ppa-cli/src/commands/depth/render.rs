@@ -43,13 +43,13 @@ pub struct RenderArgs {
     pub(super) out: PathBuf,
     /// Also write the depths as floats, OpenEXR
     #[arg(long)]
-    exr: Option<PathBuf>,
+    pub(super) exr: Option<PathBuf>,
     /// Also write a picture in false colour, near red, far blue, PNG
     #[arg(long)]
-    preview: Option<PathBuf>,
+    pub(super) preview: Option<PathBuf>,
     /// Also write the points that are seen, in the camera's frame, PLY
     #[arg(long)]
-    points: Option<PathBuf>,
+    pub(super) points: Option<PathBuf>,
     /// See through a sensor: JSON as `fit-noise` writes it, or the word default
     #[arg(long)]
     pub(super) sensor: Option<PathBuf>,
