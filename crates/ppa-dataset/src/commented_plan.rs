@@ -104,6 +104,16 @@ const KEYS: &[(&str, &str, &str)] = &[
         "roi_mm",
         "side of the square around the joint, at the joint",
     ),
+    (
+        "depth",
+        "cut_faces",
+        "pixels that see a cut face of the scan: \"invalid\" or \"flat\"",
+    ),
+    (
+        "depth",
+        "max_cut_share",
+        "a limb is refused if more of a region of interest is cut",
+    ),
     ("xray", "kvp", "tube voltage"),
     ("xray", "anode_angle_deg", "of the tungsten anode"),
     ("xray", "filters", "MATERIAL:mm"),
@@ -200,6 +210,7 @@ const OFF: &[(&str, &[&str])] = &[
     (
         "xray",
         &[
+            "#max_cut_share = 0.01    # a limb is refused if more of the rays around the joint pass through a cut face",
             "#calibration_file = \"hu.toml\"    # HU to material and density from a file, instead of the table below",
         ],
     ),
@@ -362,13 +373,12 @@ mod tests {
     fn a_commented_plan_reads_as_the_defaults() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("plan.toml");
-        plan().write_commented(&path).unwrap();
-        let read = Plan::read(&path).unwrap();
         let expected = Plan::new(vec![PlanCase {
             file: folder.path().join("leg.case.toml"),
             patient: 0,
         }]);
-        assert_eq!(read, expected);
+        expected.write_commented(&path).unwrap();
+        assert_eq!(Plan::read(&path).unwrap(), expected);
     }
 
     #[test]

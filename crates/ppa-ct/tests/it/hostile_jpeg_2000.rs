@@ -55,7 +55,7 @@ impl Stream {
         let (size, tile) = (self.size, self.tile);
         let sizes = [size, size, 0, 0, tile, tile, 0, 0].map(u32::to_be_bytes);
         let parts = [0, 1, 7, self.step, self.step];
-        let steps = vec![0x40; 3 * 32 + 1];
+        let steps = [0x40; 3 * 32 + 1];
         let mut stream = [
             vec![0xff, 0x4f],
             segment(0x51, &[&[0; 2], sizes.as_flattened(), &parts].concat()),

@@ -14,8 +14,10 @@ const RADIUS_MM: f64 = 60.0;
 const LENGTH_MM: f64 = 150.0;
 const SIDES: u32 = 360;
 
+type Triangles = Vec<[u32; 3]>;
+
 /// A tube around z from its cut end at 0 to its closed end at 150 mm, and the wall across the cut.
-fn tube() -> (Vec<Point3<f32>>, Vec<[u32; 3]>, Vec<[u32; 3]>) {
+fn tube() -> (Vec<Point3<f32>>, Triangles, Triangles) {
     let around = |side: u32, z: f64| {
         let angle = TAU * f64::from(side) / f64::from(SIDES);
         Point3::new(RADIUS_MM * angle.cos(), RADIUS_MM * angle.sin(), z).cast()

@@ -414,12 +414,7 @@ fn a_cut_plateau_is_told() {
     let landmarks = Scan::of(cut).find(Side::Right, &automatic()).unwrap();
     let lines = landmarks.joints[0].lines.as_ref().unwrap();
     assert!(lines.plateau_is_cut);
-    assert!(
-        landmarks
-            .notes
-            .iter()
-            .any(|note| *note == LandmarkNote::PlateauCut)
-    );
+    assert!(landmarks.notes.contains(&LandmarkNote::PlateauCut));
     let off = Point3::from(landmarks.joint_centre) - RIGHT.plateau;
     assert!(off.norm() < 4.0, "{off:?}");
 }
