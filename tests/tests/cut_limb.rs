@@ -21,7 +21,7 @@ const LIMB: LimbId = LimbId {
 /// The phantom's case with the front 20 mm of its scan, and most of the foot, cropped away (`cut`), or whole; one pose.
 fn plan(folder: &Path, cut: bool) -> Plan {
     let scan = folder.join("leg.nii.gz");
-    let volume = LowerLeg::p01().voxelise(3.0, TableTop::Absent).unwrap();
+    let volume = LowerLeg::p01().voxelise(2.0, TableTop::Absent).unwrap();
     ppa_ct::write_nifti(&scan, &volume).unwrap();
     let size = volume.grid().size();
     // Patients lie on their back: y grows downwards, the toes are at the smallest y.

@@ -9,7 +9,7 @@ use crate::Cli;
 /// Headings of `ppa --help`, and the commands below each of them.
 const GROUPS: &[(&str, &[&str])] = &[
     ("Start here", &["demo"]),
-    ("Scan and case", &["ct", "prepare", "mesh"]),
+    ("Scan and case", &["ct", "prepare", "case", "mesh"]),
     ("Scene, depth and radiograph", &["scene", "depth", "xray"]),
     (
         "Dataset",

@@ -188,7 +188,7 @@ mod tests {
         );
         assert_eq!(
             error("ppa ct convert"),
-            "the following required arguments were not provided: <SCAN> <OUT>"
+            "the following required arguments were not provided: <CT> <OUTPUT>"
         );
         assert_eq!(error("ppa"), "a command is missing; --help lists them");
     }

@@ -219,11 +219,11 @@ fn refusals(here: &Path) {
     );
     succeed(
         here,
-        "ct phantom --out coarse.nii --spacing-mm 2.5 --labels coarse.bones.nii",
+        "ct phantom --out coarse.nii --spacing-mm 2 --labels coarse.bones.nii",
     );
     refused(
         "prepare coarse.nii --side r --bones coarse.bones.nii --out x.toml",
-        "voxels of 2.50 x 2.50 x 2.50 mm, expected at most 1.25 mm",
+        "voxels of 2.00 x 2.00 x 2.00 mm, expected at most 1.25 mm",
     );
     for (name, expected) in [
         ("coarse.nii", "is the scan itself"),

@@ -53,7 +53,7 @@ fn a_mesh_that_is_none_is_refused() {
         ),
         (
             "depth render points.obj --out d.png",
-            ["points.obj", "triangle"],
+            ["points.obj", "at least 16"],
         ),
         (
             "depth render mesh.gltf --out d.png",

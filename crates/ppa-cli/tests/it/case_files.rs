@@ -84,7 +84,7 @@ fn only_what_was_chosen_stands_in_the_choices() {
     ] {
         assert!(text.contains(&format!("\n#{key} = ")), "{key}: {text}");
     }
-    let axis = "prepare p01.nii --side r --no-picture --out axis.case.toml --axis 0,0,-10 1,2,180 --joint 0,0,0";
+    let axis = "prepare p01.nii --side r --no-picture --out axis.case.toml --axis -92,14,-310 -91,10,-150 --joint -92,14,-300";
     succeed(folder, axis);
     let text = fs::read_to_string(folder.join("axis.case.toml")).unwrap();
     let chosen = choices(&text);
@@ -146,6 +146,11 @@ fn any_key_of_the_choices_can_be_chosen_alone() {
     ] {
         fs::write(folder.join("leg.case.toml"), &untouched).unwrap();
         edit(folder, from, to);
+        edit(
+            folder,
+            "version = 1\n",
+            "version = 1\nacknowledged = [\"no-joint\"]\n",
+        );
         let checked = check();
         assert!(shift(&checked, measure) > least, "{checked}");
         succeed(folder, "scene place leg.case.toml --angle 10");
@@ -204,7 +209,7 @@ fn a_case_that_cannot_be_used_fails_its_check() {
     fs::write(folder.join("leg.case.toml"), &untouched).unwrap();
     succeed(
         folder,
-        "ct phantom --out p01.nii --spacing-mm 2.5 --name P02",
+        "ct phantom --out p01.nii --spacing-mm 2 --name P02 --replace",
     );
     let said = fail(folder, "case check leg.case.toml");
     contains(&said, &["is not the scan this case was made from"]);

@@ -143,7 +143,7 @@ fn phantom() -> &'static Path {
         let folder = tempfile::tempdir().unwrap();
         succeed(
             folder.path(),
-            "ct phantom --out p01.nii --spacing-mm 2.5 --table",
+            "ct phantom --out p01.nii --spacing-mm 2 --table",
         );
         succeed(
             folder.path(),
