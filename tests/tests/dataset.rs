@@ -370,8 +370,9 @@ fn choices_of_a_case_are_carried_out() {
     assert!(moved.translation.vector.norm() < 1e-9 && moved.rotation.angle() < 1e-9);
 
     let mut edited = case.clone();
-    let joint = edited.choices.joint_centre.as_mut().unwrap();
+    let mut joint = first.landmarks.joint_centre;
     joint[2] += 10.0;
+    edited.choices.joint_centre = Some(joint);
     let higher = PreparedLimb::of_case(&edited).unwrap().landmarks;
     assert_eq!(Some(higher.joint_centre), edited.choices.joint_centre);
 

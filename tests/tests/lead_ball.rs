@@ -6,7 +6,7 @@ use ppa_ct::{Grid, Volume};
 use ppa_dataset::{Plan, Stage, projection};
 use ppa_depth::{Body, MeshBody, PlacedBody};
 use ppa_mesh::{Border, iso_surface};
-use ppa_scene::{LandmarkOverrides, Landmarks, Placement, Side, find_landmarks, place};
+use ppa_scene::{LandmarkOverrides, Landmarks, LimbKind, Placement, Side, find_landmarks, place};
 use ppa_xray::{Category, Detector, FastSettings, Material, VoxelPhantom, fast};
 
 const RADIUS_MM: f64 = 8.0;
@@ -101,7 +101,10 @@ fn radiograph_and_depth_images_agree_on_a_lead_ball() {
     let leg = LowerLeg::p01().voxelise(3.0, TableTop::Absent).unwrap();
     let skin = iso_surface(&leg, -500.0, Border::Open).unwrap();
     let mask: Vec<bool> = leg.hu().iter().map(|hu| *hu >= -500.0).collect();
-    let choices = LandmarkOverrides::default();
+    let choices = LandmarkOverrides {
+        limb: Some(LimbKind::Other),
+        ..LandmarkOverrides::default()
+    };
     let landmarks = find_landmarks(&leg, &skin, &mask, Side::Right, &choices).unwrap();
     let device = &stage.table.room.device;
     for (degrees, offset) in [

@@ -149,7 +149,7 @@ fn any_key_of_the_choices_can_be_chosen_alone() {
         edit(
             folder,
             "version = 1\n",
-            "version = 1\nacknowledged = [\"no-joint\"]\n",
+            "version = 1\nacknowledged = [\"no-joint\", \"axis-off-shaft\"]\n",
         );
         let checked = check();
         assert!(shift(&checked, measure) > least, "{checked}");
