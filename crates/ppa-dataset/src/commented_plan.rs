@@ -227,6 +227,10 @@ const OFF: &[(&str, &[&str])] = &[
             "#blur = { lorentzian = { h_mm2 = 0.45 } }    # of the converter",
         ],
     ),
+    (
+        "xray.presentation",
+        &["#protocol = \"limb\"    # a look by its name; keys above that differ from it win"],
+    ),
 ];
 
 /// Tables that are off by default, at the end of the file.

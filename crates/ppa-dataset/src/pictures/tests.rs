@@ -30,7 +30,7 @@ fn prepared(volume: Volume, choices: &LandmarkOverrides) -> PreparedLimb {
 }
 
 fn phantom() -> Volume {
-    LowerLeg::p01().voxelise(3.0, TableTop::Absent).unwrap()
+    LowerLeg::p01().voxelise(2.0, TableTop::Absent).unwrap()
 }
 
 static LEG: LazyLock<PreparedLimb> =

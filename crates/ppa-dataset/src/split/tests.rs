@@ -17,7 +17,11 @@ fn shares_are_rounded_to_whole_persons() {
         [1, 1, 1]
     );
     for (patients, wrong, part) in [
-        (2, shares(&[("train", 0.9), ("test", 0.1)]), "test empty"),
+        (
+            2,
+            shares(&[("train", 0.9), ("test", 0.1)]),
+            "test stays empty",
+        ),
         (
             9,
             shares(&[("train", 0.9), ("test", 0.0)]),
