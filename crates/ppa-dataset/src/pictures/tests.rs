@@ -5,7 +5,7 @@ use nalgebra::{Matrix4, Point3, Vector3};
 use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_ct::{Grid, Volume};
 use ppa_mesh::{LimbSettings, extract_limb};
-use ppa_scene::{LandmarkOverrides, Side, find_landmarks, place};
+use ppa_scene::{LandmarkOverrides, LimbKind, Side, find_landmarks, place};
 
 use super::canvas::Rect;
 use super::case_picture::panel;
@@ -193,14 +193,17 @@ fn odd_limbs_have_pictures_too() {
     let volume = phantom();
     let [ni, nj, nk] = volume.grid().size();
     let calf = volume.crop([0, 0, nk - 40], [ni, nj, nk]).unwrap();
-    let far_joint = LandmarkOverrides {
-        joint_centre: Some([400.0, -300.0, LEG.landmarks.joint_centre[2]]),
+    let other = LandmarkOverrides {
+        limb: Some(LimbKind::Other),
         ..LandmarkOverrides::default()
     };
-    let odd = [
-        prepared(calf, &LandmarkOverrides::default()),
-        prepared(phantom(), &far_joint),
-    ];
+    // Beside the limb.
+    let [x, y, z] = LEG.landmarks.joint_centre;
+    let far_joint = LandmarkOverrides {
+        joint_centre: Some([x + 80.0, y, z]),
+        ..LandmarkOverrides::default()
+    };
+    let odd = [prepared(calf, &other), prepared(phantom(), &far_joint)];
     for mut limb in odd {
         limb.findings = vec![Finding {
             code: FindingCode::LimbTooSmall,
