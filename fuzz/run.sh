@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs every fuzz target for some seconds (5 unless told: fuzz/run.sh 60), or those named after: fuzz/run.sh 60 nifti ply.
+# Runs every fuzz target for some seconds (5 by default: fuzz/run.sh 60), or those named after: fuzz/run.sh 60 nifti ply.
 #
 # As `cargo fuzz run -s none TARGET` builds and runs them, but with the stable compiler and without cargo-fuzz. What makes a target
 # crash lies in fuzz/artifacts. Needs a C++ compiler for libFuzzer.

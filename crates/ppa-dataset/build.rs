@@ -75,9 +75,9 @@ fn main() -> io::Result<()> {
 /// The target and its instructions, which `-C target-cpu` adds to.
 fn machine() -> String {
     println!("cargo::rerun-if-env-changed=CARGO_ENCODED_RUSTFLAGS");
-    let told = ["TARGET", "CARGO_CFG_TARGET_FEATURE"].map(env::var);
-    let told = told.map(|value| value.unwrap_or_default());
-    format!(" {} {}", told[0], told[1])
+    let target = ["TARGET", "CARGO_CFG_TARGET_FEATURE"].map(env::var);
+    let target = target.map(|value| value.unwrap_or_default());
+    format!(" {} {}", target[0], target[1])
 }
 
 /// The first eight bytes of a hash over the names and contents of files below some roots.

@@ -1,4 +1,4 @@
-//! A camera, a rig or a calibration file: the first byte tells which, and the depth mode.
+//! A camera, a rig or a calibration file: the first byte selects which, and the depth mode.
 
 #![no_main]
 

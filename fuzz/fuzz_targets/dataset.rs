@@ -1,4 +1,4 @@
-//! The lists of a dataset: the first byte tells which of them.
+//! The lists of a dataset: the first byte selects one of them.
 
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! A file of MC-GPU: the first byte tells input, material or voxels.
+//! A file of MC-GPU: the first byte selects input, material or voxels.
 
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! A mesh or cloud: the first byte tells PLY, OBJ or STL.
+//! A mesh or cloud: the first byte selects PLY, OBJ or STL.
 
 #![no_main]
 

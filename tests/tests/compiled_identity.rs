@@ -1,4 +1,4 @@
-//! What the code key of a dataset builds on: the identity of a type tells how its crate was compiled.
+//! What the code key of a dataset builds on: the identity of a type reveals how its crate was compiled.
 //!
 //! Neither Cargo nor the compiler promises it, so it is tried here with crates of a few lines.
 

@@ -92,7 +92,7 @@ fn depth(manifest: &Manifest, shape: BodyShape, view: View) -> (DepthImage, Opti
 }
 
 #[test]
-fn a_foot_cut_in_the_region_is_refused_until_the_plan_allows_it() {
+fn a_foot_cut_in_the_region_needs_the_plans_consent() {
     let folder = tempfile::tempdir().unwrap();
     let mut plan = plan(folder.path(), true);
     let refused = |plan: &Plan, key: &str| {
@@ -174,8 +174,8 @@ fn a_foot_cut_in_the_region_is_refused_until_the_plan_allows_it() {
         panic!("{severe:?}")
     };
     assert!(found.is_open());
-    let told = found.finding.value.unwrap();
-    assert!((told - share.max(of_rays)).abs() <= 0.005, "{told}");
+    let stated = found.finding.value.unwrap();
+    assert!((stated - share.max(of_rays)).abs() <= 0.005, "{stated}");
 }
 
 /// A leg always ends where its scan does, far from the joint: that is no reason to refuse anything.

@@ -63,7 +63,7 @@ fn dataset(case: &Case) -> tempfile::TempDir {
 }
 
 /// The left calf is mostly outside the image, so that the right one is taken for either side, without the
-/// other; for the left this is told.
+/// other; for the left this is a finding.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn of_the_calves_of_sts032_the_whole_one_is_taken_and_doubted_where_the_other_was_meant() {
@@ -76,11 +76,11 @@ fn of_the_calves_of_sts032_the_whole_one_is_taken_and_doubted_where_the_other_wa
         let end = (limb.limb.mesh.vertices.iter()).fold(f32::MIN, |end, v| end.max(v.x));
         // By eye, the calves touch where x is about 4 mm.
         assert!(end < 8.0, "{side:?}: the limb reaches to x = {end} mm");
-        let told = found
+        let neighbours = found
             .findings
             .iter()
             .filter(|finding| finding.text.contains("patient's left"));
-        assert_eq!(told.count(), doubts, "{side:?}: {:?}", found.findings);
+        assert_eq!(neighbours.count(), doubts, "{side:?}: {:?}", found.findings);
     }
 }
 
@@ -148,7 +148,7 @@ fn both_containers_of_sts028_give_the_same_images() {
 /// joint.
 #[test]
 #[ignore = "needs ../shared/data"]
-fn cuts_of_sts049_and_sts028_are_refused_and_told() {
+fn cuts_of_sts049_and_sts028_are_refused_and_reported() {
     let scans = [
         ("lower-leg-ankle-sts049", Side::Right, LimbKind::LowerLeg),
         (

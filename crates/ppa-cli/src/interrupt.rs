@@ -53,7 +53,7 @@ impl Interrupt {
         self.asked.load(Ordering::Relaxed)
     }
 
-    /// The error of a command that stopped; `how` says what is kept and how to go on.
+    /// The error of a command that stopped; `how` says what is kept and how to resume.
     pub fn stopped(&self, how: impl Into<String>) -> anyhow::Error {
         Interrupted {
             signal: self.signal.load(Ordering::Relaxed) as i32,
@@ -62,7 +62,7 @@ impl Interrupt {
         .into()
     }
 
-    /// Tells how to go on where a library stopped because it was asked to.
+    /// Adds how to resume to the error of a library that stopped on request.
     pub fn or_how<T, E>(
         &self,
         result: Result<T, E>,
@@ -104,9 +104,9 @@ impl fmt::Display for Interrupted {
 impl std::error::Error for Interrupted {}
 
 /// What a command that wrote nothing says.
-pub const NOTHING_WRITTEN: &str = "before anything was written; the same command begins again";
+pub const NOTHING_WRITTEN: &str = "before anything was written; repeat the command to start over";
 
-/// While it lives, Ctrl-C and TERM end the program at once, with a line that says how to go on.
+/// While it lives, Ctrl-C and TERM end the program at once, with a line that says how to resume.
 #[derive(Debug)]
 pub struct EndsAtOnce(Arc<AtomicBool>);
 

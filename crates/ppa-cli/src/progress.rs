@@ -177,11 +177,11 @@ impl Watch {
         self.bar.set_message(format!("{}s{left}", self.what));
     }
 
-    /// Says how far a run came that was stopped and can go on.
-    pub fn how_to_go_on(&self) -> String {
+    /// States how far a stopped run came, and how to resume it.
+    pub fn how_to_resume(&self) -> String {
         let state = locked(&self.state);
         format!(
-            "after {} of {}; the same command goes on",
+            "after {} of {}; repeat the command to resume",
             state.found + state.made,
             count(state.units, self.what)
         )

@@ -1,12 +1,12 @@
-//! Which shard of a plan this process makes: told by `--shard`, or by what started it.
+//! Which shard of a plan this process makes: named by `--shard`, or by what started it.
 
 use std::env;
 
 use anyhow::{Context, bail};
 use ppa_xray::Part;
 
-/// Where a shard was told.
-struct Told {
+/// Where a shard was named.
+struct Named {
     part: Part,
     by: &'static str,
 }
@@ -21,7 +21,7 @@ pub enum Asked {
         /// Number of the task.
         id: u64,
         /// What the environment says of it.
-        told: String,
+        named: String,
     },
 }
 
@@ -33,16 +33,16 @@ impl Asked {
     ) -> anyhow::Result<Part> {
         match self {
             Self::Part(part) => Ok(*part),
-            Self::Task { id, told } => match held()? {
+            Self::Task { id, named } => match held()? {
                 // Arrays count from 0 or from 1.
                 Some(part) if part != Part::WHOLE && [id + 1, *id].contains(&part.index()) => {
                     Ok(part)
                 }
                 Some(part) if part != Part::WHOLE => {
-                    bail!("{told}, which is not shard {part} that the folder holds; give --shard")
+                    bail!("{named}, which is not shard {part} that the folder holds; give --shard")
                 }
                 _ => bail!(
-                    "{told}, which leaves its shard open; give --shard, or run the whole array from 0 or 1 on"
+                    "{named}, which leaves its shard open; give --shard, or run the whole array from 0 or 1 on"
                 ),
             },
         }
@@ -53,10 +53,10 @@ impl Asked {
 ///
 /// Two that disagree are an error: half of a plan would be made twice, or not at all.
 pub fn shard(option: Option<Part>) -> anyhow::Result<Asked> {
-    shard_told(option, &|name| env::var(name).ok())
+    shard_named(option, &|name| env::var(name).ok())
 }
 
-fn shard_told(
+fn shard_named(
     option: Option<Part>,
     variable: &dyn Fn(&str) -> Option<String>,
 ) -> anyhow::Result<Asked> {
@@ -72,11 +72,11 @@ fn shard_told(
         let part = rank.checked_add(1).map(|k| format!("{k}/{count}"));
         let part = part.and_then(|text| text.parse().ok());
         let part = part.with_context(|| format!("{by}: rank {rank} of {count} is no shard"))?;
-        anyhow::Ok(Told { part, by })
+        anyhow::Ok(Named { part, by })
     };
-    let mut told = Vec::new();
+    let mut named = Vec::new();
     if let Some(part) = option {
-        told.push(Told {
+        named.push(Named {
             part,
             by: "--shard",
         });
@@ -99,12 +99,12 @@ fn shard_told(
         // A list with gaps leaves it open which shard this is, and a single task or a range that begins later looks like
         // tasks of a larger array that are run again.
         if even && count > 1 && first <= 1 {
-            told.push(part((id - first) / step, count, "SLURM_ARRAY_TASK_ID")?);
+            named.push(part((id - first) / step, count, "SLURM_ARRAY_TASK_ID")?);
         } else {
-            let told = format!(
+            let named = format!(
                 "SLURM_ARRAY_TASK_ID is {id} in an array of {count} (from {first} to {last} in steps of {step})"
             );
-            task = Some(Asked::Task { id, told });
+            task = Some(Asked::Task { id, named });
         }
     }
     // Processes of mpirun inherit the step of Slurm that started mpirun's daemons, which is not theirs.
@@ -114,7 +114,7 @@ fn shard_told(
             None => number("SLURM_NTASKS")?,
         };
         if number("SLURM_STEP_ID")? < FIRST_SPECIAL_STEP && count > 1 {
-            told.push(part(number("SLURM_PROCID")?, count, "SLURM_PROCID")?);
+            named.push(part(number("SLURM_PROCID")?, count, "SLURM_PROCID")?);
         }
     }
     if variable("OMPI_COMM_WORLD_RANK").is_some() {
@@ -122,29 +122,29 @@ fn shard_told(
             number("OMPI_COMM_WORLD_RANK")?,
             number("OMPI_COMM_WORLD_SIZE")?,
         );
-        told.push(part(rank, size, "OMPI_COMM_WORLD_RANK")?);
+        named.push(part(rank, size, "OMPI_COMM_WORLD_RANK")?);
     }
     if variable("JOB_COMPLETION_INDEX").is_some() {
         let count = number("JOB_COMPLETIONS").context(
             "JOB_COMPLETION_INDEX is set; set JOB_COMPLETIONS to the job's number of completions",
         )?;
-        told.push(part(
+        named.push(part(
             number("JOB_COMPLETION_INDEX")?,
             count,
             "JOB_COMPLETION_INDEX",
         )?);
     }
     if let (Some(task), None) = (task, option) {
-        if let (Asked::Task { told: array, .. }, Some(other)) = (&task, told.first()) {
+        if let (Asked::Task { named: array, .. }, Some(other)) = (&task, named.first()) {
             bail!(
-                "{array}, and {} tells shard {}; give --shard and unset one of them",
+                "{array}, and {} means shard {}; give --shard and unset one of them",
                 other.by,
                 other.part
             );
         }
         return Ok(task);
     }
-    match told.as_slice() {
+    match named.as_slice() {
         [] => Ok(Asked::Part(Part::WHOLE)),
         [first, others @ ..] => match others.iter().find(|other| other.part != first.part) {
             None => Ok(Asked::Part(first.part)),
@@ -166,12 +166,12 @@ const FIRST_SPECIAL_STEP: u64 = 0xffff_fff0;
 mod tests {
     use super::*;
 
-    fn told(option: Option<&str>, variables: &str) -> Result<String, String> {
-        told_in(None, option, variables)
+    fn named(option: Option<&str>, variables: &str) -> Result<String, String> {
+        named_in(None, option, variables)
     }
 
     /// The part for a folder that holds a part already.
-    fn told_in(
+    fn named_in(
         held: Option<&str>,
         option: Option<&str>,
         variables: &str,
@@ -186,7 +186,7 @@ mod tests {
         };
         let option = option.map(|text| text.parse().unwrap());
         let held = || Ok(held.map(|text| text.parse().unwrap()));
-        match shard_told(option, &variable).and_then(|asked| asked.part(held)) {
+        match shard_named(option, &variable).and_then(|asked| asked.part(held)) {
             Ok(part) => Ok(part.to_string()),
             Err(error) => Err(format!("{error:#}")),
         }
@@ -201,16 +201,16 @@ mod tests {
 
     #[test]
     fn the_shard_follows_from_option_or_environment() {
-        assert_eq!(told(None, ""), Ok("1/1".into()));
-        assert_eq!(told(Some("2/7"), ""), Ok("2/7".into()));
-        assert_eq!(told(None, &slurm(0, 16, 0, 15, 1)), Ok("1/16".into()));
-        assert_eq!(told(None, &slurm(16, 16, 1, 16, 1)), Ok("16/16".into()));
-        assert_eq!(told(None, &slurm(7, 4, 1, 10, 3)), Ok("3/4".into()));
+        assert_eq!(named(None, ""), Ok("1/1".into()));
+        assert_eq!(named(Some("2/7"), ""), Ok("2/7".into()));
+        assert_eq!(named(None, &slurm(0, 16, 0, 15, 1)), Ok("1/16".into()));
+        assert_eq!(named(None, &slurm(16, 16, 1, 16, 1)), Ok("16/16".into()));
+        assert_eq!(named(None, &slurm(7, 4, 1, 10, 3)), Ok("3/4".into()));
         let mpi = "OMPI_COMM_WORLD_RANK=1 OMPI_COMM_WORLD_SIZE=4";
-        assert_eq!(told(None, mpi), Ok("2/4".into()));
+        assert_eq!(named(None, mpi), Ok("2/4".into()));
         let kubernetes = "JOB_COMPLETION_INDEX=2 JOB_COMPLETIONS=3";
-        assert_eq!(told(None, kubernetes), Ok("3/3".into()));
-        assert_eq!(told(Some("2/4"), mpi), Ok("2/4".into()));
+        assert_eq!(named(None, kubernetes), Ok("3/3".into()));
+        assert_eq!(named(Some("2/4"), mpi), Ok("2/4".into()));
     }
 
     #[test]
@@ -223,60 +223,60 @@ mod tests {
             &slurm(3, 2, 2, 3, 1),
         ] {
             for held in [None, Some("1/1")] {
-                let refused = told_in(held, None, variables).unwrap_err();
+                let refused = named_in(held, None, variables).unwrap_err();
                 assert!(refused.contains("open; give --shard"), "{refused}");
             }
         }
         // Arrays that count from 1, and from 0.
-        assert_eq!(told_in(Some("2/7"), None, &again), Ok("2/7".into()));
-        assert_eq!(told_in(Some("3/7"), None, &again), Ok("3/7".into()));
+        assert_eq!(named_in(Some("2/7"), None, &again), Ok("2/7".into()));
+        assert_eq!(named_in(Some("3/7"), None, &again), Ok("3/7".into()));
         assert_eq!(
-            told_in(Some("1/7"), None, &slurm(0, 1, 0, 0, 1)),
+            named_in(Some("1/7"), None, &slurm(0, 1, 0, 0, 1)),
             Ok("1/7".into())
         );
-        let refused = told_in(Some("5/7"), None, &again).unwrap_err();
+        let refused = named_in(Some("5/7"), None, &again).unwrap_err();
         assert!(refused.contains("not shard 5/7"), "{refused}");
-        assert_eq!(told_in(Some("5/7"), Some("4/7"), &again), Ok("4/7".into()));
+        assert_eq!(named_in(Some("5/7"), Some("4/7"), &again), Ok("4/7".into()));
     }
 
     #[test]
     fn each_task_of_a_job_step_makes_a_shard() {
         let step =
             |rank: u32, id: u64| format!("SLURM_STEP_ID={id} SLURM_PROCID={rank} SLURM_NTASKS=3");
-        assert_eq!(told(None, &step(0, 0)), Ok("1/3".into()));
-        assert_eq!(told(None, &step(2, 4)), Ok("3/3".into()));
+        assert_eq!(named(None, &step(0, 0)), Ok("1/3".into()));
+        assert_eq!(named(None, &step(2, 4)), Ok("3/3".into()));
         // A step of fewer tasks than its job.
         let fewer = format!("{} SLURM_STEP_NUM_TASKS=2", step(1, 0));
-        assert_eq!(told(None, &fewer), Ok("2/2".into()));
+        assert_eq!(named(None, &fewer), Ok("2/2".into()));
         let one = format!("{} SLURM_STEP_NUM_TASKS=1", step(0, 0));
-        assert_eq!(told(None, &one), Ok("1/1".into()));
+        assert_eq!(named(None, &one), Ok("1/1".into()));
         // A batch script is no task of a step.
         assert_eq!(
-            told(None, "SLURM_PROCID=0 SLURM_NTASKS=3"),
+            named(None, "SLURM_PROCID=0 SLURM_NTASKS=3"),
             Ok("1/1".into())
         );
-        assert_eq!(told(None, &step(0, 0xffff_fffb)), Ok("1/1".into()));
+        assert_eq!(named(None, &step(0, 0xffff_fffb)), Ok("1/1".into()));
         // Under mpirun the step is that of its daemons.
         let mpi = format!(
             "{} OMPI_COMM_WORLD_RANK=4 OMPI_COMM_WORLD_SIZE=8",
             step(1, 0)
         );
-        assert_eq!(told(None, &mpi), Ok("5/8".into()));
+        assert_eq!(named(None, &mpi), Ok("5/8".into()));
         // One task within each task of an array.
         let array = format!("{} {one}", slurm(5, 7, 1, 7, 1));
-        assert_eq!(told(None, &array), Ok("5/7".into()));
-        let refused = told(None, &format!("{} {}", slurm(5, 7, 1, 7, 1), step(0, 0))).unwrap_err();
+        assert_eq!(named(None, &array), Ok("5/7".into()));
+        let refused = named(None, &format!("{} {}", slurm(5, 7, 1, 7, 1), step(0, 0))).unwrap_err();
         assert!(
-            refused.contains("tells shard 5/7, but SLURM_PROCID tells 1/3"),
+            refused.contains("means shard 5/7, but SLURM_PROCID means 1/3"),
             "{refused}"
         );
-        let refused = told(None, &format!("{} {}", slurm(2, 1, 2, 2, 1), step(0, 0))).unwrap_err();
+        let refused = named(None, &format!("{} {}", slurm(2, 1, 2, 2, 1), step(0, 0))).unwrap_err();
         assert!(
-            refused.contains("SLURM_PROCID tells shard 1/3"),
+            refused.contains("SLURM_PROCID means shard 1/3"),
             "{refused}"
         );
-        let refused = told(Some("2/7"), &step(0, 0)).unwrap_err();
-        assert!(refused.contains("--shard tells shard 2/7"), "{refused}");
+        let refused = named(Some("2/7"), &step(0, 0)).unwrap_err();
+        assert!(refused.contains("--shard means shard 2/7"), "{refused}");
     }
 
     #[test]
@@ -321,7 +321,7 @@ mod tests {
                 ["JOB_COMPLETIONS", "not set"],
             ),
         ] {
-            let error = told(option, &variables).unwrap_err();
+            let error = named(option, &variables).unwrap_err();
             for word in words {
                 assert!(error.contains(word), "{error}");
             }

@@ -33,7 +33,7 @@ pub enum FolderError {
     Differs(Box<DatasetDiffers>),
     /// The folder holds another part of the plan.
     #[error(
-        "{} holds {}, but this run is to make {}; {} goes on with it, another folder takes this run",
+        "{} holds {}, but this run is to make {}; {} resumes it; choose another folder for this run",
         root.display(), part_name(*held), part_name(*asked), how_to_ask(*held)
     )]
     OtherPart {
@@ -47,7 +47,7 @@ pub enum FolderError {
     /// The folder holds something else.
     #[error("{} is neither empty nor a dataset that ppa generate began", .0.display())]
     NotADataset(PathBuf),
-    /// The folder holds files of a dataset, but not the records that tell what they are.
+    /// The folder holds files of a dataset, but not the records that describe them.
     #[error(
         "{} holds {found}, but not the folder .ppa with the records of its poses, as a dataset that was copied in part; \
          copy .ppa as well, or choose another folder",

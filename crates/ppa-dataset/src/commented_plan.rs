@@ -8,7 +8,7 @@ use crate::plan::{Plan, PlanCase, PlanError};
 use crate::toml_file::{relative_to, to_toml};
 
 const HEADER: &str = "\
-# What a dataset is made of; `ppa plan` tells what it will take, `ppa generate` makes it.
+# What a dataset is made of; `ppa plan` forecasts its cost, `ppa generate` makes it.
 # Every key has its default here; a line may be deleted. Lines that begin with # and no space
 # are settings that are off: remove the # to use them. Lengths in mm, angles in degrees.
 # Relative paths start at this file.
@@ -241,7 +241,7 @@ const OFF_TABLES: &str = "
 #iterations = 1000
 #up = [0.0, 0.0, 1.0]
 #max_tilt_deg = 20.0
-#cell_mm = 60.0    # of the lattice that tells separate patches
+#cell_mm = 60.0    # of the lattice that separates patches
 #min_area_mm2 = 60000.0
 #region = [[-500, -500, -100], [500, 1500, 100]]    # low and high corner of where it is looked for
 #beam = [[0, 0, 1040], [0, 0, -1]]    # source and direction of the central beam

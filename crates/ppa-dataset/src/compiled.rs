@@ -10,7 +10,7 @@ use crate::files::hex;
 /// Hash of all that the bytes of an image follow from besides plan and scans.
 ///
 /// Sources, physics data and target come from `build.rs`. Which versions of other crates were compiled cannot be read there: without
-/// `--locked`, `cargo install` takes no notice of Cargo.lock and tells a build script nothing. But the compiler knows. It
+/// `--locked`, `cargo install` ignores Cargo.lock and passes nothing of it to a build script. But the compiler knows. It
 /// mixes into the identity of a type that of its crate: version, features, profile and compiler, and those of all
 /// crates that it depends on.
 pub(crate) fn code() -> &'static str {

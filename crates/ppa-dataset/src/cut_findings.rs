@@ -1,4 +1,4 @@
-//! Where the field of view of a scan cuts its limb, told when the limb is prepared.
+//! Where the field of view of a scan cuts its limb, as found when the limb is prepared.
 
 use nalgebra::{Point3, Vector3};
 use ppa_mesh::{CutWalls, Mesh};
@@ -9,7 +9,7 @@ use crate::findings::{Finding, FindingCode, Severity};
 /// A wall is an end of the limb if its normal is within 45 degrees of the axis.
 const LEAST_COS: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// A caution for each face of the scan that cuts the limb, but not where a limb goes on beyond any scan: the proximal end, and the distal
+/// A caution for each face of the scan that cuts the limb, but not where a limb extends beyond any scan: the proximal end, and the distal
 /// end of all but lower legs with their foot.
 pub(crate) fn cuts(walls: &CutWalls, skin: &Mesh, landmarks: &Landmarks) -> Vec<Finding> {
     let joint = Point3::from(landmarks.joint_centre);

@@ -8,7 +8,7 @@ use ppa_depth::{
     PlacedBody, Roi, WallDepth, render, render_before, roi_around,
 };
 use ppa_mesh::{CutWalls, Mesh, WallMeasure};
-use ppa_xray::Detector;
+use ppa_xray::{Detector, Projection, TransportError};
 
 use crate::findings::{Finding, FindingCode, Severity};
 use crate::layout::{LimbId, View, angle_text};
@@ -37,6 +37,8 @@ impl CutFaces {
         detector: &Detector,
         source_detector_mm: f64,
     ) -> Result<Self, UnitError> {
+        let at_ct = Projection::new(Isometry3::identity(), source_detector_mm, *detector);
+        at_ct.validate().map_err(TransportError::from)?;
         if walls.is_empty() {
             return Ok(Self {
                 corners: Vec::new(),

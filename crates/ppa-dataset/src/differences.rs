@@ -42,7 +42,7 @@ pub(crate) fn differences(there: &str, here: &str) -> Vec<KeyDifference> {
         Some(&parse(here)),
         &mut found,
     );
-    // Hashes of everything tell nothing beside the keys they are made of.
+    // Hashes of everything add nothing to the keys they are made of.
     let is_hash = |key: &str| key == "seal" || (key.starts_with("limbs.") && key.ends_with(".key"));
     found.retain(|difference: &KeyDifference| !is_hash(&difference.key));
     found.sort_by_key(|difference| rank(&difference.key));
@@ -129,15 +129,15 @@ mod tests {
     fn the_settings_that_differ_are_named_with_both_values() {
         let one = description(60.0, 1, &[0]);
         assert_eq!(differences(&one, &one), []);
-        let told = |a: &str, b: &str| {
+        let between = |a: &str, b: &str| {
             let found = differences(a, b);
             found.iter().map(ToString::to_string).collect::<Vec<_>>()
         };
         let kvp = "settings.xray.kvp is 60 there and 70 here";
         let code = "settings.code is 1 there and 2 here";
-        assert_eq!(told(&one, &description(70.0, 2, &[0])), [kvp, code]);
-        assert_eq!(told(&one, &description(60.0, 2, &[0])), [code]);
-        let grown = told(&one, &description(60.0, 1, &[0, 4]));
+        assert_eq!(between(&one, &description(70.0, 2, &[0])), [kvp, code]);
+        assert_eq!(between(&one, &description(60.0, 2, &[0])), [code]);
+        let grown = between(&one, &description(60.0, 1, &[0, 4]));
         assert_eq!(grown.len(), 1, "{grown:?}");
         assert!(
             grown[0].starts_with("limbs.patient_4_r is absent there and {"),

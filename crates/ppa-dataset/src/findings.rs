@@ -42,7 +42,7 @@ pub enum FindingCode {
     LimbTooLarge,
     /// A part of another limb is fused to the skin.
     FusedLimb,
-    /// The field of view cuts the limb where it does not go on.
+    /// The field of view cuts the limb elsewhere than at its end.
     CutLimb,
     /// The field of view cuts the limb within a region of interest.
     CutInRegion,
@@ -50,7 +50,7 @@ pub enum FindingCode {
     PlaneOnCut,
     /// The normal of the supporting plane is an axis of the image.
     PlaneAlongImage,
-    /// Distal and proximal contact with the table are too near to each other to tell the pitch.
+    /// Distal and proximal contact with the table are too near to each other to determine the pitch.
     ContactsTooNear,
     /// A person gave the supporting plane.
     PlaneGiven,

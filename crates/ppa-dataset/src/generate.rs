@@ -112,7 +112,7 @@ pub struct GenerateSettings<'a> {
     pub disk_limit: Option<u64>,
     /// Once true, poses under way are finished and no other begins.
     pub stop: Option<&'a AtomicBool>,
-    /// Whether poses of other settings, scans or sources are made anew, and those that the plan does not have removed.
+    /// Whether poses of other settings, scans or sources are replaced, and those that the plan does not have removed.
     pub replace: bool,
 }
 
@@ -131,7 +131,7 @@ impl Default for GenerateSettings<'_> {
 /// Makes what is missing of the plan's dataset in the folder `root`.
 ///
 /// Every pose is a unit of its own: its files appear whole, its record last, so a run that was
-/// killed goes on where it stopped. A pose is made again when its record is missing or damaged, or when one of its files
+/// killed resumes where it stopped. A pose is made again when its record is missing or damaged, or when one of its files
 /// is missing or altered; files that were altered are moved to `.ppa/altered`.
 ///
 /// A folder with poses that follow from something else (plan settings, case, code and physics data) or that the plan does

@@ -36,7 +36,7 @@ pub struct Summary {
     /// Doubts about its limbs and poses.
     #[serde(skip_serializing_if = "Findings::is_empty")]
     pub findings: Findings,
-    /// Poses of other settings that were made anew.
+    /// Poses of other settings that were replaced.
     pub replaced: usize,
     /// Poses that were removed because they are not in the plan, or the shard.
     pub removed: usize,
@@ -152,7 +152,7 @@ pub(crate) struct Job<'a> {
     pub part: Part,
     pub limbs: Vec<LimbUnits>,
     pub disk_limit: Option<u64>,
-    /// Whether poses of other settings are made anew, and those of other plans removed.
+    /// Whether poses of other settings are replaced, and those of other plans removed.
     pub replace: bool,
     pub progress: &'a (dyn Fn(Progress) + Sync),
 }

@@ -13,7 +13,7 @@ use crate::record::{Record, Unit};
 /// The lists that follow from a dataset's records.
 pub(crate) struct Lists {
     /// Path from the root and text of each, in the order in which they are written: hashes first, the manifest last, so
-    /// that it tells that all is there.
+    /// that it states that all is there.
     pub files: Vec<(String, String)>,
     /// The rows of the manifest.
     pub rows: Vec<FileRow>,

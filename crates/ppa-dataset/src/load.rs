@@ -42,7 +42,7 @@ fn a_hundred_thousand_units_do_not_slow_down() {
         progress,
     };
     let begun = Instant::now();
-    let tell = |progress: Progress| {
+    let report = |progress: Progress| {
         if progress == Progress::Made {
             times.lock().unwrap().push(begun.elapsed());
         }
@@ -56,7 +56,7 @@ fn a_hundred_thousand_units_do_not_slow_down() {
             })
         }))
     };
-    let summary = job(&tell).complete(make).unwrap();
+    let summary = job(&report).complete(make).unwrap();
     let whole = begun.elapsed();
     assert_eq!((summary.units, summary.made), (100_358, 100_358));
     let times = times.lock().unwrap();

@@ -94,7 +94,7 @@ pub enum MergeError {
 /// Joins the shards of one plan in the folder `root`, copying their images.
 ///
 /// Every image is compared with its recorded hash before it is written. What is there already is
-/// kept, so a merge that was killed goes on. Another dataset in `root` is refused, or made this one where `replace` is
+/// kept, so a merge that was killed can be repeated. Another dataset in `root` is refused, or made this one where `replace` is
 /// set, as by [`generate`](crate::generate). Once `stop` is true no other pose begins.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! What tells of a dataset as a whole, kept true while its poses change: `dataset.json`, part and lists.
+//! The files that describe a dataset as a whole, kept true while its poses change: `dataset.json`, part and lists.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -18,7 +18,7 @@ use crate::part_file::{PART_FILE, part_text, read_part};
 use crate::planned::Planned;
 use crate::staging::Staging;
 
-/// The files of one dataset that tell of all its poses.
+/// The files of one dataset that describe all its poses.
 pub(crate) struct Overview<'a> {
     pub root: &'a Path,
     /// `dataset.json` of the run.
@@ -41,7 +41,7 @@ impl<'a> Overview<'a> {
         }
     }
 
-    /// Called before poses change: removes the lists, which would tell of images that are gone, and describes the run.
+    /// Called before poses change: removes the lists, which would name images that are gone, and describes the run.
     pub fn open(&self, limbs: &[LimbUnits]) -> Result<(), FileError> {
         let mut is_open = self.is_open.lock().unwrap_or_else(|e| e.into_inner());
         if *is_open {
@@ -64,7 +64,7 @@ impl<'a> Overview<'a> {
         Ok(())
     }
 
-    /// Writes what the folder is to hold, so that its state can be told from then on.
+    /// Writes what the folder is to hold, so that its state is known from then on.
     pub fn describe(&self) -> Result<(), FileError> {
         let part = part_text(self.part);
         self.renew(PART_FILE, part.as_deref(), || read_part(self.root).is_ok())?;

@@ -49,7 +49,7 @@ pub(crate) fn read_part(root: &Path) -> Result<Part, FileError> {
     part.ok_or_else(damaged)
 }
 
-/// The part of a plan that the folder `root` holds, or is to hold once the run that began it goes on; `None` for a
+/// The part of a plan that the folder `root` holds, or is to hold once the run that began it is resumed; `None` for a
 /// folder in which no run has begun.
 ///
 /// # Errors
@@ -71,7 +71,7 @@ pub(crate) fn require_part(root: &Path, asked: Part) -> Result<(), FolderError> 
             held,
             asked,
         }),
-        // A damaged file is not that of the whole plan, which has none. Shards may go on: records that are not
+        // A damaged file is not that of the whole plan, which has none. Shards may resume: records that are not
         // theirs stop them.
         Err(FolderError::File(error))
             if error.path == root.join(PART_FILE) && asked != Part::WHOLE =>

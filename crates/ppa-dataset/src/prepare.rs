@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_limb_on_the_wanted_side_is_told() {
+    fn a_cut_limb_on_the_wanted_side_is_reported() {
         let settings = LimbSettings::default();
         let with = |other: Body, side, settings: &LimbSettings| {
             let bodies = vec![body(true, 1.4e6, -67.0), other];
@@ -295,10 +295,10 @@ mod tests {
             };
             other_on_side(&report, side, settings)
         };
-        let told = with(body(false, 4e5, 31.0), Side::Left, &settings).unwrap();
+        let finding = with(body(false, 4e5, 31.0), Side::Left, &settings).unwrap();
         assert!(
-            told.text.contains("patient's left") && told.text.contains("-67, 80, 400"),
-            "{told:?}"
+            finding.text.contains("patient's left") && finding.text.contains("-67, 80, 400"),
+            "{finding:?}"
         );
         assert_eq!(with(body(false, 4e5, 31.0), Side::Right, &settings), None);
         assert_eq!(with(body(false, 1e5, 31.0), Side::Left, &settings), None);

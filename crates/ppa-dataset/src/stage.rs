@@ -92,7 +92,7 @@ impl Table {
     /// What stands in the room, for the cameras: its triangles, or discs at its points.
     ///
     /// # Errors
-    /// [`StageError`] for points whose normals cannot be told or that cannot be rendered.
+    /// [`StageError`] for points whose normals cannot be found or that cannot be rendered.
     pub fn furniture(&self) -> Result<Body, StageError> {
         if let Some(mesh) = &self.room.mesh {
             return Ok(Body::Mesh(MeshBody::new(&mesh.vertices, &mesh.triangles)?));
@@ -104,7 +104,7 @@ impl Table {
 /// Discs at the points of a recorded room, for the cameras.
 ///
 /// # Errors
-/// [`StageError`] for points whose normals cannot be told or that cannot be rendered.
+/// [`StageError`] for points whose normals cannot be found or that cannot be rendered.
 pub fn body_of_cloud(cloud: &PointCloud) -> Result<Body, StageError> {
     let points = &cloud.points;
     let estimated;

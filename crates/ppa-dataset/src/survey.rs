@@ -45,7 +45,7 @@ impl fmt::Display for DatasetDiffers {
                 .collect();
             match self.keys.len() {
                 0 => keys.push(
-                    "other than its dataset.json tells, as a run with --replace was interrupted"
+                    "other than its dataset.json states, as a run with --replace was interrupted"
                         .to_owned(),
                 ),
                 n if n > TOLD => keys.push(format!("{} more keys", n - TOLD)),
@@ -73,7 +73,7 @@ impl fmt::Display for DatasetDiffers {
         }
         write!(
             f,
-            "{} holds another dataset: {}; --replace makes anew what differs, --out names another folder",
+            "{} holds another dataset: {}; --replace replaces what differs, --out names another folder",
             self.root.display(),
             parts.join("; ")
         )

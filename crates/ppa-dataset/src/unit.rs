@@ -144,7 +144,7 @@ impl<'a> PosableLimb<'a> {
         let (skin, walls) = (&self.prepared.limb.mesh, &self.prepared.limb.walls);
         let rigid = closed_skin(&walls.vertices(skin), skin, walls)?;
         let poses = self.plan.rotation.poses()?;
-        // A pose that cannot be made is told with its angle when its turn comes.
+        // A pose that cannot be made is reported with its angle when its turn comes.
         let cuts: Vec<PoseCuts> = poses
             .par_iter()
             .filter_map(|&pose| self.pose_cuts(pose, &rigid).ok())

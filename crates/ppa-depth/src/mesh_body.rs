@@ -39,7 +39,7 @@ impl MeshBody {
 
     /// The mesh with walls: triangles on its vertices that close it where its source was cut off, such as a limb by the
     /// field of view of its scan. They hide what is behind them; [`render`](crate::render) draws them as any surface,
-    /// [`render_before`](crate::render_before) tells them from it.
+    /// [`render_before`](crate::render_before) separates them from it.
     ///
     /// # Errors
     /// [`BodyError::Vertex`] for a wall that names a missing vertex.

@@ -243,7 +243,7 @@ fn everything_that_does_not_fit_is_named_and_changes_nothing() {
 }
 
 #[test]
-fn what_is_no_weight_file_is_told_by_its_name() {
+fn what_is_no_weight_file_is_reported_by_its_name() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["w.safetensors", "w.pth", "w.onnx"] {
         let path = folder.path().join(name);

@@ -17,7 +17,7 @@ pub(crate) struct Ankle {
 }
 
 impl Ankle {
-    /// What is told about it when the joint is taken to lie at a level.
+    /// What is reported about it when the joint is taken to lie at a level.
     pub(crate) fn note(&self, joint_mm: f64) -> LandmarkNote {
         LandmarkNote::AnkleFound {
             depth_hu: self.depth_hu,

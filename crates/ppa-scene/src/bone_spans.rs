@@ -176,7 +176,7 @@ impl BroadZone {
         /// The fibula of a lower leg above an ankle hangs together with the tibia for some 40 mm in coarse voxels.
         const FEMUR_MM: [f64; 2] = [20.0, 100.0];
         const TIBIA_MM: [f64; 2] = [15.0, 75.0];
-        /// Enough to tell a shaft, and to measure how it leans.
+        /// Enough to recognise a shaft, and to measure how it leans.
         const SEEN_MM: f64 = 12.0;
         const ENOUGH_MM: f64 = 25.0;
         let share = |spans: &[&Span]| {

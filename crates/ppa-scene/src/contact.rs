@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limb_that_cannot_rest_is_told() {
+    fn a_limb_that_cannot_rest_is_reported() {
         let steep = Profile::split([[-1.0, 500.0], [1.0, 0.0]].into_iter());
         assert!(steep.resting_tilt().is_none());
         let upright = Profile::split([[3.0, 500.0], [3.0, 0.0]].into_iter());

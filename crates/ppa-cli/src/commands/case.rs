@@ -60,14 +60,14 @@ fn check(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
     working.finish_and_clear();
     let open: Vec<&Finding> = checked.open().collect();
     let landmarks = &checked.limb.landmarks;
-    let told = Checked {
+    let checked = Checked {
         usable: open.is_empty(),
         joint_mm: landmarks.joint_centre,
         axis: landmarks.axis_direction,
         findings: checked.limb.findings.clone(),
         changed: checked.drift,
     };
-    output.print(&told, describe)?;
+    output.print(&checked, describe)?;
     if !open.is_empty() {
         bail!(
             "{} has {}; look at them, then change the case or name their codes in `acknowledged`",
@@ -78,16 +78,16 @@ fn check(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn describe(told: &Checked) -> String {
-    let [x, y, z] = told.joint_mm;
-    let [dx, dy, dz] = told.axis;
+fn describe(checked: &Checked) -> String {
+    let [x, y, z] = checked.joint_mm;
+    let [dx, dy, dz] = checked.axis;
     let mut lines = vec![
         "scan       the one that the case was made from".to_owned(),
         format!("joint      {x:.1} {y:.1} {z:.1} mm (LPS)"),
         format!("axis       {dx:.4} {dy:.4} {dz:.4}"),
-        format!("changed    {}", changes(told.changed.as_ref())),
+        format!("changed    {}", changes(checked.changed.as_ref())),
     ];
-    lines.extend(told.findings.iter().map(|finding| {
+    lines.extend(checked.findings.iter().map(|finding| {
         let severity = match finding.severity {
             Severity::Note => "note",
             Severity::Caution => "caution",

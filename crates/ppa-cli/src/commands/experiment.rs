@@ -175,9 +175,7 @@ pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
         output.print(&outcome, describe)?;
     }
     match stopped {
-        true => {
-            Err(interrupt.stopped("; the same command goes on with the training that was begun"))
-        }
+        true => Err(interrupt.stopped("; repeat the command to resume the training")),
         false => Ok(()),
     }
 }
@@ -226,7 +224,7 @@ fn describe(outcome: &Outcome) -> String {
                 n => format!("{n} test sets are"),
             }
         ),
-        (None, false) => "stopped; the same command goes on".to_owned(),
+        (None, false) => "stopped; repeat the command to resume".to_owned(),
     }];
     let begun = outcome.begun.iter();
     lines.extend(begun.map(|begun| {

@@ -26,10 +26,10 @@ shard, into a folder of its own; `ppa merge` joins them to the same bytes as one
 The shard is also taken from a Slurm job array (SLURM_ARRAY_TASK_ID, _COUNT, _MIN, _MAX, _STEP), from the tasks of srun \
 (SLURM_PROCID, SLURM_STEP_NUM_TASKS), from mpirun (OMPI_COMM_WORLD_RANK, _SIZE) and from an indexed Kubernetes job \
 (JOB_COMPLETION_INDEX, and JOB_COMPLETIONS, which you set). Where two of them disagree, nothing is made. A folder keeps its \
-shard: another one is refused there, and a single task of a Slurm array that runs again goes on with that of its folder.
+shard: another one is refused there, and a single task of a Slurm array that runs again keeps the shard of its folder.
 
 A folder that holds poses of other settings, scans or sources, or poses that the plan does not have, is refused as well. \
-With --replace they are made anew, pose by pose: each stays until the new one is whole, and what the plan does not have is \
+With --replace they are replaced pose by pose: each stays until the new one is complete, and what the plan does not have is \
 removed at the end. Files that ppa did not write, or that were altered since, are never overwritten but moved to .ppa/altered.")]
 pub struct GenerateArgs {
     /// Plan file
@@ -43,7 +43,7 @@ pub struct GenerateArgs {
     /// Make only shard k of n
     #[arg(long, value_name = "K/N")]
     shard: Option<Part>,
-    /// Make anew what differs from the plan; old images stay until the new ones are whole
+    /// Replace what differs from the plan; old images stay until the new ones are complete
     #[arg(long)]
     replace: bool,
     /// Stop before the images take more than this, as 500MB or 20GB
@@ -107,7 +107,7 @@ pub fn with_progress(
 ) -> anyhow::Result<Summary> {
     let summary = generate(plan, out, settings, &|progress| watch.report(progress));
     watch.finish();
-    interrupt.or_how(summary, || watch.how_to_go_on())
+    interrupt.or_how(summary, || watch.how_to_resume())
 }
 
 /// The summary in words; `done` is what was done to the poses that were not there yet.

@@ -19,7 +19,7 @@ pub struct MergeArgs {
     /// Folder of the whole dataset: the same bytes as one run would have left
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Make anew what differs from the plan; old images stay until the new ones are whole
+    /// Replace what differs from the plan; old images stay until the new ones are complete
     #[arg(long)]
     replace: bool,
     /// Read the merged dataset back and compare every file with what was made
@@ -41,10 +41,10 @@ pub fn run(args: &MergeArgs, output: Output) -> anyhow::Result<()> {
         &report,
     );
     watch.finish();
-    let summary = interrupt.or_how(summary, || watch.how_to_go_on())?;
+    let summary = interrupt.or_how(summary, || watch.how_to_resume())?;
     if args.verify {
         let _stoppable = ends_at_once(
-            "while the merged dataset was read back; the same command reads it again",
+            "while the merged dataset was read back; repeat the command to read it again",
         )?;
         let working = working("reading back");
         let problems = check(&args.out)?.problems;

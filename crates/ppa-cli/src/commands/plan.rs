@@ -68,7 +68,7 @@ struct Begun {
 pub fn run(args: &PlanArgs, output: Output) -> anyhow::Result<()> {
     match (&args.command, &args.plan) {
         (Some(PlanCommand::Init(args)), _) => init(args, output),
-        (None, Some(plan)) => tell(plan, args, output),
+        (None, Some(plan)) => forecast_of(plan, args, output),
         (None, None) => bail!("a plan file is missing"),
     }
 }
@@ -91,7 +91,7 @@ fn init(args: &InitArgs, output: Output) -> anyhow::Result<()> {
     })
 }
 
-fn tell(file: &Path, args: &PlanArgs, output: Output) -> anyhow::Result<()> {
+fn forecast_of(file: &Path, args: &PlanArgs, output: Output) -> anyhow::Result<()> {
     let plan = Plan::read(file)?;
     let root = match &args.out {
         Some(out) => out.clone(),

@@ -218,7 +218,7 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
     output.print(&case, |case| describe(case, args))
 }
 
-/// The bones that can be told apart in a scan, once it is sure that labels can be computed from them.
+/// The bones that can be separated in a scan, once it is sure that labels can be computed from them.
 fn segmented(path: &Path, prepared: &PreparedLimb) -> anyhow::Result<(Volume, BoneFile)> {
     let ct_from_patient = prepared.landmarks.patient_from_ct().inverse();
     let ct_from_patient = ct_from_patient.isometry();

@@ -61,7 +61,7 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
                 if progress.step > 1 {
                     let made = progress.step - 1;
                     note(&format!(
-                        "going on after {made} of {}",
+                        "resuming after {made} of {}",
                         count(steps, "step")
                     ));
                 }
@@ -99,7 +99,7 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
     match trained.finished {
         true => Ok(()),
         false => Err(interrupt.stopped(format!(
-            "after {step} of {}; the same command goes on",
+            "after {step} of {}; repeat the command to resume",
             count(steps, "step")
         ))),
     }

@@ -84,7 +84,7 @@ fn a_phantom_is_graded_best_at_its_mortise_angle() {
     // The same labels again are no others.
     succeed(here, "label auto plan");
 
-    // Readers' labels win, whichever comes first, and whoever told the bones apart; computed ones stay beside them.
+    // Readers' labels win, whichever comes first, and whoever separated the bones; computed ones stay beside them.
     let folder_of_labels = here.join("plan/patient_3/labels/r");
     let computed =
         || json(&fs::read_to_string(folder_of_labels.join("labels.computed.json")).unwrap());

@@ -42,7 +42,7 @@ fn a_density_goes_with_a_composition() {
 }
 
 #[test]
-fn a_broken_calibration_is_told_with_file_and_place() {
+fn a_broken_calibration_is_reported_with_file_and_place() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("scanner.toml");
     let segment = "[[segment]]\nname = \"all\"\nmaterial = \"water\"\n";

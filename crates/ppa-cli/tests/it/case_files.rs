@@ -15,6 +15,17 @@ fn own_case(folder: &Path) {
     succeed(folder, prepare);
 }
 
+/// Keys of `[choices]` that a case holds as comments with what was found, but for the points of the plane.
+const CHOICES: [&str; 7] = [
+    "limb",
+    "joint_centre",
+    "joint_region",
+    "calf_region",
+    "axis_source",
+    "axis",
+    "anterior",
+];
+
 fn edit(folder: &Path, from: &str, to: &str) {
     let path = folder.join("leg.case.toml");
     let text = fs::read_to_string(&path).unwrap();
@@ -72,16 +83,7 @@ fn only_what_was_chosen_stands_in_the_choices() {
         table["choices"].as_table().unwrap().clone()
     };
     assert!(choices(&text).is_empty(), "{text}");
-    for key in [
-        "limb",
-        "joint_centre",
-        "joint_region",
-        "calf_region",
-        "axis_source",
-        "axis",
-        "anterior",
-        "plane_points",
-    ] {
+    for key in CHOICES.into_iter().chain(["plane_points"]) {
         assert!(text.contains(&format!("\n#{key} = ")), "{key}: {text}");
     }
     let axis = "prepare p01.nii --side r --no-picture --out axis.case.toml --axis -92,14,-310 -91,10,-150 --joint -92,14,-300";
@@ -113,15 +115,7 @@ fn any_key_of_the_choices_can_be_chosen_alone() {
         serde_json::from_str(&succeed(folder, "case check leg.case.toml --json")).unwrap()
     };
     let shift = |changed: &Value, key: &str| changed["changed"][key].as_f64().unwrap();
-    for key in [
-        "limb",
-        "joint_centre",
-        "joint_region",
-        "calf_region",
-        "axis_source",
-        "axis",
-        "anterior",
-    ] {
+    for key in CHOICES {
         fs::write(folder.join("leg.case.toml"), &untouched).unwrap();
         switch_on(folder, key);
         let checked = check();
@@ -165,7 +159,11 @@ fn any_key_of_the_choices_can_be_chosen_alone() {
     );
     assert!(shift(&checked, "axis_deg") < 1e-3, "{checked}");
     fs::write(folder.join("leg.case.toml"), &untouched).unwrap();
-    edit(folder, "side = \"r\"", "side = \"l\"");
+    edit(
+        folder,
+        "side = \"r\"",
+        "side = \"l\"\nacknowledged = [\"side-mismatch\"]",
+    );
     assert_eq!(check()["changed"]["other_limb"], true);
 }
 
@@ -175,14 +173,7 @@ fn a_case_with_all_choices_is_read_as_it_was() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     own_case(folder);
-    for key in [
-        "limb",
-        "joint_centre",
-        "joint_region",
-        "calf_region",
-        "axis_source",
-        "anterior",
-    ] {
+    for key in CHOICES.iter().filter(|&&key| key != "axis") {
         switch_on(folder, key);
     }
     let said = succeed(folder, "case check leg.case.toml");

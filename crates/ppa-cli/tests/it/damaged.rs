@@ -63,7 +63,7 @@ fn a_forged_image_is_found_when_its_pose_is_made_again() {
         fs::write(root.join(list), &text).unwrap();
         text
     };
-    // The forger computes all hashes anew.
+    // The forger recomputes all hashes.
     let sum = |text: &str| {
         let file = folder.path().join("text");
         fs::write(&file, text).unwrap();

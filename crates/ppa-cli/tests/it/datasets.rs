@@ -70,7 +70,7 @@ fn a_dataset_is_checked_and_converted_there_and_back() {
 }
 
 #[test]
-fn what_was_edited_by_hand_is_told() {
+fn what_was_edited_by_hand_is_reported() {
     let folder = copy();
     let data = folder.path().join("data");
     let image = "patient_3/depth/r/big/depth_cam_left_5.0.png";

@@ -127,7 +127,7 @@ fn fifty_kills_and_refused_writes_change_no_byte() {
 
 /// Merging is nearly all reading and writing, so a kill often meets it at work on a file.
 #[test]
-fn a_merge_that_is_killed_goes_on() {
+fn a_merge_that_is_killed_resumes() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     write_quick_plan(here);

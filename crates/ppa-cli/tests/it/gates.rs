@@ -39,8 +39,8 @@ fn codes(limb: &PreparedLimb, least: Severity) -> Vec<FindingCode> {
     codes
 }
 
-/// A leg of either side has no finding above a note when its side is told right, and only the mismatch when it is not.
-fn is_clear_and_a_swap_is_told(name: &str, spacing_mm: f64) {
+/// A leg of either side has no finding above a note when its side is given correctly, and only the mismatch otherwise.
+fn is_clear_and_a_swap_is_reported(name: &str, spacing_mm: f64) {
     let sides = [
         (PhantomSide::Left, Side::Left),
         (PhantomSide::Right, Side::Right),
@@ -73,16 +73,16 @@ fn is_clear_and_a_swap_is_told(name: &str, spacing_mm: f64) {
 
 #[test]
 fn a_phantom_is_clear_and_its_other_side_is_a_mismatch() {
-    is_clear_and_a_swap_is_told("P07", 2.0);
+    is_clear_and_a_swap_is_reported("P07", 2.0);
 }
 
 #[test]
 #[ignore = "a minute"]
-fn seventeen_phantoms_are_clear_and_all_swaps_are_told() {
+fn seventeen_phantoms_are_clear_and_all_swaps_are_reported() {
     let names: Vec<_> = (1..=17).map(|number| format!("P{number:02}")).collect();
     names
         .par_iter()
-        .for_each(|name| is_clear_and_a_swap_is_told(name, 1.5));
+        .for_each(|name| is_clear_and_a_swap_is_reported(name, 1.5));
 }
 
 /// A right leg, and a left one that is pressed into it by some voxels.
@@ -134,7 +134,7 @@ fn two_legs(pressed_mm: f64) -> Volume {
 
 /// Apart they are two limbs of which one is taken; pressed together by 12 mm they are one body with two tibiae.
 #[test]
-fn legs_pressed_together_are_told() {
+fn legs_pressed_together_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let found = |pressed_mm: f64| {
         let scan = folder.path().join("legs.nii");
@@ -266,7 +266,7 @@ fn real_limbs_have_the_findings_that_an_eye_confirms() {
             !expected.is_empty() || severe.is_empty(),
             "{scan} {side:?}: {severe:?}"
         );
-        let told = severe.contains(&SideMismatch);
-        assert_eq!(told, expected.contains(&SideMismatch), "{scan} {side:?}");
+        let found = severe.contains(&SideMismatch);
+        assert_eq!(found, expected.contains(&SideMismatch), "{scan} {side:?}");
     }
 }

@@ -23,13 +23,13 @@ fn write_wrong_side(folder: &Path) -> String {
         folder,
         "ct phantom --name P07 --spacing-mm 2 --table --out leg.nii",
     );
-    let told = succeed(folder, "prepare leg.nii --side l --out leg.toml");
+    let said = succeed(folder, "prepare leg.nii --side l --out leg.toml");
     let plan = "version = 1\n[[case]]\nfile = \"leg.toml\"\npatient = 0\n\
          [rotation]\nfrom_deg = 0.0\nto_deg = 2.5\nstep_deg = 2.5\n\
          [xray]\ndetector = { columns = 50, rows = 50, pixel_mm = 4.0 }\n\
          engine = { scatter_histories = 20000 }\n";
     fs::write(folder.join("plan.toml"), plan).unwrap();
-    told
+    said
 }
 
 fn acknowledge(folder: &Path, codes: &str) {
@@ -43,9 +43,9 @@ fn acknowledge(folder: &Path, codes: &str) {
 fn a_severe_finding_is_repeated_until_it_is_acknowledged() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let told = write_wrong_side(folder);
+    let said = write_wrong_side(folder);
     contains(
-        &told,
+        &said,
         &[
             "severe     [side-mismatch]",
             "acknowledged = [\"side-mismatch\"]",
@@ -125,5 +125,5 @@ fn training_and_evaluation_repeat_findings_of_their_data() {
         assert_eq!(said.matches(OPEN).count(), 1, "{command}: {said}");
     }
     fs::write(folder.join("data/findings.json"), "[{").unwrap();
-    contains(&fail(folder, "eval run"), &["findings.json"]);
+    contains(&fail(folder, "eval run --replace"), &["findings.json"]);
 }

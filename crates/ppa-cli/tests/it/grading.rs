@@ -153,10 +153,10 @@ fn grades_that_cannot_be_are_named_and_nothing_is_written() {
     let twice = fail(here, "label import data --key out.key.csv a.csv b.csv");
     assert!(twice.contains("in a.csv and again in b.csv"), "{twice}");
 
-    // The dataset was made anew with another seed since.
+    // The dataset was replaced since, with another seed.
     let plan = fs::read_to_string(here.join("plan.toml")).unwrap();
     fs::write(here.join("plan.toml"), format!("seed = 9\n{plan}")).unwrap();
-    succeed(here, "generate plan.toml --out data");
+    succeed(here, "generate plan.toml --out data --replace");
     let changed = fail(here, "label import data --key out.key.csv a.csv");
     assert!(
         changed.contains("is not the radiograph that the readers saw"),
@@ -221,10 +221,12 @@ fn no_grade_and_no_label_of_readers_is_lost() {
     );
     assert_eq!(labels(here), before);
 
-    // The radiographs are made anew: labels and grades belong to the old ones.
+    // The radiographs are replaced: labels and grades belong to the old ones.
     let plan = fs::read_to_string(here.join("plan.toml")).unwrap();
     fs::write(here.join("plan.toml"), format!("seed = 9\n{plan}")).unwrap();
-    let done = ppa(here, "generate plan.toml --out data").output().unwrap();
+    let done = ppa(here, "generate plan.toml --out data --replace")
+        .output()
+        .unwrap();
     let told = String::from_utf8(done.stderr).unwrap();
     assert!(
         done.status.success()

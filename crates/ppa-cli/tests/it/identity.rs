@@ -140,7 +140,7 @@ fn no_output_identifies_the_source() {
         "mesh extract {scan} --iso -500 --out iso.ply --json"
     ));
     run(&format!(
-        "prepare {scan} --series {UID_ROOT}.1 --side r --out {case} --ply skin.ply"
+        "prepare {scan} --series {UID_ROOT}.1 --side r --limb other --out {case} --ply skin.ply"
     ));
     run(&format!(
         "xray simulate {case} --angle 18 --engine analog --histories 20000 --out x.png --exr x.exr \

@@ -1,4 +1,4 @@
-//! Ctrl-C and TERM: the next whole step, one line that says how to go on, and an exit status that tells.
+//! Ctrl-C and TERM: the next whole step, one line that says how to resume, and the exit status of the signal.
 #![cfg(unix)]
 
 use std::fs;
@@ -6,11 +6,15 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::resume::records;
 use crate::shards::write_quick_plan;
 use crate::{contains, contents, names, phantom, ppa, succeed, write_plan};
 
 fn start(folder: &Path, arguments: &str) -> Child {
-    let mut command = ppa(folder, arguments);
+    spawn(ppa(folder, arguments))
+}
+
+fn spawn(mut command: Command) -> Child {
     let command = command.stdout(Stdio::piped()).stderr(Stdio::piped());
     command.spawn().unwrap()
 }
@@ -39,6 +43,16 @@ fn wait_for(run: &mut Child, mut what: impl FnMut() -> bool) {
     }
 }
 
+/// A plan in the folder, and the command that simulates a radiograph of it with the analog engine.
+fn analog_run(folder: &Path) -> String {
+    write_plan(folder, "");
+    let case = phantom().join("p01.toml");
+    format!(
+        "xray simulate {} --plan plan.toml --engine analog --seed 5",
+        case.display()
+    )
+}
+
 /// Sends a signal some time after the start, later if it came before the program listened.
 fn interrupted(folder: &Path, arguments: &str, signal: &str) -> (i32, String) {
     for seconds in [1, 2, 4, 8, 16, 32] {
@@ -53,18 +67,8 @@ fn interrupted(folder: &Path, arguments: &str, signal: &str) -> (i32, String) {
     panic!("ppa {arguments} never listened");
 }
 
-fn poses(root: &Path) -> usize {
-    let Ok(records) = fs::read_dir(root.join(".ppa")) else {
-        return 0;
-    };
-    let names = records.map(|entry| entry.unwrap().file_name());
-    names
-        .filter(|name| name.to_string_lossy().starts_with("patient"))
-        .count()
-}
-
 #[test]
-fn a_stopped_dataset_goes_on_to_the_same_bytes() {
+fn a_stopped_dataset_resumes_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     write_plan(here, "");
@@ -72,13 +76,13 @@ fn a_stopped_dataset_goes_on_to_the_same_bytes() {
     for (signal, code, name) in [("INT", 130, "int"), ("TERM", 143, "term")] {
         let root = here.join(name);
         let mut stopped = start(here, &format!("{run} {name}"));
-        wait_for(&mut stopped, || poses(&root) > 0);
+        wait_for(&mut stopped, || records(&root) > 0);
         send(&stopped, signal);
         let (ended, said) = ended(stopped);
         assert_eq!(ended, Some(code), "{said}");
         assert_eq!(said.trim_end().lines().count(), 1, "{said}");
-        let made = poses(&root);
-        let how = format!("stopped after {made} of 5 poses; the same command goes on");
+        let made = records(&root);
+        let how = format!("stopped after {made} of 5 poses; repeat the command to resume");
         contains(&said, &[&how]);
         succeed(here, &format!("{run} {name}"));
     }
@@ -109,16 +113,11 @@ fn a_second_ctrl_c_ends_at_once() {
 fn histories_of_a_stopped_run_are_kept_without_tally() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    write_plan(here, "");
-    let case = phantom().join("p01.toml");
-    let run = format!(
-        "xray simulate {} --plan plan.toml --engine analog --seed 5",
-        case.display()
-    );
+    let run = analog_run(here);
     let endless = format!("{run} --histories 5e11 --out x.png");
     let (code, said) = interrupted(here, &endless, "TERM");
     assert_eq!(code, 143, "{said}");
-    let more = "the same command with --tally x.png.tally --resume goes on";
+    let more = "repeat the command with --tally x.png.tally --resume to resume";
     contains(&said, &["histories, which are kept in x.png.tally", more]);
     assert_eq!(names(here), ["plan.toml", "x.png.tally"]);
 
@@ -143,15 +142,10 @@ fn histories_of_a_stopped_run_are_kept_without_tally() {
 fn a_named_tally_holds_what_was_counted() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    write_plan(here, "");
-    let case = phantom().join("p01.toml");
-    let run = format!(
-        "xray simulate {} --plan plan.toml --engine analog --histories 5e11 --out x.png --tally x.tally --resume",
-        case.display()
-    );
+    let run = analog_run(here) + " --histories 5e11 --out x.png --tally x.tally --resume";
     let (code, said) = interrupted(here, &run, "INT");
     assert_eq!(code, 130, "{said}");
-    contains(&said, &["kept in x.tally; the same command goes on"]);
+    contains(&said, &["kept in x.tally; repeat the command to resume"]);
     assert_eq!(names(here), ["plan.toml", "x.tally"]);
 }
 
@@ -195,16 +189,12 @@ fn a_stopped_verification_leaves_nothing_behind() {
         "verify data --plan plan.toml --fraction 1 --threads 1 --progress quiet",
     );
     command.env("TMPDIR", &scratch);
-    let mut run = command
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut run = spawn(command);
     wait_for(&mut run, || fs::read_dir(&scratch).unwrap().count() > 0);
     send(&run, "INT");
     let (code, said) = ended(run);
     assert_eq!(code, Some(130), "{said}");
-    contains(&said, &["stopped", "the same command begins again"]);
+    contains(&said, &["stopped", "repeat the command to start over"]);
     assert_eq!(fs::read_dir(&scratch).unwrap().count(), 0);
     assert!(contents(&here.join("data")) == before);
 }

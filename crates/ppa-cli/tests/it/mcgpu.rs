@@ -79,7 +79,7 @@ fn the_result_has_its_keys_and_the_same_seed_gives_the_same_bytes() {
 }
 
 #[test]
-fn mistakes_are_told_and_leave_nothing_behind() {
+fn mistakes_are_reported_and_leave_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     write_input(folder.path());
     let text = fs::read_to_string(folder.path().join("box.in")).unwrap();
@@ -124,7 +124,7 @@ fn mistakes_are_told_and_leave_nothing_behind() {
 }
 
 #[test]
-fn a_damaged_spectrum_is_told_with_its_line_and_named_once() {
+fn a_damaged_spectrum_is_reported_with_its_line_and_named_once() {
     let folder = tempfile::tempdir().unwrap();
     write_input(folder.path());
     for (text, told) in [

@@ -44,7 +44,7 @@ fn pairs_are_exported_from_trainings_and_from_their_weight_files() {
 }
 
 #[test]
-fn what_a_start_file_has_beyond_the_network_is_told_by_name() {
+fn surplus_of_a_start_file_is_reported_by_name() {
     let folder = trained();
     let config = fs::read_to_string(folder.join("left.toml")).unwrap();
     let config = format!("start = \"right/checkpoint.safetensors\"\n{config}");

@@ -119,7 +119,7 @@ fn a_wrong_ending_is_refused_before_any_work() {
 }
 
 #[test]
-fn a_missing_folder_is_told_before_any_work() {
+fn a_missing_folder_is_reported_before_any_work() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     for command in [

@@ -54,7 +54,7 @@ fn assert_remembered(folder: &Path, option: &str, line: &str, refusal: &str) {
     assert!(said.contains(refusal), "{said}");
     succeed(
         folder,
-        &format!("prepare scan --side r --out case.toml {option}"),
+        &format!("prepare scan --side r --limb other --out case.toml {option}"),
     );
     let case = fs::read_to_string(folder.join("case.toml")).unwrap();
     assert_eq!(case.lines().filter(|l| *l == line).count(), 1, "{case}");

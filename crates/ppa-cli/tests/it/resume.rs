@@ -1,4 +1,4 @@
-//! A killed run goes on where it stopped, to the same bytes.
+//! A killed run resumes where it stopped, to the same bytes.
 
 use std::fs;
 use std::path::Path;
@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use crate::{contents, ppa, succeed, write_plan};
 
-/// Finished poses so far.
-fn records(root: &Path) -> usize {
+/// Number of poses finished so far.
+pub fn records(root: &Path) -> usize {
     fs::read_dir(root.join(".ppa")).map_or(0, |entries| {
         let names = entries.map(|entry| entry.unwrap().file_name());
         names
@@ -17,7 +17,7 @@ fn records(root: &Path) -> usize {
 }
 
 #[test]
-fn a_killed_run_goes_on_to_the_same_dataset() {
+fn a_killed_run_resumes_to_the_same_dataset() {
     let folder = tempfile::tempdir().unwrap();
     write_plan(folder.path(), "");
     succeed(folder.path(), "generate plan.toml --out whole --threads 2");

@@ -110,7 +110,7 @@ fn frames_of_a_placed_limb_meet() {
 }
 
 #[test]
-fn broken_room_files_are_told() {
+fn broken_room_files_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let room = folder.path().join("room.toml");
     succeed(folder.path(), "scene room --out a.ply --toml good.toml");

@@ -90,7 +90,7 @@ fn parts_and_sittings_end_in_the_bytes_of_one_run() {
         "--histories 20000 --dose --tally go_on.tally --resume",
     );
     assert!(read(folder, "go_on.tally") == read(folder, "one.tally"));
-    // A finished run that goes on finds nothing to do and replaces its image by the same one.
+    // A finished run that is resumed has nothing to do and replaces its image by the same one.
     for _ in 0..2 {
         simulate(
             folder,

@@ -120,10 +120,13 @@ fn a_room_that_was_written_renders_and_is_a_room_again() {
     let folder = folder.path();
     succeed(folder, "scene room --out room.ply --frames room.json");
     let by = "--camera-from-mesh room.json --motion left_from_room --json";
-    let told = succeed(folder, &format!("depth render room.ply {by} --out d.png"));
-    let told: Value = serde_json::from_str(&told).unwrap();
+    let printed = succeed(folder, &format!("depth render room.ply {by} --out d.png"));
+    let printed: Value = serde_json::from_str(&printed).unwrap();
     let image = depth(&folder.join("d.png"));
-    assert!(image.valid_pixels() * 10 > 9 * image.z_mm.len(), "{told}");
+    assert!(
+        image.valid_pixels() * 10 > 9 * image.z_mm.len(),
+        "{printed}"
+    );
     // The camera stands 220 mm beside and 980 mm above the isocentre on the table, at which it looks.
     let middle = image.z_mm[(image.height / 2 * image.width + image.width / 2) as usize];
     assert!((middle - 220_f32.hypot(980.0)).abs() < 4.0, "{middle}");

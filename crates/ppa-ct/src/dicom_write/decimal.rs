@@ -49,7 +49,7 @@ mod tests {
 
         /// A direction cosine, or a position of less than a metre: 12 places behind the point.
         #[test]
-        fn places_are_told_to_a_millionth_of_a_micrometre(value in -999.0..999.0_f64) {
+        fn places_are_reported_to_a_millionth_of_a_micrometre(value in -999.0..999.0_f64) {
             let back = decimal(value).parse::<f64>().unwrap();
             prop_assert!((back - value).abs() <= 0.6e-11, "{value}");
         }

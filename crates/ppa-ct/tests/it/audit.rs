@@ -155,7 +155,7 @@ fn the_couch_is_looked_for_in_time_that_grows_with_the_image() {
 }
 
 #[test]
-fn values_that_are_not_hounsfield_units_are_told() {
+fn values_that_are_not_hounsfield_units_are_reported() {
     let first = |change: fn(f32) -> f32| {
         Leg {
             change,
@@ -194,7 +194,7 @@ fn values_that_are_not_hounsfield_units_are_told() {
 }
 
 #[test]
-fn clipping_metal_and_padding_are_told() {
+fn clipping_metal_and_padding_are_reported() {
     let metal = Leg {
         plate_hu: 2900.0,
         ..Leg::default()
@@ -247,7 +247,7 @@ fn clipping_metal_and_padding_are_told() {
 }
 
 #[test]
-fn slices_and_axes_are_told() {
+fn slices_and_axes_are_reported() {
     let thick = |mm: f64| stated(move |a| a.slice_thickness_mm = Some(mm)).codes();
     assert_eq!(thick(2.0), [CutAtEnd]);
     assert_eq!(thick(1.25), [GapsBetweenSlices, CutAtEnd]);

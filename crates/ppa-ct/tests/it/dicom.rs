@@ -303,7 +303,7 @@ fn a_cut_file_is_an_error_at_every_length() {
 
 /// Facts pass on; of identifying attributes the names alone.
 #[test]
-fn the_acquisition_is_told_without_a_value_that_identifies() {
+fn the_acquisition_is_reported_without_a_value_that_identifies() {
     let folder = tempfile::tempdir().unwrap();
     let mut slices = axial_stack(&[0.0, 2.0]);
     slices[1].bits_stored = 12;

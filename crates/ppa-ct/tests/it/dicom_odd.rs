@@ -226,7 +226,7 @@ fn groups_that_all_frames_share_are_parsed_once() {
 }
 
 #[test]
-fn slices_beside_the_line_and_endless_gaps_are_told() {
+fn slices_beside_the_line_and_endless_gaps_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let fill = ReadOptions {
         fill_gaps: true,

@@ -208,7 +208,7 @@ fn a_failed_write_leaves_nothing() {
 
 /// `scl_slope` at byte 112, `scl_inter` at 116: values of the format's authors, and of programs in use.
 #[test]
-fn scalings_that_are_no_numbers_are_refused_unless_they_mean_none() {
+fn invalid_scalings_are_refused() {
     let scaled = |slope: f32, intercept: f32| {
         patched(&[(112, &slope.to_le_bytes()), (116, &intercept.to_le_bytes())])
     };

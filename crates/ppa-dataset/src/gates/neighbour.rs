@@ -6,7 +6,7 @@ use ppa_scene::Neighbour;
 use super::at;
 use crate::findings::{Finding, FindingCode, Severity};
 
-/// Where limbs touch, HU do not tell whose skin is whose, and the border is found up to 4 voxels beside the true one. Contacts
+/// Where limbs touch, HU do not separate their skins, and the border is found up to 4 voxels beside the true one. Contacts
 /// up to 1 cm² hardly show in an image; 10 cm² are a place 32 mm wide.
 const CONTACT_CAUTION_CM2: f64 = 1.0;
 const CONTACT_SEVERE_CM2: f64 = 10.0;

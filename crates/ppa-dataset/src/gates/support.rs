@@ -15,7 +15,7 @@ const NEAR_CUT: f64 = 1.5;
 /// a skin's surface is smooth.
 const ALONG_IMAGE_RAD: f64 = 1e-3;
 
-/// Contacts nearer to each other than this do not tell the pitch, mm: a height that is wrong by 1 mm at one of them turns the
+/// Contacts nearer to each other than this do not determine the pitch, mm: a height that is wrong by 1 mm at one of them turns the
 /// plane by 1.1 degrees, and over the second length by 0.6.
 const SPAN_SEVERE_MM: f64 = 50.0;
 const SPAN_CAUTION_MM: f64 = 100.0;
@@ -58,7 +58,7 @@ pub(super) fn findings(
     found
 }
 
-/// Skin may lie this far behind a given plane: soft tissue that gives way, mm.
+/// Skin may lie this far behind a given plane: soft tissue yields that much.
 const DEEP_MM: f64 = 5.0;
 
 /// Faces of the volume that cut the limb: axis of the image, index of the layer, name.
@@ -86,7 +86,7 @@ fn on_cut(volume: &Volume, report: &LimbReport, support: &Support) -> Vec<Findin
             .find(|(axis, layer, _)| (voxel[*axis] - layer).abs() <= NEAR_CUT)
     };
     let contacts = support.contacts_mm.into_iter().zip(["distal", "proximal"]);
-    let told = contacts.filter_map(|(contact_mm, end)| {
+    let findings = contacts.filter_map(|(contact_mm, end)| {
         let (_, _, face) = on_face(contact_mm)?;
         let [x, y, z] = contact_mm;
         Some(Finding {
@@ -100,7 +100,7 @@ fn on_cut(volume: &Volume, report: &LimbReport, support: &Support) -> Vec<Findin
             place_mm: Some(contact_mm),
         })
     });
-    told.collect()
+    findings.collect()
 }
 
 /// A plane across an axis of the image whose contacts lie on a cut across it. Elsewhere such a plane is right: a limb can lie on a

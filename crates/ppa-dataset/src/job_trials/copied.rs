@@ -23,7 +23,7 @@ fn images_without_the_folder_of_records_are_refused() {
 }
 
 #[test]
-fn images_without_their_records_are_replaced_only_when_asked_to() {
+fn images_without_records_are_replaced_on_request_only() {
     let folder = Trial::new().made();
     let root = folder.path();
     fs::remove_file(root.join(".ppa/patient_7_r_001.json")).unwrap();

@@ -44,11 +44,11 @@ fn each_of_a_thousand_flipped_bits_is_found() {
         for _ in 0..flips {
             let (file, before, _) = flip(root, &files, &mut draw);
             let found = check(root).map_or(true, |check| !check.problems.is_empty());
-            assert!(found, "{} is not told", file.display());
+            assert!(found, "{} is not reported", file.display());
             // Without the records, as in a published copy, all else is covered as well.
             if !file.starts_with(".ppa") {
                 let found = inspect(root).map_or(true, |found| !found.flaws.is_empty());
-                assert!(found, "{} is not told without records", file.display());
+                assert!(found, "{} is not reported without records", file.display());
             }
             fs::write(root.join(file), before).unwrap();
         }

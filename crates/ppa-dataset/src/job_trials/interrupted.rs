@@ -59,7 +59,7 @@ fn a_pose_that_was_half_replaced_is_completed() {
 }
 
 #[test]
-fn a_first_run_that_was_killed_goes_on() {
+fn a_first_run_that_was_killed_resumes() {
     let first = Trial {
         to_deg: 0.0,
         ..Trial::new()

@@ -95,7 +95,7 @@ fn a_broken_replacement_leaves_each_pose_whole() {
             assert!(!root.join("manifest.jsonl").exists());
             let now = status(root).unwrap();
             assert_eq!((now.made, now.complete), (replaced, false));
-            // Neither plan goes on by itself.
+            // Neither plan is carried out unasked.
             assert!(
                 other()
                     .run(root)
@@ -138,7 +138,7 @@ fn a_plan_that_shrinks_removes_poses_only_when_asked_to() {
 }
 
 #[test]
-fn a_plan_that_grows_goes_on() {
+fn a_plan_that_grows_resumes() {
     let narrow = Trial {
         to_deg: 0.0,
         patients: vec![7],

@@ -79,7 +79,7 @@ pub struct LabelledLimb {
     pub best_angle_deg: f64,
     /// Radiographs whose label in `labels.json` is that of readers.
     pub of_readers: usize,
-    /// Whether `labels.json` holds labels that do not tell their source, and was left as it is.
+    /// Whether `labels.json` holds labels without a source, and was left as it is.
     pub unnamed_kept: bool,
 }
 
@@ -223,7 +223,7 @@ impl ComputedLabels<'_> {
 
     /// Writes `openness.csv`, `openness.json` (what it was computed with), `labels.computed.json` (all labels) and `labels.json`
     /// beside the limb's regions of interest. In `labels.json` labels of readers stay, and computed ones stand where there are none; a
-    /// file of labels that do not tell their source stays as it is.
+    /// file of labels without a source stays as it is.
     ///
     /// # Errors
     /// [`AutoLabelError`] if a file cannot be written.

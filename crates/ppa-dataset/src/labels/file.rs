@@ -53,7 +53,7 @@ impl LabelFile {
         root.join(limb.roi_file()).with_file_name("labels.json")
     }
 
-    /// Where computed labels lie, those included that gave way to readers' in [`LabelFile::path`].
+    /// Where computed labels lie, those included that readers' labels replace in [`LabelFile::path`].
     pub fn computed_path(root: &Path, limb: LimbId) -> PathBuf {
         root.join(limb.roi_file())
             .with_file_name("labels.computed.json")
@@ -89,7 +89,7 @@ impl LabelFile {
         })
     }
 
-    /// Who made the label of a step; `None` where there is none, or where the file does not tell, as the published ones.
+    /// Who made the label of a step; `None` where there is none, or where the file does not name it, as the published ones.
     pub fn source_of_step(&self, step: u32) -> Option<LabelSource> {
         self.rows.get(&radiograph_name(step))?.source
     }
@@ -149,7 +149,7 @@ impl LabelFile {
         Self { rows }
     }
 
-    /// Whether any label does not tell its source.
+    /// Whether any label has no source.
     #[cfg(feature = "generate")]
     pub(super) fn has_unnamed(&self) -> bool {
         self.rows.values().any(|labelled| labelled.source.is_none())

@@ -30,7 +30,7 @@ impl LabelSource {
     }
 }
 
-/// The sources of the labels in one file: readers beside one kind of computed labels, or none that is told.
+/// The sources of the labels in one file: readers beside one kind of computed labels, or none that is named.
 #[derive(Debug, Default)]
 pub(crate) struct Sources(Vec<Option<LabelSource>>);
 

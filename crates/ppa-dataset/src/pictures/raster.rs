@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearer_of_two_squares_hides_the_other_and_all_of_it_is_painted() {
+    fn the_nearer_of_two_squares_hides_the_other() {
         let rect = Rect {
             x: 5,
             y: 5,

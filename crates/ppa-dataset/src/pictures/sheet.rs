@@ -89,18 +89,18 @@ impl Frame {
             let remarks = self.remarks.iter();
             remarks.filter(|r| r.severity == severity).count()
         };
-        let told = [Severity::Severe, Severity::Caution].into_iter();
-        let told: Vec<_> = told
+        let listed = [Severity::Severe, Severity::Caution].into_iter();
+        let listed: Vec<_> = listed
             .filter(|severity| count(*severity) > 0)
             .map(|severity| {
                 let (count, word) = (count(severity), word(severity));
                 (format!("{count} {word}"), colour(severity))
             })
             .collect();
-        if told.is_empty() {
+        if listed.is_empty() {
             return vec![("no findings".to_owned(), GOOD)];
         }
-        told
+        listed
     }
 
     fn remark_lines(&self) -> Vec<(String, Colour)> {

@@ -77,7 +77,7 @@ fn what_cannot_work_is_named() {
 
 /// Of a newer format more than the version is unknown; the version is what matters.
 #[test]
-fn another_version_is_told_before_its_keys() {
+fn another_version_is_reported_before_its_keys() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("plan.toml");
     std::fs::write(&path, "version = 2\n[holograms]\ncount = 3\n").unwrap();

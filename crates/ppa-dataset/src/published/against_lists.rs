@@ -51,7 +51,7 @@ pub(super) fn told(error: &dyn std::error::Error) -> String {
     text
 }
 
-/// Lists that are not as `checksums.sha256` tells, where there is one.
+/// Lists that differ from `checksums.sha256`, where there is one.
 fn against_checksums(root: &Path) -> Vec<Flaw> {
     match Checksums::look(root) {
         Err(error) => vec![Flaw::Manifest(told(&error))],

@@ -38,7 +38,7 @@ pub(super) fn labels(dataset: &Published, limb: LimbId) -> String {
     }
     let mut series: Vec<Series> = Vec::new();
     for (step, label) in labels {
-        let name = label.source.map_or("source not told", LabelSource::name);
+        let name = label.source.map_or("source not named", LabelSource::name);
         let place = series.iter().position(|series| series.name == name);
         let place = place.unwrap_or_else(|| {
             series.push(Series {
@@ -94,7 +94,7 @@ pub(super) fn histograms<'a>(
 }
 
 /// What heights and tilts show.
-pub(super) struct Told {
+pub(super) struct Sweeps {
     /// Two charts.
     pub charts: String,
     /// A sentence on every pose that does not follow from its neighbours.
@@ -104,8 +104,8 @@ pub(super) struct Told {
 }
 
 /// How height and tilt of a limb change from pose to pose.
-pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRow>)]) -> Told {
-    let (mut charts, mut told) = (String::new(), Vec::new());
+pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRow>)]) -> Sweeps {
+    let (mut charts, mut sentences) = (String::new(), Vec::new());
     for (i, [what, unit]) in [
         ["height of the joint", "mm"],
         ["tilt of the axis", "degrees"],
@@ -129,7 +129,7 @@ pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRo
             } else {
                 outliers(&points, FLOOR[i])
             };
-            told.extend(odd.iter().map(|&at| {
+            sentences.extend(odd.iter().map(|&at| {
                 let angle = angle_text(rows[at].step);
                 format!(
                     "<li>{}, {angle} degrees: {what} {:.2} {unit} does not follow from the poses beside it</li>",
@@ -157,19 +157,19 @@ pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRo
         );
     }
     let longest = sweeps.iter().map(|(_, rows)| rows.len()).max();
-    let html = match told.len() {
+    let html = match sentences.len() {
         0 if longest.is_none_or(|poses| poses < LEAST_POSES) => {
-            format!("<p>Fewer than {LEAST_POSES} poses: too few to tell which stands out.</p>")
+            format!("<p>Fewer than {LEAST_POSES} poses: too few to find outliers.</p>")
         }
         0 => "<p>No pose stands out from those beside it.</p>".to_owned(),
         _ => format!(
             "<div class=\"caution\"><p>Poses that stand out:</p><ul>{}</ul></div>",
-            told.concat()
+            sentences.concat()
         ),
     };
-    Told {
+    Sweeps {
         charts,
         html,
-        outliers: told.len(),
+        outliers: sentences.len(),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::curves::{Told, heights_and_tilts, histograms, labels};
+use super::curves::{Sweeps, heights_and_tilts, histograms, labels};
 use super::cuts::CutShares;
 use super::page::{QaError, figure, side};
 use super::scale::colour_scale;
@@ -87,7 +87,7 @@ pub(super) fn limb_part(
         .iter()
         .map(|&shape| (shape, depth(shape, View::Left)))
         .collect();
-    let Told {
+    let Sweeps {
         charts,
         html,
         outliers,

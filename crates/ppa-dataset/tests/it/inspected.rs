@@ -26,7 +26,7 @@ fn a_whole_dataset_has_no_flaws() {
 }
 
 #[test]
-fn each_flaw_is_told_with_its_file() {
+fn each_flaw_is_reported_with_its_file() {
     let file = "patient_0/depth/r/orig/depth_cam_left_45.5.png";
     type Break<'a> = &'a dyn Fn(&Tree);
     let broken: [(&str, Break); 6] = [
@@ -89,7 +89,7 @@ fn a_limb_that_one_camera_saw_alone_is_no_flaw() {
 }
 
 #[test]
-fn what_belongs_to_no_depth_image_is_told_and_its_radiograph_looked_at() {
+fn files_of_no_depth_image_are_reported() {
     let tree = Tree::synthetic();
     for camera in ["left", "right"] {
         for shape in ["orig", "big"] {

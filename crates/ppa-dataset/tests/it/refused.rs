@@ -23,7 +23,7 @@ fn assert_says(said: &str, parts: &[&str]) {
 }
 
 #[test]
-fn names_that_fit_no_layout_are_told() {
+fn names_that_fit_no_layout_are_reported() {
     for (file, parts) in [
         (
             "patient_0/depth/l/orig/depth_cam_left_18.3.png",
@@ -102,7 +102,7 @@ fn names_that_fit_no_layout_are_told() {
 }
 
 #[test]
-fn entries_edited_by_hand_are_told() {
+fn entries_edited_by_hand_are_reported() {
     let labels = "patient_0/labels/l/labels.json";
     let rois = "patient_0/labels/l/roi_depth.json";
     for (file, from, to, parts) in [
@@ -170,7 +170,7 @@ fn entries_edited_by_hand_are_told() {
 }
 
 #[test]
-fn entries_of_a_specimen_edited_by_hand_are_told() {
+fn entries_of_a_specimen_edited_by_hand_are_reported() {
     let lists = "patient_2_l/max/data/dataset/label";
     let labels = format!("{lists}/quality/labels.json");
     let rois = format!("{lists}/roi/roi_depth.json");
@@ -208,7 +208,7 @@ fn entries_of_a_specimen_edited_by_hand_are_told() {
 }
 
 #[test]
-fn images_that_are_damaged_or_of_other_pixels_are_told() {
+fn images_that_are_damaged_or_of_other_pixels_are_reported() {
     let tree = Tree::synthetic();
     let name = "patient_0/depth/l/orig/depth_cam_left_90.0.png";
     let path = tree.path(name);

@@ -100,7 +100,7 @@ fn look(config: &TrainConfig, sources: &[Source]) -> Result<Persons, BTreeSet<St
         Ok(persons) => return Ok(persons),
         Err(error) => error,
     };
-    // The error names the first body shape that is missing; each by itself tells of all of them.
+    // The error names the first body shape that is missing; each by itself names all of them.
     let one_shape = |source: &Source| -> Vec<Source> {
         let shapes = source.shapes.iter().flatten();
         let only = |&shape| Source {

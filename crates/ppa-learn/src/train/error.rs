@@ -47,7 +47,7 @@ pub enum TrainError {
     #[error("{} is there, but no checkpoint beside it to go on from; take another folder", .0.display())]
     WeightsAlone(PathBuf),
     /// A training that is not finished, where a finished one is needed.
-    #[error("the training in {} is not finished: {step} of {} are made; the same `ppa train` goes on with it", folder.display(), ppa_text::count(*steps, "step"))]
+    #[error("the training in {} is not finished: {step} of {} are made; repeat `ppa train` to resume", folder.display(), ppa_text::count(*steps, "step"))]
     Unfinished {
         /// The folder.
         folder: PathBuf,
@@ -57,7 +57,7 @@ pub enum TrainError {
         steps: u64,
     },
     /// A folder of another training, or of something else.
-    #[error("{} is another configuration, with no checkpoint beside it to go on from; take another folder", .0.display())]
+    #[error("{} is another configuration, with no checkpoint beside it to resume from; choose another folder", .0.display())]
     OtherConfig(PathBuf),
     /// Numbers that are not finite.
     #[error("step {step}: the loss is {loss}; {trouble}")]

@@ -87,7 +87,7 @@ fn probing_is_gathered_from_shards_and_left_as_it_is() {
 }
 
 #[test]
-fn an_experiment_goes_on_where_it_was_stopped() {
+fn an_experiment_resumes_where_it_was_stopped() {
     let data = dataset(4, &[0, 90, 180]);
     add_shapes(&data);
     let folder = tempfile::tempdir().unwrap();

@@ -65,7 +65,7 @@ fn a_training_on_pairs_that_was_stopped_ends_with_the_same_bytes() {
 }
 
 #[test]
-fn a_training_goes_on_with_the_data_it_began_with_only() {
+fn a_training_resumes_with_the_data_it_began_with_only() {
     let data = dataset(2, &[0, 90, 180]);
     let folder = tempfile::tempdir().unwrap();
     let config = config(data.path());
@@ -140,7 +140,7 @@ fn an_image_that_cannot_be_used_costs_no_steps() {
 }
 
 #[test]
-fn an_evaluation_that_failed_is_made_up_when_the_training_goes_on() {
+fn a_failed_evaluation_is_repeated_on_resume() {
     let data = dataset(2, &[90]);
     let image = data
         .path()

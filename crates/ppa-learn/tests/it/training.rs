@@ -104,7 +104,7 @@ fn quick_learns_as_it_is() {
 }
 
 #[test]
-fn what_a_start_file_lacks_or_has_beyond_the_network_is_told_by_name() {
+fn a_start_file_that_misfits_is_reported_by_name() {
     let data = dataset(2, &[90]);
     let folder = tempfile::tempdir().unwrap();
     let before = folder.path().join("before");

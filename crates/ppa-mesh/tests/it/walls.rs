@@ -11,7 +11,7 @@ use proptest::prelude::*;
 use crate::fields::{on_grid, volume};
 use crate::limb::PHANTOM;
 
-/// Closed, manifold, wound outwards, and with the volume and areas that the mask tells.
+/// Closed, manifold, wound outwards, and with the volume and areas of the mask.
 pub fn check_closed(grid: &Grid, limb: &Limb, name: &str) {
     let closed = limb.walls.close(&limb.mesh);
     let topology = closed.topology();

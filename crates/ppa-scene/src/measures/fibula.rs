@@ -1,4 +1,4 @@
-//! Where the thinner of two parallel bones lies: it tells a left leg from a right one.
+//! Where the thinner of two parallel bones lies: it distinguishes a left leg from a right one.
 
 use nalgebra::{Point3, Vector3};
 
@@ -42,7 +42,7 @@ impl Fibula {
     /// The side of a leg with such bones; `None` where the limb lies in one line with both.
     ///
     /// The tibia lies in front of the middle of the leg, under the skin, and the fibula lateral of
-    /// it: the turn from one direction to the other tells the side however the leg is rotated.
+    /// it: the turn from one direction to the other gives the side however the leg is rotated.
     pub fn side(&self) -> Option<Side> {
         (self.sine.abs() >= LEAST_SINE).then_some(match self.sine < 0.0 {
             true => Side::Right,

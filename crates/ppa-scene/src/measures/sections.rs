@@ -33,7 +33,7 @@ impl LimbSections {
         mask: &[bool],
         landmarks: &Landmarks,
     ) -> Result<Self, LandmarkError> {
-        /// More sections tell nothing more about a shaft.
+        /// More sections add nothing about a shaft.
         const MOST_WITH_BONES: usize = 100;
         let direction = Vector3::from(landmarks.scan_direction);
         let mut sections = Sections::along(volume, mask, &direction);

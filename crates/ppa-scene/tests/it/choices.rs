@@ -148,7 +148,7 @@ fn any_choice_alone_gives_landmarks_that_fit_it() {
 }
 
 #[test]
-fn a_given_axis_and_joint_meet_at_the_point_nearest_to_the_joint() {
+fn a_given_axis_passes_nearest_to_a_given_joint() {
     let found = P01.find(Side::Right, &automatic()).unwrap();
     let [x, y, z] = found.joint_centre;
     let choices = LandmarkOverrides {

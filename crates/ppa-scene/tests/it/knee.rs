@@ -335,7 +335,7 @@ fn a_whole_leg_shows_both_joints() {
     assert!((Point3::from(landmarks.joint_centre) - ankle).norm() < 6.0);
     let joints: Vec<Joint> = landmarks.joints.iter().map(|found| found.joint).collect();
     assert_eq!(joints, [Joint::Ankle, Joint::Knee]);
-    let told = |note: &LandmarkNote| {
+    let expected = |note: &LandmarkNote| {
         matches!(
             note,
             LandmarkNote::OtherJoint {
@@ -344,7 +344,11 @@ fn a_whole_leg_shows_both_joints() {
             }
         )
     };
-    assert!(landmarks.notes.iter().any(told), "{:?}", landmarks.notes);
+    assert!(
+        landmarks.notes.iter().any(expected),
+        "{:?}",
+        landmarks.notes
+    );
     let knee = leg.find(Side::Right, &asked(LimbKind::Knee)).unwrap();
     assert_eq!(knee.joint_centre, landmarks.joints[1].centre_mm);
     assert!((knee.joint_centre[2] - ankle.z) > 200.0);
@@ -361,21 +365,21 @@ fn the_axis_follows_what_is_seen_of_the_shafts() {
             .angle(&Vector3::z())
             .to_degrees()
     };
-    let told = |landmarks: &Landmarks, axis: KneeAxis| {
+    let notes = |landmarks: &Landmarks, axis: KneeAxis| {
         landmarks.notes.contains(&LandmarkNote::KneeAxis(axis))
     };
     let thigh = whole.slices(slice(-40.0)..slice(140.0));
     let thigh = thigh.find(Side::Right, &automatic()).unwrap();
     // The phantom's femur leans by 3 degrees.
     assert!(
-        lean(&thigh) < 4.0 && told(&thigh, KneeAxis::Femur),
+        lean(&thigh) < 4.0 && notes(&thigh, KneeAxis::Femur),
         "{thigh:?}"
     );
     assert!((Point3::from(thigh.joint_centre) - RIGHT.plateau).norm() < 2.0);
     let middle = whole.slices(slice(-70.0)..slice(80.0));
     let middle = middle.find(Side::Right, &automatic()).unwrap();
     assert!(
-        lean(&middle) < 3.0 && told(&middle, KneeAxis::Both),
+        lean(&middle) < 3.0 && notes(&middle, KneeAxis::Both),
         "{middle:?}"
     );
     let little = whole.slices(slice(-45.0)..slice(90.0));
@@ -400,9 +404,9 @@ fn the_axis_follows_what_is_seen_of_the_shafts() {
     );
 }
 
-/// A face of the scan that cuts the medial condyle moves the joint little, and is told.
+/// A face of the scan that cuts the medial condyle moves the joint little, and is reported.
 #[test]
-fn a_cut_plateau_is_told() {
+fn a_cut_plateau_is_reported() {
     let [ni, nj, nk] = RIGHT.volume.grid().size();
     let medial_end = RIGHT.joint.x + 30.0;
     let columns = (medial_end - RIGHT.volume.grid().origin_mm().x) / SPACING_MM;

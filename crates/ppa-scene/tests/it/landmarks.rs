@@ -286,8 +286,8 @@ fn unusable_input_is_refused() {
         ..automatic()
     };
     let error = find(&scan.mask, &far);
-    let told = matches!(error, LandmarkError::JointFar { distance_mm, .. } if (300.0..440.0).contains(&distance_mm));
-    assert!(told, "{error}");
+    let far = matches!(error, LandmarkError::JointFar { distance_mm, .. } if (300.0..440.0).contains(&distance_mm));
+    assert!(far, "{error}");
     for (name, joint_region, calf_region) in [
         ("joint region", [90.0, 50.0], [130.0, 200.0]),
         ("calf region", [50.0, 90.0], [130.0, f64::NAN]),

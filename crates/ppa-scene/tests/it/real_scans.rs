@@ -128,7 +128,7 @@ fn knee_below_a_thigh() {
     rests_at_every_angle(&limb, &landmarks);
 }
 
-/// Who asks for one joint where the scan shows the other is told which, where and what to do.
+/// A request for one joint where the scan shows the other is refused, with what was found, where, and what to do.
 #[test]
 #[ignore = "needs ../shared/data"]
 fn the_other_joint_is_refused_with_its_place() {

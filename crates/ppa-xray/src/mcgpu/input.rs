@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_with_their_line() {
+    fn mistakes_are_reported_with_their_line() {
         for (from, to, told) in [
             (
                 "2.5e5 ",

@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_with_their_line() {
+    fn mistakes_are_reported_with_their_line() {
         let sample = text(&Material::named("water").unwrap(), &energies());
         let lines: Vec<&str> = sample.lines().collect();
         let told = |line: usize, mended: &str| {

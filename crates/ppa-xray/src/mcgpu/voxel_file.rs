@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_with_their_line() {
+    fn mistakes_are_reported_with_their_line() {
         for (from, to, expected) in [
             ("3 2 2", "3 2 0", "line 3: found \"3 2 0"),
             (

@@ -181,7 +181,7 @@ mod tests {
 
     /// Every kind of mistake is told with the segment or the line it is in.
     #[test]
-    fn mistakes_are_told_with_their_place() {
+    fn mistakes_are_reported_with_their_place() {
         let broken = |from: &str, to: &str| {
             assert!(BUILT_IN.contains(from), "{from}");
             let error = HuCalibration::parse(&BUILT_IN.replacen(from, to, 1)).unwrap_err();

@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ray_that_misses_is_told_so() {
+    fn a_ray_that_misses_is_reported_so() {
         let lattice = Lattice::new(&sheared_grid(), &Isometry3::identity());
         let ray = lattice.ray(&Point3::new(100.0, 0.0, 0.0), &Vector3::z());
         assert!(lattice.clip(&ray).is_none());

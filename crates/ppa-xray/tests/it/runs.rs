@@ -117,7 +117,7 @@ fn parts_merge_to_the_bytes_of_one_run() {
 }
 
 #[test]
-fn an_interrupted_run_goes_on_from_its_file() {
+fn an_interrupted_run_resumes_from_its_file() {
     let (scene, directory) = (Scene::new(), tempfile::tempdir().unwrap());
     let path = directory.path().join("run");
     let histories = 200_000;

@@ -18,7 +18,7 @@ use crate::output::{Output, working};
 Every PNG is decoded and compared with its region of interest, with the images of other persons and, where there is one, with \
 manifest.jsonl, as are tallies. Lists are compared with checksums.sha256 and, where the folder .ppa is there, everything that ppa wrote \
 with its records. Labels must be those of the radiographs that are there now; scans may not stand under two patients; \
-radiographs, labels and regions of poses without depth images are told. Splits are those in the dataset's folder splits: each person in exactly one part.
+radiographs, labels and regions of poses without depth images are reported. Splits are those in the dataset's folder splits: each person in exactly one part.
 
 `ppa verify` makes a sample again and compares; this command needs no plan and takes datasets of others as well.")]
 pub struct CheckArgs {
@@ -39,18 +39,18 @@ pub fn run(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
     let recorded = against_records(&args.dataset)?;
     let found = inspect(&args.dataset);
     working.finish_and_clear();
-    let mut told: Vec<_> = match &found {
+    let mut problems: Vec<_> = match &found {
         Ok(found) => found.flaws.iter().map(Flaw::to_string).collect(),
         // What does not fit the layout may do so because of what is damaged.
         Err(_) => Vec::new(),
     };
     for (file, problem) in recorded {
-        let known = file.is_some_and(|file| told.iter().any(|flaw| flaw.contains(&file)));
+        let known = file.is_some_and(|file| problems.iter().any(|flaw| flaw.contains(&file)));
         if !known {
-            told.push(problem);
+            problems.push(problem);
         }
     }
-    require_none(&args.dataset, &told)?;
+    require_none(&args.dataset, &problems)?;
     let found = found?;
     let patients = Published::read(&args.dataset)?.patients();
     let splits = Split::names(&args.dataset)?;
@@ -67,9 +67,9 @@ fn against_records(dataset: &Path) -> anyhow::Result<Vec<(Option<String>, String
     if !dataset.join(".ppa").is_dir() {
         return Ok(Vec::new());
     }
-    let told = |problem: &Problem| (problem.file().map(str::to_owned), problem.to_string());
+    let described = |problem: &Problem| (problem.file().map(str::to_owned), problem.to_string());
     match ppa_dataset::check(dataset) {
-        Ok(check) => Ok(check.problems.iter().map(told).collect()),
+        Ok(check) => Ok(check.problems.iter().map(described).collect()),
         Err(error @ FolderError::Busy(_)) => Err(error.into()),
         // A file without which the others cannot be compared.
         Err(error) => Ok(vec![(None, format!("{:#}", anyhow::Error::from(error)))]),

@@ -184,7 +184,7 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
     for frame in 1..args.frames {
         if interrupt.is_asked() {
             return Err(interrupt.stopped(format!(
-                "after {frame} of {} frames; the same command with --replace begins again",
+                "after {frame} of {} frames; repeat the command with --replace to start over",
                 args.frames
             )));
         }

@@ -86,7 +86,7 @@ fn describe(labelled: &Labelled) -> String {
     let line = |limb: &LabelledLimb| {
         let kept = match (limb.unnamed_kept, limb.of_readers) {
             (true, _) => {
-                "; labels.json does not tell who made its labels and was kept, see labels.computed.json"
+                "; labels.json does not name the source of its labels and was kept, see labels.computed.json"
                     .to_owned()
             }
             (false, 0) => String::new(),

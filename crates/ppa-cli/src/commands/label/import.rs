@@ -49,7 +49,7 @@ fn describe(done: &Imported) -> String {
     )];
     if done.replaced_computed > 0 {
         lines.push(format!(
-            "{} gave way to readers' and stay in labels.computed.json",
+            "{} replaced by readers' labels, kept in labels.computed.json",
             count(done.replaced_computed, "computed label")
         ));
     }

@@ -184,7 +184,7 @@ mod tests {
 
     /// A limb is spoken of where one was cut out, not of a bare scan.
     #[test]
-    fn voxels_outside_a_limb_are_told_only_of_a_limb() {
+    fn voxels_outside_a_limb_are_reported_only_of_a_limb() {
         let grid = Grid::axis_aligned([3, 1, 1], Vector3::repeat(1.0), Point3::origin()).unwrap();
         let scan = Volume::new(grid, vec![-1_000.0, 40.0, 900.0]).unwrap();
         let told =

@@ -34,7 +34,7 @@ pub struct AnalogArgs {
     /// stopped by Ctrl-C or TERM leaves them beside the first image, as x.png.tally
     #[arg(long, value_name = "FILE")]
     pub tally: Option<PathBuf>,
-    /// Go on from the tally file, if it is there, and replace the images of the sitting before
+    /// Resume from the tally file, if it exists, and replace the images of the earlier run
     #[arg(long, requires = "tally")]
     resume: bool,
     /// Tell the energy imparted to every material and the air kerma
@@ -78,7 +78,7 @@ impl AnalogArgs {
             if exists && !self.resume {
                 anyhow::ensure!(
                     replace,
-                    "{} exists: go on from it with --resume, or give --replace to begin again",
+                    "{} exists: continue it with --resume, or give --replace to start again",
                     path.display()
                 );
             }
@@ -97,7 +97,7 @@ impl AnalogArgs {
         let path = PathBuf::from(path);
         anyhow::ensure!(
             replace || !path.exists(),
-            "{0} holds the histories of a run that was stopped: go on from it with --tally {0} --resume, or give --replace to \
+            "{0} holds the histories of a run that was stopped: continue it with --tally {0} --resume, or give --replace to \
              begin again",
             path.display()
         );
@@ -105,7 +105,7 @@ impl AnalogArgs {
         Ok(Keep { path, named: false })
     }
 
-    /// Whether there is an earlier sitting to go on from.
+    /// Whether there is an earlier run to resume.
     pub fn goes_on(&self) -> bool {
         self.resume && self.tally.as_ref().is_some_and(|tally| tally.exists())
     }
@@ -192,7 +192,7 @@ impl AnalogArgs {
                 (true, true) => String::new(),
             };
             return Err(interrupt.stopped(format!(
-                "after {counted} histories, which are kept in {path}; the same command{more} goes on"
+                "after {counted} histories, which are kept in {path}; repeat the command{more} to resume"
             )));
         }
         Ok(tally)

@@ -142,7 +142,7 @@ impl McgpuArgs {
             };
             if interrupt.is_asked() {
                 return Err(interrupt.stopped(format!(
-                    "in {which}; the images of {done} are whole in {}; the same command with --replace begins again",
+                    "in {which}; the images of {done} are whole in {}; repeat the command with --replace to start over",
                     self.out.display()
                 )));
             }

@@ -75,7 +75,7 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
     {
         anyhow::bail!("{option} needs --engine analog");
     }
-    // A sitting that goes on replaces the images of the one before.
+    // A resumed run replaces the images of the one before.
     let mut outputs = args.replace.or(args.analog.goes_on()).outputs();
     outputs.optional("--out", args.out.as_ref(), &[".png"])?;
     outputs.optional("--exr", args.exr.as_ref(), &[".exr"])?;

@@ -10,7 +10,7 @@ use super::segments::{Coding, Segments, Size};
 const TILES_ALWAYS: u64 = 1 << 10;
 /// Bytes of the shortest tile-part.
 const TILE_BYTES: u64 = 14;
-/// Most tiles that the index of a tile-part can tell apart (table A.5).
+/// Most tiles that the index of a tile-part can number (table A.5).
 const TILES_AT_MOST: u64 = 65_535;
 /// Packets that any stream may have; beyond, each takes a byte at least (section B.10.1).
 const PACKETS_ALWAYS: u64 = 1 << 16;
