@@ -161,7 +161,7 @@ pub use merge::{MergeError, merge};
 #[cfg(feature = "generate")]
 pub use part_file::held_part;
 #[cfg(feature = "generate")]
-pub use pictures::{PosedLimb, case_picture, is_own_picture, pose_picture, write_picture};
+pub use pictures::{PosedLimb, case_picture, pose_picture, write_picture};
 #[cfg(feature = "generate")]
 pub use plan::{DepthSettings, Plan, PlanCase, PlanError, PlanRoom, XraySettings};
 #[cfg(feature = "generate")]

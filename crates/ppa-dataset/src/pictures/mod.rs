@@ -18,5 +18,5 @@ mod tests;
 mod view;
 
 pub use case_picture::case_picture;
-pub use picture_file::{is_own_picture, write_picture};
+pub use picture_file::write_picture;
 pub use pose_picture::{PosedLimb, pose_picture};

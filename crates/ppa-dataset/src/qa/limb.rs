@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::curves::{Sweeps, heights_and_tilts, histograms, labels};
-use super::cuts::CutShares;
+use super::cuts::cut_shares;
 use super::page::{QaError, figure, side};
 use super::scale::colour_scale;
 use super::scene::Scene;
@@ -30,7 +30,6 @@ pub(super) fn limb_part(
     manifest: &Manifest,
     dataset: &Published,
     scene: &Scene,
-    cuts: &CutShares,
     limb: LimbId,
 ) -> Result<LimbPart, QaError> {
     let rois = manifest.rois(limb)?;
@@ -77,7 +76,7 @@ pub(super) fn limb_part(
         "Depths in the regions of interest, share of the valid pixels per 10 mm.",
         histograms(root, &rois, |view| depth(shapes[0], view)),
     );
-    if let Some((svg, largest)) = cuts.chart(&rows) {
+    if let Some((svg, largest)) = cut_shares(&rows) {
         let caption = format!(
             "Share of the regions of interest that shows a face where the field of view of the CT cut the limb, at most {largest:.1} %."
         );

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use ppa_text::{count, numbers};
 
-use super::cuts::CutShares;
 use super::findings;
 use super::limb::{LimbPart, limb_part};
 use super::scene::Scene;
@@ -55,7 +54,6 @@ pub fn qa_page(root: &Path) -> Result<String, QaError> {
     let manifest = Manifest::read(root)?;
     let dataset = Published::list(root)?;
     let scene = Scene::read(root)?;
-    let cuts = CutShares::read(root)?;
     let findings = Findings::read(root)?;
     let severe = findings
         .0
@@ -78,7 +76,7 @@ pub fn qa_page(root: &Path) -> Result<String, QaError> {
             html,
             outliers,
             is_empty,
-        } = limb_part(root, &manifest, &dataset, &scene, &cuts, limb)?;
+        } = limb_part(root, &manifest, &dataset, &scene, limb)?;
         tally.outliers += outliers;
         tally.empty_limbs += usize::from(is_empty);
         limbs += &html;
