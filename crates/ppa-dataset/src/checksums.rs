@@ -1,20 +1,21 @@
-//! `checksums.sha256`: the hashes of a dataset's lists, as `sha256sum --check` reads them.
+//! `checksums.sha256` and `labels.sha256`: hashes of a dataset's lists, and of what was added to it since, as
+//! `sha256sum --check` reads them.
 //!
 //! The lists cover the images; a last line covers the file itself.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use crate::files::{FileError, hex, sha256_of_file};
+use crate::files::{FileError, hex, sha256_of_file, write_whole};
 
 /// What the last line begins with: a comment to `sha256sum`.
 const OWN: &str = "# sha256 of the lines above: ";
 
-/// Hash of each list by its path from the dataset's root.
+/// Hash of each file by its path from the dataset's root.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Checksums(BTreeMap<String, String>);
 
@@ -30,12 +31,21 @@ pub(crate) enum FoundChecksums {
 }
 
 impl Checksums {
-    /// Its file in a dataset.
+    /// The hashes of a dataset's lists.
     pub const FILE: &str = "checksums.sha256";
 
-    /// Reads the file of the dataset in `root`.
+    /// The hashes of labels, grades and splits, which commands add to a finished dataset.
+    pub const OF_LABELS: &str = "labels.sha256";
+
+    /// Reads `checksums.sha256` of the dataset in `root`.
+    #[cfg(feature = "generate")]
     pub fn look(root: &Path) -> Result<FoundChecksums, FileError> {
-        let path = root.join(Self::FILE);
+        Self::look_at(root, Self::FILE)
+    }
+
+    /// Reads one of the files of the dataset in `root`.
+    pub fn look_at(root: &Path, file: &str) -> Result<FoundChecksums, FileError> {
+        let path = root.join(file);
         match fs::read(&path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(FoundChecksums::Absent),
             Err(error) => Err(FileError::at("read", &path)(error)),
@@ -60,7 +70,35 @@ impl Checksums {
         lines.lines().map(pair).collect::<Option<_>>().map(Self)
     }
 
-    /// The lists below `root` that are missing or have another hash.
+    /// Adds the hashes of files below `root` that were just written to `labels.sha256`; those of other files stay.
+    pub fn record_labels(root: &Path, files: &[PathBuf]) -> Result<(), FileError> {
+        let path = root.join(Self::OF_LABELS);
+        let mut sums = match Self::look_at(root, Self::OF_LABELS)? {
+            FoundChecksums::Absent => Self::default(),
+            FoundChecksums::Whole(sums) => sums,
+            FoundChecksums::Damaged => {
+                let damaged = "it is altered: its hash is not that in its last line; remove it to record hashes again";
+                return Err(FileError::at("add hashes to", &path)(io::Error::other(
+                    damaged,
+                )));
+            }
+        };
+        for file in files {
+            let below = file.strip_prefix(root).map_err(io::Error::other);
+            let below = below.map_err(FileError::at("record the hash of", file))?;
+            let names: Vec<_> = below.iter().map(|part| part.to_string_lossy()).collect();
+            sums.0.insert(names.join("/"), sha256_of_file(file)?);
+        }
+        write_whole(&path, sums.to_text().as_bytes())
+    }
+
+    /// The file's text.
+    pub fn to_text(&self) -> String {
+        let line = |(file, hash)| format!("{hash}  {file}\n");
+        with_own_line(&self.0.iter().map(line).collect::<String>())
+    }
+
+    /// The files below `root` that are missing or have another hash.
     pub fn altered(&self, root: &Path) -> Vec<String> {
         let same = |(file, hash): &(&String, &String)| {
             sha256_of_file(&root.join(file)).is_ok_and(|found| found == **hash)
@@ -100,12 +138,6 @@ impl Checksums {
                 .map(|(file, text)| (file.to_owned(), hash(text)))
                 .collect(),
         )
-    }
-
-    /// The file's text.
-    pub fn to_text(&self) -> String {
-        let line = |(file, hash)| format!("{hash}  {file}\n");
-        with_own_line(&self.0.iter().map(line).collect::<String>())
     }
 }
 

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::checksums::Checksums;
 use crate::files::{FileError, read_text, write_whole};
 
 /// Folder of the splits inside a dataset.
@@ -108,12 +109,14 @@ impl Split {
         Ok(split)
     }
 
-    /// Writes it, whole or not at all.
+    /// Writes it to [`Split::path`], whole or not at all, and its hash to `labels.sha256`.
     ///
     /// # Errors
     /// [`FileError`] when it cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), FileError> {
-        write_whole(path, self.to_text().as_bytes())
+    pub fn write(&self, root: &Path, name: &str) -> Result<(), FileError> {
+        let path = Self::path(root, name);
+        write_whole(&path, self.to_text().as_bytes())?;
+        Checksums::record_labels(root, &[path])
     }
 
     /// The bytes of the file.

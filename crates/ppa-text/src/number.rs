@@ -10,7 +10,8 @@ pub struct Number(f64);
 #[derive(Debug, Clone, PartialEq)]
 pub struct Numbers(Vec<f64>);
 
-/// A number that never shows as a negative zero: `{:.3}` of -0.0001 gives `0.000`.
+/// A number that never shows as a negative zero: `{:.3}` of -0.0001 gives `0.000`. Without a precision, large and small numbers
+/// have an exponent: `1e300`.
 pub fn number(value: impl Into<f64>) -> Number {
     Number(value.into())
 }
@@ -25,6 +26,7 @@ impl fmt::Display for Number {
         let size = self.0.abs();
         let digits = match f.precision() {
             Some(decimals) => format!("{size:.decimals$}"),
+            None if size != 0.0 && !(1e-5..1e16).contains(&size) => format!("{size:e}"),
             None => size.to_string(),
         };
         let shows_zero = digits.bytes().all(|byte| matches!(byte, b'0' | b'.'));
@@ -64,6 +66,18 @@ mod tests {
         assert_eq!(format!("{}", number(f64::NEG_INFINITY)), "-inf");
         assert_eq!(format!("{:.2}", number(f64::NAN)), "NaN");
         assert_eq!(format!("{:.2}", number(-1.25_f32)), "-1.25");
+    }
+
+    #[test]
+    fn large_and_small_numbers_have_an_exponent() {
+        for (value, shown) in [
+            (1e300, "1e300"),
+            (-2.5e-7, "-2.5e-7"),
+            (1e15, "1000000000000000"),
+            (1e-4, "0.0001"),
+        ] {
+            assert_eq!(number(value).to_string(), shown);
+        }
     }
 
     #[test]

@@ -82,7 +82,7 @@ fn seventeen_phantoms_are_clear_and_all_swaps_are_reported() {
     let names: Vec<_> = (1..=17).map(|number| format!("P{number:02}")).collect();
     names
         .par_iter()
-        .for_each(|name| is_clear_and_a_swap_is_reported(name, 1.5));
+        .for_each(|name| is_clear_and_a_swap_is_reported(name, 2.0));
 }
 
 /// A right leg, and a left one that is pressed into it by some voxels.

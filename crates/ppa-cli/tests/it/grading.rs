@@ -122,6 +122,40 @@ fn grades_become_labels_and_are_kept() {
 }
 
 #[test]
+fn a_flipped_bit_in_labels_grades_or_a_split_is_found() {
+    let folder = exported();
+    let here = folder.path();
+    grade(here, "a", &[1.0; 6]);
+    succeed(here, "label import data --key out.key.csv a.csv");
+    succeed(here, "dataset split data --name mine --part train=1");
+    succeed(here, "dataset check data");
+    let root = here.join("data");
+    for file in [
+        "patient_3/labels/r/labels.json",
+        "grades.csv",
+        "splits/mine.json",
+        "labels.sha256",
+    ] {
+        let bytes = fs::read(root.join(file)).unwrap();
+        for bit in [8, 3999, 4 * bytes.len() + 1].map(|bit| bit % (8 * bytes.len())) {
+            let mut flipped = bytes.clone();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            fs::write(root.join(file), flipped).unwrap();
+            let said = fail(here, "dataset check data");
+            assert!(said.contains(file), "bit {bit} of {file}: {said}");
+        }
+        fs::write(root.join(file), bytes).unwrap();
+    }
+    // Labels that were recorded stay so when others are added.
+    succeed(here, "dataset split data --name other --part train=1");
+    fs::remove_file(root.join("grades.csv")).unwrap();
+    let said = fail(here, "dataset check data");
+    assert!(said.contains("grades.csv is missing or altered"), "{said}");
+    fs::remove_file(root.join("labels.sha256")).unwrap();
+    succeed(here, "dataset check data");
+}
+
+#[test]
 fn grades_that_cannot_be_are_named_and_nothing_is_written() {
     let folder = exported();
     let here = folder.path();

@@ -18,6 +18,7 @@ use super::openness::{
 use super::table::table_bytes;
 use super::tallies::TalliesError;
 use crate::case::Case;
+use crate::checksums::Checksums;
 use crate::files::{FileError, write_whole};
 use crate::layout::LimbId;
 use crate::manifest::{FileKind, FileRow, Manifest, Rows};
@@ -222,15 +223,17 @@ impl ComputedLabels<'_> {
     }
 
     /// Writes `openness.csv`, `openness.json` (what it was computed with), `labels.computed.json` (all labels) and `labels.json`
-    /// beside the limb's regions of interest. In `labels.json` labels of readers stay, and computed ones stand where there are none; a
+    /// beside the limb's regions of interest, and their hashes to `labels.sha256`. In `labels.json` labels of readers stay, and computed ones stand where there are none; a
     /// file of labels without a source stays as it is.
     ///
     /// # Errors
     /// [`AutoLabelError`] if a file cannot be written.
     pub fn write(&self) -> Result<LabelledLimb, AutoLabelError> {
         let (root, limb) = (&self.manifest.root, self.limb);
+        let mut written = Vec::new();
         for (path, bytes) in self.own_files() {
             write_whole(&path, &bytes)?;
+            written.push(path);
         }
         let unnamed_kept = self.before.has_unnamed();
         let readers = self.before.not_computed();
@@ -240,7 +243,9 @@ impl ComputedLabels<'_> {
         };
         if !unnamed_kept {
             readers.over(&self.labels).write(root, limb)?;
+            written.push(LabelFile::path(root, limb));
         }
+        Checksums::record_labels(root, &written)?;
         Ok(LabelledLimb {
             limb,
             radiographs: self.rows.len(),

@@ -17,7 +17,12 @@ pub(super) fn against_lists(dataset: &Published, hashes: BTreeMap<&str, String>)
     let root = &dataset.root;
     let mut flaws = same_scans(root);
     flaws.extend(stale_metadata(root));
-    flaws.extend(against_checksums(root));
+    flaws.extend(against_checksums(root, Checksums::FILE, |file| {
+        Flaw::List { file }
+    }));
+    flaws.extend(against_checksums(root, Checksums::OF_LABELS, |file| {
+        Flaw::Labels { file }
+    }));
     if !root.join(Manifest::FILE).exists() {
         return flaws;
     }
@@ -51,16 +56,13 @@ pub(super) fn told(error: &dyn std::error::Error) -> String {
     text
 }
 
-/// Lists that differ from `checksums.sha256`, where there is one.
-fn against_checksums(root: &Path) -> Vec<Flaw> {
-    match Checksums::look(root) {
+/// What differs from a file of hashes, where there is one; `flaw` is that of a file with another hash.
+fn against_checksums(root: &Path, sums: &'static str, flaw: impl Fn(String) -> Flaw) -> Vec<Flaw> {
+    match Checksums::look_at(root, sums) {
         Err(error) => vec![Flaw::Manifest(told(&error))],
         Ok(FoundChecksums::Absent) => Vec::new(),
-        Ok(FoundChecksums::Damaged) => vec![Flaw::Checksums],
-        Ok(FoundChecksums::Whole(sums)) => {
-            let altered = sums.altered(root).into_iter();
-            altered.map(|file| Flaw::List { file }).collect()
-        }
+        Ok(FoundChecksums::Damaged) => vec![Flaw::Checksums { file: sums }],
+        Ok(FoundChecksums::Whole(sums)) => sums.altered(root).into_iter().map(flaw).collect(),
     }
 }
 

@@ -76,9 +76,20 @@ pub enum Flaw {
         /// The list.
         file: String,
     },
-    /// `checksums.sha256` is not as it was written.
-    #[error("checksums.sha256 is altered: its hash is not that in its last line")]
-    Checksums,
+    /// Labels, grades or a split that are not those in `labels.sha256`.
+    #[error(
+        "{file} is missing or altered: its hash is not that in labels.sha256, which you may remove if the change is yours"
+    )]
+    Labels {
+        /// The file.
+        file: String,
+    },
+    /// `checksums.sha256` or `labels.sha256` is not as it was written.
+    #[error("{file} is altered: its hash is not that in its last line")]
+    Checksums {
+        /// Which of both.
+        file: &'static str,
+    },
     /// An image without a row, or a row without an image.
     #[error("{file} stands {where}")]
     Unlisted {

@@ -264,8 +264,8 @@ mod tests {
             };
             Mtf::of(&blur, 0.2).unwrap_err().to_string()
         };
-        assert!(refused(&[], &[]).contains("0 frequencies"));
-        assert!(refused(&[1.0, 2.0], &[0.5]).contains("2 frequencies"));
+        assert!(refused(&[], &[]).contains("are 0 and 0"));
+        assert!(refused(&[1.0, 2.0], &[0.5]).contains("are 2 and 1"));
         assert!(refused(&[2.0, 1.0], &[0.5, 0.4]).contains("frequency"));
         assert!(refused(&[1.0], &[f64::NAN]).contains("NaN"));
         assert!(refused(&[1.0, 2.0, 3.0], &[0.2, 0.9, 0.2]).contains("falls steadily"));

@@ -167,14 +167,14 @@ fn overlap_hole_and_foreign_parts_are_refused_by_name() {
 
     let hole = refusal(&[part("1/3"), part("3/3")]);
     assert!(matches!(&hole, TallyError::Hole { missing, .. } if *missing == (3_000..6_000)));
-    assert!(hole.to_string().contains("3000..6000"), "{hole}");
+    assert!(hole.to_string().contains("3000 to 6000"), "{hole}");
     let tail = refusal(&[part("1/3"), part("2/3")]);
     assert!(matches!(&tail, TallyError::Hole { missing, .. } if *missing == (6_000..9_000)));
 
     let overlap = refusal(&[part("1/2"), part("2/3"), part("3/3")]);
     let text = overlap.to_string();
     assert!(
-        text.contains("0..4500") && text.contains("3000..6000"),
+        text.contains("0 to 4500") && text.contains("3000 to 6000"),
         "{text}"
     );
     assert!(

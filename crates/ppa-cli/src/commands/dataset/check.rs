@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use clap::Args;
 use ppa_dataset::published::{Flaw, Inspection, Published, inspect};
 use ppa_dataset::{FolderError, Problem, Split};
@@ -16,7 +15,7 @@ use crate::output::{Output, working};
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
 Every PNG is decoded and compared with its region of interest, with the images of other persons and, where there is one, with \
-manifest.jsonl, as are tallies. Lists are compared with checksums.sha256 and, where the folder .ppa is there, everything that ppa wrote \
+manifest.jsonl, as are tallies. Lists are compared with checksums.sha256, labels and splits with labels.sha256 and, where the folder .ppa is there, everything that ppa wrote \
 with its records. Labels must be those of the radiographs that are there now; scans may not stand under two patients; \
 radiographs, labels and regions of poses without depth images are reported. Splits are those in the dataset's folder splits: each person in exactly one part.
 
@@ -50,16 +49,24 @@ pub fn run(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
             problems.push(problem);
         }
     }
+    let splits = Split::names(&args.dataset)?;
+    if found.is_ok() {
+        problems.extend(split_problems(&args.dataset, &splits)?);
+    }
     require_none(&args.dataset, &problems)?;
     let found = found?;
-    let patients = Published::read(&args.dataset)?.patients();
-    let splits = Split::names(&args.dataset)?;
-    for name in &splits {
-        let path = Split::path(&args.dataset, name);
-        let checked = Split::read(&path).and_then(|split| split.check(&patients));
-        checked.with_context(|| path.display().to_string())?;
-    }
     output.print(&Checked { found, splits }, describe)
+}
+
+fn split_problems(dataset: &Path, splits: &[String]) -> anyhow::Result<Vec<String>> {
+    let patients = Published::read(dataset)?.patients();
+    let problem = |name: &String| {
+        let path = Split::path(dataset, name);
+        let checked = Split::read(&path).and_then(|split| split.check(&patients));
+        let error = anyhow::Error::from(checked.err()?);
+        Some(format!("{}: {error:#}", path.display()))
+    };
+    Ok(splits.iter().filter_map(problem).collect())
 }
 
 /// What differs from the records of the dataset, where there are any, with the file at fault.

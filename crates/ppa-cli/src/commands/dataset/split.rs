@@ -52,7 +52,7 @@ pub fn run(args: &SplitArgs, output: Output) -> anyhow::Result<()> {
     let patients = Published::read(&args.dataset)?.patients();
     let split = Split::draw(&patients, &args.parts, args.seed)?;
     require_same(&path, split.to_text().as_bytes(), args.replace)?;
-    split.write(&path)?;
+    split.write(&args.dataset, name)?;
     output.print(&split, |split| {
         let part = |(name, patients): (&String, &Vec<u32>)| {
             format!("{name}: {}", numbers(patients.iter().copied()))

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::grades::{Given, Pictures};
 use super::showing::Showing;
+use crate::checksums::Checksums;
 use crate::files::{FileError, write_whole};
 use crate::labels::file::{LabelFile, LabelFileError};
 use crate::labels::label::{LabelError, LabelRow, LabelSource};
@@ -199,15 +200,20 @@ pub fn import_grades(
     done.repeats = given.len() - firsts(&given).count();
 
     // Grades last: an import that was stopped finds the former grades, and labels that follow from those or from its own.
+    let mut written = Vec::new();
     for (limb, labels, computed) in labels {
         if let Some(computed) = computed {
             let path = LabelFile::computed_path(&manifest.root, limb);
             write_whole(&path, computed.to_text().as_bytes())?;
+            written.push(path);
         }
         labels.write(&manifest.root, limb)?;
+        written.push(LabelFile::path(&manifest.root, limb));
     }
     let grades: Vec<_> = given.iter().map(Given::by_radiograph).collect();
     write_table(&path, &grades)?;
+    written.push(path);
+    Checksums::record_labels(&manifest.root, &written)?;
     Ok(done)
 }
 
