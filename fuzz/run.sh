@@ -26,7 +26,7 @@ corpus=$(mktemp -d)
 trap 'rm -rf "$corpus"' EXIT
 export TMPDIR=$corpus/files
 mkdir -p "$TMPDIR" artifacts
-cargo run --quiet --locked --manifest-path ../Cargo.toml -p ppa-tests --example fuzz_seeds -- "$corpus"
+cargo run --quiet --locked --manifest-path ../Cargo.toml --example fuzz_seeds -- "$corpus"
 for target in "${targets[@]}"; do
     mkdir -p "$corpus/$target"
     # One thread each: threads of a pool would be waited for with every file.

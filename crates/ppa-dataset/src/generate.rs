@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use ppa_scene::SweepError;
 use ppa_xray::Part;
@@ -9,7 +10,7 @@ use ppa_xray::Part;
 use crate::case::{Case, CaseError};
 use crate::description::{Description, Settings};
 use crate::files::FileError;
-use crate::findings::Findings;
+use crate::findings::{Finding, Findings};
 use crate::job::{
     Job, JobError, LimbUnits, MakeUnit, PlannedLimb, Progress, Summary, units_of_part,
 };
@@ -177,6 +178,9 @@ pub(crate) struct Work<'a> {
     stage: Stage,
     /// `dataset.json`.
     pub description: String,
+    /// The first limb that was prepared for its findings, until its poses are made. The others are prepared twice, since
+    /// memory may not hold them all.
+    prepared: Mutex<Option<(LimbId, PreparedLimb)>>,
 }
 
 struct CasedLimb {
@@ -199,6 +203,7 @@ impl<'a> Work<'a> {
             limbs,
             stage,
             description,
+            prepared: Mutex::default(),
         })
     }
 
@@ -222,11 +227,22 @@ impl<'a> Work<'a> {
             });
             let of_limb = match made {
                 Some(findings) => findings,
-                None => self.limb(limb.limb).prepared()?.findings,
+                None => self.findings_of(limb.limb)?,
             };
             findings.add(limb.limb, &limb.acknowledged, &of_limb);
         }
         Ok(findings)
+    }
+
+    fn findings_of(&self, id: LimbId) -> Result<Vec<Finding>, GenerateError> {
+        let prepared = self.limb(id).prepared()?;
+        let findings = prepared.findings.clone();
+        self.kept().get_or_insert((id, prepared));
+        Ok(findings)
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Option<(LimbId, PreparedLimb)>> {
+        self.prepared.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn limb(&self, id: LimbId) -> &CasedLimb {
@@ -242,7 +258,11 @@ impl<'a> Work<'a> {
     ) -> Result<MakeUnit<'m, GenerateError>, GenerateError> {
         let limb = self.limb(id);
         let case = || limb.file.clone();
-        let prepared = limb.prepared()?;
+        let kept = self.kept().take_if(|(kept, _)| *kept == id);
+        let prepared = match kept {
+            Some((_, prepared)) => prepared,
+            None => limb.prepared()?,
+        };
         let posable = PosableLimb::new(id, self.plan, &self.stage, prepared).map_err(|source| {
             GenerateError::Posable {
                 case: case(),

@@ -219,6 +219,12 @@ pub(super) fn wrapped(text: &str, most: usize) -> Vec<String> {
 
 /// Columns and rows of the dots of a character; a question mark for one that the font lacks.
 fn dots(character: char) -> impl Iterator<Item = (u32, u32)> {
+    // The font's superior figures are illegible at this size.
+    let character = match character {
+        '²' => '2',
+        '³' => '3',
+        other => other,
+    };
     let glyph = [character, '?']
         .into_iter()
         .find_map(|c| {

@@ -93,8 +93,11 @@ impl Frame {
         let listed: Vec<_> = listed
             .filter(|severity| count(*severity) > 0)
             .map(|severity| {
-                let (count, word) = (count(severity), word(severity));
-                (format!("{count} {word}"), colour(severity))
+                let text = match severity {
+                    Severity::Severe => format!("{} severe", count(severity)),
+                    _ => ppa_text::count(count(severity), word(severity)),
+                };
+                (text, colour(severity))
             })
             .collect();
         if listed.is_empty() {

@@ -41,10 +41,10 @@ impl LimbSections {
             sections = Sections::across(volume, mask, &direction)?;
         }
         let joint_mm = direction.dot(&Vector3::from(landmarks.joint_centre));
-        let [from_mm, to_mm] = [
-            landmarks.joint_region.range_mm[0],
-            landmarks.calf_region.range_mm[1],
-        ];
+        // The calf is proximal of an ankle and distal of a knee.
+        let [joint, calf] = [&landmarks.joint_region, &landmarks.calf_region];
+        let from_mm = joint.range_mm[0].min(calf.range_mm[0]);
+        let to_mm = joint.range_mm[1].max(calf.range_mm[1]);
         let mut slices = sections.proximal_to_distal();
         slices.reverse();
         let above = |slice: usize| sections.level(slice) - joint_mm;

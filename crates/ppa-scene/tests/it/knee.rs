@@ -6,8 +6,8 @@ use nalgebra::{Matrix4, Point3, Rotation3, Vector3};
 use ppa_ct::phantom::{Limb, LowerLeg, Scanner, Side as PhantomSide, TableTop};
 use ppa_ct::{Grid, Interpolation, Volume};
 use ppa_scene::{
-    Joint, KneeAxis, LandmarkError, LandmarkNote, LandmarkOverrides, Landmarks, LimbKind, Plane,
-    Side, XrayDevice, bump_sites, place,
+    Joint, KneeAxis, LandmarkError, LandmarkNote, LandmarkOverrides, Landmarks, LimbKind,
+    LimbMeasures, Plane, Side, XrayDevice, bump_sites, place,
 };
 
 use crate::scan::{P01, Scan};
@@ -93,6 +93,9 @@ impl Knee {
         let found = scan.find(self.side, &automatic());
         let landmarks = found.unwrap_or_else(|error| panic!("{name}: {error}"));
         self.compare(&name, &landmarks, turn);
+        let measures = LimbMeasures::of(&scan.volume, &scan.skin, &scan.mask, &landmarks).unwrap();
+        let fibula = measures.fibula.unwrap();
+        assert_eq!(fibula.side(), Some(self.side), "{name}: {fibula:?}");
     }
 
     /// Joint centre within 2 mm, axis, front and joint line within 2 degrees.

@@ -52,7 +52,7 @@ pub enum TransportError {
         percent: f64,
     },
     /// A number in the settings is out of range.
-    #[error("{what} is {found}, expected {expected}")]
+    #[error("{what} is {found:?}, expected {expected}")]
     Setting {
         /// Which setting.
         what: &'static str,
