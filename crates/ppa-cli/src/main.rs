@@ -75,7 +75,7 @@ enum Command {
     Xray(commands::xray::XrayCommand),
     /// Estimate time and disk of a plan, and check that it can be made
     Plan(commands::plan::PlanArgs),
-    /// Make, or go on with, the dataset of a plan
+    /// Make or resume the dataset of a plan
     Generate(commands::generate::GenerateArgs),
     /// Show the progress of a dataset
     Status(commands::status::StatusArgs),
@@ -97,7 +97,7 @@ enum Command {
     /// Export weights, and compare the network with reference values
     #[command(subcommand)]
     Learn(commands::learn::LearnCommand),
-    /// Train a network on depth images and labels, or go on with it
+    /// Train a network on depth images and labels, or resume its training
     Train(commands::train::TrainArgs),
     /// Metrics, predictions and figures of a trained network
     Eval(commands::eval::EvalArgs),

@@ -149,7 +149,7 @@ fn shard_named(
         [first, others @ ..] => match others.iter().find(|other| other.part != first.part) {
             None => Ok(Asked::Part(first.part)),
             Some(other) => bail!(
-                "{} tells shard {}, but {} tells {}; unset one of them",
+                "{} means shard {}, but {} means {}; unset one of them",
                 first.by,
                 first.part,
                 other.by,
@@ -286,12 +286,12 @@ mod tests {
             (
                 Some("1/4"),
                 mpi.to_owned(),
-                ["--shard tells shard 1/4", "OMPI"],
+                ["--shard means shard 1/4", "OMPI"],
             ),
             (
                 None,
                 format!("{mpi} {}", slurm(1, 4, 1, 4, 1)),
-                ["SLURM", "tells 2/4"],
+                ["SLURM", "means 2/4"],
             ),
             (None, slurm(7, 4, 1, 7, 1), ["1 to 7", "--shard"]),
             (

@@ -97,7 +97,7 @@ pub fn dataset_folder(plan: &Path) -> anyhow::Result<PathBuf> {
     Ok(folder)
 }
 
-/// Generates and tells how far it has come.
+/// Generates and shows the progress.
 pub fn with_progress(
     plan: &Plan,
     out: &Path,

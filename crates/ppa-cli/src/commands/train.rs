@@ -20,7 +20,7 @@ use crate::stderr::note;
 pub struct TrainArgs {
     /// TOML with `preset = "paper"` or "quick", `[[training]]` and `[[evaluation]]`, and what shall differ
     config: PathBuf,
-    /// Folder of the run; a run that was stopped goes on
+    /// Folder of the run; a run that was stopped is resumed
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }

@@ -152,7 +152,7 @@ fn the_shard_is_taken_from_the_environment_and_must_agree() {
     let said = String::from_utf8(refused.stderr).unwrap();
     assert!(!refused.status.success());
     assert!(
-        said.contains("--shard tells shard 1/3, but OMPI_COMM_WORLD_RANK tells 3/3"),
+        said.contains("--shard means shard 1/3, but OMPI_COMM_WORLD_RANK means 3/3"),
         "{said}"
     );
     assert!(!folder.path().join("part").exists());
