@@ -97,7 +97,7 @@ enum Command {
     /// Export weights, and compare the network with reference values
     #[command(subcommand)]
     Learn(commands::learn::LearnCommand),
-    /// Train a network on depth images and labels, or resume its training
+    /// Train a network on depth images and labels, or resume it
     Train(commands::train::TrainArgs),
     /// Metrics, predictions and figures of a trained network
     Eval(commands::eval::EvalArgs),
