@@ -53,13 +53,21 @@ fn analog_run(folder: &Path) -> String {
     )
 }
 
-/// Sends a signal some time after the start, later if it came before the program listened.
+/// Sends a signal some time after the start, later if it came before the program listened. That ends the program by the
+/// signal itself, or not at all where the tests were started with the signal ignored.
 fn interrupted(folder: &Path, arguments: &str, signal: &str) -> (i32, String) {
     for seconds in [1, 2, 4, 8, 16, 32] {
         let mut run = start(folder, arguments);
         std::thread::sleep(Duration::from_secs(seconds));
         assert!(run.try_wait().unwrap().is_none(), "ppa {arguments} ended");
         send(&run, signal);
+        let sent = Instant::now();
+        while run.try_wait().unwrap().is_none() {
+            if sent.elapsed() > Duration::from_secs(60) {
+                run.kill().unwrap();
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
         if let (Some(code), said) = ended(run) {
             return (code, said);
         }
