@@ -86,14 +86,14 @@ proptest! {
         let of_features: Vec<f64> = of_features.iter().map(|&x| x.into()).collect();
         let gradients: Vec<f64> = gradients.iter().map(|&x| x.into()).collect();
         for (index, entry) in architecture.backbone.iter().enumerate() {
-            // The difference quotient along one random direction for each tensor: its error is (1e-4)^2 of third derivatives.
+            // The difference quotient along one random direction for each tensor: its error is (1e-5)^2 of third derivatives.
             let direction: Vec<f64> = normal(entry.range.len(), seed + 10 + index as u64).iter().map(|&x| x.into()).collect();
             let moved = |step: f64| {
                 let mut parameters = plain.clone();
                 parameters[entry.range.clone()].iter_mut().zip(&direction).for_each(|(x, d)| *x += step * d);
                 dot(&of_features, &run(&parameters))
             };
-            let expected = (moved(1e-4) - moved(-1e-4)) / 2e-4;
+            let expected = (moved(1e-5) - moved(-1e-5)) / 2e-5;
             let gradient = &gradients[entry.range.clone()];
             // The product with a normal direction has the size of the gradient. Gradients that are zero in theory are sums
             // that cancel in f32, whose error goes with the gradient of the whole.
