@@ -40,7 +40,7 @@ fn exported() -> &'static Path {
     let folder = FOLDER.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
         let here = folder.path();
-        ppa(here, "ct phantom --out p01.nii --spacing-mm 2.5 --table");
+        ppa(here, "ct phantom --out p01.nii --spacing-mm 2 --table");
         ppa(here, "prepare p01.nii --side r --out p01.toml");
         let plan = "version = 1\n[[case]]\nfile = \"p01.toml\"\npatient = 3\n\
                     [rotation]\nfrom_deg = 0.0\nto_deg = 5.0\nstep_deg = 2.5\n\
