@@ -37,8 +37,8 @@ impl CutFaces {
         detector: &Detector,
         source_detector_mm: f64,
     ) -> Result<Self, UnitError> {
-        let at_ct = Projection::new(Isometry3::identity(), source_detector_mm, *detector);
-        at_ct.validate().map_err(TransportError::from)?;
+        let projection = Projection::new(Isometry3::identity(), source_detector_mm, *detector);
+        projection.validate().map_err(TransportError::from)?;
         if walls.is_empty() {
             return Ok(Self {
                 corners: Vec::new(),

@@ -29,7 +29,7 @@ The shard is also taken from a Slurm job array (SLURM_ARRAY_TASK_ID, _COUNT, _MI
 shard: another one is refused there, and a single task of a Slurm array that runs again keeps the shard of its folder.
 
 A folder that holds poses of other settings, scans or sources, or poses that the plan does not have, is refused as well. \
-With --replace they are replaced pose by pose: each stays until the new one is complete, and what the plan does not have is \
+--replace replaces them pose by pose: each stays until the new one is complete, and what the plan does not have is \
 removed at the end. Files that ppa did not write, or that were altered since, are never overwritten but moved to .ppa/altered.")]
 pub struct GenerateArgs {
     /// Plan file

@@ -58,7 +58,7 @@ pub(super) fn findings(
     found
 }
 
-/// Skin may lie this far behind a given plane: soft tissue yields that much.
+/// Skin may lie this far behind a given plane, mm, since soft tissue yields.
 const DEEP_MM: f64 = 5.0;
 
 /// Faces of the volume that cut the limb: axis of the image, index of the layer, name.
