@@ -2,6 +2,7 @@
 
 use nalgebra::{Affine3, Point3, Vector3};
 use ppa_ct::Grid;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// A bone of the ankle joint.
@@ -257,18 +258,32 @@ fn blur(mut values: Vec<f32>, size: [usize; 3]) -> Vec<f32> {
     let weight = |d: isize| (-0.5 * (d as f64 / BLUR_VOXELS).powi(2)).exp();
     let sum: f64 = (-REACH..=REACH).map(weight).sum();
     let weights: Vec<f32> = (-REACH..=REACH).map(|d| (weight(d) / sum) as f32).collect();
-    let strides = [1, size[0], size[0] * size[1]];
+    let [columns, rows, _] = size;
     for axis in 0..3 {
-        let (n, stride) = (size[axis] as isize, strides[axis]);
         let source = values.clone();
-        for (index, value) in values.iter_mut().enumerate() {
-            let at = (index / stride) as isize % n;
-            let start = index - at as usize * stride;
-            *value = (-REACH..=REACH)
-                .zip(&weights)
-                .map(|(d, w)| w * source[start + (at + d).clamp(0, n - 1) as usize * stride])
-                .sum();
-        }
+        let near =
+            |at: usize, d: isize| (at as isize + d).clamp(0, size[axis] as isize - 1) as usize;
+        let rows_of_values = values.par_chunks_mut(columns).enumerate();
+        rows_of_values.for_each(|(row, blurred)| {
+            if axis == 0 {
+                let source = &source[row * columns..][..columns];
+                for (at, value) in blurred.iter_mut().enumerate() {
+                    let near = (-REACH..=REACH).map(|d| source[near(at, d)]);
+                    *value = near.zip(&weights).map(|(value, w)| w * value).sum();
+                }
+                return;
+            }
+            blurred.fill(0.0);
+            for (d, w) in (-REACH..=REACH).zip(&weights) {
+                let row = match axis {
+                    1 => row / rows * rows + near(row % rows, d),
+                    _ => near(row / rows, d) * rows + row % rows,
+                };
+                for (value, near) in blurred.iter_mut().zip(&source[row * columns..]) {
+                    *value += w * near;
+                }
+            }
+        });
     }
     values
 }

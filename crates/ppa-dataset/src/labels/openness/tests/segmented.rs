@@ -1,5 +1,7 @@
 //! Bones that were told apart in the scan give the joint space of the true ones.
 
+use rayon::prelude::*;
+
 use super::*;
 use crate::labels::{SegmentError, SegmentedBones, segment_bones};
 use ppa_ct::phantom::{Scanner, TableTop};
@@ -99,10 +101,10 @@ fn bones_are_told_apart_where_they_hang_together() {
 #[test]
 #[ignore = "a minute: seventeen ankles, voxelised, scanned and told apart"]
 fn bones_of_every_phantom_are_told_apart() {
-    for n in 1..=17 {
+    (1..=17).into_par_iter().for_each(|n| {
         let name = format!("P{n:02}");
         Segmented::of(&name, 0.8).check(&name);
-    }
+    });
 }
 
 /// A sharp kernel: voxels of soft tissue pass 200 HU by noise alone, here and there.
