@@ -23,7 +23,8 @@ fn dataset(here: &Path) {
                 [shapes]\nvariants = [\"orig\"]\n\
                 [xray]\nhalf_length_mm = 10.0\nmax_voxel_mm = 5.0\n\
                 detector = { columns = 4, rows = 4, pixel_mm = 50.0 }\n\
-                engine = { scatter_histories = 100, scatter_pixel_mm = 200.0, samples_per_side = 1 }\n";
+                engine = { scatter_histories = 100, scatter_pixel_mm = 200.0, samples_per_side = 1, \
+                compton_model = \"incoherent_function\" }\n";
     fs::write(here.join("plan.toml"), plan).unwrap();
     succeed(here, "generate plan.toml");
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::{contains, fail, ppa, succeed, training};
+use crate::{QUICK_XRAY, contains, fail, ppa, succeed, training};
 
 const OPEN: &str = "severe [side-mismatch] limb l of patient 0";
 
@@ -24,10 +24,10 @@ fn write_wrong_side(folder: &Path) -> String {
         "ct phantom --name P07 --spacing-mm 2 --table --out leg.nii",
     );
     let said = succeed(folder, "prepare leg.nii --side l --out leg.toml");
-    let plan = "version = 1\n[[case]]\nfile = \"leg.toml\"\npatient = 0\n\
-         [rotation]\nfrom_deg = 0.0\nto_deg = 2.5\nstep_deg = 2.5\n\
-         [xray]\ndetector = { columns = 50, rows = 50, pixel_mm = 4.0 }\n\
-         engine = { scatter_histories = 20000 }\n";
+    let plan = format!(
+        "version = 1\n[[case]]\nfile = \"leg.toml\"\npatient = 0\n\
+         [rotation]\nfrom_deg = 0.0\nto_deg = 2.5\nstep_deg = 2.5\n{QUICK_XRAY}"
+    );
     fs::write(folder.join("plan.toml"), plan).unwrap();
     said
 }

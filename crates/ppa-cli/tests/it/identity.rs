@@ -8,7 +8,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
 use crate::planted_series::{self, DATES, UID_ROOT, WORD};
-use crate::succeed;
+use crate::{QUICK_XRAY, succeed};
 
 /// What must not be found, in the encodings that text comes in; upper and lower case are alike.
 fn planted() -> Vec<Vec<u8>> {
@@ -150,8 +150,7 @@ fn no_output_identifies_the_source() {
     let settings = format!(
         "version = 1\n[[case]]\nfile = {case:?}\npatient = 3\n\
          [rotation]\nfrom_deg = 0.0\nto_deg = 18.0\nstep_deg = 18.0\n\
-         [xray]\ndetector = {{ columns = 40, rows = 40, pixel_mm = 5.0 }}\n\
-         engine = {{ scatter_histories = 5000 }}\n"
+         {QUICK_XRAY}"
     );
     fs::write(&plan, settings).unwrap();
     run(&format!("generate {} --out dataset --json", plan.display()));

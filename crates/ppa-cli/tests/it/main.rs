@@ -154,14 +154,19 @@ fn phantom() -> &'static Path {
     folder.path()
 }
 
-/// Writes a small plan on the phantom's case and returns its path.
+/// Radiographs that take no time: few pixels of few voxels.
+const QUICK_XRAY: &str = "[xray]\nhalf_length_mm = 20.0\nmax_voxel_mm = 5.0\n\
+    detector = { columns = 8, rows = 8, pixel_mm = 25.0 }\n\
+    engine = { scatter_histories = 100, scatter_pixel_mm = 200.0, samples_per_side = 1, \
+    compton_model = \"incoherent_function\" }\n";
+
+/// Writes a plan of five quick poses of the phantom's case and returns its path; `more` begins among the keys of `[xray]`.
 fn write_plan(folder: &Path, more: &str) -> PathBuf {
     let case = phantom().join("p01.toml");
     let plan = format!(
         "version = 1\n[[case]]\nfile = {case:?}\npatient = 3\n\
          [rotation]\nfrom_deg = 0.0\nto_deg = 10.0\nstep_deg = 2.5\n\
-         [xray]\ndetector = {{ columns = 50, rows = 50, pixel_mm = 4.0 }}\n\
-         engine = {{ scatter_histories = 20000 }}\n{more}"
+         {QUICK_XRAY}{more}"
     );
     let path = folder.join("plan.toml");
     fs::write(&path, plan).unwrap();

@@ -8,16 +8,9 @@ use serde_json::Value;
 
 use crate::{contents, fail, ppa, succeed, write_plan};
 
-/// Writes a plan of five quick poses.
+/// Writes a plan of five quick poses and two body shapes.
 pub fn write_quick_plan(folder: &Path) {
-    write_plan(folder, "");
-    let path = folder.join("plan.toml");
-    let plan = fs::read_to_string(&path).unwrap();
-    let quick = "half_length_mm = 20.0\ndetector = { columns = 8, rows = 8, pixel_mm = 25.0 }\n\
-                 engine = { scatter_histories = 100, scatter_pixel_mm = 200.0, samples_per_side = 1 }\n\
-                 [shapes]\nvariants = [\"orig\", \"bumps_a\"]\n";
-    let xray = plan.find("[xray]\n").unwrap() + "[xray]\n".len();
-    fs::write(&path, format!("{}{quick}", &plan[..xray])).unwrap();
+    write_plan(folder, "[shapes]\nvariants = [\"orig\", \"bumps_a\"]\n");
 }
 
 /// A folder with the quick plan and its dataset `whole`, made by one run with two threads.

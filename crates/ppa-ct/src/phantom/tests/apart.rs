@@ -145,10 +145,11 @@ fn bones_of_phantoms_by_seed_keep_apart() {
 
 /// Tibia, fibula, talus and calcaneus, whose dimensions vary most.
 #[test]
-#[ignore = "takes two minutes"]
-fn the_ankles_of_3000_seeds_keep_apart() {
-    let narrow: Vec<String> = (0..3000_u64)
+#[ignore = "takes half a minute"]
+fn the_ankles_of_every_fifth_of_3000_seeds_keep_apart() {
+    let narrow: Vec<String> = (0..600_u64)
         .into_par_iter()
+        .map(|number| 5 * number)
         .flat_map_iter(|seed| {
             let leg = LowerLeg::from_seed(seed, Side::Right);
             let size = leg.parameters.size;

@@ -8,7 +8,7 @@ use super::gauge::{Check, Gauge, SKIN_HU, within};
 use crate::phantom::parameters::Parameters;
 use crate::phantom::*;
 
-const VOXEL_MM: f64 = 1.0;
+const VOXEL_MM: f64 = 1.5;
 /// The sole is cut softly over 8 mm, which lifts a flat skin by up to a quarter of that.
 const SOFT_SOLE_MM: f64 = 2.0;
 
