@@ -259,10 +259,9 @@ fn blur(mut values: Vec<f32>, size: [usize; 3]) -> Vec<f32> {
     let sum: f64 = (-REACH..=REACH).map(weight).sum();
     let weights: Vec<f32> = (-REACH..=REACH).map(|d| (weight(d) / sum) as f32).collect();
     let [columns, rows, _] = size;
-    for axis in 0..3 {
+    for (axis, &length) in size.iter().enumerate() {
         let source = values.clone();
-        let near =
-            |at: usize, d: isize| (at as isize + d).clamp(0, size[axis] as isize - 1) as usize;
+        let near = |at: usize, d: isize| (at as isize + d).clamp(0, length as isize - 1) as usize;
         let rows_of_values = values.par_chunks_mut(columns).enumerate();
         rows_of_values.for_each(|(row, blurred)| {
             if axis == 0 {
