@@ -170,7 +170,7 @@ fn tables_and_archives_are_written_from_a_generated_dataset() {
     for row in rows.records().map(Result::unwrap) {
         let is_depth = &row[at("kind")] == "depth";
         assert_eq!(row[at("intrinsics")].contains("\"fx\""), is_depth);
-        assert_eq!(&row[at("scatter_histories")] == "20000", !is_depth);
+        assert_eq!(&row[at("scatter_histories")] == "100", !is_depth);
     }
     let metadata = "export metadata data --name ankle --license https://example.org/licence --date";
     let said = ppa(folder.path(), &format!("{metadata} 2026-13-01"))
