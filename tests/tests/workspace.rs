@@ -66,16 +66,16 @@ fn manifest(path: &Path) -> toml::Table {
 }
 
 fn members() -> BTreeMap<String, toml::Table> {
-    let folders = fs::read_dir(root().join("crates")).unwrap();
-    folders
-        .map(|folder| manifest(&folder.unwrap().path().join("Cargo.toml")))
-        .map(|manifest| {
-            (
-                manifest["package"]["name"].as_str().unwrap().to_owned(),
-                manifest,
-            )
-        })
-        .collect()
+    let mut members = BTreeMap::new();
+    for entry in fs::read_dir(root()).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        if name.starts_with("ppa-") {
+            let manifest = manifest(&root().join(&name).join("Cargo.toml"));
+            assert_eq!(manifest["package"]["name"].as_str(), Some(name.as_str()));
+            members.insert(name, manifest);
+        }
+    }
+    members
 }
 
 fn dependencies<'a>(manifest: &'a toml::Table, section: &str) -> Vec<&'a str> {
@@ -156,11 +156,7 @@ fn every_crate_is_ready_to_publish() {
             assert!(package.contains_key(key), "{name} lacks package.{key}");
         }
         assert!(
-            root()
-                .join("crates")
-                .join(&name)
-                .join("README.md")
-                .is_file(),
+            root().join(&name).join("README.md").is_file(),
             "{name} has no README.md"
         );
         assert!(

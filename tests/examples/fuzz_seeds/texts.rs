@@ -98,7 +98,7 @@ pub const TEXTS: &[(&str, &str, Option<u8>, &str)] = &[
         "calibration",
         "calibration.toml",
         None,
-        include_str!("../../../crates/ppa-xray/data/hu_calibration.toml"),
+        include_str!("../../../ppa-xray/data/hu_calibration.toml"),
     ),
     ("calibration", "composition", None, "H:0.112 O:0.888"),
     ("mcgpu", "run.in", Some(0), INPUT),

@@ -1,0 +1,150 @@
+use ppa_xray::{Blur, Collimation, DetectorModel, Receptor, Source, SpotShape};
+
+use super::*;
+
+fn read(xray: &str) -> Result<Plan, PlanError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("plan.toml");
+    let case = "version = 1\n[[case]]\nfile = \"a.toml\"\npatient = 0\n";
+    std::fs::write(&path, format!("{case}{xray}")).unwrap();
+    Plan::read(&path)
+}
+
+/// Source and receptor as a user writes them; what is written by a program reads back the same.
+#[test]
+fn source_and_receptor_are_read_from_the_plan() {
+    let plan = read(
+        r#"
+        [xray.source]
+        focal_spot = { size_mm = 0.6, shape = "gaussian" }
+        heel_effect = { anode_towards_deg = 90 }
+        collimation = { rectangle = { size_mm = [180, 240] } }
+        [xray.receptor]
+        model = { csi = { thickness_um = 500 } }
+        grid = { ratio = 8, lines_per_cm = 40, focus_mm = 1100 }
+        blur = { lorentzian = { h_mm2 = 0.45 } }
+        electronic_noise_kev = 90
+        "#,
+    )
+    .unwrap();
+    let (source, receptor) = (&plan.xray.source, &plan.xray.receptor);
+    assert_eq!(source.focal_spot.shape, SpotShape::Gaussian);
+    assert!(matches!(
+        source.collimation,
+        Collimation::Rectangle {
+            size_mm: [180.0, 240.0],
+            centre_mm: [0.0, 0.0]
+        }
+    ));
+    assert!(matches!(
+        receptor.model,
+        DetectorModel::Csi { packing: 0.8, .. }
+    ));
+    assert_eq!(receptor.blur, Some(Blur::Lorentzian { h_mm2: 0.45 }));
+    assert_eq!(receptor.grid.as_ref().unwrap().strip, "lead");
+    let folder = tempfile::tempdir().unwrap();
+    let copy = folder.path().join("copy.toml");
+    plan.write(&copy).unwrap();
+    let again = Plan::read(&copy).unwrap();
+    assert_eq!(
+        (&again.xray.source, &again.xray.receptor),
+        (source, receptor)
+    );
+}
+
+#[test]
+fn left_out_they_are_a_point_and_an_ideal_detector() {
+    let plan = read("").unwrap();
+    assert_eq!(plan.xray.source, Source::default());
+    assert_eq!(plan.xray.receptor, Receptor::default());
+}
+
+#[test]
+fn what_cannot_work_is_named() {
+    for (more, words) in [
+        (
+            "[shapes]\nbumps = [1000000000, 3]\n",
+            "shapes.bumps holds 1000000000",
+        ),
+        ("[shapes]\nbumps = [2, 0]\n", "expected 1 to 100 bumps"),
+        ("[shapes]\noffset_mm = 101\n", "at most 100 mm"),
+        ("[xray.engine]\nseed = 5\n", "xray.engine.seed"),
+    ] {
+        let error = read(more).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
+}
+
+/// Of a newer format more than the version is unknown; the version is what matters.
+#[test]
+fn another_version_is_reported_before_its_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("plan.toml");
+    std::fs::write(&path, "version = 2\n[holograms]\ncount = 3\n").unwrap();
+    let error = Plan::read(&path).unwrap_err();
+    assert!(
+        matches!(error, PlanError::Version { found: 2, .. }),
+        "{error}"
+    );
+}
+
+/// `plans/paper` is the published dataset's size.
+#[test]
+fn the_shipped_plan_has_the_papers_size() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../plans/paper/plan.toml");
+    let plan = Plan::read(&path).unwrap();
+    let units = plan.cases.len() * plan.rotation.poses().unwrap().len();
+    assert_eq!((plan.cases.len(), units), (17, 3077));
+    assert_eq!(units * 2 * plan.shapes.variants.len(), 30_770);
+    let mut patients: Vec<_> = plan.cases.iter().map(|case| case.patient).collect();
+    patients.dedup();
+    assert_eq!(patients, (0..17).collect::<Vec<_>>());
+}
+
+#[test]
+fn unknown_keys_are_named() {
+    for (xray, word) in [
+        ("[xray.source]\nfocal_spot_mm = 0.6\n", "focal_spot_mm"),
+        ("[xray.receptor]\nmodel = \"film\"\n", "film"),
+        ("[xray.receptor]\ngrid = { ratio = 8 }\n", "lines_per_cm"),
+    ] {
+        let error = read(xray).unwrap_err().to_string();
+        assert!(error.contains(word), "{error}");
+    }
+}
+
+/// Written beside or above what it names, a plan goes on naming the same files.
+#[test]
+fn a_plan_that_is_written_elsewhere_names_the_same_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    std::fs::create_dir_all(root.join("plans")).unwrap();
+    let path = root.join("plans/plan.toml");
+    let text = "version = 1\n[[case]]\nfile = \"../a.case.toml\"\npatient = 0\n[room]\nply = \"room.ply\"\n[depth]\nrig = \"rig.json\"\n";
+    std::fs::write(&path, text).unwrap();
+    let plan = Plan::read(&path).unwrap();
+    assert_eq!(plan.cases[0].file, root.join("plans/../a.case.toml"));
+    for elsewhere in ["copy.toml", "plans/copy.toml", "other/copy.toml"] {
+        let copy = root.join(elsewhere);
+        plan.write(&copy).unwrap();
+        assert_eq!(Plan::read(&copy).unwrap(), plan, "{elsewhere}");
+    }
+
+    // As a program in the current folder names its files.
+    let mut plan = Plan::new(vec![PlanCase {
+        file: "a.case.toml".into(),
+        patient: 0,
+    }]);
+    plan.room.ply = Some("rooms/room.ply".into());
+    plan.depth.rig = Some("rig.json".into());
+    let here = std::env::current_dir().unwrap();
+    let copy = root.join("copy.toml");
+    plan.write(&copy).unwrap();
+    let again = Plan::read(&copy).unwrap();
+    let canonical = |path: &Path| {
+        let folder = path.parent().unwrap().canonicalize().unwrap();
+        folder.join(path.file_name().unwrap())
+    };
+    assert_eq!(canonical(&again.cases[0].file), here.join("a.case.toml"));
+    assert_eq!(canonical(&again.depth.rig.unwrap()), here.join("rig.json"));
+}

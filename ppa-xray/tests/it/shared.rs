@@ -1,0 +1,13 @@
+//! Where the reference data lies.
+
+use std::path::PathBuf;
+
+/// A file of the shared data: beside the repository, or under `PPA_SHARED`.
+pub fn path(relative: &str) -> PathBuf {
+    std::env::var_os("PPA_SHARED")
+        .map_or_else(
+            || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared")),
+            PathBuf::from,
+        )
+        .join(relative)
+}
