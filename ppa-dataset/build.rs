@@ -13,7 +13,8 @@ use std::{env, fs, io};
 use sha2::{Digest, Sha256};
 
 /// Crates that decide the bytes of an image, as folders beside this one.
-const CRATES: [&str; 6] = [
+const CRATES: [&str; 7] = [
+    "ppa-core",
     "ppa-ct",
     "ppa-dataset",
     "ppa-depth",

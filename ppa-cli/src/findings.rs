@@ -33,7 +33,7 @@ pub fn repeat_of_datasets<'a>(datasets: impl Iterator<Item = &'a Path>) -> anyho
 pub fn prepared(case: &Case, file: &Path) -> anyhow::Result<PreparedLimb> {
     let prepared = PreparedLimb::of_case(case)
         .with_context(|| format!("cannot prepare the limb of {}", file.display()))?;
-    let side = ppa_dataset::layout::Side::from(case.side).letter();
+    let side = case.side.letter();
     for finding in prepared.open_findings(&case.acknowledged) {
         let limb = format!("limb {side} of {}", file.display());
         warning(&line(finding, &limb, 0));

@@ -1,8 +1,8 @@
 //! Options that are lists of numbers: points, ranges, boxes.
 
 use nalgebra::Point3;
+use ppa_core::Roi;
 use ppa_dataset::labels::BoneNumbers;
-use ppa_learn::data::Roi;
 use ppa_mesh::{Bump, VoxelBox};
 
 fn finite<const N: usize>(text: &str) -> Option<[f64; N]> {
@@ -63,7 +63,11 @@ pub fn square(text: &str) -> Result<Roi, String> {
         .map(|part| part.trim().parse().ok())
         .collect();
     match numbers.as_deref() {
-        Some(&[x, y, size]) if size > 0 => Ok(Roi { x, y, size }),
+        Some(&[x, y, size]) if size > 0 => Ok(Roi {
+            x_start: x,
+            y_start: y,
+            size,
+        }),
         _ => Err("expected three whole numbers separated by commas, the last above 0".to_owned()),
     }
 }

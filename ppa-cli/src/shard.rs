@@ -3,7 +3,7 @@
 use std::env;
 
 use anyhow::{Context, bail};
-use ppa_xray::Part;
+use ppa_core::Part;
 
 /// Where a shard was named.
 struct Named {

@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use ppa_text::count;
+use ppa_core::text::count;
 
 use crate::acquisition::Acquisition;
 use crate::error::ReadError;

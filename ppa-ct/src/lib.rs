@@ -65,8 +65,6 @@ mod scan_file;
 mod stored;
 mod values;
 mod volume;
-#[cfg(any(feature = "nifti", feature = "nrrd", feature = "metaimage"))]
-mod whole_file;
 mod write;
 
 pub use acquisition::Acquisition;

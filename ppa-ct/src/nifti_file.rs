@@ -102,7 +102,7 @@ fn size(header: &NiftiHeader) -> Result<[usize; 3], String> {
     }
     Err(format!(
         "dimensions {}, expected a volume with three axes",
-        ppa_text::numbers(dim[..axes.min(7)].iter().copied())
+        ppa_core::text::numbers(dim[..axes.min(7)].iter().copied())
     ))
 }
 

@@ -59,7 +59,9 @@ mod tests;
 
 pub use self::family::UnknownPhantom;
 pub use self::gutters::{GutterPoint, Gutters};
-pub use self::limb::{Limb, Side};
+pub use ppa_core::Side;
+
+pub use self::limb::Limb;
 pub use self::lower_leg::LowerLeg;
 pub use self::parameters::Sex;
 pub use self::rays::{Chord, SkinHit};

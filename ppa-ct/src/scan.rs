@@ -171,7 +171,9 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<Scan, ReadError> 
 pub(crate) fn starts_as_dicom(path: &Path) -> std::io::Result<bool> {
     use std::io::Read;
     let mut start = Vec::with_capacity(132);
-    ppa_files::open(path)?.take(132).read_to_end(&mut start)?;
+    ppa_core::regular_file::open(path)?
+        .take(132)
+        .read_to_end(&mut start)?;
     Ok(start.get(128..) == Some(b"DICM"))
 }
 

@@ -50,7 +50,7 @@ pub(crate) struct ScanFile {
 impl ScanFile {
     pub(crate) fn open(path: &Path) -> Result<Self, ReadError> {
         let opened = || -> io::Result<_> {
-            let file = ppa_files::open(path)?;
+            let file = ppa_core::regular_file::open(path)?;
             let most = file.metadata()?.len();
             Ok((file, most))
         };

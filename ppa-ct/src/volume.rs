@@ -16,7 +16,7 @@ pub enum VolumeError {
     #[error(transparent)]
     Grid(#[from] GridError),
     /// Number of values and number of voxels differ.
-    #[error("{} for {}", ppa_text::count(*found, "value"), ppa_text::count(*expected, "voxel"))]
+    #[error("{} for {}", ppa_core::text::count(*found, "value"), ppa_core::text::count(*expected, "voxel"))]
     Length {
         /// Values given.
         found: usize,
@@ -57,7 +57,7 @@ pub enum VolumeError {
         to_mm: f64,
     },
     /// More voxels than there is memory for.
-    #[error("memory does not hold {} and what is computed of them", ppa_text::count(*voxels, "voxel"))]
+    #[error("memory does not hold {} and what is computed of them", ppa_core::text::count(*voxels, "voxel"))]
     Memory {
         /// Voxels asked for.
         voxels: usize,

@@ -4,7 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use ppa_xray::Part;
+use ppa_core::Part;
 
 use crate::checksums::Checksums;
 use crate::description::DESCRIPTION_FILE;

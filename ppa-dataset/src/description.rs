@@ -1,5 +1,6 @@
 //! `dataset.json`: what all images of a dataset share, free of paths and identities.
 
+use ppa_core::TransformRows;
 use ppa_depth::{CameraSpec, RigSpec, SensorSpec, WallDepth, rows_from_isometry};
 use ppa_mesh::LimbSettings;
 use ppa_scene::{LandmarkOverrides, PlaneSettings, RoomSpec, SoftTissue, Sweep};
@@ -11,7 +12,6 @@ use crate::compiled::code;
 use crate::files::{FileError, hex, sha256_of_file};
 use crate::findings::FindingCode;
 use crate::layout::{LimbId, View};
-use crate::manifest::Rows;
 use crate::plan::{Plan, XraySettings};
 use crate::seal::sealed;
 use crate::shaped_skin::ShapeSettings;
@@ -32,7 +32,7 @@ pub(crate) struct Settings {
     room_ply_sha256: Option<String>,
     room: RoomSpec,
     table: Option<PlaneSettings>,
-    room_from_device: Option<Rows>,
+    room_from_device: Option<TransformRows>,
     rig_sha256: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     cameras: Option<RigSpec>,
@@ -91,7 +91,7 @@ pub(crate) struct Description<'a> {
     units: &'static str,
     rotation: Sweep,
     settings: &'a Settings,
-    room_from_device: Rows,
+    room_from_device: TransformRows,
     source_detector_mm: f64,
     table: Table,
     cameras: Vec<CameraRow>,
@@ -108,7 +108,7 @@ struct Table {
 struct CameraRow {
     view: View,
     intrinsics: CameraSpec,
-    room_from_camera: Rows,
+    room_from_camera: TransformRows,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]

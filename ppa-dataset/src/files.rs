@@ -1,10 +1,10 @@
 //! Files that appear whole or not at all, and their hashes.
 
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
-use atomic_write_file::AtomicWriteFile;
+use ppa_core::{regular_file, whole_file};
 use sha2::{Digest, Sha256};
 
 /// A file could not be read or written.
@@ -42,16 +42,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
         _ => Path::new("."),
     };
     fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
-    let write = || {
-        // Checked here, since a failed rename would leave the temporary file behind.
-        if path.is_dir() {
-            return Err(io::ErrorKind::IsADirectory.into());
-        }
-        let mut file = AtomicWriteFile::open(path)?;
-        file.write_all(bytes)?;
-        file.commit()
-    };
-    write().map_err(FileError::at("write", path))
+    whole_file::write(path, bytes).map_err(FileError::at("write", path))
 }
 
 /// Removes a file that may not be there.
@@ -67,7 +58,7 @@ pub(crate) fn remove_if_there(path: &Path) -> Result<(), FileError> {
 
 /// Reads a text file.
 pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
-    ppa_files::read_to_string(path).map_err(FileError::at("read", path))
+    regular_file::read_to_string(path).map_err(FileError::at("read", path))
 }
 
 /// SHA-256 of a file's bytes as lower-case hexadecimal.
@@ -75,7 +66,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
 /// # Errors
 /// [`FileError`] when the file cannot be read.
 pub fn sha256_of_file(path: &Path) -> Result<String, FileError> {
-    let bytes = ppa_files::read(path).map_err(FileError::at("read", path))?;
+    let bytes = regular_file::read(path).map_err(FileError::at("read", path))?;
     Ok(hex(&Sha256::digest(bytes)))
 }
 

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use cpu_time::ProcessTime;
+use ppa_core::Part;
 use ppa_scene::PoseAngle;
-use ppa_xray::Part;
 use serde::Serialize;
 
 use crate::files::{FileError, remove_if_there};

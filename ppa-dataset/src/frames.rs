@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use ppa_core::TransformRows;
 use ppa_depth::{RigSpec, rows_from_isometry};
 use ppa_scene::{Landmarks, Placement, ct_from_device};
 use serde::Serialize;
 
-use crate::manifest::Rows;
 use crate::stage::{StageError, Table};
 
 /// Rigid motions by name, `target_from_source`: row-major 4x4, mm.
@@ -23,7 +23,7 @@ pub struct Frames {
     /// Normal and offset of the table: normal · p = offset, room frame.
     pub table: [f64; 4],
     /// The motions.
-    pub motions: BTreeMap<&'static str, Rows>,
+    pub motions: BTreeMap<&'static str, TransformRows>,
 }
 
 impl Frames {
@@ -105,7 +105,7 @@ impl Frames {
     }
 }
 
-fn product(a: &Rows, b: &Rows) -> Rows {
+fn product(a: &TransformRows, b: &TransformRows) -> TransformRows {
     std::array::from_fn(|row| {
         std::array::from_fn(|column| (0..4).map(|k| a[row][k] * b[k][column]).sum())
     })

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use ppa_core::Part;
 use ppa_scene::SweepError;
-use ppa_xray::Part;
 
 use crate::case::{Case, CaseError};
 use crate::description::{Description, Settings};
@@ -296,7 +296,7 @@ fn planned_limbs(plan: &Plan, settings: &Settings) -> Result<Vec<CasedLimb>, Gen
         let case = Case::read(&planned.file)?;
         let id = LimbId {
             patient: planned.patient,
-            side: case.side.into(),
+            side: case.side,
         };
         if let Some(other) = limbs.iter().find(|other| other.id == id) {
             return Err(GenerateError::SameLimb {

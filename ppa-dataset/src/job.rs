@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use ppa_core::Part;
 use ppa_scene::PoseAngle;
-use ppa_xray::Part;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

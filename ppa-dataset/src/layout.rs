@@ -10,67 +10,10 @@
 
 use std::fmt;
 
+pub use ppa_core::{Side, View};
 use serde::{Deserialize, Serialize};
 
 use crate::body_shape::BodyShape;
-
-/// Which of the two cameras on the tube housing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum View {
-    /// The paper's V1.
-    #[serde(rename = "cam_left")]
-    Left,
-    /// The paper's V2.
-    #[serde(rename = "cam_right")]
-    Right,
-}
-
-impl View {
-    /// Both cameras, left first.
-    pub const ALL: [Self; 2] = [Self::Left, Self::Right];
-
-    /// The camera's name in file names and JSON.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Left => "cam_left",
-            Self::Right => "cam_right",
-        }
-    }
-}
-
-/// The person's left or right; "l" or "r" in files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Side {
-    /// Left limb.
-    #[serde(rename = "l")]
-    Left,
-    /// Right limb.
-    #[serde(rename = "r")]
-    Right,
-}
-
-impl Side {
-    /// Both sides, left first.
-    pub const ALL: [Self; 2] = [Self::Left, Self::Right];
-
-    /// `l` or `r`.
-    pub fn letter(self) -> &'static str {
-        match self {
-            Self::Left => "l",
-            Self::Right => "r",
-        }
-    }
-}
-
-#[cfg(feature = "generate")]
-impl From<ppa_scene::Side> for Side {
-    fn from(side: ppa_scene::Side) -> Self {
-        match side {
-            ppa_scene::Side::Left => Self::Left,
-            ppa_scene::Side::Right => Self::Right,
-        }
-    }
-}
 
 /// One limb of one person: the unit of everything below `patient_N/*/{l,r}`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

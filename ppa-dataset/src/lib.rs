@@ -155,7 +155,7 @@ pub use gates::NotALimb;
 pub use generate::{GenerateError, GenerateSettings, generate};
 #[cfg(feature = "generate")]
 pub use job::{JobError, Progress, Summary};
-pub use manifest::{FileKind, FileRow, Manifest, RoiFile, RoiRow, Rows};
+pub use manifest::{FileKind, FileRow, Manifest, RoiFile, RoiRow};
 #[cfg(feature = "generate")]
 pub use merge::{MergeError, merge};
 #[cfg(feature = "generate")]

@@ -3,8 +3,8 @@
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+use ppa_core::Part;
 use ppa_scene::Sweep;
-use ppa_xray::Part;
 
 use crate::job::{Job, JobError, LimbUnits, MakeUnit, PlannedLimb, Progress, units_of_part};
 use crate::layout::{LimbId, Side};

@@ -3,14 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use ppa_core::TransformRows;
 use serde::{Deserialize, Serialize};
 
 use crate::body_shape::BodyShape;
 use crate::files::{FileError, read_text};
 use crate::layout::{LimbId, View};
-
-/// A rigid motion as four rows of a homogeneous matrix, mm.
-pub type Rows = [[f64; 4]; 4];
 
 /// What a file is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -56,12 +54,12 @@ pub struct FileRow {
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub cut_share: Option<f64>,
     /// The limb's frame in the scan: T^P_CT.
-    pub patient_from_ct: Rows,
+    pub patient_from_ct: TransformRows,
     /// Pose of the limb: T^ToF_P = T_opt · T_mat · T_rot.
-    pub room_from_patient: Rows,
+    pub room_from_patient: TransformRows,
     /// Radiographs: pose of the x-ray device in the scan.
     #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub ct_from_device: Option<Rows>,
+    pub ct_from_device: Option<TransformRows>,
     /// Seed of a radiograph's histories and noise, or of a depth sensor's noise.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub seed: Option<u64>,

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use ppa_xray::Part;
+use ppa_core::Part;
 use sha2::{Digest, Sha256};
 
 use crate::claim::{Claim, FolderError, claim_existing};
@@ -61,7 +61,7 @@ pub enum MergeError {
         unit: String,
     },
     /// Poses that no shard holds.
-    #[error("no shard holds {unit}; missing are {missing} of {}", ppa_text::count(*units, "pose"))]
+    #[error("no shard holds {unit}; missing are {missing} of {}", ppa_core::text::count(*units, "pose"))]
     Hole {
         /// The first of them.
         unit: String,
@@ -216,7 +216,8 @@ impl<'a> Shards<'a> {
         }
         for row in &files {
             let path = shard.join(&row.file);
-            let bytes = ppa_files::read(&path).map_err(FileError::at("read", &path))?;
+            let bytes =
+                ppa_core::regular_file::read(&path).map_err(FileError::at("read", &path))?;
             if hex(&Sha256::digest(&bytes)) != row.sha256 {
                 return Err(MergeError::Altered(path));
             }

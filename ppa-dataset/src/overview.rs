@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::Mutex;
 
-use ppa_xray::Part;
+use ppa_core::Part;
 
 use crate::checksums::{Checksums, FoundChecksums};
 use crate::description::DESCRIPTION_FILE;

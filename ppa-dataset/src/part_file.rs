@@ -3,7 +3,7 @@
 use std::io;
 use std::path::Path;
 
-use ppa_xray::Part;
+use ppa_core::Part;
 use serde::{Deserialize, Serialize};
 
 use crate::claim::FolderError;
@@ -32,7 +32,7 @@ pub(crate) fn part_text(part: Part) -> Option<String> {
 /// The part that the folder of a begun dataset is to hold.
 pub(crate) fn read_part(root: &Path) -> Result<Part, FileError> {
     let path = root.join(PART_FILE);
-    let text = match ppa_files::read_to_string(&path) {
+    let text = match ppa_core::regular_file::read_to_string(&path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Part::WHOLE),
         text => text.map_err(FileError::at("read", &path))?,
     };

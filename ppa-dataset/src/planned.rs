@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use ppa_core::Part;
 use ppa_scene::Sweep;
-use ppa_xray::Part;
 use serde::Deserialize;
 
 use crate::description::DESCRIPTION_FILE;

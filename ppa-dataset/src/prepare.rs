@@ -213,7 +213,7 @@ fn other_on_side(report: &LimbReport, side: Side, settings: &LimbSettings) -> Op
         Side::Right => ("right", "left"),
         Side::Left => ("left", "right"),
     };
-    let [x, y, z] = chosen.centre_mm.map(ppa_text::number);
+    let [x, y, z] = chosen.centre_mm.map(ppa_core::text::number);
     let millilitres = beside.core_mm3 * 1e-3;
     let text = format!(
         "the limb around {x:.0}, {y:.0}, {z:.0} mm was taken, but towards the patient's {name} lies another one, cut by the \
@@ -232,7 +232,7 @@ fn other_on_side(report: &LimbReport, side: Side, settings: &LimbSettings) -> Op
 fn several_limbs(report: &LimbReport) -> Option<Finding> {
     let alike = report.bodies.iter().filter(|body| body.alike).count();
     let chosen = report.bodies.iter().find(|body| body.chosen)?;
-    let [x, y, z] = chosen.centre_mm.map(ppa_text::number);
+    let [x, y, z] = chosen.centre_mm.map(ppa_core::text::number);
     (alike > 1).then(|| Finding {
         code: FindingCode::SeveralLimbs,
         severity: Severity::Caution,

@@ -122,7 +122,7 @@ impl FoundRecord {
 impl Record {
     /// Reads what stands in the file of a pose's record.
     pub fn look(path: &Path, pose: PoseId) -> Result<FoundRecord, FileError> {
-        match ppa_files::read(path) {
+        match ppa_core::regular_file::read(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(FoundRecord::Absent),
             Err(error) => Err(FileError::at("read", path)(error)),
             Ok(bytes) => {

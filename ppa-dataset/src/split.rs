@@ -244,7 +244,7 @@ fn counts(patients: usize, shares: &[(String, f64)]) -> Result<Vec<usize>, Split
         None => wrong("no part to draw".to_owned()),
         Some(i) => wrong(format!(
             "with {} the part {} stays empty; give it a larger share or name fewer parts",
-            ppa_text::count(patients, "person"),
+            ppa_core::text::count(patients, "person"),
             shares[i].0
         )),
     }

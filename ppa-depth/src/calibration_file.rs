@@ -94,10 +94,11 @@ impl CameraSpec {
     /// # Errors
     /// [`CameraError`] names the file and what is missing in it.
     pub fn import(path: &Path, mode: DepthMode) -> Result<Self, CameraError> {
-        let text = ppa_files::read_to_string(path).map_err(|source| CameraError::Read {
-            path: path.into(),
-            source,
-        })?;
+        let text =
+            ppa_core::regular_file::read_to_string(path).map_err(|source| CameraError::Read {
+                path: path.into(),
+                source,
+            })?;
         let yaml = path
             .extension()
             .is_some_and(|ext| ext.eq_ignore_ascii_case("yml") || ext.eq_ignore_ascii_case("yaml"));

@@ -8,7 +8,8 @@ use exr::prelude::{
     WritableImage,
 };
 
-use crate::atomic::write_whole;
+use ppa_core::whole_file;
+
 use crate::image::{DepthError, DepthImage};
 
 impl DepthImage {
@@ -32,7 +33,7 @@ impl DepthImage {
             Encoding::SMALL_LOSSLESS,
             channels,
         ));
-        write_whole(path, |writer| {
+        whole_file::write_with(path, |writer| {
             image
                 .write()
                 .to_buffered(writer)

@@ -97,7 +97,6 @@ mod tremor;
 
 mod image;
 
-mod atomic;
 mod exr_file;
 mod png_file;
 mod points_file;
@@ -105,6 +104,8 @@ mod preview;
 
 mod coverage;
 mod roi;
+
+pub use ppa_core::Roi;
 
 pub use body::{Body, BodyError, PlacedBody};
 pub use camera::Camera;
@@ -118,7 +119,7 @@ pub use preview::false_colour;
 pub use render::render;
 pub use rig::{MountedCamera, RigError, RigSpec};
 pub use rigid::{RigidError, isometry_from_rows, rows_from_isometry};
-pub use roi::{Roi, RoiError, roi_around};
+pub use roi::{RoiError, roi_around};
 pub use sampled::{Backdrop, SampledImage};
 pub use sensor::Sensor;
 pub use sensor_spec::{

@@ -3,7 +3,8 @@
 use std::io::{self, BufReader};
 use std::path::Path;
 
-use crate::atomic::write_whole;
+use ppa_core::whole_file;
+
 use crate::image::{DepthError, DepthImage};
 use crate::spec::CameraSpec;
 
@@ -40,7 +41,7 @@ impl DepthImage {
             .iter()
             .flat_map(|z_mm| z_mm.to_be_bytes())
             .collect();
-        write_whole(path, |writer| {
+        whole_file::write_with(path, |writer| {
             let mut encoder = png::Encoder::new(writer, self.width, self.height);
             encoder.set_color(png::ColorType::Grayscale);
             encoder.set_depth(png::BitDepth::Sixteen);
@@ -66,7 +67,7 @@ impl DepthImage {
             path: path.into(),
             source,
         };
-        let file = ppa_files::open(path).map_err(broken)?;
+        let file = ppa_core::regular_file::open(path).map_err(broken)?;
         let mut reader = png::Decoder::new(BufReader::new(file))
             .read_info()
             .map_err(|e| broken(e.into()))?;

@@ -4,8 +4,8 @@ use std::io::Write;
 use std::path::Path;
 
 use nalgebra::Point3;
+use ppa_core::whole_file;
 
-use crate::atomic::write_whole;
 use crate::camera::Camera;
 use crate::image::{DepthError, DepthImage};
 use crate::surface::Surface;
@@ -29,7 +29,7 @@ impl DepthImage {
     /// [`DepthError::Write`] names the file; [`DepthError::SizeMismatch`].
     pub fn write_points(&self, camera: &Camera, path: &Path) -> Result<(), DepthError> {
         let points = self.points(camera)?;
-        write_whole(path, |writer| {
+        whole_file::write_with(path, |writer| {
             write!(writer, "ply\nformat binary_little_endian 1.0\n")?;
             writeln!(
                 writer,

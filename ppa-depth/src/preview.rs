@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use crate::atomic::write_whole;
+use ppa_core::whole_file;
+
 use crate::image::{DepthError, DepthImage};
 
 /// A depth in false colour (8 bits of red, green and blue): `range` from near, red, to far, blue; black where it is not above 0.
@@ -32,7 +33,7 @@ impl DepthImage {
             .iter()
             .flat_map(|&z_mm| false_colour(z_mm.into(), range));
         let bytes: Vec<u8> = pixels.collect();
-        write_whole(path, |writer| {
+        whole_file::write_with(path, |writer| {
             let mut encoder = png::Encoder::new(writer, self.width, self.height);
             encoder.set_color(png::ColorType::Rgb);
             let mut image = encoder.write_header()?;

@@ -126,10 +126,11 @@ impl RigSpec {
     /// # Errors
     /// [`RigError`] names the file, or the camera and the number at fault.
     pub fn read(path: &Path) -> Result<Self, RigError> {
-        let text = ppa_files::read_to_string(path).map_err(|source| RigError::Read {
-            path: path.into(),
-            source,
-        })?;
+        let text =
+            ppa_core::regular_file::read_to_string(path).map_err(|source| RigError::Read {
+                path: path.into(),
+                source,
+            })?;
         let rig: Self = serde_json::from_str(&text).map_err(|source| RigError::Json {
             path: path.into(),
             source,

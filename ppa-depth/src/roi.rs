@@ -1,21 +1,9 @@
-//! The square around a joint that a network looks at.
+//! The region of interest around a joint.
 
 use nalgebra::Point3;
-use serde::{Deserialize, Serialize};
+use ppa_core::Roi;
 
 use crate::camera::Camera;
-
-/// A square of pixels: columns `x_start..x_start + size`, rows `y_start..y_start + size`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Roi {
-    /// First column.
-    pub x_start: u32,
-    /// First row.
-    pub y_start: u32,
-    /// Columns and rows.
-    pub size: u32,
-}
 
 /// Why there is no square around a joint.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

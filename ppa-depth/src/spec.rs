@@ -191,10 +191,11 @@ impl CameraSpec {
     /// # Errors
     /// [`CameraError::Read`] or [`CameraError::Json`].
     pub fn read(path: &Path) -> Result<Self, CameraError> {
-        let text = ppa_files::read_to_string(path).map_err(|source| CameraError::Read {
-            path: path.into(),
-            source,
-        })?;
+        let text =
+            ppa_core::regular_file::read_to_string(path).map_err(|source| CameraError::Read {
+                path: path.into(),
+                source,
+            })?;
         serde_json::from_str(&text).map_err(|source| CameraError::Json {
             path: path.into(),
             source,

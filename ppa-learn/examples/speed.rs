@@ -14,8 +14,9 @@ use anyhow::Context;
 use candle_core::{Device, Tensor};
 use candle_nn::{AdamW, Optimizer, ParamsAdamW};
 use cpu_time::ProcessTime;
+use ppa_core::Roi;
 use ppa_dataset::layout::{LimbId, Side, View};
-use ppa_learn::data::{Augmentation, Balanced, Images, Loader, Order, Roi, Sample, SampleImage};
+use ppa_learn::data::{Augmentation, Balanced, Images, Loader, Order, Sample, SampleImage};
 use ppa_learn::{EfficientNetB0, InferenceNetwork, Mode, Options, QualityNetwork};
 
 fn main() -> anyhow::Result<()> {
@@ -115,8 +116,8 @@ fn depth_images(folder: &Path, count: u32) -> anyhow::Result<Vec<Sample>> {
                 path,
                 camera: View::Left,
                 roi: Roi {
-                    x: 150,
-                    y: 120,
+                    x_start: 150,
+                    y_start: 120,
                     size: 340,
                 },
                 size: [640, 576],

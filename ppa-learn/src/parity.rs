@@ -38,7 +38,7 @@ pub fn parity(weights: &Path, io: &Path) -> Result<Parity, WeightsError> {
         path: io.to_owned(),
         source,
     };
-    let bytes = ppa_files::read(io).map_err(|error| unreadable(error.into()))?;
+    let bytes = ppa_core::regular_file::read(io).map_err(|error| unreadable(error.into()))?;
     let tensors = candle_core::safetensors::load_buffer(&bytes, &Device::Cpu)
         .map_err(|error| unreadable(error.into()))?;
     let tensor = |name: &str| {

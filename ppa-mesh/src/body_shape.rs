@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 use std::collections::{BinaryHeap, HashMap};
 
 use nalgebra::{Point3, Vector3};
+use ppa_core::random::{split_mix, split_mix_at};
 
 use crate::mesh::Mesh;
 use crate::neighbours::Neighbours;
@@ -191,16 +192,10 @@ pub fn seeded_bumps(
     Ok((0..count).map(bump).collect())
 }
 
-/// Uniform in [0, 1): the SplitMix64 output function (Steele et al. 2014) of seed and index.
+/// Uniform in [0, 1): number `index` of a SplitMix64 generator that the seed starts.
 fn uniform(seed: u64, index: u64) -> f64 {
-    let mix = |mut z: u64| {
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    };
-    let stream = mix(seed.wrapping_add(0x9E37_79B9_7F4A_7C15));
-    let z = stream.wrapping_add((index + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
-    (mix(z) >> 11) as f64 / (1_u64 << 53) as f64
+    let bits = split_mix_at(split_mix(seed), index);
+    (bits >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 fn displaced(

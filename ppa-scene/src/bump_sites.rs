@@ -1,9 +1,10 @@
 //! Where swellings are plausible on a lower leg or a knee.
 
 use nalgebra::{Point3, Vector3};
+use ppa_core::Side;
 use ppa_mesh::BumpSite;
 
-use crate::landmarks::{Landmarks, LimbKind, Side};
+use crate::landmarks::{Landmarks, LimbKind};
 
 /// Half the diameter of an ankle, roughly: sites lie this far from the axis, and a site is large
 /// enough to reach the skin of thin and of swollen limbs.

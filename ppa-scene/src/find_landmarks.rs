@@ -1,6 +1,7 @@
 //! Finding the landmarks of a limb in its scan.
 
 use nalgebra::{Point3, Vector3};
+use ppa_core::Side;
 use ppa_ct::Volume;
 use ppa_mesh::Mesh;
 
@@ -10,7 +11,7 @@ use crate::knee::Knee;
 use crate::knee_regions::KneeAxis;
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
 use crate::landmark_notes::LandmarkNote;
-use crate::landmarks::{AxisSource, Landmarks, LimbKind, Side};
+use crate::landmarks::{AxisSource, Landmarks, LimbKind};
 use crate::plane::first_not_finite;
 use crate::supporting_plane::{check_plane, plane_under};
 

@@ -139,7 +139,7 @@ pub enum LandmarkError {
     /// There is no limb.
     #[error(
         "the limb has {} and {}, expected both above 0",
-        ppa_text::count(*voxels, "voxel"), ppa_text::count(*vertices, "surface point")
+        ppa_core::text::count(*voxels, "voxel"), ppa_core::text::count(*vertices, "surface point")
     )]
     Empty {
         /// Voxels in the mask.
@@ -200,7 +200,7 @@ pub enum LandmarkError {
     /// The scan ends too close to the joint.
     #[error(
         "the limb reaches {:.0} mm proximal of the joint, expected at least {expected_mm:.0} mm",
-        ppa_text::number(*found_mm)
+        ppa_core::text::number(*found_mm)
     )]
     TooShort {
         /// Length above the joint level.
@@ -211,7 +211,7 @@ pub enum LandmarkError {
     /// A region has no limb in it, or the two are in the wrong order.
     #[error(
         "the {name} from {:.1} to {:.1} mm proximal of the joint {problem}",
-        ppa_text::number(*from_mm), ppa_text::number(*to_mm)
+        ppa_core::text::number(*from_mm), ppa_core::text::number(*to_mm)
     )]
     Region {
         /// "joint region" or "calf region".
@@ -224,7 +224,7 @@ pub enum LandmarkError {
         problem: &'static str,
     },
     /// A direction or point given by a person cannot be used.
-    #[error("{name} is {}, expected {expected}", ppa_text::numbers(*found))]
+    #[error("{name} is {}, expected {expected}", ppa_core::text::numbers(*found))]
     Override {
         /// Field of [`LandmarkOverrides`].
         name: &'static str,
@@ -285,7 +285,7 @@ pub enum LandmarkError {
     /// Three points given by a person make no plane under the limb.
     #[error(
         "plane_points are ({}), ({}) and ({}), expected {expected}",
-        ppa_text::numbers(found[0]), ppa_text::numbers(found[1]), ppa_text::numbers(found[2])
+        ppa_core::text::numbers(found[0]), ppa_core::text::numbers(found[1]), ppa_core::text::numbers(found[2])
     )]
     Plane {
         /// The points.

@@ -1,22 +1,12 @@
 //! What has to be known about a limb before it can be posed, and the frame that follows.
 
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
+use ppa_core::Side;
 use serde::{Deserialize, Serialize};
 
 use crate::frames::{Ct, Patient, Rigid};
 use crate::landmark_notes::LandmarkNote;
 use crate::plane::Plane;
-
-/// The patient's left or right; "l" or "r" in files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub enum Side {
-    /// Left limb.
-    #[serde(rename = "l")]
-    Left,
-    /// Right limb.
-    #[serde(rename = "r")]
-    Right,
-}
 
 /// What kind of limb a scan shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]

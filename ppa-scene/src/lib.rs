@@ -45,6 +45,8 @@ mod supporting_plane;
 mod sweep;
 mod table_plane;
 
+pub use ppa_core::Side;
+
 pub use bump_sites::bump_sites;
 pub use device::XrayDevice;
 pub use find_landmarks::find_landmarks;
@@ -52,9 +54,7 @@ pub use frames::{Camera, Ct, Device, NotRigid, Patient, Rigid};
 pub use knee_regions::KneeAxis;
 pub use landmark_choices::{LandmarkError, LandmarkOverrides};
 pub use landmark_notes::LandmarkNote;
-pub use landmarks::{
-    AxisRegion, AxisSource, FoundJoint, Joint, KneeLines, Landmarks, LimbKind, Side,
-};
+pub use landmarks::{AxisRegion, AxisSource, FoundJoint, Joint, KneeLines, Landmarks, LimbKind};
 pub use measures::{Fibula, LimbMeasures, LimbSize, Neighbour, Shaft, Support};
 pub use place_error::PlaceError;
 pub use placement::{Contact, Placement, ct_from_device, medial_rotation, place, place_soft};

@@ -9,7 +9,7 @@ use crate::plane::{first_not_finite, on_one_line};
 #[non_exhaustive]
 pub enum PlaceError {
     /// Nothing to place.
-    #[error("the limb has {}, expected at least 3", ppa_text::count(*found, "point"))]
+    #[error("the limb has {}, expected at least 3", ppa_core::text::count(*found, "point"))]
     TooFewPoints {
         /// Points given.
         found: usize,
@@ -56,7 +56,7 @@ pub enum PlaceError {
     #[error(
         "tipping the limb by up to 60 degrees brings its ends no closer than the table: distal \
          end {:.2} mm, proximal end {:.2} mm above the lowest point",
-        ppa_text::number(*distal_mm), ppa_text::number(*proximal_mm)
+        ppa_core::text::number(*distal_mm), ppa_core::text::number(*proximal_mm)
     )]
     NoRest {
         /// Height of the lowest distal point above the lowest point, untipped.

@@ -1,12 +1,13 @@
 //! Laying a rotated limb on the table under the central beam: T_rot, T_mat and T_opt.
 
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use ppa_core::Side;
 use serde::{Deserialize, Serialize};
 
 use crate::contact::Profile;
 use crate::device::XrayDevice;
 use crate::frames::{Ct, Device, Patient, Rigid};
-use crate::landmarks::{Landmarks, Side};
+use crate::landmarks::Landmarks;
 use crate::matching::{axes_rotation, on_beam, plane_axes, table_axes};
 use crate::place_error::{PlaceError, check_points};
 use crate::plane::Plane;

@@ -1,6 +1,7 @@
 //! Finding the table top in a cloud of a room.
 
 use nalgebra::{Point3, Unit, Vector3};
+use ppa_core::random::split_mix;
 use ppa_mesh::PointCloud;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -170,7 +171,7 @@ impl<'a> Search<'a> {
 
     fn candidate(&self, pool: &[Point3<f64>], seed: u64, index: u64) -> Option<Plane> {
         let pick = |corner: u64| {
-            let random = mixed(mixed(seed) ^ mixed(4 * index + corner));
+            let random = split_mix(split_mix(seed) ^ split_mix(4 * index + corner));
             // The high product maps 64 random bits evenly onto the points.
             pool[((u128::from(random) * pool.len() as u128) >> 64) as usize]
         };
@@ -196,13 +197,4 @@ impl<'a> Search<'a> {
             }
         }
     }
-}
-
-/// Steele, Lea and Flood's 64-bit finaliser (SplitMix64, doi:10.1145/2660193.2660195): an
-/// addressed random number is the mix of its address.
-fn mixed(address: u64) -> u64 {
-    let mut z = address.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-    z ^ z >> 31
 }

@@ -51,7 +51,6 @@ mod matter;
 pub mod mcgpu;
 mod octaves;
 mod phantom;
-mod philox;
 mod run;
 mod transport;
 
@@ -64,6 +63,8 @@ mod scenes;
 // The name that `scenes` knows this crate by.
 #[cfg(test)]
 extern crate self as ppa_xray;
+
+pub use ppa_core::{Part, PartError};
 
 pub use beam::projection::{Detector, Projection};
 pub use beam::projection_error::ProjectionError;
@@ -104,7 +105,6 @@ pub use phantom::segment::{Composition, Constituent, Segment};
 pub use phantom::voxels::{PhantomError, VoxelPhantom};
 pub use run::analog_run::AnalogRun;
 pub use run::analog_tally::AnalogTally;
-pub use run::part::{Part, PartError};
 pub use run::progress::{Progress, Stop, Stopped};
 pub use run::tally_error::TallyError;
 pub use transport::tally::Category;

@@ -7,11 +7,12 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use ppa_core::TransformRows;
 use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_dataset::layout::{self, LimbId, View};
 use ppa_dataset::{
     BodyShape, Case, FileKind, FolderError, GenerateError, GenerateSettings, JobError, Manifest,
-    Plan, PlanCase, PreparedLimb, Rows, Stage, Summary, generate, prepare,
+    Plan, PlanCase, PreparedLimb, Stage, Summary, generate, prepare,
 };
 use ppa_depth::{DepthImage, isometry_from_rows};
 use ppa_scene::{Landmarks, Side, Sweep};
@@ -120,7 +121,7 @@ fn contents(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
         .collect()
 }
 
-fn motion(rows: &Rows) -> Isometry3<f64> {
+fn motion(rows: &TransformRows) -> Isometry3<f64> {
     isometry_from_rows(rows).unwrap()
 }
 

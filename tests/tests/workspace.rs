@@ -6,18 +6,16 @@ use std::path::{Path, PathBuf};
 
 /// Crates of the workspace and the crates each may depend on outside its tests.
 const ARROWS: &[(&str, &[&str])] = &[
-    ("ppa-files", &[]),
-    ("ppa-text", &[]),
-    ("ppa-ct", &["ppa-files", "ppa-text"]),
-    ("ppa-mesh", &["ppa-files", "ppa-ct"]),
-    ("ppa-scene", &["ppa-ct", "ppa-mesh", "ppa-text"]),
-    ("ppa-depth", &["ppa-files"]),
-    ("ppa-xray", &["ppa-files", "ppa-ct"]),
+    ("ppa-core", &[]),
+    ("ppa-ct", &["ppa-core"]),
+    ("ppa-mesh", &["ppa-core", "ppa-ct"]),
+    ("ppa-scene", &["ppa-ct", "ppa-mesh", "ppa-core"]),
+    ("ppa-depth", &["ppa-core"]),
+    ("ppa-xray", &["ppa-core", "ppa-ct"]),
     (
         "ppa-dataset",
         &[
-            "ppa-files",
-            "ppa-text",
+            "ppa-core",
             "ppa-ct",
             "ppa-mesh",
             "ppa-scene",
@@ -26,14 +24,11 @@ const ARROWS: &[(&str, &[&str])] = &[
         ],
     ),
     ("ppa-metrics", &[]),
-    (
-        "ppa-learn",
-        &["ppa-files", "ppa-text", "ppa-dataset", "ppa-metrics"],
-    ),
+    ("ppa-learn", &["ppa-core", "ppa-dataset", "ppa-metrics"]),
     (
         "ppa-cli",
         &[
-            "ppa-files",
+            "ppa-core",
             "ppa-ct",
             "ppa-mesh",
             "ppa-scene",
@@ -42,13 +37,19 @@ const ARROWS: &[(&str, &[&str])] = &[
             "ppa-dataset",
             "ppa-learn",
             "ppa-metrics",
-            "ppa-text",
         ],
     ),
 ];
 
 /// Foreign crates that a crate must not pull in, by prefix.
 const FORBIDDEN: &[(&str, &[&str])] = &[
+    // Names and conventions only: no formulas, readers or frontends.
+    (
+        "ppa-core",
+        &[
+            "candle", "clap", "dicom", "exr", "image", "nalgebra", "nifti", "parry", "png", "rayon",
+        ],
+    ),
     ("ppa-mesh", &["dicom", "nifti", "candle"]),
     ("ppa-depth", &["dicom", "nifti", "candle", "clap"]),
     ("ppa-xray", &["dicom", "nifti", "candle", "clap"]),
@@ -121,7 +122,7 @@ fn libraries_used_alone_pull_in_no_reader_network_or_frontend() {
 #[test]
 fn datasets_are_read_without_the_crates_that_make_them() {
     for line in tree(&["--package", "ppa-dataset", "--no-default-features"]) {
-        let may = ["ppa-dataset ", "ppa-files ", "ppa-text "];
+        let may = ["ppa-dataset ", "ppa-core "];
         let ours = line.starts_with("ppa-") && !may.iter().any(|name| line.starts_with(name));
         assert!(!ours, "reading a dataset pulls in {line}");
     }

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
+use ppa_core::text::count;
 use ppa_dataset::{CaseCheck, Drift, Finding, Severity, case_picture, write_picture};
-use ppa_text::count;
 use serde::Serialize;
 
 use crate::commands::pictures::shown_name;

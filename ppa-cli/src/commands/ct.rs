@@ -5,8 +5,8 @@ mod info;
 mod phantom;
 
 use clap::Subcommand;
+use ppa_core::text::{count, number};
 use ppa_ct::Info;
-use ppa_text::{count, number};
 
 use crate::output::Output;
 

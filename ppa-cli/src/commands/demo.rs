@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
+use ppa_core::text::count;
 use ppa_ct::phantom::{self, LowerLeg, TableTop};
 use ppa_ct::{ReadOptions, write_nifti};
 use ppa_dataset::layout::{self, LimbId};
 use ppa_dataset::{GenerateSettings, Plan, PlanCase, Summary, contact_sheet, prepare, write_whole};
 use ppa_mesh::LimbSettings;
 use ppa_scene::{LandmarkOverrides, Side, Sweep};
-use ppa_text::count;
 use serde::Serialize;
 
 use super::generate::with_progress;

@@ -12,7 +12,7 @@ use ppa_learn::evaluate::{
 };
 use ppa_learn::train::{Source, predict, read_log, samples, trained};
 
-use ppa_text::number;
+use ppa_core::text::number;
 
 use crate::findings::repeat_of_datasets;
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};

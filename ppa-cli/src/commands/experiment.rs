@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::{Args, ValueEnum};
+use ppa_core::Part;
+use ppa_core::text::{count, number};
 use ppa_dataset::write_whole;
 use ppa_learn::experiment::{Begun, Event, Experiment, ExperimentPlan, Runner, Table};
 use ppa_metrics::{ConstantPrediction, PermutationTest};
-use ppa_text::{count, number};
-use ppa_xray::Part;
 use serde::Serialize;
 
 use crate::findings::repeat_of_datasets;

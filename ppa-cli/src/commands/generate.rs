@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use ppa_core::Part;
+use ppa_core::text::count;
 use ppa_dataset::published::{Published, PublishedError};
 use ppa_dataset::{GenerateSettings, Plan, Summary, generate, held_part};
-use ppa_text::count;
-use ppa_xray::Part;
 
 use crate::interrupt::Interrupt;
 use crate::output::Output;

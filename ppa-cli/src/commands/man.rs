@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::{Args, Command, CommandFactory};
 use clap_mangen::Man;
+use ppa_core::text::count;
 use ppa_dataset::write_whole;
-use ppa_text::count;
 use serde_json::json;
 
 use crate::Cli;

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
+use ppa_core::text::{count, count_as, number};
 use ppa_dataset::{BodyShape, Case, ShapeSettings, body_shape, layout::LimbId};
 use ppa_mesh::{
     Border, Bump, Displacement, Mesh, add_bumps, dbscan, iso_surface, read_mesh_file,
     write_mesh_file,
 };
-use ppa_text::{count, count_as, number};
 use serde::Serialize;
 
 use crate::findings::prepared;
@@ -191,7 +191,7 @@ fn augment(args: &AugmentArgs, output: Output) -> anyhow::Result<()> {
     );
     let limb = LimbId {
         patient: 0,
-        side: case.side.into(),
+        side: case.side,
     };
     let watch = Stopwatch::start();
     let mesh = body_shape(

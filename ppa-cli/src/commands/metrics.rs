@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
+use ppa_core::text::number;
 use ppa_metrics::{Report, evaluate};
-use ppa_text::number;
 use serde::Deserialize;
 
 use crate::output::Output;

@@ -36,7 +36,8 @@ use serde::de::DeserializeOwned;
 /// Reads the rows of a CSV file with a header line.
 fn read_csv<T: DeserializeOwned>(path: &Path) -> anyhow::Result<Vec<T>> {
     // Read whole: to `csv` a header that cannot be read is an empty table.
-    let bytes = ppa_files::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let bytes = ppa_core::regular_file::read(path)
+        .with_context(|| format!("cannot read {}", path.display()))?;
     let rows = csv::Reader::from_reader(&bytes[..])
         .into_deserialize()
         .collect::<Result<_, _>>();
@@ -45,7 +46,7 @@ fn read_csv<T: DeserializeOwned>(path: &Path) -> anyhow::Result<Vec<T>> {
 
 /// Reads a JSON file.
 fn read_json<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
-    let text = ppa_files::read_to_string(path)
+    let text = ppa_core::regular_file::read_to_string(path)
         .with_context(|| format!("cannot read {}", path.display()))?;
     serde_json::from_str(&text)
         .with_context(|| format!("{} is not the expected JSON", path.display()))

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::{Args, Subcommand};
+use ppa_core::text::count;
 use ppa_dataset::{Forecast, Plan, forecast};
-use ppa_text::count;
 use serde::Serialize;
 
 use super::generate::dataset_folder;

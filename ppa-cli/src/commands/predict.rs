@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::Args;
+use ppa_core::Roi;
+use ppa_core::text::count;
 use ppa_learn::DeviceName;
-use ppa_learn::data::Roi;
 use ppa_learn::frames::{FramePair, PairFolder, PairPrediction, PairPredictor};
-use ppa_text::count;
 use serde::Serialize;
 
 use crate::interrupt::{Interrupt, ends_at_once};

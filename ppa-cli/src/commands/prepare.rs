@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::{Args, ValueEnum};
 use nalgebra::Point3;
+use ppa_core::text::number;
 use ppa_ct::{Format, Volume, write};
 use ppa_dataset::labels::{AnkleBones, BoneFile, BoneNumbers, JointSpace, segment_bones};
 use ppa_dataset::{Case, Found, PreparedLimb, Severity, case_picture, prepare, write_picture};
 use ppa_mesh::{LimbSettings, VoxelBox, write_mesh_file};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
-use ppa_text::number;
 
 use crate::commands::pictures::shown_name;
 use crate::findings::severity_name;

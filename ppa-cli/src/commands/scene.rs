@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
+use ppa_core::text::{count, number};
 use ppa_dataset::{
     Case, Frames, Plan, PosedLimb, RoomFile, Table, pose_picture, write_picture, write_whole,
 };
 use ppa_mesh::{read_mesh_file, write_cloud_file, write_mesh_file};
 use ppa_scene::{Contact, PlaneSettings, SoftTissue, TablePlane, place_soft, table_plane};
-use ppa_text::{count, number};
 use serde::Serialize;
 
 use crate::commands::pictures::shown_name;

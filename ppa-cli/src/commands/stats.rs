@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
+use ppa_core::text::{count, number};
 use ppa_metrics::{mean_per_seed, sign_flip_permutation};
-use ppa_text::{count, number};
 use serde::Deserialize;
 
 use crate::output::Output;

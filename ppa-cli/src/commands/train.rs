@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use ppa_core::text::count;
 use ppa_learn::Loaded;
 use ppa_learn::train::{Ended, TrainConfig, read_start, train};
-use ppa_text::count;
 use serde::Serialize;
 
 use super::learn::not_taken;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::Point3;
-use ppa_ct::phantom::{LowerLeg, Side as PhantomSide, TableTop};
+use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_ct::{Grid, Volume, write_nifti};
 use ppa_dataset::{FindingCode, PrepareError, PreparedLimb, Severity, prepare};
 use ppa_mesh::LimbSettings;
@@ -43,11 +43,11 @@ fn codes(limb: &PreparedLimb, least: Severity) -> Vec<FindingCode> {
 fn is_clear_and_a_swap_is_reported(number: u32, side: Side) {
     let folder = tempfile::tempdir().unwrap();
     let scan = folder.path().join("leg.nii");
-    let (of, other) = match side {
-        Side::Left => (PhantomSide::Left, Side::Right),
-        Side::Right => (PhantomSide::Right, Side::Left),
+    let other = match side {
+        Side::Left => Side::Right,
+        Side::Right => Side::Left,
     };
-    let leg = LowerLeg::family(&format!("P{number:02}"), of).unwrap();
+    let leg = LowerLeg::family(&format!("P{number:02}"), side).unwrap();
     write_nifti(&scan, &leg.voxelise(2.0, TableTop::Present).unwrap()).unwrap();
     for (said, expected) in [(side, vec![]), (other, vec![FindingCode::SideMismatch])] {
         let found = limb(&scan, said).unwrap();
@@ -81,7 +81,7 @@ fn two_legs(pressed_mm: f64) -> Volume {
         let leg = LowerLeg::family("P01", side).unwrap();
         leg.voxelise(SPACING_MM, TableTop::Absent).unwrap()
     };
-    let [right, left] = [PhantomSide::Right, PhantomSide::Left].map(of);
+    let [right, left] = [Side::Right, Side::Left].map(of);
     // Medial is +x in the right leg: the widest place of its calf, and that of the left leg mirrored.
     let end = |volume: &Volume, towards: f64| {
         let grid = volume.grid();

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use ppa_text::count;
+use ppa_core::text::count;
 
 use crate::acquisition::Acquisition;
 use crate::scan::{Warning, WarningCode};

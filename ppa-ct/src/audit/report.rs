@@ -5,7 +5,7 @@ use std::fmt::Write;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 
-use ppa_text::number;
+use ppa_core::text::number;
 
 use super::histogram::Histogram;
 use super::{Audit, Severity};

@@ -1,6 +1,6 @@
 //! Are these Hounsfield units, whole and of a limb?
 
-use ppa_text::{count, number};
+use ppa_core::text::{count, number};
 
 use super::Measures;
 use super::findings::{Finding, FindingCode, Severity};

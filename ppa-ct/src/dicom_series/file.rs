@@ -128,7 +128,7 @@ impl DicomFile {
                 Err(short())
             };
         }
-        let mut file = ppa_files::open(&self.path).map_err(|e| self.io(e))?;
+        let mut file = ppa_core::regular_file::open(&self.path).map_err(|e| self.io(e))?;
         file.seek(SeekFrom::Start(at)).map_err(|e| self.io(e))?;
         // The length was there when the header was read.
         bytes.resize(length as usize, 0);
@@ -140,7 +140,7 @@ impl DicomFile {
 
     /// The data set of a deflated file, from its start.
     fn inflated(&self) -> Result<impl Read + use<>, ReadError> {
-        let mut file = ppa_files::open(&self.path).map_err(|e| self.io(e))?;
+        let mut file = ppa_core::regular_file::open(&self.path).map_err(|e| self.io(e))?;
         let at = SeekFrom::Start(self.deflated_at.unwrap_or_default());
         file.seek(at).map_err(|e| self.io(e))?;
         Ok(DeflateDecoder::new(BufReader::new(file)))

@@ -42,7 +42,7 @@ impl Frame {
         if !(unit(along_row) && unit(down_column) && square) {
             return Err(attributes.bad(
                 "ImageOrientationPatient",
-                ppa_text::numbers(cosines).to_string(),
+                ppa_core::text::numbers(cosines).to_string(),
                 "two perpendicular unit vectors",
             ));
         }

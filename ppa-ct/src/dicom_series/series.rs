@@ -106,7 +106,7 @@ impl Sorted {
                 code: WarningCode::LocalizersDropped,
                 text: format!(
                     "left out: {} (scout views)",
-                    ppa_text::count(self.localizers, "localizer image")
+                    ppa_core::text::count(self.localizers, "localizer image")
                 ),
             });
         }
@@ -115,7 +115,7 @@ impl Sorted {
                 code: WarningCode::NonImagesDropped,
                 text: format!(
                     "left out: {} without an image",
-                    ppa_text::count(self.others, "DICOM object")
+                    ppa_core::text::count(self.others, "DICOM object")
                 ),
             });
         }

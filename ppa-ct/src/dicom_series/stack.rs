@@ -161,7 +161,7 @@ fn same_lattice(first: &Slice, slice: &Slice) -> Result<(), ReadError> {
     });
     // Over 512 pixels, a relative difference of 1e-4 shifts the far edge by a twentieth of a pixel.
     if du.max(dv) > 1e-4 {
-        let text = |f: &Frame| format!("{} mm", ppa_text::numbers(f.spacing_mm));
+        let text = |f: &Frame| format!("{} mm", ppa_core::text::numbers(f.spacing_mm));
         return Err(mixed("the pixel spacing", text(slice), text(first)));
     }
     let turned = (slice.along_row - first.along_row)
@@ -170,7 +170,7 @@ fn same_lattice(first: &Slice, slice: &Slice) -> Result<(), ReadError> {
     if turned > 1e-3 {
         let text = |f: &Frame| {
             let [u, v] = [f.along_row, f.down_column];
-            let [u, v] = [u, v].map(|axis| ppa_text::numbers(axis.iter().copied()));
+            let [u, v] = [u, v].map(|axis| ppa_core::text::numbers(axis.iter().copied()));
             format!("({u:.4}), ({v:.4})")
         };
         return Err(mixed("the orientation", text(slice), text(first)));

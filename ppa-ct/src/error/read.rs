@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use ppa_text::{count, number};
+use ppa_core::text::{count, number};
 
 use super::Cause;
 use crate::scan::SeriesSummary;

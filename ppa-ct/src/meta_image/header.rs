@@ -219,7 +219,7 @@ impl Header {
         if spacing.iter().any(|s| *s <= 0.0) {
             return Err(format!(
                 "ElementSpacing is {}, expected positive numbers",
-                ppa_text::numbers(spacing)
+                ppa_core::text::numbers(spacing)
             ));
         }
         let matrix = self.get(&["TransformMatrix", "Rotation", "Orientation"]);

@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 
 use flate2::write::ZlibEncoder;
 use flate2::{Compression, CrcWriter};
+use ppa_core::whole_file;
 
 use super::header::{Data, Header, is_data_file};
 use crate::error::WriteError;
 use crate::scan_file::ScanFile;
 use crate::stored::write_exact;
 use crate::volume::Volume;
-use crate::whole_file::write_whole;
 
 /// Writes a volume as `.mha`, or as `.mhd` with its voxels in a `.zraw` beside it.
 ///
@@ -27,7 +27,7 @@ use crate::whole_file::write_whole;
 pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     let extension = path.extension().unwrap_or_default();
     if extension.eq_ignore_ascii_case("mha") {
-        write_whole(path, |out| {
+        whole_file::write_with(path, |out| {
             // The header tells the packed length, which is known last: it is written again, no longer.
             out.write_all(header(volume, 0, "LOCAL").as_bytes())?;
             let packed = write_packed(out, volume)?;
@@ -65,13 +65,13 @@ fn write_pair(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     let data = path.with_file_name(&name);
     let before = data_file_before(path);
     let mut packed = 0;
-    write_whole(&data, |out| {
+    whole_file::write_with(&data, |out| {
         packed = write_packed(out, volume)?;
         Ok(())
     })
     .map_err(io_at(&data))?;
     let header = header(volume, packed, &name);
-    let written = write_whole(path, |out| out.write_all(header.as_bytes()));
+    let written = whole_file::write(path, header.as_bytes());
     // Voxels without a header are of no use; whether they can be removed matters less than what was asked for.
     let unused = match &written {
         Ok(()) => before.filter(|before| *before != data),

@@ -55,7 +55,7 @@ fn spacing(header: &NiftiHeader) -> Result<Vector3<f64>, String> {
     }
     Err(format!(
         "voxel spacing {}, expected positive numbers",
-        ppa_text::numbers(spacing.iter().copied())
+        ppa_core::text::numbers(spacing.iter().copied())
     ))
 }
 

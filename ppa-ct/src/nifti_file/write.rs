@@ -6,12 +6,12 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use nifti::NiftiHeader;
+use ppa_core::whole_file;
 
 use super::affine::set_affine;
 use crate::error::WriteError;
 use crate::stored::write_exact;
 use crate::volume::Volume;
-use crate::whole_file::write_whole;
 
 /// Voxels follow the header and four bytes that announce no extension.
 const VOXELS_AT: f32 = 352.0;
@@ -44,7 +44,7 @@ pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
             most,
         });
     }
-    write_whole(path, |out| {
+    whole_file::write_with(path, |out| {
         if compress {
             // CT noise hardly compresses: higher levels cost time and save a few percent.
             let mut gzip = GzEncoder::new(out, Compression::fast());

@@ -5,11 +5,11 @@ use std::path::Path;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use ppa_core::whole_file;
 
 use crate::error::WriteError;
 use crate::stored::write_exact;
 use crate::volume::Volume;
-use crate::whole_file::write_whole;
 
 /// Writes a volume as `.nrrd`: one file, gzipped voxels, axes in LPS.
 ///
@@ -29,7 +29,7 @@ pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
             expected: "a name ending in .nrrd",
         });
     }
-    write_whole(path, |out| {
+    whole_file::write_with(path, |out| {
         out.write_all(header(volume).as_bytes())?;
         // CT noise hardly compresses: higher levels cost time and save a few percent.
         let mut gzip = GzEncoder::new(out, Compression::fast());

@@ -1,5 +1,7 @@
 //! Random numbers by address: the same seed, purpose and index always draw the same number.
 
+use ppa_core::random::split_mix;
+
 /// What a number is drawn for. Part of the reproducibility contract: append, never renumber.
 #[derive(Debug, Clone, Copy)]
 #[repr(u8)]
@@ -20,18 +22,9 @@ pub(super) enum Purpose {
     TextureOfSeed = 7,
 }
 
-/// One step of the SplitMix64 generator (Steele, Lea and Flood 2014, doi:10.1145/2660193.2660195): every bit of
-/// the input reaches every bit of the output.
-fn mix(state: u64) -> u64 {
-    let z = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
 /// 64 random bits.
 pub(super) fn bits(seed: u64, purpose: Purpose, index: u64) -> u64 {
-    mix(mix(mix(seed) ^ u64::from(purpose as u8)) ^ index)
+    split_mix(split_mix(split_mix(seed) ^ u64::from(purpose as u8)) ^ index)
 }
 
 /// Two independent numbers above 0 and up to 1 from 64 bits.

@@ -1,8 +1,9 @@
 //! The family of lower legs: a fixed table of seventeen, and any further by seed.
 
+use ppa_core::Side;
+
 use super::draw::{Purpose, bits, truncated_normal};
 use super::family_table::{DIMENSIONS, Dimensions, FAMILY};
-use super::limb::Side;
 use super::parameters::{P01, Parameters, Sex};
 
 /// No phantom has this name.

@@ -1,10 +1,11 @@
 //! A knee: the same shapes make another joint.
 
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
+use ppa_core::Side;
 
 use super::bone::{Bone, Filling, Gap, Knot, Skeleton};
 use super::envelope::{Bounded, Cover, Envelope};
-use super::limb::{Limb, ScanRange, Side};
+use super::limb::{Limb, ScanRange};
 use super::loft::{End, Loft, Section};
 use super::sdf::{Plane, Shape};
 

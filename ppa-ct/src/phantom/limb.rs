@@ -1,20 +1,12 @@
 //! A limb of known shape: bones in soft tissue, drawn as a right one.
 
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
+use ppa_core::Side;
 
 use super::bone::Skeleton;
 use super::envelope::Envelope;
 use super::plate::Plate;
 use super::tissue::Tissue;
-
-/// Side of the body.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Side {
-    /// The left limb: x of the `ct` frame grows away from the midline.
-    Left,
-    /// The right limb: x of the `ct` frame grows towards the midline.
-    Right,
-}
 
 /// The part of the world that a scan shows, mm from the middle of the joint along x, y and z.
 #[derive(Debug, Clone, Copy)]

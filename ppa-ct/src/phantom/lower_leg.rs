@@ -3,11 +3,12 @@
 use std::ops::Deref;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use ppa_core::Side;
 
 use super::bone::Skeleton;
 use super::family::{self, UnknownPhantom};
 use super::hindfoot::Mortise;
-use super::limb::{Limb, ScanRange, Side};
+use super::limb::{Limb, ScanRange};
 use super::lower_leg_skin::{self, Rest};
 use super::parameters::{P01, Parameters, Sex};
 use super::placement::Placement;

@@ -1,13 +1,14 @@
 //! From shapes to Hounsfield units on a lattice, with partial volume.
 
 use nalgebra::{Point3, Vector3};
+use ppa_core::Side;
 use rayon::prelude::*;
 
 use crate::grid::Grid;
 use crate::values::with_room;
 use crate::volume::{Volume, VolumeError};
 
-use super::limb::{Limb, Side};
+use super::limb::Limb;
 use super::tissue::Local;
 
 /// Why a phantom cannot be voxelised.

@@ -172,7 +172,9 @@ fn names_readers(path: &Path) -> io::Result<bool> {
         return Ok(false);
     }
     let mut start = Vec::new();
-    ppa_files::open(path)?.take(64).read_to_end(&mut start)?;
+    ppa_core::regular_file::open(path)?
+        .take(64)
+        .read_to_end(&mut start)?;
     Ok(NOT_TO_BE_BAGGED
         .iter()
         .any(|header| start.starts_with(header)))
@@ -182,7 +184,7 @@ fn names_readers(path: &Path) -> io::Result<bool> {
 fn copy(from: &Path, to: &Path) -> Result<(u64, String), FileError> {
     let folder = to.parent().expect("payload lies in the folder data");
     fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
-    let mut source = ppa_files::open(from).map_err(FileError::at("read", from))?;
+    let mut source = ppa_core::regular_file::open(from).map_err(FileError::at("read", from))?;
     let mut target = File::create(to).map_err(FileError::at("write", to))?;
     let (mut size, mut hasher, mut buffer) = (0, Sha256::new(), vec![0; 1 << 16]);
     loop {

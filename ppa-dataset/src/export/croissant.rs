@@ -32,7 +32,7 @@ pub(super) fn croissant(
         "citeAs": format!("Laufer et al., Patient Pose Assessment Using a CT-Based Framework for Synthetic Data Generation, MELBA 2026:027, {PAPER}"),
         "rai:dataCollection": format!(
             "Simulated by {} (sources {}) from {} of computed tomography, of persons or phantoms; no image was taken for this dataset.",
-            provenance.settings.generator, provenance.settings.code, ppa_text::count(provenance.scans().len(), "volume")
+            provenance.settings.generator, provenance.settings.code, ppa_core::text::count(provenance.scans().len(), "volume")
         ),
         "rai:personalSensitiveInformation": "Shape of the limb's skin and bones; no name, date, number or other text of a scan.",
         "rai:dataLimitations": "Body shapes are variants of the same skin, and the bones are those of few persons: split by person.",

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use ppa_text::count;
+use ppa_core::text::count;
 
 use super::metadata::{DESCRIPTION, Metadata, PAPER, Provenance};
 use super::table::Table;

@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use ppa_core::TransformRows;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::files::{FileError, read_text, write_whole};
 use crate::labels::{LabelFile, LabelFileError};
 use crate::layout::{LimbId, View};
-use crate::manifest::{FileRow, Manifest, Rows};
+use crate::manifest::{FileRow, Manifest};
 use crate::split::{Split, SplitError};
 
 /// Why a dataset has no table.
@@ -135,7 +136,7 @@ struct Engine {
 struct CameraRow {
     view: View,
     intrinsics: Value,
-    room_from_camera: Rows,
+    room_from_camera: TransformRows,
 }
 
 impl Table {

@@ -129,7 +129,8 @@ fn write_shard(
         let name = sample_name(pair);
         for (kind, file) in images(pair) {
             let image: PathBuf = root.join(file);
-            let bytes = ppa_files::read(&image).map_err(FileError::at("read", &image))?;
+            let bytes =
+                ppa_core::regular_file::read(&image).map_err(FileError::at("read", &image))?;
             add(format!("{name}.{kind}.png"), &bytes)?;
         }
         let text = serde_json::to_string(pair).expect("rows hold only JSON values");

@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use image::{ImageBuffer, Luma};
+use ppa_core::Part;
 use ppa_scene::Sweep;
-use ppa_xray::Part;
 use sha2::{Digest, Sha256};
 
 use crate::body_shape::BodyShape;
@@ -200,7 +200,7 @@ fn row(unit: &Unit, file: String, kind: FileKind, shape: BodyShape, to: &Path) -
         let pixel = |x: u32, y: u32| Luma([u16::from(noise[(x + 12 * y) as usize % 32]) + 500]);
         ImageBuffer::from_fn(12, 9, pixel).save(&path).unwrap();
     }
-    const POSE: crate::Rows = [
+    const POSE: ppa_core::TransformRows = [
         [1.0, 0.0, 0.0, 0.1],
         [0.0, 1.0, 0.0, 0.0],
         [0.0, 0.0, 1.0, 0.0],

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use nalgebra::{Isometry3, Point3};
+use ppa_core::TransformRows;
 use ppa_depth::isometry_from_rows;
 use ppa_scene::LimbKind;
 use serde::Serialize;
@@ -21,7 +22,7 @@ use crate::case::Case;
 use crate::checksums::Checksums;
 use crate::files::{FileError, write_whole};
 use crate::layout::LimbId;
-use crate::manifest::{FileKind, FileRow, Manifest, Rows};
+use crate::manifest::{FileKind, FileRow, Manifest};
 
 /// What was computed for one radiograph; a row of `openness.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -348,7 +349,7 @@ fn computed_rows(
 fn pose(
     row: &FileRow,
     what: &'static str,
-    rows: Option<&Rows>,
+    rows: Option<&TransformRows>,
 ) -> Result<Isometry3<f64>, AutoLabelError> {
     let usable = rows.and_then(|rows| isometry_from_rows(rows).ok());
     usable.ok_or_else(|| AutoLabelError::Pose {

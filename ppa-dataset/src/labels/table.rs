@@ -25,7 +25,7 @@ pub enum TableError {
 }
 
 pub(super) fn read_table<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, TableError> {
-    let bytes = ppa_files::read(path).map_err(FileError::at("read", path))?;
+    let bytes = ppa_core::regular_file::read(path).map_err(FileError::at("read", path))?;
     let rows = csv::Reader::from_reader(&bytes[..]).into_deserialize();
     rows.collect::<Result<_, _>>()
         .map_err(|source| TableError::Parse {

@@ -26,7 +26,7 @@ impl Tallies {
             path: path.to_owned(),
             message,
         };
-        let file = ppa_files::open(path).map_err(|error| wrong(error.to_string()))?;
+        let file = ppa_core::regular_file::open(path).map_err(|error| wrong(error.to_string()))?;
         let layer = read()
             .no_deep_data()
             .largest_resolution_level()

@@ -95,7 +95,7 @@ impl Frame {
             .map(|severity| {
                 let text = match severity {
                     Severity::Severe => format!("{} severe", count(severity)),
-                    _ => ppa_text::count(count(severity), word(severity)),
+                    _ => ppa_core::text::count(count(severity), word(severity)),
                 };
                 (text, colour(severity))
             })

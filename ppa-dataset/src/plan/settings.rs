@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
+use ppa_core::TransformRows;
 use ppa_depth::{RigSpec, SensorSpec, WallDepth};
 use ppa_scene::{PlaneSettings, RoomSpec};
 use ppa_xray::{Detector, FastSettings, HuCalibration, Presentation, Receptor, Source};
 use serde::{Deserialize, Serialize};
 
 use crate::cut_share::MAX_CUT_SHARE;
-use crate::manifest::Rows;
 
 /// The x-ray room: built in, or a recorded one.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -19,7 +19,7 @@ pub struct PlanRoom {
     /// Pose of the x-ray device in a recorded room (row-major 4x4; source at the origin, z along
     /// the beam, y towards the patient's feet). When absent, the recorded frame is that of the
     /// built-in room: z up, y towards the head, origin where the beam meets the table.
-    pub room_from_device: Option<Rows>,
+    pub room_from_device: Option<TransformRows>,
     /// The built-in room, and the x-ray device in either room.
     pub parametric: RoomSpec,
     /// How the table plane is searched; when absent, it is what the central beam hits first.

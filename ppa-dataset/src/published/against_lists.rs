@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use ppa_core::text::error_chain;
 use rayon::prelude::*;
 use serde::Deserialize;
 
@@ -29,13 +30,13 @@ pub(super) fn against_lists(dataset: &Published, hashes: BTreeMap<&str, String>)
     let manifest = match Manifest::read(root) {
         Ok(manifest) => manifest,
         Err(error) => {
-            flaws.push(Flaw::Manifest(told(&error)));
+            flaws.push(Flaw::Manifest(error_chain(&error)));
             return flaws;
         }
     };
     flaws.extend(against_manifest(&manifest, hashes));
     match outdated(dataset, || Ok(manifest)) {
-        Err(error) => flaws.push(Flaw::Manifest(told(&error))),
+        Err(error) => flaws.push(Flaw::Manifest(error_chain(&error))),
         Ok(found) => flaws.extend(found.into_iter().map(|outdated| Flaw::Outdated {
             limb: outdated.limb,
             step: outdated.steps[0],
@@ -45,21 +46,10 @@ pub(super) fn against_lists(dataset: &Published, hashes: BTreeMap<&str, String>)
     flaws
 }
 
-/// An error with its causes in one line.
-pub(super) fn told(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(source) = cause {
-        text += &format!(": {source}");
-        cause = source.source();
-    }
-    text
-}
-
 /// What differs from a file of hashes, where there is one; `flaw` is that of a file with another hash.
 fn against_checksums(root: &Path, sums: &'static str, flaw: impl Fn(String) -> Flaw) -> Vec<Flaw> {
     match Checksums::look_at(root, sums) {
-        Err(error) => vec![Flaw::Manifest(told(&error))],
+        Err(error) => vec![Flaw::Manifest(error_chain(&error))],
         Ok(FoundChecksums::Absent) => Vec::new(),
         Ok(FoundChecksums::Damaged) => vec![Flaw::Checksums { file: sums }],
         Ok(FoundChecksums::Whole(sums)) => sums.altered(root).into_iter().map(flaw).collect(),
@@ -137,7 +127,7 @@ fn same_scans(root: &Path) -> Vec<Flaw> {
     };
     let scans = match read() {
         Ok(scans) => scans,
-        Err(error) => return vec![Flaw::Manifest(told(&error))],
+        Err(error) => return vec![Flaw::Manifest(error_chain(&error))],
     };
     let mut owners: BTreeMap<&str, u32> = BTreeMap::new();
     let mut flaws = Vec::new();

@@ -223,7 +223,7 @@ impl Copy<'_> {
         let folder = to.parent().expect("files lie in folders of the dataset");
         fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
         // `fs::copy` would wait for ever for somebody to write into a named pipe.
-        drop(ppa_files::open(&from).map_err(FileError::at("copy", &from))?);
+        drop(ppa_core::regular_file::open(&from).map_err(FileError::at("copy", &from))?);
         fs::copy(&from, &to).map_err(FileError::at("copy", &from))?;
         Ok(())
     }

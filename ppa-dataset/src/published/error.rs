@@ -54,7 +54,7 @@ pub enum PublishedError {
     #[error(
         "{}: labels of other radiographs than those there now: {}, the first of step {step}; make them again \
          (`ppa label auto` or `ppa label import`) or remove the file",
-        path.display(), ppa_text::count(*count, "label")
+        path.display(), ppa_core::text::count(*count, "label")
     )]
     Outdated {
         /// `labels.json` of the limb.

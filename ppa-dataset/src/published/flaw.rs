@@ -51,7 +51,7 @@ pub enum Flaw {
     Unpaired(Unpaired),
     /// Labels of radiographs that were made anew since.
     #[error("limb {} of patient {}: labels of other radiographs than those there now: {}, the first of step {step}",
-        limb.side_letter(), limb.patient, ppa_text::count(*count, "label"))]
+        limb.side_letter(), limb.patient, ppa_core::text::count(*count, "label"))]
     Outdated {
         /// The limb.
         limb: LimbId,

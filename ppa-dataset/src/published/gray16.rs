@@ -66,7 +66,7 @@ impl GrayImage16 {
     /// # Errors
     /// [`ImageFileError`] naming the file; images with fewer bits or colour are not converted.
     pub fn read(path: &Path) -> Result<Self, ImageFileError> {
-        let bytes = ppa_files::read(path).map_err(FileError::at("read", path))?;
+        let bytes = ppa_core::regular_file::read(path).map_err(FileError::at("read", path))?;
         Self::decode(&bytes, path)
     }
 

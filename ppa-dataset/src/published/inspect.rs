@@ -3,11 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use ppa_core::text::error_chain;
 use rayon::prelude::*;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use super::against_lists::{against_lists, told};
+use super::against_lists::against_lists;
 use super::convert::depth_files;
 use super::{Flaw, GrayImage16, ImageFileError, Published, PublishedError, Unpaired};
 use crate::files::{FileError, hex};
@@ -127,7 +128,7 @@ pub fn inspect(root: &Path) -> Result<Inspection, PublishedError> {
 /// Hash of an image, if it can be read, and what is wrong with it.
 fn look(root: &Path, file: &str, roi: Option<&RoiRow>) -> (Option<String>, Option<Flaw>) {
     let path = root.join(file);
-    let bytes = match ppa_files::read(&path).map_err(FileError::at("read", &path)) {
+    let bytes = match ppa_core::regular_file::read(&path).map_err(FileError::at("read", &path)) {
         Ok(bytes) => bytes,
         Err(error) => return (None, Some(damaged(&error.into()))),
     };
@@ -151,5 +152,5 @@ fn look(root: &Path, file: &str, roi: Option<&RoiRow>) -> (Option<String>, Optio
 }
 
 fn damaged(error: &ImageFileError) -> Flaw {
-    Flaw::Image(told(error))
+    Flaw::Image(error_chain(error))
 }

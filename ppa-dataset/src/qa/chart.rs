@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use ppa_text::number;
+use ppa_core::text::number;
 
 const WIDTH: f64 = 460.0;
 const HEIGHT: f64 = 240.0;

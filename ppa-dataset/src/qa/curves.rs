@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use ppa_text::number;
+use ppa_core::text::number;
 
 use super::chart::{Series, chart};
 use super::histogram::Depths;

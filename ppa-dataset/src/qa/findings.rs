@@ -1,6 +1,6 @@
 //! The findings about the limbs of a dataset, as a table of the page.
 
-use ppa_text::numbers;
+use ppa_core::text::numbers;
 
 use super::page::{escaped, side};
 use crate::findings::{Findings, LimbFinding, Severity};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ppa_text::{count, numbers};
+use ppa_core::text::{count, error_chain, numbers};
 
 use super::findings;
 use super::limb::{LimbPart, limb_part};
@@ -131,14 +131,8 @@ fn checks(root: &Path, flaws: &[Flaw]) -> String {
 
 /// An error with its causes. The page may be passed on: where the dataset lay is nobody's business.
 fn without_folder(error: &dyn std::error::Error, root: &Path) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(source) = cause {
-        text += &format!(": {source}");
-        cause = source.source();
-    }
     let folder = root.join("").display().to_string();
-    text.replace(&folder, "")
+    error_chain(error).replace(&folder, "")
 }
 
 fn splits(root: &Path, patients: &[u32]) -> Result<String, QaError> {

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
+use ppa_core::text::number;
 use ppa_depth::false_colour;
-use ppa_text::number;
 
 use super::chart::ticks;
 

@@ -3,13 +3,14 @@
 use std::path::Path;
 
 use nalgebra::{Isometry3, Point3};
+use ppa_core::TransformRows;
 use ppa_depth::{Camera, CameraSpec, isometry_from_rows};
 use serde::Deserialize;
 
 use super::page::QaError;
 use crate::files::{FileError, read_text};
 use crate::layout::View;
-use crate::manifest::{FileRow, Rows};
+use crate::manifest::FileRow;
 
 #[derive(Deserialize)]
 struct Described {
@@ -37,7 +38,7 @@ struct Table {
 struct CameraRow {
     view: View,
     intrinsics: CameraSpec,
-    room_from_camera: Rows,
+    room_from_camera: TransformRows,
 }
 
 /// One scan of the dataset.
@@ -112,7 +113,7 @@ mod tests {
 
     use super::*;
 
-    const ROOM_FROM_PATIENT: Rows = [
+    const ROOM_FROM_PATIENT: TransformRows = [
         [0.0, -1.0, 0.0, 30.0],
         [0.6, 0.0, 0.8, -20.0],
         [-0.8, 0.0, 0.6, 110.0],

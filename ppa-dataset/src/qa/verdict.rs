@@ -1,6 +1,6 @@
 //! The verdict at the top of the page, from all that was found.
 
-use ppa_text::count;
+use ppa_core::text::count;
 
 /// What was found in a dataset, in numbers.
 #[derive(Debug, Clone, Copy, Default)]

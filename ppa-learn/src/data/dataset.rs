@@ -4,12 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use ppa_core::Roi;
 use ppa_dataset::BodyShape;
 use ppa_dataset::layout::View;
 use ppa_dataset::published::{DepthFile, ImagePair, Pose, Published};
 
 use super::error::DataError;
-use super::prepare::Roi;
+use super::prepare::check_roi;
 use super::sample::{Sample, SampleImage};
 use super::size::size_of;
 
@@ -166,8 +167,8 @@ impl Reader<'_> {
         let no_roi = || DataError::NoRoi(path.clone());
         let roi = file.roi.as_ref().ok_or_else(no_roi)?;
         let roi = Roi {
-            x: roi.x_start,
-            y: roi.y_start,
+            x_start: roi.x_start,
+            y_start: roi.y_start,
             size: roi.size,
         };
         let found = size_of(&path)?;
@@ -180,11 +181,10 @@ impl Reader<'_> {
             });
         }
         let [width, height] = size;
-        roi.check(width, height)
-            .map_err(|source| DataError::Region {
-                path: path.clone(),
-                source: Box::new(source),
-            })?;
+        check_roi(&roi, width, height).map_err(|source| DataError::Region {
+            path: path.clone(),
+            source: Box::new(source),
+        })?;
         Ok(SampleImage {
             path,
             camera,

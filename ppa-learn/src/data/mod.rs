@@ -30,7 +30,7 @@ pub use error::DataError;
 pub use gradient::{gradient, quantile};
 pub use images::Images;
 pub use loader::{Batch, Loader, Order};
-pub use prepare::{RANGE_MM, Roi, evaluation_input, prepare, prepared_side};
+pub use prepare::{RANGE_MM, evaluation_input, prepare, prepared_side};
 pub use raster::Raster;
 pub use rotate::rotate;
 pub use sample::{Sample, SampleImage, check_split};

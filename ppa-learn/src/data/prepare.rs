@@ -1,39 +1,32 @@
 //! Region of interest, size and scale: the part that training and evaluation share.
 
+use ppa_core::Roi;
+
 use super::error::DataError;
 use super::raster::Raster;
 
 /// Depths are clipped here, and this depth becomes 1.
 pub const RANGE_MM: u16 = 1500;
 
-/// Square region around the joint, in pixels of the depth image, as `roi_depth.json` holds it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Roi {
-    /// First column.
-    pub x: u32,
-    /// First row.
-    pub y: u32,
-    /// Columns and rows; what lies beyond the image's border is left out.
-    pub size: u32,
-}
-
-impl Roi {
-    /// Whether a pixel of it lies in an image of `width` x `height`.
-    ///
-    /// # Errors
-    /// [`DataError::RoiOutside`] if none does.
-    pub fn check(&self, width: usize, height: usize) -> Result<(), DataError> {
-        let &Self { x, y, size } = self;
-        match size > 0 && (x as usize) < width && (y as usize) < height {
-            true => Ok(()),
-            false => Err(DataError::RoiOutside {
-                x,
-                y,
-                size,
-                width,
-                height,
-            }),
-        }
+/// Whether a pixel of a region of interest lies in an image of `width` x `height`.
+///
+/// # Errors
+/// [`DataError::RoiOutside`] if none does.
+pub fn check_roi(roi: &Roi, width: usize, height: usize) -> Result<(), DataError> {
+    let &Roi {
+        x_start,
+        y_start,
+        size,
+    } = roi;
+    match size > 0 && (x_start as usize) < width && (y_start as usize) < height {
+        true => Ok(()),
+        false => Err(DataError::RoiOutside {
+            x: x_start,
+            y: y_start,
+            size,
+            width,
+            height,
+        }),
     }
 }
 
@@ -50,8 +43,8 @@ pub fn prepared_side(side: usize) -> usize {
 /// # Panics
 /// If `side` is 0.
 pub fn prepare(depth_mm: &Raster<u16>, roi: Roi, side: usize) -> Result<Raster<u16>, DataError> {
-    roi.check(depth_mm.width(), depth_mm.height())?;
-    let [x, y, size] = [roi.x, roi.y, roi.size].map(|pixels| pixels as usize);
+    check_roi(&roi, depth_mm.width(), depth_mm.height())?;
+    let [x, y, size] = [roi.x_start, roi.y_start, roi.size].map(|pixels| pixels as usize);
     let region = depth_mm.crop(x, y, size, size);
     let region = region.expect("a pixel of the region lies in the image");
     Ok(region.resized(prepared_side(side), prepared_side(side)))
@@ -86,8 +79,8 @@ mod tests {
     fn depths_are_clipped_and_shifted_and_invalid_ones_stay_least() {
         let image = Raster::new(2, 2, vec![0, 750, 1500, 40_000]).unwrap();
         let whole = Roi {
-            x: 0,
-            y: 0,
+            x_start: 0,
+            y_start: 0,
             size: 2,
         };
         let prepared = prepare(&image, whole, 5).unwrap();
@@ -101,8 +94,8 @@ mod tests {
     fn a_region_outside_is_named() {
         let image = Raster::new(4, 3, vec![0; 12]).unwrap();
         let beyond = Roi {
-            x: 4,
-            y: 0,
+            x_start: 4,
+            y_start: 0,
             size: 9,
         };
         let error = prepare(&image, beyond, 5).unwrap_err().to_string();

@@ -3,10 +3,11 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
+use ppa_core::Roi;
 use ppa_dataset::layout::{LimbId, View};
 
 use super::error::DataError;
-use super::prepare::{Roi, prepare};
+use super::prepare::prepare;
 use super::raster::Raster;
 
 /// A depth image on disk.

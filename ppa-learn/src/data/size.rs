@@ -17,7 +17,8 @@ pub fn size_of(path: &Path) -> Result<[usize; 2], DataError> {
         path: path.to_owned(),
         source,
     };
-    let file = ppa_files::open(path).map_err(|source| ImageFileError::File(unreadable(source)))?;
+    let file = ppa_core::regular_file::open(path)
+        .map_err(|source| ImageFileError::File(unreadable(source)))?;
     let header = PngDecoder::new(BufReader::new(file));
     let header = header.map_err(|source| ImageFileError::Damaged {
         path: path.to_owned(),

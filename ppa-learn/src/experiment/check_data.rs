@@ -3,6 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
+use ppa_core::text::error_chain;
+
 use super::error::ExperimentError;
 use super::run::Runner;
 use super::unit::Unit;
@@ -120,19 +122,8 @@ fn look(config: &TrainConfig, sources: &[Source]) -> Result<Persons, BTreeSet<St
 }
 
 fn persons_of(config: &TrainConfig, sources: &[Source]) -> Result<Persons, String> {
-    let samples = samples(config, sources).map_err(|error| in_words(&error))?;
-    Balanced::new(&samples).map_err(|error| in_words(&error.into()))?;
+    let samples = samples(config, sources).map_err(|error| error_chain(&error))?;
+    Balanced::new(&samples).map_err(|error| error_chain(&TrainError::from(error)))?;
     let person = |sample: &crate::data::Sample| (sample.dataset.clone(), sample.limb.patient);
     Ok(samples.iter().map(person).collect())
-}
-
-/// An error with its causes.
-fn in_words(error: &TrainError) -> String {
-    let mut text = error.to_string();
-    let mut cause = std::error::Error::source(error);
-    while let Some(source) = cause {
-        text += &format!(": {source}");
-        cause = source.source();
-    }
-    text
 }

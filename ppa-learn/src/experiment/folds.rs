@@ -23,7 +23,7 @@ pub enum FoldError {
     /// No choice of persons gives every fold the limbs asked for.
     #[error(
         "no {folds} sets of persons have {limbs} limbs each and leave somebody to train with; the limbs of each person number {}",
-        ppa_text::numbers(counts.iter().map(|&n| n as f64))
+        ppa_core::text::numbers(counts.iter().map(|&n| n as f64))
     )]
     NoSuchLimbs {
         /// Folds asked for.

@@ -85,7 +85,8 @@ impl ExperimentPlan {
             path: path.to_owned(),
             message,
         };
-        let text = ppa_files::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
+        let text =
+            ppa_core::regular_file::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
         let mut plan: Self =
             toml::from_str(&text).map_err(|e| wrong(e.to_string().trim_end().to_owned()))?;
         if !(1..=MAX_PAIRS as u64).contains(&plan.seeds) {

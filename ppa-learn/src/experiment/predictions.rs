@@ -195,7 +195,7 @@ pub(super) fn read_predictions(path: &Path) -> Result<Vec<Prediction>, Experimen
         message: error.to_string(),
     };
     // Read whole: to `csv` a header that cannot be read is an empty table.
-    let bytes = ppa_files::read(path).map_err(|error| wrong(error.into()))?;
+    let bytes = ppa_core::regular_file::read(path).map_err(|error| wrong(error.into()))?;
     let rows = csv::Reader::from_reader(&bytes[..]).into_deserialize();
     rows.collect::<Result<_, _>>().map_err(wrong)
 }

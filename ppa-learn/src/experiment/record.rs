@@ -46,7 +46,7 @@ pub fn fingerprint(sets: &[Vec<Sample>; 2]) -> String {
 
 /// Reads a JSON file.
 pub fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, ExperimentError> {
-    let text = ppa_files::read_to_string(path).map_err(file("read", path))?;
+    let text = ppa_core::regular_file::read_to_string(path).map_err(file("read", path))?;
     serde_json::from_str(&text).map_err(|error| ExperimentError::Unreadable {
         path: path.to_owned(),
         message: error.to_string(),

@@ -1,7 +1,7 @@
 //! Tables of results in the paper's form: mean ± standard deviation of the seeds, the best of each row in bold.
 
+use ppa_core::text::count;
 use ppa_metrics::LEAST_SPREAD;
-use ppa_text::count;
 
 use super::cell::{Cell, with_best};
 use super::configuration::Configuration;

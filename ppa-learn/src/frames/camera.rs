@@ -3,10 +3,11 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
+use ppa_core::Roi;
 use ppa_dataset::layout::View;
 use ppa_dataset::published::GrayImage16;
 
-use crate::data::{DataError, Raster, Roi, SampleImage, evaluation_input};
+use crate::data::{DataError, Raster, SampleImage, evaluation_input};
 
 /// A camera whose frames all show the joint in the same region.
 #[derive(Debug)]

@@ -127,7 +127,7 @@ impl PairFolder {
 
 /// Length of a file, when it was written, and whether it ends as a PNG.
 fn end_of(file: &Path) -> io::Result<(u64, SystemTime, bool)> {
-    let mut file = ppa_files::open(file)?;
+    let mut file = ppa_core::regular_file::open(file)?;
     let metadata = file.metadata()?;
     let mut end = [0; PNG_END.len()];
     if metadata.len() >= end.len() as u64 {

@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use candle_core::{Device, Tensor};
+use ppa_core::Roi;
 use ppa_dataset::layout::View;
 use serde::Serialize;
 
 use super::camera::Camera;
 use crate::DeviceName;
-use crate::data::{Roi, Views};
+use crate::data::Views;
 use crate::network::{InferenceNetwork, NetworkError};
 use crate::train::{TrainConfig, TrainError, trained};
 

@@ -5,7 +5,7 @@
 #[non_exhaustive]
 pub enum NetworkError {
     /// Images of another number of cameras than the network is for.
-    #[error("the network takes images of {}, found those of {found}", ppa_text::count(*expected, "camera"))]
+    #[error("the network takes images of {}, found those of {found}", ppa_core::text::count(*expected, "camera"))]
     Cameras {
         /// Cameras whose images were given.
         found: usize,
@@ -23,7 +23,7 @@ pub enum NetworkError {
     /// One value for each channel has no variance.
     #[error(
         "training on {} of {height} x {width} leaves one value for each channel, which has no variance; expected more images or more than 32 pixels on a side",
-        ppa_text::count(*images, "image")
+        ppa_core::text::count(*images, "image")
     )]
     OneValue {
         /// Images in the batch.

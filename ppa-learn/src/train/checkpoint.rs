@@ -84,7 +84,7 @@ pub(super) fn load(
         path: path.to_owned(),
         message,
     };
-    let bytes = ppa_files::read(path).map_err(at("read", path))?;
+    let bytes = ppa_core::regular_file::read(path).map_err(at("read", path))?;
     let state = state(&bytes).map_err(wrong)?;
     if state.architecture != ARCHITECTURE {
         let found = state.architecture;

@@ -15,7 +15,7 @@ impl TrainConfig {
             path: path.to_owned(),
             source,
         };
-        let text = ppa_files::read_to_string(path).map_err(unreadable)?;
+        let text = ppa_core::regular_file::read_to_string(path).map_err(unreadable)?;
         let given = toml::from_str(&text).map_err(|error| wrong(path, &error))?;
         let mut config = Self::from_table(given, path)?;
         // Whole paths, so that the echo in another folder says the same.

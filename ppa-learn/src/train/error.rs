@@ -47,7 +47,7 @@ pub enum TrainError {
     #[error("{} is there, but no checkpoint beside it to go on from; take another folder", .0.display())]
     WeightsAlone(PathBuf),
     /// A training that is not finished, where a finished one is needed.
-    #[error("the training in {} is not finished: {step} of {} are made; repeat `ppa train` to resume", folder.display(), ppa_text::count(*steps, "step"))]
+    #[error("the training in {} is not finished: {step} of {} are made; repeat `ppa train` to resume", folder.display(), ppa_core::text::count(*steps, "step"))]
     Unfinished {
         /// The folder.
         folder: PathBuf,

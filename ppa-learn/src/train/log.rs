@@ -37,7 +37,7 @@ pub fn read_log(path: &Path) -> Result<Vec<LogRow>, FileError> {
     if !path.exists() {
         return Ok(Vec::new());
     }
-    let text = ppa_files::read_to_string(path).map_err(at("read", path))?;
+    let text = ppa_core::regular_file::read_to_string(path).map_err(at("read", path))?;
     let rows = text
         .lines()
         .map_while(|line| serde_json::from_str(line).ok());

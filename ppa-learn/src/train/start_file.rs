@@ -26,7 +26,7 @@ pub fn read_start(folder: &Path) -> Result<Option<Loaded>, TrainError> {
     if !path.exists() {
         return Ok(None);
     }
-    let text = ppa_files::read_to_string(&path).map_err(at("read", &path))?;
+    let text = ppa_core::regular_file::read_to_string(&path).map_err(at("read", &path))?;
     let loaded = serde_json::from_str(&text).map_err(std::io::Error::from);
     Ok(Some(loaded.map_err(at("read", &path))?))
 }

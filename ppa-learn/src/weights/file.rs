@@ -136,12 +136,12 @@ fn read_any(
 ) -> Result<HashMap<String, Tensor>, Box<dyn std::error::Error + Send + Sync>> {
     match path.extension().and_then(|extension| extension.to_str()) {
         Some("safetensors") => Ok(candle_core::safetensors::load_buffer(
-            &ppa_files::read(path)?,
+            &ppa_core::regular_file::read(path)?,
             &Device::Cpu,
         )?),
         Some("pth" | "pt") => {
             // The archive is opened by its path: what would block is refused before.
-            drop(ppa_files::open(path)?);
+            drop(ppa_core::regular_file::open(path)?);
             let tensors = pickle::read_all(path)?;
             // Training scripts put the weights beside other things.
             let tensors = if tensors.is_empty() {

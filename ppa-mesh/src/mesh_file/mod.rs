@@ -6,11 +6,11 @@ mod ply;
 mod polygons;
 mod stl;
 
-use std::io::{self, BufReader, BufWriter, Write};
+use std::io::{self, BufReader, Write};
 use std::path::Path;
 
-use atomic_write_file::AtomicWriteFile;
 use nalgebra::{Point3, Vector3};
+use ppa_core::{regular_file, whole_file};
 
 use crate::mesh::{Mesh, PointCloud};
 use error::Fault;
@@ -75,9 +75,9 @@ pub fn read_mesh_file(path: &Path) -> Result<MeshContents, MeshFileError> {
         source,
     };
     let contents = match format {
-        Format::Ply => ply::read(BufReader::new(ppa_files::open(path).map_err(open)?)),
-        Format::Obj => obj::read(&ppa_files::read(path).map_err(open)?),
-        Format::Stl => stl::read(&ppa_files::read(path).map_err(open)?),
+        Format::Ply => ply::read(BufReader::new(regular_file::open(path).map_err(open)?)),
+        Format::Obj => obj::read(&regular_file::read(path).map_err(open)?),
+        Format::Stl => stl::read(&regular_file::read(path).map_err(open)?),
     };
     let checked = contents.and_then(|mut contents| {
         let points = &contents.cloud.points;
@@ -145,15 +145,7 @@ fn store(
     path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), MeshFileError> {
-    let store = || -> io::Result<()> {
-        if path.is_dir() {
-            return Err(io::ErrorKind::IsADirectory.into());
-        }
-        let mut out = BufWriter::new(AtomicWriteFile::open(path)?);
-        write(&mut out)?;
-        out.into_inner().map_err(|e| e.into_error())?.commit()
-    };
-    store().map_err(|source| MeshFileError::Write {
+    whole_file::write_with(path, |out| write(out)).map_err(|source| MeshFileError::Write {
         path: path.to_owned(),
         source,
     })

@@ -1,9 +1,10 @@
 //! Where the thinner of two parallel bones lies: it distinguishes a left leg from a right one.
 
 use nalgebra::{Point3, Vector3};
+use ppa_core::Side;
 
 use super::sections::{LimbSection, LimbSections};
-use crate::landmarks::{Landmarks, Side};
+use crate::landmarks::Landmarks;
 
 /// The thinner bone beside the shaft of the thicker one.
 #[derive(Debug, Clone, Copy, PartialEq)]

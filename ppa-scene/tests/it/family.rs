@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Rotation3, Vector3};
 use ppa_ct::Volume;
-use ppa_ct::phantom::{LowerLeg, Side as PhantomSide, TableTop, Truth};
+use ppa_ct::phantom::{LowerLeg, TableTop, Truth};
 use ppa_mesh::{Border, iso_surface};
 use ppa_scene::{Joint, LandmarkOverrides, LimbKind, Side};
 use rayon::prelude::*;
@@ -26,12 +26,12 @@ struct Subject {
 impl Subject {
     /// Odd numbers are left legs.
     fn numbered(number: u32) -> Self {
-        let (side, phantom_side) = match number % 2 {
-            0 => (Side::Right, PhantomSide::Right),
-            _ => (Side::Left, PhantomSide::Left),
+        let side = match number % 2 {
+            0 => Side::Right,
+            _ => Side::Left,
         };
         let name = format!("P{number:02}");
-        let leg = LowerLeg::family(&name, phantom_side).unwrap();
+        let leg = LowerLeg::family(&name, side).unwrap();
         let volume = leg.voxelise(SPACING_MM, TableTop::Absent).unwrap();
         let truth = leg.truth();
         let axis = truth.axis_direction.into_inner();

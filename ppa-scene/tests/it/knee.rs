@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use nalgebra::{Matrix4, Point3, Rotation3, Vector3};
-use ppa_ct::phantom::{Limb, LowerLeg, Scanner, Side as PhantomSide, TableTop};
+use ppa_ct::phantom::{Limb, LowerLeg, Scanner, TableTop};
 use ppa_ct::{Grid, Interpolation, Volume};
 use ppa_scene::{
     Joint, KneeAxis, LandmarkError, LandmarkNote, LandmarkOverrides, Landmarks, LimbKind,
@@ -31,11 +31,11 @@ struct Knee {
 
 impl Knee {
     fn of(side: Side) -> Self {
-        let (phantom_side, x) = match side {
-            Side::Right => (PhantomSide::Right, -95.0),
-            Side::Left => (PhantomSide::Left, 95.0),
+        let x = match side {
+            Side::Right => -95.0,
+            Side::Left => 95.0,
         };
-        let limb = Limb::knee(phantom_side);
+        let limb = Limb::knee(side);
         let joint = Point3::new(x, 10.0, -150.0);
         let bone = |p: [f64; 3]| limb.bone(&(joint + Vector3::from(p)));
         let steps = |from: f64, to: f64, step: f64| {

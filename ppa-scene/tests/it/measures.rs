@@ -1,7 +1,7 @@
 //! What is measured about a limb with its landmarks.
 
 use nalgebra::{Rotation3, Vector3};
-use ppa_ct::phantom::{LowerLeg, Side as PhantomSide, TableTop};
+use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_scene::{LandmarkNote, LandmarkOverrides, Landmarks, LimbMeasures, Side};
 
 use crate::scan::{P01, Scan};
@@ -55,11 +55,8 @@ fn a_phantom_measures_what_it_was_drawn_with() {
 /// However the leg is rotated in the scanner, and whatever side it is said to be of.
 #[test]
 fn the_fibula_tells_the_side_at_every_rotation() {
-    for (of, side) in [
-        (PhantomSide::Right, Side::Right),
-        (PhantomSide::Left, Side::Left),
-    ] {
-        let leg = LowerLeg::family("P04", of).unwrap();
+    for side in [Side::Right, Side::Left] {
+        let leg = LowerLeg::family("P04", side).unwrap();
         let scan = Scan::of(leg.voxelise(2.0, TableTop::Absent).unwrap());
         for degrees in [-60.0_f64, 0.0, 60.0] {
             let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), degrees.to_radians());

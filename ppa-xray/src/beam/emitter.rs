@@ -1,6 +1,7 @@
 //! Photons of one exposure as they leave the focal spot: drawn one by one, or as the fluence at a point.
 
 use nalgebra::{Point2, Point3, Vector3};
+use ppa_core::random::Philox;
 
 use crate::beam::field::Field;
 use crate::beam::heel::{Heel, Mixture, lattice_on};
@@ -9,7 +10,6 @@ use crate::beam::projection_error::ProjectionError;
 use crate::beam::source::{FocalSpot, SpotPlane};
 use crate::beam::spectral_lines::SpectralLines;
 use crate::beam::spectrum::Spectrum;
-use crate::philox::Philox;
 
 /// A photon that leaves the focal spot, in the device frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,10 +1,10 @@
 //! The x-ray source of an exposure: focal spot, heel effect, collimation.
 
 use nalgebra::{Point3, Vector3};
+use ppa_core::random::Philox;
 use serde::{Deserialize, Serialize};
 
 use crate::beam::field::Field;
-use crate::philox::Philox;
 
 /// What the tube adds to a point that sends the same photons everywhere.
 ///

@@ -33,7 +33,7 @@ fn in_file(
     path: &Path,
     parse: impl FnOnce(&str) -> Result<Spectrum, SpectrumError>,
 ) -> Result<Spectrum, SpectrumError> {
-    ppa_files::read_to_string(path)
+    ppa_core::regular_file::read_to_string(path)
         .map_err(SpectrumError::Read)
         .and_then(|text| parse(&text))
         .map_err(|source| SpectrumError::File {

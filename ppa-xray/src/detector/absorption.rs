@@ -111,13 +111,14 @@ fn check_thickness(thickness_um: f64) -> Result<(), ReceptorError> {
 mod tests {
     use std::f64::consts::TAU;
 
+    use ppa_core::random::Philox;
+
     use super::*;
     use crate::beam::spectrum::Spectrum;
     use crate::beam::tube::TubeSpec;
     use crate::matter::cross_sections::ELECTRON_REST_KEV;
     use crate::matter::klein_nishina::energy_ratio;
     use crate::matter::material::Material;
-    use crate::philox::Philox;
 
     fn csi(thickness_um: f64) -> Absorption {
         let packing = 0.8;

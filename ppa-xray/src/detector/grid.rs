@@ -158,8 +158,9 @@ impl Crossing {
 
 #[cfg(test)]
 mod tests {
+    use ppa_core::random::Philox;
+
     use super::*;
-    use crate::philox::Philox;
 
     fn clinical() -> AntiScatterGrid {
         AntiScatterGrid {

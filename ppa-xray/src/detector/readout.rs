@@ -1,12 +1,12 @@
 //! The last steps of an image: blur of the converter, noise of the electronics.
 
+use ppa_core::random::Philox;
 use serde::{Deserialize, Serialize};
 
 use crate::beam::projection::Detector;
 use crate::detector::blur::Spread;
 use crate::detector::receptor::{Receptor, ReceptorError, require};
 use crate::image::radiograph::{Layer, Radiograph};
-use crate::philox::Philox;
 use crate::transport::stream::Stream;
 
 /// Blur and electronic noise, ready to be applied.

@@ -1,11 +1,11 @@
 //! From photons at the detector plane to energy in the detector.
 
 use nalgebra::Vector3;
+use ppa_core::random::Philox;
 
 use crate::detector::absorption::Absorption;
 use crate::detector::grid::Grid;
 use crate::detector::receptor::{Receptor, ReceptorError};
-use crate::philox::Philox;
 use crate::transport::score::Arrival;
 use crate::transport::tally::Moments;
 

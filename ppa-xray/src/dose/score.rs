@@ -1,10 +1,11 @@
 //! Collects the deposits of each history and hands them to the dose tally when it ends.
 
+use ppa_core::random::Philox;
+
 use crate::dose::air_kerma::AirKerma;
 use crate::dose::settings::VoxelBox;
 use crate::dose::tally::{DoseSums, DoseTally, STEPS_PER_KEV, Sum};
 use crate::phantom::voxels::VoxelPhantom;
-use crate::philox::Philox;
 use crate::transport::raster::Raster;
 use crate::transport::score::{Arrival, Score};
 use crate::transport::tally::nearest;

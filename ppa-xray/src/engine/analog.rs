@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use ppa_core::random::Philox;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +13,6 @@ use crate::dose::score::{DoseScore, DoseTarget};
 use crate::image::radiograph::Radiograph;
 use crate::matter::compton::ComptonModel;
 use crate::phantom::voxels::VoxelPhantom;
-use crate::philox::Philox;
 use crate::run::analog_tally::ImageSetup;
 use crate::transport::raster::Raster;
 use crate::transport::score::{Arrival, Score};

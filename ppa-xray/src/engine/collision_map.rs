@@ -1,6 +1,7 @@
 //! Where in the body first collisions happen.
 
 use nalgebra::{Point2, Point3, Vector3};
+use ppa_core::random::Philox;
 use rayon::prelude::*;
 
 use crate::beam::field::Field;
@@ -9,7 +10,6 @@ use crate::engine::lines::Lines;
 use crate::engine::outlook::Site;
 use crate::engine::paths::Paths;
 use crate::engine::running_sums::Entry;
-use crate::philox::Philox;
 use crate::transport::attenuation::{CEILING_KEV, CUTOFF_KEV};
 use crate::transport::tracking::Transport;
 

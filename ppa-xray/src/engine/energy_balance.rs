@@ -1,6 +1,7 @@
 //! Proof that no history makes or loses energy.
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use ppa_core::random::Philox;
 use ppa_ct::Grid;
 use proptest::prelude::*;
 
@@ -9,7 +10,6 @@ use crate::beam::spectrum::Spectrum;
 use crate::matter::compton::ComptonModel;
 use crate::matter::material::Material;
 use crate::phantom::voxels::VoxelPhantom;
-use crate::philox::Philox;
 use crate::transport::score::{Arrival, Score};
 use crate::transport::tracking::Transport;
 

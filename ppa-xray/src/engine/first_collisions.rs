@@ -1,5 +1,6 @@
 //! Lists of first collisions, with which all scatter starts.
 
+use ppa_core::random::Philox;
 use rayon::prelude::*;
 
 use crate::engine::attenuation_basis::{LANES, dot};
@@ -8,7 +9,6 @@ use crate::engine::lines::{Line, Lines};
 use crate::engine::outlook::{Outlook, Site};
 use crate::engine::paths::{BasisMass, Paths};
 use crate::engine::quasi_random::QuasiRandom;
-use crate::philox::Philox;
 use crate::transport::stream::Stream;
 use crate::transport::tracking::Transport;
 

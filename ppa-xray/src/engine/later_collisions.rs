@@ -3,13 +3,13 @@
 use std::ops::Range;
 
 use nalgebra::{Point3, Vector3};
+use ppa_core::random::Philox;
 
 use crate::engine::first_collisions::FirstCollisions;
 use crate::engine::lines::Lines;
 use crate::engine::outlook::{Outlook, Site};
 use crate::engine::paths::{Paths, Step};
 use crate::engine::turn::turned;
-use crate::philox::Philox;
 use crate::transport::attenuation::{CUTOFF_KEV, Coefficients};
 use crate::transport::stream::Stream;
 use crate::transport::tracking::Transport;

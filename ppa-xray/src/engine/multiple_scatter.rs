@@ -1,6 +1,7 @@
 //! Photons scattered twice or more: histories whose collisions are seen from nodes of the detector.
 
 use nalgebra::Point3;
+use ppa_core::random::Philox;
 use rayon::prelude::*;
 
 use crate::engine::attenuation_basis::LANES;
@@ -9,7 +10,6 @@ use crate::engine::node_grid::NodeGrid;
 use crate::engine::outlook::View;
 use crate::engine::paths::BasisMass;
 use crate::matter::scatter_density::ScatterDensities;
-use crate::philox::Philox;
 use crate::transport::attenuation::CUTOFF_KEV;
 use crate::transport::stream::Stream;
 use crate::transport::tally::Moments;

@@ -1,9 +1,9 @@
 //! Quantum noise of an energy-integrating detector.
 
+use ppa_core::random::Philox;
 use rayon::prelude::*;
 
 use crate::detector::readout::DrawnLayer;
-use crate::philox::Philox;
 use crate::transport::stream::Stream;
 use crate::transport::tally::Moments;
 

@@ -1,6 +1,6 @@
 //! Points that fill a cube more evenly than random ones.
 
-use crate::philox::Philox;
+use ppa_core::random::Philox;
 
 /// Randomly shifted multiples of fixed irrational numbers, modulo 1 (a Kronecker sequence).
 ///

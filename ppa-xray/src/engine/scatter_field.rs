@@ -108,9 +108,10 @@ impl ScatterField {
 
 #[cfg(test)]
 mod tests {
+    use ppa_core::random::Philox;
+
     use super::*;
     use crate::engine::first_collisions::ESTIMATES;
-    use crate::philox::Philox;
 
     fn field(grid: NodeGrid, energy: impl Fn(usize, usize) -> f64) -> ScatterField {
         let moments = |mean_kev| Moments {

@@ -1,8 +1,9 @@
 //! Scattering of one material at one energy, by angle.
 
+use ppa_core::random::Philox;
+
 use crate::matter::sampler::MaterialTables;
 use crate::matter::scatter_density::ScatterDensities;
-use crate::philox::Philox;
 use crate::transport::attenuation::Coefficients;
 
 /// Steps of sin(θ/2), in which forward peaks are wide: at 150 keV the Rayleigh peak of heavy elements covers 10 of them.

@@ -1,6 +1,7 @@
 //! Photons scattered once, as a point of the detector sees them.
 
 use nalgebra::{Point2, Point3, Vector3};
+use ppa_core::random::Philox;
 
 use crate::engine::attenuation_basis::{LANES, dot};
 use crate::engine::first_collisions::{ESTIMATES, FirstCollisions};
@@ -8,7 +9,6 @@ use crate::engine::lines::Lines;
 use crate::engine::outlook::{Outlook, View};
 use crate::engine::paths::{BasisMass, Paths};
 use crate::engine::scatter_table::ScatterTable;
-use crate::philox::Philox;
 use crate::transport::attenuation::CUTOFF_KEV;
 use crate::transport::stream::Stream;
 use crate::transport::tally::Moments;

@@ -88,8 +88,9 @@ fn local_strength(detail: &Plane) -> Plane {
 
 #[cfg(test)]
 mod tests {
+    use ppa_core::random::Philox;
+
     use super::*;
-    use crate::philox::Philox;
 
     /// That of the default presentation on pixels of 0.5 mm.
     const LIFT: Lift = Lift {

@@ -1,13 +1,13 @@
 //! Radiographs as files: 16-bit PNG to look at, EXR with every layer to compute with.
 
 use std::{
-    io::{Cursor, Write},
+    io::Cursor,
     path::{Path, PathBuf},
 };
 
 use ::exr::prelude::{self as exr, WritableImage};
-use atomic_write_file::AtomicWriteFile;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use ppa_core::whole_file;
 
 use crate::image::presentation::{Presentation, PresentationError};
 use crate::image::radiograph::{Engine, Radiograph};
@@ -165,18 +165,9 @@ impl Radiograph {
     }
 }
 
-/// Writes beside the target, syncs and renames, so that no reader ever meets half a file.
+/// [`whole_file::write`] with the error of this crate.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    let write = || {
-        // Checked here, since a failed rename would leave the temporary file behind.
-        if path.is_dir() {
-            return Err(std::io::ErrorKind::IsADirectory.into());
-        }
-        let mut file = AtomicWriteFile::open(path)?;
-        file.write_all(bytes)?;
-        file.commit()
-    };
-    write().map_err(|source| OutputError::Write {
+    whole_file::write(path, bytes).map_err(|source| OutputError::Write {
         path: path.into(),
         source,
     })

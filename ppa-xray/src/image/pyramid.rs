@@ -143,8 +143,9 @@ pub(crate) fn white_noise_of_bands(bands: usize) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use ppa_core::random::Philox;
+
     use super::*;
-    use crate::philox::Philox;
 
     fn white(columns: usize, rows: usize) -> Plane {
         let mut rng = Philox::new(3, 0, 7);

@@ -1,5 +1,7 @@
 //! One material prepared for transport: cross sections without logarithms, and the scattering samplers.
 
+use ppa_core::random::Philox;
+
 use crate::{
     matter::compton::{Compton, ComptonModel},
     matter::cross_section_table::CrossSectionTable,
@@ -9,7 +11,6 @@ use crate::{
     matter::material::Material,
     matter::rayleigh::Rayleigh,
     octaves::Octaves,
-    philox::Philox,
     transport::attenuation::CUTOFF_KEV,
 };
 

@@ -177,8 +177,10 @@ impl Curve {
 
 #[cfg(test)]
 mod tests {
+    use ppa_core::random::Philox;
+
     use super::*;
-    use crate::{matter::sampler::MaterialTables, philox::Philox};
+    use crate::matter::sampler::MaterialTables;
 
     const MODELS: [ComptonModel; 2] = [
         ComptonModel::ImpulseApproximation,

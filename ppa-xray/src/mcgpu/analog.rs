@@ -3,6 +3,8 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
+use ppa_core::Part;
+
 use crate::dose::report::Dose;
 use crate::engine::analog::AnalogSettings;
 use crate::image::radiograph::Radiograph;
@@ -10,7 +12,6 @@ use crate::mcgpu::sections::RunLength;
 use crate::mcgpu::simulation::Simulation;
 use crate::mcgpu::trajectory::Station;
 use crate::run::analog_run::AnalogRun;
-use crate::run::part::Part;
 use crate::run::progress::{Progress, Stop};
 use crate::transport::tally::MOST_HISTORIES;
 use crate::transport::tracking::TransportError;

@@ -29,7 +29,7 @@ pub(crate) struct Lines {
 impl Lines {
     pub fn open(path: &Path) -> Result<Self, McgpuError> {
         let open = || -> std::io::Result<_> {
-            let mut file = ppa_files::open(path)?;
+            let mut file = ppa_core::regular_file::open(path)?;
             let metadata = file.metadata()?;
             if metadata.is_dir() {
                 return Err(std::io::ErrorKind::IsADirectory.into());

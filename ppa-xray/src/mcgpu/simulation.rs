@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use ppa_core::random::Philox;
 use rayon::prelude::*;
 
 use crate::beam::projection::{Detector, Projection};
@@ -15,7 +16,6 @@ use crate::mcgpu::sections::MaterialSource;
 use crate::mcgpu::trajectory::Station;
 use crate::mcgpu::voxel_file::VoxelFile;
 use crate::phantom::voxels::VoxelPhantom;
-use crate::philox::Philox;
 use crate::transport::stream::Stream;
 
 /// Most square pixels that a side of an oblong one is cut into.

@@ -126,10 +126,10 @@ fn bin(hu: f32) -> i64 {
 
 #[cfg(test)]
 mod tests {
+    use ppa_core::random::Philox;
     use proptest::prelude::*;
 
     use super::*;
-    use crate::philox::Philox;
 
     fn of(values: impl IntoIterator<Item = f32>) -> Histogram {
         let mut histogram = Histogram::new();

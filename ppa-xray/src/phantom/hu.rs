@@ -69,7 +69,7 @@ impl HuCalibration {
             path: path.into(),
             source: Box::new(source),
         };
-        ppa_files::read_to_string(path)
+        ppa_core::regular_file::read_to_string(path)
             .map_err(CalibrationError::Read)
             .and_then(|text| Self::parse(&text))
             .map_err(in_file)

@@ -5,6 +5,8 @@ use std::path::Path;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
+use ppa_core::Part;
+
 use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
 use crate::dose::air_kerma::AirKerma;
@@ -15,7 +17,6 @@ use crate::engine::analog::{AnalogSettings, count, count_with_dose};
 use crate::phantom::voxels::VoxelPhantom;
 use crate::run::analog_tally::{AnalogTally, ImageSetup, RunSetup};
 use crate::run::key::key;
-use crate::run::part::Part;
 use crate::run::progress::{Progress, Stop, Stopped, is_check, next_check};
 use crate::run::tally_error::TallyError;
 use crate::transport::tracking::{Transport, TransportError};

@@ -4,7 +4,6 @@ pub(crate) mod analog_run;
 pub(crate) mod analog_tally;
 pub(crate) mod key;
 pub(crate) mod merge;
-pub(crate) mod part;
 pub(crate) mod progress;
 pub(crate) mod tally_error;
 pub(crate) mod tally_file;

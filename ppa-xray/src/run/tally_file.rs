@@ -4,11 +4,11 @@
 //! the sums of the image (u64: energy and squared energy per cell and category), then with doses the masses of the voxels
 //! (f32) and the sums (u128 and u64), and the SHA-256 of all that.
 
-use std::io::{Read, Write};
+use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
-use atomic_write_file::AtomicWriteFile;
+use ppa_core::whole_file;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -36,16 +36,7 @@ impl AnalogTally {
     /// # Errors
     /// [`TallyError::Write`].
     pub fn write(&self, path: &Path) -> Result<(), TallyError> {
-        let write = || {
-            // Checked here, since a failed rename would leave the temporary file behind.
-            if path.is_dir() {
-                return Err(std::io::ErrorKind::IsADirectory.into());
-            }
-            let mut file = AtomicWriteFile::open(path)?;
-            file.write_all(&self.to_bytes())?;
-            file.commit()
-        };
-        write().map_err(|source| TallyError::Write {
+        whole_file::write(path, &self.to_bytes()).map_err(|source| TallyError::Write {
             path: path.into(),
             source,
         })
@@ -92,7 +83,7 @@ impl AnalogTally {
             what: what.to_owned(),
         };
         let foreign = || TallyError::Foreign { path: path.into() };
-        let mut file = ppa_files::open(path).map_err(failed)?;
+        let mut file = ppa_core::regular_file::open(path).map_err(failed)?;
         let found = file.metadata().map_err(failed)?.len();
         let mut start = [0; 16];
         // Whatever is too short for the first numbers is no tally.

@@ -1,8 +1,8 @@
 //! What photon histories leave behind, on its way to the tallies.
 
 use nalgebra::Vector3;
+use ppa_core::random::Philox;
 
-use crate::philox::Philox;
 use crate::transport::tally::Category;
 
 /// A photon at the detector plane, in the device frame.

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
+use ppa_core::text::number;
 use ppa_ct::phantom::{Limb, LowerLeg, Scanner, Side, TableTop, Truth};
 use ppa_ct::{Format, Info, Volume, write};
-use ppa_text::number;
 use serde::Serialize;
 
 use super::describe;

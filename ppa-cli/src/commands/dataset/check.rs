@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use ppa_core::text::count;
 use ppa_dataset::published::{Flaw, Inspection, Published, inspect};
 use ppa_dataset::{FolderError, Problem, Split};
-use ppa_text::count;
 use serde::Serialize;
 
 use super::super::verify::require_none;

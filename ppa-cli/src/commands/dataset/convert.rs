@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use ppa_core::text::count;
 use ppa_dataset::published::{Flexion, Layout, Published, convert};
-use ppa_text::count;
 
 use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::{Output, working};

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use ppa_core::text::numbers;
 use ppa_dataset::Split;
 use ppa_dataset::published::Published;
-use ppa_text::numbers;
 
 use crate::output::Output;
 use crate::output_files::{ReplaceArgs, require_same};

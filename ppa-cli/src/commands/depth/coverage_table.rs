@@ -1,7 +1,7 @@
 //! What `ppa depth coverage` finds, as JSON, CSV and text.
 
+use ppa_core::text::{count, number};
 use ppa_depth::{Coverage, Viewpoint};
-use ppa_text::{count, number};
 use serde::Serialize;
 
 #[derive(Debug, Serialize)]

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
+use ppa_core::text::count;
 use ppa_dataset::write_whole;
 use ppa_depth::{DepthImage, Invalidation, SensorSpec, fit_noise};
-use ppa_text::count;
 
 use crate::output::Output;
 use crate::output_files::ReplaceArgs;

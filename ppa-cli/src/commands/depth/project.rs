@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Args;
 use nalgebra::Point3;
-use ppa_text::number;
+use ppa_core::text::number;
 use serde::Serialize;
 
 use crate::output::Output;
@@ -21,7 +21,8 @@ pub struct ProjectArgs {
 
 /// Reads rows of x, y, z; a first row of three words of which none is a number is a header.
 fn read_points(path: &Path) -> anyhow::Result<Vec<[f64; 3]>> {
-    let file = ppa_files::open(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let file = ppa_core::regular_file::open(path)
+        .with_context(|| format!("cannot read {}", path.display()))?;
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .trim(csv::Trim::All)

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::Args;
 use nalgebra::{Isometry3, Point3};
+use ppa_core::TransformRows;
 use ppa_dataset::body_of_cloud;
 use ppa_dataset::layout::View;
 use ppa_depth::{
@@ -76,7 +77,7 @@ const TREMOR_FRAMES: f64 = 10.0;
 #[derive(Debug, Deserialize)]
 #[serde(untagged)]
 enum Pose {
-    Rows([[f64; 4]; 4]),
+    Rows(TransformRows),
     Flat([f64; 16]),
     Named {
         motions: BTreeMap<String, [[f64; 4]; 4]>,

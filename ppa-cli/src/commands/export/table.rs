@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use ppa_core::text::count;
 use ppa_dataset::export::Table;
-use ppa_text::count;
 use serde::Serialize;
 
 use crate::output::Output;

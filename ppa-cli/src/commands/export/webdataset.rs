@@ -4,8 +4,8 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
+use ppa_core::text::count;
 use ppa_dataset::export::web_dataset;
-use ppa_text::count;
 
 use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::{Output, working};

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use clap::Args;
+use ppa_core::text::{count, number};
 use ppa_metrics::agreement::{
     IccForms, KappaWeights, Measurement, Ratings, ReaderError, RepeatAgreement, disagreements, icc,
     krippendorff_alpha, reader_errors, repeat_agreement, weighted_kappa,
 };
-use ppa_text::{count, number};
 use serde::{Deserialize, Serialize};
 
 use crate::output::Output;

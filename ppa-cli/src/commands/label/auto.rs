@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
+use ppa_core::text::{count, number};
 use ppa_dataset::labels::{ComputedLabels, GradeThresholds, LabelledLimb, compute_labels};
 use ppa_dataset::layout::LimbId;
 use ppa_dataset::{Case, Manifest, Plan};
-use ppa_text::{count, number};
 use serde::Serialize;
 
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
@@ -65,7 +65,7 @@ pub fn run(args: &AutoArgs, output: Output) -> anyhow::Result<()> {
         let case = Case::read(&planned.file)?;
         let limb = LimbId {
             patient: planned.patient,
-            side: case.side.into(),
+            side: case.side,
         };
         compute_labels(&manifest, limb, &case, &thresholds)
             .with_context(|| format!("cannot label by {}", planned.file.display()))

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use ppa_core::text::count;
 use ppa_dataset::Manifest;
 use ppa_dataset::labels::{Imported, import_grades, read_key};
-use ppa_text::count;
 
 use crate::output::Output;
 

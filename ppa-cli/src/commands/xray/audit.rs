@@ -4,9 +4,9 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
+use ppa_core::text::{count, number};
 use ppa_ct::ReadOptions;
 use ppa_dataset::Case;
-use ppa_text::{count, number};
 use ppa_xray::{Audit, HuBin, HuCalibration};
 
 use crate::findings::prepared;

@@ -34,7 +34,7 @@ pub(in crate::dicom_series) fn open(path: &Path) -> Result<Opened, ReadError> {
         path: path.to_owned(),
         source,
     };
-    let mut file = ppa_files::open(path).map_err(io)?;
+    let mut file = ppa_core::regular_file::open(path).map_err(io)?;
     let length = file.metadata().map_err(io)?.len();
     let mut bytes = Vec::new();
     (&mut file)

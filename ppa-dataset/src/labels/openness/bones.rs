@@ -67,7 +67,7 @@ impl BoneNumbers {
 #[non_exhaustive]
 pub enum BonesError {
     /// Labels and lattice disagree.
-    #[error("{}, expected {expected}, one per voxel", ppa_text::count(*found, "label"))]
+    #[error("{}, expected {expected}, one per voxel", ppa_core::text::count(*found, "label"))]
     Count {
         /// Labels.
         found: usize,

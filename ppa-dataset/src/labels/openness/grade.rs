@@ -65,7 +65,7 @@ pub enum ThresholdError {
         message: String,
     },
     /// Numbers out of order.
-    #[error("thresholds of openness are {}, expected four falling numbers from 0 to 1", ppa_text::numbers(*.0))]
+    #[error("thresholds of openness are {}, expected four falling numbers from 0 to 1", ppa_core::text::numbers(*.0))]
     Order([f64; 4]),
 }
 

@@ -68,7 +68,7 @@ pub fn grading_page(
     }
     let picture = |showing: &Showing| {
         let path = root.join(&showing.image);
-        let bytes = ppa_files::read(&path).map_err(FileError::at("read", &path))?;
+        let bytes = ppa_core::regular_file::read(&path).map_err(FileError::at("read", &path))?;
         let image = image::load_from_memory_with_format(&bytes, ImageFormat::Png)
             .map_err(|source| PageError::Image { path, source })?
             .into_luma16();

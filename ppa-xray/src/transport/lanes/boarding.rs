@@ -1,6 +1,7 @@
 //! Photons from the source into the lanes that ended histories leave.
 
-use crate::philox::Philox;
+use ppa_core::random::Philox;
+
 use crate::transport::attenuation::CUTOFF_KEV;
 use crate::transport::lanes::draws::Depths;
 use crate::transport::lanes::entry::{Aim, Enter, Place};

@@ -1,7 +1,8 @@
 //! Random numbers of many histories, and the optical depths made of them.
 
+use ppa_core::random::philox;
+
 use crate::matter::natural_log::ln;
-use crate::philox;
 use crate::transport::lanes::flights::{Each, LANES};
 use crate::transport::lanes::isa::Kernel;
 use crate::transport::stream::Stream;
@@ -56,7 +57,7 @@ impl Kernel for Draw<'_> {
         let Draws { counter, block } = self.draws;
         let key = self.key;
         for i in 0..self.count.min(LANES) {
-            let [a, b, c, d] = philox::rounds(
+            let [a, b, c, d] = philox(
                 [counter[0][i], counter[1][i], counter[2][i], counter[3][i]],
                 key,
             );

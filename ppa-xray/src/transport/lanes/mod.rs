@@ -22,8 +22,8 @@ mod turn;
 use std::ops::Range;
 
 use nalgebra::Matrix4;
+use ppa_core::random::Philox;
 
-use crate::philox::Philox;
 use crate::transport::attenuation::EnergyNode;
 use crate::transport::lanes::advance::{Advance, Blocks, Locate, Steps};
 use crate::transport::lanes::boarding::Waiting;

@@ -1,6 +1,7 @@
 //! K x-rays of a foil against their integral.
 
 use nalgebra::{Point3, Vector3};
+use ppa_core::random::Philox;
 use ppa_ct::Grid;
 
 use super::projection;
@@ -9,7 +10,6 @@ use crate::beam::spectrum::Spectrum;
 use crate::matter::compton::ComptonModel;
 use crate::matter::material::Material;
 use crate::phantom::voxels::VoxelPhantom;
-use crate::philox::Philox;
 use crate::transport::score::{Arrival, Score};
 use crate::transport::tally::Category;
 use crate::transport::tracking::Transport;

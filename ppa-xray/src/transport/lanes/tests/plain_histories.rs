@@ -1,13 +1,13 @@
 //! The lanes against one history at a time, in double precision and without any bound.
 
 use nalgebra::{Point3, Rotation3, Vector3};
+use ppa_core::random::Philox;
 
 use super::{phantom, projection};
 use crate::beam::emitter::Emission;
 use crate::beam::spectrum::Spectrum;
 use crate::matter::compton::ComptonModel;
 use crate::phantom::lattice::Walk;
-use crate::philox::Philox;
 use crate::transport::attenuation::CUTOFF_KEV;
 use crate::transport::score::{Arrival, Score};
 use crate::transport::tally::Category;

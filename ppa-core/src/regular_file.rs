@@ -1,7 +1,7 @@
-//! Opens what a path names if it is a regular file.
+//! Reading of regular files only.
 //!
 //! Opening a named pipe blocks until somebody writes to it, and a device such as `/dev/zero` never ends. Every file that a
-//! user or another file names is therefore opened here. Links are followed.
+//! user or another file names is therefore opened here. Symbolic links are followed.
 
 use std::fs::{File, FileType, Metadata, OpenOptions};
 use std::io::{self, Read};

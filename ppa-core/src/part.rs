@@ -1,10 +1,8 @@
-//! One of several equal parts of a run.
-
 use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
-/// Part `index` of `count`, counted from 1; parses from and prints as `2/8`.
+/// One of `count` equal parts of a run or of a dataset, `index` counted from 1; parses from and prints as `2/8`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Part {
     index: u64,

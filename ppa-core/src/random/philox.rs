@@ -1,15 +1,15 @@
-//! Counter-based random numbers: Philox4x32-10.
+//! Philox4x32-10, a counter-based generator.
 //!
 //! Salmon, Moraes, Dror, Shaw, *Parallel random numbers: as easy as 1, 2, 3*, SC 2011, doi:10.1145/2063384.2063405.
 
 const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 
-/// The random numbers of one history: the key is the seed, the counter (history, step, stream).
+/// The random numbers of one item, such as a photon history: the key is the seed, the counter (index, step, stream).
 ///
-/// Two generators with the same seed, stream and index give the same numbers wherever they run.
+/// Two generators with the same seed, stream and index give the same numbers on any thread.
 #[derive(Clone, Debug)]
-pub(crate) struct Philox {
+pub struct Philox {
     key: [u32; 2],
     counter: [u32; 4],
     block: [u32; 4],
@@ -17,15 +17,15 @@ pub(crate) struct Philox {
 }
 
 impl Philox {
-    /// Generator for item `index` of `stream`; nothing is computed before the first draw.
+    /// Generator for item `index` of `stream`, which stands for a purpose; nothing is computed before the first draw.
     #[inline]
-    pub(crate) fn new(seed: u64, stream: u32, index: u64) -> Self {
+    pub fn new(seed: u64, stream: u32, index: u64) -> Self {
         Self::at(seed, stream, index, 0)
     }
 
     /// The same generator after `step` blocks of four numbers.
     #[inline]
-    pub(crate) fn at(seed: u64, stream: u32, index: u64, step: u32) -> Self {
+    pub fn at(seed: u64, stream: u32, index: u64, step: u32) -> Self {
         Self {
             key: Self::key(seed),
             counter: [index as u32, (index >> 32) as u32, step, stream],
@@ -34,9 +34,9 @@ impl Philox {
         }
     }
 
-    /// The same generator with the block before the next, computed elsewhere, still to be drawn from.
+    /// The same generator with `block`, the block before the next, still to be drawn from; a vector loop may have computed it.
     #[inline]
-    pub(crate) fn after(self, block: [u32; 4]) -> Self {
+    pub fn after(self, block: [u32; 4]) -> Self {
         Self {
             block,
             used: 0,
@@ -44,21 +44,21 @@ impl Philox {
         }
     }
 
-    /// The key that stands for a seed.
+    /// The key of a seed.
     #[inline]
-    pub(crate) fn key(seed: u64) -> [u32; 2] {
+    pub fn key(seed: u64) -> [u32; 2] {
         [seed as u32, (seed >> 32) as u32]
     }
 
-    /// Number of the block that follows those used or begun.
+    /// Number of the block after those used or begun.
     #[inline]
-    pub(crate) fn step(&self) -> u32 {
+    pub fn step(&self) -> u32 {
         self.counter[2]
     }
 
     /// Uniform in [0, 1) in steps of 2⁻³²; fine enough for free paths up to 22 mean free paths per step.
     #[inline(always)]
-    pub(crate) fn unit(&mut self) -> f64 {
+    pub fn unit(&mut self) -> f64 {
         if self.used == 4 {
             self.refill();
         }
@@ -69,7 +69,7 @@ impl Philox {
 
     /// Two independent standard normal numbers, at most 6.67 in size (Box and Muller, Ann. Math. Statist. 29 (1958) 610).
     #[inline]
-    pub(crate) fn normals(&mut self) -> [f64; 2] {
+    pub fn normals(&mut self) -> [f64; 2] {
         // 1 − u lies in [2⁻³², 1], so the logarithm stays finite.
         let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
         let (sin, cos) = (std::f64::consts::TAU * self.unit()).sin_cos();
@@ -79,17 +79,15 @@ impl Philox {
     #[cold]
     #[inline(never)]
     fn refill(&mut self) {
-        self.block = rounds(self.counter, self.key);
+        self.block = philox(self.counter, self.key);
         self.counter[2] = self.counter[2].wrapping_add(1);
         self.used = 0;
     }
 }
 
-/// The bijection itself: four random words for a counter and a key.
-///
-/// Without a loop, so that a loop around it can become vector code.
+/// The bijection itself: four random words for a counter and a key. It has no loop, so that compilers vectorise loops around it.
 #[inline(always)]
-pub(crate) fn rounds(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
+pub fn philox(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
     let bump = |n: u32| {
         [
             key[0].wrapping_add(n.wrapping_mul(WEYL[0])),
@@ -139,7 +137,7 @@ mod tests {
                 [0xd16c_fe09, 0x94fd_cceb, 0x5001_e420, 0x2412_6ea1],
             ),
         ] {
-            assert_eq!(rounds(counter, key), answer);
+            assert_eq!(philox(counter, key), answer);
         }
     }
 
