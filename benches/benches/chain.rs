@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
-use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_dataset::{Plan, PlanCase, generate, prepare};
+use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{Side, Sweep};
 
 const SPACING_MM: f64 = 1.5;

@@ -41,7 +41,6 @@ mod meta_image;
 mod nifti_file;
 #[cfg(feature = "nrrd")]
 mod nrrd_file;
-pub mod phantom;
 mod refine;
 mod resample;
 mod scan;
@@ -83,6 +82,6 @@ pub use resample::Interpolation;
 pub use scan::{
     ReadOptions, Scan, SeriesChoice, SeriesSummary, Warning, WarningCode, read, read_with,
 };
-pub use values::Values;
+pub use values::{Values, with_room};
 pub use volume::{Volume, VolumeError};
 pub use write::{Format, write};

@@ -144,8 +144,11 @@ impl PartialEq for Values<'_> {
     }
 }
 
-/// An empty vector with room for `voxels` values; an error where a failed allocation would end the program.
-pub(crate) fn with_room<T>(voxels: usize) -> Result<Vec<T>, VolumeError> {
+/// An empty vector with room for `voxels` values.
+///
+/// # Errors
+/// [`VolumeError::Memory`] where a failed allocation would end the program.
+pub fn with_room<T>(voxels: usize) -> Result<Vec<T>, VolumeError> {
     let mut values = Vec::new();
     match values.try_reserve_exact(voxels) {
         Ok(()) => Ok(values),

@@ -11,9 +11,9 @@ use linfa_clustering::Dbscan;
 use nalgebra::{Point3, Vector3};
 use ndarray16::Array2;
 use ppa_benches::ProcessorTime;
-use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_ct::{Grid, Volume};
 use ppa_mesh::{Border, LimbSettings, dbscan, extract_limb, iso_surface};
+use ppa_phantom::{LowerLeg, TableTop};
 use rayon::ThreadPoolBuilder;
 
 /// A torus with a wavy skin in n³ voxels.

@@ -9,8 +9,8 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use ppa_benches::ProcessorTime;
-use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_mesh::{Border, iso_surface};
+use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{
     LandmarkOverrides, PlaneSettings, Room, RoomSpec, Side, find_landmarks, place, table_plane,
 };

@@ -4,7 +4,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use ppa_benches::ProcessorTime;
 use ppa_ct::Grid;
-use ppa_ct::phantom::{LowerLeg, TableTop};
+use ppa_phantom::{LowerLeg, TableTop};
 use ppa_xray::{
     AnalogSettings, Detector, FastSettings, HuCalibration, Material, Projection, Spectrum,
     TubeSpec, VoxelPhantom, analog, fast, primary,

@@ -5,7 +5,7 @@
 use std::error::Error;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use ppa_ct::phantom::{LowerLeg, TableTop};
+use ppa_phantom::{LowerLeg, TableTop};
 use ppa_xray::{
     Category, Detector, FastSettings, HuCalibration, Presentation, Projection, Spectrum, TubeSpec,
     VoxelPhantom, fast,

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_dataset::layout::{self, LimbId, View};
 use ppa_dataset::{
     BodyShape, FileKind, FindingCode, Findings, GenerateError, Manifest, Plan, PlanCase, Severity,
@@ -11,6 +10,7 @@ use ppa_dataset::{
 };
 use ppa_depth::{DepthImage, WallDepth};
 use ppa_mesh::{LimbSettings, VoxelBox};
+use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{Side, Sweep};
 
 const LIMB: LimbId = LimbId {

@@ -8,13 +8,13 @@ use std::sync::OnceLock;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_core::TransformRows;
-use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_dataset::layout::{self, LimbId, View};
 use ppa_dataset::{
     BodyShape, Case, FileKind, FolderError, GenerateError, GenerateSettings, JobError, Manifest,
     Plan, PlanCase, PreparedLimb, Stage, Summary, generate, prepare,
 };
 use ppa_depth::{DepthImage, isometry_from_rows};
+use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{Landmarks, Side, Sweep};
 
 const SPACING_MM: f64 = 2.0;

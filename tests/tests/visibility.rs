@@ -1,12 +1,12 @@
 //! What a radiograph shows of an ankle's joint space agrees with what its geometry lets through, the more the less noise there is.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
-use ppa_ct::phantom::{LowerLeg, Side, TableTop};
 use ppa_dataset::XraySettings;
 use ppa_dataset::labels::{
     AnkleBones, BoneNumbers, Exposure, JointSpace, Openness, Reading, Visibility,
 };
 use ppa_metrics::spearman;
+use ppa_phantom::{LowerLeg, Side, TableTop};
 use ppa_xray::{Detector, FastSettings, Projection, VoxelPhantom, fast};
 
 const SOURCE_JOINT_MM: f64 = 1050.0;

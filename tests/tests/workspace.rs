@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 const ARROWS: &[(&str, &[&str])] = &[
     ("ppa-core", &[]),
     ("ppa-ct", &["ppa-core"]),
+    ("ppa-phantom", &["ppa-core", "ppa-ct"]),
     ("ppa-mesh", &["ppa-core", "ppa-ct"]),
     ("ppa-scene", &["ppa-ct", "ppa-mesh", "ppa-core"]),
     ("ppa-depth", &["ppa-core"]),
@@ -30,6 +31,7 @@ const ARROWS: &[(&str, &[&str])] = &[
         &[
             "ppa-core",
             "ppa-ct",
+            "ppa-phantom",
             "ppa-mesh",
             "ppa-scene",
             "ppa-depth",
@@ -50,6 +52,7 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
             "candle", "clap", "dicom", "exr", "image", "nalgebra", "nifti", "parry", "png", "rayon",
         ],
     ),
+    ("ppa-phantom", &["dicom", "nifti", "candle"]),
     ("ppa-mesh", &["dicom", "nifti", "candle"]),
     ("ppa-depth", &["dicom", "nifti", "candle", "clap"]),
     ("ppa-xray", &["dicom", "nifti", "candle", "clap"]),

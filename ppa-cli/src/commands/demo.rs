@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Args;
 use ppa_core::text::count;
-use ppa_ct::phantom::{self, LowerLeg, TableTop};
 use ppa_ct::{ReadOptions, write_nifti};
-use ppa_dataset::layout::{self, LimbId};
+use ppa_dataset::layout::LimbId;
 use ppa_dataset::{GenerateSettings, Plan, PlanCase, Summary, contact_sheet, prepare, write_whole};
 use ppa_mesh::LimbSettings;
+use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{LandmarkOverrides, Side, Sweep};
 use serde::Serialize;
 
@@ -57,7 +57,7 @@ struct Demo {
 
 pub fn run(args: &DemoArgs, output: Output) -> anyhow::Result<()> {
     let watch = Stopwatch::start();
-    let leg = LowerLeg::family(&args.phantom, phantom::Side::Right)?;
+    let leg = LowerLeg::family(&args.phantom, Side::Right)?;
     let out = &args.out;
     require_writable("--out", out)?;
     std::fs::create_dir_all(out)
@@ -78,7 +78,7 @@ pub fn run(args: &DemoArgs, output: Output) -> anyhow::Result<()> {
     )?;
     let limb = LimbId {
         patient: 0,
-        side: layout::Side::Right,
+        side: Side::Right,
     };
     let poses = POSES.poses()?.len();
     let sheet = contact_sheet(&out.join("dataset"), limb, poses)?;

@@ -2,9 +2,9 @@ use std::sync::LazyLock;
 
 use image::RgbImage;
 use nalgebra::{Matrix4, Point3, Vector3};
-use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_ct::{Grid, Volume};
 use ppa_mesh::{LimbSettings, extract_limb};
+use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{LandmarkOverrides, LimbKind, Side, find_landmarks, place};
 
 use super::canvas::Rect;

@@ -3,9 +3,9 @@
 use std::sync::LazyLock;
 
 use nalgebra::{Affine3, Matrix4, Point3};
-use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_ct::{Grid, Volume};
 use ppa_mesh::{Limb, LimbError, LimbSettings, SurfaceError, VoxelBox, extract_limb};
+use ppa_phantom::{LowerLeg, TableTop};
 
 use crate::fields::{on_grid, volume};
 

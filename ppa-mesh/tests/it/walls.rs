@@ -3,9 +3,9 @@
 use std::f64::consts::PI;
 
 use nalgebra::{Matrix4, Point3, Vector3};
-use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_ct::{Grid, Volume};
 use ppa_mesh::{Limb, LimbSettings, VoxelBox, extract_limb, offset};
+use ppa_phantom::{LowerLeg, TableTop};
 use proptest::prelude::*;
 
 use crate::fields::{on_grid, volume};

@@ -2,8 +2,8 @@
 
 use nalgebra::{Point3, Rotation3, Vector3};
 use ppa_ct::Volume;
-use ppa_ct::phantom::{LowerLeg, TableTop, Truth};
 use ppa_mesh::{Border, iso_surface};
+use ppa_phantom::{LowerLeg, TableTop, Truth};
 use ppa_scene::{Joint, LandmarkOverrides, LimbKind, Side};
 use rayon::prelude::*;
 

@@ -3,8 +3,8 @@
 use std::sync::LazyLock;
 
 use nalgebra::{Matrix4, Point3, Rotation3, Vector3};
-use ppa_ct::phantom::{Limb, LowerLeg, Scanner, TableTop};
 use ppa_ct::{Grid, Interpolation, Volume};
+use ppa_phantom::{Limb, LowerLeg, Scanner, TableTop};
 use ppa_scene::{
     Joint, KneeAxis, LandmarkError, LandmarkNote, LandmarkOverrides, Landmarks, LimbKind,
     LimbMeasures, Plane, Side, XrayDevice, bump_sites, place,

@@ -1,5 +1,5 @@
 use nalgebra::{Point3, Rotation3, Vector3};
-use ppa_ct::phantom::{LowerLeg, TableTop};
+use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{
     AxisSource, LandmarkError, LandmarkOverrides, Landmarks, LimbKind, Plane, Side, XrayDevice,
     bump_sites, find_landmarks, place,
@@ -41,7 +41,7 @@ fn ankle_and_axis_of_the_phantom_are_found() {
 /// The syndesmosis of this one is thinner than a voxel: tibia and fibula are one outline up to 65 mm above the joint.
 #[test]
 fn the_ankle_is_found_where_coarse_voxels_fuse_the_bones() {
-    let leg = LowerLeg::from_seed(5, ppa_ct::phantom::Side::Right);
+    let leg = LowerLeg::from_seed(5, ppa_phantom::Side::Right);
     let scan = Scan::of(leg.voxelise(2.0, TableTop::Absent).unwrap());
     let landmarks = scan.find(Side::Right, &automatic()).unwrap();
     assert_eq!(landmarks.limb, LimbKind::LowerLeg);

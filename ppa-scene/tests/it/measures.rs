@@ -1,7 +1,7 @@
 //! What is measured about a limb with its landmarks.
 
 use nalgebra::{Rotation3, Vector3};
-use ppa_ct::phantom::{LowerLeg, TableTop};
+use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{LandmarkNote, LandmarkOverrides, Landmarks, LimbMeasures, Side};
 
 use crate::scan::{P01, Scan};

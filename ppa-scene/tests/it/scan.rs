@@ -3,9 +3,9 @@
 use std::sync::LazyLock;
 
 use nalgebra::{Affine3, Matrix4, Point3, Rotation3, Translation3, Vector3};
-use ppa_ct::phantom::{LowerLeg, TableTop};
 use ppa_ct::{Grid, Interpolation, Volume};
 use ppa_mesh::{Border, Mesh, iso_surface};
+use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{LandmarkError, LandmarkOverrides, Landmarks, Side, find_landmarks};
 
 /// A limb alone in its scan: everything above −500 HU.

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use ppa_core::text::number;
-use ppa_ct::phantom::{Limb, LowerLeg, Scanner, Side, TableTop, Truth};
 use ppa_ct::{Format, Info, Volume, write};
+use ppa_phantom::{Limb, LowerLeg, Scanner, Side, TableTop, Truth};
 use serde::Serialize;
 
 use super::describe;

@@ -8,7 +8,7 @@ mod views;
 use super::*;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Vector3};
 use ppa_ct::Grid;
-use ppa_ct::phantom::{LowerLeg, Side, Truth};
+use ppa_phantom::{LowerLeg, Side, Truth};
 
 /// A patient who lies as the scan: LPS has y posterior and z proximal.
 fn ct_from_patient(joint: Point3<f64>, axis: Vector3<f64>) -> Isometry3<f64> {

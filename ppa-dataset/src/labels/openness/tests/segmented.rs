@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::*;
 use crate::labels::{SegmentError, SegmentedBones, segment_bones};
-use ppa_ct::phantom::{Scanner, TableTop};
+use ppa_phantom::{Scanner, TableTop};
 
 /// A phantom as a scanner shows it, told apart, beside its true bones.
 struct Segmented {

@@ -5,8 +5,8 @@ use nalgebra::{Point3, Rotation3, Vector3};
 use super::bone_points::{bone_voxels, long_axis};
 use super::family;
 use super::gauge::{Check, Gauge, SKIN_HU, within};
-use crate::phantom::parameters::Parameters;
-use crate::phantom::*;
+use crate::parameters::Parameters;
+use crate::*;
 
 const VOXEL_MM: f64 = 1.5;
 /// The sole is cut softly over 8 mm, which lifts a flat skin by up to a quarter of that.

@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, Vector3};
 
 use super::gauge::{Check, Gauge, HALF_WAY_HU, SKIN_HU, within};
-use crate::phantom::lower_leg::TIBIA;
-use crate::phantom::sdf::Shape;
-use crate::phantom::*;
+use crate::lower_leg::TIBIA;
+use crate::sdf::Shape;
+use crate::*;
 
 /// The place on the tibia at a height that faces most directly away from the middle of the shaft, and its normal:
 /// elsewhere the shell, cut obliquely, is thicker.

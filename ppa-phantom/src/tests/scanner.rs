@@ -3,10 +3,10 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Point3, Vector3};
+use ppa_ct::Grid;
+use ppa_ct::Volume;
 
-use crate::grid::Grid;
-use crate::phantom::Scanner;
-use crate::volume::Volume;
+use crate::Scanner;
 
 /// A point spreads to a Gaussian of the stated width; noise has the stated standard deviation and no memory.
 #[test]

@@ -3,11 +3,11 @@
 use std::fmt;
 
 use nalgebra::{Point3, Rotation3, Unit, Vector3};
+use ppa_ct::Volume;
 
-use crate::phantom::lower_leg::{FIBULA, TIBIA};
-use crate::phantom::sdf::Plane;
-use crate::phantom::*;
-use crate::volume::Volume;
+use crate::lower_leg::{FIBULA, TIBIA};
+use crate::sdf::Plane;
+use crate::*;
 
 /// Half-way between cartilage and a thin shell blurred by a voxel.
 pub(super) const HALF_WAY_HU: f64 = 650.0;

@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use super::{LIMB, family, lattice};
-use crate::phantom::*;
+use crate::*;
 
 /// Between two bones, mm.
 const LEAST_GAP_MM: f64 = 0.5;

@@ -1,10 +1,10 @@
 //! From shapes to voxels.
 
 use nalgebra::Vector3;
+use ppa_ct::Volume;
 
 use super::{CT, LIMB};
-use crate::phantom::*;
-use crate::volume::Volume;
+use crate::*;
 
 #[test]
 fn partial_volume_keeps_the_mass_at_any_spacing() {

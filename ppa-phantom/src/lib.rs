@@ -14,7 +14,7 @@
 //! z proximal. A left limb is the mirror image, on the other side of x = 0.
 //!
 //! ```
-//! use ppa_ct::phantom::{LowerLeg, Side, TableTop, Tissue};
+//! use ppa_phantom::{LowerLeg, Side, TableTop, Tissue};
 //! let limb = LowerLeg::family("P07", Side::Left)?;
 //! let centre = limb.truth().joint_centre;
 //! assert_eq!(limb.tissue(&centre), Tissue::SoftTissue); // the cartilage of the ankle
@@ -57,10 +57,10 @@ mod voxelise;
 #[cfg(test)]
 mod tests;
 
-pub use self::family::UnknownPhantom;
-pub use self::gutters::{GutterPoint, Gutters};
 pub use ppa_core::Side;
 
+pub use self::family::UnknownPhantom;
+pub use self::gutters::{GutterPoint, Gutters};
 pub use self::limb::Limb;
 pub use self::lower_leg::LowerLeg;
 pub use self::parameters::Sex;

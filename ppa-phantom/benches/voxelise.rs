@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use ppa_ct::phantom::{LowerLeg, TableTop};
+use ppa_phantom::{LowerLeg, TableTop};
 
 fn voxelise(c: &mut Criterion) {
     let limb = LowerLeg::p01();

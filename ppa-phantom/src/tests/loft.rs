@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Isometry3, Point3};
 use proptest::prelude::*;
 
-use crate::phantom::loft::{End, Loft, Section};
+use crate::loft::{End, Loft, Section};
 
 /// A loft whose circles grow by `slope` per mm is a cone.
 fn cone(slope: f64) -> Loft {

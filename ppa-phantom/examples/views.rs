@@ -1,6 +1,6 @@
 //! Pictures of a phantom: slices, parallel projections under internal rotation, and its skin.
 //!
-//! `cargo run --release -p ppa-ct --example phantom_views -- OUT_DIR [SPACING_MM] [NAME]`
+//! `cargo run --release -p ppa-phantom --example views -- OUT_DIR [SPACING_MM] [NAME]`
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use image::{GrayImage, Luma};
 use nalgebra::{Point3, Rotation3, Unit, Vector3};
 use ppa_ct::Volume;
-use ppa_ct::phantom::{LowerLeg, Side, TableTop};
+use ppa_phantom::{LowerLeg, Side, TableTop};
 
 /// Edge of a pixel of every picture, mm.
 const PIXEL_MM: f64 = 0.35;

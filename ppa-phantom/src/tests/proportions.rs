@@ -4,8 +4,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::bone_points::length_mm;
 use super::{LIMB, family};
-use crate::phantom::lower_leg::TALUS;
-use crate::phantom::*;
+use crate::lower_leg::TALUS;
+use crate::*;
 
 /// On radiographs of 120 feet (PMC5713710) metatarsal I is the shortest, of men 56.4 ± 4.4 and of women 50.1 ± 3.1 mm, and
 /// the longest phalanx is the proximal one of the big toe, of men 28.0 ± 2.4 mm. A metatarsal I below 73 % or above 94 %

@@ -4,9 +4,9 @@ use nalgebra::{Point3, Vector3};
 use ppa_core::Side;
 use rayon::prelude::*;
 
-use crate::grid::Grid;
-use crate::values::with_room;
-use crate::volume::{Volume, VolumeError};
+use ppa_ct::Grid;
+use ppa_ct::with_room;
+use ppa_ct::{Volume, VolumeError};
 
 use super::limb::Limb;
 use super::tissue::Local;

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Unit, Vector3};
 use proptest::prelude::*;
 
 use super::LIMB;
-use crate::phantom::*;
+use crate::*;
 
 /// A ray that starts 400 mm from a point near the joint and passes it.
 fn ray(near: [f64; 3], turn: f64, tilt: f64) -> (Point3<f64>, Unit<Vector3<f64>>) {

@@ -22,9 +22,9 @@ mod voxels;
 use std::sync::LazyLock;
 
 use nalgebra::{Point3, Vector3};
+use ppa_ct::Volume;
 
 use super::*;
-use crate::volume::Volume;
 
 const VOXEL_MM: f64 = 1.0;
 

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use crate::phantom::*;
+use crate::*;
 
 #[test]
 fn the_knee_has_four_bones_apart_below_the_skin_on_the_table() {

@@ -1,9 +1,9 @@
 //! The points of one bone, and what follows from them alone.
 
 use nalgebra::{Matrix3, Point3, Vector3};
+use ppa_ct::Grid;
 
-use crate::grid::Grid;
-use crate::phantom::*;
+use crate::*;
 
 /// Centres of the voxels of a bone of a right foot, limb frame.
 pub(super) fn bone_voxels(leg: &LowerLeg, name: &str, voxel_mm: f64) -> Vec<Point3<f64>> {

@@ -1,11 +1,11 @@
 //! What a scanner makes of a phantom: blur and noise.
 
+use ppa_ct::with_room;
+use ppa_ct::{Volume, VolumeError};
 use rayon::prelude::*;
 
 use super::draw::{Purpose, normal};
 use super::voxelise::PhantomError;
-use crate::values::with_room;
-use crate::volume::{Volume, VolumeError};
 
 /// A scanner with a Gaussian point spread and white noise, which stores whole Hounsfield units of 12 bits.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,7 +6,7 @@ use nalgebra::{Point3, Rotation3, Vector3};
 
 use super::gauge::Gauge;
 use super::{CT, LIMB, VOXEL_MM, family, lattice};
-use crate::phantom::*;
+use crate::*;
 
 #[test]
 fn bones_of_p01_have_the_volumes_of_a_man() {

@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 
 use super::family;
-use crate::phantom::*;
+use crate::*;
 
 /// Area in mm² and depth from front to back in mm of the tendon in a plane across the leg.
 fn section(leg: &LowerLeg, height_mm: f64) -> [f64; 2] {

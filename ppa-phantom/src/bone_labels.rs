@@ -1,9 +1,9 @@
 //! Which bone a voxel belongs to.
 
+use ppa_ct::Grid;
 use rayon::prelude::*;
 
 use super::limb::Limb;
-use crate::grid::Grid;
 
 impl Limb {
     /// The names of the bones; label n of [`Limb::bone_labels`] is the nth name, counted from 1.

@@ -1,11 +1,11 @@
 //! Left and right, plate, labels, scanner, seeds, and the knee.
 
 use nalgebra::{Point3, Unit, Vector3};
+use ppa_ct::Volume;
 
 use super::{LIMB, family};
-use crate::phantom::parameters::{P01, Parameters};
-use crate::phantom::*;
-use crate::volume::Volume;
+use crate::parameters::{P01, Parameters};
+use crate::*;
 
 /// P01 to P17 span what they should, and the fixed table holds P01 as it is.
 #[test]

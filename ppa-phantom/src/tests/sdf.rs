@@ -3,9 +3,9 @@
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 
-use crate::phantom::loft::{End, Loft, Section};
-use crate::phantom::placement::Placement;
-use crate::phantom::sdf::{Cone, Plane, Shape, smooth_min};
+use crate::loft::{End, Loft, Section};
+use crate::placement::Placement;
+use crate::sdf::{Cone, Plane, Shape, smooth_min};
 
 fn point(reach: f64) -> impl Strategy<Value = Point3<f64>> {
     [-reach..reach, -reach..reach, -reach..reach].prop_map(Point3::from)

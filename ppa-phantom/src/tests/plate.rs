@@ -2,7 +2,7 @@
 
 use nalgebra::{Unit, Vector3};
 
-use crate::phantom::*;
+use crate::*;
 
 #[test]
 fn the_plate_lies_on_the_fibula_below_the_skin_and_its_screws_in_it() {

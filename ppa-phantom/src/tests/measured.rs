@@ -7,8 +7,8 @@ use nalgebra::{Point3, Unit, Vector3};
 use super::family;
 use super::gauge::{Check, Gauge, HALF_WAY_HU, least_deg, within};
 use super::leg_and_foot::{foot, leg};
-use crate::phantom::lower_leg::TIBIA;
-use crate::phantom::*;
+use crate::lower_leg::TIBIA;
+use crate::*;
 
 /// Gutters, trochlea and the angles at which the gutters open.
 fn joint(gauge: &Gauge, voxel_mm: f64) -> Vec<Check> {
