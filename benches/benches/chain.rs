@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
-use ppa_dataset::{Plan, PlanCase, generate, prepare};
+use ppa_generate::{Plan, PlanCase, generate, prepare};
 use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{Side, Sweep};
 

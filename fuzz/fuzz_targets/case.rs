@@ -6,6 +6,6 @@ use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
     ppa_fuzz::with_file("case.toml", data, |path| {
-        let _ = ppa_dataset::Case::read(path);
+        let _ = ppa_generate::Case::read(path);
     });
 });

@@ -6,6 +6,6 @@ use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
     ppa_fuzz::with_file("plan.toml", data, |path| {
-        let _ = ppa_dataset::Plan::read(path);
+        let _ = ppa_generate::Plan::read(path);
     });
 });

@@ -6,6 +6,6 @@ use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|data: &[u8]| {
     ppa_fuzz::with_file("room.toml", data, |path| {
-        let _ = ppa_dataset::RoomFile::read(path);
+        let _ = ppa_generate::RoomFile::read(path);
     });
 });

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use anyhow::Context;
 use ppa_dataset::layout::LimbId;
-use ppa_dataset::{Case, Finding, Findings, LimbFinding, PreparedLimb, Severity};
+use ppa_dataset::{Finding, Findings, LimbFinding, Severity};
+use ppa_generate::{Case, PreparedLimb};
 
 use crate::stderr::warning;
 

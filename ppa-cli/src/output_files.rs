@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail, ensure};
 use clap::Args;
 use ppa_ct::Format;
-use ppa_dataset::free_bytes;
+use ppa_generate::free_bytes;
 
 use crate::output::bytes as in_words;
 

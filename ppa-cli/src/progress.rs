@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use indicatif::{HumanDuration, ProgressBar};
 use ppa_core::text::count;
-use ppa_dataset::Progress;
+use ppa_generate::Progress;
 use serde::Serialize;
 
 use crate::findings::repeat;

@@ -17,11 +17,11 @@ const OWN: &str = "# sha256 of the lines above: ";
 
 /// Hash of each file by its path from the dataset's root.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(crate) struct Checksums(BTreeMap<String, String>);
+pub struct Checksums(BTreeMap<String, String>);
 
 /// What stands in a dataset.
 #[derive(Debug, PartialEq, Eq)]
-pub(crate) enum FoundChecksums {
+pub enum FoundChecksums {
     /// No file.
     Absent,
     /// A file whose last line fits.
@@ -38,7 +38,6 @@ impl Checksums {
     pub const OF_LABELS: &str = "labels.sha256";
 
     /// Reads `checksums.sha256` of the dataset in `root`.
-    #[cfg(feature = "generate")]
     pub fn look(root: &Path) -> Result<FoundChecksums, FileError> {
         Self::look_at(root, Self::FILE)
     }
@@ -108,7 +107,6 @@ impl Checksums {
     }
 }
 
-#[cfg(feature = "generate")]
 impl FoundChecksums {
     /// The recorded hash of a list.
     pub fn hash_of(&self, file: &str) -> Option<&str> {
@@ -128,7 +126,6 @@ impl FoundChecksums {
     }
 }
 
-#[cfg(feature = "generate")]
 impl Checksums {
     /// Of files given by path and text.
     pub fn of<'a>(files: impl Iterator<Item = (&'a str, &'a str)>) -> Self {
@@ -146,7 +143,7 @@ fn with_own_line(lines: &str) -> String {
     format!("{lines}{OWN}{own}\n")
 }
 
-#[cfg(all(test, feature = "generate"))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

@@ -20,10 +20,8 @@ pub struct FileError {
 }
 
 impl FileError {
-    pub(crate) fn at<'a>(
-        action: &'static str,
-        path: &'a Path,
-    ) -> impl FnOnce(io::Error) -> Self + 'a {
+    /// Adds action and path to an error of the system, for `map_err`.
+    pub fn at<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(io::Error) -> Self + 'a {
         move |source| Self {
             action,
             path: path.to_owned(),
@@ -46,8 +44,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
 }
 
 /// Removes a file that may not be there.
-#[cfg(feature = "generate")]
-pub(crate) fn remove_if_there(path: &Path) -> Result<(), FileError> {
+pub fn remove_if_there(path: &Path) -> Result<(), FileError> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => {
             Err(FileError::at("remove", path)(error))
@@ -57,7 +54,7 @@ pub(crate) fn remove_if_there(path: &Path) -> Result<(), FileError> {
 }
 
 /// Reads a text file.
-pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
+pub fn read_text(path: &Path) -> Result<String, FileError> {
     regular_file::read_to_string(path).map_err(FileError::at("read", path))
 }
 
@@ -71,6 +68,6 @@ pub fn sha256_of_file(path: &Path) -> Result<String, FileError> {
 }
 
 /// Lower-case hexadecimal.
-pub(crate) fn hex(bytes: &[u8]) -> String {
+pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

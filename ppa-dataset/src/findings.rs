@@ -165,14 +165,12 @@ impl Findings {
     }
 
     /// `findings.json` as text.
-    #[cfg(feature = "generate")]
-    pub(crate) fn to_text(&self) -> String {
+    pub fn to_text(&self) -> String {
         serde_json::to_string_pretty(self).expect("findings hold only JSON values")
     }
 
     /// Adds the findings of one pose of `limb`, but those that stand here already.
-    #[cfg(feature = "generate")]
-    pub(crate) fn add(&mut self, limb: LimbId, acknowledged: &[FindingCode], of_pose: &[Finding]) {
+    pub fn add(&mut self, limb: LimbId, acknowledged: &[FindingCode], of_pose: &[Finding]) {
         for finding in of_pose {
             let same = |known: &LimbFinding| known.limb == limb && known.finding == *finding;
             if !self.0.iter().any(same) {

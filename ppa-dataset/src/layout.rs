@@ -72,51 +72,6 @@ impl LimbId {
     }
 }
 
-/// One pose of one limb.
-#[cfg(feature = "generate")]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct PoseId {
-    /// The limb.
-    pub limb: LimbId,
-    /// Half degrees of medial rotation.
-    pub step: u32,
-}
-
-#[cfg(feature = "generate")]
-impl fmt::Display for PoseId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} at {} degrees", self.limb, angle_text(self.step))
-    }
-}
-
-#[cfg(feature = "generate")]
-impl PoseId {
-    /// The pose of a name as [`LimbId::unit_name`] makes it.
-    pub fn of_unit_name(name: &str) -> Option<Self> {
-        let mut parts = name.strip_prefix("patient_")?.split('_');
-        let (patient, side, step) = (parts.next()?, parts.next()?, parts.next()?);
-        let pose = Self {
-            limb: LimbId {
-                patient: patient.parse().ok()?,
-                side: Side::ALL.into_iter().find(|known| known.letter() == side)?,
-            },
-            step: step.parse().ok()?,
-        };
-        (pose.limb.unit_name(pose.step) == name).then_some(pose)
-    }
-
-    /// Where images of it may lie: depth images of all body shapes and cameras, then its radiograph.
-    pub fn images(self) -> Vec<String> {
-        let Self { limb, step } = self;
-        let depth = BodyShape::ALL
-            .into_iter()
-            .flat_map(|shape| View::ALL.map(|view| limb.depth(shape, view, step)));
-        depth
-            .chain([limb.radiograph_png(step), limb.radiograph_exr(step)])
-            .collect()
-    }
-}
-
 /// The angle of a step as it stands in file names: `step / 2` degrees with one decimal.
 pub fn angle_text(step: u32) -> String {
     format!(
@@ -150,26 +105,5 @@ mod tests {
             "patient_0/xray/r/xray_image_180.png"
         );
         assert_eq!(limb.roi_file(), "patient_0/labels/r/roi_depth.json");
-    }
-
-    #[test]
-    #[cfg(feature = "generate")]
-    fn only_names_of_poses_are_read_as_poses() {
-        let limb = LimbId {
-            patient: 12,
-            side: Side::Left,
-        };
-        let pose = PoseId { limb, step: 7 };
-        assert_eq!(PoseId::of_unit_name(&limb.unit_name(7)), Some(pose));
-        assert_eq!(pose.to_string(), "limb l of patient 12 at 3.5 degrees");
-        for other in [
-            "patient_12_l_7",
-            "patient_012_l_007",
-            "patient_12_l_007_1",
-            "patient_12_x_007",
-            "notes",
-        ] {
-            assert_eq!(PoseId::of_unit_name(other), None, "{other}");
-        }
     }
 }

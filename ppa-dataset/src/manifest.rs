@@ -10,6 +10,9 @@ use crate::body_shape::BodyShape;
 use crate::files::{FileError, read_text};
 use crate::layout::{LimbId, View};
 
+/// What all images of a dataset share: settings, cameras, program.
+pub const DESCRIPTION_FILE: &str = "dataset.json";
+
 /// What a file is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -75,7 +78,7 @@ fn is_zero(count: &usize) -> bool {
 
 impl FileRow {
     /// Whether the row fits the layout: its angle on the grid, its file where such an image lies.
-    pub(crate) fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), String> {
         let (step, angle) = (self.step, self.angle_deg);
         if angle != f64::from(step) / 2.0 {
             return Err(format!(
@@ -114,7 +117,7 @@ pub struct RoiRow {
 pub type RoiFile = BTreeMap<String, RoiRow>;
 
 /// `roi_depth.json` as text.
-pub(crate) fn roi_text(rois: &RoiFile) -> String {
+pub fn roi_text(rois: &RoiFile) -> String {
     serde_json::to_string_pretty(rois).expect("regions hold only JSON values")
 }
 
@@ -129,7 +132,7 @@ pub struct Manifest {
 
 impl Manifest {
     /// Its file in a dataset.
-    pub(crate) const FILE: &str = "manifest.jsonl";
+    pub const FILE: &str = "manifest.jsonl";
 
     /// Reads `manifest.jsonl`.
     ///
@@ -152,8 +155,7 @@ impl Manifest {
     }
 
     /// One line of JSON per row.
-    #[cfg(feature = "generate")]
-    pub(crate) fn to_text(&self) -> String {
+    pub fn to_text(&self) -> String {
         let line = |row| serde_json::to_string(row).expect("rows hold only JSON values") + "\n";
         self.files.iter().map(line).collect()
     }

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct Stopped;
 
 /// Fails once `stop` is true.
-pub(crate) fn go_on(stop: &AtomicBool) -> Result<(), Stopped> {
+pub fn go_on(stop: &AtomicBool) -> Result<(), Stopped> {
     match stop.load(Ordering::Relaxed) {
         true => Err(Stopped),
         false => Ok(()),

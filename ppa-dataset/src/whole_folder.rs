@@ -9,7 +9,7 @@ use crate::files::FileError;
 /// Fills a hidden folder beside `to` and gives it that name when it is finished.
 ///
 /// Refuses a `to` that holds something. Whatever fails, nothing is left behind.
-pub(crate) fn write_whole_folder<T, E: From<FileError>>(
+pub fn write_whole_folder<T, E: From<FileError>>(
     to: &Path,
     fill: impl FnOnce(&Path) -> Result<T, E>,
 ) -> Result<T, E> {

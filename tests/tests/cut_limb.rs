@@ -4,11 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use ppa_dataset::layout::{self, LimbId, View};
-use ppa_dataset::{
-    BodyShape, FileKind, FindingCode, Findings, GenerateError, Manifest, Plan, PlanCase, Severity,
-    UnitError, forecast, generate, prepare,
-};
+use ppa_dataset::{BodyShape, FileKind, FindingCode, Findings, Manifest, Severity};
 use ppa_depth::{DepthImage, WallDepth};
+use ppa_generate::{GenerateError, Plan, PlanCase, UnitError, forecast, generate, prepare};
 use ppa_mesh::{LimbSettings, VoxelBox};
 use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{Side, Sweep};

@@ -9,11 +9,12 @@ use std::sync::OnceLock;
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_core::TransformRows;
 use ppa_dataset::layout::{self, LimbId, View};
-use ppa_dataset::{
-    BodyShape, Case, FileKind, FolderError, GenerateError, GenerateSettings, JobError, Manifest,
-    Plan, PlanCase, PreparedLimb, Stage, Summary, generate, prepare,
-};
+use ppa_dataset::{BodyShape, FileKind, Manifest};
 use ppa_depth::{DepthImage, isometry_from_rows};
+use ppa_generate::{
+    Case, FolderError, GenerateError, GenerateSettings, JobError, Plan, PlanCase, PreparedLimb,
+    Stage, Summary, generate, prepare,
+};
 use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{Landmarks, Side, Sweep};
 

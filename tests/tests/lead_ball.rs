@@ -2,8 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix4, Point3, Vector3, Vector4};
 use ppa_ct::{Grid, Volume};
-use ppa_dataset::{Plan, Stage, projection};
 use ppa_depth::{Body, MeshBody, PlacedBody};
+use ppa_generate::{Plan, Stage, projection};
 use ppa_mesh::{Border, iso_surface};
 use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{LandmarkOverrides, Landmarks, LimbKind, Placement, Side, find_landmarks, place};

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use ppa_ct::read;
 use ppa_dataset::layout::{self, LimbId, View};
-use ppa_dataset::{
-    BodyShape, Case, FileKind, Finding, FindingCode, GenerateError, Manifest, Plan, PlanCase,
-    PreparedLimb, UnitError, generate, prepare,
-};
+use ppa_dataset::{BodyShape, FileKind, Finding, FindingCode, Manifest};
 use ppa_depth::DepthImage;
+use ppa_generate::{
+    Case, GenerateError, Plan, PlanCase, PreparedLimb, UnitError, generate, prepare,
+};
 use ppa_mesh::LimbSettings;
 use ppa_scene::{LandmarkOverrides, LimbKind, Side, Sweep};
 

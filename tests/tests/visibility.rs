@@ -1,10 +1,9 @@
 //! What a radiograph shows of an ankle's joint space agrees with what its geometry lets through, the more the less noise there is.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
-use ppa_dataset::XraySettings;
-use ppa_dataset::labels::{
-    AnkleBones, BoneNumbers, Exposure, JointSpace, Openness, Reading, Visibility,
-};
+use ppa_generate::BoneNumbers;
+use ppa_generate::XraySettings;
+use ppa_label::{AnkleBones, Exposure, JointSpace, Openness, Reading, Visibility};
 use ppa_metrics::spearman;
 use ppa_phantom::{LowerLeg, Side, TableTop};
 use ppa_xray::{Detector, FastSettings, Projection, VoxelPhantom, fast};
@@ -45,7 +44,7 @@ fn radiographs_rank_poses_as_geometry_does_once_there_are_photons_enough() {
 
     let settings = XraySettings::default();
     let phantom = VoxelPhantom::from_volume(&volume, &settings.calibration, None).unwrap();
-    let spectrum = ppa_dataset::spectrum(&settings).unwrap();
+    let spectrum = ppa_generate::spectrum(&settings).unwrap();
     let mortise_deg = truth.mortise_angle_rad.to_degrees();
     let devices: Vec<Isometry3<f64>> = (-5..=5)
         .map(|n| ct_from_device(&joint, &axis, mortise_deg + 2.0 * f64::from(n)))

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 use ppa_core::text::count;
-use ppa_dataset::{CaseCheck, Drift, Finding, Severity, case_picture, write_picture};
+use ppa_dataset::{Finding, Severity};
+use ppa_generate::{CaseCheck, Drift};
+use ppa_report::{case_picture, write_picture};
 use serde::Serialize;
 
 use crate::commands::pictures::shown_name;

@@ -7,9 +7,11 @@ use clap::Args;
 use ppa_core::text::count;
 use ppa_ct::{ReadOptions, write_nifti};
 use ppa_dataset::layout::LimbId;
-use ppa_dataset::{GenerateSettings, Plan, PlanCase, Summary, contact_sheet, prepare, write_whole};
+use ppa_dataset::write_whole;
+use ppa_generate::{GenerateSettings, Plan, PlanCase, Summary, prepare};
 use ppa_mesh::LimbSettings;
 use ppa_phantom::{LowerLeg, TableTop};
+use ppa_report::contact_sheet;
 use ppa_scene::{LandmarkOverrides, Side, Sweep};
 use serde::Serialize;
 

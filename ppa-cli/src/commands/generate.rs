@@ -6,7 +6,7 @@ use clap::Args;
 use ppa_core::Part;
 use ppa_core::text::count;
 use ppa_dataset::published::{Published, PublishedError};
-use ppa_dataset::{GenerateSettings, Plan, Summary, generate, held_part};
+use ppa_generate::{GenerateSettings, Plan, Summary, generate, held_part};
 
 use crate::interrupt::Interrupt;
 use crate::output::Output;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use ppa_dataset::{Progress, check, merge};
+use ppa_generate::{Progress, check, merge};
 
 use super::generate::describe;
 use super::verify::require_none;

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use ppa_core::text::{count, count_as, number};
-use ppa_dataset::{BodyShape, Case, ShapeSettings, body_shape, layout::LimbId};
+use ppa_dataset::{BodyShape, layout::LimbId};
+use ppa_generate::{Case, ShapeSettings, body_shape};
 use ppa_mesh::{
     Border, Bump, Displacement, Mesh, add_bumps, dbscan, iso_surface, read_mesh_file,
     write_mesh_file,

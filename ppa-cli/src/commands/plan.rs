@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::{Args, Subcommand};
 use ppa_core::text::count;
-use ppa_dataset::{Forecast, Plan, forecast};
+use ppa_generate::{Forecast, Plan, forecast};
 use serde::Serialize;
 
 use super::generate::dataset_folder;

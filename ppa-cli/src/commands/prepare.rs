@@ -7,9 +7,12 @@ use clap::{Args, ValueEnum};
 use nalgebra::Point3;
 use ppa_core::text::number;
 use ppa_ct::{Format, Volume, write};
-use ppa_dataset::labels::{AnkleBones, BoneFile, BoneNumbers, JointSpace, segment_bones};
-use ppa_dataset::{Case, Found, PreparedLimb, Severity, case_picture, prepare, write_picture};
+use ppa_dataset::Severity;
+use ppa_generate::{BoneFile, BoneNumbers};
+use ppa_generate::{Case, Found, PreparedLimb, prepare};
+use ppa_label::{AnkleBones, JointSpace, read_bones, segment_bones};
 use ppa_mesh::{LimbSettings, VoxelBox, write_mesh_file};
+use ppa_report::{case_picture, write_picture};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
 
 use crate::commands::pictures::shown_name;
@@ -194,7 +197,7 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
             segmented: false,
         };
         // Refused now rather than after the dataset was made.
-        bones.read(&prepared.landmarks.joint_centre.into())?;
+        read_bones(&bones, &prepared.landmarks.joint_centre.into())?;
         case.bones = Some(bones);
     }
     let segmented = match &args.segment_bones {

@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use ppa_dataset::{qa_page, write_whole};
+use ppa_dataset::write_whole;
+use ppa_report::qa_page;
 use serde_json::json;
 
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};

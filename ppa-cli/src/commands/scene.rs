@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use ppa_core::text::{count, number};
-use ppa_dataset::{
-    Case, Frames, Plan, PosedLimb, RoomFile, Table, pose_picture, write_picture, write_whole,
-};
+use ppa_dataset::write_whole;
+use ppa_generate::{Case, Frames, Plan, RoomFile, Table};
 use ppa_mesh::{read_mesh_file, write_cloud_file, write_mesh_file};
+use ppa_report::{PosedLimb, pose_picture, write_picture};
 use ppa_scene::{Contact, PlaneSettings, SoftTissue, TablePlane, place_soft, table_plane};
 use serde::Serialize;
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use ppa_core::text::count;
-use ppa_dataset::{Status, status};
+use ppa_generate::{Status, status};
 
 use crate::output::{Output, bytes};
 

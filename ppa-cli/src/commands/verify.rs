@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::Args;
 use ppa_core::text::count;
-use ppa_dataset::{Findings, Plan, verify};
+use ppa_dataset::Findings;
+use ppa_generate::{Plan, verify};
 use serde::Serialize;
 
 use crate::interrupt::{Interrupt, NOTHING_WRITTEN};

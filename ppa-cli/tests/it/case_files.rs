@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use ppa_dataset::{Plan, PlanCase};
+use ppa_generate::{Plan, PlanCase};
 use serde_json::Value;
 
 use crate::{contains, fail, names, phantom, succeed};

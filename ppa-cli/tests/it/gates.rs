@@ -4,7 +4,8 @@ use std::path::Path;
 
 use nalgebra::Point3;
 use ppa_ct::{Grid, Volume, write_nifti};
-use ppa_dataset::{FindingCode, PrepareError, PreparedLimb, Severity, prepare};
+use ppa_dataset::{FindingCode, Severity};
+use ppa_generate::{PrepareError, PreparedLimb, prepare};
 use ppa_mesh::LimbSettings;
 use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{LandmarkError, LandmarkOverrides, LimbKind, Side};

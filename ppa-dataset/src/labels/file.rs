@@ -119,18 +119,15 @@ impl LabelFile {
     }
 
     /// The computed labels in it.
-    #[cfg(feature = "generate")]
-    pub(super) fn computed(&self) -> Self {
+    pub fn computed(&self) -> Self {
         self.only(|source| source.is_some_and(LabelSource::is_computed))
     }
 
     /// The labels in it that are not computed: readers', and those without a source.
-    #[cfg(feature = "generate")]
-    pub(super) fn not_computed(&self) -> Self {
+    pub fn not_computed(&self) -> Self {
         self.only(|source| !source.is_some_and(LabelSource::is_computed))
     }
 
-    #[cfg(feature = "generate")]
     fn only(&self, keep: impl Fn(Option<LabelSource>) -> bool) -> Self {
         let rows = self.rows.iter();
         let rows = rows.filter(|(_, labelled)| keep(labelled.source));
@@ -142,21 +139,19 @@ impl LabelFile {
     }
 
     /// These labels, and those of `others` for radiographs that have none here.
-    #[cfg(feature = "generate")]
-    pub(super) fn over(self, others: &Self) -> Self {
+    pub fn over(self, others: &Self) -> Self {
         let mut rows = others.rows.clone();
         rows.extend(self.rows);
         Self { rows }
     }
 
     /// Whether any label has no source.
-    #[cfg(feature = "generate")]
-    pub(super) fn has_unnamed(&self) -> bool {
+    pub fn has_unnamed(&self) -> bool {
         self.rows.values().any(|labelled| labelled.source.is_none())
     }
 
     /// Whether any label knows which bytes its radiograph had.
-    pub(crate) fn is_bound(&self) -> bool {
+    pub fn is_bound(&self) -> bool {
         self.rows.values().any(|labelled| labelled.sha256.is_some())
     }
 
@@ -184,8 +179,7 @@ impl LabelFile {
     }
 
     /// Reads the computed labels of a limb; `None` if there is no file of them.
-    #[cfg(feature = "generate")]
-    pub(super) fn read_computed(root: &Path, limb: LimbId) -> Result<Option<Self>, LabelFileError> {
+    pub fn read_computed(root: &Path, limb: LimbId) -> Result<Option<Self>, LabelFileError> {
         Self::read_file(Self::computed_path(root, limb))
     }
 
@@ -209,7 +203,7 @@ impl LabelFile {
     }
 
     /// The bytes of the file.
-    pub(super) fn to_text(&self) -> String {
+    pub fn to_text(&self) -> String {
         serde_json::to_string_pretty(self).expect("labels are finite numbers")
     }
 }

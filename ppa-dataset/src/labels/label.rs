@@ -17,7 +17,8 @@ pub enum LabelSource {
 }
 
 impl LabelSource {
-    pub(crate) fn name(self) -> &'static str {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
         match self {
             Self::Readers => "readers",
             Self::Surrogate => "surrogate-jso/1",
@@ -25,7 +26,8 @@ impl LabelSource {
         }
     }
 
-    pub(super) fn is_computed(self) -> bool {
+    /// Whether no reader gave the label.
+    pub fn is_computed(self) -> bool {
         self != Self::Readers
     }
 }

@@ -197,7 +197,10 @@ impl Published {
     }
 
     /// As [`Published::read`], labels that no longer belong to their radiographs included.
-    pub(crate) fn list(root: &Path) -> Result<Self, PublishedError> {
+    ///
+    /// # Errors
+    /// As [`Published::read`].
+    pub fn list(root: &Path) -> Result<Self, PublishedError> {
         let subjects = folders::subjects(root)?;
         let (mut pairs, mut unpaired) = (Vec::new(), Vec::new());
         for subject in &subjects.folders {

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use ppa_core::text::count;
+use ppa_dataset::Split;
 use ppa_dataset::published::{Flaw, Inspection, Published, inspect};
-use ppa_dataset::{FolderError, Problem, Split};
+use ppa_generate::{FolderError, Problem};
 use serde::Serialize;
 
 use super::super::verify::require_none;
@@ -75,7 +76,7 @@ fn against_records(dataset: &Path) -> anyhow::Result<Vec<(Option<String>, String
         return Ok(Vec::new());
     }
     let described = |problem: &Problem| (problem.file().map(str::to_owned), problem.to_string());
-    match ppa_dataset::check(dataset) {
+    match ppa_generate::check(dataset) {
         Ok(check) => Ok(check.problems.iter().map(described).collect()),
         Err(error @ FolderError::Busy(_)) => Err(error.into()),
         // A file without which the others cannot be compared.

@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::Args;
 use nalgebra::{Isometry3, Point3};
-use ppa_dataset::{Case, Plan, RankedView, Stage, closed_skin, coverage_plot, write_whole};
+use ppa_dataset::write_whole;
 use ppa_depth::{
     Camera, CoverageSettings, JointSurface, MeshBody, PlacedBody, Viewpoint, isometry_from_rows,
     rows_from_isometry,
 };
+use ppa_generate::{Case, Plan, Stage, closed_skin};
+use ppa_report::{RankedView, coverage_plot};
 use ppa_scene::place;
 use serde::Deserialize;
 

@@ -7,12 +7,12 @@ use anyhow::{Context, bail};
 use clap::Args;
 use nalgebra::{Isometry3, Point3};
 use ppa_core::TransformRows;
-use ppa_dataset::body_of_cloud;
 use ppa_dataset::layout::View;
 use ppa_depth::{
     Backdrop, Body, Camera, DepthImage, MeshBody, PlacedBody, Sensor, SensorSpec, Tremor,
     isometry_from_rows, render,
 };
+use ppa_generate::body_of_cloud;
 use ppa_mesh::{MeshContents, read_mesh_file};
 use serde::{Deserialize, Serialize};
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use ppa_dataset::layout::View;
-use ppa_dataset::{Case, DepthView, PreparedLimb, Stage, depth_views};
+use ppa_generate::{Case, DepthView, PreparedLimb, Stage, depth_views};
 use serde::Serialize;
 
 use super::render::{RenderArgs, read_sensor, write_others};

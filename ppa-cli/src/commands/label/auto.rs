@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use ppa_core::text::{count, number};
-use ppa_dataset::labels::{ComputedLabels, GradeThresholds, LabelledLimb, compute_labels};
+use ppa_dataset::Manifest;
 use ppa_dataset::layout::LimbId;
-use ppa_dataset::{Case, Manifest, Plan};
+use ppa_generate::{Case, Plan};
+use ppa_label::{ComputedLabels, GradeThresholds, LabelledLimb, compute_labels};
 use serde::Serialize;
 
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, ensure};
 use clap::Args;
 use ppa_core::text::count;
-use ppa_dataset::labels::{PICTURES_PER_PAGE, PageNumber, Showing, grading_page, write_key};
 use ppa_dataset::{Manifest, write_whole};
+use ppa_label::{PICTURES_PER_PAGE, PageNumber, Showing, grading_page, write_key};
 use serde::Serialize;
 
 use crate::interrupt::{Interrupt, NOTHING_WRITTEN};

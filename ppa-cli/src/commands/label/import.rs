@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use ppa_core::text::count;
 use ppa_dataset::Manifest;
-use ppa_dataset::labels::{Imported, import_grades, read_key};
+use ppa_label::{Imported, import_grades, read_key};
 
 use crate::output::Output;
 

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use ppa_core::text::{count, number};
 use ppa_ct::ReadOptions;
-use ppa_dataset::Case;
+use ppa_generate::Case;
 use ppa_xray::{Audit, HuBin, HuCalibration};
 
 use crate::findings::prepared;

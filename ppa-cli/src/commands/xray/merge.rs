@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use ppa_dataset::Plan;
+use ppa_generate::Plan;
 use ppa_xray::AnalogTally;
 
 use super::report::Report;

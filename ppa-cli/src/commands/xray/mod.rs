@@ -11,7 +11,7 @@ mod simulate;
 mod spectrum;
 
 use clap::{Args, Subcommand};
-use ppa_dataset::XraySettings;
+use ppa_generate::XraySettings;
 
 use crate::output::Output;
 

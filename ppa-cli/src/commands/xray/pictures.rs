@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use ppa_dataset::{Case, PreparedLimb, Table, XraySettings, tube};
+use ppa_generate::{Case, PreparedLimb, Table, XraySettings, tube};
 use ppa_scene::{LimbKind, Side};
 use ppa_xray::{
     DxExposure, DxIntent, Examination, Laterality, Presentation, Projection, Radiograph, Region,

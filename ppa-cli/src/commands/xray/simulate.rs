@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use ppa_ct::{Volume, write_nifti};
-use ppa_dataset::{Case, Plan, Table, joint_phantom, projection, spectrum};
+use ppa_generate::{Case, Plan, Table, joint_phantom, projection, spectrum};
 use ppa_scene::{Contact, place_soft};
 use ppa_xray::{Dose, FastSettings, VoxelPhantom, fast};
 use serde::Serialize;

@@ -1,7 +1,7 @@
 //! `ppa xray spectrum`: the beam of a tungsten tube behind filters.
 
 use clap::Args;
-use ppa_dataset::{XraySettings, spectrum};
+use ppa_generate::{XraySettings, spectrum};
 use serde::Serialize;
 
 use super::BeamArgs;

@@ -145,7 +145,6 @@ fn readers_stand_beside_one_kind_of_computed_labels() {
     assert_eq!(found.source_of_step(4), None);
 }
 
-#[cfg(feature = "generate")]
 #[test]
 fn a_readers_label_wins_over_a_computed_one() {
     let row = |step, label| LabelRow {

@@ -1,0 +1,223 @@
+//! Whether a dataset holds what was made: every image, record and list against the others.
+
+use std::path::{Path, PathBuf};
+
+use ppa_dataset::checksums::Checksums;
+use ppa_dataset::files::{read_text, sha256_of_file};
+use ppa_dataset::findings::Findings;
+use ppa_dataset::manifest::{FileRow, Manifest};
+use rayon::prelude::*;
+
+use crate::claim::{Claim, FolderError, claim_existing};
+use crate::job::LimbUnits;
+use crate::lists::{Lists, stands};
+use crate::part_file::read_part;
+use crate::planned::Planned;
+use crate::record::{FoundRecord, Record, Unit};
+use crate::staging::is_interrupted;
+
+/// Something in a dataset that is not as it was made.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Problem {
+    /// A pose was never made, or its record is gone.
+    #[error("{unit} is missing")]
+    Missing {
+        /// The pose.
+        unit: String,
+    },
+    /// The record of a pose is not as it was written.
+    #[error("the record of {unit} is damaged")]
+    Record {
+        /// The pose.
+        unit: String,
+    },
+    /// A run was killed while it put the files of a pose in their place.
+    #[error(
+        "{unit} is half replaced, as the run that did it was interrupted; the next run completes it"
+    )]
+    Interrupted {
+        /// The pose.
+        unit: String,
+    },
+    /// A pose follows from other settings than `dataset.json` tells.
+    #[error("{unit} was made from other settings than those in dataset.json")]
+    Stale {
+        /// The pose.
+        unit: String,
+    },
+    /// An image is not there.
+    #[error("{file} cannot be read")]
+    Unreadable {
+        /// Path from the dataset's root.
+        file: String,
+    },
+    /// An image has other bytes than those that were written.
+    #[error("{file} is altered: its hash is not the recorded one")]
+    Altered {
+        /// Path from the dataset's root.
+        file: String,
+    },
+    /// A pose came out otherwise when it was made again.
+    #[error("{file} comes out otherwise when it is made again")]
+    Differs {
+        /// Path from the dataset's root.
+        file: String,
+    },
+    /// A line of the manifest is not the row of its image.
+    #[error("manifest.jsonl line {line} is altered: expected the row of {expected}")]
+    ManifestLine {
+        /// Counted from 1.
+        line: usize,
+        /// The image whose row belongs there, or that none does.
+        expected: String,
+    },
+    /// A list cannot be read, or is not what its records tell.
+    #[error("{file} is missing or altered")]
+    List {
+        /// Path from the dataset's root.
+        file: String,
+    },
+}
+
+impl Problem {
+    /// The image or list that is not as it was made: its path from the dataset's root.
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            Self::Unreadable { file }
+            | Self::Altered { file }
+            | Self::Differs { file }
+            | Self::List { file } => Some(file),
+            _ => None,
+        }
+    }
+}
+
+/// What [`check`] found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Check {
+    /// Poses that the folder is to hold.
+    pub units: usize,
+    /// Images whose bytes were compared with their hash.
+    pub images: usize,
+    /// Everything that is wrong, in the order of the plan.
+    pub problems: Vec<Problem>,
+}
+
+/// A dataset that nobody writes to, with the records that can be read.
+pub(crate) struct Recorded {
+    _claim: Claim,
+    pub planned: Planned,
+    pub limbs: Vec<LimbUnits>,
+    root: PathBuf,
+}
+
+impl Recorded {
+    pub fn open(root: &Path) -> Result<Self, FolderError> {
+        let claim = claim_existing(root)?;
+        let planned = Planned::read(root)?;
+        Ok(Self {
+            _claim: claim,
+            limbs: planned.part(read_part(root)?),
+            planned,
+            root: root.to_owned(),
+        })
+    }
+
+    /// Compares all files with their records.
+    pub fn check(&self) -> Check {
+        let units: Vec<_> = self.limbs.iter().flat_map(LimbUnits::units).collect();
+        let found: Vec<_> = units.par_iter().map(|unit| self.unit(unit)).collect();
+        let mut problems = Vec::new();
+        let mut records = Vec::new();
+        for (record, of_unit) in found {
+            records.extend(record);
+            problems.extend(of_unit);
+        }
+        let images = records.iter().map(|record| record.files.len()).sum();
+        // Lists are written after the last pose.
+        if records.len() == units.len() {
+            problems.extend(self.lists(records));
+        }
+        Check {
+            units: units.len(),
+            images,
+            problems,
+        }
+    }
+
+    fn unit(&self, unit: &Unit) -> (Option<Record>, Vec<Problem>) {
+        let path = self.root.join(unit.id().record_file());
+        let found = Record::look(&path, unit.id()).unwrap_or(FoundRecord::Damaged);
+        let unit_name = unit.to_string();
+        if is_interrupted(&self.root, unit.id()) {
+            return (None, vec![Problem::Interrupted { unit: unit_name }]);
+        }
+        let record = match found {
+            FoundRecord::Whole(record) => record,
+            FoundRecord::Absent => return (None, vec![Problem::Missing { unit: unit_name }]),
+            FoundRecord::Damaged => return (None, vec![Problem::Record { unit: unit_name }]),
+        };
+        if record.key != unit.key() {
+            return (None, vec![Problem::Stale { unit: unit_name }]);
+        }
+        let of_image = |row: &FileRow| {
+            let file = row.file.clone();
+            match sha256_of_file(&self.root.join(&file)) {
+                Err(_) => Some(Problem::Unreadable { file }),
+                Ok(found) => (found != row.sha256).then_some(Problem::Altered { file }),
+            }
+        };
+        let problems = record.files.iter().filter_map(of_image).collect();
+        (Some(record), problems)
+    }
+
+    /// The lists against the records, which are in the order of the plan.
+    fn lists(&self, records: Vec<Record>) -> Vec<Problem> {
+        let mut records = records.into_iter();
+        let record = |_: &Unit| records.next().ok_or(());
+        let lists = Lists::of(&self.limbs, &self.planned.text, record);
+        let lists = lists.expect("all poses have a record");
+        let mut problems = Vec::new();
+        for list @ (file, text) in &lists.files {
+            let is_sealed = self.planned.sealed || file != Checksums::FILE;
+            if file == Manifest::FILE {
+                problems.extend(self.manifest(text, &lists.rows));
+            } else if is_sealed && !stands(&self.root, list) {
+                problems.push(Problem::List { file: file.clone() });
+            }
+        }
+        if !lists.holds(Findings::FILE) && self.root.join(Findings::FILE).exists() {
+            let file = Findings::FILE.to_owned();
+            problems.push(Problem::List { file });
+        }
+        problems
+    }
+
+    fn manifest(&self, text: &str, rows: &[FileRow]) -> Option<Problem> {
+        let file = Manifest::FILE.to_owned();
+        let Ok(found) = read_text(&self.root.join(&file)) else {
+            return Some(Problem::List { file });
+        };
+        if found == text {
+            return None;
+        }
+        let (mut found, mut lines) = (found.lines(), text.lines());
+        let same = |_: &usize| matches!((found.next(), lines.next()), (Some(a), Some(b)) if a == b);
+        let line = (0..).take_while(same).count();
+        let row = rows.get(line).map(|row| row.file.clone());
+        Some(Problem::ManifestLine {
+            line: line + 1,
+            expected: row.unwrap_or_else(|| "no further image".to_owned()),
+        })
+    }
+}
+
+/// Reads every image of the dataset in `root` and compares it with its hash, and the lists with the records they were made
+/// from. Changes nothing.
+///
+/// # Errors
+/// [`FolderError`] when `root` holds no dataset or is being written.
+pub fn check(root: &Path) -> Result<Check, FolderError> {
+    Ok(Recorded::open(root)?.check())
+}

@@ -1,0 +1,155 @@
+//! A dataset's folder, claimed by one run that writes, or by any number of readers.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use ppa_core::Part;
+use ppa_dataset::checksums::Checksums;
+use ppa_dataset::files::FileError;
+use ppa_dataset::manifest::DESCRIPTION_FILE;
+use ppa_dataset::manifest::Manifest;
+
+use crate::record::FOLDER;
+use crate::survey::DatasetDiffers;
+
+/// Why a folder cannot take the images of a run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FolderError {
+    /// The folder holds poses that the run does not.
+    #[error(
+        "{} holds a dataset of another plan or shard (its {record} is not in this one); choose another folder",
+        root.display()
+    )]
+    OtherPlan {
+        /// The dataset's folder.
+        root: PathBuf,
+        /// The record of a pose that is not in the run.
+        record: String,
+    },
+    /// The folder holds what the run would replace.
+    #[error("{0}")]
+    Differs(Box<DatasetDiffers>),
+    /// The folder holds another part of the plan.
+    #[error(
+        "{} holds {}, but this run is to make {}; {} resumes it; choose another folder for this run",
+        root.display(), part_name(*held), part_name(*asked), how_to_ask(*held)
+    )]
+    OtherPart {
+        /// The dataset's folder.
+        root: PathBuf,
+        /// The part that it holds.
+        held: Part,
+        /// The part that was asked for.
+        asked: Part,
+    },
+    /// The folder holds something else.
+    #[error("{} is neither empty nor a dataset that ppa generate began", .0.display())]
+    NotADataset(PathBuf),
+    /// The folder holds files of a dataset, but not the records that describe them.
+    #[error(
+        "{} holds {found}, but not the folder .ppa with the records of its poses, as a dataset that was copied in part; \
+         copy .ppa as well, or choose another folder",
+        root.display()
+    )]
+    WithoutRecords {
+        /// The dataset's folder.
+        root: PathBuf,
+        /// What it holds.
+        found: String,
+    },
+    /// Another process relies on its files.
+    #[error("{} is in use by another process that writes or checks it", .0.display())]
+    Busy(PathBuf),
+    /// A file of the dataset.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+fn part_name(part: Part) -> String {
+    match part {
+        Part::WHOLE => "the whole plan".to_owned(),
+        part => format!("shard {part} of its plan"),
+    }
+}
+
+fn how_to_ask(part: Part) -> String {
+    match part {
+        Part::WHOLE => "a run without --shard".to_owned(),
+        part => format!("--shard {part}"),
+    }
+}
+
+/// Held while a process relies on a dataset's files; released when dropped or when the process dies.
+pub(crate) struct Claim(#[expect(dead_code, reason = "holds the lock")] Option<fs::File>);
+
+/// Claims a folder that holds a dataset, finished or not, for reading. Writes nothing, and several readers may do so.
+pub(crate) fn claim_existing(root: &Path) -> Result<Claim, FolderError> {
+    if !root.join(FOLDER).is_dir() {
+        return Err(not_a_dataset(root)?);
+    }
+    let path = lock_file(root);
+    match fs::File::open(&path) {
+        Ok(lock) => {
+            locked(root, lock.try_lock_shared())?;
+            Ok(Claim(Some(lock)))
+        }
+        // Nobody has written here since the folder was copied.
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Claim(None)),
+        Err(error) => Err(FileError::at("read", &path)(error).into()),
+    }
+}
+
+/// Claims the folder `root` for a run that writes. Refuses a folder that is in use or holds something else.
+pub(crate) fn claim(root: &Path) -> Result<Claim, FolderError> {
+    let folder = root.join(FOLDER);
+    let occupied = root.exists() && {
+        let mut entries = fs::read_dir(root).map_err(FileError::at("read", root))?;
+        entries.next().is_some()
+    };
+    if occupied && !folder.is_dir() {
+        return Err(not_a_dataset(root)?);
+    }
+    fs::create_dir_all(&folder).map_err(FileError::at("create folder", &folder))?;
+    let path = lock_file(root);
+    let mut options = fs::OpenOptions::new();
+    let options = options.write(true).create(true).truncate(false);
+    let lock = options
+        .open(&path)
+        .map_err(FileError::at("create", &path))?;
+    locked(root, lock.try_lock())?;
+    Ok(Claim(Some(lock)))
+}
+
+fn lock_file(root: &Path) -> PathBuf {
+    root.join(FOLDER).join("lock")
+}
+
+fn locked(root: &Path, tried: Result<(), fs::TryLockError>) -> Result<(), FolderError> {
+    tried.map_err(|error| match error {
+        fs::TryLockError::WouldBlock => FolderError::Busy(root.to_owned()),
+        fs::TryLockError::Error(e) => FileError::at("lock", &lock_file(root))(e).into(),
+    })
+}
+
+/// What a folder without records is.
+fn not_a_dataset(root: &Path) -> Result<FolderError, FileError> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(root).map_err(FileError::at("read", root))? {
+        let entry = entry.map_err(FileError::at("read", root))?;
+        names.push(entry.file_name().to_string_lossy().into_owned());
+    }
+    names.sort();
+    let lists = [DESCRIPTION_FILE, Manifest::FILE, Checksums::FILE];
+    let of_dataset =
+        |name: &&String| lists.contains(&name.as_str()) || name.starts_with("patient_");
+    let root = root.to_owned();
+    Ok(match names.iter().find(of_dataset) {
+        None => FolderError::NotADataset(root),
+        Some(found) => FolderError::WithoutRecords {
+            root,
+            found: found.clone(),
+        },
+    })
+}

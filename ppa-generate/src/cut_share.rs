@@ -1,0 +1,396 @@
+//! How much of what a pose shows is where the field of view of its scan cut the limb off.
+
+use std::fmt;
+
+use nalgebra::{Isometry3, Point3};
+use ppa_dataset::findings::{Finding, FindingCode, Severity};
+use ppa_dataset::layout::{LimbId, View, angle_text};
+use ppa_depth::{
+    Body, Camera, CameraError, CameraModel, CameraSpec, DepthError, DepthMode, MeshBody,
+    PlacedBody, Roi, WallDepth, render, render_before, roi_around,
+};
+use ppa_mesh::{CutWalls, Mesh, WallMeasure};
+use ppa_xray::{Detector, Projection, TransportError};
+
+use crate::stage::PlacedCamera;
+use crate::unit::UnitError;
+
+/// Largest share of a region that may be cut unless the plan says otherwise; above it, the pose has a finding.
+pub(crate) const MAX_CUT_SHARE: f64 = 0.01;
+
+/// Columns or rows at which a radiograph's rays are sampled; fewer where its detector has fewer.
+const MOST_RAYS: u32 = 512;
+
+/// Walls of a limb as cameras and the x-ray tube see them.
+pub(crate) struct CutFaces {
+    /// Corners of the walls in the `ct` frame.
+    corners: Vec<Point3<f32>>,
+    /// The walls alone, and the tube as a camera; `None` if no face of the scan cuts the limb.
+    from_tube: Option<(Body, Camera)>,
+}
+
+impl CutFaces {
+    /// For the walls of a skin and the detector of all its radiographs.
+    pub fn new(
+        walls: &CutWalls,
+        skin: &Mesh,
+        detector: &Detector,
+        source_detector_mm: f64,
+    ) -> Result<Self, UnitError> {
+        let projection = Projection::new(Isometry3::identity(), source_detector_mm, *detector);
+        projection.validate().map_err(TransportError::from)?;
+        if walls.is_empty() {
+            return Ok(Self {
+                corners: Vec::new(),
+                from_tube: None,
+            });
+        }
+        let vertices = walls.vertices(skin);
+        let mut used = walls.triangles.as_flattened().to_vec();
+        used.sort_unstable();
+        used.dedup();
+        let alone = MeshBody::new(&vertices, &walls.triangles)?.into();
+        Ok(Self {
+            corners: used.iter().map(|&id| vertices[id as usize]).collect(),
+            from_tube: Some((alone, tube(detector, source_detector_mm)?)),
+        })
+    }
+
+    /// Whether no face of the scan cuts the limb.
+    pub fn is_empty(&self) -> bool {
+        self.from_tube.is_none()
+    }
+
+    /// Share of the region's pixels at whose centre the camera sees a wall, and nothing before it. `in_room` moves points
+    /// of the scan as the limb was moved.
+    pub fn in_region(
+        &self,
+        camera: &PlacedCamera,
+        roi: &Roi,
+        limb: PlacedBody,
+        in_room: impl FnOnce(&[Point3<f32>]) -> Vec<Point3<f32>>,
+    ) -> Result<f64, DepthError> {
+        if self.is_empty() || is_beside(camera, roi, &in_room(&self.corners)) {
+            return Ok(0.0);
+        }
+        let background = &camera.background;
+        let seen = render_before(&camera.camera, &[limb], background, WallDepth::Flat)?;
+        Ok(share(roi, background.width, &seen.wall_pixels))
+    }
+
+    /// Share of the rays of a radiograph's region that pass through a wall: they enter or leave the scan inside the limb, so
+    /// that a part of what they pass is missing. The region is the square of `roi_mm` around the joint (`ct` frame) as it falls on the
+    /// detector, or the whole detector where that misses it.
+    pub fn in_radiograph(
+        &self,
+        ct_from_device: &Isometry3<f64>,
+        joint: &Point3<f64>,
+        roi_mm: f64,
+    ) -> f64 {
+        let Some((walls, tube)) = &self.from_tube else {
+            return 0.0;
+        };
+        let device_from_ct = ct_from_device.inverse();
+        let walls = PlacedBody {
+            body: walls,
+            camera_from_body: device_from_ct,
+        };
+        let image = render(tube, &[walls]);
+        let crossed = (0..).zip(&image.z_mm).filter(|(_, z_mm)| **z_mm > 0.0);
+        let crossed: Vec<u32> = crossed.map(|(pixel, _)| pixel).collect();
+        match roi_around(tube, &(device_from_ct * joint), roi_mm) {
+            Ok(roi) => share(&roi, image.width, &crossed),
+            Err(_) => crossed.len() as f64 / image.z_mm.len() as f64,
+        }
+    }
+}
+
+/// Share of a region's pixels that are among `pixels`, row-major indices of an image that wide.
+pub(crate) fn share(roi: &Roi, width: u32, pixels: &[u32]) -> f64 {
+    let within = |start: u32, at: u32| (start..start + roi.size).contains(&at);
+    let inside = pixels
+        .iter()
+        .filter(|&pixel| within(roi.x_start, pixel % width) && within(roi.y_start, pixel / width));
+    inside.count() as f64 / f64::from(roi.size).powi(2)
+}
+
+/// Whether none of what lies between points of the room can be in a camera's region: the boxes around both in X/Z and Y/Z are
+/// disjoint. Exact for points before the camera, whatever the lens.
+fn is_beside(camera: &PlacedCamera, roi: &Roi, points: &[Point3<f32>]) -> bool {
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for point in points {
+        let at = camera.camera_from_room * point.cast::<f64>();
+        if at.z <= 0.0 {
+            return false;
+        }
+        for (axis, slope) in [at.x / at.z, at.y / at.z].into_iter().enumerate() {
+            low[axis] = low[axis].min(slope);
+            high[axis] = high[axis].max(slope);
+        }
+    }
+    let width = camera.camera.width();
+    let rows = roi.y_start..roi.y_start + roi.size;
+    let pixels = rows.flat_map(|row| {
+        (roi.x_start..roi.x_start + roi.size).map(move |column| row * width + column)
+    });
+    let rays = camera.camera.rays();
+    pixels.filter_map(|pixel| rays[pixel as usize]).all(|ray| {
+        [ray.x, ray.y]
+            .into_iter()
+            .enumerate()
+            .any(|(axis, slope)| slope < low[axis] || slope > high[axis])
+    })
+}
+
+/// The tube as a pinhole camera, on whose image plane the detector lies: columns along device x, rows along device y.
+fn tube(detector: &Detector, source_detector_mm: f64) -> Result<Camera, CameraError> {
+    let binned = detector
+        .columns
+        .max(detector.rows)
+        .div_ceil(MOST_RAYS)
+        .max(1);
+    let [width, height] = [detector.columns, detector.rows].map(|pixels| pixels.div_ceil(binned));
+    let pixel_mm = detector.pixel_mm * f64::from(binned);
+    // Of the first pixel's centre from the detector's, in pixels; the last one may be cut.
+    let first = |pixels: u32, centre_mm: f64| {
+        0.5 * f64::from(pixels) / f64::from(binned) - 0.5 - centre_mm / pixel_mm
+    };
+    Camera::try_from(CameraSpec {
+        model: CameraModel::Pinhole,
+        width,
+        height,
+        fx: source_detector_mm / pixel_mm,
+        fy: source_detector_mm / pixel_mm,
+        cx: first(detector.columns, detector.centre_mm[0]),
+        cy: first(detector.rows, detector.centre_mm[1]),
+        k1: 0.0,
+        k2: 0.0,
+        k3: 0.0,
+        k4: 0.0,
+        k5: 0.0,
+        k6: 0.0,
+        p1: 0.0,
+        p2: 0.0,
+        metric_radius: None,
+        ..CameraSpec::azure_kinect(DepthMode::NfovUnbinned)
+    })
+}
+
+/// An image of a pose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PoseImage {
+    /// Depth image of the skin of the scan.
+    Depth(View),
+    /// Radiograph.
+    Radiograph,
+}
+
+impl PoseImage {
+    /// Key of the plan that limits how much of it may be cut.
+    fn key(self) -> &'static str {
+        match self {
+            Self::Depth(_) => "depth.max_cut_share",
+            Self::Radiograph => "xray.max_cut_share",
+        }
+    }
+}
+
+impl fmt::Display for PoseImage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Depth(View::Left) => "left camera's region of interest",
+            Self::Depth(View::Right) => "right camera's region of interest",
+            Self::Radiograph => "radiograph's region",
+        })
+    }
+}
+
+/// A region of which more is cut than the plan allows; the worst of a limb.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "limb {} of patient {} at {} degrees: {:.1} % of the {image} lies where the field of view of the scan cuts the limb off, but {} allows \
+     {:.1} % ({exceeding} of {poses} poses exceed it); raise {} in the plan, take another camera or other rotations, or a scan \
+     that shows more of the limb",
+    limb.side_letter(), limb.patient, angle_text(*step), 100.0 * share, image.key(), 100.0 * limit, image.key()
+)]
+pub struct CutError {
+    /// The limb.
+    pub limb: LimbId,
+    /// Half degrees of medial rotation.
+    pub step: u32,
+    /// The image.
+    pub image: PoseImage,
+    /// Share of its region, 0 to 1.
+    pub share: f64,
+    /// Largest share that the plan allows.
+    pub limit: f64,
+    /// Poses of which such a share is larger than the plan allows.
+    pub exceeding: usize,
+    /// Poses of the limb.
+    pub poses: usize,
+}
+
+/// How much of each image of a pose is cut.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct PoseCuts {
+    pub step: u32,
+    pub shares: Vec<(PoseImage, f64)>,
+}
+
+impl PoseCuts {
+    /// Share of the radiograph's region.
+    pub fn of_radiograph(&self) -> f64 {
+        let of =
+            |(image, share): &(PoseImage, f64)| (*image == PoseImage::Radiograph).then_some(*share);
+        self.shares.iter().find_map(of).unwrap_or_default()
+    }
+
+    /// The image of which most is cut, if that is more than [`MAX_CUT_SHARE`]; shares in whole percent, so that poses
+    /// alike have one finding. The place is the centre of the cut nearest to the joint.
+    pub fn finding(&self, walls: &CutWalls, skin: &Mesh, joint: &Point3<f64>) -> Option<Finding> {
+        let worse = |a: (PoseImage, f64), b: (PoseImage, f64)| if b.1 > a.1 { b } else { a };
+        let (image, share) = self.shares.iter().copied().reduce(worse)?;
+        if share <= MAX_CUT_SHARE {
+            return None;
+        }
+        let percent = (100.0 * share).round();
+        let far = |wall: &WallMeasure| (wall.centre - joint).norm();
+        let nearest = walls
+            .measured(skin)
+            .into_iter()
+            .min_by(|a, b| far(a).total_cmp(&far(b)));
+        Some(Finding {
+            code: FindingCode::CutInRegion,
+            severity: Severity::Severe,
+            text: format!(
+                "about {percent} % of the {image} lies where the field of view of the scan cuts the limb off, expected at most {} %",
+                100.0 * MAX_CUT_SHARE
+            ),
+            value: Some(percent / 100.0),
+            place_mm: nearest.map(|wall| wall.centre.into()),
+        })
+    }
+}
+
+/// Refuses a limb of which a region is cut by more than its limit: depth images, radiographs.
+pub(crate) fn check(limb: LimbId, poses: &[PoseCuts], limits: [f64; 2]) -> Result<(), CutError> {
+    let limit = |image: PoseImage| match image {
+        PoseImage::Depth(_) => limits[0],
+        PoseImage::Radiograph => limits[1],
+    };
+    let excess = |&(image, share): &(PoseImage, f64)| share - limit(image);
+    let exceeds = |pose: &&PoseCuts| pose.shares.iter().any(|cut| excess(cut) > 0.0);
+    let all = poses
+        .iter()
+        .flat_map(|pose| pose.shares.iter().map(move |cut| (pose.step, cut)));
+    // The first of equal ones, so that the message is always the same.
+    let worst = all.reduce(|worst, next| {
+        if excess(next.1) > excess(worst.1) {
+            next
+        } else {
+            worst
+        }
+    });
+    match worst {
+        Some((step, &(image, share))) if share > limit(image) => Err(CutError {
+            limb,
+            step,
+            image,
+            share,
+            limit: limit(image),
+            exceeding: poses.iter().filter(exceeds).count(),
+            poses: poses.len(),
+        }),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ppa_dataset::layout::Side;
+
+    use super::*;
+
+    const LIMB: LimbId = LimbId {
+        patient: 3,
+        side: Side::Right,
+    };
+
+    #[test]
+    fn the_worst_image_of_all_poses_is_named() {
+        let pose = |step, depth, radiograph| PoseCuts {
+            step,
+            shares: vec![
+                (PoseImage::Depth(View::Left), 0.0),
+                (PoseImage::Depth(View::Right), depth),
+                (PoseImage::Radiograph, radiograph),
+            ],
+        };
+        let poses = [
+            pose(0, 0.005, 0.0),
+            pose(1, 0.02, 0.0),
+            pose(2, 0.034, 0.03),
+            pose(3, 0.034, 0.0),
+        ];
+        let error = check(LIMB, &poses, [0.01, 0.02]).unwrap_err();
+        assert_eq!(
+            (error.step, error.image, error.exceeding),
+            (2, PoseImage::Depth(View::Right), 3)
+        );
+        let said = error.to_string();
+        for part in [
+            "limb r of patient 3",
+            "1.0 degrees",
+            "3.4 %",
+            "1.0 %",
+            "right camera",
+            "3 of 4 poses",
+            "depth.max_cut_share",
+        ] {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+        let error = check(LIMB, &poses, [0.1, 0.02]).unwrap_err();
+        assert_eq!((error.image, error.exceeding), (PoseImage::Radiograph, 1));
+        assert!(error.to_string().contains("xray.max_cut_share"));
+        assert_eq!(check(LIMB, &poses, [0.034, 0.03]), Ok(()));
+    }
+
+    /// A square wall of 40 mm at half the way: 80 mm of the detector.
+    #[test]
+    fn rays_through_a_wall_are_counted_on_the_detector() {
+        let corners = [[-20.0, -20.0], [20.0, -20.0], [20.0, 20.0], [-20.0, 20.0]];
+        let skin = Mesh {
+            vertices: corners
+                .map(|[x, y]| Point3::new(x + 10.0, y, 0.0_f32))
+                .to_vec(),
+            ..Mesh::default()
+        };
+        let walls = CutWalls {
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..CutWalls::default()
+        };
+        // 200 x 160 mm, moved along with what it shows; in one image the pixels are many, in the other few.
+        for (columns, rows, pixel_mm) in [(2000, 1600, 0.1), (100, 80, 2.0)] {
+            let detector = Detector {
+                columns,
+                rows,
+                pixel_mm,
+                centre_mm: [20.0, 0.0],
+            };
+            let cut = CutFaces::new(&walls, &skin, &detector, 1000.0).unwrap();
+            let before = Isometry3::translation(0.0, 0.0, -500.0);
+            let of = |roi_mm, x| cut.in_radiograph(&before, &Point3::new(x, 0.0, 0.0), roi_mm);
+            let close = |share: f64, expected: f64| {
+                assert!((share - expected).abs() < 0.01, "{share} {expected}")
+            };
+            close(of(40.0, 10.0), 1.0);
+            close(of(60.0, 10.0), 4.0 / 9.0);
+            close(of(40.0, 30.0), 0.5);
+            // Beside the detector: all of it counts.
+            close(of(40.0, 500.0), 80.0 * 80.0 / (200.0 * 160.0));
+            let behind = Isometry3::translation(0.0, 0.0, 100.0);
+            let joint = Point3::new(0.0, 0.0, 700.0);
+            assert_eq!(cut.in_radiograph(&behind, &joint, 40.0), 0.0);
+        }
+    }
+}

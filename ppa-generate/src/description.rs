@@ -1,0 +1,170 @@
+//! `dataset.json`: what all images of a dataset share, free of paths and identities.
+
+use ppa_core::TransformRows;
+use ppa_dataset::files::{FileError, hex, sha256_of_file};
+use ppa_dataset::findings::FindingCode;
+use ppa_dataset::layout::{LimbId, View};
+use ppa_depth::{CameraSpec, RigSpec, SensorSpec, WallDepth, rows_from_isometry};
+use ppa_mesh::LimbSettings;
+use ppa_scene::{LandmarkOverrides, PlaneSettings, RoomSpec, SoftTissue, Sweep};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use crate::case::Case;
+use crate::compiled::code;
+use crate::plan::{Plan, XraySettings};
+use crate::seal::sealed;
+use crate::shaped_skin::ShapeSettings;
+use crate::stage::Stage;
+
+/// The settings of a plan that decide the bytes of its images; files stand by their hashes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Settings {
+    generator: &'static str,
+    /// Hash of sources, physics data and compiled crates, see `compiled.rs`.
+    code: &'static str,
+    seed: u64,
+    shapes: ShapeSettings,
+    soft_tissue: SoftTissue,
+    room_ply_sha256: Option<String>,
+    room: RoomSpec,
+    table: Option<PlaneSettings>,
+    room_from_device: Option<TransformRows>,
+    rig_sha256: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cameras: Option<RigSpec>,
+    roi_mm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sensor: Option<SensorSpec>,
+    cut_faces: WallDepth,
+    xray: XraySettings,
+}
+
+impl Settings {
+    pub fn of(plan: &Plan) -> Result<Self, FileError> {
+        let hash =
+            |path: &Option<std::path::PathBuf>| path.as_deref().map(sha256_of_file).transpose();
+        Ok(Self {
+            generator: concat!("ppa ", env!("CARGO_PKG_VERSION")),
+            code: code(),
+            seed: plan.seed,
+            shapes: plan.shapes.clone(),
+            soft_tissue: plan.soft_tissue,
+            room_ply_sha256: hash(&plan.room.ply)?,
+            room: plan.room.parametric,
+            table: plan.room.table.clone(),
+            room_from_device: plan.room.room_from_device,
+            rig_sha256: hash(&plan.depth.rig)?,
+            cameras: plan.depth.cameras.clone(),
+            roi_mm: plan.depth.roi_mm,
+            sensor: plan.depth.sensor.clone(),
+            cut_faces: plan.depth.cut_faces,
+            // Limits decide which images there are, not what is in them.
+            xray: XraySettings {
+                max_cut_share: XraySettings::default().max_cut_share,
+                ..plan.xray.clone()
+            },
+        })
+    }
+
+    /// Hash of everything the images of a limb follow from, but the pose.
+    pub fn limb_key(&self, id: LimbId, case: &Case) -> String {
+        let address = (
+            self,
+            id,
+            &case.source.volume_sha256,
+            &case.surface,
+            &case.choices,
+        );
+        let text = serde_json::to_string(&address).expect("settings hold only JSON values");
+        hex(&Sha256::digest(text.as_bytes()))
+    }
+}
+
+/// `dataset.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Description<'a> {
+    version: u32,
+    units: &'static str,
+    rotation: Sweep,
+    settings: &'a Settings,
+    room_from_device: TransformRows,
+    source_detector_mm: f64,
+    table: Table,
+    cameras: Vec<CameraRow>,
+    limbs: Vec<LimbRow<'a>>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Table {
+    normal: [f64; 3],
+    offset_mm: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct CameraRow {
+    view: View,
+    intrinsics: CameraSpec,
+    room_from_camera: TransformRows,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct LimbRow<'a> {
+    #[serde(flatten)]
+    limb: LimbId,
+    key: String,
+    volume_sha256: &'a str,
+    surface: &'a LimbSettings,
+    choices: &'a LandmarkOverrides,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    acknowledged: &'a [FindingCode],
+}
+
+impl<'a> Description<'a> {
+    pub fn of(
+        rotation: Sweep,
+        settings: &'a Settings,
+        stage: &Stage,
+        cases: impl Iterator<Item = (LimbId, &'a Case)>,
+    ) -> Self {
+        let cameras = stage.cameras.iter().map(|camera| CameraRow {
+            view: camera.view,
+            intrinsics: camera.camera.spec().clone(),
+            room_from_camera: rows_from_isometry(&camera.camera_from_room.inverse()),
+        });
+        let limbs = cases.map(|(limb, case)| LimbRow {
+            limb,
+            key: settings.limb_key(limb, case),
+            volume_sha256: &case.source.volume_sha256,
+            surface: &case.surface,
+            choices: &case.choices,
+            acknowledged: &case.acknowledged,
+        });
+        Self {
+            version: 2,
+            units: "mm; depth images: Z in mm, 0 invalid; tallies: eV/cm2 per history; \
+                    transforms: row-major target_from_source; ct frame: LPS; dose_histories: null \
+                    where the radiographs carry no noise",
+            rotation,
+            settings,
+            room_from_device: stage
+                .table
+                .room
+                .device
+                .room_from_device
+                .to_homogeneous_rows(),
+            source_detector_mm: stage.table.room.device.source_detector_mm,
+            table: Table {
+                normal: stage.table.plane.plane.normal.into_inner().into(),
+                offset_mm: stage.table.plane.plane.offset_mm,
+            },
+            cameras: cameras.collect(),
+            limbs: limbs.collect(),
+        }
+    }
+
+    /// The file's text, with its seal.
+    pub fn to_text(&self) -> String {
+        sealed(&serde_json::to_string_pretty(self).expect("settings hold only JSON values"))
+    }
+}

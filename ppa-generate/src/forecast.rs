@@ -1,0 +1,254 @@
+//! What a plan will take, from a sample of its poses, before anything of it is made.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use cpu_time::ProcessTime;
+use ppa_core::Part;
+use ppa_dataset::files::{FileError, remove_if_there};
+use ppa_dataset::findings::Findings;
+use ppa_dataset::layout::View;
+use ppa_dataset::stop::{Stopped, go_on};
+use ppa_scene::PoseAngle;
+use serde::Serialize;
+
+use crate::generate::{GenerateError, Work};
+use crate::job::{Progress, units_of_part};
+use crate::plan::Plan;
+use crate::status::status;
+
+/// Why a plan cannot be carried out, or what it takes not be told.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ForecastError {
+    /// A pose of the sample, or what it needs.
+    #[error(transparent)]
+    Generate(#[from] GenerateError),
+    /// The temporary folder of the sample.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// It was asked to stop.
+    #[error("not all poses of the sample were measured")]
+    Stopped(#[from] Stopped),
+    /// A share that is none.
+    #[error("the fraction is {0}, expected a number from 0 to 1")]
+    Fraction(f64),
+    /// The images will not fit.
+    #[error(
+        "the plan's images will take {needed} more bytes in {}, where {free} are free",
+        root.display()
+    )]
+    NoRoom {
+        /// The dataset's folder.
+        root: PathBuf,
+        /// Bytes of the images that are not there yet.
+        needed: u64,
+        /// Free bytes of its file system.
+        free: u64,
+    },
+}
+
+/// What a plan will take.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Forecast {
+    /// Limbs.
+    pub limbs: usize,
+    /// Poses of all limbs.
+    pub units: usize,
+    /// Depth images of all cameras and body shapes.
+    pub depth_images: usize,
+    /// Radiographs.
+    pub radiographs: usize,
+    /// Poses that were made to measure.
+    pub measured: usize,
+    /// Processor time of a pose in seconds, mean of those measured.
+    pub cpu_s_per_unit: f64,
+    /// Standard error of that mean; absent for a single pose.
+    pub cpu_s_per_unit_error: Option<f64>,
+    /// Processor time in seconds to read and shape a limb, mean of all.
+    pub cpu_s_per_limb: f64,
+    /// Processor time of the plan in hours.
+    pub cpu_hours: f64,
+    /// Bytes of all images.
+    pub bytes: u64,
+    /// Bytes of those that are not there yet.
+    pub needed_bytes: u64,
+    /// Free bytes where the dataset will lie, if the system tells.
+    pub free_bytes: Option<u64>,
+    /// Doubts about the limbs.
+    #[serde(skip_serializing_if = "Findings::is_empty")]
+    pub findings: Findings,
+}
+
+/// Prepares every limb of the plan, makes `fraction` of its poses, at least one, in a temporary
+/// folder, one after the other, and tells what all will take in the folder `root`.
+///
+/// The poses are spread evenly, and differently for every limb. What cannot work with one of them
+/// would not work in the run. Once `stop` is true no other pose begins. Whether the disk has room for all is for [`Forecast::fits`] to say.
+///
+/// # Errors
+/// [`ForecastError`], naming the case or pose that stands against the plan.
+pub fn forecast(
+    plan: &Plan,
+    root: &Path,
+    fraction: f64,
+    stop: &AtomicBool,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Forecast, ForecastError> {
+    if !(0.0..=1.0).contains(&fraction) {
+        return Err(ForecastError::Fraction(fraction));
+    }
+    let work = Work::of_plan(plan)?;
+    let poses = plan.rotation.poses().map_err(GenerateError::from)?;
+    let limbs = units_of_part(work.planned(), &poses, Part::WHOLE);
+    let findings = work.findings(&limbs, root)?;
+    progress(Progress::Findings(&findings));
+    let of_limb = ((poses.len() as f64 * fraction).round() as usize).max(1);
+    progress(Progress::Total(limbs.len() * of_limb));
+
+    let scratch = tempfile::tempdir().map_err(FileError::at("create", &std::env::temp_dir()))?;
+    let (mut preparing_s, mut unit_s, mut bytes) = (0.0, Vec::new(), 0);
+    for (i, limb) in limbs.iter().enumerate() {
+        let begun = ProcessTime::now();
+        let make = work.prepare(limb.limb, scratch.path())?;
+        preparing_s += begun.elapsed().as_secs_f64();
+        let shift = (i as f64 + 0.5) / limbs.len() as f64;
+        for pose in spread(&poses, of_limb, shift) {
+            go_on(stop)?;
+            let begun = ProcessTime::now();
+            let images = make(limb.unit(pose))?;
+            unit_s.push(begun.elapsed().as_secs_f64());
+            for row in &images.files {
+                let path = scratch.path().join(&row.file);
+                let size = std::fs::metadata(&path).map_err(FileError::at("read", &path))?;
+                bytes += size.len();
+                remove_if_there(&path)?;
+            }
+            progress(Progress::Made);
+        }
+    }
+
+    let units = limbs.len() * poses.len();
+    let measured = unit_s.len();
+    let (mean, error) = mean_and_error(&unit_s);
+    let bytes = (bytes as f64 / measured as f64 * units as f64) as u64;
+    Ok(Forecast {
+        limbs: limbs.len(),
+        units,
+        depth_images: units * plan.shapes.variants.len() * View::ALL.len(),
+        radiographs: units,
+        measured,
+        cpu_s_per_unit: mean,
+        cpu_s_per_unit_error: error,
+        cpu_s_per_limb: preparing_s / limbs.len() as f64,
+        cpu_hours: (preparing_s + mean * units as f64) / 3600.0,
+        bytes,
+        needed_bytes: bytes.saturating_sub(status(root).map_or(0, |status| status.bytes)),
+        free_bytes: free_bytes(root),
+        findings,
+    })
+}
+
+impl Forecast {
+    /// Whether the images will fit in the folder that the forecast was made for.
+    ///
+    /// # Errors
+    /// [`ForecastError::NoRoom`].
+    pub fn fits(&self, root: &Path) -> Result<(), ForecastError> {
+        match self.free_bytes {
+            Some(free) if free < self.needed_bytes => Err(ForecastError::NoRoom {
+                root: root.to_owned(),
+                needed: self.needed_bytes,
+                free,
+            }),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// `count` poses in the middle of equal parts of the sweep, moved by `shift` (0 to 1) of a part.
+fn spread(poses: &[PoseAngle], count: usize, shift: f64) -> impl Iterator<Item = PoseAngle> {
+    let part = poses.len() as f64 / count as f64;
+    (0..count).map(move |j| {
+        let at = (j as f64 + shift) * part;
+        poses[(at as usize).min(poses.len() - 1)]
+    })
+}
+
+fn mean_and_error(values: &[f64]) -> (f64, Option<f64>) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    let error = (values.len() > 1).then(|| (squares / (n - 1.0) / n).sqrt());
+    (mean, error)
+}
+
+/// Free bytes of the file system that holds `root`, or its nearest folder that exists.
+#[cfg(unix)]
+pub fn free_bytes(root: &Path) -> Option<u64> {
+    let root = std::path::absolute(root).ok()?;
+    let disk = root
+        .ancestors()
+        .find_map(|path| rustix::fs::statvfs(path).ok())?;
+    Some(disk.f_bavail * disk.f_frsize)
+}
+
+/// Other systems are not asked.
+#[cfg(not(unix))]
+pub fn free_bytes(_: &Path) -> Option<u64> {
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use ppa_scene::Sweep;
+
+    use super::*;
+
+    #[test]
+    fn a_sample_is_spread_over_the_sweep() {
+        let poses = Sweep::default().poses().unwrap();
+        let steps = |count, shift| {
+            let sample = spread(&poses, count, shift);
+            sample.map(|pose| pose.step).collect::<Vec<_>>()
+        };
+        assert_eq!(steps(1, 0.5), [90]);
+        assert_eq!(steps(2, 0.5), [45, 135]);
+        assert_eq!(steps(181, 0.5), (0..181).collect::<Vec<_>>());
+        assert_eq!(steps(181, 0.999), (0..181).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn images_that_are_there_need_no_more_room() {
+        let forecast = |needed_bytes, free_bytes| Forecast {
+            limbs: 1,
+            units: 181,
+            depth_images: 1810,
+            radiographs: 181,
+            measured: 2,
+            cpu_s_per_unit: 10.0,
+            cpu_s_per_unit_error: None,
+            cpu_s_per_limb: 1.0,
+            cpu_hours: 0.5,
+            bytes: 1000,
+            needed_bytes,
+            free_bytes,
+            findings: Findings::default(),
+        };
+        let fits = |needed, free| forecast(needed, free).fits(Path::new("dataset"));
+        assert!(fits(600, Some(600)).is_ok() && fits(600, None).is_ok());
+        let said = fits(600, Some(599)).unwrap_err().to_string();
+        assert!(
+            said.contains("600 more bytes in dataset, where 599"),
+            "{said}"
+        );
+    }
+
+    #[test]
+    fn errors_are_those_of_the_mean() {
+        let (mean, error) = mean_and_error(&[1.0, 2.0, 3.0, 6.0]);
+        assert_eq!(mean, 3.0);
+        assert!((error.unwrap() - (14.0_f64 / 3.0 / 4.0).sqrt()).abs() < 1e-12);
+        assert_eq!(mean_and_error(&[2.0]), (2.0, None));
+    }
+}

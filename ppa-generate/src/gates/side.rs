@@ -1,0 +1,31 @@
+//! Whether the limb is of the side that was said.
+
+use ppa_dataset::findings::{Finding, FindingCode, Severity};
+use ppa_scene::{Fibula, Landmarks, Side};
+
+use super::at;
+
+pub(super) fn finding(landmarks: &Landmarks, fibula: Option<&Fibula>) -> Option<Finding> {
+    let fibula = fibula?;
+    let shown = fibula.side()?;
+    if shown == landmarks.side {
+        return None;
+    }
+    let name = |side: Side| match side {
+        Side::Left => "left",
+        Side::Right => "right",
+    };
+    Some(at(
+        fibula.centre_mm,
+        FindingCode::SideMismatch,
+        Severity::Severe,
+        fibula.sine,
+        format!(
+            "tibia and fibula lie as in a {} leg, but the case is of the {} side: medial rotation would turn this leg laterally \
+             (sine of the angle from the tibia to the fibula {:.2}, negative in a right leg)",
+            name(shown),
+            name(landmarks.side),
+            fibula.sine,
+        ),
+    ))
+}

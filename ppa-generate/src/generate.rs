@@ -1,0 +1,328 @@
+//! From a plan to a dataset: resumable, and the same bytes for any number of threads.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use ppa_core::Part;
+use ppa_dataset::files::FileError;
+use ppa_dataset::findings::{Finding, Findings};
+use ppa_dataset::layout::LimbId;
+use ppa_dataset::stop::{Stopped, go_on};
+use ppa_scene::SweepError;
+
+use crate::case::{Case, CaseError};
+use crate::description::{Description, Settings};
+use crate::job::{
+    Job, JobError, LimbUnits, MakeUnit, PlannedLimb, Progress, Summary, units_of_part,
+};
+use crate::plan::Plan;
+use crate::prepare::{PrepareError, PreparedLimb};
+use crate::record::Record;
+use crate::stage::{Stage, StageError};
+use crate::staging::staging_folder;
+use crate::unit::{PosableLimb, UnitError};
+
+/// Why a dataset could not be made. What was finished before stays and is not made again.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GenerateError {
+    /// The rotations of the plan.
+    #[error(transparent)]
+    Rotation(#[from] SweepError),
+    /// A case file.
+    #[error(transparent)]
+    Case(#[from] CaseError),
+    /// Room, cameras or beam.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    /// A limb of the plan.
+    #[error("cannot prepare the limb of {}", case.display())]
+    Limb {
+        /// Its case file.
+        case: PathBuf,
+        /// What went wrong.
+        source: Box<PrepareError>,
+    },
+    /// A limb of the plan cannot be shaped or turned into voxels for the radiograph.
+    #[error("cannot pose the limb of {}", case.display())]
+    Posable {
+        /// Its case file.
+        case: PathBuf,
+        /// What went wrong.
+        source: UnitError,
+    },
+    /// One pose.
+    #[error("cannot make the pose at {angle_deg} degrees of {}", case.display())]
+    Unit {
+        /// Its case file.
+        case: PathBuf,
+        /// Medial rotation.
+        angle_deg: f64,
+        /// What went wrong.
+        source: UnitError,
+    },
+    /// The folder, its files, or the disk.
+    #[error(transparent)]
+    Job(#[from] JobError),
+    /// A file that the plan names.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// [`GenerateSettings::stop`] became true.
+    #[error("the run ended before its last pose")]
+    Stopped(#[from] Stopped),
+    /// A plan that was not read from a file, and that reading would have refused.
+    #[error("the plan cannot be used: {0}")]
+    Unusable(String),
+    /// Two cases would write the same files.
+    #[error(
+        "{} and {} are both the {side} limb of patient {patient}; give one of them another number",
+        first.display(), second.display()
+    )]
+    SameLimb {
+        /// A case file.
+        first: PathBuf,
+        /// Another case file.
+        second: PathBuf,
+        /// The number they share.
+        patient: u32,
+        /// The side they share.
+        side: &'static str,
+    },
+    /// Two patients are one person, whose images could then stand in training and test data.
+    #[error(
+        "{} and {} come from the same scan, but are patients {} and {}; give them one number",
+        first.display(), second.display(), patients[0], patients[1]
+    )]
+    SameScan {
+        /// A case file.
+        first: PathBuf,
+        /// Another case file.
+        second: PathBuf,
+        /// Their numbers.
+        patients: [u32; 2],
+    },
+}
+
+/// Which poses of a plan are made, how much disk they may take, and what ends the run early.
+#[derive(Debug, Clone, Copy)]
+pub struct GenerateSettings<'a> {
+    /// One of several equal parts of the plan; each goes into a folder of its own.
+    pub part: Part,
+    /// Bytes that the images may take; poses that are being made may exceed it for a moment.
+    pub disk_limit: Option<u64>,
+    /// Once true, poses under way are finished and no other begins.
+    pub stop: Option<&'a AtomicBool>,
+    /// Whether poses of other settings, scans or sources are replaced, and those that the plan does not have removed.
+    pub replace: bool,
+}
+
+impl Default for GenerateSettings<'_> {
+    /// All poses, as much disk as there is, to the end, and nothing that is there is replaced.
+    fn default() -> Self {
+        Self {
+            part: Part::WHOLE,
+            disk_limit: None,
+            stop: None,
+            replace: false,
+        }
+    }
+}
+
+/// Makes what is missing of the plan's dataset in the folder `root`.
+///
+/// Every pose is a unit of its own: its files appear whole, its record last, so a run that was
+/// killed resumes where it stopped. A pose is made again when its record is missing or damaged, or when one of its files
+/// is missing or altered; files that were altered are moved to `.ppa/altered`.
+///
+/// A folder with poses that follow from something else (plan settings, case, code and physics data) or that the plan does
+/// not have is refused, unless `settings` ask to replace them. Then each of them stays until its successor is whole, and
+/// those without a successor until all others are.
+///
+/// # Errors
+/// [`GenerateError`], naming the file or pose at fault.
+pub fn generate(
+    plan: &Plan,
+    root: &Path,
+    settings: &GenerateSettings,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Summary, GenerateError> {
+    let work = Work::of_plan(plan)?;
+    let poses = plan.rotation.poses()?;
+    let limbs = units_of_part(work.planned(), &poses, settings.part);
+    progress(Progress::Findings(&work.findings(&limbs, root)?));
+    let staging = staging_folder(root);
+    let job = Job {
+        root,
+        description: &work.description,
+        part: settings.part,
+        limbs,
+        disk_limit: settings.disk_limit,
+        replace: settings.replace,
+        progress,
+    };
+    job.complete(|limb| {
+        let make = work.prepare(limb.limb, &staging)?;
+        let make: MakeUnit<GenerateError> = Box::new(move |unit| {
+            settings.stop.map_or(Ok(()), go_on)?;
+            make(unit)
+        });
+        Ok(make)
+    })
+}
+
+/// A plan with its cases and its stage: all that units are made from.
+pub(crate) struct Work<'a> {
+    plan: &'a Plan,
+    limbs: Vec<CasedLimb>,
+    stage: Stage,
+    /// `dataset.json`.
+    pub description: String,
+    /// The first limb that was prepared for its findings, until its poses are made. The others are prepared twice, since
+    /// memory may not hold them all.
+    prepared: Mutex<Option<(LimbId, PreparedLimb)>>,
+}
+
+struct CasedLimb {
+    id: LimbId,
+    key: String,
+    case: Case,
+    file: PathBuf,
+}
+
+impl<'a> Work<'a> {
+    pub fn of_plan(plan: &'a Plan) -> Result<Self, GenerateError> {
+        plan.check().map_err(GenerateError::Unusable)?;
+        let settings = Settings::of(plan)?;
+        let limbs = planned_limbs(plan, &settings)?;
+        let stage = Stage::of_plan(plan)?;
+        let cases = limbs.iter().map(|limb| (limb.id, &limb.case));
+        let description = Description::of(plan.rotation, &settings, &stage, cases).to_text();
+        Ok(Self {
+            plan,
+            limbs,
+            stage,
+            description,
+            prepared: Mutex::default(),
+        })
+    }
+
+    /// The limbs, as `dataset.json` lists them.
+    pub fn planned(&self) -> impl ExactSizeIterator<Item = PlannedLimb> {
+        self.limbs.iter().map(|limb| PlannedLimb {
+            limb: limb.id,
+            key: limb.key.clone(),
+            acknowledged: limb.case.acknowledged.clone(),
+        })
+    }
+
+    /// What is doubted about limbs, before any pose of them is made. Limbs that have a pose in the folder `root` are not
+    /// prepared for it.
+    pub fn findings(&self, limbs: &[LimbUnits], root: &Path) -> Result<Findings, GenerateError> {
+        let mut findings = Findings::default();
+        for limb in limbs {
+            let made = limb.units().find_map(|unit| {
+                let record = Record::read(root, &unit).ok()?;
+                (record.key == unit.key()).then_some(record.findings)
+            });
+            let of_limb = match made {
+                Some(findings) => findings,
+                None => self.findings_of(limb.limb)?,
+            };
+            findings.add(limb.limb, &limb.acknowledged, &of_limb);
+        }
+        Ok(findings)
+    }
+
+    fn findings_of(&self, id: LimbId) -> Result<Vec<Finding>, GenerateError> {
+        let prepared = self.limb(id).prepared()?;
+        let findings = prepared.findings.clone();
+        self.kept().get_or_insert((id, prepared));
+        Ok(findings)
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Option<(LimbId, PreparedLimb)>> {
+        self.prepared.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn limb(&self, id: LimbId) -> &CasedLimb {
+        let limb = self.limbs.iter().find(|limb| limb.id == id);
+        limb.expect("only limbs of the plan are asked for")
+    }
+
+    /// Reads, skins and shapes a limb; the result makes its poses below `root`.
+    pub fn prepare<'m>(
+        &'m self,
+        id: LimbId,
+        root: &'m Path,
+    ) -> Result<MakeUnit<'m, GenerateError>, GenerateError> {
+        let limb = self.limb(id);
+        let case = || limb.file.clone();
+        let kept = self.kept().take_if(|(kept, _)| *kept == id);
+        let prepared = match kept {
+            Some((_, prepared)) => prepared,
+            None => limb.prepared()?,
+        };
+        let posable = PosableLimb::new(id, self.plan, &self.stage, prepared).map_err(|source| {
+            GenerateError::Posable {
+                case: case(),
+                source,
+            }
+        })?;
+        Ok(Box::new(move |unit| {
+            posable
+                .make(unit.pose, root)
+                .map_err(|source| GenerateError::Unit {
+                    case: limb.file.clone(),
+                    angle_deg: unit.pose.angle_deg,
+                    source,
+                })
+        }))
+    }
+}
+
+impl CasedLimb {
+    fn prepared(&self) -> Result<PreparedLimb, GenerateError> {
+        PreparedLimb::of_case(&self.case).map_err(|error| GenerateError::Limb {
+            case: self.file.clone(),
+            source: Box::new(error),
+        })
+    }
+}
+
+fn planned_limbs(plan: &Plan, settings: &Settings) -> Result<Vec<CasedLimb>, GenerateError> {
+    let mut limbs: Vec<CasedLimb> = Vec::new();
+    for planned in &plan.cases {
+        let case = Case::read(&planned.file)?;
+        let id = LimbId {
+            patient: planned.patient,
+            side: case.side,
+        };
+        if let Some(other) = limbs.iter().find(|other| other.id == id) {
+            return Err(GenerateError::SameLimb {
+                first: other.file.clone(),
+                second: planned.file.clone(),
+                patient: id.patient,
+                side: id.side_letter(),
+            });
+        }
+        let scan = &case.source.volume_sha256;
+        let of_another = |other: &&CasedLimb| {
+            other.case.source.volume_sha256 == *scan && other.id.patient != id.patient
+        };
+        if let Some(other) = limbs.iter().find(of_another) {
+            return Err(GenerateError::SameScan {
+                first: other.file.clone(),
+                second: planned.file.clone(),
+                patients: [other.id.patient, id.patient],
+            });
+        }
+        limbs.push(CasedLimb {
+            id,
+            key: settings.limb_key(id, &case),
+            case,
+            file: planned.file.clone(),
+        });
+    }
+    Ok(limbs)
+}

@@ -1,0 +1,330 @@
+//! The units of a dataset carried through: what is there is kept, what is missing is made.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use ppa_core::Part;
+use ppa_dataset::files::FileError;
+use ppa_dataset::findings::{FindingCode, Findings};
+use ppa_dataset::layout::LimbId;
+use ppa_dataset::manifest::DESCRIPTION_FILE;
+use ppa_dataset::manifest::FileKind;
+use ppa_scene::PoseAngle;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::claim::{Claim, FolderError, claim};
+use crate::lists::Lists;
+use crate::overview::Overview;
+use crate::part_file::require_part;
+use crate::record::{FoundRecord, Record, Unit};
+use crate::staging::{Staging, staging_folder};
+use crate::survey::Survey;
+use crate::unit::Images;
+
+/// What a run did.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Poses of the plan, or of the shard.
+    pub units: usize,
+    /// Poses that were made in this run; the others were there already.
+    pub made: usize,
+    /// Depth images in the folder.
+    pub depth_images: usize,
+    /// Radiographs in the folder.
+    pub radiographs: usize,
+    /// Doubts about its limbs and poses.
+    #[serde(skip_serializing_if = "Findings::is_empty")]
+    pub findings: Findings,
+    /// Poses of other settings that were replaced.
+    pub replaced: usize,
+    /// Poses that were removed because they are not in the plan, or the shard.
+    pub removed: usize,
+    /// Files that were missing or altered and were made again, as paths from the root.
+    pub healed: Vec<String>,
+    /// Where files lie now that stood in the place of others and were not written by ppa, or altered since.
+    pub set_aside: Vec<String>,
+}
+
+/// What a run reports while it goes on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Progress<'a> {
+    /// What is doubted about the limbs, first of all.
+    Findings(&'a Findings),
+    /// The number of poses, before the first of them.
+    Total(usize),
+    /// Another pose was found complete.
+    Found,
+    /// Another pose was made.
+    Made,
+}
+
+/// Why a run ended before its last pose. What was finished stays and is not made again.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum JobError {
+    /// The folder.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// A file.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The images would take more disk than they may.
+    #[error(
+        "the images in {} would take more than {limit} bytes, of which {used} are used; raise the disk limit and run \
+         again to go on",
+        root.display()
+    )]
+    DiskLimit {
+        /// The dataset's folder.
+        root: PathBuf,
+        /// What they may take, bytes.
+        limit: u64,
+        /// What the finished ones take, bytes.
+        used: u64,
+    },
+}
+
+/// A limb of a dataset, as `dataset.json` lists it.
+#[derive(Debug, Clone, Deserialize)]
+pub(crate) struct PlannedLimb {
+    #[serde(flatten)]
+    pub limb: LimbId,
+    pub key: String,
+    #[serde(default)]
+    pub acknowledged: Vec<FindingCode>,
+}
+
+/// All poses of one limb that belong to a job.
+pub(crate) struct LimbUnits {
+    pub limb: LimbId,
+    pub key: String,
+    /// Codes of the findings that its case acknowledges.
+    pub acknowledged: Vec<FindingCode>,
+    pub poses: Vec<PoseAngle>,
+}
+
+impl LimbUnits {
+    pub fn unit(&self, pose: PoseAngle) -> Unit<'_> {
+        Unit {
+            limb: self.limb,
+            pose,
+            limb_key: &self.key,
+        }
+    }
+
+    pub fn units(&self) -> impl Iterator<Item = Unit<'_>> {
+        self.poses.iter().map(|&pose| self.unit(pose))
+    }
+}
+
+/// The units of one part of a dataset. Parts are runs of neighbours, limb by limb, so that few
+/// of them prepare the same limb.
+pub(crate) fn units_of_part(
+    limbs: impl ExactSizeIterator<Item = PlannedLimb>,
+    poses: &[PoseAngle],
+    part: Part,
+) -> Vec<LimbUnits> {
+    let share = part.share((limbs.len() * poses.len()) as u64);
+    let within = |index: usize| share.contains(&(index as u64));
+    let of_limb = |(i, limb): (usize, PlannedLimb)| {
+        let planned = poses.iter().enumerate();
+        let mine = planned.filter(|(j, _)| within(i * poses.len() + j));
+        LimbUnits {
+            limb: limb.limb,
+            key: limb.key,
+            acknowledged: limb.acknowledged,
+            poses: mine.map(|(_, pose)| *pose).collect(),
+        }
+    };
+    let limbs = limbs.enumerate().map(of_limb);
+    limbs.filter(|limb| !limb.poses.is_empty()).collect()
+}
+
+/// Makes one pose of a limb: its files whole, in the staging folder of the dataset.
+pub(crate) type MakeUnit<'a, E> = Box<dyn Fn(Unit) -> Result<Images, E> + Sync + 'a>;
+
+/// Units, the folder they belong to, and how much of it they may fill.
+pub(crate) struct Job<'a> {
+    pub root: &'a Path,
+    /// `dataset.json`, the same for all parts.
+    pub description: &'a str,
+    pub part: Part,
+    pub limbs: Vec<LimbUnits>,
+    pub disk_limit: Option<u64>,
+    /// Whether poses of other settings are replaced, and those of other plans removed.
+    pub replace: bool,
+    pub progress: &'a (dyn Fn(Progress) + Sync),
+}
+
+impl Job<'_> {
+    /// Makes what is missing, several units at a time; `prepare` is called once per limb.
+    pub fn complete<'m, E: From<JobError> + Send>(
+        &self,
+        prepare: impl Fn(&LimbUnits) -> Result<MakeUnit<'m, E>, E>,
+    ) -> Result<Summary, E> {
+        let staging = Staging::new(self.root);
+        let overview = Overview::new(self.root, self.description, self.part, &staging);
+        let (_claim, survey) = self.begin(&overview).map_err(JobError::from)?;
+        let units = self.limbs.iter().map(|limb| limb.poses.len()).sum();
+        (self.progress)(Progress::Total(units));
+
+        let used = AtomicU64::new(0);
+        let mut made = 0;
+        for limb in &self.limbs {
+            let missing = self.missing(limb, &overview, &used);
+            let missing = missing.map_err(JobError::from)?;
+            if missing.is_empty() {
+                continue;
+            }
+            let make = prepare(limb)?;
+            missing
+                .par_iter()
+                .try_for_each(|&pose| self.make(&limb.unit(pose), &make, &overview, &used))?;
+            made += missing.len();
+        }
+        self.remove_others(&survey, &overview)
+            .map_err(JobError::from)?;
+        let lists = self.finish(&overview).map_err(JobError::from)?;
+        let count = |kind| lists.rows.iter().filter(|row| row.kind == kind).count();
+        let healed = overview.into_healed();
+        Ok(Summary {
+            units,
+            made,
+            depth_images: count(FileKind::Depth),
+            radiographs: count(FileKind::Radiograph),
+            replaced: survey.stale.len(),
+            removed: survey.beyond.len(),
+            healed,
+            set_aside: staging.aside.into_kept(),
+            findings: lists.findings,
+        })
+    }
+
+    /// Claims the folder, completes what a killed run left, and refuses what only a run that replaces may change.
+    fn begin(&self, overview: &Overview) -> Result<(Claim, Survey), FolderError> {
+        let claim = claim(self.root)?;
+        require_part(self.root, self.part)?;
+        overview.staging.recover()?;
+        let survey = Survey::of(self.root, &self.limbs)?;
+        if let Some(differs) = survey.differs(self.root, self.description)
+            && !self.replace
+        {
+            return Err(FolderError::Differs(Box::new(differs)));
+        }
+        if !survey.replaces() && !self.root.join(DESCRIPTION_FILE).exists() {
+            overview.describe()?;
+        }
+        Ok((claim, survey))
+    }
+
+    /// The poses that are not complete; adds the bytes of all that are there to `used`.
+    fn missing(
+        &self,
+        limb: &LimbUnits,
+        overview: &Overview,
+        used: &AtomicU64,
+    ) -> Result<Vec<PoseAngle>, FileError> {
+        let lacks = |&pose: &PoseAngle| {
+            let unit = limb.unit(pose);
+            match self.look(&unit)? {
+                FoundRecord::Absent => {}
+                FoundRecord::Damaged => overview.add_healed([unit.id().record_file()]),
+                FoundRecord::Whole(record) => {
+                    used.fetch_add(record.size_of_rest(self.root), Ordering::Relaxed);
+                    if record.key == unit.key() {
+                        let damaged = record.damaged_images(self.root);
+                        if damaged.is_empty() {
+                            (self.progress)(Progress::Found);
+                            return Ok(None);
+                        }
+                        overview.add_healed(damaged);
+                    }
+                }
+            }
+            Ok(Some(pose))
+        };
+        let poses = limb.poses.par_iter();
+        poses.filter_map(|pose| lacks(pose).transpose()).collect()
+    }
+
+    fn look(&self, unit: &Unit) -> Result<FoundRecord, FileError> {
+        Record::look(&self.root.join(unit.id().record_file()), unit.id())
+    }
+
+    fn make<E: From<JobError>>(
+        &self,
+        unit: &Unit,
+        make: &MakeUnit<E>,
+        overview: &Overview,
+        used: &AtomicU64,
+    ) -> Result<(), E> {
+        let Images {
+            files,
+            rois,
+            findings,
+        } = make(*unit)?;
+        let record = Record {
+            key: unit.key(),
+            files,
+            rois,
+            findings,
+        };
+        self.keep(unit, &record, overview, used)?;
+        (self.progress)(Progress::Made);
+        Ok(())
+    }
+
+    /// Puts a unit in its place, or removes its images where they are too many bytes.
+    fn keep(
+        &self,
+        unit: &Unit,
+        record: &Record,
+        overview: &Overview,
+        used: &AtomicU64,
+    ) -> Result<(), JobError> {
+        let earlier = self.look(unit)?;
+        let earlier = earlier.whole().map_or(0, |old| old.size_of_rest(self.root));
+        let size = record.size(&staging_folder(self.root))?;
+        let before = used.fetch_add(size, Ordering::Relaxed);
+        if let Some(limit) = self.disk_limit
+            && (before + size).saturating_sub(earlier) > limit
+        {
+            used.fetch_sub(size, Ordering::Relaxed);
+            overview.staging.discard(record)?;
+            return Err(JobError::DiskLimit {
+                root: self.root.to_owned(),
+                limit,
+                used: before,
+            });
+        }
+        overview.open(&self.limbs)?;
+        overview.staging.put(unit.id(), record)?;
+        used.fetch_sub(earlier, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Removes the poses that the run does not have, once all others are whole.
+    fn remove_others(&self, survey: &Survey, overview: &Overview) -> Result<(), FileError> {
+        if !survey.beyond.is_empty() {
+            overview.open(&self.limbs)?;
+        }
+        for &pose in &survey.beyond {
+            overview.staging.remove(pose)?;
+        }
+        // A plan of fewer body shapes leaves folders without images.
+        for file in survey.stale.iter().flat_map(|pose| pose.images()) {
+            overview.staging.remove_empty_folders(&file);
+        }
+        Ok(())
+    }
+
+    /// Writes what lists all units: regions of interest, findings and manifest.
+    fn finish(&self, overview: &Overview) -> Result<Lists, FileError> {
+        let record = |unit: &Unit| Record::read(self.root, unit);
+        let lists = Lists::of(&self.limbs, self.description, record)?;
+        overview.close(&lists)?;
+        overview.staging.clear()?;
+        Ok(lists)
+    }
+}

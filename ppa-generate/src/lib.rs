@@ -1,0 +1,83 @@
+//! Generation of paired depth and radiograph datasets of posed limbs.
+//!
+//! [`prepare`] turns a CT into a [`Case`] that records every preprocessing decision; a [`Plan`] names cases, room, cameras, beam,
+//! rotations and body shapes; [`generate`] makes the dataset in the layout of `ppa-dataset`, pose by pose; [`merge`] joins the
+//! parts that several machines made; [`check`] and [`verify`] look for damage; [`forecast`] estimates time and disk.
+//!
+//! Units: mm, degrees in files; 16-bit depth in mm, 0 invalid. Frames: as in `ppa-scene`.
+//! Repeatable: the same plan and seed give the same bytes for any number of threads and after any interruption.
+//!
+//! Source of the method: Laufer et al., Patient Pose Assessment Using a CT-Based Framework for
+//! Synthetic Data Generation, MELBA 2026:027, doi:10.59275/j.melba.2026-c874.
+
+mod bone_file;
+mod case;
+mod case_check;
+mod check;
+mod claim;
+mod closed_skin;
+mod commented_plan;
+mod compiled;
+mod cut_findings;
+mod cut_share;
+mod depth_views;
+mod description;
+mod differences;
+mod forecast;
+mod frames;
+mod gates;
+mod generate;
+mod job;
+#[cfg(test)]
+mod job_trials;
+mod lists;
+#[cfg(test)]
+mod load;
+mod merge;
+mod overview;
+mod part_file;
+mod plan;
+mod planned;
+mod pose_id;
+mod prepare;
+mod radiograph;
+mod record;
+mod room_file;
+mod seal;
+mod seed;
+mod set_aside;
+mod shaped_skin;
+mod stage;
+mod staging;
+mod status;
+mod survey;
+mod toml_file;
+mod unit;
+mod verify;
+
+pub use bone_file::{BoneFile, BoneNumbers};
+pub use case::{Case, CaseError, Found, Source};
+pub use case_check::{CaseCheck, CaseCheckError, Drift};
+pub use check::{Check, Problem, check};
+pub use claim::FolderError;
+pub use closed_skin::closed_skin;
+pub use cut_share::{CutError, PoseImage};
+pub use depth_views::{DepthView, depth_views};
+pub use differences::KeyDifference;
+pub use forecast::{Forecast, ForecastError, forecast, free_bytes};
+pub use frames::Frames;
+pub use gates::NotALimb;
+pub use generate::{GenerateError, GenerateSettings, generate};
+pub use job::{JobError, Progress, Summary};
+pub use merge::{MergeError, merge};
+pub use part_file::held_part;
+pub use plan::{DepthSettings, Plan, PlanCase, PlanError, PlanRoom, XraySettings};
+pub use prepare::{PrepareError, PreparedLimb, prepare, volume_sha256};
+pub use radiograph::{JointError, joint_phantom, projection};
+pub use room_file::RoomFile;
+pub use shaped_skin::{ShapeSettings, body_shape};
+pub use stage::{PlacedCamera, Stage, StageError, Table, body_of_cloud, spectrum, tube};
+pub use status::{LimbStatus, Status, status};
+pub use survey::DatasetDiffers;
+pub use unit::UnitError;
+pub use verify::{Verification, VerifyError, verify};

@@ -1,0 +1,109 @@
+//! Which part of a plan a folder is to hold: `.ppa/part`, absent where it is the whole.
+
+use std::io;
+use std::path::Path;
+
+use ppa_core::Part;
+use ppa_dataset::files::FileError;
+use ppa_dataset::manifest::DESCRIPTION_FILE;
+use serde::{Deserialize, Serialize};
+
+use crate::claim::FolderError;
+use crate::record::{FOLDER, record_names};
+use crate::seal::{Opened, opened, sealed};
+
+/// Path from the dataset's root.
+pub(crate) const PART_FILE: &str = ".ppa/part";
+
+#[derive(Serialize, Deserialize)]
+struct PartFile {
+    part: String,
+}
+
+/// The text of the file; `None` where there is to be none.
+pub(crate) fn part_text(part: Part) -> Option<String> {
+    let file = PartFile {
+        part: part.to_string(),
+    };
+    let text = || serde_json::to_string(&file).expect("a part is a JSON value");
+    (part != Part::WHOLE).then(|| sealed(&text()))
+}
+
+/// The part that the folder of a begun dataset is to hold.
+pub(crate) fn read_part(root: &Path) -> Result<Part, FileError> {
+    let path = root.join(PART_FILE);
+    let text = match ppa_core::regular_file::read_to_string(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Part::WHOLE),
+        text => text.map_err(FileError::at("read", &path))?,
+    };
+    let part = match opened(&text) {
+        Opened::Sealed(text) => {
+            let file: Result<PartFile, _> = serde_json::from_str(&text);
+            file.ok().and_then(|file| file.part.parse().ok())
+        }
+        // As earlier versions wrote it.
+        Opened::Unsealed => text.parse().ok(),
+        Opened::Broken => None,
+    };
+    let damaged = || FileError::at("use", &path)(io::Error::other("it is damaged"));
+    part.ok_or_else(damaged)
+}
+
+/// The part of a plan that the folder `root` holds, or is to hold once the run that began it is resumed; `None` for a
+/// folder in which no run has begun.
+///
+/// # Errors
+/// [`FolderError`] when its files cannot be read or are damaged.
+pub fn held_part(root: &Path) -> Result<Option<Part>, FolderError> {
+    let folder = root.join(FOLDER);
+    if !folder.is_dir() {
+        return Ok(None);
+    }
+    let begun = root.join(DESCRIPTION_FILE).exists() || !record_names(&folder)?.is_empty();
+    Ok(if begun { Some(read_part(root)?) } else { None })
+}
+
+/// Refuses a run that is to make another part than the folder holds.
+pub(crate) fn require_part(root: &Path, asked: Part) -> Result<(), FolderError> {
+    match held_part(root) {
+        Ok(Some(held)) if held != asked => Err(FolderError::OtherPart {
+            root: root.to_owned(),
+            held,
+            asked,
+        }),
+        // A damaged file is not that of the whole plan, which has none. Shards may resume: records that are not
+        // theirs stop them.
+        Err(FolderError::File(error))
+            if error.path == root.join(PART_FILE) && asked != Part::WHOLE =>
+        {
+            Ok(())
+        }
+        held => held.map(|_| ()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn no_flipped_bit_names_another_part() {
+        let root = tempfile::tempdir().unwrap();
+        fs::create_dir(root.path().join(FOLDER)).unwrap();
+        let path = root.path().join(PART_FILE);
+        assert_eq!(read_part(root.path()).unwrap(), Part::WHOLE);
+        let text = part_text("2/7".parse().unwrap()).unwrap();
+        fs::write(&path, &text).unwrap();
+        assert_eq!(read_part(root.path()).unwrap().to_string(), "2/7");
+        for bit in 0..8 * text.len() {
+            let mut bytes = text.clone().into_bytes();
+            bytes[bit / 8] ^= 1 << (bit % 8);
+            fs::write(&path, bytes).unwrap();
+            assert!(read_part(root.path()).is_err(), "bit {bit}");
+        }
+        fs::write(&path, "3/7").unwrap();
+        assert_eq!(read_part(root.path()).unwrap().to_string(), "3/7");
+    }
+}

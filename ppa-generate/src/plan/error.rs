@@ -1,0 +1,44 @@
+//! Why a plan cannot be used.
+
+use std::path::PathBuf;
+
+use ppa_dataset::files::FileError;
+
+/// Why a plan cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PlanError {
+    /// The file cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The file is not a plan.
+    #[error("{} is not a plan: {message}", path.display())]
+    Parse {
+        /// The plan file.
+        path: PathBuf,
+        /// What is wrong and where.
+        message: String,
+    },
+    /// The file is of another format version.
+    #[error("{} has plan version {found}; this program reads version 1", path.display())]
+    Version {
+        /// The plan file.
+        path: PathBuf,
+        /// Its version.
+        found: u32,
+    },
+    /// The HU calibration it names.
+    #[error(transparent)]
+    Calibration(#[from] ppa_xray::CalibrationError),
+    /// Its camera rig.
+    #[error(transparent)]
+    Rig(#[from] ppa_depth::RigError),
+    /// Something in it cannot work.
+    #[error("{}: {message}", path.display())]
+    Invalid {
+        /// The plan file.
+        path: PathBuf,
+        /// What, and what was expected.
+        message: String,
+    },
+}

@@ -1,0 +1,153 @@
+//! `plan.toml`: what a dataset is made of.
+
+mod check;
+mod error;
+mod settings;
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+
+use ppa_dataset::files::{read_text, write_whole};
+use ppa_scene::{SoftTissue, Sweep};
+use ppa_xray::HuCalibration;
+use serde::{Deserialize, Serialize};
+
+pub use self::error::PlanError;
+pub use self::settings::{DepthSettings, PlanRoom, XraySettings};
+use crate::room_file::RoomFile;
+use crate::shaped_skin::ShapeSettings;
+use crate::toml_file::{other_version, relative_to, to_toml};
+
+/// Everything a dataset is made of; unknown keys are refused.
+///
+/// In the file, relative paths are taken from its folder; in memory, from the current folder.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Format of this file; 1.
+    pub version: u32,
+    /// Everything random follows from it.
+    #[serde(default)]
+    pub seed: u64,
+    /// The limbs.
+    #[serde(rename = "case")]
+    pub cases: Vec<PlanCase>,
+    /// Medial rotations about the limb's axis (T_rot).
+    #[serde(default)]
+    pub rotation: Sweep,
+    /// Body shapes.
+    #[serde(default)]
+    pub shapes: ShapeSettings,
+    /// How far heel and calf sink in where they rest; a rigid skin when left out.
+    #[serde(default)]
+    pub soft_tissue: SoftTissue,
+    /// The x-ray room.
+    #[serde(default)]
+    pub room: PlanRoom,
+    /// Room, device, detector and cameras from a [`RoomFile`]; reading the plan puts its contents in
+    /// place of the path.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub room_file: Option<PathBuf>,
+    /// Depth images.
+    #[serde(default)]
+    pub depth: DepthSettings,
+    /// Radiographs.
+    #[serde(default)]
+    pub xray: XraySettings,
+}
+
+/// One limb of a plan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlanCase {
+    /// The case file that `ppa prepare` wrote.
+    pub file: PathBuf,
+    /// N of the dataset's folder `patient_N`; both limbs of a person share it.
+    pub patient: u32,
+}
+
+impl Plan {
+    /// A plan with the paper's settings: 0 to 90 degrees in half degrees, all shapes.
+    pub fn new(cases: Vec<PlanCase>) -> Self {
+        Self {
+            version: 1,
+            seed: 0,
+            cases,
+            rotation: Sweep::default(),
+            shapes: ShapeSettings::default(),
+            soft_tissue: SoftTissue::default(),
+            room: PlanRoom::default(),
+            room_file: None,
+            depth: DepthSettings::default(),
+            xray: XraySettings::default(),
+        }
+    }
+
+    /// Reads a plan and makes its paths relative to the current folder.
+    ///
+    /// # Errors
+    /// [`PlanError`] naming the file and the line, key or value at fault.
+    pub fn read(path: &Path) -> Result<Self, PlanError> {
+        let text = read_text(path)?;
+        if let Some(found) = other_version(&text) {
+            let path = path.to_owned();
+            return Err(PlanError::Version { path, found });
+        }
+        let mut plan: Self = toml::from_str(&text).map_err(|error| PlanError::Parse {
+            path: path.to_owned(),
+            message: error.to_string().trim_end().to_owned(),
+        })?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for file in plan.files_mut() {
+            *file = folder.join(&*file);
+        }
+        if let Some(file) = plan.room_file.take() {
+            RoomFile::read(&file)?
+                .put_into(&mut plan)
+                .map_err(|message| PlanError::Invalid {
+                    path: path.to_owned(),
+                    message,
+                })?;
+        }
+        if let Some(file) = plan.xray.calibration_file.take() {
+            if plan.xray.calibration != HuCalibration::default() {
+                return Err(PlanError::Invalid {
+                    path: path.to_owned(),
+                    message: "xray.calibration and xray.calibration_file are both given".to_owned(),
+                });
+            }
+            plan.xray.calibration = HuCalibration::read(&file)?;
+        }
+        plan.check().map_err(|message| PlanError::Invalid {
+            path: path.to_owned(),
+            message,
+        })?;
+        Ok(plan)
+    }
+
+    /// Writes the plan, whole or not at all. Relative paths are rewritten to start at the plan file's folder.
+    ///
+    /// # Errors
+    /// [`PlanError::File`], also for a path that is not UTF-8, which TOML cannot hold.
+    pub fn write(&self, path: &Path) -> Result<(), PlanError> {
+        let mut plan = self.clone();
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for file in plan.files_mut() {
+            *file = relative_to(file, folder)?;
+        }
+        Ok(write_whole(path, to_toml(&plan, path)?.as_bytes())?)
+    }
+
+    /// The files that it names.
+    pub(crate) fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let cases = self.cases.iter_mut().map(|case| &mut case.file);
+        let others = [
+            &mut self.room_file,
+            &mut self.room.ply,
+            &mut self.depth.rig,
+            &mut self.xray.calibration_file,
+        ];
+        cases.chain(others.into_iter().flatten())
+    }
+}

@@ -1,0 +1,60 @@
+//! `dataset.json` read back: what a dataset is to hold.
+
+use std::path::Path;
+
+use ppa_core::Part;
+use ppa_dataset::files::{FileError, read_text};
+use ppa_dataset::manifest::DESCRIPTION_FILE;
+use ppa_scene::Sweep;
+use serde::Deserialize;
+
+use crate::job::{LimbUnits, PlannedLimb, units_of_part};
+use crate::seal::{Opened, opened};
+
+/// Which units a dataset is made of, and what they follow from.
+pub(crate) struct Planned {
+    /// `dataset.json` as it stands.
+    pub text: String,
+    /// Whether its files carry hashes, which those of earlier versions did not.
+    pub sealed: bool,
+    units: PlannedUnits,
+}
+
+#[derive(Deserialize)]
+struct PlannedUnits {
+    version: u32,
+    rotation: Sweep,
+    limbs: Vec<PlannedLimb>,
+}
+
+impl Planned {
+    pub fn read(root: &Path) -> Result<Self, FileError> {
+        let path = root.join(DESCRIPTION_FILE);
+        let text = read_text(&path)?;
+        let seal = opened(&text);
+        let units: PlannedUnits =
+            serde_json::from_str(&text).map_err(|e| FileError::at("parse", &path)(e.into()))?;
+        let sealed = matches!(seal, Opened::Sealed(_));
+        if !sealed && (units.version > 1 || seal == Opened::Broken) {
+            let damaged =
+                std::io::Error::other("it is damaged: its hash is not the one it carries");
+            return Err(FileError::at("use", &path)(damaged));
+        }
+        units
+            .rotation
+            .poses()
+            .map_err(|e| FileError::at("use", &path)(std::io::Error::other(e)))?;
+        Ok(Self {
+            text,
+            sealed,
+            units,
+        })
+    }
+
+    /// The units of one part, limb by limb.
+    pub fn part(&self, part: Part) -> Vec<LimbUnits> {
+        let poses = self.units.rotation.poses();
+        let poses = poses.expect("the rotation was checked when it was read");
+        units_of_part(self.units.limbs.iter().cloned(), &poses, part)
+    }
+}

@@ -1,0 +1,181 @@
+//! Records of finished poses, kept in the dataset: what makes a run resumable.
+
+use std::fmt;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use ppa_dataset::files::{FileError, hex, sha256_of_file};
+use ppa_dataset::findings::Finding;
+use ppa_dataset::layout::LimbId;
+use ppa_dataset::manifest::{FileRow, RoiFile};
+use ppa_scene::PoseAngle;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::pose_id::PoseId;
+use crate::seal::{Opened, opened, sealed};
+
+/// Folder inside a dataset that holds the records.
+pub(crate) const FOLDER: &str = ".ppa";
+
+/// One pose of one limb: the unit of work.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Unit<'a> {
+    /// The limb.
+    pub limb: LimbId,
+    /// Its rotation.
+    pub pose: PoseAngle,
+    /// Hash of everything the limb's images follow from, but the pose.
+    pub limb_key: &'a str,
+}
+
+impl Unit<'_> {
+    /// Which pose it is.
+    pub fn id(&self) -> PoseId {
+        PoseId {
+            limb: self.limb,
+            step: self.pose.step,
+        }
+    }
+
+    /// Hash of everything its images follow from.
+    pub fn key(&self) -> String {
+        let address = format!("{}/{}", self.limb_key, self.pose.step);
+        hex(&Sha256::digest(address.as_bytes()))
+    }
+}
+
+impl fmt::Display for Unit<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.id().fmt(f)
+    }
+}
+
+/// The poses whose records stand in a folder, in order.
+pub(crate) fn record_names(folder: &Path) -> Result<Vec<PoseId>, FileError> {
+    let names = fs::read_dir(folder).and_then(|entries| {
+        let names = entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
+        names.collect::<io::Result<Vec<_>>>()
+    });
+    let names = names.map_err(FileError::at("read", folder))?;
+    let mut poses: Vec<_> = names
+        .iter()
+        .filter_map(|name| PoseId::of_record(name))
+        .collect();
+    poses.sort_unstable();
+    Ok(poses)
+}
+
+/// A finished pose: put in its place after all its files, so its presence proves them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Record {
+    /// Hash of everything the pose's bytes follow from.
+    pub key: String,
+    /// Its images.
+    pub files: Vec<FileRow>,
+    /// Its regions of interest.
+    pub rois: RoiFile,
+    /// Doubts about the limb and about this pose.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub findings: Vec<Finding>,
+}
+
+/// What stands in the place of a record.
+#[derive(Debug)]
+pub(crate) enum FoundRecord {
+    /// Nothing.
+    Absent,
+    /// A record whose seal fits, or one of an earlier version, which had none.
+    Whole(Record),
+    /// A file that is no record of this pose, or not as it was written.
+    Damaged,
+}
+
+impl FoundRecord {
+    /// The record, if there is one.
+    pub fn whole(&self) -> Option<&Record> {
+        match self {
+            Self::Whole(record) => Some(record),
+            _ => None,
+        }
+    }
+}
+
+impl Record {
+    /// Reads what stands in the file of a pose's record.
+    pub fn look(path: &Path, pose: PoseId) -> Result<FoundRecord, FileError> {
+        match ppa_core::regular_file::read(path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(FoundRecord::Absent),
+            Err(error) => Err(FileError::at("read", path)(error)),
+            Ok(bytes) => {
+                let text = String::from_utf8(bytes).ok();
+                let record = text.and_then(|text| Self::parse(&text, pose));
+                Ok(record.map_or(FoundRecord::Damaged, FoundRecord::Whole))
+            }
+        }
+    }
+
+    /// The record in a text, when it is as it was written and of the given pose.
+    fn parse(text: &str, pose: PoseId) -> Option<Self> {
+        let record: Self = match opened(text) {
+            Opened::Sealed(text) => serde_json::from_str(&text).ok()?,
+            Opened::Unsealed => serde_json::from_str(text).ok()?,
+            Opened::Broken => return None,
+        };
+        let is_of_pose =
+            |row: &FileRow| (row.limb, row.step) == (pose.limb, pose.step) && row.check().is_ok();
+        record.files.iter().all(is_of_pose).then_some(record)
+    }
+
+    /// Reads the record of a pose.
+    pub fn read(root: &Path, unit: &Unit) -> Result<Self, FileError> {
+        let path = root.join(unit.id().record_file());
+        let because = |kind, what| FileError::at("read", &path)(io::Error::new(kind, what));
+        match Self::look(&path, unit.id())? {
+            FoundRecord::Whole(record) => Ok(record),
+            FoundRecord::Absent => Err(because(io::ErrorKind::NotFound, "there is no such record")),
+            FoundRecord::Damaged => {
+                Err(because(io::ErrorKind::InvalidData, "the record is damaged"))
+            }
+        }
+    }
+
+    /// The record with its seal.
+    pub fn to_text(&self) -> String {
+        sealed(&serde_json::to_string(self).expect("records hold only JSON values"))
+    }
+
+    /// The recorded hash of an image.
+    pub fn hash_of(&self, file: &str) -> Option<&str> {
+        let row = self.files.iter().find(|row| row.file == file);
+        row.map(|row| row.sha256.as_str())
+    }
+
+    /// Its images that are missing or have another hash.
+    pub fn damaged_images(&self, root: &Path) -> Vec<String> {
+        let intact = |row: &&FileRow| {
+            sha256_of_file(&root.join(&row.file)).is_ok_and(|found| found == row.sha256)
+        };
+        let damaged = self.files.iter().filter(|row| !intact(row));
+        damaged.map(|row| row.file.clone()).collect()
+    }
+
+    /// Bytes of its images below a folder.
+    pub fn size(&self, root: &Path) -> Result<u64, FileError> {
+        let size = |row: &FileRow| {
+            let path = root.join(&row.file);
+            let metadata = fs::metadata(&path).map_err(FileError::at("read", &path))?;
+            Ok(metadata.len())
+        };
+        self.files.iter().map(size).sum()
+    }
+
+    /// Bytes of those of its images that are there.
+    pub fn size_of_rest(&self, root: &Path) -> u64 {
+        let size =
+            |row: &FileRow| fs::metadata(root.join(&row.file)).map_or(0, |found| found.len());
+        self.files.iter().map(size).sum()
+    }
+}

@@ -1,0 +1,233 @@
+//! What all limbs of a plan share: room, table, x-ray device, cameras, x-ray beam.
+
+use std::path::PathBuf;
+
+use nalgebra::Isometry3;
+use ppa_dataset::layout::View;
+use ppa_depth::{
+    Backdrop, Body, Camera, DepthImage, MeshBody, MountedCamera, PlacedBody, RigError, Sensor,
+    SensorError, SurfelBody,
+};
+use ppa_mesh::{CloudError, PointCloud, estimate_normals, mean_spacing_mm};
+use ppa_scene::{PlaneSettings, Rigid, Room, RoomError, TablePlane, XrayDevice, table_plane};
+use ppa_xray::{Spectrum, TubeSpec};
+
+use crate::plan::{Plan, PlanRoom, XraySettings};
+use crate::seed::{Purpose, plan_seed};
+
+/// Why a plan's room, cameras or beam cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StageError {
+    /// The room.
+    #[error(transparent)]
+    Room(#[from] RoomError),
+    /// The pose of the device in a recorded room.
+    #[error("room.room_from_device of the plan")]
+    DevicePose(#[from] ppa_depth::RigidError),
+    /// Points of a recorded room.
+    #[error(transparent)]
+    Cloud(#[from] CloudError),
+    /// Its table.
+    #[error(transparent)]
+    Table(#[from] ppa_scene::PlaneError),
+    /// The camera rig.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// The errors of the cameras' sensors.
+    #[error("depth.sensor of the plan")]
+    Sensor(#[from] SensorError),
+    /// Points or triangles of a recorded room that the cameras cannot be shown.
+    #[error("{}", path.display())]
+    RoomFile {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: Box<StageError>,
+    },
+    /// Furniture that cannot be rendered.
+    #[error(transparent)]
+    Body(#[from] ppa_depth::BodyError),
+    /// The x-ray beam.
+    #[error(transparent)]
+    Spectrum(#[from] ppa_xray::SpectrumError),
+}
+
+/// A camera in its place, with the empty room as it sees it.
+pub struct PlacedCamera {
+    /// Left or right.
+    pub view: View,
+    /// Lens and sensor.
+    pub camera: Camera,
+    /// Its pose.
+    pub camera_from_room: Isometry3<f64>,
+    /// Depth image of the room without the limb; rendered once, since nothing in it moves.
+    pub background: DepthImage,
+    /// The sensor, if it is not ideal, and the empty room as it needs it.
+    pub sensor: Option<(Sensor, Backdrop)>,
+}
+
+/// Room, table and x-ray device: all that placing a limb needs.
+pub struct Table {
+    /// The room with its furniture and device.
+    pub room: Room,
+    /// Π_T.
+    pub plane: TablePlane,
+}
+
+impl Table {
+    /// Loads or builds the room of a plan and finds its table.
+    ///
+    /// # Errors
+    /// [`StageError`] naming the room or table at fault.
+    pub fn of_plan(plan: &Plan) -> Result<Self, StageError> {
+        let room = load_room(&plan.room)?;
+        let seed = plan_seed(plan.seed, Purpose::TablePlane);
+        let by_device = PlaneSettings::for_device(&room.device);
+        let settings = plan.room.table.as_ref().unwrap_or(&by_device);
+        let plane = table_plane(&room.cloud, settings, seed)?;
+        Ok(Self { room, plane })
+    }
+
+    /// What stands in the room, for the cameras: its triangles, or discs at its points.
+    ///
+    /// # Errors
+    /// [`StageError`] for points whose normals cannot be found or that cannot be rendered.
+    pub fn furniture(&self) -> Result<Body, StageError> {
+        if let Some(mesh) = &self.room.mesh {
+            return Ok(Body::Mesh(MeshBody::new(&mesh.vertices, &mesh.triangles)?));
+        }
+        body_of_cloud(&self.room.cloud)
+    }
+}
+
+/// Discs at the points of a recorded room, for the cameras.
+///
+/// # Errors
+/// [`StageError`] for points whose normals cannot be found or that cannot be rendered.
+pub fn body_of_cloud(cloud: &PointCloud) -> Result<Body, StageError> {
+    let points = &cloud.points;
+    let estimated;
+    let normals = if cloud.normals.len() == points.len() {
+        &cloud.normals
+    } else {
+        estimated = estimate_normals(points, NORMAL_NEIGHBOURS)?;
+        &estimated
+    };
+    let radius_mm = DISC_RADIUS * mean_spacing_mm(points)?;
+    Ok(Body::Surfels(SurfelBody::new(points, normals, radius_mm)?))
+}
+
+/// Everything that stands still while the limb turns.
+pub struct Stage {
+    /// Room, table and device.
+    pub table: Table,
+    /// Both cameras, left first.
+    pub cameras: Vec<PlacedCamera>,
+    /// The beam.
+    pub spectrum: Spectrum,
+}
+
+impl Stage {
+    /// Sets the stage of a plan.
+    ///
+    /// # Errors
+    /// [`StageError`] naming the room, table, camera or beam at fault.
+    pub fn of_plan(plan: &Plan) -> Result<Self, StageError> {
+        let table = Table::of_plan(plan)?;
+        let rig = plan.depth.cameras()?;
+        let furniture = match (table.furniture(), &plan.room.ply) {
+            (Err(source), Some(path)) => {
+                return Err(StageError::RoomFile {
+                    path: path.clone(),
+                    source: source.into(),
+                });
+            }
+            (furniture, _) => furniture?,
+        };
+        let device = &table.room.device;
+        let place = |view, side, mounted: &MountedCamera| {
+            let camera = Camera::try_from(mounted.camera.clone())
+                .map_err(|source| RigError::Camera { side, source })?;
+            let device_from_camera = mounted
+                .pose()
+                .map_err(|source| RigError::Pose { side, source })?;
+            let room_from_camera = device.room_from_device.isometry() * device_from_camera;
+            let camera_from_room = room_from_camera.inverse();
+            let empty_room = PlacedBody {
+                body: &furniture,
+                camera_from_body: camera_from_room,
+            };
+            let sensor = plan.depth.sensor.clone().map(|spec| {
+                // Both cameras have errors of their own.
+                let seed = plan_seed(plan.seed, Purpose::DepthSensor).wrapping_add(view as u64);
+                let sensor = Sensor::new(spec, seed)?;
+                Ok::<_, SensorError>((sensor, Backdrop::new(&camera, &[empty_room])))
+            });
+            let sensor = sensor.transpose()?;
+            let background = match &sensor {
+                Some((_, backdrop)) => backdrop.image.clone(),
+                None => ppa_depth::render(&camera, &[empty_room]),
+            };
+            Ok::<_, StageError>(PlacedCamera {
+                view,
+                camera,
+                camera_from_room,
+                background,
+                sensor,
+            })
+        };
+        let cameras = vec![
+            place(View::Left, "left", &rig.left)?,
+            place(View::Right, "right", &rig.right)?,
+        ];
+        Ok(Self {
+            table,
+            cameras,
+            spectrum: spectrum(&plan.xray)?,
+        })
+    }
+}
+
+/// The tube of a plan and its filters.
+///
+/// # Errors
+/// [`StageError::Spectrum`] for a filter that cannot be read.
+pub fn tube(settings: &XraySettings) -> Result<TubeSpec, StageError> {
+    let filters = settings.filters.iter().map(|filter| filter.parse());
+    Ok(TubeSpec {
+        kvp: settings.kvp,
+        anode_angle_deg: settings.anode_angle_deg,
+        filters: filters.collect::<Result<_, ppa_xray::SpectrumError>>()?,
+    })
+}
+
+/// The beam of a plan.
+///
+/// # Errors
+/// [`StageError::Spectrum`] for a voltage, anode or filter out of range.
+pub fn spectrum(settings: &XraySettings) -> Result<Spectrum, StageError> {
+    Ok(Spectrum::tungsten(&tube(settings)?)?)
+}
+
+fn load_room(plan: &PlanRoom) -> Result<Room, StageError> {
+    let built_in = Room::parametric(&plan.parametric)?;
+    let Some(path) = &plan.ply else {
+        return Ok(built_in);
+    };
+    let device = match &plan.room_from_device {
+        Some(rows) => XrayDevice {
+            room_from_device: Rigid::new(ppa_depth::isometry_from_rows(rows)?),
+            ..built_in.device
+        },
+        None => built_in.device,
+    };
+    Ok(Room::from_ply(path, device)?)
+}
+
+/// Neighbours from which the normal of a recorded point is estimated.
+const NORMAL_NEIGHBOURS: usize = 16;
+
+/// Radius of the discs of a recorded room over the mean distance of its points; leaves no holes
+/// in scattered points (see [`SurfelBody`]).
+const DISC_RADIUS: f64 = 1.5;

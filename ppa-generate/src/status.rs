@@ -1,0 +1,110 @@
+//! How far a dataset has come.
+
+use std::fs;
+use std::path::Path;
+
+use ppa_dataset::files::FileError;
+use ppa_dataset::findings::Findings;
+use ppa_dataset::layout::LimbId;
+use ppa_dataset::manifest::Manifest;
+use serde::Serialize;
+
+use crate::claim::{FolderError, claim_existing};
+use crate::job::LimbUnits;
+use crate::part_file::read_part;
+use crate::planned::Planned;
+use crate::record::Record;
+
+/// State of a dataset, by its records; its images are not read (see [`crate::check`]).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Status {
+    /// Which part of its plan the folder is to hold, as `2/8`.
+    pub part: String,
+    /// Poses that it is to hold.
+    pub units: usize,
+    /// Poses that are made.
+    pub made: usize,
+    /// Images of these poses.
+    pub images: usize,
+    /// Bytes of these images.
+    pub bytes: u64,
+    /// Whether a process writes into the folder now.
+    pub running: bool,
+    /// Whether all poses are made and listed in the manifest.
+    pub complete: bool,
+    /// Doubts about limbs and poses.
+    pub findings: usize,
+    /// Those of them that are severe and not acknowledged.
+    pub open_findings: usize,
+    /// The same, limb by limb.
+    pub limbs: Vec<LimbStatus>,
+}
+
+/// State of one limb.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LimbStatus {
+    /// The limb.
+    #[serde(flatten)]
+    pub limb: LimbId,
+    /// Poses that the folder is to hold.
+    pub units: usize,
+    /// Poses that are made.
+    pub made: usize,
+}
+
+/// Tells how far the dataset in `root` has come; changes nothing and may run beside `generate`.
+///
+/// # Errors
+/// [`FolderError`] when `root` holds no dataset.
+pub fn status(root: &Path) -> Result<Status, FolderError> {
+    let running = match claim_existing(root) {
+        Ok(_) => false,
+        Err(FolderError::Busy(_)) => true,
+        Err(error) => return Err(error),
+    };
+    let part = read_part(root)?;
+    let (mut images, mut bytes) = (0, 0);
+    let mut of_limb = |limb: &LimbUnits| {
+        let records = limb.units().filter_map(|unit| {
+            let record = Record::read(root, &unit).ok()?;
+            (record.key == unit.key()).then_some(record)
+        });
+        let mut made = 0;
+        for record in records {
+            // A pose whose images are gone is made again, so it does not count.
+            let Ok(size) = record.size(root) else {
+                continue;
+            };
+            made += 1;
+            images += record.files.len();
+            bytes += size;
+        }
+        LimbStatus {
+            limb: limb.limb,
+            units: limb.poses.len(),
+            made,
+        }
+    };
+    let limbs: Vec<_> = Planned::read(root)?
+        .part(part)
+        .iter()
+        .map(&mut of_limb)
+        .collect();
+    let units = limbs.iter().map(|limb| limb.units).sum();
+    let made = limbs.iter().map(|limb| limb.made).sum();
+    let manifest = root.join(Manifest::FILE);
+    let listed = fs::exists(&manifest).map_err(FileError::at("read", &manifest))?;
+    let findings = Findings::read(root)?;
+    Ok(Status {
+        findings: findings.0.len(),
+        open_findings: findings.0.iter().filter(|found| found.is_open()).count(),
+        part: part.to_string(),
+        units,
+        made,
+        images,
+        bytes,
+        running,
+        complete: listed && !running && made == units,
+        limbs,
+    })
+}

@@ -1,0 +1,201 @@
+//! What a folder holds already, compared with what a run would make in it.
+
+use std::collections::{HashMap, HashSet};
+use std::fmt;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::pose_id::PoseId;
+use ppa_dataset::files::FileError;
+use ppa_dataset::manifest::DESCRIPTION_FILE;
+use rayon::prelude::*;
+
+use crate::differences::{KeyDifference, differences};
+use crate::job::LimbUnits;
+use crate::record::{FOLDER, Record, record_names};
+
+/// A dataset of other settings, poses or images than those of a run into its folder.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DatasetDiffers {
+    /// The dataset's folder.
+    pub root: PathBuf,
+    /// Poses that it holds.
+    pub poses: usize,
+    /// Of these, the ones that follow from other settings, scans or sources.
+    pub stale: usize,
+    /// In which keys of `dataset.json` the run differs, what matters most first.
+    pub keys: Vec<KeyDifference>,
+    /// Of the poses in the folder, the ones that the run does not have: the first in words, and their number.
+    pub beyond: Option<(String, usize)>,
+    /// Images in the place of those of the run that no record lists: the first, and their number.
+    pub unrecorded: Option<(String, usize)>,
+}
+
+impl fmt::Display for DatasetDiffers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const TOLD: usize = 3;
+        let mut parts = Vec::new();
+        if self.stale > 0 {
+            let mut keys: Vec<_> = self
+                .keys
+                .iter()
+                .take(TOLD)
+                .map(ToString::to_string)
+                .collect();
+            match self.keys.len() {
+                0 => keys.push(
+                    "other than its dataset.json states, as a run with --replace was interrupted"
+                        .to_owned(),
+                ),
+                n if n > TOLD => keys.push(format!("{} more keys", n - TOLD)),
+                _ => {}
+            }
+            let (stale, keys) = (self.stale, keys.join(", "));
+            parts.push(format!(
+                "{stale} of its {} were made otherwise ({keys})",
+                counted(self.poses, "pose")
+            ));
+        }
+        if let Some((first, count)) = &self.beyond {
+            parts.push(format!(
+                "{} of it, the first {first}, {} not in this run",
+                counted(*count, "pose"),
+                are(*count)
+            ));
+        }
+        if let Some((first, count)) = &self.unrecorded {
+            parts.push(format!(
+                "{}, the first {first}, {} in none of its records",
+                counted(*count, "image"),
+                are(*count)
+            ));
+        }
+        write!(
+            f,
+            "{} holds another dataset: {}; --replace replaces what differs, --out names another folder",
+            self.root.display(),
+            parts.join("; ")
+        )
+    }
+}
+
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+fn are(count: usize) -> &'static str {
+    if count == 1 { "is" } else { "are" }
+}
+
+/// What stands in a folder that a run is to fill.
+pub(crate) struct Survey {
+    poses: usize,
+    /// Poses of the run whose record has another key.
+    pub stale: HashSet<PoseId>,
+    /// Recorded poses that the run does not have, in the order of their names.
+    pub beyond: Vec<PoseId>,
+    unrecorded: Vec<String>,
+}
+
+impl Survey {
+    /// Reads the records in `root`.
+    pub fn of(root: &Path, limbs: &[LimbUnits]) -> Result<Self, FileError> {
+        let units = limbs.iter().flat_map(LimbUnits::units);
+        let units: HashMap<_, _> = units.map(|unit| (unit.id(), unit)).collect();
+        let recorded = record_names(&root.join(FOLDER))?;
+        let is_stale = |pose: &PoseId| {
+            let Some(unit) = units.get(pose) else {
+                return Ok(None);
+            };
+            let found = Record::look(&root.join(pose.record_file()), *pose)?;
+            let stale = found.whole().is_some_and(|record| record.key != unit.key());
+            Ok(stale.then_some(*pose))
+        };
+        let stale = recorded
+            .par_iter()
+            .filter_map(|pose| is_stale(pose).transpose());
+        let stale = stale.collect::<Result<_, FileError>>()?;
+        let unrecorded = unrecorded(root, limbs, &recorded.iter().copied().collect())?;
+        Ok(Self {
+            poses: recorded.len(),
+            stale,
+            beyond: recorded
+                .into_iter()
+                .filter(|pose| !units.contains_key(pose))
+                .collect(),
+            unrecorded,
+        })
+    }
+
+    /// How the folder differs from a run with the given `dataset.json`; `None` where the run would only add to it.
+    pub fn differs(&self, root: &Path, description: &str) -> Option<DatasetDiffers> {
+        let same = self.stale.is_empty() && self.beyond.is_empty() && self.unrecorded.is_empty();
+        let there = || fs::read_to_string(root.join(DESCRIPTION_FILE)).unwrap_or_default();
+        (!same).then(|| DatasetDiffers {
+            root: root.to_owned(),
+            poses: self.poses,
+            stale: self.stale.len(),
+            keys: differences(&there(), description),
+            beyond: self
+                .beyond
+                .first()
+                .map(|pose| (pose.to_string(), self.beyond.len())),
+            unrecorded: self
+                .unrecorded
+                .first()
+                .map(|file| (file.clone(), self.unrecorded.len())),
+        })
+    }
+
+    /// Whether the run changes more than it adds.
+    pub fn replaces(&self) -> bool {
+        !(self.stale.is_empty() && self.beyond.is_empty())
+    }
+}
+
+/// Images that stand in the place of planned ones without a record.
+fn unrecorded(
+    root: &Path,
+    limbs: &[LimbUnits],
+    recorded: &HashSet<PoseId>,
+) -> Result<Vec<String>, FileError> {
+    let mut found = Vec::new();
+    for limb in limbs {
+        let poses = limb.units().map(|unit| unit.id());
+        let poses: Vec<_> = poses.filter(|pose| !recorded.contains(pose)).collect();
+        let Some(first) = poses.first() else { continue };
+        let mut there = HashSet::new();
+        let folders: HashSet<_> = first
+            .images()
+            .iter()
+            .filter_map(|file| parent(file))
+            .collect();
+        for folder in folders {
+            for name in file_names(&root.join(&folder))? {
+                there.insert(format!("{folder}/{name}"));
+            }
+        }
+        if !there.is_empty() {
+            let images = poses.iter().flat_map(|pose| pose.images());
+            found.extend(images.filter(|file| there.contains(file)));
+        }
+    }
+    Ok(found)
+}
+
+fn parent(file: &str) -> Option<String> {
+    file.rsplit_once('/').map(|(folder, _)| folder.to_owned())
+}
+
+fn file_names(folder: &Path) -> Result<Vec<String>, FileError> {
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries,
+    };
+    let names = entries.and_then(|entries| {
+        let names = entries.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
+        names.collect::<io::Result<Vec<_>>>()
+    });
+    names.map_err(FileError::at("read", folder))
+}

@@ -1,0 +1,72 @@
+//! Case, plan and room files as TOML, and the paths in them.
+
+use std::io;
+use std::path::{Component, Path, PathBuf};
+
+use serde::Serialize;
+
+use ppa_dataset::files::FileError;
+
+/// What a file at `path` is to hold, as TOML; refuses paths that are not UTF-8.
+pub(crate) fn to_toml<T: Serialize>(value: &T, path: &Path) -> Result<String, FileError> {
+    toml::to_string(value).map_err(|e| FileError::at("write", path)(io::Error::other(e)))
+}
+
+/// The format version of a TOML file, if it is not 1; its other keys may then be any.
+pub(crate) fn other_version(text: &str) -> Option<u32> {
+    #[derive(serde::Deserialize)]
+    struct Versioned {
+        version: u32,
+    }
+    let versioned: Versioned = toml::from_str(text).ok()?;
+    (versioned.version != 1).then_some(versioned.version)
+}
+
+/// `path` as seen from `folder`: with `..` where the two part. Absolute paths stay absolute, and
+/// paths become so where the way back out of `folder` is not known, since it has `..` itself.
+pub(crate) fn relative_to(path: &Path, folder: &Path) -> Result<PathBuf, FileError> {
+    if path.is_absolute() {
+        return Ok(path.to_owned());
+    }
+    let absolute = |p: &Path| std::path::absolute(p).map_err(FileError::at("resolve", p));
+    let folder = if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    };
+    let (path, folder) = (absolute(path)?, absolute(folder)?);
+    let shared = path
+        .components()
+        .zip(folder.components())
+        .take_while(|(a, b)| a == b)
+        .count();
+    let out_of = folder.components().skip(shared);
+    if out_of.clone().any(|part| part == Component::ParentDir) {
+        return Ok(path);
+    }
+    let up = out_of.map(|_| Path::new(".."));
+    let down = path.components().skip(shared);
+    Ok(up
+        .map(PathBuf::from)
+        .chain(down.map(|c| PathBuf::from(&c)))
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scan_paths_are_written_as_seen_from_the_case() {
+        let see =
+            |path: &str, folder: &str| relative_to(Path::new(path), Path::new(folder)).unwrap();
+        assert_eq!(see("scans/ct", "cases"), Path::new("../scans/ct"));
+        assert_eq!(see("scans/ct", "scans"), Path::new("ct"));
+        assert_eq!(see("p01.nii.gz", ""), Path::new("p01.nii.gz"));
+        assert_eq!(see("../data/ct", "out"), Path::new("../../data/ct"));
+        assert_eq!(see("../data/ct", "../cases"), Path::new("../data/ct"));
+        let absolute = std::path::absolute("scan").unwrap();
+        assert_eq!(see("scan", "../cases"), absolute);
+        assert_eq!(see("scan", "a/../b"), absolute);
+    }
+}

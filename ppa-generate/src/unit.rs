@@ -1,0 +1,410 @@
+//! One pose of one limb: its depth images and its radiograph.
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Point3};
+use ppa_dataset::BodyShape;
+use ppa_dataset::files::{FileError, sha256_of_file};
+use ppa_dataset::findings::Finding;
+use ppa_dataset::layout::LimbId;
+use ppa_dataset::manifest::{FileKind, FileRow, RoiFile, RoiRow};
+use ppa_depth::{
+    Body, PlacedBody, Roi, WallDepth, WalledImage, render_before, roi_around, rows_from_isometry,
+};
+use ppa_mesh::{Displacement, Mesh};
+use ppa_scene::{Placement, PoseAngle, place_soft};
+use ppa_xray::{FastSettings, Projection, VoxelPhantom};
+use rayon::prelude::*;
+
+use crate::closed_skin::closed_skin;
+use crate::cut_share::{self, CutError, CutFaces, PoseCuts, PoseImage};
+use crate::plan::Plan;
+use crate::prepare::PreparedLimb;
+use crate::radiograph::{JointError, joint_phantom, projection};
+use crate::seed::{Purpose, item_seed};
+use crate::shaped_skin::body_shape;
+use crate::stage::{PlacedCamera, Stage};
+
+/// Why a pose could not be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum UnitError {
+    /// A body shape.
+    #[error(transparent)]
+    Shape(#[from] ppa_mesh::ShapeError),
+    /// A skin that cannot be rendered.
+    #[error(transparent)]
+    Body(#[from] ppa_depth::BodyError),
+    /// The limb could not be laid on the table.
+    #[error(transparent)]
+    Place(#[from] ppa_scene::PlaceError),
+    /// A depth image.
+    #[error(transparent)]
+    Depth(#[from] ppa_depth::DepthError),
+    /// A region of interest.
+    #[error(transparent)]
+    Roi(#[from] ppa_depth::RoiError),
+    /// More of a region is cut than the plan allows.
+    #[error(transparent)]
+    Cut(#[from] CutError),
+    /// The x-ray tube as a camera that looks for cuts.
+    #[error("the x-ray tube cannot be looked through")]
+    Tube(#[from] ppa_depth::CameraError),
+    /// The rotations of the plan.
+    #[error(transparent)]
+    Rotation(#[from] ppa_scene::SweepError),
+    /// The voxels of the joint.
+    #[error(transparent)]
+    Joint(#[from] JointError),
+    /// The radiograph.
+    #[error(transparent)]
+    Transport(#[from] ppa_xray::TransportError),
+    /// The radiograph's files.
+    #[error(transparent)]
+    Output(#[from] ppa_xray::OutputError),
+    /// A file.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+struct ShapedSkin {
+    shape: BodyShape,
+    mesh: Mesh,
+    body: Body,
+    /// How much more it encloses than the skin of the scan; `None` for that itself.
+    volume_change_mm3: Option<f64>,
+}
+
+/// What a pose is made of.
+pub(crate) struct Images {
+    /// Its images, already written.
+    pub files: Vec<FileRow>,
+    /// Regions of interest in them.
+    pub rois: RoiFile,
+    /// Doubts about the limb and about this pose.
+    pub findings: Vec<Finding>,
+}
+
+/// A limb with everything that all its poses share.
+pub(crate) struct PosableLimb<'a> {
+    id: LimbId,
+    plan: &'a Plan,
+    stage: &'a Stage,
+    prepared: PreparedLimb,
+    shapes: Vec<ShapedSkin>,
+    phantom: VoxelPhantom,
+    cut_faces: CutFaces,
+    /// How much of each image is cut, by pose of the plan; empty if no face of the scan cuts the limb.
+    cuts: Vec<PoseCuts>,
+}
+
+impl<'a> PosableLimb<'a> {
+    pub(crate) fn new(
+        id: LimbId,
+        plan: &'a Plan,
+        stage: &'a Stage,
+        prepared: PreparedLimb,
+    ) -> Result<Self, UnitError> {
+        let (skin, walls) = (&prepared.limb.mesh, &prepared.limb.walls);
+        let shaped = |&shape: &BodyShape| {
+            let (landmarks, settings) = (&prepared.landmarks, &plan.shapes);
+            let mesh = body_shape(skin, landmarks, shape, settings, id, plan.seed)?;
+            let body = closed_skin(&walls.vertices(&mesh), &mesh, walls)?;
+            let change = || Displacement::between(skin, &mesh).volume_mm3;
+            let volume_change_mm3 = (shape != BodyShape::Orig).then(change);
+            Ok::<_, UnitError>(ShapedSkin {
+                shape,
+                mesh,
+                body,
+                volume_change_mm3,
+            })
+        };
+        let source_detector_mm = stage.table.room.device.source_detector_mm;
+        let cut_faces = CutFaces::new(walls, skin, &plan.xray.detector, source_detector_mm)?;
+        let shapes = plan.shapes.variants.iter().map(shaped);
+        let mut posable = Self {
+            id,
+            plan,
+            stage,
+            shapes: shapes.collect::<Result<_, _>>()?,
+            phantom: joint_phantom(&prepared, &plan.xray)?,
+            cut_faces,
+            cuts: Vec::new(),
+            prepared,
+        };
+        posable.cuts = posable.checked_cuts()?;
+        Ok(posable)
+    }
+
+    /// Looks at all poses of the plan, before the first of them is made, and refuses those cut too much.
+    fn checked_cuts(&self) -> Result<Vec<PoseCuts>, UnitError> {
+        if self.cut_faces.is_empty() {
+            return Ok(Vec::new());
+        }
+        let (skin, walls) = (&self.prepared.limb.mesh, &self.prepared.limb.walls);
+        let rigid = closed_skin(&walls.vertices(skin), skin, walls)?;
+        let poses = self.plan.rotation.poses()?;
+        // A pose that cannot be made is reported with its angle when its turn comes.
+        let cuts: Vec<PoseCuts> = poses
+            .par_iter()
+            .filter_map(|&pose| self.pose_cuts(pose, &rigid).ok())
+            .collect();
+        let limits = [self.plan.depth.max_cut_share, self.plan.xray.max_cut_share];
+        cut_share::check(self.id, &cuts, limits)?;
+        Ok(cuts)
+    }
+
+    /// How much of each image is cut; `rigid` is the closed skin of the scan.
+    fn pose_cuts(&self, pose: PoseAngle, rigid: &Body) -> Result<PoseCuts, UnitError> {
+        let skin = &self.prepared.limb.mesh;
+        let placement = self.place(skin, pose)?;
+        let flattened = self.flattened(skin, &placement)?;
+        let in_room = |points: &[Point3<f32>]| placement.in_room(points, &self.prepared.landmarks);
+        let mut shares = Vec::new();
+        for camera in &self.stage.cameras {
+            let roi = self.roi(camera, &placement)?;
+            let limb = self.placed(camera, &placement, flattened.as_ref(), rigid);
+            let share = self.cut_faces.in_region(camera, &roi, limb, in_room)?;
+            shares.push((PoseImage::Depth(camera.view), share));
+        }
+        let (projection, roi_mm) = (self.projection(&placement), self.plan.depth.roi_mm);
+        let share =
+            (self.cut_faces).in_radiograph(&projection.ct_from_device, &self.joint(), roi_mm);
+        shares.push((PoseImage::Radiograph, share));
+        Ok(PoseCuts {
+            step: pose.step,
+            shares,
+        })
+    }
+
+    fn cuts_at(&self, pose: PoseAngle) -> Option<&PoseCuts> {
+        self.cuts.iter().find(|cuts| cuts.step == pose.step)
+    }
+
+    /// Centre of the joint in the `ct` frame.
+    fn joint(&self) -> Point3<f64> {
+        self.prepared.landmarks.joint_centre.into()
+    }
+
+    /// Makes all images of one pose under `root`.
+    pub(crate) fn make(&self, pose: PoseAngle, root: &Path) -> Result<Images, UnitError> {
+        let mut files = Vec::new();
+        let noise_seed = item_seed(self.plan.seed, Purpose::DepthNoise, self.id, pose.step);
+        // The skin of the scan decides the pose of the radiograph and the regions of interest.
+        let placement = self.place(&self.prepared.limb.mesh, pose)?;
+        let cameras = self.stage.cameras.iter();
+        let rois: Vec<Roi> = cameras
+            .map(|camera| self.roi(camera, &placement))
+            .collect::<Result<_, _>>()?;
+        for shaped in &self.shapes {
+            let placement = match shaped.shape {
+                BodyShape::Orig => placement,
+                _ => self.place(&shaped.mesh, pose)?,
+            };
+            let flattened = self.flattened(&shaped.mesh, &placement)?;
+            for (camera, roi) in self.stage.cameras.iter().zip(&rois) {
+                let file = self.id.depth(shaped.shape, camera.view, pose.step);
+                let placed = self.placed(camera, &placement, flattened.as_ref(), &shaped.body);
+                let walls = self.plan.depth.cut_faces;
+                let WalledImage { image, wall_pixels } =
+                    depth_image(shaped.shape, placed, camera, noise_seed, walls)?;
+                let cut = cut_share::share(roi, image.width, &wall_pixels);
+                let path = prepare_folder(root, &file)?;
+                let too_far_pixels = image.write_png(&path)?;
+                files.push(FileRow {
+                    camera: Some(camera.view),
+                    seed: camera.sensor.is_some().then_some(noise_seed),
+                    shape: shaped.shape,
+                    volume_change_mm3: shaped.volume_change_mm3,
+                    too_far_pixels,
+                    cut_share: (cut > 0.0).then_some(cut),
+                    ..self.row(root, file, FileKind::Depth, pose, &placement)?
+                });
+            }
+        }
+        files.extend(self.radiograph(pose, &placement, root)?);
+        let mut findings = self.prepared.findings.clone();
+        findings.extend(self.cuts_at(pose).and_then(|cuts| {
+            let (skin, joint) = (&self.prepared.limb.mesh, self.joint());
+            cuts.finding(&self.prepared.limb.walls, skin, &joint)
+        }));
+        let rows = self.stage.cameras.iter().zip(&rois);
+        let rows = rows.map(|(camera, roi)| roi_row(camera, roi, pose));
+        Ok(Images {
+            files,
+            rois: rows.collect(),
+            findings,
+        })
+    }
+
+    fn place(&self, skin: &Mesh, pose: PoseAngle) -> Result<Placement, UnitError> {
+        let table = &self.stage.table;
+        Ok(place_soft(
+            &skin.vertices,
+            &self.prepared.landmarks,
+            pose.angle_rad(),
+            &table.plane.plane,
+            &table.room.device,
+            &self.plan.soft_tissue,
+        )?)
+    }
+
+    /// T^V_CT: through the patient and the room into the camera.
+    fn camera_from_ct(&self, camera: &PlacedCamera, placement: &Placement) -> Isometry3<f64> {
+        let room_from_ct = placement.room_from_patient * self.prepared.landmarks.patient_from_ct();
+        camera.camera_from_room * room_from_ct.isometry()
+    }
+
+    /// A skin that the table flattens, in the room; `None` for a rigid one.
+    fn flattened(&self, skin: &Mesh, placement: &Placement) -> Result<Option<Body>, UnitError> {
+        if placement.flattening.is_none() {
+            return Ok(None);
+        }
+        let walls = &self.prepared.limb.walls;
+        let in_room = placement.in_room(&walls.vertices(skin), &self.prepared.landmarks);
+        Ok(Some(closed_skin(&in_room, skin, walls)?))
+    }
+
+    /// A skin before a camera: flattened in the room, or rigid in the scan.
+    fn placed<'b>(
+        &self,
+        camera: &PlacedCamera,
+        placement: &Placement,
+        flattened: Option<&'b Body>,
+        rigid: &'b Body,
+    ) -> PlacedBody<'b> {
+        match flattened {
+            Some(body) => PlacedBody {
+                body,
+                camera_from_body: camera.camera_from_room,
+            },
+            None => PlacedBody {
+                body: rigid,
+                camera_from_body: self.camera_from_ct(camera, placement),
+            },
+        }
+    }
+
+    fn roi(&self, camera: &PlacedCamera, placement: &Placement) -> Result<Roi, UnitError> {
+        let joint_in_camera = self.camera_from_ct(camera, placement) * self.joint();
+        Ok(roi_around(
+            &camera.camera,
+            &joint_in_camera,
+            self.plan.depth.roi_mm,
+        )?)
+    }
+
+    fn projection(&self, placement: &Placement) -> Projection {
+        let device = &self.stage.table.room.device;
+        projection(placement, &self.prepared.landmarks, device, &self.plan.xray)
+    }
+
+    fn radiograph(
+        &self,
+        pose: PoseAngle,
+        placement: &Placement,
+        root: &Path,
+    ) -> Result<[FileRow; 2], UnitError> {
+        let settings = &self.plan.xray;
+        let projection = self.projection(placement);
+        let cut = self.cuts_at(pose).map_or(0.0, PoseCuts::of_radiograph);
+        let seed = item_seed(self.plan.seed, Purpose::Radiograph, self.id, pose.step);
+        let engine = FastSettings {
+            seed,
+            ..settings.engine
+        };
+        let radiograph = ppa_xray::fast(&self.phantom, &self.stage.spectrum, &projection, &engine)?;
+        let png = self.id.radiograph_png(pose.step);
+        radiograph.write_png(&prepare_folder(root, &png)?, &settings.presentation)?;
+        let exr = self.id.radiograph_exr(pose.step);
+        radiograph.write_exr(&root.join(&exr))?;
+        let row = |file, kind| {
+            Ok::<_, UnitError>(FileRow {
+                ct_from_device: Some(rows_from_isometry(&projection.ct_from_device)),
+                seed: Some(seed),
+                cut_share: (cut > 0.0).then_some(cut),
+                ..self.row(root, file, kind, pose, placement)?
+            })
+        };
+        Ok([
+            row(png, FileKind::Radiograph)?,
+            row(exr, FileKind::RadiographTallies)?,
+        ])
+    }
+
+    fn row(
+        &self,
+        root: &Path,
+        file: String,
+        kind: FileKind,
+        pose: PoseAngle,
+        placement: &Placement,
+    ) -> Result<FileRow, UnitError> {
+        Ok(FileRow {
+            sha256: sha256_of_file(&root.join(&file))?,
+            file,
+            kind,
+            limb: self.id,
+            step: pose.step,
+            angle_deg: pose.angle_deg,
+            camera: None,
+            shape: BodyShape::Orig,
+            volume_change_mm3: None,
+            too_far_pixels: 0,
+            cut_share: None,
+            patient_from_ct: self
+                .prepared
+                .landmarks
+                .patient_from_ct()
+                .to_homogeneous_rows(),
+            room_from_patient: placement.room_from_patient.to_homogeneous_rows(),
+            ct_from_device: None,
+            seed: None,
+        })
+    }
+}
+
+fn roi_row(camera: &PlacedCamera, roi: &Roi, pose: PoseAngle) -> (String, RoiRow) {
+    let row = RoiRow {
+        camera: camera.view,
+        image_number: pose.step,
+        x_start: roi.x_start,
+        y_start: roi.y_start,
+        size: roi.size,
+    };
+    (LimbId::depth_name(camera.view, pose.step), row)
+}
+
+pub(crate) fn depth_image(
+    shape: BodyShape,
+    placed: PlacedBody,
+    camera: &PlacedCamera,
+    noise_seed: u64,
+    walls: WallDepth,
+) -> Result<WalledImage, UnitError> {
+    placed.require_camera_outside()?;
+    if let Some((sensor, backdrop)) = &camera.sensor {
+        let seen = backdrop.before_with_walls(&camera.camera, &[placed], walls)?;
+        // One frame per body shape and camera.
+        let frame = 2 * shape as u64 + camera.view as u64;
+        let image = sensor.observe(&camera.camera, &seen, noise_seed, frame);
+        image.require_measured(seen.image.valid_pixels())?;
+        return Ok(WalledImage {
+            image,
+            wall_pixels: seen.wall_pixels,
+        });
+    }
+    Ok(render_before(
+        &camera.camera,
+        &[placed],
+        &camera.background,
+        walls,
+    )?)
+}
+
+fn prepare_folder(root: &Path, file: &str) -> Result<std::path::PathBuf, FileError> {
+    let path = root.join(file);
+    let folder = path.parent().expect("files lie in folders of the dataset");
+    std::fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
+    Ok(path)
+}

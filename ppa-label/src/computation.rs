@@ -1,0 +1,49 @@
+//! `openness.json`: what computed labels were computed with.
+
+use ppa_dataset::labels::LabelSource;
+use ppa_generate::{BoneFile, BoneNumbers};
+use serde::Serialize;
+
+use super::openness::{FREE_CHORDS_MM, GradeThresholds};
+
+/// Everything that labels of the same radiographs depend on.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct Computation<'a> {
+    pub label_source: LabelSource,
+    /// Hash of the sources that compute labels.
+    code: &'static str,
+    pub thresholds: &'a GradeThresholds,
+    free_chords_mm: [f64; 3],
+    bones: ComputedFrom<'a>,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+struct ComputedFrom<'a> {
+    /// Over size, affine and numbers: the name of the file stays out of datasets.
+    sha256: &'a str,
+    numbers: BoneNumbers,
+    segmented: bool,
+}
+
+impl<'a> Computation<'a> {
+    pub fn new(file: &BoneFile, sha256: &'a str, thresholds: &'a GradeThresholds) -> Self {
+        Self {
+            label_source: match file.segmented {
+                true => LabelSource::SegmentedSurrogate,
+                false => LabelSource::Surrogate,
+            },
+            code: env!("PPA_LABEL_CODE"),
+            thresholds,
+            free_chords_mm: FREE_CHORDS_MM,
+            bones: ComputedFrom {
+                sha256,
+                numbers: file.numbers,
+                segmented: file.segmented,
+            },
+        }
+    }
+
+    pub fn to_json(self) -> String {
+        serde_json::to_string_pretty(&self).expect("thresholds are finite numbers")
+    }
+}

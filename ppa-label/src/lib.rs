@@ -1,0 +1,24 @@
+//! Labels of poses: grades of readers, and labels computed from the bones of an ankle.
+//!
+//! Readers see the radiographs of a dataset as [`Showing`]s on a [`grading_page`]; [`import_grades`] makes labels of their grades.
+//!
+//! Computed labels are a surrogate that no reader has confirmed: how open the joint space of an ankle lies to the beam.
+//! [`segment_bones`] separates tibia, fibula and talus where nobody did; [`AnkleBones`] are their surfaces; [`JointSpace`] finds
+//! the three gutters between them; its `openness` follows the rays of an [`Exposure`]; [`GradeThresholds`] make a grade of it;
+//! [`compute_labels`] does so for a dataset.
+
+mod computation;
+mod computed;
+mod described;
+mod openness;
+mod readers;
+mod segment;
+mod table;
+mod tallies;
+
+pub use computed::{AutoLabelError, ComputedLabels, ComputedRow, LabelledLimb, compute_labels};
+pub use openness::*;
+pub use readers::*;
+pub use segment::{SegmentError, SegmentedBones, segment_bones};
+pub use table::TableError;
+pub use tallies::TalliesError;

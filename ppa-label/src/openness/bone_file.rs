@@ -1,0 +1,69 @@
+//! A file that tells which bone each voxel of a scan belongs to.
+
+use std::path::PathBuf;
+
+use nalgebra::Point3;
+use ppa_generate::{BoneFile, volume_sha256};
+
+use super::bones::{AnkleBones, BonesError};
+
+/// Bones of a file, and which they are.
+#[derive(Debug, Clone)]
+pub struct ReadBones {
+    /// Those around the joint.
+    pub bones: AnkleBones,
+    /// SHA-256 over size, affine and numbers of the file.
+    pub sha256: String,
+}
+
+/// Why a file does not give the bones of an ankle.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BoneFileError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Read(#[from] ppa_ct::ReadError),
+    /// Values that are no labels.
+    #[error("{} holds the value {found}, expected whole numbers of bones from 0 to 255", path.display())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// The value.
+        found: f32,
+    },
+    /// The labels.
+    #[error("{}", path.display())]
+    Bones {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with them.
+        source: BonesError,
+    },
+}
+
+/// Reads the bones around a joint in the `ct` frame.
+///
+/// # Errors
+/// [`BoneFileError`] naming the file: values that are no labels, a bone missing near the joint.
+pub fn read_bones(file: &BoneFile, joint: &Point3<f64>) -> Result<ReadBones, BoneFileError> {
+    let volume = ppa_ct::read(&file.path)?.volume;
+    let label = |found: f32| match (0.0..=255.0).contains(&found) && found.fract() == 0.0 {
+        true => Ok(found as u8),
+        false => Err(BoneFileError::Value {
+            path: file.path.clone(),
+            found,
+        }),
+    };
+    let labels: Vec<u8> = volume
+        .values()
+        .iter()
+        .map(label)
+        .collect::<Result<_, _>>()?;
+    let bones = AnkleBones::new(volume.grid(), &labels, file.numbers, joint);
+    let sha256 = volume_sha256(&volume);
+    let read = bones.map(|bones| ReadBones { bones, sha256 });
+    read.map_err(|source| BoneFileError::Bones {
+        path: file.path.clone(),
+        source,
+    })
+}

@@ -1,0 +1,24 @@
+//! Computed labels: how open the joint space of an ankle lies to the beam.
+
+mod bone_file;
+mod bones;
+mod exposure;
+mod grade;
+mod gutter;
+mod joint_space;
+mod overlap;
+mod rays;
+mod visibility;
+mod visible;
+
+#[cfg(test)]
+mod tests;
+
+pub use bone_file::{BoneFileError, ReadBones, read_bones};
+pub(crate) use bones::box_around;
+pub use bones::{AnkleBone, AnkleBones, BonesError};
+pub use exposure::Exposure;
+pub use grade::{ComputedLabel, GradeScale, GradeThresholds, ThresholdError};
+pub use joint_space::{FREE_CHORDS_MM, Gutter, JointSpace, JointSpaceError, Openness};
+pub use overlap::Overlaps;
+pub use visibility::{Reading, Visibility};

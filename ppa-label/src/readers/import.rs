@@ -1,0 +1,275 @@
+//! From readers' files to `grades.csv` and `labels.json` of a dataset.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::{Path, PathBuf};
+
+use ppa_dataset::checksums::Checksums;
+use ppa_dataset::files::{FileError, write_whole};
+use ppa_dataset::labels::{LabelError, LabelRow, LabelSource};
+use ppa_dataset::labels::{LabelFile, LabelFileError};
+use ppa_dataset::layout::LimbId;
+use ppa_dataset::manifest::{FileKind, FileRow, Manifest};
+use serde::Serialize;
+
+use super::grades::{Given, Pictures};
+use super::showing::Showing;
+use crate::table::{TableError, write_table};
+
+/// All grades of a dataset, as they were given.
+const GRADES_FILE: &str = "grades.csv";
+
+/// What [`import_grades`] did.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct Imported {
+    /// Readers.
+    pub readers: usize,
+    /// Radiographs that have a label now.
+    pub labelled: usize,
+    /// Second grades of a radiograph by one reader: kept, but without influence on the label.
+    pub repeats: usize,
+    /// Computed labels in whose place readers' stand in `labels.json`; they stay in `labels.computed.json`.
+    pub replaced_computed: usize,
+    /// Radiographs of the graded limbs that no reader graded and that keep their computed label.
+    pub kept_computed: usize,
+    /// Radiographs of the graded limbs without any label.
+    pub without_label: usize,
+}
+
+/// Why grades do not become labels; nothing was written then.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImportError {
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A file of grades is none.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// Off the scale.
+    #[error("{}: {reader} grades {image} with {grade}, expected 1, 1.5, 2, 2.5 or 3", path.display())]
+    Grade {
+        /// The file.
+        path: PathBuf,
+        /// The reader.
+        reader: String,
+        /// The picture.
+        image: String,
+        /// The grade.
+        grade: f64,
+    },
+    /// A reader's name that spreadsheet programs would run.
+    #[error("{}: a reader is called {reader:?}, which spreadsheets take for a formula; expected a name that does not begin with = + - @, a tab or a carriage return", path.display())]
+    Formula {
+        /// The file.
+        path: PathBuf,
+        /// The name.
+        reader: String,
+    },
+    /// A picture that neither key nor dataset know.
+    #[error("{}: {image} is neither a picture of the key nor a radiograph of the dataset", path.display())]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+        /// The picture.
+        image: String,
+    },
+    /// The dataset has changed since the key was made.
+    #[error("{0} is not the radiograph that the readers saw: its hash is not that of the key")]
+    Changed(String),
+    /// The dataset has changed since a grade was imported.
+    #[error(
+        "{}: {reader} graded another radiograph {image}: its hash was {found}, that in the manifest is {expected}; move the file \
+         away to begin anew",
+        path.display()
+    )]
+    OtherRadiograph {
+        /// The file.
+        path: PathBuf,
+        /// The reader.
+        reader: String,
+        /// The radiograph.
+        image: String,
+        /// Hash in the file.
+        found: String,
+        /// Hash in the manifest.
+        expected: String,
+    },
+    /// One picture graded twice, a radiograph a third time, or in two files.
+    #[error("{reader} grades {image} in {} and again in {}", first.display(), second.display())]
+    Twice {
+        /// The reader.
+        reader: String,
+        /// The picture or radiograph.
+        image: String,
+        /// A file.
+        first: PathBuf,
+        /// Another one, or the same.
+        second: PathBuf,
+    },
+    /// Grades that are there would be lost.
+    #[error(
+        "{} holds {reader}'s grade {grade} of {image}, which none of the given files does: give {} as well",
+        path.display(), path.display()
+    )]
+    Lost {
+        /// `grades.csv` of the dataset.
+        path: PathBuf,
+        /// The reader.
+        reader: String,
+        /// The radiograph.
+        image: String,
+        /// The grade.
+        grade: f64,
+    },
+    /// Labels of readers that are there would be lost.
+    #[error(
+        "{} holds readers' labels that do not follow from grades.csv; move it away, or give their grades, before others take their place",
+        .0.display()
+    )]
+    OtherLabels(PathBuf),
+    /// Labels that are there are none.
+    #[error(transparent)]
+    Labels(#[from] LabelFileError),
+    /// A label off the grid.
+    #[error(transparent)]
+    Label(#[from] LabelError),
+}
+
+/// Makes the labels of a dataset from readers' grades: mean and standard deviation (ddof 0) over the readers' first grades.
+///
+/// `files` are tables with the columns image, reader, grade, where image is a name of the key `shown` or a radiograph
+/// of the dataset. All grades are kept in `grades.csv` with the hash of their radiograph, so that further ones can be added by
+/// giving that file as well. Readers' labels take the place of computed ones, which stay in `labels.computed.json`; radiographs that no
+/// reader graded keep their computed label.
+///
+/// # Errors
+/// [`ImportError`], before anything is written: grades off the scale, unknown pictures, radiographs that changed since
+/// the key was made or the grades were imported, two grades of one picture, files without the grades that are there, and labels
+/// of readers whose grades are not there.
+pub fn import_grades(
+    manifest: &Manifest,
+    shown: &[Showing],
+    files: &[PathBuf],
+) -> Result<Imported, ImportError> {
+    let path = manifest.root.join(GRADES_FILE);
+    let there = path.try_exists().map_err(FileError::at("read", &path))?;
+    let kept = [path.clone()];
+    let pictures = Pictures::of(manifest, shown)?;
+    let before = pictures.all_of(if there { &kept } else { &[] })?;
+    let given = pictures.all_of(files)?;
+    refuse_loss(&path, &before, &given)?;
+
+    let readers: HashSet<_> = given.iter().map(|given| &given.grade.reader).collect();
+    let mut done = Imported {
+        readers: readers.len(),
+        ..Imported::default()
+    };
+    let limbs = label_rows(&given);
+    let rows_before = label_rows(&before);
+    let mut labels = Vec::new();
+    for (&limb, rows) in &limbs {
+        let root = &manifest.root;
+        let before = LabelFile::read(root, limb)?.unwrap_or_default();
+        let of_readers = before.not_computed().labels();
+        if !of_readers.is_empty()
+            && ![rows_before.get(&limb), Some(rows)].contains(&Some(&of_readers))
+        {
+            return Err(ImportError::OtherLabels(LabelFile::path(root, limb)));
+        }
+        let file = LabelFile::new(LabelSource::Readers, rows.iter().copied())?;
+        let file = file.of_radiographs(manifest, limb);
+        // Computed labels had no file of their own in earlier versions.
+        let (computed, has_file) = match LabelFile::read_computed(root, limb)? {
+            Some(computed) => (computed, true),
+            None => (before.computed(), false),
+        };
+        let graded = |row: &&LabelRow| file.of_step(row.step).is_some();
+        let given_way = computed.labels().iter().filter(graded).count();
+        let file = file.over(&computed);
+        let bare = |row: &&FileRow| file.of_step(row.step).is_none();
+        let radiographs = manifest.files.iter();
+        let radiographs =
+            radiographs.filter(|row| row.kind == FileKind::Radiograph && row.limb == limb);
+        done.without_label += radiographs.filter(bare).count();
+        done.labelled += rows.len();
+        done.replaced_computed += given_way;
+        done.kept_computed += computed.labels().len() - given_way;
+        let computed = (!has_file && !computed.labels().is_empty()).then_some(computed);
+        labels.push((limb, file, computed));
+    }
+    done.repeats = given.len() - firsts(&given).count();
+
+    // Grades last: an import that was stopped finds the former grades, and labels that follow from those or from its own.
+    let mut written = Vec::new();
+    for (limb, labels, computed) in labels {
+        if let Some(computed) = computed {
+            let path = LabelFile::computed_path(&manifest.root, limb);
+            write_whole(&path, computed.to_text().as_bytes())?;
+            written.push(path);
+        }
+        labels.write(&manifest.root, limb)?;
+        written.push(LabelFile::path(&manifest.root, limb));
+    }
+    let grades: Vec<_> = given.iter().map(Given::by_radiograph).collect();
+    write_table(&path, &grades)?;
+    written.push(path);
+    Checksums::record_labels(&manifest.root, &written)?;
+    Ok(done)
+}
+
+/// The first grade of each radiograph by each reader.
+fn firsts<'a>(given: &'a [Given]) -> impl Iterator<Item = &'a Given<'a>> {
+    let mut seen = HashSet::new();
+    given
+        .iter()
+        .filter(move |given| seen.insert((&given.grade.reader, &given.radiograph.file)))
+}
+
+/// Labels by limb, lowest step first.
+fn label_rows(given: &[Given]) -> BTreeMap<LimbId, Vec<LabelRow>> {
+    let mut limbs: BTreeMap<LimbId, BTreeMap<u32, Vec<f64>>> = BTreeMap::new();
+    for given in firsts(given) {
+        let of_limb = limbs.entry(given.radiograph.limb).or_default();
+        let grades = of_limb.entry(given.radiograph.step).or_default();
+        grades.push(given.grade.grade);
+    }
+    let rows = |steps: BTreeMap<u32, Vec<f64>>| {
+        let rows = steps.into_iter();
+        rows.filter_map(|(step, grades)| LabelRow::of_grades(&grades, step))
+            .collect()
+    };
+    limbs
+        .into_iter()
+        .map(|(limb, steps)| (limb, rows(steps)))
+        .collect()
+}
+
+/// Refuses to write over grades that are not among those given, each as often as it is there.
+fn refuse_loss(path: &Path, before: &[Given], given: &[Given]) -> Result<(), ImportError> {
+    let key = |given: &Given| {
+        let half_steps = (2.0 * given.grade.grade) as u32;
+        (
+            given.grade.reader.clone(),
+            given.radiograph.file.clone(),
+            half_steps,
+        )
+    };
+    let mut times: HashMap<_, u32> = HashMap::new();
+    for given in given {
+        *times.entry(key(given)).or_default() += 1;
+    }
+    for old in before {
+        match times.get_mut(&key(old)) {
+            Some(left @ 1..) => *left -= 1,
+            _ => {
+                return Err(ImportError::Lost {
+                    path: path.to_owned(),
+                    reader: old.grade.reader.clone(),
+                    image: old.radiograph.file.clone(),
+                    grade: old.grade.grade,
+                });
+            }
+        }
+    }
+    Ok(())
+}

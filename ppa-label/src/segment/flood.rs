@@ -1,0 +1,121 @@
+//! Pieces of bone, and the watershed between them.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::solid::Density;
+use crate::AnkleBone;
+
+/// Which voxels begin which bone: 0 to 2 are those of [`AnkleBone`], any further have no name.
+pub(super) struct Seeds {
+    size: [usize; 3],
+    bones: usize,
+    of: Vec<Option<u16>>,
+}
+
+impl Seeds {
+    pub fn new(size: [usize; 3]) -> Self {
+        Self {
+            size,
+            bones: AnkleBone::ALL.len(),
+            of: vec![None; size.iter().product()],
+        }
+    }
+
+    pub fn plant(&mut self, bone: usize, voxels: Vec<usize>) {
+        for at in voxels {
+            self.of[at] = Some(bone as u16);
+        }
+    }
+
+    /// Plants a bone of its own in every piece of at least so many voxels that holds no seed yet.
+    pub fn plant_others(&mut self, solid: &[bool], least: f64) {
+        for piece in self.pieces(solid) {
+            let free = piece.iter().all(|&at| self.of[at].is_none());
+            if free && piece.len() as f64 >= least && self.bones < usize::from(u16::MAX) {
+                self.plant(self.bones, piece);
+                self.bones += 1;
+            }
+        }
+    }
+
+    /// What hangs together through faces, in order of the first voxel.
+    pub fn pieces(&self, solid: &[bool]) -> Vec<Vec<usize>> {
+        let mut seen = vec![false; solid.len()];
+        let mut pieces = Vec::new();
+        for start in 0..solid.len() {
+            if seen[start] || !solid[start] {
+                continue;
+            }
+            seen[start] = true;
+            let mut piece = vec![start];
+            let mut next = 0;
+            while next < piece.len() {
+                for near in neighbours(self.size, piece[next]) {
+                    if solid[near] && !seen[near] {
+                        seen[near] = true;
+                        piece.push(near);
+                    }
+                }
+                next += 1;
+            }
+            pieces.push(piece);
+        }
+        pieces
+    }
+}
+
+/// Every solid voxel that hangs together with a seed goes to the one from which the densest way leads to it, where a way is
+/// as dense as its least dense voxel: a watershed of the density (Meyer, Signal Processing 38, 1994, 113).
+pub(super) fn flood(density: &Density, solid: &[bool], seeds: Seeds) -> Vec<Option<u16>> {
+    let mut bones = seeds.of;
+    // Shares are positive, so that their bits are in order; of equals the first voxel is first.
+    let key = |share: f32, at: usize| (share.to_bits(), Reverse(at));
+    let mut front: BinaryHeap<_> = (0..bones.len())
+        .filter(|&at| bones[at].is_some())
+        .map(|at| key(1.0, at))
+        .collect();
+    while let Some((level, Reverse(at))) = front.pop() {
+        for near in neighbours(density.size, at) {
+            if solid[near] && bones[near].is_none() {
+                bones[near] = bones[at];
+                let way = f32::from_bits(level).min(density.share[near].max(0.0));
+                front.push(key(way, near));
+            }
+        }
+    }
+    bones
+}
+
+/// What can be reached from `starts` through `free` voxels.
+pub(super) fn flooded(
+    size: [usize; 3],
+    starts: impl Iterator<Item = usize>,
+    free: impl Fn(usize) -> bool,
+) -> Vec<bool> {
+    let mut reached = vec![false; size.iter().product()];
+    let mut front: Vec<usize> = starts.filter(|&at| free(at)).collect();
+    front.iter().for_each(|&at| reached[at] = true);
+    while let Some(at) = front.pop() {
+        for near in neighbours(size, at) {
+            if !reached[near] && free(near) {
+                reached[near] = true;
+                front.push(near);
+            }
+        }
+    }
+    reached
+}
+
+/// The voxels on the other side of the faces of a voxel.
+pub(super) fn neighbours(size: [usize; 3], at: usize) -> impl Iterator<Item = usize> {
+    let [nx, ny, nz] = size;
+    let strides = [1, nx, nx * ny];
+    let place = [at % nx, at / nx % ny, at / (nx * ny)];
+    let last = [nx - 1, ny - 1, nz - 1];
+    (0..3).flat_map(move |axis| {
+        let below = (place[axis] > 0).then(|| at - strides[axis]);
+        let above = (place[axis] < last[axis]).then(|| at + strides[axis]);
+        below.into_iter().chain(above)
+    })
+}

@@ -1,0 +1,175 @@
+//! What the page shows against the angle, and of depths: charts of one limb.
+
+use std::path::Path;
+
+use ppa_core::text::number;
+use ppa_dataset::BodyShape;
+use ppa_dataset::labels::LabelSource;
+use ppa_dataset::layout::{LimbId, View, angle_text};
+use ppa_dataset::manifest::{FileRow, RoiFile};
+use ppa_dataset::published::{GrayImage16, Pose, Published};
+
+use super::chart::{Series, chart};
+use super::histogram::Depths;
+use super::outliers::{LEAST_POSES, outliers};
+use super::page::figure;
+use super::scene::Scene;
+use crate::contact_sheet::evenly_chosen;
+
+/// Depth images per limb and camera that histograms are made of.
+const SAMPLE: usize = 24;
+
+/// Outliers are looked for beyond these jumps, mm and degrees.
+const FLOOR: [f64; 2] = [0.5, 0.1];
+
+pub(super) fn labels(dataset: &Published, limb: LimbId) -> String {
+    let mut labels: Vec<_> = dataset
+        .pairs
+        .iter()
+        .filter(|pair| pair.limb == limb)
+        .filter_map(|pair| match (pair.pose, &pair.label) {
+            (Pose::Rotated { step, .. }, Some(label)) => Some((step, label)),
+            _ => None,
+        })
+        .collect();
+    labels.dedup_by_key(|(step, _)| *step);
+    if labels.is_empty() {
+        return String::new();
+    }
+    let mut series: Vec<Series> = Vec::new();
+    for (step, label) in labels {
+        let name = label.source.map_or("source not named", LabelSource::name);
+        let place = series.iter().position(|series| series.name == name);
+        let place = place.unwrap_or_else(|| {
+            series.push(Series {
+                name: name.to_owned(),
+                points: Vec::new(),
+                spread: Vec::new(),
+                marked: Vec::new(),
+            });
+            series.len() - 1
+        });
+        series[place]
+            .points
+            .push([f64::from(step) / 2.0, label.label]);
+        series[place].spread.push(label.std);
+    }
+    chart(
+        "medial rotation, degrees",
+        "label: 1 ideal, 3 inadequate",
+        &series,
+        Some([0.8, 3.2]),
+    )
+}
+
+pub(super) fn histograms<'a>(
+    root: &Path,
+    rois: &RoiFile,
+    of_view: impl Fn(View) -> Vec<&'a FileRow>,
+) -> String {
+    let mut series = Vec::new();
+    for view in View::ALL {
+        let rows = of_view(view);
+        let steps: Vec<_> = rows.iter().map(|row| row.step).collect();
+        if steps.is_empty() {
+            continue;
+        }
+        let chosen = evenly_chosen(&steps, SAMPLE);
+        let mut depths = Depths::default();
+        for row in rows.into_iter().filter(|row| chosen.contains(&row.step)) {
+            // What cannot be read stands among the flaws.
+            let Ok(image) = GrayImage16::read(&root.join(&row.file)) else {
+                continue;
+            };
+            depths.add(&image, rois.get(&LimbId::depth_name(view, row.step)));
+        }
+        let name = format!(
+            "{}, {:.1} % without depth",
+            view.name().replace('_', " "),
+            100.0 * depths.invalid_share()
+        );
+        series.push(depths.series(&name));
+    }
+    chart("depth, mm", "pixels, %", &series, None)
+}
+
+/// What heights and tilts show.
+pub(super) struct Sweeps {
+    /// Two charts.
+    pub charts: String,
+    /// A sentence on every pose that does not follow from its neighbours.
+    pub html: String,
+    /// Their number.
+    pub outliers: usize,
+}
+
+/// How height and tilt of a limb change from pose to pose.
+pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRow>)]) -> Sweeps {
+    let (mut charts, mut sentences) = (String::new(), Vec::new());
+    for (i, [what, unit]) in [
+        ["height of the joint", "mm"],
+        ["tilt of the axis", "degrees"],
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let mut series = Vec::new();
+        for (shape, rows) in sweeps {
+            let values: Vec<f64> = rows
+                .iter()
+                .map(|row| scene.height_and_tilt(row)[i])
+                .collect();
+            let points: Vec<_> = rows
+                .iter()
+                .zip(&values)
+                .map(|(row, value)| [row.angle_deg, *value])
+                .collect();
+            let odd = if values.len() < LEAST_POSES {
+                Vec::new()
+            } else {
+                outliers(&points, FLOOR[i])
+            };
+            sentences.extend(odd.iter().map(|&at| {
+                let angle = angle_text(rows[at].step);
+                format!(
+                    "<li>{}, {angle} degrees: {what} {:.2} {unit} does not follow from the poses beside it</li>",
+                    shape.name(),
+                    number(values[at])
+                )
+            }));
+            let marked = odd.iter().map(|&at| points[at]).collect();
+            series.push(Series {
+                name: shape.name().to_owned(),
+                points,
+                spread: Vec::new(),
+                marked,
+            });
+        }
+        let caption = format!("{what} above the table, {unit}; outliers are ringed.");
+        charts += &figure(
+            &caption,
+            chart(
+                "medial rotation, degrees",
+                &format!("{what}, {unit}"),
+                &series,
+                None,
+            ),
+        );
+    }
+    let longest = sweeps.iter().map(|(_, rows)| rows.len()).max();
+    let html = match sentences.len() {
+        0 if longest.is_none_or(|poses| poses < LEAST_POSES) => {
+            format!("<p>Fewer than {LEAST_POSES} poses: too few to find outliers.</p>")
+        }
+        0 => "<p>No pose stands out from those beside it.</p>".to_owned(),
+        _ => format!(
+            "<div class=\"caution\"><p>Poses that stand out:</p><ul>{}</ul></div>",
+            sentences.concat()
+        ),
+    };
+    Sweeps {
+        charts,
+        html,
+        outliers: sentences.len(),
+    }
+}

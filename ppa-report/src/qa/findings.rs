@@ -1,0 +1,96 @@
+//! The findings about the limbs of a dataset, as a table of the page.
+
+use ppa_core::text::numbers;
+use ppa_dataset::findings::{Findings, LimbFinding, Severity};
+
+use super::page::{escaped, side};
+
+/// One table, severe findings that nobody acknowledged first; nothing without findings.
+pub(super) fn table(findings: &Findings) -> String {
+    if findings.0.is_empty() {
+        return String::new();
+    }
+    let mut rows: Vec<&LimbFinding> = findings.0.iter().collect();
+    rows.sort_by_key(|row| {
+        (
+            !row.is_open(),
+            std::cmp::Reverse(row.finding.severity),
+            row.limb,
+        )
+    });
+    let rows: String = rows.into_iter().map(row).collect();
+    format!(
+        "<h2>Findings</h2><table class=\"findings\"><tr><th>limb</th><th>severity</th><th>code</th><th>finding</th>\
+         <th>place in the scan, mm (LPS)</th><th>acknowledged</th></tr>{rows}</table>"
+    )
+}
+
+fn row(row: &LimbFinding) -> String {
+    let finding = &row.finding;
+    let (class, severity) = match (row.is_open(), finding.severity) {
+        (true, _) => ("bad", "severe"),
+        (false, Severity::Severe) => ("caution", "severe"),
+        (false, Severity::Caution) => ("caution", "caution"),
+        (false, Severity::Note) => ("", "note"),
+    };
+    // The code as scripts and `acknowledged` in a case know it.
+    let code = serde_json::to_value(finding.code).ok();
+    let code = code.as_ref().and_then(|code| code.as_str()).unwrap_or("");
+    let place = finding
+        .place_mm
+        .map_or(String::new(), |place| format!("{:.1}", numbers(place)));
+    let acknowledged = match (finding.severity, row.acknowledged) {
+        (_, true) => "yes",
+        (Severity::Severe, false) => "<b>no</b>",
+        (_, false) => "",
+    };
+    format!(
+        "<tr class=\"{class}\"><td>patient {} {}</td><td>{severity}</td><td><code>{code}</code></td><td>{}</td><td>{place}</td>\
+         <td>{acknowledged}</td></tr>",
+        row.limb.patient,
+        side(row.limb),
+        escaped(&finding.text)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn findings() -> Findings {
+        let finding = |code: &str, severity: &str, acknowledged: bool| {
+            json!({
+                "patient": 2, "side": "r", "acknowledged": acknowledged, "code": code, "severity": severity,
+                "text": "3 < 5 mm", "value": 3.0, "place_mm": [1.0, -0.01, 25.125],
+            })
+        };
+        let list = [
+            finding("several-limbs", "caution", false),
+            finding("contacts-too-near", "severe", true),
+            finding("plane-on-cut", "severe", false),
+        ];
+        serde_json::from_value(json!(list)).unwrap()
+    }
+
+    #[test]
+    fn open_severe_findings_come_first_with_code_and_place() {
+        let html = table(&findings());
+        let at = |text: &str| {
+            html.find(text)
+                .unwrap_or_else(|| panic!("{text} in {html}"))
+        };
+        assert!(at("plane-on-cut") < at("contacts-too-near"));
+        assert!(at("contacts-too-near") < at("several-limbs"));
+        assert!(html.contains(
+            "<tr class=\"bad\"><td>patient 2 right</td><td>severe</td><td><code>plane-on-cut"
+        ));
+        assert!(
+            html.contains("3 &lt; 5 mm</td><td>1.0, 0.0, 25.1</td><td><b>no</b>"),
+            "{html}"
+        );
+        assert_eq!(html.matches("<td>yes</td>").count(), 1);
+        assert_eq!(table(&Findings::default()), "");
+    }
+}
