@@ -1,6 +1,5 @@
 //! Ctrl-C and TERM end a command at its next whole step. A second one ends it at once.
 
-use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
@@ -11,15 +10,13 @@ use ppa_dataset::Stopped;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 
+use crate::interrupted::{BY_SIGNAL, Interrupted};
 use crate::stderr;
 
 const SIGNALS: [i32; 2] = [SIGINT, SIGTERM];
 
 /// How long a signal waits until it is seen, at most.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
-
-/// What a shell adds to a signal's number in an exit status.
-const BY_SIGNAL: i32 = 128;
 
 /// Whether Ctrl-C was pressed or TERM was sent since [`Interrupt::listen`].
 #[derive(Debug)]
@@ -80,28 +77,6 @@ impl Interrupt {
         })
     }
 }
-
-/// A command was stopped by a signal.
-#[derive(Debug)]
-pub struct Interrupted {
-    signal: i32,
-    how: String,
-}
-
-impl Interrupted {
-    /// What the program ends with: 130 after Ctrl-C, 143 after TERM.
-    pub fn exit_code(&self) -> u8 {
-        u8::try_from(BY_SIGNAL + self.signal).unwrap_or(1)
-    }
-}
-
-impl fmt::Display for Interrupted {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "stopped {}", self.how)
-    }
-}
-
-impl std::error::Error for Interrupted {}
 
 /// What a command that wrote nothing says.
 pub const NOTHING_WRITTEN: &str = "before anything was written; repeat the command to start over";

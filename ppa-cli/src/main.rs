@@ -6,6 +6,7 @@ mod commands;
 mod findings;
 mod help;
 mod interrupt;
+mod interrupted;
 mod number_lists;
 mod output;
 mod output_files;

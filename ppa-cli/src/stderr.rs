@@ -13,7 +13,7 @@ use clap::error::ErrorKind;
 use serde::Serialize;
 use serde_json::json;
 
-use crate::interrupt::Interrupted;
+use crate::interrupted::Interrupted;
 
 /// Exit code of a command that failed; clap's own is 2.
 const FAILED: u8 = 1;

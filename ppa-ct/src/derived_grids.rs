@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::grid::Grid;
-use crate::volume::VolumeError;
+use crate::volume_error::VolumeError;
 
 /// Most voxels of a lattice to resample to: 16 GiB of values.
 pub(crate) const MOST_VOXELS: f64 = 4_294_967_296.0;

@@ -2,7 +2,7 @@
 //!
 //! [`read`] turns a DICOM series or a NIfTI, NRRD or MetaImage file into a [`Scan`] with a
 //! [`Volume`], or refuses it with the reason; [`write()`] writes one; [`Info`] tells the facts and
-//! [`audit`] whether the scan is what one thinks; [`phantom`] makes limbs whose true shape is known.
+//! [`audit`] whether the scan is what one thinks.
 //! A [`Volume`] is cropped, resampled ([`Volume::resampled`]) and set upright ([`Volume::upright`]).
 //!
 //! Units: mm, Hounsfield units. Frames: `voxel` (i, j, k; the centre of the first voxel is
@@ -41,6 +41,7 @@ mod meta_image;
 mod nifti_file;
 #[cfg(feature = "nrrd")]
 mod nrrd_file;
+mod read;
 mod refine;
 mod resample;
 mod scan;
@@ -64,6 +65,7 @@ mod scan_file;
 mod stored;
 mod values;
 mod volume;
+mod volume_error;
 mod write;
 
 pub use acquisition::Acquisition;
@@ -78,10 +80,10 @@ pub use meta_image::write as write_meta_image;
 pub use nifti_file::write as write_nifti;
 #[cfg(feature = "nrrd")]
 pub use nrrd_file::write as write_nrrd;
+pub use read::{read, read_with};
 pub use resample::Interpolation;
-pub use scan::{
-    ReadOptions, Scan, SeriesChoice, SeriesSummary, Warning, WarningCode, read, read_with,
-};
+pub use scan::{ReadOptions, Scan, SeriesChoice, SeriesSummary, Warning, WarningCode};
 pub use values::{Values, with_room};
-pub use volume::{Volume, VolumeError};
+pub use volume::Volume;
+pub use volume_error::VolumeError;
 pub use write::{Format, write};

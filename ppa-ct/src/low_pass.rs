@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::values::{Values, with_room, zeros};
-use crate::volume::VolumeError;
+use crate::volume_error::VolumeError;
 
 /// Where a Gaussian is cut off, in standard deviations.
 const REACH: f64 = 4.0;

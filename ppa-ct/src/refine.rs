@@ -6,7 +6,8 @@ use rayon::prelude::*;
 use crate::derived_grids::MOST_VOXELS;
 use crate::grid::Grid;
 use crate::values::{with_room, zeros};
-use crate::volume::{Volume, VolumeError};
+use crate::volume::Volume;
+use crate::volume_error::VolumeError;
 
 impl Volume {
     /// The volume with axes coarser than `max_spacing_mm` resampled to at most that spacing.

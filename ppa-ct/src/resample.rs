@@ -6,7 +6,8 @@ use rayon::prelude::*;
 use crate::grid::Grid;
 use crate::low_pass::{low_pass, sigma_voxels};
 use crate::values::{Values, zeros};
-use crate::volume::{Volume, VolumeError};
+use crate::volume::Volume;
+use crate::volume_error::VolumeError;
 
 /// How values between voxel centres follow from those around them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

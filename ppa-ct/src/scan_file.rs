@@ -13,7 +13,8 @@ use crate::grid::Grid;
 use crate::scan::{Scan, Warning, WarningCode, hu_plausibility};
 use crate::stored::Stored;
 use crate::values::Voxels;
-use crate::volume::{Volume, VolumeError};
+use crate::volume::Volume;
+use crate::volume_error::VolumeError;
 
 /// Most bytes that one byte of a deflate stream can unpack to (zlib's technical notes: 1032:1).
 const DEFLATE_MOST: u64 = 1032;

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::volume::VolumeError;
+use crate::volume_error::VolumeError;
 
 /// Hounsfield units, i fastest, in the type that a [`Volume`](crate::Volume) keeps them in.
 ///

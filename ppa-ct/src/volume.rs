@@ -7,65 +7,7 @@ use rayon::prelude::*;
 
 use crate::grid::{Grid, GridError};
 use crate::values::{Values, Voxels, with_room};
-
-/// Why a volume cannot be made.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum VolumeError {
-    /// The lattice itself is unusable.
-    #[error(transparent)]
-    Grid(#[from] GridError),
-    /// Number of values and number of voxels differ.
-    #[error("{} for {}", ppa_core::text::count(*found, "value"), ppa_core::text::count(*expected, "voxel"))]
-    Length {
-        /// Values given.
-        found: usize,
-        /// Voxels of the grid.
-        expected: usize,
-    },
-    /// A spacing to resample to is not a length.
-    #[error("a spacing of {0} mm, expected a length above 0")]
-    Spacing(f64),
-    /// A spacing to resample to makes more voxels than can be worked with.
-    #[error("a spacing of {spacing_mm} mm makes {voxels:.1e} voxels, expected at most {most:.1e}")]
-    TooFine {
-        /// Spacing asked for, mm.
-        spacing_mm: f64,
-        /// Voxels that it makes.
-        voxels: f64,
-        /// Most voxels.
-        most: f64,
-    },
-    /// A spacing to resample to is more than twice a side of the volume.
-    #[error(
-        "a spacing of {spacing_mm} mm, expected at most about the volume's side of {side_mm} mm"
-    )]
-    TooCoarse {
-        /// Spacing asked for, mm.
-        spacing_mm: f64,
-        /// The volume's side along that axis, mm.
-        side_mm: f64,
-    },
-    /// A box whose ends are the wrong way round, or no numbers.
-    #[error("a box from {from_mm} to {to_mm} mm along {axis}, expected the smaller end first")]
-    Reversed {
-        /// `x`, `y` or `z`.
-        axis: char,
-        /// First end, LPS.
-        from_mm: f64,
-        /// Second end, LPS.
-        to_mm: f64,
-    },
-    /// More voxels than there is memory for.
-    #[error("memory does not hold {} and what is computed of them", ppa_core::text::count(*voxels, "voxel"))]
-    Memory {
-        /// Voxels asked for.
-        voxels: usize,
-    },
-    /// A value is NaN or infinite.
-    #[error("voxel ({}, {}, {}) holds a value that is not a number", .0[0], .0[1], .0[2])]
-    NotFinite([usize; 3]),
-}
+use crate::volume_error::VolumeError;
 
 /// Hounsfield units on a lattice; i runs fastest in memory.
 #[derive(Debug, Clone)]

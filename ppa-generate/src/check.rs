@@ -9,7 +9,7 @@ use ppa_dataset::manifest::{FileRow, Manifest};
 use rayon::prelude::*;
 
 use crate::claim::{Claim, FolderError, claim_existing};
-use crate::job::LimbUnits;
+use crate::limb_units::LimbUnits;
 use crate::lists::{Lists, stands};
 use crate::part_file::read_part;
 use crate::planned::Planned;

@@ -10,7 +10,7 @@ use ppa_dataset::files::FileError;
 use ppa_dataset::manifest::DESCRIPTION_FILE;
 use ppa_dataset::manifest::Manifest;
 
-use crate::record::FOLDER;
+use crate::pose_id::FOLDER;
 use crate::survey::DatasetDiffers;
 
 /// Why a folder cannot take the images of a run.

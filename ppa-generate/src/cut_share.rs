@@ -1,10 +1,8 @@
 //! How much of what a pose shows is where the field of view of its scan cut the limb off.
 
-use std::fmt;
-
 use nalgebra::{Isometry3, Point3};
 use ppa_dataset::findings::{Finding, FindingCode, Severity};
-use ppa_dataset::layout::{LimbId, View, angle_text};
+use ppa_dataset::layout::LimbId;
 use ppa_depth::{
     Body, Camera, CameraError, CameraModel, CameraSpec, DepthError, DepthMode, MeshBody,
     PlacedBody, Roi, WallDepth, render, render_before, roi_around,
@@ -12,11 +10,9 @@ use ppa_depth::{
 use ppa_mesh::{CutWalls, Mesh, WallMeasure};
 use ppa_xray::{Detector, Projection, TransportError};
 
+use crate::cut_error::{CutError, MAX_CUT_SHARE, PoseImage};
 use crate::stage::PlacedCamera;
-use crate::unit::UnitError;
-
-/// Largest share of a region that may be cut unless the plan says otherwise; above it, the pose has a finding.
-pub(crate) const MAX_CUT_SHARE: f64 = 0.01;
+use crate::unit_error::UnitError;
 
 /// Columns or rows at which a radiograph's rays are sampled; fewer where its detector has fewer.
 const MOST_RAYS: u32 = 512;
@@ -176,60 +172,6 @@ fn tube(detector: &Detector, source_detector_mm: f64) -> Result<Camera, CameraEr
     })
 }
 
-/// An image of a pose.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PoseImage {
-    /// Depth image of the skin of the scan.
-    Depth(View),
-    /// Radiograph.
-    Radiograph,
-}
-
-impl PoseImage {
-    /// Key of the plan that limits how much of it may be cut.
-    fn key(self) -> &'static str {
-        match self {
-            Self::Depth(_) => "depth.max_cut_share",
-            Self::Radiograph => "xray.max_cut_share",
-        }
-    }
-}
-
-impl fmt::Display for PoseImage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Depth(View::Left) => "left camera's region of interest",
-            Self::Depth(View::Right) => "right camera's region of interest",
-            Self::Radiograph => "radiograph's region",
-        })
-    }
-}
-
-/// A region of which more is cut than the plan allows; the worst of a limb.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error(
-    "limb {} of patient {} at {} degrees: {:.1} % of the {image} lies where the field of view of the scan cuts the limb off, but {} allows \
-     {:.1} % ({exceeding} of {poses} poses exceed it); raise {} in the plan, take another camera or other rotations, or a scan \
-     that shows more of the limb",
-    limb.side_letter(), limb.patient, angle_text(*step), 100.0 * share, image.key(), 100.0 * limit, image.key()
-)]
-pub struct CutError {
-    /// The limb.
-    pub limb: LimbId,
-    /// Half degrees of medial rotation.
-    pub step: u32,
-    /// The image.
-    pub image: PoseImage,
-    /// Share of its region, 0 to 1.
-    pub share: f64,
-    /// Largest share that the plan allows.
-    pub limit: f64,
-    /// Poses of which such a share is larger than the plan allows.
-    pub exceeding: usize,
-    /// Poses of the limb.
-    pub poses: usize,
-}
-
 /// How much of each image of a pose is cut.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PoseCuts {
@@ -307,7 +249,7 @@ pub(crate) fn check(limb: LimbId, poses: &[PoseCuts], limits: [f64; 2]) -> Resul
 
 #[cfg(test)]
 mod tests {
-    use ppa_dataset::layout::Side;
+    use ppa_dataset::layout::{Side, View};
 
     use super::*;
 

@@ -9,7 +9,8 @@ use crate::closed_skin::closed_skin;
 use crate::plan::Plan;
 use crate::prepare::PreparedLimb;
 use crate::stage::Stage;
-use crate::unit::{UnitError, depth_image};
+use crate::unit::depth_image;
+use crate::unit_error::UnitError;
 
 /// What one camera sees.
 #[derive(Debug, Clone)]

@@ -13,7 +13,8 @@ use ppa_scene::PoseAngle;
 use serde::Serialize;
 
 use crate::generate::{GenerateError, Work};
-use crate::job::{Progress, units_of_part};
+use crate::job::Progress;
+use crate::limb_units::units_of_part;
 use crate::plan::Plan;
 use crate::status::status;
 

@@ -13,15 +13,15 @@ use ppa_scene::SweepError;
 
 use crate::case::{Case, CaseError};
 use crate::description::{Description, Settings};
-use crate::job::{
-    Job, JobError, LimbUnits, MakeUnit, PlannedLimb, Progress, Summary, units_of_part,
-};
+use crate::job::{Job, JobError, MakeUnit, Progress, Summary};
+use crate::limb_units::{LimbUnits, PlannedLimb, units_of_part};
 use crate::plan::Plan;
 use crate::prepare::{PrepareError, PreparedLimb};
 use crate::record::Record;
 use crate::stage::{Stage, StageError};
 use crate::staging::staging_folder;
-use crate::unit::{PosableLimb, UnitError};
+use crate::unit::PosableLimb;
+use crate::unit_error::UnitError;
 
 /// Why a dataset could not be made. What was finished before stays and is not made again.
 #[derive(Debug, thiserror::Error)]

@@ -5,15 +5,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use ppa_core::Part;
 use ppa_dataset::files::FileError;
-use ppa_dataset::findings::{FindingCode, Findings};
-use ppa_dataset::layout::LimbId;
+use ppa_dataset::findings::Findings;
 use ppa_dataset::manifest::DESCRIPTION_FILE;
 use ppa_dataset::manifest::FileKind;
 use ppa_scene::PoseAngle;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::claim::{Claim, FolderError, claim};
+use crate::limb_units::LimbUnits;
 use crate::lists::Lists;
 use crate::overview::Overview;
 use crate::part_file::require_part;
@@ -83,62 +83,6 @@ pub enum JobError {
         /// What the finished ones take, bytes.
         used: u64,
     },
-}
-
-/// A limb of a dataset, as `dataset.json` lists it.
-#[derive(Debug, Clone, Deserialize)]
-pub(crate) struct PlannedLimb {
-    #[serde(flatten)]
-    pub limb: LimbId,
-    pub key: String,
-    #[serde(default)]
-    pub acknowledged: Vec<FindingCode>,
-}
-
-/// All poses of one limb that belong to a job.
-pub(crate) struct LimbUnits {
-    pub limb: LimbId,
-    pub key: String,
-    /// Codes of the findings that its case acknowledges.
-    pub acknowledged: Vec<FindingCode>,
-    pub poses: Vec<PoseAngle>,
-}
-
-impl LimbUnits {
-    pub fn unit(&self, pose: PoseAngle) -> Unit<'_> {
-        Unit {
-            limb: self.limb,
-            pose,
-            limb_key: &self.key,
-        }
-    }
-
-    pub fn units(&self) -> impl Iterator<Item = Unit<'_>> {
-        self.poses.iter().map(|&pose| self.unit(pose))
-    }
-}
-
-/// The units of one part of a dataset. Parts are runs of neighbours, limb by limb, so that few
-/// of them prepare the same limb.
-pub(crate) fn units_of_part(
-    limbs: impl ExactSizeIterator<Item = PlannedLimb>,
-    poses: &[PoseAngle],
-    part: Part,
-) -> Vec<LimbUnits> {
-    let share = part.share((limbs.len() * poses.len()) as u64);
-    let within = |index: usize| share.contains(&(index as u64));
-    let of_limb = |(i, limb): (usize, PlannedLimb)| {
-        let planned = poses.iter().enumerate();
-        let mine = planned.filter(|(j, _)| within(i * poses.len() + j));
-        LimbUnits {
-            limb: limb.limb,
-            key: limb.key,
-            acknowledged: limb.acknowledged,
-            poses: mine.map(|(_, pose)| *pose).collect(),
-        }
-    };
-    let limbs = limbs.enumerate().map(of_limb);
-    limbs.filter(|limb| !limb.poses.is_empty()).collect()
 }
 
 /// Makes one pose of a limb: its files whole, in the staging folder of the dataset.

@@ -8,7 +8,7 @@ use ppa_dataset::findings::Findings;
 use ppa_dataset::manifest::DESCRIPTION_FILE;
 use ppa_dataset::manifest::{FileRow, Manifest, RoiFile, roi_text};
 
-use crate::job::LimbUnits;
+use crate::limb_units::LimbUnits;
 use crate::record::{Record, Unit};
 
 /// The lists that follow from a dataset's records.

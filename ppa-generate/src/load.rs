@@ -8,7 +8,8 @@ use ppa_dataset::layout::{LimbId, Side};
 use ppa_dataset::manifest::RoiFile;
 use ppa_scene::Sweep;
 
-use crate::job::{Job, JobError, LimbUnits, MakeUnit, PlannedLimb, Progress, units_of_part};
+use crate::job::{Job, JobError, MakeUnit, Progress};
+use crate::limb_units::{LimbUnits, PlannedLimb, units_of_part};
 use crate::unit::Images;
 
 /// 100 000 poses without images, so that only the bookkeeping takes time: the last tenth is

@@ -12,9 +12,11 @@ use sha2::{Digest, Sha256};
 
 use crate::claim::{Claim, FolderError, claim_existing};
 use crate::differences::differences;
-use crate::job::{Job, JobError, LimbUnits, Progress, Summary};
+use crate::job::{Job, JobError, Progress, Summary};
+use crate::limb_units::LimbUnits;
 use crate::planned::Planned;
-use crate::record::{FOLDER, FoundRecord, Record, Unit, record_names};
+use crate::pose_id::FOLDER;
+use crate::record::{FoundRecord, Record, Unit, record_names};
 use crate::staging::staging_folder;
 use crate::unit::Images;
 

@@ -12,7 +12,7 @@ use ppa_dataset::findings::Findings;
 use ppa_dataset::manifest::DESCRIPTION_FILE;
 use ppa_dataset::manifest::Manifest;
 
-use crate::job::LimbUnits;
+use crate::limb_units::LimbUnits;
 use crate::lists::{Lists, stands};
 use crate::part_file::{PART_FILE, part_text, read_part};
 use crate::planned::Planned;

@@ -9,7 +9,8 @@ use ppa_dataset::manifest::DESCRIPTION_FILE;
 use serde::{Deserialize, Serialize};
 
 use crate::claim::FolderError;
-use crate::record::{FOLDER, record_names};
+use crate::pose_id::FOLDER;
+use crate::record::record_names;
 use crate::seal::{Opened, opened, sealed};
 
 /// Path from the dataset's root.

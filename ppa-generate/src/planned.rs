@@ -8,7 +8,7 @@ use ppa_dataset::manifest::DESCRIPTION_FILE;
 use ppa_scene::Sweep;
 use serde::Deserialize;
 
-use crate::job::{LimbUnits, PlannedLimb, units_of_part};
+use crate::limb_units::{LimbUnits, PlannedLimb, units_of_part};
 use crate::seal::{Opened, opened};
 
 /// Which units a dataset is made of, and what they follow from.

@@ -5,7 +5,8 @@ use std::fmt;
 use ppa_dataset::BodyShape;
 use ppa_dataset::layout::{LimbId, Side, View, angle_text};
 
-use crate::record::FOLDER;
+/// Folder inside a dataset that holds the records.
+pub(crate) const FOLDER: &str = ".ppa";
 
 /// One pose of one limb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

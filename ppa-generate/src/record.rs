@@ -16,9 +16,6 @@ use sha2::{Digest, Sha256};
 use crate::pose_id::PoseId;
 use crate::seal::{Opened, opened, sealed};
 
-/// Folder inside a dataset that holds the records.
-pub(crate) const FOLDER: &str = ".ppa";
-
 /// One pose of one limb: the unit of work.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Unit<'a> {

@@ -7,7 +7,7 @@ use std::sync::Mutex;
 
 use ppa_dataset::files::{FileError, write_whole};
 
-use crate::record::FOLDER;
+use crate::pose_id::FOLDER;
 
 /// Keeps the files of one dataset that no record vouches for.
 pub(crate) struct SetAside<'a> {

@@ -12,7 +12,8 @@ use ppa_dataset::files::{FileError, remove_if_there, sha256_of_file, write_whole
 
 use crate::pose_id::PoseId;
 
-use crate::record::{FOLDER, FoundRecord, Record, record_names};
+use crate::pose_id::FOLDER;
+use crate::record::{FoundRecord, Record, record_names};
 use crate::set_aside::{SetAside, move_file};
 
 /// Where a run makes images, below the same paths as in the dataset.

@@ -10,7 +10,7 @@ use ppa_dataset::manifest::Manifest;
 use serde::Serialize;
 
 use crate::claim::{FolderError, claim_existing};
-use crate::job::LimbUnits;
+use crate::limb_units::LimbUnits;
 use crate::part_file::read_part;
 use crate::planned::Planned;
 use crate::record::Record;

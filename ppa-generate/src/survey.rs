@@ -12,8 +12,9 @@ use ppa_dataset::manifest::DESCRIPTION_FILE;
 use rayon::prelude::*;
 
 use crate::differences::{KeyDifference, differences};
-use crate::job::LimbUnits;
-use crate::record::{FOLDER, Record, record_names};
+use crate::limb_units::LimbUnits;
+use crate::pose_id::FOLDER;
+use crate::record::{Record, record_names};
 
 /// A dataset of other settings, poses or images than those of a run into its folder.
 #[derive(Debug, Clone, PartialEq, Eq)]

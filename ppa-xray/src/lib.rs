@@ -68,13 +68,14 @@ pub use ppa_core::{Part, PartError};
 
 pub use beam::projection::{Detector, Projection};
 pub use beam::projection_error::ProjectionError;
+pub use beam::receptor::{
+    AntiScatterGrid, Blur, DetectorModel, LinesAlong, Receptor, ReceptorError,
+};
 pub use beam::source::{Collimation, FocalSpot, HeelEffect, Source, SpotShape};
 pub use beam::spectrum::Spectrum;
 pub use beam::spectrum_error::SpectrumError;
 pub use beam::tube::{Filter, TubeSpec};
-pub use detector::receptor::{
-    AntiScatterGrid, Blur, DetectorModel, LinesAlong, Receptor, ReceptorError,
-};
+pub use detector::readout::Layer;
 pub use dose::report::{Dose, Estimate, Imparted, VoxelDose};
 pub use dose::settings::{DoseError, DoseSettings, VoxelBox};
 pub use engine::analog::{AnalogSettings, analog};
@@ -87,7 +88,7 @@ pub use image::dx::{
 };
 pub use image::output::{EXR_ATTRIBUTE, OutputError};
 pub use image::presentation::{Presentation, PresentationError};
-pub use image::radiograph::{CategorySums, Engine, Layer, Radiograph};
+pub use image::radiograph::{CategorySums, Engine, Radiograph};
 pub use matter::compton::ComptonModel;
 pub use matter::cross_sections::{CrossSections, MAX_ENERGY_KEV, MIN_ENERGY_KEV};
 pub use matter::electron_shell::Shell;

@@ -10,7 +10,7 @@ mod rle;
 
 use super::header::Image;
 use crate::values::{with_room, zeros};
-use crate::volume::VolumeError;
+use crate::volume_error::VolumeError;
 
 /// A family of encodings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use ppa_core::text::{count, number};
 
 use super::Cause;
 use crate::scan::SeriesSummary;
-use crate::volume::VolumeError;
+use crate::volume_error::VolumeError;
 
 /// Why a scan was refused.
 ///

@@ -22,7 +22,8 @@ use ppa_dataset::manifest::{FileKind, FileRow, RoiFile, RoiRow};
 use ppa_scene::Sweep;
 use sha2::{Digest, Sha256};
 
-use crate::job::{Job, JobError, LimbUnits, MakeUnit, PlannedLimb, Summary, units_of_part};
+use crate::job::{Job, JobError, MakeUnit, Summary};
+use crate::limb_units::{LimbUnits, PlannedLimb, units_of_part};
 use crate::record::Unit;
 use crate::seal::sealed;
 use crate::staging::staging_folder;

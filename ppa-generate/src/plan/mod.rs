@@ -2,6 +2,7 @@
 
 mod check;
 mod error;
+mod room_file;
 mod settings;
 #[cfg(test)]
 mod tests;
@@ -14,8 +15,8 @@ use ppa_xray::HuCalibration;
 use serde::{Deserialize, Serialize};
 
 pub use self::error::PlanError;
+pub use self::room_file::RoomFile;
 pub use self::settings::{DepthSettings, PlanRoom, XraySettings};
-use crate::room_file::RoomFile;
 use crate::shaped_skin::ShapeSettings;
 use crate::toml_file::{other_version, relative_to, to_toml};
 

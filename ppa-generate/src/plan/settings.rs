@@ -8,7 +8,7 @@ use ppa_scene::{PlaneSettings, RoomSpec};
 use ppa_xray::{Detector, FastSettings, HuCalibration, Presentation, Receptor, Source};
 use serde::{Deserialize, Serialize};
 
-use crate::cut_share::MAX_CUT_SHARE;
+use crate::cut_error::MAX_CUT_SHARE;
 
 /// The x-ray room: built in, or a recorded one.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]

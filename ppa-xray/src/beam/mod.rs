@@ -5,6 +5,8 @@ pub(crate) mod field;
 pub(crate) mod heel;
 pub(crate) mod projection;
 pub(crate) mod projection_error;
+pub(crate) mod raster;
+pub(crate) mod receptor;
 pub(crate) mod source;
 pub(crate) mod spectral_lines;
 pub(crate) mod spectrum;

@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 use crate::beam::emitter::Emitter;
 use crate::beam::field::Field;
 use crate::beam::projection_error::ProjectionError;
+use crate::beam::raster::Raster;
+use crate::beam::receptor::Receptor;
 use crate::beam::source::{Collimation, Source};
 use crate::beam::spectrum::Spectrum;
-use crate::detector::receptor::Receptor;
-use crate::transport::raster::Raster;
 
 /// Most pixels of a detector: 2²⁸, whose planes take 8 GiB.
 pub(crate) const MAX_PIXELS: usize = 1 << 28;

@@ -1,7 +1,7 @@
 //! What can be wrong with an exposure.
 
 use crate::beam::projection::MAX_PIXELS;
-use crate::detector::receptor::ReceptorError;
+use crate::beam::receptor::ReceptorError;
 
 /// Why a projection cannot be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

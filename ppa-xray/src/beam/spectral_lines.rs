@@ -2,7 +2,7 @@
 
 use crate::beam::heel::Mixture;
 use crate::beam::spectrum::Spectrum;
-use crate::transport::attenuation::{CEILING_KEV, CUTOFF_KEV};
+use crate::matter::energy_range::{CEILING_KEV, CUTOFF_KEV};
 
 /// Spectra as lines at common energies.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,10 +1,10 @@
 //! Energy that a photon leaves in a converter layer: its mean and its mean square.
 
+use crate::beam::receptor::{DetectorModel, ReceptorError, require};
 use crate::detector::energy_nodes::EnergyNodes;
 use crate::detector::layer::Layer;
 use crate::detector::layer_response::LayerResponse;
 use crate::detector::quadrature::gauss_legendre;
-use crate::detector::receptor::{DetectorModel, ReceptorError, require};
 use crate::transport::tally::Moments;
 
 /// Intervals between grazing (cosine 0) and normal (cosine 1) incidence.

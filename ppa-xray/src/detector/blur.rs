@@ -15,9 +15,9 @@ use std::f64::consts::TAU;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
+use crate::beam::receptor::{Blur, ReceptorError};
 use crate::detector::kernel::{Kernel, frequencies};
 use crate::detector::mtf::{Mtf, sinc};
-use crate::detector::receptor::{Blur, ReceptorError};
 
 /// The blur of a converter on pixels of one size.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

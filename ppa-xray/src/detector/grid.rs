@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
+use crate::beam::receptor::{AntiScatterGrid, LinesAlong, ReceptorError, require};
 use crate::detector::energy_nodes::EnergyNodes;
-use crate::detector::receptor::{AntiScatterGrid, LinesAlong, ReceptorError, require};
 use crate::matter::material::Material;
 
 /// A grid ready to be asked, with its attenuation by energy.

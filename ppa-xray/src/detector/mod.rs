@@ -12,5 +12,4 @@ pub(crate) mod mtf;
 pub(crate) mod open_field;
 mod quadrature;
 pub(crate) mod readout;
-pub(crate) mod receptor;
 pub(crate) mod response;

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use crate::detector::receptor::{Blur, ReceptorError, require};
+use crate::beam::receptor::{Blur, ReceptorError, require};
 
 /// An MTF as a sum of Gaussians of the frequency, without the aperture of the pixels.
 ///

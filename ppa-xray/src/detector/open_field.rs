@@ -4,6 +4,7 @@ use nalgebra::{Point2, Point3};
 use serde::{Deserialize, Serialize};
 
 use crate::beam::field::Field;
+use crate::detector::response::Response;
 use crate::transport::tracking::Transport;
 
 /// Nodes per side of the detector, when intensity or response vary over it.
@@ -28,17 +29,17 @@ pub(crate) struct OpenField {
 
 impl OpenField {
     /// The shape, and the reading at the centre in eV/cm² per history.
-    pub fn of(transport: &Transport) -> (Self, f64) {
+    pub fn of(transport: &Transport, response: &Response) -> (Self, f64) {
         let emitter = &transport.emitter;
         let source_detector_mm = transport.projection.source_detector_mm;
         let lines = emitter.lines();
-        let response = transport.response.at_lines(&lines.energy_kev);
+        let at_lines = response.at_lines(&lines.energy_kev);
         let reading = |at: Point2<f64>| {
             let direction = Point3::new(at.x, at.y, source_detector_mm)
                 .coords
                 .normalize();
             let photons = lines.mixed(emitter.mixture(&direction));
-            let left = response.moments(at.into(), &direction);
+            let left = at_lines.moments(at.into(), &direction);
             let signal_kev: f64 = photons.zip(left).map(|(n, left)| n * left.mean_kev).sum();
             1e3 * signal_kev * emitter.open_fluence_cm2(&Point3::origin(), at)
         };
@@ -46,7 +47,7 @@ impl OpenField {
         let Field { low_mm, high_mm } = detector.field();
         let centre = Point2::from(detector.centre_mm);
         let central = reading(centre);
-        let even = transport.response.is_ideal() && emitter.spectra().len() == 1;
+        let even = response.is_ideal() && emitter.spectra().len() == 1;
         let side = if even { 2 } else { NODES };
         let mut shape = Self {
             low_mm,

@@ -1,13 +1,10 @@
-//! The last steps of an image: blur of the converter, noise of the electronics.
+//! Reading of the pixels: blur of the converter; the size of the electronic noise.
 
-use ppa_core::random::Philox;
 use serde::{Deserialize, Serialize};
 
 use crate::beam::projection::Detector;
+use crate::beam::receptor::{Receptor, ReceptorError, require};
 use crate::detector::blur::Spread;
-use crate::detector::receptor::{Receptor, ReceptorError, require};
-use crate::image::radiograph::{Layer, Radiograph};
-use crate::transport::stream::Stream;
 
 /// Blur and electronic noise, ready to be applied.
 ///
@@ -17,6 +14,15 @@ use crate::transport::stream::Stream;
 pub(crate) struct Readout {
     blur: Option<Spread>,
     electronic_noise_kev: f64,
+}
+
+/// One image plane, row-major, eV/cm² per history.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layer {
+    /// Energy that arrives at the pixel, per area of it and per history.
+    pub value: Vec<f32>,
+    /// Standard error of `value`.
+    pub sigma: Vec<f32>,
 }
 
 /// A layer whose noise was drawn pixel by pixel, before blur; eV/cm² per history.
@@ -110,24 +116,9 @@ impl Readout {
         })
     }
 
-    /// Adds the electronic noise, in a layer of its own.
-    ///
-    /// It does not depend on the exposure, so per history it falls with the histories that the image stands for.
-    pub fn with_electronic_noise(&self, mut image: Radiograph) -> Radiograph {
-        if self.electronic_noise_kev > 0.0 && image.histories.is_finite() {
-            let ev_cm2 = 1e3 / image.detector.pixel_cm2() / image.histories;
-            let sigma = self.electronic_noise_kev * ev_cm2;
-            let draw = |pixel: usize| {
-                let mut rng = Philox::new(image.seed, Stream::ElectronicNoise as u32, pixel as u64);
-                (sigma * rng.normals()[0]) as f32
-            };
-            let pixels = image.detector.pixels();
-            image.electronic = Some(Layer {
-                value: (0..pixels).map(draw).collect(),
-                sigma: vec![sigma as f32; pixels],
-            });
-        }
-        image
+    /// Standard deviation of the electronic noise of a pixel, keV.
+    pub fn electronic_noise_kev(&self) -> f64 {
+        self.electronic_noise_kev
     }
 }
 

@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 use ppa_core::random::Philox;
 
+use crate::beam::receptor::{Receptor, ReceptorError};
 use crate::detector::absorption::Absorption;
 use crate::detector::grid::Grid;
-use crate::detector::receptor::{Receptor, ReceptorError};
 use crate::transport::score::Arrival;
 use crate::transport::tally::Moments;
 
@@ -168,7 +168,7 @@ impl LineResponse<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detector::receptor::{AntiScatterGrid, DetectorModel, LinesAlong};
+    use crate::beam::receptor::{AntiScatterGrid, DetectorModel, LinesAlong};
     use crate::transport::tally::Category;
 
     fn receptor() -> Receptor {

@@ -2,10 +2,10 @@
 
 use nalgebra::Point3;
 
+use crate::matter::energy_range::{CEILING_KEV, CUTOFF_KEV};
 use crate::matter::energy_transfer::GRAY_PER_KEV_G;
 use crate::matter::material::Material;
 use crate::phantom::lattice::Walk;
-use crate::transport::attenuation::{CEILING_KEV, CUTOFF_KEV};
 use crate::transport::tracking::{SOLID_G_CM3, Transport};
 
 /// Nodes per keV: linear interpolation then errs by less than 0.05 % at 5 keV, 1e-5 at 30 keV.

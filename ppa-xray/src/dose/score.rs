@@ -2,11 +2,11 @@
 
 use ppa_core::random::Philox;
 
+use crate::beam::raster::Raster;
 use crate::dose::air_kerma::AirKerma;
 use crate::dose::settings::VoxelBox;
 use crate::dose::tally::{DoseSums, DoseTally, STEPS_PER_KEV, Sum};
 use crate::phantom::voxels::VoxelPhantom;
-use crate::transport::raster::Raster;
 use crate::transport::score::{Arrival, Score};
 use crate::transport::tally::nearest;
 

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::beam::field::Field;
 use crate::beam::spectral_lines::SpectralLines;
+use crate::engine::exposure::Exposure;
 use crate::engine::paths::Paths;
 use crate::engine::primary_rays::{PrimaryRays, Scratch, area_cm2, centre};
 use crate::transport::tally::Moments;
@@ -34,12 +35,13 @@ const NEAR: f64 = 0.25;
 /// One ray through the centre where the image bends little, up to `samples_per_side`² where it does not. A focal spot that is
 /// not a point takes no more rays: each leaves from another place of the spot.
 pub(crate) fn primary_moments(
-    transport: &Transport,
+    exposure: &Exposure,
     paths: &Paths,
     lines: SpectralLines,
     samples_per_side: u32,
 ) -> Vec<Moments> {
-    let rays = PrimaryRays::new(transport, paths, lines);
+    let transport = &exposure.transport;
+    let rays = PrimaryRays::new(exposure, paths, lines);
     let open_spots = transport.emitter.spot_points(OPEN_POINTS);
     let cuts = samples_per_side.ilog2() as usize;
     let strips_mm: Vec<Vec<f64>> = (0..=cuts)

@@ -7,17 +7,18 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::beam::projection::Projection;
+use crate::beam::raster::Raster;
 use crate::beam::spectrum::Spectrum;
 use crate::detector::response::Response;
 use crate::dose::score::{DoseScore, DoseTarget};
+use crate::engine::analog_image::ImageSetup;
+use crate::engine::exposure::Exposure;
 use crate::image::radiograph::Radiograph;
 use crate::matter::compton::ComptonModel;
 use crate::phantom::voxels::VoxelPhantom;
-use crate::run::analog_tally::ImageSetup;
-use crate::transport::raster::Raster;
 use crate::transport::score::{Arrival, Score};
 use crate::transport::tally::{Inbox, MOST_HISTORIES, Tally};
-use crate::transport::tracking::{Transport, TransportError};
+use crate::transport::tracking::TransportError;
 
 /// How long the analog engine runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,9 +61,9 @@ pub fn analog(
     settings: &AnalogSettings,
 ) -> Result<Radiograph, TransportError> {
     settings.validate()?;
-    let transport = Transport::new(phantom, spectrum, projection, settings.compton_model)?;
-    let tally = run(&transport, projection.detector.raster(), settings);
-    Ok(ImageSetup::new(&transport).radiograph(&tally, settings.histories, settings.seed))
+    let exposure = Exposure::new(phantom, spectrum, projection, settings.compton_model)?;
+    let tally = run(&exposure, projection.detector.raster(), settings);
+    Ok(ImageSetup::new(&exposure).radiograph(&tally, settings.histories, settings.seed))
 }
 
 impl AnalogSettings {
@@ -82,30 +83,31 @@ impl AnalogSettings {
 }
 
 /// Follows all histories and counts what arrives on `raster`.
-pub(crate) fn run(transport: &Transport, raster: Raster, settings: &AnalogSettings) -> Tally {
+pub(crate) fn run(exposure: &Exposure, raster: Raster, settings: &AnalogSettings) -> Tally {
     let tally = Tally::new(raster);
-    count(transport, settings.seed, 0..settings.histories, &tally);
+    count(exposure, settings.seed, 0..settings.histories, &tally);
     tally
 }
 
 /// Follows `histories` and counts what arrives.
-pub(crate) fn count(transport: &Transport, seed: u64, histories: Range<u64>, tally: &Tally) {
+pub(crate) fn count(exposure: &Exposure, seed: u64, histories: Range<u64>, tally: &Tally) {
     in_batches(histories, |batch| {
-        transport.follow(seed, batch, &mut DetectorScore::new(transport, tally));
+        let mut score = DetectorScore::new(exposure, tally);
+        exposure.transport.follow(seed, batch, &mut score);
     });
 }
 
 /// Follows `histories` and counts what arrives and what stays.
 pub(crate) fn count_with_dose(
-    transport: &Transport,
+    exposure: &Exposure,
     seed: u64,
     histories: Range<u64>,
     tally: &Tally,
     target: &DoseTarget,
 ) {
     in_batches(histories, |batch| {
-        let mut score = DoseScore::new(DetectorScore::new(transport, tally), target);
-        transport.follow(seed, batch, &mut score);
+        let mut score = DoseScore::new(DetectorScore::new(exposure, tally), target);
+        exposure.transport.follow(seed, batch, &mut score);
         score.hand_in();
     });
 }
@@ -128,10 +130,10 @@ struct DetectorScore<'a> {
 }
 
 impl<'a> DetectorScore<'a> {
-    fn new(transport: &'a Transport, tally: &'a Tally) -> Self {
+    fn new(exposure: &'a Exposure, tally: &'a Tally) -> Self {
         Self {
-            response: &transport.response,
-            spot_pixels: transport.readout.spot_pixels(),
+            response: &exposure.response,
+            spot_pixels: exposure.readout.spot_pixels(),
             inbox: Inbox::new(tally),
         }
     }

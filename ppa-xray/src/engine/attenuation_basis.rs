@@ -4,7 +4,8 @@
 //! tissues differ by little more than how much of two or three smooth functions of the energy they hold (Alvarez and
 //! Macovski, Phys. Med. Biol. 21 (1976) 733). So a ray need not keep the mass of 27 materials apart, but that of four.
 
-use crate::transport::attenuation::{Attenuation, CEILING_KEV, CUTOFF_KEV};
+use crate::matter::energy_range::{CEILING_KEV, CUTOFF_KEV};
+use crate::transport::attenuation::Attenuation;
 
 /// Basis materials are counted in groups of this many, one SIMD register of numbers.
 pub(crate) const LANES: usize = 4;

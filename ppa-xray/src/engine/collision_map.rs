@@ -10,7 +10,7 @@ use crate::engine::lines::Lines;
 use crate::engine::outlook::Site;
 use crate::engine::paths::Paths;
 use crate::engine::running_sums::Entry;
-use crate::transport::attenuation::{CEILING_KEV, CUTOFF_KEV};
+use crate::matter::energy_range::{CEILING_KEV, CUTOFF_KEV};
 use crate::transport::tracking::Transport;
 
 /// Cells along device x and y of the field, and along the rays through the voxel box.

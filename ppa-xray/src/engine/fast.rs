@@ -9,6 +9,7 @@ use crate::detector::open_field::OpenField;
 use crate::engine::adaptive_nodes::single_scatter_field;
 use crate::engine::adaptive_primary::primary_moments;
 use crate::engine::collision_map::CollisionMap;
+use crate::engine::exposure::Exposure;
 use crate::engine::first_collisions::{ESTIMATES, FirstFlights};
 use crate::engine::later_collisions::{Histories, Tactics};
 use crate::engine::lines::Lines;
@@ -27,7 +28,7 @@ use crate::matter::compton::ComptonModel;
 use crate::matter::scatter_density::ScatterDensities;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::tally::Category;
-use crate::transport::tracking::{Transport, TransportError};
+use crate::transport::tracking::TransportError;
 
 /// What the fast engine spends, and the exposure its image stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -90,18 +91,19 @@ pub fn fast(
     settings: &FastSettings,
 ) -> Result<Radiograph, TransportError> {
     settings.validate(&projection.detector)?;
-    let transport = Transport::new(phantom, spectrum, projection, settings.compton_model)?;
+    let exposure = Exposure::new(phantom, spectrum, projection, settings.compton_model)?;
+    let transport = &exposure.transport;
     let detector = &projection.detector;
-    let paths = Paths::new(&transport);
-    let lines = compressed(&transport, PRIMARY_ENERGIES);
-    let primary = primary_moments(&transport, &paths, lines, settings.samples_per_side);
-    let (open_field, open_field_ev_cm2) = OpenField::of(&transport);
+    let paths = Paths::new(transport);
+    let lines = compressed(&exposure, PRIMARY_ENERGIES);
+    let primary = primary_moments(&exposure, &paths, lines, settings.samples_per_side);
+    let (open_field, open_field_ev_cm2) = OpenField::of(transport, &exposure.response);
     let signal = PrimarySignal {
         detector,
         moments: &primary,
         open_kev: open_field_ev_cm2 * detector.pixel_cm2() / 1e3,
     };
-    let scatter = Scatter::new(&transport, &paths, &signal, settings, Tactics::default());
+    let scatter = Scatter::new(&exposure, &paths, &signal, settings, Tactics::default());
     let [compton, rayleigh, _] = &scatter.fields;
     let shared = compton.covariance_kev2(rayleigh, detector);
     let scattered = scatter.fields.map(|field| field.on_pixels(detector));
@@ -121,8 +123,8 @@ pub fn fast(
     let expected = [primary, compton, rayleigh, multiple];
     let ev_cm2 = 1e3 / detector.pixel_cm2();
     let drawn = noise::drawn(&expected, ev_cm2, settings.dose_histories, settings.seed);
-    let readout = &transport.readout;
-    Ok(readout.with_electronic_noise(Radiograph {
+    let readout = &exposure.readout;
+    let image = Radiograph {
         detector: projection.detector,
         engine: Engine::Fast,
         histories: settings.dose_histories,
@@ -139,7 +141,8 @@ pub fn fast(
         electronic: None,
         sums,
         largest_score_share: Some(scatter.largest_share),
-    }))
+    };
+    Ok(image.with_electronic_noise(readout.electronic_noise_kev()))
 }
 
 /// Scatter of an exposure, before interpolation.
@@ -151,12 +154,13 @@ pub(crate) struct Scatter {
 
 impl Scatter {
     pub fn new(
-        transport: &Transport,
+        exposure: &Exposure,
         paths: &Paths,
         primary: &PrimarySignal,
         settings: &FastSettings,
         tactics: Tactics,
     ) -> Self {
+        let transport = &exposure.transport;
         let detector = primary.detector;
         let densities: Vec<ScatterDensities> = transport
             .phantom
@@ -164,7 +168,7 @@ impl Scatter {
             .par_iter()
             .map(|material| ScatterDensities::new(material, settings.compton_model))
             .collect();
-        let lines = Lines::new(transport, paths, &densities, SCATTER_ENERGIES);
+        let lines = Lines::new(exposure, paths, &densities, SCATTER_ENERGIES);
         let mut map = CollisionMap::new(transport, paths, &lines);
         let outlook = Outlook::new(transport, paths, &densities, &map);
         map.weigh(&outlook.importance(&map.cells, &primary.tolerances(transport)));
@@ -180,6 +184,7 @@ impl Scatter {
         let lists = first.lists(settings.seed, listed);
         let single = SingleScatter {
             transport,
+            response: &exposure.response,
             paths,
             outlook: &outlook,
             lines: &lines,
@@ -202,6 +207,7 @@ impl Scatter {
                 outlook: &outlook,
                 tactics,
             },
+            response: &exposure.response,
             densities: &densities,
             nodes,
         };

@@ -6,6 +6,7 @@ use ppa_ct::Grid;
 use crate::beam::projection::{Detector, Projection};
 use crate::detector::open_field::OpenField;
 use crate::engine::adaptive_primary::primary_moments;
+use crate::engine::exposure::Exposure;
 use crate::engine::fast::{FastSettings, Scatter, fast};
 use crate::engine::later_collisions::Tactics;
 use crate::engine::paths::Paths;
@@ -17,7 +18,6 @@ use crate::matter::material::Material;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::scenes::sixty_kvp;
 use crate::transport::tally::Category;
-use crate::transport::tracking::Transport;
 
 /// Energy of Compton, Rayleigh and multiple scatter on the detector, keV, with standard errors.
 type Sums = [(f64, f64); 3];
@@ -29,14 +29,15 @@ fn no_expectation_depends_on_how_the_work_is_done() {
     let (phantom, spectrum, projection) = small_limb::exposure();
     let detector = &projection.detector;
     let model = ComptonModel::default();
-    let transport = Transport::new(&phantom, &spectrum, &projection, model).unwrap();
+    let exposure = Exposure::new(&phantom, &spectrum, &projection, model).unwrap();
+    let transport = &exposure.transport;
     let (exact, coarse) = (
-        Paths::new(&transport),
-        Paths::with_coarse_cells(&transport, 1_000),
+        Paths::new(transport),
+        Paths::with_coarse_cells(transport, 1_000),
     );
     assert!(exact.coarse_is_exact() && !coarse.coarse_is_exact());
-    let primary = primary_moments(&transport, &exact, compressed(&transport, 8), 2);
-    let (_, open_ev_cm2) = OpenField::of(&transport);
+    let primary = primary_moments(&exposure, &exact, compressed(&exposure, 8), 2);
+    let (_, open_ev_cm2) = OpenField::of(transport, &exposure.response);
     let signal = PrimarySignal {
         detector,
         moments: &primary,
@@ -49,7 +50,7 @@ fn no_expectation_depends_on_how_the_work_is_done() {
             seed,
             ..FastSettings::default()
         };
-        let scatter = Scatter::new(&transport, paths, &signal, &settings, tactics);
+        let scatter = Scatter::new(&exposure, paths, &signal, &settings, tactics);
         scatter
             .fields
             .map(|field| field.on_pixels(detector).sum_kev)

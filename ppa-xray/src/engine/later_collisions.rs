@@ -10,7 +10,8 @@ use crate::engine::lines::Lines;
 use crate::engine::outlook::{Outlook, Site};
 use crate::engine::paths::{Paths, Step};
 use crate::engine::turn::turned;
-use crate::transport::attenuation::{CUTOFF_KEV, Coefficients};
+use crate::matter::energy_range::CUTOFF_KEV;
+use crate::transport::attenuation::Coefficients;
 use crate::transport::stream::Stream;
 use crate::transport::tracking::Transport;
 

@@ -5,11 +5,11 @@ use rayon::prelude::*;
 use crate::beam::heel::Mixture;
 use crate::beam::spectral_lines::SpectralLines;
 use crate::engine::attenuation_basis::LANES;
+use crate::engine::exposure::Exposure;
 use crate::engine::paths::Paths;
 use crate::engine::scatter_table::ScatterTable;
 use crate::engine::spectral_quadrature::compressed;
 use crate::matter::scatter_density::ScatterDensities;
-use crate::transport::tracking::Transport;
 
 /// Energies of a quadrature, the same for all spectra of the emitter.
 pub(crate) struct Lines {
@@ -31,11 +31,12 @@ pub(crate) struct Line {
 impl Lines {
     /// At most `nodes` energies between two absorption edges.
     pub fn new(
-        transport: &Transport,
+        exposure: &Exposure,
         paths: &Paths,
         densities: &[ScatterDensities],
         nodes: usize,
     ) -> Self {
+        let transport = &exposure.transport;
         let line = |energy_kev: f64| {
             let node = transport.attenuation.locate(energy_kev);
             let coefficients = |material: usize| transport.attenuation.at(material as u8, node);
@@ -54,7 +55,7 @@ impl Lines {
                     .collect(),
             }
         };
-        let spectra = compressed(transport, nodes);
+        let spectra = compressed(exposure, nodes);
         Self {
             lines: spectra.energy_kev.iter().map(|&kev| line(kev)).collect(),
             spectra,

@@ -3,11 +3,13 @@
 mod adaptive_nodes;
 mod adaptive_primary;
 pub(crate) mod analog;
+pub(crate) mod analog_image;
 mod attenuation_basis;
 mod coarse_cells;
 mod collision_map;
 #[cfg(test)]
 mod energy_balance;
+pub(crate) mod exposure;
 pub(crate) mod fast;
 mod first_collisions;
 #[cfg(test)]

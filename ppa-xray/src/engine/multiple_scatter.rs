@@ -4,13 +4,14 @@ use nalgebra::Point3;
 use ppa_core::random::Philox;
 use rayon::prelude::*;
 
+use crate::detector::response::Response;
 use crate::engine::attenuation_basis::LANES;
 use crate::engine::later_collisions::{Histories, LaterCollisions};
 use crate::engine::node_grid::NodeGrid;
 use crate::engine::outlook::View;
 use crate::engine::paths::BasisMass;
+use crate::matter::energy_range::CUTOFF_KEV;
 use crate::matter::scatter_density::ScatterDensities;
-use crate::transport::attenuation::CUTOFF_KEV;
 use crate::transport::stream::Stream;
 use crate::transport::tally::Moments;
 
@@ -27,6 +28,7 @@ const CHECKED: u32 = 8;
 /// Histories, and the points of the detector that their collisions are seen from.
 pub(crate) struct MultipleScatter<'a> {
     pub histories: Histories<'a>,
+    pub response: &'a Response,
     pub densities: &'a [ScatterDensities],
     pub nodes: NodeGrid,
 }
@@ -165,8 +167,9 @@ impl MultipleScatter<'_> {
         let kinds =
             [(scattered_kev, compton), (energy_kev, rayleigh)].map(|(energy_kev, density)| {
                 let followed = energy_kev >= CUTOFF_KEV;
-                let response = &self.histories.transport.response;
-                let left = response.moments(energy_kev, [target.x, target.y], &direction);
+                let left = self
+                    .response
+                    .moments(energy_kev, [target.x, target.y], &direction);
                 let left = left.scaled(if followed { density } else { 0.0 });
                 (energy_kev, left)
             });

@@ -7,6 +7,7 @@ use crate::beam::field::Field;
 use crate::beam::spectral_lines::SpectralLines;
 use crate::detector::response::LineResponse;
 use crate::engine::attenuation_basis::{LANES, dot};
+use crate::engine::exposure::Exposure;
 use crate::engine::paths::Paths;
 use crate::transport::tally::Moments;
 use crate::transport::tracking::Transport;
@@ -29,13 +30,13 @@ pub(crate) struct Scratch {
 }
 
 impl<'a> PrimaryRays<'a> {
-    pub fn new(transport: &'a Transport<'a>, paths: &'a Paths<'a>, lines: SpectralLines) -> Self {
+    pub fn new(exposure: &'a Exposure<'a>, paths: &'a Paths<'a>, lines: SpectralLines) -> Self {
         let energies = lines.energy_kev.iter();
         Self {
-            transport,
+            transport: &exposure.transport,
             paths,
             attenuation: energies.map(|&kev| paths.basis.at(kev)).collect(),
-            response: transport.response.at_lines(&lines.energy_kev),
+            response: exposure.response.at_lines(&lines.energy_kev),
             lines,
         }
     }

@@ -5,12 +5,13 @@ use nalgebra::{Point2, Point3};
 use crate::beam::field::Field;
 use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
+use crate::engine::exposure::Exposure;
 use crate::engine::paths::Paths;
 use crate::engine::primary_rays::{PrimaryRays, Scratch, area_cm2};
 use crate::matter::compton::ComptonModel;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::tally::Moments;
-use crate::transport::tracking::{Transport, TransportError};
+use crate::transport::tracking::TransportError;
 
 /// Points per side of a focal spot.
 const SPOT_POINTS: usize = 8;
@@ -30,9 +31,10 @@ pub fn primary(
     samples_per_side: u32,
 ) -> Result<Vec<f64>, TransportError> {
     check_samples(samples_per_side)?;
-    let transport = Transport::new(phantom, spectrum, projection, ComptonModel::default())?;
-    let paths = Paths::new(&transport);
-    let rays = PrimaryRays::new(&transport, &paths, transport.emitter.lines());
+    let exposure = Exposure::new(phantom, spectrum, projection, ComptonModel::default())?;
+    let transport = &exposure.transport;
+    let paths = Paths::new(transport);
+    let rays = PrimaryRays::new(&exposure, &paths, transport.emitter.lines());
     let spots = transport.emitter.spot_points(SPOT_POINTS);
     let ev_cm2 = 1e3 / projection.detector.pixel_cm2();
     let moments = rays.per_pixel(|pixel, scratch| {

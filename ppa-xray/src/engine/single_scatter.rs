@@ -3,13 +3,14 @@
 use nalgebra::{Point2, Point3, Vector3};
 use ppa_core::random::Philox;
 
+use crate::detector::response::Response;
 use crate::engine::attenuation_basis::{LANES, dot};
 use crate::engine::first_collisions::{ESTIMATES, FirstCollisions};
 use crate::engine::lines::Lines;
 use crate::engine::outlook::{Outlook, View};
 use crate::engine::paths::{BasisMass, Paths};
 use crate::engine::scatter_table::ScatterTable;
-use crate::transport::attenuation::CUTOFF_KEV;
+use crate::matter::energy_range::CUTOFF_KEV;
 use crate::transport::stream::Stream;
 use crate::transport::tally::Moments;
 use crate::transport::tracking::Transport;
@@ -30,6 +31,7 @@ pub(crate) struct Seen {
 /// First collisions as points of the detector see them.
 pub(crate) struct SingleScatter<'a> {
     pub transport: &'a Transport<'a>,
+    pub response: &'a Response,
     pub paths: &'a Paths<'a>,
     pub outlook: &'a Outlook<'a>,
     pub lines: &'a Lines,
@@ -139,7 +141,7 @@ impl SingleScatter<'_> {
     #[inline]
     fn energies(&self, sight: &Sight, after: &BasisMass) -> [Moments; 2] {
         let mut sum = [Moments::default(); 2];
-        let response = &self.transport.response;
+        let response = self.response;
         let mut add = |kind: usize, energy_kev: f64, photons: f64| {
             let left = response.moments(energy_kev, sight.at_mm, &sight.direction);
             sum[kind].mean_kev += photons * left.mean_kev;

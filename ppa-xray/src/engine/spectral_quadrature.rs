@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::beam::spectral_lines::SpectralLines;
-use crate::transport::tracking::Transport;
+use crate::engine::exposure::Exposure;
 
 /// At most `nodes` energies between two absorption edges of phantom or detector, the same for every spectrum that the
 /// source has.
@@ -12,13 +12,14 @@ use crate::transport::tracking::Transport;
 /// spectrum with n energies is exact for polynomials of degree 2n − 1 in 1/E (Golub and Welsch, Math. Comp.
 /// 23 (1969) 221). An absorption edge is not smooth: the spectrum is cut there. The energies are those of the mean of all
 /// spectra; the weights of a single one, which differs little, are exact for polynomials of degree n − 1 times the mean.
-pub(crate) fn compressed(transport: &Transport, nodes: usize) -> SpectralLines {
+pub(crate) fn compressed(exposure: &Exposure, nodes: usize) -> SpectralLines {
+    let transport = &exposure.transport;
     let mut edges: Vec<f64> = transport
         .phantom
         .materials()
         .iter()
         .flat_map(|material| material.edges_kev())
-        .chain(transport.response.edges_kev())
+        .chain(exposure.response.edges_kev())
         .collect();
     edges.sort_by(f64::total_cmp);
     edges.dedup();

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "dicom")]
 pub(crate) mod dx;
+mod electronic_noise;
 pub(crate) mod enhancement;
 mod log_exposure;
 pub(crate) mod memory;

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::beam::projection::Detector;
 use crate::detector::open_field::OpenField;
+use crate::detector::readout::Layer;
 use crate::transport::tally::Category;
 
 /// How a radiograph was computed.
@@ -14,15 +15,6 @@ pub enum Engine {
     Analog,
     /// Ray-traced primary, Monte Carlo scatter, added quantum noise.
     Fast,
-}
-
-/// One image plane, row-major, eV/cm² per history.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Layer {
-    /// Energy that arrives at the pixel, per area of it and per history.
-    pub value: Vec<f32>,
-    /// Standard error of `value`.
-    pub sigma: Vec<f32>,
 }
 
 /// Energy on the whole detector by category, eV per history, each with its standard error.

@@ -7,6 +7,7 @@ pub(crate) mod cross_sections;
 pub(crate) mod electron_shell;
 pub(crate) mod element;
 pub(crate) mod energy_nodes;
+pub(crate) mod energy_range;
 pub(crate) mod energy_transfer;
 pub(crate) mod fluorescence;
 pub(crate) mod impulse_approximation;

@@ -6,12 +6,12 @@ use crate::{
     matter::compton::{Compton, ComptonModel},
     matter::cross_section_table::CrossSectionTable,
     matter::cross_sections::{CrossSections, HC_KEV_ANGSTROM, MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::energy_range::CUTOFF_KEV,
     matter::fluorescence::Fluorescence,
     matter::impulse_approximation::BoundElectron,
     matter::material::Material,
     matter::rayleigh::Rayleigh,
     octaves::Octaves,
-    transport::attenuation::CUTOFF_KEV,
 };
 
 /// Bins per octave of q², as a power of two.

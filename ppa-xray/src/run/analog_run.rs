@@ -14,8 +14,10 @@ use crate::dose::score::DoseTarget;
 use crate::dose::settings::{DoseError, DoseSettings};
 use crate::dose::setup::DoseSetup;
 use crate::engine::analog::{AnalogSettings, count, count_with_dose};
+use crate::engine::analog_image::ImageSetup;
+use crate::engine::exposure::Exposure;
 use crate::phantom::voxels::VoxelPhantom;
-use crate::run::analog_tally::{AnalogTally, ImageSetup, RunSetup};
+use crate::run::analog_tally::{AnalogTally, RunSetup};
 use crate::run::key::key;
 use crate::run::progress::{Progress, Stop, Stopped, is_check, next_check};
 use crate::run::tally_error::TallyError;
@@ -58,7 +60,7 @@ const LEAST_SITTING: u64 = 1_024;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct AnalogRun<'a> {
-    transport: Transport<'a>,
+    exposure: Exposure<'a>,
     settings: AnalogSettings,
     dose: Option<DoseCounting>,
     key: OnceLock<String>,
@@ -84,7 +86,7 @@ impl<'a> AnalogRun<'a> {
     ) -> Result<Self, TransportError> {
         settings.validate()?;
         Ok(Self {
-            transport: Transport::new(phantom, spectrum, projection, settings.compton_model)?,
+            exposure: Exposure::new(phantom, spectrum, projection, settings.compton_model)?,
             settings: *settings,
             dose: None,
             key: OnceLock::new(),
@@ -96,7 +98,7 @@ impl<'a> AnalogRun<'a> {
     /// # Errors
     /// [`DoseError`] for a region outside the phantom.
     pub fn with_dose(self, settings: &DoseSettings) -> Result<Self, DoseError> {
-        let setup = DoseSetup::new(&self.transport, settings)?;
+        let setup = DoseSetup::new(&self.exposure.transport, settings)?;
         Ok(Self {
             dose: Some(DoseCounting {
                 settings: settings.clone(),
@@ -114,7 +116,7 @@ impl<'a> AnalogRun<'a> {
             key: self.key().to_owned(),
             seed: self.settings.seed,
             histories: self.settings.histories,
-            image: ImageSetup::new(&self.transport),
+            image: ImageSetup::new(&self.exposure),
             dose: self.dose.as_ref().map(|dose| dose.setup.clone()),
         };
         AnalogTally::empty(setup, part.share(self.settings.histories))
@@ -164,7 +166,7 @@ impl<'a> AnalogRun<'a> {
                 spectrum,
                 projection,
                 ..
-            } = self.transport;
+            } = self.exposure.transport;
             let dose = self.dose.as_ref().map(|dose| &dose.settings);
             key(phantom, spectrum, projection, &self.settings, dose)
         })
@@ -233,19 +235,19 @@ impl<'a> AnalogRun<'a> {
     /// Counts on to the history `end`.
     fn count(&self, tally: &mut AnalogTally, end: u64) {
         let histories = tally.done.end..end;
-        let (transport, seed) = (&self.transport, self.settings.seed);
+        let (exposure, seed) = (&self.exposure, self.settings.seed);
         match (&self.dose, &tally.dose) {
             (Some(DoseCounting { setup, air, .. }), Some(dose)) => {
                 let target = DoseTarget {
-                    phantom: transport.phantom,
+                    phantom: exposure.transport.phantom,
                     regions: &setup.regions(),
                     tally: dose,
                     air,
                     raster: tally.image.raster,
                 };
-                count_with_dose(transport, seed, histories, &tally.image, &target);
+                count_with_dose(exposure, seed, histories, &tally.image, &target);
             }
-            _ => count(transport, seed, histories, &tally.image),
+            _ => count(exposure, seed, histories, &tally.image),
         }
         tally.done.end = end;
     }

@@ -4,15 +4,12 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use crate::beam::projection::Detector;
-use crate::detector::open_field::OpenField;
-use crate::detector::readout::Readout;
 use crate::dose::report::Dose;
 use crate::dose::setup::DoseSetup;
 use crate::dose::tally::DoseTally;
-use crate::image::radiograph::{CategorySums, Engine, Layer, Radiograph};
-use crate::transport::tally::{Category, Tally};
-use crate::transport::tracking::Transport;
+use crate::engine::analog_image::ImageSetup;
+use crate::image::radiograph::Radiograph;
+use crate::transport::tally::Tally;
 
 /// Integer sums over a range of the histories of one run.
 ///
@@ -38,18 +35,6 @@ pub(crate) struct RunSetup {
     pub histories: u64,
     pub image: ImageSetup,
     pub dose: Option<DoseSetup>,
-}
-
-/// What turns the sums of the image into a radiograph.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct ImageSetup {
-    pub detector: Detector,
-    source_detector_mm: f64,
-    open_field_ev_cm2: f64,
-    open_field: OpenField,
-    readout: Readout,
-    histories_per_mas: Option<f64>,
 }
 
 impl AnalogTally {
@@ -139,57 +124,5 @@ impl RunSetup {
             Some(dose) => image.checked_add(dose.byte_len()?),
             None => Some(image),
         }
-    }
-}
-
-impl ImageSetup {
-    pub fn new(transport: &Transport) -> Self {
-        let projection = transport.projection;
-        let (open_field, open_field_ev_cm2) = OpenField::of(transport);
-        Self {
-            detector: projection.detector,
-            source_detector_mm: projection.source_detector_mm,
-            open_field_ev_cm2,
-            open_field,
-            readout: transport.readout.clone(),
-            histories_per_mas: transport.emitter.photons_per_mas(),
-        }
-    }
-
-    /// The radiograph of `histories` counted in `tally`.
-    pub fn radiograph(&self, tally: &Tally, histories: u64, seed: u64) -> Radiograph {
-        let n = histories as f64;
-        let ev_cm2 = 1e3 / tally.raster.cell_cm2();
-        let layers = Category::ALL.map(|category| {
-            let (value, sigma) = tally
-                .moments(category, histories)
-                .iter()
-                .map(|pixel| {
-                    let sigma = pixel.standard_error_kev(n);
-                    ((pixel.mean_kev * ev_cm2) as f32, (sigma * ev_cm2) as f32)
-                })
-                .unzip();
-            Layer { value, sigma }
-        });
-        let sums = CategorySums::from_kev(|category| {
-            let total = tally.total(category, histories);
-            (total.mean_kev, total.standard_error_kev(n))
-        });
-        let layers = self.readout.counted(layers, tally.raster.columns);
-        self.readout.with_electronic_noise(Radiograph {
-            detector: self.detector,
-            engine: Engine::Analog,
-            histories: n,
-            histories_per_mas: self.histories_per_mas,
-            seed,
-            source_detector_mm: self.source_detector_mm,
-            open_field_ev_cm2: self.open_field_ev_cm2,
-            open_field: self.open_field.clone(),
-            layers,
-            single_scatter_covariance: Vec::new(),
-            electronic: None,
-            sums,
-            largest_score_share: None,
-        })
     }
 }

@@ -2,13 +2,8 @@
 
 use rayon::prelude::*;
 
+use crate::matter::energy_range::{CEILING_KEV, CUTOFF_KEV};
 use crate::matter::sampler::MaterialTables;
-
-/// Photons below this energy are absorbed on the spot: 5 keV x-rays die within 0.25 mm of tissue.
-pub(crate) const CUTOFF_KEV: f64 = 5.0;
-
-/// Highest energy the cross-section data covers.
-pub(crate) const CEILING_KEV: f64 = 150.0;
 
 /// 2⁹ nodes in every octave of energy: linear interpolation of E⁻³ errs by less than 6e-6.
 const OCTAVE_BITS: u32 = 9;

@@ -164,13 +164,13 @@ fn regions(class: &[u16], blocks: [usize; 3], typical_mm: &[f32], block_mm: f64)
 mod tests {
     use super::*;
     use crate::engine::analog::{self, AnalogSettings};
+    use crate::engine::analog_image::ImageSetup;
+    use crate::engine::exposure::Exposure;
     use crate::matter::compton::ComptonModel;
     use crate::matter::material::Material;
     use crate::matter::sampler::MaterialTables;
-    use crate::run::analog_tally::ImageSetup;
     use crate::transport::block_classes::MOST_CLASSES;
     use crate::transport::tally::Category;
-    use crate::transport::tracking::Transport;
 
     /// Woodcock tracking is right only if no voxel exceeds the bound of any cube that holds it.
     #[test]
@@ -238,8 +238,9 @@ mod tests {
     fn no_expectation_depends_on_the_size_of_the_blocks() {
         let (phantom, spectrum, projection) = crate::engine::small_limb::exposure();
         let model = ComptonModel::default();
-        let mut transport = Transport::new(&phantom, &spectrum, &projection, model).unwrap();
+        let mut exposure = Exposure::new(&phantom, &spectrum, &projection, model).unwrap();
         let mut image = |edge: u32, seed: u64| {
+            let transport = &mut exposure.transport;
             transport.majorants = Majorants::in_blocks(
                 edge,
                 &transport.codes,
@@ -252,8 +253,8 @@ mod tests {
                 seed,
                 ..AnalogSettings::default()
             };
-            let tally = analog::run(&transport, projection.detector.raster(), &settings);
-            ImageSetup::new(&transport).radiograph(&tally, settings.histories, seed)
+            let tally = analog::run(&exposure, projection.detector.raster(), &settings);
+            ImageSetup::new(&exposure).radiograph(&tally, settings.histories, seed)
         };
         let usual = image(EDGE, 1);
         for edge in [1, 4, 64] {

@@ -4,7 +4,6 @@ pub(crate) mod attenuation;
 mod block_classes;
 mod lanes;
 pub(crate) mod majorants;
-pub(crate) mod raster;
 pub(crate) mod score;
 pub(crate) mod stream;
 pub(crate) mod tally;

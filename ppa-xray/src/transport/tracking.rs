@@ -9,14 +9,12 @@ use crate::beam::emitter::Emitter;
 use crate::beam::projection::Projection;
 use crate::beam::projection_error::ProjectionError;
 use crate::beam::spectrum::Spectrum;
-use crate::detector::readout::Readout;
-use crate::detector::response::Response;
-use crate::image::memory;
 use crate::matter::compton::ComptonModel;
+use crate::matter::energy_range::{CEILING_KEV, CUTOFF_KEV};
 use crate::matter::sampler::MaterialTables;
 use crate::phantom::lattice::Lattice;
 use crate::phantom::voxels::VoxelPhantom;
-use crate::transport::attenuation::{Attenuation, CEILING_KEV, CUTOFF_KEV};
+use crate::transport::attenuation::Attenuation;
 use crate::transport::lanes;
 use crate::transport::majorants::Majorants;
 use crate::transport::score::Score;
@@ -72,8 +70,6 @@ pub(crate) struct Transport<'a> {
     pub spectrum: &'a Spectrum,
     pub projection: &'a Projection,
     pub emitter: Emitter,
-    pub response: Response,
-    pub readout: Readout,
     pub lattice: Lattice,
     pub attenuation: Attenuation,
     pub samplers: Vec<MaterialTables>,
@@ -89,11 +85,6 @@ impl<'a> Transport<'a> {
         compton_model: ComptonModel,
     ) -> Result<Self, TransportError> {
         let emitter = Emitter::new(projection, spectrum)?;
-        memory::check(&projection.detector)?;
-        let response = Response::new(&projection.receptor, projection.detector.centre_mm)
-            .map_err(ProjectionError::from)?;
-        let readout = Readout::new(&projection.receptor, &projection.detector)
-            .map_err(ProjectionError::from)?;
         check_placement(phantom, projection)?;
         let outside = |[low_kev, high_kev]: [f64; 2]| -> f64 {
             spectrum
@@ -137,8 +128,6 @@ impl<'a> Transport<'a> {
             spectrum,
             projection,
             emitter,
-            response,
-            readout,
             lattice: Lattice::new(phantom.grid(), &projection.ct_from_device),
             majorants: Majorants::new(&codes, phantom.grid().size(), voxel_mm, &attenuation),
             codes,

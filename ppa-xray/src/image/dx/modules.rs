@@ -3,7 +3,7 @@
 use dicom_dictionary_std::tags;
 use nalgebra::Vector3;
 
-use crate::detector::receptor::{AntiScatterGrid, DetectorModel};
+use crate::beam::receptor::{AntiScatterGrid, DetectorModel};
 use crate::image::dx::elements::Elements;
 use crate::image::dx::{DxExposure, DxIntent, LOG_OF_ZERO, OPEN_STORED, STORED_PER_LOG};
 use crate::image::radiograph::{Engine, Radiograph};

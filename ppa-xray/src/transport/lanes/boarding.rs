@@ -2,7 +2,7 @@
 
 use ppa_core::random::Philox;
 
-use crate::transport::attenuation::CUTOFF_KEV;
+use crate::matter::energy_range::CUTOFF_KEV;
 use crate::transport::lanes::draws::Depths;
 use crate::transport::lanes::entry::{Aim, Enter, Place};
 use crate::transport::lanes::flights::{Each, Flights, LANES, each};

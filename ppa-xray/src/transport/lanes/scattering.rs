@@ -1,6 +1,6 @@
 //! Photons that scatter, and the x-rays of K shells: new directions and energies.
 
-use crate::transport::attenuation::CUTOFF_KEV;
+use crate::matter::energy_range::CUTOFF_KEV;
 use crate::transport::lanes::collisions::Site;
 use crate::transport::lanes::compton_attempt::{Attempt, Attempts};
 use crate::transport::lanes::draws::unit;

@@ -7,7 +7,7 @@ use ppa_depth::RigSpec;
 use ppa_xray::Detector;
 use serde::{Deserialize, Serialize};
 
-use crate::plan::{Plan, PlanError, PlanRoom};
+use super::{Plan, PlanError, PlanRoom};
 use crate::toml_file::{relative_to, to_toml};
 
 /// All that stands still in an x-ray room; unknown keys are refused.

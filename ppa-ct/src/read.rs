@@ -1,0 +1,108 @@
+//! Which reader a file or folder belongs to.
+
+use std::path::Path;
+
+use crate::error::ReadError;
+use crate::scan::{ReadOptions, Scan, starts_as_dicom};
+
+/// Reads a CT: a folder with one DICOM series, a single DICOM file, a DICOMDIR, NIfTI (`.nii`, `.nii.gz`),
+/// NRRD (`.nrrd`, `.nhdr`) or MetaImage (`.mha`, `.mhd`).
+///
+/// As [`read_with`] without any option.
+///
+/// # Errors
+/// As [`read_with`].
+pub fn read(path: &Path) -> Result<Scan, ReadError> {
+    read_with(path, &ReadOptions::default())
+}
+
+/// Reads a CT as told.
+///
+/// DICOM slices are sorted by their position along the slice normal; names and instance numbers
+/// are ignored. Subfolders are searched when the folder itself has no DICOM image. A tilted gantry
+/// gives a sheared affine, exactly as acquired. Padding becomes air.
+///
+/// # Errors
+/// [`ReadError`]: other formats, modalities other than CT, several series, missing slices,
+/// slices in the same place, mixed geometry, damaged files, pixel encodings without a decoder.
+pub fn read_with(path: &Path, options: &ReadOptions) -> Result<Scan, ReadError> {
+    let io = |source| ReadError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    if std::fs::metadata(path).map_err(io)?.is_dir() {
+        return read_dicom_folder(path, options);
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = name.to_ascii_lowercase();
+    if name.ends_with(".dcm") || starts_as_dicom(path).map_err(io)? {
+        return read_dicom_file(path, options);
+    }
+    if options.series.is_some() {
+        return Err(ReadError::NoSuchSeries {
+            path: path.to_owned(),
+            series: Vec::new(),
+        });
+    }
+    if name.ends_with(".nii") || name.ends_with(".nii.gz") {
+        read_nifti(path)
+    } else if name.ends_with(".nrrd") || name.ends_with(".nhdr") {
+        read_nrrd(path)
+    } else if name.ends_with(".mha") || name.ends_with(".mhd") {
+        read_meta_image(path, options.force)
+    } else {
+        Err(ReadError::Unsupported {
+            path: path.to_owned(),
+        })
+    }
+}
+
+#[cfg(feature = "dicom")]
+use crate::dicom_series::{read_file as read_dicom_file, read_folder as read_dicom_folder};
+
+#[cfg(feature = "nifti")]
+use crate::nifti_file::read as read_nifti;
+
+#[cfg(feature = "nrrd")]
+use crate::nrrd_file::read as read_nrrd;
+
+#[cfg(feature = "metaimage")]
+use crate::meta_image::read as read_meta_image;
+
+#[cfg(not(feature = "dicom"))]
+fn read_dicom_folder(path: &Path, _: &ReadOptions) -> Result<Scan, ReadError> {
+    feature_off(path, "dicom")
+}
+
+#[cfg(not(feature = "dicom"))]
+fn read_dicom_file(path: &Path, _: &ReadOptions) -> Result<Scan, ReadError> {
+    feature_off(path, "dicom")
+}
+
+#[cfg(not(feature = "nifti"))]
+fn read_nifti(path: &Path) -> Result<Scan, ReadError> {
+    feature_off(path, "nifti")
+}
+
+#[cfg(not(feature = "nrrd"))]
+fn read_nrrd(path: &Path) -> Result<Scan, ReadError> {
+    feature_off(path, "nrrd")
+}
+
+#[cfg(not(feature = "metaimage"))]
+fn read_meta_image(path: &Path, _: bool) -> Result<Scan, ReadError> {
+    feature_off(path, "metaimage")
+}
+
+#[cfg(not(all(
+    feature = "dicom",
+    feature = "nifti",
+    feature = "nrrd",
+    feature = "metaimage"
+)))]
+fn feature_off(path: &Path, feature: &'static str) -> Result<Scan, ReadError> {
+    Err(ReadError::FeatureOff {
+        path: path.to_owned(),
+        feature,
+    })
+}

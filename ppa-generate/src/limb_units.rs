@@ -1,0 +1,65 @@
+//! The poses of a dataset by limb, and which of them belong to a part.
+
+use ppa_core::Part;
+use ppa_dataset::findings::FindingCode;
+use ppa_dataset::layout::LimbId;
+use ppa_scene::PoseAngle;
+use serde::Deserialize;
+
+use crate::record::Unit;
+
+/// A limb of a dataset, as `dataset.json` lists it.
+#[derive(Debug, Clone, Deserialize)]
+pub(crate) struct PlannedLimb {
+    #[serde(flatten)]
+    pub limb: LimbId,
+    pub key: String,
+    #[serde(default)]
+    pub acknowledged: Vec<FindingCode>,
+}
+
+/// All poses of one limb that belong to a job.
+pub(crate) struct LimbUnits {
+    pub limb: LimbId,
+    pub key: String,
+    /// Codes of the findings that its case acknowledges.
+    pub acknowledged: Vec<FindingCode>,
+    pub poses: Vec<PoseAngle>,
+}
+
+impl LimbUnits {
+    pub fn unit(&self, pose: PoseAngle) -> Unit<'_> {
+        Unit {
+            limb: self.limb,
+            pose,
+            limb_key: &self.key,
+        }
+    }
+
+    pub fn units(&self) -> impl Iterator<Item = Unit<'_>> {
+        self.poses.iter().map(|&pose| self.unit(pose))
+    }
+}
+
+/// The units of one part of a dataset. Parts are runs of neighbours, limb by limb, so that few
+/// of them prepare the same limb.
+pub(crate) fn units_of_part(
+    limbs: impl ExactSizeIterator<Item = PlannedLimb>,
+    poses: &[PoseAngle],
+    part: Part,
+) -> Vec<LimbUnits> {
+    let share = part.share((limbs.len() * poses.len()) as u64);
+    let within = |index: usize| share.contains(&(index as u64));
+    let of_limb = |(i, limb): (usize, PlannedLimb)| {
+        let planned = poses.iter().enumerate();
+        let mine = planned.filter(|(j, _)| within(i * poses.len() + j));
+        LimbUnits {
+            limb: limb.limb,
+            key: limb.key,
+            acknowledged: limb.acknowledged,
+            poses: mine.map(|(_, pose)| *pose).collect(),
+        }
+    };
+    let limbs = limbs.enumerate().map(of_limb);
+    limbs.filter(|limb| !limb.poses.is_empty()).collect()
+}

@@ -1,0 +1,38 @@
+//! What an engine needs of one exposure.
+
+use crate::beam::projection::Projection;
+use crate::beam::projection_error::ProjectionError;
+use crate::beam::spectrum::Spectrum;
+use crate::detector::readout::Readout;
+use crate::detector::response::Response;
+use crate::image::memory;
+use crate::matter::compton::ComptonModel;
+use crate::phantom::voxels::VoxelPhantom;
+use crate::transport::tracking::{Transport, TransportError};
+
+/// Transport through the phantom to the detector plane, and what the detector makes of a photon there.
+pub(crate) struct Exposure<'a> {
+    pub transport: Transport<'a>,
+    pub response: Response,
+    pub readout: Readout,
+}
+
+impl<'a> Exposure<'a> {
+    /// # Errors
+    /// [`TransportError`] when geometry, receptor or spectrum make no sense, or the image does not fit into memory.
+    pub fn new(
+        phantom: &'a VoxelPhantom,
+        spectrum: &'a Spectrum,
+        projection: &'a Projection,
+        compton_model: ComptonModel,
+    ) -> Result<Self, TransportError> {
+        projection.validate()?;
+        memory::check(&projection.detector)?;
+        let (receptor, detector) = (&projection.receptor, &projection.detector);
+        Ok(Self {
+            response: Response::new(receptor, detector.centre_mm).map_err(ProjectionError::from)?,
+            readout: Readout::new(receptor, detector).map_err(ProjectionError::from)?,
+            transport: Transport::new(phantom, spectrum, projection, compton_model)?,
+        })
+    }
+}
