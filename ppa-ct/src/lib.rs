@@ -11,8 +11,8 @@
 //! Nothing that names a person, a place or a date passes from a file into these types.
 //!
 //! Features: `dicom`, `nifti`, `nrrd` and `metaimage` (all on by default) hold the readers and
-//! writers; `report` writes an audit as a page of HTML. Without them the crate is geometry, audit
-//! and phantoms only.
+//! writers; `report` writes an audit as a page of HTML. Without them the crate is geometry
+//! and audit only.
 //!
 //! ```
 //! use nalgebra::{Point3, Vector3};
