@@ -65,10 +65,12 @@ fn a_type_tells_versions_features_and_profile_of_its_crates() {
 
 /// Without it, `cargo install` takes the newest versions instead of those in Cargo.lock.
 #[test]
-fn every_install_line_of_the_readme_is_locked() {
-    let readme = Path::new(env!("CARGO_MANIFEST_DIR")).join("../README.md");
-    let readme = fs::read_to_string(readme).unwrap();
-    let lines = readme.matches("cargo install").count();
-    assert!(lines >= 2);
-    assert_eq!(readme.matches("cargo install --locked").count(), lines);
+fn every_documented_install_line_is_locked() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    for file in ["README.md", "docs/book/training.md"] {
+        let text = fs::read_to_string(root.join(file)).unwrap();
+        let lines = text.matches("cargo install").count();
+        assert!(lines >= 1, "{file}");
+        assert_eq!(text.matches("cargo install --locked").count(), lines);
+    }
 }
