@@ -2,7 +2,8 @@
 //!
 //! Readers see the radiographs of a dataset as [`Showing`]s on a [`grading_page`]; [`import_grades`] makes labels of their grades.
 //!
-//! Computed labels are a surrogate that no reader has confirmed: how open the joint space of an ankle lies to the beam.
+//! Computed labels measure the alignment of the joint space of an ankle with the beam. They are a surrogate that no reader has
+//! validated.
 //! [`segment_bones`] separates tibia, fibula and talus where nobody did; [`AnkleBones`] are their surfaces; [`JointSpace`] finds
 //! the three gutters between them; its `openness` follows the rays of an [`Exposure`]; [`GradeThresholds`] make a grade of it;
 //! [`compute_labels`] does so for a dataset.

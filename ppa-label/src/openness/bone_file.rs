@@ -1,4 +1,4 @@
-//! A file that tells which bone each voxel of a scan belongs to.
+//! Reading the bone labels of the voxels of a scan.
 
 use std::path::PathBuf;
 

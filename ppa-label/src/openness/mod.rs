@@ -1,4 +1,4 @@
-//! Computed labels: how open the joint space of an ankle lies to the beam.
+//! Computed labels: alignment of the joint space of an ankle with the beam.
 
 mod bone_file;
 mod bones;
