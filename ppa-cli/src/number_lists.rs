@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 use ppa_core::Roi;
-use ppa_generate::BoneNumbers;
+use ppa_dataset::labels::BoneNumbers;
 use ppa_mesh::{Bump, VoxelBox};
 
 fn finite<const N: usize>(text: &str) -> Option<[f64; N]> {

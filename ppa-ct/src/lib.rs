@@ -32,6 +32,7 @@ mod dicom_series;
 mod dicom_write;
 mod error;
 mod grid;
+mod identity;
 mod info;
 mod low_pass;
 mod lps_view;

@@ -3,7 +3,8 @@
 use nalgebra::{Point3, Vector2};
 use rayon::prelude::*;
 
-use crate::body::{Body, BodyError, PlacedBody};
+use crate::body::{Body, PlacedBody};
+use crate::body_error::BodyError;
 use crate::mesh_body::MeshBody;
 use crate::triangle::Triangle;
 

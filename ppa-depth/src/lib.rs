@@ -71,6 +71,7 @@ mod rigid;
 mod viewpoint;
 
 mod body;
+mod body_error;
 mod inside;
 mod mesh_body;
 mod nearest;
@@ -89,6 +90,7 @@ mod surface;
 mod walls;
 
 mod fit_noise;
+mod modulation;
 mod multipath;
 mod random;
 mod sensor;
@@ -107,7 +109,8 @@ mod roi;
 
 pub use ppa_core::Roi;
 
-pub use body::{Body, BodyError, PlacedBody};
+pub use body::{Body, PlacedBody};
+pub use body_error::BodyError;
 pub use camera::Camera;
 pub use coverage::{Coverage, CoverageError, CoverageSettings, JointSurface};
 pub use depth_mode::DepthMode;

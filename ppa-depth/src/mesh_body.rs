@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::body::{BodyError, check_count, check_points};
+use crate::body_error::{BodyError, check_count, check_points};
 
 /// A triangle mesh in its own frame, mm. Both sides of a triangle are seen, so the orientation does not matter.
 #[derive(Debug, Clone)]

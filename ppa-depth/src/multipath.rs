@@ -4,7 +4,7 @@ use nalgebra::{Complex, Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::image::DepthImage;
-use crate::sensor::phase_per_mm;
+use crate::modulation::phase_per_mm;
 use crate::sensor_spec::Multipath;
 use crate::surface::{Surface, signal};
 

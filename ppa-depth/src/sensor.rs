@@ -1,20 +1,16 @@
 //! From what a camera sees to what a Time-of-Flight sensor makes of it.
 
-use std::f64::consts::PI;
-
 use nalgebra::Complex;
 use rayon::prelude::*;
 
 use crate::camera::Camera;
 use crate::image::DepthImage;
+use crate::modulation::phase_per_mm;
 use crate::multipath::one_bounce;
 use crate::random::{Purpose, normals};
 use crate::sampled::{SAMPLES, SampledImage};
 use crate::sensor_spec::{SensorError, SensorSpec};
 use crate::surface::{Surface, signal};
-
-/// Speed of light in mm · MHz.
-const LIGHT_MM_MHZ: f64 = 299_792.458;
 
 /// One device: errors that stay with it are drawn when it is made.
 #[derive(Debug, Clone)]
@@ -32,11 +28,6 @@ struct Light {
     sum: Complex<f64>,
     total: f64,
     reference_mm: f64,
-}
-
-/// Radians per mm of range at a modulation frequency: 4π f / c.
-pub(crate) fn phase_per_mm(modulation_mhz: f64) -> f64 {
-    4.0 * PI * modulation_mhz / LIGHT_MM_MHZ
 }
 
 impl Sensor {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::body::{BodyError, MAX_COORDINATE_MM, check_count, check_points};
+use crate::body_error::{BodyError, MAX_COORDINATE_MM, check_count, check_points};
 use crate::nearest::{Index, Ray};
 
 /// A cloud of equal discs, one around each point and square to its normal, in its own frame, mm.

@@ -10,8 +10,8 @@ use ppa_scene::{LandmarkOverrides, Landmarks, Side};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
-use crate::bone_file::BoneFile;
 use crate::toml_file::{other_version, relative_to, to_toml};
+use ppa_dataset::labels::BoneFile;
 
 /// One limb of one CT. `ppa prepare` proposes it; a person changes `side`, `surface` and
 /// `choices`, and everything else is computed again when the case is used.

@@ -10,7 +10,6 @@
 //! Source of the method: Laufer et al., Patient Pose Assessment Using a CT-Based Framework for
 //! Synthetic Data Generation, MELBA 2026:027, doi:10.59275/j.melba.2026-c874.
 
-mod bone_file;
 mod case;
 mod case_check;
 mod check;
@@ -57,7 +56,6 @@ mod unit;
 mod unit_error;
 mod verify;
 
-pub use bone_file::{BoneFile, BoneNumbers};
 pub use case::{Case, CaseError, Found, Source};
 pub use case_check::{CaseCheck, CaseCheckError, Drift};
 pub use check::{Check, Problem, check};
@@ -74,7 +72,7 @@ pub use job::{JobError, Progress, Summary};
 pub use merge::{MergeError, merge};
 pub use part_file::held_part;
 pub use plan::{DepthSettings, Plan, PlanCase, PlanError, PlanRoom, RoomFile, XraySettings};
-pub use prepare::{PrepareError, PreparedLimb, prepare, volume_sha256};
+pub use prepare::{PrepareError, PreparedLimb, prepare};
 pub use radiograph::{JointError, joint_phantom, projection};
 pub use shaped_skin::{ShapeSettings, body_shape};
 pub use stage::{PlacedCamera, Stage, StageError, Table, body_of_cloud, spectrum, tube};

@@ -3,11 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use ppa_ct::{ReadOptions, Scan, Volume, Warning, WarningCode};
-use ppa_dataset::files::hex;
 use ppa_dataset::findings::{Finding, FindingCode, Severity};
 use ppa_mesh::{Limb, LimbReport, LimbSettings, extract_limb};
 use ppa_scene::{LandmarkOverrides, Landmarks, Side, find_landmarks};
-use sha2::{Digest, Sha256};
 
 use crate::case::{Case, Found, Source};
 use crate::cut_findings::cuts;
@@ -107,7 +105,7 @@ impl PreparedLimb {
     /// [`PrepareError`]; a scan other than the one the case was made from is refused.
     pub fn of_case(case: &Case) -> Result<Self, PrepareError> {
         let scan = ppa_ct::read_with(&case.source.path, &case.source.reading())?;
-        let found = volume_sha256(&scan.volume);
+        let found = scan.volume.sha256();
         if found != case.source.volume_sha256 {
             return Err(PrepareError::OtherScan {
                 path: case.source.path.clone(),
@@ -141,7 +139,7 @@ pub fn prepare(
                 .ok_or_else(|| PrepareError::SeriesWithoutNumber(path.to_owned()))?,
         ),
     };
-    let volume_sha256 = volume_sha256(&scan.volume);
+    let volume_sha256 = scan.volume.sha256();
     let prepared = PreparedLimb::new(scan, side, surface, choices)?;
     let case = Case {
         version: 1,
@@ -249,22 +247,6 @@ fn number_of_its_own(scan: &Scan) -> Option<i32> {
     let number = scan.series.iter().find(|series| series.read)?.number?;
     let sharing = scan.series.iter().filter(|s| s.number == Some(number));
     (sharing.count() == 1).then_some(number)
-}
-
-/// SHA-256 over size, affine and values as read: the identity of a scan.
-pub fn volume_sha256(volume: &Volume) -> String {
-    let mut hasher = Sha256::new();
-    for side in volume.grid().size() {
-        hasher.update((side as u64).to_le_bytes());
-    }
-    for value in volume.grid().ct_from_voxel().matrix() {
-        hasher.update(value.to_le_bytes());
-    }
-    for values in volume.values().parts(1 << 14) {
-        let bytes = values.iter().flat_map(f32::to_le_bytes);
-        hasher.update(bytes.collect::<Vec<_>>());
-    }
-    hex(&hasher.finalize())
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use ppa_depth::{
     SensorError, SurfelBody,
 };
 use ppa_mesh::{CloudError, PointCloud, estimate_normals, mean_spacing_mm};
-use ppa_scene::{PlaneSettings, Rigid, Room, RoomError, TablePlane, XrayDevice, table_plane};
+use ppa_scene::{PlaneSettings, Rigid, RoomError, TablePlane, XrayDevice, XrayRoom, table_plane};
 use ppa_xray::{Spectrum, TubeSpec};
 
 use crate::plan::{Plan, PlanRoom, XraySettings};
@@ -70,7 +70,7 @@ pub struct PlacedCamera {
 /// Room, table and x-ray device: all that placing a limb needs.
 pub struct Table {
     /// The room with its furniture and device.
-    pub room: Room,
+    pub room: XrayRoom,
     /// Π_T.
     pub plane: TablePlane,
 }
@@ -210,8 +210,8 @@ pub fn spectrum(settings: &XraySettings) -> Result<Spectrum, StageError> {
     Ok(Spectrum::tungsten(&tube(settings)?)?)
 }
 
-fn load_room(plan: &PlanRoom) -> Result<Room, StageError> {
-    let built_in = Room::parametric(&plan.parametric)?;
+fn load_room(plan: &PlanRoom) -> Result<XrayRoom, StageError> {
+    let built_in = XrayRoom::parametric(&plan.parametric)?;
     let Some(path) = &plan.ply else {
         return Ok(built_in);
     };
@@ -222,7 +222,7 @@ fn load_room(plan: &PlanRoom) -> Result<Room, StageError> {
         },
         None => built_in.device,
     };
-    Ok(Room::from_ply(path, device)?)
+    Ok(XrayRoom::from_ply(path, device)?)
 }
 
 /// Neighbours from which the normal of a recorded point is estimated.

@@ -1,7 +1,7 @@
 //! `openness.json`: what computed labels were computed with.
 
 use ppa_dataset::labels::LabelSource;
-use ppa_generate::{BoneFile, BoneNumbers};
+use ppa_dataset::labels::{BoneFile, BoneNumbers};
 use serde::Serialize;
 
 use super::openness::{FREE_CHORDS_MM, GradeThresholds};

@@ -6,12 +6,12 @@ use nalgebra::{Isometry3, Point3};
 use ppa_core::TransformRows;
 use ppa_dataset::checksums::Checksums;
 use ppa_dataset::files::{FileError, write_whole};
+use ppa_dataset::labels::BoneFile;
 use ppa_dataset::labels::{LabelError, LabelRow};
 use ppa_dataset::labels::{LabelFile, LabelFileError};
 use ppa_dataset::layout::LimbId;
 use ppa_dataset::manifest::{FileKind, FileRow, Manifest};
 use ppa_depth::isometry_from_rows;
-use ppa_generate::{BoneFile, Case};
 use ppa_scene::LimbKind;
 use serde::Serialize;
 
@@ -162,23 +162,35 @@ pub struct ComputedLabels<'a> {
     before: LabelFile,
 }
 
-/// Grades every radiograph of a limb from the bones that its case names.
+/// What computed labels need to know of the case of a limb.
+#[derive(Debug, Clone, Copy)]
+pub struct CaseBones<'a> {
+    /// The kind of limb that the case gives, if it does.
+    pub limb_kind: Option<LimbKind>,
+    /// The file that labels its bones.
+    pub file: Option<&'a BoneFile>,
+    /// Identity of its scan.
+    pub volume_sha256: &'a str,
+}
+
+/// Grades every radiograph of a limb from the bones of its case.
 ///
 /// # Errors
 /// [`AutoLabelError`].
 pub fn compute_labels<'a>(
     manifest: &'a Manifest,
     limb: LimbId,
-    case: &Case,
+    case: &CaseBones,
     thresholds: &GradeThresholds,
 ) -> Result<ComputedLabels<'a>, AutoLabelError> {
     let before = LabelFile::read(&manifest.root, limb)?.unwrap_or_default();
     thresholds.check()?;
-    if case.choices.limb == Some(LimbKind::Knee) {
+    if case.limb_kind == Some(LimbKind::Knee) {
         return Err(AutoLabelError::Knee(limb));
     }
-    let file = case.bones.as_ref().ok_or(AutoLabelError::NoBones(limb))?;
-    let (rows, bones_sha256) = computed_rows(manifest, limb, case, file, thresholds)?;
+    let file = case.file.ok_or(AutoLabelError::NoBones(limb))?;
+    let scan = case.volume_sha256;
+    let (rows, bones_sha256) = computed_rows(manifest, limb, scan, file, thresholds)?;
     let computation = Computation::new(file, &bones_sha256, thresholds);
     let labels = rows.iter().map(|row| LabelRow {
         label: row.label,
@@ -278,7 +290,7 @@ impl ComputedLabels<'_> {
 fn computed_rows(
     manifest: &Manifest,
     limb: LimbId,
-    case: &Case,
+    volume_sha256: &str,
     file: &BoneFile,
     thresholds: &GradeThresholds,
 ) -> Result<(Vec<ComputedRow>, String), AutoLabelError> {
@@ -294,7 +306,7 @@ fn computed_rows(
         });
     };
     let described = Described::read(manifest)?;
-    if described.scan_of(limb) != Some(&case.source.volume_sha256) {
+    if described.scan_of(limb) != Some(volume_sha256) {
         return Err(AutoLabelError::OtherScan(limb));
     }
     let patient_from_ct = pose(first, "patient_from_ct", Some(&first.patient_from_ct))?;

@@ -44,9 +44,9 @@ impl Described {
     }
 
     /// Hash of the scan that a limb was made from.
-    pub fn scan_of(&self, limb: LimbId) -> Option<&String> {
+    pub fn scan_of(&self, limb: LimbId) -> Option<&str> {
         let found = self.limbs.iter().find(|found| found.limb == limb);
-        found.map(|found| &found.volume_sha256)
+        found.map(|found| found.volume_sha256.as_str())
     }
 
     /// How well a radiograph shows the gutters, by its tallies.

@@ -17,7 +17,9 @@ mod segment;
 mod table;
 mod tallies;
 
-pub use computed::{AutoLabelError, ComputedLabels, ComputedRow, LabelledLimb, compute_labels};
+pub use computed::{
+    AutoLabelError, CaseBones, ComputedLabels, ComputedRow, LabelledLimb, compute_labels,
+};
 pub use openness::*;
 pub use readers::*;
 pub use segment::{SegmentError, SegmentedBones, segment_bones};

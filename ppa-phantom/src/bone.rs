@@ -4,7 +4,8 @@ use nalgebra::{Point3, Unit, Vector3};
 
 use super::bounds::Bounds;
 use super::placement::Placement;
-use super::sdf::{Shape, smooth_max, smooth_step};
+use super::sdf::Shape;
+use super::smooth::{smooth_max, smooth_step};
 
 /// How sharply a joint surface meets the rest of the bone, mm.
 const EDGE_MM: f64 = 0.8;

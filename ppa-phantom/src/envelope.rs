@@ -3,7 +3,8 @@
 use nalgebra::Point3;
 
 use super::bounds::Bounds;
-use super::sdf::{Plane, Shape, smooth_max, smooth_min, smooth_step};
+use super::sdf::{Plane, Shape};
+use super::smooth::{smooth_max, smooth_min, smooth_step};
 
 /// A shape and the box around it, which tells when the shape is too far away to matter.
 #[derive(Debug, Clone)]

@@ -6,9 +6,9 @@ use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 
 use super::bounds::Bounds;
 use super::placement::Placement;
-use super::sdf::smooth_max;
 pub(super) use super::section::Section;
 use super::section::{ANGLES, catmull_rom};
+use super::smooth::smooth_max;
 
 /// Where a loft ends.
 #[derive(Debug, Clone, Copy, PartialEq)]

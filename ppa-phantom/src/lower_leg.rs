@@ -14,7 +14,6 @@ use super::parameters::{P01, Parameters, Sex};
 use super::placement::Placement;
 use super::plate::Plate;
 use super::sdf::{Plane, Shape};
-use super::truth::Truth;
 use super::{hindfoot, midfoot_forefoot, tibia_fibula};
 
 /// A lower leg and foot of known shape; as a [`Limb`] it can be voxelised and asked for its tissues.
@@ -125,7 +124,8 @@ impl LowerLeg {
 
     /// The same leg with a titanium plate and five screws on the fibula, as after a fracture above the ankle.
     pub fn with_plate(mut self) -> Self {
-        let plate = Plate::on_fibula(&self);
+        let fibula = &self.limb.skeleton.bones()[FIBULA].solid;
+        let plate = Plate::on_fibula(fibula, &self.mortise, self.parameters.size);
         self.limb.envelope.parts.push(plate.bulge());
         self.limb.plate = Some(plate);
         self
@@ -139,11 +139,6 @@ impl LowerLeg {
     /// Whose average the dimensions are drawn around.
     pub fn sex(&self) -> Sex {
         self.parameters.sex
-    }
-
-    /// The numbers that a measurement on the voxelised phantom should find.
-    pub fn truth(&self) -> Truth {
-        Truth::of(self)
     }
 
     /// Plane of the medial facet of the talus, limb frame.

@@ -14,7 +14,8 @@ use super::lower_leg_skin_table::{FOOT, SHANK, ShankSection, TOES};
 use super::midfoot_forefoot::ray_shifts_mm;
 use super::parameters::{P01, Parameters, TABLES};
 use super::placement::Placement;
-use super::sdf::{Plane, Shape, smooth_step};
+use super::sdf::{Plane, Shape};
+use super::smooth::smooth_step;
 
 /// Centre and semi-axes of the heel.
 const HEEL: ([f64; 3], [f64; 3]) = ([-3.0, 27.0, 30.0 - SOLE_DEPTH_MM], [31.0, 34.5, 34.0]);

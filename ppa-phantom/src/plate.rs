@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::bounds::Bounds;
 use super::envelope::Bounded;
-use super::lower_leg::{FIBULA, LowerLeg};
+use super::hindfoot::Mortise;
 use super::sdf::Shape;
 
 /// Size of a common small-fragment plate: thickness, half its width, half its length.
@@ -33,12 +33,11 @@ pub(super) struct Plate {
 }
 
 impl Plate {
-    /// On the lateral face of the fibula, its lower end 2 cm above the joint.
-    pub(super) fn on_fibula(leg: &LowerLeg) -> Self {
-        let size = leg.parameters.size;
-        let bone = leg.limb.skeleton.bones()[FIBULA].solid.clone();
+    /// On the lateral face of the fibula, its lower end 2 cm above the joint; `size` is that of the leg.
+    pub(super) fn on_fibula(fibula: &Shape, mortise: &Mortise, size: f64) -> Self {
+        let bone = fibula.clone();
         let posterior = 3.5 * size;
-        let at = |medial, proximal| leg.mortise.point(medial, posterior, proximal);
+        let at = |medial, proximal| mortise.point(medial, posterior, proximal);
         // The outer and the inner face of the bone at a height, on a line from lateral.
         let faces = |proximal: f64| {
             let inside = |medial: &f64| bone.distance(&at(*medial, proximal).into()) < 0.0;
@@ -64,7 +63,7 @@ impl Plate {
             screws.push(Shape::ellipsoid(head, [HEAD_RADIUS_MM; 3]));
         }
         let [outer, _] = faces(middle);
-        let axes = leg.mortise.limb_from_mortise.rotation.to_rotation_matrix();
+        let axes = mortise.limb_from_mortise.rotation.to_rotation_matrix();
         let half = [12.0, HALF_WIDTH_MM, HALF_LENGTH_MM];
         let window = Shape::block(at(outer - 8.0, middle), half, 1.0, axes);
         let screws = Shape::union(0.5, screws);

@@ -7,7 +7,8 @@ use super::hindfoot::{Mortise, WIDTH_LEVEL_MM};
 use super::loft::{End, Loft, Section};
 use super::parameters::{P01, Parameters};
 use super::placement::Placement;
-use super::sdf::{Shape, smooth_step};
+use super::sdf::Shape;
+use super::smooth::smooth_step;
 use super::tibia_fibula_table::{FIBULA, TIBIA, TibiaSection};
 
 /// Half the distance between the places where the front and the back of the syndesmosis are measured.

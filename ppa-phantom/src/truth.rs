@@ -77,8 +77,15 @@ pub struct Truth {
     pub girths_mm: [[f64; 2]; 2],
 }
 
+impl LowerLeg {
+    /// The numbers that a measurement on the voxelised phantom should find.
+    pub fn truth(&self) -> Truth {
+        Truth::of(self)
+    }
+}
+
 impl Truth {
-    pub(super) fn of(leg: &LowerLeg) -> Self {
+    fn of(leg: &LowerLeg) -> Self {
         let p = &leg.parameters;
         let ct = &leg.ct_from_limb;
         let point = |limb: [f64; 3]| leg.on_right(ct * Point3::from(limb));

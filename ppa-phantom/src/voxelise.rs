@@ -8,8 +8,8 @@ use ppa_ct::Grid;
 use ppa_ct::with_room;
 use ppa_ct::{Volume, VolumeError};
 
+use super::contents::Local;
 use super::limb::Limb;
-use super::tissue::Local;
 
 /// Why a phantom cannot be voxelised.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

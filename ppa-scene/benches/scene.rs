@@ -12,11 +12,11 @@ use ppa_benches::ProcessorTime;
 use ppa_mesh::{Border, iso_surface};
 use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{
-    LandmarkOverrides, PlaneSettings, Room, RoomSpec, Side, find_landmarks, place, table_plane,
+    LandmarkOverrides, PlaneSettings, RoomSpec, Side, XrayRoom, find_landmarks, place, table_plane,
 };
 
 fn scene(criterion: &mut Criterion<ProcessorTime>) {
-    let room = Room::parametric(&RoomSpec::default()).expect("default room");
+    let room = XrayRoom::parametric(&RoomSpec::default()).expect("default room");
     let settings = PlaneSettings::for_device(&room.device);
     let table = table_plane(&room.cloud, &settings, 1).expect("table");
 

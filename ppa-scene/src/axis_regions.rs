@@ -8,7 +8,8 @@ use crate::knee::Knee;
 use crate::knee_regions::knee_ranges;
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
 use crate::landmark_notes::LandmarkNote;
-use crate::landmarks::{AxisRegion, AxisSource, FoundJoint, LimbKind};
+use crate::landmarks::{AxisRegion, AxisSource, FoundJoint};
+use crate::limb_kind::LimbKind;
 use crate::limb_sections::Sections;
 
 /// A region that is left open ends or begins this far from the one that is given, at least, mm.

@@ -4,7 +4,8 @@ use nalgebra::{Point3, Vector3};
 use ppa_core::Side;
 use ppa_mesh::BumpSite;
 
-use crate::landmarks::{Landmarks, LimbKind};
+use crate::landmarks::Landmarks;
+use crate::limb_kind::LimbKind;
 
 /// Half the diameter of an ankle, roughly: sites lie this far from the axis, and a site is large
 /// enough to reach the skin of thin and of swollen limbs.

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::frames::Room;
 use crate::frames::{Device, Rigid};
-use crate::room::Room;
 
 /// Pose and focus-detector distance of an x-ray device.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -8,10 +8,11 @@ use ppa_mesh::Mesh;
 use crate::axis_regions::Reference;
 use crate::given_choices::{check_anterior, check_joint};
 use crate::knee::Knee;
-use crate::knee_regions::KneeAxis;
+use crate::knee_axis::KneeAxis;
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
 use crate::landmark_notes::LandmarkNote;
-use crate::landmarks::{AxisSource, Landmarks, LimbKind};
+use crate::landmarks::{AxisSource, Landmarks};
+use crate::limb_kind::LimbKind;
 use crate::plane::first_not_finite;
 use crate::supporting_plane::{check_plane, plane_under};
 

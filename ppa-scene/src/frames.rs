@@ -1,6 +1,4 @@
 //! Coordinate frames as types, and rigid motions that only compose when their frames meet.
-//!
-//! The room (ToF) frame has no marker of its own: [`Room`](crate::Room) itself names it.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -22,6 +20,10 @@ pub struct Patient;
 /// X-ray device: source at the origin, z along the central beam towards the detector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Device;
+
+/// X-ray room (the paper's ToF frame): z up, y towards the head, origin where the central beam meets the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Room;
 
 /// A depth camera, OpenCV axes: x right, y down, z forward.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -8,7 +8,8 @@ use crate::bone_spans::{Lengthwise, broad_zones, spans};
 use crate::knee::{FoundKnee, Knee, find_knee};
 use crate::landmark_choices::{LandmarkError, LandmarkOverrides};
 use crate::landmark_notes::LandmarkNote;
-use crate::landmarks::{FoundJoint, Joint, KneeLines, LimbKind};
+use crate::landmarks::{FoundJoint, KneeLines};
+use crate::limb_kind::{Joint, LimbKind};
 use crate::limb_sections::Sections;
 
 /// What was found, each with slices across the shaft beside it.

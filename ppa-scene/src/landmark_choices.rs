@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::landmarks::{AxisSource, Joint, Landmarks, LimbKind};
+use crate::landmarks::{AxisSource, Landmarks};
+use crate::limb_kind::{Joint, LimbKind};
 
 /// Choices of a person that replace the automatic ones; what is `None` stays automatic.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]

@@ -1,7 +1,7 @@
 //! What landmarks alone do not show: how they were decided.
 
-use crate::knee_regions::KneeAxis;
-use crate::landmarks::Joint;
+use crate::knee_axis::KneeAxis;
+use crate::limb_kind::Joint;
 
 /// A fact about the landmarks of a limb, for the person who judges them.
 #[derive(Debug, Clone, Copy, PartialEq)]

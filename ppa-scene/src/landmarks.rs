@@ -6,38 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::frames::{Ct, Patient, Rigid};
 use crate::landmark_notes::LandmarkNote;
+use crate::limb_kind::{Joint, LimbKind};
 use crate::plane::Plane;
-
-/// What kind of limb a scan shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LimbKind {
-    /// Lower leg with its ankle.
-    LowerLeg,
-    /// Knee with parts of thigh or lower leg.
-    Knee,
-    /// Anything else: the reference level is the middle of the limb unless it is given.
-    Other,
-}
-
-/// A joint that is looked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Joint {
-    /// Tibia above talus.
-    Ankle,
-    /// Femur above tibia.
-    Knee,
-}
-
-impl std::fmt::Display for Joint {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Ankle => "ankle",
-            Self::Knee => "knee",
-        })
-    }
-}
 
 /// A joint that the limb shows, whether it is the one it is posed about or not; `ct` frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::contact::Profile;
 use crate::device::XrayDevice;
+use crate::frames::Room;
 use crate::frames::{Ct, Device, Patient, Rigid};
 use crate::landmarks::Landmarks;
 use crate::matching::{axes_rotation, on_beam, plane_axes, table_axes};
 use crate::place_error::{PlaceError, check_points};
 use crate::plane::Plane;
-use crate::room::Room;
 use crate::soft_tissue::{Flattening, SoftTissue};
 
 /// A limb on the table.

@@ -5,14 +5,15 @@ use std::path::Path;
 use ppa_mesh::{Mesh, PointCloud};
 
 use crate::device::XrayDevice;
+use crate::room_error::RoomError;
 use crate::room_spec::RoomSpec;
 
 /// Most points of a room's cloud, 24 bytes each.
 const MOST_POINTS: f64 = 2e7;
 
-/// An x-ray room with its device; as a type parameter of [`Rigid`](crate::Rigid), its frame.
+/// An x-ray room with its device.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Room {
+pub struct XrayRoom {
     /// Its surfaces as points, room frame.
     pub cloud: PointCloud,
     /// The same surfaces as triangles, when they are known.
@@ -21,26 +22,7 @@ pub struct Room {
     pub device: XrayDevice,
 }
 
-/// Why there is no room.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum RoomError {
-    /// A length of the built-in room does not make sense.
-    #[error("{name} of the room is {found} mm, expected {expected}")]
-    Length {
-        /// Field of [`RoomSpec`].
-        name: &'static str,
-        /// Its value.
-        found: f64,
-        /// What it should be.
-        expected: &'static str,
-    },
-    /// A file cannot be read, or holds no points.
-    #[error(transparent)]
-    Ply(#[from] ppa_mesh::MeshFileError),
-}
-
-impl Room {
+impl XrayRoom {
     /// Builds the room that a spec describes: table, detector, tube housing with collimator,
     /// arm and column, floor and two walls.
     ///

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::room::RoomError;
+use crate::room_error::RoomError;
 use crate::room_parts::Parts;
 
 /// Lengths of the built-in x-ray room, mm.

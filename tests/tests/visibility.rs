@@ -1,7 +1,7 @@
 //! What a radiograph shows of an ankle's joint space agrees with what its geometry lets through, the more the less noise there is.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
-use ppa_generate::BoneNumbers;
+use ppa_dataset::labels::BoneNumbers;
 use ppa_generate::XraySettings;
 use ppa_label::{AnkleBones, Exposure, JointSpace, Openness, Reading, Visibility};
 use ppa_metrics::spearman;

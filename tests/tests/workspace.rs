@@ -35,7 +35,6 @@ const ARROWS: &[(&str, &[&str])] = &[
             "ppa-depth",
             "ppa-xray",
             "ppa-dataset",
-            "ppa-generate",
         ],
     ),
     (

@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use ppa_core::text::number;
 use ppa_ct::{Format, Volume, write};
 use ppa_dataset::Severity;
-use ppa_generate::{BoneFile, BoneNumbers};
+use ppa_dataset::labels::{BoneFile, BoneNumbers};
 use ppa_generate::{Case, Found, PreparedLimb, prepare};
 use ppa_label::{AnkleBones, JointSpace, read_bones, segment_bones};
 use ppa_mesh::{LimbSettings, VoxelBox, write_mesh_file};

@@ -2,9 +2,11 @@
 //!
 //! [`LabelFile`] is `labels.json`, in which a reader's label wins over a computed one.
 
+mod bone_file;
 mod file;
 mod label;
 
+pub use bone_file::{BoneFile, BoneNumbers};
 pub use file::{LabelFile, LabelFileError};
 pub use label::{LabelError, LabelRow, LabelSource};
 pub(crate) use label::{Sources, name_of};

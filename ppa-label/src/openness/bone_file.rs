@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use nalgebra::Point3;
-use ppa_generate::{BoneFile, volume_sha256};
+use ppa_dataset::labels::BoneFile;
 
 use super::bones::{AnkleBones, BonesError};
 
@@ -60,7 +60,7 @@ pub fn read_bones(file: &BoneFile, joint: &Point3<f64>) -> Result<ReadBones, Bon
         .map(label)
         .collect::<Result<_, _>>()?;
     let bones = AnkleBones::new(volume.grid(), &labels, file.numbers, joint);
-    let sha256 = volume_sha256(&volume);
+    let sha256 = volume.sha256();
     let read = bones.map(|bones| ReadBones { bones, sha256 });
     read.map_err(|source| BoneFileError::Bones {
         path: file.path.clone(),

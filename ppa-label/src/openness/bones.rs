@@ -2,7 +2,7 @@
 
 use nalgebra::{Affine3, Point3, Vector3};
 use ppa_ct::Grid;
-use ppa_generate::BoneNumbers;
+use ppa_dataset::labels::BoneNumbers;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

@@ -13,7 +13,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Isometry3, Point3};
 use ppa_ct::{Grid, Volume, VolumeError};
-use ppa_generate::BoneNumbers;
+use ppa_dataset::labels::BoneNumbers;
 
 use self::contacts::Contacts;
 use self::flood::{Seeds, flood};

@@ -5,7 +5,8 @@ use proptest::prelude::*;
 
 use crate::loft::{End, Loft, Section};
 use crate::placement::Placement;
-use crate::sdf::{Cone, Plane, Shape, smooth_min};
+use crate::sdf::{Cone, Plane, Shape};
+use crate::smooth::smooth_min;
 
 fn point(reach: f64) -> impl Strategy<Value = Point3<f64>> {
     [-reach..reach, -reach..reach, -reach..reach].prop_map(Point3::from)

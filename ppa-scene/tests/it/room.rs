@@ -1,10 +1,10 @@
 use nalgebra::{Point3, Vector3};
-use ppa_scene::{PlaneSettings, Room, RoomError, RoomSpec, table_plane};
+use ppa_scene::{PlaneSettings, RoomError, RoomSpec, XrayRoom, table_plane};
 
 /// Table top at z = 0, detector 60 mm below, source 1040 mm above: what the spec says.
 #[test]
 fn built_in_room_has_its_table_under_the_beam() {
-    let room = Room::parametric(&RoomSpec::default()).unwrap();
+    let room = XrayRoom::parametric(&RoomSpec::default()).unwrap();
     let settings = PlaneSettings::for_device(&room.device);
     let found = table_plane(&room.cloud, &settings, 1).unwrap();
     assert!(
@@ -24,7 +24,7 @@ fn built_in_room_has_its_table_under_the_beam() {
 #[test]
 fn built_in_room_has_outward_normals_and_no_flat_triangle() {
     let spec = RoomSpec::default();
-    let room = Room::parametric(&spec).unwrap();
+    let room = XrayRoom::parametric(&spec).unwrap();
     let mesh = room.mesh.unwrap();
     let sheets = 3 * 2; // floor and two walls, last in the list
     let closed = &mesh.triangles[..mesh.triangles.len() - sheets];
@@ -61,7 +61,7 @@ fn built_in_room_has_outward_normals_and_no_flat_triangle() {
 
 #[test]
 fn impossible_rooms_are_refused() {
-    let refuse = |spec: RoomSpec, wanted: &str| match Room::parametric(&spec) {
+    let refuse = |spec: RoomSpec, wanted: &str| match XrayRoom::parametric(&spec) {
         Err(RoomError::Length { name, .. }) => assert_eq!(name, wanted),
         other => panic!("{wanted}: {other:?}"),
     };
@@ -147,16 +147,16 @@ fn impossible_rooms_are_refused() {
 #[test]
 fn recorded_rooms_come_from_ply() {
     let folder = tempfile::tempdir().unwrap();
-    let built_in = Room::parametric(&RoomSpec {
+    let built_in = XrayRoom::parametric(&RoomSpec {
         point_spacing_mm: 30.0,
         ..Default::default()
     })
     .unwrap();
     let path = folder.path().join("room.ply");
     ppa_mesh::write_cloud_file(&path, &built_in.cloud).unwrap();
-    let recorded = Room::from_ply(&path, built_in.device).unwrap();
+    let recorded = XrayRoom::from_ply(&path, built_in.device).unwrap();
     assert_eq!(recorded.cloud.points, built_in.cloud.points);
     assert!(recorded.mesh.is_none());
-    let missing = Room::from_ply(folder.path().join("no.ply"), built_in.device);
+    let missing = XrayRoom::from_ply(folder.path().join("no.ply"), built_in.device);
     assert!(matches!(missing, Err(RoomError::Ply(_))));
 }

@@ -8,7 +8,7 @@ use ppa_core::text::{count, number};
 use ppa_dataset::Manifest;
 use ppa_dataset::layout::LimbId;
 use ppa_generate::{Case, Plan};
-use ppa_label::{ComputedLabels, GradeThresholds, LabelledLimb, compute_labels};
+use ppa_label::{CaseBones, ComputedLabels, GradeThresholds, LabelledLimb, compute_labels};
 use serde::Serialize;
 
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
@@ -68,7 +68,12 @@ pub fn run(args: &AutoArgs, output: Output) -> anyhow::Result<()> {
             patient: planned.patient,
             side: case.side,
         };
-        compute_labels(&manifest, limb, &case, &thresholds)
+        let bones = CaseBones {
+            limb_kind: case.choices.limb,
+            file: case.bones.as_ref(),
+            volume_sha256: &case.source.volume_sha256,
+        };
+        compute_labels(&manifest, limb, &bones, &thresholds)
             .with_context(|| format!("cannot label by {}", planned.file.display()))
     });
     // All limbs or none: an error in a later one leaves the earlier ones as they were.

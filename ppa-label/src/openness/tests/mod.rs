@@ -8,7 +8,7 @@ mod views;
 use super::*;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Vector3};
 use ppa_ct::Grid;
-use ppa_generate::BoneNumbers;
+use ppa_dataset::labels::BoneNumbers;
 use ppa_phantom::{LowerLeg, Side, Truth};
 
 /// A patient who lies as the scan: LPS has y posterior and z proximal.

@@ -1,0 +1,128 @@
+//! Data flow one way: no circle of imports between the modules of a crate.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Modules at the top of a crate, and the others that each names outside its tests.
+type Imports = BTreeMap<String, BTreeSet<String>>;
+
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap();
+        match path.is_dir() {
+            true if name != "tests" => sources(&path, found),
+            false if name.ends_with(".rs") && !name.ends_with("tests.rs") => found.push(path),
+            _ => {}
+        }
+    }
+}
+
+/// A source without comments and without the tests at its end.
+fn code(path: &Path) -> String {
+    let text = fs::read_to_string(path).unwrap();
+    let text = text.split("#[cfg(test)]\nmod ").next().unwrap();
+    let lines = text.lines().map(|line| line.split("//").next().unwrap());
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// The names that follow a prefix such as `crate::`, those of a braced list included.
+fn names_after(code: &str, prefix: &str) -> BTreeSet<String> {
+    let name = |text: &str| -> String {
+        let is_part = |c: &char| c.is_ascii_lowercase() || c.is_ascii_digit() || *c == '_';
+        text.trim_start().chars().take_while(is_part).collect()
+    };
+    let mut names = BTreeSet::new();
+    for rest in code.split(prefix).skip(1) {
+        match rest.strip_prefix('{') {
+            None => _ = names.insert(name(rest)),
+            Some(list) => {
+                let list = list.split("};").next().unwrap();
+                names.extend(list.split(',').map(name));
+            }
+        }
+    }
+    names
+}
+
+fn imports(src: &Path) -> Imports {
+    let mut files = Vec::new();
+    sources(src, &mut files);
+    let mut imports = Imports::new();
+    for file in files {
+        let parts: Vec<_> = file.strip_prefix(src).unwrap().iter().collect();
+        let module = parts[0]
+            .to_str()
+            .unwrap()
+            .trim_end_matches(".rs")
+            .to_owned();
+        let code = code(&file);
+        let mut names = names_after(&code, "crate::");
+        // `super` is the crate in files beside lib.rs.
+        if parts.len() == 1 {
+            names.extend(names_after(&code, "super::"));
+        }
+        names.remove(&module);
+        if !["lib", "main"].contains(&module.as_str()) {
+            imports.entry(module).or_default().extend(names);
+        }
+    }
+    imports
+}
+
+/// A circle that leads from `path`'s last module back to its first.
+fn circle(imports: &Imports, path: &mut Vec<String>, done: &mut BTreeSet<String>) -> bool {
+    let last = path.last().unwrap().clone();
+    for next in imports.get(&last).into_iter().flatten() {
+        if let Some(at) = path.iter().position(|module| module == next) {
+            path.drain(..at);
+            return true;
+        }
+        if imports.contains_key(next) && !done.contains(next) {
+            path.push(next.clone());
+            if circle(imports, path, done) {
+                return true;
+            }
+            path.pop();
+        }
+    }
+    done.insert(last);
+    false
+}
+
+fn first_circle(imports: &Imports) -> Option<String> {
+    let mut done = BTreeSet::new();
+    let mut starts = imports.keys().map(|module| vec![module.clone()]);
+    let found = starts.find_map(|mut path| circle(imports, &mut path, &mut done).then_some(path));
+    found.map(|path| path.join(" -> "))
+}
+
+#[test]
+fn modules_of_a_crate_import_in_one_direction() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut modules = 0;
+    for entry in fs::read_dir(&root).unwrap() {
+        let crate_root = entry.unwrap().path();
+        let name = crate_root.file_name().unwrap().to_str().unwrap().to_owned();
+        if name.starts_with("ppa-") && crate_root.is_dir() {
+            let imports = imports(&crate_root.join("src"));
+            modules += imports.len();
+            assert_eq!(first_circle(&imports), None, "{name}");
+        }
+    }
+    assert!(modules > 200, "{modules} modules");
+}
+
+#[test]
+fn a_circle_of_three_modules_is_found() {
+    let of = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    let mut imports = Imports::from([
+        ("a".to_owned(), of(&["b"])),
+        ("b".to_owned(), of(&["c"])),
+        ("c".to_owned(), of(&[])),
+    ]);
+    assert_eq!(first_circle(&imports), None);
+    imports.insert("c".to_owned(), of(&["a"]));
+    assert_eq!(first_circle(&imports).unwrap(), "a -> b -> c");
+}
