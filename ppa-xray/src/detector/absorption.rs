@@ -220,14 +220,14 @@ mod tests {
                 continue;
             }
             left += energy_kev;
-            let mut lot = rng.unit();
+            let mut xi = rng.unit();
             for line in layer.material.k_fluorescence(energy_kev) {
-                if lot < line.probability {
+                if xi < line.probability {
                     left -= line.energy_kev;
                     flying.push((depth, 2.0 * rng.unit() - 1.0, line.energy_kev));
                     break;
                 }
-                lot -= line.probability;
+                xi -= line.probability;
             }
         }
         left

@@ -57,8 +57,8 @@ impl Scattered {
         let out = (0..AZIMUTHS).map(|azimuth| {
             let phi = TAU * (azimuth as f64 + 0.5) / AZIMUTHS as f64;
             let down = cos * self.cos + sines * phi.cos();
-            let way = if down > 0.0 { 1.0 - depth } else { depth };
-            (-self.thickness * way / down.abs().max(1e-9)).exp()
+            let path = if down > 0.0 { 1.0 - depth } else { depth };
+            (-self.thickness * path / down.abs().max(1e-9)).exp()
         });
         out.sum::<f64>() / AZIMUTHS as f64
     }

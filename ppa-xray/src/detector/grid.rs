@@ -215,8 +215,8 @@ mod tests {
                     })
                     .count() as f64
                     / steps as f64;
-                let way = height * direction.norm();
-                sum += (-way * (in_strip * strip + (1.0 - in_strip) * space)).exp();
+                let path = height * direction.norm();
+                sum += (-path * (in_strip * strip + (1.0 - in_strip) * space)).exp();
             }
             let marched = sum / rays as f64;
             let found = transmission(&grid, energy_kev, 0.0, direction);

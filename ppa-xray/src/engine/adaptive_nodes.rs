@@ -1,4 +1,7 @@
-//! Single scatter at nodes of the detector, close together where the field bends.
+//! Adaptive grid of next-event estimators: nodes of single scatter, closer together where the field has curvature.
+//!
+//! docs/physics.md, "Fast engine", single scatter. A node is inserted where cubic interpolation from its neighbours misses the estimate
+//! by more than the tolerance.
 
 use rayon::prelude::*;
 
@@ -7,7 +10,7 @@ use crate::engine::first_collisions::ESTIMATES;
 use crate::engine::node_grid::NodeGrid;
 use crate::engine::primary_signal::PrimarySignal;
 use crate::engine::scatter_field::ScatterField;
-use crate::engine::single_scatter::{Scratch, Seen, SingleScatter};
+use crate::engine::single_scatter::{PointSampling, Scratch, Seen, SingleScatter};
 use crate::transport::tally::Moments;
 
 /// Error of the interpolation, relative to the whole signal, beyond which nodes are set closer.
@@ -25,8 +28,8 @@ const BRIGHT: f64 = 0.125;
 
 /// Compton and Rayleigh scatter over the detector, and the largest share of a node that a single collision added.
 ///
-/// Nodes are `step_mm` apart, and half as far where four neighbours do not foretell the one between them. A node in the dark
-/// chooses to see about so many `collisions`.
+/// Nodes are `step_mm` apart, and half as far where the one between four neighbours is not what they predict. A node in the dark
+/// samples `collisions` collisions per list on average.
 pub(crate) fn single_scatter_field(
     scatter: &SingleScatter,
     detector: &Detector,
@@ -40,9 +43,11 @@ pub(crate) fn single_scatter_field(
             .map_init(Scratch::default, |scratch, &node| {
                 let at = grid.place(node);
                 let share = (DARK / primary.relative_at(at).max(1e-9)).clamp(BRIGHT, 1.0);
-                let every = (1.0 / share) as usize;
-                let choices = (share * collisions, every);
-                scatter.at(at, (seed, level << 40 | node as u64), choices, scratch)
+                let sampling = PointSampling {
+                    collisions: share * collisions,
+                    every: (1.0 / share) as usize,
+                };
+                scatter.at(at, (seed, level << 40 | node as u64), sampling, scratch)
             })
             .collect()
     };

@@ -1,4 +1,7 @@
-//! The primary image of the fast engine: more rays where the image has edges, spread over pixel and focal spot at once.
+//! Primary image: adaptive ray tracing, with rays stratified over pixel and focal spot by Hammersley's set.
+//!
+//! Estimator: the mean of exp(−∫µ ds) times energy and response over pixel and spot, docs/physics.md, "Fast engine", primary. Hammersley,
+//! Ann. N. Y. Acad. Sci. 86 (1960) 844.
 
 use nalgebra::Point3;
 use rayon::prelude::*;

@@ -1,4 +1,7 @@
-//! The analog engine: every history as nature plays it.
+//! Analog Monte Carlo: every event has its physical probability, no variance reduction.
+//!
+//! docs/physics.md, "Analog engine and dose". Free paths by delta (Woodcock) tracking with local majorants: Woodcock et al.,
+//! ANL-7050 (1965) 557.
 
 use std::ops::Range;
 
@@ -17,7 +20,7 @@ use crate::image::radiograph::Radiograph;
 use crate::matter::compton::ComptonModel;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::score::{Arrival, Score};
-use crate::transport::tally::{Inbox, MOST_HISTORIES, Tally};
+use crate::transport::tally::{MOST_HISTORIES, Tally, TallyBuffer};
 use crate::transport::tracking::TransportError;
 
 /// How long the analog engine runs.
@@ -126,7 +129,7 @@ struct DetectorScore<'a> {
     response: &'a Response,
     /// Side of the square over which a photon's energy is spread, in pixels.
     spot_pixels: f64,
-    inbox: Inbox<'a>,
+    buffer: TallyBuffer<'a>,
 }
 
 impl<'a> DetectorScore<'a> {
@@ -134,7 +137,7 @@ impl<'a> DetectorScore<'a> {
         Self {
             response: &exposure.response,
             spot_pixels: exposure.readout.spot_pixels(),
-            inbox: Inbox::new(tally),
+            buffer: TallyBuffer::new(tally),
         }
     }
 }
@@ -145,10 +148,10 @@ impl Score for DetectorScore<'_> {
         let Arrival { x_mm, y_mm, .. } = *arrival;
         let energy_kev = self.response.detect(arrival, rng);
         if self.spot_pixels == 0.0 {
-            self.inbox.score(x_mm, y_mm, arrival.category, energy_kev);
+            self.buffer.score(x_mm, y_mm, arrival.category, energy_kev);
         } else {
             let spot = self.spot_pixels;
-            self.inbox
+            self.buffer
                 .spread(x_mm, y_mm, spot, arrival.category, energy_kev);
         }
     }

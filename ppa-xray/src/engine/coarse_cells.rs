@@ -1,4 +1,7 @@
-//! Cubes of voxels that together fit into the cache.
+//! Cubes of voxels whose mean attenuation stands for theirs, few enough for the cache.
+//!
+//! They give optical depths whose bias [`single_scatter`](super::single_scatter) and [`multiple_scatter`](super::multiple_scatter) remove
+//! with a randomly sampled correction.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,8 @@
-//! Where in the body first collisions happen.
+//! Importance sampling of the place of the first collision, from a map of cells over the irradiated body.
+//!
+//! The density is the square root of the summed squared expected contributions to points of the detector, each in units of its
+//! tolerance, mixed with the scattered energy (defensive sampling): Kahn and Harris, NBS Appl. Math. Ser. 12 (1951) 27; Hesterberg,
+//! Technometrics 37 (1995) 185. docs/physics.md, "Fast engine", first collisions.
 
 use nalgebra::{Point2, Point3, Vector3};
 use ppa_core::random::Philox;
@@ -6,10 +10,10 @@ use rayon::prelude::*;
 
 use crate::beam::field::Field;
 use crate::engine::attenuation_basis::{LANES, dot};
+use crate::engine::cdf::Entry;
+use crate::engine::importance::Site;
 use crate::engine::lines::Lines;
-use crate::engine::outlook::Site;
 use crate::engine::paths::Paths;
-use crate::engine::running_sums::Entry;
 use crate::matter::energy_range::{CEILING_KEV, CUTOFF_KEV};
 use crate::transport::tracking::Transport;
 
@@ -31,7 +35,7 @@ const LEAST: f64 = 1e-3;
 /// The irradiated part of the box in cells.
 #[derive(Debug)]
 pub(crate) struct CollisionMap {
-    /// Running sums of how often collisions are drawn in the cells.
+    /// Cumulative sampling density of the cells.
     sums: Vec<f64>,
     field: Field,
     /// Mean mass on the way in and out.
@@ -70,16 +74,16 @@ impl CollisionMap {
             .into_par_iter()
             .map(|cell| map.look(cell, transport, paths, lines))
             .collect();
-        let mut strength = 0.0;
+        let mut weight = 0.0;
         for look in &looked {
             let before = look.mass.iter().flatten();
             for (sum, before) in map.mass.iter_mut().flatten().zip(before) {
                 *sum += before;
             }
-            strength += look.site.strength;
+            weight += look.site.weight;
         }
         // The way out is taken to be as long as the way in.
-        let twice = 2.0 / strength.max(f32::MIN_POSITIVE);
+        let twice = 2.0 / weight.max(f32::MIN_POSITIVE);
         for mean in map.mass.iter_mut().flatten() {
             *mean *= twice;
         }
@@ -88,7 +92,7 @@ impl CollisionMap {
         map
     }
 
-    /// Draws collisions in each cell as often as `importance` says, but for the cells that may have been misjudged.
+    /// Sets the sampling density of the cells from their `importance`, with a share by scattered energy for cells that it underestimates.
     pub fn weigh(&mut self, importance: &[f64]) {
         let mean = |of: &dyn Fn(usize) -> f64| -> f64 {
             (0..self.cells.len())
@@ -97,17 +101,17 @@ impl CollisionMap {
                 .max(f64::MIN_POSITIVE)
                 / self.cells.len() as f64
         };
-        let strength = |cell: usize| f64::from(self.cells[cell].strength);
-        let (important, strong) = (mean(&|cell| importance[cell]), mean(&strength));
+        let weight = |cell: usize| f64::from(self.cells[cell].weight);
+        let (important, strong) = (mean(&|cell| importance[cell]), mean(&weight));
         let both: Vec<f64> = (0..self.cells.len())
             .map(|cell| {
-                (1.0 - STRONG) * importance[cell] / important + STRONG * strength(cell) / strong
+                (1.0 - STRONG) * importance[cell] / important + STRONG * weight(cell) / strong
             })
             .collect();
         self.sums = lent(&both)
             .into_iter()
-            .scan(0.0, |sum, often| {
-                *sum += often.max(LEAST);
+            .scan(0.0, |sum, density| {
+                *sum += density.max(LEAST);
                 Some(*sum)
             })
             .collect();
@@ -117,7 +121,7 @@ impl CollisionMap {
     fn look(&self, cell: usize, transport: &Transport, paths: &Paths, lines: &Lines) -> Look {
         let mut mass = vec![[0.0; LANES]; paths.basis.groups];
         let mut sum_of_mass = mass.clone();
-        let (mut strength, mut strongest) = (0.0, 0.0);
+        let (mut weight, mut strongest) = (0.0, 0.0);
         let (mut material, mut moment) = (0, Vector3::zeros());
         for point in 0..POINTS.pow(3) {
             let inside = [point, point / POINTS, point / (POINTS * POINTS)]
@@ -140,7 +144,7 @@ impl CollisionMap {
             for (sum, mass) in sum_of_mass.iter_mut().flatten().zip(mass.iter().flatten()) {
                 *sum += here as f32 * mass;
             }
-            strength += here;
+            weight += here;
             moment += here * collision.position.coords;
             if here > strongest {
                 (strongest, material) = (here, found);
@@ -151,8 +155,8 @@ impl CollisionMap {
             *sum *= share;
         }
         let centre = self.place(split(cell), [0.5; 3], &Point3::origin(), transport, paths);
-        let middle = if strength > 0.0 {
-            Point3::from(moment / strength)
+        let middle = if weight > 0.0 {
+            Point3::from(moment / weight)
         } else {
             centre.position
         };
@@ -160,8 +164,8 @@ impl CollisionMap {
             site: Site {
                 position: middle.cast(),
                 direction: centre.direction.cast(),
-                strength: (strength / POINTS.pow(3) as f64) as f32,
-                hardness: 1.0,
+                weight: (weight / POINTS.pow(3) as f64) as f32,
+                attenuation_ratio: 1.0,
                 material,
             },
             mass: sum_of_mass,
@@ -238,16 +242,16 @@ fn lent(own: &[f64]) -> Vec<f64> {
         .map(|index| {
             let [i, j, k] = split(index);
             let near = |at: usize, axis: usize| at.saturating_sub(1)..(at + 2).min(CELLS[axis]);
-            let mut strength = own[index];
+            let mut weight = own[index];
             for row in near(j, 1) {
                 for column in near(i, 0) {
                     for depth in near(k, 2) {
                         let neighbour = own[(row * CELLS[0] + column) * CELLS[2] + depth];
-                        strength = strength.max(LENT * neighbour);
+                        weight = weight.max(LENT * neighbour);
                     }
                 }
             }
-            strength
+            weight
         })
         .collect()
 }
@@ -266,7 +270,7 @@ fn mean_energy_behind(lines: &Lines, mass: &[[f32; LANES]]) -> f64 {
 /// What a cell holds.
 struct Look {
     site: Site,
-    /// Mass between source and cell, times the strength.
+    /// Mass between source and cell, times the weight.
     mass: Vec<[f32; LANES]>,
 }
 

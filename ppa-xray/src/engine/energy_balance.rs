@@ -1,4 +1,4 @@
-//! Proof that no history makes or loses energy.
+//! Test: no history creates or loses energy.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_core::random::Philox;

@@ -1,4 +1,6 @@
-//! The fast engine: ray-traced primary, forced detection of scatter, quantum noise on top.
+//! The fast engine: ray-traced primary, next-event estimation (forced detection) of scatter, quantum noise.
+//!
+//! docs/physics.md, "Fast engine". Forced detection: Kalos, Nucl. Sci. Eng. 16 (1963) 111; Williamson, Med. Phys. 14 (1987) 567.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -11,12 +13,12 @@ use crate::engine::adaptive_primary::primary_moments;
 use crate::engine::collision_map::CollisionMap;
 use crate::engine::exposure::Exposure;
 use crate::engine::first_collisions::{ESTIMATES, FirstFlights};
-use crate::engine::later_collisions::{Histories, Tactics};
+use crate::engine::importance::ImportanceModel;
+use crate::engine::later_collisions::{Histories, VarianceReduction};
 use crate::engine::lines::Lines;
 use crate::engine::multiple_scatter::MultipleScatter;
 use crate::engine::node_grid::NodeGrid;
 use crate::engine::noise::{self, ExpectedLayer};
-use crate::engine::outlook::Outlook;
 use crate::engine::paths::Paths;
 use crate::engine::primary_signal::PrimarySignal;
 use crate::engine::raytrace::check_samples;
@@ -103,7 +105,13 @@ pub fn fast(
         moments: &primary,
         open_kev: open_field_ev_cm2 * detector.pixel_cm2() / 1e3,
     };
-    let scatter = Scatter::new(&exposure, &paths, &signal, settings, Tactics::default());
+    let scatter = Scatter::new(
+        &exposure,
+        &paths,
+        &signal,
+        settings,
+        VarianceReduction::default(),
+    );
     let [compton, rayleigh, _] = &scatter.fields;
     let shared = compton.covariance_kev2(rayleigh, detector);
     let scattered = scatter.fields.map(|field| field.on_pixels(detector));
@@ -158,7 +166,7 @@ impl Scatter {
         paths: &Paths,
         primary: &PrimarySignal,
         settings: &FastSettings,
-        tactics: Tactics,
+        variance_reduction: VarianceReduction,
     ) -> Self {
         let transport = &exposure.transport;
         let detector = primary.detector;
@@ -170,23 +178,23 @@ impl Scatter {
             .collect();
         let lines = Lines::new(exposure, paths, &densities, SCATTER_ENERGIES);
         let mut map = CollisionMap::new(transport, paths, &lines);
-        let outlook = Outlook::new(transport, paths, &densities, &map);
-        map.weigh(&outlook.importance(&map.cells, &primary.tolerances(transport)));
+        let importance_model = ImportanceModel::new(transport, paths, &densities, &map);
+        map.weigh(&importance_model.importance(&map.cells, &primary.tolerances(transport)));
         let first = FirstFlights {
             transport,
             paths,
             lines: &lines,
             map: &map,
-            outlook: &outlook,
+            importance_model: &importance_model,
         };
-        let in_all = ESTIMATES as u64 * u64::from(tactics.splitting);
+        let in_all = ESTIMATES as u64 * u64::from(variance_reduction.splitting);
         let listed = settings.scatter_histories.div_ceil(in_all);
         let lists = first.lists(settings.seed, listed);
         let single = SingleScatter {
             transport,
             response: &exposure.response,
             paths,
-            outlook: &outlook,
+            importance_model: &importance_model,
             lines: &lines,
             lists: &lists,
         };
@@ -204,8 +212,8 @@ impl Scatter {
                 paths,
                 lines: &lines,
                 lists: &lists,
-                outlook: &outlook,
-                tactics,
+                importance_model: &importance_model,
+                variance_reduction,
             },
             response: &exposure.response,
             densities: &densities,

@@ -1,12 +1,14 @@
-//! Lists of first collisions, with which all scatter starts.
+//! Lists of first collisions: places by importance sampling, forced (expected) attenuation to each, all energies at once.
+//!
+//! Estimator: the integral over the body of fluence times scattering coefficient, docs/physics.md, "Fast engine", first collisions.
 
 use ppa_core::random::Philox;
 use rayon::prelude::*;
 
 use crate::engine::attenuation_basis::{LANES, dot};
 use crate::engine::collision_map::{Collision, CollisionMap};
+use crate::engine::importance::{ImportanceModel, Site};
 use crate::engine::lines::{Line, Lines};
-use crate::engine::outlook::{Outlook, Site};
 use crate::engine::paths::{BasisMass, Paths};
 use crate::engine::quasi_random::QuasiRandom;
 use crate::transport::stream::Stream;
@@ -26,9 +28,9 @@ pub(crate) struct FirstCollisions {
     /// Photons of every line that get to a site, times the mass that it stands for, site by site. Their sum over a list is an
     /// integral over all sites: mm g/cm³ per history.
     photons: Vec<f32>,
-    /// Photons that scatter at the sites, and running sums of how often histories go on from them.
+    /// Photons that scatter at the sites, and the cumulative number of histories that start there.
     scattered: Vec<f64>,
-    often: Vec<f64>,
+    cdf: Vec<f64>,
 }
 
 /// What is needed to draw first collisions.
@@ -37,7 +39,7 @@ pub(crate) struct FirstFlights<'a> {
     pub paths: &'a Paths<'a>,
     pub lines: &'a Lines,
     pub map: &'a CollisionMap,
-    pub outlook: &'a Outlook<'a>,
+    pub importance_model: &'a ImportanceModel<'a>,
 }
 
 impl FirstFlights<'_> {
@@ -108,10 +110,10 @@ impl FirstFlights<'_> {
         list.sites.push(Site {
             position: collision.position.cast(),
             direction: collision.direction.cast(),
-            strength: arriving as f32,
-            hardness: self
-                .outlook
-                .hardness(energy / arriving.max(f64::MIN_POSITIVE)),
+            weight: arriving as f32,
+            attenuation_ratio: self
+                .importance_model
+                .attenuation_ratio(energy / arriving.max(f64::MIN_POSITIVE)),
             material,
         });
     }
@@ -137,7 +139,7 @@ impl FirstCollisions {
     fn share_out(&mut self) {
         let whole: f64 = self.scattered.iter().sum();
         let mut sum = 0.0;
-        self.often = self
+        self.cdf = self
             .scattered
             .iter()
             .map(|scattered| {
@@ -151,17 +153,13 @@ impl FirstCollisions {
     /// The history at `share` of the way through all that go on: its site, energy, and photons that it stands for if it
     /// were the only one.
     pub fn scattering(&self, share: f64, lines: &Lines) -> (&Site, f64, f64) {
-        let target = share * self.often[self.often.len() - 1];
-        let after = self.often.partition_point(|&sum| sum <= target);
+        let target = share * self.cdf[self.cdf.len() - 1];
+        let after = self.cdf.partition_point(|&sum| sum <= target);
         let index = after.min(self.sites.len() - 1);
         let site = &self.sites[index];
-        let before = if index == 0 {
-            0.0
-        } else {
-            self.often[index - 1]
-        };
-        let often = self.often[index] - before;
-        let inside = (target - before) / often * self.scattered[index];
+        let before = if index == 0 { 0.0 } else { self.cdf[index - 1] };
+        let probability = self.cdf[index] - before;
+        let inside = (target - before) / probability * self.scattered[index];
         let (mut energy_kev, mut sum) = (0.0, 0.0);
         for (line, photons) in self.photons(index, lines) {
             let here = photons * line.scattered[usize::from(site.material)];
@@ -173,7 +171,7 @@ impl FirstCollisions {
                 break;
             }
         }
-        let weight = self.scattered[index] * self.often[self.often.len() - 1] / often;
+        let weight = self.scattered[index] * self.cdf[self.cdf.len() - 1] / probability;
         (site, energy_kev, weight)
     }
 }

@@ -1,4 +1,4 @@
-//! Proof that how the work is done does not change what comes out: splitting, roulette, coarse cells, distance of points.
+//! Test: splitting, roulette, coarse cells and distance of points change no expectation.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;
@@ -8,7 +8,7 @@ use crate::detector::open_field::OpenField;
 use crate::engine::adaptive_primary::primary_moments;
 use crate::engine::exposure::Exposure;
 use crate::engine::fast::{FastSettings, Scatter, fast};
-use crate::engine::later_collisions::Tactics;
+use crate::engine::later_collisions::VarianceReduction;
 use crate::engine::paths::Paths;
 use crate::engine::primary_signal::PrimarySignal;
 use crate::engine::small_limb;
@@ -43,20 +43,24 @@ fn no_expectation_depends_on_how_the_work_is_done() {
         moments: &primary,
         open_kev: open_ev_cm2 * detector.pixel_cm2() / 1e3,
     };
-    let sums = |paths: &Paths, scatter_pixel_mm: f64, tactics: Tactics, seed: u64| -> Sums {
+    let sums = |paths: &Paths,
+                scatter_pixel_mm: f64,
+                variance_reduction: VarianceReduction,
+                seed: u64|
+     -> Sums {
         let settings = FastSettings {
             scatter_histories: 200_000,
             scatter_pixel_mm,
             seed,
             ..FastSettings::default()
         };
-        let scatter = Scatter::new(&exposure, paths, &signal, &settings, tactics);
+        let scatter = Scatter::new(&exposure, paths, &signal, &settings, variance_reduction);
         scatter
             .fields
             .map(|field| field.on_pixels(detector).sum_kev)
     };
-    let usual = Tactics::default();
-    let tactics = |splitting: u32, roulette: f64| Tactics {
+    let usual = VarianceReduction::default();
+    let variance_reduction = |splitting: u32, roulette: f64| VarianceReduction {
         splitting,
         roulette,
     };
@@ -65,10 +69,22 @@ fn no_expectation_depends_on_how_the_work_is_done() {
     let (near, nearer) = (10.0, 7.0);
     let expected = sums(&exact, near, usual, 1);
     let ways = [
-        ("no splitting", sums(&exact, near, tactics(1, 0.05), 2)),
-        ("splitting by 8", sums(&exact, near, tactics(8, 0.05), 3)),
-        ("no roulette", sums(&exact, near, tactics(2, 0.0), 4)),
-        ("much roulette", sums(&exact, near, tactics(2, 1.0), 5)),
+        (
+            "no splitting",
+            sums(&exact, near, variance_reduction(1, 0.05), 2),
+        ),
+        (
+            "splitting by 8",
+            sums(&exact, near, variance_reduction(8, 0.05), 3),
+        ),
+        (
+            "no roulette",
+            sums(&exact, near, variance_reduction(2, 0.0), 4),
+        ),
+        (
+            "much roulette",
+            sums(&exact, near, variance_reduction(2, 1.0), 5),
+        ),
         ("coarse cells", sums(&coarse, near, usual, 6)),
         ("closer points", sums(&exact, nearer, usual, 7)),
     ];

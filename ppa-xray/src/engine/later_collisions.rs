@@ -1,4 +1,6 @@
-//! Histories that go on from first collisions, and where they collide again.
+//! Histories from the first collision on: splitting, survival weighting instead of absorption, and Russian roulette.
+//!
+//! Kahn and Harris, NBS Appl. Math. Ser. 12 (1951) 27; docs/physics.md, "Fast engine", multiple scatter.
 
 use std::ops::Range;
 
@@ -6,8 +8,8 @@ use nalgebra::{Point3, Vector3};
 use ppa_core::random::Philox;
 
 use crate::engine::first_collisions::FirstCollisions;
+use crate::engine::importance::{ImportanceModel, Site};
 use crate::engine::lines::Lines;
-use crate::engine::outlook::{Outlook, Site};
 use crate::engine::paths::{Paths, Step};
 use crate::engine::turn::turned;
 use crate::matter::energy_range::CUTOFF_KEV;
@@ -17,7 +19,7 @@ use crate::transport::tracking::Transport;
 
 /// How weights are kept even. No expectation depends on it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Tactics {
+pub(crate) struct VarianceReduction {
     /// Histories that go on from a listed first collision, on average; more from strong ones, so that all of them have
     /// the same weight.
     pub splitting: u32,
@@ -25,7 +27,7 @@ pub(crate) struct Tactics {
     pub roulette: f64,
 }
 
-impl Default for Tactics {
+impl Default for VarianceReduction {
     fn default() -> Self {
         Self {
             splitting: 2,
@@ -40,11 +42,11 @@ pub(crate) struct Histories<'a> {
     pub paths: &'a Paths<'a>,
     pub lines: &'a Lines,
     pub lists: &'a [FirstCollisions],
-    pub outlook: &'a Outlook<'a>,
-    pub tactics: Tactics,
+    pub importance_model: &'a ImportanceModel<'a>,
+    pub variance_reduction: VarianceReduction,
 }
 
-/// Second and later collisions of the histories from a list. The strength of a site is the weight of its photon over the attenuation
+/// Second and later collisions of the histories from a list. The weight of a site is the weight of its photon over the attenuation
 /// of the material, so that times a scattering coefficient it is what scatters.
 #[derive(Default)]
 pub(crate) struct LaterCollisions {
@@ -70,7 +72,7 @@ impl Histories<'_> {
     /// Histories that go on from every list.
     pub fn each(&self) -> u64 {
         let listed = self.lists.iter().map(|list| list.sites.len()).max();
-        (listed.unwrap_or(0) as u64) * u64::from(self.tactics.splitting)
+        (listed.unwrap_or(0) as u64) * u64::from(self.variance_reduction.splitting)
     }
 
     /// Collisions of some of the `each` histories from a list.
@@ -113,7 +115,7 @@ impl Histories<'_> {
         collisions: &mut LaterCollisions,
         rng: &mut Philox,
     ) {
-        let least = photon.weight * self.tactics.roulette;
+        let least = photon.weight * self.variance_reduction.roulette;
         let mut here = self.at(material, photon.energy_kev);
         while self.scatter(&mut photon, here, rng) {
             let Some(Landing { voxel, distance_mm }) = self.fly(&photon, rng) else {
@@ -126,8 +128,8 @@ impl Histories<'_> {
             collisions.sites.push(Site {
                 position: photon.position.cast(),
                 direction: photon.direction.cast(),
-                strength: (photon.weight / f64::from(c.total)) as f32,
-                hardness: self.outlook.hardness(photon.energy_kev),
+                weight: (photon.weight / f64::from(c.total)) as f32,
+                attenuation_ratio: self.importance_model.attenuation_ratio(photon.energy_kev),
                 material,
             });
             collisions.energies_kev.push(photon.energy_kev as f32);

@@ -1,4 +1,4 @@
-//! The energies that stand for the spectrum, and what the materials do to them.
+//! Energies of the quadrature over the spectrum, with attenuation and scattering of every material at each.
 
 use rayon::prelude::*;
 

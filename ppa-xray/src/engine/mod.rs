@@ -1,10 +1,16 @@
-//! From an exposure to a radiograph: followed photon by photon, or fast.
+//! From an exposure to a radiograph: the analog engine, and the fast engine.
+//!
+//! Fast engine, in the order of its work (docs/physics.md, "Fast engine"): ray-traced primary ([`adaptive_primary`]); first
+//! collisions by importance sampling ([`collision_map`], [`first_collisions`]); single scatter by next-event estimation
+//! ([`single_scatter`]) at nodes of the detector ([`adaptive_nodes`]); further collisions with splitting and Russian roulette
+//! ([`later_collisions`], [`multiple_scatter`]); interpolation between nodes ([`scatter_field`]); quantum noise ([`noise`]).
 
 mod adaptive_nodes;
 mod adaptive_primary;
 pub(crate) mod analog;
 pub(crate) mod analog_image;
 mod attenuation_basis;
+mod cdf;
 mod coarse_cells;
 mod collision_map;
 #[cfg(test)]
@@ -12,6 +18,7 @@ mod energy_balance;
 pub(crate) mod exposure;
 pub(crate) mod fast;
 mod first_collisions;
+mod importance;
 #[cfg(test)]
 mod invariance;
 mod later_collisions;
@@ -19,13 +26,11 @@ mod lines;
 mod multiple_scatter;
 mod node_grid;
 pub(crate) mod noise;
-mod outlook;
 mod paths;
 mod primary_rays;
 mod primary_signal;
 mod quasi_random;
 pub(crate) mod raytrace;
-mod running_sums;
 mod scatter_field;
 #[cfg(test)]
 mod scatter_of_a_sphere;

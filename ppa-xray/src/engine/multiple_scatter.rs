@@ -1,4 +1,6 @@
-//! Photons scattered twice or more: histories whose collisions are seen from nodes of the detector.
+//! Photons scattered twice or more: next-event estimation from the collisions of [`later_collisions`](super::later_collisions).
+//!
+//! Kalos, Nucl. Sci. Eng. 16 (1963) 111; docs/physics.md, "Fast engine", multiple scatter.
 
 use nalgebra::Point3;
 use ppa_core::random::Philox;
@@ -6,9 +8,9 @@ use rayon::prelude::*;
 
 use crate::detector::response::Response;
 use crate::engine::attenuation_basis::LANES;
+use crate::engine::importance::{Draws, PointImportance, Subset};
 use crate::engine::later_collisions::{Histories, LaterCollisions};
 use crate::engine::node_grid::NodeGrid;
-use crate::engine::outlook::View;
 use crate::engine::paths::BasisMass;
 use crate::matter::energy_range::CUTOFF_KEV;
 use crate::matter::scatter_density::ScatterDensities;
@@ -53,7 +55,7 @@ struct NodeSum {
 /// Buffers of one thread.
 #[derive(Default)]
 struct Scratch {
-    view: View,
+    importance: PointImportance,
     mass: Vec<[f32; LANES]>,
 }
 
@@ -105,7 +107,7 @@ impl MultipleScatter<'_> {
         collisions: &[LaterCollisions],
         sights: f64,
         sum: &mut NodeSum,
-        Scratch { view, mass }: &mut Scratch,
+        Scratch { importance, mass }: &mut Scratch,
         rng: &mut Philox,
     ) {
         let at = self.nodes.place(node);
@@ -115,15 +117,18 @@ impl MultipleScatter<'_> {
             self.histories.transport.projection.source_detector_mm,
         );
         mass.resize(self.histories.paths.basis.groups, [0.0; LANES]);
-        view.look(self.histories.outlook, &target);
+        importance.tabulate(self.histories.importance_model, &target);
         for (collisions, part) in collisions.iter().zip(&mut sum.sums) {
-            let choices = (sights, rng.unit());
-            let all = (0, 1);
-            view.choose(
-                self.histories.outlook,
+            let draws = Draws {
+                count: sights,
+                u: rng.unit(),
+            };
+            let all = Subset { first: 0, every: 1 };
+            importance.sample(
+                self.histories.importance_model,
                 &collisions.sites,
                 all,
-                choices,
+                draws,
                 |index, inverse| {
                     let seen = self.sight(&target, collisions, index, mass, rng);
                     // mm² → cm²
@@ -187,10 +192,10 @@ impl MultipleScatter<'_> {
         let mut seen = through(mass);
         if !self.histories.paths.coarse_is_exact() && rng.unit() * f64::from(CHECKED) < 1.0 {
             self.histories.paths.between(&position, target, mass);
-            let often = f64::from(CHECKED);
-            let exact = through(mass).scaled(often);
-            seen = [seen.scaled(1.0 - often), exact].into_iter().sum();
+            let inverse_share = f64::from(CHECKED);
+            let exact = through(mass).scaled(inverse_share);
+            seen = [seen.scaled(1.0 - inverse_share), exact].into_iter().sum();
         }
-        seen.scaled(f64::from(site.strength) * along.z / (r * r * r))
+        seen.scaled(f64::from(site.weight) * along.z / (r * r * r))
     }
 }

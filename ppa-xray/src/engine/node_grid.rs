@@ -1,4 +1,6 @@
-//! Scatter at nodes of the detector plane, and smooth values in between.
+//! Regular grid of nodes on the detector plane with cubic interpolation, exact for polynomials of degree three.
+//!
+//! Keys, IEEE Trans. Acoust. Speech Signal Process. 29 (1981) 1153; docs/physics.md, "Fast engine", between the points.
 
 use nalgebra::Point2;
 

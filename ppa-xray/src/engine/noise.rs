@@ -1,4 +1,6 @@
-//! Quantum noise of an energy-integrating detector.
+//! Quantum noise of an energy-integrating detector: a Poisson number of quanta of ⟨ε²⟩/⟨ε⟩ per layer and pixel.
+//!
+//! docs/physics.md, "Fast engine", noise. Swank, J. Appl. Phys. 44 (1973) 4199, for the moments of the energy.
 
 use ppa_core::random::Philox;
 use rayon::prelude::*;

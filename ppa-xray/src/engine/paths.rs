@@ -1,4 +1,4 @@
-//! Mass along straight paths through the voxels, and through coarser cells that fit into the cache.
+//! Line integrals of mass through the voxels, and through coarser cells: Siddon, Med. Phys. 12 (1985) 252.
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;

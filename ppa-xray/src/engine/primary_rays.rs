@@ -1,4 +1,4 @@
-//! Rays from the focal spot to the detector: how much of what is sent along them arrives.
+//! Deterministic rays from focal spot to detector: transmitted energy and its second moment.
 
 use nalgebra::{Point2, Point3};
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! The primary image as a yardstick: how much scatter, and how much of its error, can be told from the noise.
+//! The primary image as tolerance of the scatter estimate: its quantum noise at each point.
 
 use nalgebra::{Point2, Point3};
 

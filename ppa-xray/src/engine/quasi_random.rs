@@ -1,4 +1,7 @@
-//! Points that fill a cube more evenly than random ones.
+//! Additive recurrence with irrational steps: points of low discrepancy with a random shift.
+//!
+//! Niederreiter, *Random Number Generation and Quasi-Monte Carlo Methods*, 1992, ch. 3; shift: Cranley and Patterson, SIAM J.
+//! Numer. Anal. 13 (1976) 904.
 
 use ppa_core::random::Philox;
 

@@ -1,4 +1,4 @@
-//! Scatter over the whole detector: estimates at nodes, and what the pixels get of them.
+//! Scatter over the whole detector: estimates at nodes interpolated to pixels, with their standard errors.
 
 use crate::beam::projection::Detector;
 use crate::engine::node_grid::NodeGrid;

@@ -1,4 +1,4 @@
-//! Scattering of one material at one energy, by angle.
+//! Differential scattering of one material at one energy, tabulated by angle.
 
 use ppa_core::random::Philox;
 

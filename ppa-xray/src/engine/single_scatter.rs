@@ -1,4 +1,9 @@
-//! Photons scattered once, as a point of the detector sees them.
+//! Photons scattered once: next-event estimation (forced detection) at points of the detector.
+//!
+//! Estimator: a point samples collisions of the lists by its importance model, with systematic sampling, and scores
+//! w · dσ/dΩ · exp(−∫µ ds) · cos θ / r² · response for each. Coarse cells give the optical depth; a quarter of the samples add the exact value minus
+//! the coarse one, times four (two-level estimator: Giles, Oper. Res. 56 (2008) 607), so the expectation is that of the voxels.
+//! Kalos, Nucl. Sci. Eng. 16 (1963) 111; docs/physics.md, "Fast engine", single scatter.
 
 use nalgebra::{Point2, Point3, Vector3};
 use ppa_core::random::Philox;
@@ -6,8 +11,8 @@ use ppa_core::random::Philox;
 use crate::detector::response::Response;
 use crate::engine::attenuation_basis::{LANES, dot};
 use crate::engine::first_collisions::{ESTIMATES, FirstCollisions};
+use crate::engine::importance::{Draws, ImportanceModel, PointImportance, Subset};
 use crate::engine::lines::Lines;
-use crate::engine::outlook::{Outlook, View};
 use crate::engine::paths::{BasisMass, Paths};
 use crate::engine::scatter_table::ScatterTable;
 use crate::matter::energy_range::CUTOFF_KEV;
@@ -15,11 +20,11 @@ use crate::transport::stream::Stream;
 use crate::transport::tally::Moments;
 use crate::transport::tracking::Transport;
 
-/// One choice in so many is also seen through the voxels themselves; the difference, so many times, makes up for what
-/// the coarse cells get wrong on average.
+/// One sample in so many is repeated through the voxels themselves; the difference, times that number, corrects the bias of
+/// the coarse cells.
 const CHECKED: u32 = 4;
 
-/// What a point of the detector sees.
+/// Estimates at a point of the detector.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Seen {
     /// Energy per cm² and history that Compton and Rayleigh scatter leave in the detector.
@@ -28,24 +33,33 @@ pub(crate) struct Seen {
     pub largest_share: f64,
 }
 
-/// First collisions as points of the detector see them.
+/// Next-event estimation from first collisions.
 pub(crate) struct SingleScatter<'a> {
     pub transport: &'a Transport<'a>,
     pub response: &'a Response,
     pub paths: &'a Paths<'a>,
-    pub outlook: &'a Outlook<'a>,
+    pub importance_model: &'a ImportanceModel<'a>,
     pub lines: &'a Lines,
     pub lists: &'a [FirstCollisions],
+}
+
+/// How a point samples the collisions of each list.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PointSampling {
+    /// Mean number of collisions sampled.
+    pub collisions: f64,
+    /// Only every so many-th of the list takes part.
+    pub every: usize,
 }
 
 /// Buffers of one thread.
 #[derive(Default)]
 pub(crate) struct Scratch {
-    view: View,
+    importance: PointImportance,
     mass: Vec<[f32; LANES]>,
 }
 
-/// A collision as one point sees it.
+/// A collision and the direction from it to the point.
 struct Sight<'a> {
     list: &'a FirstCollisions,
     site: usize,
@@ -55,20 +69,19 @@ struct Sight<'a> {
 }
 
 impl SingleScatter<'_> {
-    /// What a point of the detector sees of about `collisions` collisions that it chooses from every so many-th of each
-    /// list.
+    /// Scatter at a point of the detector.
     ///
     /// Point `index` of a seed has the same random numbers whatever is computed beside it.
     pub fn at(
         &self,
         at: Point2<f64>,
         (seed, index): (u64, u64),
-        (collisions, every): (f64, usize),
-        Scratch { view, mass }: &mut Scratch,
+        PointSampling { collisions, every }: PointSampling,
+        Scratch { importance, mass }: &mut Scratch,
     ) -> Seen {
         let target = Point3::new(at.x, at.y, self.transport.projection.source_detector_mm);
         mass.resize(self.paths.basis.groups, [0.0; LANES]);
-        view.look(self.outlook, &target);
+        importance.tabulate(self.importance_model, &target);
         let rough = !self.paths.coarse_is_exact();
         let mut result = Seen::default();
         let (mut largest, mut whole) = (0.0_f64, 0.0);
@@ -76,13 +89,15 @@ impl SingleScatter<'_> {
         for (list, sum) in self.lists.iter().zip(&mut result.estimates) {
             let first = (rng.unit() * every as f64) as usize;
             let mut until_check = (rng.unit() * f64::from(CHECKED)) as u32;
-            let choices = (collisions, rng.unit());
-            let which = (first, every);
-            view.choose(
-                self.outlook,
+            let draws = Draws {
+                count: collisions,
+                u: rng.unit(),
+            };
+            importance.sample(
+                self.importance_model,
                 &list.sites,
-                which,
-                choices,
+                Subset { first, every },
+                draws,
                 |site, inverse| {
                     let exact = rough && until_check == 0;
                     until_check = until_check.checked_sub(1).unwrap_or(CHECKED - 1);
@@ -127,11 +142,14 @@ impl SingleScatter<'_> {
         let mut seen = self.energies(&sight, mass);
         if exact {
             self.paths.between(&position, target, mass);
-            let often = f64::from(CHECKED);
+            let inverse_share = f64::from(CHECKED);
             for (rough, exact) in seen.iter_mut().zip(self.energies(&sight, mass)) {
-                *rough = [rough.scaled(1.0 - often), exact.scaled(often)]
-                    .into_iter()
-                    .sum();
+                *rough = [
+                    rough.scaled(1.0 - inverse_share),
+                    exact.scaled(inverse_share),
+                ]
+                .into_iter()
+                .sum();
             }
         }
         seen.map(|part| part.scaled(along.z / (r * r * r)))

@@ -1,4 +1,4 @@
-//! The spectra of the source as a few energies.
+//! Gauss quadrature of the spectrum between absorption edges: Golub and Welsch, Math. Comp. 23 (1969) 221.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 

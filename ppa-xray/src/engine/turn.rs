@@ -1,4 +1,4 @@
-//! Directions after scattering.
+//! Rotation of a direction by scattering angle and azimuth.
 
 use std::f64::consts::TAU;
 

@@ -39,17 +39,19 @@ impl Compton {
         }
     }
 
-    /// Energy in keV of a photon scattered by sin²(θ/2) = `half`.
+    /// Energy in keV of a photon scattered by sin²(θ/2) = `sin2_half_theta`.
     #[inline]
     pub(crate) fn sample_energy(
         &self,
         energy_kev: f32,
-        half: f32,
+        sin2_half_theta: f32,
         uniform: impl FnMut() -> f32,
     ) -> f32 {
         match self {
-            Self::ImpulseApproximation(impulse) => impulse.sample_energy(energy_kev, half, uniform),
-            Self::IncoherentFunction(_) => off_resting(energy_kev, half),
+            Self::ImpulseApproximation(impulse) => {
+                impulse.sample_energy(energy_kev, sin2_half_theta, uniform)
+            }
+            Self::IncoherentFunction(_) => off_resting(energy_kev, sin2_half_theta),
         }
     }
 

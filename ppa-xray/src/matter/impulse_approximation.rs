@@ -99,17 +99,20 @@ impl ImpulseApproximation {
     #[inline]
     pub(crate) fn sample(&self, energy_kev: f32, mut uniform: impl FnMut() -> f32) -> (f32, f32) {
         for _ in 0..PATIENCE {
-            let (half, electron) = self.attempt(energy_kev, uniform(), uniform());
-            let scattered = electron.outcome(energy_kev, half, uniform(), uniform());
+            let (sin2_half_theta, electron) = self.attempt(energy_kev, uniform(), uniform());
+            let scattered = electron.outcome(energy_kev, sin2_half_theta, uniform(), uniform());
             if scattered > TURNED_DOWN {
-                return (half, scattered);
+                return (sin2_half_theta, scattered);
             }
             if scattered == TURNED_DOWN {
-                return (half, self.sample_energy(energy_kev, half, uniform));
+                return (
+                    sin2_half_theta,
+                    self.sample_energy(energy_kev, sin2_half_theta, uniform),
+                );
             }
         }
-        let half = self.angles.half_angle_squared(energy_kev, uniform());
-        (half, off_resting(energy_kev, half))
+        let sin2_half_theta = self.angles.half_angle_squared(energy_kev, uniform());
+        (sin2_half_theta, off_resting(energy_kev, sin2_half_theta))
     }
 
     /// sin²(θ/2) of Klein–Nishina and an electron, whether or not the photon can free it at that angle.
@@ -120,41 +123,47 @@ impl ImpulseApproximation {
         u_angle: f32,
         u_shell: f32,
     ) -> (f32, BoundElectron) {
-        let half = self.angles.half_angle_squared(energy_kev, u_angle);
-        (half, self.electron(u_shell))
+        let sin2_half_theta = self.angles.half_angle_squared(energy_kev, u_angle);
+        (sin2_half_theta, self.electron(u_shell))
     }
 
     /// Energy of a photon scattered by a given angle.
     pub(crate) fn sample_energy(
         &self,
         energy_kev: f32,
-        half: f32,
+        sin2_half_theta: f32,
         mut uniform: impl FnMut() -> f32,
     ) -> f32 {
-        if half == 0.0 {
+        if sin2_half_theta == 0.0 {
             return energy_kev; // straight on no electron can be freed
         }
         for trial in 0..PATIENCE {
             let scattered = if trial < TRIALS {
                 let electron = self.electron(uniform());
-                electron.outcome(energy_kev, half, uniform(), uniform())
+                electron.outcome(energy_kev, sin2_half_theta, uniform(), uniform())
             } else {
-                let Some((electron, share)) = self.electron_freed(energy_kev, half, uniform())
+                let Some((electron, share)) =
+                    self.electron_freed(energy_kev, sin2_half_theta, uniform())
                 else {
                     break;
                 };
-                electron.outcome(energy_kev, half, uniform() * share, uniform())
+                electron.outcome(energy_kev, sin2_half_theta, uniform() * share, uniform())
             };
             if scattered > TURNED_DOWN {
                 return scattered;
             }
         }
-        off_resting(energy_kev, half)
+        off_resting(energy_kev, sin2_half_theta)
     }
 
     /// An electron of a shell by f n(p_max), and n(p_max): for angles so small that hardly one can be freed.
-    fn electron_freed(&self, energy_kev: f32, half: f32, u: f32) -> Option<(BoundElectron, f32)> {
-        let freed = |electron: &BoundElectron| electron.share_freed(energy_kev, half);
+    fn electron_freed(
+        &self,
+        energy_kev: f32,
+        sin2_half_theta: f32,
+        u: f32,
+    ) -> Option<(BoundElectron, f32)> {
+        let freed = |electron: &BoundElectron| electron.share_freed(energy_kev, sin2_half_theta);
         let all: f32 = self.shells.iter().map(|(f, e)| f * freed(e)).sum();
         let mut left = u * all;
         self.shells.iter().find_map(|(f, electron)| {
@@ -177,9 +186,9 @@ impl ImpulseApproximation {
 impl BoundElectron {
     /// p_max = a/√b: a = E (E − U)(1 − cos θ)/mc² − U and b = 2 E (E − U)(1 − cos θ) + U².
     #[inline(always)]
-    fn limit(&self, energy_kev: f32, half: f32) -> (f32, f32) {
+    fn limit(&self, energy_kev: f32, sin2_half_theta: f32) -> (f32, f32) {
         let binding = self.binding_kev;
-        let transfer = 4.0 * energy_kev * (energy_kev - binding) * half;
+        let transfer = 4.0 * energy_kev * (energy_kev - binding) * sin2_half_theta;
         (
             transfer * (0.5 / ELECTRON_REST_KEV) as f32 - binding,
             transfer + binding * binding,
@@ -187,8 +196,8 @@ impl BoundElectron {
     }
 
     /// n(p_max): share of such electrons that the photon can free.
-    fn share_freed(&self, energy_kev: f32, half: f32) -> f32 {
-        let (limit, squared) = self.limit(energy_kev, half);
+    fn share_freed(&self, energy_kev: f32, sin2_half_theta: f32) -> f32 {
+        let (limit, squared) = self.limit(energy_kev, sin2_half_theta);
         if self.binding_kev >= energy_kev || squared == 0.0 {
             return 0.0;
         }
@@ -202,14 +211,20 @@ impl BoundElectron {
     ///
     /// Where the electron could be freed moving either way, F chooses the way instead of rejecting: the two F add up to 2.
     #[inline(always)]
-    pub(crate) fn outcome(&self, energy_kev: f32, half: f32, u_momentum: f32, u_way: f32) -> f32 {
+    pub(crate) fn outcome(
+        &self,
+        energy_kev: f32,
+        sin2_half_theta: f32,
+        u_momentum: f32,
+        u_sign: f32,
+    ) -> f32 {
         // Share of the profile beyond ±p: exp(½ (1 − (1 + 2 J₀|p|)²)).
         let tail = 2.0 * u_momentum.min(1.0 - u_momentum);
         let reach = (1.0 - 2.0 * ln(tail.max(SMALLEST_TAIL))).sqrt();
         let size = self.momentum * (reach - 1.0);
         let t = size * size;
         // −|p| ≤ p_max or |p| ≤ p_max, without the roots.
-        let (limit, squared) = self.limit(energy_kev, half);
+        let (limit, squared) = self.limit(energy_kev, sin2_half_theta);
         let (beyond, below) = (t * squared >= limit * limit, t * squared <= limit * limit);
         let either_way = (limit >= 0.0) & below;
         let backwards = (u_momentum < 0.5) & ((limit >= 0.0) | beyond);
@@ -217,20 +232,24 @@ impl BoundElectron {
         // With D = E/E_C and κ = E/mc²: (D q_C/E)² = (D − 1)² + 4 D s, s = sin²(θ/2), and
         // a = (q_C/E)(1 + τ (τ − cos θ) E²/q_C²) = ((D q_C/E)² + 2 s (D − κ)) / (D² q_C/E) ≥ 0.
         let kappa = energy_kev * (1.0 / ELECTRON_REST_KEV) as f32;
-        let d = 1.0 + 2.0 * kappa * half;
-        let vector = (d - 1.0) * (d - 1.0) + 4.0 * d * half;
-        let slope = (vector + 2.0 * half * (d - kappa)) * size.min(LARGEST_CORRECTED);
-        let lot = if either_way { 2.0 * u_way - 1.0 } else { u_way };
-        let below_slope = lot * d * vector.sqrt() < slope;
+        let d = 1.0 + 2.0 * kappa * sin2_half_theta;
+        let vector = (d - 1.0) * (d - 1.0) + 4.0 * d * sin2_half_theta;
+        let slope = (vector + 2.0 * sin2_half_theta * (d - kappa)) * size.min(LARGEST_CORRECTED);
+        let xi = if either_way {
+            2.0 * u_sign - 1.0
+        } else {
+            u_sign
+        };
+        let below_slope = xi * d * vector.sqrt() < slope;
         let p = if either_way & below_slope {
             size
         } else {
             -size
         };
         // Root of the quadratic for E′ at given p, its cancelling terms collected.
-        let sin_squared = 4.0 * half * (1.0 - half);
+        let sin_squared = 4.0 * sin2_half_theta * (1.0 - sin2_half_theta);
         let shift = p * (vector - t * sin_squared).max(0.0).sqrt();
-        let scattered = energy_kev * (d - t * (1.0 - 2.0 * half) + shift) / (d * d - t);
+        let scattered = energy_kev * (d - t * (1.0 - 2.0 * sin2_half_theta) + shift) / (d * d - t);
         if !freed {
             NOT_FREED
         } else if below_slope & !either_way {
@@ -243,17 +262,17 @@ impl BoundElectron {
 
 /// E′ of an electron at rest.
 #[inline(always)]
-pub(crate) fn off_resting(energy_kev: f32, half: f32) -> f32 {
-    energy_kev / (1.0 + energy_kev * half * (2.0 / ELECTRON_REST_KEV) as f32)
+pub(crate) fn off_resting(energy_kev: f32, sin2_half_theta: f32) -> f32 {
+    energy_kev / (1.0 + energy_kev * sin2_half_theta * (2.0 / ELECTRON_REST_KEV) as f32)
 }
 
 /// Σ f Θ(E − U) n(p_max), the electrons that take part at an angle.
-pub(crate) fn electrons_freed(shells: &[Shell], energy_kev: f64, half: f64) -> f64 {
+pub(crate) fn electrons_freed(shells: &[Shell], energy_kev: f64, sin2_half_theta: f64) -> f64 {
     shells
         .iter()
         .filter(|shell| shell.binding_kev < energy_kev)
         .map(|shell| {
-            let transfer = 4.0 * energy_kev * (energy_kev - shell.binding_kev) * half;
+            let transfer = 4.0 * energy_kev * (energy_kev - shell.binding_kev) * sin2_half_theta;
             let limit = 0.5 * transfer / ELECTRON_REST_KEV - shell.binding_kev;
             let size = (transfer + shell.binding_kev * shell.binding_kev).sqrt();
             if size == 0.0 {

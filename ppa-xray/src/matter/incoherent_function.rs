@@ -56,12 +56,12 @@ impl IncoherentFunction {
         let x_backwards = (energy * (1.0 / HC_KEV_ANGSTROM)).powi(2);
         let bound = self.at(x_backwards);
         loop {
-            let half = self.angles.half_angle_squared(energy_kev, uniform());
+            let sin2_half_theta = self.angles.half_angle_squared(energy_kev, uniform());
             let threshold = f64::from(uniform()) * bound;
-            if threshold <= self.at(x_backwards * f64::from(half)) {
-                let cos = 1.0 - 2.0 * f64::from(half);
+            if threshold <= self.at(x_backwards * f64::from(sin2_half_theta)) {
+                let cos = 1.0 - 2.0 * f64::from(sin2_half_theta);
                 let ratio = energy_ratio(energy * (1.0 / ELECTRON_REST_KEV), cos);
-                return (half, (energy * ratio) as f32);
+                return (sin2_half_theta, (energy * ratio) as f32);
             }
         }
     }

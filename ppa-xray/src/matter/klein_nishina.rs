@@ -105,9 +105,10 @@ mod tests {
             let samples = 20_000;
             for i in 0..samples {
                 let u = (f64::from(i) + 0.5) / f64::from(samples);
-                let half = f64::from(table.half_angle_squared(energy_kev as f32, u as f32));
-                assert!((0.0..=1.0).contains(&half));
-                let cos = 1.0 - 2.0 * half;
+                let sin2_half_theta =
+                    f64::from(table.half_angle_squared(energy_kev as f32, u as f32));
+                assert!((0.0..=1.0).contains(&sin2_half_theta));
+                let cos = 1.0 - 2.0 * sin2_half_theta;
                 let ratio = energy_ratio(energy_kev / ELECTRON_REST_KEV, cos);
                 for (sum, value) in sampled.iter_mut().zip([1.0, cos, cos * cos, ratio]) {
                     *sum += value;

@@ -84,10 +84,10 @@ impl Rayleigh {
         let wavelength = HC_KEV_ANGSTROM as f32 / energy_kev;
         let per_x = wavelength * wavelength;
         loop {
-            let half = (self.x(1.0 - uniform() * within) * per_x).min(1.0);
-            let cos = 1.0 - 2.0 * half;
+            let sin2_half_theta = (self.x(1.0 - uniform() * within) * per_x).min(1.0);
+            let cos = 1.0 - 2.0 * sin2_half_theta;
             if 2.0 * uniform() < 1.0 + cos * cos {
-                return half;
+                return sin2_half_theta;
             }
         }
     }

@@ -73,8 +73,8 @@ impl MaterialTables {
     /// sin²(θ/2) of a Rayleigh scattering angle, with numbers of `uniform` in [0, 1).
     #[inline]
     pub fn rayleigh_scattering(&self, energy_kev: f64, mut uniform: impl FnMut() -> f64) -> f64 {
-        let half = self.rayleigh.sample(energy_kev as f32, || uniform() as f32);
-        f64::from(half)
+        let sin2_half_theta = self.rayleigh.sample(energy_kev as f32, || uniform() as f32);
+        f64::from(sin2_half_theta)
     }
 
     /// sin²(θ/2) of a Compton scattering angle and the energy of the scattered photon in keV, with numbers of `uniform` in
@@ -85,8 +85,12 @@ impl MaterialTables {
         energy_kev: f64,
         mut uniform: impl FnMut() -> f64,
     ) -> (f64, f64) {
-        let (half, scattered_kev) = self.compton.sample(energy_kev as f32, || uniform() as f32);
-        (f64::from(half), f64::from(scattered_kev).min(energy_kev))
+        let (sin2_half_theta, scattered_kev) =
+            self.compton.sample(energy_kev as f32, || uniform() as f32);
+        (
+            f64::from(sin2_half_theta),
+            f64::from(scattered_kev).min(energy_kev),
+        )
     }
 
     /// Energy in keV of the K photon that follows photoelectric absorption, if one does above 5 keV; it leaves in any
@@ -105,10 +109,10 @@ impl MaterialTables {
         cos_theta: f64,
         mut uniform: impl FnMut() -> f64,
     ) -> f64 {
-        let half = (0.5 * (1.0 - cos_theta)) as f32;
+        let sin2_half_theta = (0.5 * (1.0 - cos_theta)) as f32;
         let sampled = self
             .compton
-            .sample_energy(energy_kev as f32, half, || uniform() as f32);
+            .sample_energy(energy_kev as f32, sin2_half_theta, || uniform() as f32);
         f64::from(sampled).min(energy_kev)
     }
 
@@ -138,8 +142,9 @@ impl MaterialTables {
     /// Cosine of a Compton scattering angle and the energy of the scattered photon in keV.
     #[inline]
     pub(crate) fn sample_compton(&self, energy_kev: f64, random: &mut Philox) -> (f64, f64) {
-        let (half, scattered_kev) = self.compton_scattering(energy_kev, || random.unit());
-        (1.0 - 2.0 * half, scattered_kev)
+        let (sin2_half_theta, scattered_kev) =
+            self.compton_scattering(energy_kev, || random.unit());
+        (1.0 - 2.0 * sin2_half_theta, scattered_kev)
     }
 }
 
@@ -199,12 +204,12 @@ mod tests {
     ///
     /// E′ from its defining equation, p = (E E′(1 − cos θ) − mc²(E − E′)) / (c q), by bisection instead of the sampler's
     /// closed form; F as in the sampler.
-    fn mean_shift(shells: &[Shell], energy_kev: f64, half: f64, steps: u32) -> f64 {
-        let (m, cos) = (ELECTRON_REST_KEV, 1.0 - 2.0 * half);
-        let tau = 1.0 / (1.0 + 2.0 * energy_kev / m * half);
+    fn mean_shift(shells: &[Shell], energy_kev: f64, sin2_half_theta: f64, steps: u32) -> f64 {
+        let (m, cos) = (ELECTRON_REST_KEV, 1.0 - 2.0 * sin2_half_theta);
+        let tau = 1.0 / (1.0 + 2.0 * energy_kev / m * sin2_half_theta);
         let momentum = |e: f64| {
             let q = (energy_kev * energy_kev + e * e - 2.0 * energy_kev * e * cos).sqrt();
-            (energy_kev * e * 2.0 * half / m - (energy_kev - e)) / q
+            (energy_kev * e * 2.0 * sin2_half_theta / m - (energy_kev - e)) / q
         };
         let q_c = (1.0 + tau * tau - 2.0 * tau * cos).sqrt();
         let a = q_c + tau * (tau - cos) / q_c;
@@ -320,20 +325,28 @@ mod tests {
         for name in ["water", "bone_cortical", "lead"] {
             let material = Material::named(name).unwrap();
             let tables = MaterialTables::new(&material, ComptonModel::default());
-            for (energy_kev, half) in [10.0, 60.0]
-                .into_iter()
-                .flat_map(|energy_kev| [2e-4, 0.02, 0.5].map(|half| (energy_kev, half)))
-            {
+            for (energy_kev, sin2_half_theta) in [10.0, 60.0].into_iter().flat_map(|energy_kev| {
+                [2e-4, 0.02, 0.5].map(|sin2_half_theta| (energy_kev, sin2_half_theta))
+            }) {
                 let mut shift = Moment::default();
-                let resting = energy_kev / (1.0 + 2.0 * energy_kev / ELECTRON_REST_KEV * half);
+                let resting =
+                    energy_kev / (1.0 + 2.0 * energy_kev / ELECTRON_REST_KEV * sin2_half_theta);
                 for index in 0..SAMPLES {
                     let mut random = Philox::new(3, 0, index);
-                    let cos = 1.0 - 2.0 * half;
+                    let cos = 1.0 - 2.0 * sin2_half_theta;
                     let sampled = tables.compton_energy_at(energy_kev, cos, || random.unit());
                     shift.add(sampled / resting);
                 }
-                let z = shift.z(mean_shift(&material.shells(), energy_kev, half, 1000));
-                assert!(z.abs() < 4.5, "{name}, {energy_kev} keV, {half}: {z:.1}");
+                let z = shift.z(mean_shift(
+                    &material.shells(),
+                    energy_kev,
+                    sin2_half_theta,
+                    1000,
+                ));
+                assert!(
+                    z.abs() < 4.5,
+                    "{name}, {energy_kev} keV, {sin2_half_theta}: {z:.1}"
+                );
             }
         }
     }

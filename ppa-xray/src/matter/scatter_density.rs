@@ -69,11 +69,15 @@ impl ScatterDensities {
         let integrals = |relative: &dyn Fn(f64, f64) -> f64| -> Vec<f32> {
             let nodes = densities.energies.nodes();
             nodes
-                .map(|energy| over_the_sphere(|half| relative(energy, half)) as f32)
+                .map(|energy| {
+                    over_the_sphere(|sin2_half_theta| relative(energy, sin2_half_theta)) as f32
+                })
                 .collect()
         };
-        let rayleigh_integral = integrals(&|energy, half| densities.rayleigh(energy, half));
-        let compton_integral = integrals(&|energy, half| densities.compton(energy, half));
+        let rayleigh_integral =
+            integrals(&|energy, sin2_half_theta| densities.rayleigh(energy, sin2_half_theta));
+        let compton_integral =
+            integrals(&|energy, sin2_half_theta| densities.compton(energy, sin2_half_theta));
         densities.rayleigh_integral = rayleigh_integral;
         densities.compton_integral = compton_integral;
         densities
@@ -102,17 +106,17 @@ impl ScatterDensities {
         low + fraction * (high - low)
     }
 
-    /// F² (1 + cos²θ) at sin²(θ/2) = `half`.
+    /// F² (1 + cos²θ) at sin²(θ/2) = `sin2_half_theta`.
     #[inline]
-    fn rayleigh(&self, energy_kev: f64, half: f64) -> f64 {
-        let cos = 1.0 - 2.0 * half;
-        self.form_factor.at(q_squared(energy_kev, half)) * (1.0 + cos * cos)
+    fn rayleigh(&self, energy_kev: f64, sin2_half_theta: f64) -> f64 {
+        let cos = 1.0 - 2.0 * sin2_half_theta;
+        self.form_factor.at(q_squared(energy_kev, sin2_half_theta)) * (1.0 + cos * cos)
     }
 
     /// Klein–Nishina times the electrons that take part.
     #[inline]
-    fn compton(&self, energy_kev: f64, half: f64) -> f64 {
-        let x = q_squared(energy_kev, half);
+    fn compton(&self, energy_kev: f64, sin2_half_theta: f64) -> f64 {
+        let x = q_squared(energy_kev, sin2_half_theta);
         let electrons = if let [only] = self.electrons.as_slice() {
             only.at(x)
         } else {
@@ -120,13 +124,13 @@ impl ScatterDensities {
             let [low, high] = [row, row + 1].map(|row| self.electrons[row].at(x));
             low + fraction * (high - low)
         };
-        differential(energy_kev, 1.0 - 2.0 * half) * electrons
+        differential(energy_kev, 1.0 - 2.0 * sin2_half_theta) * electrons
     }
 }
 
 #[inline]
-fn q_squared(energy_kev: f64, half: f64) -> f64 {
-    half * (energy_kev * (1.0 / HC_KEV_ANGSTROM)).powi(2)
+fn q_squared(energy_kev: f64, sin2_half_theta: f64) -> f64 {
+    sin2_half_theta * (energy_kev * (1.0 / HC_KEV_ANGSTROM)).powi(2)
 }
 
 /// Integral over all directions by Simpson's rule in s = sin(θ/2), in which forward peaks are wide; dΩ = 8π s ds.
@@ -243,7 +247,9 @@ mod tests {
                 let mut counts = [[0_u32; BINS]; 2];
                 for index in 0..SAMPLES {
                     let mut random = Philox::new(17, 0, index);
-                    let bin = |half: f64| ((half.sqrt() * BINS as f64) as usize).min(BINS - 1);
+                    let bin = |sin2_half_theta: f64| {
+                        ((sin2_half_theta.sqrt() * BINS as f64) as usize).min(BINS - 1)
+                    };
                     let rayleigh = tables.rayleigh_scattering(energy_kev, || random.unit());
                     counts[0][bin(rayleigh)] += 1;
                     let (compton, _) = tables.compton_scattering(energy_kev, || random.unit());

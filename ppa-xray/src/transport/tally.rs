@@ -105,12 +105,12 @@ struct Hit {
 /// Cells are hit all over the detector, mostly out of cache: reading the cells of all hits first lets these waits overlap,
 /// which the additions, each a locked instruction, would not.
 #[derive(Debug)]
-pub(crate) struct Inbox<'a> {
+pub(crate) struct TallyBuffer<'a> {
     tally: &'a Tally,
     hits: Vec<Hit>,
 }
 
-impl<'a> Inbox<'a> {
+impl<'a> TallyBuffer<'a> {
     const ROOM: usize = 128;
 
     pub fn new(tally: &'a Tally) -> Self {
@@ -172,7 +172,7 @@ impl<'a> Inbox<'a> {
     }
 }
 
-impl Drop for Inbox<'_> {
+impl Drop for TallyBuffer<'_> {
     fn drop(&mut self) {
         self.hand_over();
     }
@@ -274,11 +274,11 @@ mod tests {
             extent_mm: [3.0; 2],
         };
         let tally = Tally::new(raster);
-        let mut inbox = Inbox::new(&tally);
-        inbox.spread(0.4, -0.3, 0.9, Category::Rayleigh, 60.0);
-        inbox.spread(1.49, 1.49, 0.9, Category::Rayleigh, 40.0);
-        inbox.spread(1.6, 0.0, 0.9, Category::Rayleigh, 30.0);
-        drop(inbox);
+        let mut buffer = TallyBuffer::new(&tally);
+        buffer.spread(0.4, -0.3, 0.9, Category::Rayleigh, 60.0);
+        buffer.spread(1.49, 1.49, 0.9, Category::Rayleigh, 40.0);
+        buffer.spread(1.6, 0.0, 0.9, Category::Rayleigh, 30.0);
+        drop(buffer);
         let total = tally.total(Category::Rayleigh, 1);
         assert!((total.mean_kev - 100.0).abs() < 1e-4, "{}", total.mean_kev);
         assert!(

@@ -124,21 +124,25 @@ fn advance(space: &Box32, flights: &mut Flights, blocks: &Blocks, steps: &mut St
         let bound = blocks.bound[i];
         let collide = flights.depth[i] / bound;
         let plane = flights.to_plane_mm[i];
-        let way = least(least(leave, collide), plane);
-        flights.depth[i] -= way * bound;
-        flights.to_plane_mm[i] = plane - way;
+        let distance_mm = least(least(leave, collide), plane);
+        flights.depth[i] -= distance_mm * bound;
+        flights.to_plane_mm[i] = plane - distance_mm;
         let mut inside = true;
         for axis in 0..3 {
-            let moved = flights.position[axis][i] + flights.slope[axis][i] * way;
+            let moved = flights.position[axis][i] + flights.slope[axis][i] * distance_mm;
             // Rounding must neither leave the cube early, not even onto its far wall, nor fail to leave it.
             let kept = least(greatest(moved, low[axis]), high[axis] * (1.0 - 1.2e-7));
-            let place = if exit[axis] <= way { wall[axis] } else { kept };
+            let place = if exit[axis] <= distance_mm {
+                wall[axis]
+            } else {
+                kept
+            };
             inside &= (place >= 0.0) & (place < size[axis]);
             flights.position[axis][i] = place;
             steps.voxel[axis][i] = floor(least(kept, high[axis] - 1.0)).1;
         }
         let tentative = (collide < leave) & (collide < plane);
-        let out = (plane <= way) | !inside;
+        let out = (plane <= distance_mm) | !inside;
         steps.outcome[i] = if tentative {
             Steps::TENTATIVE
         } else if out {

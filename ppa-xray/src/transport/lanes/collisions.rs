@@ -64,18 +64,18 @@ impl Lanes<'_, '_> {
                 .attenuation
                 .at(code.material(), photon.energy);
             let density = code.density_g_cm3();
-            let lot = unit(self.draws.block[0][i]) * blocks.bound[lane];
+            let xi = unit(self.draws.block[0][i]) * blocks.bound[lane];
             self.flights.depth[lane] = depths[i];
-            let absorbed = lot < density * sums.photoelectric;
-            let not_rayleigh = lot < density * sums.with_compton;
+            let absorbed = xi < density * sums.photoelectric;
+            let not_rayleigh = xi < density * sums.with_compton;
             compton.push_if(i, not_rayleigh & !absorbed);
-            rayleigh.push_if(i, (lot < density * sums.total) & !not_rayleigh);
+            rayleigh.push_if(i, (xi < density * sums.total) & !not_rayleigh);
             if absorbed {
                 let slot = usize::from(photon.slot);
                 let energy_kev = f64::from(photon.energy_kev);
-                let lot = unit(self.draws.block[3][i]);
+                let xi = unit(self.draws.block[3][i]);
                 let tables = &self.transport.samplers[usize::from(code.material())];
-                if let Some(line_kev) = tables.k_fluorescence(energy_kev, lot.into()) {
+                if let Some(line_kev) = tables.k_fluorescence(energy_kev, xi.into()) {
                     let left_kev = self.emit_k_ray(lane, line_kev);
                     score.deposit(slot, site[i].voxel, left_kev);
                     k_rays.push_if(i, true);

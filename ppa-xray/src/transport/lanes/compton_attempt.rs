@@ -11,7 +11,7 @@ use crate::transport::lanes::isa::Kernel;
 pub(super) struct Attempts {
     pub energy_kev: Each<f32>,
     /// sin²(θ/2).
-    pub half: Each<f32>,
+    pub sin2_half_theta: Each<f32>,
     /// Of the struck electron, as `momentum`.
     pub binding_kev: Each<f32>,
     pub momentum: Each<f32>,
@@ -23,7 +23,7 @@ impl Attempts {
     pub fn new() -> Self {
         Self {
             energy_kev: [0.0; LANES],
-            half: [0.0; LANES],
+            sin2_half_theta: [0.0; LANES],
             binding_kev: [0.0; LANES],
             momentum: [0.0; LANES],
             scattered_kev: [0.0; LANES],
@@ -36,7 +36,7 @@ pub(super) struct Attempt<'a> {
     pub attempts: &'a mut Attempts,
     /// Random words.
     pub momentum: &'a Each<u32>,
-    pub way: &'a Each<u32>,
+    pub sign_word: &'a Each<u32>,
     pub count: usize,
 }
 
@@ -46,23 +46,23 @@ impl Kernel for Attempt<'_> {
         attempt(
             self.attempts,
             self.momentum,
-            self.way,
+            self.sign_word,
             self.count.min(LANES),
         );
     }
 }
 
 #[inline(always)]
-fn attempt(attempts: &mut Attempts, momentum: &Each<u32>, way: &Each<u32>, count: usize) {
+fn attempt(attempts: &mut Attempts, momentum: &Each<u32>, sign_word: &Each<u32>, count: usize) {
     for i in 0..count {
         let electron = BoundElectron {
             binding_kev: attempts.binding_kev[i],
             momentum: attempts.momentum[i],
         };
-        let (energy_kev, half) = (attempts.energy_kev[i], attempts.half[i]);
+        let (energy_kev, sin2_half_theta) = (attempts.energy_kev[i], attempts.sin2_half_theta[i]);
         // In the middle of steps of 2⁻²³: neither 0 nor 1, whose momentum would be infinite.
         let u = ((momentum[i] >> 9) as i32 as f32 + 0.5) * (1.0 / 8_388_608.0);
-        let scattered = electron.outcome(energy_kev, half, u, unit(way[i]));
+        let scattered = electron.outcome(energy_kev, sin2_half_theta, u, unit(sign_word[i]));
         attempts.scattered_kev[i] = least(scattered, energy_kev);
     }
 }

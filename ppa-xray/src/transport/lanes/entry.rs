@@ -39,9 +39,9 @@ fn aim(space: &Box32, flights: &mut Flights, count: usize) {
         }
         let height = row[0] * x + row[1] * y + row[2] * z + row[3];
         let forward = direction[2];
-        let way = (plane - height) / forward;
+        let distance_mm = (plane - height) / forward;
         flights.to_plane_mm[i] = if forward > 0.0 {
-            greatest(way, 0.0)
+            greatest(distance_mm, 0.0)
         } else {
             f32::INFINITY
         };
@@ -96,14 +96,14 @@ fn enter(space: &Box32, flights: &mut Flights, meets: &mut Each<u32>, count: usi
             last = least(last, greatest(a, b));
         }
         let met = first < last;
-        let way = if met { first } else { 0.0 };
+        let distance_mm = if met { first } else { 0.0 };
         for axis in 0..3 {
-            let at = flights.position[axis][i] + flights.slope[axis][i] * way;
+            let at = flights.position[axis][i] + flights.slope[axis][i] * distance_mm;
             // The largest number below the far wall still lies in the box.
             let within = least(greatest(at, 0.0), size[axis] * (1.0 - 1.2e-7));
             flights.position[axis][i] = if met { within } else { at };
         }
-        flights.to_plane_mm[i] -= way;
+        flights.to_plane_mm[i] -= distance_mm;
         meets[i] = u32::from(met);
     }
 }

@@ -33,14 +33,14 @@ impl Lanes<'_, '_> {
         let slot = usize::from(photon.slot);
         let energy_kev = f64::from(photon.energy_kev);
         if to_plane_mm.is_finite() {
-            let way = f64::from(to_plane_mm);
+            let distance_mm = f64::from(to_plane_mm);
             let direction = Vector3::from(direction.map(f64::from));
             let [x, y, z] = position.map(f64::from);
             let m = &self.mm_from_cell;
             let mm = |row: usize| m[(row, 0)] * x + m[(row, 1)] * y + m[(row, 2)] * z + m[(row, 3)];
             let arrival = Arrival {
-                x_mm: mm(0) + direction.x * way,
-                y_mm: mm(1) + direction.y * way,
+                x_mm: mm(0) + direction.x * distance_mm,
+                y_mm: mm(1) + direction.y * distance_mm,
                 direction,
                 energy_kev,
                 category: photon.category,

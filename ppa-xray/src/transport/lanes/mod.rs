@@ -5,7 +5,6 @@
 //! seed and its index, so the company it travels in changes nothing.
 
 mod advance;
-mod boarding;
 mod collisions;
 mod compton_attempt;
 mod draws;
@@ -17,6 +16,7 @@ mod isa;
 mod picked;
 mod plain_beam;
 mod scattering;
+mod spawning;
 mod turn;
 
 use std::ops::Range;
@@ -26,12 +26,12 @@ use ppa_core::random::Philox;
 
 use crate::transport::attenuation::EnergyNode;
 use crate::transport::lanes::advance::{Advance, Blocks, Locate, Steps};
-use crate::transport::lanes::boarding::Waiting;
 use crate::transport::lanes::draws::{Draw, Draws};
 use crate::transport::lanes::flights::{Box32, Each, Flights};
 use crate::transport::lanes::isa::Isa;
 use crate::transport::lanes::picked::Picked;
 use crate::transport::lanes::scattering::Scattering;
+use crate::transport::lanes::spawning::Waiting;
 use crate::transport::majorants::Region;
 use crate::transport::score::Score;
 use crate::transport::stream::Stream;
@@ -134,7 +134,7 @@ impl<'a, 'p> Lanes<'a, 'p> {
     fn run(mut self, score: &mut impl Score) {
         let mut blocks = Blocks::new();
         let mut steps = Steps::new();
-        while self.count < LANES && self.board(self.count, score) {
+        while self.count < LANES && self.spawn(self.count, score) {
             self.count += 1;
         }
         while self.count > 0 {

@@ -62,8 +62,8 @@ impl Lanes<'_, '_> {
         self.draw(&lanes);
         self.attempt_compton(&scattered[..compton]);
         for (n, site) in scattered[..compton].iter().enumerate() {
-            let (half, scattered_kev) = self.compton(site, n);
-            self.scattering.turns.cos_theta[n] = 1.0 - 2.0 * half;
+            let (sin2_half_theta, scattered_kev) = self.compton(site, n);
+            self.scattering.turns.cos_theta[n] = 1.0 - 2.0 * sin2_half_theta;
             let photon = &mut self.photons[site.lane()];
             let slot = usize::from(photon.slot);
             let before_kev = f64::from(photon.energy_kev);
@@ -119,9 +119,9 @@ impl Lanes<'_, '_> {
             let tables = &self.transport.samplers[usize::from(site.code.material())];
             let [angle, shell, ..] = self.draws.block(n);
             match tables.attempt_compton(energy_kev, unit(angle), unit(shell)) {
-                Some((half, electron)) => {
+                Some((sin2_half_theta, electron)) => {
                     attempts.energy_kev[n] = energy_kev;
-                    attempts.half[n] = half;
+                    attempts.sin2_half_theta[n] = sin2_half_theta;
                     attempts.binding_kev[n] = electron.binding_kev;
                     attempts.momentum[n] = electron.momentum;
                 }
@@ -132,7 +132,7 @@ impl Lanes<'_, '_> {
         self.isa.run(Attempt {
             attempts,
             momentum: &self.draws.block[2],
-            way: &self.draws.block[3],
+            sign_word: &self.draws.block[3],
             count: sites.len().next_multiple_of(16),
         });
     }
@@ -140,24 +140,24 @@ impl Lanes<'_, '_> {
     /// sin²(θ/2) and the energy in keV after Compton scattering; what an attempt leaves open is drawn anew.
     #[inline(always)]
     fn compton(&mut self, site: &Site, n: usize) -> (f32, f32) {
-        let half = self.scattering.attempts.half[n];
+        let sin2_half_theta = self.scattering.attempts.sin2_half_theta[n];
         let scattered_kev = self.scattering.attempts.scattered_kev[n];
         if scattered_kev > 0.0 {
-            return (half, scattered_kev);
+            return (sin2_half_theta, scattered_kev);
         }
-        self.compton_anew(site, (scattered_kev == 0.0).then_some(half))
+        self.compton_anew(site, (scattered_kev == 0.0).then_some(sin2_half_theta))
     }
 
     #[cold]
     #[inline(never)]
-    fn compton_anew(&mut self, site: &Site, half: Option<f32>) -> (f32, f32) {
+    fn compton_anew(&mut self, site: &Site, sin2_half_theta: Option<f32>) -> (f32, f32) {
         let photon = &self.photons[site.lane()];
         let energy_kev = f64::from(photon.energy_kev);
         let mut rng = self.generator(photon);
         let tables = &self.transport.samplers[usize::from(site.code.material())];
-        let (cos_theta, scattered_kev) = match half {
-            Some(half) => {
-                let cos_theta = 1.0 - 2.0 * f64::from(half);
+        let (cos_theta, scattered_kev) = match sin2_half_theta {
+            Some(sin2_half_theta) => {
+                let cos_theta = 1.0 - 2.0 * f64::from(sin2_half_theta);
                 let scattered_kev = tables.compton_energy_at(energy_kev, cos_theta, || rng.unit());
                 (cos_theta, scattered_kev)
             }

@@ -71,8 +71,8 @@ fn plain_history(transport: &Transport, rng: &mut Philox, ends: &mut Ends) {
             .attenuation
             .at(material, transport.attenuation.locate(energy_kev));
         let tables = &transport.samplers[usize::from(material)];
-        let lot = rng.unit() as f32 * sums.total;
-        let cos_theta = if lot < sums.photoelectric {
+        let xi = rng.unit() as f32 * sums.total;
+        let cos_theta = if xi < sums.photoelectric {
             let Some(line_kev) = tables.k_fluorescence(energy_kev, rng.unit()) else {
                 return ends.add(0, energy_kev);
             };
@@ -81,7 +81,7 @@ fn plain_history(transport: &Transport, rng: &mut Philox, ends: &mut Ends) {
             category = Category::Multiple;
             order = 1;
             2.0 * rng.unit() - 1.0
-        } else if lot < sums.with_compton {
+        } else if xi < sums.with_compton {
             let (cos_theta, left_kev) = tables.sample_compton(energy_kev, rng);
             if left_kev < CUTOFF_KEV {
                 return ends.add(0, energy_kev);

@@ -1,4 +1,4 @@
-//! Running sums of weights, to draw by.
+//! Sampling from a discrete distribution by its cumulative sums.
 
 use std::ops::Range;
 

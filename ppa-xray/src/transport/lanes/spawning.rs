@@ -24,21 +24,21 @@ pub(super) struct Waiting {
 }
 
 impl Lanes<'_, '_> {
-    /// Fills the lanes of ended histories; at the end of the range, closes up.
+    /// Fills the lanes of ended histories; compacts the lanes at the end of the range.
     pub(super) fn replace(&mut self, ended: &Picked, score: &mut impl Score) {
         let mut empty = Picked::new();
         for lane in ended.iter() {
-            let filled = self.board(lane, score);
+            let filled = self.spawn(lane, score);
             empty.push_if(lane, !filled);
         }
         if empty.count > 0 {
-            self.close_up(&mut empty);
+            self.compact(&mut empty);
         }
     }
 
     /// Moves the last photons into the `empty` lanes.
     #[cold]
-    fn close_up(&mut self, empty: &mut Picked) {
+    fn compact(&mut self, empty: &mut Picked) {
         empty.lanes[..empty.count].sort_unstable();
         for lane in empty.iter().rev() {
             self.count -= 1;
@@ -51,7 +51,7 @@ impl Lanes<'_, '_> {
     }
 
     /// Puts the next photon that meets the box into `lane`; false once the range is used up.
-    pub(super) fn board(&mut self, lane: usize, score: &mut impl Score) -> bool {
+    pub(super) fn spawn(&mut self, lane: usize, score: &mut impl Score) -> bool {
         let slot = self.photons[lane].slot;
         loop {
             if self.waiting.next == self.waiting.count && !self.emit() {
@@ -71,8 +71,8 @@ impl Lanes<'_, '_> {
             } else if self.waiting.meets[next] == 0 {
                 let position = each(&flights.position, next);
                 let direction = each(&flights.direction, next);
-                let way = flights.to_plane_mm[next];
-                self.exit(&photon, position, direction, way, score);
+                let distance_mm = flights.to_plane_mm[next];
+                self.exit(&photon, position, direction, distance_mm, score);
             } else {
                 self.photons[lane] = photon;
                 self.flights.put(lane, flights.at(next));

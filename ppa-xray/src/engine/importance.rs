@@ -1,4 +1,8 @@
-//! What collisions can be expected to send to a point of the detector, and which of them to look at closely.
+//! Importance model of a detector point: the approximate expected contribution of a collision, to sample collisions by.
+//!
+//! Approximation: one energy, optical depths interpolated from a table of rays from the point. It is used as a sampling density only, mixed
+//! with the unattenuated contribution (defensive sampling, Hesterberg, Technometrics 37 (1995) 185), so estimates stay unbiased.
+//! docs/physics.md, "Fast engine", single scatter.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
@@ -11,39 +15,39 @@ use crate::matter::scatter_density::ScatterDensities;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::tracking::Transport;
 
-/// Rays per side of a view, and depths along each.
+/// Rays per side of the table of a point, and depths along each.
 const RAYS: usize = 32;
 const DEPTHS: usize = 64;
 
-/// Share of the choices that heeds no attenuation, so that no weight grows beyond bounds where a view errs.
+/// Share of the samples drawn without regard to attenuation, which bounds the weights where the model underestimates.
 const DEFENSIVE: f64 = 0.1;
 
-/// What all views share.
-pub(crate) struct Outlook<'a> {
+/// What the importance of all points has in common.
+pub(crate) struct ImportanceModel<'a> {
     paths: &'a Paths<'a>,
     /// Attenuation of the coarse cells at the typical energy, 1/mm.
     mu_per_mm: Vec<f32>,
     /// Scattering at the typical energy, by material.
     scattering: Vec<ScatterTable>,
     corners: [Point3<f64>; 8],
-    /// What photons mostly have in their way, and its attenuation at the typical energy.
+    /// Mean mass on the way of the photons, and its attenuation at the typical energy.
     mass: Vec<[f32; LANES]>,
     typical_exponent: f32,
 }
 
-/// A photon about to scatter.
+/// A photon about to scatter: a collision site.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Site {
     pub position: Point3<f32>,
     pub direction: Vector3<f32>,
-    /// What is scattered, relative to the sites beside it.
-    pub strength: f32,
-    /// Attenuation on the way out over that at the typical energy.
-    pub hardness: f32,
+    /// Statistical weight relative to the other sites.
+    pub weight: f32,
+    /// Attenuation coefficient of the outgoing photon over that at the typical energy.
+    pub attenuation_ratio: f32,
     pub material: u8,
 }
 
-impl<'a> Outlook<'a> {
+impl<'a> ImportanceModel<'a> {
     /// The typical energy is that of photons that get through.
     pub fn new(
         transport: &Transport,
@@ -74,7 +78,7 @@ impl<'a> Outlook<'a> {
     }
 
     /// Attenuation at an energy over that at the typical energy.
-    pub fn hardness(&self, energy_kev: f64) -> f32 {
+    pub fn attenuation_ratio(&self, energy_kev: f64) -> f32 {
         if self.typical_exponent > 0.0 {
             self.paths.basis.exponent(&self.mass, energy_kev) / self.typical_exponent
         } else {
@@ -83,21 +87,21 @@ impl<'a> Outlook<'a> {
     }
 }
 
-impl Outlook<'_> {
-    /// How much each site matters to points of the detector with given tolerances: the root of the sum of the squares of
-    /// what it can be expected to send to each, in units of its tolerance.
+impl ImportanceModel<'_> {
+    /// Importance of each site for points of the detector with given tolerances: the root of the summed squares of its
+    /// expected contributions, each in units of the tolerance.
     ///
-    /// Sites drawn that often leave the least sum of squared errors in those units.
+    /// Sampling in proportion to it minimises the sum of squared errors in those units.
     pub fn importance(&self, sites: &[Site], points: &[(Point3<f64>, f64)]) -> Vec<f64> {
         // Fixed groups in fixed order: the sum is the same for any number of threads.
         let squares: Vec<Vec<f64>> = points
             .par_chunks(16)
-            .map_init(View::default, |view, points| {
+            .map_init(PointImportance::default, |importance, points| {
                 let mut sums = vec![0.0; sites.len()];
                 for (target, tolerance) in points {
-                    view.look(self, target);
+                    importance.tabulate(self, target);
                     for (sum, site) in sums.iter_mut().zip(sites) {
-                        let seen = f64::from(view.expected(self, site)[1]) / tolerance;
+                        let seen = f64::from(importance.expected(self, site)[1]) / tolerance;
                         *sum += seen * seen;
                     }
                 }
@@ -110,11 +114,25 @@ impl Outlook<'_> {
     }
 }
 
-/// The body as one point of the detector sees it: optical depths along rays from there, at the typical energy.
+/// Every `every`-th site from `first` on.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Subset {
+    pub first: usize,
+    pub every: usize,
+}
+
+/// A systematic sample: the mean number of draws, and its random start in [0, 1).
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Draws {
+    pub count: f64,
+    pub u: f64,
+}
+
+/// Importance of collisions for one point of the detector: a table of optical depths along rays from there, at the typical energy.
 ///
 /// Directions are counted in stereographic coordinates, which have no pole on this side of the detector plane.
 #[derive(Debug)]
-pub(crate) struct View {
+pub(crate) struct PointImportance {
     target: Point3<f32>,
     low: [f32; 2],
     /// Rays per unit of the coordinates.
@@ -122,11 +140,11 @@ pub(crate) struct View {
     near_mm: f32,
     depths_per_mm: f32,
     depths: Vec<f32>,
-    /// For every site: what it would send with nothing in the way, and what with what there is.
+    /// Expected contribution of every site without and with attenuation.
     expected: Vec<[f32; 2]>,
 }
 
-impl Default for View {
+impl Default for PointImportance {
     fn default() -> Self {
         Self {
             target: Point3::origin(),
@@ -140,11 +158,11 @@ impl Default for View {
     }
 }
 
-impl View {
-    /// Looks at the body from `target`.
-    pub fn look(&mut self, outlook: &Outlook, target: &Point3<f64>) {
+impl PointImportance {
+    /// Tabulates the optical depths of the body from `target`.
+    pub fn tabulate(&mut self, importance_model: &ImportanceModel, target: &Point3<f64>) {
         self.target = target.cast();
-        let corners = outlook.corners.map(|corner| corner - target);
+        let corners = importance_model.corners.map(|corner| corner - target);
         let middle: Vector3<f64> = corners.iter().sum::<Vector3<f64>>() / 8.0;
         let radius_mm = (corners[0] - middle).norm();
         let near_mm = (middle.norm() - radius_mm).max(0.0);
@@ -170,12 +188,12 @@ impl View {
             let square = x * x + y * y;
             let direction = Vector3::new(2.0 * x, 2.0 * y, square - 1.0) / (1.0 + square);
             let (mut depth, mut next) = (0.0_f32, 0);
-            outlook.paths.coarse_pieces(
+            importance_model.paths.coarse_pieces(
                 target,
                 &direction,
                 near_mm + step_mm * DEPTHS as f64,
                 |cell, from_mm, to_mm| {
-                    let mu = outlook.mu_per_mm[cell];
+                    let mu = importance_model.mu_per_mm[cell];
                     while next < DEPTHS {
                         let at_mm = near_mm + step_mm * next as f64;
                         if at_mm >= to_mm {
@@ -192,22 +210,24 @@ impl View {
         }
     }
 
-    /// Chooses sites by what they can be expected to send here, `count` in the mean, by even steps from a start that `u`
-    /// stands for; tells the index of each and the inverse of how often it can be expected to be chosen.
+    /// Samples sites in proportion to their expected contribution, `count` on average, by systematic sampling with the random
+    /// start `u`; passes on the index of each and its weight, the inverse of the expected number of times it is drawn.
     ///
-    /// Only every so many-th site from `first` on is considered.
-    pub fn choose(
+    /// Only sites `first`, `first + every` and so on take part.
+    pub fn sample(
         &mut self,
-        outlook: &Outlook,
+        importance_model: &ImportanceModel,
         sites: &[Site],
-        (first, every): (usize, usize),
-        (count, u): (f64, f64),
+        subset: Subset,
+        draws: Draws,
         mut chosen: impl FnMut(usize, f64),
     ) {
+        let Subset { first, every } = subset;
+        let Draws { count, u } = draws;
         let mut expected = std::mem::take(&mut self.expected);
         expected.clear();
         let considered = sites.iter().skip(first).step_by(every);
-        expected.extend(considered.map(|site| self.expected(outlook, site)));
+        expected.extend(considered.map(|site| self.expected(importance_model, site)));
         let mut sums = [0.0_f64; 2];
         for both in &expected {
             sums[0] += f64::from(both[0]);
@@ -233,17 +253,20 @@ impl View {
     }
 
     #[inline]
-    fn expected(&self, outlook: &Outlook, site: &Site) -> [f32; 2] {
+    fn expected(&self, importance_model: &ImportanceModel, site: &Site) -> [f32; 2] {
         let along = self.target - site.position;
         let square = along.norm_squared();
         let r = square.sqrt();
         let cos_theta = f64::from(along.dot(&site.direction) / r);
-        let scattering =
-            outlook.scattering[usize::from(site.material)].at(ScatterTable::locate(cos_theta));
-        let bare = site.strength
+        let scattering = importance_model.scattering[usize::from(site.material)]
+            .at(ScatterTable::locate(cos_theta));
+        let bare = site.weight
             * (scattering.compton + scattering.rayleigh) as f32
             * (along.z / (r * square)).max(0.0);
-        [bare, bare * (-self.depth(&along, r) * site.hardness).exp()]
+        [
+            bare,
+            bare * (-self.depth(&along, r) * site.attenuation_ratio).exp(),
+        ]
     }
 
     /// Optical depth between here and a site, `along` from there to here.
