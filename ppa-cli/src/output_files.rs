@@ -97,7 +97,7 @@ impl OutputFiles {
                 "{named} exists: give --replace to replace it, or choose another name"
             );
             let target = path.metadata().unwrap_or(found);
-            ensure!(target.is_file(), "{named} is no regular file");
+            ensure!(target.is_file(), "{named} is not a regular file");
         }
         self.declare(option, path)
     }
@@ -136,7 +136,7 @@ impl OutputFiles {
         } else {
             ensure!(
                 path.symlink_metadata().is_err(),
-                "{named} exists and is no folder: choose another name"
+                "{named} exists and is not a folder: choose another name"
             );
         }
         // `out/` and `out` are one folder.
@@ -231,7 +231,7 @@ fn try_folder(folder: &Path) -> io::Result<()> {
     let nearest = whole.ancestors().find(|path| path.exists());
     let nearest = nearest.unwrap_or(&whole);
     if !nearest.is_dir() {
-        let text = format!("{} is no folder", nearest.display());
+        let text = format!("{} is not a folder", nearest.display());
         return Err(io::Error::new(io::ErrorKind::NotADirectory, text));
     }
     let mut probe = tempfile::tempfile_in(nearest)?;
@@ -318,7 +318,7 @@ mod tests {
         assert!(!folder.path().join("nowhere").exists());
         fs::write(folder.path().join("nowhere"), "a file").unwrap();
         let refused = said(outputs(false).file("--out", &path, &[]));
-        assert!(refused.contains("nowhere is no folder"), "{refused}");
+        assert!(refused.contains("nowhere is not a folder"), "{refused}");
     }
 
     #[test]

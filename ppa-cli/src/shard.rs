@@ -71,7 +71,8 @@ fn shard_named(
     let part = |rank: u64, count: u64, by: &'static str| {
         let part = rank.checked_add(1).map(|k| format!("{k}/{count}"));
         let part = part.and_then(|text| text.parse().ok());
-        let part = part.with_context(|| format!("{by}: rank {rank} of {count} is no shard"))?;
+        let part =
+            part.with_context(|| format!("{by}: rank {rank} of {count} is not a valid shard"))?;
         anyhow::Ok(Named { part, by })
     };
     let mut named = Vec::new();
@@ -250,7 +251,7 @@ mod tests {
         assert_eq!(named(None, &fewer), Ok("2/2".into()));
         let one = format!("{} SLURM_STEP_NUM_TASKS=1", step(0, 0));
         assert_eq!(named(None, &one), Ok("1/1".into()));
-        // A batch script is no task of a step.
+        // A batch script is not a task of a step.
         assert_eq!(
             named(None, "SLURM_PROCID=0 SLURM_NTASKS=3"),
             Ok("1/1".into())

@@ -16,7 +16,7 @@ fn ppa(folder: &Path, arguments: &str) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_ppa"));
     let arguments = arguments.split_whitespace();
     let out = command.current_dir(folder).args(arguments).output();
-    told(out.unwrap());
+    report(out.unwrap());
 }
 
 /// Runs a script in Python with `folder` as current folder; what it prints.
@@ -24,10 +24,10 @@ fn python(folder: &Path, script: &str) -> String {
     let program = std::env::var_os("PPA_PYTHON").unwrap_or_else(|| "python3".into());
     let mut command = Command::new(program);
     let out = command.current_dir(folder).args(["-c", script]).output();
-    told(out.unwrap())
+    report(out.unwrap())
 }
 
-fn told(out: std::process::Output) -> String {
+fn report(out: std::process::Output) -> String {
     let stderr = String::from_utf8_lossy(&out.stderr);
     assert!(out.status.success(), "{stderr}");
     String::from_utf8(out.stdout).unwrap()
@@ -163,8 +163,8 @@ assert not [name for name in bag.entries if "grades.csv" in name]
 samples = list(webdataset.WebDataset(sorted(glob.glob("shards/*.tar")), shardshuffle=False))
 assert len(samples) == 3 * 2
 assert all({"left.png", "right.png", "xray.png", "json"} <= set(sample) for sample in samples)
-told = [json.loads(sample["json"]) for sample in samples]
-assert sorted({row["step"] for row in told}) == [0, 5, 10]
+report = [json.loads(sample["json"]) for sample in samples]
+assert sorted({row["step"] for row in report}) == [0, 5, 10]
 "#;
     python(exported(), script);
 }

@@ -1,4 +1,4 @@
-//! What `ppa ct info` tells about a scan.
+//! What `ppa ct info` prints about a scan.
 
 use serde::Serialize;
 

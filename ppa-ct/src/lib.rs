@@ -1,7 +1,7 @@
 //! CT volumes in Hounsfield units with a typed voxel-to-world affine.
 //!
 //! [`read`] turns a DICOM series or a NIfTI, NRRD or MetaImage file into a [`Scan`] with a
-//! [`Volume`], or refuses it with the reason; [`write()`] writes one; [`Info`] tells the facts and
+//! [`Volume`], or refuses it with the reason; [`write()`] writes one; [`Info`] lists the facts and
 //! [`audit`] whether the scan is what one thinks.
 //! A [`Volume`] is cropped, resampled ([`Volume::resampled`]) and set upright ([`Volume::upright`]).
 //!

@@ -16,7 +16,7 @@ pub fn read(path: &Path) -> Result<Scan, ReadError> {
     read_with(path, &ReadOptions::default())
 }
 
-/// Reads a CT as told.
+/// Reads a CT with options.
 ///
 /// DICOM slices are sorted by their position along the slice normal; names and instance numbers
 /// are ignored. Subfolders are searched when the folder itself has no DICOM image. A tilted gantry

@@ -183,7 +183,7 @@ fn linear_taps(place: f64, count: usize) -> Taps<2> {
     [(base, 1.0 - t), ((base + 1).min(count - 1), t)]
 }
 
-/// Weights of the four nearest centres; beyond the ends values go on in a straight line.
+/// Weights of the four nearest centres; beyond the ends values continue in a straight line.
 fn cubic_taps(place: f64, count: usize) -> Taps<4> {
     let base = (place as usize).min(count.saturating_sub(2));
     let t = place - base as f64;

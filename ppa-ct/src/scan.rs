@@ -24,7 +24,7 @@ pub struct Scan {
     pub warnings: Vec<Warning>,
 }
 
-/// A DICOM series, told apart without its UID.
+/// A DICOM series, identified without its UID.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SeriesSummary {
     /// Series Number, if the source has one.
@@ -37,7 +37,7 @@ pub struct SeriesSummary {
     pub size: [usize; 2],
     /// Whether this is the series that was read.
     pub read: bool,
-    /// Why it cannot be read, if one of its images is no slice of a CT: in colour, or without a place.
+    /// Why it cannot be read, if one of its images is not a slice of a CT: in colour, or without a place.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refused: Option<String>,
 }

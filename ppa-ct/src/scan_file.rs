@@ -159,7 +159,7 @@ impl ScanFile {
         Ok(())
     }
 
-    /// Leaves out `count` bytes; tells whether any of them is not 0.
+    /// Leaves out `count` bytes; returns whether any of them is not 0.
     pub(crate) fn skip_filled(&mut self, count: u64) -> Result<bool, ReadError> {
         let (mut left, mut filled) = (count, false);
         while left > 0 {

@@ -62,8 +62,8 @@ fn holds_something(folder: &Path) -> io::Result<bool> {
 }
 
 fn beside(to: &Path) -> Result<PathBuf, FileError> {
-    let name = to
-        .file_name()
-        .ok_or_else(|| FileError::at("write", to)(io::Error::other("it is no name of a folder")))?;
+    let name = to.file_name().ok_or_else(|| {
+        FileError::at("write", to)(io::Error::other("the folder name is invalid"))
+    })?;
     Ok(to.with_file_name(format!(".{}.unfinished", name.to_string_lossy())))
 }

@@ -40,7 +40,7 @@ pub enum CoverageError {
     /// The radius is zero, negative or not finite.
     #[error("radius around the joint is {0} mm, expected a positive number")]
     Radius(f64),
-    /// The angle is no angle of incidence.
+    /// The angle is not an angle of incidence.
     #[error("largest angle of incidence is {0} degrees, expected more than 0 and less than 90")]
     Angle(f64),
     /// The mesh has no triangle there.

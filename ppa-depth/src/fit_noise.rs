@@ -42,7 +42,7 @@ pub enum FitError {
     Pixels(usize),
     /// The noise is too small to be seen.
     #[error(
-        "the depths vary enough to be told from rounding in {0} of 20 classes of signal only, expected 4: record surfaces further away"
+        "the depths vary enough to be distinguished from rounding in {0} of 20 classes of signal only, expected 4: record surfaces further away"
     )]
     Quiet(usize),
     /// All pixels have the same signal.
@@ -63,7 +63,7 @@ const ROUNDING_MM2: f64 = 1.0 / 12.0;
 ///
 /// `whole_mm`: the frames were rounded to millimetres, as 16-bit PNGs are; the variance of rounding is then taken off. Pixels at
 /// edges are left out, since they mix surfaces. The signal is that of diffuse surfaces of one reflectivity. Offsets that stay
-/// with the device cannot be told from such a recording.
+/// with the device cannot be found from such a recording.
 ///
 /// # Errors
 /// [`FitError`] for too few frames, pixels or too little variety, or frames that are not the camera's.

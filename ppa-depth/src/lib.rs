@@ -4,7 +4,7 @@
 //! lens distortion. A [`Body`] is a triangle mesh ([`MeshBody`]) or a cloud of oriented discs ([`SurfelBody`]), made
 //! once and then placed in as many poses as needed ([`PlacedBody`]). A mesh whose source was cut off has walls there
 //! ([`MeshBody::with_walls`]). [`render`] gives a [`DepthImage`]; [`roi_around`]
-//! the square around a joint. A [`RigSpec`] holds the two cameras on an x-ray device; [`JointSurface`] tells how much of a joint
+//! the square around a joint. A [`RigSpec`] holds the two cameras on an x-ray device; [`JointSurface`] shows how much of a joint
 //! a camera at a [`Viewpoint`] would see.
 //!
 //! Units: millimetres, pixels. Pixel (0, 0) is the *centre* of the first pixel. Camera frame: x right, y down,

@@ -14,7 +14,7 @@ const ROS_MODELS: &[&str] = &["plumb_bob", "rational_polynomial"];
 
 /// The camera in the text of a file storage, or what is wrong with it.
 pub(crate) fn camera(text: &str) -> Result<CameraSpec, String> {
-    // ROS names the model, which the number of coefficients does not tell from a fisheye.
+    // ROS names the model, which the number of coefficients does not distinguish from a fisheye.
     if let Some(entry) = after(text, "distortion_model") {
         let name = entry.lines().next().unwrap_or_default();
         let name = name.trim().trim_matches(['"', '\'']);

@@ -1,6 +1,6 @@
 //! Triangles into the distorted image.
 //!
-//! The corners are projected through the lens in single precision, which tells the few pixels that a triangle may cover; at
+//! The corners are projected through the lens in single precision, which finds the few pixels that a triangle may cover; at
 //! each the exact ray of the pixel is tested in double precision. So distortion is exact, and edges are those of the triangle
 //! although they bow in the image.
 

@@ -45,7 +45,7 @@ pub enum RigError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// The file is no rig JSON.
+    /// The file is not a rig JSON.
     #[error("{} is not a camera rig JSON", path.display())]
     Json {
         /// The file.
@@ -69,7 +69,7 @@ pub enum RigError {
         /// What is wrong.
         source: CameraError,
     },
-    /// The pose of one camera is no rigid motion.
+    /// The pose of one camera is not a rigid motion.
     #[error("device_from_camera of the {side} camera of the rig")]
     Pose {
         /// `left` or `right`.

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion};
 /// Largest deviation of RᵀR from the identity that is read as rounding in a file.
 const ORTHOGONALITY: f64 = 1e-4;
 
-/// Why a 4x4 matrix is no rigid motion.
+/// Why a 4x4 matrix is not a rigid motion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RigidError {
@@ -27,7 +27,7 @@ pub enum RigidError {
         /// The row.
         found: [f64; 4],
     },
-    /// Scale or shear: the upper left block is no rotation.
+    /// Scale or shear: the upper left block is not a rotation.
     #[error(
         "the 4x4 matrix is not rigid: its axes deviate from orthonormal by {deviation:.2e}, expected below {limit:.0e}"
     )]

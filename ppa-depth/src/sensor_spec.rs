@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Errors of an amplitude-modulated Time-of-Flight camera. A part that is left out does not happen.
 ///
 /// Signal S is relative to that of the reference target seen square on at 1 m: S = cos θ / (r / 1 m)², θ the angle of incidence, r the
-/// range along the ray. [`SensorSpec::default`] is no device: it is what published limits allow (see there). Only
+/// range along the ray. [`SensorSpec::default`] is not a device: it is what published limits allow (see there). Only
 /// [`fit_noise`](crate::fit_noise) ties it to one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -88,7 +88,7 @@ pub enum CameraError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// The file is no camera JSON.
+    /// The file is not a camera JSON.
     #[error("{} is not a camera JSON", path.display())]
     Json {
         /// The file.

@@ -8,12 +8,12 @@ use ppa_dataset::findings::Findings;
 use ppa_dataset::manifest::{FileRow, Manifest};
 use rayon::prelude::*;
 
-use crate::claim::{Claim, FolderError, claim_existing};
-use crate::limb_units::LimbUnits;
+use crate::dataset_lock::{DatasetLock, FolderError, lock_existing};
+use crate::limb_jobs::LimbJobs;
 use crate::lists::{Lists, stands};
 use crate::part_file::read_part;
 use crate::planned::Planned;
-use crate::record::{FoundRecord, Record, Unit};
+use crate::record::{FoundRecord, PoseJob, Record};
 use crate::staging::is_interrupted;
 
 /// Something in a dataset that is not as it was made.
@@ -21,30 +21,30 @@ use crate::staging::is_interrupted;
 #[non_exhaustive]
 pub enum Problem {
     /// A pose was never made, or its record is gone.
-    #[error("{unit} is missing")]
+    #[error("{pose_job} is missing")]
     Missing {
         /// The pose.
-        unit: String,
+        pose_job: String,
     },
     /// The record of a pose is not as it was written.
-    #[error("the record of {unit} is damaged")]
+    #[error("the record of {pose_job} is damaged")]
     Record {
         /// The pose.
-        unit: String,
+        pose_job: String,
     },
     /// A run was killed while it put the files of a pose in their place.
     #[error(
-        "{unit} is half replaced, as the run that did it was interrupted; the next run completes it"
+        "{pose_job} is half replaced, as the run that did it was interrupted; the next run completes it"
     )]
     Interrupted {
         /// The pose.
-        unit: String,
+        pose_job: String,
     },
-    /// A pose follows from other settings than `dataset.json` tells.
-    #[error("{unit} was made from other settings than those in dataset.json")]
+    /// A pose follows from other settings than `dataset.json` states.
+    #[error("{pose_job} was made from other settings than those in dataset.json")]
     Stale {
         /// The pose.
-        unit: String,
+        pose_job: String,
     },
     /// An image is not there.
     #[error("{file} cannot be read")]
@@ -72,7 +72,7 @@ pub enum Problem {
         /// The image whose row belongs there, or that none does.
         expected: String,
     },
-    /// A list cannot be read, or is not what its records tell.
+    /// A list cannot be read, or is not what its records state.
     #[error("{file} is missing or altered")]
     List {
         /// Path from the dataset's root.
@@ -106,18 +106,18 @@ pub struct Check {
 
 /// A dataset that nobody writes to, with the records that can be read.
 pub(crate) struct Recorded {
-    _claim: Claim,
+    _lock: DatasetLock,
     pub planned: Planned,
-    pub limbs: Vec<LimbUnits>,
+    pub limbs: Vec<LimbJobs>,
     root: PathBuf,
 }
 
 impl Recorded {
     pub fn open(root: &Path) -> Result<Self, FolderError> {
-        let claim = claim_existing(root)?;
+        let lock = lock_existing(root)?;
         let planned = Planned::read(root)?;
         Ok(Self {
-            _claim: claim,
+            _lock: lock,
             limbs: planned.part(read_part(root)?),
             planned,
             root: root.to_owned(),
@@ -126,8 +126,11 @@ impl Recorded {
 
     /// Compares all files with their records.
     pub fn check(&self) -> Check {
-        let units: Vec<_> = self.limbs.iter().flat_map(LimbUnits::units).collect();
-        let found: Vec<_> = units.par_iter().map(|unit| self.unit(unit)).collect();
+        let units: Vec<_> = self.limbs.iter().flat_map(LimbJobs::pose_jobs).collect();
+        let found: Vec<_> = units
+            .par_iter()
+            .map(|pose_job| self.pose_job(pose_job))
+            .collect();
         let mut problems = Vec::new();
         let mut records = Vec::new();
         for (record, of_unit) in found {
@@ -146,20 +149,44 @@ impl Recorded {
         }
     }
 
-    fn unit(&self, unit: &Unit) -> (Option<Record>, Vec<Problem>) {
-        let path = self.root.join(unit.id().record_file());
-        let found = Record::look(&path, unit.id()).unwrap_or(FoundRecord::Damaged);
-        let unit_name = unit.to_string();
-        if is_interrupted(&self.root, unit.id()) {
-            return (None, vec![Problem::Interrupted { unit: unit_name }]);
+    fn pose_job(&self, pose_job: &PoseJob) -> (Option<Record>, Vec<Problem>) {
+        let path = self.root.join(pose_job.id().record_file());
+        let found = Record::look(&path, pose_job.id()).unwrap_or(FoundRecord::Damaged);
+        let unit_name = pose_job.to_string();
+        if is_interrupted(&self.root, pose_job.id()) {
+            return (
+                None,
+                vec![Problem::Interrupted {
+                    pose_job: unit_name,
+                }],
+            );
         }
         let record = match found {
             FoundRecord::Whole(record) => record,
-            FoundRecord::Absent => return (None, vec![Problem::Missing { unit: unit_name }]),
-            FoundRecord::Damaged => return (None, vec![Problem::Record { unit: unit_name }]),
+            FoundRecord::Absent => {
+                return (
+                    None,
+                    vec![Problem::Missing {
+                        pose_job: unit_name,
+                    }],
+                );
+            }
+            FoundRecord::Damaged => {
+                return (
+                    None,
+                    vec![Problem::Record {
+                        pose_job: unit_name,
+                    }],
+                );
+            }
         };
-        if record.key != unit.key() {
-            return (None, vec![Problem::Stale { unit: unit_name }]);
+        if record.key != pose_job.key() {
+            return (
+                None,
+                vec![Problem::Stale {
+                    pose_job: unit_name,
+                }],
+            );
         }
         let of_image = |row: &FileRow| {
             let file = row.file.clone();
@@ -175,7 +202,7 @@ impl Recorded {
     /// The lists against the records, which are in the order of the plan.
     fn lists(&self, records: Vec<Record>) -> Vec<Problem> {
         let mut records = records.into_iter();
-        let record = |_: &Unit| records.next().ok_or(());
+        let record = |_: &PoseJob| records.next().ok_or(());
         let lists = Lists::of(&self.limbs, &self.planned.text, record);
         let lists = lists.expect("all poses have a record");
         let mut problems = Vec::new();

@@ -11,8 +11,8 @@ use ppa_mesh::{CutWalls, Mesh, WallMeasure};
 use ppa_xray::{Detector, Projection, TransportError};
 
 use crate::cut_error::{CutError, MAX_CUT_SHARE, PoseImage};
-use crate::stage::PlacedCamera;
-use crate::unit_error::UnitError;
+use crate::pose_error::PoseError;
+use crate::scene_setup::PlacedCamera;
 
 /// Columns or rows at which a radiograph's rays are sampled; fewer where its detector has fewer.
 const MOST_RAYS: u32 = 512;
@@ -32,7 +32,7 @@ impl CutFaces {
         skin: &Mesh,
         detector: &Detector,
         source_detector_mm: f64,
-    ) -> Result<Self, UnitError> {
+    ) -> Result<Self, PoseError> {
         let projection = Projection::new(Isometry3::identity(), source_detector_mm, *detector);
         projection.validate().map_err(TransportError::from)?;
         if walls.is_empty() {

@@ -7,10 +7,10 @@ use ppa_scene::place_soft;
 
 use crate::closed_skin::closed_skin;
 use crate::plan::Plan;
+use crate::posable_limb::depth_image;
+use crate::pose_error::PoseError;
 use crate::prepare::PreparedLimb;
-use crate::stage::Stage;
-use crate::unit::depth_image;
-use crate::unit_error::UnitError;
+use crate::scene_setup::SceneSetup;
 
 /// What one camera sees.
 #[derive(Debug, Clone)]
@@ -29,16 +29,16 @@ pub struct DepthView {
 /// `plan` is the plan of the stage. Ideal images are those of the plan's dataset; those of a sensor have noise of `seed`.
 ///
 /// # Errors
-/// [`UnitError`] when the limb does not rest on the table, hides a camera, or a sensor measures nothing.
+/// [`PoseError`] when the limb does not rest on the table, hides a camera, or a sensor measures nothing.
 pub fn depth_views(
-    stage: &Stage,
+    setup: &SceneSetup,
     plan: &Plan,
     limb: &PreparedLimb,
     angle_deg: f64,
     seed: u64,
-) -> Result<Vec<DepthView>, UnitError> {
+) -> Result<Vec<DepthView>, PoseError> {
     let (skin, landmarks) = (&limb.limb.mesh, &limb.landmarks);
-    let table = &stage.table;
+    let table = &setup.table;
     let placement = place_soft(
         &skin.vertices,
         landmarks,
@@ -59,7 +59,7 @@ pub fn depth_views(
     } else {
         closed_skin(&vertices, skin, &limb.limb.walls)?
     };
-    let see = |placed: &crate::stage::PlacedCamera| {
+    let see = |placed: &crate::scene_setup::PlacedCamera| {
         let camera_from_body = if is_soft {
             placed.camera_from_room
         } else {
@@ -75,5 +75,5 @@ pub fn depth_views(
             image: depth_image(BodyShape::Orig, body, placed, seed, plan.depth.cut_faces)?.image,
         })
     };
-    stage.cameras.iter().map(see).collect()
+    setup.cameras.iter().map(see).collect()
 }

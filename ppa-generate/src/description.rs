@@ -13,9 +13,9 @@ use sha2::{Digest, Sha256};
 use crate::case::Case;
 use crate::compiled::code;
 use crate::plan::{Plan, XraySettings};
+use crate::scene_setup::SceneSetup;
 use crate::seal::sealed;
 use crate::shaped_skin::ShapeSettings;
-use crate::stage::Stage;
 
 /// The settings of a plan that decide the bytes of its images; files stand by their hashes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -124,10 +124,10 @@ impl<'a> Description<'a> {
     pub fn of(
         rotation: Sweep,
         settings: &'a Settings,
-        stage: &Stage,
+        setup: &SceneSetup,
         cases: impl Iterator<Item = (LimbId, &'a Case)>,
     ) -> Self {
-        let cameras = stage.cameras.iter().map(|camera| CameraRow {
+        let cameras = setup.cameras.iter().map(|camera| CameraRow {
             view: camera.view,
             intrinsics: camera.camera.spec().clone(),
             room_from_camera: rows_from_isometry(&camera.camera_from_room.inverse()),
@@ -147,16 +147,16 @@ impl<'a> Description<'a> {
                     where the radiographs carry no noise",
             rotation,
             settings,
-            room_from_device: stage
+            room_from_device: setup
                 .table
                 .room
                 .device
                 .room_from_device
                 .to_homogeneous_rows(),
-            source_detector_mm: stage.table.room.device.source_detector_mm,
+            source_detector_mm: setup.table.room.device.source_detector_mm,
             table: Table {
-                normal: stage.table.plane.plane.normal.into_inner().into(),
-                offset_mm: stage.table.plane.plane.offset_mm,
+                normal: setup.table.plane.plane.normal.into_inner().into(),
+                offset_mm: setup.table.plane.plane.offset_mm,
             },
             cameras: cameras.collect(),
             limbs: limbs.collect(),

@@ -1,4 +1,4 @@
-//! What a plan will take, from a sample of its poses, before anything of it is made.
+//! Estimated cost of a plan, from a sample of its poses.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -14,11 +14,11 @@ use serde::Serialize;
 
 use crate::generate::{GenerateError, Work};
 use crate::job::Progress;
-use crate::limb_units::units_of_part;
+use crate::limb_jobs::jobs_of_part;
 use crate::plan::Plan;
 use crate::status::status;
 
-/// Why a plan cannot be carried out, or what it takes not be told.
+/// Why a plan cannot be carried out, or its cost cannot be estimated.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ForecastError {
@@ -36,7 +36,7 @@ pub enum ForecastError {
     Fraction(f64),
     /// The images will not fit.
     #[error(
-        "the plan's images will take {needed} more bytes in {}, where {free} are free",
+        "the plan's images need {needed} more bytes in {}, where {free} are free",
         root.display()
     )]
     NoRoom {
@@ -49,7 +49,7 @@ pub enum ForecastError {
     },
 }
 
-/// What a plan will take.
+/// Estimated cost of a plan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Forecast {
     /// Limbs.
@@ -74,7 +74,7 @@ pub struct Forecast {
     pub bytes: u64,
     /// Bytes of those that are not there yet.
     pub needed_bytes: u64,
-    /// Free bytes where the dataset will lie, if the system tells.
+    /// Free bytes where the dataset will lie, if the system reports it.
     pub free_bytes: Option<u64>,
     /// Doubts about the limbs.
     #[serde(skip_serializing_if = "Findings::is_empty")]
@@ -82,7 +82,7 @@ pub struct Forecast {
 }
 
 /// Prepares every limb of the plan, makes `fraction` of its poses, at least one, in a temporary
-/// folder, one after the other, and tells what all will take in the folder `root`.
+/// folder, one after the other, and estimates what all will take in the folder `root`.
 ///
 /// The poses are spread evenly, and differently for every limb. What cannot work with one of them
 /// would not work in the run. Once `stop` is true no other pose begins. Whether the disk has room for all is for [`Forecast::fits`] to say.
@@ -101,7 +101,7 @@ pub fn forecast(
     }
     let work = Work::of_plan(plan)?;
     let poses = plan.rotation.poses().map_err(GenerateError::from)?;
-    let limbs = units_of_part(work.planned(), &poses, Part::WHOLE);
+    let limbs = jobs_of_part(work.planned(), &poses, Part::WHOLE);
     let findings = work.findings(&limbs, root)?;
     progress(Progress::Findings(&findings));
     let of_limb = ((poses.len() as f64 * fraction).round() as usize).max(1);
@@ -117,7 +117,7 @@ pub fn forecast(
         for pose in spread(&poses, of_limb, shift) {
             go_on(stop)?;
             let begun = ProcessTime::now();
-            let images = make(limb.unit(pose))?;
+            let images = make(limb.pose_job(pose))?;
             unit_s.push(begun.elapsed().as_secs_f64());
             for row in &images.files {
                 let path = scratch.path().join(&row.file);

@@ -7,7 +7,7 @@ use ppa_depth::{RigSpec, rows_from_isometry};
 use ppa_scene::{Landmarks, Placement, ct_from_device};
 use serde::Serialize;
 
-use crate::stage::{StageError, Table};
+use crate::scene_setup::{SceneSetupError, Table};
 
 /// Rigid motions by name, `target_from_source`: row-major 4x4, mm.
 ///
@@ -31,7 +31,7 @@ impl Frames {
     ///
     /// # Errors
     /// [`StageError::Rig`] naming the camera whose pose is none.
-    pub fn of_room(table: &Table, rig: &RigSpec) -> Result<Self, StageError> {
+    pub fn of_room(table: &Table, rig: &RigSpec) -> Result<Self, SceneSetupError> {
         let room_from_device = table.room.device.room_from_device;
         let mut motions =
             BTreeMap::from([("room_from_device", room_from_device.to_homogeneous_rows())]);

@@ -13,15 +13,15 @@ use ppa_scene::SweepError;
 
 use crate::case::{Case, CaseError};
 use crate::description::{Description, Settings};
-use crate::job::{Job, JobError, MakeUnit, Progress, Summary};
-use crate::limb_units::{LimbUnits, PlannedLimb, units_of_part};
+use crate::job::{Job, JobError, MakePose, Progress, Summary};
+use crate::limb_jobs::{LimbJobs, PlannedLimb, jobs_of_part};
 use crate::plan::Plan;
+use crate::posable_limb::PosableLimb;
+use crate::pose_error::PoseError;
 use crate::prepare::{PrepareError, PreparedLimb};
 use crate::record::Record;
-use crate::stage::{Stage, StageError};
+use crate::scene_setup::{SceneSetup, SceneSetupError};
 use crate::staging::staging_folder;
-use crate::unit::PosableLimb;
-use crate::unit_error::UnitError;
 
 /// Why a dataset could not be made. What was finished before stays and is not made again.
 #[derive(Debug, thiserror::Error)]
@@ -35,7 +35,7 @@ pub enum GenerateError {
     Case(#[from] CaseError),
     /// Room, cameras or beam.
     #[error(transparent)]
-    Stage(#[from] StageError),
+    SceneSetup(#[from] SceneSetupError),
     /// A limb of the plan.
     #[error("cannot prepare the limb of {}", case.display())]
     Limb {
@@ -50,17 +50,17 @@ pub enum GenerateError {
         /// Its case file.
         case: PathBuf,
         /// What went wrong.
-        source: UnitError,
+        source: PoseError,
     },
     /// One pose.
     #[error("cannot make the pose at {angle_deg} degrees of {}", case.display())]
-    Unit {
+    Pose {
         /// Its case file.
         case: PathBuf,
         /// Medial rotation.
         angle_deg: f64,
         /// What went wrong.
-        source: UnitError,
+        source: PoseError,
     },
     /// The folder, its files, or the disk.
     #[error(transparent)]
@@ -149,7 +149,7 @@ pub fn generate(
 ) -> Result<Summary, GenerateError> {
     let work = Work::of_plan(plan)?;
     let poses = plan.rotation.poses()?;
-    let limbs = units_of_part(work.planned(), &poses, settings.part);
+    let limbs = jobs_of_part(work.planned(), &poses, settings.part);
     progress(Progress::Findings(&work.findings(&limbs, root)?));
     let staging = staging_folder(root);
     let job = Job {
@@ -163,9 +163,9 @@ pub fn generate(
     };
     job.complete(|limb| {
         let make = work.prepare(limb.limb, &staging)?;
-        let make: MakeUnit<GenerateError> = Box::new(move |unit| {
+        let make: MakePose<GenerateError> = Box::new(move |pose_job| {
             settings.stop.map_or(Ok(()), go_on)?;
-            make(unit)
+            make(pose_job)
         });
         Ok(make)
     })
@@ -175,7 +175,7 @@ pub fn generate(
 pub(crate) struct Work<'a> {
     plan: &'a Plan,
     limbs: Vec<CasedLimb>,
-    stage: Stage,
+    setup: SceneSetup,
     /// `dataset.json`.
     pub description: String,
     /// The first limb that was prepared for its findings, until its poses are made. The others are prepared twice, since
@@ -195,13 +195,13 @@ impl<'a> Work<'a> {
         plan.check().map_err(GenerateError::Unusable)?;
         let settings = Settings::of(plan)?;
         let limbs = planned_limbs(plan, &settings)?;
-        let stage = Stage::of_plan(plan)?;
+        let setup = SceneSetup::of_plan(plan)?;
         let cases = limbs.iter().map(|limb| (limb.id, &limb.case));
-        let description = Description::of(plan.rotation, &settings, &stage, cases).to_text();
+        let description = Description::of(plan.rotation, &settings, &setup, cases).to_text();
         Ok(Self {
             plan,
             limbs,
-            stage,
+            setup,
             description,
             prepared: Mutex::default(),
         })
@@ -218,12 +218,12 @@ impl<'a> Work<'a> {
 
     /// What is doubted about limbs, before any pose of them is made. Limbs that have a pose in the folder `root` are not
     /// prepared for it.
-    pub fn findings(&self, limbs: &[LimbUnits], root: &Path) -> Result<Findings, GenerateError> {
+    pub fn findings(&self, limbs: &[LimbJobs], root: &Path) -> Result<Findings, GenerateError> {
         let mut findings = Findings::default();
         for limb in limbs {
-            let made = limb.units().find_map(|unit| {
-                let record = Record::read(root, &unit).ok()?;
-                (record.key == unit.key()).then_some(record.findings)
+            let made = limb.pose_jobs().find_map(|pose_job| {
+                let record = Record::read(root, &pose_job).ok()?;
+                (record.key == pose_job.key()).then_some(record.findings)
             });
             let of_limb = match made {
                 Some(findings) => findings,
@@ -255,7 +255,7 @@ impl<'a> Work<'a> {
         &'m self,
         id: LimbId,
         root: &'m Path,
-    ) -> Result<MakeUnit<'m, GenerateError>, GenerateError> {
+    ) -> Result<MakePose<'m, GenerateError>, GenerateError> {
         let limb = self.limb(id);
         let case = || limb.file.clone();
         let kept = self.kept().take_if(|(kept, _)| *kept == id);
@@ -263,18 +263,18 @@ impl<'a> Work<'a> {
             Some((_, prepared)) => prepared,
             None => limb.prepared()?,
         };
-        let posable = PosableLimb::new(id, self.plan, &self.stage, prepared).map_err(|source| {
+        let posable = PosableLimb::new(id, self.plan, &self.setup, prepared).map_err(|source| {
             GenerateError::Posable {
                 case: case(),
                 source,
             }
         })?;
-        Ok(Box::new(move |unit| {
+        Ok(Box::new(move |pose_job| {
             posable
-                .make(unit.pose, root)
-                .map_err(|source| GenerateError::Unit {
+                .make(pose_job.pose, root)
+                .map_err(|source| GenerateError::Pose {
                     case: limb.file.clone(),
-                    angle_deg: unit.pose.angle_deg,
+                    angle_deg: pose_job.pose.angle_deg,
                     source,
                 })
         }))

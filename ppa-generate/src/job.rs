@@ -12,15 +12,15 @@ use ppa_scene::PoseAngle;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::claim::{Claim, FolderError, claim};
-use crate::limb_units::LimbUnits;
+use crate::dataset_lock::{DatasetLock, FolderError, lock};
+use crate::limb_jobs::LimbJobs;
 use crate::lists::Lists;
 use crate::overview::Overview;
 use crate::part_file::require_part;
-use crate::record::{FoundRecord, Record, Unit};
+use crate::posable_limb::Images;
+use crate::record::{FoundRecord, PoseJob, Record};
 use crate::staging::{Staging, staging_folder};
 use crate::survey::Survey;
-use crate::unit::Images;
 
 /// What a run did.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -46,7 +46,7 @@ pub struct Summary {
     pub set_aside: Vec<String>,
 }
 
-/// What a run reports while it goes on.
+/// What a run reports while it continues.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Progress<'a> {
     /// What is doubted about the limbs, first of all.
@@ -86,7 +86,7 @@ pub enum JobError {
 }
 
 /// Makes one pose of a limb: its files whole, in the staging folder of the dataset.
-pub(crate) type MakeUnit<'a, E> = Box<dyn Fn(Unit) -> Result<Images, E> + Sync + 'a>;
+pub(crate) type MakePose<'a, E> = Box<dyn Fn(PoseJob) -> Result<Images, E> + Sync + 'a>;
 
 /// Units, the folder they belong to, and how much of it they may fill.
 pub(crate) struct Job<'a> {
@@ -94,7 +94,7 @@ pub(crate) struct Job<'a> {
     /// `dataset.json`, the same for all parts.
     pub description: &'a str,
     pub part: Part,
-    pub limbs: Vec<LimbUnits>,
+    pub limbs: Vec<LimbJobs>,
     pub disk_limit: Option<u64>,
     /// Whether poses of other settings are replaced, and those of other plans removed.
     pub replace: bool,
@@ -105,11 +105,11 @@ impl Job<'_> {
     /// Makes what is missing, several units at a time; `prepare` is called once per limb.
     pub fn complete<'m, E: From<JobError> + Send>(
         &self,
-        prepare: impl Fn(&LimbUnits) -> Result<MakeUnit<'m, E>, E>,
+        prepare: impl Fn(&LimbJobs) -> Result<MakePose<'m, E>, E>,
     ) -> Result<Summary, E> {
         let staging = Staging::new(self.root);
         let overview = Overview::new(self.root, self.description, self.part, &staging);
-        let (_claim, survey) = self.begin(&overview).map_err(JobError::from)?;
+        let (_lock, survey) = self.begin(&overview).map_err(JobError::from)?;
         let units = self.limbs.iter().map(|limb| limb.poses.len()).sum();
         (self.progress)(Progress::Total(units));
 
@@ -124,7 +124,7 @@ impl Job<'_> {
             let make = prepare(limb)?;
             missing
                 .par_iter()
-                .try_for_each(|&pose| self.make(&limb.unit(pose), &make, &overview, &used))?;
+                .try_for_each(|&pose| self.make(&limb.pose_job(pose), &make, &overview, &used))?;
             made += missing.len();
         }
         self.remove_others(&survey, &overview)
@@ -146,8 +146,8 @@ impl Job<'_> {
     }
 
     /// Claims the folder, completes what a killed run left, and refuses what only a run that replaces may change.
-    fn begin(&self, overview: &Overview) -> Result<(Claim, Survey), FolderError> {
-        let claim = claim(self.root)?;
+    fn begin(&self, overview: &Overview) -> Result<(DatasetLock, Survey), FolderError> {
+        let lock = lock(self.root)?;
         require_part(self.root, self.part)?;
         overview.staging.recover()?;
         let survey = Survey::of(self.root, &self.limbs)?;
@@ -159,24 +159,24 @@ impl Job<'_> {
         if !survey.replaces() && !self.root.join(DESCRIPTION_FILE).exists() {
             overview.describe()?;
         }
-        Ok((claim, survey))
+        Ok((lock, survey))
     }
 
     /// The poses that are not complete; adds the bytes of all that are there to `used`.
     fn missing(
         &self,
-        limb: &LimbUnits,
+        limb: &LimbJobs,
         overview: &Overview,
         used: &AtomicU64,
     ) -> Result<Vec<PoseAngle>, FileError> {
         let lacks = |&pose: &PoseAngle| {
-            let unit = limb.unit(pose);
-            match self.look(&unit)? {
+            let pose_job = limb.pose_job(pose);
+            match self.look(&pose_job)? {
                 FoundRecord::Absent => {}
-                FoundRecord::Damaged => overview.add_healed([unit.id().record_file()]),
+                FoundRecord::Damaged => overview.add_healed([pose_job.id().record_file()]),
                 FoundRecord::Whole(record) => {
                     used.fetch_add(record.size_of_rest(self.root), Ordering::Relaxed);
-                    if record.key == unit.key() {
+                    if record.key == pose_job.key() {
                         let damaged = record.damaged_images(self.root);
                         if damaged.is_empty() {
                             (self.progress)(Progress::Found);
@@ -192,14 +192,14 @@ impl Job<'_> {
         poses.filter_map(|pose| lacks(pose).transpose()).collect()
     }
 
-    fn look(&self, unit: &Unit) -> Result<FoundRecord, FileError> {
-        Record::look(&self.root.join(unit.id().record_file()), unit.id())
+    fn look(&self, pose_job: &PoseJob) -> Result<FoundRecord, FileError> {
+        Record::look(&self.root.join(pose_job.id().record_file()), pose_job.id())
     }
 
     fn make<E: From<JobError>>(
         &self,
-        unit: &Unit,
-        make: &MakeUnit<E>,
+        pose_job: &PoseJob,
+        make: &MakePose<E>,
         overview: &Overview,
         used: &AtomicU64,
     ) -> Result<(), E> {
@@ -207,14 +207,14 @@ impl Job<'_> {
             files,
             rois,
             findings,
-        } = make(*unit)?;
+        } = make(*pose_job)?;
         let record = Record {
-            key: unit.key(),
+            key: pose_job.key(),
             files,
             rois,
             findings,
         };
-        self.keep(unit, &record, overview, used)?;
+        self.keep(pose_job, &record, overview, used)?;
         (self.progress)(Progress::Made);
         Ok(())
     }
@@ -222,12 +222,12 @@ impl Job<'_> {
     /// Puts a unit in its place, or removes its images where they are too many bytes.
     fn keep(
         &self,
-        unit: &Unit,
+        pose_job: &PoseJob,
         record: &Record,
         overview: &Overview,
         used: &AtomicU64,
     ) -> Result<(), JobError> {
-        let earlier = self.look(unit)?;
+        let earlier = self.look(pose_job)?;
         let earlier = earlier.whole().map_or(0, |old| old.size_of_rest(self.root));
         let size = record.size(&staging_folder(self.root))?;
         let before = used.fetch_add(size, Ordering::Relaxed);
@@ -243,7 +243,7 @@ impl Job<'_> {
             });
         }
         overview.open(&self.limbs)?;
-        overview.staging.put(unit.id(), record)?;
+        overview.staging.put(pose_job.id(), record)?;
         used.fetch_sub(earlier, Ordering::Relaxed);
         Ok(())
     }
@@ -265,7 +265,7 @@ impl Job<'_> {
 
     /// Writes what lists all units: regions of interest, findings and manifest.
     fn finish(&self, overview: &Overview) -> Result<Lists, FileError> {
-        let record = |unit: &Unit| Record::read(self.root, unit);
+        let record = |pose_job: &PoseJob| Record::read(self.root, pose_job);
         let lists = Lists::of(&self.limbs, self.description, record)?;
         overview.close(&lists)?;
         overview.staging.clear()?;

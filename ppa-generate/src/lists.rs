@@ -8,8 +8,8 @@ use ppa_dataset::findings::Findings;
 use ppa_dataset::manifest::DESCRIPTION_FILE;
 use ppa_dataset::manifest::{FileRow, Manifest, RoiFile, roi_text};
 
-use crate::limb_units::LimbUnits;
-use crate::record::{Record, Unit};
+use crate::limb_jobs::LimbJobs;
+use crate::record::{PoseJob, Record};
 
 /// The lists that follow from a dataset's records.
 pub(crate) struct Lists {
@@ -25,9 +25,9 @@ pub(crate) struct Lists {
 impl Lists {
     /// The lists of a dataset with the given `dataset.json`, from the records of its poses in the order of the plan.
     pub fn of<E>(
-        limbs: &[LimbUnits],
+        limbs: &[LimbJobs],
         description: &str,
-        mut record: impl FnMut(&Unit) -> Result<Record, E>,
+        mut record: impl FnMut(&PoseJob) -> Result<Record, E>,
     ) -> Result<Self, E> {
         let mut files = vec![(Checksums::FILE.to_owned(), String::new())];
         let mut manifest = Manifest {
@@ -37,8 +37,8 @@ impl Lists {
         let mut findings = Findings::default();
         for limb in limbs {
             let mut rois = RoiFile::new();
-            for unit in limb.units() {
-                let record = record(&unit)?;
+            for pose_job in limb.pose_jobs() {
+                let record = record(&pose_job)?;
                 manifest.files.extend(record.files);
                 rois.extend(record.rois);
                 findings.add(limb.limb, &limb.acknowledged, &record.findings);

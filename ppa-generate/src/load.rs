@@ -8,9 +8,9 @@ use ppa_dataset::layout::{LimbId, Side};
 use ppa_dataset::manifest::RoiFile;
 use ppa_scene::Sweep;
 
-use crate::job::{Job, JobError, MakeUnit, Progress};
-use crate::limb_units::{LimbUnits, PlannedLimb, units_of_part};
-use crate::unit::Images;
+use crate::job::{Job, JobError, MakePose, Progress};
+use crate::limb_jobs::{LimbJobs, PlannedLimb, jobs_of_part};
+use crate::posable_limb::Images;
 
 /// 100 000 poses without images, so that only the bookkeeping takes time: the last tenth is
 /// made as fast as the first, and looking them all over again is faster still.
@@ -37,7 +37,7 @@ fn a_hundred_thousand_units_do_not_slow_down() {
         root: folder.path(),
         description: "{}",
         part: Part::WHOLE,
-        limbs: units_of_part(limbs.clone().into_iter(), &poses, Part::WHOLE),
+        limbs: jobs_of_part(limbs.clone().into_iter(), &poses, Part::WHOLE),
         disk_limit: Some(1),
         replace: false,
         progress,
@@ -48,8 +48,8 @@ fn a_hundred_thousand_units_do_not_slow_down() {
             times.lock().unwrap().push(begun.elapsed());
         }
     };
-    let make = |_: &LimbUnits| {
-        Ok::<MakeUnit<JobError>, JobError>(Box::new(|_| {
+    let make = |_: &LimbJobs| {
+        Ok::<MakePose<JobError>, JobError>(Box::new(|_| {
             Ok(Images {
                 files: Vec::new(),
                 rois: RoiFile::new(),

@@ -10,15 +10,15 @@ use ppa_dataset::files::{FileError, hex, write_whole};
 use ppa_dataset::stop::{Stopped, go_on};
 use sha2::{Digest, Sha256};
 
-use crate::claim::{Claim, FolderError, claim_existing};
+use crate::dataset_lock::{DatasetLock, FolderError, lock_existing};
 use crate::differences::differences;
 use crate::job::{Job, JobError, Progress, Summary};
-use crate::limb_units::LimbUnits;
+use crate::limb_jobs::LimbJobs;
 use crate::planned::Planned;
+use crate::posable_limb::Images;
 use crate::pose_id::FOLDER;
-use crate::record::{FoundRecord, Record, Unit, record_names};
+use crate::record::{FoundRecord, PoseJob, Record, record_names};
 use crate::staging::staging_folder;
-use crate::unit::Images;
 
 /// Why shards could not be joined.
 #[derive(Debug, thiserror::Error)]
@@ -53,40 +53,40 @@ pub enum MergeError {
         key: String,
     },
     /// Two shards hold the same pose.
-    #[error("both {} and {} hold {unit}", first.display(), second.display())]
+    #[error("both {} and {} hold {pose_job}", first.display(), second.display())]
     Overlap {
         /// A shard.
         first: PathBuf,
         /// Another shard.
         second: PathBuf,
         /// The pose.
-        unit: String,
+        pose_job: String,
     },
     /// Poses that no shard holds.
-    #[error("no shard holds {unit}; missing are {missing} of {}", ppa_core::text::count(*units, "pose"))]
+    #[error("no shard holds {pose_job}; missing are {missing} of {}", ppa_core::text::count(*units, "pose"))]
     Hole {
         /// The first of them.
-        unit: String,
+        pose_job: String,
         /// Their number.
         missing: usize,
         /// Poses of the plan.
         units: usize,
     },
-    /// A pose was made from other settings than its shard's `dataset.json` tells.
-    #[error("{unit} in {} was made from other settings; run ppa generate for this shard again", shard.display())]
+    /// A pose was made from other settings than its shard's `dataset.json` states.
+    #[error("{pose_job} in {} was made from other settings; run ppa generate for this shard again", shard.display())]
     Stale {
         /// The shard.
         shard: PathBuf,
         /// The pose.
-        unit: String,
+        pose_job: String,
     },
     /// A record of a shard is not as it was written.
-    #[error("the record of {unit} in {} is damaged; run ppa generate for this shard again", shard.display())]
+    #[error("the record of {pose_job} in {} is damaged; run ppa generate for this shard again", shard.display())]
     Damaged {
         /// The shard.
         shard: PathBuf,
         /// The pose.
-        unit: String,
+        pose_job: String,
     },
     /// An image of a shard is not the one that was made.
     #[error("{} is altered: its hash is not the recorded one", .0.display())]
@@ -123,15 +123,15 @@ pub fn merge(
     };
     let staging = staging_folder(root);
     job.complete(|_| {
-        Ok(Box::new(|unit: Unit| {
+        Ok(Box::new(|pose_job: PoseJob| {
             go_on(stop)?;
-            shards.copy(&unit, &staging)
+            shards.copy(&pose_job, &staging)
         }))
     })
 }
 
 struct Shards<'a> {
-    _claims: Vec<Claim>,
+    _locks: Vec<DatasetLock>,
     planned: Planned,
     /// The folder that holds the record of a pose.
     holder: HashMap<PoseId, &'a Path>,
@@ -142,8 +142,8 @@ impl<'a> Shards<'a> {
         let first = folders.first().ok_or(MergeError::NoShard)?;
         let planned = Planned::read(first)?;
         let of_dataset = planned.part(Part::WHOLE);
-        let units = of_dataset.iter().flat_map(LimbUnits::units);
-        let units: HashMap<_, _> = units.map(|unit| (unit.id(), unit)).collect();
+        let units = of_dataset.iter().flat_map(LimbJobs::pose_jobs);
+        let units: HashMap<_, _> = units.map(|pose_job| (pose_job.id(), pose_job)).collect();
         let mut claims = Vec::new();
         let mut holder = HashMap::new();
         for folder in folders {
@@ -160,7 +160,7 @@ impl<'a> Shards<'a> {
                 });
             }
             for pose in record_names(&folder.join(FOLDER))? {
-                let Some(unit) = units.get(&pose) else {
+                let Some(pose_job) = units.get(&pose) else {
                     let (root, record) = (folder.clone(), pose.record_name());
                     return Err(FolderError::OtherPlan { root, record }.into());
                 };
@@ -168,26 +168,26 @@ impl<'a> Shards<'a> {
                     return Err(MergeError::Overlap {
                         first: first.to_owned(),
                         second: folder.clone(),
-                        unit: unit.to_string(),
+                        pose_job: pose_job.to_string(),
                     });
                 }
             }
-            claims.push(claim_existing(folder)?);
+            claims.push(lock_existing(folder)?);
         }
         Ok(Self {
-            _claims: claims,
+            _locks: claims,
             planned,
             holder,
         })
     }
 
-    fn require_all(&self, limbs: &[LimbUnits]) -> Result<(), MergeError> {
-        let units = || limbs.iter().flat_map(LimbUnits::units);
-        let missing = || units().filter(|unit| !self.holder.contains_key(&unit.id()));
+    fn require_all(&self, limbs: &[LimbJobs]) -> Result<(), MergeError> {
+        let units = || limbs.iter().flat_map(LimbJobs::pose_jobs);
+        let missing = || units().filter(|pose_job| !self.holder.contains_key(&pose_job.id()));
         match missing().next() {
             None => Ok(()),
-            Some(unit) => Err(MergeError::Hole {
-                unit: unit.to_string(),
+            Some(pose_job) => Err(MergeError::Hole {
+                pose_job: pose_job.to_string(),
                 missing: missing().count(),
                 units: units().count(),
             }),
@@ -195,9 +195,9 @@ impl<'a> Shards<'a> {
     }
 
     /// Copies the images of one pose from the shard that holds it below `to`.
-    fn copy(&self, unit: &Unit, to: &Path) -> Result<Images, MergeError> {
-        let shard = self.holder[&unit.id()];
-        let found = Record::look(&shard.join(unit.id().record_file()), unit.id())?;
+    fn copy(&self, pose_job: &PoseJob, to: &Path) -> Result<Images, MergeError> {
+        let shard = self.holder[&pose_job.id()];
+        let found = Record::look(&shard.join(pose_job.id().record_file()), pose_job.id())?;
         let FoundRecord::Whole(Record {
             key,
             files,
@@ -207,13 +207,13 @@ impl<'a> Shards<'a> {
         else {
             return Err(MergeError::Damaged {
                 shard: shard.to_owned(),
-                unit: unit.to_string(),
+                pose_job: pose_job.to_string(),
             });
         };
-        if key != unit.key() {
+        if key != pose_job.key() {
             return Err(MergeError::Stale {
                 shard: shard.to_owned(),
-                unit: unit.to_string(),
+                pose_job: pose_job.to_string(),
             });
         }
         for row in &files {

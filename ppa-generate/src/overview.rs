@@ -12,7 +12,7 @@ use ppa_dataset::findings::Findings;
 use ppa_dataset::manifest::DESCRIPTION_FILE;
 use ppa_dataset::manifest::Manifest;
 
-use crate::limb_units::LimbUnits;
+use crate::limb_jobs::LimbJobs;
 use crate::lists::{Lists, stands};
 use crate::part_file::{PART_FILE, part_text, read_part};
 use crate::planned::Planned;
@@ -42,7 +42,7 @@ impl<'a> Overview<'a> {
     }
 
     /// Called before poses change: removes the lists, which would name images that are gone, and describes the run.
-    pub fn open(&self, limbs: &[LimbUnits]) -> Result<(), FileError> {
+    pub fn open(&self, limbs: &[LimbJobs]) -> Result<(), FileError> {
         let mut is_open = self.is_open.lock().unwrap_or_else(|e| e.into_inner());
         if *is_open {
             return Ok(());

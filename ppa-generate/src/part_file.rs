@@ -8,7 +8,7 @@ use ppa_dataset::files::FileError;
 use ppa_dataset::manifest::DESCRIPTION_FILE;
 use serde::{Deserialize, Serialize};
 
-use crate::claim::FolderError;
+use crate::dataset_lock::FolderError;
 use crate::pose_id::FOLDER;
 use crate::record::record_names;
 use crate::seal::{Opened, opened, sealed};

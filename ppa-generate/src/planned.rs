@@ -8,7 +8,7 @@ use ppa_dataset::manifest::DESCRIPTION_FILE;
 use ppa_scene::Sweep;
 use serde::Deserialize;
 
-use crate::limb_units::{LimbUnits, PlannedLimb, units_of_part};
+use crate::limb_jobs::{LimbJobs, PlannedLimb, jobs_of_part};
 use crate::seal::{Opened, opened};
 
 /// Which units a dataset is made of, and what they follow from.
@@ -52,9 +52,9 @@ impl Planned {
     }
 
     /// The units of one part, limb by limb.
-    pub fn part(&self, part: Part) -> Vec<LimbUnits> {
+    pub fn part(&self, part: Part) -> Vec<LimbJobs> {
         let poses = self.units.rotation.poses();
         let poses = poses.expect("the rotation was checked when it was read");
-        units_of_part(self.units.limbs.iter().cloned(), &poses, part)
+        jobs_of_part(self.units.limbs.iter().cloned(), &poses, part)
     }
 }

@@ -117,7 +117,7 @@ impl PreparedLimb {
     }
 }
 
-/// Proposes a case for one limb of the scan at `path`, read as `reading` tells.
+/// Proposes a case for one limb of the scan at `path`, read with the options `reading`.
 ///
 /// Given `surface` and `choices` are kept; what they leave open is found. Of two limbs side by side the one on
 /// `side` of the patient is taken, and a warning says so; one says as well when the image shows too little of that one.
@@ -202,7 +202,7 @@ fn other_on_side(report: &LimbReport, side: Side, settings: &LimbSettings) -> Op
     let chosen = report.bodies.iter().find(|body| body.chosen)?;
     let beside = report.bodies.iter().find(|body| {
         let [x, y, z] = [0, 1, 2].map(|axis| body.centre_mm[axis] - chosen.centre_mm[axis]);
-        // Within 60 degrees of the side, as bodies side by side are told for the choice of the limb.
+        // Within 60 degrees of the side, the same limit as for bodies side by side in the choice of the limb.
         let is_on_side = 2.0 * x * towards_left(side) >= x.hypot(y).hypot(z);
         let may_be_limb = body.bone_mm3 > 0.0 && body.core_mm3 >= LEAST_OF_LIMB * chosen.core_mm3;
         !body.chosen && !body.alike && is_on_side && may_be_limb

@@ -18,7 +18,7 @@ use crate::seal::{Opened, opened, sealed};
 
 /// One pose of one limb: the unit of work.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Unit<'a> {
+pub(crate) struct PoseJob<'a> {
     /// The limb.
     pub limb: LimbId,
     /// Its rotation.
@@ -27,7 +27,7 @@ pub(crate) struct Unit<'a> {
     pub limb_key: &'a str,
 }
 
-impl Unit<'_> {
+impl PoseJob<'_> {
     /// Which pose it is.
     pub fn id(&self) -> PoseId {
         PoseId {
@@ -43,7 +43,7 @@ impl Unit<'_> {
     }
 }
 
-impl fmt::Display for Unit<'_> {
+impl fmt::Display for PoseJob<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.id().fmt(f)
     }
@@ -86,7 +86,7 @@ pub(crate) enum FoundRecord {
     Absent,
     /// A record whose seal fits, or one of an earlier version, which had none.
     Whole(Record),
-    /// A file that is no record of this pose, or not as it was written.
+    /// A file that is not a record of this pose, or not as it was written.
     Damaged,
 }
 
@@ -127,10 +127,10 @@ impl Record {
     }
 
     /// Reads the record of a pose.
-    pub fn read(root: &Path, unit: &Unit) -> Result<Self, FileError> {
-        let path = root.join(unit.id().record_file());
+    pub fn read(root: &Path, pose_job: &PoseJob) -> Result<Self, FileError> {
+        let path = root.join(pose_job.id().record_file());
         let because = |kind, what| FileError::at("read", &path)(io::Error::new(kind, what));
-        match Self::look(&path, unit.id())? {
+        match Self::look(&path, pose_job.id())? {
             FoundRecord::Whole(record) => Ok(record),
             FoundRecord::Absent => Err(because(io::ErrorKind::NotFound, "there is no such record")),
             FoundRecord::Damaged => {

@@ -9,8 +9,8 @@ use ppa_dataset::layout::LimbId;
 use ppa_dataset::manifest::Manifest;
 use serde::Serialize;
 
-use crate::claim::{FolderError, claim_existing};
-use crate::limb_units::LimbUnits;
+use crate::dataset_lock::{FolderError, lock_existing};
+use crate::limb_jobs::LimbJobs;
 use crate::part_file::read_part;
 use crate::planned::Planned;
 use crate::record::Record;
@@ -57,17 +57,17 @@ pub struct LimbStatus {
 /// # Errors
 /// [`FolderError`] when `root` holds no dataset.
 pub fn status(root: &Path) -> Result<Status, FolderError> {
-    let running = match claim_existing(root) {
+    let running = match lock_existing(root) {
         Ok(_) => false,
         Err(FolderError::Busy(_)) => true,
         Err(error) => return Err(error),
     };
     let part = read_part(root)?;
     let (mut images, mut bytes) = (0, 0);
-    let mut of_limb = |limb: &LimbUnits| {
-        let records = limb.units().filter_map(|unit| {
-            let record = Record::read(root, &unit).ok()?;
-            (record.key == unit.key()).then_some(record)
+    let mut of_limb = |limb: &LimbJobs| {
+        let records = limb.pose_jobs().filter_map(|pose_job| {
+            let record = Record::read(root, &pose_job).ok()?;
+            (record.key == pose_job.key()).then_some(record)
         });
         let mut made = 0;
         for record in records {

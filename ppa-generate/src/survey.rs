@@ -12,7 +12,7 @@ use ppa_dataset::manifest::DESCRIPTION_FILE;
 use rayon::prelude::*;
 
 use crate::differences::{KeyDifference, differences};
-use crate::limb_units::LimbUnits;
+use crate::limb_jobs::LimbJobs;
 use crate::pose_id::FOLDER;
 use crate::record::{Record, record_names};
 
@@ -101,16 +101,18 @@ pub(crate) struct Survey {
 
 impl Survey {
     /// Reads the records in `root`.
-    pub fn of(root: &Path, limbs: &[LimbUnits]) -> Result<Self, FileError> {
-        let units = limbs.iter().flat_map(LimbUnits::units);
-        let units: HashMap<_, _> = units.map(|unit| (unit.id(), unit)).collect();
+    pub fn of(root: &Path, limbs: &[LimbJobs]) -> Result<Self, FileError> {
+        let units = limbs.iter().flat_map(LimbJobs::pose_jobs);
+        let units: HashMap<_, _> = units.map(|pose_job| (pose_job.id(), pose_job)).collect();
         let recorded = record_names(&root.join(FOLDER))?;
         let is_stale = |pose: &PoseId| {
-            let Some(unit) = units.get(pose) else {
+            let Some(pose_job) = units.get(pose) else {
                 return Ok(None);
             };
             let found = Record::look(&root.join(pose.record_file()), *pose)?;
-            let stale = found.whole().is_some_and(|record| record.key != unit.key());
+            let stale = found
+                .whole()
+                .is_some_and(|record| record.key != pose_job.key());
             Ok(stale.then_some(*pose))
         };
         let stale = recorded
@@ -158,12 +160,12 @@ impl Survey {
 /// Images that stand in the place of planned ones without a record.
 fn unrecorded(
     root: &Path,
-    limbs: &[LimbUnits],
+    limbs: &[LimbJobs],
     recorded: &HashSet<PoseId>,
 ) -> Result<Vec<String>, FileError> {
     let mut found = Vec::new();
     for limb in limbs {
-        let poses = limb.units().map(|unit| unit.id());
+        let poses = limb.pose_jobs().map(|pose_job| pose_job.id());
         let poses: Vec<_> = poses.filter(|pose| !recorded.contains(pose)).collect();
         let Some(first) = poses.first() else { continue };
         let mut there = HashSet::new();

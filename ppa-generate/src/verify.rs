@@ -10,13 +10,13 @@ use ppa_scene::PoseAngle;
 use rayon::prelude::*;
 
 use crate::check::{Check, Problem, Recorded};
-use crate::claim::FolderError;
+use crate::dataset_lock::FolderError;
 use crate::differences::differences;
 use crate::generate::{GenerateError, Work};
-use crate::job::{MakeUnit, Progress};
-use crate::limb_units::LimbUnits;
+use crate::job::{MakePose, Progress};
+use crate::limb_jobs::LimbJobs;
 use crate::plan::Plan;
-use crate::record::{Record, Unit};
+use crate::record::{PoseJob, Record};
 use crate::seed::{Purpose, item_seed};
 
 /// Why a dataset could not be verified.
@@ -102,7 +102,7 @@ pub fn verify(
         let make = work.prepare(limb.limb, scratch.path())?;
         let compare = |&pose: &PoseAngle| {
             go_on(stop)?;
-            let found = compare(&limb.unit(pose), &make, root, scratch.path())?;
+            let found = compare(&limb.pose_job(pose), &make, root, scratch.path())?;
             progress(Progress::Made);
             Ok::<_, VerifyError>(found)
         };
@@ -118,18 +118,25 @@ pub fn verify(
 }
 
 /// The poses whose address hashes lowest, limb by limb.
-fn sample(limbs: &[LimbUnits], fraction: f64, seed: u64) -> Vec<(&LimbUnits, Vec<PoseAngle>)> {
-    let draw = |unit: &Unit| item_seed(seed, Purpose::Verification, unit.limb, unit.pose.step);
-    let units = || limbs.iter().flat_map(LimbUnits::units);
-    let mut draws: Vec<_> = units().map(|unit| draw(&unit)).collect();
+fn sample(limbs: &[LimbJobs], fraction: f64, seed: u64) -> Vec<(&LimbJobs, Vec<PoseAngle>)> {
+    let draw = |pose_job: &PoseJob| {
+        item_seed(
+            seed,
+            Purpose::Verification,
+            pose_job.limb,
+            pose_job.pose.step,
+        )
+    };
+    let units = || limbs.iter().flat_map(LimbJobs::pose_jobs);
+    let mut draws: Vec<_> = units().map(|pose_job| draw(&pose_job)).collect();
     draws.sort_unstable();
     let count = (draws.len() as f64 * fraction).ceil().max(1.0) as usize;
     let Some(&limit) = draws.get(count.min(draws.len()).saturating_sub(1)) else {
         return Vec::new();
     };
-    let chosen = |limb: &LimbUnits| {
-        let units = limb.units().filter(|unit| draw(unit) <= limit);
-        units.map(|unit| unit.pose).collect::<Vec<_>>()
+    let chosen = |limb: &LimbJobs| {
+        let units = limb.pose_jobs().filter(|pose_job| draw(pose_job) <= limit);
+        units.map(|pose_job| pose_job.pose).collect::<Vec<_>>()
     };
     let limbs = limbs.iter().map(|limb| (limb, chosen(limb)));
     limbs.filter(|(_, poses)| !poses.is_empty()).collect()
@@ -137,18 +144,18 @@ fn sample(limbs: &[LimbUnits], fraction: f64, seed: u64) -> Vec<(&LimbUnits, Vec
 
 /// Makes one pose again and names the images that differ from the recorded ones.
 fn compare(
-    unit: &Unit,
-    make: &MakeUnit<GenerateError>,
+    pose_job: &PoseJob,
+    make: &MakePose<GenerateError>,
     root: &Path,
     scratch: &Path,
 ) -> Result<Vec<Problem>, VerifyError> {
-    let images = make(*unit)?;
+    let images = make(*pose_job)?;
     for row in &images.files {
         let path = scratch.join(&row.file);
         std::fs::remove_file(&path).map_err(FileError::at("remove", &path))?;
     }
     // A pose without a record is among the problems of the check.
-    let Ok(record) = Record::read(root, unit) else {
+    let Ok(record) = Record::read(root, pose_job) else {
         return Ok(Vec::new());
     };
     let mut different = Vec::new();
@@ -158,7 +165,7 @@ fn compare(
         }
     }
     if record.files.len() > images.files.len() || record.rois != images.rois {
-        different.push(unit.id().record_file());
+        different.push(pose_job.id().record_file());
     }
     let problem = |file| Problem::Differs { file };
     Ok(different.into_iter().map(problem).collect())
@@ -173,7 +180,7 @@ mod tests {
 
     #[test]
     fn the_share_of_a_sample_is_the_fraction() {
-        let limb = |patient| LimbUnits {
+        let limb = |patient| LimbJobs {
             limb: LimbId {
                 patient,
                 side: Side::Left,

@@ -11,7 +11,7 @@ use serde::Deserialize;
 use super::openness::{JointSpace, Reading, Visibility};
 use super::tallies::{Tallies, TalliesError};
 
-/// What `dataset.json` tells about detector and scans.
+/// What `dataset.json` states about detector and scans.
 #[derive(Deserialize)]
 pub(super) struct Described {
     source_detector_mm: f64,

@@ -1,6 +1,6 @@
 //! Labels of poses: grades of readers, and labels computed from the bones of an ankle.
 //!
-//! Readers see the radiographs of a dataset as [`Showing`]s on a [`grading_page`]; [`import_grades`] makes labels of their grades.
+//! Readers see the radiographs of a dataset as [`ReaderCase`]s on a [`grading_page`]; [`import_grades`] makes labels of their grades.
 //!
 //! Computed labels measure the alignment of the joint space of an ankle with the beam. They are a surrogate that no reader has
 //! validated.

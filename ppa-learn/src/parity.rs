@@ -70,7 +70,7 @@ pub fn parity(weights: &Path, io: &Path) -> Result<Parity, WeightsError> {
         };
         let ours = ours
             .get(name)
-            .ok_or_else(|| unreadable(format!("{name} is no parameter").into()))?;
+            .ok_or_else(|| unreadable(format!("{name} is not a parameter").into()))?;
         let reference = values(reference)?;
         if ours.len() != reference.len() {
             return Err(unreadable(
@@ -106,7 +106,7 @@ pub fn parity(weights: &Path, io: &Path) -> Result<Parity, WeightsError> {
     })
 }
 
-/// The larger of two errors; what is no number is as wrong as can be.
+/// The larger of two errors; what is not a number is as wrong as can be.
 fn larger(a: f64, b: f64) -> f64 {
     if b.is_nan() { f64::INFINITY } else { a.max(b) }
 }

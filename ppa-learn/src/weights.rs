@@ -47,7 +47,7 @@ pub struct Loaded {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WeightsError {
-    /// Tensors that are not there, have another shape or hold what is no weight.
+    /// Tensors that are not there, have another shape or hold what is not a weight.
     #[error("{} not fit EfficientNet-B0 with one channel: {}{}", place(.path), .misfits.join("; "), beyond(.unused))]
     Misfit {
         /// The file, if the values came from one.
@@ -108,7 +108,7 @@ impl EfficientNetB0 {
     /// Takes the values of every parameter and running statistic, by torchvision's names; other names are not looked at.
     ///
     /// # Errors
-    /// If any is missing, has another shape or holds what is no weight, each named; the network is then as before.
+    /// If any is missing, has another shape or holds what is not a weight, each named; the network is then as before.
     pub fn assign(&self, tensors: &HashMap<String, Tensor>) -> Result<(), WeightsError> {
         let statistics = self.statistics_layout().map(|entry| (2, entry));
         let [backbone, classifier] = self.variables();

@@ -93,10 +93,10 @@ pub enum ShapeError {
 /// Normals are averaged over a few rings of neighbours first, so that creases and noise do not
 /// make spikes. The distance is exact nearly everywhere. Only where the skin would turn inside out or
 /// pass through itself (inwards at the tips of toes, outwards between them) it moves less, and the
-/// distance grows back by 0.2 mm per millimetre of skin around. [`Displacement`](crate::Displacement) tells where.
+/// distance grows back by 0.2 mm per millimetre of skin around. [`Displacement`](crate::Displacement) shows where.
 ///
 /// # Errors
-/// [`ShapeError::Shift`] for a distance that is no number or out of range.
+/// [`ShapeError::Shift`] for a distance that is not a number or out of range.
 pub fn offset(mesh: &Mesh, distance_mm: f64) -> Result<Mesh, ShapeError> {
     if !(-MOST_MM..=MOST_MM).contains(&distance_mm) {
         return Err(ShapeError::Shift {
@@ -116,7 +116,7 @@ pub fn offset(mesh: &Mesh, distance_mm: f64) -> Result<Mesh, ShapeError> {
 /// [`offset`]. A mesh without vertices stays as it is.
 ///
 /// # Errors
-/// [`ShapeError::Size`] for a bump whose place, height or width is no number or out of range.
+/// [`ShapeError::Size`] for a bump whose place, height or width is not a number or out of range.
 pub fn add_bumps(mesh: &Mesh, bumps: &[Bump]) -> Result<Mesh, ShapeError> {
     for (index, bump) in bumps.iter().enumerate() {
         let placed = bump.centre.coords.iter().all(|c| c.is_finite());

@@ -6,7 +6,7 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
-/// Why nothing can be told of the neighbourhood of points.
+/// Why nothing can be known of the neighbourhood of points.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CloudError {

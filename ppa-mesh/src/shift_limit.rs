@@ -13,7 +13,7 @@ const LEAST_AREA_RATIO: f64 = 0.2;
 const REDUCTION: f64 = 0.9;
 /// Enough rounds to reduce a shift to less than a hundredth, for folds and again for crossings.
 const ROUNDS: usize = 45;
-/// Rounds in which crossings between neighbours are mended by steps aside alone.
+/// Rounds in which crossings between neighbours are repaired by steps aside alone.
 const EVEN_ROUNDS: usize = 20;
 /// Change of the shift per length of skin next to a reduced place.
 const SLOPE: f64 = 0.2;

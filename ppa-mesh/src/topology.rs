@@ -1,4 +1,4 @@
-//! Counts that tell whether a mesh is one closed surface.
+//! Counts that show whether a mesh is one closed surface.
 
 use crate::mesh::Mesh;
 

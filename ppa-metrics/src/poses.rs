@@ -45,7 +45,7 @@ pub fn mean_per_pose<F: AsRef<[f64]>>(poses: &[F]) -> Result<Vec<f64>, MetricErr
     poses.iter().map(|frames| mean(frames.as_ref())).collect()
 }
 
-/// Pose Delta: mean over pairs of (b₁ + b₂)/2 − g. The larger, the better good and bad poses are told apart.
+/// Pose Delta: mean over pairs of (b₁ + b₂)/2 − g. The larger, the better good and bad poses are separated.
 ///
 /// # Errors
 /// [`MetricError`] for empty or non-finite input.

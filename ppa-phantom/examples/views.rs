@@ -124,7 +124,7 @@ fn projection(ct: &Volume, joint: &Point3<f64>, internal_rotation_rad: f64) -> G
         let start = corner + across * u - Vector3::z() * v;
         let sum: f64 = (-220..=120)
             .filter_map(|step| ct.sample(&(start + along * f64::from(step))))
-            // Water near 60 keV; calcium attenuates more than its density tells.
+            // Water near 60 keV; calcium attenuates more than its density suggests.
             .map(|hu| 0.02 * (1.0 + hu / 1000.0) * (1.0 + 0.4 * (hu / 400.0).clamp(0.0, 1.0)))
             .sum();
         1.3 * (1.0 - (-sum / 3.6).exp()) - 0.15

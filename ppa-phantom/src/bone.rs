@@ -115,7 +115,7 @@ pub(super) struct Gap {
     pub at_origin_mm: f64,
     /// Growth per mm.
     pub slope: Vector3<f64>,
-    /// The least and the most, kept where growth would go on beyond it, mm.
+    /// The least and the most, kept where growth would continue beyond it, mm.
     pub range_mm: [f64; 2],
 }
 

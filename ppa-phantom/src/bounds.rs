@@ -1,4 +1,4 @@
-//! Boxes around shapes, which tell when a shape is too far away to matter.
+//! Boxes around shapes, so that distant shapes are skipped.
 
 use nalgebra::{Point3, Vector3};
 

@@ -6,7 +6,7 @@ use super::bounds::Bounds;
 use super::sdf::{Plane, Shape};
 use super::smooth::{smooth_max, smooth_min, smooth_step};
 
-/// A shape and the box around it, which tells when the shape is too far away to matter.
+/// A shape and the box around it, so that the shape is skipped where it is far away.
 #[derive(Debug, Clone)]
 pub(super) struct Bounded {
     shape: Shape,

@@ -6,7 +6,7 @@ use super::parameters::Sex;
 pub(super) struct Dimension {
     /// Mean and standard deviation of men.
     pub men: [f64; 2],
-    /// The same of women, where sources tell them apart.
+    /// The same of women, where sources distinguish them.
     pub women: Option<[f64; 2]>,
     /// Whether the numbers above are those of a foot of P01's size, to be multiplied by the size.
     pub grows: bool,

@@ -16,7 +16,7 @@ pub enum Sex {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Parameters {
     pub sex: Sex,
-    /// All lengths that no other field tells, relative to P01.
+    /// All lengths that no other field shows, relative to P01.
     pub size: f64,
     /// Internal rotation that turns both malleoli parallel to the detector: 19.1° ± 5.0°, n = 128 feet.
     pub mortise_angle_rad: f64,

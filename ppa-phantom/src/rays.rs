@@ -76,7 +76,7 @@ impl Limb {
             }
             let leaves = bisect(t, next, |t| self.tissue_in_limb(&at(t)) == tissue);
             push(tissue, entered, leaves);
-            // A third tissue may lie before `next`: go on just behind the surface.
+            // A third tissue may lie before `next`: continue just behind the surface.
             (t, entered) = (leaves, leaves);
             tissue = self.tissue_in_limb(&at(leaves));
         }

@@ -26,7 +26,7 @@ const DOT: f64 = 5.0;
 const RING: f64 = 4.0;
 
 /// Draws views, the best first: on the left the sky above the joint, straight above in the middle, with a disc per camera, larger
-/// for larger distances and below the nearer ones; on the right share of the surface over mm per pixel. Colours tell the share.
+/// for larger distances and below the nearer ones; on the right share of the surface over mm per pixel. Colours show the share.
 pub fn coverage_plot(views: &[RankedView]) -> RgbImage {
     let width = (2.0 * PANEL + 4.0 * MARGIN) as u32;
     let mut sheet = RgbImage::from_pixel(width, HEIGHT, Rgb([24; 3]));

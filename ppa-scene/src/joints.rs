@@ -22,7 +22,7 @@ impl<'a> Joints<'a> {
     /// Looks for both joints, first with proximal superior; only where neither shows, the other way round.
     ///
     /// Upside down a knee looks like an ankle to what follows a tibia to its flare: what is found at the gap of a knee
-    /// is no ankle.
+    /// is not an ankle.
     pub(crate) fn find(volume: &'a Volume, mask: &'a [bool]) -> Result<Self, LandmarkError> {
         let up = Vector3::z();
         for (towards_proximal, is_reversed) in [(up, false), (-up, true)] {

@@ -193,7 +193,7 @@ fn nearly_level(points: Vec<GapPoint>) -> Option<Vec<GapPoint>> {
             right += row * (point.level_mm * weight(point));
         }
         plane = normal.cholesky()?.solve(&right);
-        // Steeper than 20 degrees is no joint line of a leg cut across its shaft.
+        // Steeper than 20 degrees is not a joint line of a leg cut across its shaft.
         if plane.y.hypot(plane.z) > 0.36 {
             return None;
         }

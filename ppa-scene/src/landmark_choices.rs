@@ -122,7 +122,7 @@ impl LandmarkOverrides {
     }
 }
 
-/// Why the landmarks of a limb cannot be told.
+/// Why the landmarks of a limb cannot be found.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LandmarkError {

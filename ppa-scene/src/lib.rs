@@ -1,6 +1,6 @@
 //! Scene of a synthetic radiograph: a limb from a CT scan, laid on the table under the x-ray beam.
 //!
-//! [`find_landmarks`] tells how a limb lies in its scan, [`Room`] is the x-ray room with its
+//! [`find_landmarks`] finds how a limb lies in its scan, [`XrayRoom`] is the x-ray room with its
 //! device, [`table_plane`] finds the table in the room's cloud, and [`place`] rotates the limb
 //! and lays it down. [`ct_from_device`] takes the device back into the scan, where the
 //! radiograph is computed without rotating a voxel.

@@ -16,7 +16,7 @@ pub struct PlaneSettings {
     pub up: [f64; 3],
     /// Largest angle between normal and up, degrees.
     pub max_tilt_deg: f64,
-    /// Cell of the lattice that tells connected from separate patches, mm.
+    /// Cell of the lattice that separates connected patches, mm.
     pub cell_mm: f64,
     /// Smallest area of a table top, mm².
     pub min_area_mm2: f64,

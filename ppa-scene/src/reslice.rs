@@ -16,7 +16,7 @@ pub(crate) struct Resliced {
 /// Air, for places outside the scan.
 const OUTSIDE_HU: f32 = -1000.0;
 
-/// Finer voxels than these tell nothing more about a tibia, mm.
+/// Finer voxels than these show nothing more about a tibia, mm.
 const FINEST_MM: f64 = 1.0;
 
 impl Resliced {

@@ -67,7 +67,7 @@ impl XrayRoom {
 
     /// Reads a recorded room from a PLY, OBJ or STL file in mm; its frame becomes the room frame.
     ///
-    /// Triangles are kept if the file has any. The device is given, as no cloud tells it.
+    /// Triangles are kept if the file has any. The device is given, as no cloud contains it.
     ///
     /// # Errors
     /// [`RoomError`] when the file is missing, broken or empty.

@@ -36,7 +36,7 @@ const MIN_POINTS: usize = 30;
 /// patch until its points no longer change, then the patch the beam hits first (or the largest).
 ///
 /// Only the connected patch counts, so that a wall or a cabinet cut by the plane does not tilt
-/// it. The floor is often larger than the table; the beam tells them apart. The result depends
+/// it. The floor is often larger than the table; the beam distinguishes them. The result depends
 /// on the cloud, the settings and the seed only, not on the number of threads.
 ///
 /// # Errors

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use ppa_dataset::layout::{self, LimbId, View};
 use ppa_dataset::{BodyShape, FileKind, FindingCode, Findings, Manifest, Severity};
 use ppa_depth::{DepthImage, WallDepth};
-use ppa_generate::{GenerateError, Plan, PlanCase, UnitError, forecast, generate, prepare};
+use ppa_generate::{GenerateError, Plan, PlanCase, PoseError, forecast, generate, prepare};
 use ppa_mesh::{LimbSettings, VoxelBox};
 use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{Side, Sweep};
@@ -97,7 +97,7 @@ fn a_foot_cut_in_the_region_needs_the_plans_consent() {
         let root = folder.path().join("refused");
         let error = generate(plan, &root, &Default::default(), &|_| {}).unwrap_err();
         let GenerateError::Posable {
-            source: UnitError::Cut(cut),
+            source: PoseError::Cut(cut),
             ..
         } = &error
         else {

@@ -13,7 +13,7 @@ use ppa_dataset::{BodyShape, FileKind, Manifest};
 use ppa_depth::{DepthImage, isometry_from_rows};
 use ppa_generate::{
     Case, FolderError, GenerateError, GenerateSettings, JobError, Plan, PlanCase, PreparedLimb,
-    Stage, Summary, generate, prepare,
+    SceneSetup, Summary, generate, prepare,
 };
 use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{Landmarks, Side, Sweep};
@@ -269,7 +269,7 @@ fn no_path_of_the_scan_reaches_the_dataset() {
 #[test]
 fn depth_pixels_lie_on_the_skin_of_the_scan() {
     let phantom = LowerLeg::p01();
-    let stage = Stage::of_plan(&plan()).unwrap();
+    let setup = SceneSetup::of_plan(&plan()).unwrap();
     let manifest = Manifest::read(dataset()).unwrap();
     let rois = manifest.rois(LIMB).unwrap();
     let originals = manifest
@@ -278,7 +278,7 @@ fn depth_pixels_lie_on_the_skin_of_the_scan() {
         .filter(|row| row.kind == FileKind::Depth && row.shape == BodyShape::Orig);
     for row in originals {
         let view = row.camera.unwrap();
-        let placed = stage
+        let placed = setup
             .cameras
             .iter()
             .find(|camera| camera.view == view)

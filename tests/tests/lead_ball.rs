@@ -1,9 +1,9 @@
-//! A lead ball beside the ankle: radiograph and depth images tell the same place.
+//! A lead ball beside the ankle: radiograph and depth images show the same place.
 
 use nalgebra::{Isometry3, Matrix4, Point3, Vector3, Vector4};
 use ppa_ct::{Grid, Volume};
 use ppa_depth::{Body, MeshBody, PlacedBody};
-use ppa_generate::{Plan, Stage, projection};
+use ppa_generate::{Plan, SceneSetup, projection};
 use ppa_mesh::{Border, iso_surface};
 use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{LandmarkOverrides, Landmarks, LimbKind, Placement, Side, find_landmarks, place};
@@ -31,7 +31,7 @@ fn shadow(
     centre: &Point3<f64>,
     placement: &Placement,
     landmarks: &Landmarks,
-    stage: &Stage,
+    setup: &SceneSetup,
     plan: &Plan,
 ) -> [f64; 2] {
     let grid = around(centre);
@@ -44,13 +44,13 @@ fn shadow(
     let density: Vec<f32> = density.collect();
     let lead = Material::named("lead").unwrap();
     let phantom = VoxelPhantom::new(grid, vec![0; density.len()], density, vec![lead]).unwrap();
-    let exposure = projection(placement, landmarks, &stage.table.room.device, &plan.xray);
+    let exposure = projection(placement, landmarks, &setup.table.room.device, &plan.xray);
     let settings = FastSettings {
         dose_histories: f64::INFINITY,
         scatter_histories: 2_000,
         ..FastSettings::default()
     };
-    let image = fast(&phantom, &stage.spectrum, &exposure, &settings).unwrap();
+    let image = fast(&phantom, &setup.spectrum, &exposure, &settings).unwrap();
     let primary = &image.layer(Category::Primary).value;
     let Detector {
         columns,
@@ -97,7 +97,7 @@ fn sphere_centre(points: &[Point3<f64>]) -> Point3<f64> {
 fn radiograph_and_depth_images_agree_on_a_lead_ball() {
     let mut plan = Plan::new(Vec::new());
     plan.xray.detector = Detector::centred(400, 400, 0.8);
-    let stage = Stage::of_plan(&plan).unwrap();
+    let setup = SceneSetup::of_plan(&plan).unwrap();
     let leg = LowerLeg::p01().voxelise(3.0, TableTop::Absent).unwrap();
     let skin = iso_surface(&leg, -500.0, Border::Open).unwrap();
     let mask: Vec<bool> = leg.hu().iter().map(|hu| *hu >= -500.0).collect();
@@ -106,16 +106,16 @@ fn radiograph_and_depth_images_agree_on_a_lead_ball() {
         ..LandmarkOverrides::default()
     };
     let landmarks = find_landmarks(&leg, &skin, &mask, Side::Right, &choices).unwrap();
-    let device = &stage.table.room.device;
+    let device = &setup.table.room.device;
     for (degrees, offset) in [
         (0.0_f64, [40.0, -60.0, 35.0]),
         (35.0, [-55.0, -50.0, -40.0]),
     ] {
-        let table = &stage.table.plane.plane;
+        let table = &setup.table.plane.plane;
         let angle = degrees.to_radians();
         let placement = place(&skin.vertices, &landmarks, angle, table, device).unwrap();
         let centre = Point3::from(landmarks.joint_centre) + Vector3::from(offset);
-        let dark = shadow(&centre, &placement, &landmarks, &stage, &plan);
+        let dark = shadow(&centre, &placement, &landmarks, &setup, &plan);
 
         let grid = around(&centre);
         let inside = (0..grid.len())
@@ -127,7 +127,7 @@ fn radiograph_and_depth_images_agree_on_a_lead_ball() {
         let body = Body::Mesh(MeshBody::new(&ball.vertices, &ball.triangles).unwrap());
         let room_from_ct = placement.room_from_patient * landmarks.patient_from_ct();
         let device_from_room: Isometry3<f64> = *device.room_from_device.inverse().isometry();
-        for placed in &stage.cameras {
+        for placed in &setup.cameras {
             let camera_from_body = placed.camera_from_room * room_from_ct.isometry();
             let image = ppa_depth::render(
                 &placed.camera,

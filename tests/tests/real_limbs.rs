@@ -7,7 +7,7 @@ use ppa_dataset::layout::{self, LimbId, View};
 use ppa_dataset::{BodyShape, FileKind, Finding, FindingCode, Manifest};
 use ppa_depth::DepthImage;
 use ppa_generate::{
-    Case, GenerateError, Plan, PlanCase, PreparedLimb, UnitError, generate, prepare,
+    Case, GenerateError, Plan, PlanCase, PoseError, PreparedLimb, generate, prepare,
 };
 use ppa_mesh::LimbSettings;
 use ppa_scene::{LandmarkOverrides, LimbKind, Side, Sweep};
@@ -173,7 +173,7 @@ fn cuts_of_sts049_and_sts028_are_refused_and_reported() {
         let root = folder.path().join("data");
         let error = generate(&plan, &root, &Default::default(), &|_| {}).unwrap_err();
         let GenerateError::Posable {
-            source: UnitError::Cut(cut),
+            source: PoseError::Cut(cut),
             ..
         } = error
         else {

@@ -32,7 +32,7 @@ pub struct ParityArgs {
 #[derive(Debug, Args)]
 #[command(
     after_help = "An ONNX model takes `images` [N, 1, H, W], or `left` and `right` where the network is one of pairs, and gives `quality` [N, 1]. Which \
-network a weight file is of follows from its names; score fusion with shared weights is told from a single network by its training's folder only."
+network a weight file is of follows from its names; score fusion with shared weights is distinguished from a single network by its training's folder only."
 )]
 pub struct ExportArgs {
     /// Folder of a finished `ppa train`, or weights: .safetensors, .pth or .pt

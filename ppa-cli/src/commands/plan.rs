@@ -1,4 +1,4 @@
-//! `ppa plan`: what a plan will take, before anything runs.
+//! `ppa plan`: estimated cost of a plan.
 
 use std::path::{Path, PathBuf};
 
@@ -51,7 +51,7 @@ struct InitArgs {
 }
 
 #[derive(Debug, Serialize)]
-struct Told {
+struct Estimate {
     #[serde(flatten)]
     forecast: Forecast,
     threads: usize,
@@ -104,18 +104,18 @@ fn forecast_of(file: &Path, args: &PlanArgs, output: Output) -> anyhow::Result<(
     let forecast = interrupt.or_how(forecast, || NOTHING_WRITTEN.to_owned())?;
     watch.finish();
     let threads = rayon::current_num_threads();
-    let told = Told {
+    let estimate = Estimate {
         wall_hours: forecast.cpu_hours / threads as f64,
         threads,
         forecast,
     };
-    output.print(&told, describe)?;
-    // What was measured is told even then.
-    Ok(told.forecast.fits(&root)?)
+    output.print(&estimate, describe)?;
+    // What was measured is reported even then.
+    Ok(estimate.forecast.fits(&root)?)
 }
 
-fn describe(told: &Told) -> String {
-    let f = &told.forecast;
+fn describe(estimate: &Estimate) -> String {
+    let f = &estimate.forecast;
     let error = f.cpu_s_per_unit_error;
     let error = error.map_or(String::new(), |error| format!(" ± {error:.2}"));
     let free = f.free_bytes;
@@ -132,8 +132,8 @@ fn describe(told: &Told) -> String {
         f.cpu_s_per_unit,
         f.cpu_s_per_limb,
         f.cpu_hours,
-        told.wall_hours,
-        count(told.threads, "thread"),
+        estimate.wall_hours,
+        count(estimate.threads, "thread"),
         bytes(f.bytes)
     )
 }

@@ -25,7 +25,7 @@ const PAUSE: Duration = Duration::from_millis(5);
     after_help = "Prints one line of JSON for each pair: `name`, `left`, `right` and `quality` (their mean; alone where one network judges pairs) from 1 (ideal) to 3 \
 (inadequate), and `latency_ms` from the moment when the pair was found to the answer: how long it waited before, while others were judged, is not \
 in it. Frames that cannot be used are named on stderr and skipped. In a folder a name is judged again only after its files were gone. \
-The last line tells pairs per second and latencies: on stderr, or on stdout with --json."
+The last line gives pairs per second and latencies: on stderr, or on stdout with --json."
 )]
 pub struct PredictArgs {
     /// Folder of the finished `ppa train` of the left camera's network
@@ -103,17 +103,17 @@ pub fn run(args: &PredictArgs, output: Output) -> anyhow::Result<()> {
         }
     };
     if ended.is_err() && judge.first.is_none() && judge.skipped == 0 {
-        return ended; // There is nothing that a summary could tell.
+        return ended; // There is nothing that a summary could show.
     }
     let summary = judge.summary();
-    let told = match output.json {
+    let report = match output.json {
         true => output.print(&summary, |_| String::new()),
         false => {
             stderr::note(&describe(&summary));
             Ok(())
         }
     };
-    ended.and(told)
+    ended.and(report)
 }
 
 struct Judge {

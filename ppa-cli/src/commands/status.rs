@@ -1,4 +1,4 @@
-//! `ppa status`: how far a dataset has come.
+//! `ppa status`: generation progress.
 
 use std::path::PathBuf;
 

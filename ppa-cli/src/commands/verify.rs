@@ -91,7 +91,7 @@ pub fn require_none(dataset: &Path, problems: &[impl ToString]) -> anyhow::Resul
     if problems.is_empty() {
         return Ok(());
     }
-    let told: Vec<_> = problems
+    let report: Vec<_> = problems
         .iter()
         .take(TOLD)
         .map(ToString::to_string)
@@ -100,5 +100,5 @@ pub fn require_none(dataset: &Path, problems: &[impl ToString]) -> anyhow::Resul
         0 => String::new(),
         more => format!("; and {more} more"),
     };
-    bail!("{}: {}{more}", dataset.display(), told.join("; "))
+    bail!("{}: {}{more}", dataset.display(), report.join("; "))
 }

@@ -173,7 +173,7 @@ fn bones_of_a_leg_in_thick_slices_are_refused_with_the_place() {
         ),
     );
     assert!(
-        said.contains("tibia and talus are not told apart: they touch over"),
+        said.contains("tibia and talus are not separated: they touch over"),
         "{said}"
     );
     assert!(said.contains("0.98 x 0.98 x 3.27 mm"), "{said}");
@@ -228,7 +228,7 @@ fn refusals(here: &Path) {
     for (name, expected) in [
         ("coarse.nii", "is the scan itself"),
         ("slices", "would be a DICOM CT"),
-        ("bones.nrrd", "tibia and fibula are not told apart"),
+        ("bones.nrrd", "tibia and fibula are not separated"),
     ] {
         refused(
             &format!("prepare coarse.nii --side r --segment-bones {name} --out x.toml"),

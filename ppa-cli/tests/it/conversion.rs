@@ -111,7 +111,7 @@ fn changes_that_make_no_volume_are_refused() {
         );
         assert!(said.contains(part), "{arguments}: {said}");
     }
-    // Told by the parser, which adds how to go on.
+    // Told by the parser, which adds how to continue.
     for (arguments, part) in [
         ("--crop 1,2,3", "6 voxel indices"),
         ("--crop-mm 0,1,0,1", "6 numbers"),

@@ -1,4 +1,4 @@
-//! A finished dataset looked over, damaged, and mended.
+//! A finished dataset looked over, damaged, and repaired.
 
 use std::fs;
 
@@ -135,7 +135,7 @@ fn what_was_altered_is_named_and_nothing_is_lost() {
     assert!(contents(&root) == before);
 }
 
-/// Until a run has mended what is missing, no manifest tells that the dataset is whole.
+/// Until a run has replaced what is missing, no manifest shows that the dataset is whole.
 #[test]
 fn a_broken_run_over_a_finished_dataset_leaves_no_manifest() {
     let folder = copy();

@@ -35,8 +35,8 @@ fn copy() -> tempfile::TempDir {
 fn a_dataset_is_checked_and_converted_there_and_back() {
     let folder = copy();
     let said = succeed(folder.path(), "dataset check data --json");
-    let told: Value = serde_json::from_str(&said).unwrap();
-    let count = |key: &str| told[key].as_u64().unwrap();
+    let report: Value = serde_json::from_str(&said).unwrap();
+    let count = |key: &str| report[key].as_u64().unwrap();
     assert_eq!(
         (count("patients"), count("pairs"), count("depth_images")),
         (1, 10, 20)
@@ -45,7 +45,7 @@ fn a_dataset_is_checked_and_converted_there_and_back() {
         (count("regions"), count("radiographs"), count("labelled")),
         (20, 5, 0)
     );
-    assert_eq!(told["manifest"], true);
+    assert_eq!(report["manifest"], true);
     succeed(
         folder.path(),
         "dataset convert data --out specimen --flexion max",
@@ -54,9 +54,9 @@ fn a_dataset_is_checked_and_converted_there_and_back() {
         folder.path(),
         "dataset convert specimen --out back --flexion max --json",
     );
-    let told: Value = serde_json::from_str(&said).unwrap();
+    let report: Value = serde_json::from_str(&said).unwrap();
     assert_eq!(
-        (told["depth_images"].as_u64(), told["left_out"].as_u64()),
+        (report["depth_images"].as_u64(), report["left_out"].as_u64()),
         (Some(20), Some(0))
     );
     let mut original = contents(&folder.path().join("data"));
@@ -215,7 +215,7 @@ fn tables_and_archives_are_written_from_a_generated_dataset() {
     assert!(said.contains("manifest.jsonl"), "{said}");
 }
 
-/// Nothing on it comes from elsewhere, and nothing tells where the dataset lay.
+/// Nothing on it comes from elsewhere, and nothing shows where the dataset lay.
 #[test]
 fn the_page_of_a_dataset_stands_by_itself() {
     let folder = copy();
@@ -243,7 +243,7 @@ fn the_page_of_a_dataset_stands_by_itself() {
     }
     assert!(page.contains("aria-label=\"colours of depths from "));
     assert!(page.contains("Fewer than 9 poses") && page.contains("is as in manifest.jsonl"));
-    // What is damaged is told, and where it would stand is a cross: there is a page when one is needed.
+    // What is damaged is reported, and where it would stand is a cross: there is a page when one is needed.
     let images = [
         "patient_3/depth/r/orig/depth_cam_left_0.0.png",
         "patient_3/xray/r/xray_image_0.png",

@@ -47,7 +47,7 @@ fn the_noise_of_a_recording_is_found_again_and_is_the_same_for_any_number_of_thr
 
     let fit = "depth fit-noise one --camera camera.json --out fitted.json --json";
     let fitted: Value = serde_json::from_str(&succeed(folder.path(), fit)).unwrap();
-    // The default's 1.14 mm; 7 700 pixels of 12 frames tell it to about 0.5 %.
+    // The default's 1.14 mm; 7 700 pixels of 12 frames determine it to about 0.5 %.
     let found = fitted["random"]["at_unit_signal_mm"].as_f64().unwrap();
     assert!((found / 1.14 - 1.0).abs() < 0.03, "{found}");
     let again = "depth render wall.ply --camera camera.json --sensor fitted.json --out again.png";

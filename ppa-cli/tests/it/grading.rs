@@ -51,7 +51,7 @@ fn readers_get_pictures_without_a_trace_of_what_they_show() {
     assert_eq!(names(&here.join("out")), ["grading.html"]);
     let page = fs::read_to_string(here.join("out/grading.html")).unwrap();
     for trace in ["patient", "xray_image", "http", "src=\"", "5.0"] {
-        assert!(!page.contains(trace), "the page tells {trace}");
+        assert!(!page.contains(trace), "the page contains {trace}");
     }
     let key = key(here);
     assert_eq!(key.len(), 6, "five radiographs, one of them twice");
@@ -208,7 +208,7 @@ fn no_grade_and_no_label_of_readers_is_lost() {
     let kept = fs::read_to_string(here.join("data/grades.csv")).unwrap();
     let before = labels(here);
     for [_, image, sha256] in &key {
-        assert!(kept.contains(sha256), "grades.csv tells what was graded");
+        assert!(kept.contains(sha256), "grades.csv names what was graded");
         assert_eq!(before[file_name(image)]["radiograph_sha256"], **sha256);
     }
 
@@ -261,11 +261,11 @@ fn no_grade_and_no_label_of_readers_is_lost() {
     let done = ppa(here, "generate plan.toml --out data --replace")
         .output()
         .unwrap();
-    let told = String::from_utf8(done.stderr).unwrap();
+    let report = String::from_utf8(done.stderr).unwrap();
     assert!(
         done.status.success()
-            && told.contains("than those there now: 5 labels, the first of step 0"),
-        "{told}"
+            && report.contains("than those there now: 5 labels, the first of step 0"),
+        "{report}"
     );
     for command in ["dataset check data", "export table data --out t.csv"] {
         let refused = fail(here, command);

@@ -105,7 +105,7 @@ fn assert_clean(folder: &Path) -> usize {
 #[test]
 fn no_output_identifies_the_source() {
     let root = tempfile::tempdir().unwrap();
-    // What a user keeps to himself, under names that tell as much as the headers do.
+    // What a user keeps to himself, under names that reveal as much as the headers do.
     let private = root.path().join(format!("{WORD}-{}", DATES[1]));
     let (scan, out) = (private.join("scan"), root.path().join("out"));
     fs::create_dir_all(&scan).unwrap();
@@ -155,7 +155,7 @@ fn no_output_identifies_the_source() {
     fs::write(&plan, settings).unwrap();
     run(&format!("generate {} --out dataset --json", plan.display()));
 
-    // What a command prints may name the file it was told to write, not more.
+    // What a command prints may name the file it writes, no other.
     for path in [&case, &plan.display().to_string()] {
         said = said.replace(path.as_str(), "");
     }

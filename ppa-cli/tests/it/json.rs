@@ -46,7 +46,7 @@ fn every_command_keeps_its_keys() {
         "warnings",
     ];
     let original = object("ct info p01.nii", &info);
-    // NIfTI holds places as f32, the chain goes on from there.
+    // NIfTI holds places as f32, the chain continues from there.
     for copy in ["copy.nii.gz", "copy.nrrd", "copy.mha", "copy.mhd"] {
         let copied = object(&format!("ct convert p01.nii {copy}"), &info);
         assert_eq!(copied["modality"], Value::Null);

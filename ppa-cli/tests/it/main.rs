@@ -59,7 +59,7 @@ fn succeed(folder: &Path, arguments: &str) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Runs `ppa`, expects a failure told in one sentence, and returns the sentence.
+/// Runs `ppa`, expects a failure reported in one sentence, and returns the sentence.
 fn fail(folder: &Path, arguments: &str) -> String {
     let output = ppa(folder, arguments).output().unwrap();
     let stderr = String::from_utf8(output.stderr).unwrap();

@@ -83,7 +83,7 @@ fn mistakes_are_reported_and_leave_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     write_input(folder.path());
     let text = fs::read_to_string(folder.path().join("box.in")).unwrap();
-    for (from, to, more, told) in [
+    for (from, to, more, report) in [
         (
             "ppa:water",
             "water.mcgpu.gz",
@@ -112,8 +112,8 @@ fn mistakes_are_reported_and_leave_nothing_behind() {
             folder.path(),
             &format!("xray mcgpu bad.in --out results {more}"),
         );
-        assert!(said.contains(told), "{told:?} is missing in: {said}");
-        assert!(!folder.path().join("results").exists(), "{told}");
+        assert!(said.contains(report), "{report:?} is missing in: {said}");
+        assert!(!folder.path().join("results").exists(), "{report}");
     }
     let nowhere = "xray mcgpu nowhere.in --out results";
     assert!(fail(folder.path(), nowhere).contains("nowhere.in"));
@@ -127,14 +127,14 @@ fn mistakes_are_reported_and_leave_nothing_behind() {
 fn a_damaged_spectrum_is_reported_with_its_line_and_named_once() {
     let folder = tempfile::tempdir().unwrap();
     write_input(folder.path());
-    for (text, told) in [
+    for (text, report) in [
         ("40000 1\nsixty -1\n", "line 2: found \"sixty -1\""),
         ("40000 NaN\n60000 -1\n", "energy bin 0 has weight NaN"),
         ("40000 1\n999000 -1\n", "between 40 and 999 keV"),
     ] {
         fs::write(folder.path().join("beam.spc"), text).unwrap();
         let said = fail(folder.path(), "xray mcgpu box.in --out results");
-        assert!(said.contains(told), "{told:?} is missing in: {said}");
+        assert!(said.contains(report), "{report:?} is missing in: {said}");
         assert_eq!(said.matches("beam.spc").count(), 1, "{said}");
     }
 }

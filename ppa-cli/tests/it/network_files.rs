@@ -25,7 +25,7 @@ fn pairs_are_exported_from_trainings_and_from_their_weight_files() {
         }
         let weights = format!("{name}.safetensors");
         export(what, &weights);
-        // The names in the file tell that there are two networks.
+        // The names in the file show that there are two networks.
         assert!(export(&weights, "again.onnx") == model, "{what}");
         assert!(export(&weights, "again.safetensors") == fs::read(folder.join(&weights)).unwrap());
     }

@@ -146,7 +146,7 @@ fn a_missing_folder_is_reported_before_any_work() {
         "dataset convert nowhere --out no/other",
         "eval nowhere --out no/evaluation",
     ] {
-        contains(&fail(here, command), &["no is no folder"]);
+        contains(&fail(here, command), &["no is not a folder"]);
     }
     assert_eq!(contents(here).len(), 1);
 }

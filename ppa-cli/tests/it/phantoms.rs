@@ -43,12 +43,12 @@ fn plate_labels_and_noise_are_in_the_files() {
     let whole = "--name p05 --spacing-mm 3 --out whole.nii";
     let plain = made(folder.path(), whole);
     assert_eq!(plain["phantom"], "P05, right lower leg");
-    let told = made(
+    let report = made(
         folder.path(),
         "--name P05 --spacing-mm 3 --plate --labels bones.nii.gz --noise-hu 20 --blur-mm 1 --out metal.nii",
     );
-    assert_eq!(told["labels"].as_array().unwrap().len(), 28);
-    assert_eq!(told["labels"][0], "talus");
+    assert_eq!(report["labels"].as_array().unwrap().len(), 28);
+    assert_eq!(report["labels"][0], "talus");
     assert_eq!(info("bones.nii.gz")["size"], info("metal.nii")["size"]);
     assert!(info("bones.nii.gz")["hu_max"].as_f64().unwrap() <= 28.0);
     let [metal, bone] =

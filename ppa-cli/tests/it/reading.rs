@@ -39,12 +39,12 @@ fn copy_with(folder: &Path, prefix: &str, changes: &[(Tag, VR, &str)]) {
     }
 }
 
-fn told(folder: &Path, arguments: &str) -> Value {
+fn report(folder: &Path, arguments: &str) -> Value {
     serde_json::from_str(&succeed(folder, &format!("{arguments} --json"))).unwrap()
 }
 
-fn codes(told: &Value) -> Vec<&str> {
-    let warnings = told["warnings"].as_array().unwrap().iter();
+fn codes(report: &Value) -> Vec<&str> {
+    let warnings = report["warnings"].as_array().unwrap().iter();
     warnings.map(|w| w["code"].as_str().unwrap()).collect()
 }
 
@@ -81,8 +81,8 @@ fn gaps_are_filled_only_when_asked_for() {
         );
     }
     assert_eq!(names(folder), ["scan"]);
-    let whole = told(slices(), "ct info slices");
-    let filled = told(folder, "ct info scan --fill-gaps");
+    let whole = report(slices(), "ct info slices");
+    let filled = report(folder, "ct info scan --fill-gaps");
     for key in ["size", "spacing_mm", "origin_mm"] {
         assert_eq!(filled[key], whole[key], "{key}");
     }
@@ -93,19 +93,19 @@ fn gaps_are_filled_only_when_asked_for() {
     assert_eq!(codes(&filled), ["gaps-filled"]);
     let extract = "mesh extract scan --out skin.ply";
     assert!(fail(folder, extract).contains("9.000 mm after slice 9"));
-    let skin = told(folder, &format!("{extract} --fill-gaps"));
-    let whole = told(slices(), "mesh extract slices --out whole.ply");
+    let skin = report(folder, &format!("{extract} --fill-gaps"));
+    let whole = report(slices(), "mesh extract slices --out whole.ply");
     let area = |skin: &Value| skin["area_mm2"].as_f64().unwrap();
     assert!(
         (area(&skin) / area(&whole) - 1.0).abs() < 0.02,
         "{skin} and {whole}"
     );
-    let voxels = |arguments: &str| told(folder, arguments)["voxels"].clone();
+    let voxels = |arguments: &str| report(folder, arguments)["voxels"].clone();
     assert!(fail(folder, "xray audit scan").contains("9.000 mm after slice 9"));
-    let audited = told(slices(), "xray audit slices");
+    let audited = report(slices(), "xray audit slices");
     assert_eq!(voxels("xray audit scan --fill-gaps"), audited["voxels"]);
-    // The file cannot tell; what is printed does.
-    let converted = told(folder, "ct convert scan out.nrrd --fill-gaps");
+    // The file cannot show; what is printed does.
+    let converted = report(folder, "ct convert scan out.nrrd --fill-gaps");
     assert_eq!(codes(&converted), ["gaps-filled"]);
     assert_remembered(
         folder,
@@ -135,15 +135,15 @@ fn one_of_several_series_is_chosen_by_number_or_uid() {
         said.contains("number 1") && said.contains("number 7"),
         "{said}"
     );
-    let first = told(folder, "ct info scan --series 1");
+    let first = report(folder, "ct info scan --series 1");
     assert_eq!(
         first["hu_sum"],
-        told(slices(), "ct info slices")["hu_sum"],
+        report(slices(), "ct info slices")["hu_sum"],
         "series 1 is the phantom"
     );
-    told(folder, "mesh extract scan --series 1 --out skin.ply");
+    report(folder, "mesh extract scan --series 1 --out skin.ply");
     for choice in ["7", "2.25.4711"] {
-        let seventh = told(folder, &format!("ct info scan --series {choice}"));
+        let seventh = report(folder, &format!("ct info scan --series {choice}"));
         assert_ne!(seventh["hu_sum"], first["hu_sum"]);
         assert_eq!(seventh["series"][1]["read"], true);
     }
@@ -185,14 +185,14 @@ fn another_modality_is_read_only_when_forced_and_never_called_a_ct() {
     copy_with(&folder.join("scan"), "", &[(tags::MODALITY, VR::CS, "MR")]);
     let said = fail(folder, "ct info scan");
     assert!(said.contains("modality MR, not CT"), "{said}");
-    let forced = told(folder, "ct info scan --force");
+    let forced = report(folder, "ct info scan --force");
     assert_eq!(forced["modality"], "MR");
     assert_eq!(codes(&forced), ["not-ct"]);
 
     let said = fail(folder, "ct convert scan slices --force");
     assert!(said.contains("the scan holds modality MR"), "{said}");
     assert_eq!(names(folder), ["scan"]);
-    let converted = told(folder, "ct convert scan mr.nii --force");
+    let converted = report(folder, "ct convert scan mr.nii --force");
     assert_eq!(converted["hu_sum"], forced["hu_sum"]);
     assert_eq!(codes(&converted), ["not-ct"]);
     assert_remembered(folder, "--force", "force = true", "modality MR");
@@ -250,9 +250,9 @@ fn real_scans_pass_when_asked_to() {
     ] {
         let path = shared().join("data").join(path).display().to_string();
         fail(folder.path(), &format!("ct convert {path} out.mha"));
-        let info = told(folder.path(), &format!("ct info {path} {option}"));
+        let info = report(folder.path(), &format!("ct info {path} {option}"));
         assert!(codes(&info).contains(&code), "{path}: {info}");
-        let converted = told(
+        let converted = report(
             folder.path(),
             &format!("ct convert {path} out.mha {option}"),
         );

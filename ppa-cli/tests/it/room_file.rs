@@ -115,14 +115,17 @@ fn broken_room_files_are_reported() {
     let room = folder.path().join("room.toml");
     succeed(folder.path(), "scene room --out a.ply --toml good.toml");
     let good = fs::read_to_string(folder.path().join("good.toml")).unwrap();
-    for (from, to, told) in [
+    for (from, to, report) in [
         ("version = 1", "version = 2", "version 2"),
         ("[room", "[rooms", "rooms"),
         ("fx = ", "fx = -", "fx"),
     ] {
         fs::write(&room, good.replacen(from, to, 1)).unwrap();
         let said = fail(folder.path(), "scene room --room room.toml --out b.ply");
-        assert!(said.contains("room.toml") && said.contains(told), "{said}");
+        assert!(
+            said.contains("room.toml") && said.contains(report),
+            "{said}"
+        );
     }
     assert!(!folder.path().join("b.ply").exists());
     let plan = "version = 1\nroom_file = \"good.toml\"\n[[case]]\nfile = \"a.toml\"\npatient = 0\n";

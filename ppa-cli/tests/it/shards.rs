@@ -114,7 +114,7 @@ fn overlaps_holes_and_strangers_are_refused() {
         &["s1 holds shard 1/2", "the whole plan"],
     );
 
-    // A damaged image stops the merge, which goes on once the shard is made whole again.
+    // A damaged image stops the merge, which continues once the shard is made whole again.
     let image = "patient_3/depth/r/orig/depth_cam_left_10.0.png";
     let bytes = fs::read(here.join("s2").join(image)).unwrap();
     fs::write(here.join("s2").join(image), &bytes[..bytes.len() / 2]).unwrap();
@@ -235,17 +235,17 @@ fn a_plan_tells_what_it_takes_or_why_it_cannot_work() {
     let folder = tempfile::tempdir().unwrap();
     write_quick_plan(folder.path());
     let said = succeed(folder.path(), "plan plan.toml --fraction 0.4 --json");
-    let told: Value = serde_json::from_str(&said).unwrap();
+    let report: Value = serde_json::from_str(&said).unwrap();
     let counts = ["limbs", "units", "depth_images", "radiographs", "measured"];
     assert_eq!(
-        counts.map(|key| told[key].as_u64().unwrap()),
+        counts.map(|key| report[key].as_u64().unwrap()),
         [1, 5, 20, 5, 2]
     );
-    let number = |key: &str| told[key].as_f64().unwrap();
+    let number = |key: &str| report[key].as_f64().unwrap();
     let expected = (number("cpu_s_per_limb") + 5.0 * number("cpu_s_per_unit")) / 3600.0;
     assert!(
         (number("cpu_hours") / expected - 1.0).abs() < 1e-9,
-        "{told}"
+        "{report}"
     );
     assert_eq!(
         crate::names(folder.path()),

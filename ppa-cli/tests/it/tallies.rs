@@ -27,27 +27,27 @@ fn parts_and_sittings_end_in_the_bytes_of_one_run() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     write_plan(folder, "");
-    let told = simulate(
+    let report = simulate(
         folder,
         "--histories 20000 --dose --out one.png --tally one.tally",
     );
-    assert_eq!(told["histories"], 20_000.0);
-    let absolute = &told["projections"][0];
+    assert_eq!(report["histories"], 20_000.0);
+    let absolute = &report["projections"][0];
     let factor = absolute["histories_per_mas"].as_f64().unwrap();
     let primary = absolute["primary_ev_per_history"].as_f64().unwrap();
     let per_mas = absolute["ev_per_mas"]["primary"].as_f64().unwrap();
     assert!((per_mas / (primary * factor) - 1.0).abs() < 1e-12);
-    let materials = told["materials"].as_array().unwrap().len();
+    let materials = report["materials"].as_array().unwrap().len();
     for key in [
         "material_dose_ev_per_history",
         "material_dose_ev_per_history_se",
         "material_mass_g",
     ] {
-        assert_eq!(told[key].as_array().unwrap().len(), materials, "{key}");
+        assert_eq!(report[key].as_array().unwrap().len(), materials, "{key}");
     }
     assert!(
-        told["entrance_air_kerma_ugy_per_mas"].as_f64()
-            > told["detector_air_kerma_ugy_per_mas"].as_f64()
+        report["entrance_air_kerma_ugy_per_mas"].as_f64()
+            > report["detector_air_kerma_ugy_per_mas"].as_f64()
     );
 
     for part in ["2/3", "1/3", "3/3"] {
@@ -123,7 +123,7 @@ fn a_dose_map_lies_on_the_limb_in_the_units_of_the_kerma() {
         text.replace("half_length_mm = 20.0\nmax_voxel_mm = 5.0\n", ""),
     )
     .unwrap();
-    let told = simulate(
+    let report = simulate(
         folder,
         "--target-error 60 --dose-map dose.nii.gz --out x.png",
     );
@@ -142,7 +142,7 @@ fn a_dose_map_lies_on_the_limb_in_the_units_of_the_kerma() {
         hit.len()
     );
     let mean_ugy = dose.iter().map(|&ugy| f64::from(ugy)).sum::<f64>() / grid.len() as f64;
-    let skin_ugy = told["entrance_air_kerma_ugy_per_mas"].as_f64().unwrap();
+    let skin_ugy = report["entrance_air_kerma_ugy_per_mas"].as_f64().unwrap();
     assert!(
         (0.3..0.9).contains(&(mean_ugy / skin_ugy)),
         "{mean_ugy} µGy/mAs, at the skin {skin_ugy} µGy/mAs"

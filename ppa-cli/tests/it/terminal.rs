@@ -108,7 +108,7 @@ fn errors_of_json_runs_are_objects() {
         assert!(text.contains(part), "{usage}");
         assert!(!text.contains("Usage") && !text.contains('\n'), "{usage}");
     }
-    // Help is no failure.
+    // Help is not a failure.
     assert!(output("metrics --help --json", &[]).status.success());
 }
 

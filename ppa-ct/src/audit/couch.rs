@@ -26,7 +26,7 @@ pub(super) struct Couch {
     path: Vec<(usize, f64)>,
 }
 
-/// A thin place that goes on one of an earlier column.
+/// A thin place that continues one of an earlier column.
 struct Link {
     x: usize,
     y: f64,

@@ -58,7 +58,7 @@ impl FindingCode {
                 "Metal and dense bone at the limit get one density: the shadows of implants are too light.",
             ),
             F::ClippedBelow => (
-                "Air, foam and couch cannot be told apart; the skin threshold may be below the lowest value.",
+                "Air, foam and couch cannot be distinguished; the skin threshold may be below the lowest value.",
                 "Air outside and inside the limb attenuates.",
             ),
             F::BelowAir => (
@@ -100,7 +100,7 @@ fn of_warning(code: WarningCode) -> (&'static str, &'static str) {
             "None: the beam is traced through the sheared grid.",
         ),
         WarningCode::SingleSlice => (
-            "A slab as thick as one slice is no limb.",
+            "A slab as thick as one slice is not a limb.",
             "The radiograph shows a slab of constant cross-section.",
         ),
         WarningCode::LocalizersDropped | WarningCode::NonImagesDropped => ("None.", "None."),

@@ -120,7 +120,7 @@ pub(super) fn check(measures: &Measures) -> Vec<Finding> {
         Finding::new(FindingCode::CutAtSide, Severity::Caution, text)
     });
     let ends = ends.map(|faces| {
-        let text = format!("tissue goes on beyond the ends of the scan: {faces}");
+        let text = format!("tissue extends beyond the ends of the scan: {faces}");
         Finding::new(FindingCode::CutAtEnd, Severity::Note, text)
     });
     sides.into_iter().chain(ends).collect()

@@ -9,7 +9,7 @@ use crate::acquisition::Acquisition;
 
 /// Above this lies bone.
 pub(super) const BONE_HU: f32 = 300.0;
-/// Above this lies metal: cortical bone stays below 2200 HU, enamel about 3000 is no limb's.
+/// Above this lies metal: cortical bone stays below 2200 HU, enamel, about 3000 HU, does not occur in limbs.
 pub(super) const METAL_HU: f32 = 2500.0;
 /// Less than this is noise, cm³.
 const LEAST_METAL_CM3: f64 = 0.05;
@@ -49,7 +49,7 @@ fn shifted(histogram: &Histogram) -> Option<[f64; 2]> {
     Some([air, tissue])
 }
 
-/// What else the values tell.
+/// What else the values show.
 pub(super) fn check(
     histogram: &Histogram,
     peaks: &Peaks,

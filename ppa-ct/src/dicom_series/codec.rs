@@ -61,7 +61,7 @@ impl Codec {
     }
 }
 
-/// Refuses a stream whose frame is not of the size that the header tells.
+/// Refuses a stream whose frame is not of the size that the header states.
 fn expect_size(found: [usize; 2], image: &Image) -> Result<(), CodecError> {
     let expected = [image.columns, image.rows];
     if found == expected {

@@ -18,7 +18,7 @@ pub(super) enum Encoding {
 /// Why bytes are no data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Fault {
-    /// An element goes on behind the last byte.
+    /// An element continues behind the last byte.
     #[error("an element ends behind the end of the data")]
     Short,
     /// No element, or sequences in sequences beyond all measure.
@@ -87,7 +87,7 @@ pub(super) struct DataSet<'a> {
 }
 
 impl<'a> DataSet<'a> {
-    /// Finds the elements from byte `at` on, up to the first that `stop` tells or to the end;
+    /// Finds the elements from byte `at` on, up to the first for which `stop` is true, or to the end;
     /// also returns where that is.
     pub fn parse(
         bytes: &'a [u8],

@@ -12,7 +12,7 @@ const END: Tag = Tag(0xfffe, 0xe0dd);
 /// The compressed bytes of one frame of `frames`.
 ///
 /// `bytes` start behind the length of Pixel Data; the first item is the table of offsets. `None` for the frame where
-/// fragments cannot be told apart: several for a frame, and no table.
+/// fragments cannot be distinguished: several for a frame, and no table.
 pub(super) fn of_frame(
     bytes: &[u8],
     index: usize,

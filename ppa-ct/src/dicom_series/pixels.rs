@@ -60,7 +60,9 @@ fn unpack(slice: &Slice, path: &Path) -> Result<Vec<u8>, ReadError> {
     let bytes = slice.file.fragments()?;
     let packed = fragments::of_frame(&bytes, slice.index, slice.image.frames)
         .map_err(|fault| damaged(path, fault))?
-        .ok_or_else(|| syntax::unsupported(path, uid, "its fragments tell no frames apart"))?;
+        .ok_or_else(|| {
+            syntax::unsupported(path, uid, "its fragments cannot be assigned to frames")
+        })?;
     codec
         .unpack(&packed, &slice.image)
         .map_err(|error| syntax::unsupported(path, uid, error))

@@ -48,7 +48,7 @@ fn representable_hu(pixel: StoredFormat, [slope, intercept]: [f64; 2]) -> [f64; 
     [ends[0].min(ends[1]), ends[0].max(ends[1])]
 }
 
-/// Text attributes that commonly tell who, where or which examination, after the confidentiality
+/// Text attributes that commonly identify who, where or which examination, after the confidentiality
 /// profile of PS3.15, table E.1-1. Names of persons, dates and UIDs are known by their type.
 #[expect(deprecated, reason = "retired attributes still stand in old files")]
 const TELLING: [Tag; 44] = [

@@ -23,7 +23,7 @@ pub enum ReadError {
         source: std::io::Error,
     },
     /// Neither a folder of DICOM files, nor a DICOM file, nor NIfTI, NRRD or MetaImage.
-    #[error("{} is no scan ppa can read: expected a folder with one DICOM series, a DICOM file, .nii, .nii.gz, .nrrd, .nhdr, .mha or .mhd", path.display())]
+    #[error("{} is not a scan that ppa can read: expected a folder with one DICOM series, a DICOM file, .nii, .nii.gz, .nrrd, .nhdr, .mha or .mhd", path.display())]
     Unsupported {
         /// The file.
         path: PathBuf,
@@ -120,7 +120,7 @@ pub enum ReadError {
         /// Localizers found.
         localizers: usize,
     },
-    /// A multi-frame object that does not tell where its frames lie.
+    /// A multi-frame object that does not state where its frames lie.
     #[error("{} holds {} and places for {described} of them", path.display(), count(*frames, "frame"))]
     MultiFrame {
         /// The file.

@@ -76,7 +76,7 @@ impl Header {
                 return Err(file.header(if line.is_empty() {
                     "the header ends without ElementDataFile".to_owned()
                 } else {
-                    format!("line {number} of the header is no `Key = Value` of a MetaImage")
+                    format!("line {number} of the header is not a `Key = Value` of a MetaImage")
                 }));
             };
             let key = key.trim().to_owned();

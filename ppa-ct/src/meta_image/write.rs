@@ -28,7 +28,7 @@ pub fn write(path: &Path, volume: &Volume) -> Result<(), WriteError> {
     let extension = path.extension().unwrap_or_default();
     if extension.eq_ignore_ascii_case("mha") {
         whole_file::write_with(path, |out| {
-            // The header tells the packed length, which is known last: it is written again, no longer.
+            // The header states the packed length, which is known last: it is written again, no longer.
             out.write_all(header(volume, 0, "LOCAL").as_bytes())?;
             let packed = write_packed(out, volume)?;
             out.rewind()?;
@@ -105,7 +105,7 @@ fn checksum(volume: &Volume) -> io::Result<u32> {
     Ok(sum.crc().sum())
 }
 
-/// Writes the deflated voxels and tells how many bytes they are.
+/// Writes the deflated voxels and returns how many bytes they are.
 fn write_packed(out: &mut dyn Write, volume: &Volume) -> io::Result<u64> {
     // CT noise hardly compresses: higher levels cost time and save a few percent.
     let mut zlib = ZlibEncoder::new(out, Compression::fast());

@@ -124,7 +124,7 @@ impl Header {
             return Ok(());
         }
         let Some(name) = USED.iter().find(|known| **known == name) else {
-            return Err("is no field of the format");
+            return Err("is not a field of the format");
         };
         match self.fields.insert(name, value.trim().to_owned()) {
             None => Ok(()),

@@ -4,7 +4,7 @@ use nalgebra::{Affine3, Matrix4, Vector3, Vector4};
 
 use super::header::Header;
 
-/// The place of a volume, as far as its header tells it.
+/// The place of a volume, as far as its header states it.
 pub(super) struct Place {
     pub(super) ct_from_voxel: Affine3<f64>,
     /// What the header leaves open.

@@ -100,8 +100,10 @@ fn real_scans_are_judged_as_a_radiographer_would() {
         let scan = ppa_ct::read(&data(path)).unwrap();
         let audit = Audit::of(&scan);
         let side = audit.findings.iter().find(|f| f.code == CutAtSide);
-        let told = side.map_or("", |f| f.text.split_once(": ").unwrap().1);
-        let faces = told.split(", ").map(|face| face.split(' ').next().unwrap());
+        let report = side.map_or("", |f| f.text.split_once(": ").unwrap().1);
+        let faces = report
+            .split(", ")
+            .map(|face| face.split(' ').next().unwrap());
         assert_eq!(faces.collect::<Vec<_>>().join(", "), sides, "{path}");
         let mut expected = expected.concat();
         let mut found = audit.findings.iter().map(|f| f.code).collect::<Vec<_>>();

@@ -280,7 +280,7 @@ fn blank_slices_are_read_however_well_they_pack() {
         let [high, low] = side.to_be_bytes();
         let frame = [0xff, 0xf7, 0, 11, 16, high, low, high, low, 1, 1, 0x11, 0];
         let scan = [0xff, 0xda, 0, 8, 1, 1, 0, 0, 0, 0];
-        // Ones only, which say that runs go on; behind 0xff a zero is stuffed in.
+        // Ones only, which say that runs continue; behind 0xff a zero is stuffed in.
         let ones = [0xff, 0x7f].repeat(usize::from(side) / 15 + 5);
         let stream = [&[0xff, 0xd8], &frame[..], &scan, &ones, &[0xff, 0xd9]].concat();
         let slice = SliceSpec {

@@ -130,7 +130,7 @@ fn a_slice_says_where_it_is_and_nothing_about_anyone() {
     }
 }
 
-/// A tilted gantry is told by the positions, a single slice by its thickness.
+/// Gantry tilt follows from the positions, the spacing of a single slice from its thickness.
 #[test]
 fn tilt_and_single_slices_survive() {
     let parent = tempfile::tempdir().unwrap();

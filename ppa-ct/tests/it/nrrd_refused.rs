@@ -32,7 +32,10 @@ fn what_cannot_be_read_right_is_refused_by_name() {
         (vec!["space directions:"], "lacks `space directions`"),
         (vec!["space origin: (1,2)"], "space origin"),
         (vec!["space units: \"mm\" \"mm\" \"s\""], "space units"),
-        (vec!["spacing: 1 2 3"], "line 10 of the header is no field"),
+        (
+            vec!["spacing: 1 2 3"],
+            "line 10 of the header is not a field",
+        ),
         (vec!["byte skip: -2"], "byte skip -2"),
         (vec!["encoding: gzip", "byte skip: -1"], "expected raw"),
         (vec!["data file: LIST"], "LIST"),

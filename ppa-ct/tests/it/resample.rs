@@ -146,7 +146,7 @@ proptest! {
             let voxel = [0, 1, 2].map(|axis| place[axis].round() as usize);
             prop_assert!((found.hu()[n] - volume.at(voxel)).abs() < 1e-3);
         }
-        // Its axes are told as the body's directions.
+        // Its axes are reported as the body's directions.
         for (direction, (axis, against)) in other.lps_axes().into_iter().enumerate() {
             prop_assert_eq!((order[axis], against), (direction, turned[direction]));
         }

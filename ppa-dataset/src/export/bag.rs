@@ -34,7 +34,7 @@ pub enum BagError {
     /// A file of the dataset or the bag.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A folder that is no dataset.
+    /// A folder that is not a dataset.
     #[error(transparent)]
     Published(#[from] PublishedError),
     /// `ppa generate` began it and did not finish it.
@@ -58,7 +58,7 @@ pub enum BagError {
     },
 }
 
-/// How tables of grades and keys of pictures begin: they never leave with a dataset, for they name readers, or tell who graded what.
+/// How tables of grades and keys of pictures begin: they never leave with a dataset, for they name readers, or reveal who graded what.
 const NOT_TO_BE_BAGGED: [&[u8]; 2] = [b"image,reader,grade", b"name,image,sha256"];
 
 /// Copies the dataset in `root`, of either published layout, into the bag `to`, whole or not at all. Hidden files and folders,

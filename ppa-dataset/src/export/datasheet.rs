@@ -22,7 +22,7 @@ pub(super) fn datasheet(
          After Gebru et al., Datasheets for Datasets, doi:10.1145/3458723. Lines that begin with **To answer** are for those \
          who publish the dataset: no program knows them.\n\n\
          ## Motivation\n\n\
-         Made to train and test programs that tell from depth images alone whether a limb lies well for a radiograph, by the \
+         Made to train and test programs that predict from depth images alone whether a limb is positioned adequately for a radiograph, by the \
          method of Laufer et al., {PAPER}.\n\n\
          **To answer:** Who made it, for whom, and who paid for it?\n\n\
          ## Composition\n\n\
@@ -82,7 +82,7 @@ fn sources(table: &Table) -> Vec<&str> {
     let of_radiographs = rows.zip(table.reals("label"));
     let labelled =
         of_radiographs.filter(|((kind, _), label)| *kind == Some("radiograph") && label.is_some());
-    let source = labelled.map(|((_, source), _)| source.unwrap_or("a source that is not told"));
+    let source = labelled.map(|((_, source), _)| source.unwrap_or("an unnamed source"));
     source.collect()
 }
 
@@ -102,7 +102,7 @@ fn splits(table: &Table, files: &[String]) -> String {
     let files = files.join(", ");
     match (parts.is_empty(), files.is_empty()) {
         (false, _) => format!("Files by part of the split in `manifest.csv`: {parts}."),
-        (true, false) => format!("Recommended splits stand in the folder `splits`: {files}."),
+        (true, false) => format!("Recommended splits are in the folder `splits`: {files}."),
         (true, true) => "No split is recommended.".to_owned(),
     }
 }

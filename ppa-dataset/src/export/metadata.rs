@@ -1,4 +1,4 @@
-//! What a dataset is, told to search engines (Croissant) and archives (RO-Crate).
+//! Description of a dataset for search engines (Croissant) and archives (RO-Crate).
 
 use std::collections::BTreeSet;
 use std::path::Path;

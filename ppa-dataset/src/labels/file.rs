@@ -19,7 +19,7 @@ pub enum LabelFileError {
     /// It cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
-    /// It is no file of labels.
+    /// It is not a file of labels.
     #[error("{} holds no labels: {message}", path.display())]
     Parse {
         /// The file.

@@ -11,7 +11,7 @@ pub enum LabelSource {
     /// Openness of the joint space, first edition: a surrogate that no reader has confirmed.
     #[serde(rename = "surrogate-jso/1")]
     Surrogate,
-    /// The same from bones that [`segment_bones`](crate::labels) told apart in the scan.
+    /// The same from bones that [`segment_bones`](crate::labels) separated in the scan.
     #[serde(rename = "surrogate-jso/1-segmented")]
     SegmentedSurrogate,
 }

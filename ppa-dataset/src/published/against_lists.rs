@@ -1,4 +1,4 @@
-//! A dataset against what `manifest.jsonl` and `dataset.json` tell of it.
+//! A dataset against what `manifest.jsonl` and `dataset.json` state of it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -102,7 +102,7 @@ fn against_manifest<'a>(
     flaws
 }
 
-/// What `dataset.json` tells of scans.
+/// What `dataset.json` states of scans.
 #[derive(Deserialize)]
 struct Scans {
     #[serde(default)]
@@ -156,6 +156,6 @@ fn stale_metadata(root: &Path) -> Option<Flaw> {
     let found = sha256_of_file(&table).ok();
     let same =
         found.is_some() && expected.and_then(|file| file["sha256"].as_str()) == found.as_deref();
-    let told = "croissant.json describes another manifest.csv than the one there now: run ppa export metadata again";
-    (!same).then(|| Flaw::Metadata(told.to_owned()))
+    let report = "croissant.json describes another manifest.csv than the one there now: run ppa export metadata again";
+    (!same).then(|| Flaw::Metadata(report.to_owned()))
 }

@@ -69,7 +69,7 @@ pub(super) fn labels(
     Ok(labels)
 }
 
-/// Regions by camera and number of the pose; none if the file is missing. `of_key` is what the name of a depth image tells.
+/// Regions by camera and number of the pose; none if the file is missing. `of_key` is the number in the name of a depth image.
 pub(super) fn rois(
     path: &Path,
     of_key: impl Fn(&str) -> Option<(View, u32)>,
@@ -111,14 +111,14 @@ pub(super) fn rois(
     Ok(rois)
 }
 
-/// The number of a pose, which entry and key both may tell.
+/// The number of a pose, which entry and key both may state.
 fn one_number(entry: Option<u32>, key: Option<u32>) -> Result<u32, String> {
     match (entry, key) {
         (Some(entry), Some(key)) if entry != key => Err(format!(
             "the entry is of pose {entry}, its key of pose {key}"
         )),
         (Some(number), _) | (None, Some(number)) => Ok(number),
-        (None, None) => Err("neither key nor entry tells the number of the pose".to_owned()),
+        (None, None) => Err("neither key nor entry gives the number of the pose".to_owned()),
     }
 }
 

@@ -1,11 +1,11 @@
-//! Why a folder is no dataset in a published layout.
+//! Why a folder is not a dataset in a published layout.
 
 use std::path::PathBuf;
 
 use crate::files::FileError;
 use crate::labels::LabelFileError;
 
-/// Why a folder is no dataset in a published layout.
+/// Why a folder is not a dataset in a published layout.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PublishedError {

@@ -41,12 +41,12 @@ pub enum Flaw {
         second: String,
     },
     /// Two persons with one scan: they are one person.
-    #[error("patients {} and {} come from the same scan, as dataset.json tells", patients[0], patients[1])]
+    #[error("patients {} and {} come from the same scan according to dataset.json", patients[0], patients[1])]
     SameScan {
         /// Their numbers.
         patients: [u32; 2],
     },
-    /// What no image pair tells of.
+    /// What no image pair mentions.
     #[error("{0}")]
     Unpaired(Unpaired),
     /// Labels of radiographs that were made anew since.

@@ -7,7 +7,7 @@ use image::{ColorType, DynamicImage, ImageFormat, ImageReader};
 
 use crate::files::FileError;
 
-/// Why a file is no image of one channel with 16 bits.
+/// Why a file is not an image of one channel with 16 bits.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageFileError {

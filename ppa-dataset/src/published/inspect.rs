@@ -43,7 +43,7 @@ pub struct Inspection {
 /// other and, where they are there, with `manifest.jsonl` (tallies too), `dataset.json` and `checksums.sha256`. Changes nothing.
 ///
 /// # Errors
-/// [`PublishedError`] for what fits no layout; single images are told as [`Flaw`]s.
+/// [`PublishedError`] for what fits no layout; single images are reported as [`Flaw`]s.
 pub fn inspect(root: &Path) -> Result<Inspection, PublishedError> {
     let dataset = Published::list(root)?;
     let unpaired = dataset.unpaired.iter().cloned();

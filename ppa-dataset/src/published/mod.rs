@@ -151,7 +151,7 @@ pub struct Label {
     pub label: f64,
     /// Standard deviation over the readers (over all of them, not one less), or of what was assumed.
     pub std: f64,
-    /// Who says so, if the file tells.
+    /// Who says so, if the file states it.
     pub source: Option<LabelSource>,
 }
 

@@ -11,7 +11,7 @@ pub(super) struct Outdated {
     pub steps: Vec<u32>,
 }
 
-/// All of them, as far as labels tell which bytes their radiographs had; `manifest` is read only if one does.
+/// All of them, as far as labels state which bytes their radiographs had; `manifest` is read only if one does.
 pub(super) fn outdated(
     dataset: &Published,
     manifest: impl FnOnce() -> Result<Manifest, PublishedError>,

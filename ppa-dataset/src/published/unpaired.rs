@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::{ImagePair, Pose};
 use crate::layout::View;
 
-/// A radiograph, or an entry of a list, whose pose has no depth image: no image pair tells of it.
+/// A radiograph, or an entry of a list, whose pose has no depth image: no image pair mentions it.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Unpaired {

@@ -210,16 +210,16 @@ fn metadata_describe_the_table_that_is_there() {
         );
     }
     let sheet = fs::read_to_string(tree.path("datasheet.md")).unwrap();
-    for told in [
+    for report in [
         "# Datasheet of two limbs",
         "2 persons, 2 limbs, 2 poses; files: 2 depth, 1 radiograph, 1 radiograph_tallies.",
         "Depth images by body shape: 1 big, 1 orig.",
-        "by source: 1 a source that is not told.",
-        "Recommended splits stand in the folder `splits`: mine.",
+        "by source: 1 an unnamed source.",
+        "Recommended splits are in the folder `splits`: mine.",
         "ppa 0.1.0 (sources 0123) from 2 volumes",
         "**To answer:** Who made it",
     ] {
-        assert!(sheet.contains(told), "{told}: {sheet}");
+        assert!(sheet.contains(report), "{report}: {sheet}");
     }
     // What people answered stays.
     let answered = sheet.replace("**To answer:** Who made it", "A university made it");

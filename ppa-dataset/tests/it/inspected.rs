@@ -68,10 +68,10 @@ fn each_flaw_is_reported_with_its_file() {
         let tree = Tree::synthetic();
         break_it(&tree);
         let said = flaws(&tree);
-        let told = said
+        let report = said
             .iter()
             .any(|flaw| flaw.contains(file) && flaw.contains(expected));
-        assert!(told, "{expected:?} is missing in {said:?}");
+        assert!(report, "{expected:?} is missing in {said:?}");
     }
 }
 
@@ -108,9 +108,9 @@ fn files_of_no_depth_image_are_reported() {
         ]
     );
     fs::write(tree.path(radiograph), "no picture").unwrap();
-    let told = flaws(&tree);
+    let report = flaws(&tree);
     let damaged = |flaw: &String| flaw.contains(radiograph) && flaw.contains("not a whole PNG");
-    assert!(told.iter().any(damaged), "{told:?}");
+    assert!(report.iter().any(damaged), "{report:?}");
 
     let tree = Tree::specimen();
     let folder = "patient_1_r/max/data/dataset";
@@ -118,10 +118,10 @@ fn files_of_no_depth_image_are_reported() {
         let file = format!("{folder}/depth/depth_cam_{camera}_orig_0_1000.png");
         fs::remove_file(tree.path(&file)).unwrap();
     }
-    let told = flaws(&tree);
-    assert_eq!(told.len(), 4, "{told:?}");
+    let report = flaws(&tree);
+    assert_eq!(report.len(), 4, "{report:?}");
     let expected = format!("{folder}/xray/xray_0.png is of a pose without depth images");
-    assert_eq!(told[0], expected);
+    assert_eq!(report[0], expected);
 }
 
 #[test]
@@ -140,10 +140,10 @@ fn tallies_scans_and_labels_are_compared_with_the_lists() {
     let tree = Tree::generated();
     let [first, second] = [0, 12].map(|patient| format!("\"{patient:064}\""));
     tree.edit("dataset.json", &second, &first);
-    let same = "patients 0 and 12 come from the same scan, as dataset.json tells";
+    let same = "patients 0 and 12 come from the same scan according to dataset.json";
     assert!(flaws(&tree).contains(&same.to_owned()));
 
-    // A label tells which radiograph it was given to.
+    // A label shows which radiograph it was given to.
     let tree = Tree::generated();
     let labels = "patient_0/labels/r/labels.json";
     let hash = sha256_of_file(&tree.path("patient_0/xray/r/xray_image_91.png")).unwrap();
@@ -185,8 +185,8 @@ fn unlisted(tree: &Tree) -> Vec<String> {
         .collect();
     files.sort();
     files.dedup();
-    let told = files
+    let report = files
         .iter()
         .map(|file| format!("{file} stands not in manifest.jsonl"));
-    told.collect()
+    report.collect()
 }

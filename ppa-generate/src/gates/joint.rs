@@ -154,7 +154,7 @@ fn off_ankle(place: [f64; 3], depth_hu: f64, joint_above_mm: f64) -> Option<Find
     })
 }
 
-/// The middle of a limb in which no joint was recognised is no joint.
+/// The middle of a limb in which no joint was recognised is not a joint.
 ///
 /// Judged by the joint itself: a case records what was found as a choice.
 fn no_joint(volume: &Volume, report: &LimbReport, landmarks: &Landmarks) -> Option<Finding> {

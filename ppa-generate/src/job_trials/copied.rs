@@ -3,7 +3,7 @@
 use std::fs;
 
 use super::{Trial, contents, in_place};
-use crate::claim::FolderError;
+use crate::dataset_lock::FolderError;
 use crate::job::JobError;
 
 #[test]

@@ -14,17 +14,17 @@ use crate::staging::{Staging, staging_folder};
 /// Leaves the folder as a run that is killed after the first `moved` images of the pose at 0.5 degrees are in their place.
 fn kill_after(root: &Path, trial: &Trial, moved: usize) {
     let limbs = trial.limbs();
-    let unit = limbs[0].unit(limbs[0].poses[1]);
+    let pose_job = limbs[0].pose_job(limbs[0].poses[1]);
     let staging = staging_folder(root);
-    let images = trial.images(&unit, &staging);
+    let images = trial.images(&pose_job, &staging);
     let record = Record {
-        key: unit.key(),
+        key: pose_job.key(),
         files: images.files,
         rois: images.rois,
         findings: images.findings,
     };
     write_whole(
-        &staging.join(unit.id().record_name()),
+        &staging.join(pose_job.id().record_name()),
         record.to_text().as_bytes(),
     )
     .unwrap();
@@ -44,15 +44,15 @@ fn a_pose_that_was_half_replaced_is_completed() {
         let root = folder.path();
         kill_after(root, &other, moved);
         let limbs = other.limbs();
-        let unit = limbs[0].unit(limbs[0].poses[1]);
+        let pose_job = limbs[0].pose_job(limbs[0].poses[1]);
         let interrupted = Problem::Interrupted {
-            unit: unit.to_string(),
+            pose_job: pose_job.to_string(),
         };
         assert!(check(root).unwrap().problems.contains(&interrupted));
         Staging::new(root).recover().unwrap();
         assert!(!staging_folder(root).exists());
-        let record = Record::read(root, &unit).unwrap();
-        assert_eq!(record.key, unit.key(), "{moved}");
+        let record = Record::read(root, &pose_job).unwrap();
+        assert_eq!(record.key, pose_job.key(), "{moved}");
         assert!(record.damaged_images(root).is_empty(), "{moved}");
         other.replacing().run(root).unwrap();
         assert!(contents(root) == other.fresh(), "{moved}");
@@ -72,7 +72,7 @@ fn a_first_run_that_was_killed_resumes() {
         // A file that is lost on top of it.
         if let Some(lost) = lost {
             let images = Trial::new().limbs()[0]
-                .units()
+                .pose_jobs()
                 .nth(1)
                 .unwrap()
                 .id()

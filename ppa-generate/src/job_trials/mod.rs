@@ -22,12 +22,12 @@ use ppa_dataset::manifest::{FileKind, FileRow, RoiFile, RoiRow};
 use ppa_scene::Sweep;
 use sha2::{Digest, Sha256};
 
-use crate::job::{Job, JobError, MakeUnit, Summary};
-use crate::limb_units::{LimbUnits, PlannedLimb, units_of_part};
-use crate::record::Unit;
+use crate::job::{Job, JobError, MakePose, Summary};
+use crate::limb_jobs::{LimbJobs, PlannedLimb, jobs_of_part};
+use crate::posable_limb::Images;
+use crate::record::PoseJob;
 use crate::seal::sealed;
 use crate::staging::staging_folder;
-use crate::unit::Images;
 
 /// A plan whose images show its settings.
 #[derive(Clone)]
@@ -85,9 +85,9 @@ impl Trial {
         self.patients.iter().map(limb).collect()
     }
 
-    fn limbs(&self) -> Vec<LimbUnits> {
+    fn limbs(&self) -> Vec<LimbJobs> {
         let poses = self.sweep().poses().unwrap();
-        units_of_part(
+        jobs_of_part(
             self.planned().into_iter(),
             &poses,
             self.part.parse().unwrap(),
@@ -121,14 +121,14 @@ impl Trial {
             progress: &|_| {},
         };
         job.complete(|_| {
-            let make = |unit: Unit| {
+            let make = |pose_job: PoseJob| {
                 if Some(count.fetch_add(1, Ordering::Relaxed)) == self.fails_at {
                     let failed = FileError::at("make", root)(std::io::Error::other("as asked"));
                     return Err(JobError::from(failed));
                 }
-                Ok(self.images(&unit, &staging))
+                Ok(self.images(&pose_job, &staging))
             };
-            Ok(Box::new(make) as MakeUnit<JobError>)
+            Ok(Box::new(make) as MakePose<JobError>)
         })
     }
 
@@ -146,13 +146,13 @@ impl Trial {
     }
 
     /// Makes a pose below a folder.
-    fn images(&self, unit: &Unit, to: &Path) -> Images {
-        let (limb, step) = (unit.limb, unit.pose.step);
+    fn images(&self, pose_job: &PoseJob, to: &Path) -> Images {
+        let (limb, step) = (pose_job.limb, pose_job.pose.step);
         let mut files = Vec::new();
         for &shape in &self.shapes {
             for view in View::ALL {
                 let file = limb.depth(shape, view, step);
-                let row = row(unit, file, FileKind::Depth, shape, to);
+                let row = row(pose_job, file, FileKind::Depth, shape, to);
                 files.push(FileRow {
                     camera: Some(view),
                     ..row
@@ -163,7 +163,7 @@ impl Trial {
             (limb.radiograph_png(step), FileKind::Radiograph),
             (limb.radiograph_exr(step), FileKind::RadiographTallies),
         ] {
-            files.push(row(unit, file, kind, BodyShape::Orig, to));
+            files.push(row(pose_job, file, kind, BodyShape::Orig, to));
         }
         let roi = |camera| {
             let row = RoiRow {
@@ -191,10 +191,10 @@ impl Trial {
 }
 
 /// Writes an image that follows from key and name, and returns its row.
-fn row(unit: &Unit, file: String, kind: FileKind, shape: BodyShape, to: &Path) -> FileRow {
+fn row(pose_job: &PoseJob, file: String, kind: FileKind, shape: BodyShape, to: &Path) -> FileRow {
     let path = to.join(&file);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    let noise = Sha256::digest(format!("{} {file}", unit.key()));
+    let noise = Sha256::digest(format!("{} {file}", pose_job.key()));
     if kind == FileKind::RadiographTallies {
         fs::write(&path, noise).unwrap();
     } else {
@@ -211,9 +211,9 @@ fn row(unit: &Unit, file: String, kind: FileKind, shape: BodyShape, to: &Path) -
         sha256: sha256_of_file(&path).unwrap(),
         file,
         kind,
-        limb: unit.limb,
-        step: unit.pose.step,
-        angle_deg: unit.pose.angle_deg,
+        limb: pose_job.limb,
+        step: pose_job.pose.step,
+        angle_deg: pose_job.pose.angle_deg,
         camera: None,
         shape,
         volume_change_mm3: None,

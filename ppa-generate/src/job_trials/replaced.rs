@@ -8,7 +8,7 @@ use ppa_dataset::findings::{FindingCode, Findings};
 
 use super::{Trial, contents, in_place};
 use crate::check::{Problem, check};
-use crate::claim::{FolderError, claim};
+use crate::dataset_lock::{FolderError, lock};
 use crate::job::JobError;
 use crate::record::{FoundRecord, Record};
 use crate::status::status;
@@ -57,19 +57,19 @@ fn a_replaced_dataset_is_that_of_a_fresh_run() {
 fn whole_poses(root: &Path, trial: &Trial) -> usize {
     let limbs = trial.limbs();
     let mut of_trial = 0;
-    for unit in limbs.iter().flat_map(|limb| limb.units()) {
-        let path = root.join(unit.id().record_file());
-        let FoundRecord::Whole(record) = Record::look(&path, unit.id()).unwrap() else {
-            panic!("{unit} has no record");
+    for pose_job in limbs.iter().flat_map(|limb| limb.pose_jobs()) {
+        let path = root.join(pose_job.id().record_file());
+        let FoundRecord::Whole(record) = Record::look(&path, pose_job.id()).unwrap() else {
+            panic!("{pose_job} has no record");
         };
-        assert!(record.damaged_images(root).is_empty(), "{unit}");
-        let images = unit.id().images();
+        assert!(record.damaged_images(root).is_empty(), "{pose_job}");
+        let images = pose_job.id().images();
         let there = images
             .iter()
             .filter(|file| root.join(file).exists())
             .count();
-        assert_eq!(there, record.files.len(), "{unit}");
-        of_trial += usize::from(record.key == unit.key());
+        assert_eq!(there, record.files.len(), "{pose_job}");
+        of_trial += usize::from(record.key == pose_job.key());
     }
     of_trial
 }
@@ -172,12 +172,12 @@ fn acknowledged_findings_concern_no_pose() {
 #[test]
 fn two_runs_do_not_share_a_folder() {
     let folder = Trial::new().made();
-    let claim = claim(folder.path()).unwrap();
+    let lock = lock(folder.path()).unwrap();
     let said = refused(&other().replacing(), folder.path());
     assert!(said.contains("in use by another process"), "{said}");
     assert!(matches!(check(folder.path()), Err(FolderError::Busy(_))));
     assert!(status(folder.path()).unwrap().running);
-    drop(claim);
+    drop(lock);
     assert!(!status(folder.path()).unwrap().running);
 }
 

@@ -113,7 +113,7 @@ fn unknown_keys_are_named() {
     }
 }
 
-/// Written beside or above what it names, a plan goes on naming the same files.
+/// Written beside or above what it names, a plan continues naming the same files.
 #[test]
 fn a_plan_that_is_written_elsewhere_names_the_same_files() {
     let folder = tempfile::tempdir().unwrap();

@@ -232,7 +232,7 @@ pub(crate) fn box_around(grid: &Grid, joint: &Point3<f64>) -> ([usize; 3], [usiz
     (low, size)
 }
 
-/// Gaussian blur along the three axes; beyond the box its border goes on.
+/// Gaussian blur along the three axes; beyond the box its border continues.
 fn blur(mut values: Vec<f32>, size: [usize; 3]) -> Vec<f32> {
     const REACH: isize = 3;
     let weight = |d: isize| (-0.5 * (d as f64 / BLUR_VOXELS).powi(2)).exp();

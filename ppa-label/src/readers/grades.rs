@@ -8,13 +8,13 @@ use ppa_dataset::manifest::{FileKind, FileRow, Manifest};
 use serde::{Deserialize, Serialize};
 
 use super::import::ImportError;
-use super::showing::Showing;
+use super::reader_case::ReaderCase;
 use crate::table::read_table;
 
 /// What a reader says of a radiograph; a row of `grades.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Grade {
-    /// The name of a showing, or the radiograph itself, from the dataset's root.
+    /// The name of a reader case, or the radiograph itself, from the dataset's root.
     pub image: String,
     /// Who graded it.
     pub reader: String,
@@ -57,17 +57,17 @@ pub(super) struct Pictures<'a> {
 }
 
 impl<'a> Pictures<'a> {
-    pub fn of(manifest: &'a Manifest, shown: &'a [Showing]) -> Result<Self, ImportError> {
+    pub fn of(manifest: &'a Manifest, shown: &'a [ReaderCase]) -> Result<Self, ImportError> {
         let rows = manifest.files.iter();
         let radiographs: HashMap<_, _> = rows
             .filter(|row| row.kind == FileKind::Radiograph)
             .map(|row| (row.file.as_str(), row))
             .collect();
-        let place = |(place, showing): (usize, &'a Showing)| {
-            let found = radiographs.get(showing.image.as_str());
-            match found.filter(|row| row.sha256 == showing.sha256) {
-                Some(&row) => Ok((showing.name.as_str(), (place, row))),
-                None => Err(ImportError::Changed(showing.image.clone())),
+        let place = |(place, reader_case): (usize, &'a ReaderCase)| {
+            let found = radiographs.get(reader_case.image.as_str());
+            match found.filter(|row| row.sha256 == reader_case.sha256) {
+                Some(&row) => Ok((reader_case.name.as_str(), (place, row))),
+                None => Err(ImportError::Changed(reader_case.image.clone())),
             }
         };
         let shown = shown.iter().enumerate().map(place);
@@ -77,7 +77,7 @@ impl<'a> Pictures<'a> {
         })
     }
 
-    /// The grades of several files: by reader, for each in the order of showing.
+    /// The grades of several files: by reader, for each in the order of the reader cases.
     pub fn all_of<'f>(&self, files: &'f [PathBuf]) -> Result<Vec<Given<'f>>, ImportError>
     where
         'a: 'f,

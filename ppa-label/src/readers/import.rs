@@ -12,7 +12,7 @@ use ppa_dataset::manifest::{FileKind, FileRow, Manifest};
 use serde::Serialize;
 
 use super::grades::{Given, Pictures};
-use super::showing::Showing;
+use super::reader_case::ReaderCase;
 use crate::table::{TableError, write_table};
 
 /// All grades of a dataset, as they were given.
@@ -148,7 +148,7 @@ pub enum ImportError {
 /// of readers whose grades are not there.
 pub fn import_grades(
     manifest: &Manifest,
-    shown: &[Showing],
+    shown: &[ReaderCase],
     files: &[PathBuf],
 ) -> Result<Imported, ImportError> {
     let path = manifest.root.join(GRADES_FILE);

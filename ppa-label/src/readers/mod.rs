@@ -3,9 +3,9 @@
 mod grades;
 mod import;
 mod page;
-mod showing;
+mod reader_case;
 
 pub use grades::Grade;
 pub use import::{ImportError, Imported, import_grades};
 pub use page::{PICTURES_PER_PAGE, PageError, PageNumber, grading_page};
-pub use showing::{Showing, read_key, write_key};
+pub use reader_case::{ReaderCase, read_key, write_key};

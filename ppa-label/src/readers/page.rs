@@ -9,7 +9,7 @@ use image::{GrayImage, ImageFormat};
 use ppa_dataset::files::FileError;
 use serde::Serialize;
 
-use super::showing::Showing;
+use super::reader_case::ReaderCase;
 
 /// Pictures on one page: radiographs of 448 x 448 pixels make about 30 MB, which any browser takes.
 pub const PICTURES_PER_PAGE: usize = 200;
@@ -51,7 +51,7 @@ pub struct PageNumber {
 }
 
 /// A page of HTML that shows the radiographs one by one, takes a grade of each by key, and saves them as CSV with the
-/// columns image (the name of the showing), reader and grade.
+/// columns image (the name of the reader case), reader and grade.
 ///
 /// All pictures have one window: black is 0 and white 65535 of the 16-bit radiographs. Nothing but names and pictures
 /// gets into the page.
@@ -60,14 +60,14 @@ pub struct PageNumber {
 /// [`PageError`] without radiographs, and naming one that cannot be read.
 pub fn grading_page(
     root: &Path,
-    shown: &[Showing],
+    shown: &[ReaderCase],
     number: PageNumber,
 ) -> Result<String, PageError> {
     if shown.is_empty() {
         return Err(PageError::Empty);
     }
-    let picture = |showing: &Showing| {
-        let path = root.join(&showing.image);
+    let picture = |reader_case: &ReaderCase| {
+        let path = root.join(&reader_case.image);
         let bytes = ppa_core::regular_file::read(&path).map_err(FileError::at("read", &path))?;
         let image = image::load_from_memory_with_format(&bytes, ImageFormat::Png)
             .map_err(|source| PageError::Image { path, source })?
@@ -79,7 +79,7 @@ pub fn grading_page(
         narrow
             .write_to(&mut png, ImageFormat::Png)
             .expect("memory takes any picture");
-        Ok(format_picture(&showing.name, png.get_ref()))
+        Ok(format_picture(&reader_case.name, png.get_ref()))
     };
     let pictures: Vec<String> = shown
         .iter()

@@ -60,7 +60,7 @@ impl Contacts {
         sum.moment += more.moment;
     }
 
-    /// Bones without a name that touch another over more than `most_mm2` were part of it, or were not told apart from it: they
+    /// Bones without a name that touch another over more than `most_mm2` were part of it, or were not separated from it: they
     /// join the one that they touch most. Large contacts first.
     pub fn merged(mut self, bones: &mut [Option<u16>], most_mm2: f64) -> Self {
         let mut joins = BTreeMap::new();

@@ -1,9 +1,9 @@
-//! Bones of an ankle told apart in a CT that nobody labelled.
+//! Bones of an ankle separated in a CT that nobody labelled.
 //!
 //! Bone is what is at least half as dense as the densest place nearby ([`solid`]), so that a joint space counts as one
 //! even where blur and partial volume fill it up to the density of spongy bone. Where bones still hang together, a watershed between shaft,
 //! talus and whatever else separates by itself parts them at the least dense place ([`flood`]). What touches over a larger area
-//! than a bridge of noise was not told apart: tibia, fibula and talus are refused then, with the place.
+//! than a bridge of noise was not separated: tibia, fibula and talus are refused then, with the place.
 
 mod contacts;
 mod flood;
@@ -30,7 +30,7 @@ pub struct SegmentedBones {
     pub labels: Vec<u8>,
 }
 
-/// Why bones of an ankle were not told apart.
+/// Why bones of an ankle were not separated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SegmentError {
@@ -44,7 +44,7 @@ pub enum SegmentError {
     },
     /// Two bones are one in the scan.
     #[error(
-        "{} and {} are not told apart: they touch over {area_mm2:.0} mm² around {:.1}, {:.1}, {:.1} mm (LPS), expected at most \
+        "{} and {} are not separated: they touch over {area_mm2:.0} mm² around {:.1}, {:.1}, {:.1} mm (LPS), expected at most \
          {MOST_CONTACT_MM2} mm²; voxels are {:.2} x {:.2} x {:.2} mm", bones[0], bones[1], at[0], at[1], at[2],
         spacing_mm[0], spacing_mm[1], spacing_mm[2]
     )]
@@ -60,7 +60,7 @@ pub enum SegmentError {
     },
 }
 
-/// Bones that were told apart touch at most where noise bridges their gap, mm². A gutter measures 200 mm² and more.
+/// Bones that were separated touch at most where noise bridges their gap, mm². A gutter measures 200 mm² and more.
 const MOST_CONTACT_MM2: f64 = 30.0;
 /// Where the shafts of tibia and fibula are looked for, mm above the joint.
 const SHAFT_MM: [f64; 2] = [30.0, 60.0];

@@ -47,8 +47,8 @@ impl fmt::Display for Views {
 /// some body shapes, or all.
 ///
 /// # Errors
-/// [`DataError`] for a folder that is no dataset, an image without label, without region or with one outside its camera's images, one
-/// that is no 16-bit PNG of the size of the others of its camera, as far as headers tell, a person or body shape that is not there, or
+/// [`DataError`] for a folder that is not a dataset, an image without label, without region or with one outside its camera's images, one
+/// that is no 16-bit PNG of the size of the others of its camera, as far as headers show, a person or body shape that is not there, or
 /// no image.
 pub fn read_samples(
     root: &Path,

@@ -72,10 +72,10 @@ pub enum DataError {
     /// A person on both sides of a split.
     #[error("{0} would be in training and in evaluation; a person belongs to one of both")]
     Leak(String),
-    /// A file that is no depth image.
+    /// A file that is not a depth image.
     #[error(transparent)]
     Image(#[from] ImageFileError),
-    /// A folder that is no dataset.
+    /// A folder that is not a dataset.
     #[error(transparent)]
     Dataset(#[from] PublishedError),
 }

@@ -36,7 +36,7 @@ pub enum Order {
         augmentation: Augmentation,
         /// Names, with the place in the sequence, all random numbers.
         seed: u64,
-        /// Number of the first batch; a training that goes on begins where it stopped.
+        /// Number of the first batch; a training that continues begins where it stopped.
         first_batch: u64,
     },
     /// Each sample once, in order; the last batch may be short.

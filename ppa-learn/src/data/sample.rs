@@ -66,7 +66,7 @@ pub struct Sample {
     pub pose: String,
     /// Number of the frame within pose and camera, from 0.
     pub frame: u32,
-    /// Medial rotation in degrees, where the dataset tells it.
+    /// Medial rotation in degrees, where the dataset states it.
     pub angle_deg: Option<f64>,
 }
 

@@ -59,7 +59,7 @@ const SIZE: [i32; 2] = [640, 480];
 const MARGINS: [i32; 4] = [80, 40, 20, 60];
 /// Row of the second axis' name and of those of the series.
 const LABELS_Y: f64 = 27.0;
-/// Blue, orange, green and grey of the Okabe-Ito palette, which colour-blind people tell apart.
+/// Blue, orange, green and grey of the Okabe-Ito palette, which colour-blind people distinguish.
 const COLOURS: [[u8; 3]; 4] = [[0, 114, 178], [213, 94, 0], [0, 158, 115], [110, 110, 110]];
 
 /// Something on the page; colours are places in [`COLOURS`], text stands around its place.

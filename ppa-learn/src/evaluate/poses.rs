@@ -19,7 +19,7 @@ pub struct PoseRow {
     pub side: Side,
     /// The pose, unique among those of the limb.
     pub pose: String,
-    /// Medial rotation in degrees, where the dataset tells it.
+    /// Medial rotation in degrees, where the dataset states it.
     pub angle_deg: Option<f64>,
     /// Images of all cameras and frames.
     pub images: usize,

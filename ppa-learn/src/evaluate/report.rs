@@ -38,7 +38,7 @@ pub struct Evaluation {
     pub calibration: Vec<(f64, f64, usize)>,
     /// (mean label, mean prediction, images) of the images whose predictions lie within one quarter: 1 to 1.25, 1.25 to 1.5, ….
     pub calibration_by_prediction: Vec<(f64, f64, usize)>,
-    /// (degrees, mean absolute error, images) of each angle that the dataset tells.
+    /// (degrees, mean absolute error, images) of each angle that the dataset states.
     pub error_by_angle: Vec<(f64, f64, usize)>,
 }
 

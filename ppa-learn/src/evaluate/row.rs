@@ -22,7 +22,7 @@ pub struct Row {
     pub pose: String,
     /// Number of the frame within pose and camera, from 0.
     pub frame: u32,
-    /// Medial rotation in degrees, where the dataset tells it.
+    /// Medial rotation in degrees, where the dataset states it.
     pub angle_deg: Option<f64>,
     /// Quality from 1 to 3.
     pub label: f64,

@@ -60,7 +60,7 @@ impl Runner<'_> {
             }
             None => {
                 let missing = config.start.iter().filter(|start| !start.is_file());
-                problems.extend(missing.map(|start| format!("{} is no file", start.display())));
+                problems.extend(missing.map(|start| format!("{} is not a file", start.display())));
             }
         }
         for trained in &trained {

@@ -1,4 +1,4 @@
-//! What is kept of a finished training, to tell whether it is still the one that a plan asks for.
+//! What is kept of a finished training, to check whether it is still the one that a plan asks for.
 
 use std::path::Path;
 

@@ -25,10 +25,10 @@ use crate::train::{
     trained,
 };
 
-/// What is told while an experiment runs.
+/// Progress reported while an experiment runs.
 #[derive(Debug)]
 pub enum Event<'a> {
-    /// A training begins, or goes on.
+    /// A training begins, or continues.
     Begins {
         /// Which one.
         unit: Unit,
@@ -96,7 +96,7 @@ impl<'a> Runner<'a> {
     }
 
     /// Carries out the runs that `mine` picks by their number from 0, each after the pretraining it needs. What is
-    /// finished is left as it is, what was begun goes on; a training that another process makes is waited for.
+    /// finished is left as it is, what was begun continues; a training that another process makes is waited for.
     ///
     /// Returns whether all are finished; `stop` ends it after a step.
     ///
@@ -230,7 +230,7 @@ impl<'a> Runner<'a> {
         }
     }
 
-    /// What tells whether a finished training is still the one that the plan asks for.
+    /// What shows whether a finished training is still the one that the plan asks for.
     ///
     /// Nobody whose images the weights come from may be tested with them.
     fn record(&self, unit: Unit, config: &TrainConfig) -> Result<Record, TrainError> {

@@ -50,7 +50,7 @@ impl PairFolder {
     /// The pairs that became whole since the last look, in the order in which they were written.
     ///
     /// A file is whole when it ends as every PNG does. What has not grown for a second and does not is handed out as well, so
-    /// that whoever reads it tells what is wrong with it. A pair is given out once as long as one of its files lies there;
+    /// that its reader reports what is wrong with it. A pair is given out once as long as one of its files lies there;
     /// files of the same name that come after a look without any are a new pair.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use super::fusion::{Fusion, FusionKind, LATE_OUTPUTS, LateFusion, branch_gains};
 use super::{EfficientNetB0, Mode, Named, NetworkError, Options};
 use crate::random::{Purpose, stream};
 
-/// A network that tells the quality of a pose, from the images of one camera or of both.
+/// A network that predicts the quality of a pose, from the images of one camera or of both.
 ///
 /// Its tensors bear the names of the authors' modules: torchvision's for one camera; `module.` before them where both cameras share
 /// the weights, else `cam_left_module.` and `cam_right_module.`; `fc.0` and `fc.3` for the layers of late fusion.

@@ -41,7 +41,7 @@ impl Adam {
         &mut self,
         variables: &[&Var],
         gradients: &GradStore,
-        rate: f64,
+        learning_rate: f64,
     ) -> Result<(), Error> {
         self.steps += 1;
         // Above 2³¹ steps both corrections are 1 anyway.
@@ -53,7 +53,7 @@ impl Adam {
             };
             let update = Update {
                 moments: Mutex::new((first, second)),
-                scale: (rate / (1.0 - BETA_1.powi(t))) as f32,
+                scale: (learning_rate / (1.0 - BETA_1.powi(t))) as f32,
                 correction: (1.0 - BETA_2.powi(t)).sqrt() as f32,
             };
             let gradient = gradient.contiguous()?;

@@ -29,7 +29,7 @@ struct State {
     data: DataState,
 }
 
-/// Writes all that a training needs to go on.
+/// Writes all that a training needs to continue.
 pub(super) fn save(
     path: &Path,
     network: &QualityNetwork,

@@ -122,7 +122,7 @@ impl TrainConfig {
         }
     }
 
-    /// What must be equal for a training to go on; threads, device, memory and intervals may change.
+    /// What must be equal for a training to continue; threads, device, memory and intervals may change.
     pub(crate) fn of_results(&self) -> Self {
         let paper = Self::paper();
         Self {

@@ -1,4 +1,4 @@
-//! Why a training cannot begin, go on or be evaluated.
+//! Why a training cannot begin, continue or be evaluated.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use crate::weights::WeightsError;
 use super::config_error::ConfigError;
 use super::finite::Trouble;
 
-/// Why a training cannot begin, go on or be evaluated.
+/// Why a training cannot begin, continue or be evaluated.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TrainError {
@@ -35,16 +35,16 @@ pub enum TrainError {
     /// Weights that do not fit, or cannot be read or written.
     #[error(transparent)]
     Weights(Box<WeightsError>),
-    /// A file that is no checkpoint of this network.
-    #[error("{} is no checkpoint of this training: {message}", path.display())]
+    /// A file that is not a checkpoint of this network.
+    #[error("{} is not a checkpoint of this training: {message}", path.display())]
     Checkpoint {
         /// The file.
         path: PathBuf,
         /// What was found and what expected.
         message: String,
     },
-    /// A folder with weights, but nothing to go on from.
-    #[error("{} is there, but no checkpoint beside it to go on from; take another folder", .0.display())]
+    /// A folder with weights, but nothing to continue from.
+    #[error("{} is there, but no checkpoint beside it to resume from; use another folder", .0.display())]
     WeightsAlone(PathBuf),
     /// A training that is not finished, where a finished one is needed.
     #[error("the training in {} is not finished: {step} of {} are made; repeat `ppa train` to resume", folder.display(), ppa_core::text::count(*steps, "step"))]

@@ -5,6 +5,7 @@
 //! step), and at the end `weights.safetensors`. Data position and random numbers follow from seed and step.
 
 mod adam;
+mod batch_source;
 mod checkpoint;
 mod config;
 mod config_error;
@@ -12,7 +13,6 @@ mod config_file;
 mod crc32c;
 mod data_state;
 mod error;
-mod feed;
 mod finite;
 mod limits;
 mod log;

@@ -10,18 +10,18 @@ use ppa_dataset::write_whole;
 use crate::data::{Balanced, Images, check_split};
 
 use super::adam::Adam;
+use super::batch_source::BatchSource;
 use super::checkpoint;
 use super::config::TrainConfig;
 use super::config_error::ConfigError;
 use super::data_state::DataState;
 use super::error::{TrainError, at};
-use super::feed::Feed;
 use super::log::Log;
 use super::start_file;
 use super::steps::{Run, is_due};
 use super::trained::{network, samples};
 
-/// How far a training is; told after every step.
+/// Training progress, reported after every step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Progress {
     /// Steps made.
@@ -30,8 +30,8 @@ pub struct Progress {
     pub steps: u64,
     /// Mean squared error of the step's batch.
     pub loss: f32,
-    /// Rate of the step.
-    pub rate: f64,
+    /// Learning rate of the step.
+    pub learning_rate: f64,
 }
 
 /// How a training ended.
@@ -46,7 +46,7 @@ pub enum Ended {
     },
 }
 
-/// Trains as a configuration says, in a folder; goes on from the folder's checkpoint, if there is one, to the same bytes
+/// Trains as a configuration says, in a folder; continues from the folder's checkpoint, if there is one, to the same bytes
 /// as a training that was never stopped.
 ///
 /// # Errors
@@ -106,19 +106,19 @@ pub fn train(
         },
     };
     let images = Arc::new(Images::new(training, config.side, keep_bytes)?);
-    let mut feed = Feed::new(config, &run.network, &images, run.adam.steps)?;
+    let mut batches = BatchSource::new(config, &run.network, &images, run.adam.steps)?;
     let steps = config.schedule().steps();
     run.make_up_evaluation()?;
     while run.adam.steps < steps {
-        let answers = match feed.answers(config, &run.network, run.adam.steps) {
+        let outputs = match batches.outputs(config, &run.network, run.adam.steps) {
             // An image that cannot be used costs no step that was made.
             Err(error @ TrainError::Data(_)) if run.adam.steps > 0 => {
                 run.save(&checkpoint, false)?;
                 return Err(error);
             }
-            answers => answers?,
+            outputs => outputs?,
         };
-        let progress = run.step(answers)?;
+        let progress = run.step(outputs)?;
         report(&progress);
         let step = run.adam.steps;
         let due = |every| is_due(every, step, steps);

@@ -59,7 +59,7 @@ impl Schedule {
     /// Rate of a step of the optimiser; the first one is step 0.
     ///
     /// After 95, 97.5, 99.5 and 99.75 % of the count it is divided by ten.
-    pub fn rate(&self, step: u64) -> f64 {
+    pub fn learning_rate(&self, step: u64) -> f64 {
         let counted = match self.counting {
             StepCounting::Optimiser => step,
             StepCounting::Batches => step / TRAINING * (TRAINING + EVALUATING) + step % TRAINING,
@@ -74,7 +74,8 @@ mod tests {
     use super::*;
 
     fn drops(schedule: Schedule) -> Vec<u64> {
-        let changes = |&step: &u64| schedule.rate(step) != schedule.rate(step - 1);
+        let changes =
+            |&step: &u64| schedule.learning_rate(step) != schedule.learning_rate(step - 1);
         (1..schedule.steps()).filter(changes).collect()
     }
 
@@ -87,8 +88,8 @@ mod tests {
         };
         assert_eq!(paper.steps(), 200_000);
         assert_eq!(drops(paper), [190_000, 195_000, 199_000, 199_500]);
-        assert_eq!(paper.rate(0), 1e-3);
-        assert!((paper.rate(199_999) - 1e-7).abs() < 1e-20);
+        assert_eq!(paper.learning_rate(0), 1e-3);
+        assert!((paper.learning_rate(199_999) - 1e-7).abs() < 1e-20);
         let short = Schedule {
             count: 400,
             ..paper

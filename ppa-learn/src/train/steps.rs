@@ -12,11 +12,11 @@ use crate::data::Images;
 use crate::network::QualityNetwork;
 
 use super::adam::Adam;
+use super::batch_source::Outputs;
 use super::checkpoint;
 use super::config::TrainConfig;
 use super::data_state::DataState;
 use super::error::TrainError;
-use super::feed::Answers;
 use super::finite::{is_finite, trouble};
 use super::log::{Log, LogRow};
 use super::run::Progress;
@@ -47,10 +47,10 @@ pub(super) struct Run<'a> {
 
 impl Run<'_> {
     /// Makes a step from what the network said of a batch.
-    pub fn step(&mut self, answers: Answers) -> Result<Progress, TrainError> {
+    pub fn step(&mut self, batch: Outputs) -> Result<Progress, TrainError> {
         let step = self.adam.steps;
-        let labels = Tensor::new(answers.labels, self.network.device())?.unsqueeze(1)?;
-        let loss = (answers.outputs - labels)?.sqr()?.mean_all()?;
+        let labels = Tensor::new(batch.labels, self.network.device())?.unsqueeze(1)?;
+        let loss = (batch.outputs - labels)?.sqr()?.mean_all()?;
         let mut gradients = loss.backward()?;
         for variable in self.network.variables() {
             // Adam's moments are on the CPU wherever the network is.
@@ -73,14 +73,14 @@ impl Run<'_> {
             });
         }
         let schedule = self.config.schedule();
-        let rate = schedule.rate(step);
+        let learning_rate = schedule.learning_rate(step);
         self.adam
-            .step(&self.network.variables(), &gradients, rate)?;
+            .step(&self.network.variables(), &gradients, learning_rate)?;
         Ok(Progress {
             step: self.adam.steps,
             steps: schedule.steps(),
             loss,
-            rate,
+            learning_rate,
         })
     }
 
@@ -92,7 +92,7 @@ impl Run<'_> {
     pub fn log_step(&mut self, progress: &Progress) -> Result<(), TrainError> {
         let scalars = [
             ("training/loss".to_owned(), f64::from(progress.loss)),
-            ("training/rate".to_owned(), progress.rate),
+            ("training/rate".to_owned(), progress.learning_rate),
         ];
         self.log.push(LogRow {
             step: progress.step,

@@ -17,11 +17,11 @@ impl EfficientNetB0 {
     /// Takes weights of torchvision's or timm's `efficientnet_b0` from a `.safetensors` file or from a `.pth` or `.pt` file of torch 1.6 or later.
     ///
     /// A first convolution of several channels becomes one of one channel as `first` says; a classifier with another number of outputs
-    /// is left as it is here. [`Loaded`] tells both, and what else the file holds. timm's `tf_efficientnet_b0` bears the same names
+    /// is left as it is here. [`Loaded`] states both, and what else the file holds. timm's `tf_efficientnet_b0` bears the same names
     /// but pads and normalises in another way: it is read without complaint and gives other outputs than in timm.
     ///
     /// # Errors
-    /// If the file cannot be read, or if any tensor is missing, has another shape or holds what is no weight; each is named, and
+    /// If the file cannot be read, or if any tensor is missing, has another shape or holds what is not a weight; each is named, and
     /// the network is then as before.
     pub fn load(&self, path: &Path, first: FirstConvolution) -> Result<Loaded, WeightsError> {
         let (loaded, tensors) = self.fit(read(path)?, first)?;
@@ -86,7 +86,7 @@ impl EfficientNetB0 {
         loaded.unused.retain(|name| !counter(name));
         loaded.unused.sort();
         if loaded.fresh_classifier {
-            // A weight without its bias, or the other way round, is no classifier.
+            // A weight without its bias, or the other way round, is not a classifier.
             for own in self
                 .parameters()?
                 .into_iter()

@@ -3,7 +3,7 @@
 /// timm's name of a tensor of its `efficientnet_b0`, from torchvision's.
 ///
 /// `tf_efficientnet_b0` of timm has the same names but another padding and another epsilon of its normalisations;
-/// no name tells the two apart, and its weights do not give its outputs here.
+/// no name distinguishes the two, and its weights do not give its outputs here.
 pub fn timm_name(torchvision: &str) -> Option<String> {
     let (module, value) = torchvision.rsplit_once('.')?;
     let module = match module {

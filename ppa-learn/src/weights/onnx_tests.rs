@@ -145,7 +145,7 @@ fn checked(network: &QualityNetwork, cameras: &[&str]) -> (usize, usize) {
     let spread: f32 = expected[0] - expected[1];
     assert!(
         1e-3 * expected[0].abs() < spread.abs(),
-        "equal answers tell nothing: {expected:?}"
+        "equal outputs show nothing: {expected:?}"
     );
     let values = graph.initializer.iter().map(|w| w.raw_data.len() / 4);
     (graph.node.len(), values.sum())

@@ -13,7 +13,7 @@ impl QualityNetwork {
     /// Takes the values of every parameter and running statistic by name; other names are not looked at.
     ///
     /// # Errors
-    /// If any is missing, has another shape or holds what is no weight, each named; the network is then as before.
+    /// If any is missing, has another shape or holds what is not a weight, each named; the network is then as before.
     pub fn assign(&self, tensors: &HashMap<String, Tensor>) -> Result<(), WeightsError> {
         let (layout, statistics) = (self.layout(), self.statistics_layout());
         let mut variables = self.variables();
@@ -27,7 +27,7 @@ impl QualityNetwork {
 
     /// The network that a weight file is of, with its weights; values of `seed` where the file has none to give.
     ///
-    /// Names tell which one: layers that fuse both cameras' values are those of late fusion, and networks of each camera are separate
+    /// Names show which one: layers that fuse both cameras' values are those of late fusion, and networks of each camera are separate
     /// ones. Score fusion with shared weights bears the names of a single network behind a wrapper's `module.`, and is taken for
     /// that; only the configuration of its training knows.
     ///

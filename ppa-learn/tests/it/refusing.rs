@@ -1,4 +1,4 @@
-//! Trainings that cannot be: refused before anything is written, or stopped where they cannot go on.
+//! Trainings that cannot be: refused before anything is written, or stopped where they cannot continue.
 
 use std::fs;
 
@@ -74,7 +74,7 @@ fn checkpoints_of_other_trainings_networks_and_files_are_refused() {
         b"no tensors here",
     ] {
         fs::write(&checkpoint, broken).unwrap();
-        assert!(error(&config).contains("is no checkpoint of this training"));
+        assert!(error(&config).contains("is not a checkpoint of this training"));
     }
     fs::write(&checkpoint, &bytes).unwrap();
     run(&config, folder.path()).unwrap();
@@ -89,7 +89,7 @@ fn weights_without_a_checkpoint_are_not_written_over() {
     let error = run(&config(data.path()), folder.path()).unwrap_err();
     let error = error.to_string();
     assert!(
-        error.ends_with("weights.safetensors is there, but no checkpoint beside it to go on from; take another folder"),
+        error.ends_with("weights.safetensors is there, but no checkpoint beside it to resume from; use another folder"),
         "{error}"
     );
     assert_eq!(fs::read(&weights).unwrap(), b"of another training");

@@ -1,4 +1,4 @@
-//! Trainings that go on where they were stopped, failed or were killed.
+//! Trainings that continue where they were stopped, failed or were killed.
 
 use std::fs;
 use std::path::Path;
@@ -93,7 +93,7 @@ fn a_training_resumes_with_the_data_it_began_with_only() {
     assert_eq!(run(&config, folder.path()).unwrap(), Ended::Finished);
 }
 
-/// The first step of a training that goes on after an image, damaged behind its first step, had ended it and was mended.
+/// The first step of a training that continues after an image, damaged behind its first step, had ended it and was repaired.
 fn first_step_after(config: &TrainConfig, folder: &Path, image: &Path) -> u64 {
     let whole = fs::read(image).unwrap();
     let damage = |_: &ppa_learn::train::Progress| fs::write(image, "no image").unwrap();

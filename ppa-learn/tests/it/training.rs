@@ -1,4 +1,4 @@
-//! Trainings on toy data learn, and tell what they began with and what they measured.
+//! Trainings on toy data learn, and show what they began with and what they measured.
 
 use std::fs;
 use std::path::Path;
@@ -120,15 +120,15 @@ fn a_start_file_that_misfits_is_reported_by_name() {
     };
     let after = folder.path().join("after");
     stop_after(&config, &after, 1);
-    let told = read_start(&after).unwrap().unwrap();
+    let report = read_start(&after).unwrap().unwrap();
     let moments = [
         "adam.first.0",
         "adam.first.1",
         "adam.second.0",
         "adam.second.1",
     ];
-    assert_eq!(told.unused, moments);
-    let kept: Vec<&str> = told
+    assert_eq!(report.unused, moments);
+    let kept: Vec<&str> = report
         .kept
         .iter()
         .map(|c| c.split(' ').next().unwrap())

@@ -1,4 +1,4 @@
-//! Solid bodies in a volume, told apart where they only touch.
+//! Solid bodies in a volume, separated where they only touch.
 
 use super::distance::squared_distances;
 use super::tissue::{BONE, CORE, Tissue};

@@ -5,7 +5,7 @@ use super::pieces::Pieces;
 use super::tissue::{TISSUE, Tissue};
 
 /// Tissue beyond the grown-back core is skin relief up to this far, and something that touches the
-/// limb where it goes on, mm.
+/// limb where it continues, mm.
 const RELIEF_MM: f64 = 4.0;
 
 /// Squared distance from the core beyond which nothing belongs to a body, mm².

@@ -2,7 +2,7 @@
 //!
 //! In order: tissue is what exceeds the skin's HU; the couch is removed by its shape, which does not
 //! change along the scan axis; what solid flesh encloses (air, marrow) counts as flesh; solid bodies
-//! are what remains of denser tissue after an erosion that sheets do not survive, told apart where they
+//! are what remains of denser tissue after an erosion that sheets do not survive, separated where they
 //! only touch; the limb is the body that holds most bone; its skin is grown back to the tissue border,
 //! but not along what merely touches it; air enclosed by that belongs to it; and of the surface of it
 //! all, connectivity and DBSCAN keep one piece.
@@ -115,7 +115,7 @@ const WORKING_BYTES: usize = 12;
 /// The mesh is open where the volume (or the crop) cuts the limb, since a wall there is no skin; the walls
 /// are given beside it. The mask says what to keep when everything else is to be blanked to air.
 ///
-/// Where two limbs are pressed together HU do not tell whose skin is whose: there the border is found by
+/// Where two limbs are pressed together HU do not show whose skin is whose: there the border is found by
 /// depth, in a scan of two hands up to 4 voxels from where an eye puts it. A hollow that the end of the
 /// scan cuts open is not filled. Working memory goes with the
 /// box around all tissue: once that of the scan's 16-bit voxels where a limb lies in the middle of it, over

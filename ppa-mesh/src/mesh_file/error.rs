@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshFileError {
-    /// The name does not tell the format.
+    /// The name does not give the format.
     #[error("{} ends in none of .ply, .obj and .stl", path.display())]
     Extension {
         /// File asked for.

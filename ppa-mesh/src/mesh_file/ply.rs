@@ -161,7 +161,7 @@ pub fn write(
 
 /// Further elements and properties (colours, quality) are skipped.
 pub fn read(file: impl BufRead) -> Result<MeshContents, Fault> {
-    // The parser tells where it was in the first line and why it stopped in one of the others.
+    // The parser reports where it was in the first line and why it stopped in one of the others.
     let broken = |error: ParseError| {
         let text = error.to_string();
         let cause = |line: &&str| line.trim_start().starts_with("Error:");

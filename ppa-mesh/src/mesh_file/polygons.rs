@@ -19,8 +19,8 @@ impl Polygons {
         }
     }
 
-    /// Adds a face by its corners, vertices from 0; `told` is how the file names one.
-    pub fn push(&mut self, corners: &[i64], told: impl Fn(i64) -> i64) -> Result<(), Fault> {
+    /// Adds a face by its corners, vertices from 0; `report` is how the file names one.
+    pub fn push(&mut self, corners: &[i64], report: impl Fn(i64) -> i64) -> Result<(), Fault> {
         if self.vertices == 0 {
             return Err(Fault::NoVertices);
         }
@@ -28,7 +28,7 @@ impl Polygons {
         if let Some(&corner) = corners.iter().find(|corner| !known(corner)) {
             return Err(Fault::Index {
                 face: self.faces,
-                found: told(corner).to_string(),
+                found: report(corner).to_string(),
                 vertices: self.vertices,
             });
         }

@@ -103,7 +103,7 @@ pub fn iso_surface(volume: &Volume, iso_hu: f32, border: Border) -> Result<Mesh,
 /// [`iso_surface`] for several iso values, in their order, in one pass over the volume.
 ///
 /// # Errors
-/// As [`iso_surface`]. Of several reasons the first in this order is told: an iso value that is no
+/// As [`iso_surface`]. Of several errors the first in this order is returned: an iso value that is no
 /// number, a volume too thin, an iso value above all that its samples can hold, and of the others the first
 /// iso value that has no surface or too large a one.
 pub fn iso_surfaces(

@@ -86,7 +86,7 @@ fn odd_input_is_noise() {
     );
     assert_eq!(dbscan(&points, f64::NAN, 2).noise, 3);
     assert_eq!(dbscan(&[], 1.0, 2).sizes, Vec::<usize>::new());
-    // Far more cells apart than a key can tell.
+    // Far more cells apart than a key can distinguish.
     let far = [-1e30, 0.0, 1e-30, 1e30, 1e30].map(|x| Point3::new(x, 0.0, -x));
     let labels = dbscan(&far, 1e-20, 2).labels;
     assert_eq!(labels, [None, Some(0), Some(0), Some(1), Some(1)]);

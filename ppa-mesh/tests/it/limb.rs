@@ -100,7 +100,7 @@ fn a_neighbour_and_a_sheet_leave_the_skin_where_it_was() {
     let limb = extract_limb(&planted, &LimbSettings::default()).expect("limb");
     assert!(limb.report.other_voxels > 2000, "{:?}", limb.report);
 
-    // Where the two are pressed together nobody can tell where the skin was.
+    // Where the two are pressed together nobody knows where the skin was.
     let free = |v: &Point3<f64>| (v.x - axis.x).hypot(v.y - axis.y) > radius_mm + 2.0 * VOXEL_MM;
     let vertices = limb.mesh.vertices.iter().map(|v| v.cast::<f64>());
     let (away, pressed): (Vec<_>, Vec<_>) = vertices.partition(free);

@@ -158,7 +158,7 @@ fn broken_files_are_refused_with_the_reason() {
         (
             "a.obj",
             OBJ.replace("-2/1/1", "x"),
-            "line 11: \"x\" is no corner",
+            "line 11: \"x\" is not a corner",
         ),
         (
             "a.obj",

@@ -1,4 +1,4 @@
-//! An instrument that measures a lower leg in its voxels, along lines that the shapes tell.
+//! An instrument that measures a lower leg in its voxels, along lines that the shapes show.
 
 use std::fmt;
 

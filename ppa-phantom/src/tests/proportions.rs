@@ -1,4 +1,4 @@
-//! Published dimensions that no single parameter tells.
+//! Published dimensions that no single parameter shows.
 
 use nalgebra::{Point3, Vector3};
 

@@ -31,13 +31,13 @@ proptest! {
             while place < chords.len() && chords[place].to_mm < t {
                 place += 1;
             }
-            let told = chords.get(place).filter(|c| c.from_mm <= t).map_or(Tissue::Air, |c| c.tissue);
+            let report = chords.get(place).filter(|c| c.from_mm <= t).map_or(Tissue::Air, |c| c.tissue);
             let true_tissue = LIMB.tissue(&(origin + along.scale(t)));
-            wrong += if told == true_tissue { 0.0 } else { step_mm };
+            wrong += if report == true_tissue { 0.0 } else { step_mm };
             inside += if true_tissue == Tissue::Air { 0.0 } else { step_mm };
         }
-        let told: f64 = chords.iter().map(Chord::length_mm).sum();
-        prop_assert!((told - inside).abs() < 0.06, "{told} mm for {inside} mm");
+        let report: f64 = chords.iter().map(Chord::length_mm).sum();
+        prop_assert!((report - inside).abs() < 0.06, "{report} mm for {inside} mm");
         prop_assert!(wrong < 0.01 * chords.len() as f64 + 0.04, "{wrong} mm of {} chords", chords.len());
         // Two chords of one tissue have air between them.
         let joined = |w: &[Chord]| w[0].to_mm == w[1].from_mm && w[0].tissue != w[1].tissue;

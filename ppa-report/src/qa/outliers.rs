@@ -1,7 +1,7 @@
 //! Poses that do not follow from their neighbours.
 //!
 //! A limb that turns step by step rises and tilts smoothly. A value whose distance from the line between its two neighbours is
-//! much larger than the bend usual in its sweep explains is told. Where poses are missing, that line is longer: a smooth curve
+//! much larger than the bend usual in its sweep explains is reported. Where poses are missing, that line is longer: a smooth curve
 //! leaves it by half its second derivative times the product of the steps on both sides.
 //!
 //! The first and the last pose have neighbours on one side only. Such an end must lie off two lines, through the first and second and
@@ -100,7 +100,7 @@ mod tests {
         assert!(outliers(&[[0.0, 1.0], [1.0, 2.0]], 0.5).is_empty());
     }
 
-    /// From 80 to 110 the sine bends most: beside the hole it leaves the line by 1 mm, which is no outlier.
+    /// From 80 to 110 the sine bends most: beside the hole it leaves the line by 1 mm, which is not an outlier.
     #[test]
     fn poses_beside_a_hole_are_none_and_a_jump_beside_it_is() {
         let mut holed = sweep((0..80).chain(110..181));

@@ -116,8 +116,8 @@ fn checks(root: &Path, flaws: &[Flaw]) -> String {
     if flaws.is_empty() {
         return "<p>Every image could be decoded and is as in manifest.jsonl; no region reaches beyond its image.</p>".to_owned();
     }
-    let told = flaws.iter().take(TOLD);
-    let told = told.map(|flaw| format!("<li>{}</li>", escaped(&without_folder(flaw, root))));
+    let report = flaws.iter().take(TOLD);
+    let report = report.map(|flaw| format!("<li>{}</li>", escaped(&without_folder(flaw, root))));
     format!(
         "<div class=\"bad\"><p>{}{}:</p><ul>{}</ul></div>",
         count(flaws.len(), "flaw"),
@@ -125,7 +125,7 @@ fn checks(root: &Path, flaws: &[Flaw]) -> String {
             true => format!(", the first {TOLD}"),
             false => String::new(),
         },
-        told.collect::<String>()
+        report.collect::<String>()
     )
 }
 
@@ -213,10 +213,10 @@ mod tests {
         for root in ["/home/name/data", "/home/name/data/"] {
             let path = Path::new(root).join("splits/x.json");
             let error = ppa_dataset::files::read_text(&path).unwrap_err();
-            let told = without_folder(&error, Path::new(root));
+            let report = without_folder(&error, Path::new(root));
             assert!(
-                told.contains("splits/x.json") && !told.contains("name"),
-                "{told}"
+                report.contains("splits/x.json") && !report.contains("name"),
+                "{report}"
             );
         }
     }

@@ -1,4 +1,4 @@
-//! What `dataset.json` tells of cameras and origin.
+//! What `dataset.json` states of cameras and origin.
 
 use std::path::Path;
 
@@ -95,7 +95,7 @@ impl Scene {
     }
 
     /// Height of the joint above the table, mm, and how far the limb's axis points away from it, degrees. A recorded room may
-    /// have any frame: only the table tells what is up.
+    /// have any frame: only the table shows what is up.
     pub fn height_and_tilt(&self, row: &FileRow) -> [f64; 2] {
         let pose = row.room_from_patient;
         let up = |column: usize| -> f64 {

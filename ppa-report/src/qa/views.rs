@@ -104,7 +104,7 @@ mod tests {
         let is_ink = |x, y| *view.get_pixel(x, y) == INK;
         assert!(
             is_ink(30, 4) && is_ink(35, 4) && is_ink(31, 17) && is_ink(39, 5),
-            "the frame goes on to the border"
+            "the frame reaches the border"
         );
         assert!(!is_ink(29, 4) && !is_ink(34, 8) && !is_ink(35, 18));
         assert!(is_ink(15, 20) && is_ink(22, 20) && !is_ink(19, 20));

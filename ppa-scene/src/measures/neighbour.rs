@@ -13,7 +13,7 @@ pub struct Neighbour {
     pub far_bone_mm: Option<[f64; 3]>,
 }
 
-/// Cross-sections are compared over this length, mm: noise of a single thin slice is no jump.
+/// Cross-sections are compared over this length, mm: noise of a single thin slice is not a jump.
 const OVER_MM: f64 = 3.0;
 
 /// The tibiae of two legs are at least this far apart, mm; the condyles of one femur are about 50.

@@ -1,4 +1,4 @@
-//! Landmarks of the phantom knee, however it lies in the scan, and what is no knee.
+//! Landmarks of the phantom knee, however it lies in the scan, and what is not a knee.
 
 use std::sync::LazyLock;
 
@@ -272,7 +272,7 @@ fn an_ankle_is_refused_where_a_knee_was_asked_for() {
     assert!((Point3::from(at_mm) - joint).norm() < 6.0, "{at_mm:?}");
 }
 
-/// Upside down, what follows a tibia to its flare arrives at the knee: that is no ankle, however short the calf is.
+/// Upside down, what follows a tibia to its flare arrives at the knee: that is not an ankle, however short the calf is.
 #[test]
 fn an_upside_down_knee_is_no_ankle() {
     let over = about(1, 180.0);

@@ -45,7 +45,7 @@ pub enum ProjectionError {
         /// What it was.
         found_mm: f64,
     },
-    /// The focal spot is no size, or out of proportion.
+    /// The size of the focal spot is invalid or out of proportion.
     #[error(
         "the focal spot is {size_mm} mm wide at {source_detector_mm} mm from the detector, expected 0 to 2 % of that distance"
     )]

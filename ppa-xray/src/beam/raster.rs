@@ -32,7 +32,7 @@ impl Raster {
 
     /// Cells under a square about a point of the raster, and their shares; its side is `spot` cells, at most 1.
     ///
-    /// What lies beyond the raster is folded back, as if it went on as its mirror image. None if the point lies outside.
+    /// What lies beyond the raster is folded back, as if it continued as its mirror image. None if the point lies outside.
     #[inline]
     pub fn cells_about(&self, x_mm: f64, y_mm: f64, spot: f64) -> Option<[(usize, f64); 4]> {
         self.cell_at(x_mm, y_mm)?;

@@ -28,7 +28,7 @@ impl Spectrum {
     }
 }
 
-/// Reads a file; whatever is wrong with it is told with its name.
+/// Reads a file; whatever is wrong with it is reported with its name.
 fn in_file(
     path: &Path,
     parse: impl FnOnce(&str) -> Result<Spectrum, SpectrumError>,

@@ -64,7 +64,7 @@ impl Spread {
         [kernel, squares]
     }
 
-    /// Where kernels end. Their transfer functions have a kink at Nyquist, so they go on a little beyond the light.
+    /// Where kernels end. Their transfer functions have a kink at Nyquist, so they continue a little beyond the light.
     fn reach(&self) -> usize {
         self.mtf.reach().max(12)
     }

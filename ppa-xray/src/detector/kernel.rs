@@ -80,7 +80,7 @@ impl Kernel {
             .sum()
     }
 
-    /// Spreads a row-major plane; beyond its edges it goes on as its mirror image, so that the sum is kept.
+    /// Spreads a row-major plane; beyond its edges it continues as its mirror image, so that the sum is kept.
     pub fn apply(&self, plane: &[f32], columns: usize) -> Vec<f32> {
         let rows = plane.len() / columns;
         let mut sum = vec![0.0_f32; plane.len()];
@@ -155,7 +155,7 @@ mod tests {
         pixels.map(|(x, y)| values(x, y) as f32).collect()
     }
 
-    /// A transfer function that is no product of one along x and one along y.
+    /// A transfer function that is not a product of one along x and one along y.
     fn transfer(fx: f64, fy: f64) -> f64 {
         1.0 / (1.0 + 20.0 * (fx * fx + fy * fy))
     }
@@ -167,7 +167,7 @@ mod tests {
     }
 
     /// A wave along rows, along columns or aslant, up to the edge of the plane of frequencies, keeps what the transfer function
-    /// says; whole waves in the mirror go on as waves. 0.01 for the kink at Nyquist, beyond 16 pixels.
+    /// says; whole waves in the mirror continue as waves. 0.01 for the kink at Nyquist, beyond 16 pixels.
     #[test]
     fn waves_keep_what_the_transfer_function_says() {
         let (columns, rows) = (64, 48);

@@ -8,7 +8,7 @@ use crate::detector::blur::Spread;
 
 /// Blur and electronic noise, ready to be applied.
 ///
-/// Blur acts on every layer and its quantum noise alike, as [`Spread`] tells. Electronic noise comes on top.
+/// Blur acts on every layer and its quantum noise alike, see [`Spread`]. Electronic noise comes on top.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Readout {
@@ -73,7 +73,7 @@ impl Readout {
 
     /// What is read out of pixels whose noise was drawn.
     ///
-    /// The error of the expected signal goes on over farther than the blur, which leaves it as it is.
+    /// The error of the expected signal continues over farther than the blur, which leaves it as it is.
     pub fn drawn(&self, layers: [DrawnLayer; 4], columns: usize) -> [Layer; 4] {
         let kernels = self.blur.as_ref().map(|blur| {
             let noise = blur.of_white_noise();

@@ -14,14 +14,14 @@ use crate::engine::quasi_random::QuasiRandom;
 use crate::transport::stream::Stream;
 use crate::transport::tracking::Transport;
 
-/// Independent lists, from whose spread the error is told.
+/// Independent lists, whose spread gives the standard error.
 pub(crate) const ESTIMATES: usize = 16;
 
-/// Share of the histories that go on from all sites alike.
+/// Share of the histories that continue from all sites alike.
 const ALIKE: f64 = 0.5;
 
 /// First collisions, evenly spread over the irradiated body: for single scatter each point of the detector chooses from
-/// them, histories of multiple scatter go on from them.
+/// them, histories of multiple scatter continue from them.
 #[derive(Default)]
 pub(crate) struct FirstCollisions {
     pub sites: Vec<Site>,
@@ -134,7 +134,7 @@ impl FirstCollisions {
             .zip(photons.iter().map(|&photons| f64::from(photons)))
     }
 
-    /// Many histories go on from where scatter matters, which is where the sites are, the others by the photons that
+    /// Many histories continue from where scatter matters, which is where the sites are, the others by the photons that
     /// scatter, so that no weight grows beyond bounds.
     fn share_out(&mut self) {
         let whole: f64 = self.scattered.iter().sum();
@@ -150,7 +150,7 @@ impl FirstCollisions {
             .collect();
     }
 
-    /// The history at `share` of the way through all that go on: its site, energy, and photons that it stands for if it
+    /// The history at `share` of the way through all that continue: its site, energy, and photons that it stands for if it
     /// were the only one.
     pub fn scattering(&self, share: f64, lines: &Lines) -> (&Site, f64, f64) {
         let target = share * self.cdf[self.cdf.len() - 1];

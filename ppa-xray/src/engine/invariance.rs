@@ -103,7 +103,7 @@ fn no_expectation_depends_on_how_the_work_is_done() {
             );
             assert!(
                 *se_b < 0.01 * b,
-                "{way}, kind {kind}: {b} ± {se_b} tells little"
+                "{way}, kind {kind}: {b} ± {se_b} is inconclusive"
             );
         }
     }

@@ -20,7 +20,7 @@ use crate::transport::tracking::Transport;
 /// How weights are kept even. No expectation depends on it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct VarianceReduction {
-    /// Histories that go on from a listed first collision, on average; more from strong ones, so that all of them have
+    /// Histories that continue from a listed first collision, on average; more from strong ones, so that all of them have
     /// the same weight.
     pub splitting: u32,
     /// Share of that weight below which a photon either ends or is raised to that share.
@@ -69,7 +69,7 @@ struct Landing {
 }
 
 impl Histories<'_> {
-    /// Histories that go on from every list.
+    /// Histories that continue from every list.
     pub fn each(&self) -> u64 {
         let listed = self.lists.iter().map(|list| list.sites.len()).max();
         (listed.unwrap_or(0) as u64) * u64::from(self.variance_reduction.splitting)
@@ -106,7 +106,7 @@ impl Histories<'_> {
         collisions
     }
 
-    /// A photon that scatters here goes on. Later collisions happen or not; no photon is absorbed, but loses the weight
+    /// A photon that scatters here continues. Later collisions happen or not; no photon is absorbed, but loses the weight
     /// that is, and light photons play roulette.
     fn history(
         &self,

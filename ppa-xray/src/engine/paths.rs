@@ -13,7 +13,7 @@ use crate::transport::voxel_codes::VoxelCode;
 /// Masses of the basis materials along a path, mm g/cm³, in groups of [`LANES`].
 pub(crate) type BasisMass = [[f32; LANES]];
 
-/// Whether a walk goes on.
+/// Whether a walk continues.
 pub(crate) type Step = std::ops::ControlFlow<()>;
 
 /// Lengths along a path are counted in integers of this many mm: they add and compare faster than floating-point numbers.
@@ -87,7 +87,7 @@ impl<'a> Paths<'a> {
             })
     }
 
-    /// Calls `visit(voxel, from_mm, to_mm)` for each piece of a path of `length_mm` along a unit vector, until told to stop.
+    /// Calls `visit(voxel, from_mm, to_mm)` for each piece of a path of `length_mm` along a unit vector, until `visit` ends it.
     #[inline]
     pub fn pieces(
         &self,

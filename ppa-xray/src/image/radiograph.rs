@@ -11,7 +11,7 @@ use crate::transport::tally::Category;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Engine {
-    /// Every history as nature plays it.
+    /// Analog Monte Carlo, no variance reduction.
     Analog,
     /// Ray-traced primary, Monte Carlo scatter, added quantum noise.
     Fast,

@@ -24,7 +24,7 @@ struct Bin {
 }
 
 impl Bin {
-    /// Marks a bin in which the photoelectric part is no straight line, because of an edge or the fine structure
+    /// Marks a bin in which the photoelectric part is not a straight line, because of an edge or the fine structure
     /// below one: there the material itself is asked.
     const CUT: f32 = f32::NAN;
 
@@ -73,7 +73,7 @@ impl CrossSectionTable {
         Self { grid, bins }
     }
 
-    /// Nothing in a bin that is no straight line; energies outside get the values at the nearer end.
+    /// Nothing in a bin that is not a straight line; energies outside get the values at the nearer end.
     #[inline]
     pub fn at(&self, energy_kev: f64) -> Option<CrossSections> {
         let (index, fraction) = self.grid.locate(energy_kev);

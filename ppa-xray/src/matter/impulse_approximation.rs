@@ -22,7 +22,7 @@ const PATIENCE: u32 = 1000;
 /// Momentum beyond which the correction factor of the differential cross-section stays constant, as in PENELOPE.
 const LARGEST_CORRECTED: f32 = 0.2;
 
-/// Smallest share of the electrons that is told apart in the tail of a profile.
+/// Smallest share of the electrons that is resolved in the tail of a profile.
 const SMALLEST_TAIL: f32 = 1e-30;
 
 /// Sampler of Compton scattering in one material.

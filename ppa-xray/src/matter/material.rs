@@ -130,7 +130,7 @@ impl Material {
     /// Material of the library, such as `water`, `bone_cortical` or `titanium`, or a pure element by symbol, such as `Al`.
     ///
     /// # Errors
-    /// A name that [`Material::names`] does not list and that is no symbol.
+    /// A name that [`Material::names`] does not list and that is not a symbol.
     pub fn named(name: &str) -> Result<Self, MaterialError> {
         library::find(name).ok_or_else(|| MaterialError::Unknown {
             name: name.to_owned(),

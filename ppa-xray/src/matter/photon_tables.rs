@@ -19,7 +19,7 @@ pub struct PhotonTables {
     pub rayleigh_cm2_g: Vec<f64>,
     /// Pairs (q², F²), ascending in q²: q = sin(θ/2)/λ in 1/Å, F² up to a constant factor.
     ///
-    /// Constant below the first node; beyond the last one the last power law goes on.
+    /// Constant below the first node; beyond the last one the last power law continues.
     pub form_factor_squared: Vec<[f64; 2]>,
     /// Electron shells; only the ratios of their electron numbers count.
     ///

@@ -149,7 +149,7 @@ pub enum McgpuError {
         table_high_kev: f64,
     },
     /// The numbers of a material file make no material.
-    #[error("{} is no usable material", path.display())]
+    #[error("{} is not a usable material", path.display())]
     Material {
         /// The material file.
         path: PathBuf,
@@ -170,7 +170,7 @@ pub enum McgpuError {
     #[error(transparent)]
     Spectrum(#[from] SpectrumError),
     /// The voxels make no phantom.
-    #[error("{} is no usable geometry", path.display())]
+    #[error("{} is not a usable geometry", path.display())]
     Phantom {
         /// The voxel file.
         path: PathBuf,

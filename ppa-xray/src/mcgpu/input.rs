@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn mistakes_are_reported_with_their_line() {
-        for (from, to, told) in [
+        for (from, to, report) in [
             (
                 "2.5e5 ",
                 "-1 ",
@@ -254,8 +254,8 @@ mod tests {
             ),
             ("90.0 ", "# ", "line 22: found \"#[SECTION CT SCAN"),
         ] {
-            let found = mangled::told(SAMPLE, [from, to], |path| Input::read(path));
-            assert!(found.contains(told), "{from} → {to}: {found}");
+            let found = mangled::report(SAMPLE, [from, to], |path| Input::read(path));
+            assert!(found.contains(report), "{from} → {to}: {found}");
         }
         let (before, _) = SAMPLE.split_once("../materials").unwrap();
         let found = read(before.as_bytes()).unwrap_err().to_string();

@@ -153,7 +153,7 @@ impl Lines {
 pub(crate) fn columns(line: &[u8]) -> impl Iterator<Item = &str> {
     line.split(u8::is_ascii_whitespace)
         .filter(|column| !column.is_empty())
-        // What is no text is no number either; no number begins with this mark.
+        // What is not a text is not a number either; no number begins with this mark.
         .map(|column| std::str::from_utf8(column).unwrap_or("\u{FFFD}"))
 }
 

@@ -102,7 +102,7 @@ pub(crate) fn damaged(text: &[u8], damage: &[Damage]) -> Vec<u8> {
 }
 
 /// What a reader says of `sample` with one piece of it changed.
-pub(crate) fn told<T: std::fmt::Debug, E: std::fmt::Display>(
+pub(crate) fn report<T: std::fmt::Debug, E: std::fmt::Display>(
     sample: &str,
     [from, to]: [&str; 2],
     reader: impl FnOnce(&Path) -> Result<T, E>,

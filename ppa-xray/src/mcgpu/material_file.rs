@@ -243,7 +243,7 @@ mod tests {
     fn mistakes_are_reported_with_their_line() {
         let sample = text(&Material::named("water").unwrap(), &energies());
         let lines: Vec<&str> = sample.lines().collect();
-        let told = |line: usize, mended: &str| {
+        let report = |line: usize, mended: &str| {
             let mut lines = lines.clone();
             lines[line - 1] = mended;
             match read(lines.join("\n").as_bytes()) {
@@ -259,7 +259,7 @@ mod tests {
                 "1.0",
                 "line 4: found \"1.0\", expected the nominal density",
             ),
-            (4, "# -1.0", "is no usable material"),
+            (4, "# -1.0", "is not a usable material"),
             (6, "# 41", "line 49: found \"#[RAYLEIGH INTERACTIONS]\""),
             (
                 6,
@@ -280,7 +280,7 @@ mod tests {
             (115, "# 3", "ends after line 118"),
             (117, "1 -1 1", "line 117: found \"1 -1 1\""),
         ] {
-            let found = told(line, mended);
+            let found = report(line, mended);
             assert!(found.contains(expected), "line {line} → {mended}: {found}");
         }
     }

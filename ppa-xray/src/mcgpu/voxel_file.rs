@@ -230,7 +230,7 @@ mod tests {
             ("[END", "", "expected [END OF VXH SECTION]"),
             ("[SECTION", "", "expected [SECTION VOXELS HEADER"),
         ] {
-            let found = mangled::told(SAMPLE, [from, to], |path| {
+            let found = mangled::report(SAMPLE, [from, to], |path| {
                 VoxelFile::read_into(path, 1_000_000)
             });
             assert!(found.contains(expected), "{from} → {to}: {found}");

@@ -36,7 +36,7 @@ pub struct Audit {
     /// Voxels that have exactly the highest HU.
     pub voxels_at_highest: usize,
     /// The same number if it is too large for the end of a tail, otherwise 0: the scan is clipped above. Metals cannot
-    /// be told apart there, and their density is that of the calibration.
+    /// be distinguished there, and their density is that of the calibration.
     pub clipped_above: usize,
     /// Mass of all voxels, g.
     pub mass_g: f64,
@@ -296,7 +296,7 @@ mod tests {
         );
     }
 
-    /// A curve that ends too early is told: its last density would stand for everything above.
+    /// A curve that ends too early is reported: its last density would stand for everything above.
     #[test]
     fn voxels_beyond_the_curve_are_counted() {
         let grid = Grid::axis_aligned([4, 1, 1], Vector3::repeat(1.0), Point3::origin()).unwrap();

@@ -179,7 +179,7 @@ mod tests {
         assert_eq!(HuCalibration::parse(&text).unwrap(), calibration);
     }
 
-    /// Every kind of mistake is told with the segment or the line it is in.
+    /// Every kind of mistake is reported with the segment or the line it is in.
     #[test]
     fn mistakes_are_reported_with_their_place() {
         let broken = |from: &str, to: &str| {
@@ -188,7 +188,7 @@ mod tests {
             let source = std::error::Error::source(&error).map(ToString::to_string);
             format!("{error} {}", source.unwrap_or_default())
         };
-        for (from, to, told) in [
+        for (from, to, report) in [
             (
                 "[14, 1.0305], [100, 1.0762]]",
                 "[14, 1.0305], [14, 1.0762]]",
@@ -242,7 +242,7 @@ mod tests {
             ),
         ] {
             let message = broken(from, to);
-            assert!(message.contains(told), "{to:?}: {message}");
+            assert!(message.contains(report), "{to:?}: {message}");
         }
         assert!(matches!(
             HuCalibration::parse("segment = []"),

@@ -23,7 +23,7 @@ pub struct Segment {
 /// What a segment is made of.
 ///
 /// A material is given by a name of the library ([`Material::named`]) or by mass fractions
-/// ([`Material::parse_composition`]), which are told apart by the colon.
+/// ([`Material::parse_composition`]), which are distinguished by the colon.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Composition {
     /// One material.

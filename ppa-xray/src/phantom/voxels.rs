@@ -136,7 +136,7 @@ impl VoxelPhantom {
     }
 
     /// A phantom from Hounsfield units; voxels outside `mask` (one flag per voxel) become what the lowest HU stand for,
-    /// air. [`HuCalibration::audit`] tells what became of the voxels.
+    /// air. [`HuCalibration::audit`] lists what became of the voxels.
     ///
     /// # Errors
     /// [`PhantomError`] when the calibration is not usable or the mask has the wrong length.

@@ -122,7 +122,7 @@ impl<'a> AnalogRun<'a> {
         AnalogTally::empty(setup, part.share(self.settings.histories))
     }
 
-    /// The tally of an earlier sitting, to go on with. A tally of a whole run may go on to another number of histories.
+    /// The tally of an earlier sitting, to continue with. A tally of a whole run may continue to another number of histories.
     ///
     /// # Errors
     /// [`TallyError`] when the file cannot be read, is damaged, or is of another simulation or part.

@@ -33,11 +33,11 @@ pub enum Stopped {
 pub struct Progress {
     /// Histories counted in the tally, those of earlier sittings included.
     pub histories: u64,
-    /// Histories that will be counted in the end, as far as can be told.
+    /// Histories that will be counted in the end, as far as is known.
     pub expected_histories: u64,
     /// Time since the call began.
     pub elapsed: Duration,
-    /// Time that is left, once there is a rate to tell it from.
+    /// Estimated time left, once a rate is known.
     pub remaining: Option<Duration>,
     /// The error that [`Stop::relative_error`] is compared with, when last looked at.
     pub relative_error: Option<f64>,

@@ -24,7 +24,7 @@ pub enum TallyError {
         source: std::io::Error,
     },
     /// The file does not begin as a tally does.
-    #[error("{} is no tally of ppa-xray", path.display())]
+    #[error("{} is not a tally of ppa-xray", path.display())]
     Foreign {
         /// The file.
         path: PathBuf,
@@ -39,7 +39,7 @@ pub enum TallyError {
         /// Version of this program.
         expected: u32,
     },
-    /// The file ends early or goes on.
+    /// The file ends early or continues.
     #[error("{} is {found} bytes long, expected {expected}: it was cut off or appended to", path.display())]
     Size {
         /// The file.

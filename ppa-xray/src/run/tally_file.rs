@@ -72,7 +72,7 @@ impl AnalogTally {
     /// Reads a tally.
     ///
     /// # Errors
-    /// [`TallyError`] for a file that is no tally, cut off or damaged.
+    /// [`TallyError`] for a file that is not a tally, cut off or damaged.
     pub fn read(path: &Path) -> Result<Self, TallyError> {
         let failed = |source| TallyError::Read {
             path: path.into(),
@@ -86,7 +86,7 @@ impl AnalogTally {
         let mut file = ppa_core::regular_file::open(path).map_err(failed)?;
         let found = file.metadata().map_err(failed)?.len();
         let mut start = [0; 16];
-        // Whatever is too short for the first numbers is no tally.
+        // Whatever is too short for the first numbers is not a tally.
         file.read_exact(&mut start)
             .map_err(|source| match source.kind() {
                 std::io::ErrorKind::UnexpectedEof => foreign(),

@@ -8,7 +8,7 @@ use crate::matter::sampler::MaterialTables;
 /// 2⁹ nodes in every octave of energy: linear interpolation of E⁻³ errs by less than 6e-6.
 const OCTAVE_BITS: u32 = 9;
 
-/// Energies are told apart by the leading bits of their `f32`.
+/// Energies are distinguished by the leading bits of their `f32`.
 const SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - OCTAVE_BITS;
 
 const FIRST_KEY: u32 = (CUTOFF_KEV as f32).to_bits() >> SHIFT;

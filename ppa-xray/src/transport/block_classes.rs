@@ -39,7 +39,7 @@ pub(super) fn densest_per_block(
 /// Class of every block, and the largest density per material of every class and those below it.
 ///
 /// Classes follow the attenuation at the typical energy, `mu` per density and material. If there are too many different ones,
-/// they are told apart by fewer digits.
+/// they are distinguished by fewer digits.
 pub(super) fn classify(densest: &[f32], mu: &[f32]) -> (Vec<u16>, Vec<f32>) {
     let materials = mu.len();
     let opacity: Vec<u32> = densest

@@ -135,7 +135,7 @@ impl<'a> TallyBuffer<'a> {
 
     /// Counts a photon whose energy is spread over a square of `spot` cells, at most 1.
     ///
-    /// Its squared energy is shared out as its energy is: cells then tell how many photons came with which energy,
+    /// Its squared energy is shared out as its energy is: cells then show how many photons came with which energy,
     /// and sums over cells are those of whole photons.
     pub fn spread(&mut self, x_mm: f64, y_mm: f64, spot: f64, category: Category, energy_kev: f64) {
         let shares = self.tally.raster.cells_about(x_mm, y_mm, spot);

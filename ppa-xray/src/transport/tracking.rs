@@ -136,7 +136,7 @@ impl<'a> Transport<'a> {
         })
     }
 
-    /// Follows the `histories` of a seed and tells `score` what they leave; slots are below [`lanes::LANES`].
+    /// Follows the `histories` of a seed and reports to `score` what they leave; slots are below [`lanes::LANES`].
     ///
     /// Each history is the same whatever runs beside it: any split of a range leaves the same events, in another order.
     pub fn follow(&self, seed: u64, histories: Range<u64>, score: &mut impl Score) {

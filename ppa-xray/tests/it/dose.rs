@@ -188,7 +188,7 @@ fn air_kerma_is_that_of_the_beam() {
         (skin / (at_1m / 0.95_f64.powi(2)) - 1.0).abs() < 1e-6,
         "{skin:e}"
     );
-    assert_eq!(entrance(0.2), None, "foam is no patient");
+    assert_eq!(entrance(0.2), None, "foam is not a patient");
 }
 
 #[test]

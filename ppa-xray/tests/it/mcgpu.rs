@@ -193,8 +193,8 @@ fn images_and_doses_are_written_as_mcgpu_does() {
         })
         .sum();
     let text = fs::read_to_string(folder.path().join("dose.dat")).unwrap();
-    let told = text.split("inside the dose ROI: ").nth(1).unwrap();
-    let told_kev: f64 = told.split(' ').next().unwrap().parse().unwrap();
+    let report = text.split("inside the dose ROI: ").nth(1).unwrap();
+    let told_kev: f64 = report.split(' ').next().unwrap().parse().unwrap();
     assert!(
         (1e-3 * energy_ev / told_kev - 1.0).abs() < 1e-4,
         "{energy_ev} {told_kev}"
@@ -243,7 +243,7 @@ fn apertures_are_along_columns_then_rows() {
 #[test]
 fn what_an_input_file_names_must_fit() {
     let folder = tempfile::tempdir().unwrap();
-    let told = |sections: Sections| match simulation(folder.path(), &sections) {
+    let report = |sections: Sections| match simulation(folder.path(), &sections) {
         Ok(_) => panic!("was read"),
         Err(error) => error.to_string(),
     };
@@ -268,18 +268,18 @@ fn what_an_input_file_names_must_fit() {
             "line 31: voxel file ",
         ),
     ] {
-        let found = told(Sections {
+        let found = report(Sections {
             files: &files,
             ..SCAN
         });
         assert!(found.contains(expected), "{files}: {found}");
     }
-    let found = told(Sections {
+    let found = report(Sections {
         source: "x.spc\n4 -50 2\n0 1 0\n-1 -1",
         ..SCAN
     });
     assert!(found.contains("line 8: spectrum file "), "{found}");
-    let found = told(Sections {
+    let found = report(Sections {
         source: "box.vox\n4 -50 2\n0 1 0\n-1 -1",
         ..SCAN
     });
@@ -287,12 +287,12 @@ fn what_an_input_file_names_must_fit() {
         found.starts_with("spectrum ") && found.ends_with("box.vox"),
         "{found}"
     );
-    let found = told(Sections {
+    let found = report(Sections {
         detector: "20 5\n20 10.1\n100",
         ..SCAN
     });
     assert!(found.contains("pixels of 1 cm by 2.02 cm"), "{found}");
-    let found = told(Sections {
+    let found = report(Sections {
         dose: "NO\nYES\nd\n1 8\n7 8\n1 1",
         ..SCAN
     });

@@ -147,7 +147,7 @@ fn an_interrupted_run_resumes_from_its_file() {
     assert_eq!(tally.radiograph(), whole(&scene, histories).radiograph());
     tally.write(&path).unwrap();
 
-    // A whole run goes on to more histories, but not back to fewer.
+    // A whole run continues to more histories, but not back to fewer.
     let more = scene.run(histories + 999, 3);
     let mut tally = more.read(&path, Part::WHOLE).unwrap();
     more.follow(&mut tally, &Stop::default(), |_, _| go_on());
@@ -221,7 +221,7 @@ fn overlap_hole_and_foreign_parts_are_refused_by_name() {
     assert!(matches!(error, TallyError::Unfinished { .. }), "{error}");
 }
 
-/// What a scene's key must tell apart.
+/// Differences that the key of a scene must reflect.
 #[test]
 fn tallies_of_other_simulations_are_refused() {
     let (scene, directory) = (Scene::new(), tempfile::tempdir().unwrap());

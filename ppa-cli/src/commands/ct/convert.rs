@@ -52,7 +52,7 @@ impl ConvertArgs {
             let [nx, ny, nz] = volume.grid().size();
             volume = volume.crop(low, high).map_err(|error| match error {
                 VolumeError::Memory { .. } => error.into(),
-                _ => anyhow!("--crop is no box inside the scan's {nx} x {ny} x {nz} voxels"),
+                _ => anyhow!("--crop is not a box inside the scan's {nx} x {ny} x {nz} voxels"),
             })?;
         }
         if self.upright {
@@ -87,10 +87,10 @@ pub fn run(args: &ConvertArgs, output: Output) -> anyhow::Result<()> {
     source.write(&args.output)?;
     // Told from the file, so that what is printed is what others will read.
     let mut info = Info::of(&read(&args.output)?);
-    // What the file cannot tell about the scan it was made from; a tilt it does.
+    // What the file cannot show about the scan it was made from; a tilt it does.
     let lost = source.warnings.into_iter().filter(|warning| {
-        let told = info.warnings.iter().any(|w| w.code == warning.code);
-        !told && warning.code != WarningCode::GantryTilt
+        let report = info.warnings.iter().any(|w| w.code == warning.code);
+        !report && warning.code != WarningCode::GantryTilt
     });
     info.warnings.extend(lost.collect::<Vec<_>>());
     output.print(&info, super::describe)

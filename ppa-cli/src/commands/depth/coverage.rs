@@ -10,7 +10,7 @@ use ppa_depth::{
     Camera, CoverageSettings, JointSurface, MeshBody, PlacedBody, Viewpoint, isometry_from_rows,
     rows_from_isometry,
 };
-use ppa_generate::{Case, Plan, Stage, closed_skin};
+use ppa_generate::{Case, Plan, SceneSetup, closed_skin};
 use ppa_report::{RankedView, coverage_plot};
 use ppa_scene::place;
 use serde::Deserialize;
@@ -91,8 +91,8 @@ pub fn run(args: &CoverageArgs, output: Output) -> anyhow::Result<()> {
     let case = Case::read(&args.case)?;
     let working = working("looking at the joint from all places");
     let prepared = prepared(&case, &args.case)?;
-    let stage = Stage::of_plan(&plan)?;
-    let table = &stage.table;
+    let setup = SceneSetup::of_plan(&plan)?;
+    let table = &setup.table;
     let placement = place(
         &prepared.limb.mesh.vertices,
         &prepared.landmarks,
@@ -104,7 +104,7 @@ pub fn run(args: &CoverageArgs, output: Output) -> anyhow::Result<()> {
     let room_from_ct = *room_from_ct.isometry();
     let joint_in_ct = Point3::from(prepared.landmarks.joint_centre);
     let joint = room_from_ct * joint_in_ct;
-    let candidates = candidates(args, &stage, &joint)?;
+    let candidates = candidates(args, &setup, &joint)?;
 
     let settings = CoverageSettings {
         radius_mm: args.radius_mm,
@@ -163,12 +163,12 @@ pub fn run(args: &CoverageArgs, output: Output) -> anyhow::Result<()> {
 /// The cameras of the rig, and the places that are tried.
 fn candidates(
     args: &CoverageArgs,
-    stage: &Stage,
+    setup: &SceneSetup,
     joint: &Point3<f64>,
 ) -> anyhow::Result<Vec<Candidate>> {
     let camera = super::read_camera(args.camera.as_ref())?;
     camera.rays(); // once, and shared by all clones
-    let mut candidates: Vec<Candidate> = stage
+    let mut candidates: Vec<Candidate> = setup
         .cameras
         .iter()
         .map(|placed| Candidate {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use ppa_dataset::layout::View;
-use ppa_generate::{Case, DepthView, PreparedLimb, Stage, depth_views};
+use ppa_generate::{Case, DepthView, PreparedLimb, SceneSetup, depth_views};
 use serde::Serialize;
 
 use super::render::{RenderArgs, read_sensor, write_others};
@@ -123,11 +123,11 @@ pub fn render_case(path: &Path, args: &RenderArgs, output: Output) -> anyhow::Re
     }
     let case = Case::read(path)?;
     let working = working("preparing the limb");
-    let stage = Stage::of_plan(&plan)?;
+    let setup = SceneSetup::of_plan(&plan)?;
     let limb = PreparedLimb::of_case(&case)
         .with_context(|| format!("cannot prepare the limb of {}", path.display()))?;
     let angle_deg = args.of_case.angle.unwrap_or_default();
-    let mut views = depth_views(&stage, &plan, &limb, angle_deg, args.seed)?;
+    let mut views = depth_views(&setup, &plan, &limb, angle_deg, args.seed)?;
     let wanted = args.of_case.view();
     views.retain(|seen| wanted.is_none_or(|view| view == seen.view));
     let mut written = Vec::new();

@@ -20,7 +20,7 @@ const SHOWN: usize = 10;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 One row per grade: image, reader, grade (1 ideal to 3 inadequate, in half steps). A reader's second
-grade of an image is a repeat: it tells how far the reader agrees with themselves, and counts nowhere
+grade of an image is a repeat: it measures how far the reader agrees with themselves, and counts nowhere
 else. Intraclass correlations use the images that every reader graded; alpha uses all.
 
 In what readers hand in, a picture that was shown twice has two names: `ppa label import` first, and take grades.csv.

@@ -6,7 +6,7 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use ppa_core::text::count;
 use ppa_dataset::{Manifest, write_whole};
-use ppa_label::{PICTURES_PER_PAGE, PageNumber, Showing, grading_page, write_key};
+use ppa_label::{PICTURES_PER_PAGE, PageNumber, ReaderCase, grading_page, write_key};
 use serde::Serialize;
 
 use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
@@ -16,8 +16,8 @@ use crate::output_files::OutputFiles;
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
 Give readers the folder: it holds a page that needs no network, or several of 200 pictures. Open each in a browser, grade by key, save the grades as \
-CSV. Names and order of the pictures tell nothing; a tenth of them comes twice; all have the same window. Keep the key: \
-it tells which picture is which.
+CSV. Names and order of the pictures are random; a tenth of them comes twice; all have the same window. Keep the key: \
+it identifies the pictures.
 
   ppa label export dataset --out for_readers --every-deg 5      writes for_readers.key.csv as well
   ppa label import dataset --key for_readers.key.csv grades_anna.csv grades_ben.csv")]
@@ -62,7 +62,7 @@ pub fn run(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
     );
     let working = working("collecting radiographs");
     let manifest = Manifest::read(&args.dataset)?;
-    let shown = Showing::of_dataset(&manifest, args.seed, args.every_deg);
+    let shown = ReaderCase::of_dataset(&manifest, args.seed, args.every_deg);
     let pages = pages(&args.out, shown.len());
     for path in pages.iter().chain([&key]) {
         ensure!(
@@ -96,7 +96,8 @@ pub fn run(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
     }
     write_key(&key, &shown)?;
     working.finish_and_clear();
-    let images: std::collections::HashSet<_> = shown.iter().map(|showing| &showing.image).collect();
+    let images: std::collections::HashSet<_> =
+        shown.iter().map(|reader_case| &reader_case.image).collect();
     let exported = Exported {
         pages,
         key,

@@ -105,7 +105,7 @@ fn describe(audit: &Audit) -> String {
         audit.voxels_at_highest,
         match audit.clipped_above {
             0 => "",
-            _ => " (clipped, or filled in: nothing above can be told apart)",
+            _ => " (clipped, or filled in: values above cannot be distinguished)",
         },
     ));
     text
@@ -187,10 +187,10 @@ mod tests {
     fn voxels_outside_a_limb_are_reported_only_of_a_limb() {
         let grid = Grid::axis_aligned([3, 1, 1], Vector3::repeat(1.0), Point3::origin()).unwrap();
         let scan = Volume::new(grid, vec![-1_000.0, 40.0, 900.0]).unwrap();
-        let told =
+        let report =
             |mask: Option<&[bool]>| describe(&HuCalibration::default().audit(&scan, mask).unwrap());
-        assert!(!told(None).contains("limb"), "{}", told(None));
-        let limb = told(Some(&[false, true, true]));
+        assert!(!report(None).contains("limb"), "{}", report(None));
+        let limb = report(Some(&[false, true, true]));
         assert!(limb.contains(", 1 voxel outside the limb"), "{limb}");
     }
 

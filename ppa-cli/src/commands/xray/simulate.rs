@@ -23,7 +23,7 @@ use crate::output_files::ReplaceArgs;
 pub(super) enum EngineName {
     /// Ray-traced primary, Monte Carlo scatter, added quantum noise
     Fast,
-    /// Every history as nature plays it
+    /// Analog Monte Carlo, no variance reduction
     Analog,
 }
 

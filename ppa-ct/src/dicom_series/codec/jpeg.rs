@@ -9,7 +9,7 @@ use crate::dicom_series::header::Image;
 /// What the decoder holds of a pixel: coefficients and samples.
 const BYTES_PER_PIXEL: usize = 12;
 
-/// What the start of a frame tells.
+/// What the start of a frame shows.
 struct Frame {
     lossless: bool,
     bits: u8,

@@ -60,7 +60,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Packs bytes as the given kinds of runs tell, with idle codes in between.
+    /// Packs bytes in the given kinds of runs, with idle codes in between.
     fn pack(bytes: &[u8], runs: &[usize]) -> Vec<u8> {
         let (mut packed, mut rest) = (Vec::new(), bytes);
         for run in runs.iter().cycle() {

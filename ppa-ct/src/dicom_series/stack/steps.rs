@@ -50,7 +50,7 @@ pub(super) fn distinct_places(
 pub(super) enum Steps {
     /// By the same step.
     Even(Vector3<f64>),
-    /// By different steps, with the error that tells them.
+    /// By different steps, with the error that names them.
     Uneven(ReadError),
 }
 

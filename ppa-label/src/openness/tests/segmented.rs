@@ -1,4 +1,4 @@
-//! Bones that were told apart in the scan give the joint space of the true ones.
+//! Bones that were separated in the scan give the joint space of the true ones.
 
 use rayon::prelude::*;
 
@@ -6,7 +6,7 @@ use super::*;
 use crate::{SegmentError, SegmentedBones, segment_bones};
 use ppa_phantom::{Scanner, TableTop};
 
-/// A phantom as a scanner shows it, told apart, beside its true bones.
+/// A phantom as a scanner shows it, separated, beside its true bones.
 struct Segmented {
     leg: LowerLeg,
     found: Result<SegmentedBones, SegmentError>,
@@ -99,7 +99,7 @@ fn bones_are_told_apart_where_they_hang_together() {
 }
 
 #[test]
-#[ignore = "a minute: seventeen ankles, voxelised, scanned and told apart"]
+#[ignore = "a minute: seventeen ankles, voxelised, scanned and segmented"]
 fn bones_of_every_phantom_are_told_apart() {
     (1..=17).into_par_iter().for_each(|n| {
         let name = format!("P{n:02}");

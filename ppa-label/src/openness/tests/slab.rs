@@ -1,4 +1,4 @@
-//! A joint of boxes, whose gutters open as a formula tells.
+//! A joint of boxes, whose gutters open as a formula predicts.
 
 use super::*;
 
@@ -158,7 +158,7 @@ fn chords_are_as_long_as_the_body_is_deep() {
             (found - expected).abs() < 0.08,
             "{angle}: {found}, {expected}"
         );
-        // What is longer than asked for is told to be longer, no more.
+        // What is longer than asked for is reported to be longer, no more.
         assert!(ray.chord_mm(&bones, &[talus], 2.0) > 2.0);
     }
 }

@@ -26,7 +26,7 @@ mod tests {
         let (a, b) = (of(&[b"ab", b"c"]), of(&[b"a", b"bc"]));
         assert_ne!(a, b);
         assert_eq!(a, of(&[b"ab", b"c"]));
-        // UI holds 64 characters; the first digit of an arc is no zero.
+        // UI holds 64 characters; the first digit of an arc is not a zero.
         assert!(a.len() <= 64 && !a[5..].starts_with('0'));
     }
 }

@@ -37,7 +37,7 @@ pub(super) struct Steps {
 }
 
 impl Steps {
-    /// The flight goes on in another block.
+    /// The flight continues in another block.
     pub const ON: u32 = 0;
     /// A tentative collision, to be accepted or not.
     pub const TENTATIVE: u32 = 1;

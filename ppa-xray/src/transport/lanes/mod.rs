@@ -72,7 +72,7 @@ struct Lanes<'a, 'p> {
     scattering: Scattering,
 }
 
-/// Follows `histories` of `seed` and tells `score` what they leave; slots are below [`LANES`].
+/// Follows `histories` of `seed` and reports to `score` what they leave; slots are below [`LANES`].
 pub(super) fn follow(
     transport: &Transport,
     seed: u64,

@@ -20,12 +20,12 @@ use crate::closed_skin::closed_skin;
 use crate::cut_error::PoseImage;
 use crate::cut_share::{self, CutFaces, PoseCuts};
 use crate::plan::Plan;
+use crate::pose_error::PoseError;
 use crate::prepare::PreparedLimb;
 use crate::radiograph::{joint_phantom, projection};
+use crate::scene_setup::{PlacedCamera, SceneSetup};
 use crate::seed::{Purpose, item_seed};
 use crate::shaped_skin::body_shape;
-use crate::stage::{PlacedCamera, Stage};
-use crate::unit_error::UnitError;
 
 struct ShapedSkin {
     shape: BodyShape,
@@ -49,7 +49,7 @@ pub(crate) struct Images {
 pub(crate) struct PosableLimb<'a> {
     id: LimbId,
     plan: &'a Plan,
-    stage: &'a Stage,
+    setup: &'a SceneSetup,
     prepared: PreparedLimb,
     shapes: Vec<ShapedSkin>,
     phantom: VoxelPhantom,
@@ -62,9 +62,9 @@ impl<'a> PosableLimb<'a> {
     pub(crate) fn new(
         id: LimbId,
         plan: &'a Plan,
-        stage: &'a Stage,
+        setup: &'a SceneSetup,
         prepared: PreparedLimb,
-    ) -> Result<Self, UnitError> {
+    ) -> Result<Self, PoseError> {
         let (skin, walls) = (&prepared.limb.mesh, &prepared.limb.walls);
         let shaped = |&shape: &BodyShape| {
             let (landmarks, settings) = (&prepared.landmarks, &plan.shapes);
@@ -72,20 +72,20 @@ impl<'a> PosableLimb<'a> {
             let body = closed_skin(&walls.vertices(&mesh), &mesh, walls)?;
             let change = || Displacement::between(skin, &mesh).volume_mm3;
             let volume_change_mm3 = (shape != BodyShape::Orig).then(change);
-            Ok::<_, UnitError>(ShapedSkin {
+            Ok::<_, PoseError>(ShapedSkin {
                 shape,
                 mesh,
                 body,
                 volume_change_mm3,
             })
         };
-        let source_detector_mm = stage.table.room.device.source_detector_mm;
+        let source_detector_mm = setup.table.room.device.source_detector_mm;
         let cut_faces = CutFaces::new(walls, skin, &plan.xray.detector, source_detector_mm)?;
         let shapes = plan.shapes.variants.iter().map(shaped);
         let mut posable = Self {
             id,
             plan,
-            stage,
+            setup,
             shapes: shapes.collect::<Result<_, _>>()?,
             phantom: joint_phantom(&prepared, &plan.xray)?,
             cut_faces,
@@ -97,7 +97,7 @@ impl<'a> PosableLimb<'a> {
     }
 
     /// Looks at all poses of the plan, before the first of them is made, and refuses those cut too much.
-    fn checked_cuts(&self) -> Result<Vec<PoseCuts>, UnitError> {
+    fn checked_cuts(&self) -> Result<Vec<PoseCuts>, PoseError> {
         if self.cut_faces.is_empty() {
             return Ok(Vec::new());
         }
@@ -115,13 +115,13 @@ impl<'a> PosableLimb<'a> {
     }
 
     /// How much of each image is cut; `rigid` is the closed skin of the scan.
-    fn pose_cuts(&self, pose: PoseAngle, rigid: &Body) -> Result<PoseCuts, UnitError> {
+    fn pose_cuts(&self, pose: PoseAngle, rigid: &Body) -> Result<PoseCuts, PoseError> {
         let skin = &self.prepared.limb.mesh;
         let placement = self.place(skin, pose)?;
         let flattened = self.flattened(skin, &placement)?;
         let in_room = |points: &[Point3<f32>]| placement.in_room(points, &self.prepared.landmarks);
         let mut shares = Vec::new();
-        for camera in &self.stage.cameras {
+        for camera in &self.setup.cameras {
             let roi = self.roi(camera, &placement)?;
             let limb = self.placed(camera, &placement, flattened.as_ref(), rigid);
             let share = self.cut_faces.in_region(camera, &roi, limb, in_room)?;
@@ -147,12 +147,12 @@ impl<'a> PosableLimb<'a> {
     }
 
     /// Makes all images of one pose under `root`.
-    pub(crate) fn make(&self, pose: PoseAngle, root: &Path) -> Result<Images, UnitError> {
+    pub(crate) fn make(&self, pose: PoseAngle, root: &Path) -> Result<Images, PoseError> {
         let mut files = Vec::new();
         let noise_seed = item_seed(self.plan.seed, Purpose::DepthNoise, self.id, pose.step);
         // The skin of the scan decides the pose of the radiograph and the regions of interest.
         let placement = self.place(&self.prepared.limb.mesh, pose)?;
-        let cameras = self.stage.cameras.iter();
+        let cameras = self.setup.cameras.iter();
         let rois: Vec<Roi> = cameras
             .map(|camera| self.roi(camera, &placement))
             .collect::<Result<_, _>>()?;
@@ -162,7 +162,7 @@ impl<'a> PosableLimb<'a> {
                 _ => self.place(&shaped.mesh, pose)?,
             };
             let flattened = self.flattened(&shaped.mesh, &placement)?;
-            for (camera, roi) in self.stage.cameras.iter().zip(&rois) {
+            for (camera, roi) in self.setup.cameras.iter().zip(&rois) {
                 let file = self.id.depth(shaped.shape, camera.view, pose.step);
                 let placed = self.placed(camera, &placement, flattened.as_ref(), &shaped.body);
                 let walls = self.plan.depth.cut_faces;
@@ -188,7 +188,7 @@ impl<'a> PosableLimb<'a> {
             let (skin, joint) = (&self.prepared.limb.mesh, self.joint());
             cuts.finding(&self.prepared.limb.walls, skin, &joint)
         }));
-        let rows = self.stage.cameras.iter().zip(&rois);
+        let rows = self.setup.cameras.iter().zip(&rois);
         let rows = rows.map(|(camera, roi)| roi_row(camera, roi, pose));
         Ok(Images {
             files,
@@ -197,8 +197,8 @@ impl<'a> PosableLimb<'a> {
         })
     }
 
-    fn place(&self, skin: &Mesh, pose: PoseAngle) -> Result<Placement, UnitError> {
-        let table = &self.stage.table;
+    fn place(&self, skin: &Mesh, pose: PoseAngle) -> Result<Placement, PoseError> {
+        let table = &self.setup.table;
         Ok(place_soft(
             &skin.vertices,
             &self.prepared.landmarks,
@@ -216,7 +216,7 @@ impl<'a> PosableLimb<'a> {
     }
 
     /// A skin that the table flattens, in the room; `None` for a rigid one.
-    fn flattened(&self, skin: &Mesh, placement: &Placement) -> Result<Option<Body>, UnitError> {
+    fn flattened(&self, skin: &Mesh, placement: &Placement) -> Result<Option<Body>, PoseError> {
         if placement.flattening.is_none() {
             return Ok(None);
         }
@@ -245,7 +245,7 @@ impl<'a> PosableLimb<'a> {
         }
     }
 
-    fn roi(&self, camera: &PlacedCamera, placement: &Placement) -> Result<Roi, UnitError> {
+    fn roi(&self, camera: &PlacedCamera, placement: &Placement) -> Result<Roi, PoseError> {
         let joint_in_camera = self.camera_from_ct(camera, placement) * self.joint();
         Ok(roi_around(
             &camera.camera,
@@ -255,7 +255,7 @@ impl<'a> PosableLimb<'a> {
     }
 
     fn projection(&self, placement: &Placement) -> Projection {
-        let device = &self.stage.table.room.device;
+        let device = &self.setup.table.room.device;
         projection(placement, &self.prepared.landmarks, device, &self.plan.xray)
     }
 
@@ -264,7 +264,7 @@ impl<'a> PosableLimb<'a> {
         pose: PoseAngle,
         placement: &Placement,
         root: &Path,
-    ) -> Result<[FileRow; 2], UnitError> {
+    ) -> Result<[FileRow; 2], PoseError> {
         let settings = &self.plan.xray;
         let projection = self.projection(placement);
         let cut = self.cuts_at(pose).map_or(0.0, PoseCuts::of_radiograph);
@@ -273,13 +273,13 @@ impl<'a> PosableLimb<'a> {
             seed,
             ..settings.engine
         };
-        let radiograph = ppa_xray::fast(&self.phantom, &self.stage.spectrum, &projection, &engine)?;
+        let radiograph = ppa_xray::fast(&self.phantom, &self.setup.spectrum, &projection, &engine)?;
         let png = self.id.radiograph_png(pose.step);
         radiograph.write_png(&prepare_folder(root, &png)?, &settings.presentation)?;
         let exr = self.id.radiograph_exr(pose.step);
         radiograph.write_exr(&root.join(&exr))?;
         let row = |file, kind| {
-            Ok::<_, UnitError>(FileRow {
+            Ok::<_, PoseError>(FileRow {
                 ct_from_device: Some(rows_from_isometry(&projection.ct_from_device)),
                 seed: Some(seed),
                 cut_share: (cut > 0.0).then_some(cut),
@@ -299,7 +299,7 @@ impl<'a> PosableLimb<'a> {
         kind: FileKind,
         pose: PoseAngle,
         placement: &Placement,
-    ) -> Result<FileRow, UnitError> {
+    ) -> Result<FileRow, PoseError> {
         Ok(FileRow {
             sha256: sha256_of_file(&root.join(&file))?,
             file,
@@ -341,7 +341,7 @@ pub(crate) fn depth_image(
     camera: &PlacedCamera,
     noise_seed: u64,
     walls: WallDepth,
-) -> Result<WalledImage, UnitError> {
+) -> Result<WalledImage, PoseError> {
     placed.require_camera_outside()?;
     if let Some((sensor, backdrop)) = &camera.sensor {
         let seen = backdrop.before_with_walls(&camera.camera, &[placed], walls)?;

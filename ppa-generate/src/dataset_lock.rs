@@ -82,10 +82,10 @@ fn how_to_ask(part: Part) -> String {
 }
 
 /// Held while a process relies on a dataset's files; released when dropped or when the process dies.
-pub(crate) struct Claim(#[expect(dead_code, reason = "holds the lock")] Option<fs::File>);
+pub(crate) struct DatasetLock(#[expect(dead_code, reason = "holds the lock")] Option<fs::File>);
 
 /// Claims a folder that holds a dataset, finished or not, for reading. Writes nothing, and several readers may do so.
-pub(crate) fn claim_existing(root: &Path) -> Result<Claim, FolderError> {
+pub(crate) fn lock_existing(root: &Path) -> Result<DatasetLock, FolderError> {
     if !root.join(FOLDER).is_dir() {
         return Err(not_a_dataset(root)?);
     }
@@ -93,16 +93,16 @@ pub(crate) fn claim_existing(root: &Path) -> Result<Claim, FolderError> {
     match fs::File::open(&path) {
         Ok(lock) => {
             locked(root, lock.try_lock_shared())?;
-            Ok(Claim(Some(lock)))
+            Ok(DatasetLock(Some(lock)))
         }
         // Nobody has written here since the folder was copied.
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Claim(None)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(DatasetLock(None)),
         Err(error) => Err(FileError::at("read", &path)(error).into()),
     }
 }
 
 /// Claims the folder `root` for a run that writes. Refuses a folder that is in use or holds something else.
-pub(crate) fn claim(root: &Path) -> Result<Claim, FolderError> {
+pub(crate) fn lock(root: &Path) -> Result<DatasetLock, FolderError> {
     let folder = root.join(FOLDER);
     let occupied = root.exists() && {
         let mut entries = fs::read_dir(root).map_err(FileError::at("read", root))?;
@@ -119,7 +119,7 @@ pub(crate) fn claim(root: &Path) -> Result<Claim, FolderError> {
         .open(&path)
         .map_err(FileError::at("create", &path))?;
     locked(root, lock.try_lock())?;
-    Ok(Claim(Some(lock)))
+    Ok(DatasetLock(Some(lock)))
 }
 
 fn lock_file(root: &Path) -> PathBuf {

@@ -6,7 +6,7 @@ use ppa_dataset::layout::LimbId;
 use ppa_scene::PoseAngle;
 use serde::Deserialize;
 
-use crate::record::Unit;
+use crate::record::PoseJob;
 
 /// A limb of a dataset, as `dataset.json` lists it.
 #[derive(Debug, Clone, Deserialize)]
@@ -19,7 +19,7 @@ pub(crate) struct PlannedLimb {
 }
 
 /// All poses of one limb that belong to a job.
-pub(crate) struct LimbUnits {
+pub(crate) struct LimbJobs {
     pub limb: LimbId,
     pub key: String,
     /// Codes of the findings that its case acknowledges.
@@ -27,33 +27,33 @@ pub(crate) struct LimbUnits {
     pub poses: Vec<PoseAngle>,
 }
 
-impl LimbUnits {
-    pub fn unit(&self, pose: PoseAngle) -> Unit<'_> {
-        Unit {
+impl LimbJobs {
+    pub fn pose_job(&self, pose: PoseAngle) -> PoseJob<'_> {
+        PoseJob {
             limb: self.limb,
             pose,
             limb_key: &self.key,
         }
     }
 
-    pub fn units(&self) -> impl Iterator<Item = Unit<'_>> {
-        self.poses.iter().map(|&pose| self.unit(pose))
+    pub fn pose_jobs(&self) -> impl Iterator<Item = PoseJob<'_>> {
+        self.poses.iter().map(|&pose| self.pose_job(pose))
     }
 }
 
 /// The units of one part of a dataset. Parts are runs of neighbours, limb by limb, so that few
 /// of them prepare the same limb.
-pub(crate) fn units_of_part(
+pub(crate) fn jobs_of_part(
     limbs: impl ExactSizeIterator<Item = PlannedLimb>,
     poses: &[PoseAngle],
     part: Part,
-) -> Vec<LimbUnits> {
+) -> Vec<LimbJobs> {
     let share = part.share((limbs.len() * poses.len()) as u64);
     let within = |index: usize| share.contains(&(index as u64));
     let of_limb = |(i, limb): (usize, PlannedLimb)| {
         let planned = poses.iter().enumerate();
         let mine = planned.filter(|(j, _)| within(i * poses.len() + j));
-        LimbUnits {
+        LimbJobs {
             limb: limb.limb,
             key: limb.key,
             acknowledged: limb.acknowledged,

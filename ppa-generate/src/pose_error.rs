@@ -8,7 +8,7 @@ use crate::radiograph::JointError;
 /// Why a pose could not be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum UnitError {
+pub enum PoseError {
     /// A body shape.
     #[error(transparent)]
     Shape(#[from] ppa_mesh::ShapeError),

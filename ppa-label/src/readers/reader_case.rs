@@ -1,4 +1,4 @@
-//! What readers are shown, in which order, and the key that tells which radiograph each picture is.
+//! What readers are shown, in which order, and the key that shows which radiograph each picture is.
 
 use std::path::Path;
 
@@ -12,8 +12,8 @@ use crate::table::{TableError, read_table, write_table};
 
 /// One picture that a reader grades; a row of the key.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Showing {
-    /// The name readers see: ten digits that tell nothing.
+pub struct ReaderCase {
+    /// The name readers see: ten digits that mean nothing.
     pub name: String,
     /// The radiograph, from the dataset's root.
     pub image: String,
@@ -24,7 +24,7 @@ pub struct Showing {
 /// Share of the radiographs that are shown twice, at least one.
 const REPEATED: f64 = 0.1;
 
-impl Showing {
+impl ReaderCase {
     /// All radiographs of a dataset at multiples of `every_deg` degrees in random order, and a tenth of them, rounded up,
     /// once more in the second half, where the reader has forgotten them.
     ///
@@ -35,7 +35,7 @@ impl Showing {
             row.kind == FileKind::Radiograph && (row.angle_deg / every_deg).fract() == 0.0
         });
         let seed = seed_of_address(&format!("{seed}/showing"));
-        let showing = |image: &str, sha256: &str, time: u32| {
+        let reader_case = |image: &str, sha256: &str, time: u32| {
             let address = format!("{seed}/{image}/{sha256}/{time}");
             let digest = hex(&Sha256::digest(address.as_bytes()));
             Self {
@@ -45,13 +45,13 @@ impl Showing {
             }
         };
         let mut shown: Vec<_> = radiographs
-            .map(|row| showing(&row.file, &row.sha256, 1))
+            .map(|row| reader_case(&row.file, &row.sha256, 1))
             .collect();
         shown.sort_by(|a, b| a.name.cmp(&b.name));
         let repeated = (REPEATED * shown.len() as f64).ceil() as usize;
         let again: Vec<_> = shown[..repeated]
             .iter()
-            .map(|first| showing(&first.image, &first.sha256, 2))
+            .map(|first| reader_case(&first.image, &first.sha256, 2))
             .collect();
         // One radiograph alone has no second half.
         let half = shown.len().div_ceil(2);
@@ -61,11 +61,11 @@ impl Showing {
     }
 }
 
-/// Writes the key as CSV, in the order of showing.
+/// Writes the key as CSV, in the order of the reader cases.
 ///
 /// # Errors
 /// [`FileError`] when it cannot be written.
-pub fn write_key(path: &Path, shown: &[Showing]) -> Result<(), FileError> {
+pub fn write_key(path: &Path, shown: &[ReaderCase]) -> Result<(), FileError> {
     write_table(path, shown)
 }
 
@@ -73,7 +73,7 @@ pub fn write_key(path: &Path, shown: &[Showing]) -> Result<(), FileError> {
 ///
 /// # Errors
 /// [`TableError`] naming the file and the line at fault.
-pub fn read_key(path: &Path) -> Result<Vec<Showing>, TableError> {
+pub fn read_key(path: &Path) -> Result<Vec<ReaderCase>, TableError> {
     read_table(path)
 }
 
@@ -119,7 +119,7 @@ mod tests {
     #[test]
     fn every_radiograph_is_shown_and_a_tenth_again_in_the_second_half() {
         for (count, repeats) in [(1, 1), (2, 1), (10, 1), (11, 2), (181, 19)] {
-            let shown = Showing::of_dataset(&manifest(count), 1, 0.5);
+            let shown = ReaderCase::of_dataset(&manifest(count), 1, 0.5);
             assert_eq!(shown.len(), count as usize + repeats);
             let mut names: Vec<_> = shown.iter().map(|s| &s.name).collect();
             names.sort();
@@ -129,33 +129,33 @@ mod tests {
             images.sort();
             images.dedup();
             assert_eq!(images.len(), count as usize);
-            for (place, showing) in shown.iter().enumerate() {
-                let again = shown[..place].iter().any(|s| s.image == showing.image);
+            for (place, reader_case) in shown.iter().enumerate() {
+                let again = shown[..place].iter().any(|s| s.image == reader_case.image);
                 assert!(!again || place >= count as usize / 2, "{place} of {count}");
             }
         }
-        assert!(Showing::of_dataset(&manifest(0), 1, 0.5).is_empty());
-        assert_eq!(Showing::of_dataset(&manifest(181), 1, 45.0).len(), 4);
+        assert!(ReaderCase::of_dataset(&manifest(0), 1, 0.5).is_empty());
+        assert_eq!(ReaderCase::of_dataset(&manifest(181), 1, 45.0).len(), 4);
     }
 
     #[test]
     fn order_and_names_follow_from_seed_and_bytes_and_tell_nothing() {
-        let shown = Showing::of_dataset(&manifest(60), 1, 0.5);
-        assert_eq!(shown, Showing::of_dataset(&manifest(60), 1, 0.5));
-        let names = |shown: &[Showing]| -> HashSet<String> {
+        let shown = ReaderCase::of_dataset(&manifest(60), 1, 0.5);
+        assert_eq!(shown, ReaderCase::of_dataset(&manifest(60), 1, 0.5));
+        let names = |shown: &[ReaderCase]| -> HashSet<String> {
             shown.iter().map(|s| s.name.clone()).collect()
         };
-        let other_seed = Showing::of_dataset(&manifest(60), 2, 0.5);
+        let other_seed = ReaderCase::of_dataset(&manifest(60), 2, 0.5);
         assert!(names(&shown).is_disjoint(&names(&other_seed)));
         let mut other_bytes = manifest(60);
         for row in &mut other_bytes.files {
             row.sha256 += "1";
         }
-        let other_bytes = Showing::of_dataset(&other_bytes, 1, 0.5);
+        let other_bytes = ReaderCase::of_dataset(&other_bytes, 1, 0.5);
         assert!(names(&shown).is_disjoint(&names(&other_bytes)));
         // Shuffled: of 60 in order about half would rise from one to the next; of 60 by angle, all.
-        let steps = |shown: &[Showing]| -> Vec<u32> {
-            let step = |s: &Showing| s.sha256.parse().unwrap();
+        let steps = |shown: &[ReaderCase]| -> Vec<u32> {
+            let step = |s: &ReaderCase| s.sha256.parse().unwrap();
             shown.iter().map(step).collect()
         };
         let rising = steps(&shown).windows(2).filter(|w| w[0] < w[1]).count();

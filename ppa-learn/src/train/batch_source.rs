@@ -1,4 +1,4 @@
-//! What a network says of the next training batch, through all its layers or through the last one only.
+//! Training batches and the outputs of the network for them, through all layers or through the last one only.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use crate::data::{Balanced, Images, Loader, Order};
 use crate::network::{Mode, QualityNetwork};
 
 /// The endless sequence of training batches.
-pub(super) enum Feed {
+pub(super) enum BatchSource {
     /// Augmented images, through all layers.
     Images(Loader),
     /// Linear probing: features of the images as evaluation sees them, which stay what they are while only the last
@@ -25,12 +25,12 @@ pub(super) enum Feed {
 }
 
 /// Outputs [samples, 1] for a batch, and its labels.
-pub(super) struct Answers {
+pub(super) struct Outputs {
     pub outputs: Tensor,
     pub labels: Vec<f32>,
 }
 
-impl Feed {
+impl BatchSource {
     /// Batches from number `first_batch` on.
     pub fn new(
         config: &TrainConfig,
@@ -57,20 +57,20 @@ impl Feed {
         Ok(Self::Images(loader))
     }
 
-    /// What the network answers to batch number `step`, which must be the next one.
-    pub fn answers(
+    /// Outputs of the network for batch number `step`, which must be the next one.
+    pub fn outputs(
         &mut self,
         config: &TrainConfig,
         network: &QualityNetwork,
         step: u64,
-    ) -> Result<Answers, TrainError> {
+    ) -> Result<Outputs, TrainError> {
         let mode = Mode::Train { step };
         match self {
             Self::Images(loader) => {
                 let batch = loader.next().expect("training batches never end")?;
                 let labels = batch.labels.clone();
                 let images = tensors(batch, config.side, network.device())?;
-                Ok(Answers {
+                Ok(Outputs {
                     outputs: network.forward(&images, mode)?,
                     labels,
                 })
@@ -89,7 +89,7 @@ impl Feed {
                 let rows = Tensor::new(rows, network.device())?;
                 let batch = features.iter().map(|camera| camera.index_select(&rows, 0));
                 let batch = batch.collect::<Result<Vec<_>, _>>()?;
-                Ok(Answers {
+                Ok(Outputs {
                     outputs: network.classify(&batch, mode)?,
                     labels: picked.iter().map(|&sample| labels[sample]).collect(),
                 })

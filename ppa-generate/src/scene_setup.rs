@@ -18,7 +18,7 @@ use crate::seed::{Purpose, plan_seed};
 /// Why a plan's room, cameras or beam cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum StageError {
+pub enum SceneSetupError {
     /// The room.
     #[error(transparent)]
     Room(#[from] RoomError),
@@ -43,7 +43,7 @@ pub enum StageError {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        source: Box<StageError>,
+        source: Box<SceneSetupError>,
     },
     /// Furniture that cannot be rendered.
     #[error(transparent)]
@@ -80,7 +80,7 @@ impl Table {
     ///
     /// # Errors
     /// [`StageError`] naming the room or table at fault.
-    pub fn of_plan(plan: &Plan) -> Result<Self, StageError> {
+    pub fn of_plan(plan: &Plan) -> Result<Self, SceneSetupError> {
         let room = load_room(&plan.room)?;
         let seed = plan_seed(plan.seed, Purpose::TablePlane);
         let by_device = PlaneSettings::for_device(&room.device);
@@ -93,7 +93,7 @@ impl Table {
     ///
     /// # Errors
     /// [`StageError`] for points whose normals cannot be found or that cannot be rendered.
-    pub fn furniture(&self) -> Result<Body, StageError> {
+    pub fn furniture(&self) -> Result<Body, SceneSetupError> {
         if let Some(mesh) = &self.room.mesh {
             return Ok(Body::Mesh(MeshBody::new(&mesh.vertices, &mesh.triangles)?));
         }
@@ -105,7 +105,7 @@ impl Table {
 ///
 /// # Errors
 /// [`StageError`] for points whose normals cannot be found or that cannot be rendered.
-pub fn body_of_cloud(cloud: &PointCloud) -> Result<Body, StageError> {
+pub fn body_of_cloud(cloud: &PointCloud) -> Result<Body, SceneSetupError> {
     let points = &cloud.points;
     let estimated;
     let normals = if cloud.normals.len() == points.len() {
@@ -119,7 +119,7 @@ pub fn body_of_cloud(cloud: &PointCloud) -> Result<Body, StageError> {
 }
 
 /// Everything that stands still while the limb turns.
-pub struct Stage {
+pub struct SceneSetup {
     /// Room, table and device.
     pub table: Table,
     /// Both cameras, left first.
@@ -128,17 +128,17 @@ pub struct Stage {
     pub spectrum: Spectrum,
 }
 
-impl Stage {
+impl SceneSetup {
     /// Sets the stage of a plan.
     ///
     /// # Errors
     /// [`StageError`] naming the room, table, camera or beam at fault.
-    pub fn of_plan(plan: &Plan) -> Result<Self, StageError> {
+    pub fn of_plan(plan: &Plan) -> Result<Self, SceneSetupError> {
         let table = Table::of_plan(plan)?;
         let rig = plan.depth.cameras()?;
         let furniture = match (table.furniture(), &plan.room.ply) {
             (Err(source), Some(path)) => {
-                return Err(StageError::RoomFile {
+                return Err(SceneSetupError::RoomFile {
                     path: path.clone(),
                     source: source.into(),
                 });
@@ -169,7 +169,7 @@ impl Stage {
                 Some((_, backdrop)) => backdrop.image.clone(),
                 None => ppa_depth::render(&camera, &[empty_room]),
             };
-            Ok::<_, StageError>(PlacedCamera {
+            Ok::<_, SceneSetupError>(PlacedCamera {
                 view,
                 camera,
                 camera_from_room,
@@ -193,7 +193,7 @@ impl Stage {
 ///
 /// # Errors
 /// [`StageError::Spectrum`] for a filter that cannot be read.
-pub fn tube(settings: &XraySettings) -> Result<TubeSpec, StageError> {
+pub fn tube(settings: &XraySettings) -> Result<TubeSpec, SceneSetupError> {
     let filters = settings.filters.iter().map(|filter| filter.parse());
     Ok(TubeSpec {
         kvp: settings.kvp,
@@ -206,11 +206,11 @@ pub fn tube(settings: &XraySettings) -> Result<TubeSpec, StageError> {
 ///
 /// # Errors
 /// [`StageError::Spectrum`] for a voltage, anode or filter out of range.
-pub fn spectrum(settings: &XraySettings) -> Result<Spectrum, StageError> {
+pub fn spectrum(settings: &XraySettings) -> Result<Spectrum, SceneSetupError> {
     Ok(Spectrum::tungsten(&tube(settings)?)?)
 }
 
-fn load_room(plan: &PlanRoom) -> Result<XrayRoom, StageError> {
+fn load_room(plan: &PlanRoom) -> Result<XrayRoom, SceneSetupError> {
     let built_in = XrayRoom::parametric(&plan.parametric)?;
     let Some(path) = &plan.ply else {
         return Ok(built_in);
