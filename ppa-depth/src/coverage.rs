@@ -6,11 +6,11 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::body::PlacedBody;
-use crate::camera::Camera;
+use crate::camera::projection::Camera;
 use crate::image::DepthImage;
-use crate::mesh_body::MeshBody;
-use crate::render::render;
+use crate::render::body::PlacedBody;
+use crate::render::ideal::render;
+use crate::render::mesh_body::MeshBody;
 
 /// Which part of a surface matters, and what counts as seen.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::camera::Camera;
+use crate::camera::projection::Camera;
 
 /// Depth along the camera's z axis in mm, row-major from the top left; 0 where nothing was seen.
 #[derive(Debug, Clone, PartialEq)]

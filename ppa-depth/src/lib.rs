@@ -57,79 +57,37 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod calibration_file;
-mod depth_mode;
-mod field_mask;
-mod opencv_yaml;
-mod spec;
-
 mod camera;
-mod distortion;
-
-mod rig;
-mod rigid;
-mod viewpoint;
-
-mod body;
-mod body_error;
-mod inside;
-mod mesh_body;
-mod nearest;
-mod surfel_body;
-
-mod depth_buffer;
-mod optics;
-mod raster;
-mod render;
-mod sample_raster;
-mod single_lens;
-mod triangle;
-
-mod sampled;
-mod surface;
-mod walls;
-
-mod fit_noise;
-mod modulation;
-mod multipath;
-mod random;
-mod sensor;
-mod sensor_spec;
-mod tremor;
-
-mod image;
-
-mod exr_file;
-mod png_file;
-mod points_file;
-mod preview;
-
 mod coverage;
+mod image;
+mod io;
+mod render;
 mod roi;
+mod sensor;
 
 pub use ppa_core::Roi;
 
-pub use body::{Body, PlacedBody};
-pub use body_error::BodyError;
-pub use camera::Camera;
+pub use camera::depth_mode::DepthMode;
+pub use camera::field_mask::FieldMask;
+pub use camera::projection::Camera;
+pub use camera::rig::{MountedCamera, RigError, RigSpec};
+pub use camera::rigid::{RigidError, isometry_from_rows, rows_from_isometry};
+pub use camera::spec::{CameraError, CameraModel, CameraSpec};
+pub use camera::viewpoint::Viewpoint;
 pub use coverage::{Coverage, CoverageError, CoverageSettings, JointSurface};
-pub use depth_mode::DepthMode;
-pub use field_mask::FieldMask;
-pub use fit_noise::{FitError, NoiseFit, fit_noise};
 pub use image::{DepthError, DepthImage, DepthU16};
-pub use mesh_body::MeshBody;
-pub use preview::false_colour;
-pub use render::render;
-pub use rig::{MountedCamera, RigError, RigSpec};
-pub use rigid::{RigidError, isometry_from_rows, rows_from_isometry};
+pub use io::preview::false_colour;
+pub use render::body::{Body, PlacedBody};
+pub use render::body_error::BodyError;
+pub use render::ideal::render;
+pub use render::mesh_body::MeshBody;
+pub use render::sampled::{Backdrop, SampledImage};
+pub use render::surfel_body::SurfelBody;
+pub use render::walls::{WallDepth, WalledImage, render_before};
 pub use roi::{RoiError, roi_around};
-pub use sampled::{Backdrop, SampledImage};
-pub use sensor::Sensor;
-pub use sensor_spec::{
+pub use sensor::fit_noise::{FitError, NoiseFit, fit_noise};
+pub use sensor::observe::Sensor;
+pub use sensor::spec::{
     Invalidation, MixedPixels, Multipath, RandomError, SensorError, SensorSpec, SystematicError,
 };
-pub use spec::{CameraError, CameraModel, CameraSpec};
-pub use surfel_body::SurfelBody;
-pub use tremor::Tremor;
-pub use viewpoint::Viewpoint;
-pub use walls::{WallDepth, WalledImage, render_before};
+pub use sensor::tremor::Tremor;

@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 use ppa_core::Roi;
 
-use crate::camera::Camera;
+use crate::camera::projection::Camera;
 
 /// Why there is no square around a joint.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

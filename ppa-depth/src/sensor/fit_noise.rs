@@ -1,0 +1,193 @@
+//! The noise of a real camera, from a recording of a scene that stands still.
+
+use crate::camera::projection::Camera;
+use crate::image::{DepthError, DepthImage};
+use crate::render::surface::{Surface, signal};
+use crate::sensor::spec::RandomError;
+
+/// What a recording says about the random error, and what is left to it.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct NoiseFit {
+    /// Fitted parameters.
+    pub random: RandomError,
+    /// Signal below which pixels are lost in more than half of the frames; `None` if the recording has no such pixels.
+    pub min_signal: Option<f64>,
+    /// Frames.
+    pub frames: usize,
+    /// Pixels that the fit rests on.
+    pub pixels: usize,
+    /// Root mean square of (measured − fitted) / fitted standard deviation, over the classes of signal.
+    pub relative_misfit: f64,
+    /// Signal, measured and fitted standard deviation (mm) of each class.
+    pub classes: Vec<[f64; 3]>,
+}
+
+/// Why no noise can be fitted.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FitError {
+    /// Too few frames.
+    #[error("{0} frames, expected at least 3 of a scene that stands still")]
+    Frames(usize),
+    /// Frames of different size, or not of the camera's.
+    #[error("frame {frame}")]
+    Size {
+        /// Which frame, from 0.
+        frame: usize,
+        /// The sizes.
+        source: DepthError,
+    },
+    /// Too few pixels see a surface.
+    #[error("{0} pixels see a surface in every frame, expected at least 1000")]
+    Pixels(usize),
+    /// The noise is too small to be seen.
+    #[error(
+        "the depths vary enough to be distinguished from rounding in {0} of 20 classes of signal only, expected 4: record surfaces further away"
+    )]
+    Quiet(usize),
+    /// All pixels have the same signal.
+    #[error(
+        "the signal varies by a factor of {0:.2} only, expected 1.2 or more: record surfaces at several distances"
+    )]
+    Signal(f64),
+}
+
+/// Classes of equal size, by signal.
+const CLASSES: usize = 20;
+/// Classes that a fit of two numbers needs.
+const LEAST_CLASSES: usize = 4;
+/// Variance of rounding to whole millimetres, mm².
+const ROUNDING_MM2: f64 = 1.0 / 12.0;
+
+/// Fits variance = floor² + (at_unit_signal / S)² to the spread of every pixel over the frames of a still scene.
+///
+/// `whole_mm`: the frames were rounded to millimetres, as 16-bit PNGs are; the variance of rounding is then taken off. Pixels at
+/// edges are left out, since they mix surfaces. The signal is that of diffuse surfaces of one reflectivity. Offsets that stay
+/// with the device cannot be found from such a recording.
+///
+/// # Errors
+/// [`FitError`] for too few frames, pixels or too little variety, or frames that are not the camera's.
+pub fn fit_noise(
+    camera: &Camera,
+    frames: &[DepthImage],
+    whole_mm: bool,
+) -> Result<NoiseFit, FitError> {
+    if frames.len() < 3 {
+        return Err(FitError::Frames(frames.len()));
+    }
+    for (frame, image) in frames.iter().enumerate() {
+        image
+            .check_camera(camera)
+            .map_err(|source| FitError::Size { frame, source })?;
+    }
+    let count = frames.len() as f64;
+    let mean = DepthImage {
+        width: camera.width(),
+        height: camera.height(),
+        z_mm: (0..camera.rays().len())
+            .map(|pixel| {
+                let depths = frames.iter().map(|frame| f64::from(frame.z_mm[pixel]));
+                let valid = depths.clone().filter(|z| *z > 0.0).count();
+                (depths.sum::<f64>() / valid.max(1) as f64) as f32
+            })
+            .collect(),
+    };
+    let surface = Surface::new(camera, &mean);
+    // Signal, variance of the range, share of frames without a depth.
+    let mut pixels = Vec::new();
+    let mut always = 0;
+    for (pixel, &z_mm) in mean.z_mm.iter().enumerate() {
+        let Some(ray) = surface.ray_length(pixel) else {
+            continue;
+        };
+        if !surface.is_smooth(pixel) {
+            continue;
+        }
+        let depths = frames.iter().map(|frame| frame.z_mm[pixel]);
+        let lost = depths.clone().filter(|z| *z <= 0.0).count() as f64 / count;
+        let of_mean = |z: f32| f64::from(z - z_mm).powi(2);
+        let spread = depths.filter(|z| *z > 0.0).map(of_mean).sum::<f64>();
+        let s = signal(surface.cos_incidence(pixel), f64::from(z_mm) * ray);
+        let variance = (lost == 0.0).then(|| {
+            always += 1;
+            let rounding = if whole_mm { ROUNDING_MM2 } else { 0.0 };
+            (spread / (count - 1.0) - rounding) * ray * ray
+        });
+        pixels.push((s, variance, lost));
+    }
+    if always < 1000 {
+        return Err(FitError::Pixels(always));
+    }
+    pixels.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let measured: Vec<(f64, f64)> = pixels.iter().filter_map(|p| Some((p.0, p.1?))).collect();
+    let range = measured[always - 1].0 / measured[0].0;
+    if range < 1.2 {
+        return Err(FitError::Signal(range));
+    }
+    // Mean variance of each class against the mean of 1/S².
+    let class = |points: &[(f64, f64)]| {
+        let n = points.len() as f64;
+        let mean = |value: fn(&(f64, f64)) -> f64| points.iter().map(value).sum::<f64>() / n;
+        (mean(|p| p.0.powi(-2)), mean(|p| p.1))
+    };
+    // Rounding hides what is smaller than itself: such classes say nothing.
+    let least = if whole_mm { ROUNDING_MM2 } else { 0.0 };
+    let classes: Vec<_> = measured
+        .chunks(always.div_ceil(CLASSES))
+        .map(class)
+        .filter(|(_, variance)| *variance > least)
+        .collect();
+    if classes.len() < LEAST_CLASSES {
+        return Err(FitError::Quiet(classes.len()));
+    }
+    let (floor2, unit2) = line(&classes);
+    let fitted = |x: f64| (floor2 + unit2 * x).sqrt();
+    let rows: Vec<[f64; 3]> = classes
+        .iter()
+        .map(|&(x, variance)| [x.powf(-0.5), variance.max(0.0).sqrt(), fitted(x)])
+        .collect();
+    let misfit = |row: &[f64; 3]| (row[1] / row[2] - 1.0).powi(2);
+    Ok(NoiseFit {
+        random: RandomError {
+            floor_mm: floor2.sqrt(),
+            at_unit_signal_mm: unit2.sqrt(),
+        },
+        min_signal: least_signal(&pixels),
+        frames: frames.len(),
+        pixels: always,
+        relative_misfit: (rows.iter().map(misfit).sum::<f64>() / rows.len() as f64).sqrt(),
+        classes: rows,
+    })
+}
+
+/// Least squares of y = a + b x with weights 1/y², since the spread of a variance is proportional to it; neither below 0.
+fn line(points: &[(f64, f64)]) -> (f64, f64) {
+    let weight = |y: f64| 1.0 / y.max(1e-6).powi(2);
+    let sum = |value: &dyn Fn(f64, f64) -> f64| {
+        points
+            .iter()
+            .map(|&(x, y)| weight(y) * value(x, y))
+            .sum::<f64>()
+    };
+    let (n, sx, sy) = (sum(&|_, _| 1.0), sum(&|x, _| x), sum(&|_, y| y));
+    let (sxx, sxy) = (sum(&|x, _| x * x), sum(&|x, y| x * y));
+    let b = (n * sxy - sx * sy) / (n * sxx - sx * sx);
+    let a = (sy - b * sx) / n;
+    if a < 0.0 {
+        (0.0, (sxy / sxx).max(0.0))
+    } else if b < 0.0 {
+        (sy / n, 0.0)
+    } else {
+        (a, b)
+    }
+}
+
+/// Signal below which pixels are lost in more than half of the frames.
+fn least_signal(pixels: &[(f64, Option<f64>, f64)]) -> Option<f64> {
+    let classes = pixels.chunks(pixels.len().div_ceil(CLASSES));
+    let lost = |class: &[(f64, Option<f64>, f64)]| {
+        class.iter().map(|pixel| pixel.2).sum::<f64>() / class.len() as f64
+    };
+    let gone = classes.take_while(|class| lost(class) > 0.5).last()?;
+    Some(gone[gone.len() - 1].0)
+}

@@ -1,0 +1,259 @@
+//! Laying a rotated limb on the table under the central beam: T_rot, T_mat and T_opt.
+
+use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use ppa_core::Side;
+use serde::{Deserialize, Serialize};
+
+use crate::frames::Room;
+use crate::frames::{Ct, Device, Patient, Rigid};
+use crate::landmarks::contact::Profile;
+use crate::landmarks::found::Landmarks;
+use crate::placement::error::{PlaceError, check_points};
+use crate::placement::matching::{axes_rotation, on_beam, plane_axes, table_axes};
+use crate::placement::soft_tissue::{Flattening, SoftTissue};
+use crate::room::device::XrayDevice;
+use crate::room::plane::Plane;
+
+/// A limb on the table.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Placement {
+    /// T^ToF_P = T_opt · T_mat · T_rot.
+    pub room_from_patient: Rigid<Room, Patient>,
+    /// Medial rotation about the limb's axis.
+    pub t_rot: Rigid<Patient, Patient>,
+    /// Brings Π_P onto the table plane, the limb's axis along the table and the joint centre
+    /// onto the central beam.
+    pub t_mat: Rigid<Room, Patient>,
+    /// Tips the limb about the room's X axis through the joint centre until it rests on two
+    /// places, and moves it onto the table.
+    pub t_opt: Rigid<Room, Room>,
+    /// How soft tissue gives way; `None` for a rigid skin.
+    pub flattening: Option<Flattening>,
+    /// How it rests.
+    pub contact: Contact,
+}
+
+/// How a placed limb rests on the table plane; measured on the placed points, flattened ones if soft tissue gives way.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Contact {
+    /// Air between the table and the lowest point, mm.
+    pub gap_mm: f64,
+    /// How deep the lowest point lies inside the table, mm.
+    pub penetration_mm: f64,
+    /// Height of the lowest distal point, mm.
+    pub distal_mm: f64,
+    /// Height of the lowest proximal point, mm.
+    pub proximal_mm: f64,
+    /// Distance of both contacts, mm. Next to nothing when the limb rests on its middle: its ends
+    /// then hang in the air.
+    pub apart_mm: f64,
+    /// Where distal ends and proximal begins, from the joint along the table before the limb is
+    /// tipped, mm.
+    pub split_mm: f64,
+    /// Tilt found by T_opt, radians; + lifts the proximal end.
+    pub tilt_rad: f64,
+    /// How often the closest points were looked for.
+    pub iterations: u32,
+}
+
+/// T_rot: turns the limb about its axis, the front of the limb towards the body's midline.
+///
+/// The front (+y of the patient frame) of a right limb turns towards −x, the patient's left; that
+/// of a left limb towards +x.
+pub fn medial_rotation(side: Side, angle_rad: f64) -> Rigid<Patient, Patient> {
+    let about_z = match side {
+        Side::Right => angle_rad,
+        Side::Left => -angle_rad,
+    };
+    let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), about_z);
+    Rigid::new(Isometry3::from_parts(Translation3::identity(), rotation))
+}
+
+/// Places a limb with a rigid skin, given by its vertices in the `ct` frame.
+///
+/// `table` faces the source. The limb is split into front (distal) and back (proximal) across the
+/// table at the joint; a limb that has less than a tenth of its length on one side of the joint (a
+/// knee, a calf) is split at the middle of its length instead.
+///
+/// # Errors
+/// [`PlaceError`] when the points or landmarks are unusable, the beam misses the table, or no
+/// tilt lets both ends of the limb touch.
+pub fn place(
+    points_ct: &[Point3<f32>],
+    landmarks: &Landmarks,
+    angle_rad: f64,
+    table: &Plane,
+    device: &XrayDevice,
+) -> Result<Placement, PlaceError> {
+    let rigid = SoftTissue::default();
+    place_soft(points_ct, landmarks, angle_rad, table, device, &rigid)
+}
+
+/// [`place`] with soft tissue that gives way where the limb rests: both parts sink in, and
+/// [`Placement::in_room`] is the skin as it then lies.
+///
+/// # Errors
+/// As [`place`], and for depths that make no sense.
+pub fn place_soft(
+    points_ct: &[Point3<f32>],
+    landmarks: &Landmarks,
+    angle_rad: f64,
+    table: &Plane,
+    device: &XrayDevice,
+    soft_tissue: &SoftTissue,
+) -> Result<Placement, PlaceError> {
+    check_points(points_ct)?;
+    soft_tissue.check()?;
+    if !angle_rad.is_finite() {
+        return Err(PlaceError::Angle(angle_rad));
+    }
+    let patient_from_ct = landmarks.patient_from_ct();
+    let turn = patient_from_ct.isometry().rotation;
+    if !turn.coords.iter().all(|c| c.is_finite()) {
+        return Err(PlaceError::Axes);
+    }
+    let under_limb = landmarks.supporting_plane().map_err(PlaceError::Plane)?;
+    let t_rot = medial_rotation(landmarks.side, angle_rad);
+    let (room_axes, limb_axes) = (table_axes(table, device)?, plane_axes(&under_limb));
+    let rotation = axes_rotation(&room_axes, &limb_axes);
+
+    // Lengths and heights about the joint centre, along the table and above it.
+    let table_from_ct = limb_axes.transpose()
+        * (t_rot * patient_from_ct)
+            .isometry()
+            .rotation
+            .to_rotation_matrix()
+            .matrix();
+    let joint_ct = Point3::from(landmarks.joint_centre);
+    let seen = |p: &Point3<f32>| {
+        let offset = table_from_ct * (p.cast::<f64>() - joint_ct);
+        [offset.y, offset.z]
+    };
+    let profile = Profile::split(points_ct.iter().map(seen)).lifted(soft_tissue.depths_mm());
+    let tilt = profile.resting_tilt().ok_or_else(|| {
+        let [distal, proximal] = profile.heights(0.0);
+        let low = distal.min(proximal);
+        PlaceError::NoRest {
+            distal_mm: distal - low,
+            proximal_mm: proximal - low,
+        }
+    })?;
+    let [distal, proximal] = profile.heights(tilt.angle_rad);
+
+    let matched_joint = on_beam(-under_limb.offset_mm, table, device)?;
+    let placed_joint = on_beam(-distal.min(proximal), table, device)?;
+    let t_mat = Rigid::new(Isometry3::from_parts(matched_joint.into(), rotation));
+    let room_x = Unit::new_unchecked(room_axes.column(0).into_owned());
+    let about_x = UnitQuaternion::from_axis_angle(&room_x, tilt.angle_rad);
+    let t_opt = Rigid::new(
+        Translation3::from(placed_joint) * about_x * Translation3::from(matched_joint).inverse(),
+    );
+    let room_from_patient = t_opt * t_mat * t_rot;
+    let room_from_ct = room_from_patient * patient_from_ct;
+    let is_distal = |p: &Point3<f32>| seen(p)[0] < profile.split_mm;
+    let flattening = if *soft_tissue == SoftTissue::default() {
+        None
+    } else {
+        lowest_points(points_ct, room_from_ct, table, is_distal)
+            .map(|lowest| Flattening::at(lowest, table, &room_axes))
+    };
+    let [distal_mm, proximal_mm] = measure(
+        points_ct,
+        room_from_ct,
+        table,
+        flattening.as_ref(),
+        is_distal,
+    );
+    let lowest_mm = distal_mm.min(proximal_mm);
+    Ok(Placement {
+        room_from_patient,
+        t_rot,
+        t_mat,
+        t_opt,
+        flattening,
+        contact: Contact {
+            gap_mm: lowest_mm.max(0.0),
+            penetration_mm: (-lowest_mm).max(0.0),
+            distal_mm,
+            proximal_mm,
+            apart_mm: tilt.apart_mm,
+            split_mm: profile.split_mm,
+            tilt_rad: tilt.angle_rad,
+            iterations: tilt.iterations,
+        },
+    })
+}
+
+impl Placement {
+    /// A limb, given by the vertices of its skin in the `ct` frame, as it lies in the room.
+    pub fn in_room(&self, points_ct: &[Point3<f32>], landmarks: &Landmarks) -> Vec<Point3<f32>> {
+        let room_from_ct = self.room_from_patient * landmarks.patient_from_ct();
+        let lies = |p: &Point3<f32>| {
+            let placed = room_from_ct * p.cast::<f64>();
+            self.flattening
+                .map_or(placed, |flattening| flattening.flattened(&placed))
+                .cast()
+        };
+        points_ct.iter().map(lies).collect()
+    }
+}
+
+/// Pose of the device in the scan: (T^P_CT)⁻¹ (T^ToF_P)⁻¹ · device pose in the room.
+///
+/// The radiograph of a pose is taken by moving the device, so the voxels are never rotated.
+pub fn ct_from_device(
+    placement: &Placement,
+    landmarks: &Landmarks,
+    device: &XrayDevice,
+) -> Rigid<Ct, Device> {
+    landmarks.patient_from_ct().inverse()
+        * placement.room_from_patient.inverse()
+        * device.room_from_device
+}
+
+/// Heights of the skin above the table, as it lies.
+fn measure(
+    points_ct: &[Point3<f32>],
+    room_from_ct: Rigid<Room, Ct>,
+    table: &Plane,
+    flattening: Option<&Flattening>,
+    is_distal: impl Fn(&Point3<f32>) -> bool,
+) -> [f64; 2] {
+    let (mut distal_mm, mut proximal_mm) = (f64::INFINITY, f64::INFINITY);
+    // The table as the scan sees it: one product per point.
+    let table_ct = table.transformed(room_from_ct.inverse().isometry());
+    let height = |p: Point3<f64>| match flattening {
+        None => table_ct.signed_distance(&p),
+        Some(flattening) => table.signed_distance(&flattening.flattened(&(room_from_ct * p))),
+    };
+    for p in points_ct {
+        let half = if is_distal(p) {
+            &mut distal_mm
+        } else {
+            &mut proximal_mm
+        };
+        *half = half.min(height(p.cast()));
+    }
+    [distal_mm, proximal_mm]
+}
+
+/// The lowest distal and the lowest proximal point of the placed limb, if there are both.
+fn lowest_points(
+    points_ct: &[Point3<f32>],
+    room_from_ct: Rigid<Room, Ct>,
+    table: &Plane,
+    is_distal: impl Fn(&Point3<f32>) -> bool,
+) -> Option<[Point3<f64>; 2]> {
+    let lowest = |distal: bool| {
+        points_ct
+            .iter()
+            .filter(|p| is_distal(p) == distal)
+            .map(|p| room_from_ct * p.cast::<f64>())
+            .min_by(|a, b| {
+                table
+                    .signed_distance(a)
+                    .total_cmp(&table.signed_distance(b))
+            })
+    };
+    Some([lowest(true)?, lowest(false)?])
+}

@@ -1,0 +1,109 @@
+//! Soft tissue that gives way where a limb rests on the table.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion};
+use serde::{Deserialize, Serialize};
+
+use crate::placement::error::PlaceError;
+use crate::room::plane::Plane;
+
+/// How far the two parts of a limb that rest on the table sink in: heel and calf of a lower leg.
+///
+/// The default is a rigid skin, as in the paper.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SoftTissue {
+    /// Depth of the distal contact, mm.
+    pub distal_mm: f64,
+    /// Depth of the proximal contact, mm.
+    pub proximal_mm: f64,
+}
+
+impl SoftTissue {
+    /// The depths, distal first.
+    pub(crate) fn depths_mm(&self) -> [f64; 2] {
+        [self.distal_mm, self.proximal_mm]
+    }
+
+    /// Whether the depths make sense.
+    ///
+    /// # Errors
+    /// [`PlaceError::SoftTissue`] for a depth that is not 0 to 20 mm.
+    pub fn check(&self) -> Result<(), PlaceError> {
+        let fields = ["distal_mm", "proximal_mm"]
+            .into_iter()
+            .zip(self.depths_mm());
+        for (name, found_mm) in fields {
+            if !(0.0..=20.0).contains(&found_mm) {
+                return Err(PlaceError::SoftTissue { name, found_mm });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Share of its height that the lowest tissue keeps: the contact becomes 1 / 0.4³, some 16 times,
+/// flatter.
+const KEPT: f64 = 0.4;
+
+/// What soft tissue does to a limb that was laid into the table by some depth s.
+///
+/// A layer of thickness T = 2 s / (1 − a), a = 0.4, is pressed into its upper T − s. With
+/// u = (z + s) / T from 0 at the lowest point to 1 at the top of the layer, heights become
+/// ζ(z) = T (a u + (1 − a) u² / 2), which rises everywhere, from 0 to T − s with slope
+/// ζ′ = a + (1 − a) u; lengths across the table become (x − x₀) / ζ′ about the line x₀ through
+/// both contacts. The tissue swells sideways by as much as it is pressed: the Jacobian is
+/// ζ′ · 1/ζ′ = 1, so that no volume is lost, and no two points meet. Above the layer nothing moves.
+/// s runs linearly along the table from one contact to the other and beyond, but not below 0.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Flattening {
+    /// Axes of the table at the distal contact, before it was flattened: x across, y towards the
+    /// head, z up; origin on the table.
+    room_from_contact: Isometry3<f64>,
+    /// Depth of the distal contact, mm.
+    depth_mm: f64,
+    /// How much deeper it gets per mm towards the head.
+    depth_per_mm: f64,
+    /// How much the line through both contacts moves across the table per mm towards the head.
+    across_per_mm: f64,
+}
+
+impl Flattening {
+    /// The flattening of a limb whose lowest distal and proximal points are these.
+    pub(crate) fn at(
+        [distal, proximal]: [Point3<f64>; 2],
+        table: &Plane,
+        room_axes: &Matrix3<f64>,
+    ) -> Self {
+        let rotation = Rotation3::from_matrix_unchecked(*room_axes);
+        let room_from_contact = Isometry3::from_parts(
+            Translation3::from(table.project(&distal)),
+            UnitQuaternion::from_rotation_matrix(&rotation),
+        );
+        let depths = [&distal, &proximal].map(|p| -table.signed_distance(p));
+        let apart = room_from_contact.inverse_transform_point(&proximal);
+        Self {
+            room_from_contact,
+            depth_mm: depths[0],
+            depth_per_mm: (depths[1] - depths[0]) / apart.y,
+            across_per_mm: apart.x / apart.y,
+        }
+    }
+
+    /// Where a point of the placed limb comes to lie, room frame.
+    pub fn flattened(&self, p: &Point3<f64>) -> Point3<f64> {
+        let mut at = self.room_from_contact.inverse_transform_point(p);
+        let depth_mm = self.depth_mm + self.depth_per_mm * at.y;
+        let layer_mm = 2.0 * depth_mm / (1.0 - KEPT);
+        if depth_mm <= 0.0 || at.z >= layer_mm - depth_mm {
+            return *p;
+        }
+        // Both contacts are found to 0.05 mm: other points may lie that much below their line.
+        let u = ((at.z + depth_mm) / layer_mm).max(0.0);
+        let slope = KEPT + (1.0 - KEPT) * u;
+        at.z = layer_mm * u * (KEPT + 0.5 * (1.0 - KEPT) * u);
+        let line = self.across_per_mm * at.y;
+        at.x = line + (at.x - line) / slope;
+        self.room_from_contact * at
+    }
+}
