@@ -228,6 +228,17 @@ fn points_of(spot: &FocalSpot, plane: &SpotPlane, per_side: usize) -> Vec<Point3
     strips.iter().flat_map(row).collect()
 }
 
+impl Projection {
+    /// Histories of one mAs: photons that the tube sends into the field. None if `spectrum` does not come from the
+    /// tube model, which alone knows.
+    ///
+    /// # Errors
+    /// [`ProjectionError`] when the exposure makes no sense.
+    pub fn photons_per_mas(&self, spectrum: &Spectrum) -> Result<Option<f64>, ProjectionError> {
+        Ok(Emitter::new(self, spectrum)?.photons_per_mas())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::Isometry3;

@@ -3,16 +3,11 @@
 use nalgebra::{Isometry3, Point2, Point3, Unit, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::beam::emitter::Emitter;
 use crate::beam::field::Field;
 use crate::beam::projection_error::ProjectionError;
-use crate::beam::raster::Raster;
+use crate::beam::raster::{MAX_PIXELS, Raster};
 use crate::beam::receptor::Receptor;
 use crate::beam::source::{Collimation, Source};
-use crate::beam::spectrum::Spectrum;
-
-/// Most pixels of a detector: 2²⁸, whose planes take 8 GiB.
-pub(crate) const MAX_PIXELS: usize = 1 << 28;
 
 /// A flat detector square to device z; columns run along device x, rows along device y.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -216,15 +211,6 @@ impl Projection {
             });
         }
         Ok(())
-    }
-
-    /// Histories of one mAs: photons that the tube sends into the field. None if `spectrum` does not come from the
-    /// tube model, which alone knows.
-    ///
-    /// # Errors
-    /// [`ProjectionError`] when the exposure makes no sense.
-    pub fn photons_per_mas(&self, spectrum: &Spectrum) -> Result<Option<f64>, ProjectionError> {
-        Ok(Emitter::new(self, spectrum)?.photons_per_mas())
     }
 
     /// The field of the beam in the detector plane.

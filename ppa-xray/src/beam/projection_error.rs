@@ -1,6 +1,6 @@
 //! What can be wrong with an exposure.
 
-use crate::beam::projection::MAX_PIXELS;
+use crate::beam::raster::MAX_PIXELS;
 use crate::beam::receptor::ReceptorError;
 
 /// Why a projection cannot be simulated.

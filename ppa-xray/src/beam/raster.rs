@@ -1,5 +1,8 @@
 //! Cells of the detector plane.
 
+/// Most pixels of a detector: 2²⁸, whose planes take 8 GiB.
+pub(crate) const MAX_PIXELS: usize = 1 << 28;
+
 /// A rectangle in the detector plane, cut into equal cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Raster {

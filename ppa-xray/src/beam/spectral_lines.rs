@@ -2,7 +2,7 @@
 
 use crate::beam::heel::Mixture;
 use crate::beam::spectrum::Spectrum;
-use crate::matter::energy_range::{CEILING_KEV, CUTOFF_KEV};
+use crate::matter::energy_range::{CUTOFF_KEV, MAX_ENERGY_KEV};
 
 /// Spectra as lines at common energies.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,7 +17,7 @@ impl SpectralLines {
     /// The middles of the energy bins; those that hold less than 1e-9 of the photons, or that no photon is
     /// followed at, are left out.
     pub fn of(spectra: &[Spectrum]) -> Self {
-        let followed = |energy_kev: &f64| (CUTOFF_KEV..=CEILING_KEV).contains(energy_kev);
+        let followed = |energy_kev: &f64| (CUTOFF_KEV..=MAX_ENERGY_KEV).contains(energy_kev);
         let mut energy_kev: Vec<f64> = spectra
             .iter()
             .flat_map(Spectrum::bins)

@@ -3,7 +3,7 @@
 use crate::{
     beam::spectrum_error::SpectrumError,
     beam::tube::TubeSpec,
-    matter::cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
     matter::energy_transfer::GRAY_PER_KEV_G,
     matter::material::Material,
 };

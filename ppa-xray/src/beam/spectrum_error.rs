@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::{
-    matter::cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
     matter::material_error::MaterialError,
 };
 

@@ -1,6 +1,6 @@
 //! Energies at which a quantity with absorption edges is tabulated.
 
-use crate::matter::cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV};
+use crate::matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV};
 
 /// Smallest and largest energy that reach a detector, keV.
 const RANGE_KEV: [f64; 2] = [MIN_ENERGY_KEV, MAX_ENERGY_KEV];

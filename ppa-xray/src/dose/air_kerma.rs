@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use crate::matter::energy_range::{CEILING_KEV, CUTOFF_KEV};
+use crate::matter::energy_range::{CUTOFF_KEV, MAX_ENERGY_KEV};
 use crate::matter::energy_transfer::GRAY_PER_KEV_G;
 use crate::matter::material::Material;
 use crate::phantom::lattice::Walk;
@@ -24,7 +24,7 @@ pub(crate) struct AirKerma {
 impl AirKerma {
     pub fn new() -> Self {
         let air = air();
-        let nodes = (CEILING_KEV - CUTOFF_KEV) as usize * NODES_PER_KEV;
+        let nodes = (MAX_ENERGY_KEV - CUTOFF_KEV) as usize * NODES_PER_KEV;
         let table = (0..=nodes)
             .map(|node| air.kerma_kev_cm2_g(CUTOFF_KEV + node as f64 / NODES_PER_KEV as f64))
             .collect();

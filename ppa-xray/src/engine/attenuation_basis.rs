@@ -4,7 +4,7 @@
 //! tissues differ by little more than how much of two or three smooth functions of the energy they hold (Alvarez and
 //! Macovski, Phys. Med. Biol. 21 (1976) 733). So a ray need not keep the mass of 27 materials apart, but that of four.
 
-use crate::matter::energy_range::{CEILING_KEV, CUTOFF_KEV};
+use crate::matter::energy_range::{CUTOFF_KEV, MAX_ENERGY_KEV};
 use crate::transport::attenuation::Attenuation;
 
 /// Basis materials are counted in groups of this many, one SIMD register of numbers.
@@ -32,12 +32,12 @@ impl AttenuationBasis {
     ///
     /// Takes the material that is worst represented into the basis until all are represented.
     pub fn new(attenuation: &Attenuation, materials: usize, highest_kev: f64) -> Self {
-        let nodes = ((highest_kev.min(CEILING_KEV) - CUTOFF_KEV) * NODES_PER_KEV as f64).ceil()
+        let nodes = ((highest_kev.min(MAX_ENERGY_KEV) - CUTOFF_KEV) * NODES_PER_KEV as f64).ceil()
             as usize
             + 1;
         let energy = |node: usize| CUTOFF_KEV + node as f64 / NODES_PER_KEV as f64;
         let total = |material: usize, node: usize| {
-            let at = attenuation.locate(energy(node).min(CEILING_KEV));
+            let at = attenuation.locate(energy(node).min(MAX_ENERGY_KEV));
             f64::from(attenuation.at(material as u8, at).total)
         };
         let curves: Vec<Vec<f64>> = (0..materials)
@@ -179,6 +179,26 @@ fn fit(curves: &[Vec<f64>], members: &[usize], curve: &[f64]) -> Vec<f64> {
         .iter()
         .copied()
         .collect()
+}
+
+/// Masses of the basis materials along a path, mm g/cm³, in groups of [`LANES`].
+pub(crate) type BasisMass = [[f32; LANES]];
+
+/// Adds `amount` of a mixture of basis materials.
+#[inline(always)]
+pub(super) fn add(mass: &mut BasisMass, shares: &BasisMass, amount: f32) {
+    // One group is the common case: no loop.
+    if let ([mass], [share]) = (&mut *mass, shares) {
+        for lane in 0..LANES {
+            mass[lane] += share[lane] * amount;
+        }
+        return;
+    }
+    for (mass, share) in mass.iter_mut().zip(shares) {
+        for lane in 0..LANES {
+            mass[lane] += share[lane] * amount;
+        }
+    }
 }
 
 #[cfg(test)]

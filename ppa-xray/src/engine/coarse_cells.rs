@@ -5,8 +5,7 @@
 
 use rayon::prelude::*;
 
-use crate::engine::attenuation_basis::{AttenuationBasis, LANES};
-use crate::engine::paths::BasisMass;
+use crate::engine::attenuation_basis::{AttenuationBasis, LANES, add};
 use crate::phantom::voxels::VoxelPhantom;
 
 /// Cubes of voxels, each with its mean density of every basis material.
@@ -59,23 +58,6 @@ impl CoarseCells {
             edge,
             size,
             density,
-        }
-    }
-}
-
-/// Adds `amount` of a mixture of basis materials.
-#[inline(always)]
-pub(super) fn add(mass: &mut BasisMass, shares: &BasisMass, amount: f32) {
-    // One group is the common case: no loop.
-    if let ([mass], [share]) = (&mut *mass, shares) {
-        for lane in 0..LANES {
-            mass[lane] += share[lane] * amount;
-        }
-        return;
-    }
-    for (mass, share) in mass.iter_mut().zip(shares) {
-        for lane in 0..LANES {
-            mass[lane] += share[lane] * amount;
         }
     }
 }

@@ -11,10 +11,10 @@ use rayon::prelude::*;
 use crate::beam::field::Field;
 use crate::engine::attenuation_basis::{LANES, dot};
 use crate::engine::cdf::Entry;
-use crate::engine::importance::Site;
 use crate::engine::lines::Lines;
 use crate::engine::paths::Paths;
-use crate::matter::energy_range::{CEILING_KEV, CUTOFF_KEV};
+use crate::engine::site::Site;
+use crate::matter::energy_range::{CUTOFF_KEV, MAX_ENERGY_KEV};
 use crate::transport::tracking::Transport;
 
 /// Cells along device x and y of the field, and along the rays through the voxel box.
@@ -264,7 +264,7 @@ fn mean_energy_behind(lines: &Lines, mass: &[[f32; LANES]]) -> f64 {
         photons += through;
         energy += through * line.energy_kev;
     }
-    (energy / photons).clamp(CUTOFF_KEV, CEILING_KEV)
+    (energy / photons).clamp(CUTOFF_KEV, MAX_ENERGY_KEV)
 }
 
 /// What a cell holds.

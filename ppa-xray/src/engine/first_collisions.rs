@@ -5,12 +5,14 @@
 use ppa_core::random::Philox;
 use rayon::prelude::*;
 
+use crate::engine::attenuation_basis::BasisMass;
 use crate::engine::attenuation_basis::{LANES, dot};
 use crate::engine::collision_map::{Collision, CollisionMap};
-use crate::engine::importance::{ImportanceModel, Site};
+use crate::engine::importance::ImportanceModel;
 use crate::engine::lines::{Line, Lines};
-use crate::engine::paths::{BasisMass, Paths};
+use crate::engine::paths::Paths;
 use crate::engine::quasi_random::QuasiRandom;
+use crate::engine::site::Site;
 use crate::transport::stream::Stream;
 use crate::transport::tracking::Transport;
 

@@ -11,6 +11,7 @@ use crate::engine::attenuation_basis::LANES;
 use crate::engine::collision_map::CollisionMap;
 use crate::engine::paths::{Paths, Step};
 use crate::engine::scatter_table::ScatterTable;
+use crate::engine::site::Site;
 use crate::matter::scatter_density::ScatterDensities;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::tracking::Transport;
@@ -33,18 +34,6 @@ pub(crate) struct ImportanceModel<'a> {
     /// Mean mass on the way of the photons, and its attenuation at the typical energy.
     mass: Vec<[f32; LANES]>,
     typical_exponent: f32,
-}
-
-/// A photon about to scatter: a collision site.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Site {
-    pub position: Point3<f32>,
-    pub direction: Vector3<f32>,
-    /// Statistical weight relative to the other sites.
-    pub weight: f32,
-    /// Attenuation coefficient of the outgoing photon over that at the typical energy.
-    pub attenuation_ratio: f32,
-    pub material: u8,
 }
 
 impl<'a> ImportanceModel<'a> {

@@ -8,9 +8,10 @@ use nalgebra::{Point3, Vector3};
 use ppa_core::random::Philox;
 
 use crate::engine::first_collisions::FirstCollisions;
-use crate::engine::importance::{ImportanceModel, Site};
+use crate::engine::importance::ImportanceModel;
 use crate::engine::lines::Lines;
 use crate::engine::paths::{Paths, Step};
+use crate::engine::site::Site;
 use crate::engine::turn::turned;
 use crate::matter::energy_range::CUTOFF_KEV;
 use crate::transport::attenuation::Coefficients;

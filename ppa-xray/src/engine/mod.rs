@@ -36,6 +36,7 @@ mod scatter_field;
 mod scatter_of_a_sphere;
 mod scatter_table;
 mod single_scatter;
+mod site;
 #[cfg(test)]
 pub(crate) mod small_limb;
 mod spectral_quadrature;

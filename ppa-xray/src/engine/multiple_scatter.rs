@@ -7,11 +7,11 @@ use ppa_core::random::Philox;
 use rayon::prelude::*;
 
 use crate::detector::response::Response;
+use crate::engine::attenuation_basis::BasisMass;
 use crate::engine::attenuation_basis::LANES;
 use crate::engine::importance::{Draws, PointImportance, Subset};
 use crate::engine::later_collisions::{Histories, LaterCollisions};
 use crate::engine::node_grid::NodeGrid;
-use crate::engine::paths::BasisMass;
 use crate::matter::energy_range::CUTOFF_KEV;
 use crate::matter::scatter_density::ScatterDensities;
 use crate::transport::stream::Stream;

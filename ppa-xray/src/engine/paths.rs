@@ -4,14 +4,11 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::beam::spectrum::Spectrum;
-use crate::engine::attenuation_basis::{AttenuationBasis, LANES, dot};
-use crate::engine::coarse_cells::{CoarseCells, add};
+use crate::engine::attenuation_basis::{AttenuationBasis, BasisMass, LANES, add, dot};
+use crate::engine::coarse_cells::CoarseCells;
 use crate::phantom::lattice::{Lattice, Ray};
 use crate::transport::tracking::Transport;
 use crate::transport::voxel_codes::VoxelCode;
-
-/// Masses of the basis materials along a path, mm g/cm³, in groups of [`LANES`].
-pub(crate) type BasisMass = [[f32; LANES]];
 
 /// Whether a walk continues.
 pub(crate) type Step = std::ops::ControlFlow<()>;

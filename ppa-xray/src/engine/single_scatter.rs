@@ -9,11 +9,12 @@ use nalgebra::{Point2, Point3, Vector3};
 use ppa_core::random::Philox;
 
 use crate::detector::response::Response;
+use crate::engine::attenuation_basis::BasisMass;
 use crate::engine::attenuation_basis::{LANES, dot};
 use crate::engine::first_collisions::{ESTIMATES, FirstCollisions};
 use crate::engine::importance::{Draws, ImportanceModel, PointImportance, Subset};
 use crate::engine::lines::Lines;
-use crate::engine::paths::{BasisMass, Paths};
+use crate::engine::paths::Paths;
 use crate::engine::scatter_table::ScatterTable;
 use crate::matter::energy_range::CUTOFF_KEV;
 use crate::transport::stream::Stream;

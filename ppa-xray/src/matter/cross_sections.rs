@@ -13,11 +13,6 @@ pub(crate) const HC_KEV_ANGSTROM: f64 = 12.398_419_843_320_026;
 /// Rest energy of the electron in keV (CODATA 2018).
 pub(crate) const ELECTRON_REST_KEV: f64 = 510.998_95;
 
-/// Lowest photon energy of the tables in keV.
-pub const MIN_ENERGY_KEV: f64 = 1.0;
-/// Highest photon energy of the tables in keV.
-pub const MAX_ENERGY_KEV: f64 = 150.0;
-
 /// Mass attenuation by interaction in cm²/g.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CrossSections {

@@ -1,6 +1,6 @@
 //! Energies at which the tables of the transport look at matter.
 
-use crate::matter::cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV};
+use crate::matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV};
 use crate::octaves::Octaves;
 
 /// Bins per octave of energy, as a power of two: straight lines in E are then within 1e-4 of E⁻³ laws.

@@ -1,7 +1,9 @@
-//! Energies at which photons are followed.
+//! Energies that the tables cover, and those at which photons are followed.
+
+/// Lowest photon energy of the tables in keV.
+pub const MIN_ENERGY_KEV: f64 = 1.0;
+/// Highest photon energy of the tables in keV.
+pub const MAX_ENERGY_KEV: f64 = 150.0;
 
 /// Photons below this energy are absorbed on the spot: 5 keV x-rays die within 0.25 mm of tissue.
 pub(crate) const CUTOFF_KEV: f64 = 5.0;
-
-/// Highest energy the cross-section data covers.
-pub(crate) const CEILING_KEV: f64 = 150.0;

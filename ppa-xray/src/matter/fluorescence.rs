@@ -1,7 +1,7 @@
 //! K fluorescence: the photons that follow the absorption of a photon by a K shell.
 
 use crate::{
-    matter::cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
     matter::material::Material,
     octaves::Octaves,
 };

@@ -2,7 +2,8 @@
 
 use std::sync::OnceLock;
 
-use crate::matter::cross_sections::{ELECTRON_REST_KEV, MAX_ENERGY_KEV};
+use crate::matter::cross_sections::ELECTRON_REST_KEV;
+use crate::matter::energy_range::MAX_ENERGY_KEV;
 
 /// E′/E = 1 / (1 + α (1 − cos θ)), α = E / mₑc² (Compton 1923, doi:10.1103/PhysRev.21.483).
 #[inline]

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use crate::{
     matter::composition::Composition,
-    matter::cross_sections::{CrossSections, MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::cross_sections::CrossSections,
     matter::electron_shell::Shell,
     matter::energy_nodes::energy_nodes,
+    matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
     matter::fluorescence::{FluorescenceLine, KFluorescence},
     matter::library,
     matter::material_error::MaterialError,

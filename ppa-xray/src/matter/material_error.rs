@@ -1,6 +1,6 @@
 //! What can be wrong with a material.
 
-use crate::matter::cross_sections::{MAX_ENERGY_KEV, MIN_ENERGY_KEV};
+use crate::matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV};
 
 /// Why something is not a material, or has no cross section.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

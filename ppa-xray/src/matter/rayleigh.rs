@@ -1,7 +1,8 @@
 //! Rayleigh scattering: Thomson's law times the squared form factor of independent atoms.
 
 use crate::{
-    matter::cross_sections::{HC_KEV_ANGSTROM, MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::cross_sections::HC_KEV_ANGSTROM,
+    matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
     matter::material::Material,
     octaves::Octaves,
 };

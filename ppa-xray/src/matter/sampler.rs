@@ -5,8 +5,9 @@ use ppa_core::random::Philox;
 use crate::{
     matter::compton::{Compton, ComptonModel},
     matter::cross_section_table::CrossSectionTable,
-    matter::cross_sections::{CrossSections, HC_KEV_ANGSTROM, MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::cross_sections::{CrossSections, HC_KEV_ANGSTROM},
     matter::energy_range::CUTOFF_KEV,
+    matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
     matter::fluorescence::Fluorescence,
     matter::impulse_approximation::BoundElectron,
     matter::material::Material,

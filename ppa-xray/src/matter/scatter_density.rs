@@ -3,12 +3,9 @@
 use std::f64::consts::PI;
 
 use crate::{
-    matter::compton::ComptonModel,
-    matter::cross_sections::{HC_KEV_ANGSTROM, MAX_ENERGY_KEV},
-    matter::impulse_approximation::electrons_freed,
-    matter::klein_nishina::differential,
-    matter::material::Material,
-    octaves::Octaves,
+    matter::compton::ComptonModel, matter::cross_sections::HC_KEV_ANGSTROM,
+    matter::energy_range::MAX_ENERGY_KEV, matter::impulse_approximation::electrons_freed,
+    matter::klein_nishina::differential, matter::material::Material, octaves::Octaves,
 };
 
 /// Lowest energy of the tables in keV, just below that of the transport; the values there hold below it.

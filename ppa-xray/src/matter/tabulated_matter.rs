@@ -1,9 +1,8 @@
 //! Photon data of one material, checked and ready to be asked.
 
-use crate::matter::cross_sections::{
-    CrossSections, LogLog, MAX_ENERGY_KEV, MIN_ENERGY_KEV, SectionTables,
-};
+use crate::matter::cross_sections::{CrossSections, LogLog, SectionTables};
 use crate::matter::electron_shell::Shell;
+use crate::matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV};
 use crate::matter::material_error::MaterialError;
 use crate::matter::photon_tables::PhotonTables;
 

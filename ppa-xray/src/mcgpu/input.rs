@@ -6,16 +6,7 @@ use nalgebra::{Point3, Unit, Vector3};
 
 use crate::mcgpu::error::McgpuError;
 use crate::mcgpu::sections::{MaterialLine, RunLength, Trajectory, VoxelDose, all_lengths};
-use crate::mcgpu::values::Values;
-
-/// A file that the input file names.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NamedFile {
-    /// Line of the input file, counted from 1.
-    pub line: u64,
-    /// The file, resolved against the folder of the input file.
-    pub path: PathBuf,
-}
+use crate::mcgpu::values::{NamedFile, Values};
 
 /// What an input file says. Lengths in cm, in the frame of the voxel box: its corner with the lowest coordinates is the
 /// origin.

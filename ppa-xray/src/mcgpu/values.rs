@@ -1,9 +1,8 @@
 //! Values and headlines of an input file, line by line.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::mcgpu::error::McgpuError;
-use crate::mcgpu::input::NamedFile;
 use crate::mcgpu::lines::{Lines, columns, holds, numbers};
 
 /// The headline of a section, shortened.
@@ -14,6 +13,15 @@ fn headline(line: &[u8]) -> Option<String> {
             .to_owned()
     };
     holds(line, "SECTION ").then(shown)
+}
+
+/// A file that the input file names.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedFile {
+    /// Line of the input file, counted from 1.
+    pub line: u64,
+    /// The file, resolved against the folder of the input file.
+    pub path: PathBuf,
 }
 
 /// The lines of an input file that hold values.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::matter::energy_range::{CEILING_KEV, CUTOFF_KEV};
+use crate::matter::energy_range::{CUTOFF_KEV, MAX_ENERGY_KEV};
 use crate::matter::sampler::MaterialTables;
 
 /// 2⁹ nodes in every octave of energy: linear interpolation of E⁻³ errs by less than 6e-6.
@@ -13,9 +13,9 @@ const SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - OCTAVE_BITS;
 
 const FIRST_KEY: u32 = (CUTOFF_KEV as f32).to_bits() >> SHIFT;
 
-/// Nodes, of which the last lies at or above [`CEILING_KEV`].
+/// Nodes, of which the last lies at or above [`MAX_ENERGY_KEV`].
 pub(crate) const NODES: usize =
-    (((CEILING_KEV as f32).to_bits() >> SHIFT) + 2 - FIRST_KEY) as usize;
+    (((MAX_ENERGY_KEV as f32).to_bits() >> SHIFT) + 2 - FIRST_KEY) as usize;
 
 /// Running sums of the interaction coefficients, mm⁻¹ per g/cm³.
 #[derive(Debug, Clone, Copy)]
@@ -33,7 +33,7 @@ pub(crate) struct EnergyNode {
     fraction: f32,
 }
 
-/// Coefficients of all materials from [`CUTOFF_KEV`] to [`CEILING_KEV`].
+/// Coefficients of all materials from [`CUTOFF_KEV`] to [`MAX_ENERGY_KEV`].
 #[derive(Debug)]
 pub(crate) struct Attenuation {
     /// Material by material, node by node: photoelectric, with Compton, total, and nothing, so that a node is 16 bytes.
@@ -123,7 +123,7 @@ mod tests {
         )];
         let attenuation = Attenuation::new(&tables);
         let mut energy_kev = CUTOFF_KEV;
-        while energy_kev <= CEILING_KEV {
+        while energy_kev <= MAX_ENERGY_KEV {
             let expected = tables[0].cross_sections(energy_kev);
             let found = attenuation.at(0, attenuation.locate(energy_kev));
             for (found, expected) in [

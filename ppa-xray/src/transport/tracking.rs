@@ -1,7 +1,5 @@
 //! What all histories of a projection share, checked before the first of them starts.
 
-use std::ops::Range;
-
 use nalgebra::Point3;
 use rayon::prelude::*;
 
@@ -10,14 +8,12 @@ use crate::beam::projection::Projection;
 use crate::beam::projection_error::ProjectionError;
 use crate::beam::spectrum::Spectrum;
 use crate::matter::compton::ComptonModel;
-use crate::matter::energy_range::{CEILING_KEV, CUTOFF_KEV};
+use crate::matter::energy_range::{CUTOFF_KEV, MAX_ENERGY_KEV};
 use crate::matter::sampler::MaterialTables;
 use crate::phantom::lattice::Lattice;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::attenuation::Attenuation;
-use crate::transport::lanes;
 use crate::transport::majorants::Majorants;
-use crate::transport::score::Score;
 use crate::transport::voxel_codes::{VoxelCode, voxel_codes};
 
 /// Why a simulation cannot run.
@@ -29,7 +25,7 @@ pub enum TransportError {
     Projection(#[from] ProjectionError),
     /// The spectrum reaches outside the range of the transport.
     #[error(
-        "{percent:.3} % of the spectrum lies outside {CUTOFF_KEV} to {CEILING_KEV} keV, where photons are followed"
+        "{percent:.3} % of the spectrum lies outside {CUTOFF_KEV} to {MAX_ENERGY_KEV} keV, where photons are followed"
     )]
     Spectrum {
         /// Share of the photons outside the range.
@@ -93,7 +89,7 @@ impl<'a> Transport<'a> {
                 .map(|(_, probability)| probability)
                 .sum()
         };
-        let percent = 100.0 * outside([CUTOFF_KEV, CEILING_KEV]);
+        let percent = 100.0 * outside([CUTOFF_KEV, MAX_ENERGY_KEV]);
         if percent > 1e-2 {
             return Err(TransportError::Spectrum { percent });
         }
@@ -134,13 +130,6 @@ impl<'a> Transport<'a> {
             attenuation,
             samplers,
         })
-    }
-
-    /// Follows the `histories` of a seed and reports to `score` what they leave; slots are below [`lanes::LANES`].
-    ///
-    /// Each history is the same whatever runs beside it: any split of a range leaves the same events, in another order.
-    pub fn follow(&self, seed: u64, histories: Range<u64>, score: &mut impl Score) {
-        lanes::follow(self, seed, histories, score);
     }
 }
 

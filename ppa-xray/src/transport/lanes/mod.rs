@@ -72,13 +72,17 @@ struct Lanes<'a, 'p> {
     scattering: Scattering,
 }
 
+impl Transport<'_> {
+    /// Follows the `histories` of a seed and reports to `score` what they leave; slots are below [`LANES`].
+    ///
+    /// Each history is the same whatever runs beside it: any split of a range leaves the same events, in another order.
+    pub fn follow(&self, seed: u64, histories: Range<u64>, score: &mut impl Score) {
+        follow(self, seed, histories, score);
+    }
+}
+
 /// Follows `histories` of `seed` and reports to `score` what they leave; slots are below [`LANES`].
-pub(super) fn follow(
-    transport: &Transport,
-    seed: u64,
-    histories: Range<u64>,
-    score: &mut impl Score,
-) {
+fn follow(transport: &Transport, seed: u64, histories: Range<u64>, score: &mut impl Score) {
     Lanes::new(transport, Isa::widest(), seed, histories).run(score);
 }
 

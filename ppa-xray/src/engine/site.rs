@@ -1,0 +1,15 @@
+//! A collision site.
+
+use nalgebra::{Point3, Vector3};
+
+/// A photon about to scatter: a collision site.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Site {
+    pub position: Point3<f32>,
+    pub direction: Vector3<f32>,
+    /// Statistical weight relative to the other sites.
+    pub weight: f32,
+    /// Attenuation coefficient of the outgoing photon over that at the typical energy.
+    pub attenuation_ratio: f32,
+    pub material: u8,
+}
