@@ -1,17 +1,8 @@
-//! Description of a dataset for search engines (Croissant) and archives (RO-Crate).
+//! What the metadata of a dataset are made from.
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
 use serde::Deserialize;
-use sha2::{Digest, Sha256};
-
-use super::croissant::croissant;
-use super::datasheet::datasheet;
-use super::ro_crate::ro_crate;
-use super::table::{Table, TableError};
-use crate::files::{FileError, hex, read_text, write_whole};
-use crate::split::Split;
 
 /// What no program can know about a dataset.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,7 +17,7 @@ pub struct Metadata {
 
 impl Metadata {
     /// Whether search engines and archives can use it; says what is wrong.
-    fn check(&self) -> Result<(), String> {
+    pub(super) fn check(&self) -> Result<(), String> {
         if self.name.trim().is_empty() {
             return Err("the name is empty".to_owned());
         }
@@ -115,81 +106,6 @@ pub(super) const PAPER: &str = "https://doi.org/10.59275/j.melba.2026-c874";
 
 /// Table that the metadata describe.
 pub(super) const TABLE: &str = "manifest.csv";
-
-const DATASHEET: &str = "datasheet.md";
-
-/// The datasheet where another one is there already, in which people may have answered.
-const NEW_DATASHEET: &str = "datasheet.new.md";
-
-/// Writes `manifest.csv`, `croissant.json` (Croissant 1.1), `ro-crate-metadata.json` (RO-Crate 1.1) and `datasheet.md` into the
-/// dataset in `root`, each whole or not at all; `split` names the split that stands in the table. A datasheet that is there, in
-/// which people may have answered, stays; one that differs is written beside it as `datasheet.new.md`. Names of the files written.
-///
-/// # Errors
-/// [`TableError`] naming the file at fault, among them one that is there and differs without `replace`, or what of the metadata is no
-/// name, address or day; nothing is written then.
-pub fn write_metadata(
-    root: &Path,
-    metadata: &Metadata,
-    split: Option<&str>,
-    replace: bool,
-) -> Result<[&'static str; 4], TableError> {
-    metadata.check().map_err(TableError::Metadata)?;
-    let table = Table::of_dataset(root, split)?;
-    let path = root.join("dataset.json");
-    let provenance: Provenance = serde_json::from_str(&read_text(&path)?)
-        .map_err(|e| FileError::at("parse", &path)(e.into()))?;
-    let csv = table.to_csv();
-    let sha256 = hex(&Sha256::digest(&csv));
-    let croissant = croissant(metadata, &table, &sha256, &provenance);
-    let lists = lists(root, &table)?;
-    let ro_crate = ro_crate(metadata, &table, &lists, &provenance);
-    let datasheet = datasheet(metadata, &table, &Split::names(root)?, &provenance);
-    let there = root.join(DATASHEET);
-    let is_another = there.exists() && read_text(&there)? != datasheet;
-    let sheet = if is_another { NEW_DATASHEET } else { DATASHEET };
-    let files = [
-        (TABLE, csv),
-        ("croissant.json", format!("{croissant:#}\n").into_bytes()),
-        (
-            "ro-crate-metadata.json",
-            format!("{ro_crate:#}\n").into_bytes(),
-        ),
-        (sheet, datasheet.into_bytes()),
-    ];
-    for (name, bytes) in &files {
-        let path = root.join(name);
-        let differs = || std::fs::read(&path).map(|found| found != *bytes);
-        if !replace && path.exists() && differs().map_err(FileError::at("read", &path))? {
-            return Err(TableError::Differs(path));
-        }
-    }
-    for (name, bytes) in &files {
-        write_whole(&root.join(name), bytes)?;
-    }
-    Ok(files.map(|(name, _)| name))
-}
-
-/// Files beside the images, with their formats: labels, regions of interest, splits. Those that are not there are left out.
-fn lists(root: &Path, table: &Table) -> Result<Vec<(String, &'static str)>, TableError> {
-    let mut lists = Vec::new();
-    for limb in table.limbs() {
-        let regions = limb.roi_file();
-        let folder = regions.trim_end_matches("roi_depth.json").to_owned();
-        lists.push((regions, "application/json"));
-        lists.push((folder.clone() + "labels.json", "application/json"));
-        lists.push((folder.clone() + "labels.computed.json", "application/json"));
-        lists.push((folder.clone() + "openness.csv", "text/csv"));
-        lists.push((folder + "openness.json", "application/json"));
-    }
-    lists.retain(|(file, _)| root.join(file).is_file());
-    for name in Split::names(root)? {
-        lists.push((format!("splits/{name}.json"), "application/json"));
-    }
-    lists.push(("croissant.json".to_owned(), "application/ld+json"));
-    lists.push((DATASHEET.to_owned(), "text/markdown"));
-    Ok(lists)
-}
 
 #[cfg(test)]
 mod tests {

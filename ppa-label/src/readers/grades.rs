@@ -7,7 +7,7 @@ use ppa_dataset::is_formula;
 use ppa_dataset::manifest::{FileKind, FileRow, Manifest};
 use serde::{Deserialize, Serialize};
 
-use super::import::ImportError;
+use super::import_error::ImportError;
 use super::reader_case::ReaderCase;
 use crate::table::read_table;
 

@@ -2,10 +2,12 @@
 
 mod grades;
 mod import;
+mod import_error;
 mod page;
 mod reader_case;
 
 pub use grades::Grade;
-pub use import::{ImportError, Imported, import_grades};
+pub use import::{Imported, import_grades};
+pub use import_error::ImportError;
 pub use page::{PICTURES_PER_PAGE, PageError, PageNumber, grading_page};
 pub use reader_case::{ReaderCase, read_key, write_key};

@@ -6,6 +6,7 @@
 //! than a bridge of noise was not separated: tibia, fibula and talus are refused then, with the place.
 
 mod contacts;
+mod fill;
 mod flood;
 mod solid;
 

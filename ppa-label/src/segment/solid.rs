@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use ppa_ct::Grid;
 
-use super::flood::flooded;
+use super::fill::flooded;
 
 /// Soft tissue, HU.
 const SOFT_HU: f32 = 50.0;

@@ -1,6 +1,10 @@
 //! Solid bodies in a volume, separated where they only touch.
 
+use nalgebra::Point3;
+use ppa_ct::Grid;
+
 use super::distance::squared_distances;
+use super::lattice::Lattice;
 use super::tissue::{BONE, CORE, Tissue};
 
 /// Depths that differ by less than this are treated alike, mm.
@@ -97,6 +101,14 @@ pub fn bodies(tissue: &Tissue, least_depth_mm: f64, neck_ratio: f64) -> Bodies {
         }
     }
     compact(labels, &mut parent, &basins)
+}
+
+impl Basin {
+    /// Middle of a body's core in the `ct` frame, mm.
+    pub fn centre(&self, lattice: &Lattice, grid: &Grid) -> Point3<f64> {
+        let mean = |axis: usize| self.index_sum[axis] / self.voxels as f64;
+        grid.centre([0, 1, 2].map(|axis| lattice.low[axis] as f64 + mean(axis)))
+    }
 }
 
 fn merge(parent: &mut [u32], basins: &mut [Basin], one: u32, other: u32) -> u32 {

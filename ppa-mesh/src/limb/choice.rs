@@ -38,7 +38,7 @@ pub fn body(
     };
     let towards = Vector3::from(towards).normalize();
     let from_heaviest = |body: usize| {
-        lattice.centre(grid, &found.basins[body]) - lattice.centre(grid, &found.basins[heaviest])
+        found.basins[body].centre(lattice, grid) - found.basins[heaviest].centre(lattice, grid)
     };
     let beside = alike(lattice, found)
         .into_iter()

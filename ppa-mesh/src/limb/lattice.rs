@@ -1,9 +1,7 @@
 //! The lattice of a volume, or of a box of it.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use ppa_ct::Grid;
-
-use super::bodies::Basin;
 
 /// A box of voxels of a volume. Voxels are counted from the box's first one, x fastest.
 pub struct Lattice {
@@ -70,12 +68,6 @@ impl Lattice {
         let [nx, ny, _] = self.whole;
         let start = self.low[0] + nx * (self.low[1] + j + ny * (self.low[2] + k));
         &values[start..start + self.size[0]]
-    }
-
-    /// Middle of a body's core in the `ct` frame, mm.
-    pub fn centre(&self, grid: &Grid, basin: &Basin) -> Point3<f64> {
-        let mean = |axis: usize| basin.index_sum[axis] / basin.voxels as f64;
-        grid.centre([0, 1, 2].map(|axis| self.low[axis] as f64 + mean(axis)))
     }
 
     /// The two axes across the scan axis.

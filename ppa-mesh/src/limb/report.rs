@@ -91,7 +91,7 @@ impl LimbReport {
                 core_mm3: basin.voxels as f64 * lattice.voxel_mm3,
                 bone_mm3: basin.bone_voxels as f64 * lattice.voxel_mm3,
                 side_cut_mm2: basin.side_cut_mm2,
-                centre_mm: lattice.centre(grid, basin).into(),
+                centre_mm: basin.centre(lattice, grid).into(),
             })
             .collect();
         self.bodies.sort_by(|a, b| {

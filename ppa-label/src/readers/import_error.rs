@@ -1,0 +1,108 @@
+//! Why readers' grades cannot become labels.
+
+use std::path::PathBuf;
+
+use ppa_dataset::files::FileError;
+use ppa_dataset::labels::{LabelError, LabelFileError};
+
+use crate::table::TableError;
+
+/// Why grades do not become labels; nothing was written then.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImportError {
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A file of grades is none.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// Off the scale.
+    #[error("{}: {reader} grades {image} with {grade}, expected 1, 1.5, 2, 2.5 or 3", path.display())]
+    Grade {
+        /// The file.
+        path: PathBuf,
+        /// The reader.
+        reader: String,
+        /// The picture.
+        image: String,
+        /// The grade.
+        grade: f64,
+    },
+    /// A reader's name that spreadsheet programs would run.
+    #[error("{}: a reader is called {reader:?}, which spreadsheets take for a formula; expected a name that does not begin with = + - @, a tab or a carriage return", path.display())]
+    Formula {
+        /// The file.
+        path: PathBuf,
+        /// The name.
+        reader: String,
+    },
+    /// A picture that neither key nor dataset know.
+    #[error("{}: {image} is neither a picture of the key nor a radiograph of the dataset", path.display())]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+        /// The picture.
+        image: String,
+    },
+    /// The dataset has changed since the key was made.
+    #[error("{0} is not the radiograph that the readers saw: its hash is not that of the key")]
+    Changed(String),
+    /// The dataset has changed since a grade was imported.
+    #[error(
+        "{}: {reader} graded another radiograph {image}: its hash was {found}, that in the manifest is {expected}; move the file \
+         away to begin anew",
+        path.display()
+    )]
+    OtherRadiograph {
+        /// The file.
+        path: PathBuf,
+        /// The reader.
+        reader: String,
+        /// The radiograph.
+        image: String,
+        /// Hash in the file.
+        found: String,
+        /// Hash in the manifest.
+        expected: String,
+    },
+    /// One picture graded twice, a radiograph a third time, or in two files.
+    #[error("{reader} grades {image} in {} and again in {}", first.display(), second.display())]
+    Twice {
+        /// The reader.
+        reader: String,
+        /// The picture or radiograph.
+        image: String,
+        /// A file.
+        first: PathBuf,
+        /// Another one, or the same.
+        second: PathBuf,
+    },
+    /// Grades that are there would be lost.
+    #[error(
+        "{} holds {reader}'s grade {grade} of {image}, which none of the given files does: give {} as well",
+        path.display(), path.display()
+    )]
+    Lost {
+        /// `grades.csv` of the dataset.
+        path: PathBuf,
+        /// The reader.
+        reader: String,
+        /// The radiograph.
+        image: String,
+        /// The grade.
+        grade: f64,
+    },
+    /// Labels of readers that are there would be lost.
+    #[error(
+        "{} holds readers' labels that do not follow from grades.csv; move it away, or give their grades, before others take their place",
+        .0.display()
+    )]
+    OtherLabels(PathBuf),
+    /// Labels that are there are none.
+    #[error(transparent)]
+    Labels(#[from] LabelFileError),
+    /// A label off the grid.
+    #[error(transparent)]
+    Label(#[from] LabelError),
+}
