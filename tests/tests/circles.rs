@@ -1,4 +1,4 @@
-//! Data flow one way: no circle of imports between the modules of a crate.
+//! Data flow one way: no circle of imports between the modules of a crate, nor between the files of a module.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -46,29 +46,68 @@ fn names_after(code: &str, prefix: &str) -> BTreeSet<String> {
     names
 }
 
-fn imports(src: &Path) -> Imports {
+/// The files and folders of one folder of a crate, with the others there that each imports.
+fn imports(src: &Path, folder: &Path) -> Imports {
+    let inside = folder.strip_prefix(src).unwrap();
+    let parents = inside.iter().map(|part| part.to_str().unwrap());
+    let prefix = ["crate"].into_iter().chain(parents).chain([""]);
+    let prefix = prefix.collect::<Vec<_>>().join("::");
     let mut files = Vec::new();
-    sources(src, &mut files);
+    sources(folder, &mut files);
     let mut imports = Imports::new();
     for file in files {
-        let parts: Vec<_> = file.strip_prefix(src).unwrap().iter().collect();
+        let parts: Vec<_> = file.strip_prefix(folder).unwrap().iter().collect();
         let module = parts[0]
             .to_str()
             .unwrap()
             .trim_end_matches(".rs")
             .to_owned();
         let code = code(&file);
-        let mut names = names_after(&code, "crate::");
-        // `super` is the crate in files beside lib.rs.
+        let mut names = names_after(&code, &prefix);
+        // `super` is the folder in the files that lie in it.
         if parts.len() == 1 {
             names.extend(names_after(&code, "super::"));
         }
         names.remove(&module);
-        if !["lib", "main"].contains(&module.as_str()) {
+        if !["lib", "main", "mod"].contains(&module.as_str()) {
             imports.entry(module).or_default().extend(names);
         }
     }
     imports
+}
+
+/// Folders whose files still import each other in circles, and what joins them.
+const ONE_MODULE: [(&str, &str); 5] = [
+    (
+        "ppa-cli/src/commands/depth",
+        "`render` hands cases to `render_case`, which shares its output",
+    ),
+    (
+        "ppa-ct/src/dicom_series",
+        "header, attributes and file follow one walk through the elements",
+    ),
+    (
+        "ppa-learn/src/experiment",
+        "cells, tables and errors name each other's types",
+    ),
+    (
+        "ppa-learn/src/train",
+        "`run` owns the state that `steps` moves",
+    ),
+    (
+        "ppa-report/src/qa",
+        "sections escape their text with a function of `page`",
+    ),
+];
+
+fn folders(folder: &Path, found: &mut Vec<PathBuf>) {
+    found.push(folder.to_owned());
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() && path.file_name().unwrap() != "tests" {
+            folders(&path, found);
+        }
+    }
 }
 
 /// A circle that leads from `path`'s last module back to its first.
@@ -105,13 +144,24 @@ fn modules_of_a_crate_import_in_one_direction() {
     for entry in fs::read_dir(&root).unwrap() {
         let crate_root = entry.unwrap().path();
         let name = crate_root.file_name().unwrap().to_str().unwrap().to_owned();
-        if name.starts_with("ppa-") && crate_root.is_dir() {
-            let imports = imports(&crate_root.join("src"));
+        if !name.starts_with("ppa-") || !crate_root.is_dir() {
+            continue;
+        }
+        let src = crate_root.join("src");
+        let mut found = Vec::new();
+        folders(&src, &mut found);
+        for folder in found {
+            let imports = imports(&src, &folder);
             modules += imports.len();
-            assert_eq!(first_circle(&imports), None, "{name}");
+            let place = folder.strip_prefix(&root).unwrap().to_str().unwrap();
+            let circle = first_circle(&imports);
+            match ONE_MODULE.iter().any(|(listed, _)| *listed == place) {
+                false => assert_eq!(circle, None, "{place}"),
+                true => assert!(circle.is_some(), "{place} is listed, but has no circle"),
+            }
         }
     }
-    assert!(modules > 200, "{modules} modules");
+    assert!(modules > 500, "{modules} modules");
 }
 
 #[test]
