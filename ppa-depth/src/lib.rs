@@ -107,7 +107,7 @@ mod preview;
 mod coverage;
 mod roi;
 
-pub use ppa_core::Roi;
+pub use ppa_core::{RigidError, Roi};
 
 pub use body::{Body, PlacedBody};
 pub use body_error::BodyError;
@@ -121,7 +121,7 @@ pub use mesh_body::MeshBody;
 pub use preview::false_colour;
 pub use render::render;
 pub use rig::{MountedCamera, RigError, RigSpec};
-pub use rigid::{RigidError, isometry_from_rows, rows_from_isometry};
+pub use rigid::{isometry_from_rows, rows_from_isometry};
 pub use roi::{RoiError, roi_around};
 pub use sampled::{Backdrop, SampledImage};
 pub use sensor::Sensor;

@@ -48,12 +48,12 @@ mod supporting_plane;
 mod sweep;
 mod table_plane;
 
-pub use ppa_core::Side;
+pub use ppa_core::{RigidError, Side};
 
 pub use bump_sites::bump_sites;
 pub use device::XrayDevice;
 pub use find_landmarks::find_landmarks;
-pub use frames::{Camera, Ct, Device, NotRigid, Patient, Rigid, Room};
+pub use frames::{Camera, Ct, Device, Patient, Rigid, Room};
 pub use knee_axis::KneeAxis;
 pub use landmark_choices::{LandmarkError, LandmarkOverrides};
 pub use landmark_notes::LandmarkNote;
