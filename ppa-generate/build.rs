@@ -4,10 +4,10 @@
 //! In a checkout these are files beside this crate. A published crate cannot see its neighbours; their versions, which stand
 //! in for their contents, and those of all other crates are added by `src/compiled.rs`.
 
-use std::path::{Path, PathBuf};
-use std::{env, fs, io};
+use std::path::PathBuf;
+use std::{env, io};
 
-use sha2::{Digest, Sha256};
+use ppa_core::source_hash;
 
 /// Crates that decide the bytes of an image, as folders beside this one.
 const CRATES: [&str; 8] = [
@@ -33,7 +33,7 @@ fn main() -> io::Result<()> {
         roots = PARTS.map(|part| this.join(part)).into();
     }
 
-    let code = hash(&roots)? + &machine();
+    let code = source_hash(&roots)? + &machine();
     println!("cargo::rustc-env=PPA_CODE={code}");
     Ok(())
 }
@@ -44,36 +44,4 @@ fn machine() -> String {
     let target = ["TARGET", "CARGO_CFG_TARGET_FEATURE"].map(env::var);
     let target = target.map(|value| value.unwrap_or_default());
     format!(" {} {}", target[0], target[1])
-}
-
-/// The first eight bytes of a hash over the names and contents of files below some roots.
-fn hash(roots: &[PathBuf]) -> io::Result<String> {
-    let mut hasher = Sha256::new();
-    for root in roots.iter().filter(|root| root.exists()) {
-        println!("cargo::rerun-if-changed={}", root.display());
-        for file in &files(root)? {
-            let name = file.strip_prefix(root).expect("found below it");
-            hasher.update(name.to_string_lossy().as_bytes());
-            let bytes = fs::read(file)?;
-            hasher.update((bytes.len() as u64).to_le_bytes());
-            hasher.update(bytes);
-        }
-    }
-    let bytes = hasher.finalize();
-    Ok(bytes[..8].iter().map(|b| format!("{b:02x}")).collect())
-}
-
-/// All files at or below a path, in the order of their names.
-fn files(path: &Path) -> io::Result<Vec<PathBuf>> {
-    if path.is_file() {
-        return Ok(vec![path.to_owned()]);
-    }
-    let entries = fs::read_dir(path)?.map(|entry| Ok(entry?.path()));
-    let mut paths = entries.collect::<io::Result<Vec<_>>>()?;
-    paths.sort();
-    let below: Vec<_> = paths
-        .iter()
-        .map(|path| files(path))
-        .collect::<io::Result<_>>()?;
-    Ok(below.concat())
 }

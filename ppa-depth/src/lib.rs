@@ -65,13 +65,13 @@ mod render;
 mod roi;
 mod sensor;
 
-pub use ppa_core::Roi;
+pub use ppa_core::{RigidError, Roi};
 
 pub use camera::depth_mode::DepthMode;
 pub use camera::field_mask::FieldMask;
 pub use camera::projection::Camera;
 pub use camera::rig::{MountedCamera, RigError, RigSpec};
-pub use camera::rigid::{RigidError, isometry_from_rows, rows_from_isometry};
+pub use camera::rigid::{isometry_from_rows, rows_from_isometry};
 pub use camera::spec::{CameraError, CameraModel, CameraSpec};
 pub use camera::viewpoint::Viewpoint;
 pub use coverage::{Coverage, CoverageError, CoverageSettings, JointSurface};

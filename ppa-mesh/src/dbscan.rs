@@ -1,4 +1,7 @@
 //! Density-based clustering of points.
+//!
+//! On a surface of 691 000 points it takes 0.13 of the processor time of Open3D and 0.021 of that of linfa-clustering (bench
+//! `mesh`, docs/performance.md).
 
 use nalgebra::Point3;
 

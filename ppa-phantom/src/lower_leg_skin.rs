@@ -10,7 +10,7 @@ use nalgebra::{
 use super::envelope::{Bounded, Cover, Envelope};
 use super::hindfoot::{Mortise, SOLE_DEPTH_MM, WIDTH_LEVEL_MM, heel_valgus};
 use super::loft::{End, Loft, Section};
-use super::lower_leg_skin_table::{FOOT, SHANK, ShankSection, TOES};
+use super::lower_leg_skin_table::{SKIN, ShankSection};
 use super::midfoot_forefoot::ray_shifts_mm;
 use super::parameters::{P01, Parameters, TABLES};
 use super::placement::Placement;
@@ -64,33 +64,30 @@ fn turn_rad(p: &Parameters, station: f64) -> f64 {
 }
 
 /// A section of the shank with the girth of the leg, turned with the bones of the leg.
-fn shank_section(p: &Parameters, (station, centre, radii): &ShankSection) -> Section {
-    let wider = wider_behind(p, *station);
+fn shank_section(p: &Parameters, section: &ShankSection) -> Section {
+    let wider = wider_behind(p, section.station);
     let radii: [f64; 12] = std::array::from_fn(|n| {
         // From nothing in front to twice the mean behind.
         let behind = 1.0 + (n as f64 / 12.0 * TAU).sin();
-        radii[n] * (1.0 + wider * behind)
+        section.radii[n] * (1.0 + wider * behind)
     });
-    Section::polar(*station, *centre, &radii).turned(turn_rad(p, *station))
+    Section::polar(section.station, section.centre, &radii).turned(turn_rad(p, section.station))
 }
 
 /// A place so far below the skin at the back of a section of the shank.
-fn below_the_back(
-    p: &Parameters,
-    (station, centre, radii): &ShankSection,
-    depth_mm: f64,
-) -> [f64; 3] {
+fn below_the_back(p: &Parameters, section: &ShankSection, depth_mm: f64) -> [f64; 3] {
     const BACK: usize = 3; // the fourth radius is the one at 90°
-    let radius = radii[BACK] * (1.0 + 2.0 * wider_behind(p, *station));
-    let place = Vector2::from(*centre) + Vector2::new(0.0, radius - depth_mm);
-    let place = Rotation2::new(turn_rad(p, *station)) * place;
-    [place.x, place.y, *station]
+    let station = section.station;
+    let radius = section.radii[BACK] * (1.0 + 2.0 * wider_behind(p, station));
+    let place = Vector2::from(section.centre) + Vector2::new(0.0, radius - depth_mm);
+    let place = Rotation2::new(turn_rad(p, station)) * place;
+    [place.x, place.y, station]
 }
 
 /// The Achilles tendon, from the heel to where the calf begins, in the drawing of the leg.
 fn achilles(p: &Parameters, insertion: Point3<f64>) -> Shape {
-    let [ankle, above, calf] = [(&SHANK[3], 3.6), (&SHANK[4], 3.8), (&SHANK[6], 10.0)]
-        .map(|(section, depth_mm)| below_the_back(p, section, depth_mm));
+    let [ankle, above, calf] = [(3, 3.6), (4, 3.8), (6, 10.0)]
+        .map(|(section, depth_mm)| below_the_back(p, &SKIN.shank[section], depth_mm));
     Shape::union(
         8.0,
         vec![
@@ -102,7 +99,7 @@ fn achilles(p: &Parameters, insertion: Point3<f64>) -> Shape {
 }
 
 fn shank(p: &Parameters, mortise: &Mortise) -> Shape {
-    let sections = SHANK.iter().map(|section| shank_section(p, section));
+    let sections = SKIN.shank.iter().map(|section| shank_section(p, section));
     let loft = Loft::new(
         Isometry3::identity(),
         sections.collect(),
@@ -136,8 +133,9 @@ fn foot(p: &Parameters) -> Shape {
     let foot_from_limb = Isometry3::from_parts(Translation3::new(0.0, SOLE_DEPTH_MM, 0.0), turn);
     let loft = Loft::new(
         foot_from_limb,
-        FOOT.iter()
-            .map(|(station, corners, round)| Section::polygon(*station, corners, *round))
+        SKIN.foot
+            .iter()
+            .map(|section| Section::polygon(section.station, &section.corners, section.round))
             .collect(),
         End::Capped { blend: 12.0 },
         End::Capped { blend: 10.0 },
@@ -148,12 +146,18 @@ fn foot(p: &Parameters) -> Shape {
 
 /// Balls of the toes and their tips.
 fn toes(p: &Parameters) -> impl Iterator<Item = (Point3<f64>, f64, Point3<f64>, f64)> {
-    TOES.iter()
+    SKIN.toes
+        .iter()
         .zip(ray_shifts_mm(p))
-        .map(|(&(ball, ball_radius, tip, tip_radius), forward)| {
+        .map(|(toe, forward)| {
             let place =
                 |[x, y, height]: [f64; 3]| Point3::new(x, y - forward, height - SOLE_DEPTH_MM);
-            (place(ball), ball_radius, place(tip), tip_radius)
+            (
+                place(toe.ball),
+                toe.ball_radius,
+                place(toe.tip),
+                toe.tip_radius,
+            )
         })
 }
 
@@ -182,7 +186,7 @@ pub(super) fn envelope(
     let insertion = from_leg * (heel * Point3::new(-3.0, 44.0, -42.0));
     let achilles = achilles(p, insertion);
     // Between tibia and tendon, with which it moves.
-    let [_, back, _] = below_the_back(p, &SHANK[3], 17.5);
+    let [_, back, _] = below_the_back(p, &SKIN.shank[3], 17.5);
     let kager = Shape::ellipsoid([-2.0, back, 18.0], [13.0, 12.0, 38.0]);
     let heel_pad = Shape::ellipsoid([-3.0, 27.0, 6.0 - SOLE_DEPTH_MM], [26.0, 30.0, 16.0]);
     let size = leg_placement.scaling();

@@ -1,178 +1,50 @@
-//! Skin of P01: cross-sections of shank and foot, and the toes.
+//! Skin of P01, cross-sections of shank and foot, and the toes: `data/lower_leg_skin.toml`.
 
-/// Station above the joint, centre (x, y) and radii every 30° from medial over posterior.
-pub(super) type ShankSection = (f64, [f64; 2], [f64; 12]);
+use std::sync::LazyLock;
 
-pub(super) const SHANK: [ShankSection; 9] = [
-    (
-        -52.0,
-        [-3.0, 14.0],
-        [
-            25.0, 26.0, 29.0, 34.0, 30.0, 28.0, 26.0, 27.0, 30.0, 33.0, 31.0, 28.0,
-        ],
-    ),
-    (
-        -28.0,
-        [-2.0, 9.0],
-        [
-            30.0, 29.0, 33.0, 44.0, 35.0, 32.0, 33.0, 32.0, 33.0, 35.0, 34.0, 32.0,
-        ],
-    ),
-    (
-        -8.0,
-        [-1.0, 8.0],
-        [
-            31.0, 29.0, 29.0, 42.5, 31.0, 33.0, 35.0, 34.0, 34.0, 36.0, 36.0, 34.0,
-        ],
-    ),
-    (
-        12.0,
-        [-1.0, 10.0],
-        [
-            32.0, 28.0, 27.0, 38.5, 29.0, 30.0, 34.0, 34.0, 35.0, 37.0, 36.0, 35.0,
-        ],
-    ),
-    (
-        35.0,
-        [-2.0, 12.0],
-        [
-            32.0, 28.0, 28.0, 38.0, 29.0, 29.0, 33.0, 33.0, 34.0, 38.0, 34.0, 33.0,
-        ],
-    ),
-    (
-        70.0,
-        [-3.0, 14.0],
-        [
-            33.0, 32.0, 35.0, 40.0, 36.0, 33.0, 34.0, 33.0, 35.0, 38.0, 33.0, 32.0,
-        ],
-    ),
-    (
-        110.0,
-        [-4.0, 17.0],
-        [
-            39.0, 41.0, 44.0, 45.0, 45.0, 42.0, 39.0, 37.0, 37.0, 40.5, 36.0, 37.0,
-        ],
-    ),
-    (
-        170.0,
-        [-5.0, 22.0],
-        [
-            49.0, 52.0, 51.0, 49.0, 52.0, 53.0, 50.0, 45.0, 43.0, 46.0, 42.0, 45.0,
-        ],
-    ),
-    (
-        250.0,
-        [-6.0, 27.0],
-        [
-            56.0, 58.0, 56.0, 53.0, 57.0, 59.0, 56.0, 51.0, 49.0, 51.5, 48.0, 51.0,
-        ],
-    ),
-];
+use serde::Deserialize;
 
-/// Station in front of the joint, corners (x, height above the sole) and the radius they are grown by.
-pub(super) type FootSection = (f64, &'static [[f64; 2]], f64);
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ShankSection {
+    /// Above the joint.
+    pub station: f64,
+    pub centre: [f64; 2],
+    /// Every 30° from medial over posterior.
+    pub radii: [f64; 12],
+}
 
-pub(super) const FOOT: [FootSection; 8] = [
-    (
-        -40.0,
-        &[[6.0, 20.0], [5.0, 36.0], [-11.0, 36.0], [-12.0, 20.0]],
-        20.0,
-    ),
-    (
-        0.0,
-        &[[9.0, 20.0], [8.0, 53.0], [-14.0, 53.0], [-16.0, 20.0]],
-        20.0,
-    ),
-    (
-        28.0,
-        &[
-            [19.0, 36.0],
-            [13.0, 58.0],
-            [-4.0, 60.0],
-            [-20.0, 38.0],
-            [-23.0, 18.0],
-            [-8.0, 17.0],
-            [9.0, 24.0],
-        ],
-        16.0,
-    ),
-    (
-        58.0,
-        &[
-            [23.0, 41.0],
-            [15.0, 57.0],
-            [3.0, 58.0],
-            [-22.0, 41.0],
-            [-31.0, 20.0],
-            [-28.0, 14.0],
-            [-10.0, 16.0],
-            [11.0, 27.0],
-        ],
-        13.0,
-    ),
-    (
-        92.0,
-        &[
-            [26.0, 28.0],
-            [20.5, 49.0],
-            [6.0, 54.0],
-            [-18.0, 41.0],
-            [-35.0, 18.0],
-            [-33.0, 12.5],
-            [-8.0, 13.0],
-            [15.0, 18.0],
-        ],
-        12.0,
-    ),
-    (
-        113.0,
-        &[
-            [34.0, 17.0],
-            [28.5, 37.0],
-            [8.0, 43.0],
-            [-20.0, 32.0],
-            [-40.0, 14.5],
-            [-38.0, 11.0],
-            [0.0, 11.0],
-            [28.0, 12.0],
-        ],
-        11.0,
-    ),
-    (
-        134.0,
-        &[
-            [38.0, 13.0],
-            [32.0, 25.5],
-            [8.0, 28.0],
-            [-20.0, 22.0],
-            [-42.0, 12.0],
-            [-40.0, 10.0],
-            [0.0, 10.0],
-            [34.0, 10.0],
-        ],
-        10.0,
-    ),
-    (
-        158.0,
-        &[
-            [35.0, 10.5],
-            [30.0, 22.0],
-            [5.0, 22.5],
-            [-16.0, 16.0],
-            [-32.0, 10.0],
-            [-30.0, 9.0],
-            [0.0, 9.0],
-            [32.0, 9.0],
-        ],
-        9.0,
-    ),
-];
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FootSection {
+    /// In front of the joint.
+    pub station: f64,
+    /// x, height above the sole.
+    pub corners: Vec<[f64; 2]>,
+    /// The radius by which the corners are grown.
+    pub round: f64,
+}
 
-/// Ball of the toe and its tip: x, y, height above the sole; radii.
-pub(super) const TOES: [([f64; 3], f64, [f64; 3], f64); 5] = [
-    ([27.5, -150.0, 15.0], 14.5, [22.5, -193.5, 11.5], 11.5),
-    ([4.5, -150.0, 15.0], 10.5, [3.0, -195.5, 9.0], 8.8),
-    ([-10.8, -146.0, 14.0], 10.0, [-12.0, -188.0, 8.8], 8.5),
-    ([-25.2, -138.0, 12.5], 9.2, [-25.5, -179.0, 8.5], 8.2),
-    ([-38.5, -129.0, 11.5], 8.8, [-37.0, -166.5, 8.5], 8.2),
-];
+/// Ball of a toe and its tip: x, y, height above the sole.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Toe {
+    pub ball: [f64; 3],
+    pub ball_radius: f64,
+    pub tip: [f64; 3],
+    pub tip_radius: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Skin {
+    pub shank: [ShankSection; 9],
+    pub foot: [FootSection; 8],
+    #[serde(rename = "toe")]
+    pub toes: [Toe; 5],
+}
+
+pub(super) const TEXT: &str = include_str!("../data/lower_leg_skin.toml");
+
+pub(super) static SKIN: LazyLock<Skin> =
+    LazyLock::new(|| toml::from_str(TEXT).expect("a test reads the file"));

@@ -6,7 +6,7 @@
 use nalgebra::{Rotation3, Vector3};
 
 use super::bone::{Bone, Filling, Gap};
-use super::forefoot_table::{METATARSALS, Metatarsal, TOES};
+use super::forefoot_table::{FOREFOOT, Metatarsal};
 use super::parameters::{Parameters, TABLES};
 use super::sdf::Shape;
 
@@ -17,21 +17,13 @@ pub(super) struct Hindfoot {
 }
 
 impl Metatarsal {
-    fn with_head_moved(&self, forward: f64) -> Self {
-        let [x, y, z] = self.head;
-        Self {
-            head: [x, y - forward, z],
-            ..*self
-        }
-    }
-
-    fn solid(&self) -> Shape {
+    fn solid(&self, head: [f64; 3]) -> Shape {
         Shape::union(
             4.0,
             vec![
                 Shape::block(self.base, self.base_semi, 4.5, Rotation3::identity()),
-                Shape::round_cone(self.base, self.waist + 1.2, self.head, self.waist),
-                Shape::ellipsoid(self.head, self.head_semi),
+                Shape::round_cone(self.base, self.waist + 1.2, head, self.waist),
+                Shape::ellipsoid(head, self.head_semi),
             ],
         )
     }
@@ -157,23 +149,25 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
     let tarsals = [medial, intermediate, lateral, cuboid, navicular].map(|t| (t, gap));
 
     let mut previous: Option<usize> = None;
-    for ((metatarsal, toe), forward) in METATARSALS.iter().zip(&TOES).zip(ray_shifts_mm(p)) {
-        let metatarsal = metatarsal.with_head_moved(forward);
+    let rays = FOREFOOT.metatarsals.iter().zip(&FOREFOOT.toes);
+    for ((metatarsal, toe), forward) in rays.zip(ray_shifts_mm(p)) {
+        let moved = |[x, y, z]: [f64; 3]| [x, y - forward, z];
+        let head = moved(metatarsal.head);
         let mut neighbours = tarsals.to_vec();
         neighbours.extend(previous.map(|m| (m, 0.8 * gap)));
         let mut last = push(
-            metatarsal.name,
-            metatarsal.solid(),
+            metatarsal.name.as_str(),
+            metatarsal.solid(head),
             &neighbours,
-            Filling::tubular(metatarsal.base, metatarsal.head, 2.0, p.spongy_hu(220.0)),
+            Filling::tubular(metatarsal.base, head, 2.0, p.spongy_hu(220.0)),
         );
         previous = Some(last);
-        let distal = toe.names.len() - 1;
-        for (place, (&name, &(base, end))) in toe.names.iter().zip(toe.ends).enumerate() {
-            let [base, end] = [base, end].map(|[x, y, z]| [x, y - forward, z]);
+        let distal = toe.phalanges.len() - 1;
+        for (place, bone) in toe.phalanges.iter().enumerate() {
+            let [base, end] = [bone.base, bone.end].map(moved);
             let waist = toe.waist * if place == distal { 0.8 } else { 1.0 };
             last = push(
-                name,
+                &bone.name,
                 phalanx(base, end, waist),
                 &[(last, 0.8 * gap)],
                 Filling::tubular(base, end, 1.2, p.spongy_hu(180.0)),

@@ -1,7 +1,10 @@
 //! The numbers that make one phantom.
 
+use serde::Deserialize;
+
 /// Whose average a phantom is drawn around.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Sex {
     /// Adult women.
     Female,

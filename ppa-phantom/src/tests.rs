@@ -15,6 +15,7 @@ mod rays;
 mod scanner;
 mod sdf;
 mod skin;
+mod tables;
 mod tendon;
 mod variants;
 mod voxels;

@@ -9,7 +9,7 @@ use super::parameters::{P01, Parameters};
 use super::placement::Placement;
 use super::sdf::Shape;
 use super::smooth::smooth_step;
-use super::tibia_fibula_table::{FIBULA, TIBIA, TibiaSection};
+use super::tibia_fibula_table::{TIBIA_FIBULA, TibiaSection};
 
 /// Half the distance between the places where the front and the back of the syndesmosis are measured.
 const SYNDESMOSIS_REACH_MM: f64 = 6.0;
@@ -47,9 +47,9 @@ fn share_of_shift(station: f64) -> f64 {
 }
 
 /// Corners of a section of a tibia as wide as the trochlea asks for, with its incisura.
-fn tibia_section(p: &Parameters, (station, corners, round): &TibiaSection) -> Section {
-    let share = share_of_shift(*station);
-    let mut corners = *corners;
+fn tibia_section(p: &Parameters, section: &TibiaSection) -> Section {
+    let share = share_of_shift(section.station);
+    let mut corners = section.corners;
     for (n, [medial, _]) in corners.iter_mut().enumerate() {
         match n {
             0 | 5 => *medial -= share * p.lateral_shift_mm(),
@@ -58,7 +58,7 @@ fn tibia_section(p: &Parameters, (station, corners, round): &TibiaSection) -> Se
             _ => {}
         }
     }
-    Section::polygon(*station, &corners, *round)
+    Section::polygon(section.station, &corners, section.round)
 }
 
 /// How much shallower the incisura is than in P01.
@@ -90,7 +90,8 @@ fn syndesmosis(p: &Parameters, mortise: &Mortise) -> Gap {
 ///
 /// `flexion` is the motion of the talus, to whose facets the malleoli are cut.
 pub(super) fn tibia(p: &Parameters, mortise: &Mortise, flexion: &Placement, talus: usize) -> Bone {
-    let sections = TIBIA
+    let sections = TIBIA_FIBULA
+        .tibia
         .iter()
         .map(|section| tibia_section(p, section))
         .collect();
@@ -164,11 +165,13 @@ pub(super) fn fibula(
     flexion: &Placement,
     [talus, calcaneus, tibia]: [usize; 3],
 ) -> Bone {
-    let sections = FIBULA
+    let sections = TIBIA_FIBULA
+        .fibula
         .iter()
-        .map(|&(station, [medial, posterior], semi)| {
-            let medial = medial - fibula_shift_mm(p, station);
-            Section::ellipse(station, [medial, posterior], semi)
+        .map(|section| {
+            let [medial, posterior] = section.centre;
+            let medial = medial - fibula_shift_mm(p, section.station);
+            Section::ellipse(section.station, [medial, posterior], section.semi_axes)
         })
         .collect();
     let shaft_to_malleolus = Loft::new(

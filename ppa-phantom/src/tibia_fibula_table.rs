@@ -1,126 +1,39 @@
-//! Cross-sections of tibia and fibula in P01.
+//! Cross-sections of tibia and fibula in P01: `data/tibia_fibula.toml`.
 
-/// Corners of a tibial section as (medial, posterior) in the mortise frame, to be grown by a radius: anterolateral
-/// (Chaput) tubercle, front, anteromedial, posteromedial, back, posterolateral (Volkmann) tubercle,
-/// floor of the fibular incisura.
-pub(super) type TibiaSection = (f64, [[f64; 2]; 7], f64);
+use std::sync::LazyLock;
 
-/// From the joint line proximally, station in mm above the joint centre.
-pub(super) const TIBIA: [TibiaSection; 8] = [
-    (
-        -6.0,
-        [
-            [-18.7, -11.5],
-            [1.0, -15.5],
-            [20.0, -9.5],
-            [18.5, 9.5],
-            [1.0, 17.0],
-            [-15.0, 11.5],
-            [-11.5, -0.5],
-        ],
-        3.5,
-    ),
-    (
-        4.0,
-        [
-            [-18.7, -11.5],
-            [1.0, -15.5],
-            [20.0, -9.0],
-            [18.5, 9.5],
-            [1.0, 16.5],
-            [-15.5, 11.0],
-            [-11.5, -0.5],
-        ],
-        3.5,
-    ),
-    (
-        15.0,
-        [
-            [-18.0, -10.5],
-            [1.0, -14.5],
-            [17.0, -8.5],
-            [16.0, 9.0],
-            [1.0, 15.0],
-            [-15.0, 10.0],
-            [-11.5, -0.5],
-        ],
-        3.5,
-    ),
-    (
-        28.0,
-        [
-            [-14.0, -8.0],
-            [2.0, -13.0],
-            [13.5, -7.5],
-            [13.0, 8.5],
-            [1.0, 13.0],
-            [-12.0, 8.5],
-            [-11.0, -0.5],
-        ],
-        4.0,
-    ),
-    (
-        48.0,
-        [
-            [-9.5, -6.0],
-            [2.5, -11.5],
-            [10.5, -6.0],
-            [10.0, 7.5],
-            [0.5, 10.5],
-            [-9.0, 7.5],
-            [-9.5, 0.5],
-        ],
-        4.0,
-    ),
-    (
-        90.0,
-        [
-            [-8.0, -4.0],
-            [4.0, -11.5],
-            [9.0, -4.5],
-            [8.0, 7.0],
-            [0.0, 9.0],
-            [-8.0, 6.5],
-            [-8.5, 1.5],
-        ],
-        4.0,
-    ),
-    (
-        160.0,
-        [
-            [-8.0, -2.5],
-            [5.5, -13.0],
-            [8.5, -4.0],
-            [7.5, 8.0],
-            [0.0, 9.0],
-            [-8.0, 6.0],
-            [-9.0, 2.0],
-        ],
-        4.0,
-    ),
-    (
-        260.0,
-        [
-            [-9.0, -2.0],
-            [6.0, -14.5],
-            [9.5, -4.0],
-            [8.5, 9.0],
-            [0.0, 10.0],
-            [-9.5, 6.5],
-            [-10.5, 2.0],
-        ],
-        4.5,
-    ),
-];
+use serde::Deserialize;
 
-/// Station, centre (medial, posterior) and semi-axes of the fibula in the mortise frame.
-pub(super) const FIBULA: [(f64, [f64; 2], [f64; 2]); 8] = [
-    (-14.0, [-24.6, 3.0], [9.0, 10.5]),
-    (-4.0, [-23.4, 2.5], [9.0, 10.8]),
-    (8.0, [-24.0, 3.0], [8.3, 10.0]),
-    (22.0, [-23.5, 3.0], [7.3, 8.2]),
-    (45.0, [-22.5, 3.5], [6.0, 6.8]),
-    (90.0, [-24.0, 4.5], [5.5, 6.2]),
-    (160.0, [-28.5, 6.0], [5.8, 6.5]),
-    (260.0, [-34.0, 7.0], [6.2, 7.0]),
-];
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TibiaSection {
+    /// Above the joint centre.
+    pub station: f64,
+    /// (medial, posterior) of: anterolateral tubercle, front, anteromedial, posteromedial, back, posterolateral tubercle, floor of
+    /// the fibular incisura.
+    pub corners: [[f64; 2]; 7],
+    /// The radius by which the corners are grown.
+    pub round: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FibulaSection {
+    /// Above the joint centre.
+    pub station: f64,
+    /// (medial, posterior).
+    pub centre: [f64; 2],
+    pub semi_axes: [f64; 2],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TibiaFibula {
+    pub tibia: [TibiaSection; 8],
+    pub fibula: [FibulaSection; 8],
+}
+
+pub(super) const TEXT: &str = include_str!("../data/tibia_fibula.toml");
+
+pub(super) static TIBIA_FIBULA: LazyLock<TibiaFibula> =
+    LazyLock::new(|| toml::from_str(TEXT).expect("a test reads the file"));

@@ -4,9 +4,8 @@ use std::fmt;
 use std::marker::PhantomData;
 use std::ops::Mul;
 
-use nalgebra::{
-    Isometry3, Matrix3, Matrix4, Point3, Rotation3, Translation3, UnitQuaternion, Vector3,
-};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use ppa_core::{RigidError, TransformRows, check_rigid};
 use serde::{Deserialize, Serialize};
 
 /// Patient world of the scan: DICOM LPS, mm.
@@ -29,29 +28,6 @@ pub struct Room;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Camera;
 
-/// Why sixteen numbers are not a rigid motion.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum NotRigid {
-    /// A number is NaN or infinite.
-    #[error("the 4x4 matrix holds a value that is not a number")]
-    NotFinite,
-    /// The last row is not 0 0 0 1.
-    #[error("the last row of the 4x4 matrix is {0:?}, expected [0, 0, 0, 1]")]
-    LastRow([f64; 4]),
-    /// The 3x3 part scales, shears or mirrors.
-    #[error(
-        "the 3x3 part of the matrix is not a rotation: it is {deviation} away from \
-         orthonormal and its determinant is {determinant}, expected 0 and 1"
-    )]
-    NotARotation {
-        /// Largest entry of |RᵀR − 1|.
-        deviation: f64,
-        /// Determinant of R.
-        determinant: f64,
-    },
-}
-
 /// Rigid motion that takes coordinates in `From` to coordinates in `To`; millimetres.
 ///
 /// Values are named `target_from_source`, so that products read as chains, and a product whose
@@ -73,7 +49,7 @@ pub enum NotRigid {
 ///
 /// In files it is a row-major 4x4 matrix.
 #[derive(Serialize, Deserialize)]
-#[serde(try_from = "[[f64; 4]; 4]", into = "[[f64; 4]; 4]", bound = "")]
+#[serde(try_from = "TransformRows", into = "TransformRows", bound = "")]
 pub struct Rigid<To, From> {
     isometry: Isometry3<f64>,
     frames: PhantomData<fn(From) -> To>,
@@ -142,34 +118,19 @@ impl<To, From> Rigid<To, From> {
     }
 
     /// Row-major homogeneous 4x4 matrix, mm, as manifests hold it.
-    pub fn to_homogeneous_rows(&self) -> [[f64; 4]; 4] {
+    pub fn to_homogeneous_rows(&self) -> TransformRows {
         let matrix = self.isometry.to_homogeneous();
         std::array::from_fn(|row| std::array::from_fn(|column| matrix[(row, column)]))
     }
 }
 
-impl<To, From> TryFrom<[[f64; 4]; 4]> for Rigid<To, From> {
-    type Error = NotRigid;
+impl<To, From> TryFrom<TransformRows> for Rigid<To, From> {
+    type Error = RigidError;
 
-    /// Accepts rotations that are orthonormal within 1e-4 in RᵀR, as `ppa-depth` does: matrices
-    /// printed with five decimals. The rounding is removed: the rotation is the nearest one.
-    fn try_from(rows: [[f64; 4]; 4]) -> Result<Self, NotRigid> {
-        let matrix = Matrix4::from_fn(|row, column| rows[row][column]);
-        if !matrix.iter().all(|v| v.is_finite()) {
-            return Err(NotRigid::NotFinite);
-        }
-        if rows[3] != [0.0, 0.0, 0.0, 1.0] {
-            return Err(NotRigid::LastRow(rows[3]));
-        }
-        let linear: Matrix3<f64> = matrix.fixed_view::<3, 3>(0, 0).into_owned();
-        let deviation = (linear.transpose() * linear - Matrix3::identity()).amax();
-        let determinant = linear.determinant();
-        if deviation > 1e-4 || determinant < 0.0 {
-            return Err(NotRigid::NotARotation {
-                deviation,
-                determinant,
-            });
-        }
+    /// The rounding that [`check_rigid`] accepts is removed: the rotation is the nearest one.
+    fn try_from(rows: TransformRows) -> Result<Self, RigidError> {
+        check_rigid(&rows)?;
+        let linear = Matrix3::from_fn(|row, column| rows[row][column]);
         let origin = Point3::new(rows[0][3], rows[1][3], rows[2][3]);
         // Nearest in the Frobenius norm: the orthogonal factor of the polar decomposition, U Vᵀ.
         let factors = linear.svd(true, true);
@@ -180,7 +141,7 @@ impl<To, From> TryFrom<[[f64; 4]; 4]> for Rigid<To, From> {
     }
 }
 
-impl<To, From> std::convert::From<Rigid<To, From>> for [[f64; 4]; 4] {
+impl<To, From> std::convert::From<Rigid<To, From>> for TransformRows {
     fn from(rigid: Rigid<To, From>) -> Self {
         rigid.to_homogeneous_rows()
     }

@@ -14,9 +14,9 @@ mod landmarks;
 mod placement;
 mod room;
 
-pub use ppa_core::Side;
+pub use ppa_core::{RigidError, Side};
 
-pub use frames::{Camera, Ct, Device, NotRigid, Patient, Rigid, Room};
+pub use frames::{Camera, Ct, Device, Patient, Rigid, Room};
 pub use landmarks::bump_sites::bump_sites;
 pub use landmarks::choices::{LandmarkError, LandmarkOverrides};
 pub use landmarks::find::find_landmarks;

@@ -61,17 +61,29 @@ impl Codec {
     }
 }
 
-/// Refuses a stream whose frame is not of the size that the header states.
-fn expect_size(found: [usize; 2], image: &Image) -> Result<(), CodecError> {
+/// Refuses a stream that is not a grey image of the size that the header states, or has more bits than its containers.
+fn expect_frame(
+    size: [usize; 2],
+    components: usize,
+    bits: u32,
+    image: &Image,
+) -> Result<(), CodecError> {
     let expected = [image.columns, image.rows];
-    if found == expected {
-        return Ok(());
+    if size != expected {
+        let text = |[columns, rows]: [usize; 2]| format!("{columns} x {rows} pixels");
+        return Err(CodecError::Unexpected {
+            found: text(size),
+            expected: text(expected),
+        });
     }
-    let text = |[columns, rows]: [usize; 2]| format!("{columns} x {rows} pixels");
-    Err(CodecError::Unexpected {
-        found: text(found),
-        expected: text(expected),
-    })
+    expect_grey(components)?;
+    if bits > image.stored.bits_allocated {
+        return Err(CodecError::Unexpected {
+            found: format!("samples of {bits} bits"),
+            expected: format!("at most {}", image.stored.bits_allocated),
+        });
+    }
+    Ok(())
 }
 
 /// Refuses a stream in colour.
@@ -83,6 +95,24 @@ fn expect_grey(components: usize) -> Result<(), CodecError> {
         found: format!("{components} components"),
         expected: "1 (grey)".to_owned(),
     })
+}
+
+/// The next marker of a stream.
+fn marker(rest: &mut &[u8]) -> Option<u8> {
+    let [0xff, marker, tail @ ..] = *rest else {
+        return None;
+    };
+    *rest = tail;
+    Some(*marker)
+}
+
+/// The body of a segment, behind its length.
+fn segment<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
+    let (length, tail) = rest.split_first_chunk::<2>()?;
+    let length = usize::from(u16::from_be_bytes(*length)).checked_sub(2)?;
+    let (body, tail) = tail.split_at_checked(length)?;
+    *rest = tail;
+    Some(body)
 }
 
 /// Decoded samples in the containers of the header.
@@ -121,13 +151,16 @@ fn expect_memory(image: &Image, bytes_per_pixel: usize) -> Result<(), CodecError
     Ok(())
 }
 
-/// Refuses samples of more bits than a container has.
-fn expect_depth(bits: u32, image: &Image) -> Result<(), CodecError> {
-    if bits <= image.stored.bits_allocated {
-        return Ok(());
-    }
-    Err(CodecError::Unexpected {
-        found: format!("samples of {bits} bits"),
-        expected: format!("at most {}", image.stored.bits_allocated),
-    })
-}
+#[cfg(test)]
+const FOUR_BY_FOUR: Image = Image {
+    columns: 4,
+    rows: 4,
+    frames: 1,
+    stored: super::stored::StoredFormat {
+        bits_allocated: 8,
+        bits_stored: 8,
+        high_bit: 7,
+        signed: false,
+        padding: None,
+    },
+};

@@ -2,6 +2,8 @@
 //!
 //! Lengths are followed only as far as the bytes reach and nothing is copied. So a damaged length costs an error and no
 //! memory (dicom-object reserves whatever length a file claims, up to 4 GiB), and pixels are read from where they lie.
+//! A series of 512 slices takes a quarter of SimpleITK's processor time and 0.29 of its memory (bench `dicom`,
+//! docs/performance.md).
 
 use std::ops::Range;
 

@@ -9,8 +9,9 @@ use dicom_dictionary_std::{tags, uids};
 use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
 use ppa_ct::{ReadError, WarningCode, read, write_meta_image};
 
-use crate::nrrd::{header, voxels};
+use crate::nrrd::header;
 use crate::series::{SliceSpec, write_series};
+use crate::text_headers::voxels;
 use crate::volumes::small;
 
 /// What is named in a header may be anybody's file.

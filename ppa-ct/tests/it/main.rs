@@ -19,5 +19,6 @@ mod real;
 mod real_dicom;
 mod resample;
 mod series;
+mod text_headers;
 mod volumes;
 mod write;

@@ -3,11 +3,13 @@
 use std::fs;
 use std::io::Write;
 
-use crate::volumes::small;
 use flate2::Compression;
-use flate2::write::{GzEncoder, ZlibEncoder};
+use flate2::write::ZlibEncoder;
 use nalgebra::{Matrix3, Point3, Vector3};
 use ppa_ct::{ReadError, ReadOptions, Scan, WarningCode, read, read_with};
+
+use crate::text_headers::{assert_all_small, changed, gzipped, voxels};
+use crate::volumes::small;
 
 /// The header of [`small`] as lines; `ElementDataFile` comes behind.
 const LINES: &[&str] = &[
@@ -25,21 +27,7 @@ const LINES: &[&str] = &[
 
 /// [`LINES`] with some keys replaced, added, or (an empty value) left out.
 pub fn header(changes: &[&str], data_file: &str) -> String {
-    let key = |line: &str| line.split([' ', '=', ':']).next().unwrap().to_owned();
-    let mut lines = LINES.iter().map(|l| (*l).to_owned()).collect::<Vec<_>>();
-    for change in changes {
-        let known = lines.iter().position(|l| key(l) == key(change));
-        match known {
-            Some(n) if change.ends_with('=') => drop(lines.remove(n)),
-            Some(n) => lines[n] = (*change).to_owned(),
-            None => lines.push((*change).to_owned()),
-        }
-    }
-    lines.join("\n") + "\nElementDataFile = " + data_file + "\n"
-}
-
-pub fn voxels() -> Vec<u8> {
-    (-1000..-988_i16).flat_map(i16::to_le_bytes).collect()
+    changed(LINES, changes, &[' ', '=', ':']) + "ElementDataFile = " + data_file + "\n"
 }
 
 fn deflated(bytes: &[u8]) -> Vec<u8> {
@@ -67,10 +55,8 @@ fn beside(changes: &[&str], name: &str, data: &[u8]) -> Result<Scan, ReadError> 
 fn raw_packed_local_and_beside_are_one() {
     let packed = ["CompressedData = True"];
     let zlib = deflated(&voxels());
-    let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
-    gzip.write_all(&voxels()).unwrap();
-    let gzip = gzip.finish().unwrap();
-    for (way, scan) in [
+    let gzip = gzipped(&voxels());
+    assert_all_small([
         local(&[], &voxels()),
         local(&packed, &zlib),
         local(&packed, &gzip),
@@ -105,22 +91,13 @@ fn raw_packed_local_and_beside_are_one() {
             &["Comment = anything", "Modality = MET_MOD_OTHER"],
             &voxels(),
         ),
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        let scan = scan.unwrap_or_else(|e| panic!("{way}: {e}"));
-        assert_eq!(scan.volume, small(), "{way}");
-        assert_eq!(scan.warnings, [], "{way}");
-    }
+    ]);
 }
 
 /// Whatever of the voxels the buffer holds when their packing is looked at.
 #[test]
 fn packed_voxels_are_known_wherever_the_header_ends() {
-    let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
-    gzip.write_all(&voxels()).unwrap();
-    let gzip = gzip.finish().unwrap();
+    let gzip = gzipped(&voxels());
     let bare = ["CompressedData = True", "Comment = "];
     let length = header(&bare, "LOCAL").len();
     for end in 8190..8194 {

@@ -5,7 +5,8 @@ use std::fs;
 use ppa_ct::{WarningCode, WriteError, read, write_meta_image};
 use proptest::prelude::*;
 
-use crate::meta_image::{header, voxels};
+use crate::meta_image::header;
+use crate::text_headers::voxels;
 use crate::volumes::{max_abs, small, volumes};
 
 proptest! {

@@ -4,7 +4,8 @@ use std::fs;
 
 use ppa_ct::{ReadError, read};
 
-use crate::nrrd::{attached, detached, gzipped, header, voxels};
+use crate::nrrd::{attached, detached, header};
+use crate::text_headers::{gzipped, voxels};
 
 #[test]
 fn what_cannot_be_read_right_is_refused_by_name() {

@@ -172,31 +172,27 @@ impl DeviceCalibration {
             ));
         }
         let window = mode.window();
-        let [width, height] = window.size;
         // Unit scale has pixel borders at whole numbers; here pixel (0, 0) is a centre.
         let centre = |unit: f64, crop: f64| unit * window.sensor - crop - 0.5;
+        let camera = CameraSpec::brown_conrady(
+            window.size,
+            [
+                fx * window.sensor,
+                fy * window.sensor,
+                centre(cx, window.crop[0]),
+                centre(cy, window.crop[1]),
+            ],
+            [k1, k2, k3, k4, k5, k6],
+            [p1, p2],
+        );
         Ok(CameraSpec {
             model,
-            width,
-            height,
-            fx: fx * window.sensor,
-            fy: fy * window.sensor,
-            cx: centre(cx, window.crop[0]),
-            cy: centre(cy, window.crop[1]),
-            k1,
-            k2,
-            k3,
-            k4,
-            k5,
-            k6,
-            p1,
-            p2,
             metric_radius: Some(if depth.metric_radius <= 1e-4 {
                 DEFAULT_METRIC_RADIUS
             } else {
                 depth.metric_radius
             }),
-            mask: None,
+            ..camera
         })
     }
 }
@@ -213,43 +209,12 @@ impl OrbbecParam {
                 "its distortion model is {model}, expected 3 or 4 (Brown-Conrady)"
             ));
         }
-        let OrbbecIntrinsic {
-            fx,
-            fy,
-            cx,
-            cy,
-            width,
-            height,
-        } = self.depth_intrinsic;
-        let OrbbecDistortion {
-            k1,
-            k2,
-            k3,
-            k4,
-            k5,
-            k6,
-            p1,
-            p2,
-            ..
-        } = self.depth_distortion;
-        Ok(CameraSpec {
-            model: CameraModel::BrownConrady,
-            width,
-            height,
-            fx,
-            fy,
-            cx,
-            cy,
-            k1,
-            k2,
-            k3,
-            k4,
-            k5,
-            k6,
-            p1,
-            p2,
-            metric_radius: None,
-            mask: None,
-        })
+        let (intrinsic, lens) = (&self.depth_intrinsic, &self.depth_distortion);
+        Ok(CameraSpec::brown_conrady(
+            [intrinsic.width, intrinsic.height],
+            [intrinsic.fx, intrinsic.fy, intrinsic.cx, intrinsic.cy],
+            [lens.k1, lens.k2, lens.k3, lens.k4, lens.k5, lens.k6],
+            [lens.p1, lens.p2],
+        ))
     }
 }

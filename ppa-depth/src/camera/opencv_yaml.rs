@@ -3,7 +3,7 @@
 //! A file storage is no YAML 1.2 (its first line is `%YAML:1.0`, matrices carry a tag of their own), so the few entries that
 //! make a camera are looked up line by line.
 
-use crate::camera::spec::{CameraModel, CameraSpec};
+use crate::camera::spec::CameraSpec;
 
 /// Names under which programs store the camera matrix and the coefficients.
 const MATRIX_KEYS: &[&str] = &["camera_matrix", "cameraMatrix", "K"];
@@ -52,25 +52,12 @@ pub(crate) fn camera(text: &str) -> Result<CameraSpec, String> {
             "it has thin-prism or tilt coefficients, expected the rational model alone".to_owned(),
         );
     }
-    Ok(CameraSpec {
-        model: CameraModel::BrownConrady,
-        width: size(text, "image_width")?,
-        height: size(text, "image_height")?,
-        fx,
-        fy,
-        cx,
-        cy,
-        k1,
-        k2,
-        k3,
-        k4,
-        k5,
-        k6,
-        p1,
-        p2,
-        metric_radius: None,
-        mask: None,
-    })
+    Ok(CameraSpec::brown_conrady(
+        [size(text, "image_width")?, size(text, "image_height")?],
+        [fx, fy, cx, cy],
+        [k1, k2, k3, k4, k5, k6],
+        [p1, p2],
+    ))
 }
 
 /// What follows `key:` at the start of a line.

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Isometry3, Point3, Vector3};
+use ppa_core::RigidError;
 use serde::{Deserialize, Serialize};
 
 use crate::camera::depth_mode::DepthMode;
-use crate::camera::rigid::{RigidError, isometry_from_rows, rows_from_isometry};
+use crate::camera::rigid::{isometry_from_rows, rows_from_isometry};
 use crate::camera::spec::{CameraError, CameraSpec};
 use crate::camera::viewpoint::looking_at;
 

@@ -155,6 +155,34 @@ impl CameraSpec {
     /// Most columns or rows of an image.
     pub(crate) const MAX_SIDE: u32 = 16_384;
 
+    /// A camera with OpenCV's rational lens: size in pixels, focal lengths and principal point, k1 to k6, p1 and p2.
+    pub(crate) fn brown_conrady(
+        [width, height]: [u32; 2],
+        [fx, fy, cx, cy]: [f64; 4],
+        [k1, k2, k3, k4, k5, k6]: [f64; 6],
+        [p1, p2]: [f64; 2],
+    ) -> Self {
+        Self {
+            model: CameraModel::BrownConrady,
+            width,
+            height,
+            fx,
+            fy,
+            cx,
+            cy,
+            k1,
+            k2,
+            k3,
+            k4,
+            k5,
+            k6,
+            p1,
+            p2,
+            metric_radius: None,
+            mask: None,
+        }
+    }
+
     /// An Azure Kinect in one of its depth modes, without the mode's [mask](DepthMode::mask).
     ///
     /// Numbers of the calibration in the unit tests of the public Azure Kinect Sensor SDK

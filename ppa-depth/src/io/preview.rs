@@ -2,8 +2,6 @@
 
 use std::path::Path;
 
-use ppa_core::whole_file;
-
 use crate::image::{DepthError, DepthImage};
 
 /// A depth in false colour (8 bits of red, green and blue): `range` from near, red, to far, blue; black where it is not above 0.
@@ -33,17 +31,8 @@ impl DepthImage {
             .iter()
             .flat_map(|&z_mm| false_colour(z_mm.into(), range));
         let bytes: Vec<u8> = pixels.collect();
-        whole_file::write_with(path, |writer| {
-            let mut encoder = png::Encoder::new(writer, self.width, self.height);
-            encoder.set_color(png::ColorType::Rgb);
-            let mut image = encoder.write_header()?;
-            image.write_image_data(&bytes)?;
-            Ok(image.finish()?)
-        })
-        .map_err(|source| DepthError::Write {
-            path: path.into(),
-            source,
-        })
+        let rgb = (png::ColorType::Rgb, png::BitDepth::Eight);
+        self.write_pixels(path, &bytes, rgb, png::Compression::Balanced)
     }
 
     fn percentiles(&self, shares: [f64; 2]) -> [f32; 2] {

@@ -1,4 +1,7 @@
 //! STL (stereolithography): triangles without shared vertices, text or binary.
+//!
+//! stl_io 0.11 cannot read the files of the tests: it refuses text in capitals and binary files whose header begins with
+//! `solid`, accepts NaN and bytes after the last triangle, and names no line. Its writer wraps the number of triangles at 2³².
 
 use std::collections::HashMap;
 use std::io::{self, Write};

@@ -1,5 +1,5 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use ppa_scene::{Ct, NotRigid, Patient, Plane, Rigid, Room};
+use ppa_scene::{Ct, Patient, Plane, Rigid, RigidError, Room};
 use proptest::prelude::*;
 
 pub fn isometries() -> impl Strategy<Value = Isometry3<f64>> {
@@ -81,13 +81,13 @@ fn matrices_that_are_not_rigid_are_refused() {
         Rigid::<Room, Ct>::try_from(rows).unwrap_err()
     };
     assert!(
-        matches!(refuse(0, 0, 1.01), NotRigid::NotARotation { .. }),
+        matches!(refuse(0, 0, 1.01), RigidError::NotOrthonormal { .. }),
         "scale"
     );
-    assert!(
-        matches!(refuse(2, 2, -1.0), NotRigid::NotARotation { .. }),
-        "mirror"
-    );
-    assert!(matches!(refuse(3, 0, 1.0), NotRigid::LastRow(_)));
-    assert!(matches!(refuse(1, 3, f64::NAN), NotRigid::NotFinite));
+    assert!(matches!(refuse(2, 2, -1.0), RigidError::Mirror), "mirror");
+    assert!(matches!(refuse(3, 0, 1.0), RigidError::LastRow { .. }));
+    assert!(matches!(
+        refuse(1, 3, f64::NAN),
+        RigidError::NotFinite { .. }
+    ));
 }

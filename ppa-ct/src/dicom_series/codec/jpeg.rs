@@ -3,7 +3,7 @@
 use libjpeg_turbo_rs::precision::{decompress_12bit, decompress_lossless_arbitrary};
 use libjpeg_turbo_rs::{Decoder, JpegError, PixelFormat};
 
-use super::{CodecError, contain, expect_depth, expect_grey, expect_memory, expect_size};
+use super::{CodecError, contain, expect_frame, expect_memory};
 use crate::dicom_series::header::Image;
 
 /// What the decoder holds of a pixel: coefficients and samples.
@@ -17,7 +17,6 @@ struct Frame {
 
 pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError> {
     let frame = frame(packed, image)?;
-    expect_depth(frame.bits.into(), image)?;
     expect_memory(image, BYTES_PER_PIXEL)?;
     match frame {
         Frame { lossless: true, .. } => {
@@ -55,8 +54,7 @@ fn frame(packed: &[u8], image: &Image) -> Result<Frame, CodecError> {
                     return Err(no_frame());
                 };
                 let size = [[*x1, *x0], [*y1, *y0]].map(|v| u16::from_be_bytes(v).into());
-                expect_size(size, image)?;
-                expect_grey((*components).into())?;
+                expect_frame(size, (*components).into(), (*bits).into(), image)?;
                 return Ok(Frame {
                     lossless: *marker == 0xc3,
                     bits: *bits,

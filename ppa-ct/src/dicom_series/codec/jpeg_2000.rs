@@ -6,7 +6,7 @@ mod segments;
 
 use hayro_jpeg2000::{DecodeSettings, DecoderContext, Image as Jp2};
 
-use super::{CodecError, contain, expect_depth, expect_grey, expect_memory, expect_size};
+use super::{CodecError, contain, expect_frame, expect_grey, expect_memory};
 use crate::dicom_series::header::Image;
 
 /// What the decoder holds of a pixel: coefficients, their transform, samples, and bytes of its code-block.
@@ -22,11 +22,10 @@ pub(super) fn unpack(packed: &[u8], image: &Image) -> Result<Vec<u8>, CodecError
     };
     // Without the boxes: what they may say of colours is no matter of grey images.
     let stream = Jp2::new(codestream, &settings).map_err(|e| damaged(&e))?;
-    expect_size([stream.width() as usize, stream.height() as usize], image)?;
     let components = u32::from(stream.color_space().num_channels()) + u32::from(stream.has_alpha());
-    expect_grey(components as usize)?;
     let bits = u32::from(stream.original_bit_depth());
-    expect_depth(bits, image)?;
+    let size = [stream.width() as usize, stream.height() as usize];
+    expect_frame(size, components as usize, bits, image)?;
     expect_memory(image, BYTES_PER_PIXEL)?;
     let mut context = DecoderContext::default();
     let decoded = stream.decode(&mut context).map_err(|e| damaged(&e))?;
@@ -56,7 +55,7 @@ fn is_signed(codestream: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dicom_series::stored::StoredFormat;
+    use crate::dicom_series::codec::FOUR_BY_FOUR;
 
     /// A codestream of 4 x 4 pixels whose one tile is empty.
     fn stream(components: u8) -> Vec<u8> {
@@ -82,19 +81,11 @@ mod tests {
 
     #[test]
     fn colour_is_refused_before_it_is_decoded() {
-        let image = Image {
-            columns: 4,
-            rows: 4,
-            frames: 1,
-            stored: StoredFormat {
-                bits_allocated: 8,
-                bits_stored: 8,
-                high_bit: 7,
-                signed: false,
-                padding: None,
-            },
+        let error = |components| {
+            unpack(&stream(components), &FOUR_BY_FOUR)
+                .unwrap_err()
+                .to_string()
         };
-        let error = |components| unpack(&stream(components), &image).unwrap_err().to_string();
         assert!(error(1).contains("damaged"), "{}", error(1));
         assert!(error(3).contains("3 components"), "{}", error(3));
         assert!(error(4).contains("4 components"), "{}", error(4));

@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use super::super::{marker, segment};
+
 /// Progression changes that are followed: as many as layers and resolutions of a stream that anybody writes. Each makes
 /// the decoder sort all precincts once more.
 const CHANGES_AT_MOST: usize = 64;
@@ -146,23 +148,6 @@ impl Segments {
 
 /// Start of a tile-part.
 const SOT: [u8; 2] = [0xff, 0x90];
-
-fn marker(rest: &mut &[u8]) -> Option<u8> {
-    let [0xff, marker, tail @ ..] = *rest else {
-        return None;
-    };
-    *rest = tail;
-    Some(*marker)
-}
-
-/// The body of a segment, behind its length.
-fn segment<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
-    let (length, tail) = rest.split_first_chunk::<2>()?;
-    let length = usize::from(u16::from_be_bytes(*length)).checked_sub(2)?;
-    let (body, tail) = tail.split_at_checked(length)?;
-    *rest = tail;
-    Some(body)
-}
 
 /// Leaves out a segment that decides no cost, if it has a right length.
 fn skip(marker: u8, rest: &mut &[u8], changes: &mut usize) -> Option<()> {
