@@ -1,4 +1,4 @@
-//! `ppa --help`: the commands, grouped by what they are for.
+//! `ppa --help`: the commands in groups.
 
 use std::fmt::Write;
 

@@ -1,4 +1,4 @@
-//! Which scan to read, and what to let pass: the same for every command.
+//! Options of every command that reads a scan.
 
 use std::path::PathBuf;
 

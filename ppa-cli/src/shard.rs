@@ -1,4 +1,4 @@
-//! Which shard of a plan this process makes: named by `--shard`, or by what started it.
+//! The shard that this process generates: from `--shard`, or from the environment of a scheduler.
 
 use std::env;
 

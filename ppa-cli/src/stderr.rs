@@ -1,4 +1,4 @@
-//! What is said on stderr besides progress: warnings, notes, and the error that ends the program.
+//! Messages on stderr besides progress: warnings, notes, and the final error.
 //!
 //! With `--json` each is one line of JSON.
 

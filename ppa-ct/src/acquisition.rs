@@ -1,4 +1,4 @@
-//! What a source says about its own making, beyond geometry and values: facts for the audit.
+//! Facts about the acquisition that a file states beyond geometry and values, for the audit.
 
 use std::collections::BTreeSet;
 

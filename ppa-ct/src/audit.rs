@@ -1,4 +1,4 @@
-//! Import audit: is this scan what one thinks, and what does it mean for the images made from it?
+//! Import audit: geometry, values and content of a scan, and their consequences for the images made from it.
 //!
 //! [`Audit::of`] looks at geometry, values, what the field of view cuts off, metal, couch and
 //! identifiers, and turns what the reader noticed into the same form. Spatial checks work on means

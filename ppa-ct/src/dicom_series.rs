@@ -1,4 +1,4 @@
-//! A folder of DICOM slices, or a single file, becomes a scan.
+//! A scan from a folder of DICOM slices or a single file.
 
 mod attributes;
 mod codec;

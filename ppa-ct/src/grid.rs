@@ -1,4 +1,4 @@
-//! The lattice of voxel centres: how many, and where in the world.
+//! The lattice of voxel centres: size, spacing, position and orientation.
 
 use nalgebra::{Affine3, Matrix3, Matrix4, Point3, Vector3};
 

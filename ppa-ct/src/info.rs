@@ -1,4 +1,4 @@
-//! What `ppa ct info` prints about a scan.
+//! Output of `ppa ct info`.
 
 use serde::Serialize;
 

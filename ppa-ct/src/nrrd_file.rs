@@ -1,4 +1,4 @@
-//! NRRD in and out: a text header, then raw or gzipped voxels, in the same file or in one beside it.
+//! NRRD files: a text header, then raw or gzipped voxels in the same file or a separate one.
 //!
 //! Fields as in the "Definition of NRRD File Format" (teem.sourceforge.net/nrrd/format.html).
 

@@ -1,4 +1,4 @@
-//! Which reader a file or folder belongs to.
+//! Choice of the reader for a file or folder.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! A scan as read: the volume, and what a user should know about it.
+//! A scan as read: the volume and its warnings.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! How voxels are stored in a file, and how they become Hounsfield units and back.
+//! Storage of voxels in a file, and conversion to and from Hounsfield units.
 
 use std::io::{self, Read, Write};
 

@@ -1,4 +1,4 @@
-//! Findings: doubts about a limb or a pose, which travel with the data from the case to the training.
+//! Findings: doubts about a limb or a pose, carried with the data from the case to the training.
 //!
 //! `ppa prepare` writes them into the case, a dataset lists those of all its limbs in `findings.json`. A person who has
 //! looked at a severe one names its code in `acknowledged` of the case; until then every command repeats it.

@@ -1,4 +1,4 @@
-//! Where each file of a dataset lies: the layout published by the paper's authors.
+//! File names of a dataset: the layout published by the paper's authors.
 //!
 //! ```text
 //! patient_0/depth/{l,r}/{orig,big,small,bumps_a,bumps_b}/depth_cam_{left,right}_{angle}.png

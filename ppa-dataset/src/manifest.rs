@@ -1,4 +1,4 @@
-//! The manifest: `manifest.jsonl` with one row per image, `dataset.json` with what all share.
+//! The manifest: `manifest.jsonl` with one row per image, `dataset.json` with the settings common to all.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Which persons are for training, which for testing: `splits/*.json`.
+//! Persons for training and persons for testing: `splits/*.json`.
 //!
 //! A split is by person, never by image or foot: poses of one foot are alike, and so are both feet of one person.
 

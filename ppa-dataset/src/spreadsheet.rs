@@ -1,4 +1,4 @@
-//! What spreadsheet programs do with a cell of a CSV file.
+//! Cells of a CSV file that spreadsheet programs would run as formulas.
 
 /// Whether spreadsheet programs run a text as a formula when they open a CSV file: quoting does not stop them.
 ///

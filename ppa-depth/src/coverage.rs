@@ -1,4 +1,4 @@
-//! How much of the surface near a joint a camera sees, and how finely.
+//! Share of the surface near a joint that a camera sees, and its sampling density.
 
 use std::cmp::Ordering;
 

@@ -1,4 +1,4 @@
-//! Whether a case can still be used, and what of it has changed since it was written.
+//! Carries a case out again and compares it with what was found.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Whether a dataset holds what was made: every image, record and list against the others.
+//! Checks a dataset for completeness: images, records and lists against each other.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! A plan with every key and what it means, to start from.
+//! A plan with every key and its meaning, as a template.
 
 use std::path::Path;
 

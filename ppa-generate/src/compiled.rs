@@ -1,4 +1,4 @@
-//! Which program made a dataset.
+//! Identity of the compiled program.
 
 use std::any::TypeId;
 use std::sync::LazyLock;

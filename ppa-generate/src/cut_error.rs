@@ -1,4 +1,4 @@
-//! How much of an image the field of view may cut, and the refusal of more.
+//! Limits on the share of an image cut off by the field of view.
 
 use std::fmt;
 

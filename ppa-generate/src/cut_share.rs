@@ -1,4 +1,4 @@
-//! How much of what a pose shows is where the field of view of its scan cut the limb off.
+//! Share of a pose's images in which the limb is cut off by the field of view of its scan.
 
 use nalgebra::{Isometry3, Point3};
 use ppa_dataset::findings::{Finding, FindingCode, Severity};

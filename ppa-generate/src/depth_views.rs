@@ -1,4 +1,4 @@
-//! What the cameras of a plan see of a limb at one angle, as in the plan's dataset.
+//! Depth images of a limb at one angle from the cameras of a plan, as in the plan's dataset.
 
 use ppa_dataset::BodyShape;
 use ppa_dataset::layout::View;

@@ -1,4 +1,4 @@
-//! `dataset.json`: what all images of a dataset share, free of paths and identities.
+//! `dataset.json`: the settings common to all images, without paths or identities.
 
 use ppa_core::TransformRows;
 use ppa_dataset::files::{FileError, hex, sha256_of_file};

@@ -1,4 +1,4 @@
-//! In which keys two descriptions of a dataset differ.
+//! Keys in which two descriptions of a dataset differ.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! The poses of everything in a room, named, so that any program can check them.
+//! Poses of everything in a room, named, for use in other programs.
 
 use std::collections::BTreeMap;
 

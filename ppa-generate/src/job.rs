@@ -1,4 +1,4 @@
-//! The units of a dataset carried through: what is there is kept, what is missing is made.
+//! Runs the pose jobs of a dataset: keeps finished poses, makes the missing ones.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,4 +1,4 @@
-//! The poses of a dataset by limb, and which of them belong to a part.
+//! The poses of a dataset by limb, and those of one shard.
 
 use ppa_core::Part;
 use ppa_dataset::findings::FindingCode;

@@ -1,4 +1,4 @@
-//! What lists all poses of a dataset: regions of interest, findings and manifest, with their hashes.
+//! Lists over all poses: regions of interest, findings and manifest, with their hashes.
 
 use std::path::{Path, PathBuf};
 

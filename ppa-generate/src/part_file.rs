@@ -1,4 +1,4 @@
-//! Which part of a plan a folder is to hold: `.ppa/part`, absent where it is the whole.
+//! The shard that a folder holds: `.ppa/part`, absent for a whole plan.
 
 use std::io;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! `dataset.json` read back: what a dataset is to hold.
+//! `dataset.json` read back: the intended content of a dataset.
 
 use std::path::Path;
 

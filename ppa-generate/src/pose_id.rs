@@ -1,4 +1,4 @@
-//! Which pose of which limb.
+//! Identity of a pose: limb and angle.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Records of finished poses, kept in the dataset: what makes a run resumable.
+//! Records of finished poses, stored in the dataset, from which a run resumes.
 
 use std::fmt;
 use std::fs;

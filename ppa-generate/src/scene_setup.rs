@@ -1,4 +1,4 @@
-//! What all limbs of a plan share: room, table, x-ray device, cameras, x-ray beam.
+//! Scene common to all limbs of a plan: room, table, x-ray device, cameras, beam.
 
 use std::path::PathBuf;
 

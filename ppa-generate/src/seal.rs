@@ -1,4 +1,4 @@
-//! JSON objects that carry the hash of their own text, so that any later change to them shows.
+//! JSON objects with a hash of their own text, so that later changes are detected.
 
 use sha2::{Digest, Sha256};
 

@@ -1,4 +1,4 @@
-//! How far a dataset has come.
+//! Progress of a dataset: poses done, missing and damaged.
 
 use std::fs;
 use std::path::Path;

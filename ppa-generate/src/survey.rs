@@ -1,4 +1,4 @@
-//! What a folder holds already, compared with what a run would make in it.
+//! Comparison of a folder's content with what a run would make in it.
 
 use std::collections::{HashMap, HashSet};
 use std::fmt;

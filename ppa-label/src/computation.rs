@@ -1,4 +1,4 @@
-//! `openness.json`: what computed labels were computed with.
+//! `openness.json`: settings of the computed labels.
 
 use ppa_dataset::labels::LabelSource;
 use ppa_dataset::labels::{BoneFile, BoneNumbers};

@@ -1,4 +1,4 @@
-//! Computed labels of a dataset: every radiograph of a limb graded by how open its joint space lies.
+//! Computed labels of a dataset: a grade for every radiograph of a limb from the openness of its joint space.
 
 use std::path::PathBuf;
 

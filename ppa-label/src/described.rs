@@ -1,4 +1,4 @@
-//! What computed labels need to know of a dataset beside its manifest.
+//! Data of a dataset, besides its manifest, that computed labels need.
 
 use nalgebra::Isometry3;
 use ppa_dataset::files::{FileError, read_text};

@@ -1,4 +1,4 @@
-//! Readings and their standard errors from the tallies of a radiograph.
+//! Signals and standard errors from the tallies of a radiograph.
 
 use std::io::BufReader;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! The network beside reference values of another program.
+//! Comparison of the network with reference values of another program.
 
 use std::collections::HashMap;
 use std::path::Path;

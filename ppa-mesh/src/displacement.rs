@@ -1,4 +1,4 @@
-//! How far one shape of a skin is from another.
+//! Distance between two shapes of a skin.
 
 use std::iter::zip;
 

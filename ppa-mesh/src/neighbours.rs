@@ -1,4 +1,4 @@
-//! Which vertices of a mesh are joined by an edge.
+//! Neighbours of the vertices of a mesh.
 
 use crate::mesh::Mesh;
 

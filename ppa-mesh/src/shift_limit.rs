@@ -1,4 +1,4 @@
-//! How far a skin can move before it turns inside out or meets itself.
+//! Largest displacement of a skin before it folds or meets itself.
 
 use nalgebra::{Point3, Vector3};
 

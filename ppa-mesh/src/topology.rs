@@ -1,4 +1,4 @@
-//! Counts that show whether a mesh is one closed surface.
+//! Counts that show whether a mesh is one closed surface: boundary edges, components, Euler characteristic.
 
 use crate::mesh::Mesh;
 

@@ -1,4 +1,4 @@
-//! Predictions that hardly depend on what is predicted.
+//! Predictions that are nearly constant.
 
 use std::fmt;
 

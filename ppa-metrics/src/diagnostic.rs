@@ -1,4 +1,4 @@
-//! Whether a prediction decides like the label that a radiograph must be retaken.
+//! Binary decision of a prediction: diagnostic, or to be retaken.
 
 use crate::error::{MetricError, check_scores};
 use crate::regression::mean_score;

@@ -1,4 +1,4 @@
-//! How far predictions are from labels.
+//! Errors of predictions: mean squared and mean absolute error.
 
 use crate::error::{MetricError, check_scores};
 

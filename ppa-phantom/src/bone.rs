@@ -1,4 +1,4 @@
-//! Bones: a solid, the joints cut into it, and what fills it.
+//! Bones: outer shape, joints cut into it, and filling.
 
 use nalgebra::{Point3, Unit, Vector3};
 

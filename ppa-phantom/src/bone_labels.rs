@@ -1,4 +1,4 @@
-//! Which bone a voxel belongs to.
+//! Bone label of each voxel.
 
 use ppa_ct::Grid;
 use rayon::prelude::*;

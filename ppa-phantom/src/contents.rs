@@ -1,4 +1,4 @@
-//! What fills a point or a small ball of a limb: tissue and Hounsfield units.
+//! Tissue and Hounsfield units at a point or in a small ball of a limb.
 
 use nalgebra::Point3;
 

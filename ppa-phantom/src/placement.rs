@@ -1,4 +1,4 @@
-//! Where a drawn shape goes.
+//! Placement of a drawn shape.
 
 use nalgebra::Similarity3;
 

@@ -1,4 +1,4 @@
-//! What a straight ray meets: an oracle for depth images and radiographs.
+//! Intersections of a straight ray with a limb: reference values for depth images and radiographs.
 
 use nalgebra::{Point3, Unit, Vector3};
 

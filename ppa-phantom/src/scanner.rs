@@ -1,4 +1,4 @@
-//! What a scanner makes of a phantom: blur and noise.
+//! Scanner model: blur and noise.
 
 use ppa_ct::with_room;
 use ppa_ct::{Volume, VolumeError};

@@ -1,4 +1,4 @@
-//! What is true about a phantom by construction.
+//! Ground truth of a phantom by construction.
 
 use nalgebra::{Point3, Unit, Vector3};
 use serde::Serialize;

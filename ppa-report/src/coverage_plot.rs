@@ -1,4 +1,4 @@
-//! A picture of where cameras could stand, and how much of a joint each would see.
+//! Plot of possible camera positions, and the share of a joint seen from each.
 
 use image::{Rgb, RgbImage};
 use ppa_depth::{Coverage, Viewpoint};

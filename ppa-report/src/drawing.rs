@@ -1,4 +1,4 @@
-//! What pictures for people are drawn with.
+//! Drawing of pictures for people.
 
 use image::{Rgb, RgbImage};
 

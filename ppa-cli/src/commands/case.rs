@@ -1,4 +1,4 @@
-//! `ppa case`: what has become of a case.
+//! `ppa case`: checks of a case.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `ppa completions`: what a shell needs to complete commands and options.
+//! `ppa completions`: completion scripts for shells.
 
 use clap::Args;
 use clap_complete::{Shell, generate};

@@ -1,4 +1,4 @@
-//! `ppa eval`: what the predictions of a trained network are worth.
+//! `ppa eval`: evaluation of a trained network.
 
 use std::path::PathBuf;
 use std::sync::Arc;

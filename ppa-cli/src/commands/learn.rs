@@ -1,4 +1,4 @@
-//! `ppa learn`: the network beside reference values, and its weight files.
+//! `ppa learn`: comparison of the network with reference values, and its weight files.
 
 use std::path::{Path, PathBuf};
 

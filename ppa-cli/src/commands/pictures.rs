@@ -1,4 +1,4 @@
-//! Pictures that commands write beside what they make.
+//! Pictures written beside the results of commands.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! `ppa verify`: whether a dataset is what its plan makes.
+//! `ppa verify`: regenerates a sample of a dataset and compares it.
 
 use std::path::{Path, PathBuf};
 

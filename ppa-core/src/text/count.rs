@@ -1,4 +1,4 @@
-//! Counts with the singular or the plural of what is counted.
+//! Counts with singular or plural nouns.
 
 use std::fmt::Display;
 

@@ -1,4 +1,4 @@
-//! The form of what an audit finds.
+//! Findings of an audit.
 
 use serde::Serialize;
 

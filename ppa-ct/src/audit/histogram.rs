@@ -1,4 +1,4 @@
-//! How often each HU occurs.
+//! Histogram of HU.
 
 use rayon::prelude::*;
 

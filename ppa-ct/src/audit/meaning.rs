@@ -1,4 +1,4 @@
-//! What each finding means for depth images and for radiographs.
+//! Consequences of each finding for depth images and radiographs.
 
 use super::findings::FindingCode;
 use crate::scan::WarningCode;

@@ -1,4 +1,4 @@
-//! An audit as one HTML page that needs nothing else: no network, no script, no name of a file.
+//! An audit as one self-contained HTML page: no network, no script, no file names.
 
 use std::fmt::Write;
 

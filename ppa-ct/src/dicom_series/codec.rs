@@ -1,4 +1,4 @@
-//! Compressed frames become containers as the header describes them, little-endian.
+//! Decoding of compressed frames into little-endian samples.
 //!
 //! Decoders: RLE and JPEG-LS are ours (no maintained crate of Rust alone holds the latter), JPEG is libjpeg-turbo-rs,
 //! JPEG 2000 hayro-jpeg2000. All are Rust; sizes are compared with the header before any of them reserves memory.

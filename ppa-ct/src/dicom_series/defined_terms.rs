@@ -1,4 +1,4 @@
-//! What a header calls its modality and its unit, as terms of closed lists.
+//! Modality and unit of a header as terms of closed lists.
 //!
 //! These attributes are text, and text may be anything: only terms that the standard defines are repeated.
 

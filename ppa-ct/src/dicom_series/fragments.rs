@@ -1,4 +1,4 @@
-//! Compressed pixels: which fragments make up which frame (PS3.5, section A.4).
+//! Assignment of compressed fragments to frames (PS3.5, section A.4).
 
 use std::borrow::Cow;
 

@@ -1,4 +1,4 @@
-//! Where one slice lies in space, and what its values mean.
+//! Position of one slice in space, and the unit of its values.
 
 use dicom_dictionary_std::tags;
 use nalgebra::{Point3, Vector3};

@@ -1,4 +1,4 @@
-//! What the header of one DICOM file says: which series, and which slices.
+//! The header of one DICOM file: its series and its slices.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Which series lie in a folder, and which one to read.
+//! The series in a folder, and the choice of one.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Slices in space: their order, their step, and whether they make one lattice.
+//! Slices in space: order, spacing, and whether they form one lattice.
 
 mod gaps;
 mod steps;

@@ -1,4 +1,4 @@
-//! What a DICOM header says about the acquisition, and which identifying attributes it holds.
+//! Statements of a DICOM header about the acquisition, and the identifying attributes it holds.
 
 use std::collections::BTreeSet;
 

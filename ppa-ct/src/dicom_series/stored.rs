@@ -1,4 +1,4 @@
-//! Stored numbers: where they sit in their containers, which of them are padding, and how they become HU.
+//! Stored values: bit layout, padding, conversion to HU.
 
 use dicom_dictionary_std::tags;
 

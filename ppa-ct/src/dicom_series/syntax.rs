@@ -1,4 +1,4 @@
-//! Transfer syntaxes: their names, and which of them ppa reads.
+//! Transfer syntaxes: names, and support.
 
 use std::path::Path;
 

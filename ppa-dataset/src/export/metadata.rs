@@ -1,4 +1,4 @@
-//! What the metadata of a dataset are made from.
+//! Input of a dataset's metadata.
 
 use std::collections::BTreeSet;
 

@@ -1,4 +1,4 @@
-//! What other programs read of a dataset: tables, metadata, archives. All of it is derived and can be made anew.
+//! Export for other programs: tables, metadata, archives. All of it is derived and can be regenerated.
 
 mod bag;
 mod croissant;

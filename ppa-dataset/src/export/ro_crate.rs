@@ -1,4 +1,4 @@
-//! RO-Crate 1.1 with the Process Run profile 0.5: which program made the dataset, and from what.
+//! RO-Crate 1.1 with the Process Run profile 0.5: provenance of the dataset.
 
 use serde_json::{Value, json};
 

@@ -1,4 +1,4 @@
-//! One row per file, with everything that is known of it.
+//! One row per file, with all its metadata.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! A dataset against what `manifest.jsonl` and `dataset.json` state of it.
+//! Comparison of a dataset with its `manifest.jsonl` and `dataset.json`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

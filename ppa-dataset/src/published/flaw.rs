@@ -1,4 +1,4 @@
-//! What may be wrong with a dataset that fits its layout.
+//! Flaws of a dataset.
 
 use super::Unpaired;
 use crate::layout::LimbId;

@@ -1,4 +1,4 @@
-//! Every image of a published dataset decoded and compared with what the lists say of it.
+//! Decodes every image of a dataset and compares it with the lists.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! The specimen layout: names, and how it is read.
+//! The specimen layout: file names and reading.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,4 @@
-//! What a dataset holds of poses that no camera saw.
+//! Files of poses without depth images.
 
 use std::collections::BTreeSet;
 use std::fmt;

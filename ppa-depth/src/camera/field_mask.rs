@@ -1,4 +1,4 @@
-//! Which directions a camera gives depth for.
+//! Directions in which a camera measures depth.
 
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};

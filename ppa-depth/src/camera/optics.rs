@@ -1,4 +1,4 @@
-//! What the rasteriser knows about a camera's lens: its rays, and how far straight edges bow in the image.
+//! A camera's lens as the rasteriser needs it: rays, and curvature of straight edges in the image.
 
 use nalgebra::{Matrix2, Vector2};
 

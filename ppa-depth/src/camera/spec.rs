@@ -1,4 +1,4 @@
-//! What a user writes down about one camera.
+//! Description of one camera in files.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! What stands in front of the camera.
+//! Bodies in front of a camera.
 
 use nalgebra::Isometry3;
 

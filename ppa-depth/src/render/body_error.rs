@@ -1,4 +1,4 @@
-//! What points and triangles must be to make a body.
+//! Checks of the points and triangles of a body.
 
 /// Why points or triangles do not make a body.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

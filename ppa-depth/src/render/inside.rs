@@ -1,4 +1,4 @@
-//! Whether a camera stands inside a body.
+//! Test for a camera inside a body.
 
 use nalgebra::{Point3, Vector2};
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! The lens in single precision: fast, and good to find out which pixels a triangle may cover.
+//! The lens in single precision, to find candidate pixels of a triangle.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 

@@ -1,4 +1,4 @@
-//! From what a camera sees to what a Time-of-Flight sensor makes of it.
+//! Applies the sensor model to an ideal depth image.
 
 use nalgebra::Complex;
 use rayon::prelude::*;

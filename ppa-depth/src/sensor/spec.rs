@@ -1,4 +1,4 @@
-//! What a user writes down about the errors of a Time-of-Flight sensor.
+//! Description of the errors of a Time-of-Flight sensor in files.
 
 use serde::{Deserialize, Serialize};
 

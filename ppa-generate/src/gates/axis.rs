@@ -1,4 +1,4 @@
-//! Whether the axis of rotation runs along the bone.
+//! Angle between the axis of rotation and the bone.
 
 use ppa_dataset::findings::{Finding, FindingCode, Severity};
 use ppa_scene::{AxisSource, Landmarks, LimbKind, Shaft};

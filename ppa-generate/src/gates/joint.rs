@@ -1,4 +1,4 @@
-//! Whether the joint is one, and lies where it can.
+//! Plausibility of the joint and of its position.
 
 use nalgebra::{Point3, Vector3};
 use ppa_ct::Volume;

@@ -1,4 +1,4 @@
-//! Gates: what `ppa prepare` doubts about a limb, each with the limit that its number was compared with.
+//! Gates: the doubts of `ppa prepare` about a limb, each with its value and limit.
 //!
 //! Numbers come from [`LimbMeasures`] and [`LimbReport`](ppa_mesh::LimbReport); here they are judged. Everything follows
 //! from scan, skin and landmarks, so that a case that was edited gets new findings.

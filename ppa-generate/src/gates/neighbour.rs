@@ -1,4 +1,4 @@
-//! Whether a part of another limb hangs on this one.
+//! Contact with part of another limb.
 
 use ppa_dataset::findings::{Finding, FindingCode, Severity};
 use ppa_mesh::LimbReport;

@@ -1,4 +1,4 @@
-//! Whether the limb is of the side that was said.
+//! Agreement of the stated side with the anatomy.
 
 use ppa_dataset::findings::{Finding, FindingCode, Severity};
 use ppa_scene::{Fibula, Landmarks, Side};

@@ -1,4 +1,4 @@
-//! Whether the limb has the size of one.
+//! Plausibility of the limb's size.
 
 use ppa_dataset::findings::{Finding, FindingCode, Severity};
 use ppa_mesh::LimbReport;

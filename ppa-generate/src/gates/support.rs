@@ -1,4 +1,4 @@
-//! Whether the supporting plane touches skin, at places far enough apart.
+//! Contacts of the supporting plane with the skin.
 
 use nalgebra::{Point3, Vector3};
 use ppa_ct::Volume;

@@ -1,4 +1,4 @@
-//! Commands that look at a dataset change nothing in it.
+//! Commands that only read a dataset change nothing in it.
 
 use std::fs;
 use std::os::unix::fs::MetadataExt;

@@ -1,4 +1,4 @@
-//! What of a plan cannot work, found before anything is made.
+//! Checks of a plan before anything is made.
 
 use super::Plan;
 

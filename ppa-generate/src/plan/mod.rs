@@ -1,4 +1,4 @@
-//! `plan.toml`: what a dataset is made of.
+//! `plan.toml`: the settings of a dataset.
 
 mod check;
 mod error;

@@ -1,4 +1,4 @@
-//! Where the rays of a radiograph come from.
+//! Origin of the rays of a radiograph.
 
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 

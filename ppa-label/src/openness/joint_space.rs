@@ -1,4 +1,4 @@
-//! The gutters of an ankle, and how open they lie to the beam.
+//! The gutters of an ankle, and their openness to the beam.
 
 use std::fmt;
 

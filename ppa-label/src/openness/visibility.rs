@@ -1,4 +1,4 @@
-//! How well a radiograph itself shows the gutters: contrast above its noise, with scatter and blur in it.
+//! Visibility of the gutters in a radiograph: contrast-to-noise ratio with scatter and blur.
 
 use nalgebra::{Isometry3, Point3, Vector2};
 use ppa_xray::Detector;

@@ -1,4 +1,4 @@
-//! What an exposure shows of each gutter: areas that rays pass freely, and contrast.
+//! Visible parts of each gutter: areas that rays pass freely, and contrast.
 
 use super::bones::AnkleBone;
 use super::exposure::Exposure;

@@ -1,4 +1,4 @@
-//! Labels of readers: what they are shown, and what becomes of their grades.
+//! Labels by readers: the cases they see, and their grades.
 
 mod grades;
 mod import;

@@ -1,4 +1,4 @@
-//! The page on which a reader grades radiographs: one file of HTML that needs no network.
+//! The page on which a reader grades radiographs: one HTML file that works offline.
 
 use std::io::Cursor;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! What readers are shown, in which order, and the key that shows which radiograph each picture is.
+//! Radiographs shown to readers: order, pseudonyms, and the key to them.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What of a scan is bone.
+//! Voxels that are bone.
 
 use nalgebra::Vector3;
 use ppa_ct::Grid;

@@ -1,4 +1,4 @@
-//! What can be wrong with images, labels and splits.
+//! Errors of images, labels and splits.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! From depth images to what the network sees: regions of interest, augmentation, balanced sampling, loading.
+//! From depth images to network input: regions of interest, augmentation, balanced sampling, loading.
 //!
 //! A 16-bit image in mm is cut to the square around the joint and brought to 1.2 times the network's side
 //! ([`prepare`]); training augments ([`Augmentation`]), evaluation only resizes ([`evaluation_input`]). Depths are divided by

@@ -1,4 +1,4 @@
-//! What networks train on and are evaluated on, and the split between both.
+//! Samples of training and evaluation, and the split between them.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;

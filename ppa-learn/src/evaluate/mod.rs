@@ -1,4 +1,4 @@
-//! What predictions are worth: metrics by image, pose and person, confusion, calibration, errors by angle, and figures.
+//! Evaluation of predictions: metrics by image, pose and person, confusion, calibration, errors by angle, figures.
 
 mod error;
 mod figure;

@@ -1,4 +1,4 @@
-//! Poses of a test set: what all cameras and frames of each say together.
+//! Predictions of a test set averaged over cameras and frames of each pose.
 
 use std::collections::BTreeMap;
 

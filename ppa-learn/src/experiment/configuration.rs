@@ -1,4 +1,4 @@
-//! What the paper compares: the columns of its tables 1 to 4.
+//! Configurations that the paper compares: the columns of its tables 1 to 4.
 
 use ppa_dataset::BodyShape;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! Which persons are tested in which fold, always by person, never by image.
+//! Cross-validation folds by person, never by image.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,4 @@
-//! The paper's experiments: what is compared, which trainings that takes, and the tables of their results.
+//! The paper's experiments: configurations, trainings, and tables of results.
 //!
 //! A [`Configuration`] is a column of a table. Each is trained for every fold, camera view and seed ([`runs`]), some on
 //! top of a pretraining that several runs share ([`Unit::needs`]). The predictions of the two views are joined

@@ -1,4 +1,4 @@
-//! What an experiment runs on, as a file says.
+//! The experiment file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! What the networks of the two views said of the images that they were tested with.
+//! Predictions of both views' networks on their test images.
 
 use std::collections::BTreeMap;
 use std::fmt;

@@ -1,4 +1,4 @@
-//! What is kept of a finished training, to check whether it is still the one that a plan asks for.
+//! Record of a finished training, to check that it is still the one asked for.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What networks say of the frames of both cameras.
+//! Predictions on the frames of both cameras.
 
 use std::path::{Path, PathBuf};
 

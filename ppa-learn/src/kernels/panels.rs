@@ -1,4 +1,4 @@
-//! Weights of a pointwise convolution in the order in which its kernel reads them.
+//! Weights of a pointwise convolution in the order of its kernel.
 
 use pulp::{Simd, WithSimd};
 

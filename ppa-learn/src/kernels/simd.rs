@@ -1,4 +1,4 @@
-//! Which vector instructions a kernel runs with, and the sigmoid in them.
+//! Choice of vector instructions, and the sigmoid in them.
 
 use pulp::{Arch, Scalar, Simd, WithSimd};
 

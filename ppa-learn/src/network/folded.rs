@@ -1,4 +1,4 @@
-//! What inference needs of the parameters, made ready once for as many images as follow.
+//! Parameters prepared for inference.
 
 use super::architecture::{Architecture, ConvPlace};
 use super::norm::running;

@@ -1,4 +1,4 @@
-//! The network in operations of candle beside our kernels and beside PyTorch, on the CPU.
+//! The network in operations of candle compared with our kernels and with PyTorch, on the CPU.
 
 use std::collections::HashMap;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! A network whose parameters stay as they are, made ready for one image after the other.
+//! A network with fixed parameters, prepared for repeated inference.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! First values of the parameters, and random gains of what training leaves out.
+//! Initial values of the parameters, and random gains of untrained layers.
 
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, Normal, Uniform};

@@ -1,4 +1,4 @@
-//! Batch normalisation: moments, running statistics, and what its gradient is made of.
+//! Batch normalisation: moments, running statistics, gradient.
 
 use super::architecture::NormPlace;
 use crate::kernels::batch_norm::Affine;

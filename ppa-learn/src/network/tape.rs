@@ -1,4 +1,4 @@
-//! What a training pass leaves for its gradient.
+//! Values of a forward pass that the backward pass needs.
 
 use std::ops::Range;
 

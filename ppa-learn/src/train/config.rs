@@ -1,4 +1,4 @@
-//! What a training does, as a file says.
+//! Settings of a training.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;

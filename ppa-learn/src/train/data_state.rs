@@ -1,4 +1,4 @@
-//! What a checkpoint remembers of the samples that it was trained with.
+//! Fingerprint of the training samples in a checkpoint.
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

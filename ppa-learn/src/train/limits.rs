@@ -1,4 +1,4 @@
-//! What a configuration may hold.
+//! Limits on the settings of a training.
 
 use super::config::TrainConfig;
 use super::config_error::ConfigError;

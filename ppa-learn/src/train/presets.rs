@@ -1,4 +1,4 @@
-//! What a training does unless its file says otherwise.
+//! Default settings of a training.
 
 use std::num::NonZeroUsize;
 

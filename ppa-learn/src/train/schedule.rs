@@ -1,4 +1,4 @@
-//! How many steps are made, and how far each goes.
+//! Number of steps, and learning rate of each.
 
 use std::fmt;
 

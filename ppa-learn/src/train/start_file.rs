@@ -1,4 +1,4 @@
-//! What a training did not take from its `start` file as it stood, for whoever looks at the run later.
+//! Record of the parameters that a training did not take unchanged from its `start` file.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! The steps of a training, and what is measured and kept between them.
+//! The steps of a training, with measurements and checkpoints between them.
 
 use std::num::NonZeroUsize;
 use std::path::Path;

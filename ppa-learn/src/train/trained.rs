@@ -1,4 +1,4 @@
-//! The network and the samples of a configuration, and what such a network says.
+//! The network and the samples of a configuration, and the network's predictions.
 
 use std::num::NonZeroUsize;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Which of the bodies in a scan is the limb.
+//! Choice of the limb among the bodies in a scan.
 
 use nalgebra::{Point3, Vector3};
 use ppa_ct::Grid;

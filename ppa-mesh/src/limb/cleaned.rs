@@ -1,4 +1,4 @@
-//! The limb with nothing else around it, as the surface sees it.
+//! The volume with everything but the limb removed.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! What was found and what was cut away.
+//! Bodies found and parts cut away.
 
 use ppa_ct::Grid;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! What may be chosen about finding the limb.
+//! Settings of limb extraction.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! What each voxel is, within the box that holds everything but the couch.
+//! Class of each voxel in the box that holds everything but the couch.
 
 use rayon::prelude::*;
 

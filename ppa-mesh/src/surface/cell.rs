@@ -1,4 +1,4 @@
-//! What the surface looks like inside one cell: a table made from a rule, not copied.
+//! The surface inside one cell: a table derived from a rule.
 //!
 //! Corners are numbered by bits (x = 1, y = 2, z = 4), edge `4 axis + o` runs along `axis` from the
 //! corner whose bits on the two following axes are `o`, and face `2 axis + side` is normal to

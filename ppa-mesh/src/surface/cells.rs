@@ -1,4 +1,4 @@
-//! A row of cells: what lies at their corners and on their edges, from left to right.
+//! A row of cells: corners and edges from left to right.
 
 use super::field::Sample;
 use super::inside::{InsideBits, right_of};

@@ -1,4 +1,4 @@
-//! Which voxels are inside, one bit each.
+//! Inside voxels, one bit each.
 
 use super::field::{Field, Sample};
 

@@ -1,4 +1,4 @@
-//! Parts of a surface become one mesh.
+//! Joins parts of a surface into one mesh.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Whether two loops of a cell bound one tube instead of two disks.
+//! Test whether two loops of a cell bound one tube instead of two disks.
 //!
 //! The trilinear interpolant may connect two inside (or two outside) corners through the interior
 //! of the cell though no face does. Corner values of a z-slice are linear in z and the sign of its

@@ -1,4 +1,4 @@
-//! How far readers agree: intraclass correlation, Krippendorff's α, weighted κ, bias of each reader, repeats.
+//! Agreement of readers: intraclass correlation, Krippendorff's α, weighted κ, bias of each reader, repeats.
 
 mod icc;
 mod kappa;

@@ -1,4 +1,4 @@
-//! Bones, their gaps, and what a radiograph would show of them.
+//! Bones, their gaps, and their visibility in a radiograph.
 
 use std::collections::BTreeMap;
 

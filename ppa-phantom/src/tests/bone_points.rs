@@ -1,4 +1,4 @@
-//! The points of one bone, and what follows from them alone.
+//! The points of one bone, and measures derived from them.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use ppa_ct::Grid;

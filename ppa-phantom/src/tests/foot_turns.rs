@@ -1,4 +1,4 @@
-//! How the foot is turned against the leg, from the voxels of its bones alone.
+//! Rotation of the foot against the leg, from the voxels of its bones alone.
 
 use nalgebra::{Point3, Rotation3, Vector3};
 

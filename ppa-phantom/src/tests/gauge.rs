@@ -1,4 +1,4 @@
-//! An instrument that measures a lower leg in its voxels, along lines that the shapes show.
+//! Measures a lower leg in its voxels.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Published dimensions that no single parameter shows.
+//! Published dimensions that depend on several parameters.
 
 use nalgebra::{Point3, Vector3};
 

@@ -1,4 +1,4 @@
-//! One sheet on which a person checks a prepared limb: three slices and three views of the skin.
+//! One sheet to check a prepared limb: three slices and three views of the skin.
 
 use image::RgbImage;
 use nalgebra::Vector3;

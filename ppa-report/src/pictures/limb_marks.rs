@@ -1,4 +1,4 @@
-//! What is known of a limb, drawn over a view of it in the ct frame: axis, joint, regions, plane.
+//! Axis, joint, regions and plane of a limb drawn over a view of it in the ct frame.
 
 use nalgebra::{Point3, Vector3};
 use ppa_scene::{AxisRegion, Landmarks, Plane};

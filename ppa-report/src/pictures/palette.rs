@@ -1,4 +1,4 @@
-//! Colours of the pictures, the same thing in the same colour everywhere.
+//! Colours of the pictures.
 
 use super::canvas::Colour;
 

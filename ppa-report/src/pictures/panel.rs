@@ -1,4 +1,4 @@
-//! What every panel of a picture has: its ground, title, orientation letters and scale bar.
+//! Common parts of a panel: background, title, orientation letters, scale bar.
 
 use super::canvas::{Canvas, GLYPH, Rect, text_width};
 use super::palette::{INK, PANEL};

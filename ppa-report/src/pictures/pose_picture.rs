@@ -1,4 +1,4 @@
-//! One sheet on which a person checks a limb on the table: the room with device and cameras, and the limb from three sides.
+//! One sheet to check a limb on the table: the room with device and cameras, and the limb from three sides.
 
 use image::RgbImage;
 use nalgebra::{Point3, Vector3};

@@ -1,4 +1,4 @@
-//! What stands around a placed limb, as points and lines in the room: device, detector, cameras, contacts.
+//! Surroundings of a placed limb as points and lines in the room: device, detector, cameras, contacts.
 
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use ppa_depth::{Camera, MountedCamera, RigError, RigSpec};

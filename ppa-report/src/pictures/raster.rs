@@ -1,4 +1,4 @@
-//! Triangles and points into a panel: the nearest surface per sample, with its normal and what it belongs to.
+//! Rasteriser of triangles and points: the nearest surface per sample, its normal and its owner.
 
 use nalgebra::{Point3, Vector3};
 use ppa_mesh::{Mesh, PointCloud};

@@ -1,4 +1,4 @@
-//! What the page shows against the angle, and of depths: charts of one limb.
+//! Charts of one limb: quantities against the angle, and depths.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! How much of each region of interest shows a face where the field of view of the CT cut the limb.
+//! Share of each region of interest that shows a face where the field of view of the CT cut the limb.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! What the page shows of one limb.
+//! Section of one limb.
 
 use std::path::Path;
 

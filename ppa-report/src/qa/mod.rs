@@ -1,4 +1,4 @@
-//! A dataset on one page, for a person to look through before anything is trained on it.
+//! Quality report: a dataset on one page, to be read before anything is trained on it.
 
 mod chart;
 mod curves;

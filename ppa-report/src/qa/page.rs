@@ -1,4 +1,4 @@
-//! The page: what stands on it, and in which order.
+//! The page: its sections and their order.
 
 use std::path::{Path, PathBuf};
 

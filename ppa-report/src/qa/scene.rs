@@ -1,4 +1,4 @@
-//! What `dataset.json` states of cameras and origin.
+//! Cameras and origin as stated in `dataset.json`.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! What the largest bone of each slice spans, and where it is as broad as a knee.
+//! Extent of the largest bone in each slice, and where it is as broad as a knee.
 
 use nalgebra::{Point3, Vector2, Vector3};
 use ppa_ct::Volume;

@@ -1,4 +1,4 @@
-//! What a person may decide about a limb, and what can go wrong.
+//! A person's choices about a limb, and errors of landmarks.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

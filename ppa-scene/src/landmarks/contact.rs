@@ -1,4 +1,4 @@
-//! How far a limb must tip so that it rests on two places: the core of T_opt.
+//! Tilt at which a limb rests on two places: the core of T_opt.
 
 /// The paper's τ: both ends count as resting when their heights differ by less, mm.
 pub(crate) const TAU_MM: f64 = 0.05;

@@ -1,4 +1,4 @@
-//! What has to be known about a limb before it can be posed, and the frame that follows.
+//! Landmarks needed to pose a limb, and the frame they define.
 
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 use ppa_core::Side;

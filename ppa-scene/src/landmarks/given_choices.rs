@@ -1,4 +1,4 @@
-//! Whether a joint centre and an anterior direction that a person gave fit the limb.
+//! Checks of a given joint centre and anterior direction against the limb.
 
 use nalgebra::{Point3, Vector3};
 use ppa_ct::Volume;

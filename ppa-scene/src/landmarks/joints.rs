@@ -1,4 +1,4 @@
-//! Which joints a limb shows: its ankle, its knee, or both.
+//! Joints that a limb shows: ankle, knee, or both.
 
 use nalgebra::Vector3;
 use ppa_ct::Volume;

@@ -1,4 +1,4 @@
-//! Which shafts give the axis of a knee.
+//! Choice of the shafts that give the axis of a knee.
 
 /// The shafts through which the axis of a knee runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

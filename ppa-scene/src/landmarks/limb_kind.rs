@@ -1,4 +1,4 @@
-//! Which limb and which joint.
+//! Kind of limb and joint.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! What landmarks alone do not show: how they were decided.
+//! Notes on how landmarks were decided.
 
 use crate::landmarks::knee_axis::KneeAxis;
 use crate::landmarks::limb_kind::Joint;

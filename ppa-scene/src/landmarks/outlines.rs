@@ -1,4 +1,4 @@
-//! Sets of pixels: what hangs together, its holes, and where it is pinched off.
+//! Sets of pixels: components, holes, and narrow places.
 
 /// A pixel (u, v).
 pub(crate) type Pixel = (usize, usize);

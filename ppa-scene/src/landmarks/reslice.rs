@@ -1,4 +1,4 @@
-//! A scan cut anew across a limb that lies aslant in it.
+//! Slices across a limb that is oblique in its scan.
 
 use nalgebra::{Affine3, Matrix3, Matrix4, Point3, Vector3};
 use ppa_ct::{Grid, Interpolation, Volume, VolumeError};

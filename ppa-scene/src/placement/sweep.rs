@@ -1,4 +1,4 @@
-//! The range of rotations for which pairs are made.
+//! The range of rotation angles of a dataset.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! What counts as a table top, and why none is found.
+//! Criteria for a table top, and errors when none is found.
 
 use serde::{Deserialize, Serialize};
 

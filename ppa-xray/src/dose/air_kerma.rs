@@ -1,4 +1,4 @@
-//! Air kerma: where the beam enters the patient, and of what reaches the detector.
+//! Air kerma at the entrance of the patient and at the detector.
 
 use nalgebra::Point3;
 

@@ -1,4 +1,4 @@
-//! Which doses are counted.
+//! Doses to be scored.
 
 use ppa_ct::Grid;
 use serde::{Deserialize, Serialize};

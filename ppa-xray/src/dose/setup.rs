@@ -1,4 +1,4 @@
-//! What a dose tally is about: names, masses, geometry; and how its sums become doses.
+//! Regions of a dose tally (names, masses, geometry), and conversion of its sums to doses.
 
 use serde::{Deserialize, Serialize};
 

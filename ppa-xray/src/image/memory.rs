@@ -1,4 +1,4 @@
-//! Whether an image fits into memory, before the first photon is sent.
+//! Memory check of an image before the first history.
 
 use crate::beam::projection::Detector;
 use crate::beam::projection_error::ProjectionError;

@@ -1,4 +1,4 @@
-//! Elements by mass fraction, and what a gram of them does to a photon.
+//! Elements by mass fraction, and their cross sections per gram.
 
 use crate::matter::cross_sections::{CrossSections, Element, elements};
 use crate::matter::electron_shell::Shell;

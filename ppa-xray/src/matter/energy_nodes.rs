@@ -1,4 +1,4 @@
-//! Energies at which the tables of the transport look at matter.
+//! Energy grid of the transport tables.
 
 use crate::matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV};
 use crate::octaves::Octaves;

@@ -1,4 +1,4 @@
-//! What a photon field gives to electrons.
+//! Energy transferred to electrons by a photon field.
 
 use crate::matter::cross_sections::{ELECTRON_REST_KEV, HC_KEV_ANGSTROM};
 use crate::matter::klein_nishina::{differential, energy_ratio};

@@ -1,4 +1,4 @@
-//! Materials: elements by weight or tables, and what a gram of them does to a photon.
+//! Materials: elements by weight or tables, and their cross sections per gram.
 
 use std::sync::Arc;
 

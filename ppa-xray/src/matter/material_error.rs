@@ -1,4 +1,4 @@
-//! What can be wrong with a material.
+//! Errors of materials.
 
 use crate::matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV};
 

@@ -1,4 +1,4 @@
-//! What a gram of matter does to photons: cross sections, materials and scattering.
+//! Interaction of photons with matter: cross sections, materials, scattering.
 
 mod composition;
 pub(crate) mod compton;

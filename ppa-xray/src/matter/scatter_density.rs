@@ -1,4 +1,4 @@
-//! How likely a photon scatters into a given direction: for estimators that look at the detector instead of sampling.
+//! Probability density of scattering into a given direction, for next-event estimation.
 
 use std::f64::consts::PI;
 

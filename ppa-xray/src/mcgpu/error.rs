@@ -1,4 +1,4 @@
-//! What can be wrong with the files of MC-GPU.
+//! Errors of MC-GPU files.
 
 use std::path::PathBuf;
 

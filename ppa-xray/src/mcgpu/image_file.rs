@@ -1,4 +1,4 @@
-//! Images as MC-GPU writes them: a text file and a raw one beside it.
+//! Images in the format of MC-GPU: a text file and a raw file.
 
 use std::fmt::Write;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! An MC-GPU input file with everything it names.
+//! An MC-GPU input file and all files it names.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! The header of a voxel file, and how it says that voxels are to be read.
+//! The header of a voxel file, and the order of voxels it states.
 
 use crate::mcgpu::error::McgpuError;
 use crate::mcgpu::lines::{Lines, columns, holds, numbers};

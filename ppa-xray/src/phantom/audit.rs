@@ -1,4 +1,4 @@
-//! What became of a scan's voxels: how much of each material, and where the scan or the calibration ran out.
+//! Audit of a HU calibration on a scan: mass of each material, and values outside the range of scan or calibration.
 
 use ppa_ct::Volume;
 use serde::Serialize;

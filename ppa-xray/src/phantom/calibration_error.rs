@@ -1,4 +1,4 @@
-//! What can be wrong with a HU calibration.
+//! Errors of a HU calibration.
 
 use std::path::PathBuf;
 

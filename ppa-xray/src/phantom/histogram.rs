@@ -1,4 +1,4 @@
-//! How often Hounsfield values occur, and whether they pile up at an end.
+//! Histogram of Hounsfield values, and saturation at its ends.
 
 use std::collections::BTreeMap;
 

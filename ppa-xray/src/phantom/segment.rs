@@ -1,4 +1,4 @@
-//! A part of the Hounsfield scale: what it is made of, and how dense.
+//! A range of the Hounsfield scale: its material and density.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! What a run has counted so far.
+//! Counts of an analog run.
 
 use std::ops::Range;
 

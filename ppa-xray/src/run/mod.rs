@@ -1,4 +1,4 @@
-//! Long runs of the analog engine: until when, in which parts, and their tallies in files.
+//! Long runs of the analog engine: stopping rules, parts, tally files.
 
 pub(crate) mod analog_run;
 pub(crate) mod analog_tally;

@@ -1,4 +1,4 @@
-//! When a run ends, and how far it is.
+//! Stopping rules, and progress.
 
 use std::time::Duration;
 

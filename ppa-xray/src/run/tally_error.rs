@@ -1,4 +1,4 @@
-//! Why tallies cannot be read, written, continued or merged.
+//! Errors of reading, writing, continuing or merging tallies.
 
 use std::ops::Range;
 use std::path::PathBuf;

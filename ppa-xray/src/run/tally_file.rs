@@ -1,4 +1,4 @@
-//! Tallies in files.
+//! Tally files.
 //!
 //! Layout, little-endian: the magic bytes, the format version (u32), the length of the header (u32), the header as JSON,
 //! the sums of the image (u64: energy and squared energy per cell and category), then with doses the masses of the voxels

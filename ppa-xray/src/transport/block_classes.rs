@@ -1,4 +1,4 @@
-//! Blocks of voxels by how opaque they are.
+//! Blocks of voxels by opacity.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! What photon histories leave behind, on its way to the tallies.
+//! Interface between histories and tallies.
 
 use nalgebra::Vector3;
 use ppa_core::random::Philox;

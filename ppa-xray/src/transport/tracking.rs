@@ -1,4 +1,4 @@
-//! What all histories of a projection share, checked before the first of them starts.
+//! Data common to all histories of a projection, checked before the first.
 
 use nalgebra::Point3;
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! `ppa dataset check`: whether a training program can use a dataset.
+//! `ppa dataset check`: checks every image and list of a dataset.
 
 use std::path::{Path, PathBuf};
 

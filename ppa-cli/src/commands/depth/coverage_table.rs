@@ -1,4 +1,4 @@
-//! What `ppa depth coverage` finds, as JSON, CSV and text.
+//! Results of `ppa depth coverage` as JSON, CSV and text.
 
 use ppa_core::text::{count, number};
 use ppa_depth::{Coverage, Viewpoint};

@@ -1,4 +1,4 @@
-//! `ppa depth render`: what a camera sees of meshes, ideally or through a sensor.
+//! `ppa depth render`: depth images of meshes, ideal or with sensor errors.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! `ppa depth render CASE`: what the cameras of a room see of a case's limb on the table.
+//! `ppa depth render CASE`: depth images of a case's limb on the table, from both cameras of a room.
 
 use std::path::{Path, PathBuf};
 

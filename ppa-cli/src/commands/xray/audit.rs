@@ -1,4 +1,4 @@
-//! `ppa xray audit`: what a HU calibration makes of a CT or a limb.
+//! `ppa xray audit`: materials and densities that a HU calibration assigns to a CT or a limb.
 
 use std::fmt::Write;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! The analog engine at work: until when, in which part, with which doses.
+//! Runs of the analog engine: stopping rule, part, doses.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

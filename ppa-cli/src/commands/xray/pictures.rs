@@ -1,4 +1,4 @@
-//! How a radiograph is shown, and its DICOM image.
+//! Presentation of a radiograph, and its DICOM image.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! What `simulate` and `merge` say about a radiograph and its doses.
+//! Report of `simulate` and `merge` on a radiograph and its doses.
 
 use std::collections::BTreeMap;
 use std::path::Path;

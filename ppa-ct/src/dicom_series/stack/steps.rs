@@ -1,4 +1,4 @@
-//! From slice to slice: distinct places, and whether the steps are even.
+//! Distances between neighbouring slices, and whether they are equal.
 
 use std::path::Path;
 

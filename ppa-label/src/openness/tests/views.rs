@@ -1,4 +1,4 @@
-//! What other sides and other directions of the beam change.
+//! Effect of other sides and beam directions.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! The four kinds of convolution, each with the moments of what it gives.
+//! The four kinds of convolution, each with the moments of its output.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Where the thinner of two parallel bones lies: it distinguishes a left leg from a right one.
+//! Position of the thinner of two parallel bones, which distinguishes a left leg from a right one.
 
 use nalgebra::{Point3, Vector3};
 use ppa_core::Side;

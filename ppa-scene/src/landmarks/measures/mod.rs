@@ -1,4 +1,4 @@
-//! What a limb and its landmarks measure: the numbers by which doubts about them are judged.
+//! Measures of a limb and its landmarks, from which the gates decide.
 
 mod fibula;
 mod neighbour;

@@ -1,4 +1,4 @@
-//! How a limb touches its supporting plane.
+//! Contacts of a limb with its supporting plane.
 
 use nalgebra::{Point3, Vector3};
 use ppa_ct::Grid;

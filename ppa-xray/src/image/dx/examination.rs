@@ -1,4 +1,4 @@
-//! What a radiograph shows, in the codes of DICOM PS3.16.
+//! Anatomy and view of a radiograph in the codes of DICOM PS3.16.
 
 /// A coded concept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

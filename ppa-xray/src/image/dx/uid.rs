@@ -1,4 +1,4 @@
-//! Unique identifiers that follow from what they identify.
+//! Unique identifiers derived from content.
 
 use sha2::{Digest, Sha256};
 

@@ -1,4 +1,4 @@
-//! One step of every flight: to a tentative collision, or to the end of the cube over which its bound holds.
+//! One step of every flight: to a tentative collision, or to the end of the cube over which its majorant holds.
 
 use crate::transport::lanes::elementary::{floor, greatest, least};
 use crate::transport::lanes::flights::{Box32, Each, Flights, LANES};

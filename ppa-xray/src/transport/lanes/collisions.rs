@@ -1,4 +1,4 @@
-//! What comes of tentative collisions: nothing, absorption, with or without a K x-ray, or scattering.
+//! Outcome of tentative collisions: none, absorption with or without a K x-ray, or scattering.
 
 use crate::transport::lanes::Lanes;
 use crate::transport::lanes::advance::{Blocks, Steps};

@@ -1,4 +1,4 @@
-//! The lanes against themselves in other company, and what they leave of every history.
+//! Each history is independent of the other lanes, and balances its energy.
 
 mod k_x_rays;
 mod plain_histories;

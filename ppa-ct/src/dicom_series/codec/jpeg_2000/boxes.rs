@@ -1,4 +1,4 @@
-//! The codestream in a JP2 file, which some writers put where only the codestream belongs (ISO/IEC 15444-1, annex I).
+//! The codestream inside a JP2 file, which some writers embed in place of a bare codestream (ISO/IEC 15444-1, annex I).
 
 use super::super::CodecError;
 

@@ -1,4 +1,4 @@
-//! What it takes to decode a JPEG 2000 codestream, as far as its headers decide (ISO/IEC 15444-1, annexes A and B).
+//! Upper bound of the work that a JPEG 2000 codestream asks for, from its headers (ISO/IEC 15444-1, annexes A and B).
 //!
 //! The decoder reserves memory by tile, precinct, code-block and layer before it looks at their data, so that some
 //! bytes could ask for gigabytes. All of these are counted here first and compared with the bytes and pixels that are there.

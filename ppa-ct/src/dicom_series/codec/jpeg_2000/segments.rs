@@ -1,4 +1,4 @@
-//! The marker segments of a JPEG 2000 codestream that decide what decoding it takes (ISO/IEC 15444-1, annex A).
+//! The marker segments of a JPEG 2000 codestream that determine the cost of decoding (ISO/IEC 15444-1, annex A).
 
 use std::collections::HashMap;
 

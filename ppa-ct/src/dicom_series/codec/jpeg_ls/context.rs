@@ -1,4 +1,4 @@
-//! What a context has learnt about prediction errors (sections A.4 to A.6).
+//! Adaptive statistics of a context (sections A.4 to A.6).
 
 /// Statistics of one context of the regular mode.
 #[derive(Debug, Clone, Copy)]

@@ -1,4 +1,4 @@
-//! What stands in for a device that the program was not built for.
+//! Stand-in for devices that the program was built without.
 
 use candle_core::{Error, Result};
 
