@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 
 use super::parameters::Sex;
+use super::table_list::exactly;
 
 /// How a dimension is distributed among adults.
 #[derive(Deserialize)]
@@ -44,6 +45,7 @@ pub(super) type Dimensions = [f64; 31];
 pub(super) struct Phantom {
     pub name: String,
     pub sex: Sex,
+    #[serde(deserialize_with = "exactly")]
     pub values: Dimensions,
 }
 
@@ -51,9 +53,9 @@ pub(super) struct Phantom {
 #[serde(deny_unknown_fields)]
 pub(super) struct Family {
     /// What the values of a phantom are; the place of each is part of the address of its random numbers.
-    #[serde(rename = "dimension")]
+    #[serde(rename = "dimension", deserialize_with = "exactly")]
     pub dimensions: [Dimension; 31],
-    #[serde(rename = "phantom")]
+    #[serde(rename = "phantom", deserialize_with = "exactly")]
     pub phantoms: [Phantom; 17],
 }
 

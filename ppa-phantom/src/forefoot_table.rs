@@ -4,6 +4,8 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
+use super::table_list::exactly;
+
 /// Base, waist and head of a metatarsal.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -39,9 +41,9 @@ pub(super) struct Toe {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Forefoot {
-    #[serde(rename = "metatarsal")]
+    #[serde(rename = "metatarsal", deserialize_with = "exactly")]
     pub metatarsals: [Metatarsal; 5],
-    #[serde(rename = "toe")]
+    #[serde(rename = "toe", deserialize_with = "exactly")]
     pub toes: [Toe; 5],
 }
 

@@ -50,6 +50,7 @@ mod scanner;
 mod sdf;
 mod section;
 mod smooth;
+mod table_list;
 mod texture;
 mod tibia_fibula;
 mod tibia_fibula_table;

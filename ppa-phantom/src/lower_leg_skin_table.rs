@@ -4,6 +4,8 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
+use super::table_list::exactly;
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ShankSection {
@@ -11,6 +13,7 @@ pub(super) struct ShankSection {
     pub station: f64,
     pub centre: [f64; 2],
     /// Every 30° from medial over posterior.
+    #[serde(deserialize_with = "exactly")]
     pub radii: [f64; 12],
 }
 
@@ -38,9 +41,11 @@ pub(super) struct Toe {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Skin {
+    #[serde(deserialize_with = "exactly")]
     pub shank: [ShankSection; 9],
+    #[serde(deserialize_with = "exactly")]
     pub foot: [FootSection; 8],
-    #[serde(rename = "toe")]
+    #[serde(rename = "toe", deserialize_with = "exactly")]
     pub toes: [Toe; 5],
 }
 

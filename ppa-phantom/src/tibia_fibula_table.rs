@@ -4,6 +4,8 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
+use super::table_list::exactly;
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TibiaSection {
@@ -11,6 +13,7 @@ pub(super) struct TibiaSection {
     pub station: f64,
     /// (medial, posterior) of: anterolateral tubercle, front, anteromedial, posteromedial, back, posterolateral tubercle, floor of
     /// the fibular incisura.
+    #[serde(deserialize_with = "exactly")]
     pub corners: [[f64; 2]; 7],
     /// The radius by which the corners are grown.
     pub round: f64,
@@ -29,7 +32,9 @@ pub(super) struct FibulaSection {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TibiaFibula {
+    #[serde(deserialize_with = "exactly")]
     pub tibia: [TibiaSection; 8],
+    #[serde(deserialize_with = "exactly")]
     pub fibula: [FibulaSection; 8],
 }
 

@@ -12,14 +12,16 @@ fn assert_complete<T: DeserializeOwned>(text: &str) {
     let fault = |text: &str| toml::from_str::<T>(text).err().map(|e| e.to_string());
     assert_eq!(fault(text), None);
     let (without_last_entry, last_entry) = text.rsplit_once("\n[[").unwrap();
-    let found = fault(without_last_entry).expect(last_entry);
-    assert!(found.contains("invalid length"), "{found}");
+    for other in [without_last_entry, &format!("{text}\n[[{last_entry}")] {
+        let found = fault(other).expect(last_entry);
+        assert!(found.contains("invalid length"), "{found}");
+    }
     let found = fault(&format!("{text}\nwidth_in = 1.0\n")).expect("an unknown key");
     assert!(found.contains("unknown field"), "{found}");
 }
 
 #[test]
-fn files_are_complete_and_refused_without_an_entry() {
+fn files_with_an_entry_too_few_or_too_many_are_refused() {
     assert_complete::<Family>(family_table::TEXT);
     assert_complete::<Forefoot>(forefoot_table::TEXT);
     assert_complete::<Skin>(lower_leg_skin_table::TEXT);
