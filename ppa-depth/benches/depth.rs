@@ -3,6 +3,8 @@
 //! Units of work: triangles for meshes, pixels for images and rays. The seed is the formula. Times are processor seconds of all
 //! threads, which depend less on what else the machine does than the clock on the wall.
 
+mod tube;
+
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use ppa_benches::ProcessorTime;
@@ -10,40 +12,6 @@ use ppa_depth::{
     Backdrop, Body, Camera, CameraSpec, DepthMode, MeshBody, PlacedBody, Sensor, SensorSpec,
     SurfelBody, render,
 };
-
-/// A bent, bumpy tube of 832 x 832 quads, about 400 mm long and 100 mm thick: 1.38 million triangles.
-fn limb() -> (Vec<Point3<f32>>, Vec<[u32; 3]>) {
-    const SIDE: u32 = 832;
-    let point = |i: u32, j: u32| {
-        let (angle, along) = (
-            i as f32 / SIDE as f32 * std::f32::consts::TAU,
-            j as f32 / SIDE as f32,
-        );
-        let radius = 50.0 * (1.0 + 0.2 * (3.0 * angle).sin() * (7.0 * along).cos());
-        let (x, y) = (
-            radius * angle.cos() + 40.0 * along * along,
-            400.0 * along - 200.0,
-        );
-        Point3::new(x, y, radius * angle.sin())
-    };
-    let vertices = (0..=SIDE)
-        .flat_map(|j| (0..SIDE).map(move |i| point(i, j)))
-        .collect();
-    let corner = |i: u32, j: u32| j * SIDE + i % SIDE;
-    let quads = (0..SIDE).flat_map(|j| (0..SIDE).map(move |i| (i, j)));
-    let triangles = quads
-        .flat_map(|(i, j)| {
-            let [a, b, c, d] = [
-                corner(i, j),
-                corner(i + 1, j),
-                corner(i, j + 1),
-                corner(i + 1, j + 1),
-            ];
-            [[a, b, c], [b, d, c]]
-        })
-        .collect();
-    (vertices, triangles)
-}
 
 /// Table top above a floor, 5 mm between points: 165 000 discs.
 fn room() -> SurfelBody {
@@ -77,7 +45,7 @@ fn depth(c: &mut Criterion<ProcessorTime>) {
     let camera = Camera::try_from(CameraSpec::azure_kinect(DepthMode::NfovUnbinned))
         .expect("the default camera");
     let pixels = u64::from(camera.width() * camera.height());
-    let (vertices, triangles) = limb();
+    let (vertices, triangles) = tube::tube();
     let limb = Body::from(MeshBody::new(&vertices, &triangles).expect("a valid mesh"));
     let room = Body::from(room());
 

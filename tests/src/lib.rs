@@ -2,8 +2,8 @@
 
 use ppa_core::random::split_mix_at;
 
-/// SplitMix64 of (index + seed · 2³²), sum of two uniforms: in [-1, 1), triangular; the `hash_noise` of
-/// `../shared/peers/geometry_bench.py`, so that other programs see the same volumes and clouds.
+/// SplitMix64 of (index + seed · 2³²), sum of two uniforms: in [-1, 1), triangular; as in the volumes and
+/// clouds of `shared/reference/geometry`, which other programs were run on.
 pub fn hash_noise(index: u64, seed: u64) -> f64 {
     let z = split_mix_at(0, index + (seed << 32));
     let scale = f64::from(2.0_f32.powi(32));

@@ -1,4 +1,4 @@
-//! `leg_volume` of `../shared/peers/geometry_bench.py`, on which the peers are measured: a lower leg with fat, muscle,
+//! The volume on which other programs are measured too (`benches/peers/surfaces.py`): a lower leg with fat, muscle,
 //! bones and pockets of gas on a curved table, in 26.2 million voxels of 16 bits.
 
 use std::f64::consts::PI;

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use ppa_mesh::PointCloud;
 use ppa_tests::hash_noise;
 
-/// A noisy room in mm, `room_cloud` of `../shared/peers/geometry_bench.py`: table of 2.0 x 0.6 m at 900 mm, floor at 0, wall at y = 1.5 m, clutter;
+/// A noisy room in mm: table of 2.0 x 0.6 m at 900 mm, floor at 0, wall at y = 1.5 m, clutter;
 /// noise of 3 mm standard deviation. `keep` picks heights before rounding to f32.
 pub fn room_cloud(n: u64, seed: u64, keep: std::ops::Range<f64>) -> PointCloud {
     let uniform = |i: u64, which: u64| (hash_noise(i, seed + 10 * which) + 1.0) / 2.0;

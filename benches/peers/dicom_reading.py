@@ -3,7 +3,7 @@
 
     cargo build --release -p ppa-ct --example read_and_sum
     pip install SimpleITK pydicom pylibjpeg pylibjpeg-libjpeg pylibjpeg-openjpeg pylibjpeg-rle numpy
-    ppa-ct/scripts/compare_reading.py --slices 128 --rounds 5 SLICE.dcm ...
+    benches/peers/dicom_reading.py --slices 128 --rounds 5 SLICE.dcm ...
 
 Each SLICE.dcm, of whole HU, is repeated at other heights to make a series of its encoding. Every reader is a
 process of its own that reads the series and sums its voxels; they take turns. Printed are, over the rounds, the
@@ -18,7 +18,7 @@ import sys
 import tempfile
 import time
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
+ROOT = pathlib.Path(__file__).resolve().parents[2]
 PPA = ROOT / "target/release/examples/read_and_sum"
 
 SIMPLE_ITK = """
