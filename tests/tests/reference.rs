@@ -203,6 +203,14 @@ struct Sources {
     texts: Vec<(String, String)>,
 }
 
+/// A page as it grows.
+struct Table {
+    text: String,
+    keys: BTreeSet<String>,
+    /// Whether ppa writes the files and no person does.
+    is_written: bool,
+}
+
 impl Sources {
     fn read() -> Self {
         let mut files = Vec::new();
@@ -287,13 +295,34 @@ impl Sources {
         (!plain.is_empty() && !plain.contains(['(', ':', '\n'])).then_some(plain)
     }
 
+    /// The default of a type, as `Default` has it.
+    fn plain_default(&self, shown: &str, ty: Option<&Type>) -> String {
+        match (shown, ty) {
+            ("f64" | "f32" | "u32" | "u64" | "usize" | "i32", _) => "`0`".to_owned(),
+            ("bool", _) => "`false`".to_owned(),
+            _ if shown.starts_with("Vec<") => "see `ppa plan init`".to_owned(),
+            _ if shown.starts_with('[') => "zeros".to_owned(),
+            (_, Some(ty)) if ty.is_enum => {
+                let fields = &ty.item.fields;
+                let chosen = fields
+                    .iter()
+                    .find(|variant| variant.attributes.contains("#[default]"));
+                chosen.map_or("see `ppa plan init`".to_owned(), |variant| {
+                    format!("`{}`", variant_name(ty, variant))
+                })
+            }
+            _ => "those of its keys".to_owned(),
+        }
+    }
+
     /// Rows of the table for the fields of a type, those of the types below it included.
-    fn rows(&self, ty: &Type, prefix: &str, rows: &mut String, keys: &mut BTreeSet<String>) {
-        let ty = value(&ty.item.attributes, "try_from")
+    fn rows(&self, ty: &Type, prefix: &str, page: &mut Table) {
+        let other = if page.is_written { "into" } else { "try_from" };
+        let ty = value(&ty.item.attributes, other)
             .and_then(|name| self.find(&ty.file, name))
             .unwrap_or(ty);
         let all_default = ty.item.attributes.contains("(default");
-        self.fields(ty, &ty.item.fields, all_default, prefix, rows, keys);
+        self.fields(ty, &ty.item.fields, all_default, prefix, page);
     }
 
     fn fields(
@@ -302,8 +331,7 @@ impl Sources {
         fields: &[Item],
         all_default: bool,
         prefix: &str,
-        rows: &mut String,
-        keys: &mut BTreeSet<String>,
+        page: &mut Table,
     ) {
         for field in fields {
             let shown = &field.ty;
@@ -312,37 +340,36 @@ impl Sources {
                 .filter(|word| !["Option", "Vec", "Box", "BTreeMap"].contains(word))
                 .find_map(|word| self.find(&ty.file, word));
             if let (true, Some(below)) = (field.attributes.contains("flatten"), word) {
-                self.rows(below, prefix, rows, keys);
+                self.rows(below, prefix, page);
                 continue;
             }
             let name =
                 value(&field.attributes, "rename").unwrap_or(field.name.trim_start_matches("r#"));
             let key = format!("{prefix}{name}");
             let optional = shown.starts_with("Option<");
+            let by_serde = all_default || field.attributes.contains("default");
             let default = match self.default_of(ty, &field.name) {
+                _ if page.is_written && field.attributes.contains("skip_serializing_if") => {
+                    "may be left out".to_owned()
+                }
+                _ if page.is_written && optional => "may be `null`".to_owned(),
+                _ if page.is_written => "always".to_owned(),
                 Some(value) => format!("`{value}`"),
                 None if optional => "none".to_owned(),
-                None if all_default || field.attributes.contains("default") => {
-                    "see meaning".to_owned()
-                }
+                None if by_serde => self.plain_default(shown, word),
                 None => "required".to_owned(),
             };
             let mut meaning = one_line(&field.docs);
             let list = if shown.starts_with("Vec<") { "[]" } else { "" };
+            let named = match word {
+                Some(ty) if ty.is_enum => "one of the names",
+                Some(_) => "table",
+                None => "text",
+            };
             let below = match word {
                 Some(below) if below.is_enum => {
-                    let snake_case = below.item.attributes.contains("snake_case");
                     for variant in &below.item.fields {
-                        let name = value(&variant.attributes, "rename").map_or_else(
-                            || {
-                                if snake_case {
-                                    snake(&variant.name)
-                                } else {
-                                    variant.name.clone()
-                                }
-                            },
-                            str::to_owned,
-                        );
+                        let name = variant_name(below, variant);
                         let _ = write!(meaning, " `{name}`: {}", one_line(&variant.docs));
                     }
                     None
@@ -350,59 +377,82 @@ impl Sources {
                 other => other,
             };
             let _ = writeln!(
-                rows,
+                page.text,
                 "| `{key}{list}` | {} | {default} | {meaning} |",
-                kind(shown)
+                kind(shown, named)
             );
-            keys.insert(key.clone());
+            page.keys.insert(key.clone());
+            assert!(
+                !meaning.is_empty(),
+                "{key} of {} has no documentation",
+                ty.file
+            );
             if let Some(ty) = below {
-                self.rows(ty, &format!("{key}{list}."), rows, keys);
+                self.rows(ty, &format!("{key}{list}."), page);
             } else if let Some(ty) = word {
                 for variant in &ty.item.fields {
-                    let tag = value(&variant.attributes, "rename")
-                        .map_or_else(|| snake(&variant.name), str::to_owned);
+                    let tag = variant_name(ty, variant);
                     self.fields(
                         ty,
                         &variant.fields,
                         false,
                         &format!("{key}{list}.{tag}."),
-                        rows,
-                        keys,
+                        page,
                     );
                 }
             }
         }
     }
 
-    fn page(&self, (_, title, roots): &Page) -> (String, BTreeSet<String>) {
-        let mut text = format!(
-            "# {title}\n\nLengths are in mm and angles in degrees unless the key says otherwise. `[]` marks a list.\n"
+    fn page(&self, (file, title, roots): &Page) -> Table {
+        let is_written = *file == "dataset.md";
+        let text = format!(
+            "# {title}\n\nA test generates this page from the sources. `[]` marks a list; a dot leads into a table.\n"
         );
-        let mut keys = BTreeSet::new();
+        let mut page = Table {
+            text,
+            keys: BTreeSet::new(),
+            is_written,
+        };
+        let column = if is_written { "present" } else { "default" };
         for (heading, file, name) in *roots {
             let ty = self.find(file, name).unwrap();
             let _ = write!(
-                text,
-                "\n## {heading}\n\n{}\n\n| key | type | default | meaning |\n|---|---|---|---|\n",
+                page.text,
+                "\n## {heading}\n\n{}\n\n| key | type | {column} | meaning |\n|---|---|---|---|\n",
                 one_line(&ty.item.docs)
             );
-            self.rows(ty, "", &mut text, &mut keys);
+            self.rows(ty, "", &mut page);
         }
-        (text, keys)
+        page
     }
 }
 
-/// The type in words of TOML and JSON.
-fn kind(ty: &str) -> String {
+/// What a variant is called in files.
+fn variant_name(ty: &Type, variant: &Item) -> String {
+    match value(&variant.attributes, "rename") {
+        Some(name) => name.to_owned(),
+        None if ty.item.attributes.contains("snake_case") => snake(&variant.name),
+        None if ty.item.attributes.contains("kebab-case") => snake(&variant.name).replace('_', "-"),
+        None if ty.item.attributes.contains("lowercase") => variant.name.to_lowercase(),
+        None => variant.name.clone(),
+    }
+}
+
+/// The type in words of TOML and JSON; `named` says what a type of ours is.
+fn kind(ty: &str, named: &str) -> String {
     let inner = |start: &str| {
         ty.strip_prefix(start)
             .and_then(|rest| rest.strip_suffix('>'))
     };
     if let Some(inner) = inner("Option<") {
-        return kind(inner);
+        return kind(inner, named);
+    }
+    if let Some(slice) = ty.strip_prefix("&'a [") {
+        return format!("list of {}", kind(slice.trim_end_matches(']'), named));
     }
     if let Some(inner) = inner("Vec<") {
-        return format!("list of {}", kind(inner));
+        return format!("list of {}", kind(inner, named));
     }
     match ty {
         "f64" | "f32" => "number".to_owned(),
@@ -415,8 +465,8 @@ fn kind(ty: &str) -> String {
             .strip_prefix('[')
             .and_then(|rest| rest.strip_suffix(']')?.rsplit_once("; "))
         {
-            Some((inner, count)) => format!("{count} × {}", kind(inner)),
-            None => ty.split('<').next().unwrap().to_owned(),
+            Some((inner, count)) => format!("{count} × {}", kind(inner, named)),
+            None => named.to_owned(),
         },
     }
 }
@@ -439,7 +489,7 @@ fn reference_pages_are_those_of_the_types() {
     let sources = Sources::read();
     for page in PAGES {
         let path = root().join("docs/book/reference").join(page.0);
-        let (text, _) = sources.page(page);
+        let text = sources.page(page).text;
         if std::env::var_os("PPA_WRITE_REFERENCE").is_some() {
             fs::write(&path, &text).unwrap();
         }
@@ -453,8 +503,21 @@ fn reference_pages_are_those_of_the_types() {
 }
 
 #[test]
+fn every_key_that_a_case_may_have_is_on_the_page() {
+    let sources = Sources::read();
+    let keys = sources.page(&PAGES[1]).keys;
+    let file = sources
+        .find("ppa-generate/src/case.rs", "CaseFile")
+        .unwrap();
+    for field in &file.item.fields {
+        let key = value(&field.attributes, "rename").unwrap_or(&field.name);
+        assert!(keys.contains(key), "{key} is missing in case.md");
+    }
+}
+
+#[test]
 fn every_key_of_the_plans_is_on_the_page() {
-    let (_, keys) = Sources::read().page(&PAGES[0]);
+    let keys = Sources::read().page(&PAGES[0]).keys;
     let keys: BTreeSet<_> = keys.iter().map(|key| key.replace("[]", "")).collect();
     for plan in [
         "paper/plan.toml",
