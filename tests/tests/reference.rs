@@ -292,6 +292,12 @@ impl Sources {
             .replace(".to_owned()", "")
             .replace("vec!", "")
             .replace("None", "");
+        let constant = format!("const {plain}: f64 = ");
+        let defined = self
+            .texts
+            .iter()
+            .find_map(|(_, text)| text.split(&constant).nth(1));
+        let plain = defined.map_or(plain, |text| text.split(';').next().unwrap().to_owned());
         (!plain.is_empty() && !plain.contains(['(', ':', '\n'])).then_some(plain)
     }
 
@@ -311,7 +317,10 @@ impl Sources {
                     format!("`{}`", variant_name(ty, variant))
                 })
             }
-            _ => "those of its keys".to_owned(),
+            (_, Some(ty)) if ty.item.attributes.contains("(default") => {
+                "those of its keys".to_owned()
+            }
+            _ => "see `ppa plan init`".to_owned(),
         }
     }
 
@@ -357,11 +366,15 @@ impl Sources {
                 Some(value) => format!("`{value}`"),
                 None if optional => "none".to_owned(),
                 None if by_serde => self.plain_default(shown, word),
+                None if field.attributes.contains("Vec::is_empty") => "empty list".to_owned(),
                 None => "required".to_owned(),
             };
             let mut meaning = one_line(&field.docs);
             let list = if shown.starts_with("Vec<") { "[]" } else { "" };
             let named = match word {
+                Some(ty) if ty.is_enum && ty.item.fields.iter().any(|v| !v.fields.is_empty()) => {
+                    "name, or table with one of the names"
+                }
                 Some(ty) if ty.is_enum => "one of the names",
                 Some(_) => "table",
                 None => "text",
