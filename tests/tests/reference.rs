@@ -293,10 +293,9 @@ impl Sources {
             .replace("vec!", "")
             .replace("None", "");
         let constant = format!("const {plain}: f64 = ");
-        let defined = self
-            .texts
-            .iter()
-            .find_map(|(_, text)| text.split(&constant).nth(1));
+        let is_name = plain.starts_with(|c: char| c.is_ascii_uppercase());
+        let mut texts = self.texts.iter().filter(|_| is_name);
+        let defined = texts.find_map(|(_, text)| text.split(&constant).nth(1));
         let plain = defined.map_or(plain, |text| text.split(';').next().unwrap().to_owned());
         (!plain.is_empty() && !plain.contains(['(', ':', '\n'])).then_some(plain)
     }
@@ -365,6 +364,18 @@ impl Sources {
                 _ if page.is_written => "always".to_owned(),
                 Some(value) => format!("`{value}`"),
                 None if optional => "none".to_owned(),
+                None if value(&field.attributes, "default").is_some() => {
+                    let function = value(&field.attributes, "default").unwrap();
+                    let code = self
+                        .text(&ty.file)
+                        .split(&format!("fn {function}() -> "))
+                        .nth(1);
+                    let body = code.and_then(|code| code.split(['{', '}']).nth(1));
+                    format!(
+                        "`{}`",
+                        body.unwrap_or(function).trim().replace(".to_owned()", "")
+                    )
+                }
                 None if by_serde => self.plain_default(shown, word),
                 None if field.attributes.contains("Vec::is_empty") => "empty list".to_owned(),
                 None => "required".to_owned(),
