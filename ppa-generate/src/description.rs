@@ -20,23 +20,37 @@ use crate::shaped_skin::ShapeSettings;
 /// The settings of a plan that decide the bytes of its images; files stand by their hashes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Settings {
+    /// Program and version that made the images.
     generator: &'static str,
     /// Hash of sources, physics data and compiled crates, see `compiled.rs`.
     code: &'static str,
+    /// Seed of the plan.
     seed: u64,
+    /// Body shapes.
     shapes: ShapeSettings,
+    /// How far heel and calf sink in where they rest.
     soft_tissue: SoftTissue,
+    /// SHA-256 of the point cloud of a recorded room; `null` for the built-in one.
     room_ply_sha256: Option<String>,
+    /// The built-in room, and the x-ray device in either room.
     room: RoomSpec,
+    /// How the table plane is searched; `null` where it is what the central beam hits first.
     table: Option<PlaneSettings>,
+    /// Pose of the x-ray device in a recorded room, row-major, mm; `null` where the plan gives none.
     room_from_device: Option<TransformRows>,
+    /// SHA-256 of the camera rig's file; `null` without a file.
     rig_sha256: Option<String>,
+    /// The camera rig, where the plan or its room file writes it out.
     #[serde(skip_serializing_if = "Option::is_none")]
     cameras: Option<RigSpec>,
+    /// Side of the square region of interest around the joint, mm at the joint.
     roi_mm: f64,
+    /// Errors of the cameras' sensors; left out for ideal images.
     #[serde(skip_serializing_if = "Option::is_none")]
     sensor: Option<SensorSpec>,
+    /// What a camera sees where the field of view of the scan cuts the limb off.
     cut_faces: WallDepth,
+    /// How radiographs are made. `max_cut_share`, which changes no image, is left out.
     xray: XraySettings,
 }
 
@@ -84,38 +98,58 @@ impl Settings {
 /// `dataset.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Description<'a> {
+    /// Format of this file.
     version: u32,
+    /// Units of lengths and angles.
     units: &'static str,
+    /// Medial rotations about the limb's axis.
     rotation: Sweep,
+    /// Settings that decide the bytes of the images.
     settings: &'a Settings,
+    /// Pose of the x-ray device in the room, row-major, mm.
     room_from_device: TransformRows,
+    /// Distance of the detector from the source along the central beam, mm.
     source_detector_mm: f64,
+    /// Plane of the table top in the room.
     table: Table,
+    /// The depth cameras as placed in the room.
     cameras: Vec<CameraRow>,
+    /// The limbs of the dataset.
     limbs: Vec<LimbRow<'a>>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Table {
+    /// Unit normal, upwards.
     normal: [f64; 3],
+    /// Distance of the plane from the room's origin along the normal, mm.
     offset_mm: f64,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct CameraRow {
+    /// Which camera it is.
     view: View,
+    /// Its intrinsics.
     intrinsics: CameraSpec,
+    /// Rigid motion from the camera frame to the room, row-major, mm.
     room_from_camera: TransformRows,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct LimbRow<'a> {
+    /// Person and side.
     #[serde(flatten)]
     limb: LimbId,
+    /// Hash of all that the images of this limb follow from, except the pose.
     key: String,
+    /// SHA-256 over size, affine and Hounsfield units of the scan.
     volume_sha256: &'a str,
+    /// How the skin is found and freed from the couch.
     surface: &'a LimbSettings,
+    /// Landmark decisions of a person.
     choices: &'a LandmarkOverrides,
+    /// Codes of findings that a person has accepted.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     acknowledged: &'a [FindingCode],
 }

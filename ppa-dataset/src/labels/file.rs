@@ -224,9 +224,10 @@ fn radiograph_hashes(manifest: &Manifest, limb: LimbId) -> HashMap<u32, &str> {
 struct Entry {
     #[serde(flatten)]
     row: LabelRow,
+    /// Who gave the label; left out where the file does not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     label_source: Option<LabelSource>,
-    /// Of the radiograph that was labelled.
+    /// SHA-256 of the radiograph that was labelled.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     radiograph_sha256: Option<String>,
 }

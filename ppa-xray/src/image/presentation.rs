@@ -95,11 +95,17 @@ const PROTOCOLS: &[(&str, Presentation)] = &[
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PresentationTable {
+    /// Name of a fixed presentation, such as `limb` or `ankle_lateral`; the other keys replace its values. `limb` by default.
     protocol: Option<String>,
+    /// Log exposure shown as middle grey.
     centre: Option<f64>,
+    /// Width of the window in log exposure.
     width: Option<f64>,
+    /// Share of the contrast of faint detail that is added; 0 leaves the image as it is.
     detail: Option<f64>,
+    /// Size from which detail gets less than half of that, mm.
     detail_mm: Option<f64>,
+    /// Local contrast (root mean square) in log exposure from which detail gets less than half of that.
     edge: Option<f64>,
 }
 

@@ -120,13 +120,18 @@ impl Segment {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SegmentTable {
+    /// Name of the segment in messages.
     name: String,
+    /// Lowest HU that belongs to it; left out only in the first segment, which has no lower end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     from_hu: Option<f32>,
+    /// Name of a material of the library, or its mass fractions; either this or `mixture`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     material: Option<String>,
+    /// Knots [HU, g/cm³] of the density: straight in between, constant outside.
     density: Vec<[f32; 2]>,
     // Last, since TOML wants tables after plain values.
+    /// Two materials, from the first to the second as the density goes from that of the first to that of the second.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     mixture: Option<[Constituent; 2]>,
 }
