@@ -25,7 +25,11 @@ const PAGES: &[Page] = &[
                 "ppa-generate/src/plan/room_file.rs",
                 "RoomFile",
             ),
-            ("Camera rig (JSON)", "ppa-depth/src/camera/rig.rs", "RigSpec"),
+            (
+                "Camera rig (JSON)",
+                "ppa-depth/src/camera/rig.rs",
+                "RigSpec",
+            ),
         ],
     ),
     (
