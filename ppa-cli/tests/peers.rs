@@ -132,7 +132,7 @@ print(json.dumps(sums))
 
 /// The validators and readers of the formats themselves.
 #[test]
-fn pyarrow_mlcroissant_rocrate_bagit_and_webdataset_take_what_is_exported() {
+fn pyarrow_mlcroissant_and_others_read_the_exports() {
     let script = r#"
 import glob, json, os
 import bagit, mlcroissant, pandas, rocrate.rocrate, webdataset

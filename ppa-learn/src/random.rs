@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn streams_depend_on_every_part_of_their_address_and_on_nothing_else() {
+    fn streams_depend_on_every_part_of_their_address_only() {
         let first = |seed, purpose, index| stream(seed, purpose, index).next_u64();
         let one = first(1, Purpose::Weights, 0);
         assert_eq!(one, first(1, Purpose::Weights, 0));

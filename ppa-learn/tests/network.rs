@@ -32,7 +32,7 @@ fn gradient(network: &EfficientNetB0, images: &Tensor, step: u64) -> Vec<f32> {
 }
 
 #[test]
-fn a_network_has_the_parameters_of_torchvision_with_one_channel_and_one_output() {
+fn parameters_are_those_of_torchvision_for_one_channel() {
     let network = EfficientNetB0::new(0, Options::default()).unwrap();
     let parameters = network.parameters().unwrap();
     assert_eq!(
@@ -110,7 +110,7 @@ fn seed_and_step_fix_every_byte_for_any_number_of_threads() {
 }
 
 #[test]
-fn inference_gives_the_same_bytes_for_any_number_of_threads_whatever_becomes_of_its_network() {
+fn inference_bytes_do_not_depend_on_threads() {
     let network = QualityNetwork::new(5, Options::default(), None).unwrap();
     let inference = InferenceNetwork::new(&network).unwrap();
     let images = [images(3, 97, 65)];

@@ -166,7 +166,7 @@ assert error < 1e-4
 }
 
 #[test]
-fn pytorch_loads_what_is_saved_and_the_network_loads_what_pytorch_saves() {
+fn pytorch_and_the_network_load_each_others_weights() {
     let folder = tempfile::tempdir().unwrap();
     let (network, io) = exported(folder.path());
     let (path, back) = (

@@ -59,7 +59,7 @@ fn saved_weights_are_read_again() {
 }
 
 #[test]
-fn networks_of_both_cameras_are_read_again_and_begin_with_those_of_one() {
+fn networks_of_both_cameras_are_saved_and_loaded() {
     let folder = tempfile::tempdir().unwrap();
     let [fused, single] =
         ["fused", "single"].map(|n| folder.path().join(format!("{n}.safetensors")));

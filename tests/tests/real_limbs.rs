@@ -66,7 +66,7 @@ fn dataset(case: &Case) -> tempfile::TempDir {
 /// other; for the left this is a finding.
 #[test]
 #[ignore = "needs ../shared/data"]
-fn of_the_calves_of_sts032_the_whole_one_is_taken_and_doubted_where_the_other_was_meant() {
+fn the_whole_calf_of_sts032_is_taken_with_a_finding() {
     let scan = data("two-calves-sts032/CT_image.nii.gz");
     for (side, doubts) in [(Side::Right, 0), (Side::Left, 1)] {
         let (case, limb) = prepared(&scan, side, LimbKind::Other);

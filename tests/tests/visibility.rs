@@ -26,7 +26,7 @@ fn ct_from_device(joint: &Point3<f64>, axis: &Vector3<f64>, degrees: f64) -> Iso
 }
 
 #[test]
-fn radiographs_rank_poses_as_geometry_does_once_there_are_photons_enough() {
+fn radiographs_rank_poses_as_geometry_does() {
     let leg = LowerLeg::family("P01", Side::Right).unwrap();
     let truth = leg.truth();
     let (joint, axis) = (truth.joint_centre, truth.axis_direction.into_inner());

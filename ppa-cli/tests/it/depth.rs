@@ -23,7 +23,7 @@ fn scene(folder: &Path) {
 }
 
 #[test]
-fn the_noise_of_a_recording_is_found_again_and_is_the_same_for_any_number_of_threads() {
+fn fit_noise_recovers_noise_for_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     scene(folder.path());
     let record = |frames: &str, options: &str| {
@@ -55,7 +55,7 @@ fn the_noise_of_a_recording_is_found_again_and_is_the_same_for_any_number_of_thr
 }
 
 #[test]
-fn what_is_no_camera_recording_or_sensor_is_refused_and_leaves_nothing() {
+fn invalid_cameras_recordings_and_sensors_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     scene(folder.path());
     fs::create_dir(folder.path().join("empty")).unwrap();

@@ -28,7 +28,7 @@ pub fn write_input(folder: &Path) {
 }
 
 #[test]
-fn the_result_has_its_keys_and_the_same_seed_gives_the_same_bytes() {
+fn result_has_its_keys_and_equal_seeds_give_equal_bytes() {
     let folder = tempfile::tempdir().unwrap();
     write_input(folder.path());
     // Paths resolve against the input file, not against the folder of the call.
@@ -140,7 +140,7 @@ fn a_damaged_spectrum_is_reported_with_its_line_and_named_once() {
 }
 
 #[test]
-fn a_time_limits_the_run_and_the_fast_engine_makes_an_image_without_dose() {
+fn a_time_limits_the_run_and_fast_makes_no_dose() {
     let folder = tempfile::tempdir().unwrap();
     write_input(folder.path());
     let text = fs::read_to_string(folder.path().join("box.in")).unwrap();

@@ -6,7 +6,7 @@ use crate::prediction::trained;
 use crate::{fail, succeed};
 
 #[test]
-fn pairs_are_exported_from_trainings_and_from_their_weight_files() {
+fn pairs_are_exported_from_trainings_and_weight_files() {
     let folder = trained();
     let export = |what: &str, to: &str| -> Vec<u8> {
         let said = succeed(

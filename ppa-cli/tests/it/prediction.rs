@@ -58,7 +58,7 @@ fn evaluated(folder: &Path, run: &str) -> BTreeMap<String, f64> {
 }
 
 #[test]
-fn pairs_of_standard_input_are_judged_as_evaluation_judges_them() {
+fn pairs_on_stdin_get_the_predictions_of_evaluation() {
     let folder = trained();
     let image =
         |view: &str, angle: &str| format!("patient_1/depth/l/orig/depth_cam_{view}_{angle}.png");

@@ -156,7 +156,7 @@ fn one_of_several_series_is_chosen_by_number_or_uid() {
 
 /// A page of doses in colour that calls itself CT.
 #[test]
-fn a_page_beside_a_series_is_listed_with_the_reason_why_it_is_none() {
+fn a_colour_page_beside_a_series_is_listed_with_reason() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     copy_with(&folder.join("scan"), "a_", &[]);
@@ -179,7 +179,7 @@ fn a_page_beside_a_series_is_listed_with_the_reason_why_it_is_none() {
 }
 
 #[test]
-fn another_modality_is_read_only_when_forced_and_never_called_a_ct() {
+fn another_modality_needs_force_and_is_never_called_ct() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     copy_with(&folder.join("scan"), "", &[(tags::MODALITY, VR::CS, "MR")]);
@@ -199,7 +199,7 @@ fn another_modality_is_read_only_when_forced_and_never_called_a_ct() {
 }
 
 #[test]
-fn a_unit_or_modality_of_free_text_is_refused_without_being_repeated() {
+fn units_of_free_text_are_refused_and_not_repeated() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let scan = folder.join("scan");

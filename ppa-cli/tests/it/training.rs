@@ -195,7 +195,7 @@ fn an_interrupted_training_saves_its_step() {
 }
 
 #[test]
-fn tables_of_an_experiment_are_marked_while_results_are_missing() {
+fn tables_are_marked_while_results_are_missing() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     write_data(folder);

@@ -63,7 +63,7 @@ proptest! {
 }
 
 #[test]
-fn stored_bits_and_rescale_are_honoured_per_slice_in_every_plain_encoding() {
+fn stored_bits_and_rescale_are_applied_per_slice() {
     let encodings = [
         uids::IMPLICIT_VR_LITTLE_ENDIAN,
         uids::EXPLICIT_VR_LITTLE_ENDIAN,
@@ -196,7 +196,7 @@ fn slices_that_do_not_match_are_refused() {
 }
 
 #[test]
-fn localizers_reports_and_strangers_are_left_out_but_a_second_series_is_not() {
+fn localizers_and_reports_are_left_out() {
     let folder = tempfile::tempdir().unwrap();
     let mut slices = axial_stack(&[0.0, 1.0, 2.0, 50.0]);
     slices[3].image_type = "ORIGINAL\\PRIMARY\\LOCALIZER";

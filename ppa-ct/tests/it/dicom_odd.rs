@@ -136,7 +136,7 @@ fn units_are_read_as_they_are_spelt() {
 
 /// Two frames of nine pixels: the middle word holds the last of one and the first of the other.
 #[test]
-fn frames_of_an_odd_number_of_bytes_in_big_endian_words_are_told_apart() {
+fn odd_frames_in_big_endian_words_are_separated() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("frames.dcm");
     let change = |o: &mut InMemDicomObject| {

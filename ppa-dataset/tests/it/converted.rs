@@ -31,7 +31,7 @@ fn contents(root: &Path) -> Vec<String> {
 }
 
 #[test]
-fn a_synthetic_dataset_comes_back_from_the_specimen_layout_as_it_was() {
+fn a_synthetic_dataset_survives_the_specimen_layout() {
     let tree = Tree::synthetic();
     let readers = "\"step\": 91, \"label_source\": \"readers\"";
     let surely = "\"step\": 180, \"label_source\": \"readers\"";

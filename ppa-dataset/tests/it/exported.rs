@@ -254,7 +254,7 @@ fn metadata_describe_the_table_that_is_there() {
 }
 
 #[test]
-fn metadata_that_are_none_and_labels_of_other_radiographs_are_refused() {
+fn invalid_metadata_and_foreign_labels_are_refused() {
     let tree = Tree::generated();
     let metadata = Metadata {
         name: "two limbs".to_owned(),

@@ -62,7 +62,7 @@ mod tests {
     use crate::DepthMode;
 
     #[test]
-    fn a_hexagon_has_its_corners_left_and_right_and_a_circle_is_round() {
+    fn a_hexagon_has_corners_left_and_right() {
         let inside = |mask: &FieldMask, x_deg: f64, y_deg: f64| {
             mask.contains(&Vector2::new(
                 x_deg.to_radians().tan(),

@@ -150,7 +150,7 @@ mod tests {
     };
 
     #[test]
-    fn the_worst_gutter_decides_and_thresholds_belong_to_the_better_grade() {
+    fn the_worst_gutter_decides_the_grade() {
         let label = |m, s, l| EACH.grade(&openness(m, s, l)).label;
         assert_eq!(label(0.9, 0.8, 0.45), 1.0);
         assert_eq!(label(0.9, 0.8, 0.449), 1.5);
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn uncertainty_is_half_the_range_of_what_might_have_been_assumed() {
+    fn uncertainty_is_half_the_range_of_assumptions() {
         // 0.4 is above 0.75 · 0.45 = 0.34 and not below 4/3 · 0.3 = 0.4: grades 1 to 1.5.
         assert_eq!(EACH.grade(&openness(0.4, 1.0, 1.0)).std, 0.25);
         assert_eq!(EACH.grade(&openness(0.9, 1.0, 1.0)).std, 0.0);

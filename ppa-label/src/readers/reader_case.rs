@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn every_radiograph_is_shown_and_a_tenth_again_in_the_second_half() {
+    fn every_radiograph_is_shown_and_a_tenth_twice() {
         for (count, repeats) in [(1, 1), (2, 1), (10, 1), (11, 2), (181, 19)] {
             let shown = ReaderCase::of_dataset(&manifest(count), 1, 0.5);
             assert_eq!(shown.len(), count as usize + repeats);

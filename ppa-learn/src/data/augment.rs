@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn augmentations_are_as_frequent_and_as_strong_as_the_paper_says() {
+    fn augmentations_have_the_frequencies_of_the_paper() {
         let draws = draws();
         let rate = |happened: fn(&Change) -> bool, p: f64| {
             let numbers: Vec<f64> = draws.iter().map(|d| f64::from(happened(d))).collect();

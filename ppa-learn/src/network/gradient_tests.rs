@@ -104,7 +104,7 @@ proptest! {
     }
 
     #[test]
-    fn inference_by_the_moments_of_a_batch_gives_what_training_on_it_gives((stem, stages, size) in shapes(), seed in 0..1000_u64) {
+    fn inference_by_batch_moments_equals_training((stem, stages, size) in shapes(), seed in 0..1000_u64) {
         let architecture = Architecture::of_stages(stem, &stages, 16, 1, 0.0);
         let (mut parameters, _) = initialise::parameters(&architecture, seed);
         let disturbance = normal(parameters.len(), seed + 1);

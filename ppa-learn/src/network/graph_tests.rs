@@ -89,7 +89,7 @@ fn disturbed(options: Options) -> EfficientNetB0 {
 }
 
 #[test]
-fn graph_and_kernels_give_the_same_outputs_gradients_and_statistics() {
+fn graph_and_kernels_agree_in_outputs_and_gradients() {
     let network = disturbed(Options::default());
     let twin = network.to_device(&Device::Cpu).unwrap();
     // Not square; sides are odd before some blocks and even before others, and 3 x 2 pixels in the end.

@@ -175,13 +175,13 @@ fn check_pairs(kind: FusionKind, extra: usize, each: usize, joining: usize) {
 }
 
 #[test]
-fn a_model_of_score_fusion_holds_shared_weights_once_and_averages() {
+fn score_fusion_model_holds_shared_weights_once() {
     check_pairs(FusionKind::Score, 1, ONE, 0);
 }
 
 /// With 511 more outputs of each network, and layers of 1024 to 256 values to one.
 #[test]
-fn a_model_of_late_fusion_holds_shared_weights_once_and_all_its_layers() {
+fn late_fusion_model_holds_shared_weights_once() {
     check_pairs(FusionKind::Late, 7, ONE + 511 * 1281, 1025 * 256 + 257);
 }
 

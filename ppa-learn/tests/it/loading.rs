@@ -39,7 +39,7 @@ fn first_batches(images: &Arc<Images>, first: u64, workers: usize) -> Vec<Batch>
 }
 
 #[test]
-fn batches_do_not_depend_on_workers_memory_or_where_training_began() {
+fn batches_do_not_depend_on_workers_memory_or_start() {
     let folder = dataset(2, &[0, 90, 180]);
     let all = images(&folder, Views::Pairs, usize::MAX);
     let none = images(&folder, Views::Pairs, 0);
@@ -53,7 +53,7 @@ fn batches_do_not_depend_on_workers_memory_or_where_training_began() {
 }
 
 #[test]
-fn evaluation_sees_each_sample_once_and_the_last_batch_is_short() {
+fn evaluation_sees_each_sample_exactly_once() {
     let folder = dataset(2, &[0, 90, 180]);
     let images = images(&folder, Views::Unified, 20_000);
     assert_eq!(images.samples().len(), 12);

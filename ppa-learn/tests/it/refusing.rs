@@ -46,7 +46,7 @@ fn numbers_that_are_not_finite_stop_with_step_and_layer() {
 }
 
 #[test]
-fn checkpoints_of_other_trainings_networks_and_files_are_refused() {
+fn checkpoints_of_other_trainings_are_refused() {
     let data = dataset(2, &[0, 90, 180]);
     let folder = tempfile::tempdir().unwrap();
     let config = config(data.path());

@@ -49,7 +49,7 @@ fn a_training_that_was_stopped_ends_with_the_same_bytes() {
 }
 
 #[test]
-fn a_training_on_pairs_that_was_stopped_ends_with_the_same_bytes() {
+fn a_stopped_training_on_pairs_ends_with_the_same_bytes() {
     let data = dataset(1, &[0, 180]);
     let config = TrainConfig {
         steps: 2,

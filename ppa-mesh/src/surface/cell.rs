@@ -232,7 +232,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_crossing_lies_in_exactly_one_loop_and_fillings_avoid_faces() {
+    fn every_crossing_lies_in_exactly_one_loop() {
         for (inside, configuration) in CONFIGURATIONS.iter().enumerate() {
             let crossed = (0..12_u8)
                 .filter(|&e| {

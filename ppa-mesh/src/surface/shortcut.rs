@@ -186,7 +186,7 @@ mod tests {
     proptest! {
         /// Every loop of four, against the definition in f64.
         #[test]
-        fn the_diagonal_is_the_one_whose_middle_is_nearer_to_the_trilinear_surface(
+        fn the_diagonal_is_the_one_nearer_to_the_true_surface(
             size in prop::array::uniform8(1.0..1000.0_f32),
         ) {
             let mut quads = 0;

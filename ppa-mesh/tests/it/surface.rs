@@ -161,7 +161,7 @@ fn a_full_volume_closes_to_its_own_box() {
 /// Whole HU in 16 bits and in floating point, one iso value after the other and all in one pass; iso
 /// values on and between whole numbers.
 #[test]
-fn samples_of_both_types_and_one_pass_for_several_values_give_the_same_surfaces() {
+fn both_sample_types_and_one_pass_give_equal_surfaces() {
     let size = [70, 9, 40];
     let hu: Vec<i16> = hash_noise(size.iter().product(), 5)
         .iter()

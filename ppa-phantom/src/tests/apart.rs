@@ -128,7 +128,7 @@ fn check(name: &str, limb: &Limb) {
 }
 
 #[test]
-fn bones_of_the_whole_family_keep_half_a_millimetre_and_lie_below_the_skin() {
+fn bones_keep_half_a_millimetre_below_the_skin() {
     let legs: Vec<(String, LowerLeg)> = family().collect();
     legs.par_iter().for_each(|(name, leg)| check(name, leg));
 }

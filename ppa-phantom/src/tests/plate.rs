@@ -5,7 +5,7 @@ use nalgebra::{Unit, Vector3};
 use crate::*;
 
 #[test]
-fn the_plate_lies_on_the_fibula_below_the_skin_and_its_screws_in_it() {
+fn the_plate_lies_on_the_fibula_with_screws_inside() {
     for name in ["P01", "P02", "P09"] {
         let plain = LowerLeg::family(name, Side::Right).unwrap();
         let leg = plain.clone().with_plate();

@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn voxels_are_read_x_first_with_blank_lines_and_comments_between() {
+    fn voxels_are_read_x_first_past_blanks_and_comments() {
         let file = read(SAMPLE.as_bytes()).unwrap();
         assert_eq!(file.size, [3, 2, 2]);
         assert_eq!(file.side_cm, [0.1, 0.2, 0.4]);

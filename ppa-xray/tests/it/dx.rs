@@ -200,7 +200,7 @@ fn an_image_for_processing_is_linear_in_the_reading() {
 }
 
 #[test]
-fn the_same_radiograph_gives_the_same_bytes_and_another_one_other_identifiers() {
+fn identifiers_follow_from_the_radiograph() {
     let (projection, radiograph) = exposed();
     let intent = DxIntent::Processing;
     let first = write(&projection, &radiograph, "scan", intent);

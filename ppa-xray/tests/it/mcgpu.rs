@@ -84,7 +84,7 @@ fn photons(simulation: &Simulation, station: &Station, histories: u64) -> Radiog
 
 /// The shadow of the bone turns as the source does: it lies at low x, y and z.
 #[test]
-fn a_scan_shows_the_phantom_from_all_sides_in_the_order_of_mcgpu() {
+fn a_scan_has_the_projections_of_mcgpu_in_order() {
     let folder = tempfile::tempdir().unwrap();
     let square = Sections {
         detector: "20 10\n20 10\n100",

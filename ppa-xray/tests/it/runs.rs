@@ -354,7 +354,7 @@ fn a_time_limit_is_kept_and_leaves_a_complete_run() {
 
 /// The histories at which a run is precise enough depend on the seed alone, and the error is what was asked for.
 #[test]
-fn a_target_error_is_reached_at_the_same_history_after_an_interruption() {
+fn an_interruption_does_not_change_the_last_history() {
     let scene = Scene::new();
     let run = scene.run(400_000_000_000, 3);
     let stop = Stop {

@@ -232,7 +232,7 @@ mod tests {
 
     /// 2 GiB in a file of some hundred bytes are more than any deflate stream holds; a hundred thousand bytes are not.
     #[test]
-    fn a_deflated_file_that_promises_what_it_does_not_hold_is_refused() {
+    fn a_deflated_file_shorter_than_its_header_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("empty");
         deflated(&path, b"\xe0\x7f\x10\0OW\0\0\0\0\0\x80ab");

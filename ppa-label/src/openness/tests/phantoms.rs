@@ -53,7 +53,7 @@ fn a_phantom_opens_at_its_mortise_angle() {
 
 #[test]
 #[ignore = "a minute: seventeen ankles, each seen from many sides"]
-fn every_phantom_opens_at_its_mortise_angle_and_all_of_them_as_published() {
+fn phantoms_open_at_their_mortise_angle_as_published() {
     let side = Side::Right;
     let found: Vec<f64> = family()
         .par_iter()
@@ -126,7 +126,7 @@ fn check_measures(name: &str, (space, truth): &(JointSpace, Truth)) -> [Option<f
 }
 
 #[test]
-fn clear_spaces_are_the_gaps_of_the_phantom_and_overlaps_as_published() {
+fn clear_spaces_and_overlaps_are_as_published() {
     let [front, turned] = check_measures("P01", &mortise("P01", Side::Right, FAMILY_SPACING_MM));
     assert!(front.is_some() && turned > front, "{front:?}, {turned:?}");
 }

@@ -55,7 +55,7 @@ fn openness(space: &JointSpace, degrees: &[f64]) -> Vec<Openness> {
 /// A slab of width w and depth L is closed from atan(w / L) on, within half a degree, on both sides, and half open at half its
 /// tangent.
 #[test]
-fn a_slab_closes_at_the_angle_whose_tangent_is_width_over_depth() {
+fn a_slab_closes_at_atan_of_width_over_depth() {
     for width in [3.0_f64, 4.0] {
         // Blur rounds the edges: in voxels of 0.5 mm the window is 0.75 degrees wider.
         let bones = fork(0.2, width);
@@ -93,7 +93,7 @@ fn a_slab_closes_at_the_angle_whose_tangent_is_width_over_depth() {
 /// width w and depth L with plane faces: nothing in its way up to atan(w / L), then L / cos φ − w / sin φ of bone where
 /// L / cos φ lie above and below, so a contrast of w / (L tan φ).
 #[test]
-fn a_shifted_beam_closes_a_plane_superior_gutter_as_the_formula_tells() {
+fn a_shifted_beam_closes_a_plane_gutter_by_formula() {
     let width = 3.0;
     let bones = fork(0.25, width);
     let space = JointSpace::new(bones, &ct_from_patient(Point3::origin(), Vector3::z())).unwrap();
