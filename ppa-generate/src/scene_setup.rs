@@ -79,7 +79,7 @@ impl Table {
     /// Loads or builds the room of a plan and finds its table.
     ///
     /// # Errors
-    /// [`StageError`] naming the room or table at fault.
+    /// [`SceneSetupError`] naming the room or table at fault.
     pub fn of_plan(plan: &Plan) -> Result<Self, SceneSetupError> {
         let room = load_room(&plan.room)?;
         let seed = plan_seed(plan.seed, Purpose::TablePlane);
@@ -92,7 +92,7 @@ impl Table {
     /// What stands in the room, for the cameras: its triangles, or discs at its points.
     ///
     /// # Errors
-    /// [`StageError`] for points whose normals cannot be found or that cannot be rendered.
+    /// [`SceneSetupError`] for points whose normals cannot be found or that cannot be rendered.
     pub fn furniture(&self) -> Result<Body, SceneSetupError> {
         if let Some(mesh) = &self.room.mesh {
             return Ok(Body::Mesh(MeshBody::new(&mesh.vertices, &mesh.triangles)?));
@@ -104,7 +104,7 @@ impl Table {
 /// Discs at the points of a recorded room, for the cameras.
 ///
 /// # Errors
-/// [`StageError`] for points whose normals cannot be found or that cannot be rendered.
+/// [`SceneSetupError`] for points whose normals cannot be found or that cannot be rendered.
 pub fn body_of_cloud(cloud: &PointCloud) -> Result<Body, SceneSetupError> {
     let points = &cloud.points;
     let estimated;
@@ -132,7 +132,7 @@ impl SceneSetup {
     /// Sets the stage of a plan.
     ///
     /// # Errors
-    /// [`StageError`] naming the room, table, camera or beam at fault.
+    /// [`SceneSetupError`] naming the room, table, camera or beam at fault.
     pub fn of_plan(plan: &Plan) -> Result<Self, SceneSetupError> {
         let table = Table::of_plan(plan)?;
         let rig = plan.depth.cameras()?;
@@ -192,7 +192,7 @@ impl SceneSetup {
 /// The tube of a plan and its filters.
 ///
 /// # Errors
-/// [`StageError::Spectrum`] for a filter that cannot be read.
+/// [`SceneSetupError::Spectrum`] for a filter that cannot be read.
 pub fn tube(settings: &XraySettings) -> Result<TubeSpec, SceneSetupError> {
     let filters = settings.filters.iter().map(|filter| filter.parse());
     Ok(TubeSpec {
@@ -205,7 +205,7 @@ pub fn tube(settings: &XraySettings) -> Result<TubeSpec, SceneSetupError> {
 /// The beam of a plan.
 ///
 /// # Errors
-/// [`StageError::Spectrum`] for a voltage, anode or filter out of range.
+/// [`SceneSetupError::Spectrum`] for a voltage, anode or filter out of range.
 pub fn spectrum(settings: &XraySettings) -> Result<Spectrum, SceneSetupError> {
     Ok(Spectrum::tungsten(&tube(settings)?)?)
 }
