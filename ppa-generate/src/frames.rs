@@ -30,7 +30,7 @@ impl Frames {
     /// Device and cameras in their room.
     ///
     /// # Errors
-    /// [`StageError::Rig`] naming the camera whose pose is none.
+    /// [`SceneSetupError::Rig`] naming the camera whose pose is none.
     pub fn of_room(table: &Table, rig: &RigSpec) -> Result<Self, SceneSetupError> {
         let room_from_device = table.room.device.room_from_device;
         let mut motions =

@@ -7,7 +7,7 @@ pub enum RoomError {
     /// A length of the built-in room does not make sense.
     #[error("{name} of the room is {found} mm, expected {expected}")]
     Length {
-        /// Field of [`RoomSpec`].
+        /// Field of [`RoomSpec`](crate::RoomSpec).
         name: &'static str,
         /// Its value.
         found: f64,
