@@ -10,8 +10,6 @@ mod findings;
 mod geometry;
 mod histogram;
 mod meaning;
-#[cfg(feature = "report")]
-mod report;
 mod survey;
 mod tissue;
 mod values;
@@ -19,8 +17,6 @@ mod values;
 use serde::Serialize;
 
 pub use findings::{Finding, FindingCode, Severity};
-#[cfg(feature = "report")]
-pub use report::html;
 
 use crate::scan::{Scan, WarningCode};
 use histogram::Histogram;

@@ -11,8 +11,7 @@
 //! Nothing that names a person, a place or a date passes from a file into these types.
 //!
 //! Features: `dicom`, `nifti`, `nrrd` and `metaimage` (all on by default) hold the readers and
-//! writers; `report` writes an audit as a page of HTML. Without them the crate is geometry
-//! and audit only.
+//! writers. Without them the crate is geometry and audit only.
 //!
 //! ```
 //! use nalgebra::{Point3, Vector3};
@@ -75,6 +74,7 @@ pub use dicom_write::write as write_dicom;
 pub use error::{Gap, ReadError, WriteError};
 pub use grid::{Grid, GridError};
 pub use info::Info;
+pub use lps_view::LpsView;
 #[cfg(feature = "metaimage")]
 pub use meta_image::write as write_meta_image;
 #[cfg(feature = "nifti")]

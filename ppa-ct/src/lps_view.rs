@@ -4,12 +4,13 @@ use crate::volume::Volume;
 
 /// Voxels addressed by steps towards the left, posterior and superior, as closely as the volume's
 /// own axes run along these; nothing is interpolated.
-pub(crate) struct LpsView<'a> {
+pub struct LpsView<'a> {
     volume: &'a Volume,
     axes: [(usize, bool); 3],
 }
 
 impl<'a> LpsView<'a> {
+    /// The view of a volume.
     pub fn of(volume: &'a Volume) -> Self {
         Self {
             volume,
@@ -28,6 +29,10 @@ impl<'a> LpsView<'a> {
         self.axes.map(|(axis, _)| spacing[axis])
     }
 
+    /// HU of the voxel at a place counted from the right, anterior and inferior end.
+    ///
+    /// # Panics
+    /// Outside [`size`](Self::size).
     pub fn at(&self, place: [usize; 3]) -> f32 {
         let mut voxel = [0; 3];
         for ((axis, turned), at) in self.axes.into_iter().zip(place) {

@@ -1,14 +1,17 @@
 //! Pictures and pages by which a person judges cases, poses and datasets.
 //!
-//! [`case_picture`] and [`pose_picture`] show one limb, [`contact_sheet`] a dataset on one picture, [`qa_page`] the quality report
+//! [`audit_page`] shows a scan, [`case_picture`] and [`pose_picture`] show one limb, [`contact_sheet`] a dataset on one picture, [`qa_page`] the quality report
 //! of a dataset, [`coverage_plot`] where a camera sees most of a joint.
 
+mod audit_page;
 mod contact_sheet;
 mod coverage_plot;
 mod drawing;
+mod embedded;
 mod pictures;
 mod qa;
 
+pub use audit_page::audit_page;
 pub use contact_sheet::{ContactSheetError, contact_sheet};
 pub use coverage_plot::{RankedView, coverage_plot};
 pub use pictures::{PosedLimb, case_picture, pose_picture, write_picture};

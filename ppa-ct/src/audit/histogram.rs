@@ -106,15 +106,6 @@ impl Histogram {
         let share = near as f64 / self.total as f64;
         (share >= least).then_some(f64::from(hu))
     }
-
-    /// Counts of `bins` equal intervals from `low` to `high` HU.
-    #[cfg(feature = "report")]
-    pub fn coarse(&self, low: i32, high: i32, bins: usize) -> Vec<u64> {
-        let edge = |n: usize| low + (high - low) * n as i32 / bins as i32;
-        (0..bins)
-            .map(|n| self.between(edge(n) as f32, (edge(n + 1) - 1) as f32))
-            .collect()
-    }
 }
 
 fn bin(hu: f32) -> usize {

@@ -1,7 +1,6 @@
 //! Line charts and histograms as SVG.
 
-use std::fmt::Write;
-
+use maud::{Markup, html};
 use ppa_core::text::number;
 
 const WIDTH: f64 = 460.0;
@@ -27,13 +26,26 @@ pub(super) struct Series {
     pub marked: Vec<[f64; 2]>,
 }
 
+impl Series {
+    /// The outline of the band around the points, where there is one.
+    fn band(&self) -> Option<Vec<[f64; 2]>> {
+        let is_there =
+            self.spread.len() == self.points.len() && self.spread.iter().any(|s| *s > 0.0);
+        let edge = |sign: f64| {
+            let points = self.points.iter().zip(&self.spread);
+            points.map(move |(p, s)| [p[0], p[1] + sign * s])
+        };
+        is_there.then(|| edge(1.0).chain(edge(-1.0).rev()).collect())
+    }
+}
+
 /// A chart of several series; `y_range` where it shall not follow from the points.
 pub(super) fn chart(
     x_label: &str,
     y_label: &str,
     series: &[Series],
     y_range: Option<[f64; 2]>,
-) -> String {
+) -> Markup {
     let points = || series.iter().flat_map(|s| &s.points);
     let x_range = range(points().map(|p| p[0]));
     let y_range = y_range.unwrap_or_else(|| range(points().map(|p| p[1])));
@@ -43,78 +55,38 @@ pub(super) fn chart(
         let v = v.clamp(y_range[0], y_range[1]);
         HEIGHT - BOTTOM - (v - y_range[0]) / (y_range[1] - y_range[0]) * (HEIGHT - TOP - BOTTOM)
     };
-    let mut svg = format!(
-        "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{y_label} against {x_label}\">"
-    );
-    let mut add = |text: std::fmt::Arguments| svg.write_fmt(text).expect("memory takes all");
-    for v in ticks(x_range) {
-        add(format_args!(
-            "<path class=\"grid\" d=\"M{0:.1} {TOP}V{1}\"/><text x=\"{0:.1}\" y=\"{2}\" text-anchor=\"middle\">{3}</text>",
-            x(v),
-            HEIGHT - BOTTOM,
-            HEIGHT - BOTTOM + 14.0,
-            number(v)
-        ));
-    }
-    for v in ticks(y_range) {
-        add(format_args!(
-            "<path class=\"grid\" d=\"M{LEFT} {0:.1}H{1}\"/><text x=\"{2}\" y=\"{0:.1}\" dy=\"4\" text-anchor=\"end\">{3}</text>",
-            y(v),
-            WIDTH - RIGHT,
-            LEFT - 5.0,
-            number(v)
-        ));
-    }
-    add(format_args!(
-        "<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">{x_label}</text>",
-        (LEFT + WIDTH - RIGHT) / 2.0,
-        HEIGHT - 8.0
-    ));
-    add(format_args!(
-        "<text transform=\"translate(12 {}) rotate(-90)\" text-anchor=\"middle\">{y_label}</text>",
-        (TOP + HEIGHT - BOTTOM) / 2.0
-    ));
-    for (i, one) in series.iter().enumerate() {
-        let colour = COLOURS[i % COLOURS.len()];
-        if one.points.is_empty() {
-            continue;
+    let [bottom, right] = [HEIGHT - BOTTOM, WIDTH - RIGHT];
+    let at = |[px, py]: [f64; 2]| format!("{:.1} {:.1}", x(px), y(py));
+    let path = |points: Vec<String>| format!("M{}", points.join("L"));
+    let drawn = || series.iter().zip(COLOURS.iter().cycle());
+    html! {
+        svg viewBox={ "0 0 " (WIDTH) " " (HEIGHT) } role="img" aria-label={ (y_label) " against " (x_label) } {
+            @for (at, text) in ticks(x_range).into_iter().map(|v| (format!("{:.1}", x(v)), number(v))) {
+                path class="grid" d={ "M" (at) " " (TOP) "V" (bottom) } {}
+                text x=(at) y=(bottom + 14.0) text-anchor="middle" { (text) }
+            }
+            @for (at, text) in ticks(y_range).into_iter().map(|v| (format!("{:.1}", y(v)), number(v))) {
+                path class="grid" d={ "M" (LEFT) " " (at) "H" (right) } {}
+                text x=(LEFT - 5.0) y=(at) dy="4" text-anchor="end" { (text) }
+            }
+            text x=((LEFT + right) / 2.0) y=(HEIGHT - 8.0) text-anchor="middle" { (x_label) }
+            text transform={ "translate(12 " ((TOP + bottom) / 2.0) ") rotate(-90)" } text-anchor="middle" { (y_label) }
+            @for (one, colour) in drawn().filter(|(one, _)| !one.points.is_empty()) {
+                @if let Some(band) = one.band() {
+                    path d={ (path(band.into_iter().map(at).collect())) "Z" } fill=(colour) opacity=".2" {}
+                }
+                path d=(path(one.points.iter().copied().map(at).collect())) fill="none" stroke=(colour) stroke-width="1.6" {}
+                @for mark in &one.marked {
+                    circle cx=(format!("{:.1}", x(mark[0]))) cy=(format!("{:.1}", y(mark[1]))) r="5" fill="none" stroke="#c00" stroke-width="2" {}
+                }
+            }
         }
-        let at = |[px, py]: [f64; 2]| format!("{:.1} {:.1}", x(px), y(py));
-        if one.spread.len() == one.points.len() && one.spread.iter().any(|s| *s > 0.0) {
-            let edge = |sign: f64| {
-                one.points
-                    .iter()
-                    .zip(&one.spread)
-                    .map(move |(p, s)| [p[0], p[1] + sign * s])
-            };
-            let band: Vec<_> = edge(1.0).chain(edge(-1.0).rev()).map(at).collect();
-            add(format_args!(
-                "<path d=\"M{}Z\" fill=\"{colour}\" opacity=\".2\"/>",
-                band.join("L")
-            ));
-        }
-        let line: Vec<_> = one.points.iter().copied().map(at).collect();
-        add(format_args!(
-            "<path d=\"M{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.6\"/>",
-            line.join("L")
-        ));
-        for mark in &one.marked {
-            add(format_args!(
-                "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"5\" fill=\"none\" stroke=\"#c00\" stroke-width=\"2\"/>",
-                x(mark[0]),
-                y(mark[1])
-            ));
+        p class="legend" {
+            @for (one, colour) in drawn() {
+                span { i style={ "background:" (colour) } {} (one.name) } " "
+            }
         }
     }
-    svg += "</svg><p class=\"legend\">";
-    for (i, one) in series.iter().enumerate() {
-        let colour = COLOURS[i % COLOURS.len()];
-        svg += &format!(
-            "<span><i style=\"background:{colour}\"></i>{}</span> ",
-            one.name
-        );
-    }
-    svg + "</p>"
 }
 
 /// Least and greatest value, never the same.
@@ -169,7 +141,7 @@ mod tests {
             spread: Vec::new(),
             marked: vec![[10.0, 3.0]],
         };
-        let svg = chart("x", "y", &[series], None);
+        let svg = chart("x", "y", &[series], None).into_string();
         let (right, top) = (WIDTH - RIGHT, TOP);
         assert!(
             svg.contains(&format!(

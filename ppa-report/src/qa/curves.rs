@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use maud::{Markup, html};
 use ppa_core::text::number;
 use ppa_dataset::BodyShape;
 use ppa_dataset::labels::LabelSource;
@@ -10,9 +11,9 @@ use ppa_dataset::manifest::{FileRow, RoiFile};
 use ppa_dataset::published::{GrayImage16, Pose, Published};
 
 use super::chart::{Series, chart};
+use super::figure::figure;
 use super::histogram::Depths;
 use super::outliers::{LEAST_POSES, outliers};
-use super::page::figure;
 use super::scene::Scene;
 use crate::contact_sheet::evenly_chosen;
 
@@ -22,7 +23,7 @@ const SAMPLE: usize = 24;
 /// Outliers are looked for beyond these jumps, mm and degrees.
 const FLOOR: [f64; 2] = [0.5, 0.1];
 
-pub(super) fn labels(dataset: &Published, limb: LimbId) -> String {
+pub(super) fn labels(dataset: &Published, limb: LimbId) -> Markup {
     let mut labels: Vec<_> = dataset
         .pairs
         .iter()
@@ -34,7 +35,7 @@ pub(super) fn labels(dataset: &Published, limb: LimbId) -> String {
         .collect();
     labels.dedup_by_key(|(step, _)| *step);
     if labels.is_empty() {
-        return String::new();
+        return Markup::default();
     }
     let mut series: Vec<Series> = Vec::new();
     for (step, label) in labels {
@@ -66,7 +67,7 @@ pub(super) fn histograms<'a>(
     root: &Path,
     rois: &RoiFile,
     of_view: impl Fn(View) -> Vec<&'a FileRow>,
-) -> String {
+) -> Markup {
     let mut series = Vec::new();
     for view in View::ALL {
         let rows = of_view(view);
@@ -96,16 +97,16 @@ pub(super) fn histograms<'a>(
 /// What heights and tilts show.
 pub(super) struct Sweeps {
     /// Two charts.
-    pub charts: String,
+    pub charts: Markup,
     /// A sentence on every pose that does not follow from its neighbours.
-    pub html: String,
+    pub html: Markup,
     /// Their number.
     pub outliers: usize,
 }
 
 /// How height and tilt of a limb change from pose to pose.
 pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRow>)]) -> Sweeps {
-    let (mut charts, mut sentences) = (String::new(), Vec::new());
+    let (mut charts, mut sentences) = (Vec::new(), Vec::new());
     for (i, [what, unit]) in [
         ["height of the joint", "mm"],
         ["tilt of the axis", "degrees"],
@@ -132,7 +133,7 @@ pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRo
             sentences.extend(odd.iter().map(|&at| {
                 let angle = angle_text(rows[at].step);
                 format!(
-                    "<li>{}, {angle} degrees: {what} {:.2} {unit} does not follow from the poses beside it</li>",
+                    "{}, {angle} degrees: {what} {:.2} {unit} does not follow from the poses beside it",
                     shape.name(),
                     number(values[at])
                 )
@@ -146,7 +147,7 @@ pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRo
             });
         }
         let caption = format!("{what} above the table, {unit}; outliers are ringed.");
-        charts += &figure(
+        charts.push(figure(
             &caption,
             chart(
                 "medial rotation, degrees",
@@ -154,22 +155,26 @@ pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRo
                 &series,
                 None,
             ),
-        );
+        ));
     }
     let longest = sweeps.iter().map(|(_, rows)| rows.len()).max();
-    let html = match sentences.len() {
-        0 if longest.is_none_or(|poses| poses < LEAST_POSES) => {
-            format!("<p>Fewer than {LEAST_POSES} poses: too few to find outliers.</p>")
+    let too_few = longest.is_none_or(|poses| poses < LEAST_POSES);
+    let outliers = sentences.len();
+    let html = html! {
+        @if outliers > 0 {
+            div class="caution" {
+                p { "Poses that stand out:" }
+                ul { @for sentence in sentences { li { (sentence) } } }
+            }
+        } @else if too_few {
+            p { "Fewer than " (LEAST_POSES) " poses: too few to find outliers." }
+        } @else {
+            p { "No pose stands out from those beside it." }
         }
-        0 => "<p>No pose stands out from those beside it.</p>".to_owned(),
-        _ => format!(
-            "<div class=\"caution\"><p>Poses that stand out:</p><ul>{}</ul></div>",
-            sentences.concat()
-        ),
     };
     Sweeps {
-        charts,
+        charts: html! { @for chart in charts { (chart) } },
         html,
-        outliers: sentences.len(),
+        outliers,
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use maud::Markup;
 use ppa_dataset::BodyShape;
 use ppa_dataset::layout::View;
 use ppa_dataset::manifest::{FileKind, FileRow};
@@ -14,7 +15,7 @@ fn share(row: &FileRow) -> f64 {
 
 /// The shares of a limb's images against rotation, a curve per camera and one of the radiographs, and the largest of them in
 /// percent; `None` where nothing is cut. Of several body shapes each pose has its largest share.
-pub(super) fn cut_shares(rows: &[&FileRow]) -> Option<(String, f64)> {
+pub(super) fn cut_shares(rows: &[&FileRow]) -> Option<(Markup, f64)> {
     let largest = rows.iter().map(|row| share(row)).fold(0.0, f64::max);
     if largest == 0.0 {
         return None;
@@ -85,6 +86,7 @@ mod tests {
             .map(|row| serde_json::from_value(row).unwrap())
             .collect();
         let (svg, largest) = cut_shares(&rows.iter().collect::<Vec<_>>()).unwrap();
+        let svg = svg.into_string();
         assert_eq!(largest, 20.0);
         // From 0 at the left bottom to 20 of 22 % at the right.
         assert!(svg.contains("d=\"M52.0 200.0L448.0 30.9\""), "{svg}");

@@ -1,15 +1,11 @@
 //! The findings about the limbs of a dataset, as a table of the page.
 
+use maud::{Markup, html};
 use ppa_core::text::numbers;
 use ppa_dataset::findings::{Findings, LimbFinding, Severity};
 
-use super::page::{escaped, side};
-
 /// One table, severe findings that nobody acknowledged first; nothing without findings.
-pub(super) fn table(findings: &Findings) -> String {
-    if findings.0.is_empty() {
-        return String::new();
-    }
+pub(super) fn table(findings: &Findings) -> Markup {
     let mut rows: Vec<&LimbFinding> = findings.0.iter().collect();
     rows.sort_by_key(|row| {
         (
@@ -18,20 +14,27 @@ pub(super) fn table(findings: &Findings) -> String {
             row.limb,
         )
     });
-    let rows: String = rows.into_iter().map(row).collect();
-    format!(
-        "<h2>Findings</h2><table class=\"findings\"><tr><th>limb</th><th>severity</th><th>code</th><th>finding</th>\
-         <th>place in the scan, mm (LPS)</th><th>acknowledged</th></tr>{rows}</table>"
-    )
+    html! {
+        @if !rows.is_empty() {
+            h2 { "Findings" }
+            table class="findings" {
+                tr {
+                    th { "limb" } th { "severity" } th { "code" } th { "finding" }
+                    th { "place in the scan, mm (LPS)" } th { "acknowledged" }
+                }
+                @for finding in rows { (row(finding)) }
+            }
+        }
+    }
 }
 
-fn row(row: &LimbFinding) -> String {
+fn row(row: &LimbFinding) -> Markup {
     let finding = &row.finding;
     let (class, severity) = match (row.is_open(), finding.severity) {
-        (true, _) => ("bad", "severe"),
-        (false, Severity::Severe) => ("caution", "severe"),
-        (false, Severity::Caution) => ("caution", "caution"),
-        (false, Severity::Note) => ("", "note"),
+        (true, _) => (Some("bad"), "severe"),
+        (false, Severity::Severe) => (Some("caution"), "severe"),
+        (false, Severity::Caution) => (Some("caution"), "caution"),
+        (false, Severity::Note) => (None, "note"),
     };
     // The code as scripts and `acknowledged` in a case know it.
     let code = serde_json::to_value(finding.code).ok();
@@ -39,18 +42,22 @@ fn row(row: &LimbFinding) -> String {
     let place = finding
         .place_mm
         .map_or(String::new(), |place| format!("{:.1}", numbers(place)));
-    let acknowledged = match (finding.severity, row.acknowledged) {
-        (_, true) => "yes",
-        (Severity::Severe, false) => "<b>no</b>",
-        (_, false) => "",
-    };
-    format!(
-        "<tr class=\"{class}\"><td>patient {} {}</td><td>{severity}</td><td><code>{code}</code></td><td>{}</td><td>{place}</td>\
-         <td>{acknowledged}</td></tr>",
-        row.limb.patient,
-        side(row.limb),
-        escaped(&finding.text)
-    )
+    html! {
+        tr class=[class] {
+            td { "patient " (row.limb.patient) " " (row.limb.side) }
+            td { (severity) }
+            td { code { (code) } }
+            td { (finding.text) }
+            td { (place) }
+            td {
+                @match (finding.severity, row.acknowledged) {
+                    (_, true) => "yes",
+                    (Severity::Severe, false) => b { "no" },
+                    (_, false) => "",
+                }
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -76,7 +83,7 @@ mod tests {
 
     #[test]
     fn open_severe_findings_come_first_with_code_and_place() {
-        let html = table(&findings());
+        let html = table(&findings()).into_string();
         let at = |text: &str| {
             html.find(text)
                 .unwrap_or_else(|| panic!("{text} in {html}"))
@@ -91,6 +98,6 @@ mod tests {
             "{html}"
         );
         assert_eq!(html.matches("<td>yes</td>").count(), 1);
-        assert_eq!(table(&Findings::default()), "");
+        assert_eq!(table(&Findings::default()).into_string(), "");
     }
 }

@@ -3,6 +3,9 @@
 mod chart;
 mod curves;
 mod cuts;
+mod depth_view;
+mod error;
+mod figure;
 mod findings;
 mod histogram;
 mod limb;
@@ -11,6 +14,6 @@ mod page;
 mod scale;
 mod scene;
 mod verdict;
-mod views;
 
-pub use self::page::{QaError, qa_page};
+pub use self::error::QaError;
+pub use self::page::qa_page;

@@ -1,45 +1,19 @@
 //! The page: its sections and their order.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 use ppa_core::text::{count, error_chain, numbers};
-use ppa_dataset::files::FileError;
 use ppa_dataset::findings::{Findings, Severity};
-use ppa_dataset::layout::LimbId;
 use ppa_dataset::manifest::Manifest;
-use ppa_dataset::published::{Flaw, Published, PublishedError, inspect};
-use ppa_dataset::split::{Split, SplitError};
+use ppa_dataset::published::{Flaw, Published, inspect};
+use ppa_dataset::split::Split;
 
+use super::error::QaError;
 use super::findings;
 use super::limb::{LimbPart, limb_part};
 use super::scene::Scene;
 use super::verdict::Tally;
-use crate::contact_sheet::ContactSheetError;
-
-/// Why there is no page.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum QaError {
-    /// The list of images that the page follows is missing.
-    #[error(
-        "{} has no manifest.jsonl, which the page needs: `ppa generate` and `ppa merge` write it once all poses are made, \
-         datasets of other programs have none",
-        .0.display()
-    )]
-    NoManifest(PathBuf),
-    /// A file of the dataset.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// Its layout or lists.
-    #[error(transparent)]
-    Published(#[from] PublishedError),
-    /// One of its splits.
-    #[error(transparent)]
-    Split(#[from] SplitError),
-    /// Its contact sheets.
-    #[error(transparent)]
-    ContactSheet(#[from] ContactSheetError),
-}
 
 /// The dataset in `root`, which `ppa generate` finished, as one page of HTML without any address outside of it: verdict, findings, checks of all
 /// files, contact sheets, regions and joints in whole images, labels against angle, depths, heights and tilts with outliers, origin.
@@ -70,7 +44,7 @@ pub fn qa_page(root: &Path) -> Result<String, QaError> {
         other_findings: doubts - severe,
         ..Tally::default()
     };
-    let mut limbs = String::new();
+    let mut limbs = Vec::new();
     for limb in manifest.limbs() {
         let LimbPart {
             html,
@@ -79,54 +53,55 @@ pub fn qa_page(root: &Path) -> Result<String, QaError> {
         } = limb_part(root, &manifest, &dataset, &scene, limb)?;
         tally.outliers += outliers;
         tally.empty_limbs += usize::from(is_empty);
-        limbs += &html;
+        limbs.push(html);
     }
-    let head = format!(
-        "<h1>Dataset of {}</h1><p>{}, {}, {}, {}, {} with a label.</p>",
-        count(inspection.patients, "person"),
-        count(inspection.limbs, "limb"),
-        count(inspection.pairs, "image pair"),
-        count(inspection.depth_images, "depth image"),
-        count(inspection.radiographs, "radiograph"),
-        count(inspection.labelled, "pair")
-    );
-    let parts = [
-        HEAD.to_owned(),
-        head,
-        tally.html(),
-        findings::table(&findings),
-        checks(root, &inspection.flaws),
-        splits(root, &dataset.patients())?,
-        limbs,
-        provenance(&scene),
-        "</main></body></html>\n".to_owned(),
-    ];
-    Ok(parts.concat())
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width";
+                title { "Quality report of a dataset" }
+                style { (PreEscaped(include_str!("page.css"))) }
+            }
+            body {
+                main {
+                    h1 { "Dataset of " (count(inspection.patients, "person")) }
+                    p {
+                        (count(inspection.limbs, "limb")) ", " (count(inspection.pairs, "image pair")) ", "
+                        (count(inspection.depth_images, "depth image")) ", "
+                        (count(inspection.radiographs, "radiograph")) ", "
+                        (count(inspection.labelled, "pair")) " with a label."
+                    }
+                    (tally.html())
+                    (findings::table(&findings))
+                    (checks(root, &inspection.flaws))
+                    (splits(root, &dataset.patients())?)
+                    @for limb in limbs { (limb) }
+                    (provenance(&scene))
+                }
+            }
+        }
+    };
+    Ok(page.into_string())
 }
 
-const HEAD: &str = concat!(
-    "<!DOCTYPE html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width\">",
-    "<title>Quality report of a dataset</title><style>",
-    include_str!("page.css"),
-    "</style></head><body><main>"
-);
-
-fn checks(root: &Path, flaws: &[Flaw]) -> String {
-    const TOLD: usize = 50;
-    if flaws.is_empty() {
-        return "<p>Every image could be decoded and is as in manifest.jsonl; no region reaches beyond its image.</p>".to_owned();
+fn checks(root: &Path, flaws: &[Flaw]) -> Markup {
+    const SHOWN: usize = 50;
+    html! {
+        @if flaws.is_empty() {
+            p { "Every image could be decoded and is as in manifest.jsonl; no region reaches beyond its image." }
+        } @else {
+            div class="bad" {
+                p {
+                    (count(flaws.len(), "flaw"))
+                    @if flaws.len() > SHOWN { ", the first " (SHOWN) }
+                    ":"
+                }
+                ul { @for flaw in flaws.iter().take(SHOWN) { li { (without_folder(flaw, root)) } } }
+            }
+        }
     }
-    let report = flaws.iter().take(TOLD);
-    let report = report.map(|flaw| format!("<li>{}</li>", escaped(&without_folder(flaw, root))));
-    format!(
-        "<div class=\"bad\"><p>{}{}:</p><ul>{}</ul></div>",
-        count(flaws.len(), "flaw"),
-        match flaws.len() > TOLD {
-            true => format!(", the first {TOLD}"),
-            false => String::new(),
-        },
-        report.collect::<String>()
-    )
 }
 
 /// An error with its causes. The page may be passed on: where the dataset lay is nobody's business.
@@ -135,73 +110,51 @@ fn without_folder(error: &dyn std::error::Error, root: &Path) -> String {
     error_chain(error).replace(&folder, "")
 }
 
-fn splits(root: &Path, patients: &[u32]) -> Result<String, QaError> {
-    let mut rows = String::new();
-    for name in Split::names(root)? {
-        let read = Split::read(&Split::path(root, &name))
-            .and_then(|split| split.check(patients).map(|()| split));
-        rows += &match read {
-            Err(error) => format!(
-                "<tr class=\"bad\"><td>{}</td><td>{}</td></tr>",
-                escaped(&name),
-                escaped(&without_folder(&error, root))
-            ),
-            Ok(split) => {
-                let parts = split.parts.iter().map(|(part, of)| {
-                    format!("{}: {}", escaped(part), numbers(of.iter().copied()))
-                });
-                format!(
-                    "<tr><td>{}</td><td>{}</td></tr>",
-                    escaped(&name),
-                    parts.collect::<Vec<_>>().join("; ")
-                )
+fn splits(root: &Path, patients: &[u32]) -> Result<Markup, QaError> {
+    let names = Split::names(root)?;
+    let read = |name: &str| {
+        let split = Split::read(&Split::path(root, name))?;
+        split.check(patients).map(|()| split)
+    };
+    Ok(html! {
+        @if names.is_empty() {
+            p { "No split yet." }
+        } @else {
+            h2 { "Splits by person" }
+            table {
+                @for name in &names {
+                    @match read(name) {
+                        Err(error) => tr class="bad" { td { (name) } td { (without_folder(&error, root)) } },
+                        Ok(split) => tr {
+                            td { (name) }
+                            td {
+                                @for (at, (part, of)) in split.parts.iter().enumerate() {
+                                    @if at > 0 { "; " }
+                                    (part) ": " (numbers(of.iter().copied()))
+                                }
+                            }
+                        },
+                    }
+                }
             }
-        };
-    }
-    if rows.is_empty() {
-        return Ok("<p>No split yet.</p>".to_owned());
-    }
-    Ok(format!("<h2>Splits by person</h2><table>{rows}</table>"))
+        }
+    })
 }
 
-pub(super) fn side(limb: LimbId) -> &'static str {
-    if limb.side_letter() == "l" {
-        "left"
-    } else {
-        "right"
+fn provenance(scene: &Scene) -> Markup {
+    html! {
+        h2 { "Origin" }
+        p {
+            "Made by " (scene.generator) " from sources " code { (scene.code) } " with seed " (scene.seed)
+            ". All settings stand in dataset.json, pose and hash of every image in manifest.jsonl."
+        }
+        table {
+            tr { th { "limb" } th { "SHA-256 of the scan's voxels" } }
+            @for limb in &scene.limbs {
+                tr { td { "patient " (limb.patient) " " (limb.side) } td { code { (limb.volume_sha256) } } }
+            }
+        }
     }
-}
-
-pub(super) fn figure(caption: &str, content: String) -> String {
-    if content.is_empty() {
-        return String::new();
-    }
-    format!("<figure>{content}<figcaption>{caption}</figcaption></figure>")
-}
-
-fn provenance(scene: &Scene) -> String {
-    let scans = scene.limbs.iter().map(|limb| {
-        let name = format!("patient {} {}", limb.patient, escaped(&limb.side));
-        format!(
-            "<tr><td>{name}</td><td><code>{}</code></td></tr>",
-            escaped(&limb.volume_sha256)
-        )
-    });
-    format!(
-        "<h2>Origin</h2><p>Made by {} from sources <code>{}</code> with seed {}. All settings stand in dataset.json, pose and \
-         hash of every image in manifest.jsonl.</p><table><tr><th>limb</th><th>SHA-256 of the scan's voxels</th></tr>{}</table>",
-        escaped(&scene.generator),
-        escaped(&scene.code),
-        scene.seed,
-        scans.collect::<String>()
-    )
-}
-
-pub(super) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use ppa_dataset::manifest::FileRow;
 use ppa_depth::{Camera, CameraSpec, isometry_from_rows};
 use serde::Deserialize;
 
-use super::page::QaError;
+use super::error::QaError;
 
 #[derive(Deserialize)]
 struct Described {

@@ -1,5 +1,6 @@
 //! The verdict at the top of the page, from all that was found.
 
+use maud::{Markup, html};
 use ppa_core::text::count;
 
 /// What was found in a dataset, in numbers.
@@ -19,7 +20,7 @@ pub(super) struct Tally {
 
 impl Tally {
     /// One bar: red where the dataset should not be used as it is, yellow where something should be looked at, else green.
-    pub fn html(&self) -> String {
+    pub fn html(&self) -> Markup {
         let list = |counts: &[(usize, &str, &str)]| {
             let there = counts.iter().filter(|(n, ..)| *n > 0);
             let texts: Vec<_> = there
@@ -49,7 +50,7 @@ impl Tally {
                     .to_owned(),
             ),
         };
-        format!("<p class=\"verdict {class}\">{text}</p>")
+        html! { p class={ "verdict " (class) } { (text) } }
     }
 }
 
@@ -67,8 +68,8 @@ mod tests {
 
     #[test]
     fn only_a_dataset_without_any_finding_gets_a_green_bar() {
-        assert!(CLEAN.html().contains("verdict good"));
-        let severe = Tally { severe: 1, ..CLEAN }.html();
+        assert!(CLEAN.html().into_string().contains("verdict good"));
+        let severe = Tally { severe: 1, ..CLEAN }.html().into_string();
         assert!(
             severe.contains("verdict bad") && severe.contains(": 1 severe finding."),
             "{severe}"
@@ -78,7 +79,8 @@ mod tests {
             outliers: 1,
             ..CLEAN
         }
-        .html();
+        .html()
+        .into_string();
         assert!(
             flaws.contains("verdict bad")
                 && flaws.contains("2 flaws of files. Also: 1 outlier among"),
@@ -94,7 +96,7 @@ mod tests {
                 ..CLEAN
             },
         ] {
-            let html = doubtful.html();
+            let html = doubtful.html().into_string();
             assert!(html.contains("verdict caution"), "{html}");
         }
     }

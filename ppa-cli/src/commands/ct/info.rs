@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use ppa_ct::audit::{Audit, Severity, html};
+use ppa_ct::audit::{Audit, Severity};
 use ppa_ct::{Acquisition, Info};
 use ppa_dataset::write_whole;
+use ppa_report::audit_page;
 use serde::Serialize;
 
 use crate::output::Output;
@@ -47,7 +48,7 @@ pub fn run(args: &InfoArgs, output: Output) -> anyhow::Result<()> {
         audit: Audit::of(&scan),
     };
     if let Some(path) = &args.report {
-        write_whole(path, html(&scan, &audited.audit).as_bytes())?;
+        write_whole(path, audit_page(&scan, &audited.audit).as_bytes())?;
     }
     output.print(&audited, describe)
 }

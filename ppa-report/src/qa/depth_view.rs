@@ -1,16 +1,10 @@
-//! Pictures on the page.
+//! Depth images on the page, and strips of pictures.
 
-use std::io::Cursor;
-use std::path::Path;
-
-use base64::Engine;
-use image::{ImageFormat, Rgb, RgbImage};
-use ppa_dataset::files::FileError;
+use image::{Rgb, RgbImage};
 use ppa_dataset::manifest::RoiRow;
 use ppa_dataset::published::GrayImage16;
 use ppa_depth::false_colour;
 
-use super::page::QaError;
 use crate::drawing::{INK, draw_circle, fill_disc};
 
 /// A whole depth image in false colour over a range of depths, mm, with its region of interest framed and the joint as a dot in
@@ -66,18 +60,6 @@ pub(super) fn strip(pictures: &[RgbImage]) -> RgbImage {
         image::imageops::replace(&mut strip, picture, x, 0);
     }
     strip
-}
-
-/// A picture as part of the page.
-pub(super) fn embedded(picture: &RgbImage, text: &str, root: &Path) -> Result<String, QaError> {
-    let mut png = Cursor::new(Vec::new());
-    let encoded = picture.write_to(&mut png, ImageFormat::Png);
-    encoded.map_err(|e| FileError::at("draw", root)(std::io::Error::other(e)))?;
-    let data = base64::engine::general_purpose::STANDARD.encode(png.into_inner());
-    let (width, height) = picture.dimensions();
-    Ok(format!(
-        "<img alt=\"{text}\" width=\"{width}\" height=\"{height}\" src=\"data:image/png;base64,{data}\">"
-    ))
 }
 
 #[cfg(test)]
