@@ -1,4 +1,4 @@
-//! Every relative link and anchor of the documentation resolves.
+//! The documentation is true of the repository: links resolve, and the sources and tests it names exist.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -64,4 +64,51 @@ fn relative_links_and_anchors_of_the_docs_resolve() {
         }
     }
     assert!(broken.is_empty(), "broken links:\n{}", broken.join("\n"));
+}
+
+/// Every Rust source of the crates.
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap();
+        match path.is_dir() {
+            true if name != "target" && !name.starts_with('.') => sources(&path, found),
+            false if name.ends_with(".rs") => found.push(path),
+            _ => {}
+        }
+    }
+}
+
+#[test]
+fn sources_and_tests_named_in_the_docs_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let mut rust = Vec::new();
+    sources(root, &mut rust);
+    let code: String = rust
+        .iter()
+        .map(|f| fs::read_to_string(f).unwrap())
+        .collect();
+    let mut files = vec![root.join("README.md"), root.join("CONTRIBUTING.md")];
+    pages(&root.join("docs"), &mut files);
+    let mut missing = Vec::new();
+    let mut named = 0;
+    for file in &files {
+        let text = prose(&fs::read_to_string(file).unwrap());
+        for name in text.split('`').skip(1).step_by(2) {
+            let function = name.rsplit("::").next().unwrap();
+            let is_function = function.matches('_').count() >= 4
+                && function
+                    .chars()
+                    .all(|c| matches!(c, 'a'..='z' | '0'..='9' | '_'));
+            let is_source = name.ends_with(".rs") && !name.contains(['*', ' ']);
+            let exists = (!is_source || rust.iter().any(|path| path.ends_with(name)))
+                && (!is_function || code.contains(&format!("fn {function}(")));
+            named += usize::from(is_source || is_function);
+            if !exists {
+                missing.push(format!("{}: {name}", file.display()));
+            }
+        }
+    }
+    assert!(missing.is_empty(), "{missing:#?}");
+    assert!(named > 100, "{named} names");
 }
