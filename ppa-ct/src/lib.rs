@@ -10,8 +10,8 @@
 //! A volume may be sheared (gantry tilt) or left-handed: its affine stays as acquired.
 //! Nothing that names a person, a place or a date passes from a file into these types.
 //!
-//! Features: `dicom`, `nifti`, `nrrd` and `metaimage` (all on by default) hold the readers and
-//! writers. Without them the crate is geometry and audit only.
+//! Features (all on by default): `dicom`, `nifti`, `nrrd` and `metaimage` hold the readers and
+//! writers, `audit` the findings about a scan. Without them the crate is geometry only.
 //!
 //! ```
 //! use nalgebra::{Point3, Vector3};
@@ -23,6 +23,7 @@
 //! ```
 
 mod acquisition;
+#[cfg(feature = "audit")]
 pub mod audit;
 mod derived_grids;
 #[cfg(feature = "dicom")]
