@@ -362,7 +362,7 @@ mod tests {
             "{refused}"
         );
         let refused = said(outputs(true).file("--out", Path::new("/dev/null"), &[]));
-        assert!(refused.contains("no regular file"), "{refused}");
+        assert!(refused.contains("not a regular file"), "{refused}");
     }
 
     #[test]
