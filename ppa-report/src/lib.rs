@@ -1,4 +1,4 @@
-//! Pictures and pages by which a person judges cases, poses and datasets.
+//! Pictures and pages for inspecting cases, poses and datasets.
 //!
 //! [`audit_page`] shows a scan, [`case_picture`] and [`pose_picture`] show one limb, [`contact_sheet`] a dataset on one picture, [`qa_page`] the quality report
 //! of a dataset, [`coverage_plot`] where a camera sees most of a joint.

@@ -37,7 +37,7 @@ enum Which {
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
 Each training is a folder of its own below --out. A run may be stopped at any moment and started again: what is finished \
-stays, what was begun goes on. On several machines that share the folder each makes a shard; the last command, without \
+stays, unfinished trainings resume. On several machines that share the folder each makes a shard; the last command, without \
 --shard, finds everything made and writes the tables.
 
   ppa experiment 2a plan.toml --out runs --shard 3/10

@@ -13,7 +13,7 @@ use crate::output::Output;
 pub enum LabelCommand {
     /// How far readers agree with each other, and with themselves
     Agree(agree::AgreeArgs),
-    /// Labels computed from the bones: how open the joint space lies to the beam
+    /// Labels computed from the bones: openness of the joint space along the beam
     Auto(auto::AutoArgs),
     /// A page on which readers grade radiographs, blinded and shuffled
     Export(export::ExportArgs),
