@@ -10,13 +10,14 @@ use nalgebra::{Point3, Rotation3, Unit, Vector3};
 use ppa_ct::Volume;
 use ppa_phantom::{LowerLeg, Side, TableTop};
 
-/// Edge of a pixel of every picture, mm.
-const PIXEL_MM: f64 = 0.35;
+/// Edge of a pixel of every picture over that of a voxel.
+const PIXEL_OVER_VOXEL: f64 = 0.4375;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut args = std::env::args().skip(1);
     let out = PathBuf::from(args.next().ok_or("expected an output folder")?);
-    let spacing_mm = args.next().map_or(Ok(0.8), |s| s.parse())?;
+    let spacing_mm: f64 = args.next().map_or(Ok(0.8), |s| s.parse())?;
+    let pixel_mm = PIXEL_OVER_VOXEL * spacing_mm;
     std::fs::create_dir_all(&out)?;
 
     let name = args.next().unwrap_or("P01".to_owned());
@@ -82,7 +83,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         ),
     ] {
         let corner = centre - across * size[0] / 2.0 - down * size[1] / 2.0;
-        picture(size, |u, v| {
+        picture(size, pixel_mm, |u, v| {
             let hu = ct
                 .sample(&(corner + across * u + down * v))
                 .unwrap_or(-1000.0);
@@ -92,7 +93,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let small = limb.voxelise(spacing_mm, TableTop::Absent)?;
     for degrees in [0.0, 18.0, 45.0, 90.0] {
-        projection(&small, &joint, f64::to_radians(degrees))
+        projection(&small, &joint, f64::to_radians(degrees), pixel_mm)
             .save(out.join(format!("projection_{degrees:02}.png")))?;
     }
     for (name, towards_limb) in [
@@ -101,26 +102,32 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("oblique", Vector3::new(0.8, 1.0, 0.35)),
         ("sole", Vector3::new(0.2, 0.3, 1.0)),
     ] {
-        skin(&limb, towards_limb.normalize()).save(out.join(format!("skin_{name}.png")))?;
+        skin(&limb, towards_limb.normalize(), pixel_mm)
+            .save(out.join(format!("skin_{name}.png")))?;
     }
     Ok(())
 }
 
 /// Picture of a function of mm to 0 (black) … 1 (white).
-fn picture(size_mm: [f64; 2], value: impl Fn(f64, f64) -> f64) -> GrayImage {
-    let [width, height] = size_mm.map(|s| (s / PIXEL_MM) as u32);
+fn picture(size_mm: [f64; 2], pixel_mm: f64, value: impl Fn(f64, f64) -> f64) -> GrayImage {
+    let [width, height] = size_mm.map(|s| (s / pixel_mm) as u32);
     GrayImage::from_fn(width, height, |i, j| {
-        let grey = value(f64::from(i) * PIXEL_MM, f64::from(j) * PIXEL_MM);
+        let grey = value(f64::from(i) * pixel_mm, f64::from(j) * pixel_mm);
         Luma([(255.0 * grey.clamp(0.0, 1.0)) as u8])
     })
 }
 
 /// Sum of attenuation along parallel rays from front to back, the limb turned inwards about z.
-fn projection(ct: &Volume, joint: &Point3<f64>, internal_rotation_rad: f64) -> GrayImage {
+fn projection(
+    ct: &Volume,
+    joint: &Point3<f64>,
+    internal_rotation_rad: f64,
+    pixel_mm: f64,
+) -> GrayImage {
     let limb_from_room = Rotation3::from_axis_angle(&Vector3::z_axis(), -internal_rotation_rad);
     let (across, along) = (limb_from_room * Vector3::x(), limb_from_room * Vector3::y());
     let corner = joint - across * 80.0 + Vector3::z() * 100.0;
-    picture([160.0, 190.0], |u, v| {
+    picture([160.0, 190.0], pixel_mm, |u, v| {
         let start = corner + across * u - Vector3::z() * v;
         let sum: f64 = (-220..=120)
             .filter_map(|step| ct.sample(&(start + along * f64::from(step))))
@@ -132,7 +139,7 @@ fn projection(ct: &Volume, joint: &Point3<f64>, internal_rotation_rad: f64) -> G
 }
 
 /// The skin under a light beside the viewer.
-fn skin(limb: &LowerLeg, towards_limb: Vector3<f64>) -> GrayImage {
+fn skin(limb: &LowerLeg, towards_limb: Vector3<f64>, pixel_mm: f64) -> GrayImage {
     let truth = limb.truth();
     let up = if towards_limb.z.abs() > 0.8 {
         -Vector3::y()
@@ -145,7 +152,7 @@ fn skin(limb: &LowerLeg, towards_limb: Vector3<f64>) -> GrayImage {
     let corner = middle - across * 170.0 - down * 200.0 - towards_limb * 400.0;
     let light = (-towards_limb + 0.6 * up - 0.5 * across).normalize();
     let along = Unit::new_normalize(towards_limb);
-    picture([340.0, 400.0], |u, v| {
+    picture([340.0, 400.0], pixel_mm, |u, v| {
         match limb.skin_hit(&(corner + across * u + down * v), &along, 900.0) {
             Some(hit) if hit.point.z < truth.joint_centre.z + 255.0 => {
                 0.15 + 0.8 * hit.normal.dot(&light).max(0.0)
