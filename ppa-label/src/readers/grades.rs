@@ -151,16 +151,20 @@ impl<'a> Pictures<'a> {
     }
 }
 
+/// Whether a grade lies between 1 (ideal) and 3 (inadequate) in half steps.
+pub(super) fn is_on_scale(grade: f64) -> bool {
+    (1.0..=3.0).contains(&grade) && (2.0 * grade).fract() == 0.0
+}
+
 fn read_grades(path: &Path) -> Result<Vec<Grade>, ImportError> {
     let grades: Vec<Grade> = read_table(path)?;
-    let on_scale = |grade: f64| (1.0..=3.0).contains(&grade) && (2.0 * grade).fract() == 0.0;
     if let Some(row) = grades.iter().find(|row| is_formula(&row.reader)) {
         return Err(ImportError::Formula {
             path: path.to_owned(),
             reader: row.reader.clone(),
         });
     }
-    match grades.iter().find(|row| !on_scale(row.grade)) {
+    match grades.iter().find(|row| !is_on_scale(row.grade)) {
         None => Ok(grades),
         Some(wrong) => Err(ImportError::Grade {
             path: path.to_owned(),

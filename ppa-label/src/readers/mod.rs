@@ -1,11 +1,13 @@
 //! Labels by readers: the cases they see, and their grades.
 
+mod grade_tables;
 mod grades;
 mod import;
 mod import_error;
 mod page;
 mod reader_case;
 
+pub use grade_tables::{GradeRowError, GradeTablesError, read_grade_tables};
 pub use grades::Grade;
 pub use import::{Imported, import_grades};
 pub use import_error::ImportError;

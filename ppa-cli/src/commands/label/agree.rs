@@ -1,21 +1,13 @@
 //! `ppa label agree`: agreement of readers.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context, ensure};
 use clap::Args;
 use ppa_core::text::{count, number};
-use ppa_metrics::agreement::{
-    IccForms, KappaWeights, Measurement, Ratings, ReaderError, RepeatAgreement, disagreements, icc,
-    krippendorff_alpha, reader_errors, repeat_agreement, weighted_kappa,
-};
-use serde::{Deserialize, Serialize};
+use ppa_label::read_grade_tables;
+use ppa_metrics::agreement::{AgreementReport, PairReport, agreement_report};
 
 use crate::output::Output;
-
-/// How many of the images on which readers differ most are shown.
-const SHOWN: usize = 10;
 
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -32,195 +24,12 @@ pub struct AgreeArgs {
     csv: Vec<PathBuf>,
 }
 
-#[derive(Debug, Deserialize)]
-struct Row {
-    image: String,
-    reader: String,
-    grade: f64,
-}
-
-#[derive(Debug, Serialize)]
-struct Report {
-    images: usize,
-    readers: Vec<Reader>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    icc: Option<IccForms>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    alpha_ordinal: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    alpha_interval: Option<f64>,
-    pairs: Vec<Pair>,
-    largest_disagreements: Vec<Disagreement>,
-    /// What has no value, and why.
-    undefined: Vec<String>,
-}
-
-#[derive(Debug, Serialize)]
-struct Reader {
-    name: String,
-    images: usize,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    against_others: Option<ReaderError>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    against_self: Option<RepeatAgreement>,
-}
-
-#[derive(Debug, Serialize)]
-struct Pair {
-    readers: [String; 2],
-    images: usize,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    kappa_linear: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    kappa_quadratic: Option<f64>,
-}
-
-#[derive(Debug, Serialize)]
-struct Disagreement {
-    image: String,
-    lowest: f64,
-    highest: f64,
-    std: f64,
-}
-
-/// First grade, and the second where there is one.
-type Grades = (f64, Option<f64>);
-
 pub fn run(args: &AgreeArgs, output: Output) -> anyhow::Result<()> {
-    let mut by_image: BTreeMap<String, BTreeMap<String, Grades>> = BTreeMap::new();
-    for path in &args.csv {
-        for row in super::super::read_csv::<Row>(path)? {
-            check(&row).with_context(|| path.display().to_string())?;
-            add(&mut by_image, row, path)?;
-        }
-    }
-    output.print(&report(&by_image)?, describe)
+    let grades = read_grade_tables(&args.csv)?;
+    output.print(&agreement_report(&grades)?, describe)
 }
 
-fn check(row: &Row) -> anyhow::Result<()> {
-    let on_scale = (1.0..=3.0).contains(&row.grade) && (2.0 * row.grade).fract() == 0.0;
-    ensure!(
-        on_scale,
-        "{} grades {} with {}, expected 1, 1.5, 2, 2.5 or 3",
-        row.reader,
-        row.image,
-        row.grade
-    );
-    ensure!(
-        !ppa_dataset::is_formula(&row.reader),
-        "a reader is called {:?}, which spreadsheets take for a formula",
-        row.reader
-    );
-    Ok(())
-}
-
-fn add(
-    by_image: &mut BTreeMap<String, BTreeMap<String, Grades>>,
-    row: Row,
-    path: &Path,
-) -> anyhow::Result<()> {
-    let of_image = by_image.entry(row.image.clone()).or_default();
-    let Some(grades) = of_image.get_mut(&row.reader) else {
-        of_image.insert(row.reader, (row.grade, None));
-        return Ok(());
-    };
-    ensure!(
-        grades.1.is_none(),
-        "{}: {} grades {} a third time, expected once or twice",
-        path.display(),
-        row.reader,
-        row.image
-    );
-    grades.1 = Some(row.grade);
-    Ok(())
-}
-
-fn report(by_image: &BTreeMap<String, BTreeMap<String, Grades>>) -> anyhow::Result<Report> {
-    let mut names: Vec<&String> = by_image.values().flat_map(BTreeMap::keys).collect();
-    names.sort_unstable();
-    names.dedup();
-    let row = |of_image: &BTreeMap<String, Grades>| {
-        let grade = |name: &&String| of_image.get(*name).map(|grades| grades.0);
-        names.iter().map(grade).collect()
-    };
-    let ratings = Ratings::new(by_image.values().map(row).collect())?;
-    let mut undefined = Vec::new();
-    let mut or_reason = |what: String, value: Result<f64, ppa_metrics::MetricError>| {
-        value
-            .map_err(|error| undefined.push(format!("{what}: {error}")))
-            .ok()
-    };
-    let mut alpha = |name: &str, measurement| {
-        or_reason(name.to_owned(), krippendorff_alpha(&ratings, measurement))
-    };
-    let alpha_ordinal = alpha("alpha, ordinal", Measurement::Ordinal);
-    let alpha_interval = alpha("alpha, interval", Measurement::Interval);
-    let mut pairs = Vec::new();
-    for first in 0..names.len() {
-        for second in first + 1..names.len() {
-            let (a, b) = ratings.common(first, second);
-            let readers = [names[first].clone(), names[second].clone()];
-            let mut kappa = |name: &str, weights| {
-                let what = format!("{name} kappa of {} and {}", readers[0], readers[1]);
-                or_reason(what, weighted_kappa(&a, &b, weights))
-            };
-            pairs.push(Pair {
-                images: a.len(),
-                kappa_linear: kappa("linear", KappaWeights::Linear),
-                kappa_quadratic: kappa("quadratic", KappaWeights::Quadratic),
-                readers,
-            });
-        }
-    }
-    let icc = icc(&ratings)
-        .map_err(|error| undefined.push(format!("intraclass correlation: {error}")))
-        .ok();
-    let readers = names.iter().zip(reader_errors(&ratings));
-    let images: Vec<&String> = by_image.keys().collect();
-    Ok(Report {
-        images: by_image.len(),
-        readers: readers
-            .map(|(name, against_others)| Reader {
-                images: by_image
-                    .values()
-                    .filter(|of| of.contains_key(*name))
-                    .count(),
-                against_self: repeats(by_image, name),
-                name: (*name).clone(),
-                against_others,
-            })
-            .collect(),
-        icc,
-        alpha_ordinal,
-        alpha_interval,
-        pairs,
-        largest_disagreements: disagreements(&ratings)
-            .into_iter()
-            .take(SHOWN)
-            .map(|found| Disagreement {
-                image: images[found.subject].clone(),
-                lowest: found.lowest,
-                highest: found.highest,
-                std: found.std,
-            })
-            .collect(),
-        undefined,
-    })
-}
-
-fn repeats(
-    by_image: &BTreeMap<String, BTreeMap<String, Grades>>,
-    reader: &str,
-) -> Option<RepeatAgreement> {
-    let twice = |of_image: &BTreeMap<String, Grades>| {
-        let (first, second) = of_image.get(reader)?;
-        second.map(|second| (*first, second))
-    };
-    let (first, second): (Vec<f64>, Vec<f64>) = by_image.values().filter_map(twice).unzip();
-    repeat_agreement(&first, &second).ok()
-}
-
-fn describe(report: &Report) -> String {
+fn describe(report: &AgreementReport) -> String {
     let mut lines = vec![format!(
         "{}, {}",
         count(report.images, "image"),
@@ -255,7 +64,7 @@ fn describe(report: &Report) -> String {
             alpha.map(|alpha| format!("Krippendorff's alpha, {name}  {:.4}", number(alpha))),
         );
     }
-    for Pair {
+    for PairReport {
         readers: [a, b],
         images,
         kappa_linear,

@@ -1,0 +1,102 @@
+//! Grades by image and reader, from tables that name images as they like.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use ppa_dataset::is_formula;
+
+use super::grades::{Grade, is_on_scale};
+use crate::table::{TableError, read_table};
+
+/// Why tables do not give the grades of images.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GradeTablesError {
+    /// A file is no table of grades.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// A row that is no grade of a reader.
+    #[error("{}", path.display())]
+    Row {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: GradeRowError,
+    },
+    /// More than a grade and its repeat.
+    #[error("{}: {reader} grades {image} a third time, expected once or twice", path.display())]
+    ThirdTime {
+        /// The file.
+        path: PathBuf,
+        /// The reader.
+        reader: String,
+        /// The image.
+        image: String,
+    },
+}
+
+/// Why a row is no grade of a reader.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GradeRowError {
+    /// Off the scale.
+    #[error("{reader} grades {image} with {grade}, expected 1, 1.5, 2, 2.5 or 3")]
+    Grade {
+        /// The reader.
+        reader: String,
+        /// The image.
+        image: String,
+        /// The grade.
+        grade: f64,
+    },
+    /// A reader's name that spreadsheet programs would run.
+    #[error("a reader is called {0:?}, which spreadsheets take for a formula")]
+    Formula(String),
+}
+
+/// For each image the first grade of each reader, and the second where there is one.
+///
+/// `files` are tables with the columns image, reader, grade.
+///
+/// # Errors
+/// [`GradeTablesError`] naming the file.
+pub fn read_grade_tables(
+    files: &[PathBuf],
+) -> Result<BTreeMap<String, BTreeMap<String, (f64, Option<f64>)>>, GradeTablesError> {
+    let mut by_image = BTreeMap::<_, BTreeMap<_, (f64, Option<f64>)>>::new();
+    for path in files {
+        for row in read_table::<Grade>(path)? {
+            check(&row).map_err(|source| GradeTablesError::Row {
+                path: path.clone(),
+                source,
+            })?;
+            let of_image = by_image.entry(row.image.clone()).or_default();
+            let Some((_, second)) = of_image.get_mut(&row.reader) else {
+                of_image.insert(row.reader, (row.grade, None));
+                continue;
+            };
+            if second.replace(row.grade).is_some() {
+                return Err(GradeTablesError::ThirdTime {
+                    path: path.clone(),
+                    reader: row.reader,
+                    image: row.image,
+                });
+            }
+        }
+    }
+    Ok(by_image)
+}
+
+fn check(row: &Grade) -> Result<(), GradeRowError> {
+    if !is_on_scale(row.grade) {
+        return Err(GradeRowError::Grade {
+            reader: row.reader.clone(),
+            image: row.image.clone(),
+            grade: row.grade,
+        });
+    }
+    match is_formula(&row.reader) {
+        false => Ok(()),
+        true => Err(GradeRowError::Formula(row.reader.clone())),
+    }
+}
