@@ -13,7 +13,7 @@
 //!
 //! [`render`] gives ideal depths at pixel centres. [`Backdrop`] renders what stands still once, with samples inside the
 //! pixels; a [`Sensor`] makes of it what a Time-of-Flight device might: random and systematic error, mixed pixels, pixels
-//! given up, one bounce of light. Nobody can say how close that is to a device before [`fit_noise`] has seen a recording of it.
+//! given up, one bounce of light. [`Recorder`] makes frames of it. Nobody can say how close that is to a device before [`fit_noise`] has seen a recording of it.
 //!
 //! Repeatable: images depend on scene and seeds only, whatever the number of threads.
 //!
@@ -61,6 +61,7 @@ mod camera;
 mod coverage;
 mod image;
 mod io;
+mod recorder;
 mod render;
 mod roi;
 mod sensor;
@@ -77,6 +78,7 @@ pub use camera::viewpoint::Viewpoint;
 pub use coverage::{Coverage, CoverageError, CoverageSettings, JointSurface};
 pub use image::{DepthError, DepthImage, DepthU16};
 pub use io::preview::false_colour;
+pub use recorder::{RecordError, Recorder, mean_point};
 pub use render::body::{Body, PlacedBody};
 pub use render::body_error::BodyError;
 pub use render::ideal::render;

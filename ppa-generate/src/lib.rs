@@ -76,7 +76,8 @@ pub use pose_error::PoseError;
 pub use prepare::{PrepareError, PreparedLimb, prepare};
 pub use radiograph::{JointError, joint_phantom, projection};
 pub use scene_setup::{
-    PlacedCamera, SceneSetup, SceneSetupError, Table, body_of_cloud, spectrum, tube,
+    PlacedCamera, SceneSetup, SceneSetupError, Table, body_of_cloud, body_of_contents, spectrum,
+    tube,
 };
 pub use shaped_skin::{ShapeSettings, body_shape};
 pub use status::{LimbStatus, Status, status};

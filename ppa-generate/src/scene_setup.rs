@@ -8,7 +8,7 @@ use ppa_depth::{
     Backdrop, Body, Camera, DepthImage, MeshBody, MountedCamera, PlacedBody, RigError, Sensor,
     SensorError, SurfelBody,
 };
-use ppa_mesh::{CloudError, PointCloud, estimate_normals, mean_spacing_mm};
+use ppa_mesh::{CloudError, MeshContents, PointCloud, estimate_normals, mean_spacing_mm};
 use ppa_scene::{PlaneSettings, Rigid, RoomError, TablePlane, XrayDevice, XrayRoom, table_plane};
 use ppa_xray::{Spectrum, TubeSpec};
 
@@ -99,6 +99,18 @@ impl Table {
         }
         body_of_cloud(&self.room.cloud)
     }
+}
+
+/// What a mesh file holds, for the cameras: its triangles, or discs at the points of a cloud.
+///
+/// # Errors
+/// [`SceneSetupError`] for points or triangles that cannot be rendered.
+pub fn body_of_contents(contents: &MeshContents) -> Result<Body, SceneSetupError> {
+    if contents.triangles.is_empty() {
+        return body_of_cloud(&contents.cloud);
+    }
+    let mesh = MeshBody::new(&contents.cloud.points, &contents.triangles)?;
+    Ok(Body::Mesh(mesh))
 }
 
 /// Discs at the points of a recorded room, for the cameras.

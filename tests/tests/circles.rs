@@ -77,11 +77,7 @@ fn imports(src: &Path, folder: &Path) -> Imports {
 }
 
 /// Folders whose files still import each other in circles, and what joins them.
-const ONE_MODULE: [(&str, &str); 4] = [
-    (
-        "ppa-cli/src/commands/depth",
-        "`render` hands cases to `render_case`, which shares its output",
-    ),
+const ONE_MODULE: [(&str, &str); 3] = [
     (
         "ppa-ct/src/dicom_series",
         "header, attributes and file follow one walk through the elements",

@@ -32,7 +32,10 @@ pub enum DepthCommand {
 
 pub fn run(command: &DepthCommand, output: Output) -> anyhow::Result<()> {
     match command {
-        DepthCommand::Render(args) => render::run(args, output),
+        DepthCommand::Render(args) => match args.case()? {
+            Some(case) => render_case::run(case, args, output),
+            None => render::run(args, output),
+        },
         DepthCommand::FitNoise(args) => fit_noise::run(args, output),
         DepthCommand::Camera(args) => camera::run(args, output),
         DepthCommand::Coverage(args) => coverage::run(args, output),

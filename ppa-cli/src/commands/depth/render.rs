@@ -4,22 +4,63 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use clap::Args;
-use nalgebra::{Isometry3, Point3};
+use clap::{Args, ValueEnum};
+use nalgebra::Isometry3;
 use ppa_core::TransformRows;
 use ppa_dataset::layout::View;
 use ppa_depth::{
-    Backdrop, Body, Camera, DepthImage, MeshBody, PlacedBody, Sensor, SensorSpec, Tremor,
-    isometry_from_rows, render,
+    Camera, DepthImage, PlacedBody, RecordError, Recorder, Sensor, SensorSpec, Tremor,
+    isometry_from_rows, mean_point,
 };
-use ppa_generate::body_of_cloud;
-use ppa_mesh::{MeshContents, read_mesh_file};
+use ppa_generate::body_of_contents;
+use ppa_mesh::read_mesh_file;
 use serde::{Deserialize, Serialize};
 
-use super::render_case::{OfCase, is_case, of_view, render_case};
+use crate::commands::scene::WhichRoom;
 use crate::interrupt::Interrupt;
 use crate::output::{Output, Seconds, Stopwatch};
 use crate::output_files::ReplaceArgs;
+
+#[derive(Debug, Args)]
+pub(super) struct OfCase {
+    /// Medial rotation of a case's limb, degrees [default: 0]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    pub(super) angle: Option<f64>,
+    /// One of the two cameras of a case's room [default: both]
+    #[arg(long, value_enum)]
+    view: Option<ViewName>,
+    #[command(flatten)]
+    pub(super) room: WhichRoom,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum ViewName {
+    Left,
+    Right,
+}
+
+impl OfCase {
+    /// The first option that only a case has.
+    fn given(&self) -> Option<&'static str> {
+        let given = [
+            ("--angle", self.angle.is_some()),
+            ("--view", self.view.is_some()),
+            ("--plan or --room", self.room.is_given()),
+        ];
+        given
+            .into_iter()
+            .find(|(_, given)| *given)
+            .map(|(name, _)| name)
+    }
+
+    /// The camera that was chosen.
+    pub fn view(&self) -> Option<View> {
+        self.view.map(|view| match view {
+            ViewName::Left => View::Left,
+            ViewName::Right => View::Right,
+        })
+    }
+}
 
 #[derive(Debug, Args)]
 pub struct RenderArgs {
@@ -101,27 +142,7 @@ struct Rendered {
     seconds: Seconds,
 }
 
-/// The ideal camera or a sensor behind it.
-enum Eye {
-    Ideal,
-    Sensor(Box<Sensor>, Box<Backdrop>),
-}
-
 pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
-    if let [case] = &args.meshes[..]
-        && is_case(case)
-    {
-        return render_case(case, args, output);
-    }
-    if let Some(case) = args.meshes.iter().find(|path| is_case(path)) {
-        bail!("{} is a case: render it alone", case.display());
-    }
-    if let Some(option) = args.of_case.given() {
-        bail!(
-            "{option} belongs to a case, but {} is a mesh",
-            args.meshes[0].display()
-        );
-    }
     declare(args)?;
     let camera = super::read_camera(args.camera.as_ref())?;
     let camera_from_body = match &args.camera_from_mesh {
@@ -133,50 +154,29 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
         .iter()
         .map(|path| read_mesh_file(path))
         .collect::<Result<Vec<_>, _>>()?;
-    let eye = eye(args, &camera)?;
     let tremor = Tremor {
         shift_mm: args.tremor_mm,
         turn_deg: args.tremor_deg,
         correlation_frames: TREMOR_FRAMES,
     };
-    tremor.check()?;
-    let corners = contents.iter().flat_map(|contents| &contents.cloud.points);
-    let (sum, count) = corners.fold((nalgebra::Vector3::zeros(), 0), |(sum, n), corner| {
-        (sum + corner.coords.cast::<f64>(), n + 1)
-    });
-    let pivot = camera_from_body * Point3::from(sum / f64::from(count.max(1)));
-    camera.rays();
+    let recorder = Recorder::new(camera, sensor(args)?, tremor, args.seed)?;
+    let points = contents.iter().flat_map(|contents| &contents.cloud.points);
+    let pivot = camera_from_body * mean_point(points);
     let watch = Stopwatch::start();
     let mut bodies = Vec::new();
     for (path, contents) in args.meshes.iter().zip(&contents) {
-        bodies.push(body(contents).with_context(|| path.display().to_string())?);
+        bodies.push(body_of_contents(contents).with_context(|| path.display().to_string())?);
     }
-    let see = |frame: u64| {
-        let camera_from_body = tremor.motion(&pivot, args.seed, frame) * camera_from_body;
-        let placed = |body| PlacedBody {
-            body,
-            camera_from_body,
-        };
-        let placed: Vec<_> = bodies.iter().map(placed).collect();
-        for (path, placed) in args.meshes.iter().zip(&placed) {
-            placed
-                .require_camera_outside()
-                .with_context(|| path.display().to_string())?;
+    let placed = |body| PlacedBody {
+        body,
+        camera_from_body,
+    };
+    let placed: Vec<_> = bodies.iter().map(placed).collect();
+    let see = |frame: u64| match recorder.frame(&placed, &pivot, frame) {
+        Err(RecordError::Body { body, source }) => {
+            Err(source).with_context(|| args.meshes[body].display().to_string())
         }
-        let image = match &eye {
-            Eye::Ideal => {
-                let image = render(&camera, &placed);
-                image.require_visible()?;
-                image
-            }
-            Eye::Sensor(sensor, backdrop) => {
-                let seen = backdrop.before(&camera, &placed)?;
-                let image = sensor.observe(&camera, &seen, args.seed, frame);
-                image.require_measured(seen.image.valid_pixels())?;
-                image
-            }
-        };
-        anyhow::Ok(image)
+        seen => Ok(seen?),
     };
     let interrupt = Interrupt::listen()?;
     let image = see(0)?;
@@ -191,7 +191,7 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
         }
         see(frame)?.write_png(&args.frame(frame))?;
     }
-    write_others(args, None, &camera, &image)?;
+    write_others(args, None, recorder.camera(), &image)?;
     let rendered = Rendered {
         width: image.width,
         height: image.height,
@@ -200,10 +200,7 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
         too_far_pixels,
         min_mm: image.min_mm(),
         max_mm: image.max_mm(),
-        sensor: match eye {
-            Eye::Ideal => None,
-            Eye::Sensor(sensor, _) => Some(sensor.spec().clone()),
-        },
+        sensor: recorder.sensor().map(|sensor| sensor.spec().clone()),
         seed: args.seed,
         seconds,
     };
@@ -220,15 +217,6 @@ pub fn run(args: &RenderArgs, output: Output) -> anyhow::Result<()> {
             r.height
         )
     })
-}
-
-/// Triangles, or discs at the points of a cloud.
-fn body(contents: &MeshContents) -> anyhow::Result<Body> {
-    if contents.triangles.is_empty() {
-        return Ok(body_of_cloud(&contents.cloud)?);
-    }
-    let mesh = MeshBody::new(&contents.cloud.points, &contents.triangles)?;
-    Ok(Body::Mesh(mesh))
 }
 
 fn read_pose(path: &Path, name: Option<&str>) -> anyhow::Result<Isometry3<f64>> {
@@ -266,19 +254,34 @@ pub(super) fn read_sensor(path: &Path) -> anyhow::Result<SensorSpec> {
     crate::commands::read_json(path)
 }
 
-fn eye(args: &RenderArgs, camera: &Camera) -> anyhow::Result<Eye> {
+fn sensor(args: &RenderArgs) -> anyhow::Result<Option<Sensor>> {
     let Some(path) = &args.sensor else {
-        return Ok(Eye::Ideal);
+        return Ok(None);
     };
-    let spec = read_sensor(path)?;
-    let sensor = Sensor::new(spec, args.seed).with_context(|| path.display().to_string())?;
-    Ok(Eye::Sensor(
-        Box::new(sensor),
-        Box::new(Backdrop::new(camera, &[])),
-    ))
+    let sensor = Sensor::new(read_sensor(path)?, args.seed);
+    Ok(Some(sensor.with_context(|| path.display().to_string())?))
 }
 
 impl RenderArgs {
+    /// The case, if it is one that is to be rendered and no meshes.
+    pub fn case(&self) -> anyhow::Result<Option<&Path>> {
+        if let [case] = &self.meshes[..]
+            && is_case(case)
+        {
+            return Ok(Some(case));
+        }
+        if let Some(case) = self.meshes.iter().find(|path| is_case(path)) {
+            bail!("{} is a case: render it alone", case.display());
+        }
+        if let Some(option) = self.of_case.given() {
+            bail!(
+                "{option} belongs to a case, but {} is a mesh",
+                self.meshes[0].display()
+            );
+        }
+        Ok(None)
+    }
+
     /// The file of a frame.
     fn frame(&self, frame: u64) -> PathBuf {
         if self.frames == 1 {
@@ -297,6 +300,30 @@ fn declare(args: &RenderArgs) -> anyhow::Result<()> {
     outputs.optional("--exr", args.exr.as_ref(), &[".exr"])?;
     outputs.optional("--preview", args.preview.as_ref(), &[".png"])?;
     outputs.optional("--points", args.points.as_ref(), &[".ply"])
+}
+
+/// Whether a file is a case and no mesh.
+fn is_case(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
+
+/// `name.png` as `name_left.png`, if a view is named.
+pub(super) fn of_view(path: &Path, view: Option<View>) -> PathBuf {
+    let Some(view) = view else {
+        return path.to_owned();
+    };
+    let [stem, extension] = [path.file_stem(), path.extension()]
+        .map(|part| part.unwrap_or_default().to_string_lossy().into_owned());
+    path.with_file_name(format!("{stem}_{}.{extension}", name(view)))
+}
+
+/// Name of a camera, as users read it.
+pub(super) fn name(view: View) -> &'static str {
+    match view {
+        View::Left => "left",
+        View::Right => "right",
+    }
 }
 
 /// Writes the other files of an image, with the camera's name if there are several.

@@ -3,77 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use clap::{Args, ValueEnum};
 use ppa_dataset::layout::View;
 use ppa_generate::{Case, DepthView, PreparedLimb, SceneSetup, depth_views};
 use serde::Serialize;
 
-use super::render::{RenderArgs, read_sensor, write_others};
-use crate::commands::scene::WhichRoom;
+use super::render::{RenderArgs, name, of_view, read_sensor, write_others};
 use crate::output::{Output, working};
-
-#[derive(Debug, Args)]
-pub struct OfCase {
-    /// Medial rotation of a case's limb, degrees [default: 0]
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
-    angle: Option<f64>,
-    /// One of the two cameras of a case's room [default: both]
-    #[arg(long, value_enum)]
-    view: Option<ViewName>,
-    #[command(flatten)]
-    room: WhichRoom,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum ViewName {
-    Left,
-    Right,
-}
-
-impl OfCase {
-    /// The first option that only a case has.
-    pub fn given(&self) -> Option<&'static str> {
-        let given = [
-            ("--angle", self.angle.is_some()),
-            ("--view", self.view.is_some()),
-            ("--plan or --room", self.room.is_given()),
-        ];
-        given
-            .into_iter()
-            .find(|(_, given)| *given)
-            .map(|(name, _)| name)
-    }
-
-    fn view(&self) -> Option<View> {
-        self.view.map(|view| match view {
-            ViewName::Left => View::Left,
-            ViewName::Right => View::Right,
-        })
-    }
-}
-
-/// Whether a file is a case and no mesh.
-pub fn is_case(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
-}
-
-/// `name.png` as `name_left.png`, if a view is named.
-pub fn of_view(path: &Path, view: Option<View>) -> PathBuf {
-    let Some(view) = view else {
-        return path.to_owned();
-    };
-    let [stem, extension] = [path.file_stem(), path.extension()]
-        .map(|part| part.unwrap_or_default().to_string_lossy().into_owned());
-    path.with_file_name(format!("{stem}_{}.{extension}", name(view)))
-}
-
-fn name(view: View) -> &'static str {
-    match view {
-        View::Left => "left",
-        View::Right => "right",
-    }
-}
 
 /// Tries the files that the images of a case go to.
 fn declare(args: &RenderArgs) -> anyhow::Result<()> {
@@ -114,7 +49,7 @@ struct RenderedView {
     max_mm: Option<f32>,
 }
 
-pub fn render_case(path: &Path, args: &RenderArgs, output: Output) -> anyhow::Result<()> {
+pub fn run(path: &Path, args: &RenderArgs, output: Output) -> anyhow::Result<()> {
     refuse_options_of_meshes(path, args)?;
     declare(args)?;
     let mut plan = args.of_case.room.plan()?;

@@ -1,0 +1,115 @@
+//! Frames of a recording: bodies that tremble before a camera, ideal or with the errors of a sensor.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::camera::projection::Camera;
+use crate::image::{DepthError, DepthImage};
+use crate::render::body::PlacedBody;
+use crate::render::body_error::BodyError;
+use crate::render::ideal::render;
+use crate::render::sampled::Backdrop;
+use crate::sensor::observe::Sensor;
+use crate::sensor::spec::SensorError;
+use crate::sensor::tremor::Tremor;
+
+/// Why a frame cannot be recorded.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordError {
+    /// A body that the camera cannot look at.
+    #[error("body {body}")]
+    Body {
+        /// Its place among the bodies, from 0.
+        body: usize,
+        /// What is wrong.
+        source: BodyError,
+    },
+    /// An image without a depth.
+    #[error(transparent)]
+    Depth(#[from] DepthError),
+}
+
+/// A camera that records bodies which tremble, with nothing behind them.
+pub struct Recorder {
+    camera: Camera,
+    /// With what stands behind the bodies, as the sensor needs it.
+    sensor: Option<(Sensor, Backdrop)>,
+    tremor: Tremor,
+    seed: u64,
+}
+
+impl Recorder {
+    /// An ideal camera or one with a `sensor`; `seed` is that of noise and tremor.
+    ///
+    /// # Errors
+    /// [`SensorError`] naming the number of the tremor that makes no sense.
+    pub fn new(
+        camera: Camera,
+        sensor: Option<Sensor>,
+        tremor: Tremor,
+        seed: u64,
+    ) -> Result<Self, SensorError> {
+        tremor.check()?;
+        camera.rays(); // Not with the first frame, whose time may be taken.
+        let backdrop = |sensor| (sensor, Backdrop::new(&camera, &[]));
+        let sensor = sensor.map(backdrop);
+        Ok(Self {
+            camera,
+            sensor,
+            tremor,
+            seed,
+        })
+    }
+
+    /// The lens.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The sensor, if the camera is not ideal.
+    pub fn sensor(&self) -> Option<&Sensor> {
+        self.sensor.as_ref().map(|(sensor, _)| sensor)
+    }
+
+    /// One frame of bodies that the tremor moves from where they are placed, all alike, about `pivot`, mm in the camera's frame. The
+    /// same whatever frames were recorded before.
+    ///
+    /// # Errors
+    /// [`RecordError`] if the camera stands inside a body, or if no pixel has a depth.
+    pub fn frame(
+        &self,
+        bodies: &[PlacedBody],
+        pivot: &Point3<f64>,
+        frame: u64,
+    ) -> Result<DepthImage, RecordError> {
+        let motion = self.tremor.motion(pivot, self.seed, frame);
+        let mut bodies = bodies.to_vec();
+        for placed in &mut bodies {
+            placed.camera_from_body = motion * placed.camera_from_body;
+        }
+        for (body, placed) in bodies.iter().enumerate() {
+            placed
+                .require_camera_outside()
+                .map_err(|source| RecordError::Body { body, source })?;
+        }
+        let Some((sensor, backdrop)) = &self.sensor else {
+            let image = render(&self.camera, &bodies);
+            image.require_visible()?;
+            return Ok(image);
+        };
+        let seen = backdrop.before(&self.camera, &bodies)?;
+        let image = sensor.observe(&self.camera, &seen, self.seed, frame);
+        image.require_measured(seen.image.valid_pixels())?;
+        Ok(image)
+    }
+}
+
+/// The mean of points, about which bodies tremble; the origin if there are none.
+pub fn mean_point<'a>(points: impl IntoIterator<Item = &'a Point3<f32>>) -> Point3<f64> {
+    let (sum, count) = points
+        .into_iter()
+        .fold((Vector3::zeros(), 0_u32), |(sum, count), point| {
+            (sum + point.coords.cast::<f64>(), count + 1)
+        });
+    Point3::from(sum / f64::from(count.max(1)))
+}
