@@ -3,7 +3,6 @@
 use ppa_dataset::BodyShape;
 use ppa_dataset::layout::View;
 use ppa_depth::{Camera, DepthImage, PlacedBody};
-use ppa_scene::place_soft;
 
 use crate::closed_skin::closed_skin;
 use crate::plan::Plan;
@@ -38,15 +37,8 @@ pub fn depth_views(
     seed: u64,
 ) -> Result<Vec<DepthView>, PoseError> {
     let (skin, landmarks) = (&limb.limb.mesh, &limb.landmarks);
-    let table = &setup.table;
-    let placement = place_soft(
-        &skin.vertices,
-        landmarks,
-        angle_deg.to_radians(),
-        &table.plane.plane,
-        &table.room.device,
-        &plan.soft_tissue,
-    )?;
+    let angle_rad = angle_deg.to_radians();
+    let placement = (setup.table).place(skin, landmarks, angle_rad, &plan.soft_tissue)?;
     let room_from_ct = placement.room_from_patient * landmarks.patient_from_ct();
     let is_soft = placement.flattening.is_some();
     let vertices = limb.limb.walls.vertices(skin);

@@ -12,17 +12,16 @@ use ppa_depth::{
     Body, PlacedBody, Roi, WallDepth, WalledImage, render_before, roi_around, rows_from_isometry,
 };
 use ppa_mesh::{Displacement, Mesh};
-use ppa_scene::{Placement, PoseAngle, place_soft};
-use ppa_xray::{FastSettings, Projection, VoxelPhantom};
+use ppa_scene::{Placement, PoseAngle};
 use rayon::prelude::*;
 
 use crate::closed_skin::closed_skin;
 use crate::cut_error::PoseImage;
 use crate::cut_share::{self, CutFaces, PoseCuts};
+use crate::exposable_limb::{ExposableLimb, PosedExposure};
 use crate::plan::Plan;
 use crate::pose_error::PoseError;
 use crate::prepare::PreparedLimb;
-use crate::radiograph::{joint_phantom, projection};
 use crate::scene_setup::{PlacedCamera, SceneSetup};
 use crate::seed::{Purpose, item_seed};
 use crate::shaped_skin::body_shape;
@@ -50,9 +49,8 @@ pub(crate) struct PosableLimb<'a> {
     id: LimbId,
     plan: &'a Plan,
     setup: &'a SceneSetup,
-    prepared: PreparedLimb,
+    limb: ExposableLimb<'a>,
     shapes: Vec<ShapedSkin>,
-    phantom: VoxelPhantom,
     cut_faces: CutFaces,
     /// How much of each image is cut, by pose of the plan; empty if no face of the scan cuts the limb.
     cuts: Vec<PoseCuts>,
@@ -87,10 +85,9 @@ impl<'a> PosableLimb<'a> {
             plan,
             setup,
             shapes: shapes.collect::<Result<_, _>>()?,
-            phantom: joint_phantom(&prepared, &plan.xray)?,
+            limb: ExposableLimb::new(prepared, plan, &setup.table, &setup.spectrum)?,
             cut_faces,
             cuts: Vec::new(),
-            prepared,
         };
         posable.cuts = posable.checked_cuts()?;
         Ok(posable)
@@ -101,7 +98,10 @@ impl<'a> PosableLimb<'a> {
         if self.cut_faces.is_empty() {
             return Ok(Vec::new());
         }
-        let (skin, walls) = (&self.prepared.limb.mesh, &self.prepared.limb.walls);
+        let (skin, walls) = (
+            &self.limb.prepared.limb.mesh,
+            &self.limb.prepared.limb.walls,
+        );
         let rigid = closed_skin(&walls.vertices(skin), skin, walls)?;
         let poses = self.plan.rotation.poses()?;
         // A pose that cannot be made is reported with its angle when its turn comes.
@@ -116,10 +116,12 @@ impl<'a> PosableLimb<'a> {
 
     /// How much of each image is cut; `rigid` is the closed skin of the scan.
     fn pose_cuts(&self, pose: PoseAngle, rigid: &Body) -> Result<PoseCuts, PoseError> {
-        let skin = &self.prepared.limb.mesh;
-        let placement = self.place(skin, pose)?;
+        let skin = &self.limb.prepared.limb.mesh;
+        let exposure = self.limb.pose(pose.angle_rad())?;
+        let placement = exposure.placement;
         let flattened = self.flattened(skin, &placement)?;
-        let in_room = |points: &[Point3<f32>]| placement.in_room(points, &self.prepared.landmarks);
+        let in_room =
+            |points: &[Point3<f32>]| placement.in_room(points, &self.limb.prepared.landmarks);
         let mut shares = Vec::new();
         for camera in &self.setup.cameras {
             let roi = self.roi(camera, &placement)?;
@@ -127,9 +129,8 @@ impl<'a> PosableLimb<'a> {
             let share = self.cut_faces.in_region(camera, &roi, limb, in_room)?;
             shares.push((PoseImage::Depth(camera.view), share));
         }
-        let (projection, roi_mm) = (self.projection(&placement), self.plan.depth.roi_mm);
-        let share =
-            (self.cut_faces).in_radiograph(&projection.ct_from_device, &self.joint(), roi_mm);
+        let (ct_from_device, roi_mm) = (exposure.projection.ct_from_device, self.plan.depth.roi_mm);
+        let share = (self.cut_faces).in_radiograph(&ct_from_device, &self.joint(), roi_mm);
         shares.push((PoseImage::Radiograph, share));
         Ok(PoseCuts {
             step: pose.step,
@@ -143,7 +144,7 @@ impl<'a> PosableLimb<'a> {
 
     /// Centre of the joint in the `ct` frame.
     fn joint(&self) -> Point3<f64> {
-        self.prepared.landmarks.joint_centre.into()
+        self.limb.prepared.landmarks.joint_centre.into()
     }
 
     /// Makes all images of one pose under `root`.
@@ -151,7 +152,8 @@ impl<'a> PosableLimb<'a> {
         let mut files = Vec::new();
         let noise_seed = item_seed(self.plan.seed, Purpose::DepthNoise, self.id, pose.step);
         // The skin of the scan decides the pose of the radiograph and the regions of interest.
-        let placement = self.place(&self.prepared.limb.mesh, pose)?;
+        let exposure = self.limb.pose(pose.angle_rad())?;
+        let placement = exposure.placement;
         let cameras = self.setup.cameras.iter();
         let rois: Vec<Roi> = cameras
             .map(|camera| self.roi(camera, &placement))
@@ -159,7 +161,7 @@ impl<'a> PosableLimb<'a> {
         for shaped in &self.shapes {
             let placement = match shaped.shape {
                 BodyShape::Orig => placement,
-                _ => self.place(&shaped.mesh, pose)?,
+                _ => self.limb.place(&shaped.mesh, pose.angle_rad())?,
             };
             let flattened = self.flattened(&shaped.mesh, &placement)?;
             for (camera, roi) in self.setup.cameras.iter().zip(&rois) {
@@ -182,11 +184,11 @@ impl<'a> PosableLimb<'a> {
                 });
             }
         }
-        files.extend(self.radiograph(pose, &placement, root)?);
-        let mut findings = self.prepared.findings.clone();
+        files.extend(self.radiograph(pose, &exposure, root)?);
+        let mut findings = self.limb.prepared.findings.clone();
         findings.extend(self.cuts_at(pose).and_then(|cuts| {
-            let (skin, joint) = (&self.prepared.limb.mesh, self.joint());
-            cuts.finding(&self.prepared.limb.walls, skin, &joint)
+            let (skin, joint) = (&self.limb.prepared.limb.mesh, self.joint());
+            cuts.finding(&self.limb.prepared.limb.walls, skin, &joint)
         }));
         let rows = self.setup.cameras.iter().zip(&rois);
         let rows = rows.map(|(camera, roi)| roi_row(camera, roi, pose));
@@ -197,21 +199,10 @@ impl<'a> PosableLimb<'a> {
         })
     }
 
-    fn place(&self, skin: &Mesh, pose: PoseAngle) -> Result<Placement, PoseError> {
-        let table = &self.setup.table;
-        Ok(place_soft(
-            &skin.vertices,
-            &self.prepared.landmarks,
-            pose.angle_rad(),
-            &table.plane.plane,
-            &table.room.device,
-            &self.plan.soft_tissue,
-        )?)
-    }
-
     /// T^V_CT: through the patient and the room into the camera.
     fn camera_from_ct(&self, camera: &PlacedCamera, placement: &Placement) -> Isometry3<f64> {
-        let room_from_ct = placement.room_from_patient * self.prepared.landmarks.patient_from_ct();
+        let room_from_ct =
+            placement.room_from_patient * self.limb.prepared.landmarks.patient_from_ct();
         camera.camera_from_room * room_from_ct.isometry()
     }
 
@@ -220,8 +211,8 @@ impl<'a> PosableLimb<'a> {
         if placement.flattening.is_none() {
             return Ok(None);
         }
-        let walls = &self.prepared.limb.walls;
-        let in_room = placement.in_room(&walls.vertices(skin), &self.prepared.landmarks);
+        let walls = &self.limb.prepared.limb.walls;
+        let in_room = placement.in_room(&walls.vertices(skin), &self.limb.prepared.landmarks);
         Ok(Some(closed_skin(&in_room, skin, walls)?))
     }
 
@@ -254,36 +245,25 @@ impl<'a> PosableLimb<'a> {
         )?)
     }
 
-    fn projection(&self, placement: &Placement) -> Projection {
-        let device = &self.setup.table.room.device;
-        projection(placement, &self.prepared.landmarks, device, &self.plan.xray)
-    }
-
     fn radiograph(
         &self,
         pose: PoseAngle,
-        placement: &Placement,
+        exposure: &PosedExposure,
         root: &Path,
     ) -> Result<[FileRow; 2], PoseError> {
-        let settings = &self.plan.xray;
-        let projection = self.projection(placement);
         let cut = self.cuts_at(pose).map_or(0.0, PoseCuts::of_radiograph);
         let seed = item_seed(self.plan.seed, Purpose::Radiograph, self.id, pose.step);
-        let engine = FastSettings {
-            seed,
-            ..settings.engine
-        };
-        let radiograph = ppa_xray::fast(&self.phantom, &self.setup.spectrum, &projection, &engine)?;
+        let radiograph = exposure.radiograph(seed)?;
         let png = self.id.radiograph_png(pose.step);
-        radiograph.write_png(&prepare_folder(root, &png)?, &settings.presentation)?;
+        radiograph.write_png(&prepare_folder(root, &png)?, &self.plan.xray.presentation)?;
         let exr = self.id.radiograph_exr(pose.step);
         radiograph.write_exr(&root.join(&exr))?;
         let row = |file, kind| {
             Ok::<_, PoseError>(FileRow {
-                ct_from_device: Some(rows_from_isometry(&projection.ct_from_device)),
+                ct_from_device: Some(rows_from_isometry(&exposure.projection.ct_from_device)),
                 seed: Some(seed),
                 cut_share: (cut > 0.0).then_some(cut),
-                ..self.row(root, file, kind, pose, placement)?
+                ..self.row(root, file, kind, pose, &exposure.placement)?
             })
         };
         Ok([
@@ -313,6 +293,7 @@ impl<'a> PosableLimb<'a> {
             too_far_pixels: 0,
             cut_share: None,
             patient_from_ct: self
+                .limb
                 .prepared
                 .landmarks
                 .patient_from_ct()

@@ -8,8 +8,11 @@ use ppa_depth::{
     Backdrop, Body, Camera, DepthImage, MeshBody, MountedCamera, PlacedBody, RigError, Sensor,
     SensorError, SurfelBody,
 };
-use ppa_mesh::{CloudError, MeshContents, PointCloud, estimate_normals, mean_spacing_mm};
-use ppa_scene::{PlaneSettings, Rigid, RoomError, TablePlane, XrayDevice, XrayRoom, table_plane};
+use ppa_mesh::{CloudError, Mesh, MeshContents, PointCloud, estimate_normals, mean_spacing_mm};
+use ppa_scene::{
+    Landmarks, PlaceError, Placement, PlaneSettings, Rigid, RoomError, SoftTissue, TablePlane,
+    XrayDevice, XrayRoom, place_soft, table_plane,
+};
 use ppa_xray::{Spectrum, TubeSpec};
 
 use crate::plan::{Plan, PlanRoom, XraySettings};
@@ -87,6 +90,35 @@ impl Table {
         let settings = plan.room.table.as_ref().unwrap_or(&by_device);
         let plane = table_plane(&room.cloud, settings, seed)?;
         Ok(Self { room, plane })
+    }
+
+    /// Lays a skin (`ct` frame) on the table, turned medially by an angle in radians, and lets soft tissue sink in.
+    ///
+    /// # Errors
+    /// [`PlaceError`] when the limb does not rest there.
+    pub fn place(
+        &self,
+        skin: &Mesh,
+        landmarks: &Landmarks,
+        angle_rad: f64,
+        soft_tissue: &SoftTissue,
+    ) -> Result<Placement, PlaceError> {
+        let (plane, device) = (&self.plane.plane, &self.room.device);
+        place_soft(
+            &skin.vertices,
+            landmarks,
+            angle_rad,
+            plane,
+            device,
+            soft_tissue,
+        )
+    }
+
+    /// From the source to the table top along the central beam, mm.
+    pub fn source_table_mm(&self) -> f64 {
+        let (device, plane) = (&self.room.device, &self.plane.plane);
+        let above_mm = plane.normal.dot(&device.source().coords) - plane.offset_mm;
+        -above_mm / plane.normal.dot(&device.beam_direction())
     }
 
     /// What stands in the room, for the cameras: its triangles, or discs at its points.

@@ -9,7 +9,7 @@ use ppa_dataset::write_whole;
 use ppa_generate::{Case, Frames, Plan, RoomFile, Table};
 use ppa_mesh::{read_mesh_file, write_cloud_file, write_mesh_file};
 use ppa_report::{PosedLimb, pose_picture, write_picture};
-use ppa_scene::{Contact, PlaneSettings, SoftTissue, TablePlane, place_soft, table_plane};
+use ppa_scene::{Contact, PlaneSettings, SoftTissue, TablePlane, table_plane};
 use serde::Serialize;
 
 use crate::commands::pictures::shown_name;
@@ -228,14 +228,8 @@ fn place_limb(args: &PlaceArgs, output: Output) -> anyhow::Result<()> {
     let prepared = prepared(&case, &args.case)?;
     let table = Table::of_plan(&plan)?;
     let skin = &prepared.limb.mesh;
-    let placement = place_soft(
-        &skin.vertices,
-        &prepared.landmarks,
-        args.angle.to_radians(),
-        &table.plane.plane,
-        &table.room.device,
-        &soft_tissue,
-    )?;
+    let (landmarks, angle_rad) = (&prepared.landmarks, args.angle.to_radians());
+    let placement = table.place(skin, landmarks, angle_rad, &soft_tissue)?;
     let patient_from_ct = prepared.landmarks.patient_from_ct();
     if let Some(ply) = &args.ply {
         let room_from_ct = placement.room_from_patient * patient_from_ct;

@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::Args;
+use ppa_generate::{ExposableLimb, PosedExposure};
 use ppa_xray::{
-    AnalogRun, AnalogSettings, AnalogTally, DoseSettings, Part, Projection, Spectrum, Stop,
-    Stopped, VoxelBox, VoxelPhantom,
+    AnalogRun, AnalogSettings, AnalogTally, DoseSettings, Part, Stop, Stopped, VoxelBox,
 };
 
 use crate::interrupt::Interrupt;
@@ -130,9 +130,7 @@ impl AnalogArgs {
     /// Follows photons under a progress bar. Ctrl-C and TERM keep what was counted and end the command.
     pub fn follow(
         &self,
-        phantom: &VoxelPhantom,
-        spectrum: &Spectrum,
-        projection: &Projection,
+        exposure: &PosedExposure,
         histories: Option<f64>,
         seed: u64,
         keep: &Keep,
@@ -147,7 +145,10 @@ impl AnalogArgs {
             seed,
             ..AnalogSettings::default()
         };
-        let mut run = AnalogRun::new(phantom, spectrum, projection, &settings)?;
+        let ExposableLimb {
+            phantom, spectrum, ..
+        } = exposure.limb;
+        let mut run = AnalogRun::new(phantom, spectrum, &exposure.projection, &settings)?;
         if self.dose || self.dose_map.is_some() {
             let whole = VoxelBox::whole(phantom.grid());
             run = run.with_dose(&DoseSettings {

@@ -3,11 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use ppa_generate::{Case, PreparedLimb, Table, XraySettings, tube};
+use ppa_generate::{Case, PosedExposure, XraySettings, tube};
 use ppa_scene::{LimbKind, Side};
 use ppa_xray::{
-    DxExposure, DxIntent, Examination, Laterality, Presentation, Projection, Radiograph, Region,
-    View,
+    DxExposure, DxIntent, Examination, Laterality, Presentation, Radiograph, Region, View,
 };
 
 use crate::output_files::OutputFiles;
@@ -63,12 +62,14 @@ impl PictureArgs {
         outputs.file("--dicom", path, endings)
     }
 
-    /// Writes the DICOM image if one was asked for.
+    /// Writes the DICOM image if one was asked for; `angle_deg` is the medial rotation of the limb.
     pub fn write_dicom(
         &self,
         radiograph: &Radiograph,
         presentation: Presentation,
-        exposure: &Exposure,
+        exposure: &PosedExposure,
+        case: &Case,
+        angle_deg: f64,
     ) -> anyhow::Result<()> {
         let Some(path) = &self.dicom else {
             return Ok(());
@@ -79,54 +80,34 @@ impl PictureArgs {
             DxIntent::Presentation(presentation)
         };
         let exposure = DxExposure {
-            projection: exposure.projection,
-            tube: &tube(exposure.settings)?,
-            examination: exposure.examination(),
-            source_patient_mm: Some(exposure.source_table_mm()),
-            study: &exposure.case.source.volume_sha256,
+            projection: &exposure.projection,
+            tube: &tube(exposure.limb.settings())?,
+            examination: examination(case, exposure.limb.prepared.landmarks.limb, angle_deg),
+            source_patient_mm: Some(exposure.limb.table.source_table_mm()),
+            study: &case.source.volume_sha256,
         };
         Ok(radiograph.write_dicom(path, &exposure, intent)?)
     }
 }
 
-/// What a DICOM header wants to know.
-pub struct Exposure<'a> {
-    pub case: &'a Case,
-    pub prepared: &'a PreparedLimb,
-    pub table: &'a Table,
-    pub settings: &'a XraySettings,
-    pub projection: &'a Projection,
-    /// Medial rotation of the limb.
-    pub angle_deg: f64,
-}
-
-impl Exposure<'_> {
-    /// The beam comes from above: from the front at rest, and from the side that medial rotation turns up.
-    fn examination(&self) -> Examination {
-        let view = match self.angle_deg {
-            angle if angle >= LATERAL_FROM_DEG => View::LateroMedial,
-            angle if angle <= -LATERAL_FROM_DEG => View::MedioLateral,
-            angle if angle.abs() >= OBLIQUE_FROM_DEG => View::AnteroPosteriorOblique,
-            _ => View::AnteroPosterior,
-        };
-        Examination {
-            region: match self.prepared.landmarks.limb {
-                LimbKind::LowerLeg => Region::Ankle,
-                LimbKind::Knee => Region::Knee,
-                LimbKind::Other => Region::Extremity,
-            },
-            side: match self.case.side {
-                Side::Left => Laterality::Left,
-                Side::Right => Laterality::Right,
-            },
-            view,
-        }
-    }
-
-    /// From the source to the table top along the central beam.
-    fn source_table_mm(&self) -> f64 {
-        let (device, plane) = (&self.table.room.device, &self.table.plane.plane);
-        let above_mm = plane.normal.dot(&device.source().coords) - plane.offset_mm;
-        -above_mm / plane.normal.dot(&device.beam_direction())
+/// The beam comes from above: from the front at rest, and from the side that medial rotation turns up.
+fn examination(case: &Case, limb: LimbKind, angle_deg: f64) -> Examination {
+    let view = match angle_deg {
+        angle if angle >= LATERAL_FROM_DEG => View::LateroMedial,
+        angle if angle <= -LATERAL_FROM_DEG => View::MedioLateral,
+        angle if angle.abs() >= OBLIQUE_FROM_DEG => View::AnteroPosteriorOblique,
+        _ => View::AnteroPosterior,
+    };
+    Examination {
+        region: match limb {
+            LimbKind::LowerLeg => Region::Ankle,
+            LimbKind::Knee => Region::Knee,
+            LimbKind::Other => Region::Extremity,
+        },
+        side: match case.side {
+            Side::Left => Laterality::Left,
+            Side::Right => Laterality::Right,
+        },
+        view,
     }
 }

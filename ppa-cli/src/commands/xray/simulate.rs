@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use ppa_ct::{Volume, write_nifti};
-use ppa_generate::{Case, Plan, Table, joint_phantom, projection, spectrum};
-use ppa_scene::{Contact, place_soft};
-use ppa_xray::{Dose, FastSettings, VoxelPhantom, fast};
+use ppa_generate::{Case, ExposableLimb, Plan, Table, spectrum};
+use ppa_scene::Contact;
+use ppa_xray::{Dose, VoxelPhantom};
 use serde::Serialize;
 
 use super::BeamArgs;
 use super::follow::AnalogArgs;
-use super::pictures::{Exposure, PictureArgs};
+use super::pictures::PictureArgs;
 use super::report::Report;
 use crate::findings::prepared;
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
@@ -91,41 +91,28 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
         None => Plan::new(Vec::new()),
     };
     args.beam.apply(&mut plan.xray);
+    if let (EngineName::Fast, Some(histories)) = (args.engine, args.histories) {
+        plan.xray.engine.dose_histories = histories;
+    }
     let case = Case::read(&args.case)?;
     let working = working("preparing the limb");
     let prepared = prepared(&case, &args.case)?;
     let table = Table::of_plan(&plan)?;
-    let placement = place_soft(
-        &prepared.limb.mesh.vertices,
-        &prepared.landmarks,
-        args.angle.to_radians(),
-        &table.plane.plane,
-        &table.room.device,
-        &plan.soft_tissue,
-    )?;
-    let phantom = joint_phantom(&prepared, &plan.xray)?;
     let spectrum = spectrum(&plan.xray)?;
-    let device = &table.room.device;
-    let projection = projection(&placement, &prepared.landmarks, device, &plan.xray);
+    let limb = ExposableLimb::new(prepared, &plan, &table, &spectrum)?;
+    let exposure = limb.pose(args.angle.to_radians())?;
 
     working.set_message("following photons");
     let watch = Stopwatch::start();
     let (radiograph, dose) = match &keep {
         None => {
-            let settings = FastSettings {
-                dose_histories: args.histories.unwrap_or(plan.xray.engine.dose_histories),
-                seed: args.seed,
-                ..plan.xray.engine
-            };
             let _stoppable = ends_at_once(NOTHING_WRITTEN)?;
-            (fast(&phantom, &spectrum, &projection, &settings)?, None)
+            (exposure.radiograph(args.seed)?, None)
         }
         Some(keep) => {
             working.finish_and_clear();
             let (histories, seed) = (args.histories, args.seed);
-            let tally =
-                args.analog
-                    .follow(&phantom, &spectrum, &projection, histories, seed, keep)?;
+            let tally = args.analog.follow(&exposure, histories, seed, keep)?;
             (tally.radiograph(), tally.dose())
         }
     };
@@ -136,29 +123,21 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
         radiograph.write_png(out, &presentation)?;
         written.push(out);
     }
-    let exposure = Exposure {
-        case: &case,
-        prepared: &prepared,
-        table: &table,
-        settings: &plan.xray,
-        projection: &projection,
-        angle_deg: args.angle,
-    };
     args.pictures
-        .write_dicom(&radiograph, presentation, &exposure)?;
+        .write_dicom(&radiograph, presentation, &exposure, &case, args.angle)?;
     written.extend(args.pictures.dicom.as_deref());
     if let Some(exr) = &args.exr {
         radiograph.write_exr(exr)?;
         written.push(exr);
     }
     if let (Some(path), Some(dose)) = (&args.analog.dose_map, &dose) {
-        write_nifti(path, &dose_map(&phantom, dose)?)?;
+        write_nifti(path, &dose_map(&limb.phantom, dose)?)?;
         written.push(path);
     }
     working.finish_and_clear();
     let result = Simulated {
         report: Report::new(&radiograph, dose.as_ref(), seconds),
-        contact: placement.contact,
+        contact: exposure.placement.contact,
     };
     output.print(&result, |result| result.report.describe(&written))
 }

@@ -1,0 +1,105 @@
+//! A limb before the x-ray device of a plan, and its exposure in a pose.
+
+use ppa_mesh::Mesh;
+use ppa_scene::{PlaceError, Placement};
+use ppa_xray::{FastSettings, Projection, Radiograph, Spectrum, TransportError, VoxelPhantom};
+
+use crate::plan::{Plan, XraySettings};
+use crate::prepare::PreparedLimb;
+use crate::radiograph::{JointError, joint_phantom, projection};
+use crate::scene_setup::Table;
+
+/// A limb with all that its exposures share.
+pub struct ExposableLimb<'a> {
+    /// Skin, voxels and landmarks.
+    pub prepared: PreparedLimb,
+    /// Room, table and device.
+    pub table: &'a Table,
+    /// The beam.
+    pub spectrum: &'a Spectrum,
+    /// The limb around the joint as voxels of material and density.
+    pub phantom: VoxelPhantom,
+    plan: &'a Plan,
+}
+
+/// A limb that lies on the table, and the device as its scan sees it.
+pub struct PosedExposure<'a> {
+    /// The limb.
+    pub limb: &'a ExposableLimb<'a>,
+    /// Where it lies, by the skin of the scan.
+    pub placement: Placement,
+    /// Source and detector in the `ct` frame.
+    pub projection: Projection,
+}
+
+impl<'a> ExposableLimb<'a> {
+    /// Cuts the voxels around the joint out of a limb; `table` and `spectrum` are those of `plan`.
+    ///
+    /// # Errors
+    /// [`JointError`] when there is no limb near the joint or the HU calibration is unusable.
+    pub fn new(
+        prepared: PreparedLimb,
+        plan: &'a Plan,
+        table: &'a Table,
+        spectrum: &'a Spectrum,
+    ) -> Result<Self, JointError> {
+        let phantom = joint_phantom(&prepared, &plan.xray)?;
+        Ok(Self {
+            prepared,
+            table,
+            spectrum,
+            phantom,
+            plan,
+        })
+    }
+
+    /// Lays a skin of the limb on the table, turned medially by an angle in radians.
+    ///
+    /// # Errors
+    /// [`PlaceError`] when it does not rest there.
+    pub fn place(&self, skin: &Mesh, angle_rad: f64) -> Result<Placement, PlaceError> {
+        let (landmarks, soft_tissue) = (&self.prepared.landmarks, &self.plan.soft_tissue);
+        self.table.place(skin, landmarks, angle_rad, soft_tissue)
+    }
+
+    /// The exposure of the limb turned medially by an angle in radians.
+    ///
+    /// # Errors
+    /// [`PlaceError`] when it does not rest on the table.
+    pub fn pose(&'a self, angle_rad: f64) -> Result<PosedExposure<'a>, PlaceError> {
+        let placement = self.place(&self.prepared.limb.mesh, angle_rad)?;
+        let device = &self.table.room.device;
+        Ok(PosedExposure {
+            limb: self,
+            placement,
+            projection: projection(
+                &placement,
+                &self.prepared.landmarks,
+                device,
+                self.settings(),
+            ),
+        })
+    }
+
+    /// Settings of its radiographs.
+    pub fn settings(&self) -> &'a XraySettings {
+        &self.plan.xray
+    }
+}
+
+impl PosedExposure<'_> {
+    /// The radiograph by the plan's engine.
+    ///
+    /// # Errors
+    /// [`TransportError`] when geometry, beam or a setting of the engine makes no sense.
+    pub fn radiograph(&self, seed: u64) -> Result<Radiograph, TransportError> {
+        let engine = FastSettings {
+            seed,
+            ..self.limb.settings().engine
+        };
+        let ExposableLimb {
+            phantom, spectrum, ..
+        } = self.limb;
+        ppa_xray::fast(phantom, spectrum, &self.projection, &engine)
+    }
+}
