@@ -49,6 +49,10 @@ const TABLES: &[(&str, &str)] = &[
         "[xray.engine]",
         "How much is computed; the plan's seed decides, not this one.",
     ),
+    (
+        "[xray.analog]",
+        "Analog Monte Carlo, which makes the radiographs in place of [xray.engine].",
+    ),
     ("[xray.presentation]", "The look of the 16-bit radiograph."),
     ("[xray.calibration]", ""),
 ];
@@ -173,6 +177,17 @@ const KEYS: &[(&str, &str, &str)] = &[
     ),
     ("xray.engine", "seed", "stays 0"),
     (
+        "xray.analog",
+        "histories",
+        "photons followed per radiograph",
+    ),
+    (
+        "xray.analog",
+        "compton_model",
+        "how photons scatter off electrons",
+    ),
+    ("xray.analog", "seed", "stays 0"),
+    (
         "xray.presentation",
         "centre",
         "log exposure shown as middle grey",
@@ -211,6 +226,7 @@ const OFF: &[(&str, &[&str])] = &[
     (
         "xray",
         &[
+            "#analog = { histories = 20000000 }    # analog Monte Carlo in place of [xray.engine]: photons followed per radiograph",
             "#max_cut_share = 0.01    # a limb is refused if more of the rays around the joint pass through a cut face",
             "#calibration_file = \"hu.toml\"    # HU to material and density from a file, instead of the table below",
         ],

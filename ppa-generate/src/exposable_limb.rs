@@ -2,7 +2,9 @@
 
 use ppa_mesh::Mesh;
 use ppa_scene::{PlaceError, Placement};
-use ppa_xray::{FastSettings, Projection, Radiograph, Spectrum, TransportError, VoxelPhantom};
+use ppa_xray::{
+    AnalogSettings, FastSettings, Projection, Radiograph, Spectrum, TransportError, VoxelPhantom,
+};
 
 use crate::plan::{Plan, XraySettings};
 use crate::prepare::PreparedLimb;
@@ -93,13 +95,19 @@ impl PosedExposure<'_> {
     /// # Errors
     /// [`TransportError`] when geometry, beam or a setting of the engine makes no sense.
     pub fn radiograph(&self, seed: u64) -> Result<Radiograph, TransportError> {
-        let engine = FastSettings {
-            seed,
-            ..self.limb.settings().engine
-        };
         let ExposableLimb {
             phantom, spectrum, ..
         } = self.limb;
-        ppa_xray::fast(phantom, spectrum, &self.projection, &engine)
+        let XraySettings { engine, analog, .. } = self.limb.settings();
+        match *analog {
+            Some(settings) => {
+                let settings = AnalogSettings { seed, ..settings };
+                ppa_xray::analog(phantom, spectrum, &self.projection, &settings)
+            }
+            None => {
+                let settings = FastSettings { seed, ..*engine };
+                ppa_xray::fast(phantom, spectrum, &self.projection, &settings)
+            }
+        }
     }
 }

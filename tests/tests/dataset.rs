@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_core::TransformRows;
@@ -13,10 +14,11 @@ use ppa_dataset::{BodyShape, FileKind, Manifest};
 use ppa_depth::{DepthImage, isometry_from_rows};
 use ppa_generate::{
     Case, FolderError, GenerateError, GenerateSettings, JobError, Plan, PlanCase, PreparedLimb,
-    SceneSetup, Summary, generate, prepare,
+    SceneSetup, Summary, forecast, generate, prepare, verify,
 };
 use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{Landmarks, Side, Sweep};
+use ppa_xray::AnalogSettings;
 
 const SPACING_MM: f64 = 2.0;
 
@@ -140,6 +142,38 @@ fn a_dataset_has_every_image_of_its_plan() {
     let rois = manifest.rois(LIMB).unwrap();
     assert_eq!(rois.len(), 4);
     assert_eq!(rois["depth_cam_left_18.0.png"].image_number, 36);
+}
+
+#[test]
+fn analog_radiographs_are_planned_made_and_verified() {
+    let mut plan = plan();
+    plan.rotation.to_deg = 0.0;
+    plan.shapes.variants = vec![BodyShape::Orig];
+    plan.xray.analog = Some(AnalogSettings {
+        histories: 20_000,
+        ..AnalogSettings::default()
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let (file, root) = (folder.path().join("plan.toml"), folder.path().join("data"));
+    plan.write_commented(&file).unwrap();
+    assert_eq!(Plan::read(&file).unwrap().xray, plan.xray);
+
+    let stop = AtomicBool::new(false);
+    let cost = forecast(&plan, &root, 0.0, &stop, &|_| {}).unwrap();
+    assert_eq!((cost.units, cost.measured), (1, 1));
+    assert_eq!(run(&plan, &root, 2).made, 1);
+    assert_eq!(run(&plan, &root, 1).made, 0);
+    let again = verify(&plan, &root, 1.0, 0, &stop, &|_| {}).unwrap();
+    assert_eq!((again.remade, again.different), (1, Vec::new()));
+
+    let radiograph = |root: &Path| fs::read(root.join(LIMB.radiograph_png(0))).unwrap();
+    assert_ne!(radiograph(&root), radiograph(dataset()));
+    // Datasets of the fast engine keep their text.
+    let names_it = |root: &Path| {
+        let text = fs::read_to_string(root.join("dataset.json")).unwrap();
+        text.contains("analog")
+    };
+    assert!(names_it(&root) && !names_it(dataset()));
 }
 
 #[test]

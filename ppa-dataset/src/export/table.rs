@@ -54,7 +54,7 @@ pub enum TableError {
 /// | `intrinsics` | lens of the camera: JSON of a camera file, pixels |
 /// | `patient_from_ct`, `room_from_patient`, `room_from_camera`, `ct_from_device` | 4x4 rows as JSON, mm |
 /// | `seed` | of the noise in the image |
-/// | `dose_histories`, `scatter_histories` | of a radiograph: photons whose noise it carries (`inf`: none), photons followed |
+/// | `dose_histories`, `scatter_histories` | of a radiograph: photons whose noise it carries (`inf`: none), photons followed; the same number of analog ones |
 /// | `label`, `label_std`, `label_source` | quality of the pose, 1 (ideal) to 3 |
 /// | `split` | part of the split that the person is in |
 #[derive(Debug, Clone, PartialEq)]
@@ -123,6 +123,26 @@ struct Settings {
 #[derive(Deserialize)]
 struct Xray {
     engine: Engine,
+    /// The analog engine, where it was used in place of the other.
+    analog: Option<Analog>,
+}
+
+#[derive(Deserialize)]
+struct Analog {
+    histories: u64,
+}
+
+impl Xray {
+    /// Photons whose noise an image carries, infinite for none, and photons that were followed.
+    fn histories(&self) -> (f64, u64) {
+        match (&self.analog, &self.engine) {
+            (Some(analog), _) => (analog.histories as f64, analog.histories),
+            (None, fast) => (
+                fast.dose_histories.unwrap_or(f64::INFINITY),
+                fast.scatter_histories,
+            ),
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -259,7 +279,7 @@ fn columns(
         values: Values::Real(rows.iter().map(of).collect()),
     };
     let camera = |row: &FileRow| shared.cameras.iter().find(|c| Some(c.view) == row.camera);
-    let radiograph = |row: &FileRow| row.ct_from_device.map(|_| &shared.settings.xray.engine);
+    let radiograph = |row: &FileRow| row.ct_from_device.map(|_| shared.settings.xray.histories());
     let label = |row: &FileRow| labels.get(&row.limb)?.of_step(row.step).copied();
     vec![
         text("file", &|row| Some(row.file.clone())),
@@ -280,12 +300,8 @@ fn columns(
         }),
         text("ct_from_device", &|row| json(&row.ct_from_device?)),
         count("seed", &|row| row.seed),
-        real("dose_histories", &|row| {
-            Some(radiograph(row)?.dose_histories.unwrap_or(f64::INFINITY))
-        }),
-        count("scatter_histories", &|row| {
-            Some(radiograph(row)?.scatter_histories)
-        }),
+        real("dose_histories", &|row| Some(radiograph(row)?.0)),
+        count("scatter_histories", &|row| Some(radiograph(row)?.1)),
         real("label", &|row| Some(label(row)?.label)),
         real("label_std", &|row| Some(label(row)?.std)),
         text("label_source", &|row| {

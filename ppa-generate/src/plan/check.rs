@@ -1,5 +1,7 @@
 //! Checks of a plan before anything is made.
 
+use ppa_xray::AnalogSettings;
+
 use super::Plan;
 
 /// Farther out or in, a limb is none any more, mm.
@@ -59,6 +61,18 @@ impl Plan {
         }
         if self.xray.engine.seed != 0 {
             return Err("xray.engine.seed is given, but the plan's seed decides".to_owned());
+        }
+        if let Some(analog) = &self.xray.analog {
+            if analog.seed != 0 {
+                return Err("xray.analog.seed is given, but the plan's seed decides".to_owned());
+            }
+            let most = AnalogSettings::MOST_HISTORIES;
+            if !(1..=most).contains(&analog.histories) {
+                return Err(format!(
+                    "xray.analog.histories is {}, expected 1 to {most}",
+                    analog.histories
+                ));
+            }
         }
         if self.xray.calibration_file.is_some() {
             return Err("xray.calibration_file is only looked at when a plan is read".to_owned());

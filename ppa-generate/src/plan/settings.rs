@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use ppa_core::TransformRows;
 use ppa_depth::{RigSpec, SensorSpec, WallDepth};
 use ppa_scene::{PlaneSettings, RoomSpec};
-use ppa_xray::{Detector, FastSettings, HuCalibration, Presentation, Receptor, Source};
+use ppa_xray::{
+    AnalogSettings, Detector, FastSettings, HuCalibration, Presentation, Receptor, Source,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::cut_error::MAX_CUT_SHARE;
@@ -99,8 +101,11 @@ pub struct XraySettings {
     /// HU to material and density from a file instead; reading the plan puts its contents in place of the path.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration_file: Option<PathBuf>,
-    /// The engine.
+    /// The fast engine.
     pub engine: FastSettings,
+    /// Analog Monte Carlo in place of the fast engine, which is used when this is left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub analog: Option<AnalogSettings>,
     /// The mapping to a radiograph for viewing.
     pub presentation: Presentation,
     /// Largest share of the rays around the joint that may enter or leave the scan where its field of view cuts the limb off, 0 to 1; a
@@ -123,6 +128,7 @@ impl Default for XraySettings {
             calibration: HuCalibration::default(),
             calibration_file: None,
             engine: FastSettings::default(),
+            analog: None,
             presentation: Presentation::default(),
             max_cut_share: MAX_CUT_SHARE,
         }

@@ -69,6 +69,11 @@ fn what_cannot_work_is_named() {
         ("[shapes]\nbumps = [2, 0]\n", "expected 1 to 100 bumps"),
         ("[shapes]\noffset_mm = 101\n", "at most 100 mm"),
         ("[xray.engine]\nseed = 5\n", "xray.engine.seed"),
+        ("[xray.analog]\nseed = 5\n", "xray.analog.seed"),
+        (
+            "[xray.analog]\nhistories = 0\n",
+            "xray.analog.histories is 0",
+        ),
     ] {
         let error = read(more).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");

@@ -91,6 +91,7 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
         None => Plan::new(Vec::new()),
     };
     args.beam.apply(&mut plan.xray);
+    plan.xray.analog = None; // --engine decides.
     if let (EngineName::Fast, Some(histories)) = (args.engine, args.histories) {
         plan.xray.engine.dose_histories = histories;
     }
