@@ -76,6 +76,7 @@ pub use beam::spectrum::Spectrum;
 pub use beam::spectrum_error::SpectrumError;
 pub use beam::tube::{Filter, TubeSpec};
 pub use detector::readout::Layer;
+pub use dose::map::DoseMapError;
 pub use dose::report::{Dose, Estimate, Imparted, VoxelDose};
 pub use dose::settings::{DoseError, DoseSettings, VoxelBox};
 pub use engine::analog::{AnalogSettings, analog};

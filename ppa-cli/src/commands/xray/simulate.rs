@@ -2,12 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use clap::{Args, ValueEnum};
-use ppa_ct::{Volume, write_nifti};
+use ppa_ct::write_nifti;
 use ppa_generate::{Case, ExposableLimb, Plan, Table, spectrum};
 use ppa_scene::Contact;
-use ppa_xray::{Dose, VoxelPhantom};
 use serde::Serialize;
 
 use super::BeamArgs;
@@ -132,7 +130,7 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
         written.push(exr);
     }
     if let (Some(path), Some(dose)) = (&args.analog.dose_map, &dose) {
-        write_nifti(path, &dose_map(&limb.phantom, dose)?)?;
+        write_nifti(path, &dose.map_ugy_per_mas(limb.phantom.grid())?)?;
         written.push(path);
     }
     working.finish_and_clear();
@@ -141,20 +139,4 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
         contact: exposure.placement.contact,
     };
     output.print(&result, |result| result.report.describe(&written))
-}
-
-/// µGy per mAs in every voxel.
-fn dose_map(phantom: &VoxelPhantom, dose: &Dose) -> anyhow::Result<Volume> {
-    let per_mas = dose
-        .histories_per_mas
-        .context("the spectrum does not know its fluence")?;
-    let voxels = dose
-        .voxels
-        .as_ref()
-        .context("no voxel doses were counted")?;
-    let gray = voxels.gy_per_history();
-    let micro = gray
-        .iter()
-        .map(|&gray| (1e6 * per_mas * f64::from(gray)) as f32);
-    Ok(Volume::new(phantom.grid().clone(), micro.collect())?)
 }
