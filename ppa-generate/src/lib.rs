@@ -16,6 +16,7 @@ mod check;
 mod closed_skin;
 mod commented_plan;
 mod compiled;
+mod coverage_study;
 mod cut_error;
 mod cut_findings;
 mod cut_share;
@@ -61,6 +62,9 @@ pub use case::{Case, CaseError, Found, Source};
 pub use case_check::{CaseCheck, CaseCheckError, Drift};
 pub use check::{Check, Problem, check};
 pub use closed_skin::closed_skin;
+pub use coverage_study::{
+    CameraPlace, CoverageStudy, CoverageStudyError, JointInRoom, RankedPlace,
+};
 pub use cut_error::{CutError, PoseImage};
 pub use dataset_lock::FolderError;
 pub use depth_views::{DepthView, depth_views};

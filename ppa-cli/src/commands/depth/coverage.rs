@@ -4,18 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
-use nalgebra::{Isometry3, Point3};
 use ppa_dataset::write_whole;
-use ppa_depth::{
-    Camera, CoverageSettings, JointSurface, MeshBody, PlacedBody, Viewpoint, isometry_from_rows,
-    rows_from_isometry,
-};
-use ppa_generate::{Case, Plan, SceneSetup, closed_skin};
+use ppa_depth::{CoverageSettings, Viewpoint, isometry_from_rows};
+use ppa_generate::{CameraPlace, Case, JointInRoom, Plan, RankedPlace, SceneSetup};
 use ppa_report::{RankedView, coverage_plot};
-use ppa_scene::place;
 use serde::Deserialize;
 
-use super::coverage_table::{Row, Study, table_csv};
+use super::coverage_table::{describe, table_csv};
 use crate::findings::prepared;
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::output::{Output, working};
@@ -72,13 +67,6 @@ struct NamedPlace {
     room_from_camera: [[f64; 4]; 4],
 }
 
-/// A camera somewhere in the room.
-struct Candidate {
-    name: String,
-    camera: Camera,
-    room_from_camera: Isometry3<f64>,
-}
-
 pub fn run(args: &CoverageArgs, output: Output) -> anyhow::Result<()> {
     let mut outputs = args.replace.outputs();
     outputs.optional("--csv", args.csv.as_ref(), &[".csv"])?;
@@ -92,103 +80,40 @@ pub fn run(args: &CoverageArgs, output: Output) -> anyhow::Result<()> {
     let working = working("looking at the joint from all places");
     let prepared = prepared(&case, &args.case)?;
     let setup = SceneSetup::of_plan(&plan)?;
-    let table = &setup.table;
-    let placement = place(
-        &prepared.limb.mesh.vertices,
-        &prepared.landmarks,
-        args.angle.to_radians(),
-        &table.plane.plane,
-        &table.room.device,
-    )?;
-    let room_from_ct = placement.room_from_patient * prepared.landmarks.patient_from_ct();
-    let room_from_ct = *room_from_ct.isometry();
-    let joint_in_ct = Point3::from(prepared.landmarks.joint_centre);
-    let joint = room_from_ct * joint_in_ct;
-    let candidates = candidates(args, &setup, &joint)?;
-
+    let joint = JointInRoom::new(&setup, &prepared, args.angle.to_radians())?;
     let settings = CoverageSettings {
         radius_mm: args.radius_mm,
         max_angle_deg: args.max_angle_deg,
     };
-    let (skin, walls) = (&prepared.limb.mesh, &prepared.limb.walls);
-    let mesh = MeshBody::new(&skin.vertices, &skin.triangles)?;
-    let surface = JointSurface::new(&mesh, &joint_in_ct, &settings)?;
-    // Where the scan cuts the limb no skin is to be seen, but what is behind is hidden.
-    let limb = closed_skin(&walls.vertices(skin), skin, walls)?;
-    let furniture = table.furniture()?;
-    let see = |candidate: &Candidate| {
-        let camera_from_room = candidate.room_from_camera.inverse();
-        let scene = [
-            PlacedBody {
-                body: &limb,
-                camera_from_body: camera_from_room * room_from_ct,
-            },
-            PlacedBody {
-                body: &furniture,
-                camera_from_body: camera_from_room,
-            },
-        ];
-        let position = candidate.room_from_camera * Point3::origin();
-        Row {
-            rank: 0,
-            name: candidate.name.clone(),
-            viewpoint: Viewpoint::of(&position, &joint),
-            coverage: surface.seen(&candidate.camera, &scene[0].camera_from_body, &scene),
-            room_from_camera: rows_from_isometry(&candidate.room_from_camera),
-        }
-    };
-    let mut rows: Vec<Row> = candidates.iter().map(see).collect();
-    rows.sort_by(|a, b| a.coverage.best_first(&b.coverage));
-    for (i, row) in rows.iter_mut().enumerate() {
-        row.rank = i + 1;
-    }
+    let study = joint.rank(&places(args, &joint)?, &settings)?;
     drop(stoppable);
     working.finish_and_clear();
     if let Some(path) = &args.csv {
-        write_whole(path, &table_csv(&rows)?)?;
+        write_whole(path, &table_csv(&study.places)?)?;
     }
     if let Some(path) = &args.plot {
-        draw(path, &rows)?;
+        draw(path, &study.places)?;
     }
-    let study = Study {
-        joint_mm: joint.into(),
-        surface_mm2: surface.area_mm2(),
-        radius_mm: args.radius_mm,
-        max_angle_deg: args.max_angle_deg,
-        places: rows,
-    };
-    output.print(&study, Study::describe)
+    output.print(&study, describe)
 }
 
 /// The cameras of the rig, and the places that are tried.
-fn candidates(
-    args: &CoverageArgs,
-    setup: &SceneSetup,
-    joint: &Point3<f64>,
-) -> anyhow::Result<Vec<Candidate>> {
+fn places(args: &CoverageArgs, joint: &JointInRoom) -> anyhow::Result<Vec<CameraPlace>> {
     let camera = super::read_camera(args.camera.as_ref())?;
     camera.rays(); // once, and shared by all clones
-    let mut candidates: Vec<Candidate> = setup
-        .cameras
-        .iter()
-        .map(|placed| Candidate {
-            name: format!("rig {}", placed.view.name()),
-            camera: placed.camera.clone(),
-            room_from_camera: placed.camera_from_room.inverse(),
-        })
-        .collect();
+    let mut places = joint.rig();
     if let Some(path) = &args.places {
-        let places: Vec<NamedPlace> = crate::commands::read_json(path)?;
-        for place in places {
+        let named: Vec<NamedPlace> = crate::commands::read_json(path)?;
+        for place in named {
             let room_from_camera = isometry_from_rows(&place.room_from_camera)
                 .with_context(|| format!("place {} of {}", place.name, path.display()))?;
-            candidates.push(Candidate {
+            places.push(CameraPlace {
                 name: place.name,
                 camera: camera.clone(),
                 room_from_camera,
             });
         }
-        return Ok(candidates);
+        return Ok(places);
     }
     anyhow::ensure!(
         (1.0..=90.0).contains(&args.step_deg),
@@ -210,20 +135,20 @@ fn candidates(
         "{} places are to be tried, expected at most {MOST_PLACES}: take a larger --step-deg",
         dome.len()
     );
-    candidates.extend(dome.into_iter().map(|viewpoint| Candidate {
+    places.extend(dome.into_iter().map(|viewpoint| CameraPlace {
         name: "dome".to_owned(),
         camera: camera.clone(),
-        room_from_camera: viewpoint.frame_from_camera(joint),
+        room_from_camera: viewpoint.frame_from_camera(&joint.joint),
     }));
-    Ok(candidates)
+    Ok(places)
 }
 
-fn draw(path: &Path, rows: &[Row]) -> anyhow::Result<()> {
-    let views: Vec<RankedView> = rows
+fn draw(path: &Path, places: &[RankedPlace]) -> anyhow::Result<()> {
+    let views: Vec<RankedView> = places
         .iter()
-        .map(|row| RankedView {
-            viewpoint: row.viewpoint,
-            coverage: row.coverage,
+        .map(|place| RankedView {
+            viewpoint: place.viewpoint,
+            coverage: place.coverage,
         })
         .collect();
     let mut png = std::io::Cursor::new(Vec::new());

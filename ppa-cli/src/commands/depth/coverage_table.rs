@@ -1,71 +1,47 @@
-//! Results of `ppa depth coverage` as JSON, CSV and text.
+//! Results of `ppa depth coverage` as CSV and text.
 
 use ppa_core::text::{count, number};
-use ppa_depth::{Coverage, Viewpoint};
-use serde::Serialize;
-
-#[derive(Debug, Serialize)]
-pub struct Study {
-    pub joint_mm: [f64; 3],
-    pub surface_mm2: f64,
-    pub radius_mm: f64,
-    pub max_angle_deg: f64,
-    pub places: Vec<Row>,
-}
-
-/// One place, as in the table.
-#[derive(Debug, Clone, Serialize)]
-pub struct Row {
-    pub rank: usize,
-    pub name: String,
-    #[serde(flatten)]
-    pub viewpoint: Viewpoint,
-    #[serde(flatten)]
-    pub coverage: Coverage,
-    pub room_from_camera: [[f64; 4]; 4],
-}
+use ppa_depth::Viewpoint;
+use ppa_generate::{CoverageStudy, RankedPlace};
 
 /// Places of the table on the screen, besides those of the rig.
 const SHOWN: usize = 12;
 
-impl Study {
-    /// The best places, and those of the rig, as text.
-    pub fn describe(&self) -> String {
-        let mut lines = vec![
-            format!(
-                "{:.0} cm² of skin within {} mm of the joint; seen at up to {} degrees of incidence:",
-                self.surface_mm2 / 100.0,
-                self.radius_mm,
-                self.max_angle_deg
-            ),
-            "rank  place            azimuth  elevation  distance  visible  pixels/cm²  mm/pixel"
-                .to_owned(),
-        ];
-        let shown = |row: &&Row| row.rank <= SHOWN || row.name.starts_with("rig ");
-        for row in self.places.iter().filter(shown) {
-            let (v, c) = (&row.viewpoint, &row.coverage);
-            let side = c
-                .mm_per_pixel
-                .map_or("-".to_owned(), |mm| format!("{mm:.2}"));
-            lines.push(format!(
-                "{:>4}  {:<15} {:>7.0}°  {:>8.0}°  {:>5.0} mm  {:>5.1} %  {:>10.1}  {side:>8}",
-                row.rank,
-                row.name,
-                number(v.azimuth_deg),
-                number(v.elevation_deg),
-                v.distance_mm,
-                100.0 * c.visible_share,
-                c.pixels_per_cm2,
-            ));
-        }
+/// The best places, and those of the rig, as text.
+pub fn describe(study: &CoverageStudy) -> String {
+    let mut lines = vec![
+        format!(
+            "{:.0} cm² of skin within {} mm of the joint; seen at up to {} degrees of incidence:",
+            study.surface_mm2 / 100.0,
+            study.radius_mm,
+            study.max_angle_deg
+        ),
+        "rank  place            azimuth  elevation  distance  visible  pixels/cm²  mm/pixel"
+            .to_owned(),
+    ];
+    let shown = |row: &&RankedPlace| row.rank <= SHOWN || row.name.starts_with("rig ");
+    for row in study.places.iter().filter(shown) {
+        let (v, c) = (&row.viewpoint, &row.coverage);
+        let side = c
+            .mm_per_pixel
+            .map_or("-".to_owned(), |mm| format!("{mm:.2}"));
         lines.push(format!(
-            "{}; --csv and --json give all",
-            count(self.places.len(), "place")
+            "{:>4}  {:<15} {:>7.0}°  {:>8.0}°  {:>5.0} mm  {:>5.1} %  {:>10.1}  {side:>8}",
+            row.rank,
+            row.name,
+            number(v.azimuth_deg),
+            number(v.elevation_deg),
+            v.distance_mm,
+            100.0 * c.visible_share,
+            c.pixels_per_cm2,
         ));
-        lines.join("\n")
     }
+    lines.push(format!(
+        "{}; --csv and --json give all",
+        count(study.places.len(), "place")
+    ));
+    lines.join("\n")
 }
-
 /// A cell that spreadsheets do not run.
 fn as_text(name: &str) -> String {
     let mark = if ppa_dataset::is_formula(name) {
@@ -77,7 +53,7 @@ fn as_text(name: &str) -> String {
 }
 
 /// All places as CSV.
-pub fn table_csv(rows: &[Row]) -> anyhow::Result<Vec<u8>> {
+pub fn table_csv(rows: &[RankedPlace]) -> anyhow::Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record([
         "rank",
