@@ -7,6 +7,7 @@ mod fit_noise;
 mod project;
 mod render;
 mod render_case;
+mod render_meshes;
 
 use std::path::PathBuf;
 
@@ -34,7 +35,7 @@ pub fn run(command: &DepthCommand, output: Output) -> anyhow::Result<()> {
     match command {
         DepthCommand::Render(args) => match args.case()? {
             Some(case) => render_case::run(case, args, output),
-            None => render::run(args, output),
+            None => render_meshes::run(args, output),
         },
         DepthCommand::FitNoise(args) => fit_noise::run(args, output),
         DepthCommand::Camera(args) => camera::run(args, output),

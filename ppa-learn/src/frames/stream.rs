@@ -38,7 +38,7 @@ pub enum StreamError {
     /// The folder cannot be read.
     #[error(transparent)]
     Folder(#[from] FileError),
-    /// The lines cannot be read.
+    /// Standard input cannot be read.
     #[error("cannot read standard input")]
     Lines(#[source] io::Error),
     /// An answer cannot be handed on.
@@ -141,7 +141,7 @@ where
         Ok(())
     }
 
-    /// Judges the pairs that lines name: the path of the left frame, a tab, the path of the right frame.
+    /// Judges the pairs that the lines of standard input name: the path of the left frame, a tab, the path of the right frame.
     ///
     /// # Errors
     /// [`StreamError`] if a line cannot be read or an answer cannot be handed on.
