@@ -113,3 +113,40 @@ pub fn mean_point<'a>(points: impl IntoIterator<Item = &'a Point3<f32>>) -> Poin
         });
     Point3::from(sum / f64::from(count.max(1)))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+    use crate::camera::depth_mode::DepthMode;
+    use crate::camera::spec::CameraSpec;
+    use crate::render::body::Body;
+    use crate::render::mesh_body::MeshBody;
+
+    #[test]
+    fn bodies_move_between_frames_only_if_they_tremble() {
+        let corners = [[-200.0, -200.0], [200.0, -200.0], [0.0, 200.0]];
+        let corners = corners.map(|[x, y]| Point3::new(x, y, 1000.0_f32));
+        let body = Body::from(MeshBody::new(&corners, &[[0, 1, 2]]).unwrap());
+        let placed = [PlacedBody {
+            body: &body,
+            camera_from_body: Isometry3::identity(),
+        }];
+        let frame = |shift_mm: f64, frame: u64| {
+            let camera = Camera::try_from(CameraSpec::azure_kinect(DepthMode::NfovBinned)).unwrap();
+            let tremor = Tremor {
+                shift_mm,
+                turn_deg: 0.0,
+                correlation_frames: 10.0,
+            };
+            let recorder = Recorder::new(camera, None, tremor, 1).unwrap();
+            recorder.frame(&placed, &mean_point(&corners), frame)
+        };
+        let still = frame(0.0, 0).unwrap();
+        assert_eq!(still.max_mm(), Some(1000.0));
+        assert_eq!(frame(0.0, 7).unwrap(), still);
+        assert_ne!(frame(1.0, 0).unwrap(), still);
+        assert_ne!(frame(1.0, 0).unwrap(), frame(1.0, 7).unwrap());
+    }
+}

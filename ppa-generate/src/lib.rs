@@ -2,7 +2,8 @@
 //!
 //! [`prepare`] turns a CT into a [`Case`] that records every preprocessing decision; a [`Plan`] names cases, room, cameras, beam,
 //! rotations and body shapes; [`generate`] makes the dataset in the layout of `ppa-dataset`, pose by pose; [`merge`] joins the
-//! parts that several machines made; [`ExposableLimb`] and [`depth_views`] make the images of a single pose; [`check`] and [`verify`] look for damage; [`forecast`] estimates time and disk.
+//! parts that several machines made; [`check`] and [`verify`] look for damage; [`forecast`] estimates time and disk.
+//! [`ExposableLimb`] and [`depth_views`] make the images of a single pose.
 //!
 //! Units: mm, degrees in files; 16-bit depth in mm, 0 invalid. Frames: as in `ppa-scene`.
 //! Repeatable: the same plan and seed give the same bytes for any number of threads and after any interruption.

@@ -54,16 +54,17 @@ pub enum GradeRowError {
     Formula(String),
 }
 
-/// For each image the first grade of each reader, and the second where there is one.
+/// For each image by name, the first grade of each reader by name, and the second where there is one.
+pub type GradesByImage = BTreeMap<String, BTreeMap<String, (f64, Option<f64>)>>;
+
+/// The grades of images, first and second, by reader.
 ///
 /// `files` are tables with the columns image, reader, grade.
 ///
 /// # Errors
 /// [`GradeTablesError`] naming the file.
-pub fn read_grade_tables(
-    files: &[PathBuf],
-) -> Result<BTreeMap<String, BTreeMap<String, (f64, Option<f64>)>>, GradeTablesError> {
-    let mut by_image = BTreeMap::<_, BTreeMap<_, (f64, Option<f64>)>>::new();
+pub fn read_grade_tables(files: &[PathBuf]) -> Result<GradesByImage, GradeTablesError> {
+    let mut by_image = GradesByImage::new();
     for path in files {
         for row in read_table::<Grade>(path)? {
             check(&row).map_err(|source| GradeTablesError::Row {
@@ -98,5 +99,32 @@ fn check(row: &Grade) -> Result<(), GradeRowError> {
     match is_formula(&row.reader) {
         false => Ok(()),
         true => Err(GradeRowError::Formula(row.reader.clone())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_grade_is_a_repeat_and_a_third_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("grades.csv");
+        let read = |rows: &str| {
+            std::fs::write(&file, format!("image,reader,grade\n{rows}")).unwrap();
+            read_grade_tables(std::slice::from_ref(&file))
+        };
+        let grades = read("x,a,1\nx,b,1.5\nx,a,2\n").unwrap();
+        assert_eq!(grades["x"]["a"], (1.0, Some(2.0)));
+        assert_eq!(grades["x"]["b"], (1.5, None));
+        let refused = read("x,a,1\nx,a,1\nx,a,1\n").unwrap_err();
+        assert!(matches!(refused, GradeTablesError::ThirdTime { .. }));
+        for odd in ["x,a,1.2\n", "x,=a,1\n"] {
+            let refused = read(odd).unwrap_err();
+            assert!(
+                matches!(refused, GradeTablesError::Row { .. }),
+                "{refused:?}"
+            );
+        }
     }
 }

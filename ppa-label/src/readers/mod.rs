@@ -7,7 +7,7 @@ mod import_error;
 mod page;
 mod reader_case;
 
-pub use grade_tables::{GradeRowError, GradeTablesError, read_grade_tables};
+pub use grade_tables::{GradeRowError, GradeTablesError, GradesByImage, read_grade_tables};
 pub use grades::Grade;
 pub use import::{Imported, import_grades};
 pub use import_error::ImportError;
