@@ -14,6 +14,7 @@ mod graph_tests;
 mod inference;
 mod inference_network;
 mod initialise;
+mod layers;
 mod norm;
 mod operation;
 mod quality;
@@ -25,12 +26,15 @@ mod tape;
 use candle_core::{Device, Tensor, Var};
 
 pub use architecture::Entry;
-pub(crate) use architecture::{Architecture, ConvPlace, SqueezePlace};
+pub(crate) use architecture::{
+    Architecture, Block, ConvKind, ConvPlace, LinearPlace, SqueezePlace,
+};
 pub use error::NetworkError;
 use folded::Folded;
 pub(crate) use fusion::LateFusion;
 pub use fusion::{Fusion, FusionKind};
 pub use inference_network::InferenceNetwork;
+pub(crate) use layers::Layers;
 pub(crate) use norm::running;
 use operation::Backbone;
 pub(crate) use quality::CAMERA_PREFIXES;

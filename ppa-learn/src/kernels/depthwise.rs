@@ -4,7 +4,7 @@ use pulp::{Simd, WithSimd};
 
 use super::simd::{dispatch, fma, lanes, lanes_mut};
 
-/// Kernel and stride of a depthwise convolution; padding is (kernel - 1) / 2 on every side.
+/// Kernel and stride of a convolution; padding is (kernel - 1) / 2 on every side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
     pub kernel: usize,

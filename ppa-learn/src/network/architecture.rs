@@ -11,6 +11,10 @@ use crate::kernels::depthwise::Window;
 pub const FEATURES: usize = 1280;
 /// Channels of the first convolution.
 const STEM: usize = 32;
+const STEM_WINDOW: Window = Window {
+    kernel: 3,
+    stride: 2,
+};
 
 /// Expansion, kernel, stride, channels out and blocks of a stage.
 pub(super) type Stage = (usize, usize, usize, usize, usize);
@@ -65,29 +69,48 @@ pub struct NormPlace {
     pub variance: Range<usize>,
 }
 
-/// A pointwise convolution or the stem, without bias, and the normalisation after it.
+/// What a convolution reads for each of its channels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ConvKind {
+    /// The only channel of the images.
+    Stem,
+    /// All channels, one pixel of each.
+    Pointwise,
+    /// The same channel.
+    Depthwise,
+}
+
+/// A convolution without bias, and the normalisation after it.
 #[derive(Debug, Clone)]
 pub struct ConvPlace {
+    pub kind: ConvKind,
+    pub window: Window,
     pub weight: Range<usize>,
     pub norm: NormPlace,
     pub channels: usize,
 }
 
+/// A layer whose every output depends on every input.
+#[derive(Debug, Clone)]
+pub struct LinearPlace {
+    pub weight: Range<usize>,
+    pub bias: Range<usize>,
+}
+
 /// The two layers of a squeeze-and-excitation.
 #[derive(Debug, Clone)]
 pub struct SqueezePlace {
-    pub squeeze_weight: Range<usize>,
-    pub squeeze_bias: Range<usize>,
-    pub expand_weight: Range<usize>,
-    pub expand_bias: Range<usize>,
+    pub squeeze: LinearPlace,
+    pub expand: LinearPlace,
 }
 
 /// One inverted residual block. The first one's expansion is the network's first convolution.
 #[derive(Debug, Clone)]
 pub struct Block {
+    /// Counted from 0.
+    pub number: usize,
     pub channels_in: usize,
     pub expand: ConvPlace,
-    pub window: Window,
     pub depthwise: ConvPlace,
     pub squeeze: SqueezePlace,
     pub project: ConvPlace,
@@ -134,10 +157,20 @@ struct Builder {
 }
 
 impl Builder {
-    fn conv(&mut self, prefix: &str, shape: [usize; 4]) -> ConvPlace {
-        let channels = shape[0];
+    /// A convolution of `inputs` channels for each of its `channels`.
+    fn conv(
+        &mut self,
+        prefix: &str,
+        kind: ConvKind,
+        window: Window,
+        channels: usize,
+        inputs: usize,
+    ) -> ConvPlace {
+        let shape = [channels, inputs, window.kernel, window.kernel];
         let norm = format!("{prefix}.1");
         ConvPlace {
+            kind,
+            window,
             weight: self.parameters.add(format!("{prefix}.0.weight"), &shape),
             norm: NormPlace {
                 weight: self.parameters.add(format!("{norm}.weight"), &[channels]),
@@ -153,20 +186,20 @@ impl Builder {
         }
     }
 
-    fn squeeze(&mut self, prefix: &str, channels: usize, squeezed: usize) -> SqueezePlace {
-        SqueezePlace {
-            squeeze_weight: self
+    fn pointwise(&mut self, prefix: &str, channels: usize, inputs: usize) -> ConvPlace {
+        let window = Window {
+            kernel: 1,
+            stride: 1,
+        };
+        self.conv(prefix, ConvKind::Pointwise, window, channels, inputs)
+    }
+
+    fn linear(&mut self, prefix: &str, outputs: usize, inputs: usize) -> LinearPlace {
+        LinearPlace {
+            weight: self
                 .parameters
-                .add(format!("{prefix}.fc1.weight"), &[squeezed, channels, 1, 1]),
-            squeeze_bias: self
-                .parameters
-                .add(format!("{prefix}.fc1.bias"), &[squeezed]),
-            expand_weight: self
-                .parameters
-                .add(format!("{prefix}.fc2.weight"), &[channels, squeezed, 1, 1]),
-            expand_bias: self
-                .parameters
-                .add(format!("{prefix}.fc2.bias"), &[channels]),
+                .add(format!("{prefix}.weight"), &[outputs, inputs, 1, 1]),
+            bias: self.parameters.add(format!("{prefix}.bias"), &[outputs]),
         }
     }
 }
@@ -186,7 +219,8 @@ impl Architecture {
         stochastic_depth: f32,
     ) -> Self {
         let mut builder = Builder::default();
-        let mut stem = Some(builder.conv("features.0", [stem_channels, 1, 3, 3]));
+        let mut stem =
+            Some(builder.conv("features.0", ConvKind::Stem, STEM_WINDOW, stem_channels, 1));
         let count: usize = stages.iter().map(|stage| stage.4).sum();
         let mut blocks: Vec<Block> = Vec::with_capacity(count);
         let mut channels_in = stem_channels;
@@ -200,39 +234,40 @@ impl Architecture {
                 // The only block that does not expand comes first, and takes the stem in its stead.
                 let (expand, next) = match stem.take() {
                     Some(stem) => (stem, 0),
-                    None => (
-                        builder.conv(&format!("{prefix}.0"), [expanded, channels_in, 1, 1]),
-                        1,
-                    ),
+                    None => {
+                        let prefix = format!("{prefix}.0");
+                        (builder.pointwise(&prefix, expanded, channels_in), 1)
+                    }
                 };
-                let depthwise =
-                    builder.conv(&format!("{prefix}.{next}"), [expanded, 1, kernel, kernel]);
-                let squeeze = builder.squeeze(
-                    &format!("{prefix}.{}", next + 1),
+                let depthwise = builder.conv(
+                    &format!("{prefix}.{next}"),
+                    ConvKind::Depthwise,
+                    Window { kernel, stride },
                     expanded,
-                    (channels_in / 4).max(1),
+                    1,
                 );
-                let project = builder.conv(
-                    &format!("{prefix}.{}", next + 2),
-                    [channels_out, expanded, 1, 1],
-                );
+                let squeezed = (channels_in / 4).max(1);
+                let squeeze = format!("{prefix}.{}", next + 1);
+                let squeeze = SqueezePlace {
+                    squeeze: builder.linear(&format!("{squeeze}.fc1"), squeezed, expanded),
+                    expand: builder.linear(&format!("{squeeze}.fc2"), expanded, squeezed),
+                };
+                let project = format!("{prefix}.{}", next + 2);
                 blocks.push(Block {
+                    number: blocks.len(),
                     channels_in,
                     expand,
-                    window: Window { kernel, stride },
                     depthwise,
                     squeeze,
-                    project,
+                    project: builder.pointwise(&project, channels_out, expanded),
                     residual: stride == 1 && channels_in == channels_out,
                     drop: stochastic_depth * blocks.len() as f32 / count as f32,
                 });
                 channels_in = channels_out;
             }
         }
-        let head = builder.conv(
-            &format!("features.{}", stages.len() + 1),
-            [features, channels_in, 1, 1],
-        );
+        let head = format!("features.{}", stages.len() + 1);
+        let head = builder.pointwise(&head, features, channels_in);
         let mut classifier = Names::default();
         classifier.add("classifier.1.weight".into(), &[outputs, features]);
         classifier.add("classifier.1.bias".into(), &[outputs]);

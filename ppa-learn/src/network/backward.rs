@@ -8,7 +8,7 @@ mod expand;
 mod head;
 mod project;
 
-use super::architecture::Architecture;
+use super::architecture::{Architecture, ConvKind};
 use super::tape::Tape;
 use crate::kernels::buffer::Pool;
 use crate::kernels::gradient::Linear;
@@ -25,28 +25,23 @@ impl Backward<'_> {
     /// Writes all gradients, from that of the features [images, 1280].
     pub fn run(mut self, tape: Tape, of_features: &[f32]) {
         let Tape {
-            image_size,
             blocks,
             head_input,
-            head_size,
             head,
         } = tape;
-        let mut gradient = self.head(&head_input, &head, head_size, of_features);
+        let mut gradient = self.head(&head_input.pixels, &head, of_features);
         drop((head_input, head));
-        for (index, (block, tape)) in self
-            .architecture
-            .blocks
-            .iter()
-            .zip(blocks)
-            .enumerate()
-            .rev()
-        {
+        for (block, tape) in self.architecture.blocks.iter().zip(blocks).rev() {
             let (linear, of_output) = self.project(block, &tape, &gradient);
             let (linear, of_expanded) = self.depthwise(block, &tape, linear, of_output);
-            if index == 0 {
-                self.stem(block, &tape, image_size, &linear, &of_expanded);
-            } else {
-                self.expand(block, &tape, &linear, &of_expanded, &mut gradient);
+            match block.expand.kind {
+                ConvKind::Pointwise => {
+                    self.expand(block, &tape, &linear, &of_expanded, &mut gradient);
+                }
+                // Images have no gradient.
+                ConvKind::Stem | ConvKind::Depthwise => {
+                    self.stem(block, &tape, &linear, &of_expanded);
+                }
             }
         }
     }

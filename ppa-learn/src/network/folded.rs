@@ -1,6 +1,6 @@
 //! Parameters prepared for inference.
 
-use super::architecture::{Architecture, ConvPlace};
+use super::architecture::{Architecture, ConvKind, ConvPlace};
 use super::norm::running;
 use crate::kernels::batch_norm::Affine;
 use crate::kernels::buffer::Pool;
@@ -10,20 +10,26 @@ use crate::kernels::panels::Panels;
 /// Every convolution of a backbone, with the normalisation after it where that can be folded in.
 #[derive(Debug)]
 pub struct Folded {
-    pub stem: Taps,
     pub blocks: Vec<FoldedBlock>,
     pub head: Panels,
 }
 
-/// The convolutions of a block; the first one's expansion is the stem.
+/// The convolutions of a block.
 #[derive(Debug)]
 pub struct FoldedBlock {
-    pub expand: Option<Panels>,
+    pub expand: Expansion,
     pub depthwise: Taps,
     pub project: Panels,
 }
 
-/// A convolution of each channel by itself [kernel, kernel, channels], and the normalisation after it.
+/// The first convolution of a block.
+#[derive(Debug)]
+pub enum Expansion {
+    Stem(Taps),
+    Pointwise(Panels),
+}
+
+/// A convolution of one channel for each of its own [kernel, kernel, channels], and the normalisation after it.
 #[derive(Debug)]
 pub struct Taps {
     pub weights: Vec<f32>,
@@ -44,14 +50,15 @@ impl Folded {
             weights: channels_last(weight(place), place.channels),
             affine: affine(place),
         };
-        let blocks = architecture.blocks.iter().enumerate();
-        let blocks = blocks.map(|(index, block)| FoldedBlock {
-            expand: (index > 0).then(|| panels(&block.expand)),
+        let blocks = architecture.blocks.iter().map(|block| FoldedBlock {
+            expand: match block.expand.kind {
+                ConvKind::Pointwise => Expansion::Pointwise(panels(&block.expand)),
+                ConvKind::Stem | ConvKind::Depthwise => Expansion::Stem(taps(&block.expand)),
+            },
             depthwise: taps(&block.depthwise),
             project: panels(&block.project),
         });
         Self {
-            stem: taps(&architecture.blocks[0].expand),
             blocks: blocks.collect(),
             head: panels(&architecture.head),
         }

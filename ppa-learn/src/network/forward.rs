@@ -5,17 +5,20 @@
 
 mod convolutions;
 
+use std::convert::Infallible;
+
 use rayon::prelude::*;
 
-use super::architecture::{Architecture, Block, ConvPlace};
+use super::architecture::{Architecture, Block, ConvKind, ConvPlace};
 use super::initialise::gains;
+use super::layers::Layers;
 use super::norm::Norm;
 use super::squeeze::Squeeze;
-use super::tape::{BlockTape, Normed, Size, Tape, by_image};
+use super::tape::{BlockTape, Images, Normed, Size, Tape, by_image};
 use crate::kernels::batch_norm::{Affine, activate, add_activated, normalise};
-use crate::kernels::buffer::{Buffer, Pool};
+use crate::kernels::buffer::Pool;
 
-/// Everything that a pass reads, and the running statistics that it moves.
+/// Everything that a pass reads, the running statistics that it moves, and what it keeps.
 pub struct Forward<'a> {
     pub architecture: &'a Architecture,
     pub parameters: &'a [f32],
@@ -23,123 +26,129 @@ pub struct Forward<'a> {
     pub pool: &'a Pool,
     /// Tells which branches are left out.
     pub random: &'a mut dyn rand::Rng,
+    /// Of the blocks so far.
+    pub blocks: Vec<BlockTape>,
+}
+
+/// The first two convolutions of a block.
+pub struct Filtered {
+    expand: Normed,
+    depthwise: Normed,
 }
 
 impl Forward<'_> {
     /// Features [images, 1280] of images [images, height, width], and what their gradient needs.
-    pub fn run(mut self, images: &[f32], image_size: Size) -> (Vec<f32>, Tape) {
-        let architecture = self.architecture;
-        let mut tapes = Vec::new();
-        let mut input = self.pool.take(images.len());
-        input.copy_from_slice(images);
-        let mut size = image_size;
-        for (index, block) in architecture.blocks.iter().enumerate() {
-            let (output, tape) = self.block(block, index == 0, input, size);
-            size = tape.size_out;
-            input = output;
-            tapes.push(tape);
-        }
-        let place = &architecture.head;
-        let mut pixels = self.pool.take(size.count() * place.channels);
-        let sums = self.pointwise(place, &input, size, &mut pixels);
-        let head = self.normed(place, pixels, &sums, size);
-        let features = pooled(&head, size);
-        let tape = Tape {
-            image_size,
-            blocks: tapes,
-            head_input: input,
-            head_size: size,
-            head,
-        };
-        (features, tape)
+    pub fn run(mut self, images: &[f32], size: Size) -> (Vec<f32>, Tape) {
+        let images = Images::copied(images, size, self.pool);
+        let Ok(output) = self.features(self.architecture, images);
+        output
     }
 
-    /// Output of a block, and its tape.
-    fn block(
+    /// A convolution of images of a size, and its normalisation by the batch.
+    ///
+    /// `convolve` writes the output, of the size that it is given, and gives its moments.
+    fn normed(
+        &mut self,
+        place: &ConvPlace,
+        size: Size,
+        convolve: impl FnOnce(&Self, Size, &mut [f32]) -> Vec<f64>,
+    ) -> Normed {
+        let size = size.after(place.window);
+        let mut pixels = self.pool.take(size.count() * place.channels);
+        let sums = convolve(self, size, &mut pixels);
+        let norm = Norm::batch(
+            &place.norm,
+            self.parameters,
+            self.statistics,
+            &sums,
+            size.count(),
+        );
+        Normed { pixels, size, norm }
+    }
+}
+
+impl Layers for Forward<'_> {
+    type Image = Images;
+    type Expanded = Normed;
+    type Filtered = Filtered;
+    type Gate = Squeeze;
+    type Features = (Vec<f32>, Tape);
+    type Error = Infallible;
+
+    fn expand(&mut self, block: &Block, input: &Images) -> Result<Normed, Infallible> {
+        let place = &block.expand;
+        Ok(
+            self.normed(place, input.size, |pass, size, out| match place.kind {
+                ConvKind::Pointwise => pass.pointwise(place, &input.pixels, size, out),
+                ConvKind::Stem | ConvKind::Depthwise => pass.stem(place, input, size, out),
+            }),
+        )
+    }
+
+    fn depthwise(&mut self, block: &Block, expand: Normed) -> Result<Filtered, Infallible> {
+        let place = &block.depthwise;
+        let depthwise = self.normed(place, expand.size, |pass, size, out| {
+            pass.depthwise(place, &expand, size, out)
+        });
+        Ok(Filtered { expand, depthwise })
+    }
+
+    fn squeeze(&mut self, block: &Block, filtered: &Filtered) -> Result<Squeeze, Infallible> {
+        let pooled = pooled(&filtered.depthwise);
+        Ok(Squeeze::forward(&block.squeeze, self.parameters, pooled))
+    }
+
+    fn project(
         &mut self,
         block: &Block,
-        first: bool,
-        input: Buffer,
-        size: Size,
-    ) -> (Buffer, BlockTape) {
-        let place = &block.expand;
-        let size_in = if first {
-            Size {
-                height: size.height.div_ceil(2),
-                width: size.width.div_ceil(2),
-                ..size
-            }
-        } else {
-            size
-        };
-        let mut pixels = self.pool.take(size_in.count() * place.channels);
-        let sums = if first {
-            self.stem(place, &input, size, size_in, &mut pixels)
-        } else {
-            self.pointwise(place, &input, size, &mut pixels)
-        };
-        let expand = self.normed(place, pixels, &sums, size_in);
-
-        let (place, window) = (&block.depthwise, block.window);
-        let (height, width) = (window.output(size_in.height), window.output(size_in.width));
-        let size_out = Size {
-            height,
-            width,
-            ..size
-        };
-        let mut pixels = self.pool.take(size_out.count() * place.channels);
-        let sums = self.depthwise(place, window, &expand, size_in, size_out, &mut pixels);
-        let depthwise = self.normed(place, pixels, &sums, size_out);
-        let squeeze = Squeeze::forward(
-            &block.squeeze,
-            self.parameters,
-            pooled(&depthwise, size_out),
-        );
-
+        filtered: Filtered,
+        squeeze: Squeeze,
+        input: Images,
+    ) -> Result<Images, Infallible> {
+        let Filtered { expand, depthwise } = filtered;
         let place = &block.project;
-        let mut pixels = self.pool.take(size_out.count() * place.channels);
-        let sums = self.project(place, &depthwise, &squeeze.gate, size_out, &mut pixels);
-        let project = self.normed(place, pixels, &sums, size_out);
-
+        let project = self.normed(place, depthwise.size, |pass, size, out| {
+            pass.project(place, &depthwise, &squeeze.gate, size, out)
+        });
+        let size = project.size;
         let gains = match block.residual {
             true => gains(&mut self.random, size.images, block.drop),
             false => vec![1.0; size.images],
         };
-        let mut output = self.pool.take(project.pixels.len());
-        let per_image = size_out.pixels() * place.channels;
-        output
+        let mut pixels = self.pool.take(project.pixels.len());
+        let per_image = size.pixels() * place.channels;
+        pixels
             .par_chunks_mut(per_image)
             .zip(project.pixels.par_chunks(per_image))
             .enumerate()
             .for_each(|(image, (out, pixels))| {
                 let added = block
                     .residual
-                    .then(|| &input[image * per_image..][..per_image]);
+                    .then(|| &input.pixels[image * per_image..][..per_image]);
                 normalise(pixels, &project.norm.affine, gains[image], added, out);
             });
-        let tape = BlockTape {
+        self.blocks.push(BlockTape {
             input,
-            size_in,
-            size_out,
             expand,
             depthwise,
             squeeze,
             project,
             gains,
-        };
-        (output, tape)
+        });
+        Ok(Images { pixels, size })
     }
 
-    /// The normalisation of a convolution by the batch.
-    fn normed(&mut self, place: &ConvPlace, pixels: Buffer, sums: &[f64], size: Size) -> Normed {
-        let norm = Norm::batch(
-            &place.norm,
-            self.parameters,
-            self.statistics,
-            sums,
-            size.count(),
-        );
-        Normed { pixels, norm }
+    fn head(&mut self, place: &ConvPlace, input: Images) -> Result<Self::Features, Infallible> {
+        let head = self.normed(place, input.size, |pass, size, out| {
+            pass.pointwise(place, &input.pixels, size, out)
+        });
+        let features = pooled(&head);
+        let tape = Tape {
+            blocks: std::mem::take(&mut self.blocks),
+            head_input: input,
+            head,
+        };
+        Ok((features, tape))
     }
 }
 
@@ -177,7 +186,8 @@ pub fn total<T: std::ops::AddAssign + Send>(
 }
 
 /// Mean of each activated channel over each image: [images, channels].
-fn pooled(input: &Normed, size: Size) -> Vec<f32> {
+fn pooled(input: &Normed) -> Vec<f32> {
+    let size = input.size;
     let channels = input.norm.mean.len();
     let images = input.pixels.par_chunks(size.pixels() * channels);
     images

@@ -67,7 +67,7 @@ proptest! {
 
         let mut random = stream(seed, Purpose::Dropout, 0);
         let mut statistics = initialise::statistics(&architecture);
-        let forward = Forward { architecture: &architecture, parameters: &parameters, statistics: &mut statistics, pool: &pool, random: &mut random };
+        let forward = Forward { architecture: &architecture, parameters: &parameters, statistics: &mut statistics, pool: &pool, random: &mut random, blocks: Vec::new() };
         let (out, tape) = forward.run(&images, size);
         let of_features = normal(out.len(), seed + 3);
         let mut gradients = vec![f32::NAN; parameters.len()];
@@ -113,7 +113,7 @@ proptest! {
         let pool = Pool::default();
         let mut statistics = initialise::statistics(&architecture);
         let mut random = stream(seed, Purpose::Dropout, 0);
-        let forward = Forward { architecture: &architecture, parameters: &parameters, statistics: &mut statistics, pool: &pool, random: &mut random };
+        let forward = Forward { architecture: &architecture, parameters: &parameters, statistics: &mut statistics, pool: &pool, random: &mut random, blocks: Vec::new() };
         let (trained, tape) = forward.run(&images, size);
 
         let mut moments = vec![0.0; statistics.len()];

@@ -18,86 +18,60 @@ use candle_core::{
     CpuStorage, CudaStorage, CustomOp2, Error, Layout, Result, Shape, Storage, Tensor, Var,
 };
 
-use super::architecture::{Architecture, ConvPlace};
+use super::architecture::{Architecture, Block, ConvPlace};
 use super::initialise::gains;
+use super::layers::Layers;
 use super::norm::MOMENTUM;
 use super::{EfficientNetB0, Mode};
 use crate::random::{Purpose, stream};
 use launch::elsewhere;
-use part::{Moments, Part};
+use part::{Given, Kept, Part};
 
 /// The features [images, 1280] of images [images, 1, height, width]; after a pass in training, with a gradient.
 pub fn features(network: &EfficientNetB0, images: &Tensor, mode: Mode) -> Result<Tensor> {
     let (count, _, height, width) = images.dims4()?;
     let input = images.detach().reshape((count, height, width, 1))?;
     let architecture = &*network.architecture;
-    let parameters = network.backbone.as_detached_tensor();
+    let parameters = &network.backbone.as_detached_tensor();
     let statistics = network.statistics.as_detached_tensor();
     let Mode::Train { step } = mode else {
-        let mut moments = Moments::Running(statistics);
-        let mut x = input;
-        for number in 0..=architecture.blocks.len() {
-            x = run(architecture, number, &parameters, 0, &x, None, &mut moments)?;
-        }
-        return Ok(x);
+        let mut part = Part {
+            parameters,
+            start: 0,
+            running: Some(statistics),
+            gains: &mut |_| Ok(None),
+            kept: Kept::default(),
+        };
+        return part.features(architecture, input);
     };
 
     // Drawn block by block as our kernels draw them.
     let mut random = stream(network.seed, Purpose::Dropout, 2 * step);
-    let mut moments = Moments::Batch(Vec::new());
-    let mut tape = Vec::new();
-    let mut x = input;
-    for number in 0..=architecture.blocks.len() {
-        let residual = architecture.blocks.get(number).filter(|b| b.residual);
-        let gains = residual.map(|block| {
+    let mut draw = |block: &Block| {
+        let gains = block.residual.then(|| {
             let gains = gains(&mut random, count, block.drop);
-            Tensor::from_vec(gains, (count, 1, 1, 1), x.device())
+            Tensor::from_vec(gains, (count, 1, 1, 1), images.device())
         });
-        let gains = gains.transpose()?;
-        let output = run(
-            architecture,
-            number,
-            &parameters,
-            0,
-            &x,
-            gains.as_ref(),
-            &mut moments,
-        )?;
-        tape.push(Given { input: x, gains });
-        x = output;
-    }
-    if let Moments::Batch(found) = moments {
-        let found = Tensor::cat(&found, 0)?;
-        let moved = ((statistics * (1.0 - MOMENTUM))? + (found * MOMENTUM)?)?;
-        network.statistics.set(&moved)?;
-    }
+        gains.transpose()
+    };
+    let mut part = Part {
+        parameters,
+        start: 0,
+        running: None,
+        gains: &mut draw,
+        kept: Kept::default(),
+    };
+    let features = part.features(architecture, input)?;
+    let Kept { moments, tape } = part.kept;
+    let found = Tensor::cat(&moments, 0)?;
+    let moved = ((statistics * (1.0 - MOMENTUM))? + (found * MOMENTUM)?)?;
+    network.statistics.set(&moved)?;
     let pass = Pass {
         architecture: Arc::clone(&network.architecture),
-        features: x.force_contiguous()?,
+        features: features.force_contiguous()?,
         tape: Mutex::new(Some(tape)),
     };
     images.apply_op2(&network.backbone, pass)
-}
-
-/// Output of a block, or of the head behind the last one, by parameters that begin at `start`.
-fn run(
-    architecture: &Architecture,
-    number: usize,
-    parameters: &Tensor,
-    start: usize,
-    input: &Tensor,
-    gains: Option<&Tensor>,
-    moments: &mut Moments,
-) -> Result<Tensor> {
-    let mut part = Part {
-        parameters,
-        start,
-        moments,
-    };
-    match architecture.blocks.get(number) {
-        Some(block) => part.block(block, number == 0, input, gains),
-        None => part.head(&architecture.head, input),
-    }
 }
 
 /// Where the parameters of a block or of the head lie, which is one after the other.
@@ -107,12 +81,6 @@ fn place(architecture: &Architecture, number: usize) -> Range<usize> {
         Some(block) => of(&block.expand, &block.project),
         None => of(&architecture.head, &architecture.head),
     }
-}
-
-/// What a block, or the head, was given; the head has no gains.
-struct Given {
-    input: Tensor,
-    gains: Option<Tensor>,
 }
 
 /// A pass that was made, as one operation from (images, parameters) to features.
@@ -174,19 +142,22 @@ impl CustomOp2 for Pass {
             let place = place(&self.architecture, number);
             let own = parameters.detach().narrow(0, place.start, place.len())?;
             let (own, input) = (Var::from_tensor(&own)?, Var::from_tensor(&input)?);
-            let output = run(
-                &self.architecture,
-                number,
-                &own,
-                place.start,
-                &input,
-                gains.as_ref(),
-                &mut Moments::Batch(Vec::new()),
-            )?;
+            let mut part = Part {
+                parameters: &own,
+                start: place.start,
+                running: None,
+                gains: &mut |_| Ok(gains.clone()),
+                kept: Kept::default(),
+            };
+            let input = input.as_tensor();
+            let output = match self.architecture.blocks.get(number) {
+                Some(block) => part.block(block, input.clone()),
+                None => part.head(&self.architecture.head, input.clone()),
+            }?;
             let mut gradients = (output * of_output)?.sum_all()?.backward()?;
             let missing = || Error::msg("a block does not depend on its parameters").bt();
             of_parameters.push(gradients.remove(&own).ok_or_else(missing)?);
-            match gradients.remove(&input) {
+            match gradients.remove(input) {
                 Some(of_input) => of_output = of_input,
                 // Images have none.
                 None => break,

@@ -3,20 +3,24 @@
 //!
 //! An image's rows and pixels are shared out among threads in the same parts whatever their number.
 
+use std::convert::Infallible;
+
 use rayon::prelude::*;
 
-use super::architecture::{Architecture, Block};
-use super::folded::{Folded, Taps};
+use super::architecture::{Architecture, Block, ConvPlace};
+use super::folded::{Expansion, Folded, Taps};
+use super::layers::Layers;
 use super::squeeze::Squeeze;
-use super::tape::tile_pixels;
+use super::tape::{Images, Size, tile_pixels};
 use crate::kernels::batch_norm::{activate, activate_and_add};
 use crate::kernels::buffer::{Buffer, Pool};
-use crate::kernels::depthwise::{Window, forward_row};
+use crate::kernels::depthwise::forward_row;
 use crate::kernels::panels::Panels;
 use crate::kernels::pointwise::{activated, normalised};
 use crate::kernels::stem;
 
 /// Everything that a pass reads.
+#[derive(Clone, Copy)]
 pub struct Inference<'a> {
     pub architecture: &'a Architecture,
     pub folded: &'a Folded,
@@ -25,11 +29,17 @@ pub struct Inference<'a> {
 }
 
 /// An activated image [height, width + 2 padding, channels], zero in the padding.
-struct Padded {
+pub struct Padded {
     values: Buffer,
-    height: usize,
-    width: usize,
+    /// Without the padding.
+    size: Size,
     row: usize,
+}
+
+/// The activated output of a depthwise convolution, and the mean of each channel.
+pub struct Filtered {
+    image: Images,
+    pooled: Vec<f32>,
 }
 
 /// What `work` gives of each part, in their order. A single thread works by itself: to wake another one costs more than a part.
@@ -46,81 +56,59 @@ fn of_each<T: Send, R: Send>(parts: Vec<T>, work: impl Fn(usize, T) -> R + Sync)
 impl Inference<'_> {
     /// Features [images, 1280] of images [images, height, width].
     pub fn run(&self, images: &[f32], height: usize, width: usize) -> Vec<f32> {
-        let images = images.chunks(height * width).collect();
-        of_each(images, |_, image| self.image(image, height, width)).concat()
+        let size = Size {
+            images: 1,
+            height,
+            width,
+        };
+        let images = images.chunks(size.pixels()).collect();
+        let of_image = |_, image: &[f32]| {
+            let image = Images::copied(image, size, self.pool);
+            let Ok(features) = { *self }.features(self.architecture, image);
+            features
+        };
+        of_each(images, of_image).concat()
     }
 
-    fn image(&self, image: &[f32], height: usize, width: usize) -> Vec<f32> {
-        let columns = width;
-        let (mut height, mut width) = (height.div_ceil(2), width.div_ceil(2));
-        let mut x = self.pool.take(0);
-        for (block, folded) in self.architecture.blocks.iter().zip(&self.folded.blocks) {
-            let window = block.window;
-            let expanded = match &folded.expand {
-                None => self.stem(window, image, columns, height, width),
-                Some(panels) => self.expand(window, panels, &x, height, width),
-            };
-            let (depthwise, pooled) = self.depthwise(window, &folded.depthwise, &expanded);
-            (height, width) = (window.output(height), window.output(width));
-            let gate = Squeeze::forward(&block.squeeze, self.parameters, pooled).gate;
-            x = self.project(block, &folded.project, &depthwise, &gate, &x);
-        }
-        self.head(&x)
-    }
-
-    /// The first convolution, activated [height, width, channels], of an image in rows of `columns`.
-    fn stem(
-        &self,
-        window: Window,
-        image: &[f32],
-        columns: usize,
-        height: usize,
-        width: usize,
-    ) -> Padded {
-        let taps = &self.folded.stem;
-        let channels = taps.affine.scale.len();
-        self.padded(window, channels, height, width, 8, |first, row, out| {
-            let margin = window.padding() * channels;
-            let mut raw = self.pool.take(width * channels);
+    /// The first convolution, activated, with the padding that `next` needs.
+    fn stem(&self, taps: &Taps, next: &ConvPlace, image: &Images, size: Size) -> Padded {
+        let margin = next.window.padding() * next.channels;
+        self.padded(next, size, 8, |first, row, out| {
+            let mut raw = self.pool.take(size.width * next.channels);
             for (y, out) in out.chunks_exact_mut(row).enumerate() {
-                stem::forward_row(image, columns, first + y, &taps.weights, &mut raw);
+                let (pixels, columns) = (&image.pixels, image.size.width);
+                stem::forward_row(pixels, columns, first + y, &taps.weights, &mut raw);
                 activate(&raw, &taps.affine, None, &mut out[margin..row - margin]);
             }
         })
     }
 
-    /// The pointwise convolution at the beginning of a block, activated.
-    fn expand(
-        &self,
-        window: Window,
-        panels: &Panels,
-        x: &[f32],
-        height: usize,
-        width: usize,
-    ) -> Padded {
+    /// The pointwise convolution at the beginning of a block, activated, with the padding that `next` needs.
+    fn pointwise(&self, panels: &Panels, next: &ConvPlace, input: &Images) -> Padded {
         let (channels, columns) = (panels.channels(), panels.columns());
+        let (size, width) = (input.size, input.size.width);
         let rows = tile_pixels(channels + columns).div_ceil(width);
-        self.padded(window, channels, height, width, rows, |first, row, out| {
-            let input = &x[first * width * columns..][..out.len() / row * width * columns];
-            let margin = window.padding() * channels;
+        let margin = next.window.padding() * channels;
+        self.padded(next, size, rows, |first, row, out| {
+            let input = &input.pixels[first * width * columns..];
+            let input = &input[..out.len() / row * width * columns];
             let place = |pixel| pixel / width * row + margin + pixel % width * channels;
             activated(input, panels, place, out);
         })
     }
 
-    /// An image whose rows between their padding `make` writes, `at_once` of them from a first one on, each of so many values.
+    /// An image for the convolution `next`, whose rows between their padding `make` writes, `at_once` of them from a first one
+    /// on, each of so many values.
     fn padded(
         &self,
-        window: Window,
-        channels: usize,
-        height: usize,
-        width: usize,
+        next: &ConvPlace,
+        size: Size,
         at_once: usize,
         make: impl Fn(usize, usize, &mut [f32]) + Sync,
     ) -> Padded {
-        let margin = window.padding() * channels;
-        let row = width * channels + 2 * margin;
-        let mut values = self.pool.take(height * row);
+        let margin = next.window.padding() * next.channels;
+        let row = size.width * next.channels + 2 * margin;
+        let mut values = self.pool.take(size.height * row);
         let parts = values.chunks_mut(at_once * row).collect();
         of_each(parts, |number, out: &mut [f32]| {
             for out in out.chunks_exact_mut(row) {
@@ -129,23 +117,37 @@ impl Inference<'_> {
             }
             make(number * at_once, row, out);
         });
-        Padded {
-            values,
-            height,
-            width,
-            row,
-        }
+        Padded { values, size, row }
+    }
+}
+
+impl Layers for Inference<'_> {
+    type Image = Images;
+    type Expanded = Padded;
+    type Filtered = Filtered;
+    type Gate = Vec<f32>;
+    type Features = Vec<f32>;
+    type Error = Infallible;
+
+    fn expand(&mut self, block: &Block, input: &Images) -> Result<Padded, Infallible> {
+        let next = &block.depthwise;
+        Ok(match &self.folded.blocks[block.number].expand {
+            Expansion::Pointwise(panels) => self.pointwise(panels, next, input),
+            Expansion::Stem(taps) => {
+                self.stem(taps, next, input, input.size.after(block.expand.window))
+            }
+        })
     }
 
-    /// The depthwise convolution, activated [pixels, channels], and the mean of each channel.
-    fn depthwise(&self, window: Window, taps: &Taps, input: &Padded) -> (Buffer, Vec<f32>) {
-        let channels = taps.affine.scale.len();
-        let (height, width) = (window.output(input.height), window.output(input.width));
+    fn depthwise(&mut self, block: &Block, input: Padded) -> Result<Filtered, Infallible> {
+        let taps = &self.folded.blocks[block.number].depthwise;
+        let (channels, window) = (block.depthwise.channels, block.depthwise.window);
+        let size = input.size.after(window);
         let zeros = vec![0.0; input.row];
-        let row = width * channels;
-        let mut out = self.pool.take(height * row);
-        let at_once = height.div_ceil(8);
-        let parts = out.chunks_mut(at_once * row).collect();
+        let row = size.width * channels;
+        let mut pixels = self.pool.take(size.height * row);
+        let at_once = size.height.div_ceil(8);
+        let parts = pixels.chunks_mut(at_once * row).collect();
         let parts = of_each(parts, |number, out: &mut [f32]| {
             let mut sums = vec![0.0; channels];
             let mut raw = self.pool.take(row);
@@ -153,7 +155,7 @@ impl Inference<'_> {
                 let first = (number * at_once + y) * window.stride;
                 let under: [&[f32]; 5] = std::array::from_fn(|ky| {
                     let y = (first + ky).wrapping_sub(window.padding());
-                    if y < input.height {
+                    if y < input.size.height {
                         &input.values[y * input.row..][..input.row]
                     } else {
                         &zeros[..]
@@ -170,41 +172,51 @@ impl Inference<'_> {
             }
             sums
         });
-        (out, means(&parts, height * width))
+        Ok(Filtered {
+            image: Images { pixels, size },
+            pooled: means(&parts, size.pixels()),
+        })
     }
 
-    /// The convolution at the end of a block, normalised, with the block's input where it adds it.
-    ///
-    /// The gates are multiplied into its weights, which are fewer than the pixels' values.
+    fn squeeze(&mut self, block: &Block, filtered: &Filtered) -> Result<Vec<f32>, Infallible> {
+        let pooled = filtered.pooled.clone();
+        Ok(Squeeze::forward(&block.squeeze, self.parameters, pooled).gate)
+    }
+
+    /// The gates are multiplied into the weights, which are fewer than the pixels' values.
     fn project(
-        &self,
+        &mut self,
         block: &Block,
-        panels: &Panels,
-        input: &[f32],
-        gate: &[f32],
-        added: &[f32],
-    ) -> Buffer {
+        filtered: Filtered,
+        gate: Vec<f32>,
+        added: Images,
+    ) -> Result<Images, Infallible> {
+        let panels = &self.folded.blocks[block.number].project;
         let (channels, columns) = (panels.channels(), panels.columns());
-        let gated = panels.gated(gate, self.pool);
-        let mut out = self.pool.take(input.len() / columns * channels);
+        let gated = panels.gated(&gate, self.pool);
+        let Images {
+            pixels: input,
+            size,
+        } = filtered.image;
+        let mut pixels = self.pool.take(size.pixels() * channels);
         let tile = tile_pixels(channels + columns);
-        let parts = out.chunks_mut(tile * channels).collect();
+        let parts = pixels.chunks_mut(tile * channels).collect();
         of_each(parts, |number, out: &mut [f32]| {
             let start = number * tile;
             let input = &input[start * columns..][..out.len() / channels * columns];
             let added = block
                 .residual
-                .then(|| &added[start * channels..][..out.len()]);
+                .then(|| &added.pixels[start * channels..][..out.len()]);
             normalised(input, &gated, added, out);
         });
-        out
+        Ok(Images { pixels, size })
     }
 
-    /// The last convolution, activated and averaged over the image.
-    fn head(&self, input: &[f32]) -> Vec<f32> {
+    fn head(&mut self, _: &ConvPlace, input: Images) -> Result<Vec<f32>, Infallible> {
         let panels = &self.folded.head;
         let (channels, columns) = (panels.channels(), panels.columns());
         let parts = input
+            .pixels
             .chunks(tile_pixels(channels + columns) * columns)
             .collect();
         let parts = of_each(parts, |_, input: &[f32]| {
@@ -218,7 +230,7 @@ impl Inference<'_> {
             }
             sums
         });
-        means(&parts, input.len() / columns)
+        Ok(means(&parts, input.size.pixels()))
     }
 }
 

@@ -73,6 +73,7 @@ impl CustomOp2 for Backbone {
                     statistics: &mut statistics,
                     pool: &self.pool,
                     random: &mut stream(self.seed, Purpose::Dropout, 2 * step),
+                    blocks: Vec::new(),
                 };
                 let size = Size {
                     images: count,

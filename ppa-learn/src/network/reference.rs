@@ -125,8 +125,8 @@ fn block(block: &Block, first: bool, input: Maps, parameters: &[f64], gains: &[f
         &maps,
         part(&block.depthwise.weight),
         expanded,
-        block.window.kernel,
-        block.window.stride,
+        block.depthwise.window.kernel,
+        block.depthwise.window.stride,
         expanded,
     );
     normalise(&mut maps, &block.depthwise, parameters);
@@ -135,14 +135,14 @@ fn block(block: &Block, first: bool, input: Maps, parameters: &[f64], gains: &[f
         let place = &block.squeeze;
         let hidden = linear(
             &means(image),
-            part(&place.squeeze_weight),
-            part(&place.squeeze_bias),
+            part(&place.squeeze.weight),
+            part(&place.squeeze.bias),
         );
         let hidden: Vec<f64> = hidden.into_iter().map(silu).collect();
         let gates = linear(
             &hidden,
-            part(&place.expand_weight),
-            part(&place.expand_bias),
+            part(&place.expand.weight),
+            part(&place.expand.bias),
         );
         for (plane, gate) in image.iter_mut().zip(gates) {
             plane.iter_mut().for_each(|x| *x /= 1.0 + (-gate).exp());

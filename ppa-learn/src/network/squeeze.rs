@@ -1,6 +1,6 @@
 //! Squeeze-and-excitation (Hu et al. 2018, arXiv:1709.01507): a gate for each channel from the channels' means.
 
-use super::architecture::SqueezePlace;
+use super::architecture::{LinearPlace, SqueezePlace};
 use crate::kernels::matrix::{Matrix, Store, multiply};
 
 /// What the gradient needs of a forward pass; all [images, channels] or [images, squeezed].
@@ -16,7 +16,9 @@ fn sigmoid(x: f32) -> f32 {
 }
 
 /// rows * weight' + bias, for a weight [out, in].
-fn linear(rows: &[f32], weight: &[f32], bias: &[f32]) -> Vec<f32> {
+fn linear(rows: &[f32], place: &LinearPlace, parameters: &[f32]) -> Vec<f32> {
+    let weight = &parameters[place.weight.clone()];
+    let bias = &parameters[place.bias.clone()];
     let columns = weight.len() / bias.len();
     let images = rows.len() / columns;
     let mut out = bias.repeat(images);
@@ -32,18 +34,9 @@ fn linear(rows: &[f32], weight: &[f32], bias: &[f32]) -> Vec<f32> {
 impl Squeeze {
     /// The gates, from the means of the activated channels [images, channels].
     pub fn forward(place: &SqueezePlace, parameters: &[f32], pooled: Vec<f32>) -> Self {
-        let part = |range: &std::ops::Range<usize>| &parameters[range.clone()];
-        let hidden = linear(
-            &pooled,
-            part(&place.squeeze_weight),
-            part(&place.squeeze_bias),
-        );
+        let hidden = linear(&pooled, &place.squeeze, parameters);
         let active: Vec<f32> = hidden.iter().map(|&x| x * sigmoid(x)).collect();
-        let mut gate = linear(
-            &active,
-            part(&place.expand_weight),
-            part(&place.expand_bias),
-        );
+        let mut gate = linear(&active, &place.expand, parameters);
         gate.iter_mut().for_each(|x| *x = sigmoid(*x));
         Self {
             pooled,
@@ -60,24 +53,17 @@ impl Squeeze {
         of_gate: &[f32],
         gradients: &mut [f32],
     ) -> Vec<f32> {
-        let (channels, squeezed) = (place.expand_bias.len(), place.squeeze_bias.len());
+        let (channels, squeezed) = (place.expand.bias.len(), place.squeeze.bias.len());
         let of_expanded: Vec<f32> = of_gate
             .iter()
             .zip(&self.gate)
             .map(|(g, s)| g * s * (1.0 - s))
             .collect();
         let active: Vec<f32> = self.hidden.iter().map(|&x| x * sigmoid(x)).collect();
-        layer_gradients(
-            &of_expanded,
-            channels,
-            &active,
-            squeezed,
-            (&place.expand_weight, &place.expand_bias),
-            gradients,
-        );
+        layer_gradients(&of_expanded, &active, &place.expand, gradients);
 
         let mut of_hidden = vec![0.0; self.hidden.len()];
-        let weight = Matrix::new(&parameters[place.expand_weight.clone()], squeezed);
+        let weight = Matrix::new(&parameters[place.expand.weight.clone()], squeezed);
         multiply(
             &mut of_hidden,
             Matrix::new(&of_expanded, channels),
@@ -88,17 +74,10 @@ impl Squeeze {
             let s = sigmoid(x);
             *g *= s * (1.0 + x * (1.0 - s));
         }
-        layer_gradients(
-            &of_hidden,
-            squeezed,
-            &self.pooled,
-            channels,
-            (&place.squeeze_weight, &place.squeeze_bias),
-            gradients,
-        );
+        layer_gradients(&of_hidden, &self.pooled, &place.squeeze, gradients);
 
         let mut of_pooled = vec![0.0; self.pooled.len()];
-        let weight = Matrix::new(&parameters[place.squeeze_weight.clone()], channels);
+        let weight = Matrix::new(&parameters[place.squeeze.weight.clone()], channels);
         multiply(
             &mut of_pooled,
             Matrix::new(&of_hidden, squeezed),
@@ -110,14 +89,9 @@ impl Squeeze {
 }
 
 /// Writes the gradients of weight [out, in] and bias of a layer, from those of its output [images, out].
-fn layer_gradients(
-    of_out: &[f32],
-    out: usize,
-    input: &[f32],
-    columns: usize,
-    (weight, bias): (&std::ops::Range<usize>, &std::ops::Range<usize>),
-    gradients: &mut [f32],
-) {
+fn layer_gradients(of_out: &[f32], input: &[f32], place: &LinearPlace, gradients: &mut [f32]) {
+    let LinearPlace { weight, bias } = place;
+    let (out, columns) = (bias.len(), weight.len() / bias.len());
     let left = Matrix::new(of_out, out).transposed();
     multiply(
         &mut gradients[weight.clone()],

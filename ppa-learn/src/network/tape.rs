@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use super::norm::Norm;
 use super::squeeze::Squeeze;
-use crate::kernels::buffer::Buffer;
+use crate::kernels::buffer::{Buffer, Pool};
+use crate::kernels::depthwise::Window;
 
 /// Images, and rows and columns of each, at one place in the network.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,6 +24,15 @@ impl Size {
     /// Pixels of all images.
     pub fn count(self) -> usize {
         self.images * self.pixels()
+    }
+
+    /// What a convolution makes of it.
+    pub fn after(self, window: Window) -> Self {
+        Self {
+            images: self.images,
+            height: window.output(self.height),
+            width: window.output(self.width),
+        }
     }
 
     /// Images that one task takes: the batch in eight parts, whatever the number of threads, so that sums come out the same.
@@ -53,19 +63,34 @@ pub fn by_image(run: Range<usize>, size: Size) -> impl Iterator<Item = (usize, R
     })
 }
 
+/// Channels-last images.
+#[derive(Debug)]
+pub struct Images {
+    pub pixels: Buffer,
+    pub size: Size,
+}
+
+impl Images {
+    /// Those of one channel that somebody else owns.
+    pub fn copied(images: &[f32], size: Size, pool: &Pool) -> Self {
+        let mut pixels = pool.take(images.len());
+        pixels.copy_from_slice(images);
+        Self { pixels, size }
+    }
+}
+
 /// A convolution's output before its normalisation, and the normalisation.
 #[derive(Debug)]
 pub struct Normed {
     pub pixels: Buffer,
+    pub size: Size,
     pub norm: Norm,
 }
 
 /// One block: its input, its three convolutions, its gates and the gains of stochastic depth.
 #[derive(Debug)]
 pub struct BlockTape {
-    pub input: Buffer,
-    pub size_in: Size,
-    pub size_out: Size,
+    pub input: Images,
     pub expand: Normed,
     pub depthwise: Normed,
     pub squeeze: Squeeze,
@@ -76,9 +101,7 @@ pub struct BlockTape {
 /// A whole pass.
 #[derive(Debug)]
 pub struct Tape {
-    pub image_size: Size,
     pub blocks: Vec<BlockTape>,
-    pub head_input: Buffer,
-    pub head_size: Size,
+    pub head_input: Images,
     pub head: Normed,
 }

@@ -1,8 +1,13 @@
 //! The nodes of one EfficientNet-B0, with normalisations folded into the convolutions before them.
 
+use std::convert::Infallible;
+
 use super::WeightsError;
 use super::onnx_messages::{Attribute, Graph, Node, Tensor};
-use crate::network::{Architecture, ConvPlace, EfficientNetB0, SqueezePlace, running};
+use crate::network::{
+    Architecture, Block, ConvKind, ConvPlace, EfficientNetB0, Layers, LinearPlace, SqueezePlace,
+    running,
+};
 
 /// A graph that grows, and what stands before the names of what is added now.
 #[derive(Default)]
@@ -89,137 +94,135 @@ impl<'a> Network<'a> {
 
     /// Adds what leads from `images` to `output` [N, outputs], and gives the latter's name.
     pub fn add(&self, builder: &mut Builder, images: &str, output: &str) -> String {
-        let architecture = self.architecture;
-        let mut x = images.to_owned();
-        for (index, block) in architecture.blocks.iter().enumerate() {
-            let name = format!("block{index}");
-            let input = x.clone();
-            let stem = if index == 0 { (3, 2) } else { (1, 1) };
-            x = self.conv(
-                builder,
-                &format!("{name}.expand"),
-                &x,
-                &block.expand,
-                stem,
-                1,
-            );
-            x = builder.silu(&x);
-            let window = (block.window.kernel, block.window.stride);
-            x = self.conv(
-                builder,
-                &format!("{name}.depthwise"),
-                &x,
-                &block.depthwise,
-                window,
-                block.depthwise.channels,
-            );
-            x = builder.silu(&x);
-            x = self.squeeze(builder, &name, &x, &block.squeeze);
-            x = self.conv(
-                builder,
-                &format!("{name}.project"),
-                &x,
-                &block.project,
-                (1, 1),
-                1,
-            );
-            if block.residual {
-                x = builder.node("Add", &[&x, &input], &format!("{name}.out"), vec![]);
-            }
-        }
-        x = self.conv(builder, "head", &x, &architecture.head, (1, 1), 1);
-        x = builder.silu(&x);
-        x = builder.node("GlobalAveragePool", &[&x], "pooled", vec![]);
-        x = builder.node("Flatten", &[&x], "features", vec![]);
+        let mut nodes = Nodes {
+            network: self,
+            builder,
+        };
+        let Ok(features) = nodes.features(self.architecture, images.to_owned());
         let [weight, bias] = [0, 1].map(|part| {
-            let entry = &architecture.classifier[part];
+            let entry = &self.architecture.classifier[part];
             &self.classifier[entry.range.clone()]
         });
-        builder.linear("classifier", &x, weight, bias, output)
+        builder.linear("classifier", &features, weight, bias, output)
+    }
+}
+
+/// The nodes of a backbone; what goes from layer to layer are names of outputs.
+struct Nodes<'a> {
+    network: &'a Network<'a>,
+    builder: &'a mut Builder,
+}
+
+impl Layers for Nodes<'_> {
+    type Image = String;
+    type Expanded = String;
+    type Filtered = String;
+    type Gate = String;
+    type Features = String;
+    type Error = Infallible;
+
+    fn expand(&mut self, block: &Block, x: &String) -> Result<String, Infallible> {
+        let x = self.conv(&format!("block{}.expand", block.number), x, &block.expand);
+        Ok(self.builder.silu(&x))
     }
 
+    fn depthwise(&mut self, block: &Block, x: String) -> Result<String, Infallible> {
+        let name = format!("block{}.depthwise", block.number);
+        let x = self.conv(&name, &x, &block.depthwise);
+        Ok(self.builder.silu(&x))
+    }
+
+    fn squeeze(&mut self, block: &Block, x: &String) -> Result<String, Infallible> {
+        let name = format!("block{}.squeeze", block.number);
+        let SqueezePlace { squeeze, expand } = &block.squeeze;
+        let pooled = format!("{name}.pooled");
+        let pooled = self
+            .builder
+            .node("GlobalAveragePool", &[x], &pooled, vec![]);
+        let hidden = self.gate_layer(&format!("{name}.fc1"), &pooled, squeeze);
+        let hidden = self.builder.silu(&hidden);
+        let gate = self.gate_layer(&format!("{name}.fc2"), &hidden, expand);
+        let name = format!("{name}.gate");
+        Ok(self.builder.node("Sigmoid", &[&gate], &name, vec![]))
+    }
+
+    fn project(
+        &mut self,
+        block: &Block,
+        x: String,
+        gate: String,
+        input: String,
+    ) -> Result<String, Infallible> {
+        let name = format!("block{}", block.number);
+        let gated = format!("{name}.squeeze.out");
+        let gated = self.builder.node("Mul", &[&x, &gate], &gated, vec![]);
+        let x = self.conv(&format!("{name}.project"), &gated, &block.project);
+        Ok(match block.residual {
+            true => {
+                let out = format!("{name}.out");
+                self.builder.node("Add", &[&x, &input], &out, vec![])
+            }
+            false => x,
+        })
+    }
+
+    fn head(&mut self, place: &ConvPlace, x: String) -> Result<String, Infallible> {
+        let x = self.conv("head", &x, place);
+        let x = self.builder.silu(&x);
+        let pooled = self
+            .builder
+            .node("GlobalAveragePool", &[&x], "pooled", vec![]);
+        Ok(self.builder.node("Flatten", &[&pooled], "features", vec![]))
+    }
+}
+
+impl Nodes<'_> {
     /// A convolution whose weights and bias hold the normalisation after it.
-    fn conv(
-        &self,
-        builder: &mut Builder,
-        name: &str,
-        input: &str,
-        place: &ConvPlace,
-        (kernel, stride): (usize, usize),
-        groups: usize,
-    ) -> String {
-        let affine = running(&place.norm, &self.parameters, &self.statistics);
-        let weight = &self.parameters[place.weight.clone()];
+    fn conv(&mut self, name: &str, input: &str, place: &ConvPlace) -> String {
+        let Network {
+            parameters,
+            statistics,
+            ..
+        } = self.network;
+        let affine = running(&place.norm, parameters, statistics);
+        let weight = &parameters[place.weight.clone()];
         let per_channel = weight.len() / place.channels;
         let folded: Vec<f32> = weight
             .iter()
             .enumerate()
             .map(|(i, weight)| weight * affine.scale[i / per_channel])
             .collect();
-        let shape = [
-            place.channels,
-            per_channel / (kernel * kernel),
-            kernel,
-            kernel,
-        ];
-        let weight = builder.constant(&format!("{name}.weight"), &shape, &folded);
-        let bias = builder.constant(&format!("{name}.bias"), &[place.channels], &affine.shift);
-        let padding = (kernel - 1) / 2;
+        let (channels, kernel) = (place.channels, place.window.kernel);
+        let shape = [channels, per_channel / (kernel * kernel), kernel, kernel];
+        let groups = match place.kind {
+            ConvKind::Depthwise => channels,
+            ConvKind::Stem | ConvKind::Pointwise => 1,
+        };
+        let weight = self
+            .builder
+            .constant(&format!("{name}.weight"), &shape, &folded);
+        let bias = self
+            .builder
+            .constant(&format!("{name}.bias"), &[channels], &affine.shift);
         let attributes = vec![
             Attribute::ints("kernel_shape", &[kernel; 2]),
-            Attribute::ints("strides", &[stride; 2]),
-            Attribute::ints("pads", &[padding; 4]),
+            Attribute::ints("strides", &[place.window.stride; 2]),
+            Attribute::ints("pads", &[place.window.padding(); 4]),
             Attribute::int("group", groups),
         ];
-        builder.node(
-            "Conv",
-            &[input, &weight, &bias],
-            &format!("{name}.out"),
-            attributes,
-        )
+        let input = [input, &weight, &bias];
+        self.builder
+            .node("Conv", &input, &format!("{name}.out"), attributes)
     }
 
-    fn squeeze(&self, builder: &mut Builder, name: &str, x: &str, place: &SqueezePlace) -> String {
-        let (channels, squeezed) = (place.expand_bias.len(), place.squeeze_bias.len());
-        let pooled = builder.node(
-            "GlobalAveragePool",
-            &[x],
-            &format!("{name}.squeeze.pooled"),
-            vec![],
-        );
-        let layers = [
-            (
-                "fc1",
-                &place.squeeze_weight,
-                &place.squeeze_bias,
-                [squeezed, channels, 1, 1],
-            ),
-            (
-                "fc2",
-                &place.expand_weight,
-                &place.expand_bias,
-                [channels, squeezed, 1, 1],
-            ),
-        ];
-        let mut gate = pooled;
-        for (layer, weight, bias, shape) in layers {
-            if layer == "fc2" {
-                gate = builder.silu(&gate);
-            }
-            let weight = &self.parameters[weight.clone()];
-            let weight =
-                builder.constant(&format!("{name}.squeeze.{layer}.weight"), &shape, weight);
-            let bias = &self.parameters[bias.clone()];
-            let bias =
-                builder.constant(&format!("{name}.squeeze.{layer}.bias"), &[bias.len()], bias);
-            gate = builder.node(
-                "Conv",
-                &[&gate, &weight, &bias],
-                &format!("{name}.squeeze.{layer}"),
-                vec![],
-            );
-        }
-        let gate = builder.node("Sigmoid", &[&gate], &format!("{name}.squeeze.gate"), vec![]);
-        builder.node("Mul", &[x, &gate], &format!("{name}.squeeze.out"), vec![])
+    /// A layer of a squeeze-and-excitation, as a convolution of one pixel.
+    fn gate_layer(&mut self, name: &str, x: &str, place: &LinearPlace) -> String {
+        let weight = &self.network.parameters[place.weight.clone()];
+        let bias = &self.network.parameters[place.bias.clone()];
+        let shape = [bias.len(), weight.len() / bias.len(), 1, 1];
+        let builder = &mut *self.builder;
+        let weight = builder.constant(&format!("{name}.weight"), &shape, weight);
+        let bias = builder.constant(&format!("{name}.bias"), &shape[..1], bias);
+        builder.node("Conv", &[x, &weight, &bias], name, vec![])
     }
 }

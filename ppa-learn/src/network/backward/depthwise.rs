@@ -22,11 +22,11 @@ impl Backward<'_> {
         gated: Gated,
         of_gated: Buffer,
     ) -> (Linear, Buffer) {
-        let (place, window) = (&block.depthwise, block.window);
+        let (place, window) = (&block.depthwise, block.depthwise.window);
         let channels = place.channels;
         let weights = channels_last(&self.parameters[place.weight.clone()], channels);
-        let (size, size_out) = (tape.size_in, tape.size_out);
         let (expand, depthwise) = (&tape.expand, &tape.depthwise);
+        let (size, size_out) = (expand.size, depthwise.size);
         let (row, row_out) = (size.width * channels, size_out.width * channels);
         let (kernel, stride, padding) = (window.kernel, window.stride, window.padding());
         let mut of_expanded = self.pool.take(size.count() * channels);

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::super::architecture::Block;
 use super::super::forward::total;
-use super::super::tape::{BlockTape, Size, tile_pixels};
+use super::super::tape::{BlockTape, tile_pixels};
 use super::Backward;
 use crate::kernels::buffer::Buffer;
 use crate::kernels::depthwise::channels_first;
@@ -22,7 +22,7 @@ impl Backward<'_> {
         of_expanded: &[f32],
         gradient: &mut Buffer,
     ) {
-        let (place, size) = (&block.expand, tape.size_in);
+        let (place, size) = (&block.expand, tape.expand.size);
         let (channels, columns) = (place.channels, block.channels_in);
         let weight = &self.parameters[place.weight.clone()];
         // With a residual the input's gradient is the output's and what the branch adds.
@@ -52,7 +52,7 @@ impl Backward<'_> {
                     1.0,
                     of_pixels,
                 );
-                let input = &tape.input[run.start * columns..run.end * columns];
+                let input = &tape.input.pixels[run.start * columns..run.end * columns];
                 let left = Matrix::new(of_pixels, channels);
                 multiply(
                     &mut sums,
@@ -72,13 +72,16 @@ impl Backward<'_> {
         &mut self,
         block: &Block,
         tape: &BlockTape,
-        image_size: Size,
         linear: &Linear,
         of_expanded: &[f32],
     ) {
-        let (place, size) = (&block.expand, tape.size_in);
-        let row = size.width * place.channels;
-        let images = tape.input.par_chunks(image_size.pixels()).enumerate();
+        let (place, size) = (&block.expand, tape.expand.size);
+        let (row, image_size) = (size.width * place.channels, tape.input.size);
+        let images = tape
+            .input
+            .pixels
+            .par_chunks(image_size.pixels())
+            .enumerate();
         let of_weights = total(images.map(|(index, image)| {
             let mut sums = vec![0.0; stem::TAPS * place.channels];
             let mut of_pixels = self.pool.take(row);

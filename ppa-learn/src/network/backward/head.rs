@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::super::forward::total;
-use super::super::tape::{Normed, Size, by_image, tile_pixels};
+use super::super::tape::{Normed, by_image, tile_pixels};
 use super::{Backward, scaled};
 use crate::kernels::buffer::Buffer;
 use crate::kernels::gradient::{ActivationGradient, ActivationSums};
@@ -11,14 +11,8 @@ use crate::kernels::matrix::{Matrix, Store, multiply};
 
 impl Backward<'_> {
     /// The gradient of the last block's output.
-    pub(super) fn head(
-        &mut self,
-        input: &[f32],
-        head: &Normed,
-        size: Size,
-        of_features: &[f32],
-    ) -> Buffer {
-        let place = &self.architecture.head;
+    pub(super) fn head(&mut self, input: &[f32], head: &Normed, of_features: &[f32]) -> Buffer {
+        let (place, size) = (&self.architecture.head, head.size);
         let (channels, per_image) = (place.channels, size.pixels() * place.channels);
         let pooled: Vec<f32> = of_features
             .iter()

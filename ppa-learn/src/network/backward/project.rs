@@ -19,7 +19,7 @@ impl Backward<'_> {
         tape: &BlockTape,
         of_output: &[f32],
     ) -> (Gated, Buffer) {
-        let (place, size) = (&block.project, tape.size_out);
+        let (place, size) = (&block.project, tape.project.size);
         let (project, depthwise) = (&tape.project, &tape.depthwise);
         let (channels, columns) = (place.channels, block.depthwise.channels);
         let per_image = size.pixels() * channels;

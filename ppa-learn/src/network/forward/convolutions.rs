@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use super::super::architecture::ConvPlace;
-use super::super::tape::{Normed, Size, tile_pixels};
+use super::super::tape::{Images, Normed, Size, tile_pixels};
 use super::{Forward, gated, total};
 use crate::kernels::batch_norm::{activate, add_moments};
-use crate::kernels::depthwise::{Rows, Window, channels_last, forward_row};
+use crate::kernels::depthwise::{Rows, channels_last, forward_row};
 use crate::kernels::matrix::{Matrix, Store, multiply};
 use crate::kernels::stem;
 
@@ -19,11 +19,11 @@ impl Forward<'_> {
     pub(super) fn stem(
         &self,
         place: &ConvPlace,
-        images: &[f32],
-        size: Size,
+        images: &Images,
         size_out: Size,
         out: &mut [f32],
     ) -> Vec<f64> {
+        let (size, images) = (images.size, &images.pixels);
         let weights = channels_last(&self.parameters[place.weight.clone()], place.channels);
         let row = size_out.width * place.channels;
         let center = self.center(place);
@@ -83,12 +83,11 @@ impl Forward<'_> {
     pub(super) fn depthwise(
         &self,
         place: &ConvPlace,
-        window: Window,
         input: &Normed,
-        size: Size,
         size_out: Size,
         out: &mut [f32],
     ) -> Vec<f64> {
+        let (size, window) = (input.size, place.window);
         let channels = place.channels;
         let weights = channels_last(&self.parameters[place.weight.clone()], channels);
         let center = self.center(place);

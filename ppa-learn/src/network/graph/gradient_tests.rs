@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::depthwise::depthwise;
-use super::normalise::{by_batch, moments};
+use super::normalise::{Moments, by_batch};
 use crate::kernels::depthwise::Window;
 use crate::random::{Purpose, stream};
 
@@ -82,8 +82,7 @@ proptest! {
         let x = (normal(&[pixels, channels], seed) + 3.0).unwrap();
         let affine = normal(&[2, channels], seed + 1);
         check(&[x, affine], |inputs| {
-            let (mean, variance) = moments(&inputs[0])?;
-            by_batch(&inputs[0], &inputs[1], (&mean, &variance), activated)
+            by_batch(&inputs[0], &inputs[1], &Moments::of(&inputs[0])?, activated)
         });
     }
 }
@@ -112,7 +111,7 @@ fn moments_keep_their_digits_far_from_zero() {
     // 1000 and 1002 in turn: mean 1001, variance 1.
     let values: Vec<f32> = (0..20_000).map(|i| 1000.0 + (i % 2) as f32 * 2.0).collect();
     let x = Tensor::from_vec(values, (20_000, 1), &Device::Cpu).unwrap();
-    let (mean, variance) = moments(&x).unwrap();
+    let Moments { mean, variance } = Moments::of(&x).unwrap();
     let found = [mean, variance].map(|m| m.to_vec1::<f32>().unwrap()[0]);
     assert!(
         (found[0] - 1001.0).abs() < 1e-4 && (found[1] - 1.0).abs() < 1e-5,

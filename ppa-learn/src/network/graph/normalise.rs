@@ -6,22 +6,33 @@ use super::super::norm::EPSILON;
 use super::depthwise::THREADS;
 use super::launch::{Launch, elsewhere};
 
-/// Mean and biased variance, both [channels], of each channel of x [.., channels].
-pub fn moments(x: &Tensor) -> Result<(Tensor, Tensor)> {
-    let x = x.detach().contiguous()?;
-    let channels = x.dim(D::Minus1)?;
-    let pixels = x.elem_count() / channels;
-    let about = |center: &Tensor| {
-        let launch = of_parts("moments", pixels, channels);
-        launch.run(&[&x, center])?.sum(0)? / pixels as f64
-    };
-    // About the mean itself, as sums of large squares lose digits in f32.
-    let zero = Tensor::zeros(channels, x.dtype(), x.device())?;
-    let mean = about(&zero)?.get(0)?.contiguous()?;
-    let about_mean = about(&mean)?;
-    let rest = about_mean.get(0)?;
-    let variance = (about_mean.get(1)? - rest.sqr()?)?;
-    Ok(((mean + rest)?, variance))
+/// Mean and biased variance of each channel, both [channels].
+pub struct Moments {
+    pub mean: Tensor,
+    pub variance: Tensor,
+}
+
+impl Moments {
+    /// Of x [.., channels].
+    pub fn of(x: &Tensor) -> Result<Self> {
+        let x = x.detach().contiguous()?;
+        let channels = x.dim(D::Minus1)?;
+        let pixels = x.elem_count() / channels;
+        let about = |center: &Tensor| {
+            let launch = of_parts("moments", pixels, channels);
+            launch.run(&[&x, center])?.sum(0)? / pixels as f64
+        };
+        // About the mean itself, as sums of large squares lose digits in f32.
+        let zero = Tensor::zeros(channels, x.dtype(), x.device())?;
+        let mean = about(&zero)?.get(0)?.contiguous()?;
+        let about_mean = about(&mean)?;
+        let rest = about_mean.get(0)?;
+        let variance = (about_mean.get(1)? - rest.sqr()?)?;
+        Ok(Self {
+            mean: (mean + rest)?,
+            variance,
+        })
+    }
 }
 
 /// A normalisation of x [.., channels] by moments [channels] that do not depend on it: SiLU(z), or z itself where it is not
@@ -29,7 +40,7 @@ pub fn moments(x: &Tensor) -> Result<(Tensor, Tensor)> {
 pub fn by_constants(
     x: &Tensor,
     affine: &Tensor,
-    moments: (&Tensor, &Tensor),
+    moments: &Moments,
     activated: bool,
 ) -> Result<Tensor> {
     let norm = Norm::new(affine, moments)?;
@@ -38,12 +49,7 @@ pub fn by_constants(
 }
 
 /// The same by the moments of x, with gradients of x and of `affine`.
-pub fn by_batch(
-    x: &Tensor,
-    affine: &Tensor,
-    moments: (&Tensor, &Tensor),
-    activated: bool,
-) -> Result<Tensor> {
+pub fn by_batch(x: &Tensor, affine: &Tensor, moments: &Moments, activated: bool) -> Result<Tensor> {
     let operation = Normalise {
         shape: x.shape().clone(),
         norm: Norm::new(affine, moments)?,
@@ -90,7 +96,8 @@ struct Norm {
 }
 
 impl Norm {
-    fn new(affine: &Tensor, (mean, variance): (&Tensor, &Tensor)) -> Result<Self> {
+    fn new(affine: &Tensor, moments: &Moments) -> Result<Self> {
+        let Moments { mean, variance } = moments;
         let affine = affine.detach();
         let inverse = (variance + EPSILON)?.sqrt()?.recip()?;
         let scale = (affine.get(0)? * &inverse)?;
