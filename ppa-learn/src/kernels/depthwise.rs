@@ -2,6 +2,7 @@
 
 use pulp::{Simd, WithSimd};
 
+use super::buffer::{Buffer, Pool};
 use super::simd::{dispatch, fma, lanes, lanes_mut};
 
 /// Kernel and stride of a convolution; padding is (kernel - 1) / 2 on every side.
@@ -12,6 +13,10 @@ pub struct Window {
 }
 
 impl Window {
+    pub fn new(kernel: usize, stride: usize) -> Self {
+        Self { kernel, stride }
+    }
+
     pub fn padding(self) -> usize {
         (self.kernel - 1) / 2
     }
@@ -139,36 +144,28 @@ pub fn channels_first(weights: &[f32], channels: usize) -> Vec<f32> {
 }
 
 /// A few padded rows of an image: row `y` takes the place of row `y - count`.
-pub struct Rows<'a> {
-    values: &'a mut [f32],
-    zeros: &'a [f32],
+pub struct Rows {
+    /// A row of zeros and then the rows.
+    values: Buffer,
     pub count: usize,
     pub height: usize,
     row: usize,
     margin: usize,
 }
 
-impl<'a> Rows<'a> {
-    /// Values that the rows need, the row of zeros among them.
-    pub fn len(count: usize, width: usize, padding: usize, channels: usize) -> usize {
-        (count + 1) * (width + 2 * padding) * channels
-    }
-
-    /// Empty rows in memory of [`Rows::len`] values.
+impl Rows {
+    /// Room for the rows of images, to be cleared before each image.
     pub fn new(
-        values: &'a mut [f32],
+        pool: &Pool,
         count: usize,
         height: usize,
         width: usize,
         padding: usize,
         channels: usize,
     ) -> Self {
-        values.fill(0.0);
         let row = (width + 2 * padding) * channels;
-        let (zeros, values) = values.split_at_mut(row);
         Self {
-            values,
-            zeros,
+            values: pool.take((count + 1) * row),
             count,
             height,
             row,
@@ -176,22 +173,31 @@ impl<'a> Rows<'a> {
         }
     }
 
+    /// Makes all values zero.
+    pub fn clear(&mut self) {
+        self.values.fill(0.0);
+    }
+
+    fn start(&self, y: usize) -> usize {
+        (1 + y % self.count) * self.row
+    }
+
     /// Where row `y` goes, without its padding.
     pub fn place(&mut self, y: usize) -> &mut [f32] {
-        let start = y % self.count * self.row;
+        let start = self.start(y);
         &mut self.values[start + self.margin..start + self.row - self.margin]
     }
 
     /// Row `y` with its padding; zeros above and below the image.
     pub fn padded(&self, y: isize) -> &[f32] {
         match usize::try_from(y) {
-            Ok(y) if y < self.height => &self.values[y % self.count * self.row..][..self.row],
-            _ => self.zeros,
+            Ok(y) if y < self.height => &self.values[self.start(y)..][..self.row],
+            _ => &self.values[..self.row],
         }
     }
 
     /// Row `y` of the image without its padding.
     pub fn inner(&self, y: usize) -> &[f32] {
-        &self.values[y % self.count * self.row..][self.margin..self.row - self.margin]
+        &self.values[self.start(y)..][self.margin..self.row - self.margin]
     }
 }

@@ -11,10 +11,6 @@ use crate::kernels::depthwise::Window;
 pub const FEATURES: usize = 1280;
 /// Channels of the first convolution.
 const STEM: usize = 32;
-const STEM_WINDOW: Window = Window {
-    kernel: 3,
-    stride: 2,
-};
 
 /// Expansion, kernel, stride, channels out and blocks of a stage.
 pub(super) type Stage = (usize, usize, usize, usize, usize);
@@ -88,6 +84,8 @@ pub struct ConvPlace {
     pub weight: Range<usize>,
     pub norm: NormPlace,
     pub channels: usize,
+    /// Channels that it reads for each of its own.
+    pub inputs: usize,
 }
 
 /// A layer whose every output depends on every input.
@@ -109,7 +107,6 @@ pub struct SqueezePlace {
 pub struct Block {
     /// Counted from 0.
     pub number: usize,
-    pub channels_in: usize,
     pub expand: ConvPlace,
     pub depthwise: ConvPlace,
     pub squeeze: SqueezePlace,
@@ -157,7 +154,6 @@ struct Builder {
 }
 
 impl Builder {
-    /// A convolution of `inputs` channels for each of its `channels`.
     fn conv(
         &mut self,
         prefix: &str,
@@ -183,15 +179,13 @@ impl Builder {
                     .add(format!("{norm}.running_var"), &[channels]),
             },
             channels,
+            inputs,
         }
     }
 
     fn pointwise(&mut self, prefix: &str, channels: usize, inputs: usize) -> ConvPlace {
-        let window = Window {
-            kernel: 1,
-            stride: 1,
-        };
-        self.conv(prefix, ConvKind::Pointwise, window, channels, inputs)
+        let pixel = Window::new(1, 1);
+        self.conv(prefix, ConvKind::Pointwise, pixel, channels, inputs)
     }
 
     fn linear(&mut self, prefix: &str, outputs: usize, inputs: usize) -> LinearPlace {
@@ -219,8 +213,9 @@ impl Architecture {
         stochastic_depth: f32,
     ) -> Self {
         let mut builder = Builder::default();
-        let mut stem =
-            Some(builder.conv("features.0", ConvKind::Stem, STEM_WINDOW, stem_channels, 1));
+        let stem = Window::new(3, 2);
+        let stem = builder.conv("features.0", ConvKind::Stem, stem, stem_channels, 1);
+        let mut stem = Some(stem);
         let count: usize = stages.iter().map(|stage| stage.4).sum();
         let mut blocks: Vec<Block> = Vec::with_capacity(count);
         let mut channels_in = stem_channels;
@@ -239,13 +234,8 @@ impl Architecture {
                         (builder.pointwise(&prefix, expanded, channels_in), 1)
                     }
                 };
-                let depthwise = builder.conv(
-                    &format!("{prefix}.{next}"),
-                    ConvKind::Depthwise,
-                    Window { kernel, stride },
-                    expanded,
-                    1,
-                );
+                let (name, window) = (format!("{prefix}.{next}"), Window::new(kernel, stride));
+                let depthwise = builder.conv(&name, ConvKind::Depthwise, window, expanded, 1);
                 let squeezed = (channels_in / 4).max(1);
                 let squeeze = format!("{prefix}.{}", next + 1);
                 let squeeze = SqueezePlace {
@@ -255,7 +245,6 @@ impl Architecture {
                 let project = format!("{prefix}.{}", next + 2);
                 blocks.push(Block {
                     number: blocks.len(),
-                    channels_in,
                     expand,
                     depthwise,
                     squeeze,

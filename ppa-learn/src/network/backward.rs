@@ -24,14 +24,9 @@ pub struct Backward<'a> {
 impl Backward<'_> {
     /// Writes all gradients, from that of the features [images, 1280].
     pub fn run(mut self, tape: Tape, of_features: &[f32]) {
-        let Tape {
-            blocks,
-            head_input,
-            head,
-        } = tape;
-        let mut gradient = self.head(&head_input.pixels, &head, of_features);
-        drop((head_input, head));
-        for (block, tape) in self.architecture.blocks.iter().zip(blocks).rev() {
+        let mut gradient = self.head(&tape.head_input.pixels, &tape.head, of_features);
+        drop((tape.head_input, tape.head));
+        for (block, tape) in self.architecture.blocks.iter().zip(tape.blocks).rev() {
             let (linear, of_output) = self.project(block, &tape, &gradient);
             let (linear, of_expanded) = self.depthwise(block, &tape, linear, of_output);
             match block.expand.kind {

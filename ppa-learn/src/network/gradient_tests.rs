@@ -130,7 +130,7 @@ proptest! {
         }
         let folded = Folded::new(&architecture, &parameters, &moments, &pool);
         let inference = Inference { architecture: &architecture, folded: &folded, parameters: &parameters, pool: &pool };
-        for (inferred, trained) in inference.run(&images, size.height, size.width).iter().zip(&trained) {
+        for (inferred, trained) in inference.run(&images, size).iter().zip(&trained) {
             prop_assert!((inferred - trained).abs() < 1e-4 * (1.0 + trained.abs()), "{inferred} {trained}");
         }
     }

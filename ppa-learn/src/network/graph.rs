@@ -25,7 +25,7 @@ use super::norm::MOMENTUM;
 use super::{EfficientNetB0, Mode};
 use crate::random::{Purpose, stream};
 use launch::elsewhere;
-use part::{Given, Kept, Part};
+use part::{Given, Part};
 
 /// The features [images, 1280] of images [images, 1, height, width]; after a pass in training, with a gradient.
 pub fn features(network: &EfficientNetB0, images: &Tensor, mode: Mode) -> Result<Tensor> {
@@ -35,13 +35,8 @@ pub fn features(network: &EfficientNetB0, images: &Tensor, mode: Mode) -> Result
     let parameters = &network.backbone.as_detached_tensor();
     let statistics = network.statistics.as_detached_tensor();
     let Mode::Train { step } = mode else {
-        let mut part = Part {
-            parameters,
-            start: 0,
-            running: Some(statistics),
-            gains: &mut |_| Ok(None),
-            kept: Kept::default(),
-        };
+        let mut none = |_: &Block| Ok(None);
+        let mut part = Part::new(parameters, 0, Some(statistics), &mut none);
         return part.features(architecture, input);
     };
 
@@ -54,22 +49,15 @@ pub fn features(network: &EfficientNetB0, images: &Tensor, mode: Mode) -> Result
         });
         gains.transpose()
     };
-    let mut part = Part {
-        parameters,
-        start: 0,
-        running: None,
-        gains: &mut draw,
-        kept: Kept::default(),
-    };
+    let mut part = Part::new(parameters, 0, None, &mut draw);
     let features = part.features(architecture, input)?;
-    let Kept { moments, tape } = part.kept;
-    let found = Tensor::cat(&moments, 0)?;
+    let found = Tensor::cat(&part.moments, 0)?;
     let moved = ((statistics * (1.0 - MOMENTUM))? + (found * MOMENTUM)?)?;
     network.statistics.set(&moved)?;
     let pass = Pass {
         architecture: Arc::clone(&network.architecture),
         features: features.force_contiguous()?,
-        tape: Mutex::new(Some(tape)),
+        tape: Mutex::new(Some(part.tape)),
     };
     images.apply_op2(&network.backbone, pass)
 }
@@ -142,13 +130,8 @@ impl CustomOp2 for Pass {
             let place = place(&self.architecture, number);
             let own = parameters.detach().narrow(0, place.start, place.len())?;
             let (own, input) = (Var::from_tensor(&own)?, Var::from_tensor(&input)?);
-            let mut part = Part {
-                parameters: &own,
-                start: place.start,
-                running: None,
-                gains: &mut |_| Ok(gains.clone()),
-                kept: Kept::default(),
-            };
+            let mut kept = |_: &Block| Ok(gains.clone());
+            let mut part = Part::new(&own, place.start, None, &mut kept);
             let input = input.as_tensor();
             let output = match self.architecture.blocks.get(number) {
                 Some(block) => part.block(block, input.clone()),

@@ -55,12 +55,8 @@ fn of_each<T: Send, R: Send>(parts: Vec<T>, work: impl Fn(usize, T) -> R + Sync)
 
 impl Inference<'_> {
     /// Features [images, 1280] of images [images, height, width].
-    pub fn run(&self, images: &[f32], height: usize, width: usize) -> Vec<f32> {
-        let size = Size {
-            images: 1,
-            height,
-            width,
-        };
+    pub fn run(&self, images: &[f32], size: Size) -> Vec<f32> {
+        let size = Size { images: 1, ..size };
         let images = images.chunks(size.pixels()).collect();
         let of_image = |_, image: &[f32]| {
             let image = Images::copied(image, size, self.pool);
@@ -130,12 +126,10 @@ impl Layers for Inference<'_> {
     type Error = Infallible;
 
     fn expand(&mut self, block: &Block, input: &Images) -> Result<Padded, Infallible> {
-        let next = &block.depthwise;
+        let (size, next) = (input.size.after(block.expand.window), &block.depthwise);
         Ok(match &self.folded.blocks[block.number].expand {
             Expansion::Pointwise(panels) => self.pointwise(panels, next, input),
-            Expansion::Stem(taps) => {
-                self.stem(taps, next, input, input.size.after(block.expand.window))
-            }
+            Expansion::Stem(taps) => self.stem(taps, next, input, size),
         })
     }
 
@@ -161,13 +155,8 @@ impl Layers for Inference<'_> {
                         &zeros[..]
                     }
                 });
-                forward_row(
-                    window,
-                    &under[..window.kernel],
-                    &taps.weights,
-                    channels,
-                    &mut raw,
-                );
+                let under = &under[..window.kernel];
+                forward_row(window, under, &taps.weights, channels, &mut raw);
                 activate_and_add(&raw, &taps.affine, out, &mut sums);
             }
             sums
@@ -194,10 +183,7 @@ impl Layers for Inference<'_> {
         let panels = &self.folded.blocks[block.number].project;
         let (channels, columns) = (panels.channels(), panels.columns());
         let gated = panels.gated(&gate, self.pool);
-        let Images {
-            pixels: input,
-            size,
-        } = filtered.image;
+        let (input, size) = (filtered.image.pixels, filtered.image.size);
         let mut pixels = self.pool.take(size.pixels() * channels);
         let tile = tile_pixels(channels + columns);
         let parts = pixels.chunks_mut(tile * channels).collect();

@@ -20,26 +20,15 @@ pub struct Norm {
 
 /// What a normalisation amounts to in evaluation.
 pub fn running(place: &NormPlace, parameters: &[f32], statistics: &[f32]) -> Affine {
-    Norm::running(place, parameters, statistics).affine
+    let moment = |range: &std::ops::Range<usize>| -> Vec<f64> {
+        let values = statistics[range.clone()].iter();
+        values.map(|&value| value.into()).collect()
+    };
+    let (mean, variance) = (moment(&place.mean), moment(&place.variance));
+    Norm::new(place, parameters, &mean, &variance).affine
 }
 
 impl Norm {
-    /// By the running statistics.
-    pub fn running(place: &NormPlace, parameters: &[f32], statistics: &[f32]) -> Self {
-        let moment = |range: &std::ops::Range<usize>| -> Vec<f64> {
-            statistics[range.clone()]
-                .iter()
-                .map(|&value| value.into())
-                .collect()
-        };
-        Self::new(
-            place,
-            parameters,
-            &moment(&place.mean),
-            &moment(&place.variance),
-        )
-    }
-
     /// By a batch, of which `sums` holds sum (x - center) and sum (x - center)^2 over `count` values of each channel,
     /// center being the running mean. Moves the running statistics, the variance by its unbiased estimate.
     pub fn batch(

@@ -63,6 +63,11 @@ impl CustomOp2 for Backbone {
         layout: &Layout,
     ) -> Result<(CpuStorage, Shape)> {
         let (count, _, height, width) = images_layout.shape().dims4()?;
+        let size = Size {
+            images: count,
+            height,
+            width,
+        };
         let mut statistics = self.statistics.to_vec1::<f32>()?;
         let (images, parameters) = (values(images, images_layout)?, values(parameters, layout)?);
         let features = match self.mode {
@@ -74,11 +79,6 @@ impl CustomOp2 for Backbone {
                     pool: &self.pool,
                     random: &mut stream(self.seed, Purpose::Dropout, 2 * step),
                     blocks: Vec::new(),
-                };
-                let size = Size {
-                    images: count,
-                    height,
-                    width,
                 };
                 let (features, tape) = forward.run(images, size);
                 self.statistics
@@ -98,7 +98,7 @@ impl CustomOp2 for Backbone {
                     parameters,
                     pool,
                 };
-                inference.run(images, height, width)
+                inference.run(images, size)
             }
         };
         Ok((CpuStorage::F32(features), (count, FEATURES).into()))

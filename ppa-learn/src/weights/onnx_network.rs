@@ -65,6 +65,11 @@ impl Builder {
         self.node("Gemm", &[x, &weight, &bias], out, transposed)
     }
 
+    /// The mean of each channel.
+    fn pooled(&mut self, x: &str, output: &str) -> String {
+        self.node("GlobalAveragePool", &[x], output, vec![])
+    }
+
     /// x * sigmoid(x), under a name that follows from `x`'s.
     pub fn silu(&mut self, x: &str) -> String {
         let name = x.strip_prefix(self.nodes).unwrap_or(x).to_owned();
@@ -135,10 +140,7 @@ impl Layers for Nodes<'_> {
     fn squeeze(&mut self, block: &Block, x: &String) -> Result<String, Infallible> {
         let name = format!("block{}.squeeze", block.number);
         let SqueezePlace { squeeze, expand } = &block.squeeze;
-        let pooled = format!("{name}.pooled");
-        let pooled = self
-            .builder
-            .node("GlobalAveragePool", &[x], &pooled, vec![]);
+        let pooled = self.builder.pooled(x, &format!("{name}.pooled"));
         let hidden = self.gate_layer(&format!("{name}.fc1"), &pooled, squeeze);
         let hidden = self.builder.silu(&hidden);
         let gate = self.gate_layer(&format!("{name}.fc2"), &hidden, expand);
@@ -157,21 +159,17 @@ impl Layers for Nodes<'_> {
         let gated = format!("{name}.squeeze.out");
         let gated = self.builder.node("Mul", &[&x, &gate], &gated, vec![]);
         let x = self.conv(&format!("{name}.project"), &gated, &block.project);
-        Ok(match block.residual {
-            true => {
-                let out = format!("{name}.out");
-                self.builder.node("Add", &[&x, &input], &out, vec![])
-            }
-            false => x,
-        })
+        if !block.residual {
+            return Ok(x);
+        }
+        let out = format!("{name}.out");
+        Ok(self.builder.node("Add", &[&x, &input], &out, vec![]))
     }
 
     fn head(&mut self, place: &ConvPlace, x: String) -> Result<String, Infallible> {
         let x = self.conv("head", &x, place);
         let x = self.builder.silu(&x);
-        let pooled = self
-            .builder
-            .node("GlobalAveragePool", &[&x], "pooled", vec![]);
+        let pooled = self.builder.pooled(&x, "pooled");
         Ok(self.builder.node("Flatten", &[&pooled], "features", vec![]))
     }
 }
@@ -193,17 +191,14 @@ impl Nodes<'_> {
             .map(|(i, weight)| weight * affine.scale[i / per_channel])
             .collect();
         let (channels, kernel) = (place.channels, place.window.kernel);
-        let shape = [channels, per_channel / (kernel * kernel), kernel, kernel];
+        let shape = [channels, place.inputs, kernel, kernel];
         let groups = match place.kind {
             ConvKind::Depthwise => channels,
             ConvKind::Stem | ConvKind::Pointwise => 1,
         };
-        let weight = self
-            .builder
-            .constant(&format!("{name}.weight"), &shape, &folded);
-        let bias = self
-            .builder
-            .constant(&format!("{name}.bias"), &[channels], &affine.shift);
+        let builder = &mut *self.builder;
+        let weight = builder.constant(&format!("{name}.weight"), &shape, &folded);
+        let bias = builder.constant(&format!("{name}.bias"), &[channels], &affine.shift);
         let attributes = vec![
             Attribute::ints("kernel_shape", &[kernel; 2]),
             Attribute::ints("strides", &[place.window.stride; 2]),
@@ -211,8 +206,7 @@ impl Nodes<'_> {
             Attribute::int("group", groups),
         ];
         let input = [input, &weight, &bias];
-        self.builder
-            .node("Conv", &input, &format!("{name}.out"), attributes)
+        builder.node("Conv", &input, &format!("{name}.out"), attributes)
     }
 
     /// A layer of a squeeze-and-excitation, as a convolution of one pixel.

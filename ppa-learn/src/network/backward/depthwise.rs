@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::super::architecture::Block;
 use super::super::forward::total;
-use super::super::tape::BlockTape;
+use super::super::tape::{BlockTape, Size};
 use super::{Backward, Gated};
 use crate::kernels::batch_norm::{activate_with_derivative, add};
 use crate::kernels::buffer::Buffer;
@@ -38,28 +38,17 @@ impl Backward<'_> {
                 let mut sums = vec![0.0; 2 * channels];
                 // Rows of the input live until their gradient is known, a stride after the kernel has passed.
                 let count = kernel + stride;
-                let mut memory: [Buffer; 3] = [
-                    self.pool
-                        .take(Rows::len(count, size.width, padding, channels)),
-                    self.pool.take(Rows::len(count, size.width, 0, channels)),
-                    self.pool
-                        .take(Rows::len(kernel, size_out.width, padding, channels)),
-                ];
+                let rows = |count, size: Size, padding| {
+                    Rows::new(self.pool, count, size.height, size.width, padding, channels)
+                };
+                let mut active = rows(count, size, padding);
+                let mut derivative = rows(count, size, 0);
+                let mut gradient = rows(kernel, size_out, padding);
                 for (index, of_expanded) in of_expanded.chunks_mut(size.height * row).enumerate() {
                     let image = task * size.images_per_task() + index;
-                    let [first, second, third] = &mut memory;
-                    let mut active =
-                        Rows::new(first, count, size.height, size.width, padding, channels);
-                    let mut derivative =
-                        Rows::new(second, count, size.height, size.width, 0, channels);
-                    let mut gradient = Rows::new(
-                        third,
-                        kernel,
-                        size_out.height,
-                        size_out.width,
-                        padding,
-                        channels,
-                    );
+                    active.clear();
+                    derivative.clear();
+                    gradient.clear();
                     let pixels = &expand.pixels[image * size.height * row..][..size.height * row];
                     let (mut next_active, mut next_done) = (0, 0);
                     for y in 0..size_out.height {
@@ -137,13 +126,13 @@ impl Backward<'_> {
 }
 
 /// Rows of the gradient of the output that input row `y` contributed to, each with its row of the kernel.
-fn rows_from<'a>(
+fn rows_from(
     y: usize,
     kernel: usize,
     stride: usize,
     padding: usize,
-    gradient: &'a Rows,
-) -> Vec<(usize, &'a [f32])> {
+    gradient: &Rows,
+) -> Vec<(usize, &[f32])> {
     (0..kernel)
         .filter(|ky| y + padding >= *ky && (y + padding - ky).is_multiple_of(stride))
         .map(|ky| (ky, (y + padding - ky) / stride))

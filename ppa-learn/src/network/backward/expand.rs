@@ -23,7 +23,7 @@ impl Backward<'_> {
         gradient: &mut Buffer,
     ) {
         let (place, size) = (&block.expand, tape.expand.size);
-        let (channels, columns) = (place.channels, block.channels_in);
+        let (channels, columns) = (place.channels, place.inputs);
         let weight = &self.parameters[place.weight.clone()];
         // With a residual the input's gradient is the output's and what the branch adds.
         let store = if block.residual {

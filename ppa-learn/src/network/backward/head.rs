@@ -13,7 +13,8 @@ impl Backward<'_> {
     /// The gradient of the last block's output.
     pub(super) fn head(&mut self, input: &[f32], head: &Normed, of_features: &[f32]) -> Buffer {
         let (place, size) = (&self.architecture.head, head.size);
-        let (channels, per_image) = (place.channels, size.pixels() * place.channels);
+        let (channels, columns) = (place.channels, place.inputs);
+        let per_image = size.pixels() * channels;
         let pooled: Vec<f32> = of_features
             .iter()
             .map(|g| g / size.pixels() as f32)
@@ -34,7 +35,6 @@ impl Backward<'_> {
             .backward(&place.norm, &sums, size.count(), self.gradients);
 
         let weight = &self.parameters[place.weight.clone()];
-        let columns = weight.len() / channels;
         let mut of_input = self.pool.take(size.count() * columns);
         let task = size.pixels_per_task();
         let parts = of_input.par_chunks_mut(task * columns).enumerate();

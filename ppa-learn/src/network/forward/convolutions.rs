@@ -53,9 +53,8 @@ impl Forward<'_> {
         size: Size,
         out: &mut [f32],
     ) -> Vec<f64> {
-        let channels = place.channels;
-        let weight = &self.parameters[place.weight.clone()];
-        let columns = weight.len() / channels;
+        let (channels, columns) = (place.channels, place.inputs);
+        let weight = Matrix::new(&self.parameters[place.weight.clone()], columns).transposed();
         let center = self.center(place);
         let task = size.pixels_per_task();
         let parts = out
@@ -68,12 +67,7 @@ impl Forward<'_> {
                 .chunks_mut(tile * channels)
                 .zip(input.chunks(tile * columns))
             {
-                multiply(
-                    out,
-                    Matrix::new(input, columns),
-                    Matrix::new(weight, columns).transposed(),
-                    Store::Replace,
-                );
+                multiply(out, Matrix::new(input, columns), weight, Store::Replace);
                 add_moments(out, center, &mut sums);
             }
             sums
@@ -99,21 +93,19 @@ impl Forward<'_> {
             .zip(input.pixels.par_chunks(task * size.height * row));
         total(parts.map(|(out, pixels)| {
             let mut sums = vec![0.0; 2 * channels];
-            let mut memory = self
-                .pool
-                .take(Rows::len(kernel, size.width, padding, channels));
+            let mut rows = Rows::new(
+                self.pool,
+                kernel,
+                size.height,
+                size.width,
+                padding,
+                channels,
+            );
             for (out, pixels) in out
                 .chunks_mut(size_out.height * row_out)
                 .zip(pixels.chunks(size.height * row))
             {
-                let mut rows = Rows::new(
-                    &mut memory,
-                    kernel,
-                    size.height,
-                    size.width,
-                    padding,
-                    channels,
-                );
+                rows.clear();
                 let mut next = 0;
                 for (y, out) in out.chunks_mut(row_out).enumerate() {
                     let first = (y * window.stride) as isize - padding as isize;
@@ -145,9 +137,8 @@ impl Forward<'_> {
         size: Size,
         out: &mut [f32],
     ) -> Vec<f64> {
-        let channels = place.channels;
-        let weight = &self.parameters[place.weight.clone()];
-        let columns = weight.len() / channels;
+        let (channels, columns) = (place.channels, place.inputs);
+        let weight = Matrix::new(&self.parameters[place.weight.clone()], columns).transposed();
         let center = self.center(place);
         let task = size.pixels_per_task();
         let parts = out.par_chunks_mut(task * channels).enumerate();
@@ -160,12 +151,7 @@ impl Forward<'_> {
                 let run = start..start + out.len() / channels;
                 let active = &mut active[..run.len() * columns];
                 gated(&input.pixels, &input.norm.affine, gates, size, run, active);
-                multiply(
-                    out,
-                    Matrix::new(active, columns),
-                    Matrix::new(weight, columns).transposed(),
-                    Store::Replace,
-                );
+                multiply(out, Matrix::new(active, columns), weight, Store::Replace);
                 add_moments(out, center, &mut sums);
             }
             sums

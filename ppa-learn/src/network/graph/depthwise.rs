@@ -2,6 +2,7 @@
 
 use candle_core::{CpuStorage, CudaStorage, CustomOp2, Layout, Result, Shape, Tensor};
 
+use super::super::tape::Size;
 use super::launch::Launch;
 use crate::kernels::depthwise::Window;
 
@@ -13,10 +14,14 @@ pub const THREADS: usize = 65_536;
 /// An x of one channel is taken for every channel; it has no gradient.
 pub fn depthwise(x: &Tensor, weights: &Tensor, window: Window) -> Result<Tensor> {
     let (images, height, width, inputs) = x.dims4()?;
-    let operation = Depthwise {
+    let size = Size {
         images,
         height,
         width,
+    };
+    let operation = Depthwise {
+        size,
+        out: size.after(window),
         inputs,
         channels: weights.dim(0)?,
         window,
@@ -26,34 +31,29 @@ pub fn depthwise(x: &Tensor, weights: &Tensor, window: Window) -> Result<Tensor>
 
 /// From (x, weights) to the output.
 struct Depthwise {
-    images: usize,
-    height: usize,
-    width: usize,
+    size: Size,
+    out: Size,
     inputs: usize,
     channels: usize,
     window: Window,
 }
 
 impl Depthwise {
-    fn rows(&self) -> usize {
-        self.window.output(self.height)
-    }
-
-    fn columns(&self) -> usize {
-        self.window.output(self.width)
+    fn shape(&self, size: Size) -> Shape {
+        (size.images, size.height, size.width, self.channels).into()
     }
 
     fn forward(&self) -> Launch {
-        let out = Shape::from((self.images, self.rows(), self.columns(), self.channels));
+        let out = self.shape(self.out);
         Launch {
             kernel: "depthwise",
             threads: out.elem_count(),
             sizes: vec![
-                self.height,
-                self.width,
+                self.size.height,
+                self.size.width,
                 self.inputs,
-                self.rows(),
-                self.columns(),
+                self.out.height,
+                self.out.width,
                 self.channels,
                 self.window.kernel,
                 self.window.stride,
@@ -64,15 +64,15 @@ impl Depthwise {
 
     /// Of (gradient of the output, weights).
     fn of_input(&self) -> Launch {
-        let out = Shape::from((self.images, self.height, self.width, self.channels));
+        let out = self.shape(self.size);
         Launch {
             kernel: "depthwise_of_input",
             threads: out.elem_count(),
             sizes: vec![
-                self.height,
-                self.width,
-                self.rows(),
-                self.columns(),
+                self.size.height,
+                self.size.width,
+                self.out.height,
+                self.out.width,
                 self.channels,
                 self.window.kernel,
                 self.window.stride,
@@ -83,7 +83,7 @@ impl Depthwise {
 
     /// Parts of the sum [parts, kernel * kernel, channels], of (x, gradient of the output).
     fn of_weights(&self) -> Launch {
-        let all_rows = self.images * self.rows();
+        let all_rows = self.size.images * self.out.height;
         let taps = self.window.kernel * self.window.kernel;
         let parts = (THREADS / (taps * self.channels)).clamp(1, all_rows);
         let out = Shape::from((parts, taps, self.channels));

@@ -12,21 +12,15 @@ use super::normalise::{Moments, by_batch, by_constants};
 
 /// A part of the network, whose parameters lie one after the other from `start` on.
 pub struct Part<'a> {
-    pub parameters: &'a Tensor,
-    pub start: usize,
+    parameters: &'a Tensor,
+    start: usize,
     /// The running statistics of the whole network, which normalisations take in evaluation. In training they take the batch.
-    pub running: Option<Tensor>,
+    running: Option<Tensor>,
     /// Gains [images, 1, 1, 1] of stochastic depth of a residual block in training.
-    pub gains: &'a mut dyn FnMut(&Block) -> Result<Option<Tensor>>,
-    pub kept: Kept,
-}
-
-/// What a pass in training keeps.
-#[derive(Default)]
-pub struct Kept {
-    /// Means and unbiased variances, in the order of the running statistics.
+    gains: &'a mut dyn FnMut(&Block) -> Result<Option<Tensor>>,
+    /// Means and unbiased variances of the batch, in the order of the running statistics.
     pub moments: Vec<Tensor>,
-    /// What each block in turn and the head were given.
+    /// What each block in turn and the head were given in training.
     pub tape: Vec<Given>,
 }
 
@@ -87,7 +81,23 @@ impl Layers for Part<'_> {
     }
 }
 
-impl Part<'_> {
+impl<'a> Part<'a> {
+    pub fn new(
+        parameters: &'a Tensor,
+        start: usize,
+        running: Option<Tensor>,
+        gains: &'a mut dyn FnMut(&Block) -> Result<Option<Tensor>>,
+    ) -> Self {
+        Self {
+            parameters,
+            start,
+            running,
+            gains,
+            moments: Vec::new(),
+            tape: Vec::new(),
+        }
+    }
+
     fn values(&self, range: &Range<usize>) -> Result<Tensor> {
         self.parameters
             .narrow(0, range.start - self.start, range.len())
@@ -95,7 +105,7 @@ impl Part<'_> {
 
     fn keep(&mut self, given: Given) {
         if self.running.is_none() {
-            self.kept.tape.push(given);
+            self.tape.push(given);
         }
     }
 
@@ -127,9 +137,9 @@ impl Part<'_> {
                 let count = x.dims()[..3].iter().product::<usize>() as f64;
                 let moments = Moments::of(x)?;
                 let x = by_batch(x, &affine, &moments, activated)?;
-                self.kept.moments.push(moments.mean);
+                self.moments.push(moments.mean);
                 let unbiased = moments.variance * (count / (count - 1.0));
-                self.kept.moments.push(unbiased?);
+                self.moments.push(unbiased?);
                 Ok(x)
             }
         }
