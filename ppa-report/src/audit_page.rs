@@ -1,7 +1,5 @@
 //! The audit of a scan as one self-contained HTML page: no network, no script, no file names.
 
-use std::fmt::Write;
-
 use image::GrayImage;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use ppa_core::text::number;
@@ -9,6 +7,7 @@ use ppa_ct::audit::{Audit, Severity};
 use ppa_ct::{Info, LpsView, Scan, Values, Volume};
 use rayon::prelude::*;
 
+use crate::chart::{Chart, Mark, Series};
 use crate::embedded::data_uri;
 
 /// HU shown black and white in the slices.
@@ -179,40 +178,28 @@ fn bins(hu: Values) -> Vec<u64> {
 
 /// Voxels per HU on a logarithmic scale.
 fn histogram(hu: Values) -> Markup {
-    const SIZE: [f64; 2] = [800.0, 220.0];
     let [low, high] = HISTOGRAM_HU;
-    let counts = bins(hu);
-    let most = counts.iter().copied().max().unwrap_or(0).max(1) as f64;
-    let height = |count: u64| SIZE[1] * (1.0 + count as f64).ln() / (1.0 + most).ln();
-    let step = SIZE[0] / counts.len() as f64;
-    let mut path = format!("M0 {}", SIZE[1]);
-    for (n, &count) in counts.iter().enumerate() {
-        let y = SIZE[1] - height(count);
-        let _ = write!(path, "V{y:.1}H{:.1}", (n + 1) as f64 * step);
-    }
-    let _ = write!(path, "V{}Z", SIZE[1]);
-    let x = |hu: i32| {
-        format!(
-            "{:.1}",
-            f64::from(hu - low) / f64::from(high - low) * SIZE[0]
-        )
+    let of_bin = |(n, count): (usize, u64)| {
+        let middle = f64::from(low) + (n as f64 + 0.5) * f64::from(BIN_HU);
+        [middle, (1.0 + count as f64).log10()]
     };
-    let marks = [
-        (-1000, "air"),
-        (0, "water"),
-        (1000, "1000 HU"),
-        (2000, "2000 HU"),
-    ];
+    let points: Vec<[f64; 2]> = bins(hu).into_iter().enumerate().map(of_bin).collect();
+    let most = points.iter().map(|point| point[1]).fold(1.0, f64::max);
+    let chart = Chart {
+        size: [800, 300],
+        title: String::new(),
+        labels: [
+            "HU".to_owned(),
+            format!("log10 of voxels per {BIN_HU} HU, plus 1"),
+        ],
+        ranges: [[f64::from(low), f64::from(high)], [0.0, most]],
+        tiles: Vec::new(),
+        series: vec![Series::new("", Mark::Area, points)],
+    };
     html! {
         h2 { "Hounsfield units" }
-        svg viewBox={ "0 0 " (SIZE[0]) " " (SIZE[1] + 22.0) } width="100%" role="img" {
-            path d=(path) fill="#446" {}
-            @for (hu, name) in marks {
-                path d={ "M" (x(hu)) " 0V" (SIZE[1]) } stroke="#c33" stroke-dasharray="3 3" {}
-                text x=(x(hu)) y=(SIZE[1] + 16.0) font-size="13" text-anchor="middle" { (name) }
-            }
-        }
-        p { "Voxels per " (BIN_HU) " HU, logarithmic." }
+        div role="img" { (PreEscaped(chart.to_svg())) }
+        p { "Air lies at -1000 HU, water at 0." }
     }
 }
 

@@ -1,18 +1,24 @@
 //! Pictures and pages for inspecting cases, poses and datasets.
 //!
 //! [`audit_page`] shows a scan, [`case_picture`] and [`pose_picture`] show one limb, [`contact_sheet`] a dataset on one picture, [`qa_page`] the quality report
-//! of a dataset, [`coverage_plot`] where a camera sees most of a joint.
+//! of a dataset, [`coverage_plot`] where a camera sees most of a joint; [`learning_curve`], [`confusion`] and others chart an evaluation.
 
 mod audit_page;
+mod chart;
 mod contact_sheet;
 mod coverage_plot;
 mod drawing;
 mod embedded;
+mod evaluation;
 mod pictures;
 mod qa;
 
 pub use audit_page::audit_page;
+pub use chart::{Chart, Mark, Series, Tile};
 pub use contact_sheet::{ContactSheetError, contact_sheet};
 pub use coverage_plot::{RankedView, coverage_plot};
+pub use evaluation::{
+    calibration, confusion, errors_by_angle, learning_curve, predictions_by_label,
+};
 pub use pictures::{PosedLimb, case_picture, pose_picture, write_picture};
 pub use qa::{QaError, qa_page};

@@ -7,10 +7,9 @@ use anyhow::Context;
 use clap::Args;
 use ppa_learn::DeviceName;
 use ppa_learn::data::{Images, check_split};
-use ppa_learn::evaluate::{
-    Evaluation, Row, Scores, evaluation_files, learning_curve, write_evaluation,
-};
-use ppa_learn::train::{Source, predict, read_log, samples, trained};
+use ppa_learn::evaluate::{EVALUATION_TABLES, Evaluation, Row, Scores, write_evaluation};
+use ppa_learn::train::{LogRow, Source, predict, read_log, samples, trained};
+use ppa_report::Chart;
 
 use ppa_core::text::number;
 
@@ -44,13 +43,26 @@ pub struct EvalArgs {
     replace: ReplaceArgs,
 }
 
-/// Name of the figure.
-const LEARNING_CURVE: &str = "learning_curve";
+/// Names of the charts, the last one where angles are known.
+const CHARTS: [&str; 6] = [
+    "learning_curve",
+    "scatter",
+    "confusion",
+    "confusion_half_steps",
+    "calibration",
+    "errors_by_angle",
+];
 
 pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
     let out = args.out.clone().unwrap_or(args.run.join("evaluation"));
     let mut outputs = args.replace.outputs();
-    for name in evaluation_files(&[LEARNING_CURVE]) {
+    let charts = CHARTS.iter();
+    let charts = charts.flat_map(|name| [format!("{name}.svg"), format!("{name}.png")]);
+    for name in EVALUATION_TABLES
+        .map(str::to_owned)
+        .into_iter()
+        .chain(charts)
+    {
         outputs.file_in_new_folder("--out", &out.join(name), &[])?;
     }
     let stoppable = ends_at_once(NOTHING_WRITTEN)?;
@@ -79,11 +91,45 @@ pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
     let rows = Row::of(images.samples(), &predictions);
     let evaluation = Evaluation::of(&rows)?;
     let log = read_log(&args.run.join("log.jsonl"))?;
-    let figures = vec![(LEARNING_CURVE, learning_curve(&log))];
+    let charts = charts(&log, &rows, &evaluation);
     drop(stoppable);
-    write_evaluation(&out, &rows, &evaluation, figures)
-        .with_context(|| format!("writing into {}", out.display()))?;
+    let writing = || format!("writing into {}", out.display());
+    write_evaluation(&out, &rows, &evaluation).with_context(writing)?;
+    for (name, chart) in CHARTS.into_iter().zip(charts) {
+        chart.write(&out, name).with_context(writing)?;
+    }
     output.print(&evaluation, describe)
+}
+
+/// The charts in the order of [`CHARTS`].
+fn charts(log: &[LogRow], rows: &[Row], evaluation: &Evaluation) -> Vec<Chart> {
+    let scalar = |tag: &str| {
+        let rows = log.iter();
+        let points = rows.filter_map(|row| Some([row.step as f64, *row.scalars.get(tag)?]));
+        points.collect()
+    };
+    let means = |means: &[(f64, f64, usize)]| means.iter().map(|&(x, y, _)| [x, y]).collect();
+    let by_label = means(&evaluation.calibration);
+    let by_prediction = means(&evaluation.calibration_by_prediction);
+    let mut charts = vec![
+        ppa_report::learning_curve(
+            scalar("training/loss"),
+            scalar("evaluation/mse"),
+            scalar("evaluation/mae"),
+        ),
+        ppa_report::predictions_by_label(
+            rows.iter().map(|row| [row.label, row.prediction]).collect(),
+        ),
+        ppa_report::confusion(&evaluation.confusion),
+        ppa_report::confusion(&evaluation.confusion_half_steps),
+        ppa_report::calibration(by_label, by_prediction),
+    ];
+    if !evaluation.error_by_angle.is_empty() {
+        charts.push(ppa_report::errors_by_angle(means(
+            &evaluation.error_by_angle,
+        )));
+    }
+    charts
 }
 
 fn describe(evaluation: &Evaluation) -> String {

@@ -10,11 +10,12 @@ use ppa_dataset::layout::{LimbId, View, angle_text};
 use ppa_dataset::manifest::{FileRow, RoiFile};
 use ppa_dataset::published::{GrayImage16, Pose, Published};
 
-use super::chart::{Series, chart};
+use super::chart::chart;
 use super::figure::figure;
 use super::histogram::Depths;
 use super::outliers::{LEAST_POSES, outliers};
 use super::scene::Scene;
+use crate::chart::{Mark, Series};
 use crate::contact_sheet::evenly_chosen;
 
 /// Depth images per limb and camera that histograms are made of.
@@ -42,12 +43,7 @@ pub(super) fn labels(dataset: &Published, limb: LimbId) -> Markup {
         let name = label.source.map_or("source not named", LabelSource::name);
         let place = series.iter().position(|series| series.name == name);
         let place = place.unwrap_or_else(|| {
-            series.push(Series {
-                name: name.to_owned(),
-                points: Vec::new(),
-                spread: Vec::new(),
-                marked: Vec::new(),
-            });
+            series.push(Series::new(name, Mark::Line, Vec::new()));
             series.len() - 1
         });
         series[place]
@@ -58,7 +54,7 @@ pub(super) fn labels(dataset: &Published, limb: LimbId) -> Markup {
     chart(
         "medial rotation, degrees",
         "label: 1 ideal, 3 inadequate",
-        &series,
+        series,
         Some([0.8, 3.2]),
     )
 }
@@ -91,7 +87,7 @@ pub(super) fn histograms<'a>(
         );
         series.push(depths.series(&name));
     }
-    chart("depth, mm", "pixels, %", &series, None)
+    chart("depth, mm", "pixels, %", series, None)
 }
 
 /// What heights and tilts show.
@@ -138,12 +134,9 @@ pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRo
                     number(values[at])
                 )
             }));
-            let marked = odd.iter().map(|&at| points[at]).collect();
             series.push(Series {
-                name: shape.name().to_owned(),
-                points,
-                spread: Vec::new(),
-                marked,
+                ringed: odd.iter().map(|&at| points[at]).collect(),
+                ..Series::new(shape.name(), Mark::Line, points)
             });
         }
         let caption = format!("{what} above the table, {unit}; outliers are ringed.");
@@ -152,7 +145,7 @@ pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRo
             chart(
                 "medial rotation, degrees",
                 &format!("{what}, {unit}"),
-                &series,
+                series,
                 None,
             ),
         ));

@@ -3,7 +3,7 @@
 use ppa_dataset::manifest::RoiRow;
 use ppa_dataset::published::GrayImage16;
 
-use super::chart::Series;
+use crate::chart::{Mark, Series};
 
 /// Width of a bin, mm.
 const BIN_MM: u16 = 10;
@@ -50,19 +50,11 @@ impl Depths {
         let valid = self.counts.iter().sum::<u64>().max(1) as f64;
         let first = self.counts.iter().position(|&count| count > 0).unwrap_or(0);
         let bins = self.counts.iter().enumerate().skip(first);
-        Series {
-            name: name.to_owned(),
-            points: bins
-                .map(|(bin, &count)| {
-                    [
-                        (bin as f64 + 0.5) * f64::from(BIN_MM),
-                        100.0 * count as f64 / valid,
-                    ]
-                })
-                .collect(),
-            spread: Vec::new(),
-            marked: Vec::new(),
-        }
+        let points = bins.map(|(bin, &count)| {
+            let middle_mm = (bin as f64 + 0.5) * f64::from(BIN_MM);
+            [middle_mm, 100.0 * count as f64 / valid]
+        });
+        Series::new(name, Mark::Line, points.collect())
     }
 }
 

@@ -1,10 +1,10 @@
 //! The colours of depths, with their values.
 
 use maud::{Markup, html};
+use plotters::coord::ranged1d::Ranged;
+use plotters::coord::types::RangedCoordf64;
 use ppa_core::text::number;
 use ppa_depth::false_colour;
-
-use super::chart::ticks;
 
 const WIDTH: f64 = 460.0;
 const HEIGHT: f64 = 46.0;
@@ -24,7 +24,8 @@ pub(super) fn colour_scale(range_mm: [f64; 2]) -> Markup {
         let left = format!("{:.2}", at(share) - width / 2.0);
         (left, format!("#{r:02x}{g:02x}{b:02x}"))
     });
-    let ticks = ticks(range_mm).into_iter();
+    // As many as a chart of this width has.
+    let ticks = RangedCoordf64::from(near..far).key_points(8).into_iter();
     let ticks = ticks.map(|tick| {
         (
             format!("{:.1}", at((tick - near) / (far - near))),

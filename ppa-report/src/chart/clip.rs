@@ -8,7 +8,7 @@ pub fn point(point: [f64; 2], ranges: [[f64; 2]; 2]) -> [f64; 2] {
 /// The part of a segment within the axes; none if it has no such part or an end that is not finite.
 ///
 /// Liang and Barsky 1984 (doi:10.1145/357332.357333): each side of the axes bounds the parameter from a + t (b - a).
-pub fn segment([a, b]: [[f64; 2]; 2], ranges: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
+fn segment([a, b]: [[f64; 2]; 2], ranges: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
     if !a.iter().chain(&b).all(|x| x.is_finite()) {
         return None;
     }
@@ -32,9 +32,33 @@ pub fn segment([a, b]: [[f64; 2]; 2], ranges: [[f64; 2]; 2]) -> Option<[[f64; 2]
     (first <= last).then(|| [at(first), at(last)])
 }
 
+/// The parts of a line through some points that lie within the axes.
+pub fn lines(points: &[[f64; 2]], ranges: [[f64; 2]; 2]) -> Vec<Vec<[f64; 2]>> {
+    let mut lines: Vec<Vec<[f64; 2]>> = Vec::new();
+    for pair in points.windows(2) {
+        let Some([from, to]) = segment([pair[0], pair[1]], ranges) else {
+            continue;
+        };
+        match lines.last_mut() {
+            Some(line) if line.last() == Some(&from) => line.push(to),
+            _ => lines.push(vec![from, to]),
+        }
+    }
+    lines
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A line that leaves the axes and returns is cut in two where it crosses the rim.
+    #[test]
+    fn lines_are_cut_at_the_rim() {
+        let points = [[0.0, 0.0], [1.0, 4.0], [2.0, 4.0], [2.0, 1.0], [1.0, 1.0]];
+        let cut = lines(&points, [[0.0, 2.0], [0.0, 2.0]]);
+        let second = vec![[2.0, 2.0], [2.0, 1.0], [1.0, 1.0]];
+        assert_eq!(cut, [vec![[0.0, 0.0], [0.5, 2.0]], second]);
+    }
 
     #[test]
     fn segments_by_hand() {
