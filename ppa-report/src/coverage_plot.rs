@@ -5,7 +5,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use ppa_depth::{Coverage, Viewpoint};
 
-use crate::chart::pixels::{Pixels, SCALE, picture};
+use crate::chart::pixels::{FONT, Pixels, SCALE, picture};
 
 /// A camera's place seen from the joint, and what it sees from there.
 #[derive(Debug, Clone, Copy)]
@@ -43,7 +43,7 @@ pub fn coverage_plot(views: &[RankedView]) -> RgbImage {
 }
 
 fn font() -> TextStyle<'static> {
-    TextStyle::from(("sans-serif", 13 * SCALE).into_font()).color(&INK)
+    TextStyle::from(("sans-serif", FONT).into_font()).color(&INK)
 }
 
 /// The largest share of the surface that a view sees.

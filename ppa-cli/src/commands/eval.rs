@@ -56,13 +56,9 @@ const CHARTS: [&str; 6] = [
 pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
     let out = args.out.clone().unwrap_or(args.run.join("evaluation"));
     let mut outputs = args.replace.outputs();
-    let charts = CHARTS.iter();
-    let charts = charts.flat_map(|name| [format!("{name}.svg"), format!("{name}.png")]);
-    for name in EVALUATION_TABLES
-        .map(str::to_owned)
-        .into_iter()
-        .chain(charts)
-    {
+    let charts = CHARTS.map(|name| [format!("{name}.svg"), format!("{name}.png")]);
+    let tables = EVALUATION_TABLES.map(str::to_owned);
+    for name in tables.into_iter().chain(charts.into_iter().flatten()) {
         outputs.file_in_new_folder("--out", &out.join(name), &[])?;
     }
     let stoppable = ends_at_once(NOTHING_WRITTEN)?;
@@ -91,18 +87,18 @@ pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
     let rows = Row::of(images.samples(), &predictions);
     let evaluation = Evaluation::of(&rows)?;
     let log = read_log(&args.run.join("log.jsonl"))?;
-    let charts = charts(&log, &rows, &evaluation);
+    let drawn = draw_charts(&log, &rows, &evaluation);
     drop(stoppable);
     let writing = || format!("writing into {}", out.display());
     write_evaluation(&out, &rows, &evaluation).with_context(writing)?;
-    for (name, chart) in CHARTS.into_iter().zip(charts) {
+    for (name, chart) in CHARTS.into_iter().zip(drawn) {
         chart.write(&out, name).with_context(writing)?;
     }
     output.print(&evaluation, describe)
 }
 
 /// The charts in the order of [`CHARTS`].
-fn charts(log: &[LogRow], rows: &[Row], evaluation: &Evaluation) -> Vec<Chart> {
+fn draw_charts(log: &[LogRow], rows: &[Row], evaluation: &Evaluation) -> Vec<Chart> {
     let scalar = |tag: &str| {
         let rows = log.iter();
         let points = rows.filter_map(|row| Some([row.step as f64, *row.scalars.get(tag)?]));

@@ -15,6 +15,8 @@ type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 
 /// `plotters` draws on whole pixels: on a canvas this much larger, which is shown smaller.
 pub const SCALE: i32 = 4;
+/// Size of letters on the canvas. The letters of [`Pixels`] have one size, 8 × 8 dots of [`SCALE`].
+pub const FONT: i32 = 15 * SCALE;
 
 /// Draws a picture of a size; `draw` sees a canvas [`SCALE`] times as large.
 pub fn picture(
@@ -29,11 +31,6 @@ pub fn picture(
 
 /// An image to draw on.
 pub struct Pixels<'a>(pub &'a mut RgbImage);
-
-/// Side of one of a letter's 8 × 8 dots, pixels: capital letters are about 8/13 of a font's size high.
-fn dot<S: BackendTextStyle>(style: &S) -> i32 {
-    (style.size() / 13.0).round().max(1.0) as i32
-}
 
 impl DrawingBackend for Pixels<'_> {
     type ErrorType = Infallible;
@@ -70,7 +67,6 @@ impl DrawingBackend for Pixels<'_> {
         style: &S,
         place: BackendCoord,
     ) -> Drawn {
-        let dot = dot(style);
         let (width, height) = self.estimate_text_size(text, style)?;
         let left = match style.anchor().h_pos {
             HPos::Left => 0,
@@ -90,9 +86,9 @@ impl DrawingBackend for Pixels<'_> {
             let set = (0..64).filter(|bit| rows[bit / 8] >> (bit % 8) & 1 == 1);
             for bit in set {
                 let (column, row) = (8 * n + bit % 8, bit / 8);
-                for pixel in 0..dot * dot {
-                    let x = left + column as i32 * dot + pixel % dot;
-                    let y = top + row as i32 * dot + pixel / dot;
+                for pixel in 0..SCALE * SCALE {
+                    let x = left + column as i32 * SCALE + pixel % SCALE;
+                    let y = top + row as i32 * SCALE + pixel / SCALE;
                     let (x, y) = style.transform().transform(x, y);
                     self.draw_pixel((place.0 + x, place.1 + y), style.color())?;
                 }
@@ -104,9 +100,9 @@ impl DrawingBackend for Pixels<'_> {
     fn estimate_text_size<S: BackendTextStyle>(
         &self,
         text: &str,
-        style: &S,
+        _: &S,
     ) -> Result<(u32, u32), DrawingErrorKind<Infallible>> {
-        let side = 8 * dot(style) as u32;
+        let side = 8 * SCALE as u32;
         Ok((side * text.chars().count() as u32, side))
     }
 }
