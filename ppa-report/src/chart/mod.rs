@@ -364,7 +364,7 @@ mod tests {
         // Places are rounded to whole pixels of the canvas.
         assert!((rim[0] + origin[0] - 2 * middle[0]).abs() <= 1, "{svg}");
         assert_eq!(rim[1], middle[1]);
-        assert_eq!(rim[0], (640 - RIGHT) * SCALE);
+        assert_eq!(rim[0], (640 - RIGHT) * SCALE - 1);
         assert!(svg.contains("2 values are beyond the axes"), "{svg}");
         assert!(svg.contains("a &lt; b") && svg.ends_with("</svg>\n"));
         assert!(

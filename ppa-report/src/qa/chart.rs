@@ -13,7 +13,7 @@ pub(super) fn chart(
 ) -> Markup {
     let of = |axis: usize| range(series.iter().flat_map(|s| &s.points).map(|p| p[axis]));
     let chart = Chart {
-        size: [460, 280],
+        size: [360, 250],
         title: String::new(),
         labels: [x_label, y_label].map(str::to_owned),
         ranges: [of(0), y_range.unwrap_or_else(|| of(1))],
