@@ -77,12 +77,12 @@ pub struct StreamSummary {
     pub latency_95_ms: Option<f64>,
 }
 
-/// Judges the pairs of a stream and hands each answer, or why there is none, to `hand_on`, which ends the stream with
+/// Judges the pairs of a stream and hands each answer, or why there is none, to `on_answer`, which ends the stream with
 /// [`ControlFlow::Break`].
 #[derive(Debug)]
 pub struct StreamJudge<F> {
     predictor: PairPredictor,
-    hand_on: F,
+    on_answer: F,
     /// When the first pair was found.
     first: Option<Instant>,
     /// When the last one was answered.
@@ -98,10 +98,10 @@ where
     F: FnMut(Result<StreamAnswer, SkippedPair>) -> io::Result<ControlFlow<()>>,
 {
     /// A stream of which nothing was judged.
-    pub fn new(predictor: PairPredictor, hand_on: F) -> Self {
+    pub fn new(predictor: PairPredictor, on_answer: F) -> Self {
         Self {
             predictor,
-            hand_on,
+            on_answer,
             first: None,
             last: Instant::now(),
             latencies_ms: Vec::new(),
@@ -171,7 +171,7 @@ where
 
     fn skip(&mut self, why: SkippedPair) -> io::Result<ControlFlow<()>> {
         self.skipped += 1;
-        (self.hand_on)(Err(why))
+        (self.on_answer)(Err(why))
     }
 
     fn pair(&mut self, pair: &FramePair) -> io::Result<ControlFlow<()>> {
@@ -185,7 +185,7 @@ where
         };
         let latency_ms = 1e3 * (self.last - pair.found).as_secs_f64();
         self.latencies_ms.push(latency_ms);
-        (self.hand_on)(Ok(StreamAnswer {
+        (self.on_answer)(Ok(StreamAnswer {
             name: &pair.name,
             prediction,
             latency_ms,
