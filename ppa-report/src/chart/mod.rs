@@ -132,6 +132,12 @@ impl Chart {
         )
     }
 
+    /// The chart as part of an HTML page, where SVG needs no namespace: the page then names no address at all.
+    pub(crate) fn to_inline_svg(&self) -> String {
+        self.to_svg()
+            .replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1)
+    }
+
     /// The chart as PNG.
     pub fn to_png(&self) -> Vec<u8> {
         let mut bytes = Cursor::new(Vec::new());
@@ -367,6 +373,7 @@ mod tests {
         assert_eq!(rim[0], (640 - RIGHT) * SCALE - 1);
         assert!(svg.contains("2 values are beyond the axes"), "{svg}");
         assert!(svg.contains("a &lt; b") && svg.ends_with("</svg>\n"));
+        assert!(svg.contains("http") && !chart.to_inline_svg().contains("http"));
         assert!(
             svg.starts_with("<svg width=\"640\" height=\"480\" viewBox=\"0 0 2560 1920\""),
             "{svg}"

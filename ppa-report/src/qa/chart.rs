@@ -21,6 +21,6 @@ pub(super) fn chart(
         series,
     };
     html! {
-        div role="img" aria-label={ (y_label) " against " (x_label) } { (PreEscaped(chart.to_svg())) }
+        div role="img" aria-label={ (y_label) " against " (x_label) } { (PreEscaped(chart.to_inline_svg())) }
     }
 }
