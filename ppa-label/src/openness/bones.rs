@@ -6,6 +6,8 @@ use ppa_dataset::labels::BoneNumbers;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::blocks::Blocks;
+
 /// A bone of the ankle joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -88,9 +90,46 @@ pub struct AnkleBones {
     ct_from_voxel: Affine3<f64>,
     spacing_mm: Vector3<f64>,
     /// Tibia, fibula, talus.
-    bodies: [Vec<f32>; 3],
+    bodies: [Body; 3],
     /// Every bone.
-    skeleton: Vec<f32>,
+    skeleton: Body,
+}
+
+/// A blurred indicator over the voxels of the box.
+#[derive(Debug, Clone)]
+pub(super) struct Body {
+    values: Vec<f32>,
+    /// Blocks of cells between eight voxels each: those on one side of the surface are uniform.
+    blocks: Blocks,
+}
+
+impl Body {
+    fn new(values: Vec<f32>, size: [usize; 3]) -> Self {
+        let [nx, ny, _] = size;
+        let inside = |low: [usize; 3], high: [usize; 3]| {
+            let first = values[(low[2] * ny + low[1]) * nx + low[0]] >= 0.5;
+            let mut rows =
+                (low[2]..=high[2]).flat_map(|k| (low[1]..=high[1]).map(move |j| (k * ny + j) * nx));
+            let alike = rows.all(|row| {
+                let row = &values[row + low[0]..=row + high[0]];
+                row.iter().all(|&value| (value >= 0.5) == first)
+            });
+            alike.then_some(first)
+        };
+        let blocks = Blocks::new(size.map(|n| n.saturating_sub(1)), inside);
+        Self { values, blocks }
+    }
+
+    /// Whether the points of a cell and those around it are inside, and how many voxels every coordinate may change until the surface
+    /// can come; `None` near it.
+    pub fn side(&self, cell: [usize; 3]) -> Option<(bool, usize)> {
+        self.blocks.held(cell)
+    }
+
+    /// One value per voxel of the box, i fastest.
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
 }
 
 impl AnkleBones {
@@ -141,7 +180,7 @@ impl AnkleBones {
         }
         let shift = nalgebra::Translation3::new(low[0] as f64, low[1] as f64, low[2] as f64);
         let ct_from_voxel = grid.ct_from_voxel() * shift;
-        let blurred = |holds: &dyn Fn(u8) -> bool| blur(indicator(holds), size);
+        let blurred = |holds: &dyn Fn(u8) -> bool| Body::new(blur(indicator(holds), size), size);
         Ok(Self {
             size,
             voxel_from_ct: ct_from_voxel.inverse(),
@@ -173,27 +212,25 @@ impl AnkleBones {
         self.ct_from_voxel * Point3::from(voxel.map(|v| v as f64))
     }
 
-    pub(super) fn body(&self, bone: AnkleBone) -> &[f32] {
+    pub(super) fn body(&self, bone: AnkleBone) -> &Body {
         &self.bodies[bone as usize]
     }
 
-    pub(super) fn skeleton(&self) -> &[f32] {
+    pub(super) fn skeleton(&self) -> &Body {
         &self.skeleton
     }
 
     /// Trilinear value of a body at voxel coordinates; 0 outside the box.
-    pub(super) fn at(&self, body: &[f32], voxel: &Point3<f64>) -> f32 {
-        let [nx, ny, nz] = self.size;
-        let (x, y, z) = (voxel.x, voxel.y, voxel.z);
-        let inside = |v: f64, n: usize| v >= 0.0 && v < (n - 1) as f64;
-        if !(inside(x, nx) && inside(y, ny) && inside(z, nz)) {
+    pub(super) fn at(&self, body: &Body, voxel: &Point3<f64>) -> f32 {
+        let Some([i, j, k]) = self.cell(voxel) else {
             return 0.0;
-        }
-        let (i, j, k) = (x as usize, y as usize, z as usize);
+        };
+        let body = &body.values;
+        let [nx, ny, _] = self.size;
         let (fx, fy, fz) = (
-            (x - i as f64) as f32,
-            (y - j as f64) as f32,
-            (z - k as f64) as f32,
+            (voxel.x - i as f64) as f32,
+            (voxel.y - j as f64) as f32,
+            (voxel.z - k as f64) as f32,
         );
         let first = (k * ny + j) * nx + i;
         let mix = |a: f32, b: f32, t: f32| a + t * (b - a);
@@ -202,9 +239,17 @@ impl AnkleBones {
         mix(face(first), face(first + nx * ny), fz)
     }
 
+    /// The cell between eight voxels in which a point lies.
+    pub(super) fn cell(&self, voxel: &Point3<f64>) -> Option<[usize; 3]> {
+        let [nx, ny, nz] = self.size;
+        let inside = |v: f64, n: usize| v >= 0.0 && v < (n - 1) as f64;
+        (inside(voxel.x, nx) && inside(voxel.y, ny) && inside(voxel.z, nz))
+            .then(|| [voxel.x as usize, voxel.y as usize, voxel.z as usize])
+    }
+
     /// Outward unit normal of a body in the `ct` frame, from central differences half a voxel apart; `None` where the body
     /// has no slope.
-    pub(super) fn normal(&self, body: &[f32], p: &Point3<f64>) -> Option<Vector3<f64>> {
+    pub(super) fn normal(&self, body: &Body, p: &Point3<f64>) -> Option<Vector3<f64>> {
         let step = 0.5 * self.spacing_mm.min();
         let value = |offset: Vector3<f64>| f64::from(self.at(body, &self.voxel(&(p + offset))));
         let slope = Vector3::from_fn(|axis, _| {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 
-use super::bones::{AnkleBone, AnkleBones};
+use super::bones::{AnkleBone, AnkleBones, Body};
 
 /// Wider gaps are not joint space, mm.
 const WIDEST_MM: f64 = 6.0;
@@ -34,7 +34,7 @@ impl Gap {
 /// outermost 1.5 mm of the facet: past its rim rays are free whatever their direction.
 pub(super) fn gaps(bones: &AnkleBones, other: AnkleBone) -> Vec<Gap> {
     let talus = bones.body(AnkleBone::Talus);
-    let gaps: Vec<Gap> = border_voxels(bones.size(), talus)
+    let gaps: Vec<Gap> = border_voxels(bones.size(), talus.values())
         .filter_map(|voxel| gap_from(bones, talus, other, bones.centre(voxel)))
         .collect();
     let near = bones.coarseness_mm();
@@ -70,7 +70,7 @@ fn border_voxels(size: [usize; 3], body: &[f32]) -> impl Iterator<Item = [usize;
     })
 }
 
-fn gap_from(bones: &AnkleBones, talus: &[f32], other: AnkleBone, near: Point3<f64>) -> Option<Gap> {
+fn gap_from(bones: &AnkleBones, talus: &Body, other: AnkleBone, near: Point3<f64>) -> Option<Gap> {
     let across = bones.normal(talus, &near)?;
     let reach = 2.0 * bones.coarseness_mm();
     let foot = leave(bones, talus, near - across * (0.5 * reach), across, reach)?;
@@ -91,7 +91,7 @@ fn gap_from(bones: &AnkleBones, talus: &[f32], other: AnkleBone, near: Point3<f6
 /// The last point inside a body along a line.
 fn leave(
     bones: &AnkleBones,
-    body: &[f32],
+    body: &Body,
     from: Point3<f64>,
     along: Vector3<f64>,
     reach: f64,
@@ -123,21 +123,4 @@ pub(super) fn is_superior(gap: &Gap, axis: &Unit<Vector3<f64>>) -> bool {
     // Half-way between the plafond (0°) and the medial facet (66° on average).
     const STEEPEST: f64 = 0.8;
     gap.across.dot(axis) > STEEPEST
-}
-
-/// The voxels of a gap, as a mask over the box.
-pub(super) fn gap_mask(bones: &AnkleBones, gaps: &[Gap]) -> Vec<bool> {
-    let [nx, ny, nz] = bones.size();
-    let mut mask = vec![false; nx * ny * nz];
-    let step = 0.3 * bones.coarseness_mm();
-    for gap in gaps {
-        let steps = (gap.width_mm / step).ceil() as usize;
-        for n in 0..=steps {
-            let t = gap.width_mm * n as f64 / steps as f64;
-            let v = bones.voxel(&(gap.foot + gap.across * t));
-            let v = v.map(|c| c.round() as usize);
-            mask[(v.z * ny + v.y) * nx + v.x] = true;
-        }
-    }
-    mask
 }

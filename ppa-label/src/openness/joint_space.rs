@@ -8,7 +8,8 @@ use serde::Serialize;
 
 use super::bones::{AnkleBone, AnkleBones};
 use super::exposure::{Exposure, LimbAxes};
-use super::gutter::{Gap, gap_mask, gaps, is_superior};
+use super::gap_voxels::GapVoxels;
+use super::gutter::{Gap, gaps, is_superior};
 
 /// One of the three parts of the ankle's joint space.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
@@ -107,7 +108,7 @@ pub(super) struct SeenGap {
     /// The bone opposite the talus.
     pub opposite: AnkleBone,
     pub gaps: Vec<Gap>,
-    pub mask: Vec<bool>,
+    pub voxels: GapVoxels,
 }
 
 /// What an exposure shows: areas in mm² for each of [`FREE_CHORDS_MM`], and contrast.
@@ -138,7 +139,7 @@ impl JointSpace {
             true => Err(JointSpaceError::NoGutter(gutter)),
             false => Ok(SeenGap {
                 opposite,
-                mask: gap_mask(&bones, &gaps),
+                voxels: GapVoxels::of(&gaps, &bones),
                 gaps,
             }),
         };

@@ -1,8 +1,10 @@
 //! Computed labels: alignment of the joint space of an ankle with the beam.
 
+mod blocks;
 mod bone_file;
 mod bones;
 mod exposure;
+mod gap_voxels;
 mod grade;
 mod gutter;
 mod joint_space;

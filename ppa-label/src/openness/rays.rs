@@ -2,14 +2,15 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::bones::AnkleBones;
+use super::bones::{AnkleBones, Body};
 use super::exposure::Exposure;
+use super::gap_voxels::GapVoxels;
 use super::gutter::Gap;
 
 /// Pixels in the plane through the joint, mm.
 pub(super) const PIXEL_MM: f64 = 0.25;
 /// Steps along rays, mm.
-const STEP_MM: f64 = 0.4;
+pub(super) const STEP_MM: f64 = 0.4;
 /// Half the length of rays around the joint, mm.
 const HALF_RAY_MM: f64 = 60.0;
 /// Half the depth within which gaps lie, mm.
@@ -74,47 +75,94 @@ impl Ray {
 
     /// Middles of its steps, voxels.
     pub fn points(&self) -> impl Iterator<Item = Point3<f64>> {
-        (0..self.steps).map(|n| self.start + self.step * (n as f64 + 0.5))
+        (0..self.steps).map(|n| self.point(n))
     }
 
-    /// Length inside the voxels of a mask that lies within 30 mm of the plane through the joint, mm.
-    pub fn path_mm(&self, mask: &[bool], size: [usize; 3]) -> f64 {
-        let [nx, ny, nz] = size;
-        let within = |p: &Point3<f64>| {
-            let v = p.map(|c| c.round());
-            let inside = v.iter().all(|&c| c >= 0.0)
-                && v.x < nx as f64
-                && v.y < ny as f64
-                && v.z < nz as f64;
-            inside && mask[(v.z as usize * ny + v.y as usize) * nx + v.x as usize]
-        };
-        let skipped = ((HALF_RAY_MM - HALF_GAP_MM) / STEP_MM) as usize;
-        let near = self.points().skip(skipped).take(self.steps - 2 * skipped);
+    fn point(&self, step: usize) -> Point3<f64> {
+        self.start + self.step * (step as f64 + 0.5)
+    }
+
+    /// Steps that change no coordinate by so many voxels.
+    fn steps_within(&self, voxels: usize) -> usize {
+        // A little less, so that rounding leads no point beyond.
+        ((voxels as f64 - 1e-6).max(0.0) / self.step.amax()) as usize
+    }
+
+    /// Length inside the voxels of gaps that lies within 30 mm of the plane through the joint, mm.
+    pub fn path_mm(&self, gaps: &GapVoxels) -> f64 {
         // Every other point does: gaps are long.
-        2.0 * STEP_MM * near.step_by(2).filter(within).count() as f64
+        const STRIDE: usize = 2;
+        let skipped = ((HALF_RAY_MM - HALF_GAP_MM) / STEP_MM) as usize;
+        let (mut step, mut within) = (skipped, 0_u32);
+        while step < self.steps - skipped {
+            step += match gaps.at(&self.point(step)) {
+                Ok(()) => {
+                    within += 1;
+                    STRIDE
+                }
+                Err(free) => (1 + self.steps_within(free) / STRIDE) * STRIDE,
+            };
+        }
+        STRIDE as f64 * STEP_MM * f64::from(within)
     }
 
     /// Length inside bodies, mm; a stretch in two of them counts once. A chord longer than `most_mm` is not followed on.
     ///
     /// Surfaces are taken where the line between two steps passes level 1/2, so that chords do not come in whole steps.
-    pub fn chord_mm(&self, bones: &AnkleBones, bodies: &[&[f32]], most_mm: f64) -> f64 {
-        let depth = |p: Point3<f64>| {
-            let values = bodies.iter().map(|body| bones.at(body, &p));
+    pub fn chord_mm(&self, bones: &AnkleBones, bodies: &[&Body], most_mm: f64) -> f64 {
+        let depth = |step: usize| {
+            let point = self.point(step);
+            let values = bodies.iter().map(|body| bones.at(body, &point));
             f64::from(values.fold(0.0, f32::max)) - 0.5
         };
-        let (mut chord_mm, mut before) = (0.0, -0.5);
-        for here in self.points().map(depth) {
-            let inside = match (before >= 0.0, here >= 0.0) {
-                (true, true) => 1.0,
-                (false, false) => 0.0,
-                _ => f64::max(before, here) / (before - here).abs(),
+        let (mut chord_mm, mut was_inside) = (0.0, false);
+        let mut step = 0;
+        while step < self.steps {
+            let (inside, alike) = match self.side(step, bones, bodies) {
+                Some((inside, free)) => (inside, 1 + self.steps_within(free)),
+                None => (depth(step) >= 0.0, 1),
             };
-            chord_mm += STEP_MM * inside;
+            if inside != was_inside {
+                let before = if step == 0 { -0.5 } else { depth(step - 1) };
+                let here = depth(step);
+                chord_mm += STEP_MM * (f64::max(before, here) / (before - here).abs());
+            } else if inside {
+                chord_mm += STEP_MM;
+            }
             if chord_mm > most_mm {
                 break;
             }
-            before = here;
+            was_inside = inside;
+            let next = (step + alike).min(self.steps);
+            if inside {
+                // Added one by one, so that rounding is that of single steps.
+                for _ in step + 1..next {
+                    chord_mm += STEP_MM;
+                    if chord_mm > most_mm {
+                        return chord_mm;
+                    }
+                }
+            }
+            step = next;
         }
         chord_mm
+    }
+
+    /// Whether the point of a step is inside a body, and by how many voxels every coordinate may change while that holds; `None` near
+    /// a surface.
+    fn side(&self, step: usize, bones: &AnkleBones, bodies: &[&Body]) -> Option<(bool, usize)> {
+        let Some(cell) = bones.cell(&self.point(step)) else {
+            return Some((false, 0));
+        };
+        let sides = bodies.iter().map(|body| body.side(cell));
+        let mut all = Some((false, usize::MAX));
+        for side in sides {
+            all = match (side, all) {
+                (Some((true, free)), _) => return Some((true, free)),
+                (Some((false, free)), Some((_, least))) => Some((false, free.min(least))),
+                _ => None,
+            };
+        }
+        all
     }
 }

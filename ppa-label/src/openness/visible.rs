@@ -23,7 +23,7 @@ impl JointSpace {
             .flat_map(|across| along.clone().map(move |along| [across, along]));
         let chords = pixels
             .map(|pixel| Ray::through(exposure, pixel, bones))
-            .filter(|ray| ray.path_mm(&seen.mask, bones.size()) >= LEAST_PATH_MM)
+            .filter(|ray| ray.path_mm(&seen.voxels) >= LEAST_PATH_MM)
             .map(|ray| ray.chord_mm(bones, &beside, FREE_CHORDS_MM[2]));
         let mut areas = [0.0; 3];
         for chord in chords {
@@ -57,7 +57,7 @@ impl JointSpace {
         let column: Vec<(bool, f64)> = rows
             .map(|along| {
                 let ray = Ray::through(exposure, [across, along], bones);
-                let path = ray.path_mm(&self.superior.mask, bones.size());
+                let path = ray.path_mm(&self.superior.voxels);
                 (
                     path >= LEAST_PATH_MM,
                     ray.chord_mm(bones, &[bones.skeleton()], f64::INFINITY),

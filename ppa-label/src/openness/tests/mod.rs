@@ -1,5 +1,6 @@
 //! Slabs and phantoms, whose openness is known.
 
+mod chords;
 mod phantoms;
 mod segmented;
 mod slab;

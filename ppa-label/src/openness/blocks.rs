@@ -1,0 +1,90 @@
+//! Blocks of a lattice that rays cross in one step, since nothing changes in them and around them.
+
+use rayon::prelude::*;
+
+/// Cells along each side of a block.
+const SIDE: usize = 4;
+
+/// Distances of the blocks of a lattice to the next one in which values change.
+#[derive(Debug, Clone)]
+pub(super) struct Blocks {
+    size: [usize; 3],
+    /// Blocks to the next mixed one or beyond the lattice, whichever is nearer, along the axis on which that is farther
+    /// (chessboard distance); 0 is a mixed block.
+    distance: Vec<u8>,
+    /// What a block holds that is not mixed.
+    holds: Vec<bool>,
+}
+
+impl Blocks {
+    /// Blocks of a lattice of so many cells; `of` gives what the cells from `low` to below `high` have in common, if anything.
+    pub fn new(
+        cells: [usize; 3],
+        of: impl Fn([usize; 3], [usize; 3]) -> Option<bool> + Sync,
+    ) -> Self {
+        let size = cells.map(|n| n.div_ceil(SIDE));
+        let held = |[i, j, k]: [usize; 3]| {
+            let low = [i, j, k].map(|b| b * SIDE);
+            let high = std::array::from_fn(|axis| (low[axis] + SIDE).min(cells[axis]));
+            of(low, high)
+        };
+        let held: Vec<Option<bool>> = (0..size[2])
+            .into_par_iter()
+            .flat_map_iter(|k| layer(size, k).map(held))
+            .collect();
+        let border = |block: [usize; 3]| {
+            // A last block that is not whole ends earlier.
+            let last = |axis: usize| (cells[axis] / SIDE).saturating_sub(block[axis]).max(1);
+            let near = |axis: usize| (block[axis] + 1).min(last(axis));
+            near(0).min(near(1)).min(near(2)).min(usize::from(u8::MAX)) as u8
+        };
+        let layers = (0..size[2]).flat_map(|k| layer(size, k));
+        let distance = layers.zip(&held);
+        let mut blocks = Self {
+            size,
+            distance: distance
+                .map(|(block, held)| held.map_or(0, |_| border(block)))
+                .collect(),
+            holds: held.iter().map(|held| held.unwrap_or(false)).collect(),
+        };
+        blocks.spread();
+        blocks
+    }
+
+    /// Two passes give the chessboard distance: each block is at most one farther than its neighbours
+    /// (Rosenfeld & Pfaltz, Pattern Recognition 1, 1968).
+    fn spread(&mut self) {
+        let size @ [nx, ny, nz] = self.size;
+        let around = |n: usize, most: usize| n.saturating_sub(1)..(n + 2).min(most);
+        let mut relax = |[i, j, k]: [usize; 3]| {
+            let mut least = self.distance[(k * ny + j) * nx + i];
+            for z in around(k, nz) {
+                for y in around(j, ny) {
+                    let row = (z * ny + y) * nx;
+                    for near in &self.distance[row..][around(i, nx)] {
+                        least = least.min(near.saturating_add(1));
+                    }
+                }
+            }
+            self.distance[(k * ny + j) * nx + i] = least;
+        };
+        let layers = || (0..nz).flat_map(|k| layer(size, k));
+        layers().for_each(&mut relax);
+        layers()
+            .map(|[i, j, k]| [nx - 1 - i, ny - 1 - j, nz - 1 - k])
+            .for_each(relax);
+    }
+
+    /// What this cell and those around hold, and how many cells a point may move along every axis among them; `None` in a mixed block.
+    pub fn held(&self, cell: [usize; 3]) -> Option<(bool, usize)> {
+        let [i, j, k] = cell.map(|c| c / SIDE);
+        let block = (k * self.size[1] + j) * self.size[0] + i;
+        let distance = self.distance[block].checked_sub(1)?;
+        Some((self.holds[block], usize::from(distance) * SIDE))
+    }
+}
+
+/// The blocks of a layer, i fastest.
+fn layer([nx, ny, _]: [usize; 3], k: usize) -> impl Iterator<Item = [usize; 3]> {
+    (0..ny).flat_map(move |j| (0..nx).map(move |i| [i, j, k]))
+}
