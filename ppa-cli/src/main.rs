@@ -13,6 +13,7 @@ mod output_files;
 mod progress;
 mod scan_args;
 mod shard;
+mod side_name;
 mod stderr;
 
 use std::process::ExitCode;

@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         y_start: 120,
         size: 340,
     };
-    let seen = evaluation_input(&prepare(&image, roi, SIDE)?, SIDE);
+    let seen = evaluation_input(&prepare(&image, roi, false, SIDE)?, SIDE);
     let images = Tensor::from_vec(seen.into_values(), (1, 1, SIDE, SIDE), &Device::Cpu)?;
 
     let network = EfficientNetB0::new(7, Options::default())?;

@@ -121,6 +121,7 @@ fn depth_images(folder: &Path, count: u32) -> anyhow::Result<Vec<Sample>> {
                     size: 340,
                 },
                 size: [640, 576],
+                mirrored: false,
             }],
             label: 1.0 + 2.0 * f64::from(number) / f64::from(count),
             dataset: folder.to_owned(),

@@ -20,4 +20,4 @@ pub use network::{
 };
 pub use parity::{Parity, parity};
 pub use random::{Purpose, stream};
-pub use weights::{FirstConvolution, Loaded, WeightsError};
+pub use weights::{FirstConvolution, Loaded, WeightsError, WeightsMetadata};

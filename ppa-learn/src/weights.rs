@@ -1,6 +1,7 @@
 //! Values of a whole network by torchvision's names, from files and to files.
 
 mod file;
+mod metadata;
 mod names;
 mod onnx;
 mod onnx_messages;
@@ -11,6 +12,8 @@ mod quality;
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+
+pub use metadata::WeightsMetadata;
 
 use candle_core::{DType, Tensor, Var};
 use serde::{Deserialize, Serialize};

@@ -14,6 +14,7 @@ use candle_core::{Device, Tensor};
 use ppa_learn::train::{Source, TrainConfig, train};
 use ppa_learn::{
     EfficientNetB0, FirstConvolution, Fusion, FusionKind, Loaded, Mode, Options, QualityNetwork,
+    WeightsMetadata,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -124,6 +125,7 @@ from safetensors.numpy import load_file
 model = onnx.load(sys.argv[1])
 onnx.checker.check_model(model, full_check=True)
 assert not any(node.op_type == 'BatchNormalization' for node in model.graph.node)
+assert [(entry.key, entry.value) for entry in model.metadata_props] == [('mirror', 'true')]
 io = load_file(sys.argv[2])
 expected = io.pop('quality')
 quality, = onnxruntime.InferenceSession(sys.argv[1]).run(None, io)
@@ -142,7 +144,9 @@ assert error < 1e-4
             ("quality", quality.unwrap()),
         ];
         candle_core::safetensors::save(&HashMap::from(tensors), &io).unwrap();
-        network.save_onnx(&path).unwrap();
+        network
+            .save_onnx(&path, WeightsMetadata::new(true))
+            .unwrap();
         python(script, &[&path, &io]);
     };
     for kind in [FusionKind::Score, FusionKind::Late] {
@@ -253,7 +257,7 @@ fn pytorch_says_the_same_of_pairs_by_every_fusion() {
                 .unwrap();
             let [weights, io] =
                 ["weights", "io"].map(|n| folder.path().join(format!("{n}.safetensors")));
-            network.save(&weights).unwrap();
+            network.save(&weights, WeightsMetadata::default()).unwrap();
             let tensors = [("left", left), ("right", right), ("quality", quality)];
             candle_core::safetensors::save(&HashMap::from(tensors), &io).unwrap();
             python(FUSED, &[&weights, &io]);

@@ -6,7 +6,7 @@ use std::error::Error;
 use candle_core::{DType, Device, Tensor};
 use ppa_learn::{
     EfficientNetB0, FirstConvolution, Fusion, FusionKind, Loaded, Mode, Named, Options,
-    QualityNetwork, WeightsError,
+    QualityNetwork, WeightsError, WeightsMetadata,
 };
 use proptest::prelude::*;
 
@@ -70,6 +70,7 @@ fn networks_of_both_cameras_are_saved_and_loaded() {
         quality.flatten_all().unwrap().to_vec1().unwrap()
     };
     network(7).save(&single).unwrap();
+    assert!(!WeightsMetadata::read(&single).unwrap().mirror);
     for (kind, shared_weights) in [(FusionKind::Score, false), (FusionKind::Late, true)] {
         let fusion = Fusion {
             kind,
@@ -78,7 +79,8 @@ fn networks_of_both_cameras_are_saved_and_loaded() {
         };
         let new = |seed| QualityNetwork::new(seed, Options::default(), Some(fusion)).unwrap();
         let (one, other) = (new(1), new(2));
-        one.save(&fused).unwrap();
+        one.save(&fused, WeightsMetadata::new(true)).unwrap();
+        assert!(WeightsMetadata::read(&fused).unwrap().mirror);
         let loaded = other.load(&fused, FirstConvolution::Fresh).unwrap();
         assert_eq!(loaded, Loaded::default());
         assert_eq!(say(&one), say(&other));

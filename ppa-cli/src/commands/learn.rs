@@ -7,7 +7,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use ppa_dataset::layout::View;
 use ppa_learn::frames::of_camera;
 use ppa_learn::train::trained;
-use ppa_learn::{FirstConvolution, Loaded, QualityNetwork, parity};
+use ppa_learn::{FirstConvolution, Loaded, QualityNetwork, WeightsMetadata, parity};
 use serde::Serialize;
 
 use crate::output::{Output, working};
@@ -31,7 +31,8 @@ pub struct ParityArgs {
 
 #[derive(Debug, Args)]
 #[command(
-    after_help = "An ONNX model takes `images` [N, 1, H, W], or `left` and `right` where the network is one of pairs, and gives `quality` [N, 1]. Which \
+    after_help = "An ONNX model takes `images` [N, 1, H, W], or `left` and `right` where the network is one of pairs, and gives `quality` [N, 1]. `mirror` = `true` in the metadata of \
+either format: left limbs must be shown mirrored, with the cameras exchanged, as in training. Which \
 network a weight file is of follows from its names; score fusion with shared weights is distinguished from a single network by its training's folder only."
 )]
 pub struct ExportArgs {
@@ -88,25 +89,26 @@ pub fn run(command: &LearnCommand, output: Output) -> anyhow::Result<()> {
     }
 }
 
-/// The network in a training's folder or of a weight file; refused if it is for the other camera than `camera`.
+/// The network in a training's folder or of a weight file, with what was not taken as it stood and what its users must know; refused if it is for the other camera than `camera`.
 fn open(
     path: &Path,
     camera: Option<View>,
     args: &ExportArgs,
-) -> anyhow::Result<(QualityNetwork, Loaded)> {
+) -> anyhow::Result<(QualityNetwork, Loaded, WeightsMetadata)> {
     if path.is_dir() {
         let (config, network) = trained(path)?;
         if let Some(camera) = camera {
             of_camera(path, config.views, camera)?;
         }
-        return Ok((network, Loaded::default()));
+        return Ok((network, Loaded::default(), config.weights_metadata()));
     }
     let first = match args.first_conv {
         First::Fresh => FirstConvolution::Fresh,
         First::Sum => FirstConvolution::Sum,
         First::Mean => FirstConvolution::Mean,
     };
-    Ok(QualityNetwork::open(path, args.seed, first)?)
+    let (network, loaded) = QualityNetwork::open(path, args.seed, first)?;
+    Ok((network, loaded, WeightsMetadata::read(path)?))
 }
 
 /// What was not taken from two files as it stood.
@@ -143,9 +145,15 @@ fn export(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
     let mut outputs = args.replace.outputs();
     outputs.file_in_new_folder("--out", &args.out, &[])?;
     let camera = args.right.is_some().then_some(View::Left);
-    let (mut network, mut loaded) = open(&args.weights, camera, args)?;
+    let (mut network, mut loaded, metadata) = open(&args.weights, camera, args)?;
     if let Some(right) = &args.right {
-        let (of_right, more) = open(right, Some(View::Right), args)?;
+        let (of_right, more, of_other) = open(right, Some(View::Right), args)?;
+        anyhow::ensure!(
+            of_other == metadata,
+            "one of {} and {} was trained with mirror = true, the other was not",
+            args.weights.display(),
+            right.display()
+        );
         network = QualityNetwork::averaged(&network, &of_right)?;
         loaded = both(loaded, more);
     }
@@ -156,9 +164,9 @@ fn export(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
         unused,
     } = loaded;
     let written = if onnx {
-        network.save_onnx(&args.out)
+        network.save_onnx(&args.out, metadata)
     } else {
-        network.save(&args.out)
+        network.save(&args.out, metadata)
     };
     written.with_context(|| format!("exporting {}", args.weights.display()))?;
     let exported = Exported {

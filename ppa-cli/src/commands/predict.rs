@@ -5,15 +5,18 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::Args;
-use ppa_core::Roi;
 use ppa_core::text::count;
+use ppa_core::{Roi, Side};
 use ppa_learn::DeviceName;
-use ppa_learn::frames::{PairPredictor, SkippedPair, StreamAnswer, StreamJudge, StreamSummary};
+use ppa_learn::frames::{
+    FramesError, PairPredictor, SkippedPair, StreamAnswer, StreamJudge, StreamSummary,
+};
 use serde::Serialize;
 
 use crate::interrupt::{Interrupt, ends_at_once};
 use crate::number_lists::square;
 use crate::output::{Output, Stopwatch};
+use crate::side_name::SideName;
 use crate::stderr;
 
 #[derive(Debug, Args)]
@@ -34,6 +37,9 @@ pub struct PredictArgs {
     /// The same in the right camera's frames
     #[arg(long, value_name = "X,Y,SIZE", value_parser = square)]
     roi_right: Roi,
+    /// Side of the limb in the frames: needed by networks that were trained with `mirror = true`
+    #[arg(long, value_enum)]
+    side: Option<SideName>,
     /// Where the networks compute: cpu, cuda or cuda:N
     #[arg(long, default_value_t)]
     device: DeviceName,
@@ -61,7 +67,14 @@ struct Summary {
 
 pub fn run(args: &PredictArgs, output: Output) -> anyhow::Result<()> {
     let regions = [args.roi_left, args.roi_right];
-    let predictor = PairPredictor::new(&args.left, args.right.as_deref(), regions, args.device)?;
+    let (left, right) = (&args.left, args.right.as_deref());
+    let side = args.side.map(Side::from);
+    let predictor = match PairPredictor::new(left, right, regions, side, args.device) {
+        Err(error @ FramesError::Side { .. }) => {
+            return Err(anyhow::Error::from(error).context("give --side l or --side r"));
+        }
+        predictor => predictor?,
+    };
     let watch = Stopwatch::start();
     let mut judge = StreamJudge::new(predictor, print);
     let ended = match &args.source.watch {

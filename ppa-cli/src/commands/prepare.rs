@@ -22,12 +22,7 @@ use crate::number_lists::{bone_numbers, point, range, voxel_box};
 use crate::output::{Output, working};
 use crate::output_files::{MESH, NUMBERS, PICTURE, ReplaceArgs};
 use crate::scan_args::ScanArgs;
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum SideName {
-    L,
-    R,
-}
+use crate::side_name::SideName;
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum LimbName {
@@ -171,10 +166,7 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
         }),
         axis: args.axis.as_ref().map(|points| [points[0], points[1]]),
     };
-    let side = match args.side {
-        SideName::L => Side::Left,
-        SideName::R => Side::Right,
-    };
+    let side = Side::from(args.side);
     let stoppable = ends_at_once(NOTHING_WRITTEN)?;
     let working = working("finding the limb");
     let (mut case, prepared) = prepare(

@@ -14,7 +14,8 @@ use crate::{contains, fail, ppa, succeed};
 
 const REGIONS: &str = "--roi-left 1,2,45 --roi-right 1,2,45";
 
-/// A folder with data and networks of the left camera, the right one, each of both, and pairs of both, after a step each.
+/// A folder with data and networks of the left camera, the right one, each of both, and pairs of both, after a step each; left limbs
+/// as they are, and in `mirrored_pairs` and the like as right ones.
 pub fn trained() -> &'static Path {
     static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
@@ -23,10 +24,15 @@ pub fn trained() -> &'static Path {
         let config = fs::read_to_string(folder.path().join("train.toml")).unwrap();
         let config = config.replace("steps = 8", "steps = 1");
         for views in ["left", "right", "unified", "pairs"] {
-            let file = format!("{views}.toml");
-            let text = format!("views = {views:?}\n{config}");
-            fs::write(folder.path().join(&file), text).unwrap();
-            succeed(folder.path(), &format!("train {file} --out {views}"));
+            for (run, mirror) in [
+                (views.to_owned(), false),
+                (format!("mirrored_{views}"), true),
+            ] {
+                // From torchvision's first values outputs follow images after a single step.
+                let text = format!("views = {views:?}\nmirror = {mirror}\nnetwork.last_layer = \"torchvision\"\n{config}");
+                fs::write(folder.path().join(format!("{run}.toml")), text).unwrap();
+                succeed(folder.path(), &format!("train {run}.toml --out {run}"));
+            }
         }
         folder
     });
@@ -111,6 +117,73 @@ fn pairs_on_stdin_get_the_predictions_of_evaluation() {
         lines.iter().map(bits).collect::<Vec<_>>()
     });
     assert_eq!(both[0], both[1]);
+}
+
+/// The frames show a left limb: the left camera's network sees the mirrored frame of the right camera, and the other way round.
+#[test]
+fn a_left_limb_is_mirrored_in_prediction_as_in_training() {
+    let folder = trained();
+    let image = |view: &str| format!("patient_1/depth/l/orig/depth_cam_{view}_45.0.png");
+    let [left, right] = ["left", "right"].map(image);
+    let input = format!("data/{left}\tdata/{right}\n");
+    let predict = |runs: &str| {
+        let command = format!("predict {runs} {REGIONS} --stdin");
+        answers(ppa(folder, &command), &input).0.remove(0)
+    };
+    let [by_left, by_right, joint] =
+        ["mirrored_left", "mirrored_right", "mirrored_pairs"].map(|run| evaluated(folder, run));
+    let near = |found: &Value, expected: f64| {
+        let found = found.as_f64().unwrap();
+        assert!(
+            (found - expected).abs() < 1e-5 * expected.abs(),
+            "{found}, {expected}"
+        );
+    };
+    let line = predict("mirrored_left mirrored_right --side l");
+    near(&line["left"], by_right[&left]);
+    near(&line["right"], by_left[&right]);
+    let spread = (by_right[&left] - by_left[&right]).abs();
+    assert!(spread > 1e-3 * by_right[&left].abs(), "{line}");
+    let line = predict("mirrored_pairs --side l");
+    near(&line["quality"], joint[&right]);
+    // Frames of a right limb are seen as they are.
+    assert_ne!(
+        predict("mirrored_pairs --side r")["quality"],
+        line["quality"]
+    );
+    // Networks that show limbs as they are do not ask.
+    assert_eq!(
+        predict("pairs --side l")["quality"],
+        predict("pairs")["quality"]
+    );
+
+    contains(
+        &fail(folder, &format!("predict mirrored_pairs {REGIONS} --stdin")),
+        &[
+            "--side l or --side r",
+            "mirrored_pairs was trained with mirror = true",
+        ],
+    );
+    contains(
+        &fail(
+            folder,
+            &format!("predict left mirrored_right {REGIONS} --side l --stdin"),
+        ),
+        &[
+            "left was trained with mirror = false",
+            "mirrored_right with mirror = true",
+        ],
+    );
+    contains(
+        &fail(folder, "learn export left mirrored_right --out mixed.onnx"),
+        &["was trained with mirror = true, the other was not"],
+    );
+    // What an exported network needs to know is in the file.
+    for name in ["mirrored.onnx", "mirrored.safetensors"] {
+        succeed(folder, &format!("learn export mirrored_left --out {name}"));
+        let bytes = fs::read(folder.join(name)).unwrap();
+        assert!(bytes.windows(6).any(|bytes| bytes == b"mirror"), "{name}");
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use ppa_core::Roi;
 use ppa_dataset::BodyShape;
-use ppa_dataset::layout::View;
+use ppa_dataset::layout::{LimbId, Side, View};
 use ppa_dataset::published::{DepthFile, ImagePair, Pose, Published};
 
 use super::error::DataError;
@@ -43,20 +43,54 @@ impl fmt::Display for Views {
     }
 }
 
-/// The labelled samples of some persons of a dataset, or of all persons, in the order of the dataset. Of rotated poses only
-/// some body shapes, or all.
+/// Which samples of a dataset are used, and how limbs of both sides are shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Selection<'a> {
+    /// Numbers of the persons; all of them if `None`.
+    pub patients: Option<&'a [u32]>,
+    /// Body shapes of rotated poses; all of them if `None`.
+    pub shapes: Option<&'a [BodyShape]>,
+    /// Which cameras' images make a sample.
+    pub views: Views,
+    /// Frames that are used of a recorded pose.
+    pub frames_per_pose: usize,
+    /// Show left limbs as right ones: images mirrored left to right, cameras exchanged. A mirrored left limb before mirrored
+    /// cameras is a right one before the cameras as they are.
+    pub mirror: bool,
+}
+
+impl Selection<'_> {
+    /// Everything of some views, limbs as they are.
+    pub fn all(views: Views) -> Self {
+        Self {
+            patients: None,
+            shapes: None,
+            views,
+            frames_per_pose: FRAMES_PER_POSE,
+            mirror: false,
+        }
+    }
+
+    /// Whether the images of a limb are mirrored.
+    fn mirrors(&self, limb: LimbId) -> bool {
+        self.mirror && limb.side == Side::Left
+    }
+}
+
+/// The labelled samples of a dataset that are selected, in the order of the dataset.
 ///
 /// # Errors
 /// [`DataError`] for a folder that is not a dataset, an image without label, without region or with one outside its camera's images, one
 /// that is no 16-bit PNG of the size of the others of its camera, as far as headers show, a person or body shape that is not there, or
 /// no image.
-pub fn read_samples(
-    root: &Path,
-    persons: Option<&[u32]>,
-    shapes: Option<&[BodyShape]>,
-    views: Views,
-    frames_per_pose: usize,
-) -> Result<Vec<Sample>, DataError> {
+pub fn read_samples(root: &Path, selection: &Selection) -> Result<Vec<Sample>, DataError> {
+    let Selection {
+        patients: persons,
+        shapes,
+        views,
+        frames_per_pose,
+        ..
+    } = *selection;
     let dataset = Published::read(root)?;
     let there = dataset.patients();
     if let Some(missing) = persons
@@ -100,19 +134,33 @@ pub fn read_samples(
     let pairs: Vec<&ImagePair> = dataset.pairs.iter().filter(chosen).collect();
     for pose in pairs.chunk_by(|a, b| pose_name(a) == pose_name(b)) {
         let mut taken = vec![0; cameras.len()];
+        let mirrored = selection.mirrors(pose[0].limb);
         for &pair in moments(pose) {
             for (&cameras, taken) in cameras.iter().zip(&mut taken) {
+                let seeing = |&view: &View| if mirrored { other(view) } else { view };
+                let cameras: Vec<View> = cameras.iter().map(seeing).collect();
                 if *taken < frames_per_pose && cameras.iter().all(|&v| pair.depth(v).is_some()) {
-                    samples.push(reader.sample(pair, cameras, *taken as u32)?);
+                    samples.push(reader.sample(pair, &cameras, mirrored, *taken as u32)?);
                     *taken += 1;
                 }
             }
         }
     }
     if samples.is_empty() {
-        return Err(DataError::Empty(format!("to use in {}", root.display())));
+        let mut what = format!("to use in {}", root.display());
+        if pairs.iter().any(|pair| selection.mirrors(pair.limb)) {
+            what += " (with mirror = true, left limbs are shown by the other camera's images)";
+        }
+        return Err(DataError::Empty(what));
     }
     Ok(samples)
+}
+
+fn other(view: View) -> View {
+    match view {
+        View::Left => View::Right,
+        View::Right => View::Left,
+    }
 }
 
 /// The moments of a pose to take frames from, in order of time: those that both cameras have, so that frames of equal numbers
@@ -137,6 +185,7 @@ impl Reader<'_> {
         &mut self,
         pair: &ImagePair,
         views: &[View],
+        mirrored: bool,
         frame: u32,
     ) -> Result<Sample, DataError> {
         let files = views.iter().filter_map(|&view| pair.depth(view));
@@ -145,7 +194,9 @@ impl Reader<'_> {
         let no_label = || DataError::NoLabel(path(files[0]));
         let label = pair.label.as_ref().ok_or_else(no_label)?.label;
         let images = views.iter().zip(&files);
-        let images: Result<_, _> = images.map(|(&view, file)| self.image(view, file)).collect();
+        let images: Result<_, _> = images
+            .map(|(&view, file)| self.image(view, file, mirrored))
+            .collect();
         Ok(Sample {
             id: files[0].file.clone(),
             images: images?,
@@ -162,7 +213,12 @@ impl Reader<'_> {
         })
     }
 
-    fn image(&mut self, camera: View, file: &DepthFile) -> Result<SampleImage, DataError> {
+    fn image(
+        &mut self,
+        camera: View,
+        file: &DepthFile,
+        mirrored: bool,
+    ) -> Result<SampleImage, DataError> {
         let path = self.dataset.root.join(&file.file);
         let no_roi = || DataError::NoRoi(path.clone());
         let roi = file.roi.as_ref().ok_or_else(no_roi)?;
@@ -190,6 +246,7 @@ impl Reader<'_> {
             camera,
             roi,
             size,
+            mirrored,
         })
     }
 }

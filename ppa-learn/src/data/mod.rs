@@ -25,7 +25,7 @@ mod size;
 pub use augment::Augmentation;
 pub use balance::{BUCKETS, Balanced, bucket};
 pub use blur::box_blur;
-pub use dataset::{FRAMES_PER_POSE, Views, read_samples};
+pub use dataset::{FRAMES_PER_POSE, Selection, Views, read_samples};
 pub use error::DataError;
 pub use gradient::{gradient, quantile};
 pub use images::Images;

@@ -35,18 +35,26 @@ pub fn prepared_side(side: usize) -> usize {
     side * 6 / 5
 }
 
-/// The region of a depth image (mm, 0 invalid) at [`prepared_side`], still in mm.
+/// The region of a depth image (mm, 0 invalid) at [`prepared_side`], still in mm; mirrored left to right if asked for.
 ///
 /// # Errors
 /// [`DataError::RoiOutside`] if no pixel of the region lies in the image.
 ///
 /// # Panics
 /// If `side` is 0.
-pub fn prepare(depth_mm: &Raster<u16>, roi: Roi, side: usize) -> Result<Raster<u16>, DataError> {
+pub fn prepare(
+    depth_mm: &Raster<u16>,
+    roi: Roi,
+    mirrored: bool,
+    side: usize,
+) -> Result<Raster<u16>, DataError> {
     check_roi(&roi, depth_mm.width(), depth_mm.height())?;
     let [x, y, size] = [roi.x_start, roi.y_start, roi.size].map(|pixels| pixels as usize);
     let region = depth_mm.crop(x, y, size, size);
-    let region = region.expect("a pixel of the region lies in the image");
+    let mut region = region.expect("a pixel of the region lies in the image");
+    if mirrored {
+        region = region.mirrored();
+    }
     Ok(region.resized(prepared_side(side), prepared_side(side)))
 }
 
@@ -83,11 +91,28 @@ mod tests {
             y_start: 0,
             size: 2,
         };
-        let prepared = prepare(&image, whole, 5).unwrap();
+        let prepared = prepare(&image, whole, false, 5).unwrap();
         assert_eq!((prepared.width(), prepared.height()), (6, 6));
         assert_eq!(prepared.values()[..6], [0, 0, 0, 750, 750, 750]);
         let input = evaluation_input(&prepared, 2);
         assert_eq!(input.values(), [-0.5, 0.0, 0.5, 0.5]);
+    }
+
+    #[test]
+    fn a_mirrored_image_is_prepared_as_its_mirrored_region() {
+        let image = Raster::new(7, 4, (0..28).map(|i| i * i).collect()).unwrap();
+        let flipped = image.mirrored();
+        // The second region is cut by the right border: its mirror image begins at the left one.
+        for (x_start, size, mirrored_x, cut) in [(1, 3, 3, 3), (4, 4, 0, 3)] {
+            let roi = |x_start, size| Roi {
+                x_start,
+                y_start: 1,
+                size,
+            };
+            let found = prepare(&image, roi(x_start, size), true, 5).unwrap();
+            let expected = flipped.crop(mirrored_x, 1, cut, 3).unwrap();
+            assert_eq!(found, expected.resized(6, 6));
+        }
     }
 
     #[test]
@@ -98,7 +123,7 @@ mod tests {
             y_start: 0,
             size: 9,
         };
-        let error = prepare(&image, beyond, 5).unwrap_err().to_string();
+        let error = prepare(&image, beyond, false, 5).unwrap_err().to_string();
         assert_eq!(
             error,
             "the region of 9 x 9 pixels from column 4 and row 0 lies outside the image of 4 x 3"

@@ -21,6 +21,8 @@ pub struct SampleImage {
     pub roi: Roi,
     /// Columns and rows that the camera's images have.
     pub size: [usize; 2],
+    /// Mirrored left to right for the network.
+    pub mirrored: bool,
 }
 
 impl SampleImage {
@@ -43,16 +45,17 @@ impl SampleImage {
             source: Box::new(source),
         };
         let depth = Raster::new(found[0], found[1], image.pixels).map_err(of_region)?;
-        prepare(&depth, self.roi, side).map_err(of_region)
+        prepare(&depth, self.roi, self.mirrored, side).map_err(of_region)
     }
 }
 
-/// What a network gets at once and the label it shall give: an image of one camera, or of both.
+/// What a network gets at once and the label it shall give: an image of one camera, or of both. Of a left limb that is shown as a
+/// right one, the cameras are exchanged.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
     /// Path of its first image from the dataset's root.
     pub id: String,
-    /// One image, or the left and the right camera's.
+    /// One image, or those for the left and the right camera's input.
     pub images: Vec<SampleImage>,
     /// Quality from 1 (ideal) to 3 (inadequate).
     pub label: f64,

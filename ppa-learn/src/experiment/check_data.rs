@@ -86,7 +86,10 @@ fn persons(
     seen: &mut Seen,
     problems: &mut BTreeSet<String>,
 ) -> Persons {
-    let name = format!("{sources:?} {:?} {}", config.views, config.frames_per_pose);
+    let name = format!(
+        "{sources:?} {:?} {} {}",
+        config.views, config.frames_per_pose, config.mirror
+    );
     let found = seen.entry(name).or_insert_with(|| look(config, sources));
     match found {
         Ok(persons) => persons.clone(),

@@ -14,15 +14,18 @@ use crate::data::{DataError, Raster, SampleImage, evaluation_input};
 pub(super) struct Camera {
     view: View,
     roi: Roi,
+    /// Whether networks see its frames mirrored left to right.
+    mirrored: bool,
     /// Columns and rows of its first frame that could be read: a region fits one size of images only.
     size: OnceLock<[usize; 2]>,
 }
 
 impl Camera {
-    pub fn new(view: View, roi: Roi) -> Self {
+    pub fn new(view: View, roi: Roi, mirrored: bool) -> Self {
         Self {
             view,
             roi,
+            mirrored,
             size: OnceLock::new(),
         }
     }
@@ -42,6 +45,7 @@ impl Camera {
             camera: self.view,
             roi: self.roi,
             size,
+            mirrored: self.mirrored,
         };
         Ok(evaluation_input(&image.load(side)?, side))
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use candle_core::{Device, Tensor};
 use ppa_core::Roi;
-use ppa_dataset::layout::View;
+use ppa_dataset::layout::{Side, View};
 use serde::Serialize;
 
 use super::camera::Camera;
@@ -29,6 +29,20 @@ pub enum FramesError {
         found: Views,
         /// What it could have been trained on.
         expected: &'static str,
+    },
+    /// A network that shows left limbs as right ones, and no side.
+    #[error("{} was trained with mirror = true: it must be told whether the frames show a left or a right limb", run.display())]
+    Side {
+        /// Folder of the training.
+        run: PathBuf,
+    },
+    /// Networks of which only one shows left limbs as right ones.
+    #[error("{} was trained with mirror = {left}, {} with mirror = {}; both must be equal", runs[0].display(), runs[1].display(), !left)]
+    Mirror {
+        /// Folders of the left and the right camera's training.
+        runs: [PathBuf; 2],
+        /// What the first was trained with.
+        left: bool,
     },
 }
 
@@ -75,6 +89,8 @@ pub struct PairPrediction {
 pub struct PairPredictor {
     networks: Networks,
     cameras: [Camera; 2],
+    /// Left limbs are shown as right ones, and the frames show a left one: the left camera's frame is that of the right input.
+    mirrored: bool,
 }
 
 #[derive(Debug)]
@@ -93,7 +109,8 @@ struct Trained {
 
 impl PairPredictor {
     /// The networks in the folders of finished trainings, and where each camera's frames show the joint: the left and the
-    /// right camera's network, as in the paper, or one network of a unified view or of pairs.
+    /// right camera's network, as in the paper, or one network of a unified view or of pairs. `side` is that of the limb in the frames;
+    /// networks that were trained with `mirror` need it.
     ///
     /// # Errors
     /// [`FramesError`] naming the folder, or the device that cannot be used.
@@ -101,6 +118,7 @@ impl PairPredictor {
         left: &Path,
         right: Option<&Path>,
         regions: [Roi; 2],
+        side: Option<Side>,
         device: DeviceName,
     ) -> Result<Self, FramesError> {
         let device = device.open().map_err(TrainError::from)?;
@@ -109,6 +127,7 @@ impl PairPredictor {
             Ok((config, InferenceNetwork::new(&network.to_device(&device)?)?))
         };
         let (config, network) = trained(left)?;
+        let mirror = config.mirror;
         let of = |config: &TrainConfig, network| Trained {
             network,
             side: config.side,
@@ -132,16 +151,29 @@ impl PairPredictor {
                 let of_left = of(&config, network);
                 let (config, network) = trained(right)?;
                 of_camera(right, config.views, View::Right)?;
+                if config.mirror != mirror {
+                    return Err(FramesError::Mirror {
+                        runs: [left.to_owned(), right.to_owned()],
+                        left: mirror,
+                    });
+                }
                 Networks::Separate([of_left, of(&config, network)])
             }
+        };
+        let run = left.to_owned();
+        let mirrored = match (mirror, side) {
+            (true, None) => return Err(FramesError::Side { run }),
+            (true, Some(side)) => side == Side::Left,
+            (false, _) => false,
         };
         let [left, right] = regions;
         Ok(Self {
             networks,
             cameras: [
-                Camera::new(View::Left, left),
-                Camera::new(View::Right, right),
+                Camera::new(View::Left, left, mirrored),
+                Camera::new(View::Right, right, mirrored),
             ],
+            mirrored,
         })
     }
 
@@ -153,13 +185,18 @@ impl PairPredictor {
         let image = |camera: usize, of: &Trained| {
             self.cameras[camera].image(frames[camera], of.side, of.network.device())
         };
+        // The cameras whose frames are those of the left and of the right input.
+        let [first, second] = if self.mirrored { [1, 0] } else { [0, 1] };
         match &self.networks {
-            Networks::Separate([of_left, of_right]) => {
-                let (left, right) = rayon::join(
-                    || of_left.quality(&[image(0, of_left)?]),
-                    || of_right.quality(&[image(1, of_right)?]),
+            Networks::Separate([of_first, of_second]) => {
+                let (one, other) = rayon::join(
+                    || of_first.quality(&[image(first, of_first)?]),
+                    || of_second.quality(&[image(second, of_second)?]),
                 );
-                let (left, right) = (left?, right?);
+                let mut of_camera = [0.0; 2];
+                of_camera[first] = one?;
+                of_camera[second] = other?;
+                let [left, right] = of_camera;
                 Ok(PairPrediction {
                     left: Some(left),
                     right: Some(right),
@@ -167,11 +204,11 @@ impl PairPredictor {
                 })
             }
             Networks::Joint(joint) => {
-                let (left, right) = rayon::join(|| image(0, joint), || image(1, joint));
+                let (one, other) = rayon::join(|| image(first, joint), || image(second, joint));
                 Ok(PairPrediction {
                     left: None,
                     right: None,
-                    quality: joint.quality(&[left?, right?])?,
+                    quality: joint.quality(&[one?, other?])?,
                 })
             }
         }

@@ -7,9 +7,9 @@ use ppa_dataset::BodyShape;
 use serde::{Deserialize, Serialize};
 
 use crate::DeviceName;
-use crate::data::{Augmentation, Views};
+use crate::data::{Augmentation, Selection, Views};
 use crate::network::Fusion;
-use crate::weights::FirstConvolution;
+use crate::weights::{FirstConvolution, WeightsMetadata};
 
 use super::schedule::{Schedule, StepCounting};
 
@@ -21,6 +21,10 @@ pub struct TrainConfig {
     pub seed: u64,
     /// Which cameras' images the network gets.
     pub views: Views,
+    /// Show left limbs as right ones, in training and in prediction: images mirrored left to right, cameras exchanged. Trainings of
+    /// earlier programs, whose configurations lack the key, show limbs as they are.
+    #[serde(default)]
+    pub mirror: bool,
     /// Columns and rows that the network sees.
     pub side: usize,
     /// Samples of a step.
@@ -119,6 +123,24 @@ impl TrainConfig {
             counting: self.step_counting,
             count: self.steps,
             first_rate: self.learning_rate,
+        }
+    }
+
+    /// Which samples of a source are used.
+    pub(super) fn selection<'a>(&self, source: &'a Source) -> Selection<'a> {
+        Selection {
+            patients: source.patients.as_deref(),
+            shapes: source.shapes.as_deref(),
+            views: self.views,
+            frames_per_pose: self.frames_per_pose,
+            mirror: self.mirror,
+        }
+    }
+
+    /// What users of the weights must know beside their values, for the metadata of weight files.
+    pub fn weights_metadata(&self) -> WeightsMetadata {
+        WeightsMetadata {
+            mirror: self.mirror,
         }
     }
 

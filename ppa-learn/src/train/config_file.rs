@@ -15,9 +15,7 @@ impl TrainConfig {
             path: path.to_owned(),
             source,
         };
-        let text = ppa_core::regular_file::read_to_string(path).map_err(unreadable)?;
-        let given = toml::from_str(&text).map_err(|error| wrong(path, &error))?;
-        let mut config = Self::from_table(given, path)?;
+        let mut config = Self::from_table(read_table(path)?, path)?;
         // Whole paths, so that the echo in another folder says the same.
         let whole = std::path::absolute(path).map_err(unreadable)?;
         let folder = whole.parent().unwrap_or(Path::new(""));
@@ -25,6 +23,20 @@ impl TrainConfig {
             source.dataset = folder.join(&source.dataset);
         }
         config.start = config.start.map(|start| folder.join(start));
+        config.check()?;
+        Ok(config)
+    }
+
+    /// Reads the `config.toml` of a training's folder, which holds every key that the program knew which wrote it.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub(super) fn read_run(folder: &Path) -> Result<Self, ConfigError> {
+        let path = folder.join("config.toml");
+        let mut given = read_table(&path)?;
+        // Programs that did not know the key showed limbs as they are, whatever the preset says now.
+        given.entry("mirror").or_insert(toml::Value::Boolean(false));
+        let config = Self::from_table(given, &path)?;
         config.check()?;
         Ok(config)
     }
@@ -49,6 +61,15 @@ impl TrainConfig {
         merge(&mut all, given);
         all.try_into().map_err(|e: toml::de::Error| wrong(path, &e))
     }
+}
+
+fn read_table(path: &Path) -> Result<toml::Table, ConfigError> {
+    let text =
+        ppa_core::regular_file::read_to_string(path).map_err(|source| ConfigError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+    toml::from_str(&text).map_err(|error| wrong(path, &error))
 }
 
 fn wrong(path: &Path, error: &dyn std::fmt::Display) -> ConfigError {
@@ -95,6 +116,24 @@ mod tests {
         assert!(config.training[0].dataset.ends_with("data"));
         let echoed = toml::to_string(&config).unwrap();
         assert_eq!(read(&echoed).unwrap(), config);
+    }
+
+    #[test]
+    fn a_run_without_the_key_shows_limbs_as_they_are() {
+        assert!(read(DATA).unwrap().mirror);
+        let folder = tempfile::tempdir().unwrap();
+        let mut echoed = toml::Table::try_from(read(DATA).unwrap()).unwrap();
+        for (mirror, expected) in [(Some(true), true), (Some(false), false), (None, false)] {
+            match mirror {
+                Some(mirror) => echoed.insert("mirror".into(), mirror.into()),
+                None => echoed.remove("mirror"),
+            };
+            std::fs::write(folder.path().join("config.toml"), echoed.to_string()).unwrap();
+            assert_eq!(
+                TrainConfig::read_run(folder.path()).unwrap().mirror,
+                expected
+            );
+        }
     }
 
     #[test]

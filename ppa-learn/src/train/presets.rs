@@ -10,13 +10,15 @@ use crate::network::{Fusion, Options};
 use crate::weights::FirstConvolution;
 
 impl TrainConfig {
-    /// The paper's training, without data.
+    /// The paper's training, without data. Besides, left limbs are shown as right ones, which the paper does not do: `mirror = false`
+    /// leaves them as they are.
     pub fn paper() -> Self {
         let number = |n| NonZeroUsize::new(n).expect("the numbers below are not 0");
         let options = Options::default();
         Self {
             seed: 1,
             views: Views::Left,
+            mirror: true,
             side: 336,
             batch_size: number(16),
             steps: 200_000,

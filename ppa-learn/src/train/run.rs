@@ -134,6 +134,7 @@ pub fn train(
             return Ok(Ended::Stopped { step });
         }
     }
-    run.network.save(&folder.join("weights.safetensors"))?;
+    let weights = folder.join("weights.safetensors");
+    run.network.save(&weights, config.weights_metadata())?;
     Ok(Ended::Finished)
 }

@@ -35,7 +35,7 @@ pub(super) fn network(config: &TrainConfig) -> Result<QualityNetwork, TrainError
 /// # Errors
 /// [`TrainError`] naming the file that is missing or is none of a training; [`TrainError::Unfinished`] with the steps made so far.
 pub fn trained(folder: &Path) -> Result<(TrainConfig, QualityNetwork), TrainError> {
-    let config = TrainConfig::read(&folder.join("config.toml"))?;
+    let config = TrainConfig::read_run(folder)?;
     let weights = folder.join("weights.safetensors");
     if !weights.exists() {
         return Err(TrainError::Unfinished {
@@ -68,17 +68,7 @@ pub fn steps_made(folder: &Path) -> Result<u64, TrainError> {
 pub fn samples(config: &TrainConfig, sources: &[Source]) -> Result<Vec<Sample>, TrainError> {
     let mut samples = Vec::new();
     for source in sources {
-        let persons = source.patients.as_deref();
-        let frames = config.frames_per_pose;
-        let shapes = source.shapes.as_deref();
-        let dataset = &source.dataset;
-        samples.extend(read_samples(
-            dataset,
-            persons,
-            shapes,
-            config.views,
-            frames,
-        )?);
+        samples.extend(read_samples(&source.dataset, &config.selection(source))?);
     }
     Ok(samples)
 }

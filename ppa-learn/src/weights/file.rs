@@ -7,7 +7,7 @@ use std::path::Path;
 use candle_core::{DType, Device, Tensor, pickle};
 
 use super::names::{timm_name, without_prefix};
-use super::{FirstConvolution, Loaded, WeightsError, missing, other_shape};
+use super::{FirstConvolution, Loaded, WeightsError, WeightsMetadata, missing, other_shape};
 use crate::network::{EfficientNetB0, Named};
 
 const FIRST: &str = "features.0.0.weight";
@@ -106,10 +106,8 @@ impl EfficientNetB0 {
     /// # Errors
     /// If the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), WeightsError> {
-        write(
-            path,
-            self.parameters()?.into_iter().chain(self.statistics()?),
-        )
+        let all = self.parameters()?.into_iter().chain(self.statistics()?);
+        write(path, all, WeightsMetadata::default())
     }
 }
 
@@ -117,9 +115,11 @@ impl EfficientNetB0 {
 pub(super) fn write(
     path: &Path,
     named: impl IntoIterator<Item = Named>,
+    metadata: WeightsMetadata,
 ) -> Result<(), WeightsError> {
     let tensors = named.into_iter().map(|named| (named.name, named.tensor));
-    let bytes = safetensors::serialize(tensors, None).map_err(candle_core::Error::from)?;
+    let bytes =
+        safetensors::serialize(tensors, metadata.entries()).map_err(candle_core::Error::from)?;
     Ok(ppa_dataset::write_whole(path, &bytes)?)
 }
 

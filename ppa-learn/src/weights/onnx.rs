@@ -4,9 +4,9 @@ use std::path::Path;
 
 use prost::Message;
 
-use super::WeightsError;
-use super::onnx_messages::{Attribute, Graph, Model, OperatorSet, Value};
+use super::onnx_messages::{Attribute, Graph, MetadataEntry, Model, OperatorSet, Value};
 use super::onnx_network::{Builder, Network};
+use super::{WeightsError, WeightsMetadata};
 use crate::network::{EfficientNetB0, LateFusion, QualityNetwork};
 
 /// The operators used are those of this version of ONNX's set, and of many before and after it.
@@ -22,7 +22,7 @@ impl EfficientNetB0 {
     /// # Errors
     /// If the file cannot be written.
     pub fn save_onnx(&self, path: &Path) -> Result<(), WeightsError> {
-        write(path, &one(self)?)
+        write(path, one(self)?, WeightsMetadata::default())
     }
 }
 
@@ -32,8 +32,8 @@ impl QualityNetwork {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn save_onnx(&self, path: &Path) -> Result<(), WeightsError> {
-        write(path, &model(self)?)
+    pub fn save_onnx(&self, path: &Path, metadata: WeightsMetadata) -> Result<(), WeightsError> {
+        write(path, model(self)?, metadata)
     }
 }
 
@@ -106,9 +106,13 @@ fn finished(graph: Graph, images: &[&str]) -> Model {
             domain: String::new(),
             version: OPERATOR_SET,
         }],
+        metadata_props: Vec::new(),
     }
 }
 
-fn write(path: &Path, model: &Model) -> Result<(), WeightsError> {
+fn write(path: &Path, mut model: Model, metadata: WeightsMetadata) -> Result<(), WeightsError> {
+    let entries = metadata.entries().into_iter().flatten();
+    let entries = entries.map(|(key, value)| MetadataEntry { key, value });
+    model.metadata_props = entries.collect();
     Ok(ppa_dataset::write_whole(path, &model.encode_to_vec())?)
 }

@@ -13,6 +13,17 @@ pub struct Model {
     pub graph: Option<Graph>,
     #[prost(message, repeated, tag = "8")]
     pub opset_import: Vec<OperatorSet>,
+    #[prost(message, repeated, tag = "14")]
+    pub metadata_props: Vec<MetadataEntry>,
+}
+
+/// StringStringEntryProto
+#[derive(Clone, PartialEq, prost::Message)]
+pub struct MetadataEntry {
+    #[prost(string, tag = "1")]
+    pub key: String,
+    #[prost(string, tag = "2")]
+    pub value: String,
 }
 
 /// OperatorSetIdProto

@@ -9,6 +9,7 @@ use prost::Message;
 use rand_distr::{Distribution, Uniform};
 
 use super::onnx_messages::{Graph, Model, Node};
+use crate::WeightsMetadata;
 use crate::network::{Fusion, FusionKind, Mode, Options, QualityNetwork};
 use crate::random::{Purpose, stream};
 
@@ -52,9 +53,13 @@ fn images(network: &QualityNetwork) -> Vec<Tensor> {
 fn written(network: &QualityNetwork) -> Graph {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("network.onnx");
-    network.save_onnx(&path).unwrap();
+    network
+        .save_onnx(&path, WeightsMetadata::new(true))
+        .unwrap();
     let bytes = std::fs::read(path).unwrap();
-    Model::decode(&bytes[..]).unwrap().graph.unwrap()
+    let model = Model::decode(&bytes[..]).unwrap();
+    assert_eq!(model.metadata_props[0].key, "mirror");
+    model.graph.unwrap()
 }
 
 fn names(values: &[super::onnx_messages::Value]) -> Vec<&str> {

@@ -6,7 +6,7 @@ use std::path::Path;
 use candle_core::Tensor;
 
 use super::file::{read, write};
-use super::{FirstConvolution, Loaded, WeightsError, assign, missing};
+use super::{FirstConvolution, Loaded, WeightsError, WeightsMetadata, assign, missing};
 use crate::network::{CAMERA_PREFIXES, Fusion, FusionKind, LateFusion, Options, QualityNetwork};
 
 impl QualityNetwork {
@@ -120,8 +120,8 @@ impl QualityNetwork {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn save(&self, path: &Path) -> Result<(), WeightsError> {
-        write(path, self.tensors()?)
+    pub fn save(&self, path: &Path, metadata: WeightsMetadata) -> Result<(), WeightsError> {
+        write(path, self.tensors()?, metadata)
     }
 }
 

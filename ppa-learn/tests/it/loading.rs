@@ -7,7 +7,8 @@ use std::sync::Arc;
 use ppa_dataset::BodyShape;
 use ppa_dataset::layout::View;
 use ppa_learn::data::{
-    Augmentation, Balanced, Batch, DataError, Images, Loader, Order, Sample, Views, read_samples,
+    Augmentation, Balanced, Batch, DataError, Images, Loader, Order, Sample, Selection, Views,
+    read_samples,
 };
 use tempfile::TempDir;
 
@@ -20,7 +21,7 @@ fn n(number: usize) -> NonZeroUsize {
 }
 
 fn images(folder: &TempDir, views: Views, keep_bytes: usize) -> Arc<Images> {
-    let samples = read_samples(folder.path(), None, None, views, 5).unwrap();
+    let samples = read_samples(folder.path(), &Selection::all(views)).unwrap();
     Arc::new(Images::new(samples, SIDE, keep_bytes).unwrap())
 }
 
@@ -72,13 +73,19 @@ fn evaluation_sees_each_sample_exactly_once() {
 #[test]
 fn samples_are_those_of_the_views_and_persons() {
     let folder = dataset(2, &[0, 90, 180]);
-    let read = |persons, views| read_samples(folder.path(), persons, None, views, 5);
-    let left = read(Some(&[1]), Views::Left).unwrap();
+    let read = |patients: &[u32]| {
+        let selection = Selection {
+            patients: Some(patients),
+            ..Selection::all(Views::Left)
+        };
+        read_samples(folder.path(), &selection)
+    };
+    let left = read(&[1]).unwrap();
     assert_eq!(left.len(), 3);
     assert_eq!(left[1].id, "patient_1/depth/r/orig/depth_cam_left_45.0.png");
     assert_eq!((left[1].label, left[1].angle_deg), (2.0, Some(45.0)));
     assert_eq!(left[1].limb.patient, 1);
-    let error = read(Some(&[7]), Views::Left).unwrap_err().to_string();
+    let error = read(&[7]).unwrap_err().to_string();
     assert!(
         error.starts_with("there is no image of patient 7"),
         "{error}"
@@ -90,23 +97,27 @@ fn what_is_missing_or_of_another_size_is_named() {
     let folder = dataset(2, &[0, 90, 180]);
     let labels = folder.path().join("patient_1/labels/r/labels.json");
     fs::remove_file(&labels).unwrap();
-    let error = read_samples(folder.path(), None, None, Views::Left, 5).unwrap_err();
+    let error = read_samples(folder.path(), &Selection::all(Views::Left)).unwrap_err();
     assert!(
         matches!(&error, DataError::NoLabel(path) if path.ends_with("depth_cam_left_0.0.png")),
         "{error}"
     );
-    assert!(read_samples(folder.path(), Some(&[0]), None, Views::Left, 5).is_ok());
+    let whole = Selection {
+        patients: Some(&[0]),
+        ..Selection::all(Views::Left)
+    };
+    assert!(read_samples(folder.path(), &whole).is_ok());
 
     let folder = dataset(2, &[0, 90, 180]);
     fs::remove_file(folder.path().join("patient_1/labels/r/roi_depth.json")).unwrap();
-    let error = read_samples(folder.path(), None, None, Views::Left, 5).unwrap_err();
+    let error = read_samples(folder.path(), &Selection::all(Views::Left)).unwrap_err();
     assert!(matches!(error, DataError::NoRoi(_)), "{error}");
 
     let folder = dataset(2, &[0, 90, 180]);
     let regions = folder.path().join("patient_1/labels/r/roi_depth.json");
     let text = fs::read_to_string(&regions).unwrap();
     fs::write(&regions, text.replace("\"x_start\":10", "\"x_start\":60")).unwrap();
-    let error = read_samples(folder.path(), None, None, Views::Left, 5).unwrap_err();
+    let error = read_samples(folder.path(), &Selection::all(Views::Left)).unwrap_err();
     assert!(matches!(error, DataError::Region { .. }), "{error}");
 
     let folder = dataset(2, &[0, 90, 180]);
@@ -114,7 +125,11 @@ fn what_is_missing_or_of_another_size_is_named() {
         &[BodyShape::Orig, BodyShape::BumpsA][..],
         &[BodyShape::BumpsA],
     ] {
-        let error = read_samples(folder.path(), None, Some(shapes), Views::Left, 5).unwrap_err();
+        let selection = Selection {
+            shapes: Some(shapes),
+            ..Selection::all(Views::Left)
+        };
+        let error = read_samples(folder.path(), &selection).unwrap_err();
         let text = error.to_string();
         assert!(
             text.starts_with("there is no image of body shape bumps_a"),
@@ -127,7 +142,7 @@ fn what_is_missing_or_of_another_size_is_named() {
         .path()
         .join("patient_1/depth/r/orig/depth_cam_left_90.0.png");
     png(&odd, 59, |_, _| 900);
-    let read = || read_samples(folder.path(), None, None, Views::Left, 5);
+    let read = || read_samples(folder.path(), &Selection::all(Views::Left));
     let error = read().unwrap_err().to_string();
     assert!(
         error.ends_with(
@@ -189,7 +204,11 @@ fn recorded(left: &[u32], right: &[u32]) -> TempDir {
 
 /// Camera, frame and time stamp of each sample.
 fn frames(folder: &TempDir, views: Views, frames_per_pose: usize) -> Vec<(View, u32, String)> {
-    let samples = read_samples(folder.path(), None, None, views, frames_per_pose).unwrap();
+    let selection = Selection {
+        frames_per_pose,
+        ..Selection::all(views)
+    };
+    let samples = read_samples(folder.path(), &selection).unwrap();
     let same = |s: &Sample| s.pose == samples[0].pose && s.label == 1.5;
     assert!(samples.iter().all(same));
     let time = |s: &Sample| s.id.rsplit(['_', '.']).nth(1).unwrap().to_owned();
@@ -227,7 +246,67 @@ fn frames_of_equal_number_show_one_moment() {
 fn persons_are_known_again_however_the_dataset_is_spelled() {
     let folder = dataset(2, &[0]);
     let inner = folder.path().join("patient_0/..");
-    let read = |root| read_samples(root, None, None, Views::Left, 5).unwrap();
+    let read = |root| read_samples(root, &Selection::all(Views::Left)).unwrap();
     let (one, other) = (read(folder.path()), read(&inner));
     assert!(ppa_learn::data::check_split(&one, &other).is_err());
+}
+
+/// Mirror images of right limbs before mirrored cameras, as left limbs, are the same samples.
+#[test]
+fn mirrored_left_limbs_give_the_samples_of_right_ones() {
+    let right = dataset(2, &[0, 90, 180]);
+    let left = tempfile::tempdir().unwrap();
+    for patient in 0..2 {
+        let [from, to] =
+            [&right, &left].map(|folder| folder.path().join(format!("patient_{patient}")));
+        for (angle, (view, other)) in ["0.0", "45.0", "90.0"]
+            .iter()
+            .flat_map(|angle| [("left", "right"), ("right", "left")].map(|views| (angle, views)))
+        {
+            let name = |view: &str| format!("depth_cam_{view}_{angle}.png");
+            let image = image::open(from.join("depth/r/orig").join(name(view))).unwrap();
+            let image = image.into_luma16();
+            let last = image.width() - 1;
+            png(
+                &to.join("depth/l/orig").join(name(other)),
+                image.width(),
+                |x, y| image.get_pixel(last - x, y).0[0],
+            );
+        }
+        fs::create_dir_all(to.join("labels/l")).unwrap();
+        // Columns 10 to 57 of 60 become 2 to 49.
+        for file in ["labels.json", "roi_depth.json"] {
+            let text = fs::read_to_string(from.join("labels/r").join(file)).unwrap();
+            let text = text.replace("\"x_start\":10", "\"x_start\":2");
+            fs::write(to.join("labels/l").join(file), text).unwrap();
+        }
+    }
+    for views in [Views::Left, Views::Right, Views::Unified, Views::Pairs] {
+        let inputs = |folder: &TempDir, mirror| {
+            let selection = Selection {
+                mirror,
+                ..Selection::all(views)
+            };
+            let samples = read_samples(folder.path(), &selection).unwrap();
+            let images = Arc::new(Images::new(samples, SIDE, 0).unwrap());
+            let batch = Loader::new(&images, &Order::Once, n(100), n(1)).next();
+            let batch = batch.unwrap().unwrap();
+            (batch.images, batch.labels)
+        };
+        let expected = inputs(&right, true);
+        assert!(expected == inputs(&right, false), "{views}");
+        assert!(inputs(&left, true) == expected, "{views}");
+        assert!(inputs(&left, false) != expected, "{views}");
+    }
+    // Of one camera alone, left limbs cannot be shown as right ones.
+    let selection = Selection {
+        mirror: true,
+        ..Selection::all(Views::Left)
+    };
+    let alone = recorded(&[1000], &[]);
+    assert!(read_samples(alone.path(), &Selection::all(Views::Left)).is_ok());
+    let error = read_samples(alone.path(), &selection)
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("the other camera's images"), "{error}");
 }

@@ -12,12 +12,7 @@ use serde::Serialize;
 use super::describe;
 use crate::output::{Output, working};
 use crate::output_files::ReplaceArgs;
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum SideName {
-    L,
-    R,
-}
+use crate::side_name::SideName;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum LimbName {
@@ -164,9 +159,10 @@ pub fn run(args: &PhantomArgs, output: Output) -> anyhow::Result<()> {
 
 /// What it is called, its shape, and what is true about it.
 fn limb(args: &PhantomArgs) -> anyhow::Result<(String, Limb, Option<Truth>)> {
-    let (side, side_name) = match args.side {
-        SideName::L => (Side::Left, "left"),
-        SideName::R => (Side::Right, "right"),
+    let side = Side::from(args.side);
+    let side_name = match side {
+        Side::Left => "left",
+        Side::Right => "right",
     };
     if args.limb == LimbName::Knee {
         if args.plate || args.name.is_some() || args.seed.is_some() {
