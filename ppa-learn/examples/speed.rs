@@ -124,6 +124,7 @@ fn depth_images(folder: &Path, count: u32) -> anyhow::Result<Vec<Sample>> {
                 mirrored: false,
             }],
             label: 1.0 + 2.0 * f64::from(number) / f64::from(count),
+            label_std: 0.0,
             dataset: folder.to_owned(),
             limb: LimbId {
                 patient: number,

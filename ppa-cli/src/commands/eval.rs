@@ -7,7 +7,9 @@ use anyhow::Context;
 use clap::Args;
 use ppa_learn::DeviceName;
 use ppa_learn::data::{Images, check_split};
-use ppa_learn::evaluate::{EVALUATION_TABLES, Evaluation, Row, Scores, write_evaluation};
+use ppa_learn::evaluate::{
+    Baselines, EVALUATION_TABLES, Evaluation, Row, Scores, write_evaluation,
+};
 use ppa_learn::train::{LogRow, Source, predict, read_log, samples, trained};
 use ppa_report::Chart;
 
@@ -79,13 +81,19 @@ pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
         !tested.is_empty(),
         "the configuration names no [[evaluation]]; say --dataset"
     );
-    check_split(&samples(&config, &config.training)?, &tested)?;
+    let training = samples(&config, &config.training)?;
+    check_split(&training, &tested)?;
     let spinner = working("evaluating");
     let images = Arc::new(Images::new(tested, config.side, 0)?);
     let predictions = predict(&network, &images, config.batch_size, config.workers)?;
-    spinner.finish_and_clear();
     let rows = Row::of(images.samples(), &predictions);
     let evaluation = Evaluation::of(&rows)?;
+    let baselines = Baselines::of(&training, images.samples(), &rows)?;
+    spinner.finish_and_clear();
+    let evaluation = Evaluation {
+        baselines: Some(baselines),
+        ..evaluation
+    };
     let log = read_log(&args.run.join("log.jsonl"))?;
     let drawn = draw_charts(&log, &rows, &evaluation);
     drop(stoppable);
@@ -144,6 +152,15 @@ fn describe(evaluation: &Evaluation) -> String {
             name = format!("dataset {}, {name}", person.dataset);
         }
         lines.push(line(&name, &person.scores));
+    }
+    if let Some(baselines) = &evaluation.baselines {
+        for baseline in &baselines.baselines {
+            lines.push(line(&baseline.kind.to_string(), &baseline.scores));
+        }
+        if let Some(noise) = baselines.label_noise_mae {
+            lines.push(format!("MAE of the labels' own variation: {noise:.3}"));
+        }
+        lines.push(baselines.to_string());
     }
     if let Some(spread) = evaluation.frame_spread {
         lines.push(format!(

@@ -192,7 +192,7 @@ impl Reader<'_> {
         let files: Vec<&DepthFile> = files.collect();
         let path = |file: &DepthFile| self.dataset.root.join(&file.file);
         let no_label = || DataError::NoLabel(path(files[0]));
-        let label = pair.label.as_ref().ok_or_else(no_label)?.label;
+        let label = pair.label.as_ref().ok_or_else(no_label)?;
         let images = views.iter().zip(&files);
         let images: Result<_, _> = images
             .map(|(&view, file)| self.image(view, file, mirrored))
@@ -200,7 +200,8 @@ impl Reader<'_> {
         Ok(Sample {
             id: files[0].file.clone(),
             images: images?,
-            label,
+            label: label.label,
+            label_std: label.std,
             dataset: self.place.clone(),
             limb: pair.limb,
             camera: views[0],

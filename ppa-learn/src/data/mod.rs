@@ -33,4 +33,6 @@ pub use loader::{Batch, Loader, Order};
 pub use prepare::{RANGE_MM, evaluation_input, prepare, prepared_side};
 pub use raster::Raster;
 pub use rotate::rotate;
+#[cfg(test)]
+pub(crate) use sample::tests::sample as sample_without_images;
 pub use sample::{Sample, SampleImage, check_split};

@@ -59,6 +59,8 @@ pub struct Sample {
     pub images: Vec<SampleImage>,
     /// Quality from 1 (ideal) to 3 (inadequate).
     pub label: f64,
+    /// Standard deviation of the label over the readers, or over what was assumed.
+    pub label_std: f64,
     /// Folder of the dataset, by its one path however it was spelled. Persons of different datasets are different ones.
     pub dataset: PathBuf,
     /// N of `patient_N`, and which of the person's limbs.
@@ -101,6 +103,7 @@ pub(crate) mod tests {
             id: format!("sample {number}"),
             images: Vec::new(),
             label,
+            label_std: 0.0,
             dataset: PathBuf::from("data"),
             limb: LimbId {
                 patient: number,

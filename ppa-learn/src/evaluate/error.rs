@@ -2,6 +2,8 @@
 
 use ppa_dataset::FileError;
 
+use crate::data::DataError;
+
 /// Why predictions cannot be evaluated, or an evaluation cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -14,6 +16,9 @@ pub enum EvaluateError {
         /// What the network said.
         prediction: f64,
     },
+    /// An image that a baseline cannot use.
+    #[error(transparent)]
+    Data(#[from] DataError),
     /// A file.
     #[error(transparent)]
     File(#[from] FileError),

@@ -1,12 +1,16 @@
-//! Evaluation of predictions: metrics by image, pose and person, confusion, calibration, errors by angle.
+//! Evaluation of predictions: metrics by image, pose and person, confusion, calibration, errors by angle, and what predictions without a
+//! network achieve.
 
+mod baselines;
 mod error;
 mod folder;
+mod kernel_ridge;
 mod poses;
 mod report;
 mod row;
 mod scores;
 
+pub use baselines::{Baseline, BaselineKind, Baselines, Verdict};
 pub use error::EvaluateError;
 pub use folder::{EVALUATION_TABLES, write_evaluation, write_predictions};
 pub(crate) use poses::triple;

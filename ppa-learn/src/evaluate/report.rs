@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use ppa_metrics::ConstantPrediction;
 use serde::Serialize;
 
+use super::baselines::Baselines;
 use super::error::EvaluateError;
 use super::poses::{PoseRow, frame_spread, poses, triples};
 use super::row::Row;
@@ -40,6 +41,9 @@ pub struct Evaluation {
     pub calibration_by_prediction: Vec<(f64, f64, usize)>,
     /// (degrees, mean absolute error, images) of each angle that the dataset states.
     pub error_by_angle: Vec<(f64, f64, usize)>,
+    /// What predictions without a network achieve, if it was computed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub baselines: Option<Baselines>,
 }
 
 /// Metrics of one person's poses.
@@ -55,7 +59,7 @@ pub struct PersonScores {
 }
 
 impl Evaluation {
-    /// The metrics of some predictions.
+    /// The metrics of some predictions, without baselines.
     ///
     /// # Errors
     /// [`EvaluateError::NotFinite`] naming the first image whose prediction is not finite.
@@ -101,6 +105,7 @@ impl Evaluation {
             calibration: means(pairs.iter().copied()),
             calibration_by_prediction: by_prediction(&pairs),
             error_by_angle: means(errors),
+            baselines: None,
         })
     }
 }
