@@ -1,4 +1,4 @@
-//! Blocks of a lattice that rays cross in one step, since nothing changes in them and around them.
+//! Blocks of equal cells, which rays cross in one step (empty-space skipping).
 
 use rayon::prelude::*;
 
@@ -12,40 +12,41 @@ pub(super) struct Blocks {
     /// Blocks to the next mixed one or beyond the lattice, whichever is nearer, along the axis on which that is farther
     /// (chessboard distance); 0 is a mixed block.
     distance: Vec<u8>,
-    /// What a block holds that is not mixed.
-    holds: Vec<bool>,
+    /// The value of each block that is not mixed.
+    values: Vec<bool>,
 }
 
 impl Blocks {
-    /// Blocks of a lattice of so many cells; `of` gives what the cells from `low` to below `high` have in common, if anything.
+    /// Divides a lattice of `cells` into blocks. `common_value` returns the value of all cells from `low` (inclusive) to `high`
+    /// (exclusive), or `None` if they differ.
     pub fn new(
         cells: [usize; 3],
-        of: impl Fn([usize; 3], [usize; 3]) -> Option<bool> + Sync,
+        common_value: impl Fn([usize; 3], [usize; 3]) -> Option<bool> + Sync,
     ) -> Self {
         let size = cells.map(|n| n.div_ceil(SIDE));
-        let held = |[i, j, k]: [usize; 3]| {
+        let value = |[i, j, k]: [usize; 3]| {
             let low = [i, j, k].map(|b| b * SIDE);
             let high = std::array::from_fn(|axis| (low[axis] + SIDE).min(cells[axis]));
-            of(low, high)
+            common_value(low, high)
         };
-        let held: Vec<Option<bool>> = (0..size[2])
+        let values: Vec<Option<bool>> = (0..size[2])
             .into_par_iter()
-            .flat_map_iter(|k| layer(size, k).map(held))
+            .flat_map_iter(|k| layer(size, k).map(value))
             .collect();
         let border = |block: [usize; 3]| {
-            // A last block that is not whole ends earlier.
+            // An incomplete last block ends earlier.
             let last = |axis: usize| (cells[axis] / SIDE).saturating_sub(block[axis]).max(1);
             let near = |axis: usize| (block[axis] + 1).min(last(axis));
             near(0).min(near(1)).min(near(2)).min(usize::from(u8::MAX)) as u8
         };
         let layers = (0..size[2]).flat_map(|k| layer(size, k));
-        let distance = layers.zip(&held);
+        let distance = layers.zip(&values);
         let mut blocks = Self {
             size,
             distance: distance
-                .map(|(block, held)| held.map_or(0, |_| border(block)))
+                .map(|(block, value)| value.map_or(0, |_| border(block)))
                 .collect(),
-            holds: held.iter().map(|held| held.unwrap_or(false)).collect(),
+            values: values.iter().map(|value| value.unwrap_or(false)).collect(),
         };
         blocks.spread();
         blocks
@@ -75,12 +76,13 @@ impl Blocks {
             .for_each(relax);
     }
 
-    /// What this cell and those around hold, and how many cells a point may move along every axis among them; `None` in a mixed block.
-    pub fn held(&self, cell: [usize; 3]) -> Option<(bool, usize)> {
+    /// The value of a cell, and how many cells a point in it may move along each axis without leaving cells of that value; `None` in
+    /// a mixed block.
+    pub fn uniform(&self, cell: [usize; 3]) -> Option<(bool, usize)> {
         let [i, j, k] = cell.map(|c| c / SIDE);
         let block = (k * self.size[1] + j) * self.size[0] + i;
         let distance = self.distance[block].checked_sub(1)?;
-        Some((self.holds[block], usize::from(distance) * SIDE))
+        Some((self.values[block], usize::from(distance) * SIDE))
     }
 }
 

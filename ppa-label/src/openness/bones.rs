@@ -123,7 +123,7 @@ impl Body {
     /// Whether the points of a cell and those around it are inside, and how many voxels every coordinate may change until the surface
     /// can come; `None` near it.
     pub fn side(&self, cell: [usize; 3]) -> Option<(bool, usize)> {
-        self.blocks.held(cell)
+        self.blocks.uniform(cell)
     }
 
     /// One value per voxel of the box, i fastest.

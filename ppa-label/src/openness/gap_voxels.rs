@@ -44,22 +44,19 @@ impl GapVoxels {
         }
     }
 
-    /// Whether the voxel nearest to a point is one of them; if not, how many voxels every coordinate may change until one can be.
-    pub fn at(&self, voxel: &Point3<f64>) -> Result<(), usize> {
+    /// How many voxels every coordinate of a point may change before it can enter a gap; `None` if the nearest voxel belongs to one.
+    pub fn free_voxels(&self, point: &Point3<f64>) -> Option<usize> {
         let [nx, ny, _] = self.size;
         let mut nearest = [0; 3];
         for axis in 0..3 {
-            let at = nearest_whole(voxel[axis]).filter(|&at| at < self.size[axis]);
-            let Some(at) = at else { return Err(0) };
+            let at = nearest_whole(point[axis]).filter(|&at| at < self.size[axis]);
+            let Some(at) = at else { return Some(0) };
             nearest[axis] = at;
         }
-        match self.blocks.held(nearest) {
-            Some((_, free)) => Err(free),
-            None => {
-                let [i, j, k] = nearest;
-                let within = self.within[(k * ny + j) * nx + i];
-                if within { Ok(()) } else { Err(0) }
-            }
+        let [i, j, k] = nearest;
+        match self.blocks.uniform(nearest) {
+            Some((_, free)) => Some(free),
+            None => (!self.within[(k * ny + j) * nx + i]).then_some(0),
         }
     }
 }

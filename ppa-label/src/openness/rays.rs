@@ -82,9 +82,9 @@ impl Ray {
         self.start + self.step * (step as f64 + 0.5)
     }
 
-    /// Steps that change no coordinate by so many voxels.
+    /// Number of steps over which every coordinate changes by less than `voxels`.
     fn steps_within(&self, voxels: usize) -> usize {
-        // A little less, so that rounding leads no point beyond.
+        // The margin covers rounding.
         ((voxels as f64 - 1e-6).max(0.0) / self.step.amax()) as usize
     }
 
@@ -95,12 +95,12 @@ impl Ray {
         let skipped = ((HALF_RAY_MM - HALF_GAP_MM) / STEP_MM) as usize;
         let (mut step, mut within) = (skipped, 0_u32);
         while step < self.steps - skipped {
-            step += match gaps.at(&self.point(step)) {
-                Ok(()) => {
+            step += match gaps.free_voxels(&self.point(step)) {
+                None => {
                     within += 1;
                     STRIDE
                 }
-                Err(free) => (1 + self.steps_within(free) / STRIDE) * STRIDE,
+                Some(free) => (1 + self.steps_within(free) / STRIDE) * STRIDE,
             };
         }
         STRIDE as f64 * STEP_MM * f64::from(within)

@@ -58,7 +58,7 @@ fn chord_by_single_steps(ray: &Ray, bones: &AnkleBones, bodies: &[&Body], most_m
 /// Every other step of the 150 within 30 mm of the joint.
 fn path_by_single_steps(ray: &Ray, gaps: &GapVoxels) -> f64 {
     let near = ray.points().skip(75).take(150).step_by(2);
-    2.0 * STEP_MM * near.filter(|p| gaps.at(p).is_ok()).count() as f64
+    2.0 * STEP_MM * near.filter(|p| gaps.free_voxels(p).is_none()).count() as f64
 }
 
 proptest! {
