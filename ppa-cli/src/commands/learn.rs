@@ -89,7 +89,8 @@ pub fn run(command: &LearnCommand, output: Output) -> anyhow::Result<()> {
     }
 }
 
-/// The network in a training's folder or of a weight file, with what was not taken as it stood and what its users must know; refused if it is for the other camera than `camera`.
+/// The network in a training's folder or of a weight file, what was not taken unchanged, and the metadata; refused if it is for the
+/// other camera than `camera`.
 fn open(
     path: &Path,
     camera: Option<View>,

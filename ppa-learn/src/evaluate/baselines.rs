@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::error::EvaluateError;
 use super::kernel_ridge::KernelRidge;
+use super::means::means;
 use super::row::Row;
 use super::scores::Scores;
 use crate::data::{Images, Sample, evaluation_input};
@@ -103,15 +104,17 @@ impl Baselines {
         }
         let network: Vec<f64> = rows.iter().map(|row| row.prediction).collect();
         let of_network = errors_of_persons(rows, &network);
-        let network_mae = mean_error(rows, &network);
-        let baseline = |(kind, predictions): &(BaselineKind, Vec<f64>)| {
+        let scores = |predictions: &[f64]| {
             let pairs = rows.iter().zip(predictions);
-            let pairs: Vec<(f64, f64)> = pairs.map(|(row, &p)| (row.label, p)).collect();
+            Scores::of(&pairs.map(|(row, &p)| (row.label, p)).collect::<Vec<_>>())
+        };
+        let network_mae = scores(&network).mae.unwrap_or(f64::NAN);
+        let baseline = |(kind, predictions): &(BaselineKind, Vec<f64>)| {
             let errors = errors_of_persons(rows, predictions);
             let test = sign_flip_permutation(&errors, &of_network);
             Baseline {
                 kind: *kind,
-                scores: Scores::of(&pairs),
+                scores: scores(predictions),
                 p_network_better: test.map_or(1.0, |test| test.p_one_sided),
             }
         };
@@ -165,7 +168,7 @@ impl fmt::Display for Baselines {
                 let better = named(&|b| b.scores.mae.filter(|&of| of <= mae));
                 write!(
                     f,
-                    "The network's MAE, {mae:.3}, is not lower than that of: {better}. On these data it is of no use."
+                    "The network's MAE, {mae:.3}, is not lower than that of: {better}. The network is not useful on these data."
                 )
             }
         }
@@ -176,11 +179,6 @@ fn mean_label(samples: &[Sample]) -> f64 {
     samples.iter().map(|sample| sample.label).sum::<f64>() / samples.len() as f64
 }
 
-fn mean_error(rows: &[Row], predictions: &[f64]) -> f64 {
-    let errors = rows.iter().zip(predictions);
-    errors.map(|(row, p)| (row.label - p).abs()).sum::<f64>() / rows.len() as f64
-}
-
 fn persons(rows: &[Row]) -> usize {
     let mut persons: Vec<_> = rows.iter().map(|row| (row.dataset, row.patient)).collect();
     persons.sort_unstable();
@@ -188,7 +186,7 @@ fn persons(rows: &[Row]) -> usize {
     persons.len()
 }
 
-/// Mean absolute error of each person, or of [`MAX_PAIRS`] groups of equally many persons where there are more.
+/// Mean absolute error of each person, or of [`MAX_PAIRS`] groups of persons where there are more.
 fn errors_of_persons(rows: &[Row], predictions: &[f64]) -> Vec<f64> {
     let mut errors: BTreeMap<(usize, u32), (f64, f64)> = BTreeMap::new();
     for (row, prediction) in rows.iter().zip(predictions) {
@@ -207,28 +205,21 @@ fn errors_of_persons(rows: &[Row], predictions: &[f64]) -> Vec<f64> {
 
 /// The mean label of the training samples at each tested angle; `None` unless all angles are known.
 fn by_angle(training: &[Sample], tested: &[Sample]) -> Option<Vec<f64>> {
-    let mut labels: Vec<(f64, f64)> = training
+    let labels: Vec<(f64, f64)> = training
         .iter()
         .map(|sample| Some((sample.angle_deg?, sample.label)))
         .collect::<Option<_>>()?;
-    labels.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let means: Vec<(f64, f64)> = labels
-        .chunk_by(|a, b| a.0 == b.0)
-        .map(|same| {
-            let sum: f64 = same.iter().map(|(_, label)| label).sum();
-            (same[0].0, sum / same.len() as f64)
-        })
-        .collect();
+    let means = means(labels.into_iter());
     let at = |angle: f64| {
-        let above = means.partition_point(|(known, _)| *known < angle);
+        let above = means.partition_point(|(known, ..)| *known < angle);
         let (&first, &last) = (means.first()?, means.last()?);
-        let Some(&(high, label)) = means.get(above) else {
+        let Some(&(high, label, _)) = means.get(above) else {
             return Some(last.1);
         };
         if above == 0 {
             return Some(first.1);
         }
-        let (low, before) = means[above - 1];
+        let (low, before, _) = means[above - 1];
         Some(before + (label - before) * (angle - low) / (high - low))
     };
     tested.iter().map(|sample| at(sample.angle_deg?)).collect()

@@ -5,6 +5,7 @@ mod baselines;
 mod error;
 mod folder;
 mod kernel_ridge;
+mod means;
 mod poses;
 mod report;
 mod row;

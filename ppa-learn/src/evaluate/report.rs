@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::baselines::Baselines;
 use super::error::EvaluateError;
+use super::means::means;
 use super::poses::{PoseRow, frame_spread, poses, triples};
 use super::row::Row;
 use super::scores::Scores;
@@ -133,17 +134,6 @@ fn by_prediction(pairs: &[(f64, f64)]) -> Vec<(f64, f64, usize)> {
     let both = labels.into_iter().zip(predictions);
     both.map(|((_, label, n), (_, prediction, _))| (label, prediction, n))
         .collect()
-}
-
-/// The mean value of each key, and how many there are.
-fn means(pairs: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64, usize)> {
-    let mut pairs: Vec<(f64, f64)> = pairs.collect();
-    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let of_key = |same: &[(f64, f64)]| {
-        let sum: f64 = same.iter().map(|pair| pair.1).sum();
-        (same[0].0, sum / same.len() as f64, same.len())
-    };
-    pairs.chunk_by(|a, b| a.0 == b.0).map(of_key).collect()
 }
 
 #[cfg(test)]
