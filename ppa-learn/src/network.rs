@@ -72,8 +72,33 @@ pub enum Mode {
         /// Index of the random numbers.
         step: u64,
     },
+    /// Normalises by the batch and leaves out nothing. The running statistics become the mean of those of the batches so far, whatever
+    /// they were before the first one.
+    Statistics {
+        /// Batches so far.
+        batches: u64,
+    },
     /// Normalises by the running statistics and leaves out nothing.
     Eval,
+}
+
+impl Mode {
+    /// How much of a batch enters the running statistics.
+    fn momentum(self) -> f64 {
+        match self {
+            Self::Train { .. } => norm::MOMENTUM,
+            Self::Statistics { batches } => 1.0 / (batches + 1) as f64,
+            Self::Eval => 0.0,
+        }
+    }
+
+    /// The step whose random numbers say what is left out; none where nothing is.
+    fn dropout_step(self) -> Option<u64> {
+        match self {
+            Self::Train { step } => Some(step),
+            Self::Statistics { .. } | Self::Eval => None,
+        }
+    }
 }
 
 /// A named tensor of the network, in torchvision's order and by its names.
@@ -183,8 +208,8 @@ impl EfficientNetB0 {
             unreachable!("a classifier has a weight and a bias")
         };
         let [weight, bias] = [weight, bias].map(|entry| entry.view(&self.classifier));
-        let kept = match mode {
-            Mode::Train { step } if 0.0 < self.options.dropout => {
+        let kept = match mode.dropout_step() {
+            Some(step) if 0.0 < self.options.dropout => {
                 let mut random = stream(self.seed, Purpose::Dropout, 2 * step + 1);
                 let gains =
                     initialise::gains(&mut random, features.elem_count(), self.options.dropout);

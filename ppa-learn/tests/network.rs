@@ -136,6 +136,47 @@ fn inference_bytes_do_not_depend_on_threads() {
 }
 
 #[test]
+fn statistics_become_the_mean_of_those_of_the_batches() {
+    let network = |options| EfficientNetB0::new(5, options).unwrap();
+    let plain = Options {
+        dropout: 0.0,
+        stochastic_depth: 0.0,
+    };
+    let all = images(6, 64, 40);
+    let batches = [0, 3].map(|start| all.narrow(0, start, 3).unwrap());
+    let statistics = |network: &EfficientNetB0| column(network.statistics_variable());
+    let after = |network: &EfficientNetB0, of: &[&Tensor]| {
+        for (batches, images) in of.iter().enumerate() {
+            let batches = batches as u64;
+            let mode = Mode::Statistics { batches };
+            network.features(images, mode).unwrap();
+        }
+        statistics(network)
+    };
+    let [first, second] = &batches;
+    let alone = [first, second].map(|batch| after(&network(plain), &[batch]));
+    // What was there before is forgotten, and no branch is left out.
+    let used = network(Options::default());
+    gradient(&used, first, 0);
+    let found = after(&used, &[first, second]);
+    for ((found, a), b) in found.iter().zip(&alone[0]).zip(&alone[1]) {
+        let mean = (a + b) / 2.0;
+        assert!(
+            (found - mean).abs() < 1e-5 * (1.0 + mean.abs()),
+            "{found}, expected {mean}"
+        );
+    }
+    // Training moves them by a tenth from means 0 and variances 1.
+    let trained = network(plain);
+    gradient(&trained, first, 0);
+    let initial = statistics(&network(plain));
+    for ((found, a), before) in statistics(&trained).iter().zip(&alone[0]).zip(initial) {
+        let expected = 0.9 * before + 0.1 * a;
+        assert!((found - expected).abs() < 1e-5 * (1.0 + expected.abs()));
+    }
+}
+
+#[test]
 fn images_of_another_shape_are_refused() {
     let network = EfficientNetB0::new(0, Options::default()).unwrap();
     let three = Tensor::zeros((1, 3, 32, 32), candle_core::DType::F32, &Device::Cpu).unwrap();

@@ -24,8 +24,10 @@ pub struct Forward<'a> {
     pub parameters: &'a [f32],
     pub statistics: &'a mut [f32],
     pub pool: &'a Pool,
-    /// Tells which branches are left out.
-    pub random: &'a mut dyn rand::Rng,
+    /// How much of the batch enters the running statistics.
+    pub momentum: f64,
+    /// Tells which branches are left out; none are without it.
+    pub random: Option<&'a mut dyn rand::Rng>,
     /// Of the blocks so far.
     pub blocks: Vec<BlockTape>,
 }
@@ -62,6 +64,7 @@ impl Forward<'_> {
             self.statistics,
             &sums,
             size.count(),
+            self.momentum,
         );
         Normed { pixels, size, norm }
     }
@@ -111,9 +114,9 @@ impl Layers for Forward<'_> {
             pass.project(place, &depthwise, &squeeze.gate, size, out)
         });
         let size = project.size;
-        let gains = match block.residual {
-            true => gains(&mut self.random, size.images, block.drop),
-            false => vec![1.0; size.images],
+        let gains = match &mut self.random {
+            Some(random) if block.residual => gains(random, size.images, block.drop),
+            _ => vec![1.0; size.images],
         };
         let mut pixels = self.pool.take(project.pixels.len());
         let per_image = size.pixels() * place.channels;

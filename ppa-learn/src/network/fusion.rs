@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::architecture::Entry;
 use super::initialise::gains;
-use super::{Mode, NetworkError, on_device, variable};
+use super::{NetworkError, on_device, variable};
 use crate::random::{Purpose, stream};
 
 /// Values that each camera's network gives to late fusion.
@@ -121,12 +121,12 @@ impl LateFusion {
         &self.entries
     }
 
-    /// One value for each moment [moments, 1], from the values [moments, 1024] of both cameras.
+    /// One value for each moment [moments, 1], from the values [moments, 1024] of both cameras; `random` tells what is left out in
+    /// training.
     pub fn forward(
         &self,
         joined: &Tensor,
-        mode: Mode,
-        random: &mut impl Rng,
+        random: Option<&mut impl Rng>,
     ) -> Result<Tensor, NetworkError> {
         let parts: Result<Vec<_>, _> = self
             .entries
@@ -138,7 +138,9 @@ impl LateFusion {
         };
         let hidden = joined.silu()?.matmul(&weight.t()?)?.broadcast_add(bias)?;
         let mut hidden = hidden.silu()?;
-        if mode != Mode::Eval && self.dropout > 0.0 {
+        if let Some(random) = random
+            && self.dropout > 0.0
+        {
             let gains = gains(random, hidden.elem_count(), self.dropout);
             hidden = (&hidden * Tensor::from_vec(gains, hidden.shape(), hidden.device())?)?;
         }
@@ -148,6 +150,7 @@ impl LateFusion {
 
 #[cfg(test)]
 mod tests {
+    use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
     use super::*;
@@ -201,8 +204,7 @@ mod tests {
         };
         let joined = normal(2 * LATE_OUTPUTS);
         let input = Var::from_vec(joined.clone(), (1, joined.len()), &Device::Cpu).unwrap();
-        let mut unused = stream(0, Purpose::FusionDropout, 0);
-        let output = fusion.forward(&input, Mode::Eval, &mut unused).unwrap();
+        let output = fusion.forward(&input, None::<&mut ChaCha8Rng>).unwrap();
         let gradients = output.sum_all().unwrap().backward().unwrap();
         let doubles = |values: &[f32]| -> Vec<f64> { values.iter().map(|&x| x.into()).collect() };
         let parameters = doubles(&fusion.variable.to_vec1().unwrap());

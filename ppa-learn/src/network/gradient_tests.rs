@@ -8,6 +8,7 @@ use super::backward::Backward;
 use super::folded::Folded;
 use super::forward::Forward;
 use super::inference::Inference;
+use super::norm::MOMENTUM;
 use super::reference::{Maps, features};
 use super::tape::Size;
 use super::{Purpose, initialise, stream};
@@ -67,7 +68,7 @@ proptest! {
 
         let mut random = stream(seed, Purpose::Dropout, 0);
         let mut statistics = initialise::statistics(&architecture);
-        let forward = Forward { architecture: &architecture, parameters: &parameters, statistics: &mut statistics, pool: &pool, random: &mut random, blocks: Vec::new() };
+        let forward = Forward { architecture: &architecture, parameters: &parameters, statistics: &mut statistics, pool: &pool, momentum: MOMENTUM, random: Some(&mut random), blocks: Vec::new() };
         let (out, tape) = forward.run(&images, size);
         let of_features = normal(out.len(), seed + 3);
         let mut gradients = vec![f32::NAN; parameters.len()];
@@ -113,7 +114,7 @@ proptest! {
         let pool = Pool::default();
         let mut statistics = initialise::statistics(&architecture);
         let mut random = stream(seed, Purpose::Dropout, 0);
-        let forward = Forward { architecture: &architecture, parameters: &parameters, statistics: &mut statistics, pool: &pool, random: &mut random, blocks: Vec::new() };
+        let forward = Forward { architecture: &architecture, parameters: &parameters, statistics: &mut statistics, pool: &pool, momentum: MOMENTUM, random: Some(&mut random), blocks: Vec::new() };
         let (trained, tape) = forward.run(&images, size);
 
         let mut moments = vec![0.0; statistics.len()];

@@ -21,38 +21,39 @@ use candle_core::{
 use super::architecture::{Architecture, Block, ConvPlace};
 use super::initialise::gains;
 use super::layers::Layers;
-use super::norm::MOMENTUM;
 use super::{EfficientNetB0, Mode};
 use crate::random::{Purpose, stream};
 use launch::elsewhere;
 use part::{Given, Part};
 
-/// The features [images, 1280] of images [images, 1, height, width]; after a pass in training, with a gradient.
+/// The features [images, 1280] of images [images, 1, height, width]; after a pass that normalises by the batch, with a gradient.
 pub fn features(network: &EfficientNetB0, images: &Tensor, mode: Mode) -> Result<Tensor> {
     let (count, _, height, width) = images.dims4()?;
     let input = images.detach().reshape((count, height, width, 1))?;
     let architecture = &*network.architecture;
     let parameters = &network.backbone.as_detached_tensor();
     let statistics = network.statistics.as_detached_tensor();
-    let Mode::Train { step } = mode else {
+    if mode == Mode::Eval {
         let mut none = |_: &Block| Ok(None);
         let mut part = Part::new(parameters, 0, Some(statistics), &mut none);
         return part.features(architecture, input);
-    };
+    }
 
     // Drawn block by block as our kernels draw them.
-    let mut random = stream(network.seed, Purpose::Dropout, 2 * step);
-    let mut draw = |block: &Block| {
-        let gains = block.residual.then(|| {
-            let gains = gains(&mut random, count, block.drop);
-            Tensor::from_vec(gains, (count, 1, 1, 1), images.device())
-        });
-        gains.transpose()
+    let step = mode.dropout_step();
+    let mut random = step.map(|step| stream(network.seed, Purpose::Dropout, 2 * step));
+    let mut draw = |block: &Block| match &mut random {
+        Some(random) if block.residual => {
+            let gains = gains(random, count, block.drop);
+            Tensor::from_vec(gains, (count, 1, 1, 1), images.device()).map(Some)
+        }
+        _ => Ok(None),
     };
     let mut part = Part::new(parameters, 0, None, &mut draw);
     let features = part.features(architecture, input)?;
     let found = Tensor::cat(&part.moments, 0)?;
-    let moved = ((statistics * (1.0 - MOMENTUM))? + (found * MOMENTUM)?)?;
+    let momentum = mode.momentum();
+    let moved = ((statistics * (1.0 - momentum))? + (found * momentum)?)?;
     network.statistics.set(&moved)?;
     let pass = Pass {
         architecture: Arc::clone(&network.architecture),

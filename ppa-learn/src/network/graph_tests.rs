@@ -130,6 +130,22 @@ fn graph_and_kernels_agree_in_outputs_and_gradients() {
     assert!(error < 1e-5 * length(&kernels), "evaluation {error:.1e}");
 }
 
+#[test]
+fn graph_and_kernels_agree_in_the_mean_of_statistics() {
+    let network = disturbed(Options::default());
+    let twin = network.to_device(&Device::Cpu).unwrap();
+    for batches in 0..2 {
+        let input = random(&[3, 1, 33, 47], 7 + batches);
+        let mode = Mode::Statistics { batches };
+        by_graph(&network, &input, mode).unwrap();
+        by_kernels(&twin, &input, mode).unwrap();
+    }
+    let [graph, kernels] = [&network, &twin].map(|n| values(n.statistics_variable()));
+    let relative = |(graph, kernels): (&f64, &f64)| (graph - kernels).abs() / (1.0 + kernels.abs());
+    let worst = graph.iter().zip(&kernels).map(relative).fold(0.0, f64::max);
+    assert!(worst < 1e-5, "{worst:.1e}");
+}
+
 fn reference(name: &str) -> PathBuf {
     std::env::var_os("PPA_SHARED")
         .map_or_else(|| PathBuf::from("../../shared"), PathBuf::from)

@@ -6,7 +6,7 @@ use crate::kernels::gradient::Linear;
 
 /// torch's default, added to a variance.
 pub const EPSILON: f64 = 1e-5;
-/// torch's default: how much of a batch enters the running statistics.
+/// torch's default: how much of a training batch enters the running statistics.
 pub const MOMENTUM: f64 = 0.1;
 
 /// A normalisation as it was applied.
@@ -30,13 +30,14 @@ pub fn running(place: &NormPlace, parameters: &[f32], statistics: &[f32]) -> Aff
 
 impl Norm {
     /// By a batch, of which `sums` holds sum (x - center) and sum (x - center)^2 over `count` values of each channel,
-    /// center being the running mean. Moves the running statistics, the variance by its unbiased estimate.
+    /// center being the running mean. Moves the running statistics by `momentum`, the variance by its unbiased estimate.
     pub fn batch(
         place: &NormPlace,
         parameters: &[f32],
         statistics: &mut [f32],
         sums: &[f64],
         count: usize,
+        momentum: f64,
     ) -> Self {
         let (first, second) = sums.split_at(place.mean.len());
         let count = count as f64;
@@ -53,11 +54,11 @@ impl Norm {
             .map(|(sum, offset)| (sum / count - offset * offset).max(0.0))
             .collect();
         for (running, offset) in center.iter_mut().zip(&offset) {
-            *running = (f64::from(*running) + MOMENTUM * offset) as f32;
+            *running = (f64::from(*running) + momentum * offset) as f32;
         }
         for (running, variance) in statistics[place.variance.clone()].iter_mut().zip(&variance) {
             let unbiased = variance * count / (count - 1.0);
-            *running = ((1.0 - MOMENTUM) * f64::from(*running) + MOMENTUM * unbiased) as f32;
+            *running = ((1.0 - momentum) * f64::from(*running) + momentum * unbiased) as f32;
         }
         Self::new(place, parameters, &mean, &variance)
     }

@@ -71,13 +71,16 @@ impl CustomOp2 for Backbone {
         let mut statistics = self.statistics.to_vec1::<f32>()?;
         let (images, parameters) = (values(images, images_layout)?, values(parameters, layout)?);
         let features = match self.mode {
-            Mode::Train { step } => {
+            Mode::Train { .. } | Mode::Statistics { .. } => {
+                let step = self.mode.dropout_step();
+                let mut random = step.map(|step| stream(self.seed, Purpose::Dropout, 2 * step));
                 let forward = Forward {
                     architecture: &self.architecture,
                     parameters,
                     statistics: &mut statistics,
                     pool: &self.pool,
-                    random: &mut stream(self.seed, Purpose::Dropout, 2 * step),
+                    momentum: self.mode.momentum(),
+                    random: random.as_mut().map(|random| random as &mut dyn rand::Rng),
                     blocks: Vec::new(),
                 };
                 let (features, tape) = forward.run(images, size);

@@ -179,19 +179,16 @@ impl QualityNetwork {
         let Some(fusion) = self.fusion else {
             return Ok(outputs[0].clone());
         };
-        let step = match mode {
-            Mode::Train { step } => step,
-            Mode::Eval => 0,
-        };
-        let mut random = stream(self.seed, Purpose::FusionDropout, step);
-        let gains = match mode {
-            Mode::Train { .. } => branch_gains(&mut random, fusion.branch_dropout),
-            Mode::Eval => [1.0; 2],
+        let step = mode.dropout_step();
+        let mut random = step.map(|step| stream(self.seed, Purpose::FusionDropout, step));
+        let gains = match &mut random {
+            Some(random) => branch_gains(random, fusion.branch_dropout),
+            None => [1.0; 2],
         };
         let [left, right] = [0, 1].map(|camera| &outputs[camera] * gains[camera]);
         match &self.late {
             None => Ok(((left? + right?)? / 2.0)?),
-            Some(late) => late.forward(&Tensor::cat(&[left?, right?], 1)?, mode, &mut random),
+            Some(late) => late.forward(&Tensor::cat(&[left?, right?], 1)?, random.as_mut()),
         }
     }
 
