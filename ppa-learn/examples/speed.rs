@@ -154,7 +154,7 @@ fn load(
     }
     let order = Order::Training {
         balanced: Balanced::new(images.samples())?,
-        augmentation: Augmentation::default(),
+        augmentation: Some(Augmentation::default()),
         seed: 1,
         first_batch: 0,
     };

@@ -48,7 +48,7 @@ A plan:
   seeds = 10                          # repetitions
   imagenet_weights = \"b0.safetensors\" # or .pth; its columns are left out without it
   [training]
-  preset = \"paper\"                    # or \"quick\", and what differs, as in `ppa train`
+  preset = \"paper\"                    # or \"standard\", \"quick\", and what differs, as in `ppa train`
   [synthetic]
   dataset = \"synthetic\"
   folds = 3

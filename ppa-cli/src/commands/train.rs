@@ -18,7 +18,7 @@ use crate::stderr::note;
 
 #[derive(Debug, Args)]
 pub struct TrainArgs {
-    /// TOML with `preset = "paper"` or "quick", `[[training]]` and `[[evaluation]]`, and what shall differ
+    /// TOML with `preset = "quick"`, "standard" or "paper", `[[training]]` and `[[evaluation]]`, and what shall differ
     config: PathBuf,
     /// Folder of the run; a run that was stopped is resumed
     #[arg(long, value_name = "DIR")]

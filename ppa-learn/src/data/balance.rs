@@ -1,4 +1,4 @@
-//! Balanced sampling: labels that are rare in the data are as frequent in training as others.
+//! Sampling for training: labels that are rare in the data as frequent as others, or all samples alike.
 
 use rand::RngExt;
 
@@ -18,7 +18,8 @@ pub fn bucket(label: f64) -> Option<usize> {
         .then(|| (1..BUCKETS).filter(|&i| edge(i) <= label).count())
 }
 
-/// Samples by bucket: draws a bucket that is not empty, then one of its samples, both evenly and with replacement.
+/// Samples by bucket: draws a bucket that is not empty, then one of its samples, both evenly and with replacement. Unbalanced samples
+/// are one bucket.
 #[derive(Debug, Clone)]
 pub struct Balanced {
     buckets: Vec<Vec<usize>>,
@@ -43,6 +44,14 @@ impl Balanced {
             return Err(DataError::Empty("to train on".into()));
         }
         Ok(Self { buckets })
+    }
+
+    /// The same without balance: all samples are drawn alike.
+    #[must_use]
+    pub fn unbalanced(self) -> Self {
+        let mut all = self.buckets.concat();
+        all.sort_unstable();
+        Self { buckets: vec![all] }
     }
 
     /// The place of the sample that stands at `index` of the endless sequence of `seed`.
@@ -91,6 +100,20 @@ mod tests {
             })
             .sum();
         assert!(chi2 < 161.4, "chi squared {chi2:.1}"); // 99 degrees of freedom: 7e-5
+    }
+
+    #[test]
+    fn samples_are_drawn_alike_without_balance() {
+        let labels = [1.0, 1.0, 1.0, 3.0];
+        let samples: Vec<Sample> = (0..4).map(|i| sample(labels[i], i as u32)).collect();
+        let all = Balanced::new(&samples).unwrap().unbalanced();
+        let mut counts = [0; 4];
+        for index in 0..4000 {
+            counts[all.pick(5, index)] += 1;
+        }
+        // Five standard deviations of 27.4.
+        let near = |count: &i32| (count - 1000).abs() < 137;
+        assert!(counts.iter().all(near), "{counts:?}");
     }
 
     #[test]

@@ -28,12 +28,12 @@ pub struct Batch {
 /// Which samples stand in which batch.
 #[derive(Debug, Clone)]
 pub enum Order {
-    /// Endless: balanced over the labels, augmented.
+    /// Endless, drawn at random.
     Training {
-        /// The samples by label.
+        /// How samples are drawn.
         balanced: Balanced,
-        /// How images are changed.
-        augmentation: Augmentation,
+        /// How images are changed; as evaluation sees them if left out.
+        augmentation: Option<Augmentation>,
         /// Names, with the place in the sequence, all random numbers.
         seed: u64,
         /// Number of the first batch; a training that continues begins where it stopped.
@@ -41,6 +41,8 @@ pub enum Order {
     },
     /// Each sample once, in order; the last batch may be short.
     Once,
+    /// These samples, in this order; the last batch may be short.
+    Listed(Vec<usize>),
 }
 
 /// An iterator over batches that worker threads make ahead; it ends the threads when it is dropped.
@@ -121,10 +123,8 @@ impl Maker {
                 let start = (first_batch + number) * size;
                 start..start + size
             }
-            Order::Once => {
-                let end = self.images.samples().len() as u64;
-                (number * size).min(end)..((number + 1) * size).min(end)
-            }
+            Order::Once => part(number, size, self.images.samples().len()),
+            Order::Listed(samples) => part(number, size, samples.len()),
         };
         if places.is_empty() {
             return Ok(None);
@@ -151,27 +151,33 @@ impl Maker {
     /// The sample at a place of the sequence, and what the network sees of each camera's image.
     fn inputs(&self, place: u64) -> Result<(usize, Vec<Vec<f32>>), DataError> {
         let side = self.images.side();
-        match &self.order {
+        let sample = match &self.order {
+            Order::Training { balanced, seed, .. } => balanced.pick(*seed, place),
+            Order::Once => place as usize,
+            Order::Listed(samples) => samples[place as usize],
+        };
+        let prepared = self.images.get(sample)?;
+        let inputs = match &self.order {
             Order::Training {
-                balanced,
-                augmentation,
+                augmentation: Some(augmentation),
                 seed,
                 ..
             } => {
-                let sample = balanced.pick(*seed, place);
-                let prepared = self.images.get(sample)?;
                 let prepared: Vec<_> = prepared.iter().collect();
-                let inputs = augmentation.apply(&prepared, side, *seed, place);
-                Ok((
-                    sample,
-                    inputs.into_iter().map(|i| i.into_values()).collect(),
-                ))
+                augmentation.apply(&prepared, side, *seed, place)
             }
-            Order::Once => {
-                let prepared = self.images.get(place as usize)?;
+            _ => {
                 let inputs = prepared.iter().map(|image| evaluation_input(image, side));
-                Ok((place as usize, inputs.map(|i| i.into_values()).collect()))
+                inputs.collect()
             }
-        }
+        };
+        let inputs = inputs.into_iter().map(|input| input.into_values());
+        Ok((sample, inputs.collect()))
     }
+}
+
+/// Places of batch `number` in a sequence of `count` samples; none behind its end.
+fn part(number: u64, size: u64, count: usize) -> std::ops::Range<u64> {
+    let end = count as u64;
+    (number * size).min(end)..((number + 1) * size).min(end)
 }

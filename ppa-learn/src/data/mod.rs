@@ -5,7 +5,7 @@
 //! [`RANGE_MM`] and shifted by −0.5; invalid pixels are 0 in mm and −0.5 for the network.
 //!
 //! [`read_samples`] lists a dataset of either published layout; [`Loader`] makes batches: for training an endless sequence,
-//! balanced over the labels ([`Balanced`]), for evaluation each sample once.
+//! balanced over the labels or not ([`Balanced`]), for evaluation each sample once.
 
 mod augment;
 mod balance;

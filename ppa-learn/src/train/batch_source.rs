@@ -38,7 +38,7 @@ impl BatchSource {
         images: &Arc<Images>,
         first_batch: u64,
     ) -> Result<Self, TrainError> {
-        let balanced = Balanced::new(images.samples())?;
+        let balanced = drawing(config, images)?;
         if config.layers == Layers::Last {
             let labels = images.samples().iter().map(|s| s.label as f32).collect();
             return Ok(Self::Features {
@@ -49,7 +49,7 @@ impl BatchSource {
         }
         let order = Order::Training {
             balanced,
-            augmentation: config.augmentation,
+            augmentation: Some(config.augmentation),
             seed: config.seed,
             first_batch,
         };
@@ -96,6 +96,15 @@ impl BatchSource {
             }
         }
     }
+}
+
+/// How training samples are drawn.
+pub(super) fn drawing(config: &TrainConfig, images: &Images) -> Result<Balanced, TrainError> {
+    let balanced = Balanced::new(images.samples())?;
+    Ok(match config.balanced {
+        true => balanced,
+        false => balanced.unbalanced(),
+    })
 }
 
 /// Features of each sample's evaluation images, [samples, 1280] for each camera.

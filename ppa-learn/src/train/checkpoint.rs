@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::network::QualityNetwork;
 
 use super::adam::Adam;
+use super::average::Average;
 use super::config::TrainConfig;
 use super::data_state::DataState;
 use super::error::{TrainError, at};
@@ -34,6 +35,7 @@ pub(super) fn save(
     path: &Path,
     network: &QualityNetwork,
     adam: &Adam,
+    average: Option<&Average>,
     config: &TrainConfig,
     data: &DataState,
 ) -> Result<(), TrainError> {
@@ -46,10 +48,12 @@ pub(super) fn save(
     let state = serde_json::to_string(&state).expect("names and numbers are JSON");
     let named = network.tensors()?.into_iter();
     let mut tensors: Vec<_> = named.map(|named| (named.name, named.tensor)).collect();
-    for (name, moments) in [("first", &adam.first), ("second", &adam.second)] {
-        for (i, moments) in moments.iter().enumerate() {
-            let moments = Tensor::new(moments.as_slice(), &Device::Cpu)?;
-            tensors.push((format!("adam.{name}.{i}"), moments));
+    let averages = average.map(|average| ("average", &average.values));
+    let moments = [("adam.first", &adam.first), ("adam.second", &adam.second)];
+    for (name, values) in moments.into_iter().chain(averages) {
+        for (i, values) in values.iter().enumerate() {
+            let values = Tensor::new(values.as_slice(), &Device::Cpu)?;
+            tensors.push((format!("{name}.{i}"), values));
         }
     }
     write(path, tensors, Some([(METADATA.to_owned(), state)].into()))
@@ -73,13 +77,13 @@ fn state(bytes: &[u8]) -> Result<State, String> {
     serde_json::from_str(state).map_err(|e| e.to_string())
 }
 
-/// Puts a checkpoint's values into a network and its moments into Adam.
+/// Puts a checkpoint's values into a network, its moments into Adam, and its averages, if the training has them, into an average.
 pub(super) fn load(
     path: &Path,
     network: &QualityNetwork,
     config: &TrainConfig,
     data: &DataState,
-) -> Result<Adam, TrainError> {
+) -> Result<(Adam, Option<Average>), TrainError> {
     let wrong = |message: String| TrainError::Checkpoint {
         path: path.to_owned(),
         message,
@@ -102,24 +106,34 @@ pub(super) fn load(
         .map_err(|e| wrong(e.to_string()))?;
     let mut adam = Adam::new(network.variables().iter().map(|v| v.elem_count()));
     adam.steps = state.steps;
-    for (name, moments) in [("first", &mut adam.first), ("second", &mut adam.second)] {
-        for (i, moments) in moments.iter_mut().enumerate() {
-            let name = format!("adam.{name}.{i}");
+    let mut average = (config.weight_average > 0.0).then(|| Average {
+        values: adam.first.clone(),
+    });
+    let averages = average
+        .as_mut()
+        .map(|average| ("average", &mut average.values));
+    let moments = [
+        ("adam.first", &mut adam.first),
+        ("adam.second", &mut adam.second),
+    ];
+    for (name, values) in moments.into_iter().chain(averages) {
+        for (i, values) in values.iter_mut().enumerate() {
+            let name = format!("{name}.{i}");
             let tensor = tensors
                 .get(&name)
                 .ok_or_else(|| wrong(format!("{name} is missing")))?;
-            if tensor.elem_count() != moments.len() {
-                let (found, expected) = (tensor.elem_count(), moments.len());
+            if tensor.elem_count() != values.len() {
+                let (found, expected) = (tensor.elem_count(), values.len());
                 return Err(wrong(format!(
                     "{name} has {found} values, expected {expected}"
                 )));
             }
-            *moments = tensor.flatten_all()?.to_vec1()?;
+            *values = tensor.flatten_all()?.to_vec1()?;
         }
     }
     let assigned = network.assign(&tensors);
     assigned.map_err(|error| error.in_file(path, &[]))?;
-    Ok(adam)
+    Ok((adam, average))
 }
 
 fn write(

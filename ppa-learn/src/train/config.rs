@@ -11,7 +11,7 @@ use crate::data::{Augmentation, Selection, Views};
 use crate::network::Fusion;
 use crate::weights::{FirstConvolution, WeightsMetadata};
 
-use super::schedule::{Schedule, StepCounting};
+use super::schedule::{RateSchedule, Schedule, StepCounting};
 
 /// A training, with nothing left open.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,8 +33,25 @@ pub struct TrainConfig {
     pub steps: u64,
     /// What `steps` counts.
     pub step_counting: StepCounting,
-    /// Rate of the first step; it falls by four factors of ten in the last 5 % of the steps.
+    /// The highest learning rate, that of the first step after the warm-up.
     pub learning_rate: f64,
+    /// How the rate falls from there.
+    #[serde(default)]
+    pub rate_schedule: RateSchedule,
+    /// Steps of the optimiser over which the learning rate rises evenly to the highest one.
+    #[serde(default)]
+    pub warm_up_steps: u64,
+    /// Decay by step of the exponential moving average of the weights, which is evaluated and saved in place of the weights; 0 for
+    /// none. Decays more than 0 need `recompute_statistics`.
+    #[serde(default)]
+    pub weight_average: f64,
+    /// Training batches, not augmented, whose mean statistics the normalisations have in each evaluation and in the saved weights; 0
+    /// leaves the running statistics of training. Linear probing leaves those of `start`, to which its features belong.
+    #[serde(default)]
+    pub recompute_statistics: u64,
+    /// Draw labels that are rare in the data as often as others; else every sample alike.
+    #[serde(default = "yes")]
+    pub balanced: bool,
     /// Frames that are used of a recorded pose.
     pub frames_per_pose: usize,
     /// Threads that load images.
@@ -67,6 +84,10 @@ pub struct TrainConfig {
     /// Persons to evaluate on; none of them in training.
     #[serde(default)]
     pub evaluation: Vec<Source>,
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// Which layers are trained.
@@ -123,6 +144,8 @@ impl TrainConfig {
             counting: self.step_counting,
             count: self.steps,
             first_rate: self.learning_rate,
+            shape: self.rate_schedule,
+            warm_up: self.warm_up_steps,
         }
     }
 

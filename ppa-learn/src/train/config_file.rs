@@ -6,7 +6,7 @@ use super::config::TrainConfig;
 use super::config_error::ConfigError;
 
 impl TrainConfig {
-    /// Reads a TOML file: `preset = "paper"` or `"quick"`, and every key that shall differ from it.
+    /// Reads a TOML file: `preset = "paper"`, `"standard"` or `"quick"`, and every key that shall differ from it.
     ///
     /// # Errors
     /// [`ConfigError`] naming file and key.
@@ -50,6 +50,7 @@ impl TrainConfig {
             None => Self::paper(),
             Some(toml::Value::String(name)) if name == "paper" => Self::paper(),
             Some(toml::Value::String(name)) if name == "quick" => Self::quick(),
+            Some(toml::Value::String(name)) if name == "standard" => Self::standard(),
             Some(other) => {
                 return Err(ConfigError::Preset {
                     path: path.to_owned(),
@@ -137,6 +138,29 @@ mod tests {
     }
 
     #[test]
+    fn a_run_without_newer_keys_means_what_it_meant() {
+        let folder = tempfile::tempdir().unwrap();
+        let paper = read(DATA).unwrap();
+        let mut echoed = toml::Table::try_from(&paper).unwrap();
+        let mut of_checkpoint = serde_json::to_value(&paper).unwrap();
+        for key in [
+            "rate_schedule",
+            "warm_up_steps",
+            "weight_average",
+            "recompute_statistics",
+            "balanced",
+        ] {
+            assert!(echoed.remove(key).is_some(), "{key}");
+            of_checkpoint.as_object_mut().unwrap().remove(key);
+        }
+        let of_checkpoint: TrainConfig = serde_json::from_value(of_checkpoint).unwrap();
+        assert_eq!(of_checkpoint, paper);
+        std::fs::write(folder.path().join("config.toml"), echoed.to_string()).unwrap();
+        let found = TrainConfig::read_run(folder.path()).unwrap();
+        assert_eq!(found, paper);
+    }
+
+    #[test]
     fn mistakes_are_named() {
         for (text, expected) in [
             ("preset = \"fast\"", "there is no preset \"fast\""),
@@ -144,6 +168,22 @@ mod tests {
             ("side = 8", "side is 8, expected 32 to 4096"),
             ("learning_rate = nan", "learning_rate is NaN"),
             ("steps = 0", "steps is 0"),
+            (
+                "preset = \"standard\"\nsteps = 100",
+                "warm_up_steps is 100, expected less than the steps",
+            ),
+            (
+                "weight_average = 1.0",
+                "weight_average is 1, expected 0 to less than 1",
+            ),
+            (
+                "recompute_statistics = 10001",
+                "recompute_statistics is 10001, expected 0 to 10000",
+            ),
+            (
+                "weight_average = 0.9",
+                "recompute_statistics is 0, expected at least 1 with weight_average",
+            ),
             ("steps = 46000000000000000", "expected 1 to 1000000000"),
             (
                 "workers = 1000000",

@@ -42,6 +42,31 @@ impl TrainConfig {
         let rate = self.learning_rate;
         let fine = rate.is_finite() && rate > 0.0;
         require(fine, "learning_rate", rate.to_string(), "more than 0")?;
+        let (warm_up, steps) = (self.warm_up_steps, self.schedule().steps());
+        require(
+            warm_up < steps,
+            "warm_up_steps",
+            warm_up.to_string(),
+            "less than the steps of the optimiser",
+        )?;
+        require(
+            (0.0..1.0).contains(&self.weight_average),
+            "weight_average",
+            self.weight_average.to_string(),
+            "0 to less than 1",
+        )?;
+        require(
+            self.recompute_statistics <= 10_000,
+            "recompute_statistics",
+            self.recompute_statistics.to_string(),
+            "0 to 10000",
+        )?;
+        require(
+            self.weight_average == 0.0 || self.recompute_statistics > 0,
+            "recompute_statistics",
+            "0".into(),
+            "at least 1 with weight_average, whose weights no batch has passed",
+        )?;
         let augmentation = &self.augmentation;
         for (key, share) in [
             (

@@ -2,9 +2,10 @@
 //!
 //! [`train`] follows a [`TrainConfig`] and fills a run folder: `config.toml` (what was resolved), `log.jsonl` and TensorBoard
 //! events (the same scalars), `start.json` (what of the `start` file was not taken as it stood), `checkpoint.safetensors` (weights by torchvision's names, running statistics, Adam's moments,
-//! step), and at the end `weights.safetensors`. Data position and random numbers follow from seed and step.
+//! averaged weights, step), and at the end `weights.safetensors`. Data position and random numbers follow from seed and step.
 
 mod adam;
+mod average;
 mod batch_source;
 mod checkpoint;
 mod config;
@@ -16,10 +17,12 @@ mod error;
 mod finite;
 mod limits;
 mod log;
+mod measure;
 mod presets;
 mod run;
 mod schedule;
 mod start_file;
+mod statistics;
 mod steps;
 mod tensorboard;
 mod trained;
@@ -31,7 +34,7 @@ pub use error::TrainError;
 pub use finite::Trouble;
 pub use log::{LogRow, read_log};
 pub use run::{Ended, Progress, train};
-pub use schedule::{Schedule, StepCounting};
+pub use schedule::{RateSchedule, Schedule, StepCounting};
 pub use start_file::read_start;
 pub use tensorboard::tensorboard_events;
 pub use trained::{predict, samples, steps_made, trained};

@@ -10,6 +10,7 @@ use ppa_dataset::write_whole;
 use crate::data::{Balanced, Images, check_split};
 
 use super::adam::Adam;
+use super::average::Average;
 use super::batch_source::BatchSource;
 use super::checkpoint;
 use super::config::TrainConfig;
@@ -71,7 +72,7 @@ pub fn train(
     let network = network(config)?.to_device(&device)?;
     let checkpoint = folder.join("checkpoint.safetensors");
     let data = DataState::of(&training);
-    let adam = if checkpoint.exists() {
+    let (adam, average) = if checkpoint.exists() {
         checkpoint::load(&checkpoint, &network, config, &data)?
     } else {
         let weights = folder.join("weights.safetensors");
@@ -86,7 +87,10 @@ pub fn train(
             let loaded = network.load(start, config.first_convolution)?;
             start_file::write(folder, &loaded)?;
         }
-        Adam::new(network.variables().iter().map(|v| v.elem_count()))
+        let variables = network.variables();
+        let average = (config.weight_average > 0.0).then(|| Average::new(&variables));
+        let adam = Adam::new(variables.iter().map(|v| v.elem_count()));
+        (adam, average.transpose()?)
     };
     write_whole(&folder.join("config.toml"), echoed.as_bytes())?;
     let log = Log::resume(&folder.join("log.jsonl"), adam.steps)?;
@@ -97,16 +101,17 @@ pub fn train(
         data,
         network,
         adam,
+        average,
         seconds_before: log.rows.last().map_or(0.0, |row| row.seconds),
         log,
         started: Instant::now(),
+        training: Arc::new(Images::new(training, config.side, keep_bytes)?),
         evaluation: match evaluation.is_empty() {
             true => None,
             false => Some(Arc::new(Images::new(evaluation, config.side, keep_bytes)?)),
         },
     };
-    let images = Arc::new(Images::new(training, config.side, keep_bytes)?);
-    let mut batches = BatchSource::new(config, &run.network, &images, run.adam.steps)?;
+    let mut batches = BatchSource::new(config, &run.network, &run.training, run.adam.steps)?;
     let steps = config.schedule().steps();
     run.make_up_evaluation()?;
     while run.adam.steps < steps {
@@ -135,6 +140,7 @@ pub fn train(
         }
     }
     let weights = folder.join("weights.safetensors");
-    run.network.save(&weights, config.weights_metadata())?;
+    run.evaluated_network()?
+        .save(&weights, config.weights_metadata())?;
     Ok(Ended::Finished)
 }

@@ -1,5 +1,6 @@
 //! Number of steps, and learning rate of each.
 
+use std::f64::consts::PI;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -33,6 +34,17 @@ impl fmt::Display for StepCounting {
     }
 }
 
+/// How the learning rate falls.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RateSchedule {
+    /// By a factor of ten after 95, 97.5, 99.5 and 99.75 % of the steps, as in the paper.
+    #[default]
+    Drops,
+    /// Along half a cosine to 0 (Loshchilov and Hutter 2017, arXiv:1608.03983, equation 5, without restarts).
+    Cosine,
+}
+
 /// Learning rates by step of the optimiser.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Schedule {
@@ -40,8 +52,12 @@ pub struct Schedule {
     pub counting: StepCounting,
     /// How many of it there are.
     pub count: u64,
-    /// Rate of the first step.
+    /// The highest rate: of the first step after the warm-up.
     pub first_rate: f64,
+    /// How it falls.
+    pub shape: RateSchedule,
+    /// Steps of the optimiser over which the rate rises evenly to the highest one.
+    pub warm_up: u64,
 }
 
 impl Schedule {
@@ -58,8 +74,23 @@ impl Schedule {
 
     /// Rate of a step of the optimiser; the first one is step 0.
     ///
-    /// After 95, 97.5, 99.5 and 99.75 % of the count it is divided by ten.
+    /// Step s of W warm-up steps has (s + 1) / (W + 1) of the rate that the schedule gives.
     pub fn learning_rate(&self, step: u64) -> f64 {
+        let warm = (step + 1) as f64 / (self.warm_up + 1) as f64;
+        warm.min(1.0)
+            * match self.shape {
+                RateSchedule::Drops => self.dropped_rate(step),
+                RateSchedule::Cosine => self.cosine_rate(step),
+            }
+    }
+
+    fn cosine_rate(&self, step: u64) -> f64 {
+        let falling = self.steps().saturating_sub(self.warm_up).max(1);
+        let made = step.saturating_sub(self.warm_up) as f64 / falling as f64;
+        self.first_rate * 0.5 * (1.0 + (PI * made.min(1.0)).cos())
+    }
+
+    fn dropped_rate(&self, step: u64) -> f64 {
         let counted = match self.counting {
             StepCounting::Optimiser => step,
             StepCounting::Batches => step / TRAINING * (TRAINING + EVALUATING) + step % TRAINING,
@@ -85,6 +116,8 @@ mod tests {
             counting: StepCounting::Optimiser,
             count: 200_000,
             first_rate: 1e-3,
+            shape: RateSchedule::Drops,
+            warm_up: 0,
         };
         assert_eq!(paper.steps(), 200_000);
         assert_eq!(drops(paper), [190_000, 195_000, 199_000, 199_500]);
@@ -103,11 +136,33 @@ mod tests {
             counting: StepCounting::Batches,
             count: 200_000,
             first_rate: 1e-3,
+            shape: RateSchedule::Drops,
+            warm_up: 0,
         };
         assert_eq!(code.steps(), 176_000);
         // 190 000 = 380 rounds of 500 batches.
         assert_eq!(drops(code), [380 * 440, 390 * 440, 398 * 440, 399 * 440]);
         let within_a_round = Schedule { count: 470, ..code };
         assert_eq!(within_a_round.steps(), 440);
+    }
+
+    #[test]
+    fn a_cosine_rises_in_the_warm_up_and_falls_to_0() {
+        let schedule = Schedule {
+            counting: StepCounting::Optimiser,
+            count: 1000,
+            first_rate: 1e-3,
+            shape: RateSchedule::Cosine,
+            warm_up: 99,
+        };
+        let share = |step| schedule.learning_rate(step) / 1e-3;
+        for (step, expected) in [(0, 0.01), (49, 0.5), (98, 0.99), (99, 1.0)] {
+            assert!((share(step) - expected).abs() < 1e-12, "{step}");
+        }
+        // Halfway down at half of the 901 steps after the warm-up; a third of the way in angle is cos 60° above the middle.
+        assert!((share(99 + 450) - 0.5).abs() < 2e-3);
+        assert!((share(99 + 300) - 0.75).abs() < 2e-3);
+        assert!(share(999) > 0.0 && share(999) < 1e-5);
+        assert!((1..901).all(|n| share(99 + n) < share(98 + n)));
     }
 }

@@ -12,19 +12,18 @@ use crate::data::Images;
 use crate::network::QualityNetwork;
 
 use super::adam::Adam;
+use super::average::Average;
 use super::batch_source::Outputs;
 use super::checkpoint;
-use super::config::TrainConfig;
+use super::config::{Layers, TrainConfig};
 use super::data_state::DataState;
 use super::error::TrainError;
 use super::finite::{is_finite, trouble};
 use super::log::{Log, LogRow};
+use super::measure::{EVALUATION, scalars};
 use super::run::Progress;
+use super::statistics::recompute_statistics;
 use super::tensorboard::tensorboard_events;
-use super::trained::predict;
-
-/// The scalar that every evaluation has in the log.
-const EVALUATION: &str = "evaluation/mae";
 
 /// Whether what is done `every` so many steps is done after `step`; all is after the last one.
 pub(super) fn is_due(every: NonZeroUsize, step: u64, steps: u64) -> bool {
@@ -38,10 +37,12 @@ pub(super) struct Run<'a> {
     pub data: DataState,
     pub network: QualityNetwork,
     pub adam: Adam,
+    pub average: Option<Average>,
     pub log: Log,
     pub started: Instant,
     /// Of earlier runs of the same training.
     pub seconds_before: f64,
+    pub training: Arc<Images>,
     pub evaluation: Option<Arc<Images>>,
 }
 
@@ -76,12 +77,34 @@ impl Run<'_> {
         let learning_rate = schedule.learning_rate(step);
         self.adam
             .step(&self.network.variables(), &gradients, learning_rate)?;
+        if let Some(average) = &mut self.average {
+            let decay = self.config.weight_average;
+            average.add(&self.network.variables(), decay, self.adam.steps)?;
+        }
         Ok(Progress {
             step: self.adam.steps,
             steps: schedule.steps(),
             loss,
             learning_rate,
         })
+    }
+
+    /// The network that is evaluated and saved: with averaged weights and statistics computed again, if the configuration asks for them.
+    pub fn evaluated_network(&self) -> Result<QualityNetwork, TrainError> {
+        let config = self.config;
+        // The features of linear probing belong to the statistics of its start.
+        let recomputed = config.recompute_statistics > 0 && config.layers == Layers::All;
+        if self.average.is_none() && !recomputed {
+            return Ok(self.network.clone());
+        }
+        let network = self.network.to_device(self.network.device())?;
+        if let Some(average) = &self.average {
+            average.assign(&network.variables())?;
+        }
+        if recomputed {
+            recompute_statistics(config, &network, &self.training)?;
+        }
+        Ok(network)
     }
 
     fn seconds(&self) -> f64 {
@@ -120,26 +143,13 @@ impl Run<'_> {
 
     /// Adds a row of the evaluation to the log, if there is anybody to evaluate on.
     fn evaluate(&mut self) -> Result<(), TrainError> {
-        if let Some(images) = &self.evaluation {
-            let predictions = predict(
-                &self.network,
-                images,
-                self.config.batch_size,
-                self.config.workers,
-            )?;
-            let errors = predictions.iter().zip(images.samples());
-            let errors: Vec<f64> = errors.map(|(y, sample)| y - sample.label).collect();
-            let mean = |score: fn(&f64) -> f64| {
-                errors.iter().map(score).sum::<f64>() / errors.len() as f64
-            };
-            let scalars = [
-                (EVALUATION.to_owned(), mean(|e| e.abs())),
-                ("evaluation/mse".to_owned(), mean(|e| e * e)),
-            ];
+        if let Some(evaluation) = &self.evaluation {
+            let network = self.evaluated_network()?;
+            let scalars = scalars(self.config, &network, evaluation, &self.training)?;
             self.log.push(LogRow {
                 step: self.adam.steps,
                 seconds: self.seconds(),
-                scalars: scalars.into(),
+                scalars,
             })?;
         }
         Ok(())
@@ -155,11 +165,12 @@ impl Run<'_> {
         let Self {
             network,
             adam,
+            average,
             config,
             data,
             ..
         } = &*self;
-        checkpoint::save(checkpoint, network, adam, config, data)?;
+        checkpoint::save(checkpoint, network, adam, average.as_ref(), config, data)?;
         evaluated?;
         self.write_events()
     }

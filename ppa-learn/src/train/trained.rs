@@ -95,8 +95,19 @@ pub fn predict(
     batch_size: NonZeroUsize,
     workers: NonZeroUsize,
 ) -> Result<Vec<f64>, TrainError> {
+    predict_in_order(network, images, &Order::Once, batch_size, workers)
+}
+
+/// The same of the samples of an order that ends.
+pub(super) fn predict_in_order(
+    network: &QualityNetwork,
+    images: &Arc<Images>,
+    order: &Order,
+    batch_size: NonZeroUsize,
+    workers: NonZeroUsize,
+) -> Result<Vec<f64>, TrainError> {
     let mut predictions = Vec::new();
-    for batch in Loader::new(images, &Order::Once, batch_size, workers) {
+    for batch in Loader::new(images, order, batch_size, workers) {
         let images = tensors(batch?, images.side(), network.device())?;
         let outputs = network.forward(&images, Mode::Eval)?;
         let outputs: Vec<f32> = outputs.flatten_all()?.to_vec1()?;

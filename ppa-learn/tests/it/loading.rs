@@ -28,7 +28,7 @@ fn images(folder: &TempDir, views: Views, keep_bytes: usize) -> Arc<Images> {
 fn training(images: &Images, first_batch: u64) -> Order {
     Order::Training {
         balanced: Balanced::new(images.samples()).unwrap(),
-        augmentation: Augmentation::default(),
+        augmentation: Some(Augmentation::default()),
         seed: 3,
         first_batch,
     }
@@ -51,6 +51,41 @@ fn batches_do_not_depend_on_workers_memory_or_start() {
     assert_eq!(batches, first_batches(&none, 0, 2));
     assert_eq!(batches[2..], first_batches(&all, 2, 2)[..4]);
     assert_ne!(batches[0], batches[1]);
+}
+
+#[test]
+fn listed_samples_are_loaded_as_evaluation_sees_them() {
+    let folder = dataset(2, &[0, 90, 180]);
+    let images = images(&folder, Views::Left, usize::MAX);
+    let load = |order: &Order| -> Vec<Batch> {
+        let loader = Loader::new(&images, order, n(2), n(2)).take(3);
+        loader.collect::<Result<_, _>>().unwrap()
+    };
+    let all = load(&Order::Once);
+    let listed = load(&Order::Listed(vec![4, 1, 5]));
+    let samples: Vec<_> = listed.iter().map(|batch| batch.samples.clone()).collect();
+    assert_eq!(samples, [vec![4, 1], vec![5]]);
+    assert_eq!(listed[1].images[0], all[2].images[0][SIDE * SIDE..]);
+    // Drawn as in training, without its augmentation.
+    let training = training(&images, 0);
+    let Order::Training { balanced, seed, .. } = &training else {
+        panic!("an order of training")
+    };
+    let plain = Order::Training {
+        balanced: balanced.clone(),
+        augmentation: None,
+        seed: *seed,
+        first_batch: 0,
+    };
+    let drawn = load(&training);
+    for (plain, drawn) in load(&plain).into_iter().zip(drawn) {
+        assert_eq!(plain.samples, drawn.samples);
+        assert_ne!(plain.images, drawn.images);
+        assert_eq!(
+            plain.images,
+            load(&Order::Listed(plain.samples.clone()))[0].images
+        );
+    }
 }
 
 #[test]

@@ -36,9 +36,10 @@ fn a_training_that_was_stopped_ends_with_the_same_bytes() {
         let [whole, parts] = [&whole, &parts].map(|folder| fs::read(folder.join(file)).unwrap());
         assert!(whole == parts, "{file}");
     }
+    // As text: correlations that are not defined are NaN.
     let scalars = |folder: &Path| {
-        let rows = read_log(&folder.join("log.jsonl")).unwrap();
-        let rows = rows.into_iter().map(|row| (row.step, row.scalars));
+        let rows = read_log(&folder.join("log.jsonl")).unwrap().into_iter();
+        let rows = rows.map(|row| format!("{} {:?}", row.step, row.scalars));
         rows.collect::<Vec<_>>()
     };
     // Six steps and three evaluations.
@@ -46,6 +47,45 @@ fn a_training_that_was_stopped_ends_with_the_same_bytes() {
     assert_eq!(scalars(&whole), scalars(&parts));
     // A finished training stays as it is.
     assert_eq!(run(&config, &parts).unwrap(), Ended::Finished);
+}
+
+#[test]
+fn averages_and_statistics_are_the_same_after_a_stop() {
+    let data = dataset(2, &[0, 90, 180]);
+    let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let [whole, parts] = folders.each_ref().map(|folder| folder.path());
+    let plain = config(data.path());
+    let averaged = TrainConfig {
+        weight_average: 0.9,
+        recompute_statistics: 2,
+        ..plain.clone()
+    };
+    run(&averaged, whole).unwrap();
+    // Evaluations change nothing either.
+    let rarely = TrainConfig {
+        checkpoint_every: n(5),
+        evaluation: Vec::new(),
+        ..averaged.clone()
+    };
+    let elsewhere = tempfile::tempdir().unwrap();
+    run(&rarely, elsewhere.path()).unwrap();
+    assert_eq!(stop_after(&averaged, parts, 3), Ended::Stopped { step: 3 });
+    run(&averaged, parts).unwrap();
+    let checkpoint = |folder: &Path| fs::read(folder.join("checkpoint.safetensors")).unwrap();
+    assert!(checkpoint(whole) == checkpoint(parts));
+    let weights = |folder: &Path| fs::read(folder.join("weights.safetensors")).unwrap();
+    assert!(weights(whole) == weights(parts));
+    assert!(weights(whole) == weights(elsewhere.path()));
+    // Training itself does not notice: the losses are those without an average.
+    let other = tempfile::tempdir().unwrap();
+    run(&plain, other.path()).unwrap();
+    assert!(weights(whole) != weights(other.path()));
+    let losses = |folder: &Path| {
+        let rows = read_log(&folder.join("log.jsonl")).unwrap().into_iter();
+        rows.filter_map(|row| row.scalars.get("training/loss").copied())
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(losses(whole), losses(other.path()));
 }
 
 #[test]
@@ -163,7 +203,8 @@ fn a_failed_evaluation_is_repeated_on_resume() {
         let evaluated = |folder: &Path| {
             let rows = read_log(&folder.join("log.jsonl")).unwrap().into_iter();
             let rows = rows.filter(|row| row.scalars.contains_key("evaluation/mae"));
-            rows.map(|row| (row.step, row.scalars)).collect::<Vec<_>>()
+            rows.map(|row| (row.step, format!("{:?}", row.scalars)))
+                .collect::<Vec<_>>()
         };
         let events = fs::read(folder.path().join("events.out.tfevents.ppa")).unwrap();
         assert!(events.windows(14).any(|bytes| bytes == b"evaluation/mae"));
