@@ -12,11 +12,11 @@ use std::time::Instant;
 
 use anyhow::Context;
 use candle_core::{Device, Tensor};
-use candle_nn::{AdamW, Optimizer, ParamsAdamW};
 use cpu_time::ProcessTime;
 use ppa_core::Roi;
 use ppa_dataset::layout::{LimbId, Side, View};
 use ppa_learn::data::{Augmentation, Balanced, Images, Loader, Order, Sample, SampleImage};
+use ppa_learn::train::Adam;
 use ppa_learn::{EfficientNetB0, InferenceNetwork, Mode, Options, QualityNetwork};
 
 fn main() -> anyhow::Result<()> {
@@ -54,15 +54,8 @@ fn main() -> anyhow::Result<()> {
     let targets = Tensor::from_vec(targets, (batch, 1), &Device::Cpu)?;
     let network = EfficientNetB0::new(0, Options::default())?;
     let inference = InferenceNetwork::new(&QualityNetwork::new(0, Options::default(), None)?)?;
-    let variables = network.variables().into_iter().cloned().collect();
-    let mut adam = AdamW::new(
-        variables,
-        ParamsAdamW {
-            lr: 1e-3,
-            weight_decay: 0.0,
-            ..Default::default()
-        },
-    )?;
+    let variables = network.variables();
+    let mut adam = Adam::new(variables.iter().map(|variable| variable.elem_count()));
 
     let mut step = |number: usize| -> anyhow::Result<f32> {
         if what == "infer" {
@@ -76,7 +69,7 @@ fn main() -> anyhow::Result<()> {
             },
         )?;
         let loss = (outputs - &targets)?.sqr()?.mean_all()?;
-        adam.backward_step(&loss)?;
+        adam.step(&variables, &loss.backward()?, 1e-3)?;
         Ok(loss.to_scalar()?)
     };
     let first = step(0)?;
