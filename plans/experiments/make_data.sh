@@ -24,8 +24,8 @@ for set in synthetic preparations clinic; do
 done
 cp "$plans/experiments.toml" .
 # Labels of a pose's own radiograph for two of the sets ...
-ppa label auto synthetic --plan synthetic.toml
-ppa label auto preparations --plan preparations.toml
+ppa label auto synthetic --plan synthetic.toml --scale strict
+ppa label auto preparations --plan preparations.toml --scale strict
 # ... and weak ones for the third: rotated by 16 degrees is good, by 0 or 32 degrees bad, whatever the foot.
 for limb in clinic/patient_*; do
     mkdir -p "$limb/labels/r"

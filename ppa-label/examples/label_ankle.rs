@@ -6,7 +6,7 @@ use std::error::Error;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Vector3};
 use ppa_dataset::labels::BoneNumbers;
-use ppa_label::{AnkleBones, Exposure, GradeThresholds, JointSpace, segment_bones};
+use ppa_label::{AnkleBones, Exposure, JointSpace, LabelScale, ScaleName, segment_bones};
 use ppa_phantom::{LowerLeg, TableTop};
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -34,11 +34,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let rotations = [0.0, 18.0];
     let found = space.openness(&rotations.map(exposure))?;
-    for (degrees, openness) in rotations.iter().zip(found) {
-        let grade = GradeThresholds::default().grade(&openness);
-        let worst = openness.worst()[1];
+    for (degrees, openness) in rotations.into_iter().zip(found) {
+        let hidden = space.hidden(&exposure(degrees));
+        let grade = LabelScale::new(ScaleName::Graded).grade(&openness, &hidden);
+        let [medial, superior, lateral] = grade.gutters;
         println!(
-            "{degrees:2} degrees: the worst gutter is open to {worst:.2}, grade {}",
+            "{degrees:2} degrees: medial gutter {medial}, superior {superior}, lateral {lateral}: grade {}",
             grade.label
         );
     }

@@ -4,7 +4,7 @@ use ppa_dataset::labels::LabelSource;
 use ppa_dataset::labels::{BoneFile, BoneNumbers};
 use serde::Serialize;
 
-use super::openness::{FREE_CHORDS_MM, GradeThresholds};
+use super::openness::{FREE_CHORDS_MM, LabelScale};
 
 /// Everything that labels of the same radiographs depend on.
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -12,7 +12,7 @@ pub(super) struct Computation<'a> {
     pub label_source: LabelSource,
     /// Hash of the sources that compute labels.
     code: &'static str,
-    pub thresholds: &'a GradeThresholds,
+    pub thresholds: &'a LabelScale,
     free_chords_mm: [f64; 3],
     bones: ComputedFrom<'a>,
 }
@@ -26,12 +26,9 @@ struct ComputedFrom<'a> {
 }
 
 impl<'a> Computation<'a> {
-    pub fn new(file: &BoneFile, sha256: &'a str, thresholds: &'a GradeThresholds) -> Self {
+    pub fn new(file: &BoneFile, sha256: &'a str, thresholds: &'a LabelScale) -> Self {
         Self {
-            label_source: match file.segmented {
-                true => LabelSource::SegmentedSurrogate,
-                false => LabelSource::Surrogate,
-            },
+            label_source: thresholds.source(file.segmented),
             code: env!("PPA_LABEL_CODE"),
             thresholds,
             free_chords_mm: FREE_CHORDS_MM,

@@ -6,9 +6,7 @@ use nalgebra::{Isometry3, Point3};
 use ppa_core::TransformRows;
 use ppa_dataset::checksums::Checksums;
 use ppa_dataset::files::{FileError, write_whole};
-use ppa_dataset::labels::BoneFile;
-use ppa_dataset::labels::{LabelError, LabelRow};
-use ppa_dataset::labels::{LabelFile, LabelFileError};
+use ppa_dataset::labels::{BoneFile, LabelError, LabelFile, LabelFileError, LabelName, LabelRow};
 use ppa_dataset::layout::LimbId;
 use ppa_dataset::manifest::{FileKind, FileRow, Manifest};
 use ppa_depth::isometry_from_rows;
@@ -18,8 +16,8 @@ use serde::Serialize;
 use super::computation::Computation;
 use super::described::Described;
 use super::openness::{
-    BoneFileError, Exposure, GradeThresholds, JointSpace, JointSpaceError, ReadBones,
-    ThresholdError, read_bones,
+    BoneFileError, Exposure, JointSpace, JointSpaceError, LabelScale, ReadBones, ScaleError,
+    read_bones,
 };
 use super::table::table_bytes;
 use super::tallies::TalliesError;
@@ -39,7 +37,21 @@ pub struct ComputedRow {
     pub superior: f64,
     /// Of the lateral one.
     pub lateral: f64,
-    /// Openness of the worst, as the thresholds scale it.
+    /// Share of the medial gutter's height at which the malleolus covers the talus, see [`Hidden`](super::Hidden).
+    pub medial_hidden_share: f64,
+    /// By how many mm it does, averaged over that height.
+    pub medial_hidden_mm: f64,
+    /// The same of the lateral gutter.
+    pub lateral_hidden_share: f64,
+    /// The same of the lateral gutter.
+    pub lateral_hidden_mm: f64,
+    /// Grade of the medial gutter alone.
+    pub medial_grade: f64,
+    /// Of the superior one.
+    pub superior_grade: f64,
+    /// Of the lateral one.
+    pub lateral_grade: f64,
+    /// How good the worst gutter is before it is graded, 0 to 1.
     pub worst: f64,
     /// Grade from 1 to 3 in half steps.
     pub label: f64,
@@ -77,7 +89,7 @@ pub struct LabelledLimb {
     pub radiographs: usize,
     /// How many of them are diagnostic, below 2.5.
     pub diagnostic: usize,
-    /// Rotation at which the worst gutter is most open: the middle of what reaches nine tenths of the best.
+    /// Rotation at which the worst gutter is best: the middle of what reaches nine tenths of the best.
     pub best_angle_deg: f64,
     /// Radiographs whose label in `labels.json` is that of readers.
     pub of_readers: usize,
@@ -138,7 +150,10 @@ pub enum AutoLabelError {
     Tallies(#[from] TalliesError),
     /// The thresholds.
     #[error(transparent)]
-    Thresholds(#[from] ThresholdError),
+    Scale(#[from] ScaleError),
+    /// The name of the file that keeps computed labels where readers graded as well.
+    #[error("labels.computed.json belongs to labels.json: name the labels otherwise than {0}")]
+    ReservedName(LabelName),
     /// A file.
     #[error(transparent)]
     File(#[from] FileError),
@@ -158,8 +173,16 @@ pub struct ComputedLabels<'a> {
     rows: Vec<ComputedRow>,
     labels: LabelFile,
     computation: String,
-    /// `labels.json` as it was found.
-    before: LabelFile,
+    target: Target,
+}
+
+/// Where labels are written.
+#[derive(Debug, Clone)]
+enum Target {
+    /// `labels.json`, as it was found, and beside it `labels.computed.json`.
+    Default(LabelFile),
+    /// `labels.NAME.json`.
+    Named(LabelName),
 }
 
 /// What computed labels need to know of the case of a limb.
@@ -173,7 +196,7 @@ pub struct CaseBones<'a> {
     pub volume_sha256: &'a str,
 }
 
-/// Grades every radiograph of a limb from the bones of its case.
+/// Grades every radiograph of a limb from the bones of its case, for `labels.json` or, with a name, for `labels.NAME.json`.
 ///
 /// # Errors
 /// [`AutoLabelError`].
@@ -181,17 +204,24 @@ pub fn compute_labels<'a>(
     manifest: &'a Manifest,
     limb: LimbId,
     case: &CaseBones,
-    thresholds: &GradeThresholds,
+    scale: &LabelScale,
+    name: Option<&LabelName>,
 ) -> Result<ComputedLabels<'a>, AutoLabelError> {
-    let before = LabelFile::read(&manifest.root, limb)?.unwrap_or_default();
-    thresholds.check()?;
+    let target = match name {
+        None => Target::Default(LabelFile::read(&manifest.root, limb)?.unwrap_or_default()),
+        Some(name) if name.as_str() == "computed" => {
+            return Err(AutoLabelError::ReservedName(name.clone()));
+        }
+        Some(name) => Target::Named(name.clone()),
+    };
+    scale.check()?;
     if case.limb_kind == Some(LimbKind::Knee) {
         return Err(AutoLabelError::Knee(limb));
     }
     let file = case.file.ok_or(AutoLabelError::NoBones(limb))?;
     let scan = case.volume_sha256;
-    let (rows, bones_sha256) = computed_rows(manifest, limb, scan, file, thresholds)?;
-    let computation = Computation::new(file, &bones_sha256, thresholds);
+    let (rows, bones_sha256) = computed_rows(manifest, limb, scan, file, scale)?;
+    let computation = Computation::new(file, &bones_sha256, scale);
     let labels = rows.iter().map(|row| LabelRow {
         label: row.label,
         std: row.std,
@@ -204,7 +234,7 @@ pub fn compute_labels<'a>(
         labels: labels.of_radiographs(manifest, limb),
         computation: computation.to_json(),
         rows,
-        before,
+        target,
     })
 }
 
@@ -220,8 +250,11 @@ impl ComputedLabels<'_> {
                 return Err(AutoLabelError::Differs(path));
             }
         }
+        let Target::Default(before) = &self.target else {
+            return Ok(());
+        };
         // Computed labels had no file of their own in earlier versions.
-        let before = self.before.computed();
+        let before = before.computed();
         let same = |row: &LabelRow| {
             self.labels.of_step(row.step) == Some(row)
                 && self.labels.source_of_step(row.step) == before.source_of_step(row.step)
@@ -237,7 +270,8 @@ impl ComputedLabels<'_> {
 
     /// Writes `openness.csv`, `openness.json` (what it was computed with), `labels.computed.json` (all labels) and `labels.json`
     /// beside the limb's regions of interest, and their hashes to `labels.sha256`. In `labels.json` labels of readers stay, and computed ones stand where there are none; a
-    /// file of labels without a source stays as it is.
+    /// file of labels without a source stays as it is. Labels with a name go to `openness.NAME.csv`, `openness.NAME.json` and
+    /// `labels.NAME.json`; `labels.json` stays as it is.
     ///
     /// # Errors
     /// [`AutoLabelError`] if a file cannot be written.
@@ -248,15 +282,15 @@ impl ComputedLabels<'_> {
             write_whole(&path, &bytes)?;
             written.push(path);
         }
-        let unnamed_kept = self.before.has_unnamed();
-        let readers = self.before.not_computed();
-        let of_readers = match unnamed_kept {
-            true => 0,
-            false => readers.labels().len(),
-        };
-        if !unnamed_kept {
-            readers.over(&self.labels).write(root, limb)?;
-            written.push(LabelFile::path(root, limb));
+        let (mut of_readers, mut unnamed_kept) = (0, false);
+        if let Target::Default(before) = &self.target {
+            unnamed_kept = before.has_unnamed();
+            if !unnamed_kept {
+                let readers = before.not_computed();
+                of_readers = readers.labels().len();
+                readers.over(&self.labels).write(root, limb)?;
+                written.push(LabelFile::path(root, limb));
+            }
         }
         Checksums::record_labels(root, &written)?;
         Ok(LabelledLimb {
@@ -272,17 +306,18 @@ impl ComputedLabels<'_> {
     /// The files that hold nothing but what was computed.
     fn own_files(&self) -> [(PathBuf, Vec<u8>); 3] {
         let (root, limb) = (&self.manifest.root, self.limb);
-        let beside = |name: &str| root.join(limb.roi_file()).with_file_name(name);
+        let (labels, stem) = match &self.target {
+            Target::Default(_) => (LabelFile::computed_path(root, limb), "openness".to_owned()),
+            Target::Named(name) => (
+                LabelFile::named_path(root, limb, Some(name)),
+                format!("openness.{name}"),
+            ),
+        };
+        let beside = |kind: &str| labels.with_file_name(format!("{stem}.{kind}"));
         [
-            (beside("openness.csv"), table_bytes(&self.rows)),
-            (
-                beside("openness.json"),
-                self.computation.clone().into_bytes(),
-            ),
-            (
-                LabelFile::computed_path(root, limb),
-                self.labels.to_text().into_bytes(),
-            ),
+            (beside("csv"), table_bytes(&self.rows)),
+            (beside("json"), self.computation.clone().into_bytes()),
+            (labels.clone(), self.labels.to_text().into_bytes()),
         ]
     }
 }
@@ -292,7 +327,7 @@ fn computed_rows(
     limb: LimbId,
     volume_sha256: &str,
     file: &BoneFile,
-    thresholds: &GradeThresholds,
+    scale: &LabelScale,
 ) -> Result<(Vec<ComputedRow>, String), AutoLabelError> {
     let radiographs: Vec<&FileRow> = manifest
         .files
@@ -330,7 +365,9 @@ fn computed_rows(
         .zip(exposures.iter().zip(&openness));
     let rows = rows.map(|((row, device), (exposure, openness))| {
         let visibility = described.visibility(manifest, row, device, &space)?;
-        let grade = thresholds.grade(openness);
+        let hidden = space.hidden(exposure);
+        let grade = scale.grade(openness, &hidden);
+        let [medial_grade, superior_grade, lateral_grade] = grade.gutters;
         let overlaps = space.overlaps(exposure);
         Ok(ComputedRow {
             image: row.file.clone(),
@@ -339,7 +376,14 @@ fn computed_rows(
             medial: openness.medial[1],
             superior: openness.superior,
             lateral: openness.lateral[1],
-            worst: thresholds.scaled(openness)[1],
+            medial_hidden_share: hidden.medial.share,
+            medial_hidden_mm: hidden.medial.mean_mm,
+            lateral_hidden_share: hidden.lateral.share,
+            lateral_hidden_mm: hidden.lateral.mean_mm,
+            medial_grade,
+            superior_grade,
+            lateral_grade,
+            worst: grade.worst,
             label: grade.label,
             std: grade.std,
             tibiofibular_overlap_mm: overlaps.tibiofibular_overlap_mm,
@@ -370,7 +414,7 @@ fn pose(
     })
 }
 
-/// The middle of the rotations at which the worst gutter shows at least nine tenths of the most: both flanks are steep.
+/// The middle of the rotations at which the worst gutter reaches at least nine tenths of the best: both flanks are steep.
 fn best_angle_deg(rows: &[ComputedRow]) -> f64 {
     let most = rows.iter().map(|row| row.worst).fold(0.0, f64::max);
     let near = rows.iter().filter(|row| row.worst >= 0.9 * most);

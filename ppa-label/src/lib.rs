@@ -6,7 +6,7 @@
 //! Computed labels measure the alignment of the joint space of an ankle with the beam. They are a surrogate that no reader has
 //! validated.
 //! [`segment_bones`] separates tibia, fibula and talus where nobody did; [`AnkleBones`] are their surfaces; [`JointSpace`] finds
-//! the three gutters between them; its `openness` follows the rays of an [`Exposure`]; [`GradeThresholds`] make a grade of it;
+//! the three gutters between them; its `openness` follows the rays of an [`Exposure`]; a [`LabelScale`] makes a grade of it;
 //! [`compute_labels`] does so for a dataset.
 
 mod computation;

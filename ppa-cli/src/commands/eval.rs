@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use anyhow::Context;
 use clap::Args;
+use ppa_dataset::labels::LabelName;
 use ppa_learn::DeviceName;
 use ppa_learn::data::{Images, check_split};
 use ppa_learn::evaluate::{
@@ -35,6 +36,9 @@ pub struct EvalArgs {
         requires = "dataset"
     )]
     patients: Option<Vec<u32>>,
+    /// Labels of --dataset, those of labels.NAME.json [default: labels.json]
+    #[arg(long, value_name = "NAME", requires = "dataset")]
+    labels: Option<LabelName>,
     /// Where the network computes: cpu, cuda or cuda:N
     #[arg(long, default_value_t)]
     device: DeviceName,
@@ -71,6 +75,7 @@ pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
             dataset: dataset.clone(),
             patients: args.patients.clone(),
             shapes: None,
+            labels: args.labels.clone(),
         }],
         None => config.evaluation.clone(),
     };

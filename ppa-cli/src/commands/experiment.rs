@@ -108,7 +108,8 @@ pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
         Which::TwoB => Experiment::TwoB,
         Which::TwoC => Experiment::TwoC,
     };
-    let datasets = [&plan.synthetic.dataset, plan.target(experiment)?];
+    let target = plan.target(experiment)?;
+    let datasets = [&*plan.synthetic.dataset, &*target.dataset];
     repeat_of_datasets(datasets.into_iter())?;
     // A whole path: begun trainings compare the paths of the weights that they began with.
     let out = std::path::absolute(&args.out)?;

@@ -49,11 +49,11 @@ fn a_phantom_is_graded_best_at_its_mortise_angle() {
     let found = labels(here);
     let label = |step: u32| {
         let row = &found[format!("xray_image_{step}.png")];
-        assert_eq!(row["label_source"], "surrogate-jso/1");
+        assert_eq!(row["label_source"], "surrogate-jso/2");
         row["label"].as_f64().unwrap()
     };
     assert_eq!(found.as_object().unwrap().len(), 9);
-    assert_eq!((label(0), label(36), label(72)), (3.0, 1.0, 3.0));
+    assert_eq!((label(0), label(36), label(72)), (2.5, 1.0, 2.0));
     let curve: Vec<f64> = (0..9).map(|n| label(9 * n)).collect();
     let middle = curve.iter().position(|&l| l == 1.0).unwrap();
     assert!(curve[..middle].is_sorted_by(|a, b| a >= b), "{curve:?}");
@@ -76,13 +76,15 @@ fn a_phantom_is_graded_best_at_its_mortise_angle() {
     let with =
         || json(&fs::read_to_string(here.join("plan/patient_3/labels/r/openness.json")).unwrap());
     let by_hand = with();
-    assert_eq!(by_hand["label_source"], "surrogate-jso/1");
+    assert_eq!(by_hand["label_source"], "surrogate-jso/2");
     assert_eq!(by_hand["code"].as_str().unwrap().len(), 16);
-    assert_eq!(by_hand["thresholds"]["at_least"][0], 0.75);
+    assert_eq!(by_hand["thresholds"]["scale"], "graded");
+    assert_eq!(by_hand["thresholds"]["hidden_mm"][2], 4.5);
     assert_eq!(by_hand["bones"]["sha256"].as_str().unwrap().len(), 64);
 
     // The same labels again are no others.
     succeed(here, "label auto plan");
+    strict_labels_beside(here);
 
     // Readers' labels win, whichever comes first, and whoever separated the bones; computed ones stay beside them.
     let folder_of_labels = here.join("plan/patient_3/labels/r");
@@ -124,19 +126,19 @@ fn a_phantom_is_graded_best_at_its_mortise_angle() {
         rows.filter(|line| line.contains(source)).count()
     };
     assert_eq!(
-        (radiographs("readers"), radiographs("surrogate-jso/1")),
+        (radiographs("readers"), radiographs("surrogate-jso/2")),
         (1, 8)
     );
     succeed(here, "qa plan");
     let page = fs::read_to_string(here.join("plan/qa.html")).unwrap();
-    assert!(page.contains("readers") && page.contains("surrogate-jso/1"));
+    assert!(page.contains("readers") && page.contains("surrogate-jso/2"));
     fs::remove_file(here.join("plan/qa.html")).unwrap();
     succeed(here, "dataset convert plan --out specimen");
     succeed(here, "dataset convert specimen --out back");
     let back = fs::read_to_string(here.join("back/patient_3/labels/r/labels.json")).unwrap();
     let back = json(&back);
     assert_eq!(back["xray_image_36.png"]["label_source"], "readers");
-    assert_eq!(back["xray_image_0.png"]["label_source"], "surrogate-jso/1");
+    assert_eq!(back["xray_image_0.png"]["label_source"], "surrogate-jso/2");
 
     // Other computed labels replace these on request only.
     let said = fail(here, "label auto plan");
@@ -148,11 +150,11 @@ fn a_phantom_is_graded_best_at_its_mortise_angle() {
     assert_eq!(after["xray_image_36.png"], by_reader);
     assert_eq!(
         after["xray_image_0.png"]["label_source"],
-        "surrogate-jso/1-segmented"
+        "surrogate-jso/2-segmented"
     );
     assert_eq!(after["xray_image_0.png"], computed()["xray_image_0.png"]);
     let segmented = with();
-    assert_eq!(segmented["label_source"], "surrogate-jso/1-segmented");
+    assert_eq!(segmented["label_source"], "surrogate-jso/2-segmented");
     assert_ne!(segmented["bones"]["sha256"], by_hand["bones"]["sha256"]);
     let best = said["limbs"][0]["best_angle_deg"].as_f64().unwrap();
     assert!((best - 18.0).abs() < 3.0, "{best}");
@@ -191,6 +193,49 @@ fn bones_of_a_leg_in_thick_slices_are_refused_with_the_place() {
     assert_eq!(fs::read_dir(here).unwrap().count(), 0);
 }
 
+/// The strict scale under its own name: `labels.json` stays, and either set can be trained on.
+fn strict_labels_beside(here: &Path) {
+    let folder = here.join("plan/patient_3/labels/r");
+    let before = labels(here);
+    succeed(here, "label auto plan --scale strict --name strict");
+    assert_eq!(labels(here), before);
+    let strict = json(&fs::read_to_string(folder.join("labels.strict.json")).unwrap());
+    let of = |set: &Value, step: u32| set[format!("xray_image_{step}.png")]["label"].clone();
+    assert_eq!(
+        strict["xray_image_0.png"]["label_source"],
+        "surrogate-jso/1"
+    );
+    assert_eq!(
+        (of(&strict, 0), of(&strict, 36), of(&strict, 72)),
+        (3.0.into(), 1.0.into(), 3.0.into())
+    );
+    let with = json(&fs::read_to_string(folder.join("openness.strict.json")).unwrap());
+    assert_eq!(with["thresholds"]["at_least"][0], 0.75);
+    assert!(folder.join("openness.strict.csv").exists());
+    succeed(here, "label auto plan --scale strict --name strict");
+    let said = fail(here, "label auto plan --name strict");
+    assert!(said.contains("give --replace"), "{said}");
+    let said = fail(here, "label auto plan --scale strict");
+    assert!(said.contains("give --replace"), "{said}");
+
+    let train = |name: &str| {
+        let config = format!(
+            "preset = \"quick\"\nsteps = 1\n[[training]]\ndataset = \"plan\"\nlabels = \"{name}\"\n"
+        );
+        fs::write(here.join("train.toml"), config).unwrap();
+    };
+    train("lenient");
+    let said = fail(here, "train train.toml --out by_name");
+    assert!(
+        said.contains("has no label in labels.lenient.json"),
+        "{said}"
+    );
+    train("strict");
+    succeed(here, "train train.toml --out by_name");
+    let echoed = fs::read_to_string(here.join("by_name/config.toml")).unwrap();
+    assert!(echoed.contains("labels = \"strict\""), "{echoed}");
+}
+
 /// Nothing is written by what is refused.
 fn refusals(here: &Path) {
     let case = fs::read(here.join("p01.toml")).unwrap();
@@ -201,8 +246,16 @@ fn refusals(here: &Path) {
     };
     fs::write(here.join("t.toml"), "at_least = [0.1, 0.2, 0.3, 0.4]").unwrap();
     refused(
-        "label auto plan --thresholds t.toml",
+        "label auto plan --scale strict --thresholds t.toml",
         "expected four falling numbers",
+    );
+    refused(
+        "label auto plan --thresholds t.toml",
+        "holds no thresholds of the graded scale",
+    );
+    refused(
+        "label auto plan --name computed",
+        "labels.computed.json belongs to labels.json",
     );
     refused(
         "prepare p01.nii --side r --bones p01.nii --out x.toml",

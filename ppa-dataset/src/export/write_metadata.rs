@@ -1,5 +1,6 @@
 //! Description of a dataset for search engines (Croissant) and archives (RO-Crate).
 
+use std::io::ErrorKind;
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
@@ -66,17 +67,36 @@ pub fn write_metadata(
     Ok(files.map(|(name, _)| name))
 }
 
+/// Labels of a limb and what they were computed from, by name: `labels*.json`, `openness*.csv` and `openness*.json`.
+fn labels(root: &Path, folder: &str) -> Result<Vec<(String, &'static str)>, FileError> {
+    let path = root.join(folder);
+    let entries = match std::fs::read_dir(&path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries.map_err(FileError::at("read", &path))?,
+    };
+    let mut found = Vec::new();
+    for entry in entries {
+        let name = entry.map_err(FileError::at("read", &path))?.file_name();
+        let name = name.to_string_lossy();
+        let format = match name.split_once('.') {
+            Some(("labels" | "openness", rest)) if rest.ends_with("json") => "application/json",
+            Some(("openness", rest)) if rest.ends_with("csv") => "text/csv",
+            _ => continue,
+        };
+        found.push((format!("{folder}{name}"), format));
+    }
+    found.sort();
+    Ok(found)
+}
+
 /// Files beside the images, with their formats: labels, regions of interest, splits. Those that are not there are left out.
 fn lists(root: &Path, table: &Table) -> Result<Vec<(String, &'static str)>, TableError> {
     let mut lists = Vec::new();
     for limb in table.limbs() {
         let regions = limb.roi_file();
         let folder = regions.trim_end_matches("roi_depth.json").to_owned();
+        lists.extend(labels(root, &folder)?);
         lists.push((regions, "application/json"));
-        lists.push((folder.clone() + "labels.json", "application/json"));
-        lists.push((folder.clone() + "labels.computed.json", "application/json"));
-        lists.push((folder.clone() + "openness.csv", "text/csv"));
-        lists.push((folder + "openness.json", "application/json"));
     }
     lists.retain(|(file, _)| root.join(file).is_file());
     for name in Split::names(root)? {

@@ -8,6 +8,7 @@ use serde::de::{Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::label::{LabelError, LabelRow, LabelSource, Sources, name_of, radiograph_name};
+use super::name::LabelName;
 use crate::files::{FileError, read_text, write_whole};
 use crate::layout::LimbId;
 use crate::manifest::{FileKind, Manifest};
@@ -57,6 +58,18 @@ impl LabelFile {
     pub fn computed_path(root: &Path, limb: LimbId) -> PathBuf {
         root.join(limb.roi_file())
             .with_file_name("labels.computed.json")
+    }
+
+    /// Where the labels of a name lie, beside [`LabelFile::path`]; that file itself without a name.
+    pub fn named_path(root: &Path, limb: LimbId, name: Option<&LabelName>) -> PathBuf {
+        Self::path(root, limb).with_file_name(Self::file_name(name))
+    }
+
+    /// Name of the file of the labels of a name, `labels.json` without one.
+    pub fn file_name(name: Option<&LabelName>) -> String {
+        name.map_or("labels.json".to_owned(), |name| {
+            format!("labels.{name}.json")
+        })
     }
 
     /// Labels of one source, in any order.
@@ -181,6 +194,18 @@ impl LabelFile {
     /// Reads the computed labels of a limb; `None` if there is no file of them.
     pub fn read_computed(root: &Path, limb: LimbId) -> Result<Option<Self>, LabelFileError> {
         Self::read_file(Self::computed_path(root, limb))
+    }
+
+    /// Reads the labels of a name, `labels.json` without one; `None` if there is no file of them.
+    ///
+    /// # Errors
+    /// As [`LabelFile::read`].
+    pub fn read_named(
+        root: &Path,
+        limb: LimbId,
+        name: Option<&LabelName>,
+    ) -> Result<Option<Self>, LabelFileError> {
+        Self::read_file(Self::named_path(root, limb, name))
     }
 
     fn read_file(path: PathBuf) -> Result<Option<Self>, LabelFileError> {

@@ -8,12 +8,18 @@ pub enum LabelSource {
     /// People who looked at the radiograph.
     #[serde(rename = "readers")]
     Readers,
-    /// Openness of the joint space, first edition: a surrogate that no reader has confirmed.
+    /// Openness of the joint space, strict scale: a surrogate that no reader has confirmed.
     #[serde(rename = "surrogate-jso/1")]
-    Surrogate,
-    /// The same from bones that [`segment_bones`](crate::labels) separated in the scan.
+    Strict,
+    /// The same from bones that `ppa prepare --segment-bones` separated in the scan.
     #[serde(rename = "surrogate-jso/1-segmented")]
-    SegmentedSurrogate,
+    SegmentedStrict,
+    /// How far malleoli hide the gutters, graded scale: a surrogate that no reader has confirmed.
+    #[serde(rename = "surrogate-jso/2")]
+    Graded,
+    /// The same from bones that `ppa prepare --segment-bones` separated in the scan.
+    #[serde(rename = "surrogate-jso/2-segmented")]
+    SegmentedGraded,
 }
 
 impl LabelSource {
@@ -21,8 +27,10 @@ impl LabelSource {
     pub fn name(self) -> &'static str {
         match self {
             Self::Readers => "readers",
-            Self::Surrogate => "surrogate-jso/1",
-            Self::SegmentedSurrogate => "surrogate-jso/1-segmented",
+            Self::Strict => "surrogate-jso/1",
+            Self::SegmentedStrict => "surrogate-jso/1-segmented",
+            Self::Graded => "surrogate-jso/2",
+            Self::SegmentedGraded => "surrogate-jso/2-segmented",
         }
     }
 

@@ -35,7 +35,7 @@ pub(super) fn against_lists(dataset: &Published, hashes: BTreeMap<&str, String>)
         }
     };
     flaws.extend(against_manifest(&manifest, hashes));
-    match outdated(dataset, || Ok(manifest)) {
+    match outdated(dataset, None, || Ok(manifest)) {
         Err(error) => flaws.push(Flaw::Manifest(error_chain(&error))),
         Ok(found) => flaws.extend(found.into_iter().map(|outdated| Flaw::Outdated {
             limb: outdated.limb,

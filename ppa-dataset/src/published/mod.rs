@@ -37,7 +37,7 @@ pub use self::gray16::{GrayImage16, ImageFileError};
 pub use self::inspect::{Inspection, inspect};
 pub use self::unpaired::Unpaired;
 use crate::body_shape::BodyShape;
-use crate::labels::{LabelFile, LabelSource};
+use crate::labels::{LabelFile, LabelName, LabelSource};
 use crate::layout::{LimbId, View};
 use crate::manifest::{Manifest, RoiRow};
 
@@ -178,8 +178,16 @@ impl Published {
     /// [`PublishedError`] naming the first file or entry that fits neither layout, or labels of radiographs that were made
     /// anew since.
     pub fn read(root: &Path) -> Result<Self, PublishedError> {
-        let dataset = Self::list(root)?;
-        let found = outdated::outdated(&dataset, || {
+        Self::read_labelled(root, None)
+    }
+
+    /// As [`Published::read`], with the labels of a name in `labels.NAME.json` instead of those in `labels.json`.
+    ///
+    /// # Errors
+    /// As [`Published::read`].
+    pub fn read_labelled(root: &Path, labels: Option<&LabelName>) -> Result<Self, PublishedError> {
+        let dataset = Self::list_labelled(root, labels)?;
+        let found = outdated::outdated(&dataset, labels, || {
             // Without a manifest the dataset is not finished, or not ours.
             match root.join(Manifest::FILE).exists() {
                 true => Ok(Manifest::read(root)?),
@@ -189,7 +197,7 @@ impl Published {
         match found.first() {
             None => Ok(dataset),
             Some(outdated) => Err(PublishedError::Outdated {
-                path: LabelFile::path(root, outdated.limb),
+                path: LabelFile::named_path(root, outdated.limb, labels),
                 step: outdated.steps[0],
                 count: outdated.steps.len(),
             }),
@@ -201,15 +209,19 @@ impl Published {
     /// # Errors
     /// As [`Published::read`].
     pub fn list(root: &Path) -> Result<Self, PublishedError> {
+        Self::list_labelled(root, None)
+    }
+
+    fn list_labelled(root: &Path, labels: Option<&LabelName>) -> Result<Self, PublishedError> {
         let subjects = folders::subjects(root)?;
         let (mut pairs, mut unpaired) = (Vec::new(), Vec::new());
         for subject in &subjects.folders {
             let patient = subject.patient;
             let found = match subject.side {
-                None => synthetic::read(root, patient)?,
+                None => synthetic::read(root, patient, labels)?,
                 Some(side) => {
                     let folder = folders::Folder::new(root, &subject.name);
-                    specimen::read(&folder, LimbId { patient, side })?
+                    specimen::read(&folder, LimbId { patient, side }, labels)?
                 }
             };
             pairs.extend(found.0);

@@ -1,7 +1,7 @@
 //! Labels of radiographs that were made anew since.
 
 use super::{Layout, Published, PublishedError};
-use crate::labels::LabelFile;
+use crate::labels::{LabelFile, LabelName};
 use crate::layout::LimbId;
 use crate::manifest::Manifest;
 
@@ -11,9 +11,10 @@ pub(super) struct Outdated {
     pub steps: Vec<u32>,
 }
 
-/// All of them, as far as labels state which bytes their radiographs had; `manifest` is read only if one does.
+/// All of them in the labels of a name, as far as labels state which bytes their radiographs had; `manifest` is read only if one does.
 pub(super) fn outdated(
     dataset: &Published,
+    labels: Option<&LabelName>,
     manifest: impl FnOnce() -> Result<Manifest, PublishedError>,
 ) -> Result<Vec<Outdated>, PublishedError> {
     if dataset.layout == Layout::Specimen {
@@ -23,8 +24,8 @@ pub(super) fn outdated(
     limbs.dedup();
     let mut bound = Vec::new();
     for limb in limbs {
-        let labels = LabelFile::read(&dataset.root, limb)?;
-        bound.extend(labels.filter(LabelFile::is_bound).map(|file| (limb, file)));
+        let file = LabelFile::read_named(&dataset.root, limb, labels)?;
+        bound.extend(file.filter(LabelFile::is_bound).map(|file| (limb, file)));
     }
     if bound.is_empty() {
         return Ok(Vec::new());

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::folders::{Folder, digits};
 use super::unpaired::Seen;
 use super::{DepthFile, Flexion, Found, ImagePair, Pose, PublishedError, Unpaired, entries};
+use crate::labels::{LabelFile, LabelName};
 use crate::layout::{LimbId, View};
 
 /// The folder of one flexion of a limb.
@@ -14,7 +15,11 @@ pub(super) fn flexion_folder(limb: LimbId, flexion: Flexion) -> String {
 }
 
 /// All image pairs of one limb, and what else there is.
-pub(super) fn read(limb_folder: &Folder, limb: LimbId) -> Result<Found, PublishedError> {
+pub(super) fn read(
+    limb_folder: &Folder,
+    limb: LimbId,
+    labels: Option<&LabelName>,
+) -> Result<Found, PublishedError> {
     let mut found = Found::default();
     for name in limb_folder.folders()? {
         let folder = limb_folder.below(&name);
@@ -26,17 +31,22 @@ pub(super) fn read(limb_folder: &Folder, limb: LimbId) -> Result<Found, Publishe
             expected: "min, medium or max",
         })?;
         let dataset = folder.below("data").below("dataset");
-        let (pairs, unpaired) = read_flexion(&dataset, limb, flexion)?;
+        let (pairs, unpaired) = read_flexion(&dataset, limb, flexion, labels)?;
         found.0.extend(pairs);
         found.1.extend(unpaired);
     }
     Ok(found)
 }
 
-fn read_flexion(dataset: &Folder, limb: LimbId, flexion: Flexion) -> Result<Found, PublishedError> {
+fn read_flexion(
+    dataset: &Folder,
+    limb: LimbId,
+    flexion: Flexion,
+    name: Option<&LabelName>,
+) -> Result<Found, PublishedError> {
     let lists = dataset.below("label");
-    let labels = lists.path.join("quality").join("labels.json");
-    let labels = entries::labels(&labels, number_of_radiograph)?;
+    let file = format!("quality/{}", LabelFile::file_name(name));
+    let labels = entries::labels(&lists.path.join(&file), number_of_radiograph)?;
     let rois = lists.path.join("roi").join("roi_depth.json");
     let of_key = |key: &str| depth_name(key).map(|(view, number, _)| (view, number));
     let rois = entries::rois(&rois, of_key)?;
@@ -79,7 +89,7 @@ fn read_flexion(dataset: &Folder, limb: LimbId, flexion: Flexion) -> Result<Foun
         unpaired.push(Unpaired::Radiograph { patient, file });
     }
     for &pose in labels.keys().filter(|pose| !seen.poses.contains(pose)) {
-        let list = format!("{}/quality/labels.json", lists.name);
+        let list = format!("{}/{file}", lists.name);
         unpaired.push(Unpaired::Label { list, pose });
     }
     let list = format!("{}/roi/roi_depth.json", lists.name);

@@ -7,11 +7,15 @@ use super::folders::{Folder, digits};
 use super::unpaired::Seen;
 use super::{DepthFile, Found, ImagePair, Label, Pose, PublishedError, Unpaired, entries};
 use crate::body_shape::BodyShape;
-use crate::labels::LabelFile;
+use crate::labels::{LabelFile, LabelName};
 use crate::layout::{LimbId, Side, View, angle_text};
 
 /// All image pairs of one person, and what else there is.
-pub(super) fn read(root: &Path, patient: u32) -> Result<Found, PublishedError> {
+pub(super) fn read(
+    root: &Path,
+    patient: u32,
+    labels: Option<&LabelName>,
+) -> Result<Found, PublishedError> {
     let person = Folder::new(root, &format!("patient_{patient}"));
     let mut found = Found::default();
     for kind in ["depth", "xray", "labels"] {
@@ -25,17 +29,22 @@ pub(super) fn read(root: &Path, patient: u32) -> Result<Found, PublishedError> {
         }
     }
     for side in Side::ALL {
-        let (pairs, unpaired) = read_limb(root, &person, LimbId { patient, side })?;
+        let (pairs, unpaired) = read_limb(root, &person, LimbId { patient, side }, labels)?;
         found.0.extend(pairs);
         found.1.extend(unpaired);
     }
     Ok(found)
 }
 
-fn read_limb(root: &Path, person: &Folder, limb: LimbId) -> Result<Found, PublishedError> {
+fn read_limb(
+    root: &Path,
+    person: &Folder,
+    limb: LimbId,
+    name: Option<&LabelName>,
+) -> Result<Found, PublishedError> {
     let of_kind = |kind| person.below(kind).below(limb.side_letter());
     let lists = of_kind("labels");
-    let labels = LabelFile::read(root, limb)?;
+    let labels = LabelFile::read_named(root, limb, name)?;
     let rois = entries::rois(&lists.path.join("roi_depth.json"), |key| {
         depth_name(key).ok()
     })?;
@@ -88,7 +97,7 @@ fn read_limb(root: &Path, person: &Folder, limb: LimbId) -> Result<Found, Publis
     let labels = labels.iter().flat_map(LabelFile::labels);
     for pose in labels.map(|row| row.step) {
         if !seen.poses.contains(&pose) {
-            let list = list("labels.json");
+            let list = list(&LabelFile::file_name(name));
             unpaired.push(Unpaired::Label { list, pose });
         }
     }

@@ -148,6 +148,20 @@ impl Ray {
         chord_mm
     }
 
+    /// Whether any of its steps is inside a body.
+    pub fn meets(&self, bones: &AnkleBones, body: &Body) -> bool {
+        let mut step = 0;
+        while step < self.steps {
+            step += match self.side(step, bones, &[body]) {
+                Some((true, _)) => return true,
+                Some((false, free)) => 1 + self.steps_within(free),
+                None if bones.at(body, &self.point(step)) >= 0.5 => return true,
+                None => 1,
+            };
+        }
+        false
+    }
+
     /// Whether the point of a step is inside a body, and by how many voxels every coordinate may change while that holds; `None` near
     /// a surface.
     fn side(&self, step: usize, bones: &AnkleBones, bodies: &[&Body]) -> Option<(bool, usize)> {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use ppa_core::Roi;
 use ppa_dataset::BodyShape;
+use ppa_dataset::labels::{LabelFile, LabelName};
 use ppa_dataset::layout::{LimbId, Side, View};
 use ppa_dataset::published::{DepthFile, ImagePair, Pose, Published};
 
@@ -50,6 +51,8 @@ pub struct Selection<'a> {
     pub patients: Option<&'a [u32]>,
     /// Body shapes of rotated poses; all of them if `None`.
     pub shapes: Option<&'a [BodyShape]>,
+    /// Name of the labels, those of `labels.NAME.json`; of `labels.json` if `None`.
+    pub labels: Option<&'a LabelName>,
     /// Which cameras' images make a sample.
     pub views: Views,
     /// Frames that are used of a recorded pose.
@@ -65,6 +68,7 @@ impl Selection<'_> {
         Self {
             patients: None,
             shapes: None,
+            labels: None,
             views,
             frames_per_pose: FRAMES_PER_POSE,
             mirror: false,
@@ -87,11 +91,12 @@ pub fn read_samples(root: &Path, selection: &Selection) -> Result<Vec<Sample>, D
     let Selection {
         patients: persons,
         shapes,
+        labels,
         views,
         frames_per_pose,
         ..
     } = *selection;
-    let dataset = Published::read(root)?;
+    let dataset = Published::read_labelled(root, labels)?;
     let there = dataset.patients();
     if let Some(missing) = persons
         .iter()
@@ -121,6 +126,7 @@ pub fn read_samples(root: &Path, selection: &Selection) -> Result<Vec<Sample>, D
     }
     let mut reader = Reader {
         dataset: &dataset,
+        labels,
         place: root.canonicalize().unwrap_or_else(|_| root.to_owned()),
         sizes: BTreeMap::new(),
     };
@@ -173,6 +179,7 @@ fn moments<'a>(pose: &'a [&ImagePair]) -> impl Iterator<Item = &'a &'a ImagePair
 
 struct Reader<'a> {
     dataset: &'a Published,
+    labels: Option<&'a LabelName>,
     /// The one path of the dataset's folder, however it was spelled: persons of one dataset must be known again.
     place: PathBuf,
     /// Columns and rows of each camera's first image.
@@ -191,7 +198,10 @@ impl Reader<'_> {
         let files = views.iter().filter_map(|&view| pair.depth(view));
         let files: Vec<&DepthFile> = files.collect();
         let path = |file: &DepthFile| self.dataset.root.join(&file.file);
-        let no_label = || DataError::NoLabel(path(files[0]));
+        let no_label = || DataError::NoLabel {
+            image: path(files[0]),
+            labels: LabelFile::file_name(self.labels),
+        };
         let label = pair.label.as_ref().ok_or_else(no_label)?;
         let images = views.iter().zip(&files);
         let images: Result<_, _> = images

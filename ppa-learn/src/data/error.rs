@@ -56,8 +56,13 @@ pub enum DataError {
     #[error("{} has no region of interest in roi_depth.json", .0.display())]
     NoRoi(PathBuf),
     /// A depth image without label.
-    #[error("{} has no label in labels.json", .0.display())]
-    NoLabel(PathBuf),
+    #[error("{} has no label in {labels}", image.display())]
+    NoLabel {
+        /// The image.
+        image: PathBuf,
+        /// Name of the file of labels.
+        labels: String,
+    },
     /// A label beyond the scale.
     #[error("{sample} has the label {label}, expected 1 to 3")]
     Label {

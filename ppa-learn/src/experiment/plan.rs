@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use ppa_dataset::labels::LabelName;
 use ppa_dataset::published::Published;
 use ppa_metrics::MAX_PAIRS;
 use serde::{Deserialize, Serialize};
@@ -10,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::configuration::{Configuration, Experiment, Start};
 use super::error::ExperimentError;
 use super::folds::{cross_validation, folds_of_limbs};
-use crate::train::{ConfigError, TrainConfig};
+use crate::train::{ConfigError, Source, TrainConfig};
 
 /// Datasets and settings of the experiments.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -46,6 +47,9 @@ pub struct ExperimentPlan {
 pub struct Synthetic {
     /// Its folder, from the folder of the plan.
     pub dataset: PathBuf,
+    /// Name of the labels, those of `labels.NAME.json`; of `labels.json` if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub labels: Option<LabelName>,
     /// Folds of experiment 1; the paper's number is 3.
     pub folds: usize,
     /// Limbs that a fold tests; the paper's number is 3.
@@ -58,6 +62,9 @@ pub struct Synthetic {
 pub struct Target {
     /// Its folder, from the folder of the plan.
     pub dataset: PathBuf,
+    /// Name of the labels, those of `labels.NAME.json`; of `labels.json` if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub labels: Option<LabelName>,
     /// Folds, by person: the paper has 2 for the preparations and 3 for the clinical dataset.
     pub folds: usize,
 }
@@ -69,6 +76,23 @@ pub struct Fold {
     pub training: Vec<u32>,
     /// N of `patient_N` to test.
     pub test: Vec<u32>,
+}
+
+impl Synthetic {
+    /// All its persons.
+    pub(super) fn source(&self) -> Source {
+        everybody(&self.dataset, &self.labels)
+    }
+}
+
+/// All persons of a dataset.
+fn everybody(dataset: &Path, labels: &Option<LabelName>) -> Source {
+    Source {
+        dataset: dataset.to_owned(),
+        patients: None,
+        shapes: None,
+        labels: labels.clone(),
+    }
 }
 
 fn first_seed() -> u64 {
@@ -120,18 +144,18 @@ impl ExperimentPlan {
         columns
     }
 
-    /// The dataset that an experiment tests with.
+    /// All persons of the dataset that an experiment tests with.
     ///
     /// # Errors
     /// [`ExperimentError::NoTarget`] if the plan names none.
-    pub fn target(&self, experiment: Experiment) -> Result<&Path, ExperimentError> {
+    pub fn target(&self, experiment: Experiment) -> Result<Source, ExperimentError> {
         let (target, key) = match experiment {
-            Experiment::One => return Ok(&self.synthetic.dataset),
+            Experiment::One => return Ok(self.synthetic.source()),
             Experiment::TwoA | Experiment::TwoC => (&self.preparations, "preparations"),
             Experiment::TwoB => (&self.clinical, "clinical"),
         };
         match target {
-            Some(target) => Ok(&target.dataset),
+            Some(target) => Ok(everybody(&target.dataset, &target.labels)),
             None => Err(ExperimentError::NoTarget { experiment, key }),
         }
     }
@@ -141,16 +165,16 @@ impl ExperimentPlan {
     /// # Errors
     /// [`ExperimentError`] if the dataset cannot be read, or has too few persons.
     pub fn folds(&self, experiment: Experiment) -> Result<Vec<Fold>, ExperimentError> {
-        let dataset = Published::read(self.target(experiment)?)?;
+        let dataset = Published::read(&self.target(experiment)?.dataset)?;
         let limbs: BTreeSet<_> = dataset.pairs.iter().map(|pair| pair.limb).collect();
         let mut limbs_of = BTreeMap::new();
         for limb in limbs {
             *limbs_of.entry(limb.patient).or_insert(0) += 1;
         }
-        let everybody: BTreeSet<u32> = limbs_of.keys().copied().collect();
+        let persons: BTreeSet<u32> = limbs_of.keys().copied().collect();
         let by_person = |target: &Option<Target>| {
             let folds = target.as_ref().map_or(0, |target| target.folds);
-            cross_validation(&everybody, folds, self.fold_seed)
+            cross_validation(&persons, folds, self.fold_seed)
         };
         let tests = match experiment {
             Experiment::One => {
@@ -163,7 +187,7 @@ impl ExperimentPlan {
             Experiment::TwoB => by_person(&self.clinical),
         }?;
         let fold = |test: BTreeSet<u32>| Fold {
-            training: everybody.difference(&test).copied().collect(),
+            training: persons.difference(&test).copied().collect(),
             test: test.into_iter().collect(),
         };
         Ok(tests.into_iter().map(fold).collect())

@@ -178,9 +178,8 @@ impl<'a> Runner<'a> {
     /// The whole configuration of a training.
     pub(super) fn config(&self, unit: Unit) -> Result<TrainConfig, ExperimentError> {
         let all = |shapes: &[BodyShape]| Source {
-            dataset: self.plan.synthetic.dataset.clone(),
-            patients: None,
             shapes: Some(shapes.to_vec()),
+            ..self.plan.synthetic.source()
         };
         let base = self.plan.training_config()?;
         Ok(match unit {
@@ -200,9 +199,9 @@ impl<'a> Runner<'a> {
                 let target = self.plan.target(self.experiment)?;
                 // Recorded images have no shapes; of synthetic ones the skin of the scan is tested, whatever was trained with.
                 let of = |patients: &[u32], shapes: &[BodyShape]| Source {
-                    dataset: target.to_owned(),
                     patients: Some(patients.to_vec()),
                     shapes: Some(shapes.to_vec()),
+                    ..target.clone()
                 };
                 TrainConfig {
                     seed,

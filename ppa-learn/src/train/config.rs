@@ -4,6 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use ppa_dataset::BodyShape;
+use ppa_dataset::labels::LabelName;
 use serde::{Deserialize, Serialize};
 
 use crate::DeviceName;
@@ -135,6 +136,9 @@ pub struct Source {
     /// Body shapes, of poses that were rotated; all of them if left out. Recorded poses have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shapes: Option<Vec<BodyShape>>,
+    /// Name of the labels, those of `labels.NAME.json`; of `labels.json` if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub labels: Option<LabelName>,
 }
 
 impl TrainConfig {
@@ -154,6 +158,7 @@ impl TrainConfig {
         Selection {
             patients: source.patients.as_deref(),
             shapes: source.shapes.as_deref(),
+            labels: source.labels.as_ref(),
             views: self.views,
             frames_per_pose: self.frames_per_pose,
             mirror: self.mirror,

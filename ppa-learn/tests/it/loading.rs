@@ -134,7 +134,7 @@ fn what_is_missing_or_of_another_size_is_named() {
     fs::remove_file(&labels).unwrap();
     let error = read_samples(folder.path(), &Selection::all(Views::Left)).unwrap_err();
     assert!(
-        matches!(&error, DataError::NoLabel(path) if path.ends_with("depth_cam_left_0.0.png")),
+        matches!(&error, DataError::NoLabel { image, .. } if image.ends_with("depth_cam_left_0.0.png")),
         "{error}"
     );
     let whole = Selection {

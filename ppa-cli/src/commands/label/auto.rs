@@ -6,9 +6,10 @@ use anyhow::Context;
 use clap::Args;
 use ppa_core::text::{count, number};
 use ppa_dataset::Manifest;
+use ppa_dataset::labels::LabelName;
 use ppa_dataset::layout::LimbId;
 use ppa_generate::{Case, Plan};
-use ppa_label::{CaseBones, ComputedLabels, GradeThresholds, LabelledLimb, compute_labels};
+use ppa_label::{CaseBones, ComputedLabels, LabelScale, LabelledLimb, ScaleName, compute_labels};
 use serde::Serialize;
 
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
@@ -18,27 +19,42 @@ use crate::output_files::{ReplaceArgs, require_writable};
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
 The gutters between talus, tibia and fibula are followed along the rays of every radiograph; the worst one decides. The \
-cases of the plan name the bones (`ppa prepare --bones` or `--segment-bones`). Writes labels.json, with label_source \
-surrogate-jso/1 (surrogate-jso/1-segmented), labels.computed.json with the same labels, and beside them openness.csv: openness of each gutter, overlaps and clear spaces \
-in mm, and how well the radiograph itself shows each gutter; and openness.json: thresholds, and hashes of the bones and of the code. Labels of readers stay in labels.json; there, \
-computed ones stand where no reader graded. Other results than those of an earlier run need --replace. \
-No reader has confirmed these labels.
+cases of the plan name the bones (`ppa prepare --bones` or `--segment-bones`). The graded scale grades by how many mm a malleolus covers \
+the talus and by the contrast of the superior gutter; it is as wide as readers' grades. The strict scale grades by the share of each \
+gutter through which rays pass freely. Writes labels.json, with label_source surrogate-jso/2 (strict: surrogate-jso/1; with bones \
+from --segment-bones, -segmented), labels.computed.json with the same labels, and beside them openness.csv: openness, cover and grade of each gutter, \
+overlaps and clear spaces in mm, and how well the radiograph itself shows each gutter; and openness.json: thresholds, and hashes of \
+the bones and of the code. Labels of readers stay in labels.json; there, computed ones stand where no reader graded. With --name \
+NAME, labels.NAME.json, openness.NAME.csv and openness.NAME.json are written instead and labels.json stays as it is; \
+`labels = \"NAME\"` trains on them. Other results than those of an earlier run need --replace. No reader has confirmed these labels.
 
   ppa ct phantom --out p01.nii.gz --labels p01.bones.nii.gz
   ppa prepare p01.nii.gz --side r --bones p01.bones.nii.gz --out p01.case.toml
   ppa generate plan.toml && ppa label auto plan
+  ppa label auto plan --scale strict --name strict
 
-Thresholds are a TOML file; these are the defaults, the least openness for grades 1, 1.5, 2 and 2.5:
+Thresholds are a TOML file, one number for each of the grades 1, 1.5, 2 and 2.5. These are the defaults of the graded scale:
+
+  hidden_mm = [0.9, 2.7, 4.5, 6.3]     # how far a malleolus may cover the talus, on average over the height of its gutter
+  lost_contrast = [0.1, 0.3, 0.5, 0.7] # how much the superior gutter may lose of its best contrast
+
+and of the strict one:
 
   relative_to = \"own_best\"             # or \"each_gutter\": no credit for facets that are never open together
-  at_least = [0.75, 0.5, 0.25, 0.03]")]
+  at_least = [0.75, 0.5, 0.25, 0.03]   # least openness of the worst gutter")]
 pub struct AutoArgs {
     /// Folder of a dataset
     dataset: PathBuf,
     /// Plan it was made from [default: the file beside the folder, named after it]
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// Thresholds of openness, TOML
+    /// Scale of the labels: graded or strict
+    #[arg(long, default_value_t)]
+    scale: ScaleName,
+    /// Write a further set of labels, labels.NAME.json, and leave labels.json as it is
+    #[arg(long)]
+    name: Option<LabelName>,
+    /// Thresholds of the scale, TOML
     #[arg(long, value_name = "FILE")]
     thresholds: Option<PathBuf>,
     #[command(flatten)]
@@ -48,13 +64,13 @@ pub struct AutoArgs {
 #[derive(Debug, Serialize)]
 struct Labelled {
     limbs: Vec<LabelledLimb>,
-    thresholds: GradeThresholds,
+    thresholds: LabelScale,
 }
 
 pub fn run(args: &AutoArgs, output: Output) -> anyhow::Result<()> {
     let thresholds = match &args.thresholds {
-        Some(path) => GradeThresholds::read(path)?,
-        None => GradeThresholds::default(),
+        Some(path) => LabelScale::read(args.scale, path)?,
+        None => LabelScale::new(args.scale),
     };
     let manifest = Manifest::read(&args.dataset)?;
     let beside = || args.dataset.with_extension("toml");
@@ -73,7 +89,7 @@ pub fn run(args: &AutoArgs, output: Output) -> anyhow::Result<()> {
             file: case.bones.as_ref(),
             volume_sha256: &case.source.volume_sha256,
         };
-        compute_labels(&manifest, limb, &bones, &thresholds)
+        compute_labels(&manifest, limb, &bones, &thresholds, args.name.as_ref())
             .with_context(|| format!("cannot label by {}", planned.file.display()))
     });
     // All limbs or none: an error in a later one leaves the earlier ones as they were.
@@ -99,7 +115,7 @@ fn describe(labelled: &Labelled) -> String {
             (false, kept) => format!("; labels of readers kept for {kept} of them"),
         };
         format!(
-            "{}: {}, {} diagnostic, most open at {:.1} degrees{kept}",
+            "{}: {}, {} diagnostic, best at {:.1} degrees{kept}",
             limb.limb,
             count(limb.radiographs, "radiograph"),
             limb.diagnostic,

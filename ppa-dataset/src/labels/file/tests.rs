@@ -39,7 +39,7 @@ fn labels_come_back_as_they_were_written() {
         std: 0.1 + 0.2,
         step,
     });
-    let labels = LabelFile::new(LabelSource::Surrogate, rows).unwrap();
+    let labels = LabelFile::new(LabelSource::Strict, rows).unwrap();
     labels.write(root.path(), LIMB).unwrap();
     let path = root.path().join("patient_0/labels/r/labels.json");
     assert!(
@@ -141,7 +141,7 @@ fn readers_stand_beside_one_kind_of_computed_labels() {
     let three = [by(readers, 1), by(surrogate, 2), by(readers, 3)].join(", ");
     let found = read(&format!("{{{three}}}")).unwrap();
     assert_eq!(found.source_of_step(1), Some(LabelSource::Readers));
-    assert_eq!(found.source_of_step(2), Some(LabelSource::Surrogate));
+    assert_eq!(found.source_of_step(2), Some(LabelSource::Strict));
     assert_eq!(found.source_of_step(4), None);
 }
 
@@ -152,11 +152,8 @@ fn a_readers_label_wins_over_a_computed_one() {
         std: 0.0,
         step,
     };
-    let computed = LabelFile::new(
-        LabelSource::Surrogate,
-        [row(1, 1.0), row(2, 1.5), row(3, 2.0)],
-    )
-    .unwrap();
+    let computed =
+        LabelFile::new(LabelSource::Strict, [row(1, 1.0), row(2, 1.5), row(3, 2.0)]).unwrap();
     let readers = LabelFile::new(LabelSource::Readers, [row(2, 3.0), row(5, 2.5)]).unwrap();
     let both = readers.clone().over(&computed);
     assert_eq!(

@@ -94,6 +94,10 @@ proptest! {
                     prop_assert_eq!(ray.chord_mm(&bones, bodies, most_mm), expected);
                 }
             }
+            for body in [talus, tibia] {
+                let meets = ray.points().any(|point| bones.at(body, &point) >= 0.5);
+                prop_assert_eq!(ray.meets(&bones, body), meets);
+            }
             prop_assert_eq!(ray.path_mm(&gaps), path_by_single_steps(&ray, &gaps));
         }
     }

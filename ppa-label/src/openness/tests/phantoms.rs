@@ -172,3 +172,62 @@ fn a_tilted_trochlea_shows_its_crests_apart() {
         "{found:?}"
     );
 }
+
+/// Graded labels of one phantom from 0 to 90 degrees: share of diagnostic poses, and the middle of the best ones.
+fn graded(space: &JointSpace) -> [f64; 2] {
+    const STEP_DEG: f64 = 2.0;
+    let degrees: Vec<f64> = (0..=45).map(|n| STEP_DEG * f64::from(n)).collect();
+    let exposures: Vec<_> = degrees
+        .iter()
+        .map(|&d| turned(space, Side::Right, d))
+        .collect();
+    let scale = LabelScale::new(ScaleName::Graded);
+    let seen = space.openness(&exposures).unwrap();
+    let labels = exposures.iter().zip(seen);
+    let labels: Vec<f64> = labels
+        .map(|(exposure, openness)| scale.grade(&openness, &space.hidden(exposure)).label)
+        .collect();
+    let best = labels.iter().copied().fold(3.0, f64::min);
+    let (mut diagnostic, mut at_best) = (0, Vec::new());
+    for (&degrees, label) in degrees.iter().zip(labels) {
+        diagnostic += usize::from(label < 2.5);
+        if label == best {
+            at_best.push(degrees);
+        }
+    }
+    let middle = at_best.iter().sum::<f64>() / at_best.len() as f64;
+    [diagnostic as f64 / degrees.len() as f64, middle]
+}
+
+/// The target of the graded scale: 41 % of the poses from 0 to 90 degrees are diagnostic, as for the paper's readers, and the best
+/// angle is that of the mortise view, 15 to 20 degrees.
+#[test]
+#[ignore = "a minute: seventeen ankles, each seen from many sides"]
+fn graded_labels_are_as_wide_as_those_of_readers() {
+    let found: Vec<[f64; 2]> = family()
+        .par_iter()
+        .map(|(space, _)| graded(space))
+        .collect();
+    for (n, ([share, best], (_, truth))) in found.iter().zip(family()).enumerate() {
+        let mortise = truth.mortise_angle_rad.to_degrees();
+        println!(
+            "P{:02}: diagnostic {share:.3}, best {best:.1}, mortise {mortise:.1}",
+            n + 1
+        );
+        assert!((best - mortise).abs() < 4.0, "{best}, {mortise}");
+    }
+    let mean = |n: usize| found.iter().map(|f| f[n]).sum::<f64>() / 17.0;
+    let error = |n: usize| {
+        let squares = found.iter().map(|f| (f[n] - mean(n)).powi(2));
+        (squares.sum::<f64>() / 16.0 / 17.0).sqrt()
+    };
+    let [share, best] = [mean(0), mean(1)];
+    println!(
+        "diagnostic {share:.3} ± {:.3}, window {:.1} degrees, best {best:.1} ± {:.1}",
+        error(0),
+        90.0 * share,
+        error(1)
+    );
+    assert!((share - 0.41).abs() < 0.02, "{share}");
+    assert!((15.0..20.0).contains(&best), "{best}");
+}

@@ -162,3 +162,24 @@ fn chords_are_as_long_as_the_body_is_deep() {
         assert!(ray.chord_mm(&bones, &[talus], 2.0) > 2.0);
     }
 }
+
+/// Two faces of depth L that stand w apart overlap by L sin φ − w cos φ.
+#[test]
+fn a_slab_is_hidden_by_what_its_faces_overlap() {
+    let width = 3.0;
+    let patient = ct_from_patient(Point3::origin(), Vector3::z());
+    let space = JointSpace::new(fork(0.25, width), &patient).unwrap();
+    for degrees in [-40.0_f64, -20.0, -10.0, -4.0, 0.0, 4.0, 10.0, 20.0, 40.0] {
+        let exposure = Exposure::around(&space.limb, degrees.to_radians(), 1e5);
+        let (sine, cosine) = degrees.abs().to_radians().sin_cos();
+        let expected = (DEPTH * sine - width * cosine).max(0.0);
+        let HiddenGutters { medial, lateral } = space.hidden(&exposure);
+        for found in [medial, lateral] {
+            // Columns are 0.2 mm wide, and blur rounds the edges.
+            let off = (found.mean_mm - expected).abs();
+            assert!(off < 0.6, "{degrees}: {found:?}, expected {expected}");
+            let share = if expected > 0.0 { 1.0 } else { 0.0 };
+            assert_eq!(found.share, share, "{degrees}: {found:?}");
+        }
+    }
+}

@@ -28,6 +28,13 @@ fn left_and_right_give_one_curve() {
             .openness(&angles.map(|d| turned(space, side, d)))
             .unwrap()
     };
+    for degrees in [0.0, 20.0, 40.0] {
+        let a = space.hidden(&turned(&space, Right, degrees));
+        let b = mirrored.hidden(&turned(&mirrored, Left, degrees));
+        for (a, b) in [(a.medial, b.medial), (a.lateral, b.lateral)] {
+            assert!((a.mean_mm - b.mean_mm).abs() < 0.2, "{a:?}, {b:?}");
+        }
+    }
     for (a, b) in curve(&space, Right).iter().zip(curve(&mirrored, Left)) {
         for (a, b) in a.worst().iter().zip(b.worst()) {
             assert!((a - b).abs() < 0.01, "{a}, {b}");

@@ -1,0 +1,39 @@
+//! Why thresholds cannot be used.
+
+use std::path::PathBuf;
+
+use ppa_dataset::files::FileError;
+
+use super::name::ScaleName;
+
+/// Why the thresholds of a scale cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScaleError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The file holds something else.
+    #[error("{} holds no thresholds of the {scale} scale: {message}", path.display())]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// The scale.
+        scale: ScaleName,
+        /// What is wrong.
+        message: String,
+    },
+    /// Openness out of order.
+    #[error("thresholds of openness are {}, expected four falling numbers from 0 to 1", ppa_core::text::numbers(*.0))]
+    Falling([f64; 4]),
+    /// What may be hidden out of order.
+    #[error("{key} is {}, expected four rising numbers from 0 to {most}", ppa_core::text::numbers(*found))]
+    Rising {
+        /// The key.
+        key: &'static str,
+        /// What it says.
+        found: [f64; 4],
+        /// The largest number allowed.
+        most: f64,
+    },
+}
