@@ -39,7 +39,7 @@ pub struct ComputedRow {
     pub lateral: f64,
     /// Share of the medial gutter's height at which the malleolus covers the talus, see [`Hidden`](super::Hidden).
     pub medial_hidden_share: f64,
-    /// By how many mm it does, averaged over that height.
+    /// By how many mm it does, median over that height.
     pub medial_hidden_mm: f64,
     /// The same of the lateral gutter.
     pub lateral_hidden_share: f64,
@@ -377,9 +377,9 @@ fn computed_rows(
             superior: openness.superior,
             lateral: openness.lateral[1],
             medial_hidden_share: hidden.medial.share,
-            medial_hidden_mm: hidden.medial.mean_mm,
+            medial_hidden_mm: hidden.medial.median_mm,
             lateral_hidden_share: hidden.lateral.share,
-            lateral_hidden_mm: hidden.lateral.mean_mm,
+            lateral_hidden_mm: hidden.lateral.median_mm,
             medial_grade,
             superior_grade,
             lateral_grade,

@@ -25,8 +25,8 @@ pub struct HiddenGutters {
 pub struct Hidden {
     /// Share of the gutter's height at which the shadows of malleolus and talus overlap, 0 to 1.
     pub share: f64,
-    /// Width of that overlap, averaged over the gutter's height (0 where the shadows are apart), mm in the plane through the joint.
-    pub mean_mm: f64,
+    /// Width of that overlap, 0 where the shadows are apart: the median over the gutter's height, mm in the plane through the joint.
+    pub median_mm: f64,
 }
 
 impl JointSpace {
@@ -54,11 +54,13 @@ impl JointSpace {
             });
             overlap.unwrap_or(0.0).max(0.0)
         });
-        let overlaps: Vec<f64> = overlaps.collect();
-        let count = overlaps.len() as f64;
+        let mut overlaps: Vec<f64> = overlaps.collect();
+        overlaps.sort_by(f64::total_cmp);
+        let count = overlaps.len();
         Hidden {
-            share: overlaps.iter().filter(|&&mm| mm > 0.0).count() as f64 / count,
-            mean_mm: overlaps.iter().sum::<f64>() / count,
+            share: overlaps.iter().filter(|&&mm| mm > 0.0).count() as f64 / count as f64,
+            // Not the mean: under a tilted beam a lip of the plafond can reach the highest level and lie over the whole talus.
+            median_mm: 0.5 * (overlaps[(count - 1) / 2] + overlaps[count / 2]),
         }
     }
 }

@@ -35,7 +35,7 @@ NAME, labels.NAME.json, openness.NAME.csv and openness.NAME.json are written ins
 
 Thresholds are a TOML file, one number for each of the grades 1, 1.5, 2 and 2.5. These are the defaults of the graded scale:
 
-  hidden_mm = [0.9, 2.7, 4.5, 6.3]     # how far a malleolus may cover the talus, on average over the height of its gutter
+  hidden_mm = [0.75, 2.25, 3.75, 5.25] # how far a malleolus may cover the talus, median over the height of its gutter
   lost_contrast = [0.1, 0.3, 0.5, 0.7] # how much the superior gutter may lose of its best contrast
 
 and of the strict one:

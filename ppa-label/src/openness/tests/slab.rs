@@ -176,7 +176,7 @@ fn a_slab_is_hidden_by_what_its_faces_overlap() {
         let HiddenGutters { medial, lateral } = space.hidden(&exposure);
         for found in [medial, lateral] {
             // Columns are 0.2 mm wide, and blur rounds the edges.
-            let off = (found.mean_mm - expected).abs();
+            let off = (found.median_mm - expected).abs();
             assert!(off < 0.6, "{degrees}: {found:?}, expected {expected}");
             let share = if expected > 0.0 { 1.0 } else { 0.0 };
             assert_eq!(found.share, share, "{degrees}: {found:?}");

@@ -32,7 +32,7 @@ fn left_and_right_give_one_curve() {
         let a = space.hidden(&turned(&space, Right, degrees));
         let b = mirrored.hidden(&turned(&mirrored, Left, degrees));
         for (a, b) in [(a.medial, b.medial), (a.lateral, b.lateral)] {
-            assert!((a.mean_mm - b.mean_mm).abs() < 0.2, "{a:?}, {b:?}");
+            assert!((a.median_mm - b.median_mm).abs() < 0.2, "{a:?}, {b:?}");
         }
     }
     for (a, b) in curve(&space, Right).iter().zip(curve(&mirrored, Left)) {
