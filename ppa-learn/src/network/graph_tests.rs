@@ -135,7 +135,7 @@ fn graph_and_kernels_agree_in_the_mean_of_statistics() {
     let network = disturbed(Options::default());
     let twin = network.to_device(&Device::Cpu).unwrap();
     for batches in 0..2 {
-        let input = random(&[3, 1, 33, 47], 7 + batches);
+        let input = random(&[4, 1, 65, 47], 7 + batches);
         let mode = Mode::Statistics { batches };
         by_graph(&network, &input, mode).unwrap();
         by_kernels(&twin, &input, mode).unwrap();
@@ -143,7 +143,8 @@ fn graph_and_kernels_agree_in_the_mean_of_statistics() {
     let [graph, kernels] = [&network, &twin].map(|n| values(n.statistics_variable()));
     let relative = |(graph, kernels): (&f64, &f64)| (graph - kernels).abs() / (1.0 + kernels.abs());
     let worst = graph.iter().zip(&kernels).map(relative).fold(0.0, f64::max);
-    assert!(worst < 1e-5, "{worst:.1e}");
+    // Ten times what a training step is allowed, of which a tenth enters.
+    assert!(worst < 1e-4, "{worst:.1e}");
 }
 
 fn reference(name: &str) -> PathBuf {
