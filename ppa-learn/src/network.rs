@@ -92,7 +92,7 @@ impl Mode {
         }
     }
 
-    /// The step whose random numbers say what is left out; none where nothing is.
+    /// The step whose random numbers draw dropout and stochastic depth; `None` where neither applies.
     fn dropout_step(self) -> Option<u64> {
         match self {
             Self::Train { step } => Some(step),

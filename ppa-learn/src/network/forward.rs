@@ -26,7 +26,7 @@ pub struct Forward<'a> {
     pub pool: &'a Pool,
     /// How much of the batch enters the running statistics.
     pub momentum: f64,
-    /// Tells which branches are left out; none are without it.
+    /// Random numbers of stochastic depth; `None` keeps every branch.
     pub random: Option<&'a mut dyn rand::Rng>,
     /// Of the blocks so far.
     pub blocks: Vec<BlockTape>,

@@ -121,8 +121,8 @@ impl LateFusion {
         &self.entries
     }
 
-    /// One value for each moment [moments, 1], from the values [moments, 1024] of both cameras; `random` tells what is left out in
-    /// training.
+    /// One value for each moment [moments, 1], from the values [moments, 1024] of both cameras; `random` draws the
+    /// dropout mask in training.
     pub fn forward(
         &self,
         joined: &Tensor,

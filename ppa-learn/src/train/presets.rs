@@ -58,7 +58,7 @@ impl TrainConfig {
     ///   cosine.
     /// * An average of the weights is evaluated and saved: single steps of 16 images scatter.
     /// * Running statistics are the mean of 32 batches, 512 images. Those that training leaves lag behind its weights: in its first
-    ///   hundred steps they make answers constant (`early_answers_are_nearly_constant_with_lagging_ones`).
+    ///   hundred steps predictions are then nearly constant (`early_answers_are_nearly_constant_with_lagging_ones`).
     /// * Samples are drawn as often as they are in the data, since the mean absolute error counts them so.
     /// * Images are rotated by up to 5°, a third of the paper's limit: the edge of 48 pixels moves by two. They are not mirrored: with
     ///   `mirror` all limbs are shown as right ones.
