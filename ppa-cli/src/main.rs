@@ -106,7 +106,8 @@ enum Command {
     /// Judge depth images while cameras deliver them, pair by pair
     Predict(commands::predict::PredictArgs),
     /// The paper's experiments: trainings and tables from one plan
-    Experiment(commands::experiment::ExperimentArgs),
+    #[command(subcommand)]
+    Experiment(commands::experiment::ExperimentCommand),
     /// Metrics of predictions against labels
     Metrics(commands::metrics::MetricsArgs),
     /// Statistical tests
@@ -147,7 +148,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Train(args) => commands::train::run(&args, output),
         Command::Eval(args) => commands::eval::run(&args, output),
         Command::Predict(args) => commands::predict::run(&args, output),
-        Command::Experiment(args) => commands::experiment::run(&args, output),
+        Command::Experiment(command) => commands::experiment::run(&command, output),
         Command::Metrics(args) => commands::metrics::run(&args, output),
         Command::Stats(command) => commands::stats::run(&command, output),
         Command::Completions(args) => commands::completions::run(&args, output),

@@ -126,6 +126,7 @@ mod tests {
                 dataset: "unread".into(),
                 patients: None,
                 shapes: None,
+                every_pose: None,
                 labels: None,
             }],
             ..TrainConfig::quick()

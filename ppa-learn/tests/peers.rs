@@ -295,6 +295,7 @@ fn tensorboard_reads_all_scalars_of_a_training() {
             dataset: data.path().to_owned(),
             patients: Some(vec![patient]),
             shapes: None,
+            every_pose: None,
             labels: None,
         }]
     };

@@ -73,11 +73,19 @@ pub fn calibration(by_label: Vec<[f64; 2]>, by_prediction: Vec<[f64; 2]>) -> Cha
     chart("Calibration", labels, [QUALITY; 2], series)
 }
 
-/// Mean absolute errors against medial rotation in degrees.
-pub fn errors_by_angle(points: Vec<[f64; 2]>) -> Chart {
-    let ranges = [0, 1].map(|axis| from_zero(points.iter().map(|point| point[axis])));
+/// Mean absolute errors against medial rotation in degrees, of named series.
+pub fn errors_by_angle(series: Vec<(String, Vec<[f64; 2]>)>) -> Chart {
+    let of = |axis: usize| {
+        series
+            .iter()
+            .flat_map(|s| &s.1)
+            .map(move |point| point[axis])
+    };
+    let ranges = [0, 1].map(|axis| from_zero(of(axis)));
     let labels = ["medial rotation in degrees", "mean absolute error"];
-    let series = vec![Series::new("images", Mark::DotsAndLine, points)];
+    let series = series.into_iter();
+    let series = series.map(|(name, points)| Series::new(&name, Mark::DotsAndLine, points));
+    let series = series.collect();
     chart("Errors by angle", labels, ranges, series)
 }
 

@@ -1,7 +1,8 @@
 //! Pictures and pages for inspecting cases, poses and datasets.
 //!
 //! [`audit_page`] shows a scan, [`case_picture`] and [`pose_picture`] show one limb, [`contact_sheet`] a dataset on one picture, [`qa_page`] the quality report
-//! of a dataset, [`coverage_plot`] where a camera sees most of a joint; [`learning_curve`], [`confusion`] and others chart an evaluation.
+//! of a dataset, [`coverage_plot`] where a camera sees most of a joint; [`learning_curve`], [`confusion`] and others chart an evaluation,
+//! [`experiments_page`] shows the paper's experiments.
 
 mod audit_page;
 mod chart;
@@ -10,6 +11,7 @@ mod coverage_plot;
 mod drawing;
 mod embedded;
 mod evaluation;
+mod experiments;
 mod pictures;
 mod qa;
 
@@ -20,5 +22,6 @@ pub use coverage_plot::{RankedView, coverage_plot};
 pub use evaluation::{
     calibration, confusion, errors_by_angle, learning_curve, predictions_by_label,
 };
+pub use experiments::{ExperimentPart, ResultCell, WorstPose, experiments_page};
 pub use pictures::{PosedLimb, case_picture, pose_picture, write_picture};
 pub use qa::{QaError, qa_page};

@@ -75,6 +75,7 @@ pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
             dataset: dataset.clone(),
             patients: args.patients.clone(),
             shapes: None,
+            every_pose: None,
             labels: args.labels.clone(),
         }],
         None => config.evaluation.clone(),
@@ -134,9 +135,8 @@ fn draw_charts(log: &[LogRow], rows: &[Row], evaluation: &Evaluation) -> Vec<Cha
         ppa_report::calibration(by_label, by_prediction),
     ];
     if !evaluation.error_by_angle.is_empty() {
-        charts.push(ppa_report::errors_by_angle(means(
-            &evaluation.error_by_angle,
-        )));
+        let series = ("images".to_owned(), means(&evaluation.error_by_angle));
+        charts.push(ppa_report::errors_by_angle(vec![series]));
     }
     charts
 }

@@ -1,248 +1,44 @@
 //! `ppa experiment`: the paper's experiments, from one plan.
 
-use std::path::PathBuf;
+mod report;
+mod run;
 
-use anyhow::Context;
-use clap::{Args, ValueEnum};
-use ppa_core::Part;
-use ppa_core::text::{count, number};
-use ppa_dataset::write_whole;
-use ppa_learn::experiment::{Begun, Event, Experiment, ExperimentPlan, Runner, Table};
-use ppa_metrics::{ConstantPrediction, PermutationTest};
-use serde::Serialize;
+use clap::Subcommand;
+use ppa_learn::experiment::Experiment;
 
-use crate::findings::repeat_of_datasets;
-use crate::interrupt::Interrupt;
-use crate::output::{Output, bar};
-use crate::output_files::{ReplaceArgs, require_same, require_writable};
-use crate::shard::shard;
-use crate::stderr;
+use crate::output::Output;
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Which {
+#[derive(Debug, Subcommand)]
+pub enum ExperimentCommand {
     /// Synthetic images alone, with and without variants of the skin (table 1)
-    #[value(name = "1")]
-    One,
+    #[command(name = "1")]
+    One(run::RunArgs),
     /// Finetuning on preparations (table 2)
-    #[value(name = "2a")]
-    TwoA,
+    #[command(name = "2a")]
+    TwoA(run::RunArgs),
     /// Finetuning on clinical images (table 3)
-    #[value(name = "2b")]
-    TwoB,
+    #[command(name = "2b")]
+    TwoB(run::RunArgs),
     /// Linear probing on preparations (table 4)
-    #[value(name = "2c")]
-    TwoC,
+    #[command(name = "2c")]
+    TwoC(run::RunArgs),
+    /// Learning curve: experiment 1 with fewer persons to train with
+    Persons(run::RunArgs),
+    /// Learning curve: experiment 1 with fewer poses to train with
+    Poses(run::RunArgs),
+    /// Write a page of all results so far: tables beside the paper's, charts, poses with the largest errors
+    Report(report::ReportArgs),
 }
 
-#[derive(Debug, Args)]
-#[command(after_long_help = "\
-Each training is a folder of its own below --out. A run may be stopped at any moment and started again: what is finished \
-stays, unfinished trainings resume. On several machines that share the folder each makes a shard; the last command, without \
---shard, finds everything made and writes the tables.
-
-  ppa experiment 2a plan.toml --out runs --shard 3/10
-  ppa experiment 2a plan.toml --out runs
-
-A plan:
-
-  seeds = 10                          # repetitions
-  imagenet_weights = \"b0.safetensors\" # or .pth; its columns are left out without it
-  [training]
-  preset = \"paper\"                    # or \"standard\", \"quick\", and what differs, as in `ppa train`
-  [synthetic]
-  dataset = \"synthetic\"
-  folds = 3
-  test_limbs = 3
-  [preparations]                      # of 2a and 2c
-  dataset = \"preparations\"
-  folds = 2
-  [clinical]                          # of 2b
-  dataset = \"clinical\"
-  folds = 3")]
-pub struct ExperimentArgs {
-    /// The experiment
-    which: Which,
-    /// Plan of the experiments
-    plan: PathBuf,
-    /// Folder of the trainings and tables
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-    /// Make only shard k of n, and no tables
-    #[arg(long, value_name = "K/N")]
-    shard: Option<Part>,
-    /// Write tables of what there is, marked as incomplete, and train nothing
-    #[arg(long, conflicts_with = "shard")]
-    so_far: bool,
-    #[command(flatten)]
-    replace: ReplaceArgs,
-}
-
-/// Endings of the tables of an experiment.
-const TABLES: [&str; 4] = ["md", "csv", "tex", "json"];
-
-#[derive(Debug, Serialize)]
-struct Outcome {
-    experiment: &'static str,
-    /// Test sets on which the network answers with a constant.
-    constant_prediction: Vec<ConstantTestSet>,
-    finished: bool,
-    missing: usize,
-    /// Trainings that are begun and not finished.
-    begun: Vec<Begun>,
-    permutation_test: Option<PermutationTest>,
-    table: Option<String>,
-}
-
-#[derive(Debug, Serialize)]
-struct ConstantTestSet {
-    test_set: String,
-    #[serde(flatten)]
-    constant: ConstantPrediction,
-}
-
-pub fn run(args: &ExperimentArgs, output: Output) -> anyhow::Result<()> {
-    let plan = ExperimentPlan::read(&args.plan)?;
-    let experiment = match args.which {
-        Which::One => Experiment::One,
-        Which::TwoA => Experiment::TwoA,
-        Which::TwoB => Experiment::TwoB,
-        Which::TwoC => Experiment::TwoC,
+pub fn run(command: &ExperimentCommand, output: Output) -> anyhow::Result<()> {
+    let (experiment, args) = match command {
+        ExperimentCommand::One(args) => (Experiment::One, args),
+        ExperimentCommand::TwoA(args) => (Experiment::TwoA, args),
+        ExperimentCommand::TwoB(args) => (Experiment::TwoB, args),
+        ExperimentCommand::TwoC(args) => (Experiment::TwoC, args),
+        ExperimentCommand::Persons(args) => (Experiment::Persons, args),
+        ExperimentCommand::Poses(args) => (Experiment::Poses, args),
+        ExperimentCommand::Report(args) => return report::run(args, output),
     };
-    let target = plan.target(experiment)?;
-    let datasets = [&*plan.synthetic.dataset, &*target.dataset];
-    repeat_of_datasets(datasets.into_iter())?;
-    // A whole path: begun trainings compare the paths of the weights that they began with.
-    let out = std::path::absolute(&args.out)?;
-    let runner = Runner::new(&plan, experiment, &out)?;
-    let part = shard(args.shard)?.part(|| Ok(None))?;
-    if plan.configurations(experiment).len() < experiment.configurations().len() {
-        stderr::warning("the plan names no imagenet_weights: their column is left out");
-    }
-    require_writable("--out", &out)?;
-    let tables = TABLES.map(|ending| {
-        let name = format!("experiment_{}.{ending}", experiment.name());
-        out.join(name)
-    });
-    if !args.so_far {
-        if part == Part::WHOLE && !runner.results()?.missing().is_empty() {
-            require_no_tables(&tables, args.replace)?;
-        }
-        runner.check_data()?;
-    }
-    let interrupt = Interrupt::listen()?;
-    let finished = !args.so_far && train(&runner, part, &interrupt)?;
-
-    let results = runner.results()?;
-    let table = match (args.so_far, finished && part == Part::WHOLE) {
-        (true, _) => Some(Table::so_far(&results)),
-        (false, true) => Some(
-            Table::complete(&results)
-                .context("--so-far writes tables that are marked as incomplete")?,
-        ),
-        (false, false) => None,
-    };
-    // So far there may be no seed yet that is complete in both columns.
-    let permutation_test = match (&table, results.permutation_test()) {
-        (Some(_), Some(test)) if args.so_far => test.ok(),
-        (Some(_), Some(test)) => Some(test?),
-        _ => None,
-    };
-    let constant = results.constant().iter();
-    let constant = constant.map(|(place, &constant)| ConstantTestSet {
-        test_set: place.to_string(),
-        constant,
-    });
-    let outcome = Outcome {
-        experiment: experiment.name(),
-        constant_prediction: constant.collect(),
-        finished,
-        begun: runner.begun()?,
-        missing: results.missing().len(),
-        permutation_test,
-        table: table.as_ref().map(Table::to_markdown),
-    };
-    if let Some(table) = &table {
-        let json = serde_json::to_string_pretty(&outcome)?;
-        let texts = [table.to_markdown(), table.to_csv(), table.to_latex(), json];
-        for (path, text) in tables.iter().zip(&texts) {
-            require_same(path, text.as_bytes(), args.replace)?;
-        }
-        for (path, text) in tables.iter().zip(&texts) {
-            write_whole(path, text.as_bytes())?;
-        }
-    }
-    let stopped = !finished && !args.so_far;
-    if !stopped || output.json {
-        output.print(&outcome, describe)?;
-    }
-    match stopped {
-        true => Err(interrupt.stopped("; repeat the command to resume the training")),
-        false => Ok(()),
-    }
-}
-
-/// Refuses tables that are there before they would be replaced after the trainings.
-fn require_no_tables(tables: &[PathBuf], replace: ReplaceArgs) -> anyhow::Result<()> {
-    let there = tables.iter().find(|path| path.exists());
-    match there {
-        Some(path) if !replace.is_given() => anyhow::bail!(
-            "{} exists and would be replaced after the trainings: give --replace, or move it away",
-            path.display()
-        ),
-        _ => Ok(()),
-    }
-}
-
-/// Carries out a share of the runs; whether it came to their end.
-fn train(runner: &Runner, part: Part, interrupt: &Interrupt) -> anyhow::Result<bool> {
-    let bar = bar("training");
-    let share = part.share(runner.runs().len() as u64);
-    let finished = runner.run(
-        |n| share.contains(&(n as u64)),
-        interrupt.flag(),
-        |event| match event {
-            Event::Begins { unit, number, of } => {
-                bar.suspend(|| stderr::note(&format!("{number} of {of}: {unit}")));
-                bar.reset();
-            }
-            Event::Step(progress) => {
-                bar.set_length(progress.steps);
-                bar.set_position(progress.step);
-            }
-        },
-    )?;
-    bar.finish_and_clear();
-    Ok(finished)
-}
-
-fn describe(outcome: &Outcome) -> String {
-    let mut lines = vec![match (&outcome.table, outcome.finished) {
-        (Some(table), _) => table.trim_end().to_owned(),
-        (None, true) => format!(
-            "this shard is finished; of the whole experiment {} missing",
-            match outcome.missing {
-                1 => "1 test set is".to_owned(),
-                n => format!("{n} test sets are"),
-            }
-        ),
-        (None, false) => "stopped; repeat the command to resume".to_owned(),
-    }];
-    let begun = outcome.begun.iter();
-    lines.extend(begun.map(|begun| {
-        let steps = count(begun.steps, "step");
-        format!(
-            "not finished: {} with {} of {steps}",
-            begun.training, begun.step
-        )
-    }));
-    if let Some(test) = &outcome.permutation_test {
-        lines.push(format!(
-            "\nMAE from scratch minus pretrained over {}: {:.3}, exact one-sided p = {:.4} ({})",
-            count(test.patterns.ilog2(), "seed"),
-            number(test.mean_difference),
-            test.p_one_sided,
-            count(test.patterns, "sign pattern")
-        ));
-    }
-    lines.join("\n")
+    run::run(experiment, args, output)
 }

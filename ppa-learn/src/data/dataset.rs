@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use ppa_core::Roi;
@@ -51,6 +52,8 @@ pub struct Selection<'a> {
     pub patients: Option<&'a [u32]>,
     /// Body shapes of rotated poses; all of them if `None`.
     pub shapes: Option<&'a [BodyShape]>,
+    /// Every n-th angle of each limb's rotated poses, from the smallest; all of them if `None`.
+    pub every_pose: Option<NonZeroUsize>,
     /// Name of the labels, those of `labels.NAME.json`; of `labels.json` if `None`.
     pub labels: Option<&'a LabelName>,
     /// Which cameras' images make a sample.
@@ -68,6 +71,7 @@ impl Selection<'_> {
         Self {
             patients: None,
             shapes: None,
+            every_pose: None,
             labels: None,
             views,
             frames_per_pose: FRAMES_PER_POSE,
@@ -91,6 +95,7 @@ pub fn read_samples(root: &Path, selection: &Selection) -> Result<Vec<Sample>, D
     let Selection {
         patients: persons,
         shapes,
+        every_pose,
         labels,
         views,
         frames_per_pose,
@@ -108,9 +113,10 @@ pub fn read_samples(root: &Path, selection: &Selection) -> Result<Vec<Sample>, D
         return Err(DataError::Empty(format!("of patient {missing} in {root}")));
     }
     let of_person = |pair: &&ImagePair| persons.is_none_or(|p| p.contains(&pair.limb.patient));
+    let angles = EveryAngle::new(&dataset.pairs, every_pose);
     let chosen = |pair: &&ImagePair| {
         let of_shape = |shape| shapes.is_none_or(|s| s.contains(&shape));
-        of_person(pair) && shape_of(pair).is_none_or(of_shape)
+        of_person(pair) && shape_of(pair).is_none_or(of_shape) && angles.contain(pair)
     };
     let of_persons = dataset.pairs.iter().filter(of_person);
     let found: BTreeSet<BodyShape> = of_persons.filter_map(shape_of).collect();
@@ -160,6 +166,38 @@ pub fn read_samples(root: &Path, selection: &Selection) -> Result<Vec<Sample>, D
         return Err(DataError::Empty(what));
     }
     Ok(samples)
+}
+
+/// The angles of rotated poses that a selection uses.
+struct EveryAngle {
+    every: usize,
+    /// Steps of each limb's rotated poses.
+    steps: BTreeMap<LimbId, BTreeSet<u32>>,
+}
+
+impl EveryAngle {
+    fn new(pairs: &[ImagePair], every: Option<NonZeroUsize>) -> Self {
+        let mut steps: BTreeMap<LimbId, BTreeSet<u32>> = BTreeMap::new();
+        for pair in pairs {
+            if let Pose::Rotated { step, .. } = pair.pose {
+                steps.entry(pair.limb).or_default().insert(step);
+            }
+        }
+        Self {
+            every: every.map_or(1, NonZeroUsize::get),
+            steps,
+        }
+    }
+
+    fn contain(&self, pair: &ImagePair) -> bool {
+        match pair.pose {
+            Pose::Rotated { step, .. } => {
+                let place = self.steps[&pair.limb].range(..step).count();
+                place.is_multiple_of(self.every)
+            }
+            Pose::Recorded { .. } => true,
+        }
+    }
 }
 
 fn other(view: View) -> View {

@@ -1,7 +1,7 @@
 //! Means of values by key.
 
 /// The mean value of each key, and how many there are.
-pub(super) fn means(pairs: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64, usize)> {
+pub(crate) fn means(pairs: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64, usize)> {
     let mut pairs: Vec<(f64, f64)> = pairs.collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
     let of_key = |same: &[(f64, f64)]| {

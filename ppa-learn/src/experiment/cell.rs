@@ -28,11 +28,40 @@ impl Cell {
         }
     }
 
+    /// A value that does not depend on a seed.
+    pub fn without_seeds(value: Option<f64>, metric: Metric) -> Self {
+        let print = |value: f64| format!("{:.2}", value * metric.scale());
+        Self {
+            summary: value.map(|mean| Summary {
+                mean,
+                std: None,
+                seeds: 1,
+                undefined: 0,
+            }),
+            mean: value.map_or("–".to_owned(), print),
+            std: None,
+            best: false,
+            of_seeds: None,
+        }
+    }
+
+    pub fn is_best(&self) -> bool {
+        self.best
+    }
+
+    pub fn to_text(&self) -> String {
+        self.with_mean(self.mean.clone())
+    }
+
     pub fn to_markdown(&self) -> String {
-        let mean = match self.best {
+        self.with_mean(match self.best {
             true => format!("**{}**", self.mean),
             false => self.mean.clone(),
-        };
+        })
+    }
+
+    /// The mean as it is given, and what stands after it.
+    fn with_mean(&self, mean: String) -> String {
         let std = self
             .std
             .as_ref()

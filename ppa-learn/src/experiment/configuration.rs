@@ -1,5 +1,9 @@
 //! Configurations that the paper compares: the columns of its tables 1 to 4.
 
+use std::fmt;
+use std::num::NonZeroUsize;
+
+use ppa_core::text::count;
 use ppa_dataset::BodyShape;
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +22,24 @@ pub enum Experiment {
     /// Linear probing on preparations: what are the features worth (table 4)?
     #[serde(rename = "2c")]
     TwoC,
+    /// Experiment 1 with fewer persons to train with. Not in the paper.
+    #[serde(rename = "persons")]
+    Persons,
+    /// Experiment 1 with fewer poses of each limb to train with. Not in the paper.
+    #[serde(rename = "poses")]
+    Poses,
+}
+
+/// How much of a fold's training data is used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Amount {
+    /// All of it.
+    All,
+    /// So many persons.
+    Persons(u32),
+    /// Every n-th angle of each limb.
+    EveryPose(NonZeroUsize),
 }
 
 /// Body shapes of the synthetic dataset that a network is trained with.
@@ -70,11 +92,13 @@ pub struct Configuration {
     pub start: Start,
     /// Shapes that are trained with after that: [`Shapes::Original`] where the images are not synthetic.
     pub shapes: Shapes,
+    /// Data that are trained with after that.
+    pub amount: Amount,
 }
 
 impl Experiment {
-    /// All of them, in the paper's order.
-    pub const ALL: [Self; 4] = [Self::One, Self::TwoA, Self::TwoB, Self::TwoC];
+    /// Those of the paper, in its order.
+    pub const OF_PAPER: [Self; 4] = [Self::One, Self::TwoA, Self::TwoB, Self::TwoC];
 
     /// The name on the command line and in files.
     pub fn name(self) -> &'static str {
@@ -83,6 +107,8 @@ impl Experiment {
             Self::TwoA => "2a",
             Self::TwoB => "2b",
             Self::TwoC => "2c",
+            Self::Persons => "persons",
+            Self::Poses => "poses",
         }
     }
 
@@ -100,6 +126,7 @@ impl Experiment {
                     experiment: self,
                     start: Start::Scratch,
                     shapes,
+                    amount: Amount::All,
                 };
                 return [Original, Size, Bumps, All].map(column).to_vec();
             }
@@ -124,11 +151,13 @@ impl Experiment {
                 synthetic(Unified, All),
                 synthetic(Specific, All),
             ],
+            Self::Persons | Self::Poses => Vec::new(),
         };
         let column = |start| Configuration {
             experiment: self,
             start,
             shapes: Original,
+            amount: Amount::All,
         };
         starts.into_iter().map(column).collect()
     }
@@ -138,7 +167,7 @@ impl Experiment {
         let shapes = match self {
             Self::TwoA => Shapes::Size,
             Self::TwoB => Shapes::All,
-            Self::One | Self::TwoC => return None,
+            Self::One | Self::TwoC | Self::Persons | Self::Poses => return None,
         };
         let pretrained = Start::Synthetic {
             views: ViewChoice::Specific,
@@ -148,7 +177,29 @@ impl Experiment {
             experiment: self,
             start,
             shapes: Shapes::Original,
+            amount: Amount::All,
         }))
+    }
+
+    /// The column of a learning curve, which trains from scratch with a part of the data.
+    pub fn with_amount(self, amount: Amount) -> Configuration {
+        Configuration {
+            experiment: self,
+            start: Start::Scratch,
+            shapes: Shapes::Original,
+            amount,
+        }
+    }
+}
+
+impl fmt::Display for Amount {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::All => f.write_str("all data"),
+            Self::Persons(n) => f.write_str(&count(*n as usize, "person")),
+            Self::EveryPose(n) if n.get() == 1 => f.write_str("every pose"),
+            Self::EveryPose(n) => write!(f, "every pose of {n}"),
+        }
     }
 }
 
@@ -201,7 +252,15 @@ impl ViewChoice {
 
 impl Configuration {
     /// Headings of the column as the paper prints them, the most general first.
-    pub fn headings(self) -> Vec<&'static str> {
+    pub fn headings(self) -> Vec<String> {
+        if self.amount != Amount::All {
+            return vec![self.amount.to_string()];
+        }
+        let headings = self.headings_of_paper();
+        headings.into_iter().map(str::to_owned).collect()
+    }
+
+    fn headings_of_paper(self) -> Vec<&'static str> {
         let Start::Synthetic { views, shapes } = self.start else {
             return vec![match self {
                 Self {
@@ -226,6 +285,7 @@ impl Configuration {
     /// A name for folders and rows: unique within its experiment, of lower-case letters and `-`.
     pub fn name(self) -> String {
         match self.start {
+            _ if self.amount != Amount::All => self.amount.to_string().replace(' ', "-"),
             Start::Scratch if self.experiment == Experiment::One => self.shapes.name().to_owned(),
             Start::Scratch => "scratch".to_owned(),
             Start::ImageNet => "imagenet".to_owned(),
@@ -242,7 +302,7 @@ mod tests {
 
     #[test]
     fn the_tables_have_the_papers_columns() {
-        let columns = Experiment::ALL.map(|e| e.configurations().len());
+        let columns = Experiment::OF_PAPER.map(|e| e.configurations().len());
         assert_eq!(columns, [4, 10, 4, 4]);
         // The paper's counts: 21 configurations, 980 downstream runs, 1100 networks (section 4.3).
         let folds = [3, 2, 3, 2];
@@ -255,7 +315,7 @@ mod tests {
 
     #[test]
     fn names_are_unique_within_an_experiment() {
-        for experiment in Experiment::ALL {
+        for experiment in Experiment::OF_PAPER {
             let columns = experiment.configurations();
             let names: BTreeSet<_> = columns.iter().map(|c| c.name()).collect();
             assert_eq!(names.len(), columns.len());

@@ -4,6 +4,7 @@
 //! top of a pretraining that several runs share ([`Unit::needs`]). The predictions of the two views are joined
 //! ([`join_views`]), their metrics brought together ([`Results`]) and printed as the paper does ([`Table`]). A [`Runner`] carries all that out for an [`ExperimentPlan`].
 
+mod baselines;
 mod cell;
 mod check_data;
 mod configuration;
@@ -12,19 +13,21 @@ mod folds;
 mod metric;
 mod plan;
 mod predictions;
+mod published;
 mod record;
 mod results;
 mod run;
 mod table;
 mod unit;
 
-pub use configuration::{Configuration, Experiment, Shapes, Start, ViewChoice};
+pub use configuration::{Amount, Configuration, Experiment, Shapes, Start, ViewChoice};
 pub use error::ExperimentError;
 pub use folds::{FoldError, cross_validation, folds_of_limbs};
 pub use metric::Metric;
-pub use plan::{ExperimentPlan, Fold, Synthetic, Target};
+pub use plan::{ExperimentPlan, Fold, LearningCurves, Synthetic, Target};
 pub use predictions::{Moment, Prediction, PredictionError, join_views, pose_triples};
-pub use results::{Missing, Results, Summary};
+pub use published::published;
+pub use results::{Comparison, Missing, Results, Summary};
 pub use run::{Begun, Event, Runner};
-pub use table::{Incomplete, Table};
+pub use table::{Incomplete, Table, TableCell};
 pub use unit::{Unit, runs};

@@ -1,6 +1,7 @@
 //! The experiment file.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use ppa_dataset::labels::LabelName;
@@ -8,7 +9,7 @@ use ppa_dataset::published::Published;
 use ppa_metrics::MAX_PAIRS;
 use serde::{Deserialize, Serialize};
 
-use super::configuration::{Configuration, Experiment, Start};
+use super::configuration::{Amount, Configuration, Experiment, Start};
 use super::error::ExperimentError;
 use super::folds::{cross_validation, folds_of_limbs};
 use crate::train::{ConfigError, Source, TrainConfig};
@@ -36,6 +37,9 @@ pub struct ExperimentPlan {
     /// The clinical dataset, or what stands for it: of experiment 2b.
     #[serde(default)]
     pub clinical: Option<Target>,
+    /// Parts of the synthetic dataset to train with in the experiments on the amount of data.
+    #[serde(default)]
+    pub learning_curves: LearningCurves,
     /// The file that said all this.
     #[serde(skip)]
     path: PathBuf,
@@ -69,6 +73,18 @@ pub struct Target {
     pub folds: usize,
 }
 
+/// Columns of the experiments on the amount of data.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LearningCurves {
+    /// Numbers of persons to train with.
+    #[serde(default)]
+    pub persons: Vec<u32>,
+    /// Train with every n-th angle of each limb.
+    #[serde(default)]
+    pub every_pose: Vec<NonZeroUsize>,
+}
+
 /// Persons of a fold.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fold {
@@ -91,6 +107,7 @@ fn everybody(dataset: &Path, labels: &Option<LabelName>) -> Source {
         dataset: dataset.to_owned(),
         patients: None,
         shapes: None,
+        every_pose: None,
         labels: labels.clone(),
     }
 }
@@ -139,7 +156,21 @@ impl ExperimentPlan {
 
     /// The columns of an experiment that can be run: without ImageNet where there is no file of its weights.
     pub fn configurations(&self, experiment: Experiment) -> Vec<Configuration> {
-        let mut columns = experiment.configurations();
+        let LearningCurves {
+            persons,
+            every_pose,
+        } = &self.learning_curves;
+        let mut columns = match experiment {
+            Experiment::Persons => {
+                let amounts = persons.iter().map(|&n| Amount::Persons(n));
+                amounts.map(|n| experiment.with_amount(n)).collect()
+            }
+            Experiment::Poses => {
+                let amounts = every_pose.iter().map(|&n| Amount::EveryPose(n));
+                amounts.map(|n| experiment.with_amount(n)).collect()
+            }
+            _ => experiment.configurations(),
+        };
         columns.retain(|c| c.start != Start::ImageNet || self.imagenet_weights.is_some());
         columns
     }
@@ -151,6 +182,15 @@ impl ExperimentPlan {
     pub fn target(&self, experiment: Experiment) -> Result<Source, ExperimentError> {
         let (target, key) = match experiment {
             Experiment::One => return Ok(self.synthetic.source()),
+            Experiment::Persons | Experiment::Poses => {
+                return match self.configurations(experiment).is_empty() {
+                    false => Ok(self.synthetic.source()),
+                    true => Err(ExperimentError::NoTarget {
+                        experiment,
+                        key: "learning_curves",
+                    }),
+                };
+            }
             Experiment::TwoA | Experiment::TwoC => (&self.preparations, "preparations"),
             Experiment::TwoB => (&self.clinical, "clinical"),
         };
@@ -177,7 +217,7 @@ impl ExperimentPlan {
             cross_validation(&persons, folds, self.fold_seed)
         };
         let tests = match experiment {
-            Experiment::One => {
+            Experiment::One | Experiment::Persons | Experiment::Poses => {
                 let Synthetic {
                     folds, test_limbs, ..
                 } = self.synthetic;
@@ -190,6 +230,21 @@ impl ExperimentPlan {
             training: persons.difference(&test).copied().collect(),
             test: test.into_iter().collect(),
         };
-        Ok(tests.into_iter().map(fold).collect())
+        let folds: Vec<Fold> = tests.into_iter().map(fold).collect();
+        let fewest = folds.iter().map(|fold| fold.training.len()).min();
+        let wanted = self.learning_curves.persons.iter().max();
+        match (fewest, wanted) {
+            (Some(fewest), Some(&wanted))
+                if experiment == Experiment::Persons && wanted as usize > fewest =>
+            {
+                Err(ExperimentError::Plan {
+                    path: self.path.clone(),
+                    message: format!(
+                        "learning_curves.persons asks for {wanted}, but a fold has {fewest} persons to train with"
+                    ),
+                })
+            }
+            _ => Ok(folds),
+        }
     }
 }

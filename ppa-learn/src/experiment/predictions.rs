@@ -9,7 +9,7 @@ use ppa_metrics::{MetricError, PoseTriple, mean_per_pose};
 use serde::{Deserialize, Serialize};
 
 use super::error::ExperimentError;
-use crate::evaluate::triple;
+use crate::evaluate::{Row, triple};
 
 /// A depth image of a test set without its camera: both cameras see the same moment.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -35,6 +35,9 @@ pub struct Prediction {
     pub pose: String,
     /// Number of the frame within the pose, from 0.
     pub frame: u32,
+    /// Medial rotation in degrees, where the dataset states it.
+    #[serde(default)]
+    pub angle_deg: Option<f64>,
     /// Quality given by readers, 1 to 3.
     pub label: f64,
     /// Quality that the network says.
@@ -100,6 +103,21 @@ impl Prediction {
             side: self.side,
             pose: self.pose.clone(),
             frame: self.frame,
+        }
+    }
+}
+
+/// What is said of an image, without its camera.
+impl From<Row> for Prediction {
+    fn from(row: Row) -> Self {
+        Self {
+            patient: row.patient,
+            side: row.side,
+            pose: row.pose,
+            frame: row.frame,
+            angle_deg: row.angle_deg,
+            label: row.label,
+            prediction: row.prediction,
         }
     }
 }
@@ -210,6 +228,7 @@ mod tests {
             side: Side::Left,
             pose: pose.to_owned(),
             frame,
+            angle_deg: None,
             label,
             prediction,
         }

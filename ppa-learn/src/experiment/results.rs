@@ -11,6 +11,10 @@ use serde::Serialize;
 use super::configuration::{Configuration, Experiment};
 use super::metric::Metric;
 use super::predictions::{Prediction, PredictionError};
+use crate::evaluate::{
+    BaselineKind, Compared, Verdict, label_noise_mae, mean_by, means, p_network_better, sentence,
+    verdict,
+};
 
 /// Metrics of each column's test sets.
 ///
@@ -21,9 +25,41 @@ pub struct Results {
     columns: Vec<Configuration>,
     folds: usize,
     seeds: Vec<u64>,
-    values: BTreeMap<(Configuration, u64, usize), BTreeMap<Metric, Option<f64>>>,
+    values: BTreeMap<(Configuration, u64, usize), TestSet>,
+    baselines: BTreeMap<(BaselineKind, usize), TestSet>,
+    label_std: Vec<f64>,
     not_finite: BTreeSet<Missing>,
     constant: BTreeMap<Missing, ConstantPrediction>,
+}
+
+/// Metrics of the predictions on one fold.
+#[derive(Debug, Clone)]
+struct TestSet {
+    metrics: BTreeMap<Metric, Option<f64>>,
+    predictions: Vec<Prediction>,
+}
+
+/// A column beside predictions without a network.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// The column, by its headings.
+    pub column: String,
+    /// Its mean absolute error.
+    pub network_mae: f64,
+    /// The baselines, and persons' errors compared: each the mean over the column's seeds.
+    pub baselines: Vec<Compared>,
+    /// Persons of all folds; one that several folds test counts once.
+    pub persons: usize,
+    /// Whether the network is better.
+    pub verdict: Verdict,
+}
+
+impl fmt::Display for Comparison {
+    /// The verdict in a sentence or two.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sentence = sentence(self.network_mae, &self.baselines, self.persons);
+        write!(f, "{}: {sentence}", self.column)
+    }
 }
 
 /// A test set without predictions that can be judged.
@@ -79,6 +115,8 @@ impl Results {
             folds,
             seeds: seeds.to_vec(),
             values: BTreeMap::new(),
+            baselines: BTreeMap::new(),
+            label_std: Vec::new(),
             not_finite: BTreeSet::new(),
             constant: BTreeMap::new(),
         }
@@ -98,17 +136,44 @@ impl Results {
             self.not_finite.insert(place);
             return Ok(());
         }
-        let values = Metric::of(self.experiment).into_iter();
-        let values = values.map(|metric| Ok((metric, metric.value(predictions)?)));
-        let values = values.collect::<Result<_, PredictionError>>()?;
+        let test_set = self.test_set(predictions)?;
         let labels: Vec<_> = predictions.iter().map(|row| row.label).collect();
         let answers: Vec<_> = predictions.iter().map(|row| row.prediction).collect();
         if let Some(constant) = constant_prediction(&labels, &answers)? {
             self.constant.insert(place, constant);
         }
         let key = (place.configuration, place.seed, place.fold);
-        self.values.insert(key, values);
+        self.values.insert(key, test_set);
         Ok(())
+    }
+
+    /// Adds what a baseline predicts for one fold, the views joined.
+    ///
+    /// # Errors
+    /// [`PredictionError`] for predictions that cannot be judged.
+    pub fn insert_baseline(
+        &mut self,
+        kind: BaselineKind,
+        fold: usize,
+        predictions: &[Prediction],
+    ) -> Result<(), PredictionError> {
+        let test_set = self.test_set(predictions)?;
+        self.baselines.insert((kind, fold), test_set);
+        Ok(())
+    }
+
+    /// Adds the standard deviations of tested labels.
+    pub fn insert_label_std(&mut self, label_std: Vec<f64>) {
+        self.label_std.extend(label_std);
+    }
+
+    fn test_set(&self, predictions: &[Prediction]) -> Result<TestSet, PredictionError> {
+        let metrics = Metric::of(self.experiment).into_iter();
+        let metrics = metrics.map(|metric| Ok((metric, metric.value(predictions)?)));
+        Ok(TestSet {
+            metrics: metrics.collect::<Result<_, PredictionError>>()?,
+            predictions: predictions.to_vec(),
+        })
     }
 
     /// The experiment.
@@ -164,7 +229,7 @@ impl Results {
     fn of_seed(&self, column: Configuration, metric: Metric, seed: u64) -> Option<Option<f64>> {
         let folds = (0..self.folds).map(|fold| self.values.get(&(column, seed, fold)));
         let folds = folds.collect::<Option<Vec<_>>>()?;
-        let values: Option<Vec<f64>> = folds.iter().map(|values| values[&metric]).collect();
+        let values: Option<Vec<f64>> = folds.iter().map(|set| set.metrics[&metric]).collect();
         Some(values.map(|values| mean(&values)))
     }
 
@@ -183,6 +248,84 @@ impl Results {
         })
     }
 
+    /// The predictions of a column, averaged over the seeds that are there, in the order of moments. Of a moment that several folds
+    /// test, the mean over the folds.
+    pub fn mean_predictions(&self, column: Configuration) -> Vec<Prediction> {
+        let sets = self.values.iter().filter(|(key, _)| key.0 == column);
+        let rows: Vec<&Prediction> = sets.flat_map(|(_, set)| &set.predictions).collect();
+        let means = mean_by(rows.iter().map(|row| (row.moment(), row.prediction)));
+        let of_moment: BTreeMap<_, _> = rows.iter().map(|&row| (row.moment(), row)).collect();
+        let mean = |(row, prediction): (&Prediction, f64)| Prediction {
+            prediction,
+            ..row.clone()
+        };
+        let both = of_moment.into_values().zip(means.into_values());
+        both.map(mean).collect()
+    }
+
+    /// (degrees, mean absolute error, predictions) of each angle that the dataset states, over the seeds and folds of a column.
+    pub fn error_by_angle(&self, column: Configuration) -> Vec<(f64, f64, usize)> {
+        let sets = self.values.iter().filter(|(key, _)| key.0 == column);
+        let rows = sets.flat_map(|(_, set)| &set.predictions);
+        means(rows.filter_map(|row| Some((row.angle_deg?, (row.label - row.prediction).abs()))))
+    }
+
+    /// The baselines that are known of every fold.
+    pub fn baselines(&self) -> Vec<BaselineKind> {
+        let of_first = self.baselines.keys().filter(|(_, fold)| *fold == 0);
+        let kinds = of_first.map(|&(kind, _)| kind);
+        let all = |kind: &BaselineKind| {
+            (0..self.folds).all(|fold| self.baselines.contains_key(&(*kind, fold)))
+        };
+        kinds.filter(all).collect()
+    }
+
+    /// Mean over the folds of a baseline, which has no seeds; `None` if the metric is not defined.
+    pub fn of_baseline(&self, kind: BaselineKind, metric: Metric) -> Option<f64> {
+        let folds = (0..self.folds).map(|fold| self.baselines.get(&(kind, fold))?.metrics[&metric]);
+        Some(mean(&folds.collect::<Option<Vec<_>>>()?))
+    }
+
+    /// Mean absolute error of labels that vary normally by their standard deviation; `None` if none varies.
+    pub fn label_noise_mae(&self) -> Option<f64> {
+        label_noise_mae(self.label_std.iter().copied())
+    }
+
+    /// Each column of which a seed is complete beside the baselines, if there are any.
+    pub fn comparisons(&self) -> Vec<Comparison> {
+        let kinds = self.baselines();
+        let columns = self.columns.iter().filter(|_| !kinds.is_empty());
+        columns
+            .filter_map(|&column| self.comparison(column, &kinds))
+            .collect()
+    }
+
+    fn comparison(&self, column: Configuration, kinds: &[BaselineKind]) -> Option<Comparison> {
+        let network_mae = self.summary(column, Metric::Mae)?.mean;
+        let seeds = self.seeds.iter().copied();
+        let complete = seeds.filter(|&seed| self.of_seed(column, Metric::Mae, seed).is_some());
+        let sets = complete.flat_map(|seed| {
+            (0..self.folds).filter_map(move |fold| self.values.get(&(column, seed, fold)))
+        });
+        let of_network = errors_of_persons(sets);
+        let compared = |&kind: &BaselineKind| {
+            let folds = (0..self.folds).map(|fold| &self.baselines[&(kind, fold)]);
+            Some(Compared {
+                kind,
+                mae: self.of_baseline(kind, Metric::Mae)?,
+                p_network_better: p_network_better(&errors_of_persons(folds), &of_network),
+            })
+        };
+        let baselines = kinds.iter().map(compared).collect::<Option<Vec<_>>>()?;
+        Some(Comparison {
+            column: column.headings().join(", "),
+            network_mae,
+            verdict: verdict(network_mae, &baselines),
+            baselines,
+            persons: of_network.len(),
+        })
+    }
+
     /// The paper's test of the MAE, from scratch against pretrained, paired by seed; the folds of a seed are averaged
     /// first. `None` for experiments without such a test.
     ///
@@ -198,6 +341,13 @@ impl Results {
         let (scratch, pretrained): (Vec<_>, Vec<_>) = self.seeds.iter().filter_map(both).unzip();
         Some(sign_flip_permutation(&scratch, &pretrained))
     }
+}
+
+/// Mean absolute error of each person over test sets.
+fn errors_of_persons<'a>(sets: impl Iterator<Item = &'a TestSet>) -> Vec<f64> {
+    let rows = sets.flat_map(|set| &set.predictions);
+    let errors = rows.map(|row| (row.patient, (row.label - row.prediction).abs()));
+    mean_by(errors).into_values().collect()
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -224,6 +374,7 @@ mod tests {
             side: Side::Right,
             pose: pose.to_owned(),
             frame: 0,
+            angle_deg: None,
             label,
             prediction,
         };
@@ -286,6 +437,50 @@ mod tests {
             "{table}"
         );
         assert!(first.contains("column scratch 1 of 1"), "{table}");
+    }
+
+    #[test]
+    fn columns_are_compared_with_baselines_by_person() {
+        let columns = Experiment::TwoC.configurations();
+        let mut results = Results::new(Experiment::TwoC, columns, 2, &[1, 2]);
+        // Errors of 0.25 and 0.5 with the two seeds, of persons 1 and 2 in the two folds.
+        for place in results.missing() {
+            let error = 0.25 * place.seed as f64;
+            results
+                .insert(place, &of_person(place.fold, error))
+                .unwrap();
+        }
+        assert_eq!(results.comparisons(), []);
+        for fold in 0..2 {
+            let constant = of_person(fold, 0.5 + 0.25 * fold as f64);
+            let kind = BaselineKind::Constant;
+            results.insert_baseline(kind, fold, &constant).unwrap();
+        }
+        // A baseline of one fold only is not compared.
+        let angle = of_person(0, 0.125);
+        results
+            .insert_baseline(BaselineKind::Angle, 0, &angle)
+            .unwrap();
+        assert_eq!(
+            results.of_baseline(BaselineKind::Constant, Metric::Mae),
+            Some(0.625)
+        );
+        let found = &results.comparisons()[0];
+        assert_eq!((found.network_mae, found.persons), (0.375, 2));
+        let [constant] = found.baselines[..] else {
+            panic!("{found:?}")
+        };
+        // 0.5 and 0.75 against 0.375 of both: the least of the four sign patterns.
+        assert_eq!((constant.mae, constant.p_network_better), (0.625, 0.25));
+        assert_eq!(found.verdict, Verdict::NotShown);
+    }
+
+    /// The test set of one person for each fold.
+    fn of_person(fold: usize, error: f64) -> Vec<Prediction> {
+        let mut rows = test_set(error);
+        rows.iter_mut()
+            .for_each(|row| row.patient = 1 + fold as u32);
+        rows
     }
 
     #[test]

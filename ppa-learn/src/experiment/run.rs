@@ -9,17 +9,19 @@ use std::sync::atomic::AtomicBool;
 use ppa_dataset::layout::View;
 use ppa_dataset::{BodyShape, sha256_of_file, write_whole};
 
+use rand::seq::SliceRandom;
 use serde::{Serialize, Serializer};
 
-use super::configuration::{Experiment, Start};
+use super::configuration::{Amount, Experiment, Start};
 use super::error::ExperimentError;
 use super::plan::{ExperimentPlan, Fold};
-use super::predictions::{Prediction, join_views, read_predictions};
+use super::predictions::{Moment, Prediction, join_views, read_predictions};
 use super::record::{Record, file, fingerprint, read_json, without_paths};
 use super::results::Results;
 use super::unit::{Unit, runs};
-use crate::data::{Images, Views, check_split};
+use crate::data::{Images, Sample, SampleImage, Views, check_split};
 use crate::evaluate::{Row, write_predictions};
+use crate::random::{Purpose, stream};
 use crate::train::{
     Ended, Layers, Progress, Source, TrainConfig, TrainError, predict, samples, steps_made, train,
     trained,
@@ -171,6 +173,16 @@ impl<'a> Runner<'a> {
         Ok(true)
     }
 
+    /// The folder of all trainings.
+    pub(super) fn root(&self) -> &Path {
+        self.root
+    }
+
+    /// Which experiment it is.
+    pub(super) fn experiment(&self) -> Experiment {
+        self.experiment
+    }
+
     fn folder(&self, unit: Unit) -> PathBuf {
         self.root.join(unit.to_string())
     }
@@ -195,6 +207,7 @@ impl<'a> Runner<'a> {
                 view,
                 seed,
             } => {
+                let training = self.training_persons(fold, configuration.amount);
                 let fold = &self.folds[fold];
                 let target = self.plan.target(self.experiment)?;
                 // Recorded images have no shapes; of synthetic ones the skin of the scan is tested, whatever was trained with.
@@ -211,12 +224,33 @@ impl<'a> Runner<'a> {
                         Experiment::TwoC => Layers::Last,
                         _ => Layers::All,
                     },
-                    training: vec![of(&fold.training, configuration.shapes.variants())],
+                    training: vec![Source {
+                        every_pose: match configuration.amount {
+                            Amount::EveryPose(n) => Some(n),
+                            Amount::All | Amount::Persons(_) => None,
+                        },
+                        ..of(&training, configuration.shapes.variants())
+                    }],
                     evaluation: vec![of(&fold.test, &[BodyShape::Orig])],
                     ..base
                 }
             }
         })
+    }
+
+    /// Persons to train with. Fewer ones are the first of a random order of the fold's, so that a larger number holds a smaller one's.
+    fn training_persons(&self, fold: usize, amount: Amount) -> Vec<u32> {
+        let mut persons = self.folds[fold].training.clone();
+        if let Amount::Persons(n) = amount {
+            persons.shuffle(&mut stream(
+                self.plan.fold_seed,
+                Purpose::Folds,
+                1 + fold as u64,
+            ));
+            persons.truncate(n as usize);
+            persons.sort_unstable();
+        }
+        persons
     }
 
     /// The weights that a training begins with.
@@ -262,6 +296,44 @@ impl<'a> Runner<'a> {
         }
         let path = folder.join("predictions.csv");
         Ok(Some(read_predictions(&path)?))
+    }
+
+    /// The images of both views of a tested moment, left camera first.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] if the data cannot be read.
+    pub fn images_of(&self, moment: &Moment) -> Result<Vec<SampleImage>, ExperimentError> {
+        let tests = |fold: &Fold| fold.test.contains(&moment.patient);
+        let Some(fold) = self.folds.iter().position(tests) else {
+            return Ok(Vec::new());
+        };
+        let mut images = Vec::new();
+        for view in View::ALL {
+            let unit = Unit::Run {
+                configuration: self.plan.configurations(self.experiment)[0],
+                fold,
+                view,
+                seed: 1,
+            };
+            let config = self.config(unit)?;
+            let wrong = |source| ExperimentError::Training {
+                unit: unit.to_string(),
+                source: Box::new(source),
+            };
+            let samples = samples(&config, &config.evaluation).map_err(wrong)?;
+            let seen = |sample: &&Sample| {
+                let of_limb =
+                    sample.limb.patient == moment.patient && sample.limb.side == moment.side;
+                of_limb && sample.pose == moment.pose && sample.frame == moment.frame
+            };
+            images.extend(
+                samples
+                    .iter()
+                    .find(seen)
+                    .and_then(|s| s.images.first().cloned()),
+            );
+        }
+        Ok(images)
     }
 
     /// The trainings that are begun and not finished, pretrainings among them.

@@ -6,16 +6,61 @@ use ppa_metrics::LEAST_SPREAD;
 use super::cell::{Cell, with_best};
 use super::configuration::Configuration;
 use super::metric::Metric;
-use super::results::{Missing, Results, Summary};
+use super::published::published;
+use super::results::{Comparison, Missing, Results, Summary};
+use crate::evaluate::BaselineKind;
 
-/// A table: a row for each metric, a column for each configuration.
+/// A table: a row for each metric, a column for each configuration and for each baseline.
 #[derive(Debug, Clone)]
 pub struct Table {
-    columns: Vec<Configuration>,
+    columns: Vec<Column>,
     rows: Vec<(Metric, Vec<Cell>)>,
     /// What stands above the table, as it makes its numbers misleading.
     warning: Option<String>,
     notes: Vec<String>,
+}
+
+/// A column of a table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Column {
+    Network(Configuration),
+    Baseline(BaselineKind),
+}
+
+impl Column {
+    fn headings(self) -> Vec<String> {
+        match self {
+            Self::Network(column) => column.headings(),
+            Self::Baseline(kind) => vec![kind.to_string()],
+        }
+    }
+
+    /// A name for rows: unique within its experiment, of lower-case letters and `-`.
+    fn name(self) -> String {
+        match self {
+            Self::Network(column) => column.name(),
+            Self::Baseline(kind) => kind.to_string().replace(' ', "-"),
+        }
+    }
+
+    /// What the column's cell of a metric holds.
+    fn cell(self, metric: Metric, results: &Results) -> Cell {
+        match self {
+            Self::Network(column) => Cell::new(results.summary(column, metric), metric, results),
+            Self::Baseline(kind) => Cell::without_seeds(results.of_baseline(kind, metric), metric),
+        }
+    }
+}
+
+/// A cell of a table as it is printed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TableCell {
+    /// Mean, and standard deviation where there are several seeds.
+    pub text: String,
+    /// Whether it is the best of its row.
+    pub best: bool,
+    /// Mean and standard deviation that the paper states.
+    pub published: Option<[&'static str; 2]>,
 }
 
 /// Why there is no table.
@@ -63,11 +108,11 @@ impl Table {
 
     /// The table of what there is; cells of fewer seeds than planned say how many they hold.
     pub fn so_far(results: &Results) -> Self {
-        let columns = results.columns().to_vec();
+        let networks = results.columns().iter().copied().map(Column::Network);
+        let baselines = results.baselines().into_iter().map(Column::Baseline);
+        let columns: Vec<_> = networks.chain(baselines).collect();
         let rows = Metric::of(results.experiment()).into_iter().map(|metric| {
-            let cells = columns
-                .iter()
-                .map(|&column| Cell::new(results.summary(column, metric), metric, results));
+            let cells = columns.iter().map(|column| column.cell(metric, results));
             (metric, with_best(cells.collect(), metric))
         });
         let rows: Vec<_> = rows.collect();
@@ -77,7 +122,9 @@ impl Table {
             count(results.planned_seeds(), "seed")
         )];
         let left_out = results.experiment().configurations();
-        let left_out = left_out.into_iter().filter(|c| !columns.contains(c));
+        let left_out = left_out
+            .into_iter()
+            .filter(|c| !results.columns().contains(c));
         for column in left_out {
             notes.push(format!(
                 "Left out: the column {}, since the plan names no such weights.",
@@ -96,11 +143,21 @@ impl Table {
             ));
         }
         let undefined = |cell: &Cell| cell.summary.is_none_or(|summary| summary.undefined > 0);
-        if missing == 0 && rows.iter().any(|(_, cells)| cells.iter().any(undefined)) {
+        let of_networks = |(_, cells): &(Metric, Vec<Cell>)| {
+            cells[..results.columns().len()].iter().any(undefined)
+        };
+        if missing == 0 && rows.iter().any(of_networks) {
             notes.push(
                 "n is the number of seeds for which a metric is defined, – where it is for none: a correlation needs predictions that differ."
                     .to_owned(),
             );
+        }
+        let comparisons = results.comparisons();
+        notes.extend(comparisons.iter().map(Comparison::to_string));
+        if let Some(noise) = results.label_noise_mae() {
+            notes.push(format!(
+                "Labels that vary by their standard deviation about the true ones have a MAE of {noise:.3}."
+            ));
         }
         Self {
             columns,
@@ -110,19 +167,46 @@ impl Table {
         }
     }
 
+    /// Headings of the columns.
+    pub fn headings(&self) -> Vec<String> {
+        let headings = self.columns.iter().map(|column| column.headings());
+        headings.map(|levels| levels.join(", ")).collect()
+    }
+
+    /// Name and cells of each row.
+    pub fn rows(&self) -> Vec<(&'static str, Vec<TableCell>)> {
+        let cell = |metric: Metric, (column, cell): (&Column, &Cell)| TableCell {
+            text: cell.to_text(),
+            best: cell.is_best(),
+            published: match column {
+                Column::Network(column) => published(*column, metric),
+                Column::Baseline(_) => None,
+            },
+        };
+        let row = |(metric, cells): &(Metric, Vec<Cell>)| {
+            let cells = self.columns.iter().zip(cells);
+            (
+                metric.name(),
+                cells.map(|both| cell(*metric, both)).collect(),
+            )
+        };
+        self.rows.iter().map(row).collect()
+    }
+
+    /// What is said about the table: a warning first, where its numbers mislead.
+    pub fn notes(&self) -> impl Iterator<Item = &str> {
+        self.warning.iter().chain(&self.notes).map(String::as_str)
+    }
+
     /// As a table of Markdown, with its notes.
     pub fn to_markdown(&self) -> String {
-        let headings = self
-            .columns
-            .iter()
-            .map(|column| column.headings().join(", "));
         let warning = self
             .warning
             .iter()
             .flat_map(|text| [text.clone(), String::new()]);
         let mut lines: Vec<String> = warning.collect();
         lines.extend([
-            format!("| Metric | {} |", headings.collect::<Vec<_>>().join(" | ")),
+            format!("| Metric | {} |", self.headings().join(" | ")),
             format!("|---|{}", "---|".repeat(self.columns.len())),
         ]);
         for (metric, cells) in &self.rows {
@@ -173,11 +257,7 @@ impl Table {
         }
         lines.push("\\bottomrule".to_owned());
         lines.push("\\end{tabular}".to_owned());
-        let notes = self
-            .warning
-            .iter()
-            .chain(&self.notes)
-            .map(|note| format!("% {note}"));
+        let notes = self.notes().map(|note| format!("% {note}"));
         notes.chain(lines).collect::<Vec<_>>().join("\n") + "\n"
     }
 
@@ -196,7 +276,7 @@ impl Table {
             while n < headings.len() {
                 let alike = (n..headings.len()).take_while(|&m| up_to(m) == up_to(n));
                 let span = if up_to(n).is_some() { alike.count() } else { 1 };
-                let words = up_to(n).map_or("", |words| words[level]);
+                let words = up_to(n).map_or("", |words| &*words[level]);
                 cells.push(match span {
                     1 => words.to_owned(),
                     _ => format!("\\multicolumn{{{span}}}{{c}}{{{words}}}"),
@@ -250,6 +330,7 @@ mod tests {
             side: Side::Right,
             pose: pose.to_owned(),
             frame: 0,
+            angle_deg: None,
             label,
             prediction,
         };

@@ -97,7 +97,7 @@ pub fn runs(columns: &[Configuration], folds: usize, seeds: &[u64]) -> Vec<Unit>
 mod tests {
     use std::collections::BTreeSet;
 
-    use super::super::configuration::Experiment;
+    use super::super::configuration::{Amount, Experiment};
     use super::*;
 
     #[test]
@@ -105,7 +105,7 @@ mod tests {
         let seeds: Vec<_> = (0..10).collect();
         let all: Vec<_> = [3, 2, 3, 2]
             .into_iter()
-            .zip(Experiment::ALL)
+            .zip(Experiment::OF_PAPER)
             .flat_map(|(folds, experiment)| runs(&experiment.configurations(), folds, &seeds))
             .collect();
         // 980 and the 60 of ImageNet in experiment 2b, which the paper's count leaves out.
@@ -130,6 +130,7 @@ mod tests {
                     shapes: Shapes::All,
                 },
                 shapes: Shapes::Original,
+                amount: Amount::All,
             },
             fold: 1,
             view,

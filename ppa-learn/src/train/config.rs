@@ -136,6 +136,9 @@ pub struct Source {
     /// Body shapes, of poses that were rotated; all of them if left out. Recorded poses have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shapes: Option<Vec<BodyShape>>,
+    /// Use every n-th angle of each limb, from the smallest, of poses that were rotated; all of them if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub every_pose: Option<NonZeroUsize>,
     /// Name of the labels, those of `labels.NAME.json`; of `labels.json` if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub labels: Option<LabelName>,
@@ -158,6 +161,7 @@ impl TrainConfig {
         Selection {
             patients: source.patients.as_deref(),
             shapes: source.shapes.as_deref(),
+            every_pose: source.every_pose,
             labels: source.labels.as_ref(),
             views: self.views,
             frames_per_pose: self.frames_per_pose,

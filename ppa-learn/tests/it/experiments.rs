@@ -36,6 +36,12 @@ fn add_shapes(folder: &TempDir) {
     }
 }
 
+/// The line with the headings of a table, which may follow a warning.
+fn headings(table: &str) -> &str {
+    let headings = |line: &&str| line.starts_with("| Metric |");
+    table.lines().find(headings).unwrap()
+}
+
 fn go() -> AtomicBool {
     AtomicBool::new(false)
 }
@@ -68,14 +74,28 @@ fn probing_is_gathered_from_shards_and_left_as_it_is() {
     let again = runner.run(|_| true, &go(), |_| panic!("all is finished"));
     assert!(again.unwrap());
 
-    let results = runner.results().unwrap();
+    let mut results = runner.results().unwrap();
     assert!(results.missing().is_empty());
+    runner.add_baselines(&mut results).unwrap();
     let table = Table::complete(&results).unwrap().to_markdown();
     assert!(!table.contains("INCOMPLETE"), "{table}");
     let note = "Left out: the column pretrained on ImageNet, since the plan names no such weights.";
     assert!(table.contains(note), "{table}");
-    let columns = table.lines().next().unwrap();
+    let columns = headings(&table);
     assert!(!columns.contains("ImageNet"), "{columns}");
+    assert!(
+        columns.ends_with(" | constant | mean by true angle | kernel ridge |"),
+        "{columns}"
+    );
+    assert!(
+        table.contains("\n\nfrom scratch: The network's MAE, "),
+        "{table}"
+    );
+    // Read from the files of the first time.
+    let first = results.comparisons();
+    let mut results = runner.results().unwrap();
+    runner.add_baselines(&mut results).unwrap();
+    assert_eq!(results.comparisons(), first);
 
     // Another number of steps would be another experiment.
     let other = self::plan(folder.path(), &synthetic, &preparations, 4);
@@ -83,6 +103,8 @@ fn probing_is_gathered_from_shards_and_left_as_it_is() {
     let refused = other.run(|_| true, &go(), |_| ());
     assert!(matches!(refused, Err(ExperimentError::OtherSettings(_))));
     let refused = other.results();
+    assert!(matches!(refused, Err(ExperimentError::OtherSettings(_))));
+    let refused = other.add_baselines(&mut results);
     assert!(matches!(refused, Err(ExperimentError::OtherSettings(_))));
 }
 
@@ -115,6 +137,70 @@ fn an_experiment_resumes_where_it_was_stopped() {
     );
     assert!(ended.unwrap());
     assert_eq!(steps, 2, "one of three steps was made before");
+}
+
+/// The plan with columns for numbers of persons and poses.
+fn with_learning_curves(folder: &Path, data: &TempDir, persons: &str) -> ExperimentPlan {
+    plan(folder, data, data, 2);
+    let path = folder.join("plan.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    let curves = format!("[learning_curves]\npersons = {persons}\nevery_pose = [2, 1]\n");
+    fs::write(&path, text + &curves).unwrap();
+    ExperimentPlan::read(&path).unwrap()
+}
+
+#[test]
+fn learning_curves_have_a_column_for_each_amount() {
+    let data = dataset(4, &[0, 90, 180]);
+    let folder = tempfile::tempdir().unwrap();
+    let plan = with_learning_curves(folder.path(), &data, "[1, 3]");
+    let root = folder.path().join("runs");
+    for (experiment, columns) in [
+        (
+            Experiment::Persons,
+            "| Metric | 1 person | 3 persons | constant ",
+        ),
+        (
+            Experiment::Poses,
+            "| Metric | every pose of 2 | every pose | constant ",
+        ),
+    ] {
+        let runner = Runner::new(&plan, experiment, &root).unwrap();
+        assert!(runner.run(|_| true, &go(), |_| ()).unwrap());
+        let mut results = runner.results().unwrap();
+        runner.add_baselines(&mut results).unwrap();
+        let table = Table::complete(&results).unwrap().to_markdown();
+        assert!(headings(&table).starts_with(columns), "{table}");
+    }
+    let data_of = |unit: &str| {
+        let path = root.join(unit).join("fold_0/cam_left/seed_1/finished.json");
+        let record: serde_json::Value =
+            serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap();
+        record["data_sha256"].clone()
+    };
+    let [one, three] =
+        ["1-person", "3-persons"].map(|n| data_of(&format!("experiment_persons/{n}")));
+    let [half, all] =
+        ["every-pose-of-2", "every-pose"].map(|n| data_of(&format!("experiment_poses/{n}")));
+    assert_eq!(three, all);
+    assert!(one != three && half != all && one != half);
+
+    let plan = with_learning_curves(folder.path(), &data, "[4]");
+    let refused = Runner::new(&plan, Experiment::Persons, &root)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        refused.ends_with("asks for 4, but a fold has 3 persons to train with"),
+        "{refused}"
+    );
+    let plan = self::plan(folder.path(), &data, &data, 2);
+    let refused = Runner::new(&plan, Experiment::Poses, &root)
+        .unwrap_err()
+        .to_string();
+    assert_eq!(
+        refused,
+        "experiment poses needs [learning_curves] in the plan"
+    );
 }
 
 #[test]

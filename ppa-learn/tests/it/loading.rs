@@ -128,6 +128,18 @@ fn samples_are_those_of_the_views_and_persons() {
 }
 
 #[test]
+fn every_second_pose_begins_with_the_smallest_angle() {
+    let folder = dataset(2, &[0, 60, 90, 120, 180]);
+    let selection = Selection {
+        every_pose: NonZeroUsize::new(2),
+        ..Selection::all(Views::Left)
+    };
+    let samples = read_samples(folder.path(), &selection).unwrap();
+    let angles: Vec<_> = samples.iter().filter_map(|s| s.angle_deg).collect();
+    assert_eq!(angles, [0.0, 45.0, 90.0, 0.0, 45.0, 90.0]);
+}
+
+#[test]
 fn what_is_missing_or_of_another_size_is_named() {
     let folder = dataset(2, &[0, 90, 180]);
     let labels = folder.path().join("patient_1/labels/r/labels.json");

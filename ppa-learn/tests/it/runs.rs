@@ -17,6 +17,7 @@ pub fn source(data: &Path, patients: &[u32]) -> Vec<Source> {
         dataset: data.to_owned(),
         patients: Some(patients.to_vec()),
         shapes: None,
+        every_pose: None,
         labels: None,
     }]
 }

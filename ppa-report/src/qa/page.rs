@@ -62,7 +62,7 @@ pub fn qa_page(root: &Path) -> Result<String, QaError> {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width";
                 title { "Quality report of a dataset" }
-                style { (PreEscaped(include_str!("page.css"))) }
+                style { (PreEscaped(include_str!("../page.css"))) }
             }
             body {
                 main {

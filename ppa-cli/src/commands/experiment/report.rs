@@ -1,0 +1,227 @@
+//! `ppa experiment report`: one page of all results.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::Args;
+use ppa_core::text::count;
+use ppa_dataset::published::GrayImage16;
+use ppa_dataset::write_whole;
+use ppa_learn::experiment::{
+    Configuration, Experiment, ExperimentPlan, Metric, Prediction, Results, Runner, Table,
+    TableCell,
+};
+use ppa_report::{
+    ExperimentPart, ResultCell, WorstPose, errors_by_angle, experiments_page, predictions_by_label,
+};
+use serde::Serialize;
+
+use super::run::tested;
+use crate::output::Output;
+use crate::output_files::ReplaceArgs;
+
+/// Poses with the largest errors that are shown of an experiment, one of each limb.
+const WORST: usize = 6;
+/// Pixels along a side of their pictures.
+const WORST_SIDE: usize = 96;
+
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// Plan of the experiments
+    plan: PathBuf,
+    /// Folder of the trainings, as given to `ppa experiment 1`
+    #[arg(long, value_name = "DIR")]
+    runs: PathBuf,
+    /// Page to write
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    #[command(flatten)]
+    replace: ReplaceArgs,
+}
+
+#[derive(Debug, Serialize)]
+struct Outcome {
+    page: PathBuf,
+    /// What each experiment shows, in sentences.
+    findings: Vec<Finding>,
+}
+
+#[derive(Debug, Serialize)]
+struct Finding {
+    experiment: String,
+    findings: Vec<String>,
+    failures: Vec<String>,
+}
+
+pub fn run(args: &ReportArgs, output: Output) -> anyhow::Result<()> {
+    args.replace
+        .outputs()
+        .file("--out", &args.out, &[".html"])?;
+    let plan = ExperimentPlan::read(&args.plan)?;
+    let runs = std::path::absolute(&args.runs)?;
+    let learning_curves = [Experiment::Persons, Experiment::Poses];
+    let planned = Experiment::OF_PAPER.into_iter().chain(learning_curves);
+    let planned = planned.filter(|&experiment| plan.target(experiment).is_ok());
+    let parts = planned.map(|experiment| part(&plan, experiment, &runs));
+    let parts: Vec<ExperimentPart> = parts.collect::<anyhow::Result<_>>()?;
+    let text = experiments_page(&parts).context("a picture cannot be encoded")?;
+    write_whole(&args.out, text.as_bytes())?;
+    let finding = |part: ExperimentPart| Finding {
+        experiment: part.title,
+        findings: part.findings,
+        failures: part.failures,
+    };
+    let outcome = Outcome {
+        page: args.out.clone(),
+        findings: parts.into_iter().map(finding).collect(),
+    };
+    output.print(&outcome, describe)
+}
+
+fn part(
+    plan: &ExperimentPlan,
+    experiment: Experiment,
+    runs: &std::path::Path,
+) -> anyhow::Result<ExperimentPart> {
+    let runner = Runner::new(plan, experiment, runs)?;
+    let mut results = runner.results()?;
+    let missing = results.missing().len();
+    let mut failures = Vec::new();
+    if missing > 0 {
+        failures.push(format!("{} missing", sets_are(missing)));
+    }
+    let best = best(&results);
+    if best.is_some() {
+        runner.add_baselines(&mut results)?;
+    }
+    let table = Table::so_far(&results);
+    let mut findings = Vec::new();
+    if let Some(Ok(test)) = results.permutation_test() {
+        findings.push(tested(&test));
+    }
+    findings.extend(results.comparisons().iter().map(ToString::to_string));
+    let predictions = best.map_or(Vec::new(), |best| results.mean_predictions(best));
+    Ok(ExperimentPart {
+        title: title(experiment).to_owned(),
+        findings,
+        failures,
+        headings: table.headings(),
+        rows: table.rows().into_iter().map(row).collect(),
+        notes: table.notes().map(str::to_owned).collect(),
+        charts: charts(&results, best, &predictions),
+        worst: worst(&runner, predictions)?,
+    })
+}
+
+fn title(experiment: Experiment) -> &'static str {
+    match experiment {
+        Experiment::One => "Experiment 1: synthetic images alone",
+        Experiment::TwoA => "Experiment 2a: finetuning on preparations",
+        Experiment::TwoB => "Experiment 2b: finetuning on clinical images",
+        Experiment::TwoC => "Experiment 2c: linear probing on preparations",
+        Experiment::Persons => "Learning curve over persons",
+        Experiment::Poses => "Learning curve over poses",
+    }
+}
+
+fn sets_are(n: usize) -> String {
+    format!(
+        "{} {}",
+        count(n, "test set"),
+        if n == 1 { "is" } else { "are" }
+    )
+}
+
+/// The column with the lowest mean absolute error.
+fn best(results: &Results) -> Option<Configuration> {
+    let error = |column: &Configuration| {
+        let mae = results.summary(*column, Metric::Mae)?.mean;
+        Some((mae, *column))
+    };
+    let columns = results.columns().iter().filter_map(error);
+    columns
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|best| best.1)
+}
+
+fn row((metric, cells): (&'static str, Vec<TableCell>)) -> (String, Vec<ResultCell>) {
+    let cell = |cell: TableCell| ResultCell {
+        text: cell.text,
+        best: cell.best,
+        published: cell.published.map(|[mean, std]| format!("{mean}±{std}")),
+    };
+    (metric.to_owned(), cells.into_iter().map(cell).collect())
+}
+
+/// Predictions of the best column against labels, and errors of all columns by angle where angles are known.
+fn charts(
+    results: &Results,
+    best: Option<Configuration>,
+    predictions: &[Prediction],
+) -> Vec<(String, ppa_report::Chart)> {
+    let Some(best) = best else {
+        return Vec::new();
+    };
+    let points = predictions.iter().map(|p| [p.label, p.prediction]);
+    let mut charts = vec![(
+        format!(
+            "{}: mean predictions of all seeds",
+            best.headings().join(", ")
+        ),
+        predictions_by_label(points.collect()),
+    )];
+    let by_angle = results.columns().iter().map(|&column| {
+        let means = results.error_by_angle(column).into_iter();
+        let points = means.map(|(angle, error, _)| [angle, error]);
+        (column.headings().join(", "), points.collect::<Vec<_>>())
+    });
+    let by_angle: Vec<_> = by_angle.filter(|(_, points)| !points.is_empty()).collect();
+    if !by_angle.is_empty() {
+        let caption = "mean absolute errors of single seeds by angle".to_owned();
+        charts.push((caption, errors_by_angle(by_angle)));
+    }
+    charts
+}
+
+fn worst(runner: &Runner, mut predictions: Vec<Prediction>) -> anyhow::Result<Vec<WorstPose>> {
+    let error = |p: &Prediction| (p.prediction - p.label).abs();
+    predictions.sort_by(|a, b| error(b).total_cmp(&error(a)));
+    let mut limbs = std::collections::BTreeSet::new();
+    predictions.retain(|p| limbs.insert((p.patient, p.side)));
+    predictions.truncate(WORST);
+    let worst = predictions.into_iter().map(|prediction| {
+        let moment = prediction.moment();
+        let images = runner.images_of(&moment)?.into_iter().map(|image| {
+            let raster = image.load(WORST_SIDE)?;
+            anyhow::Ok(GrayImage16 {
+                width: raster.width() as u32,
+                height: raster.height() as u32,
+                pixels: raster.into_values(),
+            })
+        });
+        Ok(WorstPose {
+            caption: format!(
+                "{moment}: label {}, prediction {:.2}",
+                prediction.label, prediction.prediction
+            ),
+            images: images.collect::<anyhow::Result<_>>()?,
+        })
+    });
+    worst.collect()
+}
+
+fn describe(outcome: &Outcome) -> String {
+    let mut lines = Vec::new();
+    for Finding {
+        experiment,
+        findings,
+        failures,
+    } in &outcome.findings
+    {
+        lines.push(experiment.clone());
+        let sentences = failures.iter().chain(findings);
+        lines.extend(sentences.map(|sentence| format!("  {sentence}")));
+    }
+    lines.push(format!("page: {}", outcome.page.display()));
+    lines.join("\n")
+}

@@ -1,0 +1,112 @@
+//! Predictions without a network on the test sets of an experiment.
+
+use std::fs::create_dir_all;
+
+use ppa_dataset::layout::View;
+use ppa_dataset::write_whole;
+use serde::{Deserialize, Serialize};
+
+use super::error::ExperimentError;
+use super::predictions::{Prediction, join_views};
+use super::record::{Record, file, fingerprint, read_json, without_paths};
+use super::results::Results;
+use super::run::Runner;
+use super::unit::Unit;
+use crate::evaluate::{BaselineKind, Row, baseline_predictions};
+use crate::train::{TrainError, samples};
+
+/// Baselines of one view's images of a fold, as a file holds them.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct OfView {
+    /// What they were computed from.
+    record: Record,
+    /// Standard deviation of each tested image's label.
+    label_std: Vec<f64>,
+    predictions: Vec<(BaselineKind, Vec<Prediction>)>,
+}
+
+impl Runner<'_> {
+    /// Adds to results what the baselines achieve on each fold: computed from the images of the experiment's first column, kept in
+    /// a file of each fold and view.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] naming the fold, or the file.
+    pub fn add_baselines(&self, results: &mut Results) -> Result<(), ExperimentError> {
+        for fold in 0..results.folds() {
+            let [left, right] = View::ALL.map(|view| self.of_view(results, fold, view));
+            let (left, right) = (left?, right?);
+            let wrong = |source| ExperimentError::Predictions {
+                place: self.place(fold),
+                source,
+            };
+            for ((kind, left_view), (_, right_view)) in
+                left.predictions.iter().zip(&right.predictions)
+            {
+                let joined = join_views(left_view, right_view).map_err(wrong)?;
+                results
+                    .insert_baseline(*kind, fold, &joined)
+                    .map_err(wrong)?;
+            }
+            results.insert_label_std(left.label_std);
+        }
+        Ok(())
+    }
+
+    fn of_view(
+        &self,
+        results: &Results,
+        fold: usize,
+        view: View,
+    ) -> Result<OfView, ExperimentError> {
+        // Seeds and later columns have the same tested images and, but for pretraining and body shapes, the same training images.
+        let unit = Unit::Run {
+            configuration: results.columns()[0],
+            fold,
+            view,
+            seed: 1,
+        };
+        let named = |source: TrainError| ExperimentError::Training {
+            unit: self.place(fold),
+            source: Box::new(source),
+        };
+        let config = self.config(unit)?;
+        let training = samples(&config, &config.training).map_err(named)?;
+        let tested = samples(&config, &config.evaluation).map_err(named)?;
+        let data_sha256 = fingerprint(&[training.clone(), tested.clone()]);
+        let record = Record {
+            config: without_paths(&config),
+            start_sha256: None,
+            data_sha256,
+        };
+        let folder = self.root().join(self.place(fold));
+        let path = folder.join(format!("{}.json", view.name()));
+        if path.exists() {
+            let found: OfView = read_json(&path)?;
+            return match found.record == record {
+                true => Ok(found),
+                false => Err(ExperimentError::OtherSettings(path)),
+            };
+        }
+        let predicted = baseline_predictions(&training, &tested)?;
+        let rows = |(kind, predictions): (BaselineKind, Vec<f64>)| {
+            let rows = Row::of(&tested, &predictions).into_iter();
+            (kind, rows.map(Prediction::from).collect())
+        };
+        let of_view = OfView {
+            record,
+            label_std: tested.iter().map(|sample| sample.label_std).collect(),
+            predictions: predicted.into_iter().map(rows).collect(),
+        };
+        create_dir_all(&folder).map_err(file("create", &folder))?;
+        let text = serde_json::to_string(&of_view).expect("predictions are JSON");
+        write_whole(&path, text.as_bytes())?;
+        Ok(of_view)
+    }
+
+    fn place(&self, fold: usize) -> String {
+        format!(
+            "experiment_{}/baselines/fold_{fold}",
+            self.experiment().name()
+        )
+    }
+}
