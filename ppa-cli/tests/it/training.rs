@@ -229,6 +229,18 @@ fn tables_are_marked_while_results_are_missing() {
     );
     let again = fs::read_to_string(folder.join("runs/experiment_2a.md")).unwrap();
     assert_eq!(again, table);
+    let report = "experiment report plan.toml --runs runs --out page.html";
+    let said = succeed(folder, report);
+    let expected = [
+        "Experiment 2a: finetuning on preparations",
+        "36 test sets are missing",
+    ];
+    contains(&said, &expected);
+    let page = fs::read_to_string(folder.join("page.html")).unwrap();
+    contains(&page, &expected);
+    contains(&page, &["paper 0.22±0.06"]);
+    let refused = fail(folder, report);
+    assert!(refused.contains("page.html exists"), "{refused}");
     let refused = fail(folder, "experiment 2b plan.toml --out runs --so-far");
     assert!(refused.contains("2b needs [clinical]"), "{refused}");
     fs::write(

@@ -50,7 +50,7 @@ pub struct Compared {
     pub kind: BaselineKind,
     /// Its mean absolute error; NaN if it is not defined.
     pub mae: f64,
-    /// As [`p_network_better`] gives it.
+    /// Exact one-sided sign-flip test of persons' mean absolute errors: small where the network's are lower.
     pub p_network_better: f64,
 }
 

@@ -201,6 +201,11 @@ impl Results {
         &self.constant
     }
 
+    /// Whether no test set has been judged yet.
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
     /// Number of folds of each seed.
     pub fn folds(&self) -> usize {
         self.folds

@@ -60,8 +60,6 @@ impl TrainConfig {
     /// * Running statistics are the mean of 32 batches, 512 images. Those that training leaves lag behind its weights: in its first
     ///   hundred steps predictions are then nearly constant (`early_answers_are_nearly_constant_with_lagging_ones`).
     /// * Samples are drawn as often as they are in the data, since the mean absolute error counts them so.
-    /// * Images are rotated by up to 5°, a third of the paper's limit: the edge of 48 pixels moves by two. They are not mirrored: with
-    ///   `mirror` all limbs are shown as right ones.
     pub fn standard() -> Self {
         let quick = Self::quick();
         Self {
@@ -73,11 +71,6 @@ impl TrainConfig {
             balanced: false,
             log_every: NonZeroUsize::MIN.saturating_add(49),
             checkpoint_every: NonZeroUsize::MIN.saturating_add(249),
-            augmentation: Augmentation {
-                rotate_probability: 0.5,
-                rotate_limit_deg: 5.0,
-                ..quick.augmentation
-            },
             ..quick
         }
     }

@@ -91,7 +91,7 @@ fn part(
         failures.push(format!("{} missing", sets_are(missing)));
     }
     let best = best(&results);
-    if best.is_some() {
+    if !results.is_empty() {
         runner.add_baselines(&mut results)?;
     }
     let table = Table::so_far(&results);
@@ -190,24 +190,38 @@ fn worst(runner: &Runner, mut predictions: Vec<Prediction>) -> anyhow::Result<Ve
     predictions.retain(|p| limbs.insert((p.patient, p.side)));
     predictions.truncate(WORST);
     let worst = predictions.into_iter().map(|prediction| {
-        let moment = prediction.moment();
-        let images = runner.images_of(&moment)?.into_iter().map(|image| {
-            let raster = image.load(WORST_SIDE)?;
-            anyhow::Ok(GrayImage16 {
-                width: raster.width() as u32,
-                height: raster.height() as u32,
-                pixels: raster.into_values(),
-            })
-        });
+        let images = runner
+            .images_of(&prediction.moment())?
+            .into_iter()
+            .map(|image| {
+                let raster = image.load(WORST_SIDE)?;
+                anyhow::Ok(GrayImage16 {
+                    width: raster.width() as u32,
+                    height: raster.height() as u32,
+                    pixels: raster.into_values(),
+                })
+            });
         Ok(WorstPose {
-            caption: format!(
-                "{moment}: label {}, prediction {:.2}",
-                prediction.label, prediction.prediction
-            ),
+            caption: caption(&prediction),
             images: images.collect::<anyhow::Result<_>>()?,
         })
     });
     worst.collect()
+}
+
+fn caption(prediction: &Prediction) -> String {
+    let pose = match prediction.angle_deg {
+        Some(angle_deg) => format!(
+            "patient {} {}, {angle_deg} degrees",
+            prediction.patient,
+            prediction.side.letter()
+        ),
+        None => prediction.moment().to_string(),
+    };
+    let Prediction {
+        label, prediction, ..
+    } = prediction;
+    format!("{pose}: label {label}, prediction {prediction:.2}")
 }
 
 fn describe(outcome: &Outcome) -> String {

@@ -114,7 +114,7 @@ pub fn run(experiment: Experiment, args: &RunArgs, output: Output) -> anyhow::Re
     let finished = !args.so_far && train(&runner, part, &interrupt)?;
 
     let mut results = runner.results()?;
-    if args.so_far || (finished && part == Part::WHOLE) {
+    if !results.is_empty() && (args.so_far || (finished && part == Part::WHOLE)) {
         runner.add_baselines(&mut results)?;
     }
     let table = match (args.so_far, finished && part == Part::WHOLE) {
