@@ -6,6 +6,7 @@ use ppa_dataset::layout::View;
 use ppa_dataset::write_whole;
 use serde::{Deserialize, Serialize};
 
+use super::configuration::{Amount, Configuration};
 use super::error::ExperimentError;
 use super::predictions::{Prediction, join_views};
 use super::record::{Record, file, fingerprint, read_json, without_paths};
@@ -26,8 +27,8 @@ struct OfView {
 }
 
 impl Runner<'_> {
-    /// Adds to results what the baselines achieve on each fold: computed from the images of the experiment's first column, kept in
-    /// a file of each fold and view.
+    /// Adds to results what the baselines achieve on each fold: computed from all its training images without variants of the skin,
+    /// kept in a file of each fold and view.
     ///
     /// # Errors
     /// [`ExperimentError`] naming the fold, or the file.
@@ -58,9 +59,13 @@ impl Runner<'_> {
         fold: usize,
         view: View,
     ) -> Result<OfView, ExperimentError> {
-        // Seeds and later columns have the same tested images and, but for pretraining and body shapes, the same training images.
+        // Tested images are the same for all columns and seeds. A learning curve's columns are compared with baselines of all data.
+        let configuration = Configuration {
+            amount: Amount::All,
+            ..results.columns()[0]
+        };
         let unit = Unit::Run {
-            configuration: results.columns()[0],
+            configuration,
             fold,
             view,
             seed: 1,

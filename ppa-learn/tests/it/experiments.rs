@@ -4,7 +4,10 @@ use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use ppa_learn::experiment::{Event, Experiment, ExperimentError, ExperimentPlan, Runner, Table};
+use ppa_learn::evaluate::BaselineKind;
+use ppa_learn::experiment::{
+    Event, Experiment, ExperimentError, ExperimentPlan, Metric, Runner, Table,
+};
 use tempfile::TempDir;
 
 use crate::toy::dataset;
@@ -155,6 +158,7 @@ fn learning_curves_have_a_column_for_each_amount() {
     let folder = tempfile::tempdir().unwrap();
     let plan = with_learning_curves(folder.path(), &data, "[1, 3]");
     let root = folder.path().join("runs");
+    let mut ridges = Vec::new();
     for (experiment, columns) in [
         (
             Experiment::Persons,
@@ -171,7 +175,10 @@ fn learning_curves_have_a_column_for_each_amount() {
         runner.add_baselines(&mut results).unwrap();
         let table = Table::complete(&results).unwrap().to_markdown();
         assert!(headings(&table).starts_with(columns), "{table}");
+        ridges.push(results.of_baseline(BaselineKind::KernelRidge, Metric::Mae));
     }
+    assert!(ridges[0].is_some());
+    assert_eq!(ridges[0], ridges[1], "baselines of all data");
     let data_of = |unit: &str| {
         let path = root.join(unit).join("fold_0/cam_left/seed_1/finished.json");
         let record: serde_json::Value =

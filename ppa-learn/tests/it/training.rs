@@ -142,10 +142,11 @@ fn the_angle_of_a_bar_is_learned_from_other_bars() {
 
 /// Mean absolute error on the bar of a sixth person, and the spread of the answers as a share of that of the labels, after 40 of
 /// the steps of `standard`, shortened and at a rate that is high at once.
-fn early(statistics: impl FnOnce(TrainConfig) -> TrainConfig) -> (f64, f64) {
+fn early(seed: u64, statistics: impl FnOnce(TrainConfig) -> TrainConfig) -> (f64, f64) {
     let folder = tempfile::tempdir().unwrap();
     let data = bars_of_six();
     let config = statistics(TrainConfig {
+        seed,
         side: 32,
         steps: 40,
         warm_up_steps: 5,
@@ -165,17 +166,23 @@ fn spread(values: &[f64]) -> f64 {
     (squares.sum::<f64>() / values.len() as f64).sqrt()
 }
 
+/// After 40 steps errors still differ by seed: 0.51, 0.25, 0.32, 0.28 and 0.18 with the first five.
 #[test]
 fn early_answers_spread_with_recomputed_statistics() {
-    let (mae, spread) = early(|standard| standard);
-    println!("error {mae}, spread {spread}");
-    assert!(mae < 0.4 && spread > 1.0 / 3.0, "{mae}, {spread}");
+    let mut sum = 0.0;
+    for seed in 1..=3 {
+        let (mae, spread) = early(seed, |standard| standard);
+        println!("error {mae}, spread {spread}");
+        assert!(spread > 1.0 / 3.0, "{mae}, {spread}");
+        sum += mae;
+    }
+    assert!(sum / 3.0 < 0.45, "{}", sum / 3.0);
 }
 
 /// Why statistics are computed again: those that training moves by a tenth in each step lag behind its weights.
 #[test]
 fn early_answers_are_nearly_constant_with_lagging_ones() {
-    let (mae, spread) = early(|standard| TrainConfig {
+    let (mae, spread) = early(1, |standard| TrainConfig {
         weight_average: 0.0,
         recompute_statistics: 0,
         ..standard

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use ppa_core::text::count;
 use ppa_dataset::published::GrayImage16;
 use ppa_dataset::write_whole;
 use ppa_learn::experiment::{
@@ -85,11 +84,7 @@ fn part(
 ) -> anyhow::Result<ExperimentPart> {
     let runner = Runner::new(plan, experiment, runs)?;
     let mut results = runner.results()?;
-    let missing = results.missing().len();
-    let mut failures = Vec::new();
-    if missing > 0 {
-        failures.push(format!("{} missing", sets_are(missing)));
-    }
+    let failures = Table::complete(&results).err();
     let best = best(&results);
     if !results.is_empty() {
         runner.add_baselines(&mut results)?;
@@ -104,7 +99,7 @@ fn part(
     Ok(ExperimentPart {
         title: title(experiment).to_owned(),
         findings,
-        failures,
+        failures: failures.iter().map(ToString::to_string).collect(),
         headings: table.headings(),
         rows: table.rows().into_iter().map(row).collect(),
         notes: table.notes().map(str::to_owned).collect(),
@@ -122,14 +117,6 @@ fn title(experiment: Experiment) -> &'static str {
         Experiment::Persons => "Learning curve over persons",
         Experiment::Poses => "Learning curve over poses",
     }
-}
-
-fn sets_are(n: usize) -> String {
-    format!(
-        "{} {}",
-        count(n, "test set"),
-        if n == 1 { "is" } else { "are" }
-    )
 }
 
 /// The column with the lowest mean absolute error.
