@@ -1,6 +1,6 @@
 //! The exponential moving average of the weights.
 
-use candle_core::{Device, Error, Tensor, Var};
+use candle_core::{Device, Error, Storage, Tensor, Var};
 
 /// The decay at a step t: at most (1 + t) / (10 + t), as in TensorFlow's `ExponentialMovingAverage`, so that the average lags by a
 /// tenth of the steps made at most and soon forgets the first values.
@@ -27,9 +27,19 @@ impl Average {
     /// Adds the values after a step, `steps` having been made.
     pub fn add(&mut self, variables: &[&Var], most_decay: f64, steps: u64) -> Result<(), Error> {
         let share = (1.0 - decay(most_decay, steps)) as f32;
-        for (average, variable) in self.values.iter_mut().zip(variables) {
-            for (average, value) in average.iter_mut().zip(values_of(variable)?) {
+        let add = |average: &mut [f32], values: &[f32]| {
+            for (average, value) in average.iter_mut().zip(values) {
                 *average += share * (value - *average);
+            }
+        };
+        for (average, variable) in self.values.iter_mut().zip(variables) {
+            let (storage, layout) = variable.storage_and_layout();
+            match (&*storage, layout.contiguous_offsets()) {
+                // Without a copy of four million values.
+                (Storage::Cpu(values), Some((start, end))) => {
+                    add(average, &values.as_slice::<f32>()?[start..end]);
+                }
+                _ => add(average, &values_of(variable)?),
             }
         }
         Ok(())
