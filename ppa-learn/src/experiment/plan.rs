@@ -83,6 +83,9 @@ pub struct LearningCurves {
     /// Train with every n-th angle of each limb.
     #[serde(default)]
     pub every_pose: Vec<NonZeroUsize>,
+    /// Number of their repetitions; that of the other experiments if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seeds: Option<u64>,
 }
 
 /// Persons of a fold.
@@ -130,11 +133,15 @@ impl ExperimentPlan {
             ppa_core::regular_file::read_to_string(path).map_err(|e| wrong(e.to_string()))?;
         let mut plan: Self =
             toml::from_str(&text).map_err(|e| wrong(e.to_string().trim_end().to_owned()))?;
-        if !(1..=MAX_PAIRS as u64).contains(&plan.seeds) {
-            return Err(wrong(format!(
-                "seeds is {}, expected 1 to {MAX_PAIRS}, the most that the exact permutation test takes",
-                plan.seeds
-            )));
+        for (key, seeds) in [
+            ("seeds", Some(plan.seeds)),
+            ("learning_curves.seeds", plan.learning_curves.seeds),
+        ] {
+            if let Some(seeds) = seeds.filter(|seeds| !(1..=MAX_PAIRS as u64).contains(seeds)) {
+                return Err(wrong(format!(
+                    "{key} is {seeds}, expected 1 to {MAX_PAIRS}, the most that the exact permutation test takes"
+                )));
+            }
         }
         let whole = std::path::absolute(path).map_err(|e| wrong(e.to_string()))?;
         let folder = whole.parent().unwrap_or(Path::new(""));
@@ -154,11 +161,22 @@ impl ExperimentPlan {
         TrainConfig::from_table(self.training.clone(), &self.path)
     }
 
+    /// The seeds of an experiment's repetitions.
+    pub(super) fn seeds_of(&self, experiment: Experiment) -> Vec<u64> {
+        let of_curves = self.learning_curves.seeds;
+        let number = match experiment {
+            Experiment::Persons | Experiment::Poses => of_curves.unwrap_or(self.seeds),
+            _ => self.seeds,
+        };
+        (1..=number).collect()
+    }
+
     /// The columns of an experiment that can be run: without ImageNet where there is no file of its weights.
     pub fn configurations(&self, experiment: Experiment) -> Vec<Configuration> {
         let LearningCurves {
             persons,
             every_pose,
+            ..
         } = &self.learning_curves;
         let mut columns = match experiment {
             Experiment::Persons => {

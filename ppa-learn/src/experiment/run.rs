@@ -89,7 +89,7 @@ impl<'a> Runner<'a> {
 
     /// Its runs, those with ImageNet only if the plan has weights.
     pub fn runs(&self) -> Vec<Unit> {
-        let seeds: Vec<_> = (1..=self.plan.seeds).collect();
+        let seeds = self.plan.seeds_of(self.experiment);
         runs(
             &self.plan.configurations(self.experiment),
             self.folds.len(),
@@ -372,7 +372,7 @@ impl<'a> Runner<'a> {
     /// # Errors
     /// [`ExperimentError`] naming predictions that cannot be read or joined.
     pub fn results(&self) -> Result<Results, ExperimentError> {
-        let seeds: Vec<_> = (1..=self.plan.seeds).collect();
+        let seeds = self.plan.seeds_of(self.experiment);
         let columns = self.plan.configurations(self.experiment);
         let mut results = Results::new(self.experiment, columns, self.folds.len(), &seeds);
         for place in results.missing() {

@@ -147,7 +147,8 @@ fn with_learning_curves(folder: &Path, data: &TempDir, persons: &str) -> Experim
     plan(folder, data, data, 2);
     let path = folder.join("plan.toml");
     let text = fs::read_to_string(&path).unwrap();
-    let curves = format!("[learning_curves]\npersons = {persons}\nevery_pose = [2, 1]\n");
+    let curves =
+        format!("[learning_curves]\npersons = {persons}\nevery_pose = [2, 1]\nseeds = 2\n");
     fs::write(&path, text + &curves).unwrap();
     ExperimentPlan::read(&path).unwrap()
 }
@@ -175,6 +176,7 @@ fn learning_curves_have_a_column_for_each_amount() {
         runner.add_baselines(&mut results).unwrap();
         let table = Table::complete(&results).unwrap().to_markdown();
         assert!(headings(&table).starts_with(columns), "{table}");
+        assert_eq!(results.planned_seeds(), 2, "those of learning curves");
         ridges.push(results.of_baseline(BaselineKind::KernelRidge, Metric::Mae));
     }
     assert!(ridges[0].is_some());
