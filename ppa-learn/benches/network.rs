@@ -3,7 +3,7 @@
 use candle_core::{Device, Tensor};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use ppa_benches::ProcessorTime;
-use ppa_learn::{EfficientNetB0, InferenceNetwork, Mode, Options, QualityNetwork};
+use ppa_learn::{EfficientNetB0, InferenceNetwork, Mode, Options, QualityNetwork, Targets};
 
 const SIDE: usize = 96;
 
@@ -17,7 +17,8 @@ fn network(c: &mut Criterion<ProcessorTime>) {
     let mut group = c.benchmark_group("efficientnet_b0");
     group.sample_size(10);
     let one = [images(1)];
-    let quality = QualityNetwork::new(0, Options::default(), None).expect("a network");
+    let quality =
+        QualityNetwork::new(0, Options::default(), None, Targets::Quality).expect("a network");
     let inference = InferenceNetwork::new(&quality).expect("a network");
     group.throughput(Throughput::Elements(1));
     group.bench_function("inference", |b| b.iter(|| inference.forward(&one)));

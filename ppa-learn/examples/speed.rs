@@ -17,7 +17,7 @@ use ppa_core::Roi;
 use ppa_dataset::layout::{LimbId, Side, View};
 use ppa_learn::data::{Augmentation, Balanced, Images, Loader, Order, Sample, SampleImage};
 use ppa_learn::train::Adam;
-use ppa_learn::{EfficientNetB0, InferenceNetwork, Mode, Options, QualityNetwork};
+use ppa_learn::{EfficientNetB0, InferenceNetwork, Mode, Options, QualityNetwork, Targets};
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -53,7 +53,12 @@ fn main() -> anyhow::Result<()> {
         .collect();
     let targets = Tensor::from_vec(targets, (batch, 1), &Device::Cpu)?;
     let network = EfficientNetB0::new(0, Options::default())?;
-    let inference = InferenceNetwork::new(&QualityNetwork::new(0, Options::default(), None)?)?;
+    let inference = InferenceNetwork::new(&QualityNetwork::new(
+        0,
+        Options::default(),
+        None,
+        Targets::Quality,
+    )?)?;
     let variables = network.variables();
     let mut adam = Adam::new(variables.iter().map(|variable| variable.elem_count()));
 
@@ -127,6 +132,7 @@ fn depth_images(folder: &Path, count: u32) -> anyhow::Result<Vec<Sample>> {
             pose: number.to_string(),
             frame: 0,
             angle_deg: None,
+            correction_deg: None,
         });
     }
     Ok(samples)

@@ -15,8 +15,8 @@ pub mod train;
 
 pub use device::{DeviceError, DeviceName};
 pub use network::{
-    EfficientNetB0, Entry, Fusion, FusionKind, InferenceNetwork, Mode, Named, NetworkError,
-    Options, Place, QualityNetwork,
+    CORRECTION_UNIT_DEG, EfficientNetB0, Entry, Fusion, FusionKind, InferenceNetwork, Mode, Named,
+    NetworkError, Options, Place, PosePrediction, QualityNetwork, Targets,
 };
 pub use parity::{Parity, parity};
 pub use random::{Purpose, stream};

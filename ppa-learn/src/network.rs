@@ -38,7 +38,7 @@ pub(crate) use layers::Layers;
 pub(crate) use norm::running;
 use operation::Backbone;
 pub(crate) use quality::CAMERA_PREFIXES;
-pub use quality::{Place, QualityNetwork};
+pub use quality::{CORRECTION_UNIT_DEG, Place, PosePrediction, QualityNetwork, Targets};
 
 use crate::kernels::buffer::Pool;
 use crate::random::{Purpose, stream};

@@ -1,7 +1,9 @@
 //! What a new network is and does.
 
 use candle_core::{Device, Storage, Tensor};
-use ppa_learn::{EfficientNetB0, InferenceNetwork, Mode, NetworkError, Options, QualityNetwork};
+use ppa_learn::{
+    EfficientNetB0, InferenceNetwork, Mode, NetworkError, Options, QualityNetwork, Targets,
+};
 
 /// Images of smooth waves, different for each number.
 fn images(count: usize, height: usize, width: usize) -> Tensor {
@@ -111,7 +113,7 @@ fn seed_and_step_fix_every_byte_for_any_number_of_threads() {
 
 #[test]
 fn inference_bytes_do_not_depend_on_threads() {
-    let network = QualityNetwork::new(5, Options::default(), None).unwrap();
+    let network = QualityNetwork::new(5, Options::default(), None, Targets::Quality).unwrap();
     let inference = InferenceNetwork::new(&network).unwrap();
     let images = [images(3, 97, 65)];
     let expected = column(&network.forward(&images, Mode::Eval).unwrap());

@@ -14,7 +14,7 @@ use candle_core::{Device, Tensor};
 use ppa_learn::train::{Source, TrainConfig, train};
 use ppa_learn::{
     EfficientNetB0, FirstConvolution, Fusion, FusionKind, Loaded, Mode, Options, QualityNetwork,
-    WeightsMetadata,
+    Targets, WeightsMetadata,
 };
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -145,7 +145,7 @@ assert error < 1e-4
         ];
         candle_core::safetensors::save(&HashMap::from(tensors), &io).unwrap();
         network
-            .save_onnx(&path, WeightsMetadata::new(true))
+            .save_onnx(&path, WeightsMetadata::new(true, Targets::Quality))
             .unwrap();
         python(script, &[&path, &io]);
     };
@@ -156,13 +156,15 @@ assert error < 1e-4
                 shared_weights,
                 ..Fusion::default()
             };
-            let network = QualityNetwork::new(5, Options::default(), Some(fusion)).unwrap();
+            let network =
+                QualityNetwork::new(5, Options::default(), Some(fusion), Targets::Quality).unwrap();
             follow_images(&network);
             check(&network, [64, right]);
         }
     }
     let [left, right] = [1, 2].map(|seed| {
-        let network = QualityNetwork::new(seed, Options::default(), None).unwrap();
+        let network =
+            QualityNetwork::new(seed, Options::default(), None, Targets::Quality).unwrap();
         follow_images(&network);
         network
     });
@@ -249,7 +251,8 @@ fn pytorch_says_the_same_of_pairs_by_every_fusion() {
                 shared_weights,
                 ..Fusion::default()
             };
-            let network = QualityNetwork::new(5, Options::default(), Some(fusion)).unwrap();
+            let network =
+                QualityNetwork::new(5, Options::default(), Some(fusion), Targets::Quality).unwrap();
             follow_images(&network);
             let [left, right] = pair(2 * PASSES, [64, 64]);
             let quality = network

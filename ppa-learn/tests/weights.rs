@@ -6,7 +6,7 @@ use std::error::Error;
 use candle_core::{DType, Device, Tensor};
 use ppa_learn::{
     EfficientNetB0, FirstConvolution, Fusion, FusionKind, Loaded, Mode, Named, Options,
-    QualityNetwork, WeightsError, WeightsMetadata,
+    QualityNetwork, Targets, WeightsError, WeightsMetadata,
 };
 use proptest::prelude::*;
 
@@ -77,9 +77,12 @@ fn networks_of_both_cameras_are_saved_and_loaded() {
             shared_weights,
             ..Fusion::default()
         };
-        let new = |seed| QualityNetwork::new(seed, Options::default(), Some(fusion)).unwrap();
+        let new = |seed| {
+            QualityNetwork::new(seed, Options::default(), Some(fusion), Targets::Quality).unwrap()
+        };
         let (one, other) = (new(1), new(2));
-        one.save(&fused, WeightsMetadata::new(true)).unwrap();
+        one.save(&fused, WeightsMetadata::new(true, Targets::Quality))
+            .unwrap();
         assert!(WeightsMetadata::read(&fused).unwrap().mirror);
         let loaded = other.load(&fused, FirstConvolution::Fresh).unwrap();
         assert_eq!(loaded, Loaded::default());

@@ -9,7 +9,7 @@ use ppa_dataset::labels::LabelName;
 use ppa_learn::DeviceName;
 use ppa_learn::data::{Images, check_split};
 use ppa_learn::evaluate::{
-    Baselines, EVALUATION_TABLES, Evaluation, Row, Scores, write_evaluation,
+    Baselines, CorrectionScores, EVALUATION_TABLES, Evaluation, Row, Scores, write_evaluation,
 };
 use ppa_learn::train::{LogRow, Source, predict, read_log, samples, trained};
 use ppa_report::Chart;
@@ -167,6 +167,7 @@ fn describe(evaluation: &Evaluation) -> String {
         }
         lines.push(baselines.to_string());
     }
+    lines.extend(correction(evaluation));
     if let Some(spread) = evaluation.frame_spread {
         lines.push(format!(
             "Frames of a pose differ by {spread:.3} (standard deviation)."
@@ -184,6 +185,20 @@ fn describe(evaluation: &Evaluation) -> String {
         lines.push(row.map(|n| format!("{n:>8}")).concat());
     }
     lines.join("\n")
+}
+
+fn correction(evaluation: &Evaluation) -> Option<String> {
+    let CorrectionScores {
+        mae_deg, bias_deg, ..
+    } = evaluation.correction?;
+    let without = evaluation.baselines.as_ref()?.correction_mae_deg;
+    let without = without.map(|mae| {
+        format!("; from the true angle to the mean best angle of the training limbs: {mae:.1}")
+    });
+    let without = without.unwrap_or_default();
+    Some(format!(
+        "Correction (medial rotation to the best pose): MAE {mae_deg:.1} degrees, mean error {bias_deg:+.1}{without}"
+    ))
 }
 
 fn percent(value: Option<f64>) -> String {

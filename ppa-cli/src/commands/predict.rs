@@ -22,7 +22,7 @@ use crate::stderr;
 #[derive(Debug, Args)]
 #[command(
     after_help = "Prints one line of JSON for each pair: `name`, `left`, `right` and `quality` (their mean; alone where one network judges pairs) from 1 (ideal) to 3 \
-(inadequate), and `latency_ms` from the moment when the pair was found to the answer: how long it waited before, while others were judged, is not \
+(inadequate), `correction_deg` where networks were trained with a `correction_weight` (medial rotation to the best pose), and `latency_ms` from the moment when the pair was found to the answer: how long it waited before, while others were judged, is not \
 in it. Frames that cannot be used are named on stderr and skipped. In a folder a name is judged again only after its files were gone. \
 The last line gives pairs per second and latencies: on stderr, or on stdout with --json."
 )]

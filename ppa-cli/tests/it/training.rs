@@ -94,7 +94,8 @@ fn a_killed_training_resumes_to_the_same_weights() {
     let files = names(&folder.join("whole/evaluation"));
     assert_eq!(files.len(), 15, "{files:?}");
     let table = fs::read_to_string(folder.join("whole/evaluation/predictions.csv")).unwrap();
-    let header = "id,dataset,camera,patient,side,pose,frame,angle_deg,label,prediction";
+    let header = "id,dataset,camera,patient,side,pose,frame,angle_deg,label,prediction,\
+        correction_deg,predicted_correction_deg";
     assert_eq!(table.lines().next(), Some(header));
     assert_eq!(table.lines().count(), 4);
     let refused = fail(folder, "eval whole");

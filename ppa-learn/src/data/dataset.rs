@@ -11,6 +11,7 @@ use ppa_dataset::labels::{LabelFile, LabelName};
 use ppa_dataset::layout::{LimbId, Side, View};
 use ppa_dataset::published::{DepthFile, ImagePair, Pose, Published};
 
+use super::correction::set_corrections;
 use super::error::DataError;
 use super::prepare::check_roi;
 use super::sample::{Sample, SampleImage};
@@ -165,6 +166,7 @@ pub fn read_samples(root: &Path, selection: &Selection) -> Result<Vec<Sample>, D
         }
         return Err(DataError::Empty(what));
     }
+    set_corrections(&mut samples);
     Ok(samples)
 }
 
@@ -259,6 +261,7 @@ impl Reader<'_> {
                 Pose::Rotated { step, .. } => Some(f64::from(step) / 2.0),
                 Pose::Recorded { .. } => None,
             },
+            correction_deg: None,
         })
     }
 

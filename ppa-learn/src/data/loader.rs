@@ -10,6 +10,7 @@ use super::balance::Balanced;
 use super::error::DataError;
 use super::images::Images;
 use super::prepare::evaluation_input;
+use super::sample::Sample;
 
 /// Batches that each worker makes ahead.
 const AHEAD: usize = 2;
@@ -23,6 +24,8 @@ pub struct Batch {
     pub images: Vec<Vec<f32>>,
     /// One label for each sample.
     pub labels: Vec<f32>,
+    /// Medial rotation in degrees to the best pose of the limb, where it is known.
+    pub corrections_deg: Vec<Option<f32>>,
 }
 
 /// Which samples stand in which batch.
@@ -133,13 +136,19 @@ impl Maker {
             samples: Vec::new(),
             images: Vec::new(),
             labels: Vec::new(),
+            corrections_deg: Vec::new(),
         };
         for place in places {
             let (sample, inputs) = self.inputs(place)?;
             batch.samples.push(sample);
-            batch
-                .labels
-                .push(self.images.samples()[sample].label as f32);
+            let Sample {
+                label,
+                correction_deg,
+                ..
+            } = &self.images.samples()[sample];
+            batch.labels.push(*label as f32);
+            let correction_deg = correction_deg.map(|degrees| degrees as f32);
+            batch.corrections_deg.push(correction_deg);
             batch.images.resize_with(inputs.len(), Vec::new);
             for (camera, input) in batch.images.iter_mut().zip(inputs) {
                 camera.extend(input);

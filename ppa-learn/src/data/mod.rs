@@ -10,6 +10,7 @@
 mod augment;
 mod balance;
 mod blur;
+mod correction;
 mod dataset;
 mod error;
 mod gradient;

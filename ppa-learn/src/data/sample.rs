@@ -73,6 +73,9 @@ pub struct Sample {
     pub frame: u32,
     /// Medial rotation in degrees, where the dataset states it.
     pub angle_deg: Option<f64>,
+    /// Medial rotation in degrees from the pose to the best one of its limb, as the labels of the limb's samples say; where angles are
+    /// known.
+    pub correction_deg: Option<f64>,
 }
 
 /// Refuses a split that has images of one person in training and in evaluation.
@@ -113,6 +116,7 @@ pub(crate) mod tests {
             pose: format!("pose {number}"),
             frame: 0,
             angle_deg: None,
+            correction_deg: None,
         }
     }
 

@@ -43,6 +43,9 @@ pub struct Baselines {
     /// Mean absolute error of labels that vary normally by their `std` about the true ones: no prediction can be expected to err
     /// less. Open where all labels are given without variation.
     pub label_noise_mae: Option<f64>,
+    /// Mean absolute error in degrees of corrections from the true angle to the mean best angle of the training limbs. Open where
+    /// either is unknown.
+    pub correction_mae_deg: Option<f64>,
     /// Whether the network is better.
     pub verdict: Verdict,
 }
@@ -80,6 +83,7 @@ impl Baselines {
             network_mae,
             persons: of_network.len(),
             label_noise_mae: label_noise_mae(tested.iter().map(|sample| sample.label_std)),
+            correction_mae_deg: correction_mae_deg(training, tested),
             verdict,
         })
     }
@@ -120,6 +124,20 @@ pub(crate) fn baseline_predictions(
         predicted.insert(1, (BaselineKind::Angle, by_angle));
     }
     Ok(predicted)
+}
+
+/// The best angle of a sample's limb.
+fn best_angle_deg(sample: &Sample) -> Option<f64> {
+    Some(sample.angle_deg? + sample.correction_deg?)
+}
+
+/// Mean distance of the tested samples' best angles from the mean of the training samples'.
+fn correction_mae_deg(training: &[Sample], tested: &[Sample]) -> Option<f64> {
+    let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
+    let known = mean(training.iter().filter_map(best_angle_deg).collect());
+    let errors = tested.iter().filter_map(best_angle_deg);
+    let mae = mean(errors.map(|best| (best - known).abs()).collect());
+    mae.is_finite().then_some(mae)
 }
 
 fn mean_label(samples: &[Sample]) -> f64 {

@@ -2,6 +2,7 @@
 //! network achieve.
 
 mod baselines;
+mod correction;
 mod error;
 mod folder;
 mod kernel_ridge;
@@ -14,6 +15,7 @@ mod verdict;
 
 pub use baselines::{Baseline, Baselines};
 pub(crate) use baselines::{baseline_predictions, label_noise_mae};
+pub use correction::CorrectionScores;
 pub use error::EvaluateError;
 pub use folder::{EVALUATION_TABLES, write_evaluation, write_predictions};
 pub(crate) use means::means;

@@ -6,6 +6,7 @@ use ppa_metrics::ConstantPrediction;
 use serde::Serialize;
 
 use super::baselines::Baselines;
+use super::correction::CorrectionScores;
 use super::error::EvaluateError;
 use super::means::means;
 use super::poses::{PoseRow, frame_spread, poses, triples};
@@ -42,6 +43,9 @@ pub struct Evaluation {
     pub calibration_by_prediction: Vec<(f64, f64, usize)>,
     /// (degrees, mean absolute error, images) of each angle that the dataset states.
     pub error_by_angle: Vec<(f64, f64, usize)>,
+    /// Errors of corrections, if the network predicts them and they are known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correction: Option<CorrectionScores>,
     /// What predictions without a network achieve, if it was computed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baselines: Option<Baselines>,
@@ -106,6 +110,7 @@ impl Evaluation {
             calibration: means(pairs.iter().copied()),
             calibration_by_prediction: by_prediction(&pairs),
             error_by_angle: means(errors),
+            correction: CorrectionScores::of(rows),
             baselines: None,
         })
     }
@@ -154,6 +159,8 @@ mod tests {
             angle_deg: (patient == 1).then_some(10.0),
             label,
             prediction,
+            correction_deg: None,
+            predicted_correction_deg: None,
         }
     }
 

@@ -3,6 +3,7 @@
 use ppa_dataset::layout::{Side, View};
 use serde::{Deserialize, Serialize};
 
+use crate::PosePrediction;
 use crate::data::Sample;
 
 /// A prediction and its label. The columns are those that `ppa metrics` and the experiments read, and more.
@@ -28,6 +29,12 @@ pub struct Row {
     pub label: f64,
     /// What the network says.
     pub prediction: f64,
+    /// Medial rotation in degrees to the best pose of the limb, where angles are known.
+    #[serde(default)]
+    pub correction_deg: Option<f64>,
+    /// What the network says of it, if it predicts corrections.
+    #[serde(default)]
+    pub predicted_correction_deg: Option<f64>,
 }
 
 impl Row {
@@ -35,7 +42,7 @@ impl Row {
     ///
     /// # Panics
     /// If there is not one prediction for each sample.
-    pub fn of(samples: &[Sample], predictions: &[f64]) -> Vec<Self> {
+    pub fn of(samples: &[Sample], predictions: &[PosePrediction]) -> Vec<Self> {
         assert_eq!(
             samples.len(),
             predictions.len(),
@@ -48,7 +55,7 @@ impl Row {
             }
         }
         let number = |sample: &Sample| datasets.iter().position(|&d| *d == sample.dataset);
-        let row = |(sample, &prediction): (&Sample, &f64)| Self {
+        let row = |(sample, prediction): (&Sample, &PosePrediction)| Self {
             id: sample.id.clone(),
             dataset: 1 + number(sample).expect("all datasets are numbered"),
             camera: sample.camera,
@@ -58,7 +65,9 @@ impl Row {
             frame: sample.frame,
             angle_deg: sample.angle_deg,
             label: sample.label,
-            prediction,
+            prediction: prediction.quality,
+            correction_deg: sample.correction_deg,
+            predicted_correction_deg: prediction.correction_deg,
         };
         samples.iter().zip(predictions).map(row).collect()
     }

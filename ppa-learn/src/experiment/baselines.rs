@@ -13,6 +13,7 @@ use super::record::{Record, file, fingerprint, read_json, without_paths};
 use super::results::Results;
 use super::run::Runner;
 use super::unit::Unit;
+use crate::PosePrediction;
 use crate::evaluate::{BaselineKind, Row, baseline_predictions};
 use crate::train::{TrainError, samples};
 
@@ -94,6 +95,10 @@ impl Runner<'_> {
         }
         let predicted = baseline_predictions(&training, &tested)?;
         let rows = |(kind, predictions): (BaselineKind, Vec<f64>)| {
+            let predictions: Vec<_> = predictions
+                .into_iter()
+                .map(PosePrediction::of_quality)
+                .collect();
             let rows = Row::of(&tested, &predictions).into_iter();
             (kind, rows.map(Prediction::from).collect())
         };

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::camera::Camera;
 use crate::DeviceName;
 use crate::data::Views;
-use crate::network::{InferenceNetwork, NetworkError};
+use crate::network::{InferenceNetwork, PosePrediction};
 use crate::train::{TrainConfig, TrainError, trained};
 
 /// Why frames cannot be judged.
@@ -82,6 +82,10 @@ pub struct PairPrediction {
     pub right: Option<f64>,
     /// The mean of both, which is the paper's answer for a pose, or what the network says of both together.
     pub quality: f64,
+    /// Medial rotation in degrees that would bring the limb into its best pose, laterally where negative: from networks that predict
+    /// it, the mean of both.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correction_deg: Option<f64>,
 }
 
 /// The networks that judge the frames of both cameras.
@@ -190,25 +194,30 @@ impl PairPredictor {
         match &self.networks {
             Networks::Separate([of_first, of_second]) => {
                 let (one, other) = rayon::join(
-                    || of_first.quality(&[image(first, of_first)?]),
-                    || of_second.quality(&[image(second, of_second)?]),
+                    || of_first.prediction(&[image(first, of_first)?]),
+                    || of_second.prediction(&[image(second, of_second)?]),
                 );
+                let (one, other) = (one?, other?);
                 let mut of_camera = [0.0; 2];
-                of_camera[first] = one?;
-                of_camera[second] = other?;
+                of_camera[first] = one.quality;
+                of_camera[second] = other.quality;
                 let [left, right] = of_camera;
+                let corrections = one.correction_deg.zip(other.correction_deg);
                 Ok(PairPrediction {
                     left: Some(left),
                     right: Some(right),
                     quality: (left + right) / 2.0,
+                    correction_deg: corrections.map(|(one, other)| (one + other) / 2.0),
                 })
             }
             Networks::Joint(joint) => {
                 let (one, other) = rayon::join(|| image(first, joint), || image(second, joint));
+                let prediction = joint.prediction(&[one?, other?])?;
                 Ok(PairPrediction {
                     left: None,
                     right: None,
-                    quality: joint.quality(&[one?, other?])?,
+                    quality: prediction.quality,
+                    correction_deg: prediction.correction_deg,
                 })
             }
         }
@@ -217,10 +226,8 @@ impl PairPredictor {
 
 impl Trained {
     /// What the network says of one image of each of its cameras.
-    fn quality(&self, images: &[Tensor]) -> Result<f64, TrainError> {
-        let quality = self.network.forward(images)?;
-        let quality = quality.flatten_all().and_then(|all| all.to_vec1::<f32>());
-        Ok(f64::from(quality.map_err(NetworkError::from)?[0]))
+    fn prediction(&self, images: &[Tensor]) -> Result<PosePrediction, TrainError> {
+        Ok(PosePrediction::of(&self.network.forward(images)?)?[0])
     }
 }
 

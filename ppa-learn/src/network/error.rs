@@ -12,6 +12,9 @@ pub enum NetworkError {
         /// Cameras that the network is for.
         expected: usize,
     },
+    /// Networks of two cameras of which only one predicts corrections.
+    #[error("only one of both networks predicts corrections")]
+    Targets,
     /// Images of another shape.
     #[error(
         "images have the shape {found:?}, expected [images, 1, height, width] with nothing empty"

@@ -64,7 +64,7 @@ pub fn branch_gains(random: &mut impl Rng, drop: f32) -> [f64; 2] {
     }
 }
 
-/// The layers after those of both cameras: SiLU, 1024 to 256 values, SiLU, dropout, 256 to 1.
+/// The layers after those of both cameras: SiLU, 1024 to 256 values, SiLU, dropout, 256 to the network's outputs.
 #[derive(Debug, Clone)]
 pub struct LateFusion {
     variable: Var,
@@ -74,8 +74,11 @@ pub struct LateFusion {
 
 impl LateFusion {
     /// Layers with torch's first values: uniform in ±1 / sqrt(values in), weights and biases.
-    pub fn new(seed: u64, dropout: f32) -> Result<Self, NetworkError> {
-        let layers = [("fc.0", HIDDEN, 2 * LATE_OUTPUTS), ("fc.3", 1, HIDDEN)];
+    pub fn new(seed: u64, dropout: f32, outputs: usize) -> Result<Self, NetworkError> {
+        let layers = [
+            ("fc.0", HIDDEN, 2 * LATE_OUTPUTS),
+            ("fc.3", outputs, HIDDEN),
+        ];
         let (mut entries, mut values) = (Vec::new(), Vec::new());
         for (name, out, columns) in layers {
             let bound = 1.0 / (columns as f32).sqrt();
@@ -121,7 +124,7 @@ impl LateFusion {
         &self.entries
     }
 
-    /// One value for each moment [moments, 1], from the values [moments, 1024] of both cameras; `random` draws the
+    /// The network's outputs for each moment [moments, outputs], from the values [moments, 1024] of both cameras; `random` draws the
     /// dropout mask in training.
     pub fn forward(
         &self,
@@ -194,7 +197,7 @@ mod tests {
 
     #[test]
     fn answer_and_gradients_of_late_fusion_are_those_of_f64() {
-        let fusion = LateFusion::new(3, 0.3).unwrap();
+        let fusion = LateFusion::new(3, 0.3, 1).unwrap();
         let mut random = stream(4, Purpose::Sampling, 0);
         let mut normal = |count: usize| -> Vec<f32> {
             StandardNormal

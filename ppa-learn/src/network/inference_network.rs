@@ -24,7 +24,7 @@ impl InferenceNetwork {
         Ok(Self(copy))
     }
 
-    /// One value for each moment, as [`QualityNetwork::forward`] in [`Mode::Eval`].
+    /// Values for each moment, as [`QualityNetwork::forward`] in [`Mode::Eval`].
     ///
     /// # Errors
     /// As [`QualityNetwork::forward`].

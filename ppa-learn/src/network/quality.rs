@@ -8,7 +8,7 @@ use super::fusion::{Fusion, FusionKind, LATE_OUTPUTS, LateFusion, branch_gains};
 use super::{EfficientNetB0, Mode, Named, NetworkError, Options};
 use crate::random::{Purpose, stream};
 
-/// A network that predicts the quality of a pose, from the images of one camera or of both.
+/// A network that predicts the quality of a pose, and the correction if asked for, from the images of one camera or of both.
 ///
 /// Its tensors bear the names of the authors' modules: torchvision's for one camera; `module.` before them where both cameras share
 /// the weights, else `cam_left_module.` and `cam_right_module.`; `fc.0` and `fc.3` for the layers of late fusion.
@@ -18,7 +18,62 @@ pub struct QualityNetwork {
     branches: Vec<EfficientNetB0>,
     fusion: Option<Fusion>,
     late: Option<LateFusion>,
+    targets: Targets,
     seed: u64,
+}
+
+/// Degrees of one unit of a network's second output: corrections are then of the size of labels.
+pub const CORRECTION_UNIT_DEG: f64 = 30.0;
+
+/// What a network predicts.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Targets {
+    /// The quality of a pose: the paper's network.
+    #[default]
+    Quality,
+    /// Also the correction: the medial rotation from a pose to the best one of the limb.
+    QualityAndCorrection,
+}
+
+impl Targets {
+    /// Values for each moment.
+    pub(crate) fn outputs(self) -> usize {
+        match self {
+            Self::Quality => 1,
+            Self::QualityAndCorrection => 2,
+        }
+    }
+}
+
+/// What a network predicts of a pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PosePrediction {
+    /// Quality from 1 (ideal) to 3 (inadequate).
+    pub quality: f64,
+    /// Medial rotation in degrees that would bring the limb into its best pose; laterally where negative.
+    pub correction_deg: Option<f64>,
+}
+
+impl PosePrediction {
+    /// A quality without a correction.
+    pub fn of_quality(quality: f64) -> Self {
+        Self {
+            quality,
+            correction_deg: None,
+        }
+    }
+
+    /// The predictions of a network's outputs [moments, 1 or 2].
+    pub(crate) fn of(outputs: &Tensor) -> Result<Vec<Self>, NetworkError> {
+        let rows = outputs.to_vec2::<f32>()?;
+        let prediction = |row: &Vec<f32>| Self {
+            quality: row[0].into(),
+            correction_deg: row
+                .get(1)
+                .map(|&units| CORRECTION_UNIT_DEG * f64::from(units)),
+        };
+        Ok(rows.iter().map(prediction).collect())
+    }
 }
 
 /// What stands before the names of each camera's network.
@@ -34,15 +89,20 @@ pub struct Place {
 }
 
 impl QualityNetwork {
-    /// A network with first values as [`EfficientNetB0::new`]; of both cameras if it fuses them.
+    /// A network of `targets` with first values as [`EfficientNetB0::new`]; of both cameras if it fuses them.
     ///
     /// # Errors
     /// If candle cannot make the variables.
-    pub fn new(seed: u64, options: Options, fusion: Option<Fusion>) -> Result<Self, NetworkError> {
+    pub fn new(
+        seed: u64,
+        options: Options,
+        fusion: Option<Fusion>,
+        targets: Targets,
+    ) -> Result<Self, NetworkError> {
         let kind = fusion.map(|fusion| fusion.kind);
         let outputs = match kind {
             Some(FusionKind::Late) => LATE_OUTPUTS,
-            _ => 1,
+            _ => targets.outputs(),
         };
         let branch = |seed| EfficientNetB0::with_outputs(seed, options, outputs);
         let branches = match fusion {
@@ -54,7 +114,8 @@ impl QualityNetwork {
         };
         let late = match fusion {
             Some(fusion) if fusion.kind == FusionKind::Late => {
-                Some(LateFusion::new(seed, fusion.late_dropout)?)
+                let outputs = targets.outputs();
+                Some(LateFusion::new(seed, fusion.late_dropout, outputs)?)
             }
             _ => None,
         };
@@ -62,6 +123,7 @@ impl QualityNetwork {
             branches,
             fusion,
             late,
+            targets,
             seed,
         })
     }
@@ -70,7 +132,7 @@ impl QualityNetwork {
     /// shares its variables with them.
     ///
     /// # Errors
-    /// If one of them takes the images of both cameras.
+    /// If one of them takes the images of both cameras, or only one predicts corrections.
     pub fn averaged(left: &Self, right: &Self) -> Result<Self, NetworkError> {
         let mut branches = Vec::new();
         for network in [left, right] {
@@ -80,15 +142,19 @@ impl QualityNetwork {
             }
             branches.extend(network.branches.iter().cloned());
         }
+        if left.targets != right.targets {
+            return Err(NetworkError::Targets);
+        }
         Ok(Self {
             branches,
             fusion: Some(Fusion::default()),
             late: None,
+            targets: left.targets,
             seed: left.seed,
         })
     }
 
-    /// Makes the answer to everything `quality`, by last layers whose weights are 0.
+    /// Makes the answer to everything `quality`, and a correction of 0, by last layers whose weights are 0.
     ///
     /// # Errors
     /// If candle cannot set the variables.
@@ -104,8 +170,9 @@ impl QualityNetwork {
         for (variable, start) in last {
             let mut values = variable.to_vec1::<f32>()?;
             values[start..].fill(0.0);
-            // The bias stands behind the weights.
-            *values.last_mut().expect("a layer has a bias") = quality;
+            // The biases stand behind the weights, that of the quality first.
+            let biases = values.len() - self.targets.outputs();
+            values[biases] = quality;
             variable.set(&Tensor::new(values, variable.device())?)?;
         }
         Ok(())
@@ -130,12 +197,17 @@ impl QualityNetwork {
         })
     }
 
+    /// What it predicts.
+    pub fn targets(&self) -> Targets {
+        self.targets
+    }
+
     /// Cameras whose images it takes.
     pub fn cameras(&self) -> usize {
         if self.fusion.is_some() { 2 } else { 1 }
     }
 
-    /// One value for each moment [moments, 1], from each camera's images [moments, 1, height, width], left first.
+    /// Quality and, if it is a target, correction as a share of [`CORRECTION_UNIT_DEG`] for each moment [moments, 1 or 2], from each camera's images [moments, 1, height, width], left first.
     ///
     /// # Errors
     /// As [`EfficientNetB0::forward`], and for another number of cameras.

@@ -20,14 +20,16 @@ pub(super) enum BatchSource {
         /// [samples, 1280] of each camera.
         features: Vec<Tensor>,
         labels: Vec<f32>,
+        corrections_deg: Vec<Option<f32>>,
         balanced: Balanced,
     },
 }
 
-/// Outputs [samples, 1] for a batch, and its labels.
+/// Outputs [samples, 1 or 2] for a batch, and what they should be.
 pub(super) struct Outputs {
     pub outputs: Tensor,
     pub labels: Vec<f32>,
+    pub corrections_deg: Vec<Option<f32>>,
 }
 
 impl BatchSource {
@@ -40,10 +42,13 @@ impl BatchSource {
     ) -> Result<Self, TrainError> {
         let balanced = drawing(config, images)?;
         if config.layers == Layers::Last {
-            let labels = images.samples().iter().map(|s| s.label as f32).collect();
+            let samples = images.samples().iter();
+            let labels = samples.clone().map(|s| s.label as f32).collect();
+            let corrections_deg = samples.map(|s| s.correction_deg.map(|degrees| degrees as f32));
             return Ok(Self::Features {
                 features: features(config, network, images)?,
                 labels,
+                corrections_deg: corrections_deg.collect(),
                 balanced,
             });
         }
@@ -68,16 +73,19 @@ impl BatchSource {
         match self {
             Self::Images(loader) => {
                 let batch = loader.next().expect("training batches never end")?;
-                let labels = batch.labels.clone();
+                let (labels, corrections_deg) =
+                    (batch.labels.clone(), batch.corrections_deg.clone());
                 let images = tensors(batch, config.side, network.device())?;
                 Ok(Outputs {
                     outputs: network.forward(&images, mode)?,
                     labels,
+                    corrections_deg,
                 })
             }
             Self::Features {
                 features,
                 labels,
+                corrections_deg,
                 balanced,
             } => {
                 let size = config.batch_size.get() as u64;
@@ -92,6 +100,10 @@ impl BatchSource {
                 Ok(Outputs {
                     outputs: network.classify(&batch, mode)?,
                     labels: picked.iter().map(|&sample| labels[sample]).collect(),
+                    corrections_deg: picked
+                        .iter()
+                        .map(|&sample| corrections_deg[sample])
+                        .collect(),
                 })
             }
         }

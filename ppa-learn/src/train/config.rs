@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::DeviceName;
 use crate::data::{Augmentation, Selection, Views};
-use crate::network::Fusion;
+use crate::network::{Fusion, Targets};
 use crate::weights::{FirstConvolution, WeightsMetadata};
 
 use super::schedule::{RateSchedule, Schedule, StepCounting};
@@ -50,6 +50,10 @@ pub struct TrainConfig {
     /// leaves the running statistics of training. Linear probing leaves those of `start`, to which its features belong.
     #[serde(default)]
     pub recompute_statistics: u64,
+    /// Weight of the mean squared error of the correction in the loss, in units of 30°; the network then has a second output, the
+    /// medial rotation from a pose to the best one of its limb. 0 for the paper's network, which has none.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub correction_weight: f64,
     /// Draw labels that are rare in the data as often as others; else every sample alike.
     #[serde(default = "yes")]
     pub balanced: bool,
@@ -89,6 +93,10 @@ pub struct TrainConfig {
 
 fn yes() -> bool {
     true
+}
+
+fn is_zero(weight: &f64) -> bool {
+    *weight == 0.0
 }
 
 /// Which layers are trained.
@@ -145,6 +153,14 @@ pub struct Source {
 }
 
 impl TrainConfig {
+    /// What the network predicts.
+    pub fn targets(&self) -> Targets {
+        match self.correction_weight > 0.0 {
+            true => Targets::QualityAndCorrection,
+            false => Targets::Quality,
+        }
+    }
+
     /// The rates of all steps.
     pub fn schedule(&self) -> Schedule {
         Schedule {
@@ -171,9 +187,7 @@ impl TrainConfig {
 
     /// What users of the weights must know beside their values, for the metadata of weight files.
     pub fn weights_metadata(&self) -> WeightsMetadata {
-        WeightsMetadata {
-            mirror: self.mirror,
-        }
+        WeightsMetadata::new(self.mirror, self.targets())
     }
 
     /// What must be equal for a training to continue; threads, device, memory and intervals may change.

@@ -177,6 +177,10 @@ mod tests {
                 "weight_average is 1, expected 0 to less than 1",
             ),
             (
+                "correction_weight = -1.0",
+                "correction_weight is -1, expected 0 to 1000",
+            ),
+            (
                 "recompute_statistics = 10001",
                 "recompute_statistics is 10001, expected 0 to 10000",
             ),

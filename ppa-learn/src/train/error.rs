@@ -26,6 +26,11 @@ pub enum TrainError {
     /// Images, labels or the split.
     #[error(transparent)]
     Data(#[from] DataError),
+    /// Corrections to learn, and none known.
+    #[error(
+        "correction_weight is more than 0, but no training sample has a correction: expected rotated poses, not all inadequate"
+    )]
+    NoCorrection,
     /// A file.
     #[error(transparent)]
     File(#[from] FileError),

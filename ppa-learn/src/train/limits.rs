@@ -55,6 +55,13 @@ impl TrainConfig {
             self.weight_average.to_string(),
             "0 to less than 1",
         )?;
+        let weight = self.correction_weight;
+        require(
+            (0.0..=1000.0).contains(&weight),
+            "correction_weight",
+            weight.to_string(),
+            "0 to 1000",
+        )?;
         require(
             self.recompute_statistics <= 10_000,
             "recompute_statistics",

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use super::config::TrainConfig;
 use super::error::TrainError;
 use super::trained::predict_in_order;
-use crate::data::{Images, Order};
-use crate::network::QualityNetwork;
+use crate::data::{Images, Order, Sample};
+use crate::network::{PosePrediction, QualityNetwork};
 
 /// The scalar that every evaluation has in the log.
 pub(super) const EVALUATION: &str = "evaluation/mae";
@@ -15,7 +15,8 @@ pub(super) const EVALUATION: &str = "evaluation/mae";
 const MOST_TRAINING_SAMPLES: usize = 256;
 
 /// Mean absolute and squared error and Spearman's correlation on evaluation images, the mean absolute error on at most 256 training
-/// samples, evenly spread and not augmented, and how much larger that on evaluation images is.
+/// samples, evenly spread and not augmented, and how much larger that on evaluation images is; the mean absolute error of
+/// corrections where they are predicted and known.
 ///
 /// The correlation is NaN where labels or answers are all the same, and where an answer is not finite.
 pub(super) fn scalars(
@@ -34,18 +35,30 @@ pub(super) fn scalars(
     let learned = predictions(training, &Order::Listed(spread))?;
     let labels = labels(evaluation, 0..evaluation.samples().len());
     let predictions = predictions(evaluation, &Order::Once)?;
-    let mae = mean_of(&labels, &predictions, f64::abs);
+    let quality = |predictions: &[PosePrediction]| predictions.iter().map(|p| p.quality).collect();
+    let (learned, qualities): (Vec<f64>, Vec<f64>) = (quality(&learned), quality(&predictions));
+    let mae = mean_of(&labels, &qualities, f64::abs);
     let training_mae = mean_of(&known, &learned, f64::abs);
-    let r_s = ppa_metrics::spearman(&labels, &predictions).unwrap_or(f64::NAN);
+    let r_s = ppa_metrics::spearman(&labels, &qualities).unwrap_or(f64::NAN);
     let scalars = [
         (EVALUATION, mae),
-        ("evaluation/mse", mean_of(&labels, &predictions, |e| e * e)),
+        ("evaluation/mse", mean_of(&labels, &qualities, |e| e * e)),
         ("evaluation/r_s", r_s),
         ("evaluation/gap", mae - training_mae),
         ("training/mae", training_mae),
     ];
-    let named = scalars.into_iter().map(|(tag, x)| (tag.to_owned(), x));
-    Ok(named.collect())
+    let corrections = correction_mae_deg(evaluation.samples(), &predictions);
+    let correction = corrections.map(|mae| ("evaluation/correction_mae_deg", mae));
+    let named = scalars.into_iter().chain(correction);
+    Ok(named.map(|(tag, x)| (tag.to_owned(), x)).collect())
+}
+
+/// `None` where no correction is both predicted and known.
+fn correction_mae_deg(samples: &[Sample], predictions: &[PosePrediction]) -> Option<f64> {
+    let both = samples.iter().zip(predictions);
+    let errors = both.filter_map(|(s, p)| Some((s.correction_deg? - p.correction_deg?).abs()));
+    let errors: Vec<f64> = errors.collect();
+    (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64)
 }
 
 fn labels(images: &Images, samples: impl Iterator<Item = usize>) -> Vec<f64> {

@@ -17,6 +17,7 @@ mod error;
 mod finite;
 mod limits;
 mod log;
+mod loss;
 mod measure;
 mod presets;
 mod run;

@@ -28,6 +28,7 @@ impl TrainConfig {
             warm_up_steps: 0,
             weight_average: 0.0,
             recompute_statistics: 0,
+            correction_weight: 0.0,
             balanced: true,
             frames_per_pose: FRAMES_PER_POSE,
             workers: number(2),

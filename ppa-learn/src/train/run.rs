@@ -29,7 +29,7 @@ pub struct Progress {
     pub step: u64,
     /// Steps in all.
     pub steps: u64,
-    /// Mean squared error of the step's batch.
+    /// Loss of the step's batch: the mean squared error of the quality, and the weighted one of corrections.
     pub loss: f32,
     /// Learning rate of the step.
     pub learning_rate: f64,
@@ -63,6 +63,9 @@ pub fn train(
     let training = samples(config, &config.training)?;
     let evaluation = samples(config, &config.evaluation)?;
     check_split(&training, &evaluation)?;
+    if config.correction_weight > 0.0 && training.iter().all(|s| s.correction_deg.is_none()) {
+        return Err(TrainError::NoCorrection);
+    }
     let echoed = toml::to_string(config).map_err(|e| ConfigError::Write(e.to_string()))?;
     Balanced::new(&training)?; // Labels outside the scale are found before training.
     if !evaluation.is_empty() {

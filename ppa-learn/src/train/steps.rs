@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use candle_core::{Device, Tensor};
+use candle_core::Device;
 use ppa_dataset::write_whole;
 
 use crate::data::Images;
@@ -20,6 +20,7 @@ use super::data_state::DataState;
 use super::error::TrainError;
 use super::finite::{is_finite, trouble};
 use super::log::{Log, LogRow};
+use super::loss::loss;
 use super::measure::{EVALUATION, scalars};
 use super::run::Progress;
 use super::statistics::recompute_statistics;
@@ -50,8 +51,7 @@ impl Run<'_> {
     /// Makes a step from what the network said of a batch.
     pub fn step(&mut self, batch: Outputs) -> Result<Progress, TrainError> {
         let step = self.adam.steps;
-        let labels = Tensor::new(batch.labels, self.network.device())?.unsqueeze(1)?;
-        let loss = (batch.outputs - labels)?.sqr()?.mean_all()?;
+        let loss = loss(&batch, self.config.correction_weight)?;
         let mut gradients = loss.backward()?;
         for variable in self.network.variables() {
             // Adam's moments are on the CPU wherever the network is.

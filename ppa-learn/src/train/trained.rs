@@ -7,7 +7,7 @@ use std::sync::Arc;
 use candle_core::{Device, Tensor};
 
 use crate::data::{Batch, Images, Loader, Order, Sample, Views, read_samples};
-use crate::network::{Mode, Options, QualityNetwork};
+use crate::network::{Mode, Options, PosePrediction, QualityNetwork};
 
 use super::checkpoint;
 use super::config::{LastLayer, Source, TrainConfig};
@@ -23,7 +23,7 @@ pub(super) fn network(config: &TrainConfig) -> Result<QualityNetwork, TrainError
         stochastic_depth: config.network.stochastic_depth,
     };
     let fusion = (config.views == Views::Pairs).then_some(config.fusion);
-    let network = QualityNetwork::new(config.seed, options, fusion)?;
+    let network = QualityNetwork::new(config.seed, options, fusion, config.targets())?;
     if config.network.last_layer == LastLayer::Middle {
         network.begin_with(MIDDLE)?;
     }
@@ -85,7 +85,7 @@ pub(super) fn tensors(
     Ok(tensors.collect::<Result<_, _>>()?)
 }
 
-/// What a network says of each sample, in order, from its evaluation images.
+/// What a network predicts of each sample, in order, from its evaluation images.
 ///
 /// # Errors
 /// [`TrainError`] naming the image that cannot be used.
@@ -94,7 +94,7 @@ pub fn predict(
     images: &Arc<Images>,
     batch_size: NonZeroUsize,
     workers: NonZeroUsize,
-) -> Result<Vec<f64>, TrainError> {
+) -> Result<Vec<PosePrediction>, TrainError> {
     predict_in_order(network, images, &Order::Once, batch_size, workers)
 }
 
@@ -105,13 +105,12 @@ pub(super) fn predict_in_order(
     order: &Order,
     batch_size: NonZeroUsize,
     workers: NonZeroUsize,
-) -> Result<Vec<f64>, TrainError> {
+) -> Result<Vec<PosePrediction>, TrainError> {
     let mut predictions = Vec::new();
     for batch in Loader::new(images, order, batch_size, workers) {
         let images = tensors(batch?, images.side(), network.device())?;
         let outputs = network.forward(&images, Mode::Eval)?;
-        let outputs: Vec<f32> = outputs.flatten_all()?.to_vec1()?;
-        predictions.extend(outputs.into_iter().map(f64::from));
+        predictions.extend(PosePrediction::of(&outputs)?);
     }
     Ok(predictions)
 }

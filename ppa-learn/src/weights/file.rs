@@ -1,7 +1,7 @@
 //! Weight files: safetensors and PyTorch's zip files in, safetensors out.
 
-use std::collections::HashMap;
 use std::collections::hash_map::Entry::{Occupied, Vacant};
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use candle_core::{DType, Device, Tensor, pickle};
@@ -118,9 +118,26 @@ pub(super) fn write(
     metadata: WeightsMetadata,
 ) -> Result<(), WeightsError> {
     let tensors = named.into_iter().map(|named| (named.name, named.tensor));
-    let bytes =
-        safetensors::serialize(tensors, metadata.entries()).map_err(candle_core::Error::from)?;
+    let bytes = safetensors::serialize(tensors, None).map_err(candle_core::Error::from)?;
+    let bytes = with_metadata(bytes, &metadata.entries());
     Ok(ppa_dataset::write_whole(path, &bytes)?)
+}
+
+/// Adds metadata to the header of a safetensors file, where the library would put it: it takes a hash map, whose order changes from run
+/// to run.
+fn with_metadata(file: Vec<u8>, entries: &BTreeMap<String, String>) -> Vec<u8> {
+    if entries.is_empty() {
+        return file;
+    }
+    // The length of the header, the header padded with spaces to a multiple of 8 bytes, the tensors.
+    let (length, rest) = file.split_first_chunk().expect("a length of 8 bytes");
+    let (before, tensors) = rest.split_at(u64::from_le_bytes(*length) as usize);
+    let entries = serde_json::to_string(entries).expect("strings are JSON");
+    let mut header = format!("{{\"__metadata__\":{entries},").into_bytes();
+    header.extend(before[1..].trim_ascii_end());
+    header.resize(header.len().next_multiple_of(8), b' ');
+    let length = (header.len() as u64).to_le_bytes();
+    [&length, &header[..], tensors].concat()
 }
 
 /// The tensors of a file, by the names that they have there.
@@ -152,5 +169,29 @@ fn read_any(
             Ok(tensors.into_iter().collect())
         }
         _ => Err("weights are read from .safetensors, .pth and .pt files".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn metadata_are_those_of_the_library_and_sorted() {
+        let tensor = |value: f32| Tensor::new(&[value, 2.0], &Device::Cpu).unwrap();
+        let tensors = || [("a", tensor(1.0)), ("b", tensor(3.0))];
+        let plain = || safetensors::serialize(tensors(), None).unwrap();
+        let entry = |key: &str, value: &str| (key.to_owned(), value.to_owned());
+        let one = BTreeMap::from([entry("mirror", "true")]);
+        let of_library = safetensors::serialize(tensors(), Some(one.clone().into_iter().collect()));
+        assert_eq!(with_metadata(plain(), &one), of_library.unwrap());
+        assert_eq!(with_metadata(plain(), &BTreeMap::new()), plain());
+        let two = BTreeMap::from([entry("mirror", "true"), entry("correction", "\"30\"")]);
+        let bytes = with_metadata(plain(), &two);
+        assert!(bytes[8..].starts_with(b"{\"__metadata__\":{\"correction\":"));
+        let (_, header) = safetensors::SafeTensors::read_metadata(&bytes).unwrap();
+        assert_eq!(*header.metadata(), Some(two.into_iter().collect()));
+        let file = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+        assert_eq!(file.tensor("b").unwrap().data()[..4], 3f32.to_le_bytes());
     }
 }

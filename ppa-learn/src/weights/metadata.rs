@@ -1,14 +1,17 @@
 //! What users of a weight file must know beside its values.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use safetensors::SafeTensors;
 
 use super::WeightsError;
+use crate::network::{CORRECTION_UNIT_DEG, Targets};
 
 /// Key of [`WeightsMetadata::mirror`] in safetensors and ONNX.
 const MIRROR: &str = "mirror";
+/// Key of the unit of corrections in safetensors and ONNX.
+const CORRECTION_UNIT: &str = "correction_unit_deg";
 
 /// What users of a weight file must know beside its values; in the metadata of safetensors and ONNX.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -17,18 +20,20 @@ pub struct WeightsMetadata {
     /// The network was trained with left limbs shown as right ones: images mirrored left to right, cameras exchanged. It must see
     /// left limbs in the same way. Written as `mirror` = `true`, and not at all otherwise.
     pub mirror: bool,
+    /// What the network predicts. Corrections are written as `correction_unit_deg` = `30`: degrees of one unit of the second output.
+    pub targets: Targets,
 }
 
 impl WeightsMetadata {
     /// That of a network whose left limbs are shown as right ones, or not.
-    pub fn new(mirror: bool) -> Self {
-        Self { mirror }
+    pub fn new(mirror: bool, targets: Targets) -> Self {
+        Self { mirror, targets }
     }
 
     /// That of a weight file: nothing but in safetensors.
     ///
     /// # Errors
-    /// If the file cannot be read.
+    /// If the file cannot be read, or its corrections have another unit.
     pub fn read(path: &Path) -> Result<Self, WeightsError> {
         if path
             .extension()
@@ -43,15 +48,27 @@ impl WeightsMetadata {
         let bytes = ppa_core::regular_file::read(path).map_err(|error| unreadable(error.into()))?;
         let header =
             SafeTensors::read_metadata(&bytes).map_err(|error| unreadable(error.into()))?;
-        let entry = header.1.metadata().as_ref().and_then(|all| all.get(MIRROR));
+        let entry = |key| header.1.metadata().as_ref().and_then(|all| all.get(key));
+        let targets = match entry(CORRECTION_UNIT) {
+            None => Targets::Quality,
+            Some(unit) if *unit == CORRECTION_UNIT_DEG.to_string() => Targets::QualityAndCorrection,
+            Some(unit) => {
+                let message =
+                    format!("{CORRECTION_UNIT} is {unit:?}, expected \"{CORRECTION_UNIT_DEG}\"");
+                return Err(unreadable(message.into()));
+            }
+        };
         Ok(Self {
-            mirror: entry.is_some_and(|value| value == "true"),
+            mirror: entry(MIRROR).is_some_and(|value| value == "true"),
+            targets,
         })
     }
 
-    /// Names and values.
-    pub(super) fn entries(self) -> Option<HashMap<String, String>> {
-        self.mirror
-            .then(|| HashMap::from([(MIRROR.to_owned(), "true".to_owned())]))
+    /// Names and values, sorted so that the same metadata are the same bytes.
+    pub(super) fn entries(self) -> BTreeMap<String, String> {
+        let mirror = self.mirror.then(|| (MIRROR.to_owned(), "true".to_owned()));
+        let unit = (self.targets == Targets::QualityAndCorrection)
+            .then(|| (CORRECTION_UNIT.to_owned(), CORRECTION_UNIT_DEG.to_string()));
+        mirror.into_iter().chain(unit).collect()
     }
 }

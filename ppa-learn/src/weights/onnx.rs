@@ -7,7 +7,7 @@ use prost::Message;
 use super::onnx_messages::{Attribute, Graph, MetadataEntry, Model, OperatorSet, Value};
 use super::onnx_network::{Builder, Network};
 use super::{WeightsError, WeightsMetadata};
-use crate::network::{EfficientNetB0, LateFusion, QualityNetwork};
+use crate::network::{EfficientNetB0, LateFusion, QualityNetwork, Targets};
 
 /// The operators used are those of this version of ONNX's set, and of many before and after it.
 const OPERATOR_SET: i64 = 13;
@@ -22,13 +22,18 @@ impl EfficientNetB0 {
     /// # Errors
     /// If the file cannot be written.
     pub fn save_onnx(&self, path: &Path) -> Result<(), WeightsError> {
-        write(path, one(self)?, WeightsMetadata::default())
+        write(
+            path,
+            one(self, names(Targets::Quality))?,
+            WeightsMetadata::default(),
+        )
     }
 }
 
 impl QualityNetwork {
     /// Writes the network for inference as ONNX, whole or not at all: `images` [N, 1, H, W] in f32 to `quality` [N, 1]; of both
-    /// cameras `left` [N, 1, H, W] and `right` [N, 1, H', W'] to `quality` [N, 1]. Weights that both cameras share are in it once.
+    /// cameras `left` [N, 1, H, W] and `right` [N, 1, H', W'] to `quality` [N, 1]. A network that predicts corrections also gives
+    /// `correction_deg` [N, 1]. Weights that both cameras share are in it once.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -39,62 +44,89 @@ impl QualityNetwork {
 
 fn model(network: &QualityNetwork) -> Result<Model, WeightsError> {
     match network.cameras() {
-        1 => one(&network.branches()[0]),
+        1 => one(&network.branches()[0], names(network.targets())),
         _ => both(network),
     }
 }
 
-fn one(network: &EfficientNetB0) -> Result<Model, WeightsError> {
+/// Names of a model's outputs.
+fn names(targets: Targets) -> &'static [&'static str] {
+    match targets {
+        Targets::Quality => &["quality"],
+        Targets::QualityAndCorrection => &["quality", "correction_deg"],
+    }
+}
+
+fn one(network: &EfficientNetB0, outputs: &[&str]) -> Result<Model, WeightsError> {
     let mut builder = Builder::default();
-    Network::of(network)?.add(&mut builder, "images", "quality");
-    Ok(finished(builder.graph, &["images"]))
+    let network = Network::of(network)?;
+    let features = network.features(&mut builder, "images");
+    builder.targets("classifier", &features, network.last_layer(), outputs);
+    Ok(finished(builder.graph, &["images"], outputs))
 }
 
 fn both(network: &QualityNetwork) -> Result<Model, WeightsError> {
     let networks = network.branches().iter().map(Network::of);
     let networks = networks.collect::<Result<Vec<_>, _>>()?;
+    let outputs = names(network.targets());
     let mut builder = Builder::default();
-    let outputs = [0, 1].map(|camera| {
+    let of_cameras = [0, 1].map(|camera| {
         builder.nodes = ["left.", "right."][camera];
-        let (network, weights) = match &networks[..] {
+        let (of_camera, weights) = match &networks[..] {
             [shared] => (shared, ""),
             separate => (&separate[camera], builder.nodes),
         };
         builder.weights = weights;
-        network.add(&mut builder, CAMERAS[camera], "output")
+        let features = of_camera.features(&mut builder, CAMERAS[camera]);
+        let [weight, bias] = of_camera.last_layer();
+        match network.late() {
+            None => builder.targets("classifier", &features, [weight, bias], outputs),
+            Some(_) => vec![builder.linear("classifier", &features, weight, bias, "output")],
+        }
     });
     (builder.nodes, builder.weights) = ("", "");
-    let outputs = outputs.each_ref().map(String::as_str);
+    let [left, right] = of_cameras;
+    let pairs = left.iter().zip(&right);
     match network.late() {
         None => {
-            builder.node("Mean", &outputs, "quality", vec![]);
+            for ((left, right), output) in pairs.zip(outputs) {
+                builder.node("Mean", &[left, right], output, vec![]);
+            }
         }
-        Some(late) => join(&mut builder, late, &outputs)?,
+        Some(late) => join(&mut builder, late, [&left[0], &right[0]], outputs)?,
     }
-    Ok(finished(builder.graph, &CAMERAS))
+    Ok(finished(builder.graph, &CAMERAS, outputs))
 }
 
-/// The layers of late fusion, from the values of both cameras to `quality`.
-fn join(builder: &mut Builder, late: &LateFusion, outputs: &[&str]) -> Result<(), WeightsError> {
-    let values: Vec<f32> = late.variable().to_vec1()?;
-    let part = |index: usize| &values[late.entries()[index].range.clone()];
-    let joined = builder.node("Concat", outputs, "joined", vec![Attribute::int("axis", 1)]);
+/// The layers of late fusion, from the values of both cameras to the model's outputs.
+fn join(
+    builder: &mut Builder,
+    late: &LateFusion,
+    values: [&str; 2],
+    outputs: &[&str],
+) -> Result<(), WeightsError> {
+    let parameters: Vec<f32> = late.variable().to_vec1()?;
+    let part = |index: usize| &parameters[late.entries()[index].range.clone()];
+    let joined = builder.node("Concat", &values, "joined", vec![Attribute::int("axis", 1)]);
     let x = builder.silu(&joined);
     let x = builder.linear("fc.0", &x, part(0), part(1), "hidden");
     let x = builder.silu(&x);
-    builder.linear("fc.3", &x, part(2), part(3), "quality");
+    builder.targets("fc.3", &x, [part(2), part(3)], outputs);
     Ok(())
 }
 
-/// A model of a graph that leads from images to `quality`.
-fn finished(graph: Graph, images: &[&str]) -> Model {
+/// A model of a graph that leads from images to outputs.
+fn finished(graph: Graph, images: &[&str], outputs: &[&str]) -> Model {
     let images = images
         .iter()
         .map(|name| Value::of_floats(name, &[None, Some(1), None, None]));
+    let outputs = outputs.iter();
     let graph = Graph {
         name: "efficientnet_b0".into(),
         input: images.collect(),
-        output: vec![Value::of_floats("quality", &[None, Some(1)])],
+        output: outputs
+            .map(|name| Value::of_floats(name, &[None, Some(1)]))
+            .collect(),
         ..graph
     };
     Model {
@@ -111,7 +143,7 @@ fn finished(graph: Graph, images: &[&str]) -> Model {
 }
 
 fn write(path: &Path, mut model: Model, metadata: WeightsMetadata) -> Result<(), WeightsError> {
-    let entries = metadata.entries().into_iter().flatten();
+    let entries = metadata.entries().into_iter();
     let entries = entries.map(|(key, value)| MetadataEntry { key, value });
     model.metadata_props = entries.collect();
     Ok(ppa_dataset::write_whole(path, &model.encode_to_vec())?)

@@ -5,8 +5,8 @@ use std::convert::Infallible;
 use super::WeightsError;
 use super::onnx_messages::{Attribute, Graph, Node, Tensor};
 use crate::network::{
-    Architecture, Block, ConvKind, ConvPlace, EfficientNetB0, Layers, LinearPlace, SqueezePlace,
-    running,
+    Architecture, Block, CORRECTION_UNIT_DEG, ConvKind, ConvPlace, EfficientNetB0, Layers,
+    LinearPlace, SqueezePlace, running,
 };
 
 /// A graph that grows, and what stands before the names of what is added now.
@@ -65,6 +65,29 @@ impl Builder {
         self.node("Gemm", &[x, &weight, &bias], out, transposed)
     }
 
+    /// The last layer, with one output [N, 1] for each name: the quality, then the correction in degrees.
+    pub fn targets(
+        &mut self,
+        name: &str,
+        x: &str,
+        [weight, bias]: [&[f32]; 2],
+        outputs: &[&str],
+    ) -> Vec<String> {
+        let columns = weight.len() / bias.len();
+        let rows = weight.chunks(columns).zip(bias).zip(outputs);
+        let target = |(place, ((weight, &bias), output)): (usize, ((&[f32], _), &&str))| match place
+        {
+            0 => self.linear(name, x, weight, &[bias], output),
+            _ => {
+                let degrees = |value: f32| CORRECTION_UNIT_DEG as f32 * value;
+                let weight: Vec<f32> = weight.iter().copied().map(degrees).collect();
+                let name = format!("{name}.correction");
+                self.linear(&name, x, &weight, &[degrees(bias)], output)
+            }
+        };
+        rows.enumerate().map(target).collect()
+    }
+
     /// The mean of each channel.
     fn pooled(&mut self, x: &str, output: &str) -> String {
         self.node("GlobalAveragePool", &[x], output, vec![])
@@ -97,18 +120,22 @@ impl<'a> Network<'a> {
         })
     }
 
-    /// Adds what leads from `images` to `output` [N, outputs], and gives the latter's name.
-    pub fn add(&self, builder: &mut Builder, images: &str, output: &str) -> String {
+    /// Adds what leads from `images` to the features that the last layer sees, and gives their name.
+    pub fn features(&self, builder: &mut Builder, images: &str) -> String {
         let mut nodes = Nodes {
             network: self,
             builder,
         };
         let Ok(features) = nodes.features(self.architecture, images.to_owned());
-        let [weight, bias] = [0, 1].map(|part| {
+        features
+    }
+
+    /// Weight and bias of the last layer.
+    pub fn last_layer(&self) -> [&[f32]; 2] {
+        [0, 1].map(|part| {
             let entry = &self.architecture.classifier[part];
             &self.classifier[entry.range.clone()]
-        });
-        builder.linear("classifier", &features, weight, bias, output)
+        })
     }
 }
 

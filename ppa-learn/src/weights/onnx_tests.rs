@@ -10,13 +10,19 @@ use rand_distr::{Distribution, Uniform};
 
 use super::onnx_messages::{Graph, Model, Node};
 use crate::WeightsMetadata;
-use crate::network::{Fusion, FusionKind, Mode, Options, QualityNetwork};
+use crate::network::{
+    CORRECTION_UNIT_DEG, Fusion, FusionKind, Mode, Options, QualityNetwork, Targets,
+};
 use crate::random::{Purpose, stream};
 
 /// A network whose normalisations keep values of the size that they have, so that answers follow images; of both cameras if it
 /// fuses them.
 fn network(seed: u64, fusion: Option<Fusion>) -> QualityNetwork {
-    let network = QualityNetwork::new(seed, Options::default(), fusion).unwrap();
+    network_of(Targets::Quality, seed, fusion)
+}
+
+fn network_of(targets: Targets, seed: u64, fusion: Option<Fusion>) -> QualityNetwork {
+    let network = QualityNetwork::new(seed, Options::default(), fusion, targets).unwrap();
     let tensors = network.tensors().unwrap().into_iter();
     let mut tensors: HashMap<String, Tensor> = tensors.map(|t| (t.name, t.tensor)).collect();
     let variances = tensors.keys().filter(|name| name.ends_with("running_var"));
@@ -54,11 +60,13 @@ fn written(network: &QualityNetwork) -> Graph {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("network.onnx");
     network
-        .save_onnx(&path, WeightsMetadata::new(true))
+        .save_onnx(&path, WeightsMetadata::new(true, network.targets()))
         .unwrap();
     let bytes = std::fs::read(path).unwrap();
     let model = Model::decode(&bytes[..]).unwrap();
-    assert_eq!(model.metadata_props[0].key, "mirror");
+    let keys: Vec<_> = model.metadata_props.iter().map(|p| &p.key[..]).collect();
+    let keys_of = ["correction_unit_deg", "mirror"];
+    assert_eq!(keys, keys_of[2 - network.targets().outputs()..]);
     model.graph.unwrap()
 }
 
@@ -99,8 +107,8 @@ fn run(node: &Node, inputs: &[&Tensor]) -> candle_core::Result<Tensor> {
     }
 }
 
-/// What a graph says of images, each node after those that it needs.
-fn evaluate(graph: &Graph, images: Vec<Tensor>) -> Tensor {
+/// What each output of a graph says of images, each node after those that it needs.
+fn evaluate(graph: &Graph, images: Vec<Tensor>) -> Vec<Tensor> {
     let weights = graph.initializer.iter().map(|weight| {
         let values = weight.raw_data.as_chunks().0.iter();
         let values: Vec<f32> = values.map(|&bytes| f32::from_le_bytes(bytes)).collect();
@@ -119,14 +127,16 @@ fn evaluate(graph: &Graph, images: Vec<Tensor>) -> Tensor {
         let replaced = values.insert(&node.output[0], output);
         assert!(replaced.is_none(), "{} is there twice", node.output[0]);
     }
-    values["quality"].clone()
+    let outputs = names(&graph.output).into_iter();
+    outputs.map(|name| values[name].clone()).collect()
 }
 
 /// Checks a model, and gives its number of nodes and of values in weights.
 fn checked(network: &QualityNetwork, cameras: &[&str]) -> (usize, usize) {
     let graph = written(network);
     assert_eq!(names(&graph.input), cameras);
-    assert_eq!(names(&graph.output), ["quality"]);
+    let outputs = ["quality", "correction_deg"];
+    assert_eq!(names(&graph.output), outputs[..network.targets().outputs()]);
     let needed: HashSet<&String> = graph.node.iter().flat_map(|node| &node.input).collect();
     for weight in &graph.initializer {
         assert!(
@@ -138,20 +148,25 @@ fn checked(network: &QualityNetwork, cameras: &[&str]) -> (usize, usize) {
     let images = images(network);
     let expected = network.forward(&images, Mode::Eval).unwrap();
     let found = evaluate(&graph, images);
-    assert_eq!(found.dims(), [2, 1]);
-    let [found, expected] = [found, expected].map(|t| t.flatten_all().unwrap().to_vec1().unwrap());
-    for (found, expected) in found.iter().zip(&expected) {
-        let (found, expected): (&f32, &f32) = (found, expected);
+    for (output, found) in found.iter().enumerate() {
+        assert_eq!(found.dims(), [2, 1]);
+        let unit = [1.0, CORRECTION_UNIT_DEG][output];
+        let expected = (expected.narrow(1, output, 1).unwrap() * unit).unwrap();
+        let [found, expected] =
+            [found, &expected].map(|t| t.flatten_all().unwrap().to_vec1().unwrap());
+        for (found, expected) in found.iter().zip(&expected) {
+            let (found, expected): (&f32, &f32) = (found, expected);
+            assert!(
+                (found - expected).abs() < 1e-4 * expected.abs(),
+                "{found}, the network says {expected}"
+            );
+        }
+        let spread: f32 = expected[0] - expected[1];
         assert!(
-            (found - expected).abs() < 1e-4 * expected.abs(),
-            "{found}, the network says {expected}"
+            1e-3 * expected[0].abs() < spread.abs(),
+            "equal outputs show nothing: {expected:?}"
         );
     }
-    let spread: f32 = expected[0] - expected[1];
-    assert!(
-        1e-3 * expected[0].abs() < spread.abs(),
-        "equal outputs show nothing: {expected:?}"
-    );
     let values = graph.initializer.iter().map(|w| w.raw_data.len() / 4);
     (graph.node.len(), values.sum())
 }
@@ -162,6 +177,23 @@ const ONE: usize = 4_008_253 - 42_016 / 2;
 #[test]
 fn every_node_has_what_it_needs_and_says_what_the_network_says() {
     assert_eq!(checked(&network(3, None), &["images"]).1, ONE);
+}
+
+/// With a second row of the last layer.
+#[test]
+fn corrections_are_an_output_of_their_own() {
+    let corrected = |fusion| network_of(Targets::QualityAndCorrection, 3, fusion);
+    assert_eq!(checked(&corrected(None), &["images"]).1, ONE + 1281);
+    for kind in [FusionKind::Score, FusionKind::Late] {
+        for shared_weights in [false, true] {
+            let fusion = Fusion {
+                kind,
+                shared_weights,
+                ..Fusion::default()
+            };
+            checked(&corrected(Some(fusion)), &["left", "right"]);
+        }
+    }
 }
 
 /// Checks the models of separate and shared weights: `extra` nodes join both cameras, each network of `each` values.

@@ -25,7 +25,8 @@ impl QualityNetwork {
         assign(&variables, entries.chain(statistics), tensors)
     }
 
-    /// The network that a weight file is of, with its weights; values of `seed` where the file has none to give.
+    /// The network that a weight file is of, with its weights; values of `seed` where the file has none to give. Metadata of
+    /// safetensors says whether it predicts corrections.
     ///
     /// Names show which one: layers that fuse both cameras' values are those of late fusion, and networks of each camera are separate
     /// ones. Score fusion with shared weights bears the names of a single network behind a wrapper's `module.`, and is taken for
@@ -49,7 +50,8 @@ impl QualityNetwork {
             shared_weights: !by_camera,
             ..Fusion::default()
         });
-        let network = Self::new(seed, Options::default(), fusion)?;
+        let targets = WeightsMetadata::read(path)?.targets;
+        let network = Self::new(seed, Options::default(), fusion, targets)?;
         let loaded = network.fill(found, path, first)?;
         Ok((network, loaded))
     }

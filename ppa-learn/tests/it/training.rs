@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use candle_core::Device;
 use cpu_time::ProcessTime;
-use ppa_learn::FusionKind;
 use ppa_learn::data::Images;
 use ppa_learn::train::{
     Layers, RateSchedule, Source, TrainConfig, predict, read_log, read_start, samples, trained,
 };
+use ppa_learn::{FusionKind, QualityNetwork};
 use tempfile::TempDir;
 
 use crate::runs::{by_heart, config, n, pairs, run, source, stop_after};
@@ -73,7 +73,8 @@ fn answers(folder: &Path, persons: &[Source]) -> [Vec<f64>; 2] {
     let labels = samples.iter().map(|sample| sample.label).collect();
     let images = Arc::new(Images::new(samples, config.side, 0).unwrap());
     let answers = predict(&network, &images, config.batch_size, config.workers);
-    [labels, answers.unwrap()]
+    let answers = answers.unwrap().iter().map(|a| a.quality).collect();
+    [labels, answers]
 }
 
 #[test]
@@ -189,6 +190,59 @@ fn early_answers_are_nearly_constant_with_lagging_ones() {
     });
     println!("error {mae}, spread {spread}");
     assert!(mae > 0.5 && spread < 0.1, "{mae}, {spread}");
+}
+
+/// The best angle of every bar is the centre of 0 to 90 degrees weighted by 3 - label, about 30: a constant correction is wrong by 22.5
+/// on average.
+#[test]
+fn corrections_of_bars_are_learned_and_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = bars_of_six();
+    let config = TrainConfig {
+        side: 32,
+        steps: 100,
+        correction_weight: 1.0,
+        checkpoint_every: n(1000),
+        ..of_bars(data.path(), TrainConfig::quick())
+    };
+    run(&config, folder.path()).unwrap();
+    let log = read_log(&folder.path().join("log.jsonl")).unwrap();
+    let logged = log.last().unwrap().scalars["evaluation/correction_mae_deg"];
+    assert!(logged < 15.0, "{logged}");
+    // The network in the folder, and the one of the weight file alone.
+    let (config, network) = trained(folder.path()).unwrap();
+    let weights = folder.path().join("weights.safetensors");
+    let (alone, _) = QualityNetwork::open(&weights, 1, config.first_convolution).unwrap();
+    let samples = samples(&config, &config.evaluation).unwrap();
+    let images = Arc::new(Images::new(samples, config.side, 0).unwrap());
+    for network in [network, alone] {
+        let answers = predict(&network, &images, config.batch_size, config.workers).unwrap();
+        let errors = images
+            .samples()
+            .iter()
+            .zip(answers)
+            .map(|(sample, answer)| {
+                (sample.correction_deg.unwrap() - answer.correction_deg.unwrap()).abs()
+            });
+        let mae = errors.sum::<f64>() / images.samples().len() as f64;
+        assert!((mae - logged).abs() < 1e-9, "{mae}, logged {logged}");
+    }
+}
+
+#[test]
+fn corrections_need_samples_that_have_one() {
+    let data = dataset(2, &[180]); // Label 3.
+    let folder = tempfile::tempdir().unwrap();
+    let config = TrainConfig {
+        correction_weight: 1.0,
+        ..config(data.path())
+    };
+    let error = run(&config, folder.path()).unwrap_err().to_string();
+    assert!(
+        error.contains("no training sample has a correction"),
+        "{error}"
+    );
+    assert!(!folder.path().join("config.toml").exists());
 }
 
 #[test]
