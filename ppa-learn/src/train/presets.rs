@@ -51,24 +51,28 @@ impl TrainConfig {
         }
     }
 
-    /// 3000 steps on images of 48 x 48 pixels, for a quarter of an hour on two cores.
+    /// 3000 steps of 32 images of 48 x 48 pixels, for a quarter of an hour.
     ///
     /// As [`quick`](Self::quick), and besides:
     ///
+    /// * Steps of 32 images instead of 16: normalisation by the batch mixes less of other poses into a prediction, and the learning rate
+    ///   can be twice as high.
     /// * The learning rate rises over 100 steps, since Adam's first steps have full length whatever the gradient, and falls to 0 along a
     ///   cosine.
-    /// * An average of the weights is evaluated and saved: single steps of 16 images scatter.
-    /// * Running statistics are the mean of 32 batches, 512 images. Those that training leaves lag behind its weights: in its first
+    /// * An average of the weights is evaluated and saved: single steps scatter.
+    /// * Running statistics are the mean of 16 batches, 512 images. Those that training leaves lag behind its weights: in its first
     ///   hundred steps predictions are then nearly constant (`early_answers_are_nearly_constant_with_lagging_ones`).
     /// * Samples are drawn as often as they are in the data, since the mean absolute error counts them so.
     pub fn standard() -> Self {
         let quick = Self::quick();
         Self {
             steps: 3000,
+            batch_size: NonZeroUsize::MIN.saturating_add(31),
+            learning_rate: 2e-3,
             rate_schedule: RateSchedule::Cosine,
             warm_up_steps: 100,
             weight_average: 0.995,
-            recompute_statistics: 32,
+            recompute_statistics: 16,
             balanced: false,
             log_every: NonZeroUsize::MIN.saturating_add(49),
             checkpoint_every: NonZeroUsize::MIN.saturating_add(249),
