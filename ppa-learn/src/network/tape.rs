@@ -40,11 +40,21 @@ impl Size {
         self.images.div_ceil(8)
     }
 
-    /// Pixels that one task takes.
-    pub fn pixels_per_task(self) -> usize {
-        self.images_per_task() * self.pixels()
+    /// Images that one task takes where their pixels are multiplied by a matrix of weights: more where eight parts would have fewer than
+    /// 64 pixels, as each product reads all weights.
+    pub fn images_per_product(self) -> usize {
+        let least = LEAST_PIXELS.div_ceil(self.pixels());
+        self.images_per_task().max(least.min(self.images))
+    }
+
+    /// Pixels that one task takes in products with weights.
+    pub fn pixels_per_product(self) -> usize {
+        self.images_per_product() * self.pixels()
     }
 }
+
+/// Least pixels of a product with weights, but for the last one of a batch.
+const LEAST_PIXELS: usize = 64;
 
 /// Pixels that are worked on at once, so that what belongs to them stays in the second-level cache (512 KiB).
 pub fn tile_pixels(values_per_pixel: usize) -> usize {
@@ -104,4 +114,27 @@ pub struct Tape {
     pub blocks: Vec<BlockTape>,
     pub head_input: Images,
     pub head: Normed,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn products_take_at_least_64_pixels_where_there_are_so_many() {
+        for (images, side, expected) in [
+            (16, 11, 2),
+            (32, 6, 4),
+            (32, 2, 16),
+            (100, 1, 64),
+            (3, 1, 3),
+        ] {
+            let size = Size {
+                images,
+                height: side,
+                width: side,
+            };
+            assert_eq!(size.images_per_product(), expected, "{size:?}");
+        }
+    }
 }

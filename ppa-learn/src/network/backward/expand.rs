@@ -34,7 +34,7 @@ impl Backward<'_> {
         if !block.residual {
             *gradient = self.pool.take(size.count() * columns);
         }
-        let task = size.pixels_per_task();
+        let task = size.pixels_per_product();
         let parts = gradient.par_chunks_mut(task * columns).enumerate();
         let of_weight = total(parts.map(|(index, of_input)| {
             let mut sums = vec![0.0; weight.len()];

@@ -36,7 +36,7 @@ impl Backward<'_> {
 
         let weight = &self.parameters[place.weight.clone()];
         let mut of_input = self.pool.take(size.count() * columns);
-        let task = size.pixels_per_task();
+        let task = size.pixels_per_product();
         let parts = of_input.par_chunks_mut(task * columns).enumerate();
         let of_weight = total(parts.map(|(index, of_input)| {
             let mut sums = vec![0.0; weight.len()];

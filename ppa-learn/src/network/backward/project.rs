@@ -42,7 +42,7 @@ impl Backward<'_> {
 
         let weight = &self.parameters[place.weight.clone()];
         let mut of_gated = self.pool.take(size.count() * columns);
-        let task = size.pixels_per_task();
+        let task = size.pixels_per_product();
         let parts: Vec<(Vec<f32>, Vec<ActivationSums>)> = of_gated
             .par_chunks_mut(task * columns)
             .enumerate()
@@ -92,7 +92,7 @@ impl Backward<'_> {
                         let pixels = &depthwise.pixels
                             [(run.start + part.start) * columns..(run.start + part.end) * columns];
                         let upstream = &of_gated[part.start * columns..part.end * columns];
-                        let sums = &mut sums[image - index * size.images_per_task()];
+                        let sums = &mut sums[image - index * size.images_per_product()];
                         sums.add(
                             Some(upstream),
                             pixels,

@@ -56,7 +56,7 @@ impl Forward<'_> {
         let (channels, columns) = (place.channels, place.inputs);
         let weight = Matrix::new(&self.parameters[place.weight.clone()], columns).transposed();
         let center = self.center(place);
-        let task = size.pixels_per_task();
+        let task = size.pixels_per_product();
         let parts = out
             .par_chunks_mut(task * channels)
             .zip(input.par_chunks(task * columns));
@@ -140,7 +140,7 @@ impl Forward<'_> {
         let (channels, columns) = (place.channels, place.inputs);
         let weight = Matrix::new(&self.parameters[place.weight.clone()], columns).transposed();
         let center = self.center(place);
-        let task = size.pixels_per_task();
+        let task = size.pixels_per_product();
         let parts = out.par_chunks_mut(task * channels).enumerate();
         total(parts.map(|(index, out)| {
             let mut sums = vec![0.0; 2 * channels];
