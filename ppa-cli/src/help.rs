@@ -20,7 +20,14 @@ const GROUPS: &[(&str, &[&str])] = &[
     ("Labels", &["label"]),
     (
         "Networks",
-        &["train", "eval", "predict", "experiment", "learn"],
+        &[
+            "train",
+            "eval",
+            "calibrate",
+            "predict",
+            "experiment",
+            "learn",
+        ],
     ),
     ("Statistics", &["metrics", "stats"]),
     ("Program", &["completions", "man", "help"]),

@@ -103,6 +103,8 @@ enum Command {
     Train(commands::train::TrainArgs),
     /// Metrics, predictions and figures of a trained network
     Eval(commands::eval::EvalArgs),
+    /// Find how far predictions can be trusted, with persons who were not trained with
+    Calibrate(commands::calibrate::CalibrateArgs),
     /// Judge depth images while cameras deliver them, pair by pair
     Predict(commands::predict::PredictArgs),
     /// The paper's experiments: trainings and tables from one plan
@@ -147,6 +149,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Learn(command) => commands::learn::run(&command, output),
         Command::Train(args) => commands::train::run(&args, output),
         Command::Eval(args) => commands::eval::run(&args, output),
+        Command::Calibrate(args) => commands::calibrate::run(&args, output),
         Command::Predict(args) => commands::predict::run(&args, output),
         Command::Experiment(command) => commands::experiment::run(&command, output),
         Command::Metrics(args) => commands::metrics::run(&args, output),

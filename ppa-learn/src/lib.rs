@@ -7,6 +7,7 @@ mod parity;
 mod random;
 mod weights;
 
+pub mod confidence;
 pub mod data;
 pub mod evaluate;
 pub mod experiment;

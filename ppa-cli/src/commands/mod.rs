@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub mod calibrate;
 pub mod case;
 pub mod completions;
 pub mod ct;

@@ -40,6 +40,9 @@ pub struct PredictArgs {
     /// Side of the limb in the frames: needed by networks that were trained with `mirror = true`
     #[arg(long, value_enum)]
     side: Option<SideName>,
+    /// Intervals and unlike frames, from `ppa calibrate` of the same networks: adds `interval` and `diagnostic` (yes, no or not_sure), and skips frames unlike the training images
+    #[arg(long, value_name = "FILE")]
+    confidence: Option<PathBuf>,
     /// Where the networks compute: cpu, cuda or cuda:N
     #[arg(long, default_value_t)]
     device: DeviceName,
@@ -74,6 +77,10 @@ pub fn run(args: &PredictArgs, output: Output) -> anyhow::Result<()> {
             return Err(anyhow::Error::from(error).context("give --side l or --side r"));
         }
         predictor => predictor?,
+    };
+    let predictor = match &args.confidence {
+        Some(file) => predictor.with_confidence(file)?,
+        None => predictor,
     };
     let watch = Stopwatch::start();
     let mut judge = StreamJudge::new(predictor, print);

@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use crate::training::write_data;
+use crate::training::{write_data, write_person};
 use crate::{contains, fail, ppa, succeed};
 
 const REGIONS: &str = "--roi-left 1,2,45 --roi-right 1,2,45";
@@ -279,4 +279,51 @@ fn a_folder_is_watched_until_ctrl_c() {
         (&3.into(), &0.into(), &1.into())
     );
     assert!(run.wait().unwrap().success());
+}
+
+#[test]
+fn calibration_adds_intervals_and_refuses_odd_frames() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let steps: Vec<u32> = (0..=180).step_by(9).collect();
+    for patient in 0..6 {
+        write_person(&folder.join("data"), patient, &steps);
+    }
+    let config = "preset = \"quick\"\nviews = \"unified\"\nside = 32\nsteps = 1\nbatch_size = 4\nevaluation = []\n\
+        [[training]]\ndataset = \"data\"\npatients = [0]\n";
+    for (run, seed) in [("run", 1), ("other", 2)] {
+        let text = format!("seed = {seed}\n{config}");
+        fs::write(folder.join(format!("{run}.toml")), text).unwrap();
+        succeed(folder, &format!("train {run}.toml --out {run}"));
+    }
+    let calibrate = |patients: &str| {
+        format!("calibrate run --dataset data --patients {patients} --out trust.safetensors")
+    };
+    contains(&fail(folder, &calibrate("0,1")), &["patient 0"]);
+    contains(
+        &fail(folder, &calibrate("1")),
+        &["21 of calibration, expected at least 5 and 99"],
+    );
+    let said = succeed(folder, &calibrate("1,2,3,4,5"));
+    contains(&said, &["105 pairs of 5 persons", "90.0 %"]);
+    contains(&fail(folder, &calibrate("1,2,3,4,5")), &["--replace"]);
+
+    let good = |view| format!("data/patient_2/depth/l/orig/depth_cam_{view}_45.0.png");
+    let black = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::new(50, 50);
+    black.save(folder.join("black.png")).unwrap();
+    let (left, right) = (good("left"), good("right"));
+    let input = format!("{left}\t{right}\n{left}\tblack.png\n");
+    let predict =
+        |run: &str| format!("predict {run} {REGIONS} --confidence trust.safetensors --stdin");
+    let (lines, stderr) = answers(ppa(folder, &predict("run")), &input);
+    let [line] = &lines[..] else {
+        panic!("{lines:?}")
+    };
+    let [low, high] = [0, 1].map(|end| line["interval"][end].as_f64().unwrap());
+    assert!(1.0 <= low && low <= high && high <= 3.0, "{line}");
+    let diagnostic = line["diagnostic"].as_str().unwrap();
+    assert!(["yes", "no", "not_sure"].contains(&diagnostic), "{line}");
+    contains(&stderr, &["black.png is unlike the training images: "]);
+    let other = fail(folder, &predict("other"));
+    contains(&other, &["trust.safetensors", "other networks"]);
 }

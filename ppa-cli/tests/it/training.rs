@@ -9,34 +9,39 @@ use crate::{contains, fail, names, ppa, succeed};
 /// Two persons with three poses each, seen by both cameras, and a configuration of few and small steps.
 pub fn write_data(folder: &Path) {
     for patient in 0..2 {
-        let root = folder.join(format!("data/patient_{patient}"));
-        let (depth, labels) = (root.join("depth/l/orig"), root.join("labels/l"));
-        fs::create_dir_all(&depth).unwrap();
-        fs::create_dir_all(&labels).unwrap();
-        let mut grades = serde_json::Map::new();
-        let mut rois = serde_json::Map::new();
-        for (step, label) in [(0, 1.0), (90, 2.0), (180, 3.0)] {
-            for (view, nearer) in [("cam_left", 0), ("cam_right", 90)] {
-                let name = format!("depth_{view}_{:.1}.png", f64::from(step) / 2.0);
-                let value = |x, y| {
-                    image::Luma([(700 - nearer + step + (x * y + 20 * patient) % 300) as u16])
-                };
-                image::ImageBuffer::from_fn(50, 50, value)
-                    .save(depth.join(&name))
-                    .unwrap();
-                let roi = serde_json::json!({"camera": view, "image_number": step, "x_start": 1, "y_start": 2, "size": 45});
-                rois.insert(name, roi);
-            }
-            let grade = serde_json::json!({"label": label, "std": 0.0, "step": step});
-            grades.insert(format!("xray_image_{step}.png"), grade);
-        }
-        for (name, entries) in [("labels.json", grades), ("roi_depth.json", rois)] {
-            fs::write(labels.join(name), serde_json::to_string(&entries).unwrap()).unwrap();
-        }
+        write_person(&folder.join("data"), patient, &[0, 90, 180]);
     }
     let config = "preset = \"quick\"\nside = 32\nsteps = 8\nbatch_size = 4\nlog_every = 1\ncheckpoint_every = 2\n\
         [[training]]\ndataset = \"data\"\npatients = [0]\n[[evaluation]]\ndataset = \"data\"\npatients = [1]\n";
     fs::write(folder.join("train.toml"), config).unwrap();
+}
+
+/// A person in a dataset, at rotations of so many half degrees.
+pub fn write_person(dataset: &Path, patient: u32, steps: &[u32]) {
+    let root = dataset.join(format!("patient_{patient}"));
+    let (depth, labels) = (root.join("depth/l/orig"), root.join("labels/l"));
+    fs::create_dir_all(&depth).unwrap();
+    fs::create_dir_all(&labels).unwrap();
+    let mut grades = serde_json::Map::new();
+    let mut rois = serde_json::Map::new();
+    for &step in steps {
+        for (view, nearer) in [("cam_left", 0), ("cam_right", 90)] {
+            let name = format!("depth_{view}_{:.1}.png", f64::from(step) / 2.0);
+            let value =
+                |x, y| image::Luma([(700 - nearer + step + (x * y + 20 * patient) % 300) as u16]);
+            image::ImageBuffer::from_fn(50, 50, value)
+                .save(depth.join(&name))
+                .unwrap();
+            let roi = serde_json::json!({"camera": view, "image_number": step, "x_start": 1, "y_start": 2, "size": 45});
+            rois.insert(name, roi);
+        }
+        let label = 1.0 + f64::from(step) / 90.0;
+        let grade = serde_json::json!({"label": label, "std": 0.0, "step": step});
+        grades.insert(format!("xray_image_{step}.png"), grade);
+    }
+    for (name, entries) in [("labels.json", grades), ("roi_depth.json", rois)] {
+        fs::write(labels.join(name), serde_json::to_string(&entries).unwrap()).unwrap();
+    }
 }
 
 #[test]

@@ -1,75 +1,19 @@
 //! Predictions on the frames of both cameras.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use candle_core::{Device, Tensor};
 use ppa_core::Roi;
 use ppa_dataset::layout::{Side, View};
+use ppa_metrics::NON_DIAGNOSTIC;
 use serde::Serialize;
 
 use super::camera::Camera;
+use super::confidence::Confidence;
+use super::error::FramesError;
+use super::networks::Networks;
 use crate::DeviceName;
-use crate::data::Views;
-use crate::network::{InferenceNetwork, PosePrediction};
-use crate::train::{TrainConfig, TrainError, trained};
-
-/// Why frames cannot be judged.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum FramesError {
-    /// A training that is not finished, or a frame that cannot be used.
-    #[error(transparent)]
-    Train(#[from] TrainError),
-    /// A network for other images.
-    #[error("{} was trained with views = \"{found}\", expected {expected}", run.display())]
-    Views {
-        /// Folder of the training.
-        run: PathBuf,
-        /// What it was trained on.
-        found: Views,
-        /// What it could have been trained on.
-        expected: &'static str,
-    },
-    /// A network that shows left limbs as right ones, and no side.
-    #[error("{} was trained with mirror = true: it must be told whether the frames show a left or a right limb", run.display())]
-    Side {
-        /// Folder of the training.
-        run: PathBuf,
-    },
-    /// Networks of which only one shows left limbs as right ones.
-    #[error("{} was trained with mirror = {left}, {} with mirror = {}; both must be equal", runs[0].display(), runs[1].display(), !left)]
-    Mirror {
-        /// Folders of the left and the right camera's training.
-        runs: [PathBuf; 2],
-        /// What the first was trained with.
-        left: bool,
-    },
-}
-
-/// Refuses the training in the folder `run`, on images of `views`, if its network is none for one camera's images.
-///
-/// # Errors
-/// [`FramesError::Views`].
-pub fn of_camera(run: &Path, views: Views, camera: View) -> Result<(), FramesError> {
-    let (own, expected) = match camera {
-        View::Left => (
-            Views::Left,
-            "\"left\" or \"unified\" for the left camera's network",
-        ),
-        View::Right => (
-            Views::Right,
-            "\"right\" or \"unified\" for the right camera's network",
-        ),
-    };
-    if views == own || views == Views::Unified {
-        return Ok(());
-    }
-    Err(FramesError::Views {
-        run: run.to_owned(),
-        found: views,
-        expected,
-    })
-}
+use crate::train::TrainError;
 
 /// Quality of a pose from 1 (ideal) to 3 (inadequate), as networks see it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -86,29 +30,56 @@ pub struct PairPrediction {
     /// it, the mean of both.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correction_deg: Option<f64>,
+    /// How far the quality can be trusted, if that was calibrated.
+    #[serde(flatten)]
+    pub trust: Option<Trust>,
+}
+
+/// How far a quality can be trusted.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Trust {
+    /// Interval that contains the label with the probability of the calibration.
+    pub interval: [f64; 2],
+    /// What the interval says of the pose.
+    pub diagnostic: Answer,
+}
+
+/// Whether a pose is diagnostic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Answer {
+    /// The interval lies below 2.5.
+    Yes,
+    /// The interval lies at 2.5 or above.
+    No,
+    /// The interval contains both.
+    NotSure,
+}
+
+impl Trust {
+    /// What an interval says.
+    fn of(interval: [f64; 2]) -> Self {
+        let diagnostic = match interval {
+            [_, high] if high < NON_DIAGNOSTIC => Answer::Yes,
+            [low, _] if low >= NON_DIAGNOSTIC => Answer::No,
+            _ => Answer::NotSure,
+        };
+        Self {
+            interval,
+            diagnostic,
+        }
+    }
 }
 
 /// The networks that judge the frames of both cameras.
 #[derive(Debug)]
 pub struct PairPredictor {
     networks: Networks,
-    cameras: [Camera; 2],
-    /// Left limbs are shown as right ones, and the frames show a left one: the left camera's frame is that of the right input.
-    mirrored: bool,
-}
-
-#[derive(Debug)]
-enum Networks {
-    /// One for each camera; their outputs are averaged.
-    Separate([Trained; 2]),
-    /// One that takes both images.
-    Joint(Trained),
-}
-
-#[derive(Debug)]
-struct Trained {
-    network: InferenceNetwork,
-    side: usize,
+    /// The camera of the left and of the right input.
+    inputs: [Camera; 2],
+    /// Place of each input's frame in a pair: exchanged for limbs that are mirrored.
+    frames: [usize; 2],
+    confidence: Option<Confidence>,
 }
 
 impl PairPredictor {
@@ -125,60 +96,31 @@ impl PairPredictor {
         side: Option<Side>,
         device: DeviceName,
     ) -> Result<Self, FramesError> {
-        let device = device.open().map_err(TrainError::from)?;
-        let trained = |run: &Path| -> Result<_, TrainError> {
-            let (config, network) = trained(run)?;
-            Ok((config, InferenceNetwork::new(&network.to_device(&device)?)?))
-        };
-        let (config, network) = trained(left)?;
-        let mirror = config.mirror;
-        let of = |config: &TrainConfig, network| Trained {
-            network,
-            side: config.side,
-        };
-        let networks = match right {
-            None => match config.views {
-                Views::Pairs => Networks::Joint(of(&config, network)),
-                Views::Unified => {
-                    Networks::Separate([of(&config, network.clone()), of(&config, network)])
-                }
-                found => {
-                    return Err(FramesError::Views {
-                        run: left.to_owned(),
-                        found,
-                        expected: "\"unified\" or \"pairs\" for a network that stands alone",
-                    });
-                }
-            },
-            Some(right) => {
-                of_camera(left, config.views, View::Left)?;
-                let of_left = of(&config, network);
-                let (config, network) = trained(right)?;
-                of_camera(right, config.views, View::Right)?;
-                if config.mirror != mirror {
-                    return Err(FramesError::Mirror {
-                        runs: [left.to_owned(), right.to_owned()],
-                        left: mirror,
-                    });
-                }
-                Networks::Separate([of_left, of(&config, network)])
-            }
-        };
+        let networks = Networks::open(left, right, device)?;
         let run = left.to_owned();
-        let mirrored = match (mirror, side) {
+        // Left limbs are shown as right ones: the left camera's frame is then that of the right input.
+        let mirrored = match (networks.of_inputs()[0].config.mirror, side) {
             (true, None) => return Err(FramesError::Side { run }),
             (true, Some(side)) => side == Side::Left,
             (false, _) => false,
         };
-        let [left, right] = regions;
+        let views = [View::Left, View::Right];
+        let frames = if mirrored { [1, 0] } else { [0, 1] };
         Ok(Self {
             networks,
-            cameras: [
-                Camera::new(View::Left, left, mirrored),
-                Camera::new(View::Right, right, mirrored),
-            ],
-            mirrored,
+            inputs: frames.map(|frame| Camera::new(views[frame], regions[frame], mirrored)),
+            frames,
+            confidence: None,
         })
+    }
+
+    /// With intervals, and without answers for frames unlike the training images, as a file says that was calibrated with the same networks.
+    ///
+    /// # Errors
+    /// [`FramesError::Confidence`].
+    pub fn with_confidence(self, path: &Path) -> Result<Self, FramesError> {
+        let confidence = Some(Confidence::read(path, &self.networks)?);
+        Ok(Self { confidence, ..self })
     }
 
     /// Reads the left and the right camera's frame and judges them, each on a thread of its own where there are two.
@@ -186,48 +128,32 @@ impl PairPredictor {
     /// # Errors
     /// [`FramesError`] naming the frame that cannot be used.
     pub fn predict(&self, frames: [&Path; 2]) -> Result<PairPrediction, FramesError> {
-        let image = |camera: usize, of: &Trained| {
-            self.cameras[camera].image(frames[camera], of.side, of.network.device())
+        let networks = self.networks.of_inputs();
+        let image = |input: usize| {
+            let of = networks[input];
+            let frame = frames[self.frames[input]];
+            self.inputs[input].image(frame, of.config.side, of.network.device())
         };
-        // The cameras whose frames are those of the left and of the right input.
-        let [first, second] = if self.mirrored { [1, 0] } else { [0, 1] };
-        match &self.networks {
-            Networks::Separate([of_first, of_second]) => {
-                let (one, other) = rayon::join(
-                    || of_first.prediction(&[image(first, of_first)?]),
-                    || of_second.prediction(&[image(second, of_second)?]),
-                );
-                let (one, other) = (one?, other?);
-                let mut of_camera = [0.0; 2];
-                of_camera[first] = one.quality;
-                of_camera[second] = other.quality;
-                let [left, right] = of_camera;
-                let corrections = one.correction_deg.zip(other.correction_deg);
-                Ok(PairPrediction {
-                    left: Some(left),
-                    right: Some(right),
-                    quality: (left + right) / 2.0,
-                    correction_deg: corrections.map(|(one, other)| (one + other) / 2.0),
-                })
-            }
-            Networks::Joint(joint) => {
-                let (one, other) = rayon::join(|| image(first, joint), || image(second, joint));
-                let prediction = joint.prediction(&[one?, other?])?;
-                Ok(PairPrediction {
-                    left: None,
-                    right: None,
-                    quality: prediction.quality,
-                    correction_deg: prediction.correction_deg,
-                })
+        let (left, right) = rayon::join(|| image(0), || image(1));
+        let moment = self.networks.moments(&[left?, right?])?.remove(0);
+        if let Some(confidence) = &self.confidence {
+            let distances = confidence.relative_distances(&moment.images);
+            for (input, distance) in distances.into_iter().enumerate() {
+                if distance > 1.0 {
+                    let frame = frames[self.frames[input]].to_owned();
+                    return Err(FramesError::Unfamiliar { frame, distance });
+                }
             }
         }
-    }
-}
-
-impl Trained {
-    /// What the network says of one image of each of its cameras.
-    fn prediction(&self, images: &[Tensor]) -> Result<PosePrediction, TrainError> {
-        Ok(PosePrediction::of(&self.network.forward(images)?)?[0])
+        let quality = moment.prediction.quality;
+        let interval = |confidence: &Confidence| confidence.intervals().interval(quality);
+        Ok(PairPrediction {
+            left: moment.alone.map(|alone| alone[self.frames[0]]),
+            right: moment.alone.map(|alone| alone[self.frames[1]]),
+            quality,
+            correction_deg: moment.prediction.correction_deg,
+            trust: self.confidence.as_ref().map(interval).map(Trust::of),
+        })
     }
 }
 

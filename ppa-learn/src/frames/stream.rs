@@ -8,8 +8,9 @@ use std::time::{Duration, Instant};
 use ppa_dataset::FileError;
 use serde::Serialize;
 
+use super::error::FramesError;
 use super::folder::{FramePair, PairFolder};
-use super::predictor::{FramesError, PairPrediction, PairPredictor};
+use super::predictor::{PairPrediction, PairPredictor};
 
 /// Between two looks into a folder.
 const PAUSE: Duration = Duration::from_millis(5);

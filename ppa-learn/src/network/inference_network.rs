@@ -32,6 +32,22 @@ impl InferenceNetwork {
         self.0.forward(images, Mode::Eval)
     }
 
+    /// The features [moments, 1280] of each camera's images, as [`QualityNetwork::features`] in [`Mode::Eval`].
+    ///
+    /// # Errors
+    /// As [`QualityNetwork::features`].
+    pub fn features(&self, images: &[Tensor]) -> Result<Vec<Tensor>, NetworkError> {
+        self.0.features(images, Mode::Eval)
+    }
+
+    /// The layers after the features, as [`QualityNetwork::classify`] in [`Mode::Eval`].
+    ///
+    /// # Errors
+    /// As [`QualityNetwork::classify`].
+    pub fn classify(&self, features: &[Tensor]) -> Result<Tensor, NetworkError> {
+        self.0.classify(features, Mode::Eval)
+    }
+
     /// Where it computes, and where its images have to be.
     pub fn device(&self) -> &Device {
         self.0.device()

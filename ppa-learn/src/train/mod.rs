@@ -38,4 +38,5 @@ pub use run::{Ended, Progress, train};
 pub use schedule::{RateSchedule, Schedule, StepCounting};
 pub use start_file::read_start;
 pub use tensorboard::tensorboard_events;
+pub(crate) use trained::tensors;
 pub use trained::{predict, samples, steps_made, trained};

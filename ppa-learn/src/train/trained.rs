@@ -74,7 +74,7 @@ pub fn samples(config: &TrainConfig, sources: &[Source]) -> Result<Vec<Sample>, 
 }
 
 /// Images of each camera as a tensor [samples, 1, side, side] on a device.
-pub(super) fn tensors(
+pub(crate) fn tensors(
     batch: Batch,
     side: usize,
     device: &Device,

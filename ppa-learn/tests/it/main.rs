@@ -1,6 +1,7 @@
 //! Tests of the crate from outside.
 
 mod augmentation;
+mod confidence;
 mod experiments;
 mod loading;
 mod refusing;

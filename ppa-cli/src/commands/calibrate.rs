@@ -1,0 +1,102 @@
+//! `ppa calibrate`: how far the predictions of trained networks can be trusted.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use ppa_core::text::count;
+use ppa_dataset::labels::LabelName;
+use ppa_learn::DeviceName;
+use ppa_learn::frames::{Calibration, Confidence};
+use ppa_learn::train::Source;
+
+use crate::findings::repeat_of_datasets;
+use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
+use crate::output::{Output, working};
+use crate::output_files::ReplaceArgs;
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "The persons must be none of the trainings', and the dataset must have images of both cameras. Intervals come from the absolute errors of their poses (split conformal prediction): \
+they contain the label of a pose of a new person with about the coverage as probability. `ppa predict` refuses a frame whose network features or mean depths of 8 x 8 blocks lie farther from \
+those of training images than 99 % of the calibration images' do."
+)]
+pub struct CalibrateArgs {
+    /// Folder of the finished `ppa train` of the left camera's network
+    left: PathBuf,
+    /// Of the right camera's [default: the first one judges both, and has to be of views = "unified" or "pairs"]
+    right: Option<PathBuf>,
+    /// Dataset with the persons of calibration
+    #[arg(long, value_name = "DIR")]
+    dataset: PathBuf,
+    /// Persons of --dataset [default: all]
+    #[arg(long, value_name = "N,...", value_delimiter = ',')]
+    patients: Option<Vec<u32>>,
+    /// Labels of --dataset, those of labels.NAME.json [default: labels.json]
+    #[arg(long, value_name = "NAME")]
+    labels: Option<LabelName>,
+    /// Probability that an interval contains the label
+    #[arg(long, value_name = "SHARE", default_value_t = 0.9)]
+    coverage: f64,
+    /// Where the networks compute: cpu, cuda or cuda:N
+    #[arg(long, default_value_t)]
+    device: DeviceName,
+    /// File for `ppa predict --confidence`, in safetensors
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    #[command(flatten)]
+    replace: ReplaceArgs,
+}
+
+pub fn run(args: &CalibrateArgs, output: Output) -> anyhow::Result<()> {
+    let mut outputs = args.replace.outputs();
+    outputs.file("--out", &args.out, &[".safetensors"])?;
+    let stoppable = ends_at_once(NOTHING_WRITTEN)?;
+    repeat_of_datasets(std::iter::once(&*args.dataset))?;
+    let sources = [Source {
+        dataset: args.dataset.clone(),
+        patients: args.patients.clone(),
+        shapes: None,
+        every_pose: None,
+        labels: args.labels.clone(),
+    }];
+    let spinner = working("calibrating");
+    let (left, right) = (&args.left, args.right.as_deref());
+    let (confidence, calibration) =
+        Confidence::calibrate(left, right, &sources, args.coverage, args.device)?;
+    spinner.finish_and_clear();
+    drop(stoppable);
+    confidence.write(&args.out)?;
+    output.print(&calibration, describe)
+}
+
+fn describe(calibration: &Calibration) -> String {
+    let Calibration {
+        persons,
+        moments,
+        intervals,
+        coverage_of_left_out_persons,
+    } = calibration;
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let mut lines = vec![format!(
+        "{} of {}; intervals that contain the label with {} probability:",
+        count(*moments, "pair"),
+        count(*persons, "person"),
+        percent(intervals.coverage),
+    )];
+    for bin in &intervals.bins {
+        lines.push(format!(
+            "  predictions to {:.2}: +- {:.2} ({})",
+            bin.to,
+            bin.half_width,
+            count(bin.poses, "pair")
+        ));
+    }
+    lines.push(match coverage_of_left_out_persons {
+        Some(share) => format!(
+            "Each person's labels in intervals of the other persons: {}",
+            percent(*share)
+        ),
+        None => "Too few persons to try the intervals on those left out.".to_owned(),
+    });
+    lines.join("\n")
+}

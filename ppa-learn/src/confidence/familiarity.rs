@@ -1,0 +1,119 @@
+//! How unlike the training images an image is.
+
+use super::neighbours::Neighbours;
+
+/// Blocks in each direction of an image whose mean values describe it.
+const BLOCKS: usize = 8;
+
+/// What an image is like.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Appearance {
+    /// The network's features, at length 1.
+    pub(crate) features: Vec<f32>,
+    /// Mean values of blocks of the network's input.
+    pub(crate) blocks: Vec<f32>,
+}
+
+impl Appearance {
+    /// From the network's features and its square input of `side` x `side` values.
+    ///
+    /// # Panics
+    /// If the input is not of that side.
+    pub fn new(features: &[f32], input: &[f32], side: usize) -> Self {
+        assert_eq!(input.len(), side * side, "a square input");
+        let length = features.iter().map(|x| x * x).sum::<f32>().sqrt();
+        let share = if length > 0.0 { 1.0 / length } else { 0.0 };
+        Self {
+            features: features.iter().map(|x| share * x).collect(),
+            blocks: blocks(input, side),
+        }
+    }
+}
+
+/// What training images of one camera are like, and how far from them other images of the kind lie, in two respects:
+///
+/// * the network's features at length 1 (Sun et al., ICML 2022, "Out-of-distribution detection with deep nearest neighbors");
+/// * the mean depths of 8 x 8 blocks, as a network that was trained on limbs only may give a plain wall the features of some limb.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Familiarity {
+    pub(crate) features: Neighbours,
+    pub(crate) blocks: Neighbours,
+}
+
+impl Familiarity {
+    /// From training images and images that the network was not trained with, of which a share of `coverage` shall be familiar in each
+    /// respect.
+    ///
+    /// None for too few images: fewer than five of training, or than coverage / (1 − coverage) others.
+    ///
+    /// # Panics
+    /// If they are of different networks.
+    pub fn new(training: &[Appearance], others: &[Appearance], coverage: f64) -> Option<Self> {
+        let neighbours = |respect: fn(&Appearance) -> &[f32]| {
+            let [training, others] =
+                [training, others].map(|all| all.iter().map(respect).collect::<Vec<_>>());
+            Neighbours::new(&training, &others, coverage)
+        };
+        Some(Self {
+            features: neighbours(|image| &image.features)?,
+            blocks: neighbours(|image| &image.blocks)?,
+        })
+    }
+
+    /// Distance of an image from training images as a share of the limit, in the respect in which it is greater: above 1 an image is
+    /// unfamiliar.
+    ///
+    /// # Panics
+    /// If it is of another network.
+    pub fn relative_distance(&self, image: &Appearance) -> f32 {
+        let of_features = self.features.relative_distance(&image.features);
+        of_features.max(self.blocks.relative_distance(&image.blocks))
+    }
+}
+
+/// Mean values of blocks, row by row.
+fn blocks(input: &[f32], side: usize) -> Vec<f32> {
+    let count = BLOCKS.min(side);
+    let part = |n: usize| n * side / count..(n + 1) * side / count;
+    let mean = |row: usize, column: usize| {
+        let pixels = part(row).flat_map(|y| &input[y * side..][part(column)]);
+        let area = part(row).len() * part(column).len();
+        pixels.sum::<f32>() / area as f32
+    };
+    let all = |row| (0..count).map(move |column| mean(row, column));
+    (0..count).flat_map(all).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A direction in a plane, and an image of one depth.
+    fn image(degrees: f32, depth: f32) -> Appearance {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        Appearance::new(&[3.0 * cos, 3.0 * sin], &[depth; 100], 10)
+    }
+
+    #[test]
+    fn odd_features_and_odd_depths_are_both_unfamiliar() {
+        let training: Vec<_> = (0..10).map(|n| image(n as f32, 0.01 * n as f32)).collect();
+        let other = |n| image(0.1 * n as f32, 0.001 * n as f32);
+        let others: Vec<_> = (0..99).map(other).collect();
+        let familiarity = Familiarity::new(&training, &others, 0.99).unwrap();
+        let distance = |degrees, depth| familiarity.relative_distance(&image(degrees, depth));
+        assert!(distance(5.0, 0.05) < 1.0);
+        assert!(distance(15.0, 0.05) > 1.0);
+        assert!(distance(5.0, 0.15) > 1.0);
+        let zeros = Appearance::new(&[0.0, 0.0], &[0.05; 100], 10);
+        assert!(familiarity.relative_distance(&zeros) > 1.0);
+    }
+
+    #[test]
+    fn blocks_of_an_uneven_side_are_means_of_their_pixels() {
+        let input: Vec<f32> = (0..100).map(|n| (n % 10) as f32).collect();
+        let columns = [0.0, 1.0, 2.0, 3.5, 5.0, 6.0, 7.0, 8.5];
+        assert_eq!(blocks(&input, 10)[..8], columns);
+        assert_eq!(blocks(&input, 10).len(), 64);
+        assert_eq!(blocks(&[1.0, 2.0, 3.0, 4.0], 2), [1.0, 2.0, 3.0, 4.0]);
+    }
+}

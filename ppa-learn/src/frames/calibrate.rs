@@ -1,0 +1,136 @@
+//! Calibration: what networks say of persons whom they were not trained with.
+
+use std::collections::BTreeSet;
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::sync::Arc;
+
+use candle_core::Tensor;
+use ppa_dataset::layout::LimbId;
+use serde::Serialize;
+
+use super::confidence::{Confidence, fingerprints};
+use super::error::FramesError;
+use super::networks::{Moment, Networks, Trained};
+use crate::DeviceName;
+use crate::confidence::{Appearance, Familiarity, Intervals, coverage_of_left_out};
+use crate::data::{Images, Loader, Order, Sample, Views, check_split};
+use crate::train::{Source, TrainConfig, TrainError, samples, tensors};
+
+/// Share of the calibration images that are familiar in each respect.
+const FAMILIAR: f64 = 0.99;
+/// Most training images of a network that others are compared with.
+const MOST_REFERENCES: usize = 512;
+
+/// What a calibration found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Calibration {
+    /// Persons of calibration.
+    pub persons: usize,
+    /// Moments: pairs of images.
+    pub moments: usize,
+    /// The intervals.
+    pub intervals: Intervals,
+    /// Share of labels in the intervals that the other persons give, if there are enough.
+    pub coverage_of_left_out_persons: Option<f64>,
+}
+
+impl Confidence {
+    /// Calibrates the networks in the folders of finished trainings, as [`super::PairPredictor::new`] takes them, with the images of both
+    /// cameras of persons whom they were not trained with; `coverage` is the probability of intervals.
+    ///
+    /// # Errors
+    /// [`FramesError`] naming the folder or image that cannot be used, or the number of images that is too small.
+    pub fn calibrate(
+        left: &Path,
+        right: Option<&Path>,
+        sources: &[Source],
+        coverage: f64,
+        device: DeviceName,
+    ) -> Result<(Self, Calibration), FramesError> {
+        let networks = Networks::open(left, right, device)?;
+        let inputs = networks.of_inputs();
+        let pairs = TrainConfig {
+            views: Views::Pairs,
+            ..inputs[0].config.clone()
+        };
+        let tested = samples(&pairs, sources)?;
+        for trained in inputs {
+            let training = samples(&trained.config, &trained.config.training)?;
+            check_split(&training, &tested).map_err(TrainError::from)?;
+        }
+        let moments = moments(&networks, &tested)?;
+        let answers: Vec<_> = tested.iter().zip(&moments).map(answer).collect();
+        let pairs: Vec<_> = answers.iter().map(|&(_, x, y)| (x, y)).collect();
+        let intervals = Intervals::new(&pairs, coverage)?;
+        let persons: BTreeSet<_> = answers.iter().map(|answer| answer.0).collect();
+        let familiarity = |input: usize| {
+            let references = references(inputs[input], input)?;
+            let others: Vec<_> = moments.iter().map(|m| m.images[input].clone()).collect();
+            Familiarity::new(&references, &others, FAMILIAR).ok_or(FramesError::FewImages {
+                training: references.len(),
+                calibration: others.len(),
+            })
+        };
+        let calibration = Calibration {
+            persons: persons.len(),
+            moments: moments.len(),
+            coverage_of_left_out_persons: coverage_of_left_out(&answers, coverage),
+            intervals: intervals.clone(),
+        };
+        let confidence = Self {
+            familiarity: [familiarity(0)?, familiarity(1)?],
+            networks: fingerprints(&networks),
+            intervals,
+        };
+        Ok((confidence, calibration))
+    }
+}
+
+/// Person, label and prediction.
+fn answer<'a>((sample, moment): (&'a Sample, &Moment)) -> ((&'a Path, u32), f64, f64) {
+    let LimbId { patient, .. } = sample.limb;
+    let person = (&*sample.dataset, patient);
+    (person, sample.label, moment.prediction.quality)
+}
+
+/// What networks say of samples of both cameras.
+fn moments(networks: &Networks, samples: &[Sample]) -> Result<Vec<Moment>, FramesError> {
+    let [left, right] = networks.of_inputs();
+    let batches = [left, right].map(|trained| batches(trained, samples.to_vec()));
+    let [left, right] = batches;
+    let mut moments = Vec::new();
+    for (left, right) in left?.zip(right?) {
+        // Of the images of both cameras, each network's own.
+        moments.extend(networks.moments(&[left?.swap_remove(0), right?.swap_remove(1)])?);
+    }
+    Ok(moments)
+}
+
+/// At most [`MOST_REFERENCES`] training images of an input's network, evenly spread.
+fn references(trained: &Trained, input: usize) -> Result<Vec<Appearance>, FramesError> {
+    let all = samples(&trained.config, &trained.config.training)?;
+    let count = all.len().min(MOST_REFERENCES);
+    let spread = (0..count).map(|n| all[n * all.len() / count].clone());
+    let mut references = Vec::new();
+    for images in batches(trained, spread.collect())? {
+        let (_, mut of_cameras) = trained.outputs(&images?)?;
+        // A network of one camera has images of one camera.
+        references.extend(of_cameras.swap_remove(input.min(of_cameras.len() - 1)));
+    }
+    Ok(references)
+}
+
+/// Images of samples as a network sees them, by camera.
+fn batches(
+    trained: &Trained,
+    samples: Vec<Sample>,
+) -> Result<impl Iterator<Item = Result<Vec<Tensor>, TrainError>>, TrainError> {
+    let side = trained.config.side;
+    let images = Arc::new(Images::new(samples, side, 0)?);
+    // One size for both networks: their batches go together.
+    let batch_size = NonZeroUsize::MIN.saturating_add(31);
+    let loader = Loader::new(&images, &Order::Once, batch_size, trained.config.workers);
+    let device = trained.network.device().clone();
+    Ok(loader.map(move |batch| tensors(batch?, side, &device)))
+}

@@ -1,0 +1,69 @@
+//! Why frames cannot be judged.
+
+use std::path::PathBuf;
+
+use crate::confidence::ConfidenceError;
+use crate::data::Views;
+use crate::train::TrainError;
+
+/// Why frames cannot be judged.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FramesError {
+    /// A training that is not finished, or a frame that cannot be used.
+    #[error(transparent)]
+    Train(#[from] TrainError),
+    /// A network for other images.
+    #[error("{} was trained with views = \"{found}\", expected {expected}", run.display())]
+    Views {
+        /// Folder of the training.
+        run: PathBuf,
+        /// What it was trained on.
+        found: Views,
+        /// What it could have been trained on.
+        expected: &'static str,
+    },
+    /// A network that shows left limbs as right ones, and no side.
+    #[error("{} was trained with mirror = true: it must be told whether the frames show a left or a right limb", run.display())]
+    Side {
+        /// Folder of the training.
+        run: PathBuf,
+    },
+    /// A frame unlike those that the networks were trained with.
+    #[error("{} is unlike the training images: {distance:.2} times as far from them as the limit", frame.display())]
+    Unfamiliar {
+        /// The frame.
+        frame: PathBuf,
+        /// Its distance as a share of the limit.
+        distance: f32,
+    },
+    /// A confidence file that cannot be read, or of other networks.
+    #[error("{}: {message}", path.display())]
+    Confidence {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        message: String,
+    },
+    /// Data from which no confidence can be had.
+    #[error(transparent)]
+    Calibration(#[from] ConfidenceError),
+    /// Too few images to say what familiar ones are like.
+    #[error(
+        "{training} training images and {calibration} of calibration, expected at least 5 and 99"
+    )]
+    FewImages {
+        /// Training images of a network.
+        training: usize,
+        /// Images of an input in the calibration.
+        calibration: usize,
+    },
+    /// Networks of which only one shows left limbs as right ones.
+    #[error("{} was trained with mirror = {left}, {} with mirror = {}; both must be equal", runs[0].display(), runs[1].display(), !left)]
+    Mirror {
+        /// Folders of the left and the right camera's training.
+        runs: [PathBuf; 2],
+        /// What the first was trained with.
+        left: bool,
+    },
+}
