@@ -103,7 +103,7 @@ enum Command {
     Train(commands::train::TrainArgs),
     /// Metrics, predictions and figures of a trained network
     Eval(commands::eval::EvalArgs),
-    /// Find how far predictions can be trusted, with persons who were not trained with
+    /// Find how far the predictions of networks can be trusted
     Calibrate(commands::calibrate::CalibrateArgs),
     /// Judge depth images while cameras deliver them, pair by pair
     Predict(commands::predict::PredictArgs),
