@@ -28,8 +28,8 @@ pub fn trained() -> &'static Path {
                 (views.to_owned(), false),
                 (format!("mirrored_{views}"), true),
             ] {
-                // From torchvision's first values outputs follow images after a single step.
-                let text = format!("views = {views:?}\nmirror = {mirror}\nnetwork.last_layer = \"torchvision\"\n{config}");
+                // From torchvision's first values and with statistics of the training images, outputs follow images after a step.
+                let text = format!("views = {views:?}\nmirror = {mirror}\nrecompute_statistics = 4\nnetwork.last_layer = \"torchvision\"\n{config}");
                 fs::write(folder.path().join(format!("{run}.toml")), text).unwrap();
                 succeed(folder.path(), &format!("train {run}.toml --out {run}"));
             }
@@ -147,10 +147,9 @@ fn a_left_limb_is_mirrored_in_prediction_as_in_training() {
     let line = predict("mirrored_pairs --side l");
     near(&line["quality"], joint[&right]);
     // Frames of a right limb are seen as they are.
-    assert_ne!(
-        predict("mirrored_pairs --side r")["quality"],
-        line["quality"]
-    );
+    let other = predict("mirrored_pairs --side r")["quality"].as_f64();
+    let spread = (other.unwrap() - joint[&right]).abs();
+    assert!(spread > 1e-3 * joint[&right].abs(), "{line}");
     // Networks that show limbs as they are do not ask.
     assert_eq!(
         predict("pairs --side l")["quality"],
@@ -313,8 +312,9 @@ fn calibration_adds_intervals_and_refuses_odd_frames() {
     black.save(folder.join("black.png")).unwrap();
     let (left, right) = (good("left"), good("right"));
     let input = format!("{left}\t{right}\n{left}\tblack.png\n");
-    let predict =
-        |run: &str| format!("predict {run} {REGIONS} --confidence trust.safetensors --stdin");
+    let predict = |run: &str| {
+        format!("predict {run} {REGIONS} --side l --confidence trust.safetensors --stdin")
+    };
     let (lines, stderr) = answers(ppa(folder, &predict("run")), &input);
     let [line] = &lines[..] else {
         panic!("{lines:?}")
