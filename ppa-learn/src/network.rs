@@ -27,7 +27,7 @@ use candle_core::{Device, Tensor, Var};
 
 pub use architecture::Entry;
 pub(crate) use architecture::{
-    Architecture, Block, ConvKind, ConvPlace, LinearPlace, SqueezePlace,
+    Architecture, Block, ConvKind, ConvPlace, FEATURES, LinearPlace, SqueezePlace,
 };
 pub use error::NetworkError;
 use folded::Folded;

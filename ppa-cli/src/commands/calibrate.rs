@@ -72,14 +72,14 @@ pub fn run(args: &CalibrateArgs, output: Output) -> anyhow::Result<()> {
 fn describe(calibration: &Calibration) -> String {
     let Calibration {
         persons,
-        moments,
+        pairs,
         intervals,
         coverage_of_left_out_persons,
     } = calibration;
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     let mut lines = vec![format!(
         "{} of {}; intervals that contain the label with {} probability:",
-        count(*moments, "pair"),
+        count(*pairs, "pair"),
         count(*persons, "person"),
         percent(intervals.coverage),
     )];

@@ -16,7 +16,7 @@ pub fn write_data(folder: &Path) {
     fs::write(folder.join("train.toml"), config).unwrap();
 }
 
-/// A person in a dataset, at rotations of so many half degrees.
+/// Writes one person into a dataset; `steps` are rotations in units of half a degree.
 pub fn write_person(dataset: &Path, patient: u32, steps: &[u32]) {
     let root = dataset.join(format!("patient_{patient}"));
     let (depth, labels) = (root.join("depth/l/orig"), root.join("labels/l"));

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// Poses of calibration that a bin has at least, where there are so many.
-const POSES_OF_BIN: usize = 50;
-/// Most bins: more would follow chance.
-const MOST_BINS: usize = 5;
+/// Minimum number of calibration poses per bin.
+const MIN_POSES_PER_BIN: usize = 50;
+/// Maximum number of bins: more would fit noise.
+const MAX_BINS: usize = 5;
 /// Relative error of floating-point numbers before a rounding up: 0.9 (9 + 1) is 9, not slightly more.
 const ROUNDING: f64 = 1e-12;
 /// Range of the quality.
@@ -17,17 +17,17 @@ const QUALITY: [f64; 2] = [1.0, 3.0];
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConfidenceError {
-    /// A coverage that no interval can have.
+    /// A coverage outside of 0 to 1.
     #[error("coverage is {0}, expected more than 0 and less than 1")]
     Coverage(f64),
-    /// So few poses that the interval would have to contain everything.
+    /// Too few poses for an interval of finite width.
     #[error(
         "{found} poses of calibration, expected at least {expected} for intervals of coverage {coverage}"
     )]
     TooFew {
         /// Poses of calibration.
         found: usize,
-        /// The least number.
+        /// Minimum number.
         expected: usize,
         /// Of the intervals.
         coverage: f64,
@@ -79,7 +79,7 @@ impl Intervals {
         let mut sorted = poses.to_vec();
         sorted.sort_by(|a, b| a.1.total_cmp(&b.1));
         let count = sorted.len();
-        let number = (count / POSES_OF_BIN.max(least)).clamp(1, MOST_BINS);
+        let number = (count / MIN_POSES_PER_BIN.max(least)).clamp(1, MAX_BINS);
         let bin = |n: usize| {
             let poses = &sorted[n * count / number..(n + 1) * count / number];
             let errors = poses
@@ -105,8 +105,8 @@ impl Intervals {
     pub fn interval(&self, prediction: f64) -> [f64; 2] {
         let place = self.bins.partition_point(|bin| bin.to < prediction);
         let bin = self.bins[place.min(self.bins.len() - 1)];
-        let [least, most] = QUALITY;
-        [-bin.half_width, bin.half_width].map(|offset| (prediction + offset).clamp(least, most))
+        let [min, max] = QUALITY;
+        [-bin.half_width, bin.half_width].map(|offset| (prediction + offset).clamp(min, max))
     }
 }
 
@@ -180,7 +180,7 @@ mod tests {
         let pairs: Vec<_> = poses.iter().map(|&(_, x, y)| (x, y)).collect();
         let intervals = Intervals::new(&pairs, 0.9).unwrap();
         let width = |at| intervals.interval(at)[1] - intervals.interval(at)[0];
-        assert_eq!(intervals.bins.len(), MOST_BINS);
+        assert_eq!(intervals.bins.len(), MAX_BINS);
         assert!(width(2.0) > 1.5 * width(1.3), "{intervals:?}");
         let covered = coverage_of_left_out(&poses, 0.9).unwrap();
         assert!((covered - 0.9).abs() < 0.02, "{covered}");

@@ -1,27 +1,25 @@
-//! How far descriptions of images lie from those of training images.
+//! Distance of an image's descriptor from those of training images.
 
 use super::intervals::conformal_quantile;
 
-/// The neighbour whose distance counts: a single odd training image then makes no other one familiar.
+/// The k of the k-th nearest neighbour: with k above 1, a single odd training image does not let others like it pass.
 const NEIGHBOUR: usize = 5;
 
-/// Vectors that describe training images, and how far from them those of other images of the kind lie: at the Euclidean distance to the
-/// fifth nearest.
+/// One descriptor of all training images, and the limit of the Euclidean distance to the fifth nearest of them.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Neighbours {
-    /// Vectors of training images, one after the other.
+    /// Descriptors of training images, one after the other.
     pub references: Vec<f32>,
-    /// Values of each.
+    /// Number of values of each.
     pub size: usize,
     /// Distance that the stated share of calibration images does not exceed.
     pub limit: f32,
 }
 
 impl Neighbours {
-    /// From vectors of training images and of images that the network was not trained with, of which a share of `coverage` shall not
-    /// exceed the limit.
+    /// From descriptors of training images and of calibration images, of which a share of `coverage` does not exceed the limit.
     ///
-    /// None for too few images: fewer of training than the neighbour's number, or than coverage / (1 − coverage) others.
+    /// None for too few images: fewer of training than the neighbour's number, or than coverage / (1 − coverage) of calibration.
     pub fn new(training: &[&[f32]], others: &[&[f32]], coverage: f64) -> Option<Self> {
         let mut neighbours = Self {
             references: training.concat(),
@@ -36,12 +34,12 @@ impl Neighbours {
         Some(neighbours)
     }
 
-    /// Whether there are so many that one has the distance.
+    /// Whether there are enough references for the distance to the fifth neighbour.
     pub fn are_enough(&self) -> bool {
         self.size > 0 && self.references.len() >= NEIGHBOUR * self.size
     }
 
-    /// Distance of a vector as a share of the limit.
+    /// Distance of a descriptor as a share of the limit.
     ///
     /// # Panics
     /// If it has another length than those of training images.
@@ -49,7 +47,7 @@ impl Neighbours {
         self.distance(own) / self.limit
     }
 
-    /// Distance to the nearest but some.
+    /// Distance to the k-th nearest reference.
     fn distance(&self, own: &[f32]) -> f32 {
         assert_eq!(own.len(), self.size, "vectors of the same kind");
         let of_one = |one: &[f32]| {

@@ -13,22 +13,22 @@ use super::confidence::{Confidence, fingerprints};
 use super::error::FramesError;
 use super::networks::{Moment, Networks, Trained};
 use crate::DeviceName;
-use crate::confidence::{Appearance, Familiarity, Intervals, coverage_of_left_out};
+use crate::confidence::{Descriptors, Intervals, OutOfDistributionDetector, coverage_of_left_out};
 use crate::data::{Images, Loader, Order, Sample, Views, check_split};
 use crate::train::{Source, TrainConfig, TrainError, samples, tensors};
 
-/// Share of the calibration images that are familiar in each respect.
-const FAMILIAR: f64 = 0.99;
-/// Most training images of a network that others are compared with.
-const MOST_REFERENCES: usize = 512;
+/// Share of the calibration images that do not exceed a descriptor's limit.
+const IN_DISTRIBUTION: f64 = 0.99;
+/// Maximum number of training images of a network that others are compared with.
+const MAX_REFERENCES: usize = 512;
 
 /// What a calibration found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Calibration {
     /// Persons of calibration.
     pub persons: usize,
-    /// Moments: pairs of images.
-    pub moments: usize,
+    /// Pairs of images.
+    pub pairs: usize,
     /// The intervals.
     pub intervals: Intervals,
     /// Share of labels in the intervals that the other persons give, if there are enough.
@@ -64,23 +64,25 @@ impl Confidence {
         let pairs: Vec<_> = answers.iter().map(|&(_, x, y)| (x, y)).collect();
         let intervals = Intervals::new(&pairs, coverage)?;
         let persons: BTreeSet<_> = answers.iter().map(|answer| answer.0).collect();
-        let familiarity = |input: usize| {
+        let detector = |input: usize| {
             let references = references(inputs[input], input)?;
-            let others: Vec<_> = moments.iter().map(|m| m.images[input].clone()).collect();
-            Familiarity::new(&references, &others, FAMILIAR).ok_or(FramesError::FewImages {
-                training: references.len(),
-                calibration: others.len(),
-            })
+            let own: Vec<_> = moments.iter().map(|m| m.images[input].clone()).collect();
+            OutOfDistributionDetector::new(&references, &own, IN_DISTRIBUTION).ok_or(
+                FramesError::FewImages {
+                    training: references.len(),
+                    calibration: own.len(),
+                },
+            )
         };
         let calibration = Calibration {
             persons: persons.len(),
-            moments: moments.len(),
+            pairs: moments.len(),
             coverage_of_left_out_persons: coverage_of_left_out(&answers, coverage),
             intervals: intervals.clone(),
         };
         let confidence = Self {
-            familiarity: [familiarity(0)?, familiarity(1)?],
-            networks: fingerprints(&networks),
+            detectors: [detector(0)?, detector(1)?],
+            networks: fingerprints(&networks)?,
             intervals,
         };
         Ok((confidence, calibration))
@@ -107,10 +109,10 @@ fn moments(networks: &Networks, samples: &[Sample]) -> Result<Vec<Moment>, Frame
     Ok(moments)
 }
 
-/// At most [`MOST_REFERENCES`] training images of an input's network, evenly spread.
-fn references(trained: &Trained, input: usize) -> Result<Vec<Appearance>, FramesError> {
+/// At most [`MAX_REFERENCES`] training images of an input's network, evenly spread.
+fn references(trained: &Trained, input: usize) -> Result<Vec<Descriptors>, FramesError> {
     let all = samples(&trained.config, &trained.config.training)?;
-    let count = all.len().min(MOST_REFERENCES);
+    let count = all.len().min(MAX_REFERENCES);
     let spread = (0..count).map(|n| all[n * all.len() / count].clone());
     let mut references = Vec::new();
     for images in batches(trained, spread.collect())? {

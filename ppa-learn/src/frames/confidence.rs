@@ -10,23 +10,24 @@ use serde::{Deserialize, Serialize};
 
 use super::error::FramesError;
 use super::networks::Networks;
-use crate::confidence::{Appearance, Familiarity, Intervals, Neighbours};
+use crate::confidence::{Descriptors, Intervals, Neighbours, OutOfDistributionDetector};
+use crate::train::TrainError;
 
 /// Key of what is not a tensor.
 const METADATA: &str = "ppa";
-/// Names of the tensors that describe training images, of each input: features and blocks.
+/// Names of the tensors of each input's descriptors of training images: features and blocks.
 const NAMES: [[&str; 2]; 2] = [
     ["left.features", "left.blocks"],
     ["right.features", "right.blocks"],
 ];
 
-/// Intervals of predictions, and what images are like that networks can judge.
+/// Intervals of predictions, and detectors of images unlike the training images.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Confidence {
     pub(super) intervals: Intervals,
     /// Of the left and of the right input.
-    pub(super) familiarity: [Familiarity; 2],
-    /// SHA-256 of each input's network.
+    pub(super) detectors: [OutOfDistributionDetector; 2],
+    /// SHA-256 of the weights of each input's network.
     pub(super) networks: [String; 2],
 }
 
@@ -47,8 +48,8 @@ impl Confidence {
     }
 
     /// Distance of each input's image from training images, as a share of the limit.
-    pub(super) fn relative_distances(&self, images: &[Appearance; 2]) -> [f32; 2] {
-        [0, 1].map(|input| self.familiarity[input].relative_distance(&images[input]))
+    pub(super) fn relative_distances(&self, images: &[Descriptors; 2]) -> [f32; 2] {
+        [0, 1].map(|input| self.detectors[input].relative_distance(&images[input]))
     }
 
     /// Writes all as safetensors, whole or not at all.
@@ -59,12 +60,12 @@ impl Confidence {
         let wrong = |error: &dyn std::error::Error| wrong(path, error.to_string());
         let state = State {
             intervals: self.intervals.clone(),
-            limits: self.respects().map(|both| both.map(|one| one.limit)),
+            limits: self.neighbours().map(|both| both.map(|one| one.limit)),
             networks: self.networks.clone(),
         };
         let state = serde_json::to_string(&state).map_err(|error| wrong(&error))?;
         let mut tensors = Vec::new();
-        for (name, one) in NAMES.into_iter().flatten().zip(self.respects().concat()) {
+        for (name, one) in NAMES.into_iter().flatten().zip(self.neighbours().concat()) {
             let shape = (one.references.len() / one.size, one.size);
             let tensor = Tensor::from_slice(&one.references, shape, &Device::Cpu);
             tensors.push((name, tensor.map_err(|error| wrong(&error))?));
@@ -77,21 +78,25 @@ impl Confidence {
 
     /// Reads what was calibrated with these networks.
     pub(super) fn read(path: &Path, networks: &Networks) -> Result<Self, FramesError> {
-        let confidence = Self::parse(path).map_err(|message| wrong(path, message))?;
-        match confidence.networks == fingerprints(networks) {
+        let sizes = networks
+            .of_inputs()
+            .map(|of| Descriptors::sizes(of.config.side));
+        let confidence = Self::parse(path, sizes).map_err(|message| wrong(path, message))?;
+        match confidence.networks == fingerprints(networks)? {
             true => Ok(confidence),
             false => Err(wrong(path, "it was calibrated with other networks".into())),
         }
     }
 
     /// Of each input, in the order of names.
-    fn respects(&self) -> [[&Neighbours; 2]; 2] {
-        self.familiarity
+    fn neighbours(&self) -> [[&Neighbours; 2]; 2] {
+        self.detectors
             .each_ref()
             .map(|one| [&one.features, &one.blocks])
     }
 
-    fn parse(path: &Path) -> Result<Self, String> {
+    /// Reads descriptors of the stated sizes, of each input.
+    fn parse(path: &Path, sizes: [[usize; 2]; 2]) -> Result<Self, String> {
         let bytes = ppa_core::regular_file::read(path).map_err(|error| error.to_string())?;
         let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|error| error.to_string())?;
         let state = header.metadata().as_ref().and_then(|all| all.get(METADATA));
@@ -102,29 +107,30 @@ impl Confidence {
         }
         let tensors = candle_core::safetensors::load_buffer(&bytes, &Device::Cpu);
         let tensors = tensors.map_err(|error| error.to_string())?;
-        let neighbours = |input: usize, respect: usize| {
-            let name = NAMES[input][respect];
+        let neighbours = |input: usize, descriptor: usize| {
+            let name = NAMES[input][descriptor];
             let tensor = tensors.get(name).ok_or(format!("it lacks {name}"))?;
             let (count, size) = tensor.dims2().map_err(|error| error.to_string())?;
             let values = tensor.flatten_all().and_then(|all| all.to_vec1());
             let neighbours = Neighbours {
                 references: values.map_err(|error| error.to_string())?,
                 size,
-                limit: state.limits[input][respect],
+                limit: state.limits[input][descriptor],
             };
-            let valid = neighbours.are_enough() && neighbours.limit >= 0.0;
+            let expected = sizes[input][descriptor];
+            let valid = size == expected && neighbours.are_enough() && neighbours.limit >= 0.0;
             valid.then_some(neighbours).ok_or(format!(
-                "{name} are {count} x {size} values, expected at least five rows and a limit"
+                "{name} are {count} x {size} values, expected at least 5 x {expected} and a limit"
             ))
         };
-        let familiarity = |input| {
-            Ok::<_, String>(Familiarity {
+        let detector = |input| {
+            Ok::<_, String>(OutOfDistributionDetector {
                 features: neighbours(input, 0)?,
                 blocks: neighbours(input, 1)?,
             })
         };
         Ok(Self {
-            familiarity: [familiarity(0)?, familiarity(1)?],
+            detectors: [detector(0)?, detector(1)?],
             intervals: state.intervals,
             networks: state.networks,
         })
@@ -132,8 +138,9 @@ impl Confidence {
 }
 
 /// SHA-256 of the weights of each input's network.
-pub(super) fn fingerprints(networks: &Networks) -> [String; 2] {
-    networks.of_inputs().map(|trained| trained.sha256.clone())
+pub(super) fn fingerprints(networks: &Networks) -> Result<[String; 2], TrainError> {
+    let [left, right] = networks.of_inputs();
+    Ok([left.sha256()?, right.sha256()?])
 }
 
 fn wrong(path: &Path, message: String) -> FramesError {

@@ -31,7 +31,7 @@ pub enum FramesError {
     },
     /// A frame unlike those that the networks were trained with.
     #[error("{} is unlike the training images: {distance:.2} times as far from them as the limit", frame.display())]
-    Unfamiliar {
+    OutOfDistribution {
         /// The frame.
         frame: PathBuf,
         /// Its distance as a share of the limit.
@@ -45,10 +45,10 @@ pub enum FramesError {
         /// What is wrong.
         message: String,
     },
-    /// Data from which no confidence can be had.
+    /// Poses that give no intervals.
     #[error(transparent)]
     Calibration(#[from] ConfidenceError),
-    /// Too few images to say what familiar ones are like.
+    /// Too few images for the limits of the detector.
     #[error(
         "{training} training images and {calibration} of calibration, expected at least 5 and 99"
     )]

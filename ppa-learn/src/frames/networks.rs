@@ -1,16 +1,16 @@
 //! The networks that judge the frames of both cameras.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use candle_core::{Device, Tensor};
 use ppa_dataset::layout::View;
-use sha2::{Digest, Sha256};
+use ppa_dataset::sha256_of_file;
 
 use super::error::FramesError;
 use crate::DeviceName;
-use crate::confidence::Appearance;
+use crate::confidence::Descriptors;
 use crate::data::Views;
-use crate::network::{InferenceNetwork, PosePrediction, QualityNetwork};
+use crate::network::{InferenceNetwork, PosePrediction};
 use crate::train::{TrainConfig, TrainError, trained};
 
 /// Refuses the training in the folder `run`, on images of `views`, if its network is none for one camera's images.
@@ -50,10 +50,10 @@ pub(super) enum Networks {
 /// The network of a training.
 #[derive(Debug, Clone)]
 pub(super) struct Trained {
+    /// Folder of the training.
+    run: PathBuf,
     pub config: TrainConfig,
     pub network: InferenceNetwork,
-    /// SHA-256 of its weights.
-    pub sha256: String,
 }
 
 /// What networks say of one moment.
@@ -63,8 +63,8 @@ pub(super) struct Moment {
     pub prediction: PosePrediction,
     /// From each image alone, unless one network takes both.
     pub alone: Option<[f64; 2]>,
-    /// What each image is like.
-    pub images: [Appearance; 2],
+    /// Descriptors of each image.
+    pub images: [Descriptors; 2],
 }
 
 impl Networks {
@@ -150,49 +150,41 @@ impl Networks {
 impl Trained {
     fn open(run: &Path, device: &Device) -> Result<Self, TrainError> {
         let (config, network) = trained(run)?;
-        let sha256 = fingerprint(&network)?;
         let network = InferenceNetwork::new(&network.to_device(device)?)?;
         Ok(Self {
+            run: run.to_owned(),
             config,
             network,
-            sha256,
         })
     }
 
-    /// What the network says of moments, and what each of its cameras' images is like.
+    /// SHA-256 of its file of weights.
+    pub fn sha256(&self) -> Result<String, TrainError> {
+        let weights = self.run.join("weights.safetensors");
+        Ok(sha256_of_file(&weights)?)
+    }
+
+    /// What the network says of moments, and descriptors of each of its cameras' images.
     pub fn outputs(&self, images: &[Tensor]) -> Result<Outputs, TrainError> {
         let features = self.network.features(images)?;
         let predictions = PosePrediction::of(&self.network.classify(&features)?)?;
         let cameras = features.iter().zip(images);
-        let appearances = cameras.map(|(features, images)| {
+        let descriptors = cameras.map(|(features, images)| {
             let inputs: Vec<Vec<f32>> = images.flatten_from(1)?.to_vec2()?;
             let features: Vec<Vec<f32>> = features.to_vec2()?;
             let all = features.iter().zip(&inputs);
             let side = self.config.side;
             Ok(all
-                .map(|(of, input)| Appearance::new(of, input, side))
+                .map(|(of, input)| Descriptors::new(of, input, side))
                 .collect())
         });
-        let appearances = appearances.collect::<Result<_, candle_core::Error>>()?;
-        Ok((predictions, appearances))
+        let descriptors = descriptors.collect::<Result<_, candle_core::Error>>()?;
+        Ok((predictions, descriptors))
     }
-}
-
-/// SHA-256 of all parameters and running statistics.
-fn fingerprint(network: &QualityNetwork) -> Result<String, TrainError> {
-    let mut hash = Sha256::new();
-    for named in network.tensors()? {
-        let values = named.tensor.flatten_all()?.to_vec1::<f32>()?;
-        for value in values {
-            hash.update(value.to_le_bytes());
-        }
-    }
-    let hash = hash.finalize();
-    Ok(hash.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
 /// A prediction of each moment; images by camera and moment.
-type Outputs = (Vec<PosePrediction>, Vec<Vec<Appearance>>);
+type Outputs = (Vec<PosePrediction>, Vec<Vec<Descriptors>>);
 
 /// The paper's answer for a pose.
 fn mean(left: PosePrediction, right: PosePrediction) -> PosePrediction {

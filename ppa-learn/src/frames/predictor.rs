@@ -141,7 +141,7 @@ impl PairPredictor {
             for (input, distance) in distances.into_iter().enumerate() {
                 if distance > 1.0 {
                     let frame = frames[self.frames[input]].to_owned();
-                    return Err(FramesError::Unfamiliar { frame, distance });
+                    return Err(FramesError::OutOfDistribution { frame, distance });
                 }
             }
         }

@@ -43,7 +43,7 @@ impl Size {
     /// Images that one task takes where their pixels are multiplied by a matrix of weights: more where eight parts would have fewer than
     /// 64 pixels, as each product reads all weights.
     pub fn images_per_product(self) -> usize {
-        let least = LEAST_PIXELS.div_ceil(self.pixels());
+        let least = MIN_PIXELS.div_ceil(self.pixels());
         self.images_per_task().max(least.min(self.images))
     }
 
@@ -53,8 +53,8 @@ impl Size {
     }
 }
 
-/// Least pixels of a product with weights, but for the last one of a batch.
-const LEAST_PIXELS: usize = 64;
+/// Minimum number of pixels of a product with weights, except for the last product of a batch.
+const MIN_PIXELS: usize = 64;
 
 /// Pixels that are worked on at once, so that what belongs to them stays in the second-level cache (512 KiB).
 pub fn tile_pixels(values_per_pixel: usize) -> usize {

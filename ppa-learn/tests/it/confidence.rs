@@ -39,7 +39,7 @@ fn calibrated(data: &Path, run: &Path) -> PathBuf {
     let (confidence, calibration) =
         Confidence::calibrate(run, None, &persons, 0.9, device).unwrap();
     println!("{calibration:?}");
-    assert_eq!((calibration.persons, calibration.moments), (7, 112));
+    assert_eq!((calibration.persons, calibration.pairs), (7, 112));
     let left_out = calibration.coverage_of_left_out_persons.unwrap();
     assert!(left_out > 0.7, "{left_out}");
     let file = run.join("confidence.safetensors");
@@ -115,7 +115,7 @@ fn intervals_cover_a_new_person_and_odd_frames_are_refused() {
         for frames in [[&*frame, &usual], [&usual, &frame]] {
             assert!(without.predict(frames).is_ok());
             match with.predict(frames) {
-                Err(FramesError::Unfamiliar {
+                Err(FramesError::OutOfDistribution {
                     frame: found,
                     distance,
                 }) => {

@@ -1,20 +1,26 @@
-//! How unlike the training images an image is.
+//! Detection of images outside the distribution of the training images.
 
 use super::neighbours::Neighbours;
+use crate::network::FEATURES;
 
 /// Blocks in each direction of an image whose mean values describe it.
 const BLOCKS: usize = 8;
 
-/// What an image is like.
+/// Descriptors of one image, which the detector compares.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Appearance {
+pub struct Descriptors {
     /// The network's features, at length 1.
     pub(crate) features: Vec<f32>,
     /// Mean values of blocks of the network's input.
     pub(crate) blocks: Vec<f32>,
 }
 
-impl Appearance {
+impl Descriptors {
+    /// Number of values in features and in blocks, of images of `side` x `side` pixels.
+    pub(crate) fn sizes(side: usize) -> [usize; 2] {
+        [FEATURES, BLOCKS.min(side).pow(2)]
+    }
+
     /// From the network's features and its square input of `side` x `side` values.
     ///
     /// # Panics
@@ -30,29 +36,33 @@ impl Appearance {
     }
 }
 
-/// What training images of one camera are like, and how far from them other images of the kind lie, in two respects:
+/// Detector of images of one camera unlike the training images, by the distance of two descriptors from theirs:
 ///
 /// * the network's features at length 1 (Sun et al., ICML 2022, "Out-of-distribution detection with deep nearest neighbors");
 /// * the mean depths of 8 x 8 blocks, as a network that was trained on limbs only may give a plain wall the features of some limb.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Familiarity {
+pub struct OutOfDistributionDetector {
     pub(crate) features: Neighbours,
     pub(crate) blocks: Neighbours,
 }
 
-impl Familiarity {
-    /// From training images and images that the network was not trained with, of which a share of `coverage` shall be familiar in each
-    /// respect.
+impl OutOfDistributionDetector {
+    /// From training images and images of calibration that the network was not trained with. Each descriptor's limit is the distance that
+    /// a share of `coverage` of the calibration images does not exceed.
     ///
-    /// None for too few images: fewer than five of training, or than coverage / (1 − coverage) others.
+    /// None for too few images: fewer than five of training, or than coverage / (1 − coverage) of calibration.
     ///
     /// # Panics
     /// If they are of different networks.
-    pub fn new(training: &[Appearance], others: &[Appearance], coverage: f64) -> Option<Self> {
-        let neighbours = |respect: fn(&Appearance) -> &[f32]| {
-            let [training, others] =
-                [training, others].map(|all| all.iter().map(respect).collect::<Vec<_>>());
-            Neighbours::new(&training, &others, coverage)
+    pub fn new(
+        training: &[Descriptors],
+        calibration: &[Descriptors],
+        coverage: f64,
+    ) -> Option<Self> {
+        let neighbours = |descriptor: fn(&Descriptors) -> &[f32]| {
+            let [training, calibration] =
+                [training, calibration].map(|all| all.iter().map(descriptor).collect::<Vec<_>>());
+            Neighbours::new(&training, &calibration, coverage)
         };
         Some(Self {
             features: neighbours(|image| &image.features)?,
@@ -60,12 +70,12 @@ impl Familiarity {
         })
     }
 
-    /// Distance of an image from training images as a share of the limit, in the respect in which it is greater: above 1 an image is
-    /// unfamiliar.
+    /// Distance of an image from the training images as a share of the limit, the larger one of both descriptors. Above 1, the image is out
+    /// of distribution.
     ///
     /// # Panics
     /// If it is of another network.
-    pub fn relative_distance(&self, image: &Appearance) -> f32 {
+    pub fn relative_distance(&self, image: &Descriptors) -> f32 {
         let of_features = self.features.relative_distance(&image.features);
         of_features.max(self.blocks.relative_distance(&image.blocks))
     }
@@ -89,23 +99,23 @@ mod tests {
     use super::*;
 
     /// A direction in a plane, and an image of one depth.
-    fn image(degrees: f32, depth: f32) -> Appearance {
+    fn image(degrees: f32, depth: f32) -> Descriptors {
         let (sin, cos) = degrees.to_radians().sin_cos();
-        Appearance::new(&[3.0 * cos, 3.0 * sin], &[depth; 100], 10)
+        Descriptors::new(&[3.0 * cos, 3.0 * sin], &[depth; 100], 10)
     }
 
     #[test]
-    fn odd_features_and_odd_depths_are_both_unfamiliar() {
+    fn odd_features_and_odd_depths_are_out_of_distribution() {
         let training: Vec<_> = (0..10).map(|n| image(n as f32, 0.01 * n as f32)).collect();
         let other = |n| image(0.1 * n as f32, 0.001 * n as f32);
         let others: Vec<_> = (0..99).map(other).collect();
-        let familiarity = Familiarity::new(&training, &others, 0.99).unwrap();
-        let distance = |degrees, depth| familiarity.relative_distance(&image(degrees, depth));
+        let detector = OutOfDistributionDetector::new(&training, &others, 0.99).unwrap();
+        let distance = |degrees, depth| detector.relative_distance(&image(degrees, depth));
         assert!(distance(5.0, 0.05) < 1.0);
         assert!(distance(15.0, 0.05) > 1.0);
         assert!(distance(5.0, 0.15) > 1.0);
-        let zeros = Appearance::new(&[0.0, 0.0], &[0.05; 100], 10);
-        assert!(familiarity.relative_distance(&zeros) > 1.0);
+        let zeros = Descriptors::new(&[0.0, 0.0], &[0.05; 100], 10);
+        assert!(detector.relative_distance(&zeros) > 1.0);
     }
 
     #[test]

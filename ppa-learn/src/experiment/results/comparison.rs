@@ -1,0 +1,131 @@
+//! Columns of a table compared with baselines, person by person.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Results, TestSet};
+use crate::evaluate::{
+    BaselineKind, Compared, Verdict, mean_by, p_network_better, sentence, verdict,
+};
+use crate::experiment::configuration::Configuration;
+use crate::experiment::metric::Metric;
+
+/// A column beside predictions without a network.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// The column, by its headings.
+    pub column: String,
+    /// Its mean absolute error.
+    pub network_mae: f64,
+    /// The baselines, and persons' errors compared: each the mean over the column's seeds.
+    pub baselines: Vec<Compared>,
+    /// Persons of all folds; one that several folds test counts once.
+    pub persons: usize,
+    /// Whether the network is better.
+    pub verdict: Verdict,
+}
+
+impl fmt::Display for Comparison {
+    /// The verdict in a sentence or two.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sentence = sentence(self.network_mae, &self.baselines, self.persons);
+        write!(f, "{}: {sentence}", self.column)
+    }
+}
+
+impl Results {
+    /// Each column of which a seed is complete beside the baselines, if there are any.
+    pub fn comparisons(&self) -> Vec<Comparison> {
+        let kinds = self.baselines();
+        let columns = self.columns.iter().filter(|_| !kinds.is_empty());
+        columns
+            .filter_map(|&column| self.comparison(column, &kinds))
+            .collect()
+    }
+
+    fn comparison(&self, column: Configuration, kinds: &[BaselineKind]) -> Option<Comparison> {
+        let network_mae = self.summary(column, Metric::Mae)?.mean;
+        let seeds = self.seeds.iter().copied();
+        let complete = seeds.filter(|&seed| self.of_seed(column, Metric::Mae, seed).is_some());
+        let sets = complete.flat_map(|seed| {
+            (0..self.folds).filter_map(move |fold| self.values.get(&(column, seed, fold)))
+        });
+        let of_network = errors_of_persons(sets);
+        let compared = |&kind: &BaselineKind| {
+            let folds = (0..self.folds).map(|fold| &self.baselines[&(kind, fold)]);
+            Some(Compared {
+                kind,
+                mae: self.of_baseline(kind, Metric::Mae)?,
+                p_network_better: p_network_better(&errors_of_persons(folds), &of_network),
+            })
+        };
+        let baselines = kinds.iter().map(compared).collect::<Option<Vec<_>>>()?;
+        Some(Comparison {
+            column: column.headings().join(", "),
+            network_mae,
+            verdict: verdict(network_mae, &baselines),
+            baselines,
+            persons: of_network.len(),
+        })
+    }
+}
+
+/// Mean absolute error of each person over test sets.
+fn errors_of_persons<'a>(sets: impl Iterator<Item = &'a TestSet>) -> Vec<f64> {
+    let rows = sets.flat_map(|set| &set.predictions);
+    let errors = rows.map(|row| (row.patient, (row.label - row.prediction).abs()));
+    mean_by(errors).into_values().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::test_set;
+    use super::*;
+    use crate::experiment::configuration::Experiment;
+    use crate::experiment::predictions::Prediction;
+
+    #[test]
+    fn columns_are_compared_with_baselines_by_person() {
+        let columns = Experiment::TwoC.configurations();
+        let mut results = Results::new(Experiment::TwoC, columns, 2, &[1, 2]);
+        // Errors of 0.25 and 0.5 with the two seeds, of persons 1 and 2 in the two folds.
+        for place in results.missing() {
+            let error = 0.25 * place.seed as f64;
+            results
+                .insert(place, &of_person(place.fold, error))
+                .unwrap();
+        }
+        assert_eq!(results.comparisons(), []);
+        for fold in 0..2 {
+            let constant = of_person(fold, 0.5 + 0.25 * fold as f64);
+            let kind = BaselineKind::Constant;
+            results.insert_baseline(kind, fold, &constant).unwrap();
+        }
+        // A baseline of one fold only is not compared.
+        let angle = of_person(0, 0.125);
+        results
+            .insert_baseline(BaselineKind::Angle, 0, &angle)
+            .unwrap();
+        assert_eq!(
+            results.of_baseline(BaselineKind::Constant, Metric::Mae),
+            Some(0.625)
+        );
+        let found = &results.comparisons()[0];
+        assert_eq!((found.network_mae, found.persons), (0.375, 2));
+        let [constant] = found.baselines[..] else {
+            panic!("{found:?}")
+        };
+        // 0.5 and 0.75 against 0.375 of both: the least of the four sign patterns.
+        assert_eq!((constant.mae, constant.p_network_better), (0.625, 0.25));
+        assert_eq!(found.verdict, Verdict::NotShown);
+    }
+
+    /// The test set of one person for each fold.
+    fn of_person(fold: usize, error: f64) -> Vec<Prediction> {
+        let mut rows = test_set(error);
+        rows.iter_mut()
+            .for_each(|row| row.patient = 1 + fold as u32);
+        rows
+    }
+}
