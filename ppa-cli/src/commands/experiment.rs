@@ -26,6 +26,10 @@ pub enum ExperimentCommand {
     Persons(run::RunArgs),
     /// Learning curve: experiment 1 with fewer poses to train with
     Poses(run::RunArgs),
+    /// The networks of experiment 1, tested with persons of altered body shapes
+    Shapes(run::RunArgs),
+    /// Experiment 1 with one camera, and without showing left limbs as right ones
+    Ablations(run::RunArgs),
     /// Write a page of all results so far: tables beside the paper's, charts, poses with the largest errors
     Report(report::ReportArgs),
 }
@@ -38,6 +42,8 @@ pub fn run(command: &ExperimentCommand, output: Output) -> anyhow::Result<()> {
         ExperimentCommand::TwoC(args) => (Experiment::TwoC, args),
         ExperimentCommand::Persons(args) => (Experiment::Persons, args),
         ExperimentCommand::Poses(args) => (Experiment::Poses, args),
+        ExperimentCommand::Shapes(args) => (Experiment::Shapes, args),
+        ExperimentCommand::Ablations(args) => (Experiment::Ablations, args),
         ExperimentCommand::Report(args) => return report::run(args, output),
     };
     run::run(experiment, args, output)

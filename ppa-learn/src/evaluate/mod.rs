@@ -25,4 +25,4 @@ pub use report::{Evaluation, PersonScores};
 pub use row::Row;
 pub use scores::Scores;
 pub use verdict::{BaselineKind, Compared, Verdict};
-pub(crate) use verdict::{mean_by, p_network_better, sentence, verdict};
+pub(crate) use verdict::{mean_by, p_network_better, sentence, test_of_persons, verdict};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
-use ppa_metrics::{MAX_PAIRS, sign_flip_permutation};
+use ppa_metrics::{MAX_PAIRS, PermutationTest, sign_flip_permutation};
 use serde::{Deserialize, Serialize};
 
 /// Below this, a difference between persons' errors is not put down to chance.
@@ -55,16 +55,20 @@ pub struct Compared {
 }
 
 /// Exact one-sided sign-flip test of persons' mean absolute errors, small where the network's are lower; 1 if there is no pair.
+pub(crate) fn p_network_better(baseline: &[f64], network: &[f64]) -> f64 {
+    test_of_persons(baseline, network).map_or(1.0, |test| test.p_one_sided)
+}
+
+/// Exact sign-flip test of persons' mean absolute errors, paired; `None` if there is no pair.
 ///
 /// More than [`MAX_PAIRS`] persons are averaged in groups of equal size but the last.
-pub(crate) fn p_network_better(baseline: &[f64], network: &[f64]) -> f64 {
+pub(crate) fn test_of_persons(first: &[f64], second: &[f64]) -> Option<PermutationTest> {
     let groups = |errors: &[f64]| -> Vec<f64> {
         let size = errors.len().div_ceil(MAX_PAIRS).max(1);
         let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
         errors.chunks(size).map(mean).collect()
     };
-    let test = sign_flip_permutation(&groups(baseline), &groups(network));
-    test.map_or(1.0, |test| test.p_one_sided)
+    sign_flip_permutation(&groups(first), &groups(second)).ok()
 }
 
 /// The mean of each key's values.

@@ -6,7 +6,7 @@ use ppa_dataset::layout::View;
 use ppa_dataset::write_whole;
 use serde::{Deserialize, Serialize};
 
-use super::configuration::{Amount, Configuration};
+use super::configuration::{Configuration, Variation};
 use super::error::ExperimentError;
 use super::predictions::{Prediction, join_views};
 use super::record::{Record, file, fingerprint, read_json, without_paths};
@@ -62,7 +62,7 @@ impl Runner<'_> {
     ) -> Result<OfView, ExperimentError> {
         // Tested images are the same for all columns and seeds. A learning curve's columns are compared with baselines of all data.
         let configuration = Configuration {
-            amount: Amount::All,
+            variation: Variation::None,
             ..results.columns()[0]
         };
         let unit = Unit::Run {

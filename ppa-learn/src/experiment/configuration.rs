@@ -5,6 +5,7 @@ use std::num::NonZeroUsize;
 
 use ppa_core::text::count;
 use ppa_dataset::BodyShape;
+use ppa_dataset::layout::View;
 use serde::{Deserialize, Serialize};
 
 /// One of the paper's experiments.
@@ -28,18 +29,28 @@ pub enum Experiment {
     /// Experiment 1 with fewer poses of each limb to train with. Not in the paper.
     #[serde(rename = "poses")]
     Poses,
+    /// The networks of experiment 1, tested with persons whose body shapes are altered. Not in the paper.
+    #[serde(rename = "shapes")]
+    Shapes,
+    /// Experiment 1 without one of its parts. Not in the paper.
+    #[serde(rename = "ablations")]
+    Ablations,
 }
 
-/// How much of a fold's training data is used.
+/// How the networks of a column differ from those of experiment 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Amount {
-    /// All of it.
-    All,
-    /// So many persons.
+pub enum Variation {
+    /// Not at all.
+    None,
+    /// They are trained with so many persons of a fold.
     Persons(u32),
-    /// Every n-th angle of each limb.
+    /// They are trained with every n-th angle of each limb.
     EveryPose(NonZeroUsize),
+    /// Only the network of one camera predicts.
+    OneCamera(View),
+    /// Limbs of both sides are shown as they are.
+    Unmirrored,
 }
 
 /// Body shapes of the synthetic dataset that a network is trained with.
@@ -92,8 +103,8 @@ pub struct Configuration {
     pub start: Start,
     /// Shapes that are trained with after that: [`Shapes::Original`] where the images are not synthetic.
     pub shapes: Shapes,
-    /// Data that are trained with after that.
-    pub amount: Amount,
+    /// How the networks differ from those of experiment 1.
+    pub variation: Variation,
 }
 
 impl Experiment {
@@ -109,6 +120,8 @@ impl Experiment {
             Self::TwoC => "2c",
             Self::Persons => "persons",
             Self::Poses => "poses",
+            Self::Shapes => "shapes",
+            Self::Ablations => "ablations",
         }
     }
 
@@ -121,12 +134,12 @@ impl Experiment {
         use ViewChoice::{Specific, Unified};
         let synthetic = |views, shapes| Start::Synthetic { views, shapes };
         let starts = match self {
-            Self::One => {
+            Self::One | Self::Shapes => {
                 let column = |shapes| Configuration {
                     experiment: self,
                     start: Start::Scratch,
                     shapes,
-                    amount: Amount::All,
+                    variation: Variation::None,
                 };
                 return [Original, Size, Bumps, All].map(column).to_vec();
             }
@@ -151,13 +164,22 @@ impl Experiment {
                 synthetic(Unified, All),
                 synthetic(Specific, All),
             ],
+            Self::Ablations => {
+                let cameras = View::ALL.map(Variation::OneCamera);
+                let variations = [Variation::None, Variation::Unmirrored]
+                    .into_iter()
+                    .chain(cameras);
+                return variations
+                    .map(|variation| self.with_variation(variation))
+                    .collect();
+            }
             Self::Persons | Self::Poses => Vec::new(),
         };
         let column = |start| Configuration {
             experiment: self,
             start,
             shapes: Original,
-            amount: Amount::All,
+            variation: Variation::None,
         };
         starts.into_iter().map(column).collect()
     }
@@ -167,7 +189,7 @@ impl Experiment {
         let shapes = match self {
             Self::TwoA => Shapes::Size,
             Self::TwoB => Shapes::All,
-            Self::One | Self::TwoC | Self::Persons | Self::Poses => return None,
+            _ => return None,
         };
         let pretrained = Start::Synthetic {
             views: ViewChoice::Specific,
@@ -177,28 +199,31 @@ impl Experiment {
             experiment: self,
             start,
             shapes: Shapes::Original,
-            amount: Amount::All,
+            variation: Variation::None,
         }))
     }
 
-    /// The column of a learning curve, which trains from scratch with a part of the data.
-    pub fn with_amount(self, amount: Amount) -> Configuration {
+    /// The column of a variation of experiment 1, trained from scratch without variants of the skin.
+    pub fn with_variation(self, variation: Variation) -> Configuration {
         Configuration {
             experiment: self,
             start: Start::Scratch,
             shapes: Shapes::Original,
-            amount,
+            variation,
         }
     }
 }
 
-impl fmt::Display for Amount {
+impl fmt::Display for Variation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::All => f.write_str("all data"),
+            Self::None => f.write_str("experiment 1"),
             Self::Persons(n) => f.write_str(&count(*n as usize, "person")),
             Self::EveryPose(n) if n.get() == 1 => f.write_str("every pose"),
             Self::EveryPose(n) => write!(f, "every pose of {n}"),
+            Self::OneCamera(View::Left) => f.write_str("left camera only"),
+            Self::OneCamera(View::Right) => f.write_str("right camera only"),
+            Self::Unmirrored => f.write_str("sides not mirrored"),
         }
     }
 }
@@ -253,18 +278,31 @@ impl ViewChoice {
 impl Configuration {
     /// Headings of the column as the paper prints them, the most general first.
     pub fn headings(self) -> Vec<String> {
-        if self.amount != Amount::All {
-            return vec![self.amount.to_string()];
+        if self.is_named_by_variation() {
+            return vec![self.variation.to_string()];
         }
         let headings = self.headings_of_paper();
         headings.into_iter().map(str::to_owned).collect()
+    }
+
+    fn is_named_by_variation(self) -> bool {
+        self.variation != Variation::None || self.experiment == Experiment::Ablations
+    }
+
+    /// The cameras whose networks' predictions are averaged.
+    pub fn views(self) -> &'static [View] {
+        match self.variation {
+            Variation::OneCamera(View::Left) => &[View::Left],
+            Variation::OneCamera(View::Right) => &[View::Right],
+            _ => &View::ALL,
+        }
     }
 
     fn headings_of_paper(self) -> Vec<&'static str> {
         let Start::Synthetic { views, shapes } = self.start else {
             return vec![match self {
                 Self {
-                    experiment: Experiment::One,
+                    experiment: Experiment::One | Experiment::Shapes,
                     ..
                 } => self.shapes.heading(),
                 Self {
@@ -285,8 +323,10 @@ impl Configuration {
     /// A name for folders and rows: unique within its experiment, of lower-case letters and `-`.
     pub fn name(self) -> String {
         match self.start {
-            _ if self.amount != Amount::All => self.amount.to_string().replace(' ', "-"),
-            Start::Scratch if self.experiment == Experiment::One => self.shapes.name().to_owned(),
+            _ if self.is_named_by_variation() => self.variation.to_string().replace(' ', "-"),
+            Start::Scratch if matches!(self.experiment, Experiment::One | Experiment::Shapes) => {
+                self.shapes.name().to_owned()
+            }
             Start::Scratch => "scratch".to_owned(),
             Start::ImageNet => "imagenet".to_owned(),
             Start::Synthetic { views, shapes } => format!("{}-{}", views.name(), shapes.name()),
@@ -315,7 +355,8 @@ mod tests {
 
     #[test]
     fn names_are_unique_within_an_experiment() {
-        for experiment in Experiment::OF_PAPER {
+        let others = [Experiment::Shapes, Experiment::Ablations];
+        for experiment in Experiment::OF_PAPER.into_iter().chain(others) {
             let columns = experiment.configurations();
             let names: BTreeSet<_> = columns.iter().map(|c| c.name()).collect();
             assert_eq!(names.len(), columns.len());

@@ -20,14 +20,14 @@ mod run;
 mod table;
 mod unit;
 
-pub use configuration::{Amount, Configuration, Experiment, Shapes, Start, ViewChoice};
+pub use configuration::{Configuration, Experiment, Shapes, Start, Variation, ViewChoice};
 pub use error::ExperimentError;
 pub use folds::{FoldError, cross_validation, folds_of_limbs};
 pub use metric::Metric;
 pub use plan::{ExperimentPlan, Fold, LearningCurves, Synthetic, Target};
 pub use predictions::{Moment, Prediction, PredictionError, join_views, pose_triples};
 pub use published::published;
-pub use results::{Comparison, Missing, Results, Summary};
+pub use results::{Comparison, Difference, Missing, Results, Summary};
 pub use run::{Begun, Event, Runner};
 pub use table::{Incomplete, Table, TableCell};
 pub use unit::{Unit, runs};

@@ -9,10 +9,10 @@ use ppa_dataset::published::Published;
 use ppa_metrics::MAX_PAIRS;
 use serde::{Deserialize, Serialize};
 
-use super::configuration::{Amount, Configuration, Experiment, Start};
+use super::configuration::{Configuration, Experiment, Start, Variation};
 use super::error::ExperimentError;
 use super::folds::{cross_validation, folds_of_limbs};
-use crate::train::{ConfigError, Source, TrainConfig};
+use crate::train::{ConfigError, Source, TrainConfig, merge};
 
 /// Datasets and settings of the experiments.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -29,6 +29,9 @@ pub struct ExperimentPlan {
     pub imagenet_weights: Option<PathBuf>,
     /// How networks are trained: a preset and what differs from it. Seed, views and data are filled in.
     pub training: toml::Table,
+    /// What differs from [`training`](Self::training) in the runs of experiments 2a to 2c, from scratch or not.
+    #[serde(default)]
+    pub finetuning: toml::Table,
     /// The synthetic dataset: of experiment 1, and to pretrain with.
     pub synthetic: Synthetic,
     /// The preparations, or what stands for them: of experiments 2a and 2c.
@@ -153,12 +156,20 @@ impl ExperimentPlan {
         }
         plan.path = path.to_owned();
         plan.training_config()?;
+        plan.finetuning_config()?;
         Ok(plan)
     }
 
     /// How networks are trained, without data.
     pub(super) fn training_config(&self) -> Result<TrainConfig, ConfigError> {
         TrainConfig::from_table(self.training.clone(), &self.path)
+    }
+
+    /// How networks are trained with preparations or clinical images, without data.
+    pub(super) fn finetuning_config(&self) -> Result<TrainConfig, ConfigError> {
+        let mut table = self.training.clone();
+        merge(&mut table, self.finetuning.clone());
+        TrainConfig::from_table(table, &self.path)
     }
 
     /// The seeds of an experiment's repetitions.
@@ -180,12 +191,12 @@ impl ExperimentPlan {
         } = &self.learning_curves;
         let mut columns = match experiment {
             Experiment::Persons => {
-                let amounts = persons.iter().map(|&n| Amount::Persons(n));
-                amounts.map(|n| experiment.with_amount(n)).collect()
+                let amounts = persons.iter().map(|&n| Variation::Persons(n));
+                amounts.map(|n| experiment.with_variation(n)).collect()
             }
             Experiment::Poses => {
-                let amounts = every_pose.iter().map(|&n| Amount::EveryPose(n));
-                amounts.map(|n| experiment.with_amount(n)).collect()
+                let amounts = every_pose.iter().map(|&n| Variation::EveryPose(n));
+                amounts.map(|n| experiment.with_variation(n)).collect()
             }
             _ => experiment.configurations(),
         };
@@ -199,7 +210,9 @@ impl ExperimentPlan {
     /// [`ExperimentError::NoTarget`] if the plan names none.
     pub fn target(&self, experiment: Experiment) -> Result<Source, ExperimentError> {
         let (target, key) = match experiment {
-            Experiment::One => return Ok(self.synthetic.source()),
+            Experiment::One | Experiment::Shapes | Experiment::Ablations => {
+                return Ok(self.synthetic.source());
+            }
             Experiment::Persons | Experiment::Poses => {
                 return match self.configurations(experiment).is_empty() {
                     false => Ok(self.synthetic.source()),
@@ -235,7 +248,11 @@ impl ExperimentPlan {
             cross_validation(&persons, folds, self.fold_seed)
         };
         let tests = match experiment {
-            Experiment::One | Experiment::Persons | Experiment::Poses => {
+            Experiment::One
+            | Experiment::Persons
+            | Experiment::Poses
+            | Experiment::Shapes
+            | Experiment::Ablations => {
                 let Synthetic {
                     folds, test_limbs, ..
                 } = self.synthetic;

@@ -1,6 +1,7 @@
 //! Metrics of an experiment's runs, brought together over views, folds and seeds.
 
 mod comparison;
+mod difference;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -15,6 +16,7 @@ use super::metric::Metric;
 use super::predictions::{Prediction, PredictionError};
 use crate::evaluate::{BaselineKind, label_noise_mae, mean_by, means};
 pub use comparison::Comparison;
+pub use difference::Difference;
 
 /// Metrics of each column's test sets.
 ///
@@ -215,6 +217,19 @@ impl Results {
         Some(values.map(|values| mean(&values)))
     }
 
+    /// Mean absolute error of each person, over the seeds that are complete in all of some columns.
+    fn errors_of_persons(&self, column: Configuration, complete_in: &[Configuration]) -> Vec<f64> {
+        let complete = |seed: &&u64| {
+            let mut columns = complete_in.iter();
+            columns.all(|&column| self.of_seed(column, Metric::Mae, **seed).is_some())
+        };
+        let seeds = self.seeds.iter().filter(complete);
+        let sets = seeds.flat_map(|&seed| {
+            (0..self.folds).filter_map(move |fold| self.values.get(&(column, seed, fold)))
+        });
+        errors_of_persons(sets)
+    }
+
     /// Mean and standard deviation over the seeds of a column; `None` if no seed has a value.
     pub fn summary(&self, column: Configuration, metric: Metric) -> Option<Summary> {
         let there = self.seeds.iter();
@@ -288,6 +303,13 @@ impl Results {
         let (scratch, pretrained): (Vec<_>, Vec<_>) = self.seeds.iter().filter_map(both).unzip();
         Some(sign_flip_permutation(&scratch, &pretrained))
     }
+}
+
+/// Mean absolute error of each person over test sets, in the order of persons.
+fn errors_of_persons<'a>(sets: impl Iterator<Item = &'a TestSet>) -> Vec<f64> {
+    let rows = sets.flat_map(|set| &set.predictions);
+    let errors = rows.map(|row| (row.patient, (row.label - row.prediction).abs()));
+    mean_by(errors).into_values().collect()
 }
 
 fn mean(values: &[f64]) -> f64 {

@@ -12,7 +12,7 @@ use ppa_dataset::{BodyShape, sha256_of_file, write_whole};
 use rand::seq::SliceRandom;
 use serde::{Serialize, Serializer};
 
-use super::configuration::{Amount, Experiment, Start};
+use super::configuration::{Experiment, Start, Variation};
 use super::error::ExperimentError;
 use super::plan::{ExperimentPlan, Fold};
 use super::predictions::{Moment, Prediction, join_views, read_predictions};
@@ -158,18 +158,24 @@ impl<'a> Runner<'a> {
             };
         }
         report(begins);
-        let steps = |progress: &Progress| report(Event::Step(progress));
-        if train(&config, &folder, stop, steps).map_err(named)? != Ended::Finished {
-            return Ok(false);
+        let tested = unit.tests_network_of();
+        if tested.is_none() {
+            let steps = |progress: &Progress| report(Event::Step(progress));
+            if train(&config, &folder, stop, steps).map_err(named)? != Ended::Finished {
+                return Ok(false);
+            }
         }
         if let Unit::Run { .. } = unit {
-            let rows = test(&folder, &config).map_err(named)?;
+            let network = tested.map_or(folder.clone(), |tested| self.folder(tested));
+            let rows = test(&network, &config).map_err(named)?;
             write_predictions(&folder.join("predictions.csv"), &rows)?;
         }
         let text = serde_json::to_string_pretty(&record).expect("settings are JSON");
         write_whole(&path, text.as_bytes())?;
-        let checkpoint = folder.join("checkpoint.safetensors");
-        remove_file(&checkpoint).map_err(file("remove", &checkpoint))?;
+        if tested.is_none() {
+            let checkpoint = folder.join("checkpoint.safetensors");
+            remove_file(&checkpoint).map_err(file("remove", &checkpoint))?;
+        }
         Ok(true)
     }
 
@@ -193,13 +199,12 @@ impl<'a> Runner<'a> {
             shapes: Some(shapes.to_vec()),
             ..self.plan.synthetic.source()
         };
-        let base = self.plan.training_config()?;
         Ok(match unit {
             Unit::Pretraining { shapes, view, seed } => TrainConfig {
                 seed,
                 views: view.map_or(Views::Unified, of_view),
                 training: vec![all(shapes.variants())],
-                ..base
+                ..self.plan.training_config()?
             },
             Unit::Run {
                 configuration,
@@ -207,10 +212,21 @@ impl<'a> Runner<'a> {
                 view,
                 seed,
             } => {
-                let training = self.training_persons(fold, configuration.amount);
+                let training = self.training_persons(fold, configuration.variation);
                 let fold = &self.folds[fold];
-                let target = self.plan.target(self.experiment)?;
+                let experiment = configuration.experiment;
+                let target = self.plan.target(experiment)?;
+                let base = match experiment {
+                    Experiment::TwoA | Experiment::TwoB | Experiment::TwoC => {
+                        self.plan.finetuning_config()?
+                    }
+                    _ => self.plan.training_config()?,
+                };
                 // Recorded images have no shapes; of synthetic ones the skin of the scan is tested, whatever was trained with.
+                let tested: &[BodyShape] = match experiment {
+                    Experiment::Shapes => &ALTERED,
+                    _ => &[BodyShape::Orig],
+                };
                 let of = |patients: &[u32], shapes: &[BodyShape]| Source {
                     patients: Some(patients.to_vec()),
                     shapes: Some(shapes.to_vec()),
@@ -220,18 +236,19 @@ impl<'a> Runner<'a> {
                     seed,
                     views: of_view(view),
                     start: self.start(unit),
-                    layers: match self.experiment {
+                    mirror: base.mirror && configuration.variation != Variation::Unmirrored,
+                    layers: match experiment {
                         Experiment::TwoC => Layers::Last,
                         _ => Layers::All,
                     },
                     training: vec![Source {
-                        every_pose: match configuration.amount {
-                            Amount::EveryPose(n) => Some(n),
-                            Amount::All | Amount::Persons(_) => None,
+                        every_pose: match configuration.variation {
+                            Variation::EveryPose(n) => Some(n),
+                            _ => None,
                         },
                         ..of(&training, configuration.shapes.variants())
                     }],
-                    evaluation: vec![of(&fold.test, &[BodyShape::Orig])],
+                    evaluation: vec![of(&fold.test, tested)],
                     ..base
                 }
             }
@@ -239,9 +256,9 @@ impl<'a> Runner<'a> {
     }
 
     /// Persons to train with. Fewer ones are the first of a random order of the fold's, so that a larger number holds a smaller one's.
-    fn training_persons(&self, fold: usize, amount: Amount) -> Vec<u32> {
+    fn training_persons(&self, fold: usize, variation: Variation) -> Vec<u32> {
         let mut persons = self.folds[fold].training.clone();
-        if let Amount::Persons(n) = amount {
+        if let Variation::Persons(n) = variation {
             persons.shuffle(&mut stream(
                 self.plan.fold_seed,
                 Purpose::Folds,
@@ -269,7 +286,7 @@ impl<'a> Runner<'a> {
     fn record(&self, unit: Unit, config: &TrainConfig) -> Result<Record, TrainError> {
         let training = samples(config, &config.training)?;
         let tested = samples(config, &config.evaluation)?;
-        if let Some(pretraining) = unit.needs() {
+        if let Some(pretraining) = unit.pretraining() {
             let config = self.config(pretraining).map_err(|e| match e {
                 ExperimentError::Config(e) => TrainError::Config(e),
                 _ => unreachable!("a pretraining has no target"),
@@ -341,7 +358,6 @@ impl<'a> Runner<'a> {
     /// # Errors
     /// [`ExperimentError`] naming the checkpoint that cannot be read.
     pub fn begun(&self) -> Result<Vec<Begun>, ExperimentError> {
-        let steps = self.plan.training_config()?.schedule().steps();
         let runs = self.runs().into_iter();
         let all: BTreeSet<Unit> = runs
             .flat_map(|run| run.needs().into_iter().chain([run]))
@@ -360,14 +376,14 @@ impl<'a> Runner<'a> {
                 begun.push(Begun {
                     training,
                     step,
-                    steps,
+                    steps: self.config(training)?.schedule().steps(),
                 });
             }
         }
         Ok(begun)
     }
 
-    /// What is known so far: the results of all test sets of which both views are finished.
+    /// What is known so far: the results of all test sets of which the column's views are finished.
     ///
     /// # Errors
     /// [`ExperimentError`] naming predictions that cannot be read or joined.
@@ -376,7 +392,7 @@ impl<'a> Runner<'a> {
         let columns = self.plan.configurations(self.experiment);
         let mut results = Results::new(self.experiment, columns, self.folds.len(), &seeds);
         for place in results.missing() {
-            let views = View::ALL.map(|view| {
+            let views = place.configuration.views().iter().map(|&view| {
                 let unit = Unit::Run {
                     configuration: place.configuration,
                     fold: place.fold,
@@ -385,16 +401,16 @@ impl<'a> Runner<'a> {
                 };
                 self.predictions(unit)
             });
-            let [left, right] = views;
-            let (Some(left), Some(right)) = (left?, right?) else {
-                continue;
-            };
             let wrong = |source| ExperimentError::Predictions {
                 place: place.to_string(),
                 source,
             };
-            let joined = join_views(&left, &right).map_err(wrong)?;
-            results.insert(place, &joined).map_err(wrong)?;
+            let predictions = match &views.collect::<Result<Vec<_>, _>>()?[..] {
+                [Some(left), Some(right)] => join_views(left, right).map_err(wrong)?,
+                [Some(one)] => one.clone(),
+                _ => continue,
+            };
+            results.insert(place, &predictions).map_err(wrong)?;
         }
         Ok(results)
     }
@@ -409,6 +425,14 @@ fn test(folder: &Path, config: &TrainConfig) -> Result<Vec<Row>, TrainError> {
     let predictions = predict(&network, &images, config.batch_size, config.workers)?;
     Ok(Row::of(images.samples(), &predictions))
 }
+
+/// Body shapes other than the skin of the scan.
+const ALTERED: [BodyShape; 4] = [
+    BodyShape::Big,
+    BodyShape::Small,
+    BodyShape::BumpsA,
+    BodyShape::BumpsB,
+];
 
 fn of_view(view: View) -> Views {
     match view {

@@ -7,7 +7,7 @@ use super::cell::{Cell, with_best};
 use super::configuration::Configuration;
 use super::metric::Metric;
 use super::published::published;
-use super::results::{Comparison, Missing, Results, Summary};
+use super::results::{Comparison, Difference, Missing, Results, Summary};
 use crate::evaluate::BaselineKind;
 
 /// A table: a row for each metric, a column for each configuration and for each baseline.
@@ -154,6 +154,7 @@ impl Table {
         }
         let comparisons = results.comparisons();
         notes.extend(comparisons.iter().map(Comparison::to_string));
+        notes.extend(results.differences().iter().map(Difference::to_string));
         if let Some(noise) = results.label_noise_mae() {
             notes.push(format!(
                 "Labels that vary by their standard deviation about the true ones have a MAE of {noise:.3}."

@@ -4,7 +4,7 @@ use std::fmt;
 
 use ppa_dataset::layout::View;
 
-use super::configuration::{Configuration, Shapes, Start, ViewChoice};
+use super::configuration::{Configuration, Experiment, Shapes, Start, Variation, ViewChoice};
 
 /// One training, and the test of its network where it has one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -32,8 +32,41 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// The pretraining whose weights this one begins with.
+    /// The training of experiment 1 whose network this unit tests, if it trains none itself.
+    pub fn tests_network_of(self) -> Option<Self> {
+        let Self::Run {
+            configuration,
+            fold,
+            view,
+            seed,
+        } = self
+        else {
+            return None;
+        };
+        let tests = match configuration.experiment {
+            Experiment::Shapes => true,
+            Experiment::Ablations => configuration.variation != Variation::Unmirrored,
+            _ => false,
+        };
+        tests.then_some(Self::Run {
+            configuration: Configuration {
+                experiment: Experiment::One,
+                variation: Variation::None,
+                ..configuration
+            },
+            fold,
+            view,
+            seed,
+        })
+    }
+
+    /// The training that comes first: of the network that this unit tests, or of the weights that it begins with.
     pub fn needs(self) -> Option<Self> {
+        self.tests_network_of().or_else(|| self.pretraining())
+    }
+
+    /// The pretraining whose weights this one begins with.
+    pub fn pretraining(self) -> Option<Self> {
         let Self::Run {
             configuration,
             view,
@@ -81,7 +114,7 @@ pub fn runs(columns: &[Configuration], folds: usize, seeds: &[u64]) -> Vec<Unit>
     for &seed in seeds {
         for &configuration in columns {
             for fold in 0..folds {
-                runs.extend(View::ALL.map(|view| Unit::Run {
+                runs.extend(configuration.views().iter().map(|&view| Unit::Run {
                     configuration,
                     fold,
                     view,
@@ -97,7 +130,7 @@ pub fn runs(columns: &[Configuration], folds: usize, seeds: &[u64]) -> Vec<Unit>
 mod tests {
     use std::collections::BTreeSet;
 
-    use super::super::configuration::{Amount, Experiment};
+    use super::super::configuration::{Experiment, Variation};
     use super::*;
 
     #[test]
@@ -121,6 +154,23 @@ mod tests {
     }
 
     #[test]
+    fn variations_test_networks_of_experiment_1() {
+        let columns = [Experiment::Shapes, Experiment::Ablations];
+        let columns = columns.map(|experiment| runs(&experiment.configurations(), 1, &[1]));
+        let tested: BTreeSet<_> = columns.iter().flatten().filter_map(|u| u.needs()).collect();
+        let of_one = runs(&Experiment::One.configurations(), 1, &[1]);
+        assert_eq!(tested, of_one.into_iter().collect());
+        let trained = columns[1].iter().filter(|unit| unit.needs().is_none());
+        let trained: Vec<_> = trained.map(Unit::to_string).collect();
+        assert_eq!(
+            trained,
+            ["cam_left", "cam_right"].map(|view| format!(
+                "experiment_ablations/sides-not-mirrored/fold_0/{view}/seed_1"
+            ))
+        );
+    }
+
+    #[test]
     fn unified_weights_serve_both_views() {
         let run = |view, views| Unit::Run {
             configuration: Configuration {
@@ -130,7 +180,7 @@ mod tests {
                     shapes: Shapes::All,
                 },
                 shapes: Shapes::Original,
-                amount: Amount::All,
+                variation: Variation::None,
             },
             fold: 1,
             view,

@@ -81,7 +81,7 @@ fn wrong(path: &Path, error: &dyn std::fmt::Display) -> ConfigError {
 }
 
 /// Puts every value that is given over the one that stands there; tables are merged key by key.
-fn merge(all: &mut toml::Table, given: toml::Table) {
+pub(crate) fn merge(all: &mut toml::Table, given: toml::Table) {
     for (key, value) in given {
         match (all.get_mut(&key), value) {
             (Some(toml::Value::Table(all)), toml::Value::Table(given)) => merge(all, given),

@@ -31,6 +31,7 @@ mod trained;
 pub use adam::Adam;
 pub use config::{LastLayer, Layers, NetworkConfig, Source, TrainConfig};
 pub use config_error::ConfigError;
+pub(crate) use config_file::merge;
 pub use error::TrainError;
 pub use finite::Trouble;
 pub use log::{LogRow, read_log};

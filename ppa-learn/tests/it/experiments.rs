@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use ppa_learn::evaluate::BaselineKind;
 use ppa_learn::experiment::{
-    Event, Experiment, ExperimentError, ExperimentPlan, Metric, Runner, Table,
+    Event, Experiment, ExperimentError, ExperimentPlan, Metric, Results, Runner, Table, Unit,
 };
 use tempfile::TempDir;
 
@@ -210,6 +210,88 @@ fn learning_curves_have_a_column_for_each_amount() {
         refused,
         "experiment poses needs [learning_curves] in the plan"
     );
+}
+
+#[test]
+fn shapes_and_ablations_test_networks_of_experiment_1() {
+    let data = dataset(4, &[0, 90, 180]);
+    // With the images of the scan's skin: altered shapes have the errors of experiment 1.
+    add_shapes(&data);
+    let folder = tempfile::tempdir().unwrap();
+    let plan = plan(folder.path(), &data, &data, 2);
+    let root = folder.path().join("runs");
+    let mut steps = 0;
+    let mut results_of = |experiment| {
+        let runner = Runner::new(&plan, experiment, &root).unwrap();
+        let before = steps;
+        let count = |event: Event| steps += u64::from(matches!(event, Event::Step(_)));
+        assert!(runner.run(|_| true, &go(), count).unwrap());
+        let mut results = runner.results().unwrap();
+        runner.add_baselines(&mut results).unwrap();
+        (results, steps - before)
+    };
+    // Three networks of each view without variants of the skin, and as many of sides that are not mirrored.
+    let (ablations, steps) = results_of(Experiment::Ablations);
+    assert_eq!(steps, 2 * 2 * 3 * 2);
+    // The networks with variants of the skin, three columns.
+    let (shapes, steps) = results_of(Experiment::Shapes);
+    assert_eq!(steps, 3 * 2 * 3 * 2);
+    let (one, steps) = results_of(Experiment::One);
+    assert_eq!(steps, 0);
+
+    let mae = |results: &Results, column: usize| {
+        let summary = results.summary(results.columns()[column], Metric::Mae);
+        summary.unwrap().mean
+    };
+    for column in 0..4 {
+        assert!((mae(&shapes, column) - mae(&one, column)).abs() < 1e-9);
+    }
+    assert_eq!(mae(&ablations, 0), mae(&one, 0));
+    // All limbs are right ones: none is mirrored.
+    assert_eq!(mae(&ablations, 1), mae(&ablations, 0));
+    let predictions = |column: usize| ablations.mean_predictions(ablations.columns()[column]);
+    for ((both, left), right) in predictions(0)
+        .iter()
+        .zip(predictions(2))
+        .zip(predictions(3))
+    {
+        assert_eq!(both.prediction, 0.5 * (left.prediction + right.prediction));
+    }
+    let table = Table::complete(&ablations).unwrap().to_markdown();
+    let columns =
+        "| Metric | experiment 1 | sides not mirrored | left camera only | right camera only | ";
+    assert!(headings(&table).starts_with(columns), "{table}");
+    let difference =
+        "sides not mirrored compared with experiment 1: MAE +0.000, two-sided p = 1.000";
+    assert!(table.contains(difference), "{table}");
+}
+
+#[test]
+fn finetuning_has_settings_of_its_own() {
+    let (synthetic, preparations) = (dataset(3, &[0, 90, 180]), dataset(2, &[0, 90, 180]));
+    let folder = tempfile::tempdir().unwrap();
+    plan(folder.path(), &synthetic, &preparations, 3);
+    let path = folder.path().join("plan.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.clone() + "[finetuning]\nsteps = 2\n").unwrap();
+    let plan = ExperimentPlan::read(&path).unwrap();
+    let runner = Runner::new(&plan, Experiment::TwoA, folder.path()).unwrap();
+    let number = |column: &str| {
+        let is_of = |run: &Unit| run.to_string().contains(column);
+        runner.runs().iter().position(is_of).unwrap()
+    };
+    let steps = |number: usize| {
+        let mut steps = 0;
+        let count = |event: Event| steps += u64::from(matches!(event, Event::Step(_)));
+        assert!(runner.run(|n| n == number, &go(), count).unwrap());
+        steps
+    };
+    assert_eq!(steps(number("/scratch/")), 2);
+    assert_eq!(steps(number("/specific-original/")), 3 + 2);
+
+    fs::write(&path, text + "[finetuning]\nstep = 2\n").unwrap();
+    let refused = ExperimentPlan::read(&path).unwrap_err().to_string();
+    assert!(refused.contains("unknown field `step`"), "{refused}");
 }
 
 #[test]

@@ -58,8 +58,13 @@ pub fn run(args: &ReportArgs, output: Output) -> anyhow::Result<()> {
         .file("--out", &args.out, &[".html"])?;
     let plan = ExperimentPlan::read(&args.plan)?;
     let runs = std::path::absolute(&args.runs)?;
-    let learning_curves = [Experiment::Persons, Experiment::Poses];
-    let planned = Experiment::OF_PAPER.into_iter().chain(learning_curves);
+    let others = [
+        Experiment::Persons,
+        Experiment::Poses,
+        Experiment::Shapes,
+        Experiment::Ablations,
+    ];
+    let planned = Experiment::OF_PAPER.into_iter().chain(others);
     let planned = planned.filter(|&experiment| plan.target(experiment).is_ok());
     let parts = planned.map(|experiment| part(&plan, experiment, &runs));
     let parts: Vec<ExperimentPart> = parts.collect::<anyhow::Result<_>>()?;
@@ -95,6 +100,7 @@ fn part(
         findings.push(tested(&test));
     }
     findings.extend(results.comparisons().iter().map(ToString::to_string));
+    findings.extend(results.differences().iter().map(ToString::to_string));
     let predictions = best.map_or(Vec::new(), |best| results.mean_predictions(best));
     Ok(ExperimentPart {
         title: title(experiment).to_owned(),
@@ -116,6 +122,8 @@ fn title(experiment: Experiment) -> &'static str {
         Experiment::TwoC => "Experiment 2c: linear probing on preparations",
         Experiment::Persons => "Learning curve over persons",
         Experiment::Poses => "Learning curve over poses",
+        Experiment::Shapes => "Experiment 1, tested with altered body shapes",
+        Experiment::Ablations => "Ablations of experiment 1",
     }
 }
 

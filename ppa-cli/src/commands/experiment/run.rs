@@ -2,12 +2,15 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Args;
 use ppa_core::Part;
 use ppa_core::text::{count, number};
 use ppa_dataset::write_whole;
-use ppa_learn::experiment::{Begun, Comparison, Event, Experiment, ExperimentPlan, Runner, Table};
+use ppa_learn::experiment::{
+    Begun, Comparison, Configuration, Difference, Event, Experiment, ExperimentPlan, Runner, Table,
+    Unit,
+};
 use ppa_metrics::{ConstantPrediction, PermutationTest};
 use serde::Serialize;
 
@@ -33,6 +36,8 @@ A plan:
   imagenet_weights = \"b0.safetensors\" # or .pth; its columns are left out without it
   [training]
   preset = \"paper\"                    # or \"standard\", \"quick\", and what differs, as in `ppa train`
+  [finetuning]                        # what differs from [training] in 2a, 2b and 2c, from scratch or not
+  steps = 50000
   [synthetic]
   dataset = \"synthetic\"
   folds = 3
@@ -55,6 +60,14 @@ pub struct RunArgs {
     /// Make only shard k of n, and no tables
     #[arg(long, value_name = "K/N")]
     shard: Option<Part>,
+    /// Make only these columns of the table, by the names of the folders of trainings (such as scratch,specific-size), and no tables
+    #[arg(
+        long,
+        value_name = "NAMES",
+        value_delimiter = ',',
+        conflicts_with = "so_far"
+    )]
+    columns: Vec<String>,
     /// Write tables of what there is, marked as incomplete, and train nothing
     #[arg(long, conflicts_with = "shard")]
     so_far: bool,
@@ -77,6 +90,8 @@ struct Outcome {
     permutation_test: Option<PermutationTest>,
     /// Each column beside predictions without a network.
     comparisons: Vec<Comparison>,
+    /// Columns beside the first one, where each alters one thing.
+    differences: Vec<Difference>,
     table: Option<String>,
 }
 
@@ -104,20 +119,22 @@ pub fn run(experiment: Experiment, args: &RunArgs, output: Output) -> anyhow::Re
         let name = format!("experiment_{}.{ending}", experiment.name());
         out.join(name)
     });
+    let chosen = chosen(&runner, &plan.configurations(experiment), &args.columns)?;
+    let whole = part == Part::WHOLE && args.columns.is_empty();
     if !args.so_far {
-        if part == Part::WHOLE && !runner.results()?.missing().is_empty() {
+        if whole && !runner.results()?.missing().is_empty() {
             require_no_tables(&tables, args.replace)?;
         }
         runner.check_data()?;
     }
     let interrupt = Interrupt::listen()?;
-    let finished = !args.so_far && train(&runner, part, &interrupt)?;
+    let finished = !args.so_far && train(&runner, &chosen, part, &interrupt)?;
 
     let mut results = runner.results()?;
-    if !results.is_empty() && (args.so_far || (finished && part == Part::WHOLE)) {
+    if !results.is_empty() && (args.so_far || (finished && whole)) {
         runner.add_baselines(&mut results)?;
     }
-    let table = match (args.so_far, finished && part == Part::WHOLE) {
+    let table = match (args.so_far, finished && whole) {
         (true, _) => Some(Table::so_far(&results)),
         (false, true) => Some(
             Table::complete(&results)
@@ -144,6 +161,7 @@ pub fn run(experiment: Experiment, args: &RunArgs, output: Output) -> anyhow::Re
         missing: results.missing().len(),
         permutation_test,
         comparisons: results.comparisons(),
+        differences: results.differences(),
         table: table.as_ref().map(Table::to_markdown),
     };
     if let Some(table) = &table {
@@ -170,7 +188,7 @@ pub fn run(experiment: Experiment, args: &RunArgs, output: Output) -> anyhow::Re
 fn require_no_tables(tables: &[PathBuf], replace: ReplaceArgs) -> anyhow::Result<()> {
     let there = tables.iter().find(|path| path.exists());
     match there {
-        Some(path) if !replace.is_given() => anyhow::bail!(
+        Some(path) if !replace.is_given() => bail!(
             "{} exists and would be replaced after the trainings: give --replace, or move it away",
             path.display()
         ),
@@ -178,12 +196,44 @@ fn require_no_tables(tables: &[PathBuf], replace: ReplaceArgs) -> anyhow::Result
     }
 }
 
-/// Carries out a share of the runs; whether it came to their end.
-fn train(runner: &Runner, part: Part, interrupt: &Interrupt) -> anyhow::Result<bool> {
+/// Numbers of the runs of the named columns; all of them if none is named.
+fn chosen(
+    runner: &Runner,
+    columns: &[Configuration],
+    names: &[String],
+) -> anyhow::Result<Vec<usize>> {
+    let all: Vec<String> = columns.iter().map(|column| column.name()).collect();
+    if let Some(unknown) = names.iter().find(|name| !all.contains(name)) {
+        bail!(
+            "--columns: found {unknown}, expected some of {}",
+            all.join(", ")
+        );
+    }
+    let is_chosen = |unit: &Unit| match unit {
+        Unit::Run { configuration, .. } => {
+            names.is_empty() || names.contains(&configuration.name())
+        }
+        Unit::Pretraining { .. } => false,
+    };
+    let runs = runner.runs().into_iter().enumerate();
+    Ok(runs
+        .filter(|(_, unit)| is_chosen(unit))
+        .map(|(n, _)| n)
+        .collect())
+}
+
+/// Carries out a share of the chosen runs; whether it came to their end.
+fn train(
+    runner: &Runner,
+    chosen: &[usize],
+    part: Part,
+    interrupt: &Interrupt,
+) -> anyhow::Result<bool> {
     let bar = bar("training");
-    let share = part.share(runner.runs().len() as u64);
+    let share = part.share(chosen.len() as u64);
+    let share = &chosen[share.start as usize..share.end as usize];
     let finished = runner.run(
-        |n| share.contains(&(n as u64)),
+        |n| share.contains(&n),
         interrupt.flag(),
         |event| match event {
             Event::Begins { unit, number, of } => {
@@ -204,7 +254,7 @@ fn describe(outcome: &Outcome) -> String {
     let mut lines = vec![match (&outcome.table, outcome.finished) {
         (Some(table), _) => table.trim_end().to_owned(),
         (None, true) => format!(
-            "this shard is finished; of the whole experiment {} missing",
+            "what was asked for is finished; of the whole experiment {} missing",
             match outcome.missing {
                 1 => "1 test set is".to_owned(),
                 n => format!("{n} test sets are"),

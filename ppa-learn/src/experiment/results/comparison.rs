@@ -4,10 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::{Results, TestSet};
-use crate::evaluate::{
-    BaselineKind, Compared, Verdict, mean_by, p_network_better, sentence, verdict,
-};
+use super::{Results, errors_of_persons};
+use crate::evaluate::{BaselineKind, Compared, Verdict, p_network_better, sentence, verdict};
 use crate::experiment::configuration::Configuration;
 use crate::experiment::metric::Metric;
 
@@ -46,12 +44,7 @@ impl Results {
 
     fn comparison(&self, column: Configuration, kinds: &[BaselineKind]) -> Option<Comparison> {
         let network_mae = self.summary(column, Metric::Mae)?.mean;
-        let seeds = self.seeds.iter().copied();
-        let complete = seeds.filter(|&seed| self.of_seed(column, Metric::Mae, seed).is_some());
-        let sets = complete.flat_map(|seed| {
-            (0..self.folds).filter_map(move |fold| self.values.get(&(column, seed, fold)))
-        });
-        let of_network = errors_of_persons(sets);
+        let of_network = self.errors_of_persons(column, &[column]);
         let compared = |&kind: &BaselineKind| {
             let folds = (0..self.folds).map(|fold| &self.baselines[&(kind, fold)]);
             Some(Compared {
@@ -69,13 +62,6 @@ impl Results {
             persons: of_network.len(),
         })
     }
-}
-
-/// Mean absolute error of each person over test sets.
-fn errors_of_persons<'a>(sets: impl Iterator<Item = &'a TestSet>) -> Vec<f64> {
-    let rows = sets.flat_map(|set| &set.predictions);
-    let errors = rows.map(|row| (row.patient, (row.label - row.prediction).abs()));
-    mean_by(errors).into_values().collect()
 }
 
 #[cfg(test)]
