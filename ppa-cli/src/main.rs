@@ -2,6 +2,7 @@
 //!
 //! Parses, calls the libraries, prints. Results go to stdout, everything else to stderr.
 
+mod allocator;
 mod commands;
 mod findings;
 mod help;

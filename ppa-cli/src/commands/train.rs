@@ -4,17 +4,18 @@ use std::path::PathBuf;
 
 use clap::Args;
 use ppa_core::text::count;
-use ppa_learn::Loaded;
 use ppa_learn::train::{Ended, TrainConfig, read_start, train};
+use ppa_learn::{Loaded, WeightsMetadata};
 use serde::Serialize;
 
 use super::learn::not_taken;
 
+use crate::allocator::keep_freed_memory;
 use crate::findings::repeat_of_datasets;
 use crate::interrupt::Interrupt;
 use crate::output::{Output, bar};
 use crate::output_files::require_writable;
-use crate::stderr::note;
+use crate::stderr::{note, warning};
 
 #[derive(Debug, Args)]
 pub struct TrainArgs {
@@ -43,7 +44,17 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
     let sources = config.training.iter().chain(&config.evaluation);
     repeat_of_datasets(sources.map(|source| &*source.dataset))?;
     require_writable("--out", &args.out)?;
+    if let Some(start) = &config.start
+        && !config.mirror
+        && WeightsMetadata::read(start)?.mirror
+    {
+        warning(&format!(
+            "{} was trained with mirror = true, this training shows left limbs as they are",
+            start.display()
+        ));
+    }
     let interrupt = Interrupt::listen()?;
+    keep_freed_memory();
     let bar = bar("training");
     bar.set_length(steps);
     let mut last_loss = None;

@@ -125,7 +125,35 @@ fn an_experiment_names_all_missing_data_before_it_trains() {
         let missing = format!("there is no image of body shape {shape}");
         assert!(said.contains(&missing), "{said}");
     }
+    let said = fail(folder, "experiment 1 plan.toml --out runs --columns bumps");
+    assert!(!said.contains("body shape big"), "{said}");
+    assert!(said.contains("body shape bumps_a"), "{said}");
     assert!(!folder.join("runs").exists());
+}
+
+#[test]
+fn an_experiment_makes_the_chosen_columns_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_data(folder);
+    let plan = "seeds = 1\n[training]\npreset = \"quick\"\nsteps = 1\n[synthetic]\ndataset = \"data\"\nfolds = 2\ntest_limbs = 1\n";
+    fs::write(folder.join("plan.toml"), plan).unwrap();
+    let columns = |names| format!("experiment 1 plan.toml --out runs --columns {names}");
+    let said = fail(folder, &columns("original,skin"));
+    let expected = "--columns: found skin, expected some of original, size, bumps, all";
+    assert!(said.contains(expected), "{said}");
+    let said = succeed(folder, &columns("original"));
+    let expected =
+        "what was asked for is finished; of the whole experiment 6 test sets are missing";
+    assert!(said.contains(expected), "{said}");
+    assert_eq!(names(&folder.join("runs/experiment_1")), ["original"]);
+    assert!(!folder.join("runs/experiment_1.md").exists());
+    succeed(folder, "experiment 1 plan.toml --out runs --so-far");
+    let table = fs::read_to_string(folder.join("runs/experiment_1.md")).unwrap();
+    assert!(
+        table.contains("INCOMPLETE: 6 test sets are missing"),
+        "{table}"
+    );
 }
 
 #[test]

@@ -14,6 +14,7 @@ use ppa_learn::experiment::{
 use ppa_metrics::{ConstantPrediction, PermutationTest};
 use serde::Serialize;
 
+use crate::allocator::keep_freed_memory;
 use crate::findings::repeat_of_datasets;
 use crate::interrupt::Interrupt;
 use crate::output::{Output, bar};
@@ -125,9 +126,10 @@ pub fn run(experiment: Experiment, args: &RunArgs, output: Output) -> anyhow::Re
         if whole && !runner.results()?.missing().is_empty() {
             require_no_tables(&tables, args.replace)?;
         }
-        runner.check_data()?;
+        runner.check_data(|n| chosen.contains(&n))?;
     }
     let interrupt = Interrupt::listen()?;
+    keep_freed_memory();
     let finished = !args.so_far && train(&runner, &chosen, part, &interrupt)?;
 
     let mut results = runner.results()?;
