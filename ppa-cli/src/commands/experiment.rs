@@ -30,6 +30,8 @@ pub enum ExperimentCommand {
     Shapes(run::RunArgs),
     /// Experiment 1 with one camera, and without showing left limbs as right ones
     Ablations(run::RunArgs),
+    /// All of these that the plan has data for, one after the other
+    All(run::RunArgs),
     /// Write a page of all results so far: tables beside the paper's, charts, poses with the largest errors
     Report(report::ReportArgs),
 }
@@ -44,6 +46,7 @@ pub fn run(command: &ExperimentCommand, output: Output) -> anyhow::Result<()> {
         ExperimentCommand::Poses(args) => (Experiment::Poses, args),
         ExperimentCommand::Shapes(args) => (Experiment::Shapes, args),
         ExperimentCommand::Ablations(args) => (Experiment::Ablations, args),
+        ExperimentCommand::All(args) => return run::run_all(args, output),
         ExperimentCommand::Report(args) => return report::run(args, output),
     };
     run::run(experiment, args, output)

@@ -154,6 +154,19 @@ fn an_experiment_makes_the_chosen_columns_only() {
         table.contains("INCOMPLETE: 6 test sets are missing"),
         "{table}"
     );
+    // All that the plan has data for: 1, and its variations.
+    let all = "experiment all plan.toml --out runs --so-far --replace";
+    let said = succeed(folder, &format!("{all} --json"));
+    let said: serde_json::Value = serde_json::from_str(&said).unwrap();
+    let experiments = said["experiments"].as_array().unwrap().iter();
+    let experiments: Vec<_> = experiments.map(|one| &one["experiment"]).collect();
+    assert_eq!(experiments, ["1", "shapes", "ablations"]);
+    assert!(folder.join("runs/experiment_ablations.md").exists());
+    let refused = fail(folder, "experiment all plan.toml --out runs --columns all");
+    assert!(
+        refused.contains("--columns is for one experiment"),
+        "{refused}"
+    );
 }
 
 #[test]

@@ -111,6 +111,9 @@ impl Experiment {
     /// Those of the paper, in its order.
     pub const OF_PAPER: [Self; 4] = [Self::One, Self::TwoA, Self::TwoB, Self::TwoC];
 
+    /// Those that are not in the paper.
+    pub const OTHERS: [Self; 4] = [Self::Persons, Self::Poses, Self::Shapes, Self::Ablations];
+
     /// The name on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {

@@ -204,6 +204,13 @@ impl ExperimentPlan {
         columns
     }
 
+    /// The experiments for which the plan has data: the paper's, then the others.
+    pub fn experiments(&self) -> Vec<Experiment> {
+        let all = Experiment::OF_PAPER.into_iter().chain(Experiment::OTHERS);
+        all.filter(|&experiment| self.target(experiment).is_ok())
+            .collect()
+    }
+
     /// All persons of the dataset that an experiment tests with.
     ///
     /// # Errors

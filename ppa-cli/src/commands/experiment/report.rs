@@ -58,15 +58,8 @@ pub fn run(args: &ReportArgs, output: Output) -> anyhow::Result<()> {
         .file("--out", &args.out, &[".html"])?;
     let plan = ExperimentPlan::read(&args.plan)?;
     let runs = std::path::absolute(&args.runs)?;
-    let others = [
-        Experiment::Persons,
-        Experiment::Poses,
-        Experiment::Shapes,
-        Experiment::Ablations,
-    ];
-    let planned = Experiment::OF_PAPER.into_iter().chain(others);
-    let planned = planned.filter(|&experiment| plan.target(experiment).is_ok());
-    let parts = planned.map(|experiment| part(&plan, experiment, &runs));
+    let parts = plan.experiments().into_iter();
+    let parts = parts.map(|experiment| part(&plan, experiment, &runs));
     let parts: Vec<ExperimentPart> = parts.collect::<anyhow::Result<_>>()?;
     let text = experiments_page(&parts).context("a picture cannot be encoded")?;
     write_whole(&args.out, text.as_bytes())?;

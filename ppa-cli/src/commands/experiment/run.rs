@@ -1,6 +1,6 @@
-//! `ppa experiment 1` to `2c`: trainings and tables of one of the paper's experiments.
+//! `ppa experiment 1` to `2c` and `all`: trainings and tables of the paper's experiments.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
@@ -30,6 +30,8 @@ stays, unfinished trainings resume. On several machines that share the folder ea
 
   ppa experiment 2a plan.toml --out runs --shard 3/10
   ppa experiment 2a plan.toml --out runs
+
+`ppa experiment all` makes all experiments of the plan, and takes the same options except --columns.
 
 A plan:
 
@@ -103,34 +105,137 @@ struct ConstantTestSet {
     constant: ConstantPrediction,
 }
 
+/// All experiments of a plan.
+#[derive(Debug, Serialize)]
+struct Outcomes {
+    experiments: Vec<Outcome>,
+}
+
+/// Runs one experiment.
 pub fn run(experiment: Experiment, args: &RunArgs, output: Output) -> anyhow::Result<()> {
     let plan = ExperimentPlan::read(&args.plan)?;
-    let target = plan.target(experiment)?;
-    let datasets = [&*plan.synthetic.dataset, &*target.dataset];
+    let (mut outcomes, stopped) = carry_out_all(&plan, &[experiment], args)?;
+    if (stopped.is_none() || output.json)
+        && let Some(outcome) = outcomes.pop()
+    {
+        output.print(&outcome, describe)?;
+    }
+    stopped.map_or(Ok(()), Err)
+}
+
+/// Runs all experiments of the plan, one after the other.
+pub fn run_all(args: &RunArgs, output: Output) -> anyhow::Result<()> {
+    if !args.columns.is_empty() {
+        bail!("--columns is for one experiment, found it with all");
+    }
+    let plan = ExperimentPlan::read(&args.plan)?;
+    let (experiments, stopped) = carry_out_all(&plan, &plan.experiments(), args)?;
+    if stopped.is_none() || output.json {
+        output.print(&Outcomes { experiments }, |all| {
+            let texts: Vec<String> = all.experiments.iter().map(describe).collect();
+            texts.join("\n\n")
+        })?;
+    }
+    stopped.map_or(Ok(()), Err)
+}
+
+/// Looks at the data of all experiments, then carries out one after the other; the error that says so if they were stopped.
+fn carry_out_all(
+    plan: &ExperimentPlan,
+    experiments: &[Experiment],
+    args: &RunArgs,
+) -> anyhow::Result<(Vec<Outcome>, Option<anyhow::Error>)> {
+    let targets = experiments
+        .iter()
+        .map(|&experiment| plan.target(experiment));
+    let targets: Vec<_> = targets.collect::<Result<_, _>>()?;
+    let mut datasets: Vec<&Path> = targets.iter().map(|target| &*target.dataset).collect();
+    datasets.insert(0, &plan.synthetic.dataset);
     repeat_of_datasets(datasets.into_iter())?;
     // A whole path: begun trainings compare the paths of the weights that they began with.
     let out = std::path::absolute(&args.out)?;
-    let runner = Runner::new(&plan, experiment, &out)?;
     let part = shard(args.shard)?.part(|| Ok(None))?;
-    if plan.configurations(experiment).len() < experiment.configurations().len() {
+    let left_out = |e: &Experiment| plan.configurations(*e).len() < e.configurations().len();
+    if experiments.iter().any(left_out) {
         stderr::warning("the plan names no imagenet_weights: their column is left out");
     }
     require_writable("--out", &out)?;
-    let tables = TABLES.map(|ending| {
-        let name = format!("experiment_{}.{ending}", experiment.name());
-        out.join(name)
-    });
-    let chosen = chosen(&runner, &plan.configurations(experiment), &args.columns)?;
-    let whole = part == Part::WHOLE && args.columns.is_empty();
-    if !args.so_far {
-        if whole && !runner.results()?.missing().is_empty() {
-            require_no_tables(&tables, args.replace)?;
-        }
-        runner.check_data(|n| chosen.contains(&n))?;
-    }
+    let prepared = experiments
+        .iter()
+        .map(|&experiment| Prepared::new(plan, experiment, &out, part, args));
+    let prepared: Vec<_> = prepared.collect::<anyhow::Result<_>>()?;
     let interrupt = Interrupt::listen()?;
     keep_freed_memory();
-    let finished = !args.so_far && train(&runner, &chosen, part, &interrupt)?;
+    let mut outcomes = Vec::new();
+    for one in &prepared {
+        let outcome = carry_out(one, part, args, &interrupt)?;
+        let stopped = !outcome.finished && !args.so_far;
+        outcomes.push(outcome);
+        if stopped {
+            let error = interrupt.stopped("; repeat the command to resume the training");
+            return Ok((outcomes, Some(error)));
+        }
+    }
+    Ok((outcomes, None))
+}
+
+/// An experiment whose data can be used.
+struct Prepared<'a> {
+    experiment: Experiment,
+    runner: Runner<'a>,
+    /// Numbers of the runs of the chosen columns.
+    chosen: Vec<usize>,
+    /// Whether all of it is made here.
+    whole: bool,
+    tables: [PathBuf; 4],
+}
+
+impl<'a> Prepared<'a> {
+    fn new(
+        plan: &'a ExperimentPlan,
+        experiment: Experiment,
+        out: &'a Path,
+        part: Part,
+        args: &RunArgs,
+    ) -> anyhow::Result<Self> {
+        let runner = Runner::new(plan, experiment, out)?;
+        let tables = TABLES.map(|ending| {
+            let name = format!("experiment_{}.{ending}", experiment.name());
+            out.join(name)
+        });
+        let chosen = chosen(&runner, &plan.configurations(experiment), &args.columns)?;
+        let whole = part == Part::WHOLE && args.columns.is_empty();
+        if !args.so_far {
+            if whole && !runner.results()?.missing().is_empty() {
+                require_no_tables(&tables, args.replace)?;
+            }
+            runner.check_data(|n| chosen.contains(&n))?;
+        }
+        Ok(Self {
+            experiment,
+            runner,
+            chosen,
+            whole,
+            tables,
+        })
+    }
+}
+
+/// Carries out the trainings of an experiment and writes its tables.
+fn carry_out(
+    prepared: &Prepared,
+    part: Part,
+    args: &RunArgs,
+    interrupt: &Interrupt,
+) -> anyhow::Result<Outcome> {
+    let &Prepared {
+        experiment,
+        ref runner,
+        ref chosen,
+        whole,
+        ref tables,
+    } = prepared;
+    let finished = !args.so_far && train(runner, chosen, part, interrupt)?;
 
     let mut results = runner.results()?;
     if !results.is_empty() && (args.so_far || (finished && whole)) {
@@ -176,14 +281,7 @@ pub fn run(experiment: Experiment, args: &RunArgs, output: Output) -> anyhow::Re
             write_whole(path, text.as_bytes())?;
         }
     }
-    let stopped = !finished && !args.so_far;
-    if !stopped || output.json {
-        output.print(&outcome, describe)?;
-    }
-    match stopped {
-        true => Err(interrupt.stopped("; repeat the command to resume the training")),
-        false => Ok(()),
-    }
+    Ok(outcome)
 }
 
 /// Refuses tables that are there before they would be replaced after the trainings.
