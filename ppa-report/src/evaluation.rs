@@ -75,6 +75,15 @@ pub fn calibration(by_label: Vec<[f64; 2]>, by_prediction: Vec<[f64; 2]>) -> Cha
 
 /// Mean absolute errors against medial rotation in degrees, of named series.
 pub fn errors_by_angle(series: Vec<(String, Vec<[f64; 2]>)>) -> Chart {
+    errors_along("Errors by angle", "medial rotation in degrees", series)
+}
+
+/// Mean absolute error against the amount of training data, such as "persons", of a network and of baselines.
+pub fn errors_by_amount(amount: &str, series: Vec<(String, Vec<[f64; 2]>)>) -> Chart {
+    errors_along("Errors by training data", amount, series)
+}
+
+fn errors_along(title: &str, along: &str, series: Vec<(String, Vec<[f64; 2]>)>) -> Chart {
     let of = |axis: usize| {
         series
             .iter()
@@ -82,11 +91,11 @@ pub fn errors_by_angle(series: Vec<(String, Vec<[f64; 2]>)>) -> Chart {
             .map(move |point| point[axis])
     };
     let ranges = [0, 1].map(|axis| from_zero(of(axis)));
-    let labels = ["medial rotation in degrees", "mean absolute error"];
+    let labels = [along, "mean absolute error"];
     let series = series.into_iter();
     let series = series.map(|(name, points)| Series::new(&name, Mark::DotsAndLine, points));
     let series = series.collect();
-    chart("Errors by angle", labels, ranges, series)
+    chart(title, labels, ranges, series)
 }
 
 /// Loss of training and errors of evaluation against steps.
@@ -124,6 +133,16 @@ mod tests {
         let [steps, errors] = chart.ranges;
         assert_eq!(steps, [0.0, 1.1 * 8.0]);
         assert_eq!(errors, [0.0, 2.2]);
+    }
+
+    #[test]
+    fn errors_along_an_axis_begin_at_zero_and_fit() {
+        let network = ("network".to_owned(), vec![[5.0, 0.5], [40.0, 0.25]]);
+        let baseline = ("constant".to_owned(), vec![[5.0, 1.0], [40.0, 1.0]]);
+        let chart = errors_by_amount("persons", vec![network, baseline]);
+        assert_eq!(chart.labels, ["persons", "mean absolute error"]);
+        assert_eq!(chart.ranges, [[0.0, 1.1 * 40.0], [0.0, 1.1]]);
+        assert_eq!(chart.series.len(), 2);
     }
 
     /// Rows are labels, which lie along the first axis.

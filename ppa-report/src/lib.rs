@@ -20,7 +20,7 @@ pub use chart::{Chart, Mark, Series, Tile};
 pub use contact_sheet::{ContactSheetError, contact_sheet};
 pub use coverage_plot::{RankedView, coverage_plot};
 pub use evaluation::{
-    calibration, confusion, errors_by_angle, learning_curve, predictions_by_label,
+    calibration, confusion, errors_by_amount, errors_by_angle, learning_curve, predictions_by_label,
 };
 pub use experiments::{ExperimentPart, ResultCell, WorstPose, experiments_page};
 pub use pictures::{PosedLimb, case_picture, pose_picture, write_picture};

@@ -8,10 +8,11 @@ use ppa_dataset::published::GrayImage16;
 use ppa_dataset::write_whole;
 use ppa_learn::experiment::{
     Configuration, Experiment, ExperimentPlan, Metric, Prediction, Results, Runner, Table,
-    TableCell,
+    TableCell, Variation,
 };
 use ppa_report::{
-    ExperimentPart, ResultCell, WorstPose, errors_by_angle, experiments_page, predictions_by_label,
+    ExperimentPart, ResultCell, WorstPose, errors_by_amount, errors_by_angle, experiments_page,
+    predictions_by_label,
 };
 use serde::Serialize;
 
@@ -168,7 +169,46 @@ fn charts(
         let caption = "mean absolute errors of single seeds by angle".to_owned();
         charts.push((caption, errors_by_angle(by_angle)));
     }
+    charts.extend(learning_curve(results));
     charts
+}
+
+/// Errors of a learning curve's columns against the amount of data, and of the baselines, which have all of it.
+fn learning_curve(results: &Results) -> Option<(String, ppa_report::Chart)> {
+    let (label, caption) = match results.experiment() {
+        Experiment::Persons => (
+            "persons",
+            "persons to train with; baselines with all of them",
+        ),
+        Experiment::Poses => (
+            "every n-th pose",
+            "every n-th pose to train with; baselines with all of them",
+        ),
+        _ => return None,
+    };
+    let amount = |column: &Configuration| match column.variation {
+        Variation::Persons(n) => Some(f64::from(n)),
+        Variation::EveryPose(n) => Some(n.get() as f64),
+        _ => None,
+    };
+    let point = |column: &Configuration| {
+        let mae = results.summary(*column, Metric::Mae)?.mean;
+        Some([amount(column)?, mae])
+    };
+    let mut network: Vec<[f64; 2]> = results.columns().iter().filter_map(point).collect();
+    network.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let [first, .., last] = network[..] else {
+        return None;
+    };
+    let baselines = results.baselines().into_iter().filter_map(|kind| {
+        let mae = results.of_baseline(kind, Metric::Mae)?;
+        Some((kind.to_string(), vec![[first[0], mae], [last[0], mae]]))
+    });
+    let series = [("network".to_owned(), network)]
+        .into_iter()
+        .chain(baselines);
+    let chart = errors_by_amount(label, series.collect());
+    Some((caption.to_owned(), chart))
 }
 
 fn worst(runner: &Runner, mut predictions: Vec<Prediction>) -> anyhow::Result<Vec<WorstPose>> {

@@ -33,11 +33,15 @@ impl fmt::Display for Difference {
             p_two_sided,
             persons,
         } = self;
+        let persons = count(*persons, "person");
         write!(
             f,
-            "{column} compared with {reference}: MAE {mae_difference:+.3}, two-sided p = {p_two_sided:.3} over {}.",
-            count(*persons, "person")
-        )
+            "{column} compared with {reference}: MAE {mae_difference:+.3}, two-sided p "
+        )?;
+        match *p_two_sided < 0.0005 {
+            true => write!(f, "< 0.001 over {persons}."),
+            false => write!(f, "= {p_two_sided:.3} over {persons}."),
+        }
     }
 }
 
@@ -108,6 +112,11 @@ mod tests {
             found[0].to_string(),
             "size aug. compared with without aug.: MAE -0.250, two-sided p = 0.250 over 3 persons."
         );
+        let surely = Difference {
+            p_two_sided: 1e-9,
+            ..found[0].clone()
+        };
+        assert!(surely.to_string().ends_with("p < 0.001 over 3 persons."));
         let other = Experiment::TwoA.configurations();
         let results = Results::new(Experiment::TwoA, other, 2, &[1]);
         assert_eq!(results.differences(), []);
