@@ -246,7 +246,12 @@ fn shapes_and_ablations_test_networks_of_experiment_1() {
     for column in 0..4 {
         assert!((mae(&shapes, column) - mae(&one, column)).abs() < 1e-9);
     }
+    let moments = |results: &Results| results.mean_predictions(results.columns()[0]).len();
+    assert_eq!(moments(&shapes), 4 * moments(&one), "four altered shapes");
     assert_eq!(mae(&ablations, 0), mae(&one, 0));
+    let config = "experiment_ablations/sides-not-mirrored/fold_0/cam_left/seed_1/config.toml";
+    let config = fs::read_to_string(root.join(config)).unwrap();
+    assert!(config.contains("mirror = false"), "{config}");
     // All limbs are right ones: none is mirrored.
     assert_eq!(mae(&ablations, 1), mae(&ablations, 0));
     let predictions = |column: usize| ablations.mean_predictions(ablations.columns()[column]);
