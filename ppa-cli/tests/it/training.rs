@@ -144,7 +144,7 @@ fn an_experiment_makes_the_chosen_columns_only() {
     assert!(said.contains(expected), "{said}");
     let said = succeed(folder, &columns("original"));
     let expected =
-        "what was asked for is finished; of the whole experiment 6 test sets are missing";
+        "the requested trainings are finished; 6 test sets are missing from the whole experiment";
     assert!(said.contains(expected), "{said}");
     assert_eq!(names(&folder.join("runs/experiment_1")), ["original"]);
     assert!(!folder.join("runs/experiment_1.md").exists());

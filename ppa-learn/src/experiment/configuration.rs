@@ -41,15 +41,15 @@ pub enum Experiment {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Variation {
-    /// Not at all.
+    /// No difference.
     None,
-    /// They are trained with so many persons of a fold.
+    /// Trained with this number of persons.
     Persons(u32),
-    /// They are trained with every n-th angle of each limb.
+    /// Trained with every n-th angle of each limb.
     EveryPose(NonZeroUsize),
-    /// Only the network of one camera predicts.
+    /// Prediction by the network of one camera only.
     OneCamera(View),
-    /// Limbs of both sides are shown as they are.
+    /// Left limbs are shown as they are, not as right ones.
     Unmirrored,
 }
 

@@ -6,6 +6,7 @@ use anyhow::Context;
 use clap::Args;
 use ppa_dataset::published::GrayImage16;
 use ppa_dataset::write_whole;
+use ppa_learn::evaluate::BaselineKind;
 use ppa_learn::experiment::{
     Configuration, Experiment, ExperimentPlan, Metric, Prediction, Results, Runner, Table,
     TableCell, Variation,
@@ -200,7 +201,10 @@ fn learning_curve(results: &Results) -> Option<(String, ppa_report::Chart)> {
     let [first, .., last] = network[..] else {
         return None;
     };
-    let baselines = results.baselines().into_iter().filter_map(|kind| {
+    // The error of a constant would squeeze the others.
+    let kinds = results.baselines().into_iter();
+    let kinds = kinds.filter(|&kind| kind != BaselineKind::Constant);
+    let baselines = kinds.filter_map(|kind| {
         let mae = results.of_baseline(kind, Metric::Mae)?;
         Some((kind.to_string(), vec![[first[0], mae], [last[0], mae]]))
     });

@@ -354,7 +354,7 @@ fn describe(outcome: &Outcome) -> String {
     let mut lines = vec![match (&outcome.table, outcome.finished) {
         (Some(table), _) => table.trim_end().to_owned(),
         (None, true) => format!(
-            "what was asked for is finished; of the whole experiment {} missing",
+            "the requested trainings are finished; {} missing from the whole experiment",
             match outcome.missing {
                 1 => "1 test set is".to_owned(),
                 n => format!("{n} test sets are"),
