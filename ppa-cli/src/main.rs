@@ -37,8 +37,8 @@ struct Cli {
     /// Print one JSON object instead of text, and JSON lines on stderr
     ///
     /// Each line on stderr is then one object: {"warning": "…"}, {"note": "…"}, progress with the keys done and units, and where
-    /// the command fails {"error": "…", "causes": ["…"], "exit_code": 1}. The exit code is 2 where the command line cannot be
-    /// used, else 1.
+    /// the command fails {"error": "…", "causes": ["…"], "exit_code": 1}. The exit code is 2 for an invalid command line,
+    /// else 1.
     #[arg(long, global = true)]
     json: bool,
     /// When to colour messages, help and progress
@@ -56,7 +56,7 @@ struct Cli {
 enum Command {
     /// Make a small dataset and a contact sheet of the built-in phantom
     Demo(commands::demo::DemoArgs),
-    /// Look at, convert or make a CT
+    /// Inspect, convert or make a CT
     #[command(subcommand)]
     Ct(commands::ct::CtCommand),
     /// Find skin, axis and plane of a limb, and write them as a case
@@ -67,7 +67,7 @@ enum Command {
     /// Surfaces of a CT
     #[command(subcommand)]
     Mesh(commands::mesh::MeshCommand),
-    /// The table, and the limb on it
+    /// The x-ray room, and the limb on its table
     #[command(subcommand)]
     Scene(commands::scene::SceneCommand),
     /// Depth images and the camera model
@@ -84,7 +84,7 @@ enum Command {
     Status(commands::status::StatusArgs),
     /// Join the shards of a plan
     Merge(commands::merge::MergeArgs),
-    /// Check all files of a dataset, and make a sample of it again
+    /// Check all files of a dataset and recompute a sample of its poses
     Verify(commands::verify::VerifyArgs),
     /// Check, split or convert a dataset, ours or the authors'
     #[command(subcommand)]
@@ -104,9 +104,9 @@ enum Command {
     Train(commands::train::TrainArgs),
     /// Metrics, predictions and figures of a trained network
     Eval(commands::eval::EvalArgs),
-    /// Find how far the predictions of networks can be trusted
+    /// Calibrate prediction intervals of networks with further persons
     Calibrate(commands::calibrate::CalibrateArgs),
-    /// Judge depth images while cameras deliver them, pair by pair
+    /// Predict pose quality from pairs of depth images as they arrive
     Predict(commands::predict::PredictArgs),
     /// The paper's experiments: trainings and tables from one plan
     #[command(subcommand)]

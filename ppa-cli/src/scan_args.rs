@@ -16,7 +16,7 @@ pub struct ScanArgs {
     /// Interpolate DICOM slices that are missing or unevenly spaced, instead of refusing the series
     #[arg(long)]
     fill_gaps: bool,
-    /// Read other modalities than CT and values that are no HU, instead of refusing them
+    /// Read other modalities than CT and values not in HU, instead of refusing them
     #[arg(long)]
     force: bool,
 }

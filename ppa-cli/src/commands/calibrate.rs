@@ -16,16 +16,16 @@ use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Args)]
 #[command(
-    after_help = "The persons must be none of the trainings', and the dataset must have images of both cameras. Intervals come from the absolute errors of their poses (split conformal prediction): \
-they contain the label of a pose of a new person with about the coverage as probability. `ppa predict` refuses a frame whose network features or mean depths of 8 x 8 blocks lie farther from \
+    after_help = "None of the persons may have been trained with, and the dataset must have images of both cameras. Intervals come from the absolute errors of their poses (split conformal prediction): \
+for a new person, they contain the label of a pose with a probability of about the coverage. `ppa predict` refuses a frame whose network features or mean depths of 8 x 8 blocks lie farther from \
 those of training images than 99 % of the calibration images' do."
 )]
 pub struct CalibrateArgs {
     /// Folder of the finished `ppa train` of the left camera's network
     left: PathBuf,
-    /// Of the right camera's [default: the first one judges both, and has to be of views = "unified" or "pairs"]
+    /// Folder of the right camera's network [default: LEFT is used for both cameras; its views must be "unified" or "pairs"]
     right: Option<PathBuf>,
-    /// Dataset with the persons of calibration
+    /// Dataset with the persons to calibrate with
     #[arg(long, value_name = "DIR")]
     dataset: PathBuf,
     /// Persons of --dataset [default: all]

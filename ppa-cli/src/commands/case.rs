@@ -16,7 +16,7 @@ use crate::output_files::{PICTURE, ReplaceArgs};
 
 #[derive(Debug, Subcommand)]
 pub enum CaseCommand {
-    /// Carry a case out again: is the scan the same, what is found, what has changed since the case was written?
+    /// Recompute a case and report what has changed since it was written
     Check(CheckArgs),
 }
 

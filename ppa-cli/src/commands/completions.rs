@@ -13,7 +13,7 @@ use crate::output::Output;
   ppa completions zsh  > \"${fpath[1]}/_ppa\"
   ppa completions fish > ~/.config/fish/completions/ppa.fish")]
 pub struct CompletionsArgs {
-    /// Shell that completes
+    /// Shell to complete for
     #[arg(value_enum)]
     shell: Shell,
 }

@@ -12,7 +12,7 @@ use crate::output::Output;
 
 #[derive(Debug, Subcommand)]
 pub enum CtCommand {
-    /// What a CT is, what is odd about it, and what that means for the images
+    /// Report geometry and values of a CT, what is unusual, and its effects
     Info(info::InfoArgs),
     /// Write a CT in another format: NIfTI, NRRD, MetaImage or DICOM
     Convert(convert::ConvertArgs),

@@ -10,11 +10,11 @@ use crate::output::Output;
 
 #[derive(Debug, Subcommand)]
 pub enum DatasetCommand {
-    /// Look for damaged images, regions outside of them, and persons on both sides of a split
+    /// Check hashes, images, regions of interest, labels and splits
     Check(check::CheckArgs),
-    /// Write it in the other published layout: synthetic to specimen, or back
+    /// Convert to the other published layout: synthetic to specimen, or back
     Convert(convert::ConvertArgs),
-    /// Draw which persons are for training and which for testing
+    /// Split the persons at random into training, validation and test
     Split(split::SplitArgs),
 }
 

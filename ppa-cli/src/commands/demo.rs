@@ -26,7 +26,7 @@ pub struct DemoArgs {
     /// Folder for everything the demo makes
     #[arg(long, default_value = "ppa-demo")]
     out: PathBuf,
-    /// Seed of the dataset, which TOML holds up to 2^63 - 1
+    /// Seed of the dataset, at most 2^63 - 1 (the largest integer of TOML)
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     seed: u64,
     /// Right lower leg to take: P01 to P17

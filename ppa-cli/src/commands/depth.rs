@@ -19,15 +19,15 @@ use crate::output::Output;
 
 #[derive(Debug, Subcommand)]
 pub enum DepthCommand {
-    /// Depth image of meshes or of a room, or of a case's limb on the table as both cameras see it
+    /// Render depth images of meshes, of a room, or of the limb of a case
     Render(Box<render::RenderArgs>),
-    /// Noise of a camera from a recording of a scene that stands still
+    /// Fit the noise of a camera to a recording of a static scene
     FitNoise(fit_noise::FitNoiseArgs),
     /// Camera JSON from the calibration file of a device
     Camera(camera::CameraArgs),
-    /// Where a camera would see most of a joint
+    /// Find camera positions that see most of a joint
     Coverage(coverage::CoverageArgs),
-    /// Pixels of points given in the camera's frame
+    /// Project points in the camera's frame to pixels
     Project(project::ProjectArgs),
 }
 

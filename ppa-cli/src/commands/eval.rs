@@ -25,7 +25,7 @@ use crate::output_files::ReplaceArgs;
 pub struct EvalArgs {
     /// Folder of a finished `ppa train`
     run: PathBuf,
-    /// Another dataset than the configuration's `[[evaluation]]`
+    /// Dataset to use in place of the configuration's `[[evaluation]]`
     #[arg(long, value_name = "DIR")]
     dataset: Option<PathBuf>,
     /// Persons of --dataset [default: all]

@@ -28,11 +28,13 @@ pub enum ExperimentCommand {
     Poses(run::RunArgs),
     /// The networks of experiment 1, tested with persons of altered body shapes
     Shapes(run::RunArgs),
-    /// Experiment 1 with one camera, and without showing left limbs as right ones
+    /// Experiment 1 with one camera, and without mirroring left limbs
     Ablations(run::RunArgs),
     /// All of these that the plan has data for, one after the other
     All(run::RunArgs),
-    /// Write a page of all results so far: tables beside the paper's, charts, poses with the largest errors
+    /// Write a page of all results so far: tables, charts, largest errors
+    ///
+    /// Tables are shown beside the paper's, and the poses with the largest errors as images.
     Report(report::ReportArgs),
 }
 

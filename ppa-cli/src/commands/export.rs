@@ -13,9 +13,9 @@ use crate::output::Output;
 pub enum ExportCommand {
     /// One row per file, with pose, camera, seed, label, split and hash, as CSV or Parquet
     Table(table::TableArgs),
-    /// What the dataset is: Croissant for search engines, RO-Crate for archives
+    /// Metadata: Croissant for search engines, RO-Crate for archives
     Metadata(metadata::MetadataArgs),
-    /// A copy with the hash of every file, as archives take it
+    /// BagIt, a copy with the hash of every file, for archives
     Bagit(bagit::BagitArgs),
     /// Tar archives for training programs that stream
     Webdataset(webdataset::WebdatasetArgs),

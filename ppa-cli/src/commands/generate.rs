@@ -46,7 +46,7 @@ pub struct GenerateArgs {
     /// Replace what differs from the plan; old images stay until the new ones are complete
     #[arg(long)]
     replace: bool,
-    /// Stop before the images take more than this, as 500MB or 20GB
+    /// Stop before the images take more than this, such as 500MB or 20GB
     #[arg(long, value_name = "SIZE", value_parser = crate::output::parse_bytes)]
     disk_limit: Option<u64>,
     #[command(flatten)]

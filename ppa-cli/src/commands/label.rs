@@ -11,7 +11,7 @@ use crate::output::Output;
 
 #[derive(Debug, Subcommand)]
 pub enum LabelCommand {
-    /// How far readers agree with each other, and with themselves
+    /// Agreement of readers with each other, and with themselves
     Agree(agree::AgreeArgs),
     /// Labels computed from the bones: openness of the joint space along the beam
     Auto(auto::AutoArgs),

@@ -15,9 +15,11 @@ use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Subcommand)]
 pub enum LearnCommand {
-    /// Outputs, loss and gradients of the network beside reference values of another program
+    /// Compare outputs, loss and gradients with those of another program
     Parity(ParityArgs),
-    /// Turn a training, or weights of torchvision or timm, into safetensors with torchvision's names, or into ONNX
+    /// Export a training or a weight file as safetensors or ONNX
+    ///
+    /// Reads weights of `ppa train`, torchvision and timm; safetensors are written with torchvision's names.
     Export(ExportArgs),
 }
 
@@ -31,22 +33,22 @@ pub struct ParityArgs {
 
 #[derive(Debug, Args)]
 #[command(
-    after_help = "An ONNX model takes `images` [N, 1, H, W], or `left` and `right` where the network is one of pairs, and gives `quality` [N, 1]. `mirror` = `true` in the metadata of \
+    after_help = "An ONNX model takes `images` [N, 1, H, W], or `left` and `right` for a network of pairs, and gives `quality` [N, 1]. `mirror` = `true` in the metadata of \
 either format: left limbs must be shown mirrored, with the cameras exchanged, as in training. Which \
 network a weight file is of follows from its names; score fusion with shared weights is distinguished from a single network by its training's folder only."
 )]
 pub struct ExportArgs {
     /// Folder of a finished `ppa train`, or weights: .safetensors, .pth or .pt
     weights: PathBuf,
-    /// The right camera's network, where the first one is the left camera's: both in one, with averaged outputs
+    /// Network of the right camera, where WEIGHTS is that of the left one: exports both as one, with averaged outputs
     right: Option<PathBuf>,
-    /// Where they go: .safetensors or .onnx
+    /// File to write: .safetensors or .onnx
     #[arg(long)]
     out: PathBuf,
-    /// What becomes of a first convolution of several channels
+    /// How a first convolution of several channels is converted to one
     #[arg(long, value_enum, default_value_t = First::Fresh)]
     first_conv: First,
-    /// Seed of what the file does not give
+    /// Seed of the weights that the file does not contain
     #[arg(long, default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
@@ -55,7 +57,7 @@ pub struct ExportArgs {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum First {
-    /// Thrown away and made new, as the paper's authors do
+    /// Replaced by random weights, as the paper's authors do
     Fresh,
     /// Summed over the channels
     Sum,

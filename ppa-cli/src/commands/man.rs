@@ -17,10 +17,10 @@ use crate::output::Output;
   ppa man --out ~/.local/share/man/man1
   man ppa-ct-info")]
 pub struct ManArgs {
-    /// Folder for the pages, made if it is missing
+    /// Folder for the pages, created if it is missing
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Overwrite pages that are there and differ, as those of another version
+    /// Overwrite pages that differ, such as those of another version
     #[arg(long)]
     replace: bool,
 }

@@ -58,7 +58,7 @@ pub struct AugmentArgs {
     /// Seed of the bumps of bumps_a and bumps_b: another one makes another variant
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// A bump more, at a place in the ct frame, so high and so wide (sigma) in mm; negative heights are dents
+    /// A further bump: position in the ct frame, height and width (sigma) in mm; negative heights are dents
     #[arg(long = "bump", value_name = "X,Y,Z,HEIGHT,SIGMA", value_parser = bump, allow_hyphen_values = true)]
     bumps: Vec<Bump>,
     /// File to write: .ply, .obj or .stl
@@ -82,10 +82,10 @@ fn body_shape_named(name: &str) -> Result<BodyShape, String> {
 pub struct ClusterArgs {
     /// Point cloud: .ply, .obj or .stl
     cloud: PathBuf,
-    /// Neighbours are at most this far away
+    /// Largest distance between neighbours in mm
     #[arg(long)]
     eps_mm: f64,
-    /// Points within that distance, itself included, that make a core point
+    /// Points within --eps-mm that make a core point, itself included
     #[arg(long)]
     min_points: usize,
 }

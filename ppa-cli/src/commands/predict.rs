@@ -21,15 +21,15 @@ use crate::stderr;
 
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Prints one line of JSON for each pair: `name`, `left`, `right` and `quality` (their mean; alone where one network judges pairs) from 1 (ideal) to 3 \
-(inadequate), `correction_deg` where networks were trained with a `correction_weight` (medial rotation to the best pose), and `latency_ms` from the moment when the pair was found to the answer: how long it waited before, while others were judged, is not \
-in it. Frames that cannot be used are named on stderr and skipped. In a folder a name is judged again only after its files were gone. \
+    after_help = "Prints one line of JSON for each pair: `name`, `left`, `right` and `quality` (their mean; the only value of a network of pairs) from 1 (ideal) to 3 \
+(inadequate), `correction_deg` where networks were trained with a `correction_weight` (medial rotation to the best pose), and `latency_ms` from the moment when the pair was found to the prediction; the time that it waited while others were processed is not \
+included. Frames that cannot be used are named on stderr and skipped. In a folder, a name is processed again only after its files were removed. \
 The last line gives pairs per second and latencies: on stderr, or on stdout with --json."
 )]
 pub struct PredictArgs {
     /// Folder of the finished `ppa train` of the left camera's network
     left: PathBuf,
-    /// Of the right camera's [default: the first one judges both, and has to be of views = "unified" or "pairs"]
+    /// Folder of the right camera's network [default: LEFT is used for both cameras; its views must be "unified" or "pairs"]
     right: Option<PathBuf>,
     /// Square around the joint in the left camera's frames, in pixels, as in `roi_depth.json`
     #[arg(long, value_name = "X,Y,SIZE", value_parser = square)]
@@ -40,7 +40,7 @@ pub struct PredictArgs {
     /// Side of the limb in the frames: needed by networks that were trained with `mirror = true`
     #[arg(long, value_enum)]
     side: Option<SideName>,
-    /// Intervals and unlike frames, from `ppa calibrate` of the same networks: adds `interval` and `diagnostic` (yes, no or not_sure), and skips frames unlike the training images
+    /// File that `ppa calibrate` wrote for the same networks: adds `interval` and `diagnostic` (yes, no or not_sure), and skips frames unlike the training images
     #[arg(long, value_name = "FILE")]
     confidence: Option<PathBuf>,
     /// Where the networks compute: cpu, cuda or cuda:N
@@ -53,7 +53,7 @@ pub struct PredictArgs {
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 struct Source {
-    /// Judge what is and comes in a folder, `depth_cam_left_NAME.png` with `depth_cam_right_NAME.png`, until Ctrl-C
+    /// Predict for all pairs in this folder, now and later, `depth_cam_left_NAME.png` with `depth_cam_right_NAME.png`, until Ctrl-C
     #[arg(long, value_name = "DIR")]
     watch: Option<PathBuf>,
     /// Read pairs from standard input, one a line: the path of the left frame, a tab, the path of the right frame
@@ -91,7 +91,7 @@ pub fn run(args: &PredictArgs, output: Output) -> anyhow::Result<()> {
         }
         None => {
             let _stoppable = ends_at_once(
-                "; the answers above are whole, and the pairs after them were not judged",
+                "; the predictions above are complete, and the pairs after them were not processed",
             )?;
             judge.lines(io::stdin().lock())
         }

@@ -36,7 +36,7 @@ enum LimbName {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum AxisName {
-    /// The tibia, so that a swelling does not move the axis off the joint
+    /// The tibia: a swelling does not move the axis off the joint
     Bone,
     /// The whole cross-section inside the skin
     Limb,
@@ -46,7 +46,7 @@ enum AxisName {
 pub struct PrepareArgs {
     #[command(flatten)]
     scan: ScanArgs,
-    /// Which limb it is; of two side by side in the scan the one on this side of the patient is taken
+    /// Side of the limb; if the scan shows two side by side, the one on this side of the patient is used
     #[arg(long, value_enum)]
     side: SideName,
     /// Case file to write
@@ -70,7 +70,7 @@ pub struct PrepareArgs {
     /// Centre of the joint, ct frame
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     joint: Option<[f64; 3]>,
-    /// What the regions' centres are centres of: bone or the whole limb
+    /// Whose centres in the two regions give the axis: the bone's or the whole limb's
     #[arg(long, value_enum)]
     axis_source: Option<AxisName>,
     /// Region just proximal to the joint, mm from the joint towards proximal
@@ -104,11 +104,11 @@ pub struct PrepareArgs {
     /// Which bone each voxel belongs to, for `ppa label auto`: NIfTI, NRRD or MetaImage in the scan's frame
     #[arg(long, value_name = "FILE")]
     bones: Option<PathBuf>,
-    /// Tell tibia, fibula, talus and their neighbours apart in the scan itself, for `ppa label auto`, and write their numbers here:
-    /// NIfTI, NRRD or MetaImage. Refused, with the place, where they touch
+    /// Segment tibia, fibula, talus and neighbouring bones for `ppa label auto`, and write the label volume: NIfTI, NRRD or MetaImage.
+    /// Refused, with the location, where bones touch
     #[arg(long, value_name = "FILE", conflicts_with = "bones")]
     segment_bones: Option<PathBuf>,
-    /// Numbers of tibia, fibula and talus in it
+    /// Labels of tibia, fibula and talus in --bones
     #[arg(long, value_name = "TIBIA,FIBULA,TALUS", default_value = "3,4,1", requires = "bones", value_parser = bone_numbers)]
     bone_numbers: BoneNumbers,
     #[command(flatten)]

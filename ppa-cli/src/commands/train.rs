@@ -19,7 +19,7 @@ use crate::stderr::{note, warning};
 
 #[derive(Debug, Args)]
 pub struct TrainArgs {
-    /// TOML with `preset = "quick"`, "standard" or "paper", `[[training]]` and `[[evaluation]]`, and what shall differ
+    /// TOML with `preset = "quick"`, "standard" or "paper", `[[training]]`, `[[evaluation]]` and keys that differ from the preset
     config: PathBuf,
     /// Folder of the run; a run that was stopped is resumed
     #[arg(long, value_name = "DIR")]

@@ -23,7 +23,7 @@ pub struct VerifyArgs {
     /// Share of the poses to make again and compare, at least one pose
     #[arg(long, default_value_t = 0.001)]
     fraction: f64,
-    /// Which poses: another number takes others
+    /// Seed of the sample: another number selects other poses
     #[arg(long, default_value_t = 0)]
     sample_seed: u64,
     #[command(flatten)]

@@ -17,7 +17,7 @@ use crate::output::{Output, working};
 #[command(after_long_help = "\
 Every PNG is decoded and compared with its region of interest, with the images of other persons and, where there is one, with \
 manifest.jsonl, as are tallies. Lists are compared with checksums.sha256, labels and splits with labels.sha256 and, where the folder .ppa is there, everything that ppa wrote \
-with its records. Labels must be those of the radiographs that are there now; scans may not stand under two patients; \
+with its records. Labels must be those of the radiographs that are there now; a scan may not belong to two patients; \
 radiographs, labels and regions of poses without depth images are reported. Splits are those in the dataset's folder splits: each person in exactly one part.
 
 `ppa verify` makes a sample again and compares; this command needs no plan and takes datasets of others as well.")]

@@ -13,7 +13,7 @@ use crate::output_files::OutputFiles;
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
 Synthetic to specimen: the step becomes the image number, the body shape the time stamp (0 orig, 1 big, 2 small, 3 bumps_a, \
-4 bumps_b), and all poses stand under --flexion, since a scan does not show it.
+4 bumps_b), and all poses get the flexion --flexion, since a scan does not show it.
 
 Specimen to synthetic: the poses of --flexion; the number of an image becomes its step, so that the angle in a file's name is only \
 half that number. The earliest image of a pose becomes orig; what is left out is counted.")]

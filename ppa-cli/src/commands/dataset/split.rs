@@ -12,7 +12,7 @@ use crate::output_files::{ReplaceArgs, require_same};
 
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
-The split is written into the dataset, as splits/NAME.json. It is by person: both feet of a person stand on one side. To choose the \
+The split is written into the dataset, as splits/NAME.json. It is by person: both feet of a person are in one part. To choose the \
 persons yourself, edit the file; `ppa dataset check` refuses one with a person in two parts or in none.")]
 pub struct SplitArgs {
     /// Dataset in either layout
@@ -24,7 +24,7 @@ pub struct SplitArgs {
     #[arg(long = "part", value_name = "NAME=SHARE", value_parser = part,
         default_values = ["train=0.7", "val=0.15", "test=0.15"])]
     parts: Vec<(String, f64)>,
-    /// Another seed draws other persons
+    /// Seed of the split: another one draws other persons
     #[arg(long, default_value_t = 0)]
     seed: u64,
     #[command(flatten)]

@@ -13,7 +13,7 @@ use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Args)]
 pub struct FitNoiseArgs {
-    /// Folder with the frames of a scene that stands still, 16-bit PNG in mm, 0 invalid
+    /// Folder with the frames of a static scene, 16-bit PNG in mm, 0 invalid
     frames: PathBuf,
     /// Camera JSON [default: an Azure Kinect, 640 x 576]
     #[arg(long)]

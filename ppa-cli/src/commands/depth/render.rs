@@ -61,11 +61,11 @@ pub struct RenderArgs {
     /// Camera JSON [default: an Azure Kinect, 640 x 576]
     #[arg(long)]
     pub(super) camera: Option<PathBuf>,
-    /// JSON with the row-major 4x4 motion from the meshes' frame to the camera's, mm, or what `ppa scene --frames` wrote, with
-    /// --motion [default: identity]
+    /// JSON with the row-major 4x4 motion from the meshes' frame to the camera's, mm, or what --frames of `ppa scene place`
+    /// or `ppa scene room` wrote, with --motion [default: identity]
     #[arg(long)]
     pub(super) camera_from_mesh: Option<PathBuf>,
-    /// Which motion of such a file: left_from_room for a room or a placed skin, left_from_ct for a skin in the scan
+    /// Which motion of that file: left_from_room for a room or a placed skin, left_from_ct for a skin in the scan
     #[arg(long, value_name = "NAME", requires = "camera_from_mesh")]
     pub(super) motion: Option<String>,
     /// Image to write: 16-bit PNG, Z in mm, 0 invalid; of several frames name_0000.png, name_0001.png …; of a case
@@ -81,7 +81,7 @@ pub struct RenderArgs {
     /// Also write the points that are seen, in the camera's frame, PLY
     #[arg(long)]
     pub(super) points: Option<PathBuf>,
-    /// See through a sensor: JSON as `fit-noise` writes it, or the word default
+    /// Sensor model to apply: JSON as `ppa depth fit-noise` writes it, or `default`
     #[arg(long)]
     pub(super) sensor: Option<PathBuf>,
     /// Seed of the sensor's noise and of the tremor

@@ -28,7 +28,7 @@ pub struct MetadataArgs {
     /// Day of publication
     #[arg(long, value_name = "YYYY-MM-DD")]
     date: String,
-    /// Split whose parts stand in the table
+    /// Split whose parts are written to the table
     #[arg(long, value_name = "NAME")]
     split: Option<String>,
     #[command(flatten)]

@@ -17,7 +17,7 @@ pub struct TableArgs {
     /// File to write: .csv or .parquet
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Split whose parts stand in the column split
+    /// Split whose parts are written to the column split
     #[arg(long, value_name = "NAME")]
     split: Option<String>,
     #[command(flatten)]

@@ -21,7 +21,7 @@ pub struct WebdatasetArgs {
     /// Folder of the archives, which must not be there yet
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Image pairs of an archive
+    /// Image pairs per archive
     #[arg(long, default_value = "1000", value_name = "N")]
     per_shard: NonZeroUsize,
     /// Split of the dataset

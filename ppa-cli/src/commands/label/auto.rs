@@ -24,9 +24,9 @@ the talus and by the contrast of the superior gutter; it is as wide as readers' 
 gutter through which rays pass freely. Writes labels.json, with label_source surrogate-jso/2 (strict: surrogate-jso/1; with bones \
 from --segment-bones, -segmented), labels.computed.json with the same labels, and beside them openness.csv: openness, cover and grade of each gutter, \
 overlaps and clear spaces in mm, and how well the radiograph itself shows each gutter; and openness.json: thresholds, and hashes of \
-the bones and of the code. Labels of readers stay in labels.json; there, computed ones stand where no reader graded. With --name \
+the bones and of the code. Labels of readers stay in labels.json; computed ones are added there where no reader graded. With --name \
 NAME, labels.NAME.json, openness.NAME.csv and openness.NAME.json are written instead and labels.json stays as it is; \
-`labels = \"NAME\"` trains on them. Other results than those of an earlier run need --replace. No reader has confirmed these labels.
+`labels = \"NAME\"` trains on them. Results that differ from those of an earlier run need --replace. No reader has confirmed these labels.
 
   ppa ct phantom --out p01.nii.gz --labels p01.bones.nii.gz
   ppa prepare p01.nii.gz --side r --bones p01.bones.nii.gz --out p01.case.toml

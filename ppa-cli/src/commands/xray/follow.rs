@@ -30,14 +30,14 @@ pub struct AnalogArgs {
     /// Follow part k of n only; `ppa xray merge` joins the tallies of all parts
     #[arg(long, value_name = "K/N", requires = "tally", conflicts_with_all = ["time", "target_error"])]
     part: Option<Part>,
-    /// Keep the sums in this file: saved every minute and at the end, to resume from and to merge. Without it, a run that is
+    /// Keep the tallies in this file: saved every minute and at the end, to resume from and to merge. Without it, a run that is
     /// stopped by Ctrl-C or TERM leaves them beside the first image, as x.png.tally
     #[arg(long, value_name = "FILE")]
     pub tally: Option<PathBuf>,
     /// Resume from the tally file, if it exists, and replace the images of the earlier run
     #[arg(long, requires = "tally")]
     resume: bool,
-    /// Tell the energy imparted to every material and the air kerma
+    /// Report the energy imparted to every material and the air kerma
     #[arg(long)]
     dose: bool,
     /// Absorbed dose to write, µGy per mAs in every voxel: NIfTI, .nii or .nii.gz

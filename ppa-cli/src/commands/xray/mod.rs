@@ -25,7 +25,9 @@ pub enum XrayCommand {
     Spectrum(spectrum::SpectrumArgs),
     /// Mass attenuation of a material
     Materials(materials::MaterialsArgs),
-    /// What a HU calibration makes of a CT, or of the limb alone of a case (.toml): material, volume, mass, clipped voxels
+    /// Materials, volumes, masses and clipped voxels after HU calibration
+    ///
+    /// Takes a CT, or a case (.toml) for its limb alone.
     Audit(audit::AuditArgs),
     /// Run an input file of MC-GPU v1.3
     Mcgpu(mcgpu::McgpuArgs),

@@ -16,7 +16,7 @@ pub struct PictureArgs {
     /// Fixed window and contrast by name, in place of the plan's: limb, ankle_ap, ankle_mortise or ankle_lateral
     #[arg(long, value_name = "NAME", value_parser = protocol)]
     protocol: Option<Presentation>,
-    /// Fit the window to this one image; images to be compared or learnt from want a fixed one
+    /// Fit the window to this image alone; images to be compared or trained on need a fixed window
     #[arg(long)]
     autoscale: bool,
     /// Radiograph to write: DICOM Digital X-Ray image, flagged as synthetic
