@@ -107,7 +107,7 @@ pub struct Finding {
     pub severity: Severity,
     /// What was found and expected, in one sentence with units.
     pub text: String,
-    /// The number that was compared with a limit; its unit stands in `text`.
+    /// The number that was compared with a limit; its unit is in `text`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
     /// Where it is: a point in the ct frame (LPS), mm.

@@ -70,7 +70,7 @@ pub struct Source {
     /// Whether gaps between slices are interpolated.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub fill_gaps: bool,
-    /// Whether another modality or values that are no HU are read.
+    /// Whether another modality or values not in HU are read.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub force: bool,
 }

@@ -9,9 +9,9 @@ use crate::plan::{Plan, PlanCase, PlanError};
 use crate::toml_file::{relative_to, to_toml};
 
 const HEADER: &str = "\
-# What a dataset is made of; `ppa plan` forecasts its cost, `ppa generate` makes it.
-# Every key has its default here; a line may be deleted. Lines that begin with # and no space
-# are settings that are off: remove the # to use them. Lengths in mm, angles in degrees.
+# Plan of a dataset: `ppa plan` estimates its cost, `ppa generate` generates it.
+# Every key is listed with its default; a line may be deleted. Lines that begin with # and no
+# space are optional settings: remove the # to use them. Lengths in mm, angles in degrees.
 # Relative paths start at this file.
 
 ";
@@ -53,7 +53,7 @@ const TABLES: &[(&str, &str)] = &[
         "[xray.analog]",
         "Analog Monte Carlo, which makes the radiographs in place of [xray.engine].",
     ),
-    ("[xray.presentation]", "The look of the 16-bit radiograph."),
+    ("[xray.presentation]", "Window and contrast of the 16-bit radiograph."),
     ("[xray.calibration]", ""),
 ];
 
@@ -246,7 +246,7 @@ const OFF: &[(&str, &[&str])] = &[
     ),
     (
         "xray.presentation",
-        &["#protocol = \"limb\"    # a look by its name; keys above that differ from it win"],
+        &["#protocol = \"limb\"    # a presentation by name; keys above that differ from it take precedence"],
     ),
 ];
 

@@ -145,7 +145,7 @@ impl Job<'_> {
         })
     }
 
-    /// Claims the folder, completes what a killed run left, and refuses what only a run that replaces may change.
+    /// Locks the folder, completes what a killed run left, and refuses what only a run that replaces may change.
     fn begin(&self, overview: &Overview) -> Result<(DatasetLock, Survey), FolderError> {
         let lock = lock(self.root)?;
         require_part(self.root, self.part)?;

@@ -52,7 +52,7 @@ pub struct LimbStatus {
     pub made: usize,
 }
 
-/// Tells how far the dataset in `root` has come; changes nothing and may run beside `generate`.
+/// Returns the generation progress of the dataset in `root`; changes nothing and may run beside `generate`.
 ///
 /// # Errors
 /// [`FolderError`] when `root` holds no dataset.

@@ -5,8 +5,8 @@
 //! (or, by [`ComptonModel`], Klein–Nishina × S(q)).
 //! A [`VoxelPhantom`] is the patient, a [`Projection`] the exposure. Two engines make a [`Radiograph`] of them:
 //! [`analog`] follows every photon, [`fast`] ray-traces the primary, estimates the scatter, and adds the noise of the
-//! exposure asked for. An [`AnalogRun`] follows photons in sittings and parts, until they are precise enough, and counts
-//! the [`Dose`].
+//! exposure asked for. An [`AnalogRun`] follows photons in parts that can be interrupted and resumed, until the image is
+//! precise enough, and counts the [`Dose`].
 //!
 //! [`mcgpu`] runs input files of MC-GPU v1.3.
 //!

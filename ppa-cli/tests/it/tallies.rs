@@ -1,4 +1,4 @@
-//! Analog runs in parts and sittings.
+//! Analog runs in parts, interrupted and resumed.
 
 use std::fs;
 use std::path::Path;
@@ -23,7 +23,7 @@ fn read(folder: &Path, name: &str) -> Vec<u8> {
 }
 
 #[test]
-fn parts_and_sittings_end_in_the_bytes_of_one_run() {
+fn parts_and_resumed_runs_end_in_the_bytes_of_one_run() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     write_plan(folder, "");

@@ -244,7 +244,7 @@ fn radiograph_hashes(manifest: &Manifest, limb: LimbId) -> HashMap<u32, &str> {
         .collect()
 }
 
-/// A label as it stands in the file.
+/// A label as written in the file.
 #[derive(Serialize, Deserialize)]
 struct Entry {
     #[serde(flatten)]

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::{Plan, PlanError, PlanRoom};
 use crate::toml_file::{relative_to, to_toml};
 
-/// All that stands still in an x-ray room; unknown keys are refused.
+/// The fixed objects of an x-ray room; unknown keys are refused.
 ///
 /// Relative paths are taken from the folder of the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -125,10 +125,10 @@ pub struct NetworkConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LastLayer {
-    /// As torchvision draws them, which the paper's authors use: weights uniform in ±1 / sqrt(outputs) = ±1, bias 0. Answers begin
+    /// As torchvision draws them, which the paper's authors use: weights uniform in ±1 / sqrt(outputs) = ±1, bias 0. Outputs begin
     /// with errors of about 10, and a thousand steps of 10⁻³ pass until they are of the size of labels.
     Torchvision,
-    /// Weights 0 and bias 2: answers begin in the middle of the labels, 1 to 3.
+    /// Weights 0 and bias 2: outputs begin in the middle of the labels, 1 to 3.
     Middle,
 }
 

@@ -1,4 +1,4 @@
-//! A run of the analog engine in sittings.
+//! A run of the analog engine, in batches of histories between checks of when to stop.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -23,14 +23,14 @@ use crate::run::progress::{Progress, Stop, Stopped, is_check, next_check};
 use crate::run::tally_error::TallyError;
 use crate::transport::tracking::{Transport, TransportError};
 
-/// How long the observer waits for news at most, about.
-const SITTING: Duration = Duration::from_millis(250);
+/// About the longest time between two checks.
+const CHECK_EVERY: Duration = Duration::from_millis(250);
 
-/// Histories of the first sitting, before the rate is known.
-const FIRST_SITTING: u64 = 16_384;
+/// Histories of the first batch, before the rate is known.
+const FIRST_BATCH: u64 = 16_384;
 
 /// Fewest histories worth handing to the threads.
-const LEAST_SITTING: u64 = 1_024;
+const LEAST_BATCH: u64 = 1_024;
 
 /// An exposure that is simulated photon by photon, as far and in as many parts as its user wants.
 ///
@@ -122,7 +122,7 @@ impl<'a> AnalogRun<'a> {
         AnalogTally::empty(setup, part.share(self.settings.histories))
     }
 
-    /// The tally of an earlier sitting, to continue with. A tally of a whole run may continue to another number of histories.
+    /// The tally of an earlier, interrupted run, to continue with. A tally of a whole run may continue to another number of histories.
     ///
     /// # Errors
     /// [`TallyError`] when the file cannot be read, is damaged, or is of another simulation or part.
@@ -174,7 +174,7 @@ impl<'a> AnalogRun<'a> {
 
     /// Follows the histories that `tally` still lacks, until `stop` or the observer says so.
     ///
-    /// `observe` hears of the progress a few times per second and ends the sitting by [`ControlFlow::Break`]; whenever it
+    /// `observe` hears of the progress a few times per second and ends the run by [`ControlFlow::Break`]; whenever it
     /// is called and at the end, the tally is whole and may be written. When [`Stop`] ends a run that is not in
     /// parts, the run is complete at the histories counted until then.
     ///
@@ -189,7 +189,7 @@ impl<'a> AnalogRun<'a> {
         assert_eq!(tally.setup.key, self.key(), "the tally is of another run");
         let start = Instant::now();
         let first = tally.done.end;
-        let mut sitting = FIRST_SITTING;
+        let mut batch = FIRST_BATCH;
         let mut relative_error = None;
         loop {
             let counted = tally.done.end - tally.done.start;
@@ -220,11 +220,11 @@ impl<'a> AnalogRun<'a> {
                 }
                 let until = stop
                     .time
-                    .map_or(SITTING, |time| SITTING.min(time - elapsed));
+                    .map_or(CHECK_EVERY, |time| CHECK_EVERY.min(time - elapsed));
                 // The rate of the first moments says little: no jumps.
-                sitting = ((rate * until.as_secs_f64()) as u64).clamp(LEAST_SITTING, 2 * sitting);
+                batch = ((rate * until.as_secs_f64()) as u64).clamp(LEAST_BATCH, 2 * batch);
             }
-            let mut end = tally.done.end + left.min(sitting);
+            let mut end = tally.done.end + left.min(batch);
             if stop.relative_error.is_some() {
                 end = end.min(tally.done.start.saturating_add(next_check(counted)));
             }

@@ -31,7 +31,7 @@ pub enum Stopped {
 /// How far a run is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
-    /// Histories counted in the tally, those of earlier sittings included.
+    /// Histories counted in the tally, those of earlier, interrupted runs included.
     pub histories: u64,
     /// Histories that will be counted in the end, as far as is known.
     pub expected_histories: u64,

@@ -1,4 +1,4 @@
-//! Long runs: parts, sittings, tallies in files, and when to stop.
+//! Long runs: parts, resumption, tallies in files, and when to stop.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
