@@ -40,7 +40,7 @@ pub enum SplitError {
     #[error("the split has version {0}; this program reads version 1")]
     Version(u32),
     /// A person in two parts: what is tested was trained on.
-    #[error("patient {patient} stands in {first} and in {second}: a person belongs to one part")]
+    #[error("patient {patient} is in {first} and in {second}: a person belongs to one part")]
     Leak {
         /// The person.
         patient: u32,
@@ -50,7 +50,7 @@ pub enum SplitError {
         second: String,
     },
     /// A person of the dataset in no part.
-    #[error("patient {0} stands in no part of the split")]
+    #[error("patient {0} is in no part of the split")]
     Unassigned(u32),
     /// A person that the dataset does not hold.
     #[error("patient {patient} of part {part} is not in the dataset")]

@@ -34,7 +34,7 @@ pub enum Problem {
     },
     /// A run was killed while it put the files of a pose in their place.
     #[error(
-        "{pose_job} is half replaced, as the run that did it was interrupted; the next run completes it"
+        "{pose_job} is replaced only in part, because the run was interrupted; the next run completes it"
     )]
     Interrupted {
         /// The pose.
@@ -58,8 +58,8 @@ pub enum Problem {
         /// Path from the dataset's root.
         file: String,
     },
-    /// A pose came out otherwise when it was made again.
-    #[error("{file} comes out otherwise when it is made again")]
+    /// A pose has other bytes when it is generated again.
+    #[error("{file} differs when it is generated again")]
     Differs {
         /// Path from the dataset's root.
         file: String,

@@ -84,7 +84,7 @@ fn how_to_ask(part: Part) -> String {
 /// Held while a process relies on a dataset's files; released when dropped or when the process dies.
 pub(crate) struct DatasetLock(#[expect(dead_code, reason = "holds the lock")] Option<fs::File>);
 
-/// Claims a folder that holds a dataset, finished or not, for reading. Writes nothing, and several readers may do so.
+/// Locks a folder that holds a dataset, finished or not, for reading. Writes nothing, and several readers may do so.
 pub(crate) fn lock_existing(root: &Path) -> Result<DatasetLock, FolderError> {
     if !root.join(FOLDER).is_dir() {
         return Err(not_a_dataset(root)?);
@@ -101,7 +101,7 @@ pub(crate) fn lock_existing(root: &Path) -> Result<DatasetLock, FolderError> {
     }
 }
 
-/// Claims the folder `root` for a run that writes. Refuses a folder that is in use or holds something else.
+/// Locks the folder `root` for a run that writes. Refuses a folder that is in use or holds something else.
 pub(crate) fn lock(root: &Path) -> Result<DatasetLock, FolderError> {
     let folder = root.join(FOLDER);
     let occupied = root.exists() && {

@@ -54,7 +54,7 @@ impl fmt::Display for DatasetDiffers {
             }
             let (stale, keys) = (self.stale, keys.join(", "));
             parts.push(format!(
-                "{stale} of its {} were made otherwise ({keys})",
+                "{stale} of its {} were made from other inputs ({keys})",
                 counted(self.poses, "pose")
             ));
         }

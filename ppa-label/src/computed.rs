@@ -130,7 +130,7 @@ pub enum AutoLabelError {
     },
     /// Results of an earlier computation that differ from the new ones.
     #[error(
-        "{} holds other computed labels, or was computed otherwise: give --replace to replace it",
+        "{} holds other computed labels, or was computed with other settings: give --replace to replace it",
         .0.display()
     )]
     Differs(PathBuf),
@@ -152,7 +152,7 @@ pub enum AutoLabelError {
     #[error(transparent)]
     Scale(#[from] ScaleError),
     /// The name of the file that keeps computed labels where readers graded as well.
-    #[error("labels.computed.json belongs to labels.json: name the labels otherwise than {0}")]
+    #[error("labels.computed.json belongs to labels.json: choose another name than {0}")]
     ReservedName(LabelName),
     /// A file.
     #[error(transparent)]

@@ -1,4 +1,4 @@
-//! A finished dataset looked over, damaged, and repaired.
+//! Checks, damages and repairs a finished dataset.
 
 use std::fs;
 
@@ -86,7 +86,7 @@ fn a_forged_image_is_found_when_its_pose_is_made_again() {
     );
     let said = fail(folder.path(), "verify plan --fraction 1 --progress quiet");
     assert!(
-        said.contains("depth_cam_left_0.0.png comes out otherwise"),
+        said.contains("depth_cam_left_0.0.png differs when it is generated again"),
         "{said}"
     );
     assert!(!said.contains(';'), "only that one: {said}");

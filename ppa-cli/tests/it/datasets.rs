@@ -108,7 +108,7 @@ fn what_was_edited_by_hand_is_reported() {
         ),
         (
             &|| edited(&first_row, ""),
-            ["depth_cam_left_0.0.png", "not in manifest.jsonl"],
+            ["depth_cam_left_0.0.png", "not listed in manifest.jsonl"],
         ),
         (
             &|| edited(&first_row, &first_row.repeat(2)),
@@ -141,7 +141,7 @@ fn persons_are_split_and_leaks_refused() {
     let leak = r#"{"version": 1, "parts": {"train": [3], "test": [3]}}"#;
     fs::write(&path, leak).unwrap();
     let said = fail(folder.path(), "dataset check data");
-    for part in ["default.json", "patient 3 stands in test and in train"] {
+    for part in ["default.json", "patient 3 is in test and in train"] {
         assert!(said.contains(part), "{said}");
     }
     for (command, part) in [

@@ -21,13 +21,13 @@ pub(super) enum Encoding {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Fault {
     /// An element continues behind the last byte.
-    #[error("an element ends behind the end of the data")]
+    #[error("an element extends beyond the end of the data")]
     Short,
     /// No element, or sequences in sequences beyond all measure.
-    #[error("byte {0} of the data set starts no element")]
+    #[error("no valid element begins at byte {0} of the data set")]
     Damaged(usize),
     /// A deflated header beyond all measure.
-    #[error("no pixels in the first {0} bytes that it inflates to")]
+    #[error("no pixel data in the first {0} bytes after inflating")]
     Endless(u64),
 }
 

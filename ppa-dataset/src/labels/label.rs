@@ -63,7 +63,7 @@ impl Sources {
 
 /// A source in words.
 pub(crate) fn name_of(source: Option<LabelSource>) -> &'static str {
-    source.map_or("nobody named", LabelSource::name)
+    source.map_or("an unnamed source", LabelSource::name)
 }
 
 /// The label of one radiograph.

@@ -75,14 +75,14 @@ fn against_manifest<'a>(
         if !listed.insert(row.file.as_str()) {
             flaws.push(Flaw::Unlisted {
                 file,
-                r#where: "twice in manifest.jsonl",
+                r#where: "listed twice in manifest.jsonl",
             });
             continue;
         }
         match hashes.get(row.file.as_str()) {
             None => flaws.push(Flaw::Unlisted {
                 file,
-                r#where: "in manifest.jsonl, but is not there",
+                r#where: "listed in manifest.jsonl, but missing",
             }),
             Some(hash) if *hash != row.sha256 => flaws.push(Flaw::Altered {
                 file,
@@ -96,7 +96,7 @@ fn against_manifest<'a>(
         let file = (*file).to_owned();
         flaws.push(Flaw::Unlisted {
             file,
-            r#where: "not in manifest.jsonl",
+            r#where: "not listed in manifest.jsonl",
         });
     }
     flaws

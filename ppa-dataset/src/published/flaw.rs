@@ -91,7 +91,7 @@ pub enum Flaw {
         file: &'static str,
     },
     /// An image without a row, or a row without an image.
-    #[error("{file} stands {where}")]
+    #[error("{file} is {where}")]
     Unlisted {
         /// The image.
         file: String,

@@ -67,10 +67,7 @@ fn a_person_in_two_parts_is_named() {
     assert_eq!(Split::names(folder.path()).unwrap(), ["mine"]);
     split.check(&[0, 3, 7]).unwrap();
     let said = |patients: &[u32]| split.check(patients).unwrap_err().to_string();
-    assert_eq!(
-        said(&[0, 3, 5, 7]),
-        "patient 5 stands in no part of the split"
-    );
+    assert_eq!(said(&[0, 3, 5, 7]), "patient 5 is in no part of the split");
     assert_eq!(
         said(&[0, 3]),
         "patient 7 of part test is not in the dataset"

@@ -134,7 +134,7 @@ fn tallies_scans_and_labels_are_compared_with_the_lists() {
     let altered = |flaw: &String| flaw.starts_with(&format!("{tallies} is altered: its hash is "));
     assert!(said.iter().any(altered), "{said:?}");
     fs::remove_file(tree.path(tallies)).unwrap();
-    let missing = format!("{tallies} stands in manifest.jsonl, but is not there");
+    let missing = format!("{tallies} is listed in manifest.jsonl, but missing");
     assert!(flaws(&tree).contains(&missing));
 
     let tree = Tree::generated();
@@ -187,6 +187,6 @@ fn unlisted(tree: &Tree) -> Vec<String> {
     files.dedup();
     let report = files
         .iter()
-        .map(|file| format!("{file} stands not in manifest.jsonl"));
+        .map(|file| format!("{file} is not listed in manifest.jsonl"));
     report.collect()
 }

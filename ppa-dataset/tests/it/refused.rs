@@ -240,5 +240,8 @@ fn labels_of_two_sources_do_not_mix() {
     let mixed = text.replacen("\"std\"", "\"label_source\": \"readers\", \"std\"", 1);
     assert_ne!(mixed, text);
     fs::write(tree.path(file), mixed).unwrap();
-    assert_says(&refusal(&tree), &["labels.json", "readers", "nobody named"]);
+    assert_says(
+        &refusal(&tree),
+        &["labels.json", "readers", "an unnamed source"],
+    );
 }

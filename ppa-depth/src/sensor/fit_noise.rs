@@ -27,7 +27,7 @@ pub struct NoiseFit {
 #[non_exhaustive]
 pub enum FitError {
     /// Too few frames.
-    #[error("{0} frames, expected at least 3 of a scene that stands still")]
+    #[error("{0} frames, expected at least 3 of a static scene")]
     Frames(usize),
     /// Frames of different size, or not of the camera's.
     #[error("frame {frame}")]

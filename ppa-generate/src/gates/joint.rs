@@ -61,7 +61,7 @@ pub(super) fn findings(
             LandmarkNote::PlateauCut => Some(doubt(
                 place,
                 FindingCode::PlateauCut,
-                "the scan cuts the tibial plateau: the notch between the condyles stands for the middle of the knee",
+                "the scan cuts the tibial plateau: the notch between the condyles is used as the middle of the knee",
             )),
             LandmarkNote::KneeAxis(axis) => knee_axis(place, axis),
             LandmarkNote::CondylesNotSeen => Some(doubt(

@@ -28,7 +28,7 @@ pub(super) fn findings(report: &LimbReport, neighbour: Option<&Neighbour>) -> Ve
             jump,
             format!(
                 "the cross-section of the limb changes by {jump:.1} % per mm along it, expected at most \
-                 {JUMP_PERCENT_PER_MM:.0}: does a part of another limb or of the couch hang on it from there on?"
+                 {JUMP_PERCENT_PER_MM:.0}: part of another limb or of the couch may be attached from there on"
             ),
         ));
     }
@@ -64,7 +64,7 @@ fn contact(report: &LimbReport) -> Option<Finding> {
         contact_cm2,
         format!(
             "another body touches the limb over {contact_cm2:.1} cm² around {x:.0}, {y:.0}, {z:.0} mm: there the skin is a \
-             guess, and a sliver of the other may hang on it"
+             guess, and a sliver of the other body may be attached"
         ),
     ))
 }

@@ -33,7 +33,7 @@ fn other_settings_are_refused_with_the_keys_that_differ() {
     let folder = Trial::new().made();
     let said = refused(&other(), folder.path());
     for words in [
-        "4 of its 4 poses were made otherwise",
+        "4 of its 4 poses were made from other inputs",
         "settings.xray.kvp is 60 there and 70 here",
         "settings.shapes is [\"orig\",\"big\"] there and [\"orig\"] here",
         "--replace",

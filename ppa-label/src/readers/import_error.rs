@@ -51,7 +51,7 @@ pub enum ImportError {
     /// The dataset has changed since a grade was imported.
     #[error(
         "{}: {reader} graded another radiograph {image}: its hash was {found}, that in the manifest is {expected}; move the file \
-         away to begin anew",
+         away to start again",
         path.display()
     )]
     OtherRadiograph {

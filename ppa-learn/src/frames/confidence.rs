@@ -100,7 +100,7 @@ impl Confidence {
         let bytes = ppa_core::regular_file::read(path).map_err(|error| error.to_string())?;
         let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|error| error.to_string())?;
         let state = header.metadata().as_ref().and_then(|all| all.get(METADATA));
-        let state = state.ok_or("it is no confidence file of ppa calibrate")?;
+        let state = state.ok_or("it is not a confidence file of ppa calibrate")?;
         let state: State = serde_json::from_str(state).map_err(|error| error.to_string())?;
         if state.intervals.bins.is_empty() {
             return Err("it holds no interval".into());

@@ -85,7 +85,7 @@ pub enum LimbError {
         expected: &'static str,
     },
     /// More voxels than there is memory to work on.
-    #[error("the limb cannot be looked for")]
+    #[error("cannot search for the limb")]
     Memory(#[source] VolumeError),
     /// Nothing solid is in the volume.
     #[error(
