@@ -23,7 +23,7 @@ use anyhow::Context;
 use clap::{ColorChoice, FromArgMatches, Parser, Subcommand};
 
 use crate::output::Output;
-use crate::stderr::Early;
+use crate::stderr::GlobalOptions;
 
 /// Paired Time-of-Flight depth images and radiographs of posed limbs, made from CT scans.
 ///
@@ -161,8 +161,8 @@ fn run(cli: Cli) -> anyhow::Result<()> {
 }
 
 fn main() -> ExitCode {
-    let early = Early::of(std::env::args_os());
-    let mut command = help::command().color(early.color);
+    let options = GlobalOptions::of(std::env::args_os());
+    let mut command = help::command().color(options.color);
     let parsed = command.try_get_matches_from_mut(std::env::args_os());
     let cli = parsed
         .and_then(|matches| Cli::from_arg_matches(&matches))
@@ -176,7 +176,7 @@ fn main() -> ExitCode {
             )
         }
         Err(error) => {
-            stderr::set_up(early.json, early.color);
+            stderr::set_up(options.json, options.color);
             stderr::usage(&error)
         }
     }

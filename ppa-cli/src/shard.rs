@@ -11,9 +11,9 @@ struct Named {
     by: &'static str,
 }
 
-/// Which part of a plan a process is to make.
+/// Which shard of a plan a process is to make.
 #[derive(Debug)]
-pub enum Asked {
+pub enum ShardRequest {
     /// This one.
     Part(Part),
     /// That of one task of a Slurm array which is not all of the array, as when a task is run again.
@@ -25,7 +25,7 @@ pub enum Asked {
     },
 }
 
-impl Asked {
+impl ShardRequest {
     /// The part; `held` is that of the folder it goes into, where one was begun.
     pub fn part(
         &self,
@@ -52,14 +52,14 @@ impl Asked {
 /// The shard of `--shard`, of a Slurm job array or job step, of `mpirun`, or of an indexed Kubernetes job.
 ///
 /// Two that disagree are an error: half of a plan would be made twice, or not at all.
-pub fn shard(option: Option<Part>) -> anyhow::Result<Asked> {
+pub fn shard(option: Option<Part>) -> anyhow::Result<ShardRequest> {
     shard_named(option, &|name| env::var(name).ok())
 }
 
 fn shard_named(
     option: Option<Part>,
     variable: &dyn Fn(&str) -> Option<String>,
-) -> anyhow::Result<Asked> {
+) -> anyhow::Result<ShardRequest> {
     let number = |name: &str| {
         let text = variable(name).with_context(|| format!("{name} is not set"))?;
         let number: u64 = text
@@ -105,7 +105,7 @@ fn shard_named(
             let named = format!(
                 "SLURM_ARRAY_TASK_ID is {id} in an array of {count} (from {first} to {last} in steps of {step})"
             );
-            task = Some(Asked::Task { id, named });
+            task = Some(ShardRequest::Task { id, named });
         }
     }
     // Processes of mpirun inherit the step of Slurm that started mpirun's daemons, which is not theirs.
@@ -136,7 +136,7 @@ fn shard_named(
         )?);
     }
     if let (Some(task), None) = (task, option) {
-        if let (Asked::Task { named: array, .. }, Some(other)) = (&task, named.first()) {
+        if let (ShardRequest::Task { named: array, .. }, Some(other)) = (&task, named.first()) {
             bail!(
                 "{array}, and {} means shard {}; give --shard and unset one of them",
                 other.by,
@@ -146,9 +146,9 @@ fn shard_named(
         return Ok(task);
     }
     match named.as_slice() {
-        [] => Ok(Asked::Part(Part::WHOLE)),
+        [] => Ok(ShardRequest::Part(Part::WHOLE)),
         [first, others @ ..] => match others.iter().find(|other| other.part != first.part) {
-            None => Ok(Asked::Part(first.part)),
+            None => Ok(ShardRequest::Part(first.part)),
             Some(other) => bail!(
                 "{} means shard {}, but {} means {}; unset one of them",
                 first.by,
@@ -187,7 +187,7 @@ mod tests {
         };
         let option = option.map(|text| text.parse().unwrap());
         let held = || Ok(held.map(|text| text.parse().unwrap()));
-        match shard_named(option, &variable).and_then(|asked| asked.part(held)) {
+        match shard_named(option, &variable).and_then(|request| request.part(held)) {
             Ok(part) => Ok(part.to_string()),
             Err(error) => Err(format!("{error:#}")),
         }

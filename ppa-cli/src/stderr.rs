@@ -20,19 +20,19 @@ const FAILED: u8 = 1;
 
 static AS_JSON: OnceLock<bool> = OnceLock::new();
 
-/// What has to be known before the command line is parsed, as parsing may fail.
+/// Global options that are needed before the command line is parsed, as parsing may fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Early {
+pub struct GlobalOptions {
     /// Whether `--json` was given.
     pub json: bool,
     /// The last `--color`; `Auto` without one.
     pub color: ColorChoice,
 }
 
-impl Early {
+impl GlobalOptions {
     /// Looks for both options among the arguments before `--`.
     pub fn of<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Self {
-        let mut early = Self {
+        let mut options = Self {
             json: false,
             color: ColorChoice::Auto,
         };
@@ -41,7 +41,7 @@ impl Early {
             let value = match argument.as_ref().to_str() {
                 Some("--") => break,
                 Some("--json") => {
-                    early.json = true;
+                    options.json = true;
                     continue;
                 }
                 Some("--color") => arguments.next().map(|value| value.as_ref().to_owned()),
@@ -51,9 +51,9 @@ impl Early {
             let choice = value
                 .as_ref()
                 .and_then(|value| value.to_str()?.parse().ok());
-            early.color = choice.unwrap_or(early.color);
+            options.color = choice.unwrap_or(options.color);
         }
-        early
+        options
     }
 }
 
@@ -162,14 +162,14 @@ mod tests {
 
     #[test]
     fn json_and_color_are_found_before_parsing() {
-        let of = |text: &str| Early::of(text.split(' '));
-        let plain = Early {
+        let of = |text: &str| GlobalOptions::of(text.split(' '));
+        let plain = GlobalOptions {
             json: false,
             color: ColorChoice::Auto,
         };
         assert_eq!(of("ppa ct info a -- --json --color=always"), plain);
         assert_eq!(of("ppa --color sideways status"), plain);
-        let both = Early {
+        let both = GlobalOptions {
             json: true,
             color: ColorChoice::Never,
         };

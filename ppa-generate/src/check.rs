@@ -97,7 +97,7 @@ impl Problem {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Check {
     /// Poses that the folder is to hold.
-    pub units: usize,
+    pub pose_jobs: usize,
     /// Images whose bytes were compared with their hash.
     pub images: usize,
     /// Everything that is wrong, in the order of the plan.
@@ -126,8 +126,8 @@ impl Recorded {
 
     /// Compares all files with their records.
     pub fn check(&self) -> Check {
-        let units: Vec<_> = self.limbs.iter().flat_map(LimbJobs::pose_jobs).collect();
-        let found: Vec<_> = units
+        let pose_jobs: Vec<_> = self.limbs.iter().flat_map(LimbJobs::pose_jobs).collect();
+        let found: Vec<_> = pose_jobs
             .par_iter()
             .map(|pose_job| self.pose_job(pose_job))
             .collect();
@@ -139,11 +139,11 @@ impl Recorded {
         }
         let images = records.iter().map(|record| record.files.len()).sum();
         // Lists are written after the last pose.
-        if records.len() == units.len() {
+        if records.len() == pose_jobs.len() {
             problems.extend(self.lists(records));
         }
         Check {
-            units: units.len(),
+            pose_jobs: pose_jobs.len(),
             images,
             problems,
         }

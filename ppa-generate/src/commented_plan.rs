@@ -53,7 +53,10 @@ const TABLES: &[(&str, &str)] = &[
         "[xray.analog]",
         "Analog Monte Carlo, which makes the radiographs in place of [xray.engine].",
     ),
-    ("[xray.presentation]", "Window and contrast of the 16-bit radiograph."),
+    (
+        "[xray.presentation]",
+        "Window and contrast of the 16-bit radiograph.",
+    ),
     ("[xray.calibration]", ""),
 ];
 
@@ -246,7 +249,9 @@ const OFF: &[(&str, &[&str])] = &[
     ),
     (
         "xray.presentation",
-        &["#protocol = \"limb\"    # a presentation by name; keys above that differ from it take precedence"],
+        &[
+            "#protocol = \"limb\"    # a presentation by name; keys above that differ from it take precedence",
+        ],
     ),
 ];
 

@@ -22,10 +22,10 @@ pub struct DepthView {
     pub image: DepthImage,
 }
 
-/// Depth images of a limb, its skin as in the scan, turned by `angle_deg` and laid on the table of a stage; left camera first.
+/// Depth images of a limb, its skin as in the scan, turned by `angle_deg` and laid on the table of a scene setup; left camera first.
 /// Pixels that see a cut face of the field of view are as [`DepthSettings::cut_faces`](crate::DepthSettings) says.
 ///
-/// `plan` is the plan of the stage. Ideal images are those of the plan's dataset; those of a sensor have noise of `seed`.
+/// `plan` is the plan of the scene setup. Ideal images are those of the plan's dataset; those of a sensor have noise of `seed`.
 ///
 /// # Errors
 /// [`PoseError`] when the limb does not rest on the table, hides a camera, or a sensor measures nothing.

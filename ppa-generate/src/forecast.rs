@@ -55,7 +55,8 @@ pub struct Forecast {
     /// Limbs.
     pub limbs: usize,
     /// Poses of all limbs.
-    pub units: usize,
+    #[serde(rename = "units")]
+    pub pose_jobs: usize,
     /// Depth images of all cameras and body shapes.
     pub depth_images: usize,
     /// Radiographs.
@@ -129,20 +130,20 @@ pub fn forecast(
         }
     }
 
-    let units = limbs.len() * poses.len();
+    let pose_jobs = limbs.len() * poses.len();
     let measured = unit_s.len();
     let (mean, error) = mean_and_error(&unit_s);
-    let bytes = (bytes as f64 / measured as f64 * units as f64) as u64;
+    let bytes = (bytes as f64 / measured as f64 * pose_jobs as f64) as u64;
     Ok(Forecast {
         limbs: limbs.len(),
-        units,
-        depth_images: units * plan.shapes.variants.len() * View::ALL.len(),
-        radiographs: units,
+        pose_jobs,
+        depth_images: pose_jobs * plan.shapes.variants.len() * View::ALL.len(),
+        radiographs: pose_jobs,
         measured,
         cpu_s_per_unit: mean,
         cpu_s_per_unit_error: error,
         cpu_s_per_limb: preparing_s / limbs.len() as f64,
-        cpu_hours: (preparing_s + mean * units as f64) / 3600.0,
+        cpu_hours: (preparing_s + mean * pose_jobs as f64) / 3600.0,
         bytes,
         needed_bytes: bytes.saturating_sub(status(root).map_or(0, |status| status.bytes)),
         free_bytes: free_bytes(root),
@@ -223,7 +224,7 @@ mod tests {
     fn images_that_are_there_need_no_more_room() {
         let forecast = |needed_bytes, free_bytes| Forecast {
             limbs: 1,
-            units: 181,
+            pose_jobs: 181,
             depth_images: 1810,
             radiographs: 181,
             measured: 2,

@@ -131,7 +131,7 @@ impl Default for GenerateSettings<'_> {
 
 /// Makes what is missing of the plan's dataset in the folder `root`.
 ///
-/// Every pose is a unit of its own: its files appear whole, its record last, so a run that was
+/// Every pose is generated on its own: its files appear whole, its record last, so a run that was
 /// killed resumes where it stopped. A pose is made again when its record is missing or damaged, or when one of its files
 /// is missing or altered; files that were altered are moved to `.ppa/altered`.
 ///
@@ -171,7 +171,7 @@ pub fn generate(
     })
 }
 
-/// A plan with its cases and its stage: all that units are made from.
+/// A plan with its cases and its scene setup: all that poses are generated from.
 pub(crate) struct Work<'a> {
     plan: &'a Plan,
     limbs: Vec<CasedLimb>,

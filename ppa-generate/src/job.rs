@@ -26,7 +26,8 @@ use crate::survey::Survey;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// Poses of the plan, or of the shard.
-    pub units: usize,
+    #[serde(rename = "units")]
+    pub pose_jobs: usize,
     /// Poses that were made in this run; the others were there already.
     pub made: usize,
     /// Depth images in the folder.
@@ -88,7 +89,7 @@ pub enum JobError {
 /// Makes one pose of a limb: its files whole, in the staging folder of the dataset.
 pub(crate) type MakePose<'a, E> = Box<dyn Fn(PoseJob) -> Result<Images, E> + Sync + 'a>;
 
-/// Units, the folder they belong to, and how much of it they may fill.
+/// Pose jobs, the folder they belong to, and how much of it they may fill.
 pub(crate) struct Job<'a> {
     pub root: &'a Path,
     /// `dataset.json`, the same for all parts.
@@ -102,7 +103,7 @@ pub(crate) struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Makes what is missing, several units at a time; `prepare` is called once per limb.
+    /// Makes what is missing, several poses at a time; `prepare` is called once per limb.
     pub fn complete<'m, E: From<JobError> + Send>(
         &self,
         prepare: impl Fn(&LimbJobs) -> Result<MakePose<'m, E>, E>,
@@ -110,8 +111,8 @@ impl Job<'_> {
         let staging = Staging::new(self.root);
         let overview = Overview::new(self.root, self.description, self.part, &staging);
         let (_lock, survey) = self.begin(&overview).map_err(JobError::from)?;
-        let units = self.limbs.iter().map(|limb| limb.poses.len()).sum();
-        (self.progress)(Progress::Total(units));
+        let pose_jobs = self.limbs.iter().map(|limb| limb.poses.len()).sum();
+        (self.progress)(Progress::Total(pose_jobs));
 
         let used = AtomicU64::new(0);
         let mut made = 0;
@@ -133,7 +134,7 @@ impl Job<'_> {
         let count = |kind| lists.rows.iter().filter(|row| row.kind == kind).count();
         let healed = overview.into_healed();
         Ok(Summary {
-            units,
+            pose_jobs,
             made,
             depth_images: count(FileKind::Depth),
             radiographs: count(FileKind::Radiograph),
@@ -219,7 +220,7 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// Puts a unit in its place, or removes its images where they are too many bytes.
+    /// Puts a pose in its place, or removes its images where they are too many bytes.
     fn keep(
         &self,
         pose_job: &PoseJob,
@@ -263,7 +264,7 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// Writes what lists all units: regions of interest, findings and manifest.
+    /// Writes what lists all poses: regions of interest, findings and manifest.
     fn finish(&self, overview: &Overview) -> Result<Lists, FileError> {
         let record = |pose_job: &PoseJob| Record::read(self.root, pose_job);
         let lists = Lists::of(&self.limbs, self.description, record)?;

@@ -41,7 +41,7 @@ impl LimbJobs {
     }
 }
 
-/// The units of one part of a dataset. Parts are runs of neighbours, limb by limb, so that few
+/// The pose jobs of one shard of a dataset. Shards are runs of neighbours, limb by limb, so that few
 /// of them prepare the same limb.
 pub(crate) fn jobs_of_part(
     limbs: impl ExactSizeIterator<Item = PlannedLimb>,

@@ -1,4 +1,4 @@
-//! Test: the bookkeeping of 100 000 units.
+//! Test: the bookkeeping of 100 000 pose jobs.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -16,7 +16,7 @@ use crate::posable_limb::Images;
 /// printed, not tested: on a busy disk the last tenth took three times as long as the first.
 #[test]
 #[ignore = "writes 100 000 files; takes a minute or two"]
-fn a_hundred_thousand_units_are_made_and_found_again() {
+fn a_hundred_thousand_poses_are_made_and_found_again() {
     let folder = tempfile::tempdir().unwrap();
     let poses = Sweep {
         to_deg: 180.0,
@@ -59,11 +59,11 @@ fn a_hundred_thousand_units_are_made_and_found_again() {
     };
     let summary = job(&count).complete(make).unwrap();
     eprintln!("made in {:?}", begun.elapsed());
-    assert_eq!((summary.units, summary.made), (100_358, 100_358));
+    assert_eq!((summary.pose_jobs, summary.made), (100_358, 100_358));
     assert_eq!(made.load(Ordering::Relaxed), 100_358);
 
     let begun = Instant::now();
     let summary = job(&|_| {}).complete(make).unwrap();
     eprintln!("found again in {:?}", begun.elapsed());
-    assert_eq!((summary.units, summary.made), (100_358, 0));
+    assert_eq!((summary.pose_jobs, summary.made), (100_358, 0));
 }

@@ -63,14 +63,14 @@ pub enum MergeError {
         pose_job: String,
     },
     /// Poses that no shard holds.
-    #[error("no shard holds {pose_job}; missing are {missing} of {}", ppa_core::text::count(*units, "pose"))]
+    #[error("no shard holds {pose_job}; missing are {missing} of {}", ppa_core::text::count(*pose_jobs, "pose"))]
     Hole {
         /// The first of them.
         pose_job: String,
         /// Their number.
         missing: usize,
         /// Poses of the plan.
-        units: usize,
+        pose_jobs: usize,
     },
     /// A pose was made from other settings than its shard's `dataset.json` states.
     #[error("{pose_job} in {} was made from other settings; run ppa generate for this shard again", shard.display())]
@@ -142,8 +142,10 @@ impl<'a> Shards<'a> {
         let first = folders.first().ok_or(MergeError::NoShard)?;
         let planned = Planned::read(first)?;
         let of_dataset = planned.part(Part::WHOLE);
-        let units = of_dataset.iter().flat_map(LimbJobs::pose_jobs);
-        let units: HashMap<_, _> = units.map(|pose_job| (pose_job.id(), pose_job)).collect();
+        let pose_jobs = of_dataset.iter().flat_map(LimbJobs::pose_jobs);
+        let pose_jobs: HashMap<_, _> = pose_jobs
+            .map(|pose_job| (pose_job.id(), pose_job))
+            .collect();
         let mut claims = Vec::new();
         let mut holder = HashMap::new();
         for folder in folders {
@@ -160,7 +162,7 @@ impl<'a> Shards<'a> {
                 });
             }
             for pose in record_names(&folder.join(FOLDER))? {
-                let Some(pose_job) = units.get(&pose) else {
+                let Some(pose_job) = pose_jobs.get(&pose) else {
                     let (root, record) = (folder.clone(), pose.record_name());
                     return Err(FolderError::OtherPlan { root, record }.into());
                 };
@@ -182,14 +184,14 @@ impl<'a> Shards<'a> {
     }
 
     fn require_all(&self, limbs: &[LimbJobs]) -> Result<(), MergeError> {
-        let units = || limbs.iter().flat_map(LimbJobs::pose_jobs);
-        let missing = || units().filter(|pose_job| !self.holder.contains_key(&pose_job.id()));
+        let pose_jobs = || limbs.iter().flat_map(LimbJobs::pose_jobs);
+        let missing = || pose_jobs().filter(|pose_job| !self.holder.contains_key(&pose_job.id()));
         match missing().next() {
             None => Ok(()),
             Some(pose_job) => Err(MergeError::Hole {
                 pose_job: pose_job.to_string(),
                 missing: missing().count(),
-                units: units().count(),
+                pose_jobs: pose_jobs().count(),
             }),
         }
     }

@@ -11,17 +11,17 @@ use serde::Deserialize;
 use crate::limb_jobs::{LimbJobs, PlannedLimb, jobs_of_part};
 use crate::seal::{Opened, opened};
 
-/// Which units a dataset is made of, and what they follow from.
+/// Which poses a dataset is made of, and what they follow from.
 pub(crate) struct Planned {
     /// `dataset.json` as it stands.
     pub text: String,
     /// Whether its files carry hashes, which those of earlier versions did not.
     pub sealed: bool,
-    units: PlannedUnits,
+    planned: PlannedPoses,
 }
 
 #[derive(Deserialize)]
-struct PlannedUnits {
+struct PlannedPoses {
     version: u32,
     rotation: Sweep,
     limbs: Vec<PlannedLimb>,
@@ -32,29 +32,29 @@ impl Planned {
         let path = root.join(DESCRIPTION_FILE);
         let text = read_text(&path)?;
         let seal = opened(&text);
-        let units: PlannedUnits =
+        let planned: PlannedPoses =
             serde_json::from_str(&text).map_err(|e| FileError::at("parse", &path)(e.into()))?;
         let sealed = matches!(seal, Opened::Sealed(_));
-        if !sealed && (units.version > 1 || seal == Opened::Broken) {
+        if !sealed && (planned.version > 1 || seal == Opened::Broken) {
             let damaged =
                 std::io::Error::other("it is damaged: its hash is not the one it carries");
             return Err(FileError::at("use", &path)(damaged));
         }
-        units
+        planned
             .rotation
             .poses()
             .map_err(|e| FileError::at("use", &path)(std::io::Error::other(e)))?;
         Ok(Self {
             text,
             sealed,
-            units,
+            planned,
         })
     }
 
-    /// The units of one part, limb by limb.
+    /// The pose jobs of one shard, limb by limb.
     pub fn part(&self, part: Part) -> Vec<LimbJobs> {
-        let poses = self.units.rotation.poses();
+        let poses = self.planned.rotation.poses();
         let poses = poses.expect("the rotation was checked when it was read");
-        jobs_of_part(self.units.limbs.iter().cloned(), &poses, part)
+        jobs_of_part(self.planned.limbs.iter().cloned(), &poses, part)
     }
 }

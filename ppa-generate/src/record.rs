@@ -16,7 +16,7 @@ use sha2::{Digest, Sha256};
 use crate::pose_id::PoseId;
 use crate::seal::{Opened, opened, sealed};
 
-/// One pose of one limb: the unit of work.
+/// The generation of one pose of one limb.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PoseJob<'a> {
     /// The limb.

@@ -162,7 +162,7 @@ pub fn body_of_cloud(cloud: &PointCloud) -> Result<Body, SceneSetupError> {
     Ok(Body::Surfels(SurfelBody::new(points, normals, radius_mm)?))
 }
 
-/// Everything that stands still while the limb turns.
+/// Everything that is fixed while the limb turns.
 pub struct SceneSetup {
     /// Room, table and device.
     pub table: Table,
@@ -173,7 +173,7 @@ pub struct SceneSetup {
 }
 
 impl SceneSetup {
-    /// Sets the stage of a plan.
+    /// The scene setup of a plan.
     ///
     /// # Errors
     /// [`SceneSetupError`] naming the room, table, camera or beam at fault.

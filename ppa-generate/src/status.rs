@@ -21,7 +21,8 @@ pub struct Status {
     /// Which part of its plan the folder is to hold, as `2/8`.
     pub part: String,
     /// Poses that it is to hold.
-    pub units: usize,
+    #[serde(rename = "units")]
+    pub pose_jobs: usize,
     /// Poses that are made.
     pub made: usize,
     /// Images of these poses.
@@ -47,7 +48,8 @@ pub struct LimbStatus {
     #[serde(flatten)]
     pub limb: LimbId,
     /// Poses that the folder is to hold.
-    pub units: usize,
+    #[serde(rename = "units")]
+    pub pose_jobs: usize,
     /// Poses that are made.
     pub made: usize,
 }
@@ -81,7 +83,7 @@ pub fn status(root: &Path) -> Result<Status, FolderError> {
         }
         LimbStatus {
             limb: limb.limb,
-            units: limb.poses.len(),
+            pose_jobs: limb.poses.len(),
             made,
         }
     };
@@ -90,7 +92,7 @@ pub fn status(root: &Path) -> Result<Status, FolderError> {
         .iter()
         .map(&mut of_limb)
         .collect();
-    let units = limbs.iter().map(|limb| limb.units).sum();
+    let pose_jobs = limbs.iter().map(|limb| limb.pose_jobs).sum();
     let made = limbs.iter().map(|limb| limb.made).sum();
     let manifest = root.join(Manifest::FILE);
     let listed = fs::exists(&manifest).map_err(FileError::at("read", &manifest))?;
@@ -99,12 +101,12 @@ pub fn status(root: &Path) -> Result<Status, FolderError> {
         findings: findings.0.len(),
         open_findings: findings.0.iter().filter(|found| found.is_open()).count(),
         part: part.to_string(),
-        units,
+        pose_jobs,
         made,
         images,
         bytes,
         running,
-        complete: listed && !running && made == units,
+        complete: listed && !running && made == pose_jobs,
         limbs,
     })
 }

@@ -102,11 +102,13 @@ pub(crate) struct Survey {
 impl Survey {
     /// Reads the records in `root`.
     pub fn of(root: &Path, limbs: &[LimbJobs]) -> Result<Self, FileError> {
-        let units = limbs.iter().flat_map(LimbJobs::pose_jobs);
-        let units: HashMap<_, _> = units.map(|pose_job| (pose_job.id(), pose_job)).collect();
+        let pose_jobs = limbs.iter().flat_map(LimbJobs::pose_jobs);
+        let pose_jobs: HashMap<_, _> = pose_jobs
+            .map(|pose_job| (pose_job.id(), pose_job))
+            .collect();
         let recorded = record_names(&root.join(FOLDER))?;
         let is_stale = |pose: &PoseId| {
-            let Some(pose_job) = units.get(pose) else {
+            let Some(pose_job) = pose_jobs.get(pose) else {
                 return Ok(None);
             };
             let found = Record::look(&root.join(pose.record_file()), *pose)?;
@@ -125,7 +127,7 @@ impl Survey {
             stale,
             beyond: recorded
                 .into_iter()
-                .filter(|pose| !units.contains_key(pose))
+                .filter(|pose| !pose_jobs.contains_key(pose))
                 .collect(),
             unrecorded,
         })

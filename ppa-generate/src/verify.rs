@@ -127,16 +127,16 @@ fn sample(limbs: &[LimbJobs], fraction: f64, seed: u64) -> Vec<(&LimbJobs, Vec<P
             pose_job.pose.step,
         )
     };
-    let units = || limbs.iter().flat_map(LimbJobs::pose_jobs);
-    let mut draws: Vec<_> = units().map(|pose_job| draw(&pose_job)).collect();
+    let pose_jobs = || limbs.iter().flat_map(LimbJobs::pose_jobs);
+    let mut draws: Vec<_> = pose_jobs().map(|pose_job| draw(&pose_job)).collect();
     draws.sort_unstable();
     let count = (draws.len() as f64 * fraction).ceil().max(1.0) as usize;
     let Some(&limit) = draws.get(count.min(draws.len()).saturating_sub(1)) else {
         return Vec::new();
     };
     let chosen = |limb: &LimbJobs| {
-        let units = limb.pose_jobs().filter(|pose_job| draw(pose_job) <= limit);
-        units.map(|pose_job| pose_job.pose).collect::<Vec<_>>()
+        let pose_jobs = limb.pose_jobs().filter(|pose_job| draw(pose_job) <= limit);
+        pose_jobs.map(|pose_job| pose_job.pose).collect::<Vec<_>>()
     };
     let limbs = limbs.iter().map(|limb| (limb, chosen(limb)));
     limbs.filter(|(_, poses)| !poses.is_empty()).collect()

@@ -160,7 +160,7 @@ fn analog_radiographs_are_planned_made_and_verified() {
 
     let stop = AtomicBool::new(false);
     let cost = forecast(&plan, &root, 0.0, &stop, &|_| {}).unwrap();
-    assert_eq!((cost.units, cost.measured), (1, 1));
+    assert_eq!((cost.pose_jobs, cost.measured), (1, 1));
     assert_eq!(run(&plan, &root, 2).made, 1);
     assert_eq!(run(&plan, &root, 1).made, 0);
     let again = verify(&plan, &root, 1.0, 0, &stop, &|_| {}).unwrap();

@@ -117,7 +117,7 @@ pub fn describe(summary: &Summary, out: &Path, done: &str) -> String {
         out.display(),
         count(summary.depth_images, "depth image"),
         count(summary.radiographs, "radiograph"),
-        count(summary.units, "pose"),
+        count(summary.pose_jobs, "pose"),
         summary.made
     );
     if summary.replaced > 0 {

@@ -125,7 +125,7 @@ fn describe(estimate: &Estimate) -> String {
          measured   {}: {:.2}{error} s of processor time each; {:.1} s to prepare a limb\n\
          forecast   {:.2} CPU hours, {:.2} hours on {}; {} of disk{free}",
         count(f.limbs, "limb"),
-        count(f.units, "pose"),
+        count(f.pose_jobs, "pose"),
         count(f.depth_images, "depth image"),
         count(f.radiographs, "radiograph"),
         count(f.measured, "pose"),

@@ -23,7 +23,7 @@ fn describe(status: &Status) -> String {
         "shard {}: {} of {} made, {}, {}{}",
         status.part,
         status.made,
-        count(status.units, "pose"),
+        count(status.pose_jobs, "pose"),
         count(status.images, "image"),
         bytes(status.bytes),
         match (status.running, status.complete) {
@@ -42,7 +42,7 @@ fn describe(status: &Status) -> String {
         let (patient, side) = (limb.limb.patient, limb.limb.side_letter());
         lines.push(format!(
             "patient {patient} {side}  {} of {}",
-            limb.made, limb.units
+            limb.made, limb.pose_jobs
         ));
     }
     lines.join("\n")

@@ -69,7 +69,7 @@ pub fn run(args: &VerifyArgs, output: Output) -> anyhow::Result<()> {
     let problems: Vec<_> = [found.check.problems, found.different].concat();
     require_none(&args.dataset, &problems)?;
     let verified = Verified {
-        units: found.check.units,
+        units: found.check.pose_jobs,
         images: found.check.images,
         remade: found.remade,
         findings: found.findings,

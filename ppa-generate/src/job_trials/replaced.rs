@@ -147,7 +147,7 @@ fn a_plan_that_grows_resumes() {
     };
     let folder = narrow.made();
     let summary = Trial::new().run(folder.path()).unwrap();
-    assert_eq!((summary.units, summary.made), (4, 3));
+    assert_eq!((summary.pose_jobs, summary.made), (4, 3));
     assert!(contents(folder.path()) == Trial::new().fresh());
 }
 

@@ -98,9 +98,9 @@ fn another_version_is_reported_before_its_keys() {
 fn the_shipped_plan_has_the_papers_size() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../plans/paper/plan.toml");
     let plan = Plan::read(&path).unwrap();
-    let units = plan.cases.len() * plan.rotation.poses().unwrap().len();
-    assert_eq!((plan.cases.len(), units), (17, 3077));
-    assert_eq!(units * 2 * plan.shapes.variants.len(), 30_770);
+    let poses = plan.cases.len() * plan.rotation.poses().unwrap().len();
+    assert_eq!((plan.cases.len(), poses), (17, 3077));
+    assert_eq!(poses * 2 * plan.shapes.variants.len(), 30_770);
     let mut patients: Vec<_> = plan.cases.iter().map(|case| case.patient).collect();
     patients.dedup();
     assert_eq!(patients, (0..17).collect::<Vec<_>>());

@@ -12,7 +12,7 @@ use super::predictions::{Prediction, join_views};
 use super::record::{Record, file, fingerprint, read_json, without_paths};
 use super::results::Results;
 use super::run::Runner;
-use super::unit::Unit;
+use super::training::Training;
 use crate::PosePrediction;
 use crate::evaluate::{BaselineKind, Row, baseline_predictions};
 use crate::train::{TrainError, samples};
@@ -65,20 +65,20 @@ impl Runner<'_> {
             variation: Variation::None,
             ..results.columns()[0]
         };
-        let unit = Unit::Run {
+        let training = Training::Run {
             configuration,
             fold,
             view,
             seed: 1,
         };
         let named = |source: TrainError| ExperimentError::Training {
-            unit: self.place(fold),
+            training: self.place(fold),
             source: Box::new(source),
         };
-        let config = self.config(unit)?;
-        let training = samples(&config, &config.training).map_err(named)?;
+        let config = self.config(training)?;
+        let trained = samples(&config, &config.training).map_err(named)?;
         let tested = samples(&config, &config.evaluation).map_err(named)?;
-        let data_sha256 = fingerprint(&[training.clone(), tested.clone()]);
+        let data_sha256 = fingerprint(&[trained.clone(), tested.clone()]);
         let record = Record {
             config: without_paths(&config),
             start_sha256: None,
@@ -93,7 +93,7 @@ impl Runner<'_> {
                 false => Err(ExperimentError::OtherSettings(path)),
             };
         }
-        let predicted = baseline_predictions(&training, &tested)?;
+        let predicted = baseline_predictions(&trained, &tested)?;
         let rows = |(kind, predictions): (BaselineKind, Vec<f64>)| {
             let predictions: Vec<_> = predictions
                 .into_iter()

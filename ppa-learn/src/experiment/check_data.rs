@@ -7,7 +7,7 @@ use ppa_core::text::error_chain;
 
 use super::error::ExperimentError;
 use super::run::Runner;
-use super::unit::Unit;
+use super::training::Training;
 use crate::data::{Balanced, DataError};
 use crate::train::{Source, TrainConfig, TrainError, samples};
 
@@ -26,9 +26,11 @@ impl Runner<'_> {
     pub fn check_data(&self, mine: impl Fn(usize) -> bool) -> Result<(), ExperimentError> {
         // Seeds draw from the same images: one of them stands for all.
         let picked = self.runs().into_iter().enumerate();
-        let picked = picked.filter(|&(n, _)| mine(n)).map(|(_, unit)| unit);
+        let picked = picked
+            .filter(|&(n, _)| mine(n))
+            .map(|(_, training)| training);
         let picked: Vec<_> = picked.collect();
-        let Some(first) = picked.iter().map(|unit| seed(*unit)).min() else {
+        let Some(first) = picked.iter().map(|training| seed(*training)).min() else {
             return Ok(());
         };
         let runs = picked.into_iter().filter(|run| seed(*run) == first);
@@ -51,7 +53,11 @@ impl Runner<'_> {
     }
 
     /// What stands against a run and the pretraining it needs.
-    fn problems(&self, run: Unit, seen: &mut Seen) -> Result<BTreeSet<String>, ExperimentError> {
+    fn problems(
+        &self,
+        run: Training,
+        seen: &mut Seen,
+    ) -> Result<BTreeSet<String>, ExperimentError> {
         let config = self.config(run)?;
         let mut problems = BTreeSet::new();
         let tested = persons(&config, &config.evaluation, seen, &mut problems);
@@ -76,9 +82,9 @@ impl Runner<'_> {
     }
 }
 
-fn seed(unit: Unit) -> u64 {
-    match unit {
-        Unit::Pretraining { seed, .. } | Unit::Run { seed, .. } => seed,
+fn seed(training: Training) -> u64 {
+    match training {
+        Training::Pretraining { seed, .. } | Training::Run { seed, .. } => seed,
     }
 }
 

@@ -42,10 +42,10 @@ pub enum ExperimentError {
     #[error(transparent)]
     Folds(#[from] FoldError),
     /// A training.
-    #[error("{unit}")]
+    #[error("{training}")]
     Training {
         /// Which one.
-        unit: String,
+        training: String,
         /// What was wrong.
         source: Box<TrainError>,
     },
@@ -59,7 +59,7 @@ pub enum ExperimentError {
         /// What is wrong with their data.
         problems: String,
     },
-    /// Results of other settings or data where those of a unit should go.
+    /// Results of other settings or data where those of a training should go.
     #[error("{} was made with other settings or data; choose another folder", .0.display())]
     OtherSettings(PathBuf),
     /// Predictions that cannot be read.

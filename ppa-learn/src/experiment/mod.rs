@@ -1,7 +1,7 @@
 //! The paper's experiments: configurations, trainings, and tables of results.
 //!
 //! A [`Configuration`] is a column of a table. Each is trained for every fold, camera view and seed ([`runs`]), some on
-//! top of a pretraining that several runs share ([`Unit::needs`]). The predictions of the two views are joined
+//! top of a pretraining that several runs share ([`Training::needs`]). The predictions of the two views are joined
 //! ([`join_views`]), their metrics brought together ([`Results`]) and printed as the paper does ([`Table`]). A [`Runner`] carries all that out for an [`ExperimentPlan`].
 
 mod baselines;
@@ -18,7 +18,7 @@ mod record;
 mod results;
 mod run;
 mod table;
-mod unit;
+mod training;
 
 pub use configuration::{Configuration, Experiment, Shapes, Start, Variation, ViewChoice};
 pub use error::ExperimentError;
@@ -30,4 +30,4 @@ pub use published::published;
 pub use results::{Comparison, Difference, Missing, Results, Summary};
 pub use run::{Begun, Event, Runner};
 pub use table::{Incomplete, Table, TableCell};
-pub use unit::{Unit, runs};
+pub use training::{Training, runs};

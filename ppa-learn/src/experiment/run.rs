@@ -18,7 +18,7 @@ use super::plan::{ExperimentPlan, Fold};
 use super::predictions::{Moment, Prediction, join_views, read_predictions};
 use super::record::{Record, file, fingerprint, read_json, without_paths};
 use super::results::Results;
-use super::unit::{Unit, runs};
+use super::training::{Training, runs};
 use crate::data::{Images, Sample, SampleImage, Views, check_split};
 use crate::evaluate::{Row, write_predictions};
 use crate::random::{Purpose, stream};
@@ -33,7 +33,7 @@ pub enum Event<'a> {
     /// A training begins, or continues.
     Begins {
         /// Which one.
-        unit: Unit,
+        training: Training,
         /// Its number among the runs of this share, from 1.
         number: usize,
         /// Runs of this share.
@@ -48,15 +48,15 @@ pub enum Event<'a> {
 pub struct Begun {
     /// Which one; its folder's name.
     #[serde(serialize_with = "as_text")]
-    pub training: Unit,
+    pub training: Training,
     /// Steps that its checkpoint holds.
     pub step: u64,
     /// Steps of the whole training.
     pub steps: u64,
 }
 
-fn as_text<S: Serializer>(unit: &Unit, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_str(unit)
+fn as_text<S: Serializer>(training: &Training, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(training)
 }
 
 /// One experiment of a plan, in a folder that holds a folder for each training.
@@ -88,7 +88,7 @@ impl<'a> Runner<'a> {
     }
 
     /// Its runs, those with ImageNet only if the plan has weights.
-    pub fn runs(&self) -> Vec<Unit> {
+    pub fn runs(&self) -> Vec<Training> {
         let seeds = self.plan.seeds_of(self.experiment);
         runs(
             &self.plan.configurations(self.experiment),
@@ -113,16 +113,16 @@ impl<'a> Runner<'a> {
         let all = self.runs().into_iter().enumerate();
         let share: Vec<_> = all
             .filter(|&(n, _)| mine(n))
-            .map(|(_, unit)| unit)
+            .map(|(_, training)| training)
             .collect();
-        for (n, &unit) in share.iter().enumerate() {
-            for unit in unit.needs().into_iter().chain([unit]) {
+        for (n, &run) in share.iter().enumerate() {
+            for training in run.needs().into_iter().chain([run]) {
                 let begins = Event::Begins {
-                    unit,
+                    training,
                     number: n + 1,
                     of: share.len(),
                 };
-                if !self.make(unit, stop, begins, &mut report)? {
+                if !self.make(training, stop, begins, &mut report)? {
                     return Ok(false);
                 }
             }
@@ -133,23 +133,23 @@ impl<'a> Runner<'a> {
     /// Carries out one training, unless it is finished.
     fn make(
         &self,
-        unit: Unit,
+        training: Training,
         stop: &AtomicBool,
         begins: Event,
         report: &mut impl FnMut(Event),
     ) -> Result<bool, ExperimentError> {
         let named = |source: TrainError| ExperimentError::Training {
-            unit: unit.to_string(),
+            training: training.to_string(),
             source: Box::new(source),
         };
-        let folder = self.folder(unit);
+        let folder = self.folder(training);
         create_dir_all(&folder).map_err(file("create", &folder))?;
         let path = folder.join("lock");
         let lock = File::create(&path).map_err(file("create", &path))?;
         lock.lock().map_err(file("lock", &path))?;
 
-        let config = self.config(unit)?;
-        let record = self.record(unit, &config).map_err(named)?;
+        let config = self.config(training)?;
+        let record = self.record(training, &config).map_err(named)?;
         let path = folder.join("finished.json");
         if path.exists() {
             return match read_json::<Record>(&path)? == record {
@@ -158,14 +158,14 @@ impl<'a> Runner<'a> {
             };
         }
         report(begins);
-        let tested = unit.tests_network_of();
+        let tested = training.tests_network_of();
         if tested.is_none() {
             let steps = |progress: &Progress| report(Event::Step(progress));
             if train(&config, &folder, stop, steps).map_err(named)? != Ended::Finished {
                 return Ok(false);
             }
         }
-        if let Unit::Run { .. } = unit {
+        if let Training::Run { .. } = training {
             let network = tested.map_or(folder.clone(), |tested| self.folder(tested));
             let rows = test(&network, &config).map_err(named)?;
             write_predictions(&folder.join("predictions.csv"), &rows)?;
@@ -189,30 +189,30 @@ impl<'a> Runner<'a> {
         self.experiment
     }
 
-    fn folder(&self, unit: Unit) -> PathBuf {
-        self.root.join(unit.to_string())
+    fn folder(&self, training: Training) -> PathBuf {
+        self.root.join(training.to_string())
     }
 
     /// The whole configuration of a training.
-    pub(super) fn config(&self, unit: Unit) -> Result<TrainConfig, ExperimentError> {
+    pub(super) fn config(&self, training: Training) -> Result<TrainConfig, ExperimentError> {
         let all = |shapes: &[BodyShape]| Source {
             shapes: Some(shapes.to_vec()),
             ..self.plan.synthetic.source()
         };
-        Ok(match unit {
-            Unit::Pretraining { shapes, view, seed } => TrainConfig {
+        Ok(match training {
+            Training::Pretraining { shapes, view, seed } => TrainConfig {
                 seed,
                 views: view.map_or(Views::Unified, of_view),
                 training: vec![all(shapes.variants())],
                 ..self.plan.training_config()?
             },
-            Unit::Run {
+            Training::Run {
                 configuration,
                 fold,
                 view,
                 seed,
             } => {
-                let training = self.training_persons(fold, configuration.variation);
+                let trained = self.training_persons(fold, configuration.variation);
                 let fold = &self.folds[fold];
                 let experiment = configuration.experiment;
                 let target = self.plan.target(experiment)?;
@@ -235,7 +235,7 @@ impl<'a> Runner<'a> {
                 TrainConfig {
                     seed,
                     views: of_view(view),
-                    start: self.start(unit),
+                    start: self.start(training),
                     mirror: base.mirror && configuration.variation != Variation::Unmirrored,
                     layers: match experiment {
                         Experiment::TwoC => Layers::Last,
@@ -246,7 +246,7 @@ impl<'a> Runner<'a> {
                             Variation::EveryPose(n) => Some(n),
                             _ => None,
                         },
-                        ..of(&training, configuration.shapes.variants())
+                        ..of(&trained, configuration.shapes.variants())
                     }],
                     evaluation: vec![of(&fold.test, tested)],
                     ..base
@@ -271,22 +271,22 @@ impl<'a> Runner<'a> {
     }
 
     /// The weights that a training begins with.
-    fn start(&self, unit: Unit) -> Option<PathBuf> {
-        match unit {
-            Unit::Run { configuration, .. } if configuration.start == Start::ImageNet => {
+    fn start(&self, training: Training) -> Option<PathBuf> {
+        match training {
+            Training::Run { configuration, .. } if configuration.start == Start::ImageNet => {
                 self.plan.imagenet_weights.clone()
             }
-            _ => Some(self.folder(unit.needs()?).join("weights.safetensors")),
+            _ => Some(self.folder(training.needs()?).join("weights.safetensors")),
         }
     }
 
     /// What shows whether a finished training is still the one that the plan asks for.
     ///
     /// Nobody whose images the weights come from may be tested with them.
-    fn record(&self, unit: Unit, config: &TrainConfig) -> Result<Record, TrainError> {
-        let training = samples(config, &config.training)?;
+    fn record(&self, training: Training, config: &TrainConfig) -> Result<Record, TrainError> {
+        let trained = samples(config, &config.training)?;
         let tested = samples(config, &config.evaluation)?;
-        if let Some(pretraining) = unit.pretraining() {
+        if let Some(pretraining) = training.pretraining() {
             let config = self.config(pretraining).map_err(|e| match e {
                 ExperimentError::Config(e) => TrainError::Config(e),
                 _ => unreachable!("a pretraining has no target"),
@@ -297,18 +297,18 @@ impl<'a> Runner<'a> {
         Ok(Record {
             config: without_paths(config),
             start_sha256,
-            data_sha256: fingerprint(&[training, tested]),
+            data_sha256: fingerprint(&[trained, tested]),
         })
     }
 
     /// Predictions of a finished run.
-    fn predictions(&self, unit: Unit) -> Result<Option<Vec<Prediction>>, ExperimentError> {
-        let folder = self.folder(unit);
+    fn predictions(&self, training: Training) -> Result<Option<Vec<Prediction>>, ExperimentError> {
+        let folder = self.folder(training);
         let finished = folder.join("finished.json");
         if !finished.exists() {
             return Ok(None);
         }
-        if read_json::<Record>(&finished)?.config != without_paths(&self.config(unit)?) {
+        if read_json::<Record>(&finished)?.config != without_paths(&self.config(training)?) {
             return Err(ExperimentError::OtherSettings(folder));
         }
         let path = folder.join("predictions.csv");
@@ -326,15 +326,15 @@ impl<'a> Runner<'a> {
         };
         let mut images = Vec::new();
         for view in View::ALL {
-            let unit = Unit::Run {
+            let training = Training::Run {
                 configuration: self.plan.configurations(self.experiment)[0],
                 fold,
                 view,
                 seed: 1,
             };
-            let config = self.config(unit)?;
+            let config = self.config(training)?;
             let wrong = |source| ExperimentError::Training {
-                unit: unit.to_string(),
+                training: training.to_string(),
                 source: Box::new(source),
             };
             let samples = samples(&config, &config.evaluation).map_err(wrong)?;
@@ -359,7 +359,7 @@ impl<'a> Runner<'a> {
     /// [`ExperimentError`] naming the checkpoint that cannot be read.
     pub fn begun(&self) -> Result<Vec<Begun>, ExperimentError> {
         let runs = self.runs().into_iter();
-        let all: BTreeSet<Unit> = runs
+        let all: BTreeSet<Training> = runs
             .flat_map(|run| run.needs().into_iter().chain([run]))
             .collect();
         let mut begun = Vec::new();
@@ -369,7 +369,7 @@ impl<'a> Runner<'a> {
                 continue;
             }
             let step = steps_made(&folder).map_err(|source| ExperimentError::Training {
-                unit: training.to_string(),
+                training: training.to_string(),
                 source: Box::new(source),
             })?;
             if step > 0 {
@@ -393,13 +393,13 @@ impl<'a> Runner<'a> {
         let mut results = Results::new(self.experiment, columns, self.folds.len(), &seeds);
         for place in results.missing() {
             let views = place.configuration.views().iter().map(|&view| {
-                let unit = Unit::Run {
+                let training = Training::Run {
                     configuration: place.configuration,
                     fold: place.fold,
                     view,
                     seed: place.seed,
                 };
-                self.predictions(unit)
+                self.predictions(training)
             });
             let wrong = |source| ExperimentError::Predictions {
                 place: place.to_string(),

@@ -11,7 +11,7 @@ use crate::network::NetworkError;
 use crate::weights::WeightsError;
 
 use super::config_error::ConfigError;
-use super::finite::Trouble;
+use super::finite::NonFinite;
 
 /// Why a training cannot begin, continue or be evaluated.
 #[derive(Debug, thiserror::Error)]
@@ -65,14 +65,14 @@ pub enum TrainError {
     #[error("{} is another configuration, with no checkpoint beside it to resume from; choose another folder", .0.display())]
     OtherConfig(PathBuf),
     /// Numbers that are not finite.
-    #[error("step {step}: the loss is {loss}; {trouble}")]
+    #[error("step {step}: the loss is {loss}; {place}")]
     NotFinite {
         /// The step, from 0.
         step: u64,
         /// Its loss.
         loss: f32,
         /// Where it began.
-        trouble: Trouble,
+        place: NonFinite,
     },
     /// candle's arithmetic.
     #[error("arithmetic failed")]

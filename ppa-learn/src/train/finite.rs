@@ -9,7 +9,7 @@ use crate::network::{Entry, Place, QualityNetwork};
 
 /// The layer at which numbers stopped being finite.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Trouble {
+pub enum NonFinite {
     /// A parameter: the step before was too far.
     Parameter(String),
     /// Running statistics: the first layer whose values were not finite on the way forward.
@@ -20,7 +20,7 @@ pub enum Trouble {
     Output,
 }
 
-impl fmt::Display for Trouble {
+impl fmt::Display for NonFinite {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Parameter(name) => write!(f, "the parameter {name} is not finite"),
@@ -34,7 +34,10 @@ impl fmt::Display for Trouble {
 }
 
 /// Where it began, on a network whose loss or gradient is not finite.
-pub(super) fn trouble(network: &QualityNetwork, gradients: &GradStore) -> Result<Trouble, Error> {
+pub(super) fn first_non_finite(
+    network: &QualityNetwork,
+    gradients: &GradStore,
+) -> Result<NonFinite, Error> {
     let variables = network.variables();
     let bad_in = |variables: &[&Var], layout: Vec<Place>| -> Result<Option<String>, Error> {
         let flat = variables.iter().map(|v| v.flatten_all()?.to_vec1());
@@ -45,10 +48,10 @@ pub(super) fn trouble(network: &QualityNetwork, gradients: &GradStore) -> Result
         Ok(bad.map(|place| place.entry.name))
     };
     if let Some(name) = bad_in(&variables, network.layout())? {
-        return Ok(Trouble::Parameter(name));
+        return Ok(NonFinite::Parameter(name));
     }
     if let Some(name) = bad_in(&network.statistics_variables(), network.statistics_layout())? {
-        return Ok(Trouble::Forward(name));
+        return Ok(NonFinite::Forward(name));
     }
     let mut last = None;
     for Place { variable, entry } in network.layout() {
@@ -58,7 +61,7 @@ pub(super) fn trouble(network: &QualityNetwork, gradients: &GradStore) -> Result
             last = Some(entry.name);
         }
     }
-    Ok(last.map_or(Trouble::Output, Trouble::Backward))
+    Ok(last.map_or(NonFinite::Output, NonFinite::Backward))
 }
 
 fn is_bad(flat: &[f32], entry: &Entry) -> bool {

@@ -33,7 +33,7 @@ pub use config::{LastLayer, Layers, NetworkConfig, Source, TrainConfig};
 pub use config_error::ConfigError;
 pub(crate) use config_file::merge;
 pub use error::TrainError;
-pub use finite::Trouble;
+pub use finite::NonFinite;
 pub use log::{LogRow, read_log};
 pub use run::{Ended, Progress, train};
 pub use schedule::{RateSchedule, Schedule, StepCounting};

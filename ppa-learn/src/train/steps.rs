@@ -18,7 +18,7 @@ use super::checkpoint;
 use super::config::{Layers, TrainConfig};
 use super::data_state::DataState;
 use super::error::TrainError;
-use super::finite::{is_finite, trouble};
+use super::finite::{first_non_finite, is_finite};
 use super::log::{Log, LogRow};
 use super::loss::loss;
 use super::measure::{EVALUATION, scalars};
@@ -70,7 +70,7 @@ impl Run<'_> {
             return Err(TrainError::NotFinite {
                 step,
                 loss,
-                trouble: trouble(&self.network, &gradients)?,
+                place: first_non_finite(&self.network, &gradients)?,
             });
         }
         let schedule = self.config.schedule();

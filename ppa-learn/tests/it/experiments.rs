@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use ppa_learn::evaluate::BaselineKind;
 use ppa_learn::experiment::{
-    Event, Experiment, ExperimentError, ExperimentPlan, Metric, Results, Runner, Table, Unit,
+    Event, Experiment, ExperimentError, ExperimentPlan, Metric, Results, Runner, Table, Training,
 };
 use tempfile::TempDir;
 
@@ -65,8 +65,8 @@ fn probing_is_gathered_from_shards_and_left_as_it_is() {
             |n| n % 3 == shard,
             &go(),
             |event| {
-                if let Event::Begins { unit, .. } = event {
-                    begun.push(unit.to_string());
+                if let Event::Begins { training, .. } = event {
+                    begun.push(training.to_string());
                 }
             },
         );
@@ -282,7 +282,7 @@ fn finetuning_has_settings_of_its_own() {
     let plan = ExperimentPlan::read(&path).unwrap();
     let runner = Runner::new(&plan, Experiment::TwoA, folder.path()).unwrap();
     let number = |column: &str| {
-        let is_of = |run: &Unit| run.to_string().contains(column);
+        let is_of = |run: &Training| run.to_string().contains(column);
         runner.runs().iter().position(is_of).unwrap()
     };
     let steps = |number: usize| {

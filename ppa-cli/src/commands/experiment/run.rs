@@ -9,7 +9,7 @@ use ppa_core::text::{count, number};
 use ppa_dataset::write_whole;
 use ppa_learn::experiment::{
     Begun, Comparison, Configuration, Difference, Event, Experiment, ExperimentPlan, Runner, Table,
-    Unit,
+    Training,
 };
 use ppa_metrics::{ConstantPrediction, PermutationTest};
 use serde::Serialize;
@@ -309,15 +309,15 @@ fn chosen(
             all.join(", ")
         );
     }
-    let is_chosen = |unit: &Unit| match unit {
-        Unit::Run { configuration, .. } => {
+    let is_chosen = |training: &Training| match training {
+        Training::Run { configuration, .. } => {
             names.is_empty() || names.contains(&configuration.name())
         }
-        Unit::Pretraining { .. } => false,
+        Training::Pretraining { .. } => false,
     };
     let runs = runner.runs().into_iter().enumerate();
     Ok(runs
-        .filter(|(_, unit)| is_chosen(unit))
+        .filter(|(_, training)| is_chosen(training))
         .map(|(n, _)| n)
         .collect())
 }
@@ -336,8 +336,12 @@ fn train(
         |n| share.contains(&n),
         interrupt.flag(),
         |event| match event {
-            Event::Begins { unit, number, of } => {
-                bar.suspend(|| stderr::note(&format!("{number} of {of}: {unit}")));
+            Event::Begins {
+                training,
+                number,
+                of,
+            } => {
+                bar.suspend(|| stderr::note(&format!("{number} of {of}: {training}")));
                 bar.reset();
             }
             Event::Step(progress) => {

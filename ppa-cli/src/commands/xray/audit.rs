@@ -49,7 +49,7 @@ pub fn run(args: &AuditArgs, output: Output) -> anyhow::Result<()> {
 const WIDTH: usize = 40;
 
 fn describe(audit: &Audit) -> String {
-    let bars = Bars::of(audit);
+    let histogram = HistogramRows::of(audit);
     let mut text = format!(
         "{:<16}{:>10}{:>12}{:>10}{:>9}{:>8}  {}\n",
         "segment",
@@ -58,7 +58,7 @@ fn describe(audit: &Audit) -> String {
         "mass g",
         "from HU",
         "to HU",
-        bars.caption()
+        histogram.caption()
     );
     let mut line = |text_line: std::fmt::Arguments| {
         text.write_fmt(text_line)
@@ -74,7 +74,7 @@ fn describe(audit: &Audit) -> String {
             segment.mass_g,
             hu(segment.lowest_hu),
             hu(segment.highest_hu),
-            bars.row(&segment.bins)
+            histogram.row(&segment.bins)
         ));
         if segment.below_curve + segment.above_curve > 0 {
             line(format_args!(
@@ -112,13 +112,13 @@ fn describe(audit: &Audit) -> String {
 }
 
 /// Rows of bars, one character for the same number of neighbouring bins everywhere, its height logarithmic.
-struct Bars {
+struct HistogramRows {
     bin_hu: f32,
     hu_per_bar: f32,
     most: f64,
 }
 
-impl Bars {
+impl HistogramRows {
     fn of(audit: &Audit) -> Self {
         let bin_hu = f32::from(audit.bin_hu);
         let widths = audit
@@ -131,7 +131,7 @@ impl Bars {
             });
         // A row whose first bin does not begin a bar needs one bar more.
         let bins_per_bar = (widths.fold(0.0, f32::max) / bin_hu / (WIDTH - 1) as f32).ceil();
-        let mut bars = Self {
+        let mut histogram = Self {
             bin_hu,
             hu_per_bar: bins_per_bar.max(1.0) * bin_hu,
             most: 1.0,
@@ -139,9 +139,9 @@ impl Bars {
         let rows = audit
             .segments
             .iter()
-            .flat_map(|segment| bars.sums(&segment.bins));
-        bars.most = rows.fold(1, usize::max) as f64;
-        bars
+            .flat_map(|segment| histogram.sums(&segment.bins));
+        histogram.most = rows.fold(1, usize::max) as f64;
+        histogram
     }
 
     fn caption(&self) -> String {
@@ -199,13 +199,13 @@ mod tests {
     fn bars_stand_for_neighbouring_bins() {
         let bin = |from_hu, voxels| HuBin { from_hu, voxels };
         let bins = [bin(-50.0, 1), bin(0.0, 400), bin(50.0, 599), bin(200.0, 30)];
-        let bars = Bars {
+        let histogram = HistogramRows {
             bin_hu: 50.0,
             hu_per_bar: 100.0,
             most: 999.0,
         };
-        assert_eq!(bars.sums(&bins), [1, 999, 0, 30]);
-        assert_eq!(bars.row(&bins), "▁█ ▄");
-        assert_eq!(bars.row(&[]), "");
+        assert_eq!(histogram.sums(&bins), [1, 999, 0, 30]);
+        assert_eq!(histogram.row(&bins), "▁█ ▄");
+        assert_eq!(histogram.row(&[]), "");
     }
 }

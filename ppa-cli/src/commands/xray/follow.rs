@@ -46,13 +46,13 @@ pub struct AnalogArgs {
 }
 
 /// Where the sums of a run are kept.
-pub struct Keep {
+pub struct TallyDestination {
     path: PathBuf,
     /// Asked for by `--tally`; else they are kept only if the run is stopped.
     named: bool,
 }
 
-impl Keep {
+impl TallyDestination {
     fn folder(&self) -> &Path {
         match self.path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -68,7 +68,7 @@ impl AnalogArgs {
         outputs: &mut OutputFiles,
         image: Option<&Path>,
         replace: ReplaceArgs,
-    ) -> anyhow::Result<Keep> {
+    ) -> anyhow::Result<TallyDestination> {
         outputs.optional("--dose-map", self.dose_map.as_ref(), &[".nii", ".nii.gz"])?;
         let replace = replace.is_given();
         if let Some(path) = &self.tally {
@@ -85,7 +85,7 @@ impl AnalogArgs {
             if !exists || !self.resume {
                 outputs.file("--tally", path, &[])?;
             }
-            return Ok(Keep {
+            return Ok(TallyDestination {
                 path: path.clone(),
                 named: true,
             });
@@ -102,7 +102,7 @@ impl AnalogArgs {
             path.display()
         );
         outputs.file("the tally", &path, &[])?;
-        Ok(Keep { path, named: false })
+        Ok(TallyDestination { path, named: false })
     }
 
     /// Whether there is an earlier run to resume.
@@ -133,7 +133,7 @@ impl AnalogArgs {
         exposure: &PosedExposure,
         histories: Option<f64>,
         seed: u64,
-        keep: &Keep,
+        destination: &TallyDestination,
     ) -> anyhow::Result<AnalogTally> {
         let stop = self.stop()?;
         let settings = AnalogSettings {
@@ -156,7 +156,7 @@ impl AnalogArgs {
                 voxels: self.dose_map.is_some().then_some(whole),
             })?;
         }
-        let mut tally = self.start(&run, keep)?;
+        let mut tally = self.start(&run, destination)?;
         let interrupt = Interrupt::listen()?;
         let bar = bar("following photons");
         let mut saved = Instant::now();
@@ -169,9 +169,9 @@ impl AnalogArgs {
             if interrupt.is_asked() {
                 return ControlFlow::Break(());
             }
-            if keep.named && saved.elapsed() > SAVE_EVERY {
+            if destination.named && saved.elapsed() > SAVE_EVERY {
                 saved = Instant::now();
-                if let Err(error) = tally.write(&keep.path) {
+                if let Err(error) = tally.write(&destination.path) {
                     failed = Some(error);
                     return ControlFlow::Break(());
                 }
@@ -182,12 +182,12 @@ impl AnalogArgs {
         if let Some(error) = failed {
             return Err(error.into());
         }
-        if keep.named || ended == Stopped::Interrupted {
-            tally.write(&keep.path)?;
+        if destination.named || ended == Stopped::Interrupted {
+            tally.write(&destination.path)?;
         }
         if ended == Stopped::Interrupted {
-            let path = keep.path.display();
-            let more = match (keep.named, self.resume) {
+            let path = destination.path.display();
+            let more = match (destination.named, self.resume) {
                 (false, _) => format!(" with --tally {path} --resume"),
                 (true, false) => " with --resume".to_owned(),
                 (true, true) => String::new(),
@@ -200,17 +200,21 @@ impl AnalogArgs {
     }
 
     /// The tally to begin with.
-    fn start(&self, run: &AnalogRun, keep: &Keep) -> anyhow::Result<AnalogTally> {
+    fn start(
+        &self,
+        run: &AnalogRun,
+        destination: &TallyDestination,
+    ) -> anyhow::Result<AnalogTally> {
         let part = self.part.unwrap_or(Part::WHOLE);
-        let there = keep.named && keep.path.exists();
+        let there = destination.named && destination.path.exists();
         if there && self.resume {
-            return Ok(run.read(&keep.path, part)?);
+            return Ok(run.read(&destination.path, part)?);
         }
         let tally = run.tally(part);
-        require_room(keep.folder(), tally.file_bytes())?;
-        if keep.named && !there {
+        require_room(destination.folder(), tally.file_bytes())?;
+        if destination.named && !there {
             // What cannot be written is found now rather than after hours.
-            tally.write(&keep.path)?;
+            tally.write(&destination.path)?;
         }
         Ok(tally)
     }

@@ -80,7 +80,7 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
     args.pictures.declare(&mut outputs)?;
     let images = [&args.out, &args.exr, &args.pictures.dicom];
     let image = images.into_iter().flatten().next().map(PathBuf::as_path);
-    let keep = match args.engine {
+    let destination = match args.engine {
         EngineName::Fast => None,
         EngineName::Analog => Some(args.analog.declare(&mut outputs, image, args.replace)?),
     };
@@ -103,15 +103,17 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
 
     working.set_message("following photons");
     let watch = Stopwatch::start();
-    let (radiograph, dose) = match &keep {
+    let (radiograph, dose) = match &destination {
         None => {
             let _stoppable = ends_at_once(NOTHING_WRITTEN)?;
             (exposure.radiograph(args.seed)?, None)
         }
-        Some(keep) => {
+        Some(destination) => {
             working.finish_and_clear();
             let (histories, seed) = (args.histories, args.seed);
-            let tally = args.analog.follow(&exposure, histories, seed, keep)?;
+            let tally = args
+                .analog
+                .follow(&exposure, histories, seed, destination)?;
             (tally.radiograph(), tally.dose())
         }
     };

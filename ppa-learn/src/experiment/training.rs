@@ -8,7 +8,7 @@ use super::configuration::{Configuration, Experiment, Shapes, Start, Variation, 
 
 /// One training, and the test of its network where it has one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Unit {
+pub enum Training {
     /// Training with all of the synthetic dataset; several runs begin with its weights.
     Pretraining {
         /// Shapes to train with.
@@ -31,8 +31,8 @@ pub enum Unit {
     },
 }
 
-impl Unit {
-    /// The training of experiment 1 whose network this unit tests, if it trains none itself.
+impl Training {
+    /// The training of experiment 1 whose network this training tests, if it trains none itself.
     pub fn tests_network_of(self) -> Option<Self> {
         let Self::Run {
             configuration,
@@ -60,7 +60,7 @@ impl Unit {
         })
     }
 
-    /// The training that comes first: of the network that this unit tests, or of the weights that it begins with.
+    /// The training that comes first: of the network that this training tests, or of the weights that it begins with.
     pub fn needs(self) -> Option<Self> {
         self.tests_network_of().or_else(|| self.pretraining())
     }
@@ -84,8 +84,8 @@ impl Unit {
     }
 }
 
-/// A folder's name: unique among all units of all experiments.
-impl fmt::Display for Unit {
+/// A folder's name: unique among all trainings of all experiments.
+impl fmt::Display for Training {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Pretraining { shapes, view, seed } => {
@@ -109,12 +109,12 @@ impl fmt::Display for Unit {
 }
 
 /// The runs of some columns, repetition by repetition: columns that a test pairs by seed grow together.
-pub fn runs(columns: &[Configuration], folds: usize, seeds: &[u64]) -> Vec<Unit> {
+pub fn runs(columns: &[Configuration], folds: usize, seeds: &[u64]) -> Vec<Training> {
     let mut runs = Vec::new();
     for &seed in seeds {
         for &configuration in columns {
             for fold in 0..folds {
-                runs.extend(configuration.views().iter().map(|&view| Unit::Run {
+                runs.extend(configuration.views().iter().map(|&view| Training::Run {
                     configuration,
                     fold,
                     view,
@@ -148,7 +148,7 @@ mod tests {
         let names: BTreeSet<_> = all
             .iter()
             .chain(&pretrainings)
-            .map(Unit::to_string)
+            .map(Training::to_string)
             .collect();
         assert_eq!(names.len(), all.len() + pretrainings.len());
     }
@@ -160,8 +160,10 @@ mod tests {
         let tested: BTreeSet<_> = columns.iter().flatten().filter_map(|u| u.needs()).collect();
         let of_one = runs(&Experiment::One.configurations(), 1, &[1]);
         assert_eq!(tested, of_one.into_iter().collect());
-        let trained = columns[1].iter().filter(|unit| unit.needs().is_none());
-        let trained: Vec<_> = trained.map(Unit::to_string).collect();
+        let trained = columns[1]
+            .iter()
+            .filter(|training| training.needs().is_none());
+        let trained: Vec<_> = trained.map(Training::to_string).collect();
         assert_eq!(
             trained,
             ["cam_left", "cam_right"].map(|view| format!(
@@ -172,7 +174,7 @@ mod tests {
 
     #[test]
     fn unified_weights_serve_both_views() {
-        let run = |view, views| Unit::Run {
+        let run = |view, views| Training::Run {
             configuration: Configuration {
                 experiment: Experiment::TwoA,
                 start: Start::Synthetic {
