@@ -1,3 +1,5 @@
+//! Equal parts of a run or shards of a dataset, `k/n`.
+
 use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;

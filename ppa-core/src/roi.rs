@@ -1,3 +1,5 @@
+//! Regions of interest of depth images.
+
 use serde::{Deserialize, Serialize};
 
 /// Region of interest: the square of a depth image around the joint, columns `x_start..x_start + size`, rows

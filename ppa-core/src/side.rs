@@ -1,3 +1,5 @@
+//! Sides of the body.
+
 use std::fmt;
 
 use serde::{Deserialize, Serialize};

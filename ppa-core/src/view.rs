@@ -1,3 +1,5 @@
+//! The two depth cameras.
+
 use serde::{Deserialize, Serialize};
 
 /// Which of the two depth cameras on the tube housing.

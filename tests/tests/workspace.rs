@@ -140,6 +140,22 @@ fn crates_depend_only_along_the_arrows() {
     }
 }
 
+/// What all crates share must not grow unnoticed.
+#[test]
+fn the_shared_crate_has_exactly_its_listed_dependencies() {
+    let manifest = &members()["ppa-core"];
+    let mut found = dependencies(manifest, "dependencies");
+    found.sort_unstable();
+    let listed = ["atomic-write-file", "serde", "sha2", "thiserror"];
+    assert_eq!(found, listed);
+    let targets = manifest["target"].as_table().unwrap();
+    let of_targets = targets.values().map(|target| target.as_table().unwrap());
+    let of_targets: Vec<_> = of_targets
+        .flat_map(|target| dependencies(target, "dependencies"))
+        .collect();
+    assert_eq!(of_targets, ["rustix"]);
+}
+
 /// Follows the lock file, so that a feature switched on by mistake is seen as well.
 #[test]
 fn libraries_used_alone_pull_in_no_reader_network_or_frontend() {

@@ -31,6 +31,8 @@ pub enum ExperimentCommand {
     /// Experiment 1 with one camera, and without mirroring left limbs
     Ablations(run::RunArgs),
     /// All of these that the plan has data for, one after the other
+    // Columns are those of one experiment's table.
+    #[command(mut_arg("columns", |columns| columns.hide(true)))]
     All(run::RunArgs),
     /// Write a page of all results so far: tables, charts, largest errors
     ///

@@ -1,3 +1,5 @@
+//! Seeds from the text of an address.
+
 use sha2::{Digest, Sha256};
 
 /// A seed for what an address names, such as `1/radiograph/0/r/36`: the first eight bytes of the SHA-256 of the text, little-endian.

@@ -1,3 +1,5 @@
+//! Tests of splits by person.
+
 use super::*;
 
 fn shares(shares: &[(&str, f64)]) -> Vec<(String, f64)> {

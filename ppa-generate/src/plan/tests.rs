@@ -1,3 +1,5 @@
+//! Tests of plans: what is read, written and refused.
+
 use ppa_xray::{Blur, Collimation, DetectorModel, Receptor, Source, SpotShape};
 
 use super::*;

@@ -1,3 +1,5 @@
+//! Tests of the pictures of cases and poses.
+
 use std::sync::LazyLock;
 
 use image::RgbImage;

@@ -1,3 +1,5 @@
+//! Rigid transforms between frames, and their matrices in files.
+
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use ppa_scene::{Ct, Patient, Plane, Rigid, RigidError, Room};
 use proptest::prelude::*;

@@ -1,3 +1,5 @@
+//! Landmarks of the phantom: joint, axis and supporting plane.
+
 use nalgebra::{Point3, Rotation3, Vector3};
 use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{

@@ -1,3 +1,5 @@
+//! Placement of the limb on the table: contacts, rotation and sides.
+
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_scene::{PlaceError, Placement, Plane, Rigid, Side, XrayDevice, ct_from_device, place};
 use proptest::prelude::*;

@@ -1,3 +1,5 @@
+//! The built-in room and recorded rooms.
+
 use nalgebra::{Point3, Vector3};
 use ppa_scene::{PlaneSettings, RoomError, RoomSpec, XrayRoom, table_plane};
 

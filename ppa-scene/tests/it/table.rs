@@ -1,3 +1,5 @@
+//! The table plane in point clouds.
+
 use nalgebra::Point3;
 use ppa_mesh::PointCloud;
 use ppa_scene::{PlaneError, PlaneSettings, TablePlane, table_plane};

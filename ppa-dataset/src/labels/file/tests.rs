@@ -1,3 +1,5 @@
+//! Tests of label files: what is read, written and refused.
+
 use super::*;
 use crate::layout::Side;
 
