@@ -42,15 +42,6 @@ pub fn prepared(case: &Case, file: &Path) -> anyhow::Result<PreparedLimb> {
     Ok(prepared)
 }
 
-/// Name of a severity, as users read it.
-pub fn severity_name(severity: Severity) -> &'static str {
-    match severity {
-        Severity::Note => "note",
-        Severity::Caution => "caution",
-        Severity::Severe => "severe",
-    }
-}
-
 fn lines(findings: &Findings, of: &str) -> Vec<String> {
     let open: Vec<&LimbFinding> = findings.0.iter().filter(|found| found.is_open()).collect();
     let alike =
@@ -76,9 +67,7 @@ fn line(finding: &Finding, limb: &str, more: usize) -> String {
     };
     format!(
         "{} [{}] {limb}: {}{more}; acknowledge it in the case once you have looked",
-        severity_name(finding.severity),
-        finding.code,
-        finding.text
+        finding.severity, finding.code, finding.text
     )
 }
 

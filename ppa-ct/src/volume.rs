@@ -164,28 +164,6 @@ impl Volume {
             .ok_or(GridError::Empty([0; 3]))?;
         self.crop(low, high)
     }
-
-    /// The smallest block of voxels `low..high` (half-open) that holds every value above
-    /// `threshold_hu`: the bounding box of tissue, for [`Volume::crop`]. `None` when there is none.
-    pub fn block_above(&self, threshold_hu: f32) -> Option<([usize; 3], [usize; 3])> {
-        let [nx, ny, _] = self.grid.size();
-        let rows = self.values().par_parts(nx).enumerate();
-        let blocks = rows.filter_map(|(row, values)| {
-            let above = |i: &usize| values.at(*i) > threshold_hu;
-            let first = (0..nx).find(above)?;
-            let last = (0..nx).rfind(above)?;
-            let (j, k) = (row % ny, row / ny);
-            Some(([first, j, k], [last + 1, j + 1, k + 1]))
-        });
-        blocks.reduce_with(|a, b| {
-            let (mut low, mut high) = a;
-            for axis in 0..3 {
-                low[axis] = low[axis].min(b.0[axis]);
-                high[axis] = high[axis].max(b.1[axis]);
-            }
-            (low, high)
-        })
-    }
 }
 
 /// The values of the voxels `low..high`.
@@ -249,26 +227,6 @@ mod tests {
                     let low = [0, 1, 2].map(|axis| bound(axis, usize::min).unwrap());
                     let high = [0, 1, 2].map(|axis| bound(axis, usize::max).unwrap() + 1);
                     prop_assert_eq!(cropped.unwrap(), volume.crop(low, high).unwrap());
-                }
-            }
-        }
-
-        #[test]
-        fn the_block_above_is_the_tightest(
-            size in prop::array::uniform3(1..6_usize),
-            values in prop::collection::vec(-1000.0..0.0_f32, 125),
-            threshold in -300.0..0.0_f32,
-        ) {
-            let grid = Grid::axis_aligned(size, Vector3::repeat(1.0), Point3::origin()).unwrap();
-            let volume = Volume::new(grid.clone(), values[..grid.len()].to_vec()).unwrap();
-            let above = (0..grid.len()).filter(|n| volume.hu()[*n] > threshold);
-            let above = above.map(|n| grid.voxel(n)).collect::<Vec<_>>();
-            let found = volume.block_above(threshold);
-            prop_assert_eq!(found.is_none(), above.is_empty());
-            if let Some((low, high)) = found {
-                for axis in 0..3 {
-                    prop_assert_eq!(above.iter().map(|v| v[axis]).min(), Some(low[axis]));
-                    prop_assert_eq!(above.iter().map(|v| v[axis] + 1).max(), Some(high[axis]));
                 }
             }
         }

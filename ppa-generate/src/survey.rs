@@ -7,6 +7,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::pose_id::PoseId;
+use ppa_core::text::count;
 use ppa_dataset::files::FileError;
 use ppa_dataset::manifest::DESCRIPTION_FILE;
 use rayon::prelude::*;
@@ -55,21 +56,21 @@ impl fmt::Display for DatasetDiffers {
             let (stale, keys) = (self.stale, keys.join(", "));
             parts.push(format!(
                 "{stale} of its {} were made from other inputs ({keys})",
-                counted(self.poses, "pose")
+                count(self.poses, "pose")
             ));
         }
-        if let Some((first, count)) = &self.beyond {
+        if let Some((first, n)) = &self.beyond {
             parts.push(format!(
                 "{} of it, the first {first}, {} not in this run",
-                counted(*count, "pose"),
-                are(*count)
+                count(*n, "pose"),
+                are(*n)
             ));
         }
-        if let Some((first, count)) = &self.unrecorded {
+        if let Some((first, n)) = &self.unrecorded {
             parts.push(format!(
                 "{}, the first {first}, {} in none of its records",
-                counted(*count, "image"),
-                are(*count)
+                count(*n, "image"),
+                are(*n)
             ));
         }
         write!(
@@ -79,10 +80,6 @@ impl fmt::Display for DatasetDiffers {
             parts.join("; ")
         )
     }
-}
-
-fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 fn are(count: usize) -> &'static str {

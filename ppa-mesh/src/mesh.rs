@@ -33,14 +33,6 @@ impl Mesh {
         }
     }
 
-    /// The vertices as a cloud.
-    pub fn to_cloud(&self) -> PointCloud {
-        PointCloud {
-            points: self.vertices.clone(),
-            normals: self.normals.clone(),
-        }
-    }
-
     /// Unit normals from the triangles around each vertex, weighted by their area; zero for a vertex
     /// without triangles.
     pub fn geometric_normals(&self) -> Vec<Vector3<f32>> {

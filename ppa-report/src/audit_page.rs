@@ -3,7 +3,7 @@
 use image::GrayImage;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use ppa_core::text::number;
-use ppa_ct::audit::{Audit, Severity};
+use ppa_ct::audit::Audit;
 use ppa_ct::{Info, LpsView, Scan, Values, Volume};
 use rayon::prelude::*;
 
@@ -50,13 +50,8 @@ fn findings(audit: &Audit) -> Markup {
         table {
             tr { th {} th { "Found" } th { "For depth images" } th { "For radiographs" } }
             @for finding in &audit.findings {
-                @let severity = match finding.severity {
-                    Severity::Note => "note",
-                    Severity::Caution => "caution",
-                    Severity::Severe => "severe",
-                };
                 tr {
-                    td class=(severity) { (severity) }
+                    td class=(finding.severity) { (finding.severity) }
                     td { (finding.text) }
                     td { (finding.depth_images) }
                     td { (finding.radiographs) }

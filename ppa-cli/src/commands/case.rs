@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 use ppa_core::text::count;
-use ppa_dataset::{Finding, Severity};
+use ppa_dataset::Finding;
 use ppa_generate::{CaseCheck, Drift};
 use ppa_report::{case_picture, write_picture};
 use serde::Serialize;
@@ -89,14 +89,12 @@ fn describe(checked: &Checked) -> String {
         format!("axis       {dx:.4} {dy:.4} {dz:.4}"),
         format!("changed    {}", changes(checked.changed.as_ref())),
     ];
-    lines.extend(checked.findings.iter().map(|finding| {
-        let severity = match finding.severity {
-            Severity::Note => "note",
-            Severity::Caution => "caution",
-            Severity::Severe => "severe",
-        };
-        format!("{severity:10} {}", finding.text)
-    }));
+    lines.extend(
+        checked
+            .findings
+            .iter()
+            .map(|finding| format!("{:10} {}", finding.severity, finding.text)),
+    );
     lines.join("\n")
 }
 

@@ -16,7 +16,6 @@ use ppa_report::{case_picture, write_picture};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
 
 use crate::commands::pictures::shown_name;
-use crate::findings::severity_name;
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::number_lists::{bone_numbers, point, range, voxel_box};
 use crate::output::{Output, working};
@@ -274,8 +273,10 @@ fn describe_found(found: &Found) -> Vec<String> {
         lines.push(format!("plane      {x:.1} {y:.1} {z:.1} mm"));
     }
     lines.extend(found.findings.iter().map(|finding| {
-        let severity = severity_name(finding.severity);
-        format!("{severity:10} [{}] {}", finding.code, finding.text)
+        format!(
+            "{:10} [{}] {}",
+            finding.severity, finding.code, finding.text
+        )
     }));
     let mut severe: Vec<String> = found
         .findings

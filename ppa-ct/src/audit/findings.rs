@@ -1,5 +1,7 @@
 //! Findings of an audit.
 
+use std::fmt;
+
 use serde::Serialize;
 
 use ppa_core::text::count;
@@ -32,6 +34,13 @@ pub enum Severity {
     Caution,
     /// Do not use the scan as it is.
     Severe,
+}
+
+impl fmt::Display for Severity {
+    /// As in JSON.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.serialize(f)
+    }
 }
 
 /// Kinds of [`Finding`]; written in kebab-case, e.g. `metal`.

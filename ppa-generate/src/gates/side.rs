@@ -1,7 +1,7 @@
 //! Agreement of the stated side with the anatomy.
 
 use ppa_dataset::findings::{Finding, FindingCode, Severity};
-use ppa_scene::{Fibula, Landmarks, Side};
+use ppa_scene::{Fibula, Landmarks};
 
 use super::at;
 
@@ -11,10 +11,6 @@ pub(super) fn finding(landmarks: &Landmarks, fibula: Option<&Fibula>) -> Option<
     if shown == landmarks.side {
         return None;
     }
-    let name = |side: Side| match side {
-        Side::Left => "left",
-        Side::Right => "right",
-    };
     Some(at(
         fibula.centre_mm,
         FindingCode::SideMismatch,
@@ -23,9 +19,7 @@ pub(super) fn finding(landmarks: &Landmarks, fibula: Option<&Fibula>) -> Option<
         format!(
             "tibia and fibula lie as in a {} leg, but the case is of the {} side: medial rotation would turn this leg laterally \
              (sine of the angle from the tibia to the fibula {:.2}, negative in a right leg)",
-            name(shown),
-            name(landmarks.side),
-            fibula.sine,
+            shown, landmarks.side, fibula.sine,
         ),
     ))
 }

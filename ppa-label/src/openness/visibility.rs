@@ -32,23 +32,6 @@ pub struct Visibility {
     pub lateral: f64,
 }
 
-impl Visibility {
-    /// Relative to the best that each gutter shows in several radiographs of one foot; the worst gutter decides. 0 throughout where
-    /// a gutter is never seen.
-    pub fn worst_relative(all: &[Self]) -> Vec<f64> {
-        let relative = |of: fn(&Self) -> f64| -> Vec<f64> {
-            let best = all.iter().map(of).fold(0.0, f64::max);
-            let seen = |one: &Self| if best > 0.0 { of(one) / best } else { 0.0 };
-            all.iter().map(seen).collect()
-        };
-        let (medial, superior) = (relative(|v| v.medial), relative(|v| v.superior));
-        let lateral = relative(|v| v.lateral);
-        (0..all.len())
-            .map(|n| medial[n].min(superior[n]).min(lateral[n]))
-            .collect()
-    }
-}
-
 /// The gap must stand out by so many standard errors: by chance one place in a thousand does.
 const LEAST_CNR: f64 = 3.0;
 /// How far beside the gap the bone is read, mm in the plane through the joint.

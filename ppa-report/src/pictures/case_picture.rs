@@ -104,10 +104,7 @@ pub(super) fn remarks(limb: &PreparedLimb, acknowledged: &[FindingCode]) -> Vec<
 
 /// The limb in two words.
 pub(super) fn limb_name(landmarks: &Landmarks) -> String {
-    let side = match landmarks.side {
-        Side::Right => "right",
-        Side::Left => "left",
-    };
+    let side = landmarks.side;
     let kind = match landmarks.limb {
         LimbKind::LowerLeg => "lower leg",
         LimbKind::Knee => "knee",

@@ -27,14 +27,6 @@ fn colour(severity: Severity) -> Colour {
     }
 }
 
-fn word(severity: Severity) -> &'static str {
-    match severity {
-        Severity::Severe => "severe",
-        Severity::Caution => "caution",
-        Severity::Note => "note",
-    }
-}
-
 /// Something a person should know, in one sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Remark {
@@ -96,7 +88,7 @@ impl Frame {
             .map(|severity| {
                 let text = match severity {
                     Severity::Severe => format!("{} severe", count(severity)),
-                    _ => ppa_core::text::count(count(severity), word(severity)),
+                    _ => ppa_core::text::count(count(severity), &severity.to_string()),
                 };
                 (text, colour(severity))
             })
@@ -113,7 +105,7 @@ impl Frame {
         remarks.sort_by_key(|remark| std::cmp::Reverse(remark.severity));
         let mut lines = Vec::new();
         for (index, remark) in remarks.iter().enumerate() {
-            let text = format!("{}: {}", word(remark.severity), remark.text);
+            let text = format!("{}: {}", remark.severity, remark.text);
             let mut parts = wrapped(&text, most - 2);
             parts[1..]
                 .iter_mut()

@@ -30,11 +30,10 @@ pub(super) fn table(findings: &Findings) -> Markup {
 
 fn row(row: &LimbFinding) -> Markup {
     let finding = &row.finding;
-    let (class, severity) = match (row.is_open(), finding.severity) {
-        (true, _) => (Some("bad"), "severe"),
-        (false, Severity::Severe) => (Some("caution"), "severe"),
-        (false, Severity::Caution) => (Some("caution"), "caution"),
-        (false, Severity::Note) => (None, "note"),
+    let class = match (row.is_open(), finding.severity) {
+        (true, _) => Some("bad"),
+        (false, Severity::Severe | Severity::Caution) => Some("caution"),
+        (false, Severity::Note) => None,
     };
     // The code as scripts and `acknowledged` in a case know it.
     let code = serde_json::to_value(finding.code).ok();
@@ -45,7 +44,7 @@ fn row(row: &LimbFinding) -> Markup {
     html! {
         tr class=[class] {
             td { "patient " (row.limb.patient) " " (row.limb.side) }
-            td { (severity) }
+            td { (finding.severity) }
             td { code { (code) } }
             td { (finding.text) }
             td { (place) }

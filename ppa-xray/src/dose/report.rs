@@ -75,11 +75,6 @@ impl VoxelDose {
     pub fn gy_per_history(&self) -> Vec<f32> {
         gray(&self.ev_per_history, &self.mass_g)
     }
-
-    /// Standard error of [`VoxelDose::gy_per_history`].
-    pub fn gy_per_history_se(&self) -> Vec<f32> {
-        gray(&self.ev_per_history_se, &self.mass_g)
-    }
 }
 
 impl Estimate {

@@ -175,18 +175,6 @@ impl Radiograph {
         Some(self.histories / self.histories_per_mas?)
     }
 
-    /// All energy per pixel, eV/cm² per mAs.
-    pub fn total_per_mas(&self) -> Option<Vec<f32>> {
-        let factor = self.histories_per_mas?;
-        let total = self.total();
-        Some(
-            total
-                .iter()
-                .map(|&value| (f64::from(value) * factor) as f32)
-                .collect(),
-        )
-    }
-
     /// Reading of a pixel with nothing in the beam and the collimator wide open, eV/cm² per history.
     pub fn open_field_at(&self, pixel: usize) -> f64 {
         let at = self.detector.pixel_centre_mm(pixel);

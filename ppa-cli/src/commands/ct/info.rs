@@ -61,12 +61,7 @@ fn describe(audited: &Audited) -> String {
     };
     let mut lines = vec![super::describe(&facts)];
     for finding in &audited.audit.findings {
-        let severity = match finding.severity {
-            Severity::Note => "note",
-            Severity::Caution => "caution",
-            Severity::Severe => "severe",
-        };
-        lines.push(format!("{severity:<10} {}", finding.text));
+        lines.push(format!("{:<10} {}", finding.severity, finding.text));
         if finding.severity > Severity::Note {
             lines.push(format!("           depth images: {}", finding.depth_images));
             lines.push(format!("           radiographs: {}", finding.radiographs));

@@ -160,15 +160,11 @@ pub fn run(args: &PhantomArgs, output: Output) -> anyhow::Result<()> {
 /// What it is called, its shape, and what is true about it.
 fn limb(args: &PhantomArgs) -> anyhow::Result<(String, Limb, Option<Truth>)> {
     let side = Side::from(args.side);
-    let side_name = match side {
-        Side::Left => "left",
-        Side::Right => "right",
-    };
     if args.limb == LimbName::Knee {
         if args.plate || args.name.is_some() || args.seed.is_some() {
             bail!("--limb knee is one shape: it takes neither --name, --seed nor --plate");
         }
-        return Ok((format!("{side_name} knee"), Limb::knee(side), None));
+        return Ok((format!("{side} knee"), Limb::knee(side), None));
     }
     let (name, mut leg) = match (args.seed, args.name.as_deref().unwrap_or("P01")) {
         (Some(seed), _) => (format!("seed {seed}"), LowerLeg::from_seed(seed, side)),
@@ -178,6 +174,6 @@ fn limb(args: &PhantomArgs) -> anyhow::Result<(String, Limb, Option<Truth>)> {
         leg = leg.with_plate();
     }
     let truth = leg.truth();
-    let name = format!("{name}, {side_name} lower leg");
+    let name = format!("{name}, {side} lower leg");
     Ok((name, leg.into_limb(), Some(truth)))
 }
