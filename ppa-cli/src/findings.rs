@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use ppa_dataset::layout::LimbId;
-use ppa_dataset::{Finding, Findings, LimbFinding, Severity};
+use ppa_dataset::{Finding, Findings, LimbFinding};
 use ppa_generate::{Case, PreparedLimb};
 
 use crate::stderr::warning;
@@ -73,8 +73,8 @@ fn line(finding: &Finding, limb: &str, more: usize) -> String {
 
 #[cfg(test)]
 mod tests {
-    use ppa_dataset::FindingCode;
     use ppa_dataset::layout::Side;
+    use ppa_dataset::{FindingCode, Severity};
 
     use super::*;
 
