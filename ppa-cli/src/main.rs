@@ -25,7 +25,7 @@ use clap::{ColorChoice, FromArgMatches, Parser, Subcommand};
 use crate::output::Output;
 use crate::stderr::GlobalOptions;
 
-/// Paired Time-of-Flight depth images and radiographs of posed limbs, made from CT scans.
+/// Paired Time-of-Flight depth images and radiographs of posed limbs from CT scans.
 ///
 /// Start with `ppa demo`. With a CT of your own: `ppa ct info`, `ppa prepare`, then
 /// `ppa generate` with a plan.

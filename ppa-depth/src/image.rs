@@ -44,7 +44,7 @@ pub enum DepthError {
     },
     /// A sensor gave up all pixels.
     #[error(
-        "the sensor measures nothing: of {seen} pixels that see a surface it gives up all (too dim, too oblique or at edges)"
+        "the sensor measures nothing: it rejects all {seen} pixels that see a surface (too dim, too oblique or at edges)"
     )]
     NothingMeasured {
         /// Pixels that have a depth without the sensor.

@@ -28,7 +28,7 @@ pub enum PoseError {
     #[error(transparent)]
     Cut(#[from] CutError),
     /// The x-ray tube as a camera that looks for cuts.
-    #[error("the x-ray tube cannot be looked through")]
+    #[error("the view from the x-ray tube cannot be computed")]
     Tube(#[from] ppa_depth::CameraError),
     /// The rotations of the plan.
     #[error(transparent)]

@@ -51,7 +51,7 @@ pub fn run(command: &CaseCommand, output: Output) -> anyhow::Result<()> {
 fn check(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
     let mut outputs = args.replace.outputs();
     outputs.optional("--picture", args.picture.as_ref(), PICTURE)?;
-    let working = working("carrying out the case");
+    let working = working("recomputing the case");
     let checked = CaseCheck::of(&args.case)
         .with_context(|| format!("{} cannot be used", args.case.display()))?;
     if let Some(path) = &args.picture {

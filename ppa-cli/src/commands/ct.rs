@@ -16,7 +16,7 @@ pub enum CtCommand {
     Info(info::InfoArgs),
     /// Write a CT in another format: NIfTI, NRRD, MetaImage or DICOM
     Convert(convert::ConvertArgs),
-    /// Make the CT of a phantom: a lower leg of P01 to P17 or by seed, or a knee
+    /// Make the CT of a phantom, a lower leg or a knee
     Phantom(phantom::PhantomArgs),
 }
 

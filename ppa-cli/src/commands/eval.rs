@@ -85,7 +85,7 @@ pub fn run(args: &EvalArgs, output: Output) -> anyhow::Result<()> {
     let tested = samples(&config, &sources)?;
     anyhow::ensure!(
         !tested.is_empty(),
-        "the configuration names no [[evaluation]]; say --dataset"
+        "the configuration has no [[evaluation]]; give --dataset"
     );
     let training = samples(&config, &config.training)?;
     check_split(&training, &tested)?;

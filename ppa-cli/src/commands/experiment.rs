@@ -10,7 +10,7 @@ use crate::output::Output;
 
 #[derive(Debug, Subcommand)]
 pub enum ExperimentCommand {
-    /// Synthetic images alone, with and without variants of the skin (table 1)
+    /// Synthetic images alone, with and without skin variants (table 1)
     #[command(name = "1")]
     One(run::RunArgs),
     /// Finetuning on preparations (table 2)
@@ -26,7 +26,7 @@ pub enum ExperimentCommand {
     Persons(run::RunArgs),
     /// Learning curve: experiment 1 with fewer poses to train with
     Poses(run::RunArgs),
-    /// The networks of experiment 1, tested with persons of altered body shapes
+    /// The networks of experiment 1, tested with altered body shapes
     Shapes(run::RunArgs),
     /// Experiment 1 with one camera, and without mirroring left limbs
     Ablations(run::RunArgs),

@@ -11,7 +11,7 @@ use crate::output::Output;
 
 #[derive(Debug, Subcommand)]
 pub enum ExportCommand {
-    /// One row per file, with pose, camera, seed, label, split and hash, as CSV or Parquet
+    /// One row per file with pose, label, split and hash (CSV, Parquet)
     Table(table::TableArgs),
     /// Metadata: Croissant for search engines, RO-Crate for archives
     Metadata(metadata::MetadataArgs),

@@ -13,7 +13,7 @@ use crate::output::Output;
 pub enum LabelCommand {
     /// Agreement of readers with each other, and with themselves
     Agree(agree::AgreeArgs),
-    /// Labels computed from the bones: openness of the joint space along the beam
+    /// Labels from the bones: openness of the joint space along the beam
     Auto(auto::AutoArgs),
     /// A page on which readers grade radiographs, blinded and shuffled
     Export(export::ExportArgs),

@@ -85,7 +85,7 @@ fn init(args: &InitArgs, output: Output) -> anyhow::Result<()> {
     output.print(&begun, |begun| {
         let plan = begun.plan.display();
         format!(
-            "{plan}: {}, all settings at their defaults; ppa plan {plan} forecasts what they take",
+            "{plan}: {}, all settings at their defaults; ppa plan {plan} estimates its cost",
             count(begun.limbs, "limb")
         )
     })

@@ -143,7 +143,7 @@ fn describe(Summary { stream, cpu_s }: &Summary) -> String {
         text += &format!("; {} skipped", stream.skipped);
     }
     if stream.unjudged > 0 {
-        text += &format!("; {} found but not judged", stream.unjudged);
+        text += &format!("; {} found but not processed", stream.unjudged);
     }
     if stream.alone > 0 {
         text += &format!(

@@ -233,7 +233,7 @@ fn segmented(path: &Path, prepared: &PreparedLimb) -> anyhow::Result<(Volume, Bo
 fn check_bones_name(bones: &Path, scan: &Path) -> anyhow::Result<()> {
     if Format::of_name(bones)? == Format::Dicom {
         bail!(
-            "--segment-bones {} would be a DICOM CT, but numbers of bones are none: write NIfTI, NRRD or MetaImage",
+            "--segment-bones {} would be a DICOM CT in Hounsfield units, but labels are numbers of bones: write NIfTI, NRRD or MetaImage",
             bones.display()
         );
     }

@@ -12,7 +12,7 @@ use crate::output::Output;
 
 #[derive(Debug, Subcommand)]
 pub enum StatsCommand {
-    /// Exact paired sign-flip permutation test of the mean difference a − b
+    /// Exact paired sign-flip test of the mean difference a − b
     Permutation(PermutationArgs),
 }
 

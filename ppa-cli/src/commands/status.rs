@@ -29,7 +29,7 @@ fn describe(status: &Status) -> String {
         match (status.running, status.complete) {
             (true, _) => ", being written now",
             (false, true) => ", complete",
-            (false, false) => ", to be continued",
+            (false, false) => ", incomplete",
         }
     )];
     if status.findings > 0 {

@@ -78,7 +78,9 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
                 }
                 if let Ok(Some(loaded)) = read_start(&args.out) {
                     let text = not_taken(&loaded.kept, &loaded.unused);
-                    note(&format!("the file of `start` is taken{text}"));
+                    note(&format!(
+                        "training starts from the weights of `start`{text}"
+                    ));
                 }
             });
             bar.set_position(progress.step - 1);

@@ -135,7 +135,7 @@ fn a_sensor_that_measures_nothing_says_so() {
     let command = "depth render wall.ply --camera camera.json --sensor blind.json --out d.png";
     let said = fail(folder.path(), command);
     assert!(
-        said.contains("of 7680 pixels that see a surface it gives up all"),
+        said.contains("it rejects all 7680 pixels that see a surface"),
         "{said}"
     );
     assert!(!folder.path().join("d.png").exists());

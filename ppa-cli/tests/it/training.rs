@@ -177,7 +177,10 @@ fn bad_trainings_are_reported_in_one_sentence() {
     let config = fs::read_to_string(folder.join("train.toml")).unwrap();
     fs::write(folder.join("leak.toml"), config.replace("[1]", "[0]")).unwrap();
     let said = fail(folder, "train leak.toml --out run");
-    assert!(said.contains("a person belongs to one of both"), "{said}");
+    assert!(
+        said.contains("a person belongs to only one of them"),
+        "{said}"
+    );
     fs::write(folder.join("nobody.toml"), config.replace("[1]", "[5]")).unwrap();
     assert!(fail(folder, "train nobody.toml --out run").contains("patient 5"));
     fs::write(folder.join("typo.toml"), config.replace("steps", "stepz")).unwrap();

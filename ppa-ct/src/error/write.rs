@@ -52,7 +52,7 @@ pub enum WriteError {
     },
     /// The axes i and j are not perpendicular: no DICOM slice.
     #[error(
-        "the axes i and j lean {lean_deg:.3} degrees from perpendicular, which a DICOM slice cannot say"
+        "the axes i and j lean {lean_deg:.3} degrees from perpendicular, which a DICOM slice cannot express"
     )]
     SlantedSlices {
         /// How far from perpendicular.

@@ -44,7 +44,7 @@ impl fmt::Display for Gutter {
 pub enum JointSpaceError {
     /// A gutter was not found.
     #[error(
-        "no {0} gutter: talus and {opposite} face each other nowhere across at most 6 mm",
+        "no {0} gutter: talus and {opposite} do not face each other within 6 mm anywhere",
         opposite = if *.0 == Gutter::Lateral { "fibula" } else { "tibia" }
     )]
     NoGutter(Gutter),

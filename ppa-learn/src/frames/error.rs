@@ -24,7 +24,7 @@ pub enum FramesError {
         expected: &'static str,
     },
     /// A network that shows left limbs as right ones, and no side.
-    #[error("{} was trained with mirror = true: it must be told whether the frames show a left or a right limb", run.display())]
+    #[error("{} was trained with mirror = true: state whether the frames show a left or a right limb", run.display())]
     Side {
         /// Folder of the training.
         run: PathBuf,

@@ -97,9 +97,7 @@ pub enum ProjectionError {
         found_deg: f64,
     },
     /// The heel effect needs the tube model.
-    #[error(
-        "the heel effect needs a spectrum of the tube model; this one does not say from which anode it comes"
-    )]
+    #[error("the heel effect needs a spectrum of the tube model; the anode of this one is unknown")]
     HeelWithoutTube,
     /// The tube model has no spectrum at a take-off angle of the field.
     #[error(

@@ -9,7 +9,7 @@ use crate::dose::report::Dose;
 #[non_exhaustive]
 pub enum DoseMapError {
     /// Doses are per history only.
-    #[error("the spectrum does not know its fluence")]
+    #[error("the fluence of the spectrum is unknown")]
     Fluence,
     /// No voxels were asked for.
     #[error("no voxel doses were counted")]

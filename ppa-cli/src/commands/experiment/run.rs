@@ -126,7 +126,7 @@ pub fn run(experiment: Experiment, args: &RunArgs, output: Output) -> anyhow::Re
 /// Runs all experiments of the plan, one after the other.
 pub fn run_all(args: &RunArgs, output: Output) -> anyhow::Result<()> {
     if !args.columns.is_empty() {
-        bail!("--columns is for one experiment, found it with all");
+        bail!("--columns names columns of one experiment and cannot be used with all");
     }
     let plan = ExperimentPlan::read(&args.plan)?;
     let (experiments, stopped) = carry_out_all(&plan, &plan.experiments(), args)?;

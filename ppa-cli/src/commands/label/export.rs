@@ -67,7 +67,7 @@ pub fn run(args: &ExportArgs, output: Output) -> anyhow::Result<()> {
     for path in pages.iter().chain([&key]) {
         ensure!(
             !path.exists(),
-            "{} is there already, and grades may depend on it; choose another --out",
+            "{} already exists, and grades may depend on it; choose another --out",
             path.display()
         );
     }

@@ -25,9 +25,9 @@ pub struct Report {
 struct Projected {
     #[serde(flatten)]
     sums: CategorySums,
-    /// Photons into the field per mAs; null when the spectrum does not know its fluence, as what follows.
+    /// Photons into the field per mAs; null when the fluence of the spectrum is unknown, as what follows.
     histories_per_mas: Option<f64>,
-    /// Tube load that the noise stands for.
+    /// Tube load whose quantum noise the image carries.
     mas: Option<f64>,
     ev_per_mas: Option<BTreeMap<&'static str, f64>>,
     open_field_ev_cm2_per_mas: Option<f64>,
