@@ -53,6 +53,7 @@ mod octaves;
 mod phantom;
 mod run;
 mod transport;
+mod vector_math;
 
 /// Scenes of the public interface's tests, which tests in here look at too; not every scene.
 #[cfg(test)]

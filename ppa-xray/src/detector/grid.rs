@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use crate::beam::receptor::{AntiScatterGrid, LinesAlong, ReceptorError, require};
 use crate::detector::energy_nodes::EnergyNodes;
 use crate::matter::material::Material;
+use crate::vector_math::exp;
 
 /// A grid ready to be asked, with its attenuation by energy.
 ///
@@ -153,6 +154,23 @@ impl Crossing {
         let ramp = if most.abs() > 1e-9 { lost / most } else { 1.0 };
         let mean = self.plateau * (1.0 - lost) + self.gap + self.ramps * ramp;
         (-space * self.way_mm - kappa * self.certain_mm).exp() * mean
+    }
+
+    /// [`Crossing::transmission`] without a branch.
+    #[inline(always)]
+    pub fn transmission_f32(&self, strip: f32, space: f32) -> f32 {
+        let kappa = (strip - space) * (self.way_mm * self.per_sideways_mm) as f32;
+        let most = kappa * self.more_mm as f32;
+        let lost = 1.0 - exp(-most);
+        // Where the difference loses digits, the first terms of its series.
+        let series = 1.0 - most * (0.5 - most * (1.0 / 6.0 - most * (1.0 / 24.0)));
+        let ramp = if most.abs() > 0.05 {
+            lost / most
+        } else {
+            series
+        };
+        let mean = self.plateau as f32 * (1.0 - lost) + self.gap as f32 + self.ramps as f32 * ramp;
+        exp(-space * self.way_mm as f32 - kappa * self.certain_mm as f32) * mean
     }
 }
 

@@ -13,3 +13,4 @@ pub(crate) mod open_field;
 mod quadrature;
 pub(crate) mod readout;
 pub(crate) mod response;
+pub(crate) mod tabulated_response;

@@ -37,6 +37,15 @@ impl Response {
         self.absorption.is_none() && self.grid.is_none()
     }
 
+    /// The converter; none for the ideal detector.
+    pub fn absorption(&self) -> Option<&Absorption> {
+        self.absorption.as_ref()
+    }
+
+    pub fn grid(&self) -> Option<&Grid> {
+        self.grid.as_ref()
+    }
+
     /// Energies at which a photon leaves abruptly more or less.
     pub fn edges_kev(&self) -> impl Iterator<Item = f64> {
         let absorption = self.absorption.iter().flat_map(Absorption::edges_kev);

@@ -25,6 +25,10 @@ const EDGE: f64 = 2e-2;
 /// A rectangle is cut as long as opposite quarters differ from its centre by more than this share of the pixel.
 const TOLERANCE: f64 = 3e-3;
 
+/// Where the quantum noise of the exposure is larger, [`EVEN`] and [`TOLERANCE`] are at least this share of it: the error of the rays
+/// is then a twentieth of the noise, and adds 0.3 % to its variance.
+const HIDDEN: f64 = 0.4;
+
 /// Points per side of the focal spot over which fluence and response of the detector, which vary slowly, are averaged.
 const OPEN_POINTS: usize = 2;
 
@@ -35,23 +39,27 @@ const NEAR: f64 = 0.25;
 
 /// First two moments per history of the primary energy in every pixel.
 ///
-/// One ray through the centre where the image bends little, up to `samples_per_side`² where it does not. A focal spot that is
-/// not a point takes no more rays: each leaves from another place of the spot.
+/// One ray through the centre where the image bends little, up to `samples_per_side`² where it does not and the noise of so many
+/// `histories` does not hide it. A focal spot that is not a point takes no more rays: each leaves from another place of the spot.
 pub(crate) fn primary_moments(
     exposure: &Exposure,
     paths: &Paths,
     lines: SpectralLines,
     samples_per_side: u32,
+    histories: f64,
 ) -> Vec<Moments> {
     let transport = &exposure.transport;
     let rays = PrimaryRays::new(exposure, paths, lines);
-    let open_spots = transport.emitter.spot_points(OPEN_POINTS);
+    let pixels = transport.projection.detector.pixels();
+    let Some(open_beam) = rays.open_beam(&transport.emitter.spot_points(OPEN_POINTS)) else {
+        return vec![Moments::default(); pixels]; // the field misses the detector
+    };
     let cuts = samples_per_side.ilog2() as usize;
     let strips_mm: Vec<Vec<f64>> = (0..=cuts)
         .map(|cut| transport.emitter.spot().strips_mm(1 << cut))
         .collect();
     let aimed = |lit: Field, scratch: &mut Scratch| {
-        rays.aim(&open_spots, centre(lit), scratch);
+        rays.aim_by(&open_beam, centre(lit), scratch);
         rays.behind(&Point3::origin(), centre(lit), scratch)
     };
     let centres = rays.per_pixel(|pixel, scratch| {
@@ -66,11 +74,11 @@ pub(crate) fn primary_moments(
     let shadow = shadow_sigma_pixels(transport);
     let reach = (REACH * shadow - NEAR).ceil().max(0.0) as usize;
     // Half the square of the standard deviation is to the blur of an even bend what 1/24 is to the pixel, 1/8 to a kink in it.
-    let even = EVEN / (1.0 + 4.0 * shadow * shadow);
+    let even_share = 1.0 / (1.0 + 4.0 * shadow * shadow);
     let voxels_per_pixel = voxels_per_pixel(transport);
     let fine = voxels_per_pixel <= 0.5;
     // An edge may cut off a corner that the five rays of an uncut pixel miss, and a part of the spot that the 20 rays of its
-    // quarters miss.
+    // quarters miss: where no noise hides it, pixels at edges are cut in any case.
     let edge_cuts = if shadow > 0.0 { 2 } else { 1 };
     let sure_cuts = voxels_per_pixel.log2().ceil().max(0.0) as usize;
     rays.per_pixel(|pixel, scratch| {
@@ -79,24 +87,25 @@ pub(crate) fn primary_moments(
         };
         let middle = centres[pixel];
         let worst = largest_about(&bends, pixel, columns, reach);
+        let hidden = HIDDEN * relative_noise(middle, area_cm2(lit), histories);
         if fine
-            && worst <= even
+            && worst <= EVEN.max(hidden) * even_share
             && is_wholly_lit(&rays, pixel)
             && let Some([x, y]) = bend(&centres, pixel, columns)
         {
             let mean = [middle, x.scaled(1.0 / 24.0), y.scaled(1.0 / 24.0)];
             return mean.into_iter().sum::<Moments>().scaled(area_cm2(lit));
         }
-        rays.aim(&open_spots, centre(lit), scratch);
+        rays.aim_by(&open_beam, centre(lit), scratch);
         let cut = Cut {
             rays: &rays,
             strips_mm: &strips_mm,
-            sure: if worst > EDGE {
+            sure: if worst > EDGE && hidden < TOLERANCE {
                 sure_cuts.max(edge_cuts)
             } else {
                 sure_cuts
             },
-            tolerance_kev: TOLERANCE * middle.mean_kev * area_cm2(lit),
+            tolerance_kev: TOLERANCE.max(hidden) * middle.mean_kev * area_cm2(lit),
         };
         let whole = Part {
             field: lit,
@@ -105,6 +114,11 @@ pub(crate) fn primary_moments(
         };
         cut.refined(whole, middle, scratch)
     })
+}
+
+/// Quantum noise of so many histories on an area, relative to the signal there.
+fn relative_noise(per_cm2: Moments, cm2: f64, histories: f64) -> f64 {
+    (per_cm2.square_kev2 / (cm2 * histories)).sqrt() / per_cm2.mean_kev.max(f64::MIN_POSITIVE)
 }
 
 /// Second differences along x and y; none at the rim.

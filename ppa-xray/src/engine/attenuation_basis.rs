@@ -6,6 +6,7 @@
 
 use crate::matter::energy_range::{CUTOFF_KEV, MAX_ENERGY_KEV};
 use crate::transport::attenuation::Attenuation;
+use crate::vector_math::{WIDTH, pad};
 
 /// Basis materials are counted in groups of this many, one SIMD register of numbers.
 pub(crate) const LANES: usize = 4;
@@ -86,6 +87,21 @@ impl AttenuationBasis {
             .collect()
     }
 
+    /// Attenuation of every basis material, mm⁻¹ per g/cm³, energy by energy, padded with zeros to a multiple of [`WIDTH`].
+    pub fn by_line(&self, energies_kev: &[f64]) -> Vec<Vec<f32>> {
+        let mut by_line = vec![Vec::new(); self.groups * LANES];
+        for &energy_kev in energies_kev {
+            let at = self.at(energy_kev);
+            for (material, mu) in by_line.iter_mut().zip(at.as_flattened()) {
+                material.push(*mu);
+            }
+        }
+        for material in &mut by_line {
+            pad(material);
+        }
+        by_line
+    }
+
     /// Attenuation exponent of basis masses, mm g/cm³, at an energy within the table.
     #[inline]
     pub fn exponent(&self, mass: &[[f32; LANES]], energy_kev: f64) -> f32 {
@@ -111,6 +127,18 @@ pub(crate) fn dot(mass: &[[f32; LANES]], attenuation: &[[f32; LANES]]) -> f32 {
         .zip(attenuation)
         .map(|(m, mu)| (m[0] * mu[0] + m[1] * mu[1]) + (m[2] * mu[2] + m[3] * mu[3]))
         .sum()
+}
+
+/// Attenuation exponents of basis masses at [`WIDTH`] lines from `first` on; `by_line` is [`AttenuationBasis::by_line`].
+#[inline(always)]
+pub(crate) fn exponents(mass: &BasisMass, by_line: &[Vec<f32>], first: usize) -> [f32; WIDTH] {
+    let mut exponents = [0.0; WIDTH];
+    for (mass, mu) in mass.as_flattened().iter().zip(by_line) {
+        for (sum, mu) in exponents.iter_mut().zip(&mu[first..first + WIDTH]) {
+            *sum += mass * mu;
+        }
+    }
+    exponents
 }
 
 /// Members of the basis, and every curve as a sum of them.

@@ -16,6 +16,7 @@ use crate::engine::paths::Paths;
 use crate::engine::site::Site;
 use crate::matter::energy_range::{CUTOFF_KEV, MAX_ENERGY_KEV};
 use crate::transport::tracking::Transport;
+use crate::vector_math::exp;
 
 /// Cells along device x and y of the field, and along the rays through the voxel box.
 const CELLS: [usize; 3] = [40, 40, 16];
@@ -137,7 +138,7 @@ impl CollisionMap {
                 paths.coarse_between(&Point3::origin(), &collision.position, &mut mass);
             }
             let scattered = lines.usual().map(|(line, photons)| {
-                let through = f64::from(-dot(&mass, &line.attenuation)).exp();
+                let through = f64::from(exp(-dot(&mass, &line.attenuation)));
                 photons * line.scattered[usize::from(found)] * through
             });
             let here = density * collision.mm3 * scattered.sum::<f64>();
@@ -260,7 +261,7 @@ fn lent(own: &[f64]) -> Vec<f64> {
 fn mean_energy_behind(lines: &Lines, mass: &[[f32; LANES]]) -> f64 {
     let (mut photons, mut energy) = (f64::MIN_POSITIVE, 0.0);
     for (line, photons_sent) in lines.usual() {
-        let through = photons_sent * f64::from(-dot(mass, &line.attenuation)).exp();
+        let through = photons_sent * f64::from(exp(-dot(mass, &line.attenuation)));
         photons += through;
         energy += through * line.energy_kev;
     }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::beam::projection::{Detector, Projection};
 use crate::beam::spectrum::Spectrum;
 use crate::detector::open_field::OpenField;
+use crate::detector::tabulated_response::TabulatedResponse;
 use crate::engine::adaptive_nodes::single_scatter_field;
 use crate::engine::adaptive_primary::primary_moments;
 use crate::engine::collision_map::CollisionMap;
@@ -24,7 +25,7 @@ use crate::engine::primary_signal::PrimarySignal;
 use crate::engine::raytrace::check_samples;
 use crate::engine::scatter_field::ScatterField;
 use crate::engine::single_scatter::SingleScatter;
-use crate::engine::spectral_quadrature::compressed;
+use crate::engine::spectral_quadrature::{Accuracy, compressed};
 use crate::image::radiograph::{CategorySums, Engine, Radiograph};
 use crate::matter::compton::ComptonModel;
 use crate::matter::scatter_density::ScatterDensities;
@@ -65,10 +66,15 @@ impl Default for FastSettings {
     }
 }
 
-/// Energies between two absorption edges that stand for the spectrum: the primary is then right to 3e-5 behind any
-/// thickness, the scatter to 1e-3.
-const PRIMARY_ENERGIES: usize = 12;
-const SCATTER_ENERGIES: usize = 8;
+/// Energies that stand for the spectrum: the primary is then right to 3e-5 behind any thickness, the scatter to 1e-3.
+const PRIMARY_ENERGIES: Accuracy = Accuracy {
+    most: 12,
+    tolerance: 1e-5,
+};
+pub(crate) const SCATTER_ENERGIES: Accuracy = Accuracy {
+    most: 8,
+    tolerance: 3e-4,
+};
 
 /// How much farther apart than for single scatter the points for multiple scatter are.
 const SMOOTHER: f64 = 1.4;
@@ -98,7 +104,13 @@ pub fn fast(
     let detector = &projection.detector;
     let paths = Paths::new(transport);
     let lines = compressed(&exposure, PRIMARY_ENERGIES);
-    let primary = primary_moments(&exposure, &paths, lines, settings.samples_per_side);
+    let primary = primary_moments(
+        &exposure,
+        &paths,
+        lines,
+        settings.samples_per_side,
+        settings.dose_histories,
+    );
     let (open_field, open_field_ev_cm2) = OpenField::of(transport, &exposure.response);
     let signal = PrimarySignal {
         detector,
@@ -190,9 +202,10 @@ impl Scatter {
         let in_all = ESTIMATES as u64 * u64::from(variance_reduction.splitting);
         let listed = settings.scatter_histories.div_ceil(in_all);
         let lists = first.lists(settings.seed, listed);
+        let response = TabulatedResponse::new(&exposure.response, lines.energies_kev());
         let single = SingleScatter {
             transport,
-            response: &exposure.response,
+            response: &response,
             paths,
             importance_model: &importance_model,
             lines: &lines,
@@ -215,7 +228,7 @@ impl Scatter {
                 importance_model: &importance_model,
                 variance_reduction,
             },
-            response: &exposure.response,
+            response: &response,
             densities: &densities,
             nodes,
         };

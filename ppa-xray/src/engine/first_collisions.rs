@@ -15,6 +15,7 @@ use crate::engine::quasi_random::QuasiRandom;
 use crate::engine::site::Site;
 use crate::transport::stream::Stream;
 use crate::transport::tracking::Transport;
+use crate::vector_math::{exp, pad};
 
 /// Independent lists, whose spread gives the standard error.
 pub(crate) const ESTIMATES: usize = 16;
@@ -27,8 +28,8 @@ const ALIKE: f64 = 0.5;
 #[derive(Default)]
 pub(crate) struct FirstCollisions {
     pub sites: Vec<Site>,
-    /// Photons of every line that get to a site, times the mass that it stands for, site by site. Their sum over a list is an
-    /// integral over all sites: mm g/cm³ per history.
+    /// Photons of every line that get to a site, times the mass that it stands for, site by site, padded as the lines are. Their sum
+    /// over a list is an integral over all sites: mm g/cm³ per history.
     photons: Vec<f32>,
     /// Photons that scatter at the sites, and the cumulative number of histories that start there.
     scattered: Vec<f64>,
@@ -101,13 +102,14 @@ impl FirstFlights<'_> {
         let mixture = emitter.mixture(&collision.direction);
         let (mut arriving, mut energy, mut scattered) = (0.0, 0.0, 0.0);
         for (line, photons) in self.lines.of(mixture) {
-            let through = f64::from(-dot(mass, &line.attenuation)).exp();
+            let through = f64::from(exp(-dot(mass, &line.attenuation)));
             let photons = (weight * photons * through) as f32;
             list.photons.push(photons);
             arriving += f64::from(photons);
             energy += f64::from(photons) * line.energy_kev;
             scattered += f64::from(photons) * line.scattered[usize::from(material)];
         }
+        pad(&mut list.photons);
         list.scattered.push(scattered);
         list.sites.push(Site {
             position: collision.position.cast(),
@@ -129,11 +131,15 @@ impl FirstCollisions {
         site: usize,
         lines: &'a Lines,
     ) -> impl Iterator<Item = (&'a Line, f64)> {
-        let lines = lines.all();
-        let photons = &self.photons[site * lines.len()..][..lines.len()];
-        lines
-            .iter()
-            .zip(photons.iter().map(|&photons| f64::from(photons)))
+        let photons = self.padded_photons(site, lines).iter();
+        let lines = lines.all().iter();
+        lines.zip(photons.map(|&photons| f64::from(photons)))
+    }
+
+    /// How many photons of every line get to a site, padded.
+    #[inline]
+    pub fn padded_photons(&self, site: usize, lines: &Lines) -> &[f32] {
+        &self.photons[site * lines.padded()..][..lines.padded()]
     }
 
     /// Many histories continue from where scatter matters, which is where the sites are, the others by the photons that

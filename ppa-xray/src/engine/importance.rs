@@ -15,6 +15,7 @@ use crate::engine::site::Site;
 use crate::matter::scatter_density::ScatterDensities;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::tracking::Transport;
+use crate::vector_math::exp;
 
 /// Rays per side of the table of a point, and depths along each.
 const RAYS: usize = 32;
@@ -254,7 +255,7 @@ impl PointImportance {
             * (along.z / (r * square)).max(0.0);
         [
             bare,
-            bare * (-self.depth(&along, r) * site.attenuation_ratio).exp(),
+            bare * exp(-self.depth(&along, r) * site.attenuation_ratio),
         ]
     }
 

@@ -7,7 +7,7 @@ use crate::beam::projection::{Detector, Projection};
 use crate::detector::open_field::OpenField;
 use crate::engine::adaptive_primary::primary_moments;
 use crate::engine::exposure::Exposure;
-use crate::engine::fast::{FastSettings, Scatter, fast};
+use crate::engine::fast::{FastSettings, SCATTER_ENERGIES, Scatter, fast};
 use crate::engine::later_collisions::VarianceReduction;
 use crate::engine::paths::Paths;
 use crate::engine::primary_signal::PrimarySignal;
@@ -36,7 +36,13 @@ fn no_expectation_depends_on_how_the_work_is_done() {
         Paths::with_coarse_cells(transport, 1_000),
     );
     assert!(exact.coarse_is_exact() && !coarse.coarse_is_exact());
-    let primary = primary_moments(&exposure, &exact, compressed(&exposure, 8), 2);
+    let primary = primary_moments(
+        &exposure,
+        &exact,
+        compressed(&exposure, SCATTER_ENERGIES),
+        2,
+        f64::INFINITY,
+    );
     let (_, open_ev_cm2) = OpenField::of(transport, &exposure.response);
     let signal = PrimarySignal {
         detector,

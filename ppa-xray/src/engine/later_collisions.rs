@@ -65,7 +65,7 @@ struct Photon {
 
 /// Where a flight ends.
 struct Landing {
-    voxel: usize,
+    material: u8,
     distance_mm: f64,
 }
 
@@ -119,11 +119,14 @@ impl Histories<'_> {
         let least = photon.weight * self.variance_reduction.roulette;
         let mut here = self.at(material, photon.energy_kev);
         while self.scatter(&mut photon, here, rng) {
-            let Some(Landing { voxel, distance_mm }) = self.fly(&photon, rng) else {
+            let Some(Landing {
+                material,
+                distance_mm,
+            }) = self.fly(&photon, rng)
+            else {
                 return;
             };
             photon.position += photon.direction * distance_mm;
-            let material = self.transport.phantom.material()[voxel];
             here = self.at(material, photon.energy_kev);
             let c = here.1;
             collisions.sites.push(Site {
@@ -153,7 +156,6 @@ impl Histories<'_> {
     /// Flies to the next collision, if there is one this side of the detector plane.
     fn fly(&self, photon: &Photon, rng: &mut Philox) -> Option<Landing> {
         let Transport {
-            phantom,
             attenuation,
             projection,
             ..
@@ -167,20 +169,24 @@ impl Histories<'_> {
         // 1 − u lies in (0, 1], so the logarithm stays finite.
         let mut depth = -(1.0 - rng.unit()).ln();
         let mut landing = None;
-        self.paths.pieces(
+        self.paths.stretches(
             &photon.position,
             &photon.direction,
             to_plane_mm,
-            |voxel, from_mm, to_mm| {
-                let total = attenuation.at(phantom.material()[voxel], node).total;
-                let mu = f64::from(phantom.density_g_cm3()[voxel] * total);
+            |code, from_mm, to_mm| {
+                let material = code.material();
+                let total = attenuation.at(material, node).total;
+                let mu = f64::from(code.density_g_cm3() * total);
                 let here = mu * (to_mm - from_mm);
                 if depth >= here {
                     depth -= here;
                     return Step::Continue(());
                 }
                 let distance_mm = from_mm + depth / mu;
-                landing = Some(Landing { voxel, distance_mm });
+                landing = Some(Landing {
+                    material,
+                    distance_mm,
+                });
                 Step::Break(())
             },
         );

@@ -6,15 +6,21 @@ use crate::beam::heel::Mixture;
 use crate::beam::spectral_lines::SpectralLines;
 use crate::engine::attenuation_basis::LANES;
 use crate::engine::exposure::Exposure;
+use crate::engine::line_scattering::LineScattering;
 use crate::engine::paths::Paths;
 use crate::engine::scatter_table::ScatterTable;
-use crate::engine::spectral_quadrature::compressed;
+use crate::engine::spectral_quadrature::{Accuracy, compressed};
 use crate::matter::scatter_density::ScatterDensities;
+use crate::vector_math::WIDTH;
 
 /// Energies of a quadrature, the same for all spectra of the emitter.
 pub(crate) struct Lines {
     lines: Vec<Line>,
     spectra: SpectralLines,
+    /// By material.
+    scattering: Vec<LineScattering>,
+    /// Attenuation of every basis material, line by line, padded.
+    attenuation: Vec<Vec<f32>>,
 }
 
 /// An energy of a quadrature.
@@ -22,44 +28,76 @@ pub(crate) struct Line {
     pub energy_kev: f64,
     /// Attenuation of the basis materials.
     pub attenuation: Vec<[f32; LANES]>,
-    /// By material.
-    pub scattering: Vec<ScatterTable>,
     /// Compton and Rayleigh scattering in all directions by material, mm⁻¹ per g/cm³.
     pub scattered: Vec<f64>,
 }
 
 impl Lines {
-    /// At most `nodes` energies between two absorption edges.
+    /// The energies that `accuracy` asks for.
     pub fn new(
         exposure: &Exposure,
         paths: &Paths,
         densities: &[ScatterDensities],
-        nodes: usize,
+        accuracy: Accuracy,
     ) -> Self {
         let transport = &exposure.transport;
         let line = |energy_kev: f64| {
             let node = transport.attenuation.locate(energy_kev);
             let coefficients = |material: usize| transport.attenuation.at(material as u8, node);
-            let table = |material: usize| {
-                let tables = &transport.samplers[material];
-                let c = coefficients(material);
-                ScatterTable::new(&densities[material], tables, energy_kev, &c)
-            };
             Line {
                 energy_kev,
                 attenuation: paths.basis.at(energy_kev),
-                scattering: (0..densities.len()).into_par_iter().map(table).collect(),
                 scattered: (0..densities.len())
                     .map(coefficients)
                     .map(|c| f64::from(c.total - c.photoelectric))
                     .collect(),
             }
         };
-        let spectra = compressed(exposure, nodes);
+        let spectra = compressed(exposure, accuracy);
+        let scattering = |material: usize| {
+            let tables: Vec<ScatterTable> = spectra
+                .energy_kev
+                .iter()
+                .map(|&energy_kev| {
+                    let node = transport.attenuation.locate(energy_kev);
+                    let c = transport.attenuation.at(material as u8, node);
+                    let tables = &transport.samplers[material];
+                    ScatterTable::new(&densities[material], tables, energy_kev, &c)
+                })
+                .collect();
+            LineScattering::new(&tables)
+        };
+        let scattering = (0..densities.len())
+            .into_par_iter()
+            .map(scattering)
+            .collect();
         Self {
             lines: spectra.energy_kev.iter().map(|&kev| line(kev)).collect(),
+            scattering,
+            attenuation: paths.basis.by_line(&spectra.energy_kev),
             spectra,
         }
+    }
+
+    /// Ascending.
+    pub fn energies_kev(&self) -> &[f64] {
+        &self.spectra.energy_kev
+    }
+
+    /// Scattering of a material at every line.
+    pub fn scattering(&self, material: u8) -> &LineScattering {
+        &self.scattering[usize::from(material)]
+    }
+
+    /// Attenuation of every basis material, mm⁻¹ per g/cm³, line by line, padded to a multiple of
+    /// [`WIDTH`](crate::vector_math::WIDTH).
+    pub fn attenuation(&self) -> &[Vec<f32>] {
+        &self.attenuation
+    }
+
+    /// Lines with padding.
+    pub fn padded(&self) -> usize {
+        self.lines.len().next_multiple_of(WIDTH)
     }
 
     pub fn all(&self) -> &[Line] {

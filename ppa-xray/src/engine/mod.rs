@@ -15,6 +15,7 @@ mod coarse_cells;
 mod collision_map;
 #[cfg(test)]
 mod energy_balance;
+mod even_blocks;
 pub(crate) mod exposure;
 pub(crate) mod fast;
 mod first_collisions;
@@ -22,10 +23,12 @@ mod importance;
 #[cfg(test)]
 mod invariance;
 mod later_collisions;
+mod line_scattering;
 mod lines;
 mod multiple_scatter;
 mod node_grid;
 pub(crate) mod noise;
+mod open_beam;
 mod paths;
 mod primary_rays;
 mod primary_signal;

@@ -6,16 +6,16 @@ use nalgebra::Point3;
 use ppa_core::random::Philox;
 use rayon::prelude::*;
 
-use crate::detector::response::Response;
+use crate::detector::tabulated_response::TabulatedResponse;
 use crate::engine::attenuation_basis::BasisMass;
 use crate::engine::attenuation_basis::LANES;
 use crate::engine::importance::{Draws, PointImportance, Subset};
 use crate::engine::later_collisions::{Histories, LaterCollisions};
 use crate::engine::node_grid::NodeGrid;
-use crate::matter::energy_range::CUTOFF_KEV;
 use crate::matter::scatter_density::ScatterDensities;
 use crate::transport::stream::Stream;
 use crate::transport::tally::Moments;
+use crate::vector_math::exp;
 
 /// Most histories from a list whose collisions are kept at the same time.
 const ROUND: u64 = 8_192;
@@ -30,7 +30,7 @@ const CHECKED: u32 = 8;
 /// Histories, and the points of the detector that their collisions are seen from.
 pub(crate) struct MultipleScatter<'a> {
     pub histories: Histories<'a>,
-    pub response: &'a Response,
+    pub response: &'a TabulatedResponse<'a>,
     pub densities: &'a [ScatterDensities],
     pub nodes: NodeGrid,
 }
@@ -169,22 +169,17 @@ impl MultipleScatter<'_> {
             * densities.compton_density(energy_kev, cos_theta);
         let rayleigh =
             f64::from(c.total - c.with_compton) * densities.rayleigh_density(energy_kev, cos_theta);
+        let incidence = self.response.incidence([target.x, target.y], &direction);
         let kinds =
             [(scattered_kev, compton), (energy_kev, rayleigh)].map(|(energy_kev, density)| {
-                let followed = energy_kev >= CUTOFF_KEV;
-                let left = self
-                    .response
-                    .moments(energy_kev, [target.x, target.y], &direction);
-                let left = left.scaled(if followed { density } else { 0.0 });
-                (energy_kev, left)
+                (energy_kev, incidence.of_energy(energy_kev).scaled(density))
             });
         let through = |mass: &BasisMass| -> Moments {
             kinds
                 .iter()
                 .map(|(energy_kev, left)| {
-                    left.scaled(
-                        f64::from(-self.histories.paths.basis.exponent(mass, *energy_kev)).exp(),
-                    )
+                    let exponent = self.histories.paths.basis.exponent(mass, *energy_kev);
+                    left.scaled(f64::from(exp(-exponent)))
                 })
                 .sum()
         };

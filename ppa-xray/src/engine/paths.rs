@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use crate::beam::spectrum::Spectrum;
 use crate::engine::attenuation_basis::{AttenuationBasis, BasisMass, LANES, add, dot};
 use crate::engine::coarse_cells::CoarseCells;
+use crate::engine::even_blocks::{EDGE, EvenBlocks};
 use crate::phantom::lattice::{Lattice, Ray};
 use crate::transport::tracking::Transport;
 use crate::transport::voxel_codes::VoxelCode;
@@ -25,6 +26,7 @@ pub(crate) struct Paths<'a> {
     lattice: &'a Lattice,
     pub basis: AttenuationBasis,
     coarse: CoarseCells,
+    even: EvenBlocks,
 }
 
 impl<'a> Paths<'a> {
@@ -48,6 +50,7 @@ impl<'a> Paths<'a> {
             codes: &transport.codes,
             lattice: &transport.lattice,
             coarse: CoarseCells::new(transport.phantom, &basis, cells),
+            even: EvenBlocks::new(&transport.codes, transport.lattice.size),
             basis,
         }
     }
@@ -84,22 +87,64 @@ impl<'a> Paths<'a> {
             })
     }
 
-    /// Calls `visit(voxel, from_mm, to_mm)` for each piece of a path of `length_mm` along a unit vector, until `visit` ends it.
-    #[inline]
-    pub fn pieces(
+    /// Calls `visit(code, from_mm, to_mm)` for each stretch of a path of `length_mm` along a unit vector, until `visit` ends it:
+    /// voxel by voxel, and even blocks at once.
+    #[inline(always)]
+    pub fn stretches(
         &self,
         from: &Point3<f64>,
         direction: &Vector3<f64>,
         length_mm: f64,
-        visit: impl FnMut(usize, f64, f64) -> Step,
+        mut visit: impl FnMut(VoxelCode, f64, f64) -> Step,
     ) {
         let ray = self.lattice.ray(from, direction);
-        if let Some((enter, leave)) = self.lattice.clip(&ray) {
-            walk(&ray, self.lattice.size, enter, leave.min(length_mm), visit);
+        let Some((enter, leave)) = self.lattice.clip(&ray) else {
+            return;
+        };
+        let end = leave.min(length_mm);
+        // Where the uneven blocks that are not yet walked through began.
+        let mut uneven_mm = None;
+        let blocks = ray.shrunk(EDGE);
+        let step = walk(
+            &blocks,
+            self.even.size,
+            enter,
+            end,
+            |block, from_mm, to_mm| {
+                let code = self.even.code(block);
+                let Some(code) = code else {
+                    uneven_mm.get_or_insert(from_mm);
+                    return Step::Continue(());
+                };
+                if let Some(start_mm) = uneven_mm.take() {
+                    self.voxels(&ray, start_mm, from_mm, &mut visit)?;
+                }
+                visit(code, from_mm, to_mm)
+            },
+        );
+        if let (Step::Continue(()), Some(start_mm)) = (step, uneven_mm) {
+            let _ = self.voxels(&ray, start_mm, end, &mut visit);
         }
     }
 
-    /// As [`Paths::pieces`] with the coarse cells for voxels.
+    #[inline]
+    fn voxels(
+        &self,
+        ray: &Ray,
+        from_mm: f64,
+        to_mm: f64,
+        visit: &mut impl FnMut(VoxelCode, f64, f64) -> Step,
+    ) -> Step {
+        walk(
+            ray,
+            self.lattice.size,
+            from_mm,
+            to_mm,
+            |voxel, from_mm, to_mm| visit(self.codes[voxel], from_mm, to_mm),
+        )
+    }
+
+    /// Calls `visit(cell, from_mm, to_mm)` for each piece of a path through a coarse cell, until `visit` ends it.
     #[inline]
     pub fn coarse_pieces(
         &self,
@@ -108,21 +153,11 @@ impl<'a> Paths<'a> {
         length_mm: f64,
         visit: impl FnMut(usize, f64, f64) -> Step,
     ) {
-        let mut ray = self.lattice.ray(from, direction);
+        let ray = self.lattice.ray(from, direction);
         if let Some((enter, leave)) = self.lattice.clip(&ray) {
-            let shrink = 1.0 / self.coarse.edge as f64;
-            ray.origin *= shrink;
-            ray.slope *= shrink;
-            walk(&ray, self.coarse.size, enter, leave.min(length_mm), visit);
+            let ray = ray.shrunk(self.coarse.edge);
+            let _ = walk(&ray, self.coarse.size, enter, leave.min(length_mm), visit);
         }
-    }
-
-    /// Adds a piece through a voxel to the masses.
-    #[inline(always)]
-    pub fn add(&self, mass: &mut BasisMass, voxel: usize, length_mm: f64) {
-        let code = self.codes[voxel];
-        let amount = code.density_g_cm3() * length_mm as f32;
-        add(mass, self.basis.shares(code.material()), amount);
     }
 
     /// Adds a piece through a coarse cell to the masses.
@@ -150,8 +185,9 @@ impl<'a> Paths<'a> {
     pub fn between(&self, from: &Point3<f64>, to: &Point3<f64>, mass: &mut BasisMass) {
         let (direction, length_mm) = towards(from, to);
         self.gather(mass, |mass| {
-            self.pieces(from, &direction, length_mm, |voxel, from_mm, to_mm| {
-                self.add(mass, voxel, to_mm - from_mm);
+            self.stretches(from, &direction, length_mm, |code, from_mm, to_mm| {
+                let amount = code.density_g_cm3() * (to_mm - from_mm) as f32;
+                add(mass, self.basis.shares(code.material()), amount);
                 Step::Continue(())
             });
         });
@@ -171,7 +207,7 @@ impl<'a> Paths<'a> {
 
     /// Sums into registers if there is one group.
     #[inline(always)]
-    fn gather(&self, mass: &mut BasisMass, sum: impl Fn(&mut BasisMass)) {
+    fn gather(&self, mass: &mut BasisMass, mut sum: impl FnMut(&mut BasisMass)) {
         if let [mass] = mass {
             let mut single = [[0.0; LANES]];
             sum(&mut single);
@@ -190,7 +226,7 @@ fn towards(from: &Point3<f64>, to: &Point3<f64>) -> (Vector3<f64>, f64) {
     (along / length_mm, length_mm)
 }
 
-/// Walks from cell to cell of a lattice between two lengths on a ray (Amanatides and Woo, Eurographics 1987).
+/// Walks from cell to cell of a lattice between two lengths on a ray, until `visit` ends it (Amanatides and Woo, Eurographics 1987).
 #[inline(always)]
 fn walk(
     ray: &Ray,
@@ -198,9 +234,9 @@ fn walk(
     enter: f64,
     end: f64,
     mut visit: impl FnMut(usize, f64, f64) -> Step,
-) {
+) -> Step {
     if enter >= end {
-        return;
+        return Step::Continue(());
     }
     let mut cross = [i64::MAX; 3];
     let mut pitch = [0_i64; 3];
@@ -229,11 +265,11 @@ fn walk(
         let to = next.min(end).max(at);
         // Rounding may lead a hair out of the lattice at its far side.
         if index < 0 || index >= layer {
-            return;
+            return Step::Continue(());
         }
-        let step = visit(index as usize, at as f64 * MM, to as f64 * MM);
-        if next >= end || step.is_break() {
-            return;
+        visit(index as usize, at as f64 * MM, to as f64 * MM)?;
+        if next >= end {
+            return Step::Continue(());
         }
         at = to;
         let first_z = !(first_x | first_y);

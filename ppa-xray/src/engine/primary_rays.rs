@@ -6,36 +6,37 @@ use rayon::prelude::*;
 use crate::beam::field::Field;
 use crate::beam::spectral_lines::SpectralLines;
 use crate::detector::response::LineResponse;
-use crate::engine::attenuation_basis::{LANES, dot};
+use crate::engine::attenuation_basis::{LANES, exponents};
 use crate::engine::exposure::Exposure;
+use crate::engine::open_beam::{LineMoments, OpenBeam};
 use crate::engine::paths::Paths;
 use crate::transport::tally::Moments;
 use crate::transport::tracking::Transport;
+use crate::vector_math::{WIDTH, exp, pad};
 
 /// What all rays share.
 pub(crate) struct PrimaryRays<'a> {
     pub transport: &'a Transport<'a>,
     paths: &'a Paths<'a>,
     lines: SpectralLines,
-    /// Of the basis materials at every line.
-    attenuation: Vec<Vec<[f32; LANES]>>,
+    /// Of every basis material, line by line, padded to a multiple of [`WIDTH`].
+    attenuation: Vec<Vec<f32>>,
     response: LineResponse<'a>,
 }
 
 /// Buffers of one thread.
 pub(crate) struct Scratch {
     mass: Vec<[f32; LANES]>,
-    /// With nothing in the beam, line by line: first two moments of the energy per cm² and history that stays in the detector.
-    open: Vec<Moments>,
+    /// With nothing in the beam: first two moments of the energy per cm² and history that stays in the detector.
+    open: LineMoments,
 }
 
 impl<'a> PrimaryRays<'a> {
     pub fn new(exposure: &'a Exposure<'a>, paths: &'a Paths<'a>, lines: SpectralLines) -> Self {
-        let energies = lines.energy_kev.iter();
         Self {
             transport: &exposure.transport,
             paths,
-            attenuation: energies.map(|&kev| paths.basis.at(kev)).collect(),
+            attenuation: paths.basis.by_line(&lines.energy_kev),
             response: exposure.response.at_lines(&lines.energy_kev),
             lines,
         }
@@ -49,7 +50,7 @@ impl<'a> PrimaryRays<'a> {
             .map_init(
                 || Scratch {
                     mass: vec![[0.0; LANES]; self.paths.basis.groups],
-                    open: Vec::new(),
+                    open: LineMoments::default(),
                 },
                 |scratch, pixel| of(pixel, scratch),
             )
@@ -67,23 +68,46 @@ impl<'a> PrimaryRays<'a> {
         self.pixel(pixel).overlap(self.transport.emitter.field())
     }
 
-    /// Prepares for rays to `at` and close by: what would stay in the detector there with nothing in the beam, mean over
-    /// `spots`.
-    pub fn aim(&self, spots: &[Point3<f64>], at: Point2<f64>, scratch: &mut Scratch) {
+    /// What would stay in the detector at `at` with nothing in the beam, mean over `spots`.
+    fn open(&self, spots: &[Point3<f64>], at: Point2<f64>) -> LineMoments {
         let emitter = &self.transport.emitter;
-        scratch.open.clear();
-        scratch
-            .open
-            .resize(self.lines.energy_kev.len(), Moments::default());
+        let mut open = vec![Moments::default(); self.lines.energy_kev.len()];
         for spot in spots {
             let direction = (self.on_plane(at) - spot).normalize();
             let photons = emitter.open_fluence_cm2(spot, at) / spots.len() as f64;
             let shares = self.lines.mixed(emitter.mixture(&direction));
             let left = self.response.moments(at.into(), &direction);
-            for ((sum, share), left) in scratch.open.iter_mut().zip(shares).zip(left) {
+            for ((sum, share), left) in open.iter_mut().zip(shares).zip(left) {
                 *sum = [*sum, left.scaled(photons * share)].into_iter().sum();
             }
         }
+        let padded = |of: fn(&Moments) -> f64| {
+            let mut values: Vec<f32> = open.iter().map(|moments| of(moments) as f32).collect();
+            pad(&mut values);
+            values
+        };
+        LineMoments {
+            mean_kev: padded(|moments| moments.mean_kev),
+            square_kev2: padded(|moments| moments.square_kev2),
+        }
+    }
+
+    /// [`PrimaryRays::aim`] for all places that the field lights on the detector.
+    pub fn open_beam(&self, spots: &[Point3<f64>]) -> Option<OpenBeam> {
+        let detector = self.transport.projection.detector.field();
+        let lit = detector.overlap(self.transport.emitter.field())?;
+        Some(OpenBeam::new(&lit, |at| self.open(spots, at)))
+    }
+
+    /// Prepares for rays to `at` and close by: what would stay in the detector there with nothing in the beam, mean over
+    /// `spots`.
+    pub fn aim(&self, spots: &[Point3<f64>], at: Point2<f64>, scratch: &mut Scratch) {
+        scratch.open = self.open(spots, at);
+    }
+
+    /// As [`PrimaryRays::aim`], from the table.
+    pub fn aim_by(&self, open_beam: &OpenBeam, at: Point2<f64>, scratch: &mut Scratch) {
+        open_beam.interpolate(at, &mut scratch.open);
     }
 
     /// Moments of the energy per cm² and history that arrives on the way from `spot` to `at`, close to where the rays were
@@ -92,9 +116,21 @@ impl<'a> PrimaryRays<'a> {
     pub fn behind(&self, spot: &Point3<f64>, at: Point2<f64>, scratch: &mut Scratch) -> Moments {
         let Scratch { mass, open } = scratch;
         self.paths.between(spot, &self.on_plane(at), mass);
-        let lines = open.iter().zip(&self.attenuation);
-        let arriving = lines.map(|(open, mu)| open.scaled(f64::from(-dot(mass, mu)).exp()));
-        arriving.sum()
+        let mut sums = [[0.0_f32; WIDTH]; 2];
+        let lines = open.mean_kev.chunks_exact(WIDTH);
+        for (chunk, (mean, square)) in lines.zip(open.square_kev2.chunks_exact(WIDTH)).enumerate() {
+            let exponent = exponents(mass, &self.attenuation, chunk * WIDTH);
+            for lane in 0..WIDTH {
+                let through = exp(-exponent[lane]);
+                sums[0][lane] += mean[lane] * through;
+                sums[1][lane] += square[lane] * through;
+            }
+        }
+        let [mean_kev, square_kev2] = sums.map(|lanes| lanes.iter().copied().map(f64::from).sum());
+        Moments {
+            mean_kev,
+            square_kev2,
+        }
     }
 
     fn on_plane(&self, at: Point2<f64>) -> Point3<f64> {

@@ -24,7 +24,6 @@ pub(crate) struct ScatterTable {
 pub(crate) struct Scattering {
     pub compton: f64,
     pub rayleigh: f64,
-    pub compton_kev: f64,
 }
 
 impl ScatterTable {
@@ -73,6 +72,11 @@ impl ScatterTable {
         (step, (at - step as f64) as f32)
     }
 
+    /// Compton and Rayleigh scattering and the mean energy after Compton scattering, step by step.
+    pub fn rows(&self) -> &[[f32; 3]] {
+        &self.rows
+    }
+
     #[inline]
     pub fn at(&self, (step, fraction): (usize, f32)) -> Scattering {
         let (low, high) = (&self.rows[step], &self.rows[step + 1]);
@@ -80,7 +84,6 @@ impl ScatterTable {
         Scattering {
             compton: mix(0),
             rayleigh: mix(1),
-            compton_kev: mix(2),
         }
     }
 }

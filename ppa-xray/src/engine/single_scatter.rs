@@ -5,21 +5,21 @@
 //! the coarse one, times four (two-level estimator: Giles, Oper. Res. 56 (2008) 607), so the expectation is that of the voxels.
 //! Kalos, Nucl. Sci. Eng. 16 (1963) 111; docs/physics.md, "Fast engine", single scatter.
 
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Point2, Point3};
 use ppa_core::random::Philox;
 
-use crate::detector::response::Response;
-use crate::engine::attenuation_basis::BasisMass;
-use crate::engine::attenuation_basis::{LANES, dot};
+use crate::detector::tabulated_response::{Incidence, TabulatedResponse};
+use crate::engine::attenuation_basis::{BasisMass, LANES, exponents};
 use crate::engine::first_collisions::{ESTIMATES, FirstCollisions};
 use crate::engine::importance::{Draws, ImportanceModel, PointImportance, Subset};
+use crate::engine::line_scattering::LinesAtAngle;
 use crate::engine::lines::Lines;
 use crate::engine::paths::Paths;
 use crate::engine::scatter_table::ScatterTable;
-use crate::matter::energy_range::CUTOFF_KEV;
 use crate::transport::stream::Stream;
 use crate::transport::tally::Moments;
 use crate::transport::tracking::Transport;
+use crate::vector_math::{WIDTH, exp};
 
 /// One sample in so many is repeated through the voxels themselves; the difference, times that number, corrects the bias of
 /// the coarse cells.
@@ -37,7 +37,7 @@ pub(crate) struct Seen {
 /// Next-event estimation from first collisions.
 pub(crate) struct SingleScatter<'a> {
     pub transport: &'a Transport<'a>,
-    pub response: &'a Response,
+    pub response: &'a TabulatedResponse<'a>,
     pub paths: &'a Paths<'a>,
     pub importance_model: &'a ImportanceModel<'a>,
     pub lines: &'a Lines,
@@ -57,16 +57,22 @@ pub(crate) struct PointSampling {
 #[derive(Default)]
 pub(crate) struct Scratch {
     importance: PointImportance,
+    buffers: Buffers,
+}
+
+/// Buffers of a sight.
+#[derive(Default)]
+struct Buffers {
     mass: Vec<[f32; LANES]>,
+    scattering: LinesAtAngle,
+    photons: Vec<f32>,
 }
 
 /// A collision and the direction from it to the point.
 struct Sight<'a> {
-    list: &'a FirstCollisions,
-    site: usize,
-    at_mm: [f64; 2],
-    direction: Vector3<f64>,
-    cos_theta: f64,
+    /// Photons that get to the collision, line by line.
+    photons: &'a [f32],
+    incidence: Incidence<'a>,
 }
 
 impl SingleScatter<'_> {
@@ -78,10 +84,13 @@ impl SingleScatter<'_> {
         at: Point2<f64>,
         (seed, index): (u64, u64),
         PointSampling { collisions, every }: PointSampling,
-        Scratch { importance, mass }: &mut Scratch,
+        Scratch {
+            importance,
+            buffers,
+        }: &mut Scratch,
     ) -> Seen {
         let target = Point3::new(at.x, at.y, self.transport.projection.source_detector_mm);
-        mass.resize(self.paths.basis.groups, [0.0; LANES]);
+        buffers.mass.resize(self.paths.basis.groups, [0.0; LANES]);
         importance.tabulate(self.importance_model, &target);
         let rough = !self.paths.coarse_is_exact();
         let mut result = Seen::default();
@@ -104,7 +113,7 @@ impl SingleScatter<'_> {
                     until_check = until_check.checked_sub(1).unwrap_or(CHECKED - 1);
                     // mm² → cm²
                     let weight = 100.0 * inverse * every as f64;
-                    let seen = self.seen(&target, list, site, exact, mass);
+                    let seen = self.seen(&target, list, site, exact, buffers);
                     let seen = seen.map(|part| part.scaled(weight));
                     largest = largest.max((seen[0].mean_kev + seen[1].mean_kev).abs());
                     for (sum, part) in sum.iter_mut().zip(seen) {
@@ -125,26 +134,31 @@ impl SingleScatter<'_> {
         list: &FirstCollisions,
         index: usize,
         exact: bool,
-        mass: &mut BasisMass,
+        Buffers {
+            mass,
+            scattering,
+            photons,
+        }: &mut Buffers,
     ) -> [Moments; 2] {
         let site = &list.sites[index];
         let position = site.position.cast::<f64>();
         let along = target - position;
         let r = along.norm();
         let direction = along / r;
+        let cos_theta = direction.dot(&site.direction.cast()).clamp(-1.0, 1.0);
         let sight = Sight {
-            list,
-            site: index,
-            at_mm: [target.x, target.y],
-            direction,
-            cos_theta: direction.dot(&site.direction.cast()).clamp(-1.0, 1.0),
+            photons: list.padded_photons(index, self.lines),
+            incidence: self.response.incidence([target.x, target.y], &direction),
         };
+        let table = self.lines.scattering(site.material);
+        table.at(ScatterTable::locate(cos_theta), scattering);
         self.paths.coarse_between(&position, target, mass);
-        let mut seen = self.energies(&sight, mass);
+        let mut seen = self.energies(&sight, scattering, mass, photons);
         if exact {
             self.paths.between(&position, target, mass);
             let inverse_share = f64::from(CHECKED);
-            for (rough, exact) in seen.iter_mut().zip(self.energies(&sight, mass)) {
+            let exact = self.energies(&sight, scattering, mass, photons);
+            for (rough, exact) in seen.iter_mut().zip(exact) {
                 *rough = [
                     rough.scaled(1.0 - inverse_share),
                     exact.scaled(inverse_share),
@@ -156,28 +170,40 @@ impl SingleScatter<'_> {
         seen.map(|part| part.scaled(along.z / (r * r * r)))
     }
 
-    /// Energy that the photons of a collision leave in the detector, per solid angle.
-    #[inline]
-    fn energies(&self, sight: &Sight, after: &BasisMass) -> [Moments; 2] {
-        let mut sum = [Moments::default(); 2];
-        let response = self.response;
-        let mut add = |kind: usize, energy_kev: f64, photons: f64| {
-            let left = response.moments(energy_kev, sight.at_mm, &sight.direction);
-            sum[kind].mean_kev += photons * left.mean_kev;
-            sum[kind].square_kev2 += photons * left.square_kev2;
-        };
-        let angle = ScatterTable::locate(sight.cos_theta);
-        let material = usize::from(sight.list.sites[sight.site].material);
-        for (line, photons) in sight.list.photons(sight.site, self.lines) {
-            let scattering = line.scattering[material].at(angle);
-            let through = f64::from(-dot(after, &line.attenuation)).exp();
-            add(1, line.energy_kev, photons * scattering.rayleigh * through);
-            if scattering.compton_kev >= CUTOFF_KEV {
-                let outwards = self.paths.basis.exponent(after, scattering.compton_kev);
-                let photons = photons * scattering.compton * f64::from(-outwards).exp();
-                add(0, scattering.compton_kev, photons);
+    /// Energy that the photons of a collision leave in the detector behind the masses `after` it, per solid angle; `photons` is a buffer.
+    fn energies(
+        &self,
+        sight: &Sight,
+        scattering: &LinesAtAngle,
+        after: &BasisMass,
+        photons: &mut Vec<f32>,
+    ) -> [Moments; 2] {
+        let [compton, rayleigh, compton_kev] = scattering.parts();
+        photons.resize(sight.photons.len(), 0.0);
+        let arriving = sight.photons.chunks_exact(WIDTH);
+        let scattered = arriving.zip(compton.chunks_exact(WIDTH));
+        for (chunk, (out, (arriving, compton))) in
+            photons.chunks_exact_mut(WIDTH).zip(scattered).enumerate()
+        {
+            let energies = &compton_kev[chunk * WIDTH..][..WIDTH];
+            let exponents: [f32; WIDTH] = std::array::from_fn(|lane| {
+                self.paths.basis.exponent(after, f64::from(energies[lane]))
+            });
+            for lane in 0..WIDTH {
+                out[lane] = arriving[lane] * compton[lane] * exp(-exponents[lane]);
             }
         }
-        sum
+        let compton = sight.incidence.of_energies(compton_kev, photons);
+        let arriving = sight.photons.chunks_exact(WIDTH);
+        let scattered = arriving.zip(rayleigh.chunks_exact(WIDTH));
+        for (chunk, (out, (arriving, rayleigh))) in
+            photons.chunks_exact_mut(WIDTH).zip(scattered).enumerate()
+        {
+            let exponents = exponents(after, self.lines.attenuation(), chunk * WIDTH);
+            for lane in 0..WIDTH {
+                out[lane] = arriving[lane] * rayleigh[lane] * exp(-exponents[lane]);
+            }
+        }
+        [compton, sight.incidence.of_lines(photons)]
     }
 }

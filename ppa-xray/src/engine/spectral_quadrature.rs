@@ -1,18 +1,32 @@
-//! Gauss quadrature of the spectrum between absorption edges: Golub and Welsch, Math. Comp. 23 (1969) 221.
+//! Gauss quadrature of the spectrum between absorption edges, with as few energies as the accuracy asks for.
+//!
+//! Golub and Welsch, Math. Comp. 23 (1969) 221.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::beam::spectral_lines::SpectralLines;
 use crate::engine::exposure::Exposure;
 
-/// At most `nodes` energies between two absorption edges of phantom or detector, the same for every spectrum that the
-/// source has.
+/// How many energies stand for a spectrum.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Accuracy {
+    /// Most energies between two absorption edges.
+    pub most: usize,
+    /// Error of energy and squared energy behind any thickness, relative, that fewer energies may have.
+    pub tolerance: f64,
+}
+
+/// Thicknesses at which fewer energies are tried, as the attenuation exponent at the mean energy of the spectrum.
+const EXPONENTS: [f64; 7] = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
+
+/// Energies between the absorption edges of phantom and detector, the same for every spectrum that the source has.
 ///
 /// Integrals of smooth functions over a spectrum of 110 bins need no 110 energies: the Gauss quadrature of the
 /// spectrum with n energies is exact for polynomials of degree 2n − 1 in 1/E (Golub and Welsch, Math. Comp.
 /// 23 (1969) 221). An absorption edge is not smooth: the spectrum is cut there. The energies are those of the mean of all
 /// spectra; the weights of a single one, which differs little, are exact for polynomials of degree n − 1 times the mean.
-pub(crate) fn compressed(exposure: &Exposure, nodes: usize) -> SpectralLines {
+/// A piece of the spectrum that holds few photons or a narrow range of energies needs few of them.
+pub(crate) fn compressed(exposure: &Exposure, accuracy: Accuracy) -> SpectralLines {
     let transport = &exposure.transport;
     let mut edges: Vec<f64> = transport
         .phantom
@@ -23,11 +37,13 @@ pub(crate) fn compressed(exposure: &Exposure, nodes: usize) -> SpectralLines {
         .collect();
     edges.sort_by(f64::total_cmp);
     edges.dedup();
-    gauss(&transport.emitter.lines(), &edges, nodes)
+    gauss(&transport.emitter.lines(), &edges, accuracy)
 }
 
-/// At most `nodes` energies between two neighbouring `edges_kev`, in ascending order.
-fn gauss(lines: &SpectralLines, edges_kev: &[f64], nodes: usize) -> SpectralLines {
+/// Energies between neighbouring `edges_kev`, in ascending order.
+fn gauss(lines: &SpectralLines, edges_kev: &[f64], accuracy: Accuracy) -> SpectralLines {
+    let behind = Behind::new(lines);
+    let allowed = behind.of(lines).map(|whole| accuracy.tolerance * whole);
     let mut chosen = SpectralLines {
         energy_kev: Vec::new(),
         weights: vec![Vec::new(); lines.weights.len()],
@@ -43,7 +59,16 @@ fn gauss(lines: &SpectralLines, edges_kev: &[f64], nodes: usize) -> SpectralLine
                 .map(|w| w[first..end].to_vec())
                 .collect(),
         };
-        let few = smooth_piece(piece, nodes);
+        let exact = behind.of(&piece);
+        let fine = |few: &SpectralLines| {
+            let errors = behind.of(few).into_iter().zip(exact);
+            let mut errors = errors.map(|(few, exact)| (few - exact).abs()).zip(allowed);
+            errors.all(|(error, allowed)| error <= allowed)
+        };
+        let few = (1..accuracy.most)
+            .map(|nodes| smooth_piece(&piece, nodes))
+            .find(fine)
+            .unwrap_or_else(|| smooth_piece(&piece, accuracy.most));
         chosen.energy_kev.extend(few.energy_kev);
         for (all, piece) in chosen.weights.iter_mut().zip(few.weights) {
             all.extend(piece);
@@ -53,20 +78,51 @@ fn gauss(lines: &SpectralLines, edges_kev: &[f64], nodes: usize) -> SpectralLine
     chosen
 }
 
+/// Energy and squared energy of the mean of all spectra behind absorbers of all [`EXPONENTS`].
+///
+/// Between edges attenuation is a constant and a multiple of 1/E³, more or less; the constant cancels in relative errors.
+struct Behind {
+    mean_kev: f64,
+}
+
+impl Behind {
+    fn new(lines: &SpectralLines) -> Self {
+        let (mut photons, mut energy) = (f64::MIN_POSITIVE, 0.0);
+        for (line, &kev) in lines.energy_kev.iter().enumerate() {
+            photons += total(lines, line);
+            energy += total(lines, line) * kev;
+        }
+        Self {
+            mean_kev: energy / photons,
+        }
+    }
+
+    fn of(&self, lines: &SpectralLines) -> [f64; 2 * EXPONENTS.len()] {
+        let mut sums = [0.0; 2 * EXPONENTS.len()];
+        for (line, &kev) in lines.energy_kev.iter().enumerate() {
+            let relative = (self.mean_kev / kev).powi(3);
+            for (sums, exponent) in sums.chunks_exact_mut(2).zip(EXPONENTS) {
+                let photons = total(lines, line) * (-exponent * relative).exp();
+                sums[0] += photons * kev;
+                sums[1] += photons * kev * kev;
+            }
+        }
+        sums
+    }
+}
+
+/// Photons of a line in all spectra.
+fn total(lines: &SpectralLines, line: usize) -> f64 {
+    lines.weights.iter().map(|weights| weights[line]).sum()
+}
+
 /// The quadrature of one smooth piece.
-fn smooth_piece(lines: SpectralLines, nodes: usize) -> SpectralLines {
+fn smooth_piece(lines: &SpectralLines, nodes: usize) -> SpectralLines {
     let n = lines.energy_kev.len();
     if n <= nodes {
-        return lines;
+        return lines.clone();
     }
-    let total = |line: usize| {
-        lines
-            .weights
-            .iter()
-            .map(|weights| weights[line])
-            .sum::<f64>()
-    };
-    let root = DVector::from_fn(n, |line, _| total(line).sqrt());
+    let root = DVector::from_fn(n, |line, _| total(lines, line).sqrt());
     let norm = root.norm();
     // Lanczos on diag(1/E) from the square roots of the weights gives the Jacobi matrix of the measure; full
     // orthogonalisation keeps it exact. Each vector is an orthonormal polynomial of 1/E times those roots.
@@ -149,7 +205,14 @@ mod tests {
             Spectrum::tungsten(&tube).unwrap()
         });
         let exact = lines(&spectra);
-        let few = gauss(&exact, &[], 12);
+        let few = gauss(
+            &exact,
+            &[],
+            Accuracy {
+                most: 12,
+                tolerance: 0.0,
+            },
+        );
         assert_eq!(few.energy_kev.len(), 12);
         for (name, cm) in [("water", 25.0), ("bone_cortical", 5.0), ("copper", 0.1)] {
             let material = Material::named(name).unwrap();
@@ -179,7 +242,11 @@ mod tests {
             energy_kev: (0..100).map(|i| 20.0 + f64::from(i)).collect(),
             weights: vec![vec![1.0; 100]],
         };
-        let cut = gauss(&even, &[69.5], 6);
+        let accuracy = Accuracy {
+            most: 6,
+            tolerance: 0.0,
+        };
+        let cut = gauss(&even, &[69.5], accuracy);
         assert_eq!(cut.energy_kev.len(), 12);
         let below: f64 = cut.weights[0][..6].iter().sum();
         assert!(

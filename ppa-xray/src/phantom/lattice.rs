@@ -21,6 +21,18 @@ pub(crate) struct Ray {
     pub slope: Vector3<f64>,
 }
 
+impl Ray {
+    /// The same ray in cubes of `edge` cells.
+    #[inline]
+    pub fn shrunk(&self, edge: usize) -> Self {
+        let shrink = 1.0 / edge as f64;
+        Self {
+            origin: self.origin * shrink,
+            slope: self.slope * shrink,
+        }
+    }
+}
+
 impl Lattice {
     pub fn new(grid: &Grid, ct_from_device: &Isometry3<f64>) -> Self {
         let cell_from_device =
