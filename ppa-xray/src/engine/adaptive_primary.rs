@@ -267,3 +267,46 @@ impl Cut<'_> {
         self.rays.behind(&spot, centre(part.field), scratch)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::small_limb;
+    use crate::engine::spectral_quadrature::{Accuracy, compressed};
+    use crate::matter::compton::ComptonModel;
+
+    /// Rays that the noise of an exposure hides are left out: what that changes is a tenth of the noise at most, and it changes something.
+    #[test]
+    fn rays_are_saved_only_where_noise_hides_it() {
+        let (phantom, spectrum, projection) = small_limb::exposure();
+        let model = ComptonModel::default();
+        let exposure = Exposure::new(&phantom, &spectrum, &projection, model).unwrap();
+        let paths = Paths::new(&exposure.transport);
+        let accuracy = Accuracy {
+            most: 12,
+            tolerance: 1e-5,
+        };
+        let image = |histories: f64| {
+            primary_moments(
+                &exposure,
+                &paths,
+                compressed(&exposure, accuracy),
+                8,
+                histories,
+            )
+        };
+        let expected = image(f64::INFINITY);
+        let histories = 1e7;
+        let mut squares = Vec::new();
+        for (few, all) in image(histories).iter().zip(&expected) {
+            if all.mean_kev > 0.0 {
+                squares.push(
+                    ((few.mean_kev - all.mean_kev) / all.standard_error_kev(histories)).powi(2),
+                );
+            }
+        }
+        let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        println!("{rms:.4} of the noise in {} pixels", squares.len());
+        assert!(rms > 0.0 && rms < 0.1, "{rms}");
+    }
+}

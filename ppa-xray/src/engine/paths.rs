@@ -291,3 +291,88 @@ fn walk(
 fn fixed(mm: f64) -> i64 {
     ((mm * (1.0 / MM)) as i64).min(i64::MAX / 4)
 }
+
+#[cfg(test)]
+mod tests {
+    use ppa_core::random::Philox;
+    use ppa_ct::Grid;
+
+    use super::*;
+    use crate::engine::exposure::Exposure;
+    use crate::engine::small_limb;
+    use crate::matter::compton::ComptonModel;
+    use crate::phantom::voxels::VoxelPhantom;
+
+    /// Masses and lengths of random paths, with even blocks at once and voxel by voxel; some begin or end in the box.
+    #[test]
+    fn even_blocks_change_no_path() {
+        let (small, spectrum, projection) = small_limb::exposure();
+        let corner = Point3::new(-50.0, -40.0, -40.0);
+        let grid = Grid::axis_aligned([50, 40, 36], Vector3::repeat(2.0), corner).unwrap();
+        // A ball of graded density in air.
+        let (material, density) = (0..grid.len())
+            .map(|index| {
+                let at = grid.centre(grid.voxel(index).map(|v| v as f64));
+                let from_mm = (at - Point3::new(-20.0, -10.0, -15.0)).norm();
+                if from_mm < 18.0 {
+                    (1, 1.0 + 0.01 * from_mm as f32)
+                } else {
+                    (0, 0.001_2)
+                }
+            })
+            .unzip();
+        let materials = small.materials().to_vec();
+        let phantom = VoxelPhantom::new(grid, material, density, materials).unwrap();
+        let model = ComptonModel::default();
+        let exposure = Exposure::new(&phantom, &spectrum, &projection, model).unwrap();
+        let paths = Paths::new(&exposure.transport);
+        let size = paths.even.size;
+        let even = (0..size.iter().product()).filter(|&block| paths.even.code(block).is_some());
+        assert!(even.count() > 0, "no even block in {size:?}");
+        let inverse = projection.ct_from_device.inverse();
+        let corners = phantom.corners_ct().map(|corner| inverse * corner);
+        for index in 0..500 {
+            let mut rng = Philox::new(5, 0, index);
+            let mut point = || {
+                let [u, v, w] = [(); 3].map(|()| 1.6 * rng.unit() - 0.3);
+                let along = |to: usize, share: f64| (corners[to] - corners[0]) * share;
+                corners[0] + along(1, u) + along(2, v) + along(4, w)
+            };
+            let (from, to) = (point(), point());
+            let (direction, length_mm) = towards(&from, &to);
+            let mut masses = [[0.0_f64; 256]; 2];
+            let mut lengths = [0.0; 2];
+            paths.stretches(&from, &direction, length_mm, |code, from_mm, to_mm| {
+                let mm = to_mm - from_mm;
+                masses[0][usize::from(code.material())] += mm * f64::from(code.density_g_cm3());
+                lengths[0] += mm;
+                Step::Continue(())
+            });
+            let ray = paths.lattice.ray(&from, &direction);
+            if let Some((enter, leave)) = paths.lattice.clip(&ray) {
+                let _ = paths.voxels(
+                    &ray,
+                    enter,
+                    leave.min(length_mm),
+                    &mut |code, from_mm, to_mm| {
+                        let mm: f64 = to_mm - from_mm;
+                        masses[1][usize::from(code.material())] +=
+                            mm * f64::from(code.density_g_cm3());
+                        lengths[1] += mm;
+                        Step::Continue(())
+                    },
+                );
+            }
+            assert!(
+                (lengths[0] - lengths[1]).abs() < 1e-6,
+                "{from} to {to}: {lengths:?}"
+            );
+            for (blocks, voxels) in masses[0].iter().zip(masses[1]) {
+                assert!(
+                    (blocks - voxels).abs() < 1e-5,
+                    "{from} to {to}: {blocks}, {voxels}"
+                );
+            }
+        }
+    }
+}
