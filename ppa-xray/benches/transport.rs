@@ -6,8 +6,9 @@ use ppa_benches::ProcessorTime;
 use ppa_ct::Grid;
 use ppa_phantom::{LowerLeg, TableTop};
 use ppa_xray::{
-    AnalogSettings, Detector, FastSettings, HuCalibration, Material, Projection, Spectrum,
-    TubeSpec, VoxelPhantom, analog, fast, primary,
+    AnalogSettings, AntiScatterGrid, Collimation, Detector, DetectorModel, FastSettings, FocalSpot,
+    HeelEffect, HuCalibration, LinesAlong, Material, Projection, Source, Spectrum, TubeSpec,
+    VoxelPhantom, analog, fast, primary,
 };
 use rayon::ThreadPoolBuilder;
 
@@ -134,9 +135,55 @@ fn images(criterion: &mut Criterion<ProcessorTime>) {
     }
 }
 
+/// Radiographs worth 2e10 histories of the whole leg in voxels of 0.5 mm, on a point source and an ideal detector and with all options of the
+/// plan in docs/book/generate.md but blur and electronic noise, which cost nothing.
+fn exposures(criterion: &mut Criterion<ProcessorTime>) {
+    let spectrum = spectrum();
+    let volume = LowerLeg::p01().voxelise(0.5, TableTop::Absent).unwrap();
+    let phantom = VoxelPhantom::from_volume(&volume, &HuCalibration::default(), None).unwrap();
+    let settings = FastSettings::default();
+    let mut group = criterion.benchmark_group("exposure");
+    group.sample_size(10);
+    for (pixels, pixel_mm) in [(448, 0.5), (1_500, 0.15)] {
+        let (_, ideal) = ankle(false, Detector::centred(pixels, pixels, pixel_mm));
+        let mut real = ideal.clone();
+        real.source = Source {
+            focal_spot: FocalSpot {
+                size_mm: 0.6,
+                ..FocalSpot::default()
+            },
+            heel_effect: Some(HeelEffect {
+                anode_towards_deg: -90.0,
+            }),
+            collimation: Collimation::Rectangle {
+                size_mm: [180.0, 220.0],
+                centre_mm: [0.0; 2],
+            },
+        };
+        real.receptor.model = DetectorModel::Csi {
+            thickness_um: 600.0,
+            packing: 0.8,
+        };
+        real.receptor.grid = Some(AntiScatterGrid {
+            ratio: 8.0,
+            lines_per_cm: 40.0,
+            strip_mm: 0.05,
+            strip: "lead".to_owned(),
+            interspace: "aluminium".to_owned(),
+            focus_mm: Some(1_100.0),
+            lines_along: LinesAlong::Y,
+        });
+        for (name, exposure) in [("ideal", &ideal), ("real", &real)] {
+            group.bench_with_input(BenchmarkId::new(name, pixels), exposure, |b, at| {
+                b.iter(|| fast(&phantom, &spectrum, at, &settings).unwrap())
+            });
+        }
+    }
+}
+
 criterion_group! {
     name = transport;
     config = Criterion::default().with_measurement(ProcessorTime);
-    targets = histories, preparation, images
+    targets = histories, preparation, images, exposures
 }
 criterion_main!(transport);

@@ -33,8 +33,9 @@ impl AttenuationBasis {
     ///
     /// Takes the material that is worst represented into the basis until all are represented.
     pub fn new(attenuation: &Attenuation, materials: usize, highest_kev: f64) -> Self {
-        let nodes = ((highest_kev.min(MAX_ENERGY_KEV) - CUTOFF_KEV) * NODES_PER_KEV as f64).ceil()
-            as usize
+        let nodes = ((highest_kev.min(MAX_ENERGY_KEV) - CUTOFF_KEV) * NODES_PER_KEV as f64)
+            .ceil()
+            .max(1.0) as usize
             + 1;
         let energy = |node: usize| CUTOFF_KEV + node as f64 / NODES_PER_KEV as f64;
         let total = |material: usize, node: usize| {

@@ -262,10 +262,10 @@ impl FastSettings {
             (
                 "the number of histories for the noise",
                 self.dose_histories,
-                self.dose_histories > 0.0
+                self.dose_histories >= 1.0
                     && (self.dose_histories <= Self::MOST_DOSE
                         || self.dose_histories == f64::INFINITY),
-                "above 0, up to 1e18, or infinite for none",
+                "1 to 1e18, or infinite for none",
             ),
             (
                 "the number of histories for the scatter",

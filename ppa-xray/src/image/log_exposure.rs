@@ -15,7 +15,7 @@ impl Radiograph {
     /// Grey values 0 (black, bare field) to 65535 (white), row-major.
     ///
     /// # Errors
-    /// [`PresentationError`] when a parameter is out of range.
+    /// [`PresentationError`] when a parameter is out of range, or a layer does not have a value per pixel.
     pub fn present(&self, presentation: &Presentation) -> Result<Vec<u16>, PresentationError> {
         let enhanced = self.enhanced_log_exposure(presentation)?;
         Ok(enhanced
@@ -37,6 +37,7 @@ impl Radiograph {
         presentation: &Presentation,
     ) -> Result<Vec<f32>, PresentationError> {
         presentation.validate()?;
+        self.check_layers()?;
         let (image, sigma): (Vec<f32>, Vec<f32>) = self
             .total()
             .iter()

@@ -102,6 +102,7 @@ impl Radiograph {
     /// # Errors
     /// [`OutputError`] naming the file.
     pub fn write_exr(&self, path: &Path) -> Result<(), OutputError> {
+        self.check_layers()?;
         let mut channels = exr::SmallVec::new();
         let mut add = |name: &str, samples: Vec<f32>| {
             channels.push(exr::AnyChannel::new(name, exr::FlatSamples::F32(samples)));

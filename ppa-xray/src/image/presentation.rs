@@ -26,6 +26,16 @@ pub enum PresentationError {
         /// The names there are.
         known: Vec<&'static str>,
     },
+    /// A layer was cut or extended.
+    #[error("layer {layer} has {found} values, expected {expected}, one per pixel")]
+    Pixels {
+        /// Name of the layer.
+        layer: &'static str,
+        /// Values or standard errors it has.
+        found: usize,
+        /// Pixels of the detector.
+        expected: usize,
+    },
 }
 
 /// Fixed mapping of a radiograph to grey values; never adapted to the single image.

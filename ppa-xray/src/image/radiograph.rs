@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::beam::projection::Detector;
 use crate::detector::open_field::OpenField;
 use crate::detector::readout::Layer;
+use crate::image::presentation::PresentationError;
 use crate::transport::tally::Category;
 
 /// How a radiograph was computed.
@@ -146,11 +147,35 @@ impl Radiograph {
         self.layers.iter().chain(&self.electronic)
     }
 
-    /// The reading of every pixel: all layers together, eV/cm² per history.
+    /// # Errors
+    /// [`PresentationError::Pixels`] where a layer does not have one value and one standard error per pixel.
+    pub(crate) fn check_layers(&self) -> Result<(), PresentationError> {
+        let expected = self.detector.pixels();
+        let names = Category::ALL.map(Category::name).into_iter();
+        for (name, layer) in names.chain(["electronic"]).zip(self.planes()) {
+            for found in [layer.value.len(), layer.sigma.len()] {
+                if found != expected {
+                    return Err(PresentationError::Pixels {
+                        layer: name,
+                        found,
+                        expected,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The reading of every pixel: all layers together, eV/cm² per history; not a number where a layer lacks the pixel.
     pub fn total(&self) -> Vec<f32> {
         self.per_pixel(|pixel| {
             self.planes()
-                .map(|layer| f64::from(layer.value[pixel]))
+                .map(|layer| {
+                    layer
+                        .value
+                        .get(pixel)
+                        .map_or(f64::NAN, |&value| value.into())
+                })
                 .sum()
         })
     }
@@ -158,15 +183,24 @@ impl Radiograph {
     /// Standard error of [`Radiograph::total`].
     ///
     /// The fast engine finds all scatter from the same collisions. What the errors of Compton and Rayleigh scatter share is
-    /// counted; multiple scatter is taken as independent of both, which is right to 5 % of the error.
+    /// counted; multiple scatter is taken as independent of both, which is right to 5 % of the error. Not a number where a layer
+    /// lacks the pixel.
     pub fn sigma(&self) -> Vec<f32> {
         self.per_pixel(|pixel| {
             let variances = self
                 .planes()
-                .map(|layer| f64::from(layer.sigma[pixel]).powi(2));
+                .map(|layer| {
+                    layer
+                        .sigma
+                        .get(pixel)
+                        .map_or(f64::NAN, |&sigma| sigma.into())
+                })
+                .map(|sigma: f64| sigma * sigma);
             let shared = self.single_scatter_covariance.get(pixel);
             let shared = shared.map_or(0.0, |&shared| 2.0 * f64::from(shared));
-            (variances.sum::<f64>() + shared).max(0.0).sqrt()
+            let variance = variances.sum::<f64>() + shared;
+            // Not `max`, which would turn a missing value into 0.
+            if variance < 0.0 { 0.0 } else { variance.sqrt() }
         })
     }
 

@@ -312,6 +312,23 @@ fn noise_is_white_and_as_large_as_that_of_analog() {
     }
 }
 
+/// The lowest energy that photons are followed at leaves primary only: a scattered photon has lost too much, or nothing (Rayleigh).
+#[test]
+fn photons_of_the_cutoff_energy_make_an_image() {
+    let phantom = limb(&Isometry3::identity());
+    let spectrum = Spectrum::monoenergetic(5.0).unwrap();
+    let image = fast(
+        &phantom,
+        &spectrum,
+        &frontal(8, 5.0),
+        &expected_image(320, 1),
+    )
+    .unwrap();
+    assert!(image.total().iter().all(|reading| reading.is_finite()));
+    assert_eq!(image.sums.of(Category::Compton).0, 0.0);
+    assert!(image.sums.of(Category::Primary).0 > 0.0);
+}
+
 /// Numbers beyond all sense are refused in one sentence, not carried out.
 #[test]
 fn settings_beyond_all_sense_are_refused() {
@@ -323,7 +340,14 @@ fn settings_beyond_all_sense_are_refused() {
                 dose_histories: 1e300,
                 ..usual
             },
-            "the number of histories for the noise is 1e300, expected above 0, up to 1e18, or infinite for none",
+            "the number of histories for the noise is 1e300, expected 1 to 1e18, or infinite for none",
+        ),
+        (
+            FastSettings {
+                dose_histories: 1e-300,
+                ..usual
+            },
+            "the number of histories for the noise is 1e-300, expected 1 to 1e18, or infinite for none",
         ),
         (
             FastSettings {

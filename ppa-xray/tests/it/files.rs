@@ -108,3 +108,24 @@ fn a_failed_write_leaves_nothing_and_names_the_file() {
     assert!(error.to_string().contains("image.exr"), "{error}");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
+
+#[test]
+fn cut_layers_are_refused_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut image = radiograph();
+    image.layers[1].sigma.truncate(100);
+    let errors = [
+        image.write_png(&folder.path().join("x.png"), &Presentation::default()),
+        image.write_exr(&folder.path().join("x.exr")),
+    ];
+    for error in errors.map(Result::unwrap_err) {
+        assert_eq!(
+            error.to_string(),
+            "layer compton has 100 values, expected 3600, one per pixel"
+        );
+    }
+    image.layers[1].value.truncate(100);
+    assert!(image.total()[100].is_nan() && image.sigma()[100].is_nan());
+    assert!(image.total()[99].is_finite() && image.sigma()[99].is_finite());
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}

@@ -80,6 +80,7 @@ impl Radiograph {
                 rows: self.detector.rows,
             });
         };
+        self.check_layers()?;
         let pixels = match intent {
             DxIntent::Processing => self.linear_pixels(),
             DxIntent::Presentation(presentation) => self.logarithmic_pixels(&presentation)?,
