@@ -27,7 +27,7 @@ pub(crate) fn exp(x: f32) -> f32 {
     let twos = shifted - MAGIC;
     let r = (x - twos * LN2_HIGH) - twos * LN2_LOW;
     let tail = 0.499_999_93
-        + r * (0.166_665_19 + r * (4.166_840_8e-2 + r * (8.368_922e-3 + r * 1.381_417_4e-3)));
+        + r * (0.166_665_2 + r * (4.166_840_8e-2 + r * (8.368_922e-3 + r * 1.381_417_4e-3)));
     let power = 1.0 + (r + r * r * tail);
     f32::from_bits(power.to_bits().wrapping_add(shifted.to_bits() << 23))
 }

@@ -10,7 +10,7 @@ use crate::engine::first_collisions::ESTIMATES;
 use crate::engine::node_grid::NodeGrid;
 use crate::engine::primary_signal::PrimarySignal;
 use crate::engine::scatter_field::ScatterField;
-use crate::engine::single_scatter::{PointSampling, Scratch, Seen, SingleScatter};
+use crate::engine::single_scatter::{NodeEstimate, PointSampling, Scratch, SingleScatter};
 use crate::transport::tally::Moments;
 
 /// Error of the interpolation, relative to the whole signal, beyond which nodes are set closer.
@@ -37,7 +37,7 @@ pub(crate) fn single_scatter_field(
     (seed, collisions): (u64, f64),
     primary: &PrimarySignal,
 ) -> ([ScatterField; 2], f64) {
-    let see = |grid: &NodeGrid, level: u64, nodes: &[usize]| -> Vec<Seen> {
+    let estimate = |grid: &NodeGrid, level: u64, nodes: &[usize]| -> Vec<NodeEstimate> {
         nodes
             .par_iter()
             .map_init(Scratch::default, |scratch, &node| {
@@ -53,16 +53,16 @@ pub(crate) fn single_scatter_field(
     };
     let mut grid = NodeGrid::new(detector, step_mm);
     let all: Vec<usize> = (0..grid.nodes()).collect();
-    let mut nodes = see(&grid, 0, &all);
+    let mut nodes = estimate(&grid, 0, &all);
     let mut largest_share = largest(&nodes);
     let close = new_nodes_beside(&grid, &bent_nodes(&grid, &nodes, primary));
     if !close.is_empty() {
         nodes = interpolated(&grid, &nodes);
         grid = grid.refined();
-        let seen = see(&grid, 1, &close);
-        largest_share = largest_share.max(largest(&seen));
-        for (&node, seen) in close.iter().zip(seen) {
-            nodes[node] = seen;
+        let closer = estimate(&grid, 1, &close);
+        largest_share = largest_share.max(largest(&closer));
+        for (&node, closer) in close.iter().zip(closer) {
+            nodes[node] = closer;
         }
     }
     let field = |kind: usize| ScatterField {
@@ -92,14 +92,14 @@ fn new_nodes_beside(grid: &NodeGrid, bent: &[bool]) -> Vec<usize> {
         .collect()
 }
 
-fn largest(nodes: &[Seen]) -> f64 {
+fn largest(nodes: &[NodeEstimate]) -> f64 {
     nodes
         .iter()
         .map(|node| node.largest_share)
         .fold(0.0, f64::max)
 }
 
-fn mean_kev(node: &Seen) -> f64 {
+fn mean_kev(node: &NodeEstimate) -> f64 {
     let both = |kinds: &[Moments; 2]| kinds[0].mean_kev + kinds[1].mean_kev;
     node.estimates.iter().map(both).sum::<f64>() / ESTIMATES as f64
 }
@@ -109,10 +109,10 @@ fn mean_kev(node: &Seen) -> f64 {
 /// The middle of four nodes in a row, at -3, -1, 1, 3 steps, is (-1, 9, 9, -1)/16 of them up to an error that falls with
 /// the fourth power of the step; at kinks with the first. A quarter of it is what half the distance is taken to leave.
 /// Beside the rim the four are at -1, 1, 2, 3 steps.
-fn bent_nodes(grid: &NodeGrid, nodes: &[Seen], primary: &PrimarySignal) -> Vec<bool> {
+fn bent_nodes(grid: &NodeGrid, nodes: &[NodeEstimate], primary: &PrimarySignal) -> Vec<bool> {
     let values: Vec<f64> = nodes.iter().map(mean_kev).collect();
     let cm2 = primary.detector.pixel_cm2();
-    let foretold = |at: usize, count: usize, value: &dyn Fn(usize) -> f64| {
+    let predicted = |at: usize, count: usize, value: &dyn Fn(usize) -> f64| {
         let beside_rim = |from: usize, steps: [usize; 3]| {
             let [near, far, farther] = steps.map(value);
             0.25 * (value(from) + farther) + 1.5 * near - far
@@ -131,22 +131,22 @@ fn bent_nodes(grid: &NodeGrid, nodes: &[Seen], primary: &PrimarySignal) -> Vec<b
     (0..grid.nodes())
         .map(|node| {
             let (i, j) = (node % grid.columns, node / grid.columns);
-            let along_x = foretold(i, grid.columns, &|i| values[j * grid.columns + i]);
-            let along_y = foretold(j, grid.rows, &|j| values[j * grid.columns + i]);
+            let along_x = predicted(i, grid.columns, &|i| values[j * grid.columns + i]);
+            let along_y = predicted(j, grid.rows, &|j| values[j * grid.columns + i]);
             let signal = primary.at(grid.place(node)) / cm2 + values[node];
             let allowed = (BEND * signal).min(OWN_BEND * values[node]);
             [along_x, along_y]
                 .into_iter()
                 .flatten()
-                .any(|foretold| 0.25 * (foretold - values[node]).abs() > allowed)
+                .any(|predicted| 0.25 * (predicted - values[node]).abs() > allowed)
         })
         .collect()
 }
 
 /// Every estimate between the nodes.
-fn interpolated(grid: &NodeGrid, nodes: &[Seen]) -> Vec<Seen> {
+fn interpolated(grid: &NodeGrid, nodes: &[NodeEstimate]) -> Vec<NodeEstimate> {
     let interpolation = grid.to_refined();
-    let mut fine = vec![Seen::default(); grid.refined().nodes()];
+    let mut fine = vec![NodeEstimate::default(); grid.refined().nodes()];
     for estimate in 0..ESTIMATES {
         for kind in 0..2 {
             let plane = |of: fn(&Moments) -> f64| -> Vec<f64> {
@@ -189,8 +189,8 @@ mod tests {
             open_kev: detector.pixel_cm2(),
         };
         let grid = NodeGrid::new(&detector, 20.0);
-        let nodes: Vec<Seen> = (0..grid.nodes())
-            .map(|node| Seen {
+        let nodes: Vec<NodeEstimate> = (0..grid.nodes())
+            .map(|node| NodeEstimate {
                 estimates: [[kev(scatter(grid.place(node))), kev(0.0)]; ESTIMATES],
                 largest_share: 0.0,
             })

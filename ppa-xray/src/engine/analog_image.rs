@@ -1,4 +1,6 @@
 //! From the tally of the analog engine to a radiograph.
+//!
+//! docs/physics.md, "Analog engine and dose".
 
 use serde::{Deserialize, Serialize};
 

@@ -3,6 +3,7 @@
 //! Bone between spongy and compact is a mixture of soft tissue and cortical bone, and so is its attenuation; all
 //! tissues differ by little more than how much of two or three smooth functions of the energy they hold (Alvarez and
 //! Macovski, Phys. Med. Biol. 21 (1976) 733). So a ray need not keep the mass of 27 materials apart, but that of four.
+//! docs/physics.md, "Fast engine", primary.
 
 use crate::matter::energy_range::{CUTOFF_KEV, MAX_ENERGY_KEV};
 use crate::transport::attenuation::Attenuation;

@@ -1,4 +1,6 @@
 //! Sampling from a discrete distribution by its cumulative sums.
+//!
+//! Inverse transform: docs/physics.md, "Fast engine", first collisions.
 
 use std::ops::Range;
 
@@ -62,7 +64,7 @@ mod tests {
             );
             assert_eq!(found.inside, (target - low) / size);
         }
-        // Rounding may put a target beyond the entries that are looked through.
+        // Rounding may put a target beyond the entries that are searched.
         let last = Entry::find(&sums, 1, 2..4, 10.0);
         assert_eq!((last.index, last.inside), (3, 1.0));
     }

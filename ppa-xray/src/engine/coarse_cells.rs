@@ -1,7 +1,7 @@
-//! Cubes of voxels whose mean attenuation stands for theirs, few enough for the cache.
+//! Cubes of voxels of equal mean attenuation, few enough for the cache.
 //!
 //! They give optical depths whose bias [`single_scatter`](super::single_scatter) and [`multiple_scatter`](super::multiple_scatter) remove
-//! with a randomly sampled correction.
+//! with a randomly sampled correction; docs/physics.md, "Fast engine", single scatter.
 
 use rayon::prelude::*;
 

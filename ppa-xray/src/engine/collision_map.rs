@@ -21,17 +21,17 @@ use crate::vector_math::exp;
 /// Cells along device x and y of the field, and along the rays through the voxel box.
 const CELLS: [usize; 3] = [40, 40, 16];
 
-/// Points per side of a cell at which the body is looked at.
+/// Points per side of a cell at which the body is sampled.
 const POINTS: usize = 2;
 
 /// Share of the collisions that are drawn where most happen, whether they are important or not.
-const STRONG: f64 = 0.3;
+const DEFENSIVE_SHARE: f64 = 0.3;
 
 /// Share of what a neighbour has that a cell has at least.
-const LENT: f64 = 0.1;
+const NEIGHBOUR_SHARE: f64 = 0.1;
 
 /// Share of the mean that a cell has at least: a corner of the body may lie between the points.
-const LEAST: f64 = 1e-3;
+const LEAST_SHARE: f64 = 1e-3;
 
 /// The irradiated part of the box in cells.
 #[derive(Debug)]
@@ -71,17 +71,17 @@ impl CollisionMap {
             typical_kev: 0.0,
             cells: Vec::new(),
         };
-        let looked: Vec<Look> = (0..CELLS.iter().product::<usize>())
+        let samples: Vec<CellSample> = (0..CELLS.iter().product::<usize>())
             .into_par_iter()
-            .map(|cell| map.look(cell, transport, paths, lines))
+            .map(|cell| map.sample(cell, transport, paths, lines))
             .collect();
         let mut weight = 0.0;
-        for look in &looked {
-            let before = look.mass.iter().flatten();
+        for sample in &samples {
+            let before = sample.mass.iter().flatten();
             for (sum, before) in map.mass.iter_mut().flatten().zip(before) {
                 *sum += before;
             }
-            weight += look.site.weight;
+            weight += sample.site.weight;
         }
         // The way out is taken to be as long as the way in.
         let twice = 2.0 / weight.max(f32::MIN_POSITIVE);
@@ -89,12 +89,12 @@ impl CollisionMap {
             *mean *= twice;
         }
         map.typical_kev = mean_energy_behind(lines, &map.mass);
-        map.cells = looked.into_iter().map(|look| look.site).collect();
+        map.cells = samples.into_iter().map(|sample| sample.site).collect();
         map
     }
 
     /// Sets the sampling density of the cells from their `importance`, with a share by scattered energy for cells that it underestimates.
-    pub fn weigh(&mut self, importance: &[f64]) {
+    pub fn set_density(&mut self, importance: &[f64]) {
         let mean = |of: &dyn Fn(usize) -> f64| -> f64 {
             (0..self.cells.len())
                 .map(of)
@@ -106,20 +106,27 @@ impl CollisionMap {
         let (important, strong) = (mean(&|cell| importance[cell]), mean(&weight));
         let both: Vec<f64> = (0..self.cells.len())
             .map(|cell| {
-                (1.0 - STRONG) * importance[cell] / important + STRONG * weight(cell) / strong
+                (1.0 - DEFENSIVE_SHARE) * importance[cell] / important
+                    + DEFENSIVE_SHARE * weight(cell) / strong
             })
             .collect();
-        self.sums = lent(&both)
+        self.sums = spread_to_neighbours(&both)
             .into_iter()
             .scan(0.0, |sum, density| {
-                *sum += density.max(LEAST);
+                *sum += density.max(LEAST_SHARE);
                 Some(*sum)
             })
             .collect();
     }
 
     /// What a cell holds.
-    fn look(&self, cell: usize, transport: &Transport, paths: &Paths, lines: &Lines) -> Look {
+    fn sample(
+        &self,
+        cell: usize,
+        transport: &Transport,
+        paths: &Paths,
+        lines: &Lines,
+    ) -> CellSample {
         let mut mass = vec![[0.0; LANES]; paths.basis.groups];
         let mut sum_of_mass = mass.clone();
         let (mut weight, mut strongest) = (0.0, 0.0);
@@ -137,7 +144,7 @@ impl CollisionMap {
             if density > 0.05 {
                 paths.coarse_between(&Point3::origin(), &collision.position, &mut mass);
             }
-            let scattered = lines.usual().map(|(line, photons)| {
+            let scattered = lines.central_spectrum().map(|(line, photons)| {
                 let through = f64::from(exp(-dot(&mass, &line.attenuation)));
                 photons * line.scattered[usize::from(found)] * through
             });
@@ -161,7 +168,7 @@ impl CollisionMap {
         } else {
             centre.position
         };
-        Look {
+        CellSample {
             site: Site {
                 position: middle.cast(),
                 direction: centre.direction.cast(),
@@ -203,7 +210,7 @@ impl CollisionMap {
         }
     }
 
-    /// A collision drawn as [`CollisionMap::weigh`] says; the point is uniform in the unit cube.
+    /// A collision drawn as [`CollisionMap::set_density`] says; the point is uniform in the unit cube.
     #[inline]
     pub fn draw(
         &self,
@@ -237,8 +244,8 @@ impl CollisionMap {
     }
 }
 
-/// Gives every cell a share of what its strongest neighbour has: between the points a cell was looked at may lie as much.
-fn lent(own: &[f64]) -> Vec<f64> {
+/// Gives every cell a share of what its strongest neighbour has: between the sampled points of a cell may lie as much.
+fn spread_to_neighbours(own: &[f64]) -> Vec<f64> {
     (0..own.len())
         .map(|index| {
             let [i, j, k] = split(index);
@@ -248,7 +255,7 @@ fn lent(own: &[f64]) -> Vec<f64> {
                 for column in near(i, 0) {
                     for depth in near(k, 2) {
                         let neighbour = own[(row * CELLS[0] + column) * CELLS[2] + depth];
-                        weight = weight.max(LENT * neighbour);
+                        weight = weight.max(NEIGHBOUR_SHARE * neighbour);
                     }
                 }
             }
@@ -260,7 +267,7 @@ fn lent(own: &[f64]) -> Vec<f64> {
 /// Mean energy of the photons that pass the given masses, keV.
 fn mean_energy_behind(lines: &Lines, mass: &[[f32; LANES]]) -> f64 {
     let (mut photons, mut energy) = (f64::MIN_POSITIVE, 0.0);
-    for (line, photons_sent) in lines.usual() {
+    for (line, photons_sent) in lines.central_spectrum() {
         let through = photons_sent * f64::from(exp(-dot(mass, &line.attenuation)));
         photons += through;
         energy += through * line.energy_kev;
@@ -269,7 +276,7 @@ fn mean_energy_behind(lines: &Lines, mass: &[[f32; LANES]]) -> f64 {
 }
 
 /// What a cell holds.
-struct Look {
+struct CellSample {
     site: Site,
     /// Mass between source and cell, times the weight.
     mass: Vec<[f32; LANES]>,

@@ -1,4 +1,4 @@
-//! What an engine needs of one exposure.
+//! What both engines need of one exposure: transport, response of the detector, readout.
 
 use crate::beam::projection::Projection;
 use crate::beam::projection_error::ProjectionError;

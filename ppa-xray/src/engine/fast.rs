@@ -77,9 +77,9 @@ pub(crate) const SCATTER_ENERGIES: Accuracy = Accuracy {
 };
 
 /// How much farther apart than for single scatter the points for multiple scatter are.
-const SMOOTHER: f64 = 1.4;
+const MULTIPLE_SPACING: f64 = 1.4;
 
-/// First collisions on a list for each that a point of the detector in the dark chooses to see.
+/// First collisions on a list for each that a point of the detector in the dark samples.
 const LISTED_PER_CHOICE: f64 = 32.0;
 
 /// Simulates a radiograph of [`FastSettings::dose_histories`] photons at a fraction of the work.
@@ -191,7 +191,7 @@ impl Scatter {
         let lines = Lines::new(exposure, paths, &densities, SCATTER_ENERGIES);
         let mut map = CollisionMap::new(transport, paths, &lines);
         let importance_model = ImportanceModel::new(transport, paths, &densities, &map);
-        map.weigh(&importance_model.importance(&map.cells, &primary.tolerances(transport)));
+        map.set_density(&importance_model.importance(&map.cells, &primary.tolerances(transport)));
         let first = FirstFlights {
             transport,
             paths,
@@ -218,7 +218,7 @@ impl Scatter {
             (settings.seed, listed as f64 / LISTED_PER_CHOICE),
             primary,
         );
-        let nodes = NodeGrid::new(detector, SMOOTHER * settings.scatter_pixel_mm);
+        let nodes = NodeGrid::new(detector, MULTIPLE_SPACING * settings.scatter_pixel_mm);
         let multiple = MultipleScatter {
             histories: Histories {
                 transport,
@@ -232,14 +232,14 @@ impl Scatter {
             densities: &densities,
             nodes,
         };
-        let seen = multiple.seen(settings.seed);
+        let estimate = multiple.fluence(settings.seed);
         let multiple = ScatterField {
             grid: nodes,
-            estimates: seen.fluence,
+            estimates: estimate.fluence,
         };
         Self {
             fields: [compton, rayleigh, multiple],
-            largest_share: single_share.max(seen.largest_share),
+            largest_share: single_share.max(estimate.largest_share),
         }
     }
 }

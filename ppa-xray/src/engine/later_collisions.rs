@@ -11,8 +11,8 @@ use crate::engine::first_collisions::FirstCollisions;
 use crate::engine::importance::ImportanceModel;
 use crate::engine::lines::Lines;
 use crate::engine::paths::{Paths, Step};
+use crate::engine::rotation::rotated;
 use crate::engine::site::Site;
-use crate::engine::turn::turned;
 use crate::matter::energy_range::CUTOFF_KEV;
 use crate::transport::attenuation::Coefficients;
 use crate::transport::stream::Stream;
@@ -193,7 +193,7 @@ impl Histories<'_> {
         landing
     }
 
-    /// Turns the photon; false if too little energy is left.
+    /// Rotates the direction of the photon; false if too little energy is left.
     fn scatter(
         &self,
         photon: &mut Photon,
@@ -210,7 +210,7 @@ impl Histories<'_> {
         } else {
             tables.sample_rayleigh(photon.energy_kev, rng)
         };
-        photon.direction = turned(&photon.direction, cos_theta, rng.unit());
+        photon.direction = rotated(&photon.direction, cos_theta, rng.unit());
         photon.energy_kev >= CUTOFF_KEV
     }
 }

@@ -1,4 +1,6 @@
 //! Energies of the quadrature over the spectrum, with attenuation and scattering of every material at each.
+//!
+//! docs/physics.md, "Fast engine", first collisions and single scatter.
 
 use rayon::prelude::*;
 
@@ -111,7 +113,7 @@ impl Lines {
     }
 
     /// Every line with its photons in the middle of the field, more or less.
-    pub fn usual(&self) -> impl Iterator<Item = (&Line, f64)> {
+    pub fn central_spectrum(&self) -> impl Iterator<Item = (&Line, f64)> {
         let middle = &self.spectra.weights[self.spectra.weights.len() / 2];
         self.lines.iter().zip(middle.iter().copied())
     }

@@ -34,6 +34,7 @@ mod primary_rays;
 mod primary_signal;
 mod quasi_random;
 pub(crate) mod raytrace;
+mod rotation;
 mod scatter_field;
 #[cfg(test)]
 mod scatter_of_a_sphere;
@@ -43,4 +44,3 @@ mod site;
 #[cfg(test)]
 pub(crate) mod small_limb;
 mod spectral_quadrature;
-mod turn;

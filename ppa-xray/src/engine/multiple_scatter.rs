@@ -20,14 +20,14 @@ use crate::vector_math::exp;
 /// Most histories from a list whose collisions are kept at the same time.
 const ROUND: u64 = 8_192;
 
-/// Histories for each collision that a node chooses to see.
-const HISTORIES_PER_SIGHT: f64 = 16.0;
+/// Histories for each collision that a node samples.
+const HISTORIES_PER_SAMPLE: f64 = 16.0;
 
-/// One choice in so many is also seen through the voxels themselves; the difference, so many times, makes up for what
+/// One sample in so many is repeated through the voxels themselves; the difference, times that number, corrects what
 /// the coarse cells get wrong on average.
-const CHECKED: u32 = 8;
+const CORRECTION_INTERVAL: u32 = 8;
 
-/// Histories, and the points of the detector that their collisions are seen from.
+/// Histories, and the points of the detector that sample their collisions.
 pub(crate) struct MultipleScatter<'a> {
     pub histories: Histories<'a>,
     pub response: &'a TabulatedResponse<'a>,
@@ -36,14 +36,14 @@ pub(crate) struct MultipleScatter<'a> {
 }
 
 /// Energy per cm² and history that multiple scatter leaves in the detector, at every node.
-pub(crate) struct Seen {
+pub(crate) struct NodeFluence {
     /// List by list.
     pub fluence: Vec<Vec<Moments>>,
-    /// Largest share of a node's sum that a single sight added.
+    /// Largest share of a node's sum that a single sample added.
     pub largest_share: f64,
 }
 
-/// What a node has seen.
+/// What a node has summed.
 #[derive(Clone, Default)]
 struct NodeSum {
     /// List by list.
@@ -61,7 +61,7 @@ struct Scratch {
 
 impl MultipleScatter<'_> {
     /// Follows histories from all listed collisions.
-    pub fn seen(&self, seed: u64) -> Seen {
+    pub fn fluence(&self, seed: u64) -> NodeFluence {
         let (each, lists) = (self.histories.each(), self.histories.lists.len());
         let start = NodeSum {
             sums: vec![Moments::default(); lists],
@@ -70,7 +70,7 @@ impl MultipleScatter<'_> {
         let mut nodes = vec![start; self.nodes.nodes()];
         for (round, first) in (0..each).step_by(ROUND as usize).enumerate() {
             let histories = first..(first + ROUND).min(each);
-            let sights = (histories.end - histories.start) as f64 / HISTORIES_PER_SIGHT;
+            let samples = (histories.end - histories.start) as f64 / HISTORIES_PER_SAMPLE;
             let collisions: Vec<LaterCollisions> = (0..lists)
                 .into_par_iter()
                 .map(|list| {
@@ -82,14 +82,14 @@ impl MultipleScatter<'_> {
                 Scratch::default,
                 |scratch, (node, sum)| {
                     let index = (round * self.nodes.nodes() + node) as u64;
-                    let stream = Stream::MultipleScatterSights as u32;
+                    let stream = Stream::MultipleScatterSampling as u32;
                     let mut rng = Philox::new(seed, stream, index);
-                    self.see(node, &collisions, sights, sum, scratch, &mut rng);
+                    self.add_samples(node, &collisions, samples, sum, scratch, &mut rng);
                 },
             );
         }
         let whole = |node: &NodeSum| node.sums.iter().map(|sum| sum.mean_kev).sum::<f64>();
-        Seen {
+        NodeFluence {
             largest_share: nodes
                 .iter()
                 .map(|node| node.largest / whole(node).max(f64::MIN_POSITIVE))
@@ -100,12 +100,12 @@ impl MultipleScatter<'_> {
         }
     }
 
-    /// Adds what a node sees of about `sights` collisions that it chooses for every list.
-    fn see(
+    /// Adds about `samples` collisions of every list, sampled by importance, to a node.
+    fn add_samples(
         &self,
         node: usize,
         collisions: &[LaterCollisions],
-        sights: f64,
+        samples: f64,
         sum: &mut NodeSum,
         Scratch { importance, mass }: &mut Scratch,
         rng: &mut Philox,
@@ -120,7 +120,7 @@ impl MultipleScatter<'_> {
         importance.tabulate(self.histories.importance_model, &target);
         for (collisions, part) in collisions.iter().zip(&mut sum.sums) {
             let draws = Draws {
-                count: sights,
+                count: samples,
                 u: rng.unit(),
             };
             let all = Subset { first: 0, every: 1 };
@@ -130,18 +130,18 @@ impl MultipleScatter<'_> {
                 all,
                 draws,
                 |index, inverse| {
-                    let seen = self.sight(&target, collisions, index, mass, rng);
+                    let sample = self.contribution(&target, collisions, index, mass, rng);
                     // mm² → cm²
-                    let seen = seen.scaled(100.0 * inverse);
-                    *part = [*part, seen].into_iter().sum();
-                    sum.largest = sum.largest.max(seen.mean_kev.abs());
+                    let sample = sample.scaled(100.0 * inverse);
+                    *part = [*part, sample].into_iter().sum();
+                    sum.largest = sum.largest.max(sample.mean_kev.abs());
                 },
             );
         }
     }
 
     /// What a photon about to collide sends to `target`, per mm².
-    fn sight(
+    fn contribution(
         &self,
         target: &Point3<f64>,
         collisions: &LaterCollisions,
@@ -184,13 +184,15 @@ impl MultipleScatter<'_> {
                 .sum()
         };
         self.histories.paths.coarse_between(&position, target, mass);
-        let mut seen = through(mass);
-        if !self.histories.paths.coarse_is_exact() && rng.unit() * f64::from(CHECKED) < 1.0 {
+        let mut part = through(mass);
+        if !self.histories.paths.coarse_is_exact()
+            && rng.unit() * f64::from(CORRECTION_INTERVAL) < 1.0
+        {
             self.histories.paths.between(&position, target, mass);
-            let inverse_share = f64::from(CHECKED);
+            let inverse_share = f64::from(CORRECTION_INTERVAL);
             let exact = through(mass).scaled(inverse_share);
-            seen = [seen.scaled(1.0 - inverse_share), exact].into_iter().sum();
+            part = [part.scaled(1.0 - inverse_share), exact].into_iter().sum();
         }
-        seen.scaled(f64::from(site.weight) * along.z / (r * r * r))
+        part.scaled(f64::from(site.weight) * along.z / (r * r * r))
     }
 }

@@ -1,4 +1,6 @@
 //! Line integrals of mass through the voxels, and through coarser cells: Siddon, Med. Phys. 12 (1985) 252.
+//!
+//! docs/physics.md, "Fast engine", primary.
 
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;

@@ -1,4 +1,6 @@
 //! Deterministic rays from focal spot to detector: transmitted energy and its second moment.
+//!
+//! docs/physics.md, "Fast engine", primary.
 
 use nalgebra::{Point2, Point3};
 use rayon::prelude::*;

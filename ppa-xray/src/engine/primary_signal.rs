@@ -1,4 +1,6 @@
 //! The primary image as tolerance of the scatter estimate: its quantum noise at each point.
+//!
+//! docs/physics.md, "Fast engine", first collisions.
 
 use nalgebra::{Point2, Point3};
 

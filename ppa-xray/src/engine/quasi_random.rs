@@ -1,7 +1,7 @@
 //! Additive recurrence with irrational steps: points of low discrepancy with a random shift.
 //!
 //! Niederreiter, *Random Number Generation and Quasi-Monte Carlo Methods*, 1992, ch. 3; shift: Cranley and Patterson, SIAM J.
-//! Numer. Anal. 13 (1976) 904.
+//! Numer. Anal. 13 (1976) 904. docs/physics.md, "Fast engine", first collisions.
 
 use ppa_core::random::Philox;
 

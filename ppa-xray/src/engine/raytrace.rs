@@ -1,4 +1,6 @@
 //! The primary image without randomness: line integrals through the voxels, averaged over each pixel.
+//!
+//! docs/physics.md, "Fast engine", primary.
 
 use nalgebra::{Point2, Point3};
 

@@ -1,4 +1,6 @@
 //! Scatter over the whole detector: estimates at nodes interpolated to pixels, with their standard errors.
+//!
+//! docs/physics.md, "Fast engine", precision.
 
 use crate::beam::projection::Detector;
 use crate::engine::node_grid::NodeGrid;

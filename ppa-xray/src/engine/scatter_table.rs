@@ -1,4 +1,6 @@
 //! Differential scattering of one material at one energy, tabulated by angle.
+//!
+//! docs/physics.md, "Photon data and scattering".
 
 use ppa_core::random::Philox;
 

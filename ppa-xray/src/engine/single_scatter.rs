@@ -23,11 +23,11 @@ use crate::vector_math::{WIDTH, exp};
 
 /// One sample in so many is repeated through the voxels themselves; the difference, times that number, corrects the bias of
 /// the coarse cells.
-const CHECKED: u32 = 4;
+const CORRECTION_INTERVAL: u32 = 4;
 
 /// Estimates at a point of the detector.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Seen {
+pub(crate) struct NodeEstimate {
     /// Energy per cm² and history that Compton and Rayleigh scatter leave in the detector.
     pub estimates: [[Moments; 2]; ESTIMATES],
     /// Largest share of both that a single collision added.
@@ -60,7 +60,7 @@ pub(crate) struct Scratch {
     buffers: Buffers,
 }
 
-/// Buffers of a sight.
+/// Buffers of a contribution.
 #[derive(Default)]
 struct Buffers {
     mass: Vec<[f32; LANES]>,
@@ -69,7 +69,7 @@ struct Buffers {
 }
 
 /// A collision and the direction from it to the point.
-struct Sight<'a> {
+struct PathToPoint<'a> {
     /// Photons that get to the collision, line by line.
     photons: &'a [f32],
     incidence: Incidence<'a>,
@@ -88,17 +88,17 @@ impl SingleScatter<'_> {
             importance,
             buffers,
         }: &mut Scratch,
-    ) -> Seen {
+    ) -> NodeEstimate {
         let target = Point3::new(at.x, at.y, self.transport.projection.source_detector_mm);
         buffers.mass.resize(self.paths.basis.groups, [0.0; LANES]);
         importance.tabulate(self.importance_model, &target);
         let rough = !self.paths.coarse_is_exact();
-        let mut result = Seen::default();
+        let mut result = NodeEstimate::default();
         let (mut largest, mut whole) = (0.0_f64, 0.0);
-        let mut rng = Philox::new(seed, Stream::SingleScatterSights as u32, index);
+        let mut rng = Philox::new(seed, Stream::SingleScatterSampling as u32, index);
         for (list, sum) in self.lists.iter().zip(&mut result.estimates) {
             let first = (rng.unit() * every as f64) as usize;
-            let mut until_check = (rng.unit() * f64::from(CHECKED)) as u32;
+            let mut until_correction = (rng.unit() * f64::from(CORRECTION_INTERVAL)) as u32;
             let draws = Draws {
                 count: collisions,
                 u: rng.unit(),
@@ -109,14 +109,16 @@ impl SingleScatter<'_> {
                 Subset { first, every },
                 draws,
                 |site, inverse| {
-                    let exact = rough && until_check == 0;
-                    until_check = until_check.checked_sub(1).unwrap_or(CHECKED - 1);
+                    let exact = rough && until_correction == 0;
+                    until_correction = until_correction
+                        .checked_sub(1)
+                        .unwrap_or(CORRECTION_INTERVAL - 1);
                     // mm² → cm²
                     let weight = 100.0 * inverse * every as f64;
-                    let seen = self.seen(&target, list, site, exact, buffers);
-                    let seen = seen.map(|part| part.scaled(weight));
-                    largest = largest.max((seen[0].mean_kev + seen[1].mean_kev).abs());
-                    for (sum, part) in sum.iter_mut().zip(seen) {
+                    let part = self.contribution(&target, list, site, exact, buffers);
+                    let part = part.map(|part| part.scaled(weight));
+                    largest = largest.max((part[0].mean_kev + part[1].mean_kev).abs());
+                    for (sum, part) in sum.iter_mut().zip(part) {
                         *sum = [*sum, part].into_iter().sum();
                     }
                 },
@@ -128,7 +130,7 @@ impl SingleScatter<'_> {
     }
 
     /// Compton and Rayleigh part of what one collision brings to `target`, per mm².
-    fn seen(
+    fn contribution(
         &self,
         target: &Point3<f64>,
         list: &FirstCollisions,
@@ -146,19 +148,19 @@ impl SingleScatter<'_> {
         let r = along.norm();
         let direction = along / r;
         let cos_theta = direction.dot(&site.direction.cast()).clamp(-1.0, 1.0);
-        let sight = Sight {
+        let path = PathToPoint {
             photons: list.padded_photons(index, self.lines),
             incidence: self.response.incidence([target.x, target.y], &direction),
         };
         let table = self.lines.scattering(site.material);
         table.at(ScatterTable::locate(cos_theta), scattering);
         self.paths.coarse_between(&position, target, mass);
-        let mut seen = self.energies(&sight, scattering, mass, photons);
+        let mut energies = self.energies(&path, scattering, mass, photons);
         if exact {
             self.paths.between(&position, target, mass);
-            let inverse_share = f64::from(CHECKED);
-            let exact = self.energies(&sight, scattering, mass, photons);
-            for (rough, exact) in seen.iter_mut().zip(exact) {
+            let inverse_share = f64::from(CORRECTION_INTERVAL);
+            let exact = self.energies(&path, scattering, mass, photons);
+            for (rough, exact) in energies.iter_mut().zip(exact) {
                 *rough = [
                     rough.scaled(1.0 - inverse_share),
                     exact.scaled(inverse_share),
@@ -167,20 +169,20 @@ impl SingleScatter<'_> {
                 .sum();
             }
         }
-        seen.map(|part| part.scaled(along.z / (r * r * r)))
+        energies.map(|part| part.scaled(along.z / (r * r * r)))
     }
 
     /// Energy that the photons of a collision leave in the detector behind the masses `after` it, per solid angle; `photons` is a buffer.
     fn energies(
         &self,
-        sight: &Sight,
+        path: &PathToPoint,
         scattering: &LinesAtAngle,
         after: &BasisMass,
         photons: &mut Vec<f32>,
     ) -> [Moments; 2] {
         let [compton, rayleigh, compton_kev] = scattering.parts();
-        photons.resize(sight.photons.len(), 0.0);
-        let arriving = sight.photons.chunks_exact(WIDTH);
+        photons.resize(path.photons.len(), 0.0);
+        let arriving = path.photons.chunks_exact(WIDTH);
         let scattered = arriving.zip(compton.chunks_exact(WIDTH));
         for (chunk, (out, (arriving, compton))) in
             photons.chunks_exact_mut(WIDTH).zip(scattered).enumerate()
@@ -193,8 +195,8 @@ impl SingleScatter<'_> {
                 out[lane] = arriving[lane] * compton[lane] * exp(-exponents[lane]);
             }
         }
-        let compton = sight.incidence.of_energies(compton_kev, photons);
-        let arriving = sight.photons.chunks_exact(WIDTH);
+        let compton = path.incidence.of_energies(compton_kev, photons);
+        let arriving = path.photons.chunks_exact(WIDTH);
         let scattered = arriving.zip(rayleigh.chunks_exact(WIDTH));
         for (chunk, (out, (arriving, rayleigh))) in
             photons.chunks_exact_mut(WIDTH).zip(scattered).enumerate()
@@ -204,6 +206,6 @@ impl SingleScatter<'_> {
                 out[lane] = arriving[lane] * rayleigh[lane] * exp(-exponents[lane]);
             }
         }
-        [compton, sight.incidence.of_lines(photons)]
+        [compton, path.incidence.of_lines(photons)]
     }
 }

@@ -1,4 +1,4 @@
-//! A collision site.
+//! A collision site: place, direction and weight; docs/physics.md, "Fast engine", first collisions.
 
 use nalgebra::{Point3, Vector3};
 

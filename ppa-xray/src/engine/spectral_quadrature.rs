@@ -1,6 +1,6 @@
 //! Gauss quadrature of the spectrum between absorption edges, with as few energies as the accuracy asks for.
 //!
-//! Golub and Welsch, Math. Comp. 23 (1969) 221.
+//! Golub and Welsch, Math. Comp. 23 (1969) 221; docs/physics.md, "Fast engine", primary.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 

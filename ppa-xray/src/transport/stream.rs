@@ -10,6 +10,6 @@ pub(crate) enum Stream {
     SingleScatter = 4,
     MultipleScatter = 5,
     MultipleScatterStarts = 6,
-    SingleScatterSights = 7,
-    MultipleScatterSights = 8,
+    SingleScatterSampling = 7,
+    MultipleScatterSampling = 8,
 }

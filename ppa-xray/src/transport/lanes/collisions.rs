@@ -90,7 +90,7 @@ impl Lanes<'_, '_> {
         let mut scattered = [Site::default(); LANES];
         for (n, i) in sites.enumerate() {
             scattered[n] = site[i];
-            self.scattering.turns.azimuth[n] = self.draws.block[2][i];
+            self.scattering.angles.azimuth[n] = self.draws.block[2][i];
         }
         let kinds = [compton.count, rayleigh.count];
         let scattered = &scattered[..compton.count + rayleigh.count + k_rays.count];

@@ -15,9 +15,9 @@ mod flights;
 mod isa;
 mod picked;
 mod plain_beam;
+mod rotation;
 mod scattering;
 mod spawning;
-mod turn;
 
 use std::ops::Range;
 

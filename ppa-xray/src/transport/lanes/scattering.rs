@@ -7,7 +7,7 @@ use crate::transport::lanes::draws::unit;
 use crate::transport::lanes::entry::Aim;
 use crate::transport::lanes::flights::Flights;
 use crate::transport::lanes::picked::Picked;
-use crate::transport::lanes::turn::{Turn, Turns};
+use crate::transport::lanes::rotation::{Rotate, ScatterAngles};
 use crate::transport::lanes::{Lanes, Photon};
 use crate::transport::score::Score;
 use crate::transport::tally::Category;
@@ -15,7 +15,7 @@ use crate::transport::tally::Category;
 /// Room for the photons that scatter in one round, side by side; behind them old, harmless numbers.
 pub(super) struct Scattering {
     flights: Flights,
-    pub turns: Turns,
+    pub angles: ScatterAngles,
     attempts: Attempts,
 }
 
@@ -23,7 +23,7 @@ impl Scattering {
     pub fn new() -> Self {
         Self {
             flights: Flights::new(),
-            turns: Turns::new(),
+            angles: ScatterAngles::new(),
             attempts: Attempts::new(),
         }
     }
@@ -63,7 +63,7 @@ impl Lanes<'_, '_> {
         self.attempt_compton(&scattered[..compton]);
         for (n, site) in scattered[..compton].iter().enumerate() {
             let (sin2_half_theta, scattered_kev) = self.compton(site, n);
-            self.scattering.turns.cos_theta[n] = 1.0 - 2.0 * sin2_half_theta;
+            self.scattering.angles.cos_theta[n] = 1.0 - 2.0 * sin2_half_theta;
             let photon = &mut self.photons[site.lane()];
             let slot = usize::from(photon.slot);
             let before_kev = f64::from(photon.energy_kev);
@@ -86,18 +86,20 @@ impl Lanes<'_, '_> {
             let mut rng = self.generator(photon).after(self.draws.block(n));
             let tables = &self.transport.samplers[usize::from(site.code.material())];
             let cos_theta = tables.sample_rayleigh(photon.energy_kev.into(), &mut rng);
-            self.scattering.turns.cos_theta[n] = cos_theta as f32;
+            self.scattering.angles.cos_theta[n] = cos_theta as f32;
             let photon = &mut self.photons[site.lane()];
             photon.step = rng.step();
             photon.scatter(Category::Rayleigh);
         }
         for n in compton + rayleigh..scattered.len() {
-            self.scattering.turns.cos_theta[n] = 1.0 - 2.0 * unit(self.draws.block[0][n]);
+            self.scattering.angles.cos_theta[n] = 1.0 - 2.0 * unit(self.draws.block[0][n]);
         }
         let count = scattered.len().next_multiple_of(16);
-        let Scattering { flights, turns, .. } = &mut self.scattering;
-        self.isa.run(Turn {
-            turns,
+        let Scattering {
+            flights, angles, ..
+        } = &mut self.scattering;
+        self.isa.run(Rotate {
+            angles,
             direction: &mut flights.direction,
             count,
         });

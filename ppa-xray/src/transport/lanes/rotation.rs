@@ -7,13 +7,13 @@ use crate::transport::lanes::isa::Kernel;
 
 /// A polar angle and an azimuth about the old direction.
 #[derive(Debug)]
-pub(super) struct Turns {
+pub(super) struct ScatterAngles {
     pub cos_theta: Each<f32>,
     /// Random word of the azimuth.
     pub azimuth: Each<u32>,
 }
 
-impl Turns {
+impl ScatterAngles {
     pub fn new() -> Self {
         Self {
             cos_theta: [0.0; LANES],
@@ -22,25 +22,25 @@ impl Turns {
     }
 }
 
-/// Turns directions.
-pub(super) struct Turn<'a> {
-    pub turns: &'a Turns,
+/// Rotates directions.
+pub(super) struct Rotate<'a> {
+    pub angles: &'a ScatterAngles,
     pub direction: &'a mut [Each<f32>; 3],
     pub count: usize,
 }
 
-impl Kernel for Turn<'_> {
+impl Kernel for Rotate<'_> {
     #[inline(always)]
     fn run(self) {
-        turn(self.turns, self.direction, self.count.min(LANES));
+        rotate(self.angles, self.direction, self.count.min(LANES));
     }
 }
 
 #[inline(always)]
-fn turn(turns: &Turns, direction: &mut [Each<f32>; 3], count: usize) {
+fn rotate(angles: &ScatterAngles, direction: &mut [Each<f32>; 3], count: usize) {
     for i in 0..count {
-        let (sin_phi, cos_phi) = sin_cos_turn(unit(turns.azimuth[i]));
-        let cos_theta = turns.cos_theta[i];
+        let (sin_phi, cos_phi) = sin_cos_turn(unit(angles.azimuth[i]));
+        let cos_theta = angles.cos_theta[i];
         let sin_theta = greatest((1.0 - cos_theta) * (1.0 + cos_theta), 0.0).sqrt();
         // Orthonormal basis without a branch near the pole (Duff et al., JCGT 6(1), 2017).
         let [x, y, z] = each(direction, i);
