@@ -164,7 +164,7 @@ fn an_experiment_makes_the_chosen_columns_only() {
     assert!(folder.join("runs/experiment_ablations.md").exists());
     let refused = fail(folder, "experiment all plan.toml --out runs --columns all");
     assert!(
-        refused.contains("--columns is for one experiment"),
+        refused.contains("--columns names columns of one experiment"),
         "{refused}"
     );
 }
