@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 use crate::beam::projection::Detector;
 use crate::detector::open_field::OpenField;
 use crate::detector::readout::Layer;
-use crate::image::presentation::PresentationError;
 use crate::transport::tally::Category;
 
 /// How a radiograph was computed.
@@ -143,27 +142,8 @@ impl Radiograph {
     }
 
     /// All layers, electronic noise among them.
-    fn planes(&self) -> impl Iterator<Item = &Layer> {
+    pub(super) fn planes(&self) -> impl Iterator<Item = &Layer> {
         self.layers.iter().chain(&self.electronic)
-    }
-
-    /// # Errors
-    /// [`PresentationError::Pixels`] where a layer does not have one value and one standard error per pixel.
-    pub(crate) fn check_layers(&self) -> Result<(), PresentationError> {
-        let expected = self.detector.pixels();
-        let names = Category::ALL.map(Category::name).into_iter();
-        for (name, layer) in names.chain(["electronic"]).zip(self.planes()) {
-            for found in [layer.value.len(), layer.sigma.len()] {
-                if found != expected {
-                    return Err(PresentationError::Pixels {
-                        layer: name,
-                        found,
-                        expected,
-                    });
-                }
-            }
-        }
-        Ok(())
     }
 
     /// The reading of every pixel: all layers together, eV/cm² per history; not a number where a layer lacks the pixel.
