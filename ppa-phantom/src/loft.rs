@@ -15,7 +15,7 @@ use super::smooth::smooth_max;
 pub(super) enum End {
     /// Continues with its last section.
     Open,
-    /// Cut square, the edge rounded over so many mm.
+    /// Cut square, the edge rounded over this many mm.
     Capped { blend: f64 },
 }
 

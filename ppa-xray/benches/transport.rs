@@ -7,8 +7,8 @@ use ppa_ct::Grid;
 use ppa_phantom::{LowerLeg, TableTop};
 use ppa_xray::{
     AnalogSettings, AntiScatterGrid, Collimation, Detector, DetectorModel, FastSettings, FocalSpot,
-    HeelEffect, HuCalibration, LinesAlong, Material, Projection, Source, Spectrum, TubeSpec,
-    VoxelPhantom, analog, fast, primary,
+    HeelEffect, HuCalibration, Material, Projection, Source, Spectrum, TubeSpec, VoxelPhantom,
+    analog, fast, primary,
 };
 use rayon::ThreadPoolBuilder;
 
@@ -165,13 +165,8 @@ fn exposures(criterion: &mut Criterion<ProcessorTime>) {
             packing: 0.8,
         };
         real.receptor.grid = Some(AntiScatterGrid {
-            ratio: 8.0,
-            lines_per_cm: 40.0,
-            strip_mm: 0.05,
-            strip: "lead".to_owned(),
-            interspace: "aluminium".to_owned(),
             focus_mm: Some(1_100.0),
-            lines_along: LinesAlong::Y,
+            ..AntiScatterGrid::new(8.0, 40.0)
         });
         for (name, exposure) in [("ideal", &ideal), ("real", &real)] {
             group.bench_with_input(BenchmarkId::new(name, pixels), exposure, |b, at| {

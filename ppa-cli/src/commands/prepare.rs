@@ -69,7 +69,7 @@ pub struct PrepareArgs {
     /// Centre of the joint, ct frame
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     joint: Option<[f64; 3]>,
-    /// Whose centres in the two regions give the axis: the bone's or the whole limb's
+    /// Which centres in the two regions define the axis: those of the bone or of the whole limb
     #[arg(long, value_enum)]
     axis_source: Option<AxisName>,
     /// Region just proximal to the joint, mm from the joint towards proximal

@@ -111,7 +111,7 @@ fn named_pipes_are_refused_wherever_a_file_is_named() {
     assert_eq!(names(here), before, "nothing was written");
 }
 
-/// Runs `ppa` with an address space of so many megabytes, which stand for LIMIT in its arguments: whether it succeeded. If
+/// Runs `ppa` with an address space of this many megabytes, which replace LIMIT in its arguments: whether it succeeded. If
 /// not, it said why in one sentence.
 fn with_memory(folder: &Path, megabytes: usize, arguments: &str) -> bool {
     let arguments = arguments.replace("LIMIT", &megabytes.to_string());

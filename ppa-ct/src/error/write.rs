@@ -40,7 +40,7 @@ pub enum WriteError {
         /// Cargo feature that holds the writer.
         feature: &'static str,
     },
-    /// The format cannot hold so many voxels along one axis.
+    /// More voxels along one axis than the format can hold.
     #[error("a volume of {} x {} x {} voxels does not fit {format}, which holds {most} along an axis", size[0], size[1], size[2])]
     TooLarge {
         /// Voxels along i, j, k.

@@ -32,7 +32,7 @@ pub struct Visibility {
     pub lateral: f64,
 }
 
-/// The gap must stand out by so many standard errors: by chance one place in a thousand does.
+/// The gap must exceed the noise by this many standard errors: by chance one place in a thousand does.
 const LEAST_CNR: f64 = 3.0;
 /// How far beside the gap the bone is read, mm in the plane through the joint.
 const BESIDE_MM: f64 = 2.0;

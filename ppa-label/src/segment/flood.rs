@@ -29,7 +29,7 @@ impl Seeds {
         }
     }
 
-    /// Plants a bone of its own in every piece of at least so many voxels that holds no seed yet.
+    /// Plants a bone of its own in every piece of at least `least` voxels that holds no seed yet.
     pub fn plant_others(&mut self, solid: &[bool], least: f64) {
         for piece in self.pieces(solid) {
             let free = piece.iter().all(|&at| self.of[at].is_none());

@@ -81,7 +81,7 @@ impl fmt::Display for Missing {
 }
 
 impl Results {
-    /// No results yet, of the columns of an experiment that are run, with so many folds and these seeds.
+    /// No results yet, of the columns of an experiment that are run, with `folds` folds and these seeds.
     pub fn new(
         experiment: Experiment,
         columns: Vec<Configuration>,

@@ -210,7 +210,7 @@ where
     }
 }
 
-/// The least of sorted values that so many percent are not above.
+/// Percentile of sorted values: the least value that `percent` of them do not exceed.
 fn percentile(sorted: &[f64], percent: usize) -> Option<f64> {
     let rank = (sorted.len() * percent).div_ceil(100);
     Some(sorted[rank.checked_sub(1)?])

@@ -49,7 +49,7 @@ pub enum TrainError {
         message: String,
     },
     /// A folder with weights, but nothing to continue from.
-    #[error("{} exists, but no checkpoint beside it to resume from; use another folder", .0.display())]
+    #[error("{} exists without a checkpoint to resume from; use another folder", .0.display())]
     WeightsAlone(PathBuf),
     /// A training that is not finished, where a finished one is needed.
     #[error("the training in {} is not finished: {step} of {} are made; repeat `ppa train` to resume", folder.display(), ppa_core::text::count(*steps, "step"))]

@@ -26,7 +26,7 @@ use super::run::Progress;
 use super::statistics::recompute_statistics;
 use super::tensorboard::tensorboard_events;
 
-/// Whether what is done `every` so many steps is done after `step`; all is after the last one.
+/// Whether what is done every `every` steps is done after `step`; all is after the last one.
 pub(super) fn is_due(every: NonZeroUsize, step: u64, steps: u64) -> bool {
     step.is_multiple_of(every.get() as u64) || step == steps
 }

@@ -89,7 +89,9 @@ fn weights_without_a_checkpoint_are_not_written_over() {
     let error = run(&config(data.path()), folder.path()).unwrap_err();
     let error = error.to_string();
     assert!(
-        error.ends_with("weights.safetensors exists, but no checkpoint beside it to resume from; use another folder"),
+        error.ends_with(
+            "weights.safetensors exists without a checkpoint to resume from; use another folder"
+        ),
         "{error}"
     );
     assert_eq!(fs::read(&weights).unwrap(), b"of another training");

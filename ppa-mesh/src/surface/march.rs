@@ -40,7 +40,7 @@ pub struct March<'a, T> {
 }
 
 impl<'a, T: Sample> March<'a, T> {
-    /// Begins at slice `start`, with room for so many crossings. `inside` has the slices on both sides of it.
+    /// Begins at slice `start`, with room for `room` crossings. `inside` has the slices on both sides of it.
     pub fn new(
         field: &'a Field<'a, T>,
         inside: &InsideBits<T>,

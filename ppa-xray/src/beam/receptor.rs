@@ -92,6 +92,22 @@ pub struct AntiScatterGrid {
     pub lines_along: LinesAlong,
 }
 
+impl AntiScatterGrid {
+    /// A grid with strips of 0.05 mm of lead along device y, spaces of aluminium and parallel strips, as plans assume by default.
+    #[must_use]
+    pub fn new(ratio: f64, lines_per_cm: f64) -> Self {
+        Self {
+            ratio,
+            lines_per_cm,
+            strip_mm: default_strip_mm(),
+            strip: default_strip(),
+            interspace: default_interspace(),
+            focus_mm: None,
+            lines_along: LinesAlong::default(),
+        }
+    }
+}
+
 /// Device axis that the strips of a grid run along.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

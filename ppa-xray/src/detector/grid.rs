@@ -182,13 +182,8 @@ mod tests {
 
     fn clinical() -> AntiScatterGrid {
         AntiScatterGrid {
-            ratio: 10.0,
-            lines_per_cm: 40.0,
-            strip_mm: 0.05,
-            strip: "lead".to_owned(),
-            interspace: "aluminium".to_owned(),
             focus_mm: Some(1_100.0),
-            lines_along: LinesAlong::Y,
+            ..AntiScatterGrid::new(10.0, 40.0)
         }
     }
 

@@ -212,7 +212,7 @@ impl Incidence<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::beam::receptor::{AntiScatterGrid, DetectorModel, LinesAlong, Receptor};
+    use crate::beam::receptor::{AntiScatterGrid, DetectorModel, Receptor};
 
     fn receptors() -> [Receptor; 2] {
         let real = Receptor {
@@ -221,13 +221,8 @@ mod tests {
                 packing: 0.8,
             },
             grid: Some(AntiScatterGrid {
-                ratio: 8.0,
-                lines_per_cm: 40.0,
-                strip_mm: 0.05,
-                strip: "lead".to_owned(),
-                interspace: "aluminium".to_owned(),
                 focus_mm: Some(1_100.0),
-                lines_along: LinesAlong::Y,
+                ..AntiScatterGrid::new(8.0, 40.0)
             }),
             ..Receptor::default()
         };

@@ -25,9 +25,9 @@ const EDGE: f64 = 2e-2;
 /// A rectangle is cut as long as opposite quarters differ from its centre by more than this share of the pixel.
 const TOLERANCE: f64 = 3e-3;
 
-/// Where the quantum noise of the exposure is larger, [`EVEN`] and [`TOLERANCE`] are at least this share of it: the error of the rays
-/// is then a twentieth of the noise, and adds 0.3 % to its variance.
-const HIDDEN: f64 = 0.4;
+/// [`EVEN`] and [`TOLERANCE`] are at least this share of the quantum noise of a pixel: the error of the rays is then a twentieth of
+/// the noise and adds 0.3 % to its variance.
+const NOISE_SHARE: f64 = 0.4;
 
 /// Points per side of the focal spot over which fluence and response of the detector, which vary slowly, are averaged.
 const OPEN_POINTS: usize = 2;
@@ -39,8 +39,8 @@ const NEAR: f64 = 0.25;
 
 /// First two moments per history of the primary energy in every pixel.
 ///
-/// One ray through the centre where the image bends little, up to `samples_per_side`² where it does not and the noise of so many
-/// `histories` does not hide it. A focal spot that is not a point takes no more rays: each leaves from another place of the spot.
+/// One ray through the centre where the image is smooth, up to `samples_per_side`² where it is not and the quantum noise of an exposure
+/// of `histories` does not exceed the error. An extended focal spot takes no more rays: each leaves from another place of the spot.
 pub(crate) fn primary_moments(
     exposure: &Exposure,
     paths: &Paths,
@@ -59,7 +59,7 @@ pub(crate) fn primary_moments(
         .map(|cut| transport.emitter.spot().strips_mm(1 << cut))
         .collect();
     let aimed = |lit: Field, scratch: &mut Scratch| {
-        rays.aim_by(&open_beam, centre(lit), scratch);
+        rays.aim_from_table(&open_beam, centre(lit), scratch);
         rays.behind(&Point3::origin(), centre(lit), scratch)
     };
     let centres = rays.per_pixel(|pixel, scratch| {
@@ -78,7 +78,7 @@ pub(crate) fn primary_moments(
     let voxels_per_pixel = voxels_per_pixel(transport);
     let fine = voxels_per_pixel <= 0.5;
     // An edge may cut off a corner that the five rays of an uncut pixel miss, and a part of the spot that the 20 rays of its
-    // quarters miss: where no noise hides it, pixels at edges are cut in any case.
+    // quarters miss: pixels at edges are always cut where the noise is below the tolerance.
     let edge_cuts = if shadow > 0.0 { 2 } else { 1 };
     let sure_cuts = voxels_per_pixel.log2().ceil().max(0.0) as usize;
     rays.per_pixel(|pixel, scratch| {
@@ -87,25 +87,25 @@ pub(crate) fn primary_moments(
         };
         let middle = centres[pixel];
         let worst = largest_about(&bends, pixel, columns, reach);
-        let hidden = HIDDEN * relative_noise(middle, area_cm2(lit), histories);
+        let noise = NOISE_SHARE * relative_noise(middle, area_cm2(lit), histories);
         if fine
-            && worst <= EVEN.max(hidden) * even_share
+            && worst <= EVEN.max(noise) * even_share
             && is_wholly_lit(&rays, pixel)
             && let Some([x, y]) = bend(&centres, pixel, columns)
         {
             let mean = [middle, x.scaled(1.0 / 24.0), y.scaled(1.0 / 24.0)];
             return mean.into_iter().sum::<Moments>().scaled(area_cm2(lit));
         }
-        rays.aim_by(&open_beam, centre(lit), scratch);
+        rays.aim_from_table(&open_beam, centre(lit), scratch);
         let cut = Cut {
             rays: &rays,
             strips_mm: &strips_mm,
-            sure: if worst > EDGE && hidden < TOLERANCE {
+            sure: if worst > EDGE && noise < TOLERANCE {
                 sure_cuts.max(edge_cuts)
             } else {
                 sure_cuts
             },
-            tolerance_kev: TOLERANCE.max(hidden) * middle.mean_kev * area_cm2(lit),
+            tolerance_kev: TOLERANCE.max(noise) * middle.mean_kev * area_cm2(lit),
         };
         let whole = Part {
             field: lit,
@@ -116,7 +116,7 @@ pub(crate) fn primary_moments(
     })
 }
 
-/// Quantum noise of so many histories on an area, relative to the signal there.
+/// Quantum noise on an area of `cm2` after `histories`, relative to the signal there.
 fn relative_noise(per_cm2: Moments, cm2: f64, histories: f64) -> f64 {
     (per_cm2.square_kev2 / (cm2 * histories)).sqrt() / per_cm2.mean_kev.max(f64::MIN_POSITIVE)
 }
@@ -271,26 +271,23 @@ impl Cut<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::fast::PRIMARY_ENERGIES;
     use crate::engine::small_limb;
-    use crate::engine::spectral_quadrature::{Accuracy, compressed};
+    use crate::engine::spectral_quadrature::compressed;
     use crate::matter::compton::ComptonModel;
 
-    /// Rays that the noise of an exposure hides are left out: what that changes is a tenth of the noise at most, and it changes something.
+    /// An exposure with noise takes fewer rays than the expected image: the images differ, by less than a tenth of the noise.
     #[test]
-    fn rays_are_saved_only_where_noise_hides_it() {
+    fn errors_of_fewer_rays_are_below_a_tenth_of_the_noise() {
         let (phantom, spectrum, projection) = small_limb::exposure();
         let model = ComptonModel::default();
         let exposure = Exposure::new(&phantom, &spectrum, &projection, model).unwrap();
         let paths = Paths::new(&exposure.transport);
-        let accuracy = Accuracy {
-            most: 12,
-            tolerance: 1e-5,
-        };
         let image = |histories: f64| {
             primary_moments(
                 &exposure,
                 &paths,
-                compressed(&exposure, accuracy),
+                compressed(&exposure, PRIMARY_ENERGIES),
                 8,
                 histories,
             )

@@ -66,8 +66,8 @@ impl Default for FastSettings {
     }
 }
 
-/// Energies that stand for the spectrum: the primary is then right to 3e-5 behind any thickness, the scatter to 1e-3.
-const PRIMARY_ENERGIES: Accuracy = Accuracy {
+/// Energies of the quadrature over the spectrum: errors are then 3e-5 of the primary behind any thickness, and 1e-3 of the scatter.
+pub(crate) const PRIMARY_ENERGIES: Accuracy = Accuracy {
     most: 12,
     tolerance: 1e-5,
 };

@@ -169,7 +169,7 @@ impl Histories<'_> {
         // 1 − u lies in (0, 1], so the logarithm stays finite.
         let mut depth = -(1.0 - rng.unit()).ln();
         let mut landing = None;
-        self.paths.stretches(
+        self.paths.segments(
             &photon.position,
             &photon.direction,
             to_plane_mm,

@@ -15,7 +15,6 @@ mod coarse_cells;
 mod collision_map;
 #[cfg(test)]
 mod energy_balance;
-mod even_blocks;
 pub(crate) mod exposure;
 pub(crate) mod fast;
 mod first_collisions;
@@ -44,3 +43,4 @@ mod site;
 #[cfg(test)]
 pub(crate) mod small_limb;
 mod spectral_quadrature;
+mod uniform_blocks;

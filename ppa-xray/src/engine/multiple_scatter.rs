@@ -23,7 +23,7 @@ const ROUND: u64 = 8_192;
 /// Histories for each collision that a node samples.
 const HISTORIES_PER_SAMPLE: f64 = 16.0;
 
-/// One sample in so many is repeated through the voxels themselves; the difference, times that number, corrects what
+/// One sample in this many is repeated through the voxels themselves; the difference, times this number, corrects what
 /// the coarse cells get wrong on average.
 const CORRECTION_INTERVAL: u32 = 8;
 

@@ -113,7 +113,7 @@ struct Stencil {
 }
 
 impl Stencil {
-    /// Lagrange's polynomial through the (up to) so many nodes around `at`; at the rim, through the last of them.
+    /// Lagrange's polynomial through up to `neighbours` nodes around `at`; at the rim, through the outermost ones.
     fn at(at: f64, nodes: usize, neighbours: usize) -> Self {
         let length = nodes.min(neighbours);
         let first = (at.floor() - (neighbours / 2 - 1) as f64).max(0.0) as usize;

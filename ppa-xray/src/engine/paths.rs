@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::beam::spectrum::Spectrum;
 use crate::engine::attenuation_basis::{AttenuationBasis, BasisMass, LANES, add, dot};
 use crate::engine::coarse_cells::CoarseCells;
-use crate::engine::even_blocks::{EDGE, EvenBlocks};
+use crate::engine::uniform_blocks::{EDGE, UniformBlocks};
 use crate::phantom::lattice::{Lattice, Ray};
 use crate::transport::tracking::Transport;
 use crate::transport::voxel_codes::VoxelCode;
@@ -28,7 +28,7 @@ pub(crate) struct Paths<'a> {
     lattice: &'a Lattice,
     pub basis: AttenuationBasis,
     coarse: CoarseCells,
-    even: EvenBlocks,
+    blocks: UniformBlocks,
 }
 
 impl<'a> Paths<'a> {
@@ -36,7 +36,7 @@ impl<'a> Paths<'a> {
         Self::with_coarse_cells(transport, COARSE_CELLS)
     }
 
-    /// As [`Paths::new`], with at most so many coarse cells.
+    /// As [`Paths::new`], with at most `cells` coarse cells.
     pub fn with_coarse_cells(transport: &'a Transport<'a>, cells: usize) -> Self {
         let basis = AttenuationBasis::new(
             &transport.attenuation,
@@ -52,7 +52,7 @@ impl<'a> Paths<'a> {
             codes: &transport.codes,
             lattice: &transport.lattice,
             coarse: CoarseCells::new(transport.phantom, &basis, cells),
-            even: EvenBlocks::new(&transport.codes, transport.lattice.size),
+            blocks: UniformBlocks::new(&transport.codes, transport.lattice.size),
             basis,
         }
     }
@@ -89,10 +89,10 @@ impl<'a> Paths<'a> {
             })
     }
 
-    /// Calls `visit(code, from_mm, to_mm)` for each stretch of a path of `length_mm` along a unit vector, until `visit` ends it:
-    /// voxel by voxel, and even blocks at once.
+    /// Calls `visit(code, from_mm, to_mm)` for each segment of a path of `length_mm` along a unit vector, until `visit` ends it:
+    /// one segment per voxel, one per uniform block.
     #[inline(always)]
-    pub fn stretches(
+    pub fn segments(
         &self,
         from: &Point3<f64>,
         direction: &Vector3<f64>,
@@ -104,27 +104,27 @@ impl<'a> Paths<'a> {
             return;
         };
         let end = leave.min(length_mm);
-        // Where the uneven blocks that are not yet walked through began.
-        let mut uneven_mm = None;
-        let blocks = ray.shrunk(EDGE);
+        // Start of the mixed blocks that have not been walked through yet.
+        let mut mixed_mm = None;
+        let in_blocks = ray.shrunk(EDGE);
         let step = walk(
-            &blocks,
-            self.even.size,
+            &in_blocks,
+            self.blocks.size,
             enter,
             end,
             |block, from_mm, to_mm| {
-                let code = self.even.code(block);
+                let code = self.blocks.code(block);
                 let Some(code) = code else {
-                    uneven_mm.get_or_insert(from_mm);
+                    mixed_mm.get_or_insert(from_mm);
                     return Step::Continue(());
                 };
-                if let Some(start_mm) = uneven_mm.take() {
+                if let Some(start_mm) = mixed_mm.take() {
                     self.voxels(&ray, start_mm, from_mm, &mut visit)?;
                 }
                 visit(code, from_mm, to_mm)
             },
         );
-        if let (Step::Continue(()), Some(start_mm)) = (step, uneven_mm) {
+        if let (Step::Continue(()), Some(start_mm)) = (step, mixed_mm) {
             let _ = self.voxels(&ray, start_mm, end, &mut visit);
         }
     }
@@ -187,7 +187,7 @@ impl<'a> Paths<'a> {
     pub fn between(&self, from: &Point3<f64>, to: &Point3<f64>, mass: &mut BasisMass) {
         let (direction, length_mm) = towards(from, to);
         self.gather(mass, |mass| {
-            self.stretches(from, &direction, length_mm, |code, from_mm, to_mm| {
+            self.segments(from, &direction, length_mm, |code, from_mm, to_mm| {
                 let amount = code.density_g_cm3() * (to_mm - from_mm) as f32;
                 add(mass, self.basis.shares(code.material()), amount);
                 Step::Continue(())
@@ -305,9 +305,9 @@ mod tests {
     use crate::matter::compton::ComptonModel;
     use crate::phantom::voxels::VoxelPhantom;
 
-    /// Masses and lengths of random paths, with even blocks at once and voxel by voxel; some begin or end in the box.
+    /// Masses and lengths of random paths, with uniform blocks in one step and voxel by voxel; some paths begin or end in the box.
     #[test]
-    fn even_blocks_change_no_path() {
+    fn uniform_blocks_change_no_path() {
         let (small, spectrum, projection) = small_limb::exposure();
         let corner = Point3::new(-50.0, -40.0, -40.0);
         let grid = Grid::axis_aligned([50, 40, 36], Vector3::repeat(2.0), corner).unwrap();
@@ -328,9 +328,10 @@ mod tests {
         let model = ComptonModel::default();
         let exposure = Exposure::new(&phantom, &spectrum, &projection, model).unwrap();
         let paths = Paths::new(&exposure.transport);
-        let size = paths.even.size;
-        let even = (0..size.iter().product()).filter(|&block| paths.even.code(block).is_some());
-        assert!(even.count() > 0, "no even block in {size:?}");
+        let size = paths.blocks.size;
+        let uniform =
+            (0..size.iter().product()).filter(|&block| paths.blocks.code(block).is_some());
+        assert!(uniform.count() > 0, "no uniform block in {size:?}");
         let inverse = projection.ct_from_device.inverse();
         let corners = phantom.corners_ct().map(|corner| inverse * corner);
         for index in 0..500 {
@@ -344,7 +345,7 @@ mod tests {
             let (direction, length_mm) = towards(&from, &to);
             let mut masses = [[0.0_f64; 256]; 2];
             let mut lengths = [0.0; 2];
-            paths.stretches(&from, &direction, length_mm, |code, from_mm, to_mm| {
+            paths.segments(&from, &direction, length_mm, |code, from_mm, to_mm| {
                 let mm = to_mm - from_mm;
                 masses[0][usize::from(code.material())] += mm * f64::from(code.density_g_cm3());
                 lengths[0] += mm;

@@ -107,8 +107,8 @@ impl<'a> PrimaryRays<'a> {
         scratch.open = self.open(spots, at);
     }
 
-    /// As [`PrimaryRays::aim`], from the table.
-    pub fn aim_by(&self, open_beam: &OpenBeam, at: Point2<f64>, scratch: &mut Scratch) {
+    /// [`PrimaryRays::aim`] by interpolation in a table.
+    pub fn aim_from_table(&self, open_beam: &OpenBeam, at: Point2<f64>, scratch: &mut Scratch) {
         open_beam.interpolate(at, &mut scratch.open);
     }
 

@@ -11,7 +11,7 @@ use crate::transport::attenuation::Coefficients;
 /// Steps of sin(θ/2), in which forward peaks are wide: at 150 keV the Rayleigh peak of heavy elements covers 10 of them.
 const STEPS: usize = 512;
 
-/// Every so many steps the mean energy after Compton scattering is found anew, from this many draws.
+/// Interval, in steps, at which the mean energy after Compton scattering is computed, and the number of draws for it.
 const ENERGY_STEPS: usize = 8;
 const DRAWS: u32 = 32;
 

@@ -21,7 +21,7 @@ use crate::transport::tally::Moments;
 use crate::transport::tracking::Transport;
 use crate::vector_math::{WIDTH, exp};
 
-/// One sample in so many is repeated through the voxels themselves; the difference, times that number, corrects the bias of
+/// One sample in this many is repeated through the voxels themselves; the difference, times this number, corrects the bias of
 /// the coarse cells.
 const CORRECTION_INTERVAL: u32 = 4;
 
@@ -49,7 +49,7 @@ pub(crate) struct SingleScatter<'a> {
 pub(crate) struct PointSampling {
     /// Mean number of collisions sampled.
     pub collisions: f64,
-    /// Only every so many-th of the list takes part.
+    /// Interval of the sites of the list that take part.
     pub every: usize,
 }
 

@@ -19,7 +19,7 @@ use crate::transport::tracking::TransportError;
 impl Simulation {
     /// Follows the photons of a projection one by one, and counts the doses that the input file asks for.
     ///
-    /// `observe` is told the progress a few times per second and ends the run early by [`ControlFlow::Break`]; what was counted
+    /// `observe` receives the progress a few times per second and ends the run early by [`ControlFlow::Break`]; what was counted
     /// until then is the result. Otherwise the result depends on seed and number of histories only;
     /// how many fit into a time depends on the machine.
     ///

@@ -174,7 +174,7 @@ impl<'a> AnalogRun<'a> {
 
     /// Follows the histories that `tally` still lacks, until `stop` or the observer says so.
     ///
-    /// `observe` is told the progress a few times per second and ends the run by [`ControlFlow::Break`]; whenever it
+    /// `observe` receives the progress a few times per second and ends the run by [`ControlFlow::Break`]; whenever it
     /// is called and at the end, the tally is whole and may be written. When [`Stop`] ends a run that is not in
     /// parts, the run is complete at the histories counted until then.
     ///

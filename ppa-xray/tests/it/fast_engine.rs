@@ -312,7 +312,7 @@ fn noise_is_white_and_as_large_as_that_of_analog() {
     }
 }
 
-/// The lowest energy that photons are followed at leaves primary only: a scattered photon has lost too much, or nothing (Rayleigh).
+/// At the cut-off energy any Compton scattering ends a photon: the image has primary and Rayleigh scatter only.
 #[test]
 fn photons_of_the_cutoff_energy_make_an_image() {
     let phantom = limb(&Isometry3::identity());

@@ -30,7 +30,7 @@ pub struct ExportArgs {
     /// The key, outside of that folder [default: beside it, with .key.csv added to its name]
     #[arg(long, value_name = "FILE")]
     key: Option<PathBuf>,
-    /// Seed of names and order: another seed for each reader gives each another order
+    /// Seed of names and order; give each reader a seed of their own for a different order
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Show only poses at multiples of this angle

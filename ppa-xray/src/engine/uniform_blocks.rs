@@ -1,4 +1,4 @@
-//! Blocks of voxels that all hold the same, such as air around the limb: a path crosses one in a single step.
+//! Uniform blocks of voxels, such as air around the limb: a path crosses one in a single step.
 
 use rayon::prelude::*;
 
@@ -7,15 +7,15 @@ use crate::transport::voxel_codes::VoxelCode;
 /// Voxels along the edge of a block.
 pub(super) const EDGE: usize = 16;
 
-/// Which blocks are even.
-pub(super) struct EvenBlocks {
+/// Blocks of [`EDGE`]³ voxels, and which of them are uniform: of one material and density.
+pub(super) struct UniformBlocks {
     /// Blocks along each axis.
     pub size: [usize; 3],
-    /// The voxel that all others of the block are like; x fastest.
+    /// Material and density of every uniform block; x fastest.
     code: Vec<Option<VoxelCode>>,
 }
 
-impl EvenBlocks {
+impl UniformBlocks {
     pub fn new(codes: &[VoxelCode], voxels: [usize; 3]) -> Self {
         let size = voxels.map(|count| count.div_ceil(EDGE));
         let range =
@@ -40,7 +40,7 @@ impl EvenBlocks {
         Self { size, code }
     }
 
-    /// What all voxels of a block hold, if it is the same.
+    /// Material and density of a block, if it is uniform.
     #[inline(always)]
     pub fn code(&self, block: usize) -> Option<VoxelCode> {
         self.code[block]
@@ -51,9 +51,9 @@ impl EvenBlocks {
 mod tests {
     use super::*;
 
-    /// 20 x 17 x 16 voxels, of which one is different: its block, and no other, is uneven, also where blocks are cut off.
+    /// 20 x 17 x 16 voxels, one of them different: its block is mixed and all others are uniform, including incomplete blocks.
     #[test]
-    fn one_voxel_makes_its_block_uneven() {
+    fn one_different_voxel_makes_its_block_mixed() {
         let voxels = [20, 17, 16];
         let (air, bone) = (VoxelCode::new(0, 1.2e-3), VoxelCode::new(3, 1.9));
         for (odd, block) in [
@@ -64,7 +64,7 @@ mod tests {
         ] {
             let mut codes = vec![air; voxels.iter().product()];
             codes[odd[0] + voxels[0] * (odd[1] + voxels[1] * odd[2])] = bone;
-            let blocks = EvenBlocks::new(&codes, voxels);
+            let blocks = UniformBlocks::new(&codes, voxels);
             assert_eq!(blocks.size, [2, 2, 1]);
             for other in 0..4 {
                 let expected = if other == block { None } else { Some(air) };
