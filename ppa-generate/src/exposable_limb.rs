@@ -3,7 +3,7 @@
 use ppa_mesh::Mesh;
 use ppa_scene::{PlaceError, Placement};
 use ppa_xray::{
-    AnalogSettings, FastSettings, Projection, Radiograph, Spectrum, TransportError, VoxelPhantom,
+    AnalogSettings, FastSettings, PreparedPhantom, Projection, Radiograph, Spectrum, TransportError,
 };
 
 use crate::plan::{Plan, XraySettings};
@@ -19,8 +19,8 @@ pub struct ExposableLimb<'a> {
     pub table: &'a Table,
     /// The beam.
     pub spectrum: &'a Spectrum,
-    /// The limb around the joint as voxels of material and density.
-    pub phantom: VoxelPhantom,
+    /// The limb around the joint as voxels of material and density, prepared for exposures of all its poses.
+    pub phantom: PreparedPhantom<'static>,
     plan: &'a Plan,
 }
 
@@ -45,7 +45,8 @@ impl<'a> ExposableLimb<'a> {
         table: &'a Table,
         spectrum: &'a Spectrum,
     ) -> Result<Self, JointError> {
-        let phantom = joint_phantom(&prepared, &plan.xray)?;
+        let voxels = joint_phantom(&prepared, &plan.xray)?;
+        let phantom = PreparedPhantom::new(voxels, plan.xray.engine.compton_model);
         Ok(Self {
             prepared,
             table,
@@ -102,11 +103,11 @@ impl PosedExposure<'_> {
         match *analog {
             Some(settings) => {
                 let settings = AnalogSettings { seed, ..settings };
-                ppa_xray::analog(phantom, spectrum, &self.projection, &settings)
+                ppa_xray::analog(phantom.phantom(), spectrum, &self.projection, &settings)
             }
             None => {
                 let settings = FastSettings { seed, ..*engine };
-                ppa_xray::fast(phantom, spectrum, &self.projection, &settings)
+                phantom.fast(spectrum, &self.projection, &settings)
             }
         }
     }

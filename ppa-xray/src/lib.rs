@@ -5,7 +5,7 @@
 //! (or, by [`ComptonModel`], Klein–Nishina × S(q)).
 //! A [`VoxelPhantom`] is the patient, a [`Projection`] the exposure. Two engines make a [`Radiograph`] of them:
 //! [`analog`] follows every photon, [`fast`] ray-traces the primary, estimates the scatter, and adds the noise of the
-//! exposure asked for. An [`AnalogRun`] follows photons in parts that can be interrupted and resumed, until the image is
+//! exposure that the settings give. A [`PreparedPhantom`] keeps what the exposures of one phantom share, reports progress, and gives a preview. An [`AnalogRun`] follows photons in parts that can be interrupted and resumed, until the image is
 //! precise enough, and counts the [`Dose`].
 //!
 //! [`mcgpu`] runs input files of MC-GPU v1.3.
@@ -81,7 +81,9 @@ pub use dose::map::DoseMapError;
 pub use dose::report::{Dose, Estimate, Imparted, VoxelDose};
 pub use dose::settings::{DoseError, DoseSettings, VoxelBox};
 pub use engine::analog::{AnalogSettings, analog};
-pub use engine::fast::{FastSettings, fast};
+pub use engine::fast::fast;
+pub use engine::fast_settings::FastSettings;
+pub use engine::prepared_phantom::PreparedPhantom;
 pub use engine::raytrace::primary;
 #[cfg(feature = "dicom")]
 pub use image::dx::{

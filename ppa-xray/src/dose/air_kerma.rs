@@ -50,7 +50,7 @@ fn air() -> Material {
 /// The patient begins at the first voxel on the central ray of more than 0.3 g/cm³; voxels before it attenuate. `None`
 /// when the central ray meets no such voxel before the detector plane, or is blocked by the collimator.
 pub(crate) fn entrance_gy_per_history(transport: &Transport) -> Option<f64> {
-    let phantom = transport.phantom;
+    let phantom = &transport.tables.phantom;
     let (lattice, projection) = (&transport.lattice, transport.projection);
     let central = projection.central_ray;
     let foot_mm = projection.source_detector_mm / central.z;

@@ -28,7 +28,7 @@ impl DoseSetup {
     /// # Errors
     /// [`DoseError`] for a box that leaves the phantom.
     pub fn new(transport: &Transport, settings: &DoseSettings) -> Result<Self, DoseError> {
-        let phantom = transport.phantom;
+        let phantom = &transport.tables.phantom;
         let grid = phantom.grid();
         settings.validate(grid)?;
         let volume_cm3 = voxel_mm3(grid) / 1e3;

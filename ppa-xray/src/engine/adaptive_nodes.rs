@@ -6,6 +6,7 @@
 use rayon::prelude::*;
 
 use crate::beam::projection::Detector;
+use crate::engine::fast_progress::{Monitor, PRIMARY_DONE, SINGLE_DONE};
 use crate::engine::first_collisions::ESTIMATES;
 use crate::engine::node_grid::NodeGrid;
 use crate::engine::primary_signal::PrimarySignal;
@@ -36,11 +37,19 @@ pub(crate) fn single_scatter_field(
     step_mm: f64,
     (seed, collisions): (u64, f64),
     primary: &PrimarySignal,
+    monitor: &Monitor,
 ) -> ([ScatterField; 2], f64) {
     let estimate = |grid: &NodeGrid, level: u64, nodes: &[usize]| -> Vec<NodeEstimate> {
+        let middle = 0.5 * (PRIMARY_DONE + SINGLE_DONE);
+        let shares = [PRIMARY_DONE..middle, middle..SINGLE_DONE];
+        let phase = monitor.phase(shares[level as usize].clone(), nodes.len());
         nodes
             .par_iter()
             .map_init(Scratch::default, |scratch, &node| {
+                if phase.is_cancelled() {
+                    return NodeEstimate::default();
+                }
+                phase.advance();
                 let at = grid.place(node);
                 let share = (DARK / primary.relative_at(at).max(1e-9)).clamp(BRIGHT, 1.0);
                 let sampling = PointSampling {

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use crate::beam::field::Field;
 use crate::beam::spectral_lines::SpectralLines;
 use crate::engine::exposure::Exposure;
+use crate::engine::fast_progress::{Monitor, PRIMARY_DONE};
 use crate::engine::paths::Paths;
 use crate::engine::primary_rays::{PrimaryRays, Scratch, area_cm2, centre};
 use crate::transport::tally::Moments;
@@ -47,6 +48,7 @@ pub(crate) fn primary_moments(
     lines: SpectralLines,
     samples_per_side: u32,
     histories: f64,
+    monitor: &Monitor,
 ) -> Vec<Moments> {
     let transport = &exposure.transport;
     let rays = PrimaryRays::new(exposure, paths, lines);
@@ -62,11 +64,21 @@ pub(crate) fn primary_moments(
         rays.aim_from_table(&open_beam, centre(lit), scratch);
         rays.behind(&Point3::origin(), centre(lit), scratch)
     };
+    let columns = transport.projection.detector.columns as usize;
+    let rows = transport.projection.detector.rows as usize;
+    let phase = monitor.phase(0.0..PRIMARY_DONE, 2 * rows);
+    // Counts a row at its first pixel.
+    let goes_on = |pixel: usize| {
+        if pixel.is_multiple_of(columns) {
+            phase.advance();
+        }
+        !phase.is_cancelled()
+    };
     let centres = rays.per_pixel(|pixel, scratch| {
         let lit = rays.lit(pixel);
-        lit.map_or_else(Moments::default, |lit| aimed(lit, scratch))
+        lit.filter(|_| goes_on(pixel))
+            .map_or_else(Moments::default, |lit| aimed(lit, scratch))
     });
-    let columns = transport.projection.detector.columns as usize;
     let bends: Vec<f32> = (0..centres.len())
         .into_par_iter()
         .map(|pixel| relative_bend(&centres, pixel, columns))
@@ -82,7 +94,7 @@ pub(crate) fn primary_moments(
     let edge_cuts = if shadow > 0.0 { 2 } else { 1 };
     let sure_cuts = voxels_per_pixel.log2().ceil().max(0.0) as usize;
     rays.per_pixel(|pixel, scratch| {
-        let Some(lit) = rays.lit(pixel) else {
+        let Some(lit) = rays.lit(pixel).filter(|_| goes_on(pixel)) else {
             return Moments::default();
         };
         let middle = centres[pixel];
@@ -175,7 +187,7 @@ fn is_wholly_lit(rays: &PrimaryRays, pixel: usize) -> bool {
 
 /// Pixel side over the smallest side of a voxel: below a half neighbouring centres miss nothing.
 fn voxels_per_pixel(transport: &Transport) -> f64 {
-    let spacing_mm = transport.phantom.grid().spacing_mm().min();
+    let spacing_mm = transport.tables.phantom.grid().spacing_mm().min();
     transport.projection.detector.pixel_mm / spacing_mm
 }
 
@@ -183,7 +195,7 @@ fn voxels_per_pixel(transport: &Transport) -> f64 {
 fn shadow_sigma_pixels(transport: &Transport) -> f64 {
     let projection = transport.projection;
     let device_from_ct = projection.ct_from_device.inverse();
-    let corners = transport.phantom.corners_ct().into_iter();
+    let corners = transport.tables.phantom.corners_ct().into_iter();
     let nearest_mm = corners
         .map(|corner| (device_from_ct * corner).z)
         .fold(f64::INFINITY, f64::min);
@@ -290,6 +302,7 @@ mod tests {
                 compressed(&exposure, PRIMARY_ENERGIES),
                 8,
                 histories,
+                &Monitor::silent(),
             )
         };
         let expected = image(f64::INFINITY);

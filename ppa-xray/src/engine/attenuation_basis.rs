@@ -15,8 +15,11 @@ pub(crate) const LANES: usize = 4;
 /// Nodes per keV of the table of the basis.
 const NODES_PER_KEV: usize = 8;
 
-/// Largest relative error of a material's attenuation at any energy. Rounding of the tables is about 1e-6.
-const TOLERANCE: f64 = 2e-5;
+/// Largest weighted relative error of a material's attenuation at any energy. Rounding of the tables is about 1e-6.
+const TOLERANCE: f64 = 1e-4;
+
+/// Energy from which relative errors count in full, keV.
+const FULL_WEIGHT_KEV: f64 = 20.0;
 
 /// Every material as a sum of basis materials.
 #[derive(Debug)]
@@ -30,14 +33,11 @@ pub(crate) struct AttenuationBasis {
 }
 
 impl AttenuationBasis {
-    /// The basis of `materials` materials for photons up to `highest_kev`.
+    /// The basis of `materials` materials.
     ///
     /// Takes the material that is worst represented into the basis until all are represented.
-    pub fn new(attenuation: &Attenuation, materials: usize, highest_kev: f64) -> Self {
-        let nodes = ((highest_kev.min(MAX_ENERGY_KEV) - CUTOFF_KEV) * NODES_PER_KEV as f64)
-            .ceil()
-            .max(1.0) as usize
-            + 1;
+    pub fn new(attenuation: &Attenuation, materials: usize) -> Self {
+        let nodes = ((MAX_ENERGY_KEV - CUTOFF_KEV) * NODES_PER_KEV as f64).ceil() as usize + 1;
         let energy = |node: usize| CUTOFF_KEV + node as f64 / NODES_PER_KEV as f64;
         let total = |material: usize, node: usize| {
             let at = attenuation.locate(energy(node).min(MAX_ENERGY_KEV));
@@ -46,7 +46,8 @@ impl AttenuationBasis {
         let curves: Vec<Vec<f64>> = (0..materials)
             .map(|material| (0..nodes).map(|node| total(material, node)).collect())
             .collect();
-        let (members, shares) = represent(&curves);
+        let weights: Vec<f64> = (0..nodes).map(|node| weight(energy(node))).collect();
+        let (members, shares) = represent(&curves, &weights);
         let groups = members.len().div_ceil(LANES);
         let padded = |values: &[f64]| -> Vec<[f32; LANES]> {
             (0..groups)
@@ -143,10 +144,15 @@ pub(crate) fn exponents(mass: &BasisMass, by_line: &[Vec<f32>], first: usize) ->
     exponents
 }
 
+/// Weight of a relative error at an energy: where attenuation is so strong that few photons get through, it matters less.
+fn weight(energy_kev: f64) -> f64 {
+    (energy_kev / FULL_WEIGHT_KEV).powi(3).min(1.0)
+}
+
 /// Members of the basis, and every curve as a sum of them.
 ///
-/// Gram–Schmidt with the worst curve next; curves are weighted by their own inverse, so that errors are relative.
-fn represent(curves: &[Vec<f64>]) -> (Vec<usize>, Vec<Vec<f64>>) {
+/// Gram–Schmidt with the worst curve next; errors are relative, with the `weights` of the nodes.
+fn represent(curves: &[Vec<f64>], weights: &[f64]) -> (Vec<usize>, Vec<Vec<f64>>) {
     let mut members = Vec::new();
     loop {
         let shares: Vec<Vec<f64>> = curves
@@ -157,7 +163,7 @@ fn represent(curves: &[Vec<f64>]) -> (Vec<usize>, Vec<Vec<f64>>) {
                     .iter()
                     .position(|&member| member == index)
                     .map_or_else(
-                        || fit(curves, &members, curve),
+                        || fit(curves, &members, curve, weights),
                         |place| unit(place, members.len()),
                     )
             })
@@ -171,7 +177,7 @@ fn represent(curves: &[Vec<f64>]) -> (Vec<usize>, Vec<Vec<f64>>) {
                         .zip(&shares[index])
                         .map(|(&member, share): (&usize, _)| share * curves[member][node])
                         .sum();
-                    (sum / curve[node] - 1.0).abs()
+                    (sum / curve[node] - 1.0).abs() * weights[node]
                 })
                 .fold(0.0, f64::max)
         };
@@ -192,16 +198,16 @@ fn unit(place: usize, length: usize) -> Vec<f64> {
         .collect()
 }
 
-/// Least squares of relative errors.
-fn fit(curves: &[Vec<f64>], members: &[usize], curve: &[f64]) -> Vec<f64> {
+/// Weighted least squares of relative errors.
+fn fit(curves: &[Vec<f64>], members: &[usize], curve: &[f64], weights: &[f64]) -> Vec<f64> {
     if members.is_empty() {
         return Vec::new();
     }
     let rows = curve.len();
     let matrix = nalgebra::DMatrix::from_fn(rows, members.len(), |node, member| {
-        curves[members[member]][node] / curve[node]
+        weights[node] * curves[members[member]][node] / curve[node]
     });
-    let target = nalgebra::DVector::from_element(rows, 1.0);
+    let target = nalgebra::DVector::from_column_slice(weights);
     matrix
         .svd(true, true)
         .solve(&target, 1e-14)
@@ -256,7 +262,7 @@ mod tests {
             .map(|material| MaterialTables::new(material, ComptonModel::default()))
             .collect();
         let attenuation = Attenuation::new(&tables);
-        let basis = AttenuationBasis::new(&attenuation, materials.len(), 120.0);
+        let basis = AttenuationBasis::new(&attenuation, materials.len());
         assert!(basis.groups <= 2, "{} groups", basis.groups);
         let masses: Vec<f32> = (0..materials.len()).map(|m| 3.0 + m as f32).collect();
         for energy_kev in [5.0, 17.3, 60.0, 119.9] {

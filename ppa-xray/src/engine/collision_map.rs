@@ -138,8 +138,8 @@ impl CollisionMap {
             let Some(voxel) = paths.voxel_at(&collision.position) else {
                 continue;
             };
-            let found = transport.phantom.material()[voxel];
-            let density = f64::from(transport.phantom.density_g_cm3()[voxel]);
+            let found = transport.tables.phantom.material()[voxel];
+            let density = f64::from(transport.tables.phantom.density_g_cm3()[voxel]);
             mass.fill([0.0; LANES]);
             if density > 0.05 {
                 paths.coarse_between(&Point3::origin(), &collision.position, &mut mass);

@@ -7,11 +7,11 @@ use proptest::prelude::*;
 
 use crate::beam::projection::{Detector, Projection};
 use crate::beam::spectrum::Spectrum;
+use crate::engine::exposure::Exposure;
 use crate::matter::compton::ComptonModel;
 use crate::matter::material::Material;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::score::{Arrival, Score};
-use crate::transport::tracking::Transport;
 
 const MATERIALS: [&str; 5] = ["air", "water", "bone_cortical", "titanium", "lead"];
 
@@ -90,7 +90,8 @@ proptest! {
         } else {
             ComptonModel::IncoherentFunction
         };
-        let transport = Transport::new(&phantom, &spectrum, &projection, model).unwrap();
+        let exposure = Exposure::new(&phantom, &spectrum, &projection, model).unwrap();
+        let transport = exposure.transport;
         let mut balance = Balance::default();
         transport.follow(seed, 100..2_100, &mut balance);
         prop_assert_eq!(balance.finished, 2_000);

@@ -1,5 +1,8 @@
 //! What both engines need of one exposure: transport, response of the detector, readout.
 
+use std::borrow::Cow;
+use std::sync::Arc;
+
 use crate::beam::projection::Projection;
 use crate::beam::projection_error::ProjectionError;
 use crate::beam::spectrum::Spectrum;
@@ -8,6 +11,7 @@ use crate::detector::response::Response;
 use crate::image::memory;
 use crate::matter::compton::ComptonModel;
 use crate::phantom::voxels::VoxelPhantom;
+use crate::transport::phantom_tables::PhantomTables;
 use crate::transport::tracking::{Transport, TransportError};
 
 /// Transport through the phantom to the detector plane, and what the detector makes of a photon there.
@@ -26,13 +30,23 @@ impl<'a> Exposure<'a> {
         projection: &'a Projection,
         compton_model: ComptonModel,
     ) -> Result<Self, TransportError> {
+        let tables = PhantomTables::new(Arc::new(Cow::Borrowed(phantom)), compton_model);
+        Self::with_tables(Arc::new(tables), spectrum, projection)
+    }
+
+    /// As [`Exposure::new`], with tables that are made once for several exposures.
+    pub fn with_tables(
+        tables: Arc<PhantomTables<'a>>,
+        spectrum: &'a Spectrum,
+        projection: &'a Projection,
+    ) -> Result<Self, TransportError> {
         projection.validate()?;
         memory::check(&projection.detector)?;
         let (receptor, detector) = (&projection.receptor, &projection.detector);
         Ok(Self {
             response: Response::new(receptor, detector.centre_mm).map_err(ProjectionError::from)?,
             readout: Readout::new(receptor, detector).map_err(ProjectionError::from)?,
-            transport: Transport::new(phantom, spectrum, projection, compton_model)?,
+            transport: Transport::new(tables, spectrum, projection)?,
         })
     }
 }

@@ -88,8 +88,9 @@ impl FirstFlights<'_> {
             return; // on the surface of the box, but for rounding
         };
         let Transport {
-            phantom, emitter, ..
+            tables, emitter, ..
         } = self.transport;
+        let phantom = &tables.phantom;
         let emitted_per_mm2 = emitter.open_fluence_cm2(&collision.spot, collision.aim) / 100.0;
         let density = f64::from(phantom.density_g_cm3()[voxel]);
         let weight = weight * emitted_per_mm2 * collision.mm3 * density;

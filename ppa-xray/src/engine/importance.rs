@@ -13,7 +13,6 @@ use crate::engine::paths::{Paths, Step};
 use crate::engine::scatter_table::ScatterTable;
 use crate::engine::site::Site;
 use crate::matter::scatter_density::ScatterDensities;
-use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::tracking::Transport;
 use crate::vector_math::exp;
 
@@ -46,9 +45,9 @@ impl<'a> ImportanceModel<'a> {
         map: &CollisionMap,
     ) -> Self {
         let typical_kev = map.typical_kev;
-        let node = transport.attenuation.locate(typical_kev);
+        let node = transport.tables.attenuation.locate(typical_kev);
         let device_from_ct: Isometry3<f64> = transport.projection.ct_from_device.inverse();
-        let phantom: &VoxelPhantom = transport.phantom;
+        let phantom = &*transport.tables.phantom;
         Self {
             paths,
             mu_per_mm: paths.coarse_exponents(typical_kev),
@@ -56,8 +55,8 @@ impl<'a> ImportanceModel<'a> {
                 .iter()
                 .enumerate()
                 .map(|(material, densities)| {
-                    let c = transport.attenuation.at(material as u8, node);
-                    let tables = &transport.samplers[material];
+                    let c = transport.tables.attenuation.at(material as u8, node);
+                    let tables = &transport.tables.samplers[material];
                     ScatterTable::new(densities, tables, typical_kev, &c)
                 })
                 .collect(),

@@ -7,7 +7,9 @@ use crate::beam::projection::{Detector, Projection};
 use crate::detector::open_field::OpenField;
 use crate::engine::adaptive_primary::primary_moments;
 use crate::engine::exposure::Exposure;
-use crate::engine::fast::{FastSettings, SCATTER_ENERGIES, Scatter, fast};
+use crate::engine::fast::{SCATTER_ENERGIES, Scatter, fast};
+use crate::engine::fast_progress::Monitor;
+use crate::engine::fast_settings::FastSettings;
 use crate::engine::later_collisions::VarianceReduction;
 use crate::engine::paths::Paths;
 use crate::engine::primary_signal::PrimarySignal;
@@ -15,6 +17,7 @@ use crate::engine::small_limb;
 use crate::engine::spectral_quadrature::compressed;
 use crate::matter::compton::ComptonModel;
 use crate::matter::material::Material;
+use crate::matter::scatter_density::ScatterDensities;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::scenes::sixty_kvp;
 use crate::transport::tally::Category;
@@ -42,6 +45,7 @@ fn no_expectation_depends_on_how_the_work_is_done() {
         compressed(&exposure, SCATTER_ENERGIES),
         2,
         f64::INFINITY,
+        &Monitor::silent(),
     );
     let (_, open_ev_cm2) = OpenField::of(transport, &exposure.response);
     let signal = PrimarySignal {
@@ -49,6 +53,10 @@ fn no_expectation_depends_on_how_the_work_is_done() {
         moments: &primary,
         open_kev: open_ev_cm2 * detector.pixel_cm2() / 1e3,
     };
+    let materials = phantom.materials().iter();
+    let densities: Vec<ScatterDensities> = materials
+        .map(|material| ScatterDensities::new(material, model))
+        .collect();
     let sums = |paths: &Paths,
                 scatter_pixel_mm: f64,
                 variance_reduction: VarianceReduction,
@@ -60,7 +68,15 @@ fn no_expectation_depends_on_how_the_work_is_done() {
             seed,
             ..FastSettings::default()
         };
-        let scatter = Scatter::new(&exposure, paths, &signal, &settings, variance_reduction);
+        let scatter = Scatter::new(
+            &exposure,
+            paths,
+            &signal,
+            &densities,
+            &settings,
+            variance_reduction,
+            &Monitor::silent(),
+        );
         scatter
             .fields
             .map(|field| field.on_pixels(detector).sum_kev)

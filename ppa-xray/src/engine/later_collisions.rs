@@ -148,18 +148,17 @@ impl Histories<'_> {
     }
 
     fn at(&self, material: u8, energy_kev: f64) -> (usize, Coefficients) {
-        let node = self.transport.attenuation.locate(energy_kev);
-        let coefficients = self.transport.attenuation.at(material, node);
+        let node = self.transport.tables.attenuation.locate(energy_kev);
+        let coefficients = self.transport.tables.attenuation.at(material, node);
         (usize::from(material), coefficients)
     }
 
     /// Flies to the next collision, if there is one this side of the detector plane.
     fn fly(&self, photon: &Photon, rng: &mut Philox) -> Option<Landing> {
         let Transport {
-            attenuation,
-            projection,
-            ..
+            tables, projection, ..
         } = self.transport;
+        let attenuation = &tables.attenuation;
         let node = attenuation.locate(photon.energy_kev);
         let to_plane_mm = if photon.direction.z > 0.0 {
             (projection.source_detector_mm - photon.position.z) / photon.direction.z
@@ -200,7 +199,7 @@ impl Histories<'_> {
         (material, c): (usize, Coefficients),
         rng: &mut Philox,
     ) -> bool {
-        let tables = &self.transport.samplers[material];
+        let tables = &self.transport.tables.samplers[material];
         let compton = c.with_compton - c.photoelectric;
         let scattering = c.total - c.photoelectric;
         let cos_theta = if rng.unit() * f64::from(scattering) < f64::from(compton) {

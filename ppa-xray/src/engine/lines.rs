@@ -44,8 +44,9 @@ impl Lines {
     ) -> Self {
         let transport = &exposure.transport;
         let line = |energy_kev: f64| {
-            let node = transport.attenuation.locate(energy_kev);
-            let coefficients = |material: usize| transport.attenuation.at(material as u8, node);
+            let node = transport.tables.attenuation.locate(energy_kev);
+            let coefficients =
+                |material: usize| transport.tables.attenuation.at(material as u8, node);
             Line {
                 energy_kev,
                 attenuation: paths.basis.at(energy_kev),
@@ -61,9 +62,9 @@ impl Lines {
                 .energy_kev
                 .iter()
                 .map(|&energy_kev| {
-                    let node = transport.attenuation.locate(energy_kev);
-                    let c = transport.attenuation.at(material as u8, node);
-                    let tables = &transport.samplers[material];
+                    let node = transport.tables.attenuation.locate(energy_kev);
+                    let c = transport.tables.attenuation.at(material as u8, node);
+                    let tables = &transport.tables.samplers[material];
                     ScatterTable::new(&densities[material], tables, energy_kev, &c)
                 })
                 .collect();

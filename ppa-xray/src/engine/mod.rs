@@ -17,6 +17,8 @@ mod collision_map;
 mod energy_balance;
 pub(crate) mod exposure;
 pub(crate) mod fast;
+mod fast_progress;
+pub(crate) mod fast_settings;
 mod first_collisions;
 mod importance;
 #[cfg(test)]
@@ -29,6 +31,8 @@ mod node_grid;
 pub(crate) mod noise;
 mod open_beam;
 mod paths;
+pub(crate) mod prepared_phantom;
+mod preview;
 mod primary_rays;
 mod primary_signal;
 mod quasi_random;

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use crate::detector::tabulated_response::TabulatedResponse;
 use crate::engine::attenuation_basis::BasisMass;
 use crate::engine::attenuation_basis::LANES;
+use crate::engine::fast_progress::{Monitor, SINGLE_DONE};
 use crate::engine::importance::{Draws, PointImportance, Subset};
 use crate::engine::later_collisions::{Histories, LaterCollisions};
 use crate::engine::node_grid::NodeGrid;
@@ -61,19 +62,25 @@ struct Scratch {
 
 impl MultipleScatter<'_> {
     /// Follows histories from all listed collisions.
-    pub fn fluence(&self, seed: u64) -> NodeFluence {
+    pub fn fluence(&self, seed: u64, monitor: &Monitor) -> NodeFluence {
         let (each, lists) = (self.histories.each(), self.histories.lists.len());
         let start = NodeSum {
             sums: vec![Moments::default(); lists],
             largest: 0.0,
         };
         let mut nodes = vec![start; self.nodes.nodes()];
+        let rounds = each.div_ceil(ROUND) as usize;
+        let phase = monitor.phase(SINGLE_DONE..1.0, rounds * (lists + nodes.len()));
         for (round, first) in (0..each).step_by(ROUND as usize).enumerate() {
+            if phase.is_cancelled() {
+                break;
+            }
             let histories = first..(first + ROUND).min(each);
             let samples = (histories.end - histories.start) as f64 / HISTORIES_PER_SAMPLE;
             let collisions: Vec<LaterCollisions> = (0..lists)
                 .into_par_iter()
                 .map(|list| {
+                    phase.advance();
                     self.histories
                         .collisions(seed, list, histories.clone(), each)
                 })
@@ -81,6 +88,10 @@ impl MultipleScatter<'_> {
             nodes.par_iter_mut().enumerate().for_each_init(
                 Scratch::default,
                 |scratch, (node, sum)| {
+                    if phase.is_cancelled() {
+                        return;
+                    }
+                    phase.advance();
                     let index = (round * self.nodes.nodes() + node) as u64;
                     let stream = Stream::MultipleScatterSampling as u32;
                     let mut rng = Philox::new(seed, stream, index);
@@ -158,9 +169,9 @@ impl MultipleScatter<'_> {
         let direction = along / r;
         let cos_theta = direction.dot(&site.direction.cast()).clamp(-1.0, 1.0);
         let densities = &self.densities[material];
-        let attenuation = &self.histories.transport.attenuation;
+        let attenuation = &self.histories.transport.tables.attenuation;
         let c = attenuation.at(site.material, attenuation.locate(energy_kev));
-        let scattered_kev = self.histories.transport.samplers[material].compton_energy_at(
+        let scattered_kev = self.histories.transport.tables.samplers[material].compton_energy_at(
             energy_kev,
             cos_theta,
             || rng.unit(),

@@ -2,14 +2,16 @@
 //!
 //! docs/physics.md, "Fast engine", primary.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use crate::beam::spectrum::Spectrum;
 use crate::engine::attenuation_basis::{AttenuationBasis, BasisMass, LANES, add, dot};
 use crate::engine::coarse_cells::CoarseCells;
 use crate::engine::uniform_blocks::{EDGE, UniformBlocks};
 use crate::phantom::lattice::{Lattice, Ray};
+use crate::transport::phantom_tables::PhantomTables;
 use crate::transport::tracking::Transport;
 use crate::transport::voxel_codes::VoxelCode;
 
@@ -26,35 +28,62 @@ const COARSE_CELLS: usize = 128 * 1024;
 pub(crate) struct Paths<'a> {
     codes: &'a [VoxelCode],
     lattice: &'a Lattice,
-    pub basis: AttenuationBasis,
-    coarse: CoarseCells,
-    blocks: UniformBlocks,
+    pub basis: Arc<AttenuationBasis>,
+    coarse: Arc<CoarseCells>,
+    blocks: Arc<UniformBlocks>,
+}
+
+/// What paths need of a phantom, whatever the exposure is.
+#[derive(Clone)]
+pub(crate) struct PathTables {
+    basis: Arc<AttenuationBasis>,
+    coarse: Arc<CoarseCells>,
+    blocks: Arc<UniformBlocks>,
+}
+
+impl PathTables {
+    pub fn new(tables: &PhantomTables) -> Self {
+        Self::with_coarse_cells(tables, COARSE_CELLS)
+    }
+
+    /// As [`PathTables::new`], with at most `cells` coarse cells.
+    fn with_coarse_cells(tables: &PhantomTables, cells: usize) -> Self {
+        let phantom = &*tables.phantom;
+        let basis = AttenuationBasis::new(&tables.attenuation, phantom.materials().len());
+        Self {
+            coarse: Arc::new(CoarseCells::new(phantom, &basis, cells)),
+            blocks: Arc::new(UniformBlocks::new(&tables.codes, phantom.grid().size())),
+            basis: Arc::new(basis),
+        }
+    }
 }
 
 impl<'a> Paths<'a> {
     pub fn new(transport: &'a Transport<'a>) -> Self {
-        Self::with_coarse_cells(transport, COARSE_CELLS)
+        Self::with_tables(transport, PathTables::new(&transport.tables))
+    }
+
+    /// As [`Paths::new`], with tables that are made once for several exposures.
+    pub fn with_tables(transport: &'a Transport<'a>, tables: PathTables) -> Self {
+        let PathTables {
+            basis,
+            coarse,
+            blocks,
+        } = tables;
+        Self {
+            codes: &transport.tables.codes,
+            lattice: &transport.lattice,
+            basis,
+            coarse,
+            blocks,
+        }
     }
 
     /// As [`Paths::new`], with at most `cells` coarse cells.
+    #[cfg(test)]
     pub fn with_coarse_cells(transport: &'a Transport<'a>, cells: usize) -> Self {
-        let basis = AttenuationBasis::new(
-            &transport.attenuation,
-            transport.phantom.materials().len(),
-            transport
-                .emitter
-                .spectra()
-                .iter()
-                .map(Spectrum::max_energy_kev)
-                .fold(0.0, f64::max),
-        );
-        Self {
-            codes: &transport.codes,
-            lattice: &transport.lattice,
-            coarse: CoarseCells::new(transport.phantom, &basis, cells),
-            blocks: UniformBlocks::new(&transport.codes, transport.lattice.size),
-            basis,
-        }
+        let tables = PathTables::with_coarse_cells(&transport.tables, cells);
+        Self::with_tables(transport, tables)
     }
 
     /// Whether the coarse cells are single voxels.

@@ -29,6 +29,7 @@ const EXPONENTS: [f64; 7] = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
 pub(crate) fn compressed(exposure: &Exposure, accuracy: Accuracy) -> SpectralLines {
     let transport = &exposure.transport;
     let mut edges: Vec<f64> = transport
+        .tables
         .phantom
         .materials()
         .iter()

@@ -162,13 +162,13 @@ impl<'a> AnalogRun<'a> {
     pub(crate) fn key(&self) -> &str {
         self.key.get_or_init(|| {
             let Transport {
-                phantom,
+                tables,
                 spectrum,
                 projection,
                 ..
-            } = self.exposure.transport;
+            } = &self.exposure.transport;
             let dose = self.dose.as_ref().map(|dose| &dose.settings);
-            key(phantom, spectrum, projection, &self.settings, dose)
+            key(&tables.phantom, spectrum, projection, &self.settings, dose)
         })
     }
 
@@ -239,7 +239,7 @@ impl<'a> AnalogRun<'a> {
         match (&self.dose, &tally.dose) {
             (Some(DoseCounting { setup, air, .. }), Some(dose)) => {
                 let target = DoseTarget {
-                    phantom: exposure.transport.phantom,
+                    phantom: &exposure.transport.tables.phantom,
                     regions: &setup.regions(),
                     tally: dose,
                     air,

@@ -162,6 +162,8 @@ fn regions(class: &[u16], blocks: [usize; 3], typical_mm: &[f32], block_mm: f64)
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
     use crate::engine::analog::{self, AnalogSettings};
     use crate::engine::analog_image::ImageSetup;
@@ -240,14 +242,15 @@ mod tests {
         let model = ComptonModel::default();
         let mut exposure = Exposure::new(&phantom, &spectrum, &projection, model).unwrap();
         let mut image = |edge: u32, seed: u64| {
-            let transport = &mut exposure.transport;
-            transport.majorants = Majorants::in_blocks(
+            let tables = Arc::get_mut(&mut exposure.transport.tables).unwrap();
+            let majorants = Majorants::in_blocks(
                 edge,
-                &transport.codes,
+                &tables.codes,
                 phantom.grid().size(),
                 phantom.grid().spacing_mm().mean(),
-                &transport.attenuation,
+                &tables.attenuation,
             );
+            tables.set_majorants(majorants);
             let settings = AnalogSettings {
                 histories: 300_000,
                 seed,

@@ -7,6 +7,7 @@ pub(crate) mod attenuation;
 mod block_classes;
 mod lanes;
 pub(crate) mod majorants;
+pub(crate) mod phantom_tables;
 pub(crate) mod score;
 pub(crate) mod stream;
 pub(crate) mod tally;

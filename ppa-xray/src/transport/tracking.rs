@@ -1,7 +1,8 @@
 //! Data common to all histories of a projection, checked before the first.
 
+use std::sync::Arc;
+
 use nalgebra::Point3;
-use rayon::prelude::*;
 
 use crate::beam::emitter::Emitter;
 use crate::beam::projection::Projection;
@@ -9,12 +10,9 @@ use crate::beam::projection_error::ProjectionError;
 use crate::beam::spectrum::Spectrum;
 use crate::matter::compton::ComptonModel;
 use crate::matter::energy_range::{CUTOFF_KEV, MAX_ENERGY_KEV};
-use crate::matter::sampler::MaterialTables;
 use crate::phantom::lattice::Lattice;
 use crate::phantom::voxels::VoxelPhantom;
-use crate::transport::attenuation::Attenuation;
-use crate::transport::majorants::Majorants;
-use crate::transport::voxel_codes::{VoxelCode, voxel_codes};
+use crate::transport::phantom_tables::PhantomTables;
 
 /// Why a simulation cannot run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -45,6 +43,19 @@ pub enum TransportError {
         /// Share of the photons outside the range.
         percent: f64,
     },
+    /// The phantom was prepared for another Compton model.
+    #[error(
+        "the phantom was prepared for the Compton model {prepared:?}, the settings name {found:?}"
+    )]
+    ComptonModel {
+        /// Model in the settings.
+        found: ComptonModel,
+        /// Model that the phantom was prepared for.
+        prepared: ComptonModel,
+    },
+    /// The observer of the progress has cancelled the work.
+    #[error("the simulation was cancelled")]
+    Cancelled,
     /// A number in the settings is out of range.
     #[error("{what} is {found:?}, expected {expected}")]
     Setting {
@@ -62,24 +73,20 @@ pub(crate) const SOLID_G_CM3: f32 = 0.3;
 
 /// Everything the histories of one projection share.
 pub(crate) struct Transport<'a> {
-    pub phantom: &'a VoxelPhantom,
+    pub tables: Arc<PhantomTables<'a>>,
     pub spectrum: &'a Spectrum,
     pub projection: &'a Projection,
     pub emitter: Emitter,
     pub lattice: Lattice,
-    pub attenuation: Attenuation,
-    pub samplers: Vec<MaterialTables>,
-    pub(super) majorants: Majorants,
-    pub codes: Vec<VoxelCode>,
 }
 
 impl<'a> Transport<'a> {
     pub fn new(
-        phantom: &'a VoxelPhantom,
+        tables: Arc<PhantomTables<'a>>,
         spectrum: &'a Spectrum,
         projection: &'a Projection,
-        compton_model: ComptonModel,
     ) -> Result<Self, TransportError> {
+        let phantom = &*tables.phantom;
         let emitter = Emitter::new(projection, spectrum)?;
         check_placement(phantom, projection)?;
         let outside = |[low_kev, high_kev]: [f64; 2]| -> f64 {
@@ -105,30 +112,12 @@ impl<'a> Transport<'a> {
                 });
             }
         }
-        let samplers: Vec<_> = phantom
-            .materials()
-            .par_iter()
-            .map(|material| MaterialTables::new(material, compton_model))
-            .collect();
-        let attenuation = Attenuation::new(&samplers);
-        let codes = voxel_codes(phantom);
-        let voxels_per_mm3 = phantom
-            .grid()
-            .voxel_from_ct()
-            .to_homogeneous()
-            .determinant()
-            .abs();
-        let voxel_mm = voxels_per_mm3.cbrt().recip();
         Ok(Self {
-            phantom,
             spectrum,
             projection,
             emitter,
             lattice: Lattice::new(phantom.grid(), &projection.ct_from_device),
-            majorants: Majorants::new(&codes, phantom.grid().size(), voxel_mm, &attenuation),
-            codes,
-            attenuation,
-            samplers,
+            tables,
         })
     }
 }

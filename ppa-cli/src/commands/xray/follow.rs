@@ -148,6 +148,7 @@ impl AnalogArgs {
         let ExposableLimb {
             phantom, spectrum, ..
         } = exposure.limb;
+        let phantom = phantom.phantom();
         let mut run = AnalogRun::new(phantom, spectrum, &exposure.projection, &settings)?;
         if self.dose || self.dose_map.is_some() {
             let whole = VoxelBox::whole(phantom.grid());

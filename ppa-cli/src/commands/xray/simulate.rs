@@ -1,11 +1,13 @@
 //! `ppa xray simulate`: one radiograph of a posed limb.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use ppa_ct::write_nifti;
 use ppa_generate::{Case, ExposableLimb, Plan, Table, spectrum};
 use ppa_scene::Contact;
+use ppa_xray::FastSettings;
 use serde::Serialize;
 
 use super::BeamArgs;
@@ -14,7 +16,7 @@ use super::pictures::PictureArgs;
 use super::report::Report;
 use crate::findings::prepared;
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
-use crate::output::{Output, Stopwatch, working};
+use crate::output::{Output, Stopwatch, bar, working};
 use crate::output_files::ReplaceArgs;
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -106,7 +108,22 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
     let (radiograph, dose) = match &destination {
         None => {
             let _stoppable = ends_at_once(NOTHING_WRITTEN)?;
-            (exposure.radiograph(args.seed)?, None)
+            working.finish_and_clear();
+            let bar = bar("simulating");
+            bar.set_length(100);
+            let settings = FastSettings {
+                seed: args.seed,
+                ..plan.xray.engine
+            };
+            let observe = |share: f64| {
+                bar.set_position((100.0 * share) as u64);
+                ControlFlow::Continue(())
+            };
+            let (phantom, projection) = (&limb.phantom, &exposure.projection);
+            let radiograph =
+                phantom.fast_with_progress(&spectrum, projection, &settings, &observe)?;
+            bar.finish_and_clear();
+            (radiograph, None)
         }
         Some(destination) => {
             working.finish_and_clear();
@@ -132,7 +149,7 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
         written.push(exr);
     }
     if let (Some(path), Some(dose)) = (&args.analog.dose_map, &dose) {
-        write_nifti(path, &dose.map_ugy_per_mas(limb.phantom.grid())?)?;
+        write_nifti(path, &dose.map_ugy_per_mas(limb.phantom.phantom().grid())?)?;
         written.push(path);
     }
     working.finish_and_clear();

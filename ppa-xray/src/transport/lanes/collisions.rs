@@ -40,7 +40,7 @@ impl Lanes<'_, '_> {
         for (site, lane) in site.iter_mut().zip(tentative.iter()) {
             let [x, y, z] = each(&steps.voxel, lane);
             let voxel = x as usize + size[0] * (y as usize + size[1] * z as usize);
-            prefetch(&self.transport.codes, voxel);
+            prefetch(&self.transport.tables.codes, voxel);
             *site = Site {
                 lane: lane as u8,
                 voxel,
@@ -57,10 +57,11 @@ impl Lanes<'_, '_> {
         let (mut compton, mut rayleigh, mut k_rays) = (Picked::new(), Picked::new(), Picked::new());
         for (i, lane) in tentative.iter().enumerate() {
             let photon = &self.photons[lane];
-            let code = self.transport.codes[site[i].voxel];
+            let code = self.transport.tables.codes[site[i].voxel];
             site[i].code = code;
             let sums = self
                 .transport
+                .tables
                 .attenuation
                 .at(code.material(), photon.energy);
             let density = code.density_g_cm3();
@@ -74,7 +75,7 @@ impl Lanes<'_, '_> {
                 let slot = usize::from(photon.slot);
                 let energy_kev = f64::from(photon.energy_kev);
                 let xi = unit(self.draws.block[3][i]);
-                let tables = &self.transport.samplers[usize::from(code.material())];
+                let tables = &self.transport.tables.samplers[usize::from(code.material())];
                 if let Some(line_kev) = tables.k_fluorescence(energy_kev, xi.into()) {
                     let left_kev = self.emit_k_ray(lane, line_kev);
                     score.deposit(slot, site[i].voxel, left_kev);
@@ -106,8 +107,8 @@ impl Lanes<'_, '_> {
         let absorbed_kev = f64::from(photon.energy_kev);
         photon.energy_kev = line_kev as f32;
         photon.category = Category::Multiple;
-        photon.energy = self.transport.attenuation.locate(line_kev);
-        photon.row = self.transport.majorants.row(photon.energy);
+        photon.energy = self.transport.tables.attenuation.locate(line_kev);
+        photon.row = self.transport.tables.majorants().row(photon.energy);
         absorbed_kev - f64::from(photon.energy_kev)
     }
 }

@@ -93,7 +93,7 @@ impl<'a, 'p> Lanes<'a, 'p> {
         let row = |matrix: &Matrix4<f64>, row: usize| {
             [0, 1, 2, 3].map(|column| matrix[(row, column)] as f32)
         };
-        let blocks = transport.majorants.blocks;
+        let blocks = transport.tables.majorants().blocks;
         let idle = Photon {
             history: 0,
             step: 0,
@@ -110,7 +110,7 @@ impl<'a, 'p> Lanes<'a, 'p> {
                 source_detector_mm: transport.projection.source_detector_mm as f32,
                 size: transport.lattice.size.map(|n| n as f32),
                 blocks,
-                edge: transport.majorants.edge as f32,
+                edge: transport.tables.majorants().edge as f32,
             },
             mm_from_cell,
             transport,
@@ -168,7 +168,7 @@ impl<'a, 'p> Lanes<'a, 'p> {
             blocks,
             count,
         });
-        let majorants = &self.transport.majorants;
+        let majorants = &self.transport.tables.majorants();
         for lane in 0..self.count {
             let region: Region = majorants.region(blocks.index[lane]);
             blocks.reach[lane] = f32::from(region.reach);

@@ -76,15 +76,19 @@ impl Lanes<'_, '_> {
                 ended.push_if(site.lane(), true);
             } else {
                 score.deposit(slot, site.voxel, before_kev - f64::from(scattered_kev));
-                photon.energy = self.transport.attenuation.locate(scattered_kev.into());
-                photon.row = self.transport.majorants.row(photon.energy);
+                photon.energy = self
+                    .transport
+                    .tables
+                    .attenuation
+                    .locate(scattered_kev.into());
+                photon.row = self.transport.tables.majorants().row(photon.energy);
             }
         }
         let coherent = scattered.iter().enumerate().skip(compton).take(rayleigh);
         for (n, site) in coherent {
             let photon = &self.photons[site.lane()];
             let mut rng = self.generator(photon).after(self.draws.block(n));
-            let tables = &self.transport.samplers[usize::from(site.code.material())];
+            let tables = &self.transport.tables.samplers[usize::from(site.code.material())];
             let cos_theta = tables.sample_rayleigh(photon.energy_kev.into(), &mut rng);
             self.scattering.angles.cos_theta[n] = cos_theta as f32;
             let photon = &mut self.photons[site.lane()];
@@ -118,7 +122,7 @@ impl Lanes<'_, '_> {
         let attempts = &mut self.scattering.attempts;
         for (n, site) in sites.iter().enumerate() {
             let energy_kev = self.photons[site.lane()].energy_kev;
-            let tables = &self.transport.samplers[usize::from(site.code.material())];
+            let tables = &self.transport.tables.samplers[usize::from(site.code.material())];
             let [angle, shell, ..] = self.draws.block(n);
             match tables.attempt_compton(energy_kev, unit(angle), unit(shell)) {
                 Some((sin2_half_theta, electron)) => {
@@ -156,7 +160,7 @@ impl Lanes<'_, '_> {
         let photon = &self.photons[site.lane()];
         let energy_kev = f64::from(photon.energy_kev);
         let mut rng = self.generator(photon);
-        let tables = &self.transport.samplers[usize::from(site.code.material())];
+        let tables = &self.transport.tables.samplers[usize::from(site.code.material())];
         let (cos_theta, scattered_kev) = match sin2_half_theta {
             Some(sin2_half_theta) => {
                 let cos_theta = 1.0 - 2.0 * f64::from(sin2_half_theta);

@@ -170,11 +170,11 @@ impl Lanes<'_, '_> {
                     (emission.energy_kev, rng.step())
                 }
             };
-            let energy = transport.attenuation.locate(energy_kev);
+            let energy = transport.tables.attenuation.locate(energy_kev);
             self.waiting.photons[i] = Photon {
                 history,
                 step,
-                row: transport.majorants.row(energy),
+                row: transport.tables.majorants().row(energy),
                 energy_kev: energy_kev as f32,
                 energy,
                 category: Category::Primary,

@@ -8,6 +8,7 @@ use nalgebra::Isometry3;
 use super::*;
 use crate::beam::projection::{Detector, Projection};
 use crate::beam::spectrum::Spectrum;
+use crate::engine::exposure::Exposure;
 use crate::matter::compton::ComptonModel;
 use crate::matter::material::Material;
 use crate::phantom::voxels::VoxelPhantom;
@@ -119,8 +120,9 @@ fn record(transport: &Transport, isa: Isa, ranges: &[Range<u64>]) -> Vec<Events>
 fn company_and_vector_width_change_no_bit() {
     let (phantom, projection) = (phantom(), projection());
     let spectrum = Spectrum::monoenergetic(60.0).unwrap();
-    let transport =
-        Transport::new(&phantom, &spectrum, &projection, ComptonModel::default()).unwrap();
+    let model = ComptonModel::default();
+    let exposure = Exposure::new(&phantom, &spectrum, &projection, model).unwrap();
+    let transport = exposure.transport;
     let whole = record(&transport, Isa::widest(), std::slice::from_ref(&(0..6_000)));
     assert_eq!(whole.len(), 6_000);
     let parts = [0..1, 1..65, 65..65, 65..200, 200..3_000, 3_000..6_000];

@@ -7,12 +7,12 @@ use ppa_ct::Grid;
 use super::projection;
 use crate::beam::projection::Detector;
 use crate::beam::spectrum::Spectrum;
+use crate::engine::exposure::Exposure;
 use crate::matter::compton::ComptonModel;
 use crate::matter::material::Material;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::score::{Arrival, Score};
 use crate::transport::tally::Category;
-use crate::transport::tracking::Transport;
 
 /// Photons of the energies of K lines, by the side of the foil on which they leave.
 #[derive(Default)]
@@ -67,10 +67,11 @@ fn k_x_rays_leave_a_foil_as_the_integral_says() {
     );
     let phantom = phantom.unwrap();
     let spectrum = Spectrum::monoenergetic(incident_kev).unwrap();
-    let mut exposure = projection();
-    exposure.detector = Detector::centred(10, 10, 1.0);
-    let transport =
-        Transport::new(&phantom, &spectrum, &exposure, ComptonModel::default()).unwrap();
+    let mut projection = projection();
+    projection.detector = Detector::centred(10, 10, 1.0);
+    let model = ComptonModel::default();
+    let exposure = Exposure::new(&phantom, &spectrum, &projection, model).unwrap();
+    let transport = exposure.transport;
     let mut found = KRays {
         lines: lines
             .iter()

@@ -6,6 +6,7 @@ use ppa_core::random::Philox;
 use super::{phantom, projection};
 use crate::beam::emitter::Emission;
 use crate::beam::spectrum::Spectrum;
+use crate::engine::exposure::Exposure;
 use crate::matter::compton::ComptonModel;
 use crate::matter::energy_range::CUTOFF_KEV;
 use crate::phantom::lattice::Walk;
@@ -68,9 +69,10 @@ fn plain_history(transport: &Transport, rng: &mut Philox, ends: &mut Ends) {
         };
         position += direction * distance_mm;
         let sums = transport
+            .tables
             .attenuation
-            .at(material, transport.attenuation.locate(energy_kev));
-        let tables = &transport.samplers[usize::from(material)];
+            .at(material, transport.tables.attenuation.locate(energy_kev));
+        let tables = &transport.tables.samplers[usize::from(material)];
         let xi = rng.unit() as f32 * sums.total;
         let cos_theta = if xi < sums.photoelectric {
             let Some(line_kev) = tables.k_fluorescence(energy_kev, rng.unit()) else {
@@ -119,13 +121,13 @@ fn plain_flight(
     let (enter, leave) = lattice.clip(&ray)?;
     let end = leave.min(to_plane_mm);
     let mut walk = Walk::new(&ray, enter, lattice.size.map(|n| n as u32), 1.0);
-    let energy = transport.attenuation.locate(energy_kev);
+    let energy = transport.tables.attenuation.locate(energy_kev);
     let mut depth = -(1.0 - rng.unit()).ln();
     let mut at = enter;
     while at < end {
-        let material = transport.phantom.material()[walk.index];
-        let density = transport.phantom.density_g_cm3()[walk.index];
-        let mu = f64::from(density * transport.attenuation.at(material, energy).total);
+        let material = transport.tables.phantom.material()[walk.index];
+        let density = transport.tables.phantom.density_g_cm3()[walk.index];
+        let mu = f64::from(density * transport.tables.attenuation.at(material, energy).total);
         let (axis, next) = walk.exit();
         let next = next.min(end);
         if depth < mu * (next - at) {
@@ -145,8 +147,9 @@ fn plain_flight(
 fn lanes_and_plain_histories_agree() {
     let (phantom, projection) = (phantom(), projection());
     let spectrum = Spectrum::from_bins(&[20.0, 40.0, 70.0], &[1.0, 1.0]).unwrap();
-    let transport =
-        Transport::new(&phantom, &spectrum, &projection, ComptonModel::default()).unwrap();
+    let model = ComptonModel::default();
+    let exposure = Exposure::new(&phantom, &spectrum, &projection, model).unwrap();
+    let transport = exposure.transport;
     let histories = 400_000;
     let (mut lanes, mut plain) = (Ends::default(), Ends::default());
     transport.follow(1, 0..histories, &mut lanes);

@@ -1,0 +1,91 @@
+//! Settings of the fast engine.
+
+use serde::{Deserialize, Serialize};
+
+use crate::beam::projection::Detector;
+use crate::engine::raytrace::check_samples;
+use crate::matter::compton::ComptonModel;
+use crate::transport::tracking::TransportError;
+
+/// What the fast engine spends, and the exposure its image stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FastSettings {
+    /// Histories whose quantum noise the image carries; infinite gives the expected image.
+    pub dose_histories: f64,
+    /// Histories that are followed to find multiple scatter; half as many first collisions are listed, which is where they
+    /// start and what single scatter is summed from. The scatter's error falls with the root of it.
+    pub scatter_histories: u64,
+    /// Largest distance of the points at which scatter is computed, mm.
+    pub scatter_pixel_mm: f64,
+    /// Most rays per pixel side of the primary, where the image has edges.
+    pub samples_per_side: u32,
+    /// How photons scatter off electrons.
+    pub compton_model: ComptonModel,
+    /// Seed of the image.
+    pub seed: u64,
+}
+
+impl Default for FastSettings {
+    /// The 2e10 histories of Laufer et al. 2026, section 3.3.
+    fn default() -> Self {
+        Self {
+            dose_histories: 2e10,
+            scatter_histories: 320_000,
+            scatter_pixel_mm: 20.0,
+            samples_per_side: 8,
+            compton_model: ComptonModel::default(),
+            seed: 0,
+        }
+    }
+}
+
+impl FastSettings {
+    /// Most histories that the noise of an image may stand for, if not infinitely many: a tube load of 3e7 mAs.
+    const MOST_DOSE: f64 = 1e18;
+
+    /// Most histories for the scatter: their first collisions take about 5 GB.
+    const MOST_SCATTER: u64 = 100_000_000;
+
+    /// Most points for scatter before any are set closer; a point and those around it take about 2 kB.
+    const MOST_NODES: f64 = 1e5;
+
+    pub(crate) fn validate(&self, detector: &Detector) -> Result<(), TransportError> {
+        let [width, height] = detector.field().size_mm();
+        let along = |size_mm: f64| (size_mm / self.scatter_pixel_mm).ceil() + 1.0;
+        let distance_mm = self.scatter_pixel_mm;
+        for (what, found, fine, expected) in [
+            (
+                "the number of histories for the noise",
+                self.dose_histories,
+                self.dose_histories >= 1.0
+                    && (self.dose_histories <= Self::MOST_DOSE
+                        || self.dose_histories == f64::INFINITY),
+                "1 to 1e18, or infinite for none",
+            ),
+            (
+                "the number of histories for the scatter",
+                self.scatter_histories as f64,
+                (1..=Self::MOST_SCATTER).contains(&self.scatter_histories),
+                "1 to 1e8",
+            ),
+            (
+                "the distance of the scatter points in mm",
+                distance_mm,
+                distance_mm > 0.0
+                    && distance_mm.is_finite()
+                    && along(width) * along(height) <= Self::MOST_NODES,
+                "a positive length that sets at most 100000 points on the detector",
+            ),
+        ] {
+            if !fine {
+                return Err(TransportError::Setting {
+                    what,
+                    found,
+                    expected,
+                });
+            }
+        }
+        check_samples(self.samples_per_side)
+    }
+}
