@@ -65,6 +65,11 @@ mod scenes;
 #[cfg(test)]
 extern crate self as ppa_xray;
 
+/// Vectors, points and poses of this crate's interface, in the version that it takes.
+pub use nalgebra;
+/// Grids and volumes of this crate's interface, in the version that it takes.
+pub use ppa_ct;
+
 pub use ppa_core::{Part, PartError};
 
 pub use beam::projection::{Detector, Projection};
