@@ -127,7 +127,16 @@ impl<'a> AnalogRun<'a> {
     /// # Errors
     /// [`TallyError`] when the file cannot be read, is damaged, or is of another simulation or part.
     pub fn read(&self, path: &Path, part: Part) -> Result<AnalogTally, TallyError> {
-        let mut tally = AnalogTally::read(path)?;
+        self.resume(AnalogTally::read(path)?, path, part)
+    }
+
+    /// As [`Self::read`], with the tally that was read from `path`.
+    pub(crate) fn resume(
+        &self,
+        mut tally: AnalogTally,
+        path: &Path,
+        part: Part,
+    ) -> Result<AnalogTally, TallyError> {
         if tally.setup.key != self.key() {
             return Err(TallyError::Key {
                 path: path.into(),

@@ -2,6 +2,7 @@
 
 pub(crate) mod analog_run;
 pub(crate) mod analog_tally;
+pub(crate) mod framed_file;
 pub(crate) mod key;
 pub(crate) mod merge;
 pub(crate) mod progress;
