@@ -156,14 +156,29 @@ fn a_named_tally_holds_what_was_counted() {
 }
 
 #[test]
-fn a_scan_of_mcgpu_stops_within_a_projection() {
+fn a_stopped_scan_of_mcgpu_resumes_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     crate::mcgpu::write_input(here);
-    let run = "xray mcgpu box.in --histories 4e11 --out images";
-    let (code, said) = interrupted(here, run, "INT");
+    let run = "xray mcgpu box.in --histories 4e6 --out";
+    let mut stopped = start(here, &format!("{run} stopped"));
+    let second = here.join("stopped/image.dat_0000.raw");
+    wait_for(&mut stopped, || second.exists());
+    send(&stopped, "INT");
+    let (code, said) = ended(stopped);
     assert_eq!(code, Some(130), "{said}");
-    contains(&said, &["in projection 1 of 2", "images of 0 are whole"]);
+    let tally = "stopped/image.dat.tally";
+    let how = format!("after 1 of 2 projections; repeat the command to resume from {tally}");
+    contains(&said, &[&how]);
+    let kept = ["image.dat.tally", "image.dat_0000", "image.dat_0000.raw"];
+    assert_eq!(names(&here.join("stopped")), kept);
+
+    let time = || fs::metadata(&second).unwrap().modified().unwrap();
+    let before = time();
+    succeed(here, &format!("{run} stopped"));
+    assert_eq!(time(), before, "a complete image is not written again");
+    succeed(here, &format!("{run} whole"));
+    assert!(contents(&here.join("stopped")) == contents(&here.join("whole")));
 }
 
 #[test]

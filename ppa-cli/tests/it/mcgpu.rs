@@ -1,11 +1,15 @@
 //! `ppa xray mcgpu`: keys, files and mistakes.
 
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::Path;
+use std::time::Duration;
 
+use ppa_xray::Engine;
+use ppa_xray::mcgpu::{RunLength, Scan, Simulation};
 use serde_json::Value;
 
-use crate::{fail, names, succeed};
+use crate::{contents, fail, names, succeed};
 
 /// A water box before a small detector, two projections, doses.
 pub fn write_input(folder: &Path) {
@@ -76,6 +80,177 @@ fn result_has_its_keys_and_equal_seeds_give_equal_bytes() {
         assert_eq!(bytes("first", file), bytes("again", file), "{file}");
         assert_ne!(bytes("first", file), bytes("other", file), "{file}");
     }
+}
+
+/// An input in `folder`, and in `folder/images` its scan, interrupted in the second projection.
+fn write_interrupted(folder: &Path) {
+    write_input(folder);
+    let out = folder.join("images");
+    fs::create_dir(&out).unwrap();
+    let simulation = Simulation::read(folder.join("box.in")).unwrap();
+    let mut scan = Scan::new(
+        &simulation,
+        RunLength::Histories(20_000),
+        Engine::Analog,
+        out,
+    );
+    let stations = simulation.input().stations();
+    let [first, second] = &stations[..] else {
+        panic!("two projections");
+    };
+    let (image, dose) = scan
+        .analog(first, Duration::MAX, |_| ControlFlow::Continue(()))
+        .unwrap()
+        .unwrap();
+    scan.add(first, &image, dose.as_ref()).unwrap();
+    let stop = scan.analog(second, Duration::MAX, |_| ControlFlow::Break(()));
+    assert!(stop.unwrap().is_none());
+}
+
+const RESUME: &str = "xray mcgpu box.in --histories 20000 --out images";
+
+#[test]
+fn an_interrupted_scan_resumes_to_the_result_of_a_whole_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_interrupted(here);
+    let result = |out: &str| -> Value {
+        let whole = RESUME.replace("images", out);
+        let mut result: Value =
+            serde_json::from_str(&succeed(here, &format!("{whole} --json"))).unwrap();
+        let keys = result.as_object_mut().unwrap();
+        keys.retain(|key, _| key != "wall_s" && key != "cpu_s");
+        serde_json::from_str(&result.to_string().replace(&format!("{out}/"), "")).unwrap()
+    };
+    assert_eq!(result("images"), result("whole"));
+    assert!(contents(&here.join("images")) == contents(&here.join("whole")));
+}
+
+#[test]
+fn a_scan_of_another_input_is_not_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_interrupted(here);
+    let before = contents(&here.join("images"));
+    let refused = |arguments: &str| {
+        let said = fail(here, arguments);
+        assert!(
+            said.contains("image.dat.tally is of another scan"),
+            "{said}"
+        );
+        assert!(said.contains("--replace starts over"), "{said}");
+        assert!(contents(&here.join("images")) == before);
+    };
+    refused(&format!("{RESUME} --seed 2"));
+    refused(&RESUME.replace("20000", "30000"));
+    let changes = [
+        ("box.in", "ppa:water", "ppa:muscle"),
+        ("box.in", "1 4\n1 4\n1 4", "1 4\n1 4\n1 3"),
+        ("box.vox", "1 1.0", "1 1.1"),
+        ("beam.spc", "40000 1", "41000 1"),
+    ];
+    for (file, from, to) in changes {
+        let path = here.join(file);
+        let text = fs::read_to_string(&path).unwrap();
+        fs::write(&path, text.replacen(from, to, 1)).unwrap();
+        refused(RESUME);
+        fs::write(&path, text).unwrap();
+    }
+    // A comment changes nothing; a folder may be named in another way.
+    let input = fs::read_to_string(here.join("box.in")).unwrap();
+    fs::write(here.join("box.in"), input + "# a comment\n").unwrap();
+    succeed(here, &RESUME.replace("box.in", "./box.in"));
+}
+
+#[test]
+fn replace_begins_another_scan_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_interrupted(here);
+    succeed(here, &format!("{RESUME} --seed 2 --replace"));
+    let whole = RESUME.replace("images", "whole");
+    succeed(here, &format!("{whole} --seed 2"));
+    assert!(contents(&here.join("images")) == contents(&here.join("whole")));
+}
+
+#[test]
+fn images_of_others_are_kept_when_a_scan_resumes() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_interrupted(here);
+    let images = here.join("images");
+    for (name, bytes) in [
+        ("image.dat_0000", "changed"),
+        ("image.dat_0001.raw", "mine"),
+        ("dose.dat", "mine"),
+    ] {
+        let path = images.join(name);
+        let before = fs::read(&path).ok();
+        fs::write(&path, bytes).unwrap();
+        let said = fail(here, RESUME);
+        assert!(said.contains(&format!("{name} exists: give --replace")));
+        assert_eq!(fs::read_to_string(&path).unwrap(), bytes);
+        match before {
+            Some(before) => fs::write(&path, before).unwrap(),
+            None => fs::remove_file(&path).unwrap(),
+        }
+    }
+    // A complete image that is lost is simulated again, without counting its dose twice.
+    fs::remove_file(images.join("image.dat_0000")).unwrap();
+    succeed(here, RESUME);
+    succeed(here, &RESUME.replace("images", "whole"));
+    assert!(contents(&images) == contents(&here.join("whole")));
+}
+
+#[test]
+fn a_damaged_tally_of_a_scan_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_interrupted(here);
+    let path = here.join("images/image.dat.tally");
+    let bytes = fs::read(&path).unwrap();
+    let mut flipped = bytes.clone();
+    flipped[bytes.len() - 500] ^= 1;
+    for (bytes, report) in [
+        (&bytes[..bytes.len() - 1], "cut off or appended to"),
+        (&flipped, "its checksum does not fit"),
+        (&b"my notes"[..], "is not a tally"),
+    ] {
+        fs::write(&path, bytes).unwrap();
+        let said = fail(here, RESUME);
+        assert!(said.contains(report), "{report:?} is missing in: {said}");
+        assert_eq!(fs::read(&path).unwrap(), bytes);
+    }
+}
+
+#[test]
+fn images_of_the_fast_engine_are_kept_as_well() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_input(here);
+    let text = fs::read_to_string(here.join("box.in")).unwrap();
+    fs::write(here.join("box.in"), text.replace("YES", "NO")).unwrap();
+    let run = format!("{RESUME} --engine fast");
+    let simulation = Simulation::read(here.join("box.in")).unwrap();
+    let length = RunLength::Histories(20_000);
+    let images = here.join("images");
+    fs::create_dir(&images).unwrap();
+    let mut scan = Scan::new(&simulation, length, Engine::Fast, &images);
+    let station = &simulation.input().stations()[0];
+    // Any image will do to see that it is kept.
+    let (image, _) = simulation
+        .analog(station, length, |_| ControlFlow::Continue(()))
+        .unwrap();
+    scan.add(station, &image, None).unwrap();
+    let before = contents(&images);
+    assert!(fail(here, RESUME).contains("is of another scan"));
+    succeed(here, &run);
+    let after = contents(&images);
+    for name in ["image.dat_0000", "image.dat_0000.raw"] {
+        let path = Path::new(name);
+        assert!(before.get(path).is_some() && before.get(path) == after.get(path));
+    }
+    assert!(after.get(Path::new("image.dat_0001")).is_some());
 }
 
 #[test]

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use ppa_core::Part;
 
+use crate::beam::projection::Projection;
 use crate::dose::report::Dose;
 use crate::engine::analog::AnalogSettings;
 use crate::image::radiograph::Radiograph;
@@ -31,34 +32,46 @@ impl Simulation {
         length: RunLength,
         mut observe: impl FnMut(&Progress) -> ControlFlow<()>,
     ) -> Result<(Radiograph, Option<Dose>), TransportError> {
-        let (histories, stop) = match length {
-            RunLength::Histories(histories) => (histories, Stop::default()),
-            RunLength::Seconds(seconds) => {
-                let time = Some(Duration::from_secs_f64(seconds));
-                (
-                    MOST_HISTORIES,
-                    Stop {
-                        time,
-                        ..Stop::default()
-                    },
-                )
-            }
-        };
+        let projection = self.projection(station);
+        let run = self.analog_run(station, &projection, length)?;
+        let mut tally = run.tally(Part::WHOLE);
+        run.follow(&mut tally, &stop(length), |_, progress| observe(progress));
+        Ok((tally.radiograph(), tally.dose()))
+    }
+
+    /// The run of a projection, with the doses that the input file asks for; [`stop`] ends it.
+    pub(crate) fn analog_run<'a>(
+        &'a self,
+        station: &Station,
+        projection: &'a Projection,
+        length: RunLength,
+    ) -> Result<AnalogRun<'a>, TransportError> {
         let settings = AnalogSettings {
-            histories,
+            histories: match length {
+                RunLength::Histories(histories) => histories,
+                RunLength::Seconds(_) => MOST_HISTORIES,
+            },
             seed: self.seed(station),
             ..AnalogSettings::default()
         };
-        let projection = self.projection(station);
-        let mut run = AnalogRun::new(self.phantom(), self.spectrum(), &projection, &settings)?;
-        if let Some(dose) = self.dose_settings() {
-            run = run
+        let run = AnalogRun::new(self.phantom(), self.spectrum(), projection, &settings)?;
+        Ok(match self.dose_settings() {
+            Some(dose) => run
                 .with_dose(&dose)
-                .expect("the dose region lies in the geometry");
-        }
-        let mut tally = run.tally(Part::WHOLE);
-        run.follow(&mut tally, &stop, |_, progress| observe(progress));
-        Ok((tally.radiograph(), tally.dose()))
+                .expect("the dose region lies in the geometry"),
+            None => run,
+        })
+    }
+}
+
+/// When a run of this length ends before all its histories are followed.
+pub(crate) fn stop(length: RunLength) -> Stop {
+    Stop {
+        time: match length {
+            RunLength::Histories(_) => None,
+            RunLength::Seconds(seconds) => Some(Duration::from_secs_f64(seconds)),
+        },
+        ..Stop::default()
     }
 }
 

@@ -124,9 +124,17 @@ impl ScanDose {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, folder: &Path, simulation: &Simulation) -> Result<(), McgpuError> {
+        for (name, bytes) in self.files(simulation) {
+            write_whole(&folder.join(name), &bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Names and contents of the files that [`Self::write`] writes.
+    pub(crate) fn files(&self, simulation: &Simulation) -> Vec<(String, Vec<u8>)> {
         let (Some(asked), Some(voxels)) = (&simulation.input().voxel_dose, simulation.dose_box())
         else {
-            return Ok(());
+            return Vec::new();
         };
         let grid = simulation.phantom().grid();
         let densities = simulation.phantom().density_g_cm3();
@@ -151,15 +159,42 @@ impl ScanDose {
             }
         };
         let name = &asked.file;
-        let text = self.text(simulation, &voxels, &doses);
-        write_whole(&folder.join(name), text.as_bytes())?;
-        write_whole(
-            &folder.join(format!("{name}.raw")),
-            &floats(|dose| dose.value),
-        )?;
-        let errors = format!("{name}_PercentRelError2sigma.raw");
-        write_whole(&folder.join(errors), &floats(relative))?;
-        Ok(())
+        let text = self.text(simulation, &voxels, &doses).into_bytes();
+        vec![
+            (name.clone(), text),
+            (format!("{name}.raw"), floats(|dose| dose.value)),
+            (
+                format!("{name}_PercentRelError2sigma.raw"),
+                floats(relative),
+            ),
+        ]
+    }
+
+    /// All sums, little-endian: histories (u64), then f64.
+    pub(crate) fn to_bytes(&self) -> Vec<u8> {
+        let sums = self.materials.iter().chain(&self.voxels);
+        let sums = sums.flat_map(|sum| [sum.ev, sum.se_ev2]);
+        let numbers = self.materials_mass_g.iter().copied().chain(sums);
+        let histories = self.histories.to_le_bytes();
+        histories
+            .into_iter()
+            .chain(numbers.flat_map(f64::to_le_bytes))
+            .collect()
+    }
+
+    /// Doses of a scan of `simulation` from [`Self::to_bytes`]; `None` if their number is another one.
+    pub(crate) fn from_bytes(simulation: &Simulation, bytes: &[u8]) -> Option<Self> {
+        let mut dose = Self::new(simulation);
+        let (histories, numbers) = bytes.split_first_chunk()?;
+        dose.histories = u64::from_le_bytes(*histories);
+        let sums = dose.materials.iter_mut().chain(&mut dose.voxels);
+        let sums = sums.flat_map(|sum| [&mut sum.ev, &mut sum.se_ev2]);
+        let (numbers, rest) = numbers.as_chunks();
+        let mut numbers = numbers.iter();
+        for number in dose.materials_mass_g.iter_mut().chain(sums) {
+            *number = f64::from_le_bytes(*numbers.next()?);
+        }
+        (numbers.len() == 0 && rest.is_empty()).then_some(dose)
     }
 
     fn text(&self, simulation: &Simulation, voxels: &VoxelBox, doses: &[Estimate]) -> String {

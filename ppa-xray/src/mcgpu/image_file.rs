@@ -98,11 +98,18 @@ impl Simulation {
         }
     }
 
+    /// Names of both files of a projection: text, then raw.
+    pub fn image_names(&self, station: &Station) -> [String; 2] {
+        let name = self.image_name(station);
+        let raw = format!("{name}.raw");
+        [name, raw]
+    }
+
     /// Names of all files that a scan of these projections leaves: images, and voxel doses if the input file asks for them.
     pub fn file_names(&self, stations: &[Station]) -> Vec<String> {
-        let images = stations.iter().map(|station| self.image_name(station));
-        let mut names: Vec<String> = images
-            .flat_map(|name| [format!("{name}.raw"), name])
+        let mut names: Vec<String> = stations
+            .iter()
+            .flat_map(|station| self.image_names(station))
             .collect();
         if let (Some(asked), Some(_)) = (&self.input().voxel_dose, self.dose_box()) {
             let name = &asked.file;
@@ -130,15 +137,25 @@ impl Simulation {
         station: &Station,
         radiograph: &Radiograph,
     ) -> Result<(), McgpuError> {
+        for (name, bytes) in self.image_files(station, radiograph) {
+            write_whole(&folder.join(name), &bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Names and contents of the files that [`Simulation::write_image`] writes.
+    pub(crate) fn image_files(
+        &self,
+        station: &Station,
+        radiograph: &Radiograph,
+    ) -> [(String, Vec<u8>); 2] {
         let image = self.image(radiograph);
-        let name = self.image_name(station);
         let text = image.text(
             &self.header(station, radiograph),
             &self.footer(&image, radiograph),
         );
-        write_whole(&folder.join(&name), text.as_bytes())?;
-        write_whole(&folder.join(format!("{name}.raw")), &image.raw())?;
-        Ok(())
+        let [name, raw_name] = self.image_names(station);
+        [(name, text.into_bytes()), (raw_name, image.raw())]
     }
 
     fn header(&self, station: &Station, radiograph: &Radiograph) -> String {

@@ -4,10 +4,11 @@ use std::fmt::Write;
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::time::Duration;
 
 use nalgebra::{Isometry3, Vector3};
-use ppa_xray::mcgpu::{McgpuError, RunLength, ScanDose, Simulation, Station};
-use ppa_xray::{Category, Radiograph};
+use ppa_xray::mcgpu::{McgpuError, RunLength, Scan, ScanDose, Simulation, Station};
+use ppa_xray::{Category, Engine, Radiograph};
 use serde_json::Value;
 
 use crate::shared;
@@ -404,4 +405,92 @@ fn case_a_from_its_input_file_agrees_with_mcgpu() {
         (0.5..1.0).contains(&(stays / emitted)),
         "{stays} of {emitted} eV"
     );
+}
+
+/// Names and contents of the files in a folder.
+fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap());
+    let mut files: Vec<_> = entries
+        .map(|entry| {
+            let name = entry.file_name().into_string().unwrap();
+            (name, fs::read(entry.path()).unwrap())
+        })
+        .collect();
+    files.sort();
+    files
+}
+
+/// Every call follows one batch of histories and is then cut off; the next one resumes from the file.
+#[test]
+fn a_scan_cut_into_pieces_writes_the_same_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let simulation = simulation(folder.path(), &SCAN).unwrap();
+    let stations = &simulation.input().stations()[..2];
+    let length = RunLength::Histories(60_000);
+    let resumed = folder.path().join("resumed");
+    let whole = folder.path().join("whole");
+    for out in [&resumed, &whole] {
+        fs::create_dir(out).unwrap();
+    }
+    let start = || Scan::new(&simulation, length, Engine::Analog, &resumed);
+    let mut pieces = 0;
+    let scan = loop {
+        let mut scan = match start().tally_path().exists() {
+            true => Scan::resume(&simulation, length, Engine::Analog, &resumed).unwrap(),
+            false => start(),
+        };
+        let next = stations.iter().find(|s| scan.projection(s).is_none());
+        let Some(station) = next else {
+            break scan;
+        };
+        let mut batches = 0;
+        let simulated = scan.analog(station, Duration::ZERO, |_| {
+            batches += 1;
+            match batches {
+                1 => ControlFlow::Continue(()),
+                _ => ControlFlow::Break(()),
+            }
+        });
+        pieces += 1;
+        if let Some((image, dose)) = simulated.unwrap() {
+            scan.add(station, &image, dose.as_ref()).unwrap();
+        }
+    };
+    assert!(pieces > 2, "{pieces}");
+    let resumed_dose = scan.finish().unwrap().unwrap();
+
+    let mut scan_dose = ScanDose::new(&simulation);
+    for station in stations {
+        let (image, dose) = simulation
+            .analog(station, length, |_| ControlFlow::Continue(()))
+            .unwrap();
+        scan_dose.add(&simulation, &dose.unwrap());
+        simulation.write_image(&whole, station, &image).unwrap();
+    }
+    scan_dose.write(&whole, &simulation).unwrap();
+    assert_eq!(resumed_dose, scan_dose);
+    assert!(files(&resumed) == files(&whole));
+}
+
+#[test]
+fn a_lost_image_of_a_timed_scan_is_the_same_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let simulation = simulation(folder.path(), &SCAN).unwrap();
+    let station = &simulation.input().stations()[0];
+    let out = folder.path().join("out");
+    fs::create_dir(&out).unwrap();
+    let length = RunLength::Seconds(0.05);
+    let expose = |mut scan: Scan| {
+        let simulated = scan.analog(station, Duration::MAX, |_| ControlFlow::Continue(()));
+        let (image, dose) = simulated.unwrap().unwrap();
+        scan.add(station, &image, dose.as_ref()).unwrap();
+    };
+    expose(Scan::new(&simulation, length, Engine::Analog, &out));
+    let before = files(&out);
+    let [text, _] = simulation.image_names(station);
+    fs::remove_file(out.join(&text)).unwrap();
+    let scan = Scan::resume(&simulation, length, Engine::Analog, &out).unwrap();
+    assert!(!scan.written().contains(&text));
+    expose(scan);
+    assert!(files(&out) == before);
 }

@@ -16,7 +16,7 @@ use crate::output::bar;
 use crate::output_files::{OutputFiles, ReplaceArgs, require_room};
 
 /// Time between two saved states of a run, at most what an interruption costs.
-const SAVE_EVERY: Duration = Duration::from_secs(60);
+pub(super) const SAVE_EVERY: Duration = Duration::from_secs(60);
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Analog engine")]

@@ -1,5 +1,6 @@
 //! `ppa xray mcgpu`: runs an input file of MC-GPU v1.3 as it is.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -7,10 +8,11 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use indicatif::ProgressBar;
-use ppa_xray::mcgpu::{RunLength, ScanDose, Simulation, Station};
-use ppa_xray::{CategorySums, Dose, Engine, FastSettings, Imparted, Radiograph, fast};
+use ppa_xray::mcgpu::{RunLength, Scan, ScanDose, Simulation, Station};
+use ppa_xray::{CategorySums, Engine, FastSettings, Imparted, Radiograph, fast};
 use serde::Serialize;
 
+use super::follow::SAVE_EVERY;
 use super::simulate::EngineName;
 use crate::interrupt::Interrupt;
 use crate::output::{Output, Seconds, Stopwatch, working};
@@ -29,7 +31,8 @@ pub struct McgpuArgs {
     /// Seed of histories and noise [default: that of the file]
     #[arg(long)]
     seed: Option<u64>,
-    /// Folder for images and doses; they get the names that the file gives them
+    /// Folder for images and doses; they get the names that the file gives them. Until the scan is complete, IMAGE.tally in this
+    /// folder keeps what is simulated; the same command resumes from it
     #[arg(long)]
     out: PathBuf,
     #[command(flatten)]
@@ -83,28 +86,29 @@ pub fn run(args: &McgpuArgs, output: Output) -> anyhow::Result<()> {
         "{}: no projection has an angle of interest",
         args.input.display()
     );
-    args.declare(&simulation, &stations)?;
+    let scan = args.start(&simulation, length)?;
+    let written = scan.written();
+    args.declare(&simulation, &stations, &scan, &written)?;
     let interrupt = Interrupt::listen()?;
     let is_new = !args.out.exists();
     fs::create_dir_all(&args.out)
         .with_context(|| format!("cannot make the folder {}", args.out.display()))?;
 
     let watch = Stopwatch::start();
-    let scan = args.scan(&simulation, &stations, length, &working, &interrupt);
-    if scan.is_err() && is_new {
+    let scanned = args
+        .simulate(&simulation, &stations, scan, &written, &working, &interrupt)
+        .and_then(|scan| args.finish(&simulation, &stations, scan));
+    if scanned.is_err() && is_new {
         // Goes only if nothing is in it.
         let _ = fs::remove_dir(&args.out);
     }
-    let (projections, dose) = scan?;
+    let (projections, dose) = scanned?;
     working.finish_and_clear();
     let fewest = |fewest: f64, projected: &Projected| fewest.min(projected.histories);
     let result = Simulated {
         histories: projections.iter().fold(f64::INFINITY, fewest),
         projections,
-        engine: match args.engine {
-            EngineName::Analog => Engine::Analog,
-            EngineName::Fast => Engine::Fast,
-        },
+        engine: args.engine(),
         dose: dose.map(|dose| MaterialDose::new(&dose.materials())),
         seconds: watch.read(),
     };
@@ -112,24 +116,53 @@ pub fn run(args: &McgpuArgs, output: Output) -> anyhow::Result<()> {
 }
 
 impl McgpuArgs {
-    /// Simulates projection by projection and writes what the file asks for.
-    fn scan(
+    /// The scan that was interrupted in the folder, or a new one.
+    fn start<'a>(&self, simulation: &'a Simulation, length: RunLength) -> anyhow::Result<Scan<'a>> {
+        let scan = Scan::new(simulation, length, self.engine(), &self.out);
+        let path = scan.tally_path();
+        if path.symlink_metadata().is_err() {
+            return Ok(scan);
+        }
+        match Scan::resume(simulation, length, self.engine(), &self.out) {
+            Err(_) if self.replace.is_given() => Ok(scan),
+            resumed => resumed.with_context(|| {
+                let out = self.out.display();
+                format!("cannot resume the scan in {out} (--replace starts over)")
+            }),
+        }
+    }
+
+    /// Simulates the projections that `scan` lacks, and complete ones whose images are not among the files `written`.
+    fn simulate<'a>(
         &self,
         simulation: &Simulation,
         stations: &[Station],
-        length: RunLength,
+        mut scan: Scan<'a>,
+        written: &BTreeSet<String>,
         working: &ProgressBar,
         interrupt: &Interrupt,
-    ) -> anyhow::Result<(Vec<Projected>, Option<ScanDose>)> {
-        let mut dose = simulation
-            .dose_settings()
-            .map(|_| ScanDose::new(simulation));
-        let mut projections = Vec::new();
-        for (done, station) in stations.iter().enumerate() {
-            let which = format!("projection {} of {}", done + 1, stations.len());
+    ) -> anyhow::Result<Scan<'a>> {
+        let tally = scan.tally_path();
+        let stopped = |scan: &Scan| {
+            interrupt.stopped(format!(
+                "after {} of {} projections; repeat the command to resume from {}",
+                scan.complete().len(),
+                stations.len(),
+                tally.display()
+            ))
+        };
+        for (index, station) in stations.iter().enumerate() {
+            let mut names = simulation.image_names(station).into_iter();
+            if scan.projection(station).is_some() && names.all(|name| written.contains(&name)) {
+                continue;
+            }
+            if interrupt.is_asked() {
+                return Err(stopped(&scan));
+            }
+            let which = format!("projection {} of {}", index + 1, stations.len());
             working.set_message(which.clone());
-            let (radiograph, left) = match self.engine {
-                EngineName::Analog => simulation.analog(station, length, |progress| {
+            let simulated = match self.engine {
+                EngineName::Analog => scan.analog(station, SAVE_EVERY, |progress| {
                     if let Some(left) = progress.remaining {
                         working.set_message(format!("{which}, {:.0} s left", left.as_secs_f64()));
                     }
@@ -138,48 +171,71 @@ impl McgpuArgs {
                         false => ControlFlow::Continue(()),
                     }
                 })?,
-                EngineName::Fast => self.fast(simulation, station, length)?,
+                EngineName::Fast => {
+                    let radiograph = self.fast(simulation, station, scan.length(station))?;
+                    Some((radiograph, None))
+                }
             };
-            if interrupt.is_asked() {
-                return Err(interrupt.stopped(format!(
-                    "in {which}; the images of {done} are whole in {}; repeat the command with --replace to start over",
-                    self.out.display()
-                )));
-            }
-            if let (Some(dose), Some(left)) = (&mut dose, &left) {
-                dose.add(simulation, left);
-            }
-            simulation.write_image(&self.out, station, &radiograph)?;
-            projections.push(Projected {
-                number: station.number,
-                angle_deg: station.angle_deg,
-                sums: radiograph.sums,
-                histories: radiograph.histories,
-                image: self.out.join(simulation.image_name(station)),
-            });
+            let Some((radiograph, dose)) = simulated else {
+                return Err(stopped(&scan));
+            };
+            scan.add(station, &radiograph, dose.as_ref())?;
         }
-        if let Some(dose) = &dose {
-            dose.write(&self.out, simulation)?;
-        }
-        Ok((projections, dose))
+        Ok(scan)
     }
 
-    /// Declares all files of the scan.
-    fn declare(&self, simulation: &Simulation, stations: &[Station]) -> anyhow::Result<()> {
+    /// Writes the doses that the file asks for and ends the scan.
+    fn finish(
+        &self,
+        simulation: &Simulation,
+        stations: &[Station],
+        scan: Scan,
+    ) -> anyhow::Result<(Vec<Projected>, Option<ScanDose>)> {
+        let projections = stations
+            .iter()
+            .filter_map(|station| Some((station, scan.projection(station)?)))
+            .map(|(station, projection)| Projected {
+                number: station.number,
+                angle_deg: station.angle_deg,
+                sums: projection.sums,
+                histories: projection.histories,
+                image: self.out.join(simulation.image_name(station)),
+            })
+            .collect();
+        Ok((projections, scan.finish()?))
+    }
+
+    /// Declares all files of the scan that are not `written`.
+    fn declare(
+        &self,
+        simulation: &Simulation,
+        stations: &[Station],
+        scan: &Scan,
+        written: &BTreeSet<String>,
+    ) -> anyhow::Result<()> {
         let mut outputs = self.replace.outputs();
-        for name in simulation.file_names(stations) {
-            let path = self.out.join(name);
+        let mut names = simulation.file_names(stations);
+        names.retain(|name| !written.contains(name));
+        for path in names.into_iter().map(|name| self.out.join(name)) {
             if path.parent() == Some(&self.out) {
                 outputs.file_in_new_folder("--out", &path, &[])?;
             } else {
                 outputs.file("--out", &path, &[])?;
             }
         }
+        if !scan.tally_path().exists() {
+            outputs.file_in_new_folder("the tally", &scan.tally_path(), &[])?;
+        }
         let pixels: u64 = simulation.input().pixels.map(u64::from).iter().product();
-        require_room(
-            &self.out,
-            LEAST_PIXEL_BYTES * pixels * stations.len() as u64,
-        )
+        let missing = stations.len() - scan.complete().len();
+        require_room(&self.out, LEAST_PIXEL_BYTES * pixels * missing as u64)
+    }
+
+    fn engine(&self) -> Engine {
+        match self.engine {
+            EngineName::Analog => Engine::Analog,
+            EngineName::Fast => Engine::Fast,
+        }
     }
 
     fn length(&self, in_file: RunLength) -> anyhow::Result<RunLength> {
@@ -198,7 +254,7 @@ impl McgpuArgs {
         simulation: &Simulation,
         station: &Station,
         length: RunLength,
-    ) -> anyhow::Result<(Radiograph, Option<Dose>)> {
+    ) -> anyhow::Result<Radiograph> {
         let file = self.input.display();
         anyhow::ensure!(
             simulation.dose_settings().is_none(),
@@ -213,13 +269,12 @@ impl McgpuArgs {
             ..FastSettings::default()
         };
         let projection = simulation.projection(station);
-        let radiograph = fast(
+        Ok(fast(
             simulation.phantom(),
             simulation.spectrum(),
             &projection,
             &settings,
-        )?;
-        Ok((radiograph, None))
+        )?)
     }
 }
 
