@@ -193,12 +193,17 @@ const KEYS: &[(&str, &str, &str)] = &[
     (
         "xray.presentation",
         "centre",
-        "log exposure shown as middle grey",
+        "of the window in log exposure",
     ),
     (
         "xray.presentation",
         "width",
         "of the window in log exposure",
+    ),
+    (
+        "xray.presentation",
+        "latitude_reduction",
+        "large areas lose contrast by 1 + this x log exposure",
     ),
     (
         "xray.presentation",

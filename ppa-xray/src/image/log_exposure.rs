@@ -1,4 +1,4 @@
-//! The radiograph as log exposure over the bare field, with its detail lifted, and as grey values.
+//! The radiograph as log exposure over the bare field, with latitude reduced and detail lifted, and as grey values.
 
 use crate::image::enhancement::{Lift, lifted};
 use crate::image::presentation::{Presentation, PresentationError};
@@ -21,9 +21,9 @@ impl Radiograph {
         Ok(enhanced
             .iter()
             .enumerate()
-            .map(|(pixel, &a)| {
+            .map(|(pixel, &t)| {
                 if self.in_field(pixel) {
-                    (65_535.0 * presentation.grey(f64::from(a))).round() as u16
+                    (65_535.0 * presentation.grey(f64::from(t))).round() as u16
                 } else {
                     0
                 }
@@ -31,13 +31,14 @@ impl Radiograph {
             .collect())
     }
 
-    /// Log exposure with its detail lifted, before the window; that of the bare field outside the field.
+    /// Log exposure after latitude reduction with its detail lifted, before the window; that of the bare field outside the field.
     pub(crate) fn enhanced_log_exposure(
         &self,
         presentation: &Presentation,
     ) -> Result<Vec<f32>, PresentationError> {
         presentation.validate()?;
         self.check_layers()?;
+        let reduction = presentation.reduction();
         let (image, sigma): (Vec<f32>, Vec<f32>) = self
             .total()
             .iter()
@@ -46,13 +47,15 @@ impl Radiograph {
             .map(|(pixel, (&reading, sigma))| {
                 if self.in_field(pixel) {
                     let open = self.open_field_at(pixel);
-                    log_exposure(f64::from(reading), f64::from(sigma), open)
+                    let (a, sigma) = log_exposure(f64::from(reading), f64::from(sigma), open);
+                    let t = reduction.reduced(a);
+                    (t as f32, (sigma / reduction.divisor(t)) as f32)
                 } else {
                     (0.0, 0.0)
                 }
             })
             .unzip();
-        if presentation.detail == 0.0 {
+        if presentation.detail == 0.0 && presentation.latitude_reduction == 0.0 {
             return Ok(image);
         }
         let image = Plane {
@@ -61,6 +64,7 @@ impl Radiograph {
             values: image,
         };
         let lift = Lift {
+            reduction,
             detail: presentation.detail,
             size_px: presentation.detail_mm / self.detector.pixel_mm,
             edge: presentation.edge,
@@ -70,10 +74,10 @@ impl Radiograph {
 }
 
 /// ln(open / reading) and its standard error.
-fn log_exposure(reading: f64, sigma: f64, open: f64) -> (f32, f32) {
+fn log_exposure(reading: f64, sigma: f64, open: f64) -> (f64, f64) {
     let (share, sigma) = (reading / open, sigma / open);
     if share <= DARKEST {
-        return (-DARKEST.ln() as f32, EMPTY_SIGMA as f32);
+        return (-DARKEST.ln(), EMPTY_SIGMA);
     }
-    (-share.ln() as f32, (sigma / share) as f32)
+    (-share.ln(), sigma / share)
 }

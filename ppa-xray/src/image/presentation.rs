@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::image::latitude::LatitudeReduction;
 use crate::image::radiograph::Radiograph;
 
 /// Why a presentation cannot be used.
@@ -41,33 +42,42 @@ pub enum PresentationError {
 /// Fixed mapping of a radiograph to grey values; never adapted to the single image.
 ///
 /// A pixel's log exposure is compared with the bare field, a = ln(open / reading), which for the primary alone is
-/// the line integral of the attenuation. Faint detail that stands out of the noise is lifted band by band of a Laplacian
-/// pyramid, in the manner of clinical multi-scale processing (Vuylsteke and Schoeters, Proc. SPIE 2167 (1994) 551); the noise is known from
-/// the standard errors of the radiograph. Then a sigmoid window (DICOM PS3.3 C.11.2.1.3.1) turns a into grey:
-/// 1 / (1 + exp(−4 (a − centre) / width)), stretched so that the bare field is black. Pixels outside the field are black.
+/// the line integral of the attenuation. From skin to hindfoot it covers more than a picture can show with the contrast of a joint space. As in
+/// clinical multi-scale processing (Vuylsteke and Schoeters, Proc. SPIE 2167 (1994) 551; Stahl, Aach and Dippel, Med. Phys. 27 (2000) 56), large areas
+/// and fine detail are therefore treated apart:
 ///
-/// In a file it is a table of these numbers, or a name and what differs from it: `{ protocol = "ankle_lateral", width = 3.0 }`.
+/// 1. Latitude reduction: a becomes t = ln(1 + r a) / r, which divides contrast by 1 + r a. Bare field stays 0, and more
+///    attenuation always gives more.
+/// 2. In the bands of a Laplacian pyramid of t, faint detail that stands out of the noise gets back what step 1 took, and the share `detail` on top.
+///    The noise is known from the standard errors of the radiograph. Large areas and strong edges stay as reduced.
+/// 3. A sigmoid window (DICOM PS3.3 C.11.2.1.3.1) over the t of its ends turns t into grey: 1 / (1 + exp(−4 (t − middle) / (high − low))),
+///    stretched so that the bare field is black. Pixels outside the field are black.
+///
+/// In a file it is a table of these numbers, or a name and what differs from it: `{ protocol = "ankle_lateral", width = 4.5 }`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "PresentationTable")]
 pub struct Presentation {
-    /// Log exposure shown as middle grey.
+    /// Middle of the window in log exposure.
     pub centre: f64,
     /// Width of the window in log exposure.
     pub width: f64,
-    /// Share of the contrast of faint detail that is added; 0 leaves the image as it is.
+    /// Latitude reduction: contrast of large areas and strong edges is divided by 1 + this × log exposure; 0 leaves it as it is.
+    pub latitude_reduction: f64,
+    /// Share of the contrast of faint detail that is added; 0 leaves it as it is in log exposure.
     pub detail: f64,
-    /// Size from which detail gets less than half of that, mm.
+    /// Size from which detail gets less than half of the lift, mm.
     pub detail_mm: f64,
-    /// Local contrast (root mean square) in log exposure from which detail gets less than half of that, so that strong edges
+    /// Local contrast (root mean square) in log exposure from which detail gets less than half of the lift, so that strong edges
     /// get no halo.
     pub edge: f64,
 }
 
 /// A limb at 50 to 70 kVp.
 const LIMB: Presentation = Presentation {
-    centre: 2.4,
-    width: 4.0,
-    detail: 2.0,
+    centre: 2.1,
+    width: 5.8,
+    latitude_reduction: 0.5,
+    detail: 1.5,
     detail_mm: 8.0,
     edge: 0.12,
 };
@@ -78,24 +88,24 @@ const PROTOCOLS: &[(&str, Presentation)] = &[
     (
         "ankle_ap",
         Presentation {
-            centre: 2.5,
-            width: 4.2,
+            centre: 2.3,
+            width: 6.2,
             ..LIMB
         },
     ),
     (
         "ankle_mortise",
         Presentation {
-            centre: 2.5,
-            width: 4.2,
+            centre: 2.2,
+            width: 6.0,
             ..LIMB
         },
     ),
     (
         "ankle_lateral",
         Presentation {
-            centre: 2.1,
-            width: 3.6,
+            centre: 1.9,
+            width: 5.2,
             ..LIMB
         },
     ),
@@ -107,15 +117,17 @@ const PROTOCOLS: &[(&str, Presentation)] = &[
 struct PresentationTable {
     /// Name of a fixed presentation, such as `limb` or `ankle_lateral`; the other keys replace its values. `limb` by default.
     protocol: Option<String>,
-    /// Log exposure shown as middle grey.
+    /// Middle of the window in log exposure.
     centre: Option<f64>,
     /// Width of the window in log exposure.
     width: Option<f64>,
-    /// Share of the contrast of faint detail that is added; 0 leaves the image as it is.
+    /// Latitude reduction: contrast of large areas and strong edges is divided by 1 + this × log exposure; 0 leaves it as it is.
+    latitude_reduction: Option<f64>,
+    /// Share of the contrast of faint detail that is added; 0 leaves it as it is in log exposure.
     detail: Option<f64>,
-    /// Size from which detail gets less than half of that, mm.
+    /// Size from which detail gets less than half of the lift, mm.
     detail_mm: Option<f64>,
-    /// Local contrast (root mean square) in log exposure from which detail gets less than half of that.
+    /// Local contrast (root mean square) in log exposure from which detail gets less than half of the lift.
     edge: Option<f64>,
 }
 
@@ -129,6 +141,7 @@ impl TryFrom<PresentationTable> for Presentation {
         Ok(Self {
             centre: table.centre.unwrap_or(base.centre),
             width: table.width.unwrap_or(base.width),
+            latitude_reduction: table.latitude_reduction.unwrap_or(base.latitude_reduction),
             detail: table.detail.unwrap_or(base.detail),
             detail_mm: table.detail_mm.unwrap_or(base.detail_mm),
             edge: table.edge.unwrap_or(base.edge),
@@ -144,7 +157,7 @@ impl Default for Presentation {
 }
 
 /// Log exposure from which a pixel counts as covered when a window is fitted.
-const COVERED: f32 = 0.1;
+const COVERED: f64 = 0.1;
 
 /// Share of the covered pixels that a fitted window leaves at either end.
 const TAIL: f64 = 0.02;
@@ -175,12 +188,14 @@ impl Presentation {
     /// # Errors
     /// [`PresentationError`] when a parameter is out of range, or when the image is bare or even, so that no window fits it.
     pub fn fitted(&self, radiograph: &Radiograph) -> Result<Self, PresentationError> {
+        let reduction = self.reduction();
         let mut covered = radiograph.enhanced_log_exposure(self)?;
-        covered.retain(|a| *a > COVERED);
+        covered.retain(|t| f64::from(*t) > reduction.reduced(COVERED));
         covered.sort_unstable_by(f32::total_cmp);
         let percentile = |share: f64| -> f64 {
             let index = (share * covered.len().saturating_sub(1) as f64).round() as usize;
-            covered.get(index).copied().map_or(0.0, f64::from)
+            let shown = covered.get(index).copied().map_or(0.0, f64::from);
+            reduction.restored(shown)
         };
         let (low, high) = (percentile(TAIL), percentile(1.0 - TAIL));
         let fitted = Self {
@@ -202,6 +217,12 @@ impl Presentation {
         for (what, found, fine, expected) in [
             ("centre", self.centre, self.centre.is_finite(), "a number"),
             ("width", self.width, positive(self.width), positive_number),
+            (
+                "latitude reduction",
+                self.latitude_reduction,
+                (0.0..=10.0).contains(&self.latitude_reduction),
+                "0 to 10",
+            ),
             (
                 "detail",
                 self.detail,
@@ -227,11 +248,17 @@ impl Presentation {
         Ok(())
     }
 
-    /// 0 (black, bare field) to 1 (white).
-    pub(super) fn grey(&self, log_exposure: f64) -> f64 {
-        let sigmoid = |a: f64| 1.0 / (1.0 + (-4.0 * (a - self.centre) / self.width).exp());
+    pub(super) fn reduction(&self) -> LatitudeReduction {
+        LatitudeReduction(self.latitude_reduction)
+    }
+
+    /// 0 (black, bare field) to 1 (white) of a log exposure after latitude reduction.
+    pub(super) fn grey(&self, reduced: f64) -> f64 {
+        let reduction = self.reduction();
+        let [low, high] = [-0.5, 0.5].map(|end| reduction.reduced(self.centre + end * self.width));
+        let sigmoid = |t: f64| 1.0 / (1.0 + (-4.0 * (t - 0.5 * (low + high)) / (high - low)).exp());
         let open = sigmoid(0.0);
-        ((sigmoid(log_exposure) - open) / (1.0 - open)).clamp(0.0, 1.0)
+        ((sigmoid(reduced) - open) / (1.0 - open)).clamp(0.0, 1.0)
     }
 }
 
@@ -262,6 +289,27 @@ mod tests {
         }
     }
 
+    /// A file from before the latitude reduction.
+    #[test]
+    fn a_file_without_latitude_reduction_takes_the_default() {
+        let old = "centre = 2.4\nwidth = 4.0\ndetail = 2.0\ndetail_mm = 8.0\nedge = 0.12";
+        let read: Presentation = toml::from_str(old).unwrap();
+        assert_eq!(read.latitude_reduction, LIMB.latitude_reduction);
+        assert_eq!((read.centre, read.width), (2.4, 4.0));
+    }
+
+    /// A rim of soft tissue, log exposure 0.25, and the hindfoot from the front, log exposure 5, lie between black and white.
+    #[test]
+    fn no_protocol_burns_skin_or_hindfoot() {
+        for (name, presentation) in PROTOCOLS {
+            let grey = |a: f64| presentation.grey(presentation.reduction().reduced(a));
+            assert_eq!(grey(0.0), 0.0, "{name}");
+            let (skin, hindfoot) = (grey(0.25), grey(5.0));
+            assert!(skin > 0.06 && hindfoot < 0.9, "{name}: {skin} {hindfoot}");
+            assert!((1..600).all(|i| grey(0.01 * f64::from(i)) > grey(0.01 * f64::from(i - 1))));
+        }
+    }
+
     #[test]
     fn parameters_out_of_range_are_refused() {
         for (what, broken) in [
@@ -273,6 +321,20 @@ mod tests {
                 },
             ),
             ("width", Presentation { width: 0.0, ..LIMB }),
+            (
+                "latitude",
+                Presentation {
+                    latitude_reduction: -0.1,
+                    ..LIMB
+                },
+            ),
+            (
+                "latitude",
+                Presentation {
+                    latitude_reduction: f64::NAN,
+                    ..LIMB
+                },
+            ),
             (
                 "detail",
                 Presentation {

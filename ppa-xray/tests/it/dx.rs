@@ -101,7 +101,7 @@ fn a_header_says_what_the_exposure_was_and_that_it_was_none() {
         (tags::CONTENT_QUALIFICATION, "RESEARCH"),
         (tags::PRESENTATION_INTENT_TYPE, "FOR PRESENTATION"),
         (tags::PIXEL_INTENSITY_RELATIONSHIP, "LOG"),
-        (tags::VOILUT_FUNCTION, "SIGMOID"),
+        (tags::PRESENTATION_LUT_SHAPE, "IDENTITY"),
         (tags::KVP, "60"),
         (tags::FILTER_MATERIAL, "ALUMINUM\\COPPER"),
         (tags::FILTER_THICKNESS_MAXIMUM, "2.5\\0.1"),
@@ -151,27 +151,28 @@ fn the_detector_is_as_far_as_the_central_ray_says() {
     }
 }
 
-/// A reader that applies the sigmoid of the header sees what the PNG shows, but for the black level.
+/// A reader that applies the look-up table of the header shows the PNG, the black of the bare field included.
 #[test]
-fn the_window_of_the_header_gives_the_grey_of_the_png() {
+fn the_table_of_the_header_gives_the_grey_of_the_png() {
     let (projection, radiograph) = exposed();
     let presentation = Presentation::default();
     let intent = DxIntent::Presentation(presentation);
     let object = read(&write(&projection, &radiograph, "scan", intent));
-    let number = |tag| text(&object, tag).parse::<f64>().unwrap();
-    let (centre, width) = (number(tags::WINDOW_CENTER), number(tags::WINDOW_WIDTH));
-    let sigmoid = |stored: f64| 1.0 / (1.0 + (-4.0 * (stored - centre) / width).exp());
-    let open = sigmoid(6_000.0);
+    assert!(object.element(tags::WINDOW_CENTER).is_err());
+    let tables = object.element(tags::VOILUT_SEQUENCE).unwrap();
+    let [item] = tables.items().unwrap() else {
+        panic!("one table is expected");
+    };
+    let numbers = |tag| -> Vec<u16> { item.element(tag).unwrap().to_multi_int().unwrap() };
+    let (descriptor, table) = (numbers(tags::LUT_DESCRIPTOR), numbers(tags::LUT_DATA));
+    assert_eq!(descriptor, [table.len() as u16, 6_000, 16]);
+    assert_eq!(table[0], 0);
     let png = radiograph.present(&presentation).unwrap();
     for (pixel, (stored, grey)) in pixels(&object).into_iter().zip(png).enumerate() {
-        let shown = (sigmoid(f64::from(stored)) - open) / (1.0 - open);
-        let expected = f64::from(grey) / 65_535.0;
         if radiograph.in_field(pixel) {
-            // Half a step of 1/6000 in log exposure, at a slope of at most 1 / width.
-            assert!(
-                (shown.max(0.0) - expected).abs() < 2e-4,
-                "{pixel}: {shown} {expected}"
-            );
+            let shown = table[usize::from(stored.saturating_sub(6_000))];
+            // Half a step of 1/6000 in reduced log exposure, at a slope of at most 65 535.
+            assert!(shown.abs_diff(grey) <= 6, "{pixel}: {shown} {grey}");
         } else {
             assert_eq!((stored, grey), (6_000, 0));
         }
@@ -190,6 +191,7 @@ fn an_image_for_processing_is_linear_in_the_reading() {
     assert_eq!(text(&object, tags::PIXEL_INTENSITY_RELATIONSHIP), "LIN");
     assert_eq!(text(&object, tags::PRESENTATION_LUT_SHAPE), "INVERSE");
     assert!(object.element(tags::WINDOW_CENTER).is_err());
+    assert!(object.element(tags::VOILUT_SEQUENCE).is_err());
     let total = radiograph.total();
     for (pixel, stored) in pixels(&object).into_iter().enumerate() {
         if radiograph.in_field(pixel) {

@@ -77,6 +77,34 @@ fn png_holds_sixteen_bits_with_bone_white_and_air_black() {
     assert!(corner < 2_000 && centre > 40_000, "{corner} {centre}");
 }
 
+/// Steps of 60 mm, wide against the size of detail, that double the exposure each time, for every protocol.
+#[test]
+fn a_step_wedge_gets_darker_with_every_step_of_exposure() {
+    let mut wedge = radiograph();
+    let pixels = wedge.detector.pixels();
+    for layer in &mut wedge.layers {
+        layer.value.fill(0.0);
+        layer.sigma.fill(0.0);
+    }
+    for pixel in 0..pixels {
+        let step = 2 * (pixel / 60 / 20) + pixel % 60 / 30;
+        let share = f64::exp2(-(step as f64));
+        wedge.layers[0].value[pixel] = (share * wedge.open_field_at(pixel)) as f32;
+    }
+    for name in Presentation::protocols() {
+        let presentation = Presentation::protocol(name).unwrap();
+        let grey = wedge.present(&presentation).unwrap();
+        let middles: Vec<u16> = (0..6)
+            .map(|step| grey[(20 * (step / 2) + 10) * 60 + 30 * (step % 2) + 15])
+            .collect();
+        assert_eq!(middles[0], 0, "{name}");
+        assert!(
+            middles.is_sorted_by(|a, b| b.saturating_sub(*a) > 2_000),
+            "{name}: {middles:?}"
+        );
+    }
+}
+
 /// The window is fixed: a metal plate in one corner leaves the far corner as it was. A fitted one is asked for.
 #[test]
 fn grey_values_do_not_depend_on_the_rest_of_the_image() {

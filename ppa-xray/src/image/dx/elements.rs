@@ -3,7 +3,7 @@
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::value::DataSetSequence;
 use dicom_core::{DataElement, Length, PrimitiveValue, Tag, VR};
-use dicom_dictionary_std::{StandardDataDictionary, uids};
+use dicom_dictionary_std::{StandardDataDictionary, tags, uids};
 use dicom_object::InMemDicomObject;
 
 use crate::image::dx::examination::Code;
@@ -58,6 +58,20 @@ impl Elements {
         self.text(tag, &texts.join("\\"));
     }
 
+    /// A look-up table as a sequence of one item (PS3.3 C.11.2.1.1): 16-bit grey values of the stored values from `first` on.
+    pub fn voi_lut(&mut self, explanation: &str, first: u16, table: Vec<u16>) {
+        let mut item = Self::new();
+        // A count of 65 536 is written as 0.
+        let descriptor = [table.len() as u16, first, 16];
+        item.put(
+            tags::LUT_DESCRIPTOR,
+            PrimitiveValue::U16(descriptor.as_slice().into()),
+        );
+        item.text(tags::LUT_EXPLANATION, explanation);
+        item.words(tags::LUT_DATA, table);
+        self.sequence(tags::VOILUT_SEQUENCE, vec![item.0]);
+    }
+
     /// A sequence of one coded concept.
     pub fn code(&mut self, tag: Tag, code: Code) {
         self.sequence(tag, vec![code_item(code).0]);
@@ -73,12 +87,12 @@ impl Elements {
         self.0.put(DataElement::new(tag, VR::SQ, sequence));
     }
 
-    /// 16-bit pixels.
-    pub fn pixels(&mut self, tag: Tag, pixels: Vec<u16>) {
+    /// 16-bit words, such as pixels: as many as there are, where other representations end at 65 534 bytes.
+    pub fn words(&mut self, tag: Tag, words: Vec<u16>) {
         self.0.put(DataElement::new(
             tag,
             VR::OW,
-            PrimitiveValue::U16(pixels.into()),
+            PrimitiveValue::U16(words.into()),
         ));
     }
 
@@ -102,7 +116,6 @@ impl Elements {
 }
 
 fn code_item(code: Code) -> Elements {
-    use dicom_dictionary_std::tags;
     let mut item = Elements::new();
     item.text(tags::CODE_VALUE, code.value);
     item.text(tags::CODING_SCHEME_DESIGNATOR, code.scheme);

@@ -21,7 +21,7 @@ use crate::image::radiograph::Radiograph;
 /// Stored value of the bare field in a For Processing image; scatter can add to it.
 const OPEN_STORED: f64 = 40_000.0;
 
-/// Stored values per unit of log exposure in a For Presentation image, and the log exposure that is stored as 0.
+/// Stored values per unit of log exposure after latitude reduction in a For Presentation image, and the one that is stored as 0.
 const STORED_PER_LOG: f64 = 6_000.0;
 const LOG_OF_ZERO: f64 = -1.0;
 
@@ -45,7 +45,7 @@ pub struct DxExposure<'a> {
 pub enum DxIntent {
     /// Detector signal over that of the bare field, linear: what a workstation would process.
     Processing,
-    /// Enhanced log exposure with the window as a sigmoid VOI LUT: what a reader would see.
+    /// Enhanced log exposure with the window as a VOI LUT: what a reader would see.
     Presentation(Presentation),
 }
 
@@ -56,8 +56,9 @@ impl Radiograph {
     /// contents (2.25.‹hash›), so that the same radiograph gives the same bytes.
     ///
     /// * [`DxIntent::Processing`]: stored value = 40 000 × reading / bare field, clipped at 65 535 (LIN, sign +1).
-    /// * [`DxIntent::Presentation`]: stored value = 6 000 × (a + 1) with the enhanced log exposure a (LOG, sign −1), the window as
-    ///   a sigmoid. [`Radiograph::write_png`] shows the same but stretches it so that the bare field is black.
+    /// * [`DxIntent::Presentation`]: stored value = 6 000 × (t + 1) with the enhanced log exposure t after latitude reduction (LOG, sign −1), the
+    ///   window as a VOI LUT, whose values are the grey of [`Radiograph::write_png`]. They are P-values (Presentation LUT Shape IDENTITY): equal steps
+    ///   look equal on a display that follows the Grayscale Standard Display Function (PS3.14).
     ///
     /// Pixels outside the collimated field are stored as the bare field and covered by a display shutter.
     ///
@@ -87,7 +88,7 @@ impl Radiograph {
         };
         let mut elements = Elements::new();
         self.put_modules(&mut elements, exposure, intent, [columns, rows]);
-        elements.pixels(tags::PIXEL_DATA, pixels);
+        elements.words(tags::PIXEL_DATA, pixels);
         let study = uid::of(&[b"study", exposure.study.as_bytes()]);
         let kind: &[u8] = match intent {
             DxIntent::Processing => b"processing",
@@ -128,13 +129,13 @@ impl Radiograph {
     }
 
     fn logarithmic_pixels(&self, presentation: &Presentation) -> Result<Vec<u16>, OutputError> {
-        let stored = |(pixel, &a): (usize, &f32)| {
-            let a = if self.in_field(pixel) {
-                f64::from(a)
+        let stored = |(pixel, &t): (usize, &f32)| {
+            let t = if self.in_field(pixel) {
+                f64::from(t)
             } else {
                 0.0
             };
-            (STORED_PER_LOG * (a - LOG_OF_ZERO)).round() as u16
+            (STORED_PER_LOG * (t - LOG_OF_ZERO)).round() as u16
         };
         let enhanced = self.enhanced_log_exposure(presentation)?;
         Ok(enhanced.iter().enumerate().map(stored).collect())

@@ -49,9 +49,13 @@ impl Radiograph {
             DxIntent::Processing => {
                 format!("stored value = {OPEN_STORED} x signal / signal of the bare field")
             }
-            DxIntent::Presentation(_) => format!(
-                "stored value = {STORED_PER_LOG} x (ln(signal of the bare field / signal) + {}) after multi-scale contrast enhancement",
-                -LOG_OF_ZERO
+            DxIntent::Presentation(presentation) => format!(
+                "stored value = {STORED_PER_LOG} x (t + {}), t = {} after multi-scale contrast enhancement",
+                -LOG_OF_ZERO,
+                match presentation.latitude_reduction {
+                    0.0 => "ln(signal of the bare field / signal)".to_owned(),
+                    r => format!("ln(1 + {r} x ln(signal of the bare field / signal)) / {r}"),
+                }
             ),
         };
         let histories = self.histories;
@@ -86,10 +90,14 @@ impl Radiograph {
                 to.text(tags::PRESENTATION_LUT_SHAPE, "IDENTITY");
                 to.text(tags::PIXEL_INTENSITY_RELATIONSHIP, "LOG");
                 to.signed(tags::PIXEL_INTENSITY_RELATIONSHIP_SIGN, -1);
-                let centre = STORED_PER_LOG * (presentation.centre - LOG_OF_ZERO);
-                to.decimals(tags::WINDOW_CENTER, &[centre]);
-                to.decimals(tags::WINDOW_WIDTH, &[STORED_PER_LOG * presentation.width]);
-                to.text(tags::VOILUT_FUNCTION, "SIGMOID");
+                // From the bare field on; what is stored below it is as black.
+                let first = (-STORED_PER_LOG * LOG_OF_ZERO) as u16;
+                let grey = |stored: u16| {
+                    let t = f64::from(stored) / STORED_PER_LOG + LOG_OF_ZERO;
+                    (65_535.0 * presentation.grey(t)).round() as u16
+                };
+                let table = (first..=u16::MAX).map(grey).collect();
+                to.voi_lut("Window", first, table);
             }
         }
     }
