@@ -248,9 +248,9 @@ fn images_of_the_fast_engine_are_kept_as_well() {
     let after = contents(&images);
     for name in ["image.dat_0000", "image.dat_0000.raw"] {
         let path = Path::new(name);
-        assert!(before.get(path).is_some() && before.get(path) == after.get(path));
+        assert!(before.contains_key(path) && before.get(path) == after.get(path));
     }
-    assert!(after.get(Path::new("image.dat_0001")).is_some());
+    assert!(after.contains_key(Path::new("image.dat_0001")));
 }
 
 #[test]

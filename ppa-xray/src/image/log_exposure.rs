@@ -18,12 +18,13 @@ impl Radiograph {
     /// [`PresentationError`] when a parameter is out of range, or a layer does not have a value per pixel.
     pub fn present(&self, presentation: &Presentation) -> Result<Vec<u16>, PresentationError> {
         let enhanced = self.enhanced_log_exposure(presentation)?;
+        let grey = presentation.grey();
         Ok(enhanced
             .iter()
             .enumerate()
             .map(|(pixel, &t)| {
                 if self.in_field(pixel) {
-                    (65_535.0 * presentation.grey(f64::from(t))).round() as u16
+                    (65_535.0 * grey(f64::from(t))).round() as u16
                 } else {
                     0
                 }

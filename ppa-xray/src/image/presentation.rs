@@ -252,13 +252,14 @@ impl Presentation {
         LatitudeReduction(self.latitude_reduction)
     }
 
-    /// 0 (black, bare field) to 1 (white) of a log exposure after latitude reduction.
-    pub(super) fn grey(&self, reduced: f64) -> f64 {
+    /// The grey, 0 (black, bare field) to 1 (white), of a log exposure after latitude reduction.
+    pub(super) fn grey(&self) -> impl Fn(f64) -> f64 {
         let reduction = self.reduction();
         let [low, high] = [-0.5, 0.5].map(|end| reduction.reduced(self.centre + end * self.width));
-        let sigmoid = |t: f64| 1.0 / (1.0 + (-4.0 * (t - 0.5 * (low + high)) / (high - low)).exp());
+        let sigmoid =
+            move |t: f64| 1.0 / (1.0 + (-4.0 * (t - 0.5 * (low + high)) / (high - low)).exp());
         let open = sigmoid(0.0);
-        ((sigmoid(reduced) - open) / (1.0 - open)).clamp(0.0, 1.0)
+        move |reduced| ((sigmoid(reduced) - open) / (1.0 - open)).clamp(0.0, 1.0)
     }
 }
 
@@ -300,9 +301,10 @@ mod tests {
 
     /// A rim of soft tissue, log exposure 0.25, and the hindfoot from the front, log exposure 5, lie between black and white.
     #[test]
-    fn no_protocol_burns_skin_or_hindfoot() {
+    fn skin_and_hindfoot_are_grey_in_every_protocol() {
         for (name, presentation) in PROTOCOLS {
-            let grey = |a: f64| presentation.grey(presentation.reduction().reduced(a));
+            let shown = presentation.grey();
+            let grey = |a: f64| shown(presentation.reduction().reduced(a));
             assert_eq!(grey(0.0), 0.0, "{name}");
             let (skin, hindfoot) = (grey(0.25), grey(5.0));
             assert!(skin > 0.06 && hindfoot < 0.9, "{name}: {skin} {hindfoot}");

@@ -92,11 +92,12 @@ impl Radiograph {
                 to.signed(tags::PIXEL_INTENSITY_RELATIONSHIP_SIGN, -1);
                 // From the bare field on; what is stored below it is as black.
                 let first = (-STORED_PER_LOG * LOG_OF_ZERO) as u16;
-                let grey = |stored: u16| {
+                let grey = presentation.grey();
+                let shown = |stored: u16| {
                     let t = f64::from(stored) / STORED_PER_LOG + LOG_OF_ZERO;
-                    (65_535.0 * presentation.grey(t)).round() as u16
+                    (65_535.0 * grey(t)).round() as u16
                 };
-                let table = (first..=u16::MAX).map(grey).collect();
+                let table = (first..=u16::MAX).map(shown).collect();
                 to.voi_lut("Window", first, table);
             }
         }
