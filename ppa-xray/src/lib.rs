@@ -95,6 +95,7 @@ pub use image::dx::{
     DxExposure, DxIntent,
     examination::{Examination, Laterality, Region, View},
 };
+pub use image::exposure_index::deviation_index;
 pub use image::output::{EXR_ATTRIBUTE, OutputError};
 pub use image::presentation::{Presentation, PresentationError};
 pub use image::radiograph::{CategorySums, Engine, Radiograph};

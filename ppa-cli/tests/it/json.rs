@@ -216,6 +216,14 @@ fn every_command_keeps_its_keys() {
         "xray simulate p01.toml --angle 18 --engine analog --histories 20000 --out x.png --exr x.exr --dicom x.dcm --protocol ankle_mortise",
         &["projections", "histories", "engine", "wall_s", "cpu_s"],
     );
+    let indices = ["exposure_index", "target_exposure_index", "deviation_index"];
+    let exposed = object(
+        "xray simulate p01.toml --out y.png --target-exposure-index 400",
+        &indices,
+    );
+    let [index, target, deviation] = indices.map(|key| exposed[key].as_f64().unwrap());
+    assert_eq!(target, 400.0);
+    assert!((deviation - 10.0 * (index / 400.0).log10()).abs() < 1e-9);
     for category in ["primary", "compton", "rayleigh", "multiple"] {
         for suffix in ["", "_se"] {
             let key = format!("{category}_ev_per_history{suffix}");

@@ -59,6 +59,10 @@ pub enum OutputError {
         /// Rows of the image.
         rows: u32,
     },
+    /// The receptor makes no sense.
+    #[cfg(feature = "dicom")]
+    #[error(transparent)]
+    Receptor(#[from] crate::beam::receptor::ReceptorError),
     /// The presentation is not usable.
     #[error(transparent)]
     Presentation(#[from] PresentationError),

@@ -1,5 +1,6 @@
 //! DICOM Digital X-Ray images, read back.
 
+use dicom_core::VR;
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::{FileDicomObject, InMemDicomObject, Tag, open_file};
 use nalgebra::Isometry3;
@@ -52,6 +53,7 @@ fn write(
             view: View::AnteroPosteriorOblique,
         },
         source_patient_mm: Some(1_000.0),
+        target_exposure_index: Some(400.0),
         study,
     };
     radiograph.write_dicom(&path, &exposure, intent).unwrap();
@@ -133,6 +135,28 @@ fn a_header_says_what_the_exposure_was_and_that_it_was_none() {
         text(&view.items().unwrap()[0], tags::CODE_VALUE),
         "399312000"
     );
+}
+
+#[test]
+fn exposure_indices_are_decimal_strings_of_the_image() {
+    let (projection, mut radiograph) = exposed();
+    let object = read(&write(&projection, &radiograph, "", DxIntent::Processing));
+    let index = radiograph.exposure_index(&projection.receptor).unwrap();
+    let index = index.unwrap();
+    for (tag, expected) in [
+        (Tag(0x0018, 0x1411), index),
+        (Tag(0x0018, 0x1412), 400.0),
+        (Tag(0x0018, 0x1413), 10.0 * (index / 400.0).log10()),
+    ] {
+        assert_eq!(object.element(tag).unwrap().vr(), VR::DS);
+        let found: f64 = text(&object, tag).parse().unwrap();
+        assert!((found - expected).abs() <= 1e-7 * expected.abs(), "{tag}");
+    }
+    // The expected image stands for no exposure.
+    radiograph.histories = f64::INFINITY;
+    let object = read(&write(&projection, &radiograph, "", DxIntent::Processing));
+    assert!(object.element(tags::EXPOSURE_INDEX).is_err());
+    assert!(object.element(tags::DEVIATION_INDEX).is_err());
 }
 
 /// A detector that is turned about its centre stays at its distance from the source.
@@ -244,6 +268,7 @@ fn an_image_too_large_for_dicom_is_refused() {
             view: View::AnteroPosterior,
         },
         source_patient_mm: None,
+        target_exposure_index: None,
         study: "",
     };
     let path = std::path::Path::new("never-written.dcm");

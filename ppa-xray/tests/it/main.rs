@@ -7,6 +7,7 @@ mod dose;
 #[cfg(feature = "dicom")]
 mod dx;
 mod exposure;
+mod exposure_index;
 mod fast_engine;
 mod files;
 mod mcgpu;

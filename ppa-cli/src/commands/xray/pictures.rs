@@ -25,6 +25,15 @@ pub struct PictureArgs {
     /// Make the DICOM image one For Processing: detector signal instead of the picture
     #[arg(long, requires = "dicom")]
     for_processing: bool,
+    /// Exposure index that the examination aims at, for the deviation index of IEC 62494-1; no standard gives one
+    #[arg(long, value_name = "EI", value_parser = target_exposure_index)]
+    pub target_exposure_index: Option<f64>,
+}
+
+fn target_exposure_index(text: &str) -> Result<f64, String> {
+    let index = text.parse().ok();
+    let valid = index.filter(|index| (1.0..=1e6).contains(index));
+    valid.ok_or_else(|| "expected a number from 1 to 1e6".to_owned())
 }
 
 fn protocol(name: &str) -> Result<Presentation, String> {
@@ -84,6 +93,7 @@ impl PictureArgs {
             tube: &tube(exposure.limb.settings())?,
             examination: examination(case, exposure.limb.prepared.landmarks.limb, angle_deg),
             source_patient_mm: Some(exposure.limb.table.source_table_mm()),
+            target_exposure_index: self.target_exposure_index,
             study: &case.source.volume_sha256,
         };
         Ok(radiograph.write_dicom(path, &exposure, intent)?)

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use ppa_xray::{Category, CategorySums, Dose, Engine, Radiograph};
+use ppa_xray::{Category, CategorySums, Dose, Engine, Radiograph, deviation_index};
 use serde::Serialize;
 
 use crate::output::Seconds;
@@ -14,6 +14,8 @@ pub struct Report {
     projections: [Projected; 1],
     histories: f64,
     engine: Engine,
+    #[serde(flatten)]
+    exposure: ExposureReport,
     #[serde(flatten)]
     dose: Option<DoseReport>,
     #[serde(flatten)]
@@ -31,6 +33,14 @@ struct Projected {
     mas: Option<f64>,
     ev_per_mas: Option<BTreeMap<&'static str, f64>>,
     open_field_ev_cm2_per_mas: Option<f64>,
+}
+
+/// By IEC 62494-1; null where it is not known.
+#[derive(Debug, Default, Serialize)]
+struct ExposureReport {
+    exposure_index: Option<f64>,
+    target_exposure_index: Option<f64>,
+    deviation_index: Option<f64>,
 }
 
 /// Material by material, in one order.
@@ -66,9 +76,22 @@ impl Report {
             projections: [projected],
             histories: radiograph.histories,
             engine: radiograph.engine,
+            exposure: ExposureReport::default(),
             dose: dose.map(DoseReport::new),
             seconds,
         }
+    }
+
+    /// Adds an exposure index and its deviation from a target.
+    pub fn with_exposure_index(mut self, index: Option<f64>, target: Option<f64>) -> Self {
+        self.exposure = ExposureReport {
+            exposure_index: index,
+            target_exposure_index: target,
+            deviation_index: index
+                .zip(target)
+                .map(|(index, target)| deviation_index(index, target)),
+        };
+        self
     }
 
     /// In words; `written` names the files.
@@ -94,6 +117,13 @@ impl Report {
                     text += &format!("air kerma at the {place} {kerma:.4e} µGy/mAs\n");
                 }
             }
+        }
+        if let Some(index) = self.exposure.exposure_index {
+            text += &format!("exposure index {index:.3}");
+            if let Some(deviation) = self.exposure.deviation_index {
+                text += &format!(", deviation {deviation:+.1}");
+            }
+            text.push('\n');
         }
         text += &format!("{:.3e} histories", self.histories);
         if let Some(mas) = projected.mas.filter(|mas| mas.is_finite()) {

@@ -153,8 +153,10 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
         written.push(path);
     }
     working.finish_and_clear();
+    let index = radiograph.exposure_index(&exposure.projection.receptor)?;
     let result = Simulated {
-        report: Report::new(&radiograph, dose.as_ref(), seconds),
+        report: Report::new(&radiograph, dose.as_ref(), seconds)
+            .with_exposure_index(index, args.pictures.target_exposure_index),
         contact: exposure.placement.contact,
     };
     output.print(&result, |result| result.report.describe(&written))

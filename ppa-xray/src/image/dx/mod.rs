@@ -36,6 +36,8 @@ pub struct DxExposure<'a> {
     pub examination: Examination,
     /// Distance from the source to the table or the skin along the central ray, mm, if it is known.
     pub source_patient_mm: Option<f64>,
+    /// Exposure index that the examination aims at, if one is agreed on; it gives the deviation index.
+    pub target_exposure_index: Option<f64>,
     /// Images with the same words here share a study, such as the hash of a scan. Nothing of it can be read from the file.
     pub study: &'a str,
 }
@@ -63,7 +65,7 @@ impl Radiograph {
     /// Pixels outside the collimated field are stored as the bare field and covered by a display shutter.
     ///
     /// # Errors
-    /// [`OutputError`] naming the file, or an image with sides of more than 65 535 pixels, which DICOM cannot say.
+    /// [`OutputError`] naming the file, a receptor that makes no sense, or an image with sides of more than 65 535 pixels, which DICOM cannot say.
     pub fn write_dicom(
         &self,
         path: &Path,
@@ -88,6 +90,8 @@ impl Radiograph {
         };
         let mut elements = Elements::new();
         self.put_modules(&mut elements, exposure, intent, [columns, rows]);
+        let index = self.exposure_index(&exposure.projection.receptor)?;
+        modules::put_exposure_index(&mut elements, index, exposure.target_exposure_index);
         elements.words(tags::PIXEL_DATA, pixels);
         let study = uid::of(&[b"study", exposure.study.as_bytes()]);
         let kind: &[u8] = match intent {

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use crate::beam::receptor::{AntiScatterGrid, DetectorModel};
 use crate::image::dx::elements::Elements;
 use crate::image::dx::{DxExposure, DxIntent, LOG_OF_ZERO, OPEN_STORED, STORED_PER_LOG};
+use crate::image::exposure_index::deviation_index;
 use crate::image::radiograph::{Engine, Radiograph};
 use crate::matter::material::Material;
 
@@ -213,6 +214,18 @@ impl Radiograph {
             to.integers(collimator, &[edge]);
             to.integers(shutter, &[edge]);
         }
+    }
+}
+
+/// Exposure index, and with a target the deviation index of IEC 62494-1; nothing for an image without index.
+pub(super) fn put_exposure_index(to: &mut Elements, index: Option<f64>, target: Option<f64>) {
+    let Some(index) = index else {
+        return;
+    };
+    to.decimals(tags::EXPOSURE_INDEX, &[index]);
+    if let Some(target) = target {
+        to.decimals(tags::TARGET_EXPOSURE_INDEX, &[target]);
+        to.decimals(tags::DEVIATION_INDEX, &[deviation_index(index, target)]);
     }
 }
 
