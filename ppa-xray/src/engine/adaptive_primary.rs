@@ -75,9 +75,12 @@ pub(crate) fn primary_moments(
         !phase.is_cancelled()
     };
     let centres = rays.per_pixel(|pixel, scratch| {
-        let lit = rays.lit(pixel);
-        lit.filter(|_| goes_on(pixel))
-            .map_or_else(Moments::default, |lit| aimed(lit, scratch))
+        let lit = if goes_on(pixel) {
+            rays.lit(pixel)
+        } else {
+            None
+        };
+        lit.map_or_else(Moments::default, |lit| aimed(lit, scratch))
     });
     let bends: Vec<f32> = (0..centres.len())
         .into_par_iter()
@@ -94,7 +97,12 @@ pub(crate) fn primary_moments(
     let edge_cuts = if shadow > 0.0 { 2 } else { 1 };
     let sure_cuts = voxels_per_pixel.log2().ceil().max(0.0) as usize;
     rays.per_pixel(|pixel, scratch| {
-        let Some(lit) = rays.lit(pixel).filter(|_| goes_on(pixel)) else {
+        let lit = if goes_on(pixel) {
+            rays.lit(pixel)
+        } else {
+            None
+        };
+        let Some(lit) = lit else {
             return Moments::default();
         };
         let middle = centres[pixel];

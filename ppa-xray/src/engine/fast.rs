@@ -66,15 +66,8 @@ pub fn fast(
     projection: &Projection,
     settings: &FastSettings,
 ) -> Result<Radiograph, TransportError> {
-    settings.validate(&projection.detector)?;
     let prepared = PreparedPhantom::new(phantom, settings.compton_model);
-    expose(
-        &prepared,
-        spectrum,
-        projection,
-        settings,
-        &Monitor::silent(),
-    )
+    prepared.fast(spectrum, projection, settings)
 }
 
 impl PreparedPhantom<'_> {
@@ -110,7 +103,7 @@ impl PreparedPhantom<'_> {
         expose(self, spectrum, projection, settings, &Monitor::new(observe))
     }
 
-    /// The same exposure on 96 to 191 pixels along the shorter side, with fewer rays and a thirty-second of the histories for the scatter.
+    /// The same exposure on 96 to 191 pixels along the shorter side, or as many as the image has if they are fewer, with fewer rays and a thirty-second of the histories for the scatter.
     ///
     /// It takes less than a tenth of the time of [`PreparedPhantom::fast`], to be shown before that. Values and standard errors
     /// hold for its own, larger pixels; its detector begins in the same corner at low x and y.
@@ -294,6 +287,8 @@ mod tests {
     use std::sync::Mutex;
 
     use super::*;
+    use crate::beam::source::Collimation;
+    use crate::engine::fast_progress::PRIMARY_DONE;
     use crate::engine::small_limb;
     use crate::matter::compton::ComptonModel;
 
@@ -328,6 +323,25 @@ mod tests {
         assert!(shares.len() > 100, "{shares:?}");
         let (first, last) = (shares[0], shares[shares.len() - 1]);
         assert!(first > 0.0 && (last - 1.0).abs() < 1e-9, "{shares:?}");
+    }
+
+    /// Rows whose first pixels lie in the shadow of the collimator count as well.
+    #[test]
+    fn a_collimated_primary_can_be_cancelled() {
+        let (phantom, spectrum, mut projection) = small_limb::exposure();
+        projection.source.collimation = Collimation::Rectangle {
+            size_mm: [20.0; 2],
+            centre_mm: [0.0; 2],
+        };
+        let prepared = PreparedPhantom::new(&phantom, ComptonModel::default());
+        let first = Mutex::new(None);
+        let result = prepared.fast_with_progress(&spectrum, &projection, &settings(), &|share| {
+            first.lock().unwrap().get_or_insert(share);
+            ControlFlow::Break(())
+        });
+        assert_eq!(result.err(), Some(TransportError::Cancelled));
+        let first = first.into_inner().unwrap().unwrap();
+        assert!(first < PRIMARY_DONE, "{first}");
     }
 
     /// Sums of scatter within 5 standard errors, three comparisons: a false alarm once in 6e5. The primary by fewer rays within 1 %.
