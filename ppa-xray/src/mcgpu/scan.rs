@@ -24,7 +24,7 @@ use crate::mcgpu::simulation::Simulation;
 use crate::mcgpu::trajectory::Station;
 use crate::run::analog_tally::AnalogTally;
 use crate::run::framed_file::{Frame, open};
-use crate::run::key::key;
+use crate::run::key::{hex, key};
 use crate::run::progress::{Progress, Stopped};
 use crate::run::tally_error::TallyError;
 
@@ -322,6 +322,5 @@ fn scan_key(simulation: &Simulation, length: RunLength, engine: Engine) -> Strin
 
 /// In hexadecimal.
 fn sha256(bytes: &[u8]) -> String {
-    let hash = Sha256::digest(bytes);
-    hash.iter().map(|byte| format!("{byte:02x}")).collect()
+    hex(&Sha256::digest(bytes))
 }

@@ -40,11 +40,12 @@ pub(crate) fn key(
         let bytes: Vec<u8> = densities.iter().flat_map(|d| d.to_le_bytes()).collect();
         hash.0.update(&bytes);
     }
-    hash.0
-        .finalize()
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect()
+    hex(&hash.0.finalize())
+}
+
+/// Bytes in hexadecimal.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 struct Hash(Sha256);
