@@ -136,6 +136,11 @@ const KEYS: &[(&str, &str, &str)] = &[
         "thicker slices are interpolated to this",
     ),
     (
+        "xray",
+        "interpolation",
+        "between centres of voxels; or \"nearest\"",
+    ),
+    (
         "xray.source",
         "collimation",
         "or { rectangle = { size_mm = [180, 240] } }",

@@ -63,11 +63,8 @@ pub fn joint_phantom(
     });
     let limb = Volume::new(cropped.grid().clone(), hu.collect())?;
     let fine = limb.refined(settings.max_voxel_mm)?;
-    Ok(VoxelPhantom::from_volume(
-        &fine,
-        &settings.calibration,
-        None,
-    )?)
+    let phantom = VoxelPhantom::from_volume(&fine, &settings.calibration, None)?;
+    Ok(phantom.with_interpolation(settings.interpolation))
 }
 
 /// The exposure of a placed limb: the device moves into the scan, the voxels stay.

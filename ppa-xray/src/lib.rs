@@ -14,8 +14,7 @@
 //! `ct` (DICOM LPS); `device` has the source at the origin and z towards the detector. The device is moved, never the
 //! voxels.
 //! Left out: electrons deposit where they are born, since at 150 keV they travel about 0.3 mm in water, less than a voxel;
-//! photons below 5 keV are absorbed on the spot; of fluorescence the K x-rays above 5 keV are followed, by the analog engine
-//! only. Cross sections and spectra reach down to 1 keV.
+//! photons below 5 keV are absorbed on the spot; of fluorescence the K x-rays above 5 keV are followed. Cross sections and spectra reach down to 1 keV.
 //! A [`Projection`] begins with a point source and a detector that takes everything; its [`Source`] adds focal spot, heel
 //! effect and collimation, its [`Receptor`] grid, CsI or selenium, blur and electronic noise.
 //! Repeatable: random numbers are addressed by seed and history and tallies are integers, so the number of threads
@@ -113,6 +112,7 @@ pub use phantom::audit::{Audit, MaterialCount, SegmentAudit};
 pub use phantom::calibration_error::CalibrationError;
 pub use phantom::histogram::HuBin;
 pub use phantom::hu::HuCalibration;
+pub use phantom::interpolation::Interpolation;
 pub use phantom::segment::{Composition, Constituent, Segment};
 pub use phantom::voxels::{PhantomError, VoxelPhantom};
 pub use run::analog_run::AnalogRun;

@@ -6,7 +6,8 @@ use ppa_core::TransformRows;
 use ppa_depth::{RigSpec, SensorSpec, WallDepth};
 use ppa_scene::{PlaneSettings, RoomSpec};
 use ppa_xray::{
-    AnalogSettings, Detector, FastSettings, HuCalibration, Presentation, Receptor, Source,
+    AnalogSettings, Detector, FastSettings, HuCalibration, Interpolation, Presentation, Receptor,
+    Source,
 };
 use serde::{Deserialize, Serialize};
 
@@ -96,6 +97,8 @@ pub struct XraySettings {
     /// Largest voxel that photons travel through, mm: thicker slices are interpolated, so that
     /// bone edges do not come out as stairs.
     pub max_voxel_mm: f64,
+    /// What lies between the centres of these voxels.
+    pub interpolation: Interpolation,
     /// HU to material and density, written out as `[[xray.calibration.segment]]`.
     pub calibration: HuCalibration,
     /// HU to material and density from a file instead; reading the plan puts its contents in place of the path.
@@ -125,6 +128,7 @@ impl Default for XraySettings {
             receptor: Receptor::default(),
             half_length_mm: 120.0,
             max_voxel_mm: 1.0,
+            interpolation: Interpolation::Trilinear,
             calibration: HuCalibration::default(),
             calibration_file: None,
             engine: FastSettings::default(),

@@ -12,13 +12,17 @@ use crate::engine::exposure::Exposure;
 use crate::engine::fast_progress::{Monitor, PRIMARY_DONE};
 use crate::engine::paths::Paths;
 use crate::engine::primary_rays::{PrimaryRays, Scratch, area_cm2, centre};
+use crate::phantom::interpolation::Interpolation;
 use crate::transport::tally::Moments;
 use crate::transport::tracking::Transport;
 
 /// Largest second difference between neighbouring pixels for which the centre of a pixel stands for the whole, relative.
 ///
-/// Where the image bends evenly the correction with it is exact; a kink in the centre of a pixel leaves an eighth.
+/// Where the image bends evenly the correction with it is exact; a [`KINK`] in the centre of a pixel leaves an eighth.
 const EVEN: f64 = 4e-3;
+
+/// Share of the second difference that is left in a pixel with a kink in its centre, as homogeneous voxels have them.
+const KINK: f64 = 0.125;
 
 /// Second difference beyond which there may be an edge.
 const EDGE: f64 = 2e-2;
@@ -88,10 +92,12 @@ pub(crate) fn primary_moments(
         .collect();
     let shadow = shadow_sigma_pixels(transport);
     let reach = (REACH * shadow - NEAR).ceil().max(0.0) as usize;
-    // Half the square of the standard deviation is to the blur of an even bend what 1/24 is to the pixel, 1/8 to a kink in it.
-    let even_share = 1.0 / (1.0 + 4.0 * shadow * shadow);
     let voxels_per_pixel = voxels_per_pixel(transport);
-    let fine = voxels_per_pixel <= 0.5;
+    let interpolation = transport.tables.phantom.interpolation();
+    let fine = voxels_per_pixel <= finest_detail(interpolation);
+    // Half the square of the standard deviation is to the blur of an even bend what 1/24 is to the pixel.
+    let left = bend_left(interpolation, voxels_per_pixel);
+    let even_share = KINK / (left + 0.5 * shadow * shadow);
     // An edge may cut off a corner that the five rays of an uncut pixel miss, and a part of the spot that the 20 rays of its
     // quarters miss: pixels at edges are always cut where the noise is below the tolerance.
     let edge_cuts = if shadow > 0.0 { 2 } else { 1 };
@@ -134,6 +140,17 @@ pub(crate) fn primary_moments(
         };
         cut.refined(whole, middle, scratch)
     })
+}
+
+/// Share of the second difference that is left after the correction with it.
+///
+/// Between trilinear voxels there is no kink. Details of an image of theirs vary as (π x / voxel)², so the second difference misses
+/// (π voxels per pixel)² / 12 of the second derivative, of which a pixel takes 1/24: less than a twentieth of the square.
+fn bend_left(interpolation: Interpolation, voxels_per_pixel: f64) -> f64 {
+    match interpolation {
+        Interpolation::Nearest => KINK,
+        Interpolation::Trilinear => KINK.min(voxels_per_pixel * voxels_per_pixel / 20.0),
+    }
 }
 
 /// Quantum noise on an area of `cm2` after `histories`, relative to the signal there.
@@ -193,7 +210,15 @@ fn is_wholly_lit(rays: &PrimaryRays, pixel: usize) -> bool {
     })
 }
 
-/// Pixel side over the smallest side of a voxel: below a half neighbouring centres miss nothing.
+/// Pixel side over the smallest side of a voxel up to which neighbouring centres miss nothing.
+fn finest_detail(interpolation: Interpolation) -> f64 {
+    match interpolation {
+        Interpolation::Nearest => 0.5,
+        Interpolation::Trilinear => 1.0,
+    }
+}
+
+/// Pixel side over the smallest side of a voxel.
 fn voxels_per_pixel(transport: &Transport) -> f64 {
     let spacing_mm = transport.tables.phantom.grid().spacing_mm().min();
     transport.projection.detector.pixel_mm / spacing_mm

@@ -52,7 +52,7 @@ const LISTED_PER_CHOICE: f64 = 32.0;
 
 /// Simulates a radiograph of [`FastSettings::dose_histories`] photons at a fraction of the work.
 ///
-/// Geometry, physics and units are those of [`crate::analog`], but for the K x-rays of contrast media, which are left out.
+/// Geometry, physics and units are those of [`crate::analog`].
 /// Primary: line integrals averaged over each pixel.
 /// Scatter, which varies slowly: forced detection at points of the detector, close together where it bends, and cubic
 /// interpolation to the pixels. Then every layer gets the noise of an energy-integrating detector. The standard errors

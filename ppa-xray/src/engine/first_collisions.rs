@@ -31,8 +31,9 @@ pub(crate) struct FirstCollisions {
     /// Photons of every line that get to a site, times the mass that it stands for, site by site, padded as the lines are. Their sum
     /// over a list is an integral over all sites: mm g/cm³ per history.
     photons: Vec<f32>,
-    /// Photons that scatter at the sites, and the cumulative number of histories that start there.
-    scattered: Vec<f64>,
+    /// Photons that scatter at the sites or are absorbed and followed by a K x-ray, and the cumulative number of histories that start
+    /// there.
+    secondary: Vec<f64>,
     cdf: Vec<f64>,
 }
 
@@ -70,7 +71,13 @@ impl FirstFlights<'_> {
         let mut list = FirstCollisions::default();
         let mut mass = vec![[0.0; LANES]; self.paths.basis.groups];
         for collision in &drawn {
-            self.enter(collision, 1.0 / collisions as f64, &mut mass, &mut list);
+            self.enter(
+                collision,
+                1.0 / collisions as f64,
+                &mut mass,
+                &mut list,
+                rng,
+            );
         }
         list.share_out();
         list
@@ -83,35 +90,36 @@ impl FirstFlights<'_> {
         weight: f64,
         mass: &mut BasisMass,
         list: &mut FirstCollisions,
+        rng: &mut Philox,
     ) {
-        let Some(voxel) = self.paths.voxel_at(&collision.position) else {
+        let Some(cell) = self.paths.cell_at(&collision.position) else {
             return; // on the surface of the box, but for rounding
         };
         let Transport {
             tables, emitter, ..
         } = self.transport;
-        let phantom = &tables.phantom;
+        let code = tables.draw_code(&cell, rng);
         let emitted_per_mm2 = emitter.open_fluence_cm2(&collision.spot, collision.aim) / 100.0;
-        let density = f64::from(phantom.density_g_cm3()[voxel]);
+        let density = f64::from(code.density_g_cm3());
         let weight = weight * emitted_per_mm2 * collision.mm3 * density;
         if weight == 0.0 {
             return; // vacuum
         }
         self.paths
             .between(&collision.spot, &collision.position, mass);
-        let material = phantom.material()[voxel];
+        let material = code.material();
         let mixture = emitter.mixture(&collision.direction);
-        let (mut arriving, mut energy, mut scattered) = (0.0, 0.0, 0.0);
+        let (mut arriving, mut energy, mut secondary) = (0.0, 0.0, 0.0);
         for (line, photons) in self.lines.of(mixture) {
             let through = f64::from(exp(-dot(mass, &line.attenuation)));
             let photons = (weight * photons * through) as f32;
             list.photons.push(photons);
             arriving += f64::from(photons);
             energy += f64::from(photons) * line.energy_kev;
-            scattered += f64::from(photons) * line.scattered[usize::from(material)];
+            secondary += f64::from(photons) * line.secondary[usize::from(material)];
         }
         pad(&mut list.photons);
-        list.scattered.push(scattered);
+        list.secondary.push(secondary);
         list.sites.push(Site {
             position: collision.position.cast(),
             direction: collision.direction.cast(),
@@ -144,16 +152,16 @@ impl FirstCollisions {
     }
 
     /// Many histories continue from where scatter matters, which is where the sites are, the others by the photons that
-    /// scatter, so that no weight grows beyond bounds.
+    /// continue, so that no weight grows beyond bounds.
     fn share_out(&mut self) {
-        let whole: f64 = self.scattered.iter().sum();
+        let whole: f64 = self.secondary.iter().sum();
         let mut sum = 0.0;
         self.cdf = self
-            .scattered
+            .secondary
             .iter()
-            .map(|scattered| {
+            .map(|secondary| {
                 sum += ALIKE / self.sites.len() as f64
-                    + (1.0 - ALIKE) * scattered / whole.max(f64::MIN_POSITIVE);
+                    + (1.0 - ALIKE) * secondary / whole.max(f64::MIN_POSITIVE);
                 sum
             })
             .collect();
@@ -161,17 +169,17 @@ impl FirstCollisions {
 
     /// The history at `share` of the way through all that continue: its site, energy, and photons that it stands for if it
     /// were the only one.
-    pub fn scattering(&self, share: f64, lines: &Lines) -> (&Site, f64, f64) {
+    pub fn continuing(&self, share: f64, lines: &Lines) -> (&Site, f64, f64) {
         let target = share * self.cdf[self.cdf.len() - 1];
         let after = self.cdf.partition_point(|&sum| sum <= target);
         let index = after.min(self.sites.len() - 1);
         let site = &self.sites[index];
         let before = if index == 0 { 0.0 } else { self.cdf[index - 1] };
         let probability = self.cdf[index] - before;
-        let inside = (target - before) / probability * self.scattered[index];
+        let inside = (target - before) / probability * self.secondary[index];
         let (mut energy_kev, mut sum) = (0.0, 0.0);
         for (line, photons) in self.photons(index, lines) {
-            let here = photons * line.scattered[usize::from(site.material)];
+            let here = photons * line.secondary[usize::from(site.material)];
             if here > 0.0 {
                 energy_kev = line.energy_kev;
             }
@@ -180,7 +188,7 @@ impl FirstCollisions {
                 break;
             }
         }
-        let weight = self.scattered[index] * self.cdf[self.cdf.len() - 1] / probability;
+        let weight = self.secondary[index] * self.cdf[self.cdf.len() - 1] / probability;
         (site, energy_kev, weight)
     }
 }

@@ -1,4 +1,5 @@
-//! Histories from the first collision on: splitting, survival weighting instead of absorption, and Russian roulette.
+//! Histories from the first collision on, K x-rays included: splitting, survival weighting instead of absorption, and Russian
+//! roulette.
 //!
 //! Kahn and Harris, NBS Appl. Math. Ser. 12 (1951) 27; docs/physics.md, "Fast engine", multiple scatter.
 
@@ -7,13 +8,15 @@ use std::ops::Range;
 use nalgebra::{Point3, Vector3};
 use ppa_core::random::Philox;
 
+use crate::engine::delta_tracking::{Landing, fly};
 use crate::engine::first_collisions::FirstCollisions;
 use crate::engine::importance::ImportanceModel;
-use crate::engine::lines::Lines;
-use crate::engine::paths::{Paths, Step};
+use crate::engine::lines::{Lines, secondary};
+use crate::engine::paths::Paths;
 use crate::engine::rotation::rotated;
 use crate::engine::site::Site;
 use crate::matter::energy_range::CUTOFF_KEV;
+use crate::matter::sampler::MaterialTables;
 use crate::transport::attenuation::Coefficients;
 use crate::transport::stream::Stream;
 use crate::transport::tracking::Transport;
@@ -52,7 +55,16 @@ pub(crate) struct Histories<'a> {
 #[derive(Default)]
 pub(crate) struct LaterCollisions {
     pub sites: Vec<Site>,
-    pub energies_kev: Vec<f32>,
+    pub events: Vec<Event>,
+}
+
+/// What happens at a collision, with energies in keV.
+#[derive(Clone, Copy)]
+pub(crate) enum Event {
+    /// The photon may scatter, or be absorbed and followed by a K x-ray.
+    Any { energy_kev: f32 },
+    /// It was absorbed, and a K x-ray leaves: what else a first collision sends out is single scatter.
+    KRay { absorbed_kev: f32, line_kev: f32 },
 }
 
 /// A photon that has scattered.
@@ -61,12 +73,6 @@ struct Photon {
     direction: Vector3<f64>,
     energy_kev: f64,
     weight: f64,
-}
-
-/// Where a flight ends.
-struct Landing {
-    material: u8,
-    distance_mm: f64,
 }
 
 impl Histories<'_> {
@@ -95,7 +101,7 @@ impl Histories<'_> {
             let index = (number as u64) << 40 | history;
             let mut rng = Philox::new(seed, Stream::MultipleScatter as u32, index);
             let share = (history as f64 + start) / each as f64;
-            let (site, energy_kev, photons) = list.scattering(share, self.lines);
+            let (site, energy_kev, photons) = list.continuing(share, self.lines);
             let photon = Photon {
                 position: site.position.cast(),
                 direction: site.direction.cast(),
@@ -107,7 +113,7 @@ impl Histories<'_> {
         collisions
     }
 
-    /// A photon that scatters here continues. Later collisions happen or not; no photon is absorbed, but loses the weight
+    /// A photon that collides here for the first time continues. Later collisions happen or not; no photon is absorbed, but loses the weight
     /// that is, and light photons play roulette.
     fn history(
         &self,
@@ -117,27 +123,38 @@ impl Histories<'_> {
         rng: &mut Philox,
     ) {
         let least = photon.weight * self.variance_reduction.roulette;
-        let mut here = self.at(material, photon.energy_kev);
-        while self.scatter(&mut photon, here, rng) {
-            let Some(Landing {
-                material,
-                distance_mm,
-            }) = self.fly(&photon, rng)
-            else {
+        let tables = &self.transport.tables;
+        let energy = tables.attenuation.locate(photon.energy_kev);
+        let mut c = tables.attenuation.at(material, energy);
+        let mut sampler = &tables.samplers[usize::from(material)];
+        let all = secondary(sampler, photon.energy_kev, &c);
+        if let Some(line_kev) = sampler.k_fluorescence(photon.energy_kev, rng.unit()) {
+            let event = Event::KRay {
+                absorbed_kev: photon.energy_kev as f32,
+                line_kev: line_kev as f32,
+            };
+            let weight = photon.weight / all;
+            collisions
+                .sites
+                .push(self.site(&photon, material, weight, line_kev));
+            collisions.events.push(event);
+        }
+        while continue_photon(&mut photon, sampler, &c, rng) {
+            let Some(landing) = self.fly(&photon, rng) else {
                 return;
             };
-            photon.position += photon.direction * distance_mm;
-            here = self.at(material, photon.energy_kev);
-            let c = here.1;
-            collisions.sites.push(Site {
-                position: photon.position.cast(),
-                direction: photon.direction.cast(),
-                weight: (photon.weight / f64::from(c.total)) as f32,
-                attenuation_ratio: self.importance_model.attenuation_ratio(photon.energy_kev),
-                material,
+            photon.position += photon.direction * landing.distance_mm;
+            c = landing.coefficients;
+            sampler = &tables.samplers[usize::from(landing.material)];
+            let total = f64::from(c.total);
+            let weight = photon.weight / total;
+            let energy_kev = photon.energy_kev;
+            let site = self.site(&photon, landing.material, weight, energy_kev);
+            collisions.sites.push(site);
+            collisions.events.push(Event::Any {
+                energy_kev: energy_kev as f32,
             });
-            collisions.energies_kev.push(photon.energy_kev as f32);
-            photon.weight *= f64::from((c.total - c.photoelectric) / c.total);
+            photon.weight *= secondary(sampler, photon.energy_kev, &c) / total;
             if photon.weight < least {
                 if rng.unit() * least >= photon.weight {
                     return;
@@ -147,69 +164,69 @@ impl Histories<'_> {
         }
     }
 
-    fn at(&self, material: u8, energy_kev: f64) -> (usize, Coefficients) {
-        let node = self.transport.tables.attenuation.locate(energy_kev);
-        let coefficients = self.transport.tables.attenuation.at(material, node);
-        (usize::from(material), coefficients)
+    /// Where the photon is, for the importance model, which takes photons of `outgoing_kev` to leave.
+    fn site(&self, photon: &Photon, material: u8, weight: f64, outgoing_kev: f64) -> Site {
+        Site {
+            position: photon.position.cast(),
+            direction: photon.direction.cast(),
+            weight: weight as f32,
+            attenuation_ratio: self.importance_model.attenuation_ratio(outgoing_kev),
+            material,
+        }
     }
 
     /// Flies to the next collision, if there is one this side of the detector plane.
     fn fly(&self, photon: &Photon, rng: &mut Philox) -> Option<Landing> {
-        let Transport {
-            tables, projection, ..
-        } = self.transport;
-        let attenuation = &tables.attenuation;
-        let node = attenuation.locate(photon.energy_kev);
-        let to_plane_mm = if photon.direction.z > 0.0 {
-            (projection.source_detector_mm - photon.position.z) / photon.direction.z
+        let Photon {
+            position,
+            direction,
+            energy_kev,
+            ..
+        } = photon;
+        let energy = self.transport.tables.attenuation.locate(*energy_kev);
+        let to_plane_mm = if direction.z > 0.0 {
+            (self.transport.projection.source_detector_mm - position.z) / direction.z
         } else {
             f64::INFINITY
         };
-        // 1 − u lies in (0, 1], so the logarithm stays finite.
-        let mut depth = -(1.0 - rng.unit()).ln();
-        let mut landing = None;
-        self.paths.segments(
-            &photon.position,
-            &photon.direction,
+        fly(
+            self.transport,
+            position,
+            direction,
             to_plane_mm,
-            |code, from_mm, to_mm| {
-                let material = code.material();
-                let total = attenuation.at(material, node).total;
-                let mu = f64::from(code.density_g_cm3() * total);
-                let here = mu * (to_mm - from_mm);
-                if depth >= here {
-                    depth -= here;
-                    return Step::Continue(());
-                }
-                let distance_mm = from_mm + depth / mu;
-                landing = Some(Landing {
-                    material,
-                    distance_mm,
-                });
-                Step::Break(())
-            },
-        );
-        landing
+            energy,
+            rng,
+        )
     }
+}
 
-    /// Rotates the direction of the photon; false if too little energy is left.
-    fn scatter(
-        &self,
-        photon: &mut Photon,
-        (material, c): (usize, Coefficients),
-        rng: &mut Philox,
-    ) -> bool {
-        let tables = &self.transport.tables.samplers[material];
-        let compton = c.with_compton - c.photoelectric;
-        let scattering = c.total - c.photoelectric;
-        let cos_theta = if rng.unit() * f64::from(scattering) < f64::from(compton) {
-            let (cos_theta, energy_kev) = tables.sample_compton(photon.energy_kev, rng);
-            photon.energy_kev = energy_kev;
-            cos_theta
+/// Scatters the photon, or puts a K x-ray in its place; false if too little energy is left.
+fn continue_photon(
+    photon: &mut Photon,
+    tables: &MaterialTables,
+    c: &Coefficients,
+    rng: &mut Philox,
+) -> bool {
+    let scattering = f64::from(c.total - c.photoelectric);
+    let compton = f64::from(c.with_compton - c.photoelectric);
+    let xi = rng.unit() * secondary(tables, photon.energy_kev, c);
+    let cos_theta = if xi < compton {
+        let (cos_theta, energy_kev) = tables.sample_compton(photon.energy_kev, rng);
+        photon.energy_kev = energy_kev;
+        cos_theta
+    } else if xi < scattering {
+        tables.sample_rayleigh(photon.energy_kev, rng)
+    } else {
+        // Every absorption with that much of the coefficient left emits.
+        let per_absorption = (xi - scattering) / f64::from(c.photoelectric);
+        if let Some(line_kev) = tables.k_fluorescence(photon.energy_kev, per_absorption) {
+            photon.energy_kev = line_kev;
+            2.0 * rng.unit() - 1.0
         } else {
+            // Rounding at the upper end, or no K x-rays at all.
             tables.sample_rayleigh(photon.energy_kev, rng)
-        };
-        photon.direction = rotated(&photon.direction, cos_theta, rng.unit());
-        photon.energy_kev >= CUTOFF_KEV
-    }
+        }
+    };
+    photon.direction = rotated(&photon.direction, cos_theta, rng.unit());
+    photon.energy_kev >= CUTOFF_KEV
 }

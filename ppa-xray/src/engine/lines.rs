@@ -12,7 +12,9 @@ use crate::engine::line_scattering::LineScattering;
 use crate::engine::paths::Paths;
 use crate::engine::scatter_table::ScatterTable;
 use crate::engine::spectral_quadrature::{Accuracy, compressed};
+use crate::matter::sampler::MaterialTables;
 use crate::matter::scatter_density::ScatterDensities;
+use crate::transport::attenuation::Coefficients;
 use crate::vector_math::WIDTH;
 
 /// Energies of a quadrature, the same for all spectra of the emitter.
@@ -32,6 +34,8 @@ pub(crate) struct Line {
     pub attenuation: Vec<[f32; LANES]>,
     /// Compton and Rayleigh scattering in all directions by material, mm⁻¹ per g/cm³.
     pub scattered: Vec<f64>,
+    /// The same with the emission of K x-rays.
+    pub secondary: Vec<f64>,
 }
 
 impl Lines {
@@ -53,6 +57,12 @@ impl Lines {
                 scattered: (0..densities.len())
                     .map(coefficients)
                     .map(|c| f64::from(c.total - c.photoelectric))
+                    .collect(),
+                secondary: (0..densities.len())
+                    .map(|material| {
+                        let samplers = &transport.tables.samplers;
+                        secondary(&samplers[material], energy_kev, &coefficients(material))
+                    })
                     .collect(),
             }
         };
@@ -118,4 +128,12 @@ impl Lines {
         let middle = &self.spectra.weights[self.spectra.weights.len() / 2];
         self.lines.iter().zip(middle.iter().copied())
     }
+}
+
+/// Coefficient of what sends on a photon: Compton scattering, Rayleigh scattering, and absorption followed by a K x-ray; mm⁻¹ per
+/// g/cm³.
+#[inline]
+pub(crate) fn secondary(tables: &MaterialTables, energy_kev: f64, c: &Coefficients) -> f64 {
+    let emitted: f64 = tables.k_lines(energy_kev).map(|(_, share)| share).sum();
+    f64::from(c.total - c.photoelectric) + f64::from(c.photoelectric) * emitted
 }

@@ -13,6 +13,7 @@ mod attenuation_basis;
 mod cdf;
 mod coarse_cells;
 mod collision_map;
+mod delta_tracking;
 #[cfg(test)]
 mod energy_balance;
 pub(crate) mod exposure;
@@ -47,4 +48,5 @@ mod site;
 #[cfg(test)]
 pub(crate) mod small_limb;
 mod spectral_quadrature;
+mod trilinear;
 mod uniform_blocks;

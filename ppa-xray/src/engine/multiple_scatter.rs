@@ -1,4 +1,4 @@
-//! Photons scattered twice or more: next-event estimation from the collisions of [`later_collisions`](super::later_collisions).
+//! Photons scattered twice or more, and K x-rays: next-event estimation from the collisions of [`later_collisions`](super::later_collisions).
 //!
 //! Kalos, Nucl. Sci. Eng. 16 (1963) 111; docs/physics.md, "Fast engine", multiple scatter.
 
@@ -11,9 +11,10 @@ use crate::engine::attenuation_basis::BasisMass;
 use crate::engine::attenuation_basis::LANES;
 use crate::engine::fast_progress::{Monitor, SINGLE_DONE};
 use crate::engine::importance::{Draws, PointImportance, Subset};
-use crate::engine::later_collisions::{Histories, LaterCollisions};
+use crate::engine::later_collisions::{Event, Histories, LaterCollisions};
 use crate::engine::node_grid::NodeGrid;
 use crate::matter::scatter_density::ScatterDensities;
+use crate::transport::attenuation::Coefficients;
 use crate::transport::stream::Stream;
 use crate::transport::tally::Moments;
 use crate::vector_math::exp;
@@ -27,6 +28,9 @@ const HISTORIES_PER_SAMPLE: f64 = 16.0;
 /// One sample in this many is repeated through the voxels themselves; the difference, times this number, corrects what
 /// the coarse cells get wrong on average.
 const CORRECTION_INTERVAL: u32 = 8;
+
+/// Solid angle of all directions, sr.
+const SPHERE: f64 = 4.0 * std::f64::consts::PI;
 
 /// Histories, and the points of the detector that sample their collisions.
 pub(crate) struct MultipleScatter<'a> {
@@ -161,33 +165,50 @@ impl MultipleScatter<'_> {
         rng: &mut Philox,
     ) -> Moments {
         let site = &collisions.sites[index];
-        let energy_kev = f64::from(collisions.energies_kev[index]);
         let material = usize::from(site.material);
         let position = site.position.cast::<f64>();
         let along = target - position;
         let r = along.norm();
         let direction = along / r;
-        let cos_theta = direction.dot(&site.direction.cast()).clamp(-1.0, 1.0);
-        let densities = &self.densities[material];
         let attenuation = &self.histories.transport.tables.attenuation;
-        let c = attenuation.at(site.material, attenuation.locate(energy_kev));
-        let scattered_kev = self.histories.transport.tables.samplers[material].compton_energy_at(
-            energy_kev,
-            cos_theta,
-            || rng.unit(),
-        );
-        let compton = f64::from(c.with_compton - c.photoelectric)
-            * densities.compton_density(energy_kev, cos_theta);
-        let rayleigh =
-            f64::from(c.total - c.with_compton) * densities.rayleigh_density(energy_kev, cos_theta);
+        let tables = &self.histories.transport.tables.samplers[material];
         let incidence = self.response.incidence([target.x, target.y], &direction);
-        let kinds =
-            [(scattered_kev, compton), (energy_kev, rayleigh)].map(|(energy_kev, density)| {
-                (energy_kev, incidence.of_energy(energy_kev).scaled(density))
-            });
+        // Energies of photons towards the target, with what each leaves there per solid angle.
+        let left = |energy_kev: f64, per_sr: f64| {
+            (energy_kev, incidence.of_energy(energy_kev).scaled(per_sr))
+        };
+        let k_ray =
+            |c: &Coefficients, line_kev: f64| left(line_kev, f64::from(c.photoelectric) / SPHERE);
+        let kinds = match collisions.events[index] {
+            Event::KRay {
+                absorbed_kev,
+                line_kev,
+            } => {
+                let c = attenuation.at(site.material, attenuation.locate(absorbed_kev.into()));
+                [Some(k_ray(&c, line_kev.into())), None, None]
+            }
+            Event::Any { energy_kev } => {
+                let energy_kev = f64::from(energy_kev);
+                let c = attenuation.at(site.material, attenuation.locate(energy_kev));
+                let densities = &self.densities[material];
+                let cos_theta = direction.dot(&site.direction.cast()).clamp(-1.0, 1.0);
+                let scattered_kev = tables.compton_energy_at(energy_kev, cos_theta, || rng.unit());
+                let compton = f64::from(c.with_compton - c.photoelectric)
+                    * densities.compton_density(energy_kev, cos_theta);
+                let rayleigh = f64::from(c.total - c.with_compton)
+                    * densities.rayleigh_density(energy_kev, cos_theta);
+                let line_kev = tables.k_fluorescence(energy_kev, rng.unit());
+                [
+                    Some(left(scattered_kev, compton)),
+                    Some(left(energy_kev, rayleigh)),
+                    line_kev.map(|line_kev| k_ray(&c, line_kev)),
+                ]
+            }
+        };
         let through = |mass: &BasisMass| -> Moments {
             kinds
                 .iter()
+                .flatten()
                 .map(|(energy_kev, left)| {
                     let exponent = self.histories.paths.basis.exponent(mass, *energy_kev);
                     left.scaled(f64::from(exp(-exponent)))
@@ -199,7 +220,9 @@ impl MultipleScatter<'_> {
         if !self.histories.paths.coarse_is_exact()
             && rng.unit() * f64::from(CORRECTION_INTERVAL) < 1.0
         {
-            self.histories.paths.between(&position, target, mass);
+            self.histories
+                .paths
+                .between_in_voxels(&position, target, mass);
             let inverse_share = f64::from(CORRECTION_INTERVAL);
             let exact = through(mass).scaled(inverse_share);
             part = [part.scaled(1.0 - inverse_share), exact].into_iter().sum();

@@ -1,5 +1,7 @@
 //! Line integrals of mass through the voxels, and through coarser cells: Siddon, Med. Phys. 12 (1985) 252.
 //!
+//! A path goes from cell to cell. Cells are the voxels themselves, or, where the density is trilinear, the boxes between eight centres.
+//!
 //! docs/physics.md, "Fast engine", primary.
 
 use std::sync::Arc;
@@ -9,11 +11,13 @@ use rayon::prelude::*;
 
 use crate::engine::attenuation_basis::{AttenuationBasis, BasisMass, LANES, add, dot};
 use crate::engine::coarse_cells::CoarseCells;
+use crate::engine::trilinear::corner_lengths;
 use crate::engine::uniform_blocks::{EDGE, UniformBlocks};
+use crate::phantom::interpolation::Interpolation;
 use crate::phantom::lattice::{Lattice, Ray};
 use crate::transport::phantom_tables::PhantomTables;
 use crate::transport::tracking::Transport;
-use crate::transport::voxel_codes::VoxelCode;
+use crate::transport::voxel_codes::{VoxelCode, VoxelCodes};
 
 /// Whether a walk continues.
 pub(crate) type Step = std::ops::ControlFlow<()>;
@@ -26,7 +30,8 @@ const COARSE_CELLS: usize = 128 * 1024;
 
 /// Paths through a phantom, in the device frame.
 pub(crate) struct Paths<'a> {
-    codes: &'a [VoxelCode],
+    codes: &'a VoxelCodes,
+    interpolation: Interpolation,
     lattice: &'a Lattice,
     pub basis: Arc<AttenuationBasis>,
     coarse: Arc<CoarseCells>,
@@ -52,7 +57,10 @@ impl PathTables {
         let basis = AttenuationBasis::new(&tables.attenuation, phantom.materials().len());
         Self {
             coarse: Arc::new(CoarseCells::new(phantom, &basis, cells)),
-            blocks: Arc::new(UniformBlocks::new(&tables.codes, phantom.grid().size())),
+            blocks: Arc::new(UniformBlocks::new(
+                &tables.codes,
+                phantom.interpolation().halo(),
+            )),
             basis: Arc::new(basis),
         }
     }
@@ -72,6 +80,7 @@ impl<'a> Paths<'a> {
         } = tables;
         Self {
             codes: &transport.tables.codes,
+            interpolation: transport.tables.phantom.interpolation(),
             lattice: &transport.lattice,
             basis,
             coarse,
@@ -91,13 +100,20 @@ impl<'a> Paths<'a> {
         self.coarse.edge == 1
     }
 
-    /// The voxel at a point, if it lies in the box.
+    /// A point in cells from the corner of the box, if it lies in the box.
     #[inline]
-    pub fn voxel_at(&self, point: &Point3<f64>) -> Option<usize> {
+    pub fn cell_at(&self, point: &Point3<f64>) -> Option<Vector3<f64>> {
         let cell = self.lattice.ray(point, &Vector3::zeros()).origin;
         let size = self.lattice.size;
         let inside = (0..3).all(|axis| cell[axis] >= 0.0 && cell[axis] < size[axis] as f64);
-        inside.then(|| {
+        inside.then_some(cell)
+    }
+
+    /// The voxel at a point, if it lies in the box.
+    #[inline]
+    pub fn voxel_at(&self, point: &Point3<f64>) -> Option<usize> {
+        let size = self.lattice.size;
+        self.cell_at(point).map(|cell| {
             let [i, j, k] = [0, 1, 2].map(|axis| cell[axis] as usize);
             i + size[0] * (j + size[1] * k)
         })
@@ -118,61 +134,111 @@ impl<'a> Paths<'a> {
             })
     }
 
-    /// Calls `visit(code, from_mm, to_mm)` for each segment of a path of `length_mm` along a unit vector, until `visit` ends it:
-    /// one segment per voxel, one per uniform block.
+    /// Adds the masses on a path of `length_mm` along a unit vector: uniform blocks in one step each, all else cell by cell.
     #[inline(always)]
-    pub fn segments(
+    fn add_path(
         &self,
         from: &Point3<f64>,
         direction: &Vector3<f64>,
         length_mm: f64,
-        mut visit: impl FnMut(VoxelCode, f64, f64) -> Step,
+        interpolation: Interpolation,
+        mass: &mut BasisMass,
     ) {
-        let ray = self.lattice.ray(from, direction);
-        let Some((enter, leave)) = self.lattice.clip(&ray) else {
+        let in_box = self.lattice.ray(from, direction);
+        let Some((enter, leave)) = self.lattice.clip(&in_box) else {
             return;
         };
         let end = leave.min(length_mm);
+        let ray = cells(in_box, interpolation);
         // Start of the mixed blocks that have not been walked through yet.
         let mut mixed_mm = None;
-        let in_blocks = ray.shrunk(EDGE);
-        let step = walk(
+        let in_blocks = cells(in_box, self.interpolation).shrunk(EDGE);
+        let _ = walk(
             &in_blocks,
             self.blocks.size,
             enter,
             end,
             |block, from_mm, to_mm| {
-                let code = self.blocks.code(block);
-                let Some(code) = code else {
+                let Some(code) = self.blocks.code(block) else {
                     mixed_mm.get_or_insert(from_mm);
                     return Step::Continue(());
                 };
                 if let Some(start_mm) = mixed_mm.take() {
-                    self.voxels(&ray, start_mm, from_mm, &mut visit)?;
+                    self.add_cells(&ray, start_mm, from_mm, interpolation, mass);
                 }
-                visit(code, from_mm, to_mm)
+                self.add_code(mass, code, (to_mm - from_mm) as f32);
+                Step::Continue(())
             },
         );
-        if let (Step::Continue(()), Some(start_mm)) = (step, mixed_mm) {
-            let _ = self.voxels(&ray, start_mm, end, &mut visit);
+        if let Some(start_mm) = mixed_mm {
+            self.add_cells(&ray, start_mm, end, interpolation, mass);
         }
     }
 
-    #[inline]
-    fn voxels(
+    /// Adds the masses between two lengths on a ray, cell by cell.
+    #[inline(always)]
+    fn add_cells(
         &self,
         ray: &Ray,
         from_mm: f64,
         to_mm: f64,
-        visit: &mut impl FnMut(VoxelCode, f64, f64) -> Step,
-    ) -> Step {
-        walk(
-            ray,
-            self.lattice.size,
-            from_mm,
-            to_mm,
-            |voxel, from_mm, to_mm| visit(self.codes[voxel], from_mm, to_mm),
-        )
+        interpolation: Interpolation,
+        mass: &mut BasisMass,
+    ) {
+        let size = self.codes.size();
+        let codes = self.codes.all();
+        match interpolation {
+            Interpolation::Nearest => {
+                let _ = walk(ray, size, from_mm, to_mm, |voxel, from_mm, to_mm| {
+                    self.add_code(mass, codes[voxel], (to_mm - from_mm) as f32);
+                    Step::Continue(())
+                });
+            }
+            Interpolation::Trilinear => {
+                let (row, layer) = (size[0], size[0] * size[1]);
+                let last = codes.len() - (1 + row + layer) - 1;
+                let _ = walk(ray, size, from_mm, to_mm, |voxel, from_mm, to_mm| {
+                    let lengths = corner_lengths(ray, from_mm, to_mm);
+                    // Rounding may lead a hair beyond the last cell.
+                    let voxel = voxel.min(last);
+                    let mut corners = [(VoxelCode::default(), 0.0); 8];
+                    for (side, offset) in [0, row, layer, row + layer].into_iter().enumerate() {
+                        let pair = &codes[voxel + offset..][..2];
+                        corners[2 * side] = (pair[0], lengths[2 * side]);
+                        corners[2 * side + 1] = (pair[1], lengths[2 * side + 1]);
+                    }
+                    self.add_corners(mass, &corners);
+                    Step::Continue(())
+                });
+            }
+        }
+    }
+
+    /// Adds lengths in eight materials. Two sums do not wait for each other, and the mass is touched once.
+    #[inline(always)]
+    fn add_corners(&self, mass: &mut BasisMass, corners: &[(VoxelCode, f32); 8]) {
+        let corners = corners.map(|(code, length_mm)| {
+            let shares = self.basis.shares(code.material());
+            (shares, code.density_g_cm3() * length_mm)
+        });
+        for (group, mass) in mass.iter_mut().enumerate() {
+            let mut sums = [[0.0_f32; LANES]; 2];
+            for (corner, (shares, amount)) in corners.iter().enumerate() {
+                for lane in 0..LANES {
+                    sums[corner % 2][lane] += shares[group][lane] * amount;
+                }
+            }
+            for lane in 0..LANES {
+                mass[lane] += sums[0][lane] + sums[1][lane];
+            }
+        }
+    }
+
+    /// Adds a length in a material.
+    #[inline(always)]
+    fn add_code(&self, mass: &mut BasisMass, code: VoxelCode, length_mm: f32) {
+        let shares = self.basis.shares(code.material());
+        add(mass, shares, code.density_g_cm3() * length_mm);
     }
 
     /// Calls `visit(cell, from_mm, to_mm)` for each piece of a path through a coarse cell, until `visit` ends it.
@@ -212,15 +278,31 @@ impl<'a> Paths<'a> {
     }
 
     /// Masses from one point to another.
-    #[inline]
     pub fn between(&self, from: &Point3<f64>, to: &Point3<f64>, mass: &mut BasisMass) {
+        self.sum_path(from, to, self.interpolation, mass);
+    }
+
+    /// Masses from one point to another through homogeneous voxels, whatever lies between their centres: on the average over paths the same.
+    pub fn between_in_voxels(&self, from: &Point3<f64>, to: &Point3<f64>, mass: &mut BasisMass) {
+        self.sum_path(from, to, Interpolation::Nearest, mass);
+    }
+
+    fn sum_path(
+        &self,
+        from: &Point3<f64>,
+        to: &Point3<f64>,
+        interpolation: Interpolation,
+        mass: &mut BasisMass,
+    ) {
         let (direction, length_mm) = towards(from, to);
-        self.gather(mass, |mass| {
-            self.segments(from, &direction, length_mm, |code, from_mm, to_mm| {
-                let amount = code.density_g_cm3() * (to_mm - from_mm) as f32;
-                add(mass, self.basis.shares(code.material()), amount);
-                Step::Continue(())
-            });
+        self.gather(mass, |mass| match interpolation {
+            // A copy of the walk for each.
+            Interpolation::Nearest => {
+                self.add_path(from, &direction, length_mm, Interpolation::Nearest, mass);
+            }
+            Interpolation::Trilinear => {
+                self.add_path(from, &direction, length_mm, Interpolation::Trilinear, mass);
+            }
         });
     }
 
@@ -247,6 +329,19 @@ impl<'a> Paths<'a> {
             mass.fill([0.0; LANES]);
             sum(mass);
         }
+    }
+}
+
+/// A ray of the box in cells of the codes, counted from the corner of the rim, or from the centre of the voxel there.
+#[inline(always)]
+fn cells(in_box: Ray, interpolation: Interpolation) -> Ray {
+    let shift = match interpolation {
+        Interpolation::Nearest => 1.0,
+        Interpolation::Trilinear => 0.5,
+    };
+    Ray {
+        origin: in_box.origin.add_scalar(shift),
+        ..in_box
     }
 }
 
@@ -334,77 +429,111 @@ mod tests {
     use crate::matter::compton::ComptonModel;
     use crate::phantom::voxels::VoxelPhantom;
 
-    /// Masses and lengths of random paths, with uniform blocks in one step and voxel by voxel; some paths begin or end in the box.
-    #[test]
-    fn uniform_blocks_change_no_path() {
+    /// A box of 100 x 80 x 72 mm and the beam of the small limb.
+    fn exposed(
+        interpolation: Interpolation,
+        of: impl Fn(Point3<f64>) -> (u8, f32),
+        check: impl Fn(&Paths, &dyn Fn(u64) -> [Point3<f64>; 2]),
+    ) {
         let (small, spectrum, projection) = small_limb::exposure();
         let corner = Point3::new(-50.0, -40.0, -40.0);
         let grid = Grid::axis_aligned([50, 40, 36], Vector3::repeat(2.0), corner).unwrap();
-        // A ball of graded density in air.
         let (material, density) = (0..grid.len())
-            .map(|index| {
-                let at = grid.centre(grid.voxel(index).map(|v| v as f64));
-                let from_mm = (at - Point3::new(-20.0, -10.0, -15.0)).norm();
-                if from_mm < 18.0 {
-                    (1, 1.0 + 0.01 * from_mm as f32)
-                } else {
-                    (0, 0.001_2)
-                }
-            })
+            .map(|index| of(grid.centre(grid.voxel(index).map(|v| v as f64))))
             .unzip();
         let materials = small.materials().to_vec();
         let phantom = VoxelPhantom::new(grid, material, density, materials).unwrap();
+        let phantom = phantom.with_interpolation(interpolation);
         let model = ComptonModel::default();
         let exposure = Exposure::new(&phantom, &spectrum, &projection, model).unwrap();
-        let paths = Paths::new(&exposure.transport);
-        let size = paths.blocks.size;
-        let uniform =
-            (0..size.iter().product()).filter(|&block| paths.blocks.code(block).is_some());
-        assert!(uniform.count() > 0, "no uniform block in {size:?}");
         let inverse = projection.ct_from_device.inverse();
         let corners = phantom.corners_ct().map(|corner| inverse * corner);
-        for index in 0..500 {
+        // Ends of a path; some lie outside the box.
+        let ends = |index: u64| {
             let mut rng = Philox::new(5, 0, index);
-            let mut point = || {
+            [(); 2].map(|()| {
                 let [u, v, w] = [(); 3].map(|()| 1.6 * rng.unit() - 0.3);
                 let along = |to: usize, share: f64| (corners[to] - corners[0]) * share;
                 corners[0] + along(1, u) + along(2, v) + along(4, w)
-            };
-            let (from, to) = (point(), point());
-            let (direction, length_mm) = towards(&from, &to);
-            let mut masses = [[0.0_f64; 256]; 2];
-            let mut lengths = [0.0; 2];
-            paths.segments(&from, &direction, length_mm, |code, from_mm, to_mm| {
-                let mm = to_mm - from_mm;
-                masses[0][usize::from(code.material())] += mm * f64::from(code.density_g_cm3());
-                lengths[0] += mm;
-                Step::Continue(())
-            });
-            let ray = paths.lattice.ray(&from, &direction);
-            if let Some((enter, leave)) = paths.lattice.clip(&ray) {
-                let _ = paths.voxels(
-                    &ray,
-                    enter,
-                    leave.min(length_mm),
-                    &mut |code, from_mm, to_mm| {
-                        let mm: f64 = to_mm - from_mm;
-                        masses[1][usize::from(code.material())] +=
-                            mm * f64::from(code.density_g_cm3());
-                        lengths[1] += mm;
-                        Step::Continue(())
-                    },
-                );
-            }
-            assert!(
-                (lengths[0] - lengths[1]).abs() < 1e-6,
-                "{from} to {to}: {lengths:?}"
-            );
-            for (blocks, voxels) in masses[0].iter().zip(masses[1]) {
-                assert!(
-                    (blocks - voxels).abs() < 1e-5,
-                    "{from} to {to}: {blocks}, {voxels}"
-                );
-            }
+            })
+        };
+        check(&Paths::new(&exposure.transport), &ends);
+    }
+
+    /// A ball of graded density in air.
+    fn ball(at: Point3<f64>) -> (u8, f32) {
+        let from_mm = (at - Point3::new(-20.0, -10.0, -15.0)).norm();
+        if from_mm < 18.0 {
+            (1, 1.0 + 0.01 * from_mm as f32)
+        } else {
+            (0, 0.001_2)
         }
+    }
+
+    /// Masses of random paths, with uniform blocks in one step and cell by cell.
+    #[test]
+    fn uniform_blocks_change_no_path() {
+        for interpolation in [Interpolation::Nearest, Interpolation::Trilinear] {
+            exposed(interpolation, ball, |paths, ends| {
+                let size = paths.blocks.size;
+                let uniform =
+                    (0..size.iter().product()).filter(|&block| paths.blocks.code(block).is_some());
+                assert!(uniform.count() > 0, "no uniform block in {size:?}");
+                let without = Paths {
+                    blocks: Arc::new(UniformBlocks::mixed(size)),
+                    basis: paths.basis.clone(),
+                    coarse: paths.coarse.clone(),
+                    ..*paths
+                };
+                for index in 0..500 {
+                    let [from, to] = ends(index);
+                    let mut masses = [[[0.0; LANES]]; 2];
+                    paths.between(&from, &to, &mut masses[0]);
+                    without.between(&from, &to, &mut masses[1]);
+                    for (blocks, cells) in masses[0][0].iter().zip(masses[1][0]) {
+                        assert!(
+                            (blocks - cells).abs() < 2e-4,
+                            "{from} to {to}: {blocks}, {cells}"
+                        );
+                    }
+                }
+            });
+        }
+    }
+
+    /// Where the density is a linear function of the place, that of the middle of a path is its mean.
+    #[test]
+    fn chords_of_a_linear_density_are_exact() {
+        let density = |at: Point3<f64>| 1.0 + 0.004 * at.x - 0.007 * at.y + 0.003 * at.z;
+        let of = |at: Point3<f64>| (1, density(at) as f32);
+        exposed(Interpolation::Trilinear, of, |paths, ends| {
+            let ct_from_device = small_limb::exposure().2.ct_from_device;
+            let mut inside = 0;
+            for index in 0..2_000 {
+                let [from, to] = ends(index);
+                // Both ends between centres of voxels.
+                let within = [from, to].iter().all(|end| {
+                    let cell = paths.lattice.ray(end, &Vector3::zeros()).origin;
+                    let size = paths.lattice.size;
+                    (0..3).all(|axis| (0.5..size[axis] as f64 - 0.5).contains(&cell[axis]))
+                });
+                if !within {
+                    continue;
+                }
+                inside += 1;
+                let mut mass = [[0.0; LANES]];
+                paths.between(&from, &to, &mut mass);
+                // All of it is one basis material or a mixture of them: compare attenuation at 60 keV with that of a gram.
+                let per_gram = paths.basis.exponent(paths.basis.shares(1), 60.0);
+                let found = f64::from(paths.basis.exponent(&mass, 60.0) / per_gram);
+                let expected =
+                    (to - from).norm() * density(ct_from_device * nalgebra::center(&from, &to));
+                assert!(
+                    (found / expected - 1.0).abs() < 3e-5,
+                    "{from} to {to}: {found} {expected}"
+                );
+            }
+            assert!(inside > 50, "{inside} paths");
+        });
     }
 }

@@ -21,8 +21,8 @@ const SPOT_POINTS: usize = 8;
 /// Energy of unscattered photons per pixel, row-major, eV/cm² per history.
 ///
 /// Each pixel is the mean over `samples_per_side`² evenly spread rays, from each of 64 points if the focal spot is not one;
-/// rays through pixel centres alone are off by up to 13 % at sharp edges. All energies of the spectrum take part. Voxels are
-/// homogeneous, as in the transport.
+/// rays through pixel centres alone are off by up to 13 % at sharp edges. All energies of the spectrum take part. Between
+/// the centres of voxels the density is that of the transport.
 ///
 /// # Errors
 /// As [`crate::analog`]; also when `samples_per_side` is not 1 to 64.

@@ -157,7 +157,7 @@ impl SingleScatter<'_> {
         self.paths.coarse_between(&position, target, mass);
         let mut energies = self.energies(&path, scattering, mass, photons);
         if exact {
-            self.paths.between(&position, target, mass);
+            self.paths.between_in_voxels(&position, target, mass);
             let inverse_share = f64::from(CORRECTION_INTERVAL);
             let exact = self.energies(&path, scattering, mass, photons);
             for (rough, exact) in energies.iter_mut().zip(exact) {

@@ -1,13 +1,13 @@
-//! Uniform blocks of voxels, such as air around the limb: a path crosses one in a single step.
+//! Uniform blocks of cells, such as air around the limb: a path crosses one in a single step.
 
 use rayon::prelude::*;
 
-use crate::transport::voxel_codes::VoxelCode;
+use crate::transport::voxel_codes::{VoxelCode, VoxelCodes};
 
-/// Voxels along the edge of a block.
+/// Cells along the edge of a block.
 pub(super) const EDGE: usize = 16;
 
-/// Blocks of [`EDGE`]³ voxels, and which of them are uniform: of one material and density.
+/// Blocks of [`EDGE`]³ cells, and which of them are uniform: of one material and density.
 pub(super) struct UniformBlocks {
     /// Blocks along each axis.
     pub size: [usize; 3],
@@ -16,10 +16,12 @@ pub(super) struct UniformBlocks {
 }
 
 impl UniformBlocks {
-    pub fn new(codes: &[VoxelCode], voxels: [usize; 3]) -> Self {
+    /// Blocks of cells, each of which depends on the voxel of the same index and on `halo` voxels after that along each axis.
+    pub fn new(codes: &VoxelCodes, halo: usize) -> Self {
+        let voxels = codes.size();
         let size = voxels.map(|count| count.div_ceil(EDGE));
         let range =
-            |block: usize, axis: usize| block * EDGE..((block + 1) * EDGE).min(voxels[axis]);
+            |block: usize, axis: usize| block * EDGE..((block + 1) * EDGE + halo).min(voxels[axis]);
         let code = (0..size.iter().product())
             .into_par_iter()
             .map(|block| {
@@ -30,14 +32,23 @@ impl UniformBlocks {
                 ];
                 let x = range(at[0], 0);
                 let mut rows = range(at[2], 2)
-                    .flat_map(|k| range(at[1], 1).map(move |j| voxels[0] * (j + voxels[1] * k)))
-                    .map(|row| &codes[row + x.start..row + x.end]);
-                let first = codes[x.start + voxels[0] * (at[1] * EDGE + voxels[1] * at[2] * EDGE)];
+                    .flat_map(|k| range(at[1], 1).map(move |j| codes.index([0, j, k])))
+                    .map(|row| &codes.all()[row + x.start..row + x.end]);
+                let first = codes.all()[codes.index(at.map(|block| block * EDGE))];
                 rows.all(|row| row.iter().all(|code| *code == first))
                     .then_some(first)
             })
             .collect();
         Self { size, code }
+    }
+
+    /// Blocks none of which is uniform.
+    #[cfg(test)]
+    pub fn mixed(size: [usize; 3]) -> Self {
+        Self {
+            size,
+            code: vec![None; size.iter().product()],
+        }
     }
 
     /// Material and density of a block, if it is uniform.
@@ -51,24 +62,28 @@ impl UniformBlocks {
 mod tests {
     use super::*;
 
-    /// 20 x 17 x 16 voxels, one of them different: its block is mixed and all others are uniform, including incomplete blocks.
+    /// 18 x 15 x 14 voxels, which are 20 x 17 x 16 with the rim, one of them different: the blocks that hold it are mixed, and with a
+    /// halo those before them; all others are uniform, including incomplete blocks.
     #[test]
     fn one_different_voxel_makes_its_block_mixed() {
-        let voxels = [20, 17, 16];
+        let voxels = [18, 15, 14];
         let (air, bone) = (VoxelCode::new(0, 1.2e-3), VoxelCode::new(3, 1.9));
-        for (odd, block) in [
-            ([3, 4, 5], 0),
-            ([19, 15, 15], 1),
-            ([0, 16, 0], 2),
-            ([16, 16, 7], 3),
+        for (odd, halo, mixed) in [
+            ([3, 4, 5], 0, vec![0]),
+            ([17, 13, 13], 0, vec![1]),
+            ([0, 14, 0], 0, vec![0, 2]), // the rim repeats it
+            ([15, 14, 6], 0, vec![1, 3]),
+            ([15, 4, 6], 1, vec![0, 1]),
+            ([16, 4, 6], 1, vec![1]),
         ] {
-            let mut codes = vec![air; voxels.iter().product()];
-            codes[odd[0] + voxels[0] * (odd[1] + voxels[1] * odd[2])] = bone;
-            let blocks = UniformBlocks::new(&codes, voxels);
+            let index = odd[0] + voxels[0] * (odd[1] + voxels[1] * odd[2]);
+            let codes =
+                VoxelCodes::from_voxels(voxels, |voxel| if voxel == index { bone } else { air });
+            let blocks = UniformBlocks::new(&codes, halo);
             assert_eq!(blocks.size, [2, 2, 1]);
-            for other in 0..4 {
-                let expected = if other == block { None } else { Some(air) };
-                assert_eq!(blocks.code(other), expected, "{odd:?}, block {other}");
+            for block in 0..4 {
+                let expected = (!mixed.contains(&block)).then_some(air);
+                assert_eq!(blocks.code(block), expected, "{odd:?}, block {block}");
             }
         }
     }

@@ -123,22 +123,27 @@ impl Fluorescence {
     }
 
     fn line(&self, energy_kev: f64, mut u: f64) -> Option<f64> {
-        for emitter in &self.emitters {
-            if energy_kev <= emitter.edge_kev {
-                continue;
+        for (line_kev, probability) in self.lines(energy_kev) {
+            if u < probability {
+                return Some(line_kev);
             }
-            let (bin, fraction) = self.energies.locate(energy_kev);
-            let [low, high] = [bin, bin + 1].map(|i| f64::from(emitter.share[i]));
-            let share = low + fraction * (high - low);
-            for &(line_kev, per_absorption) in &emitter.lines {
-                let probability = share * per_absorption;
-                if u < probability {
-                    return Some(line_kev);
-                }
-                u -= probability;
-            }
+            u -= probability;
         }
         None
+    }
+
+    /// Energies in keV of the photons that may follow an absorption at `energy_kev`, with the probability of each.
+    pub(crate) fn lines(&self, energy_kev: f64) -> impl Iterator<Item = (f64, f64)> {
+        let emitters = self.emitters.iter();
+        emitters
+            .filter(move |emitter| energy_kev > emitter.edge_kev)
+            .flat_map(move |emitter| {
+                let (bin, fraction) = self.energies.locate(energy_kev);
+                let [low, high] = [bin, bin + 1].map(|i| f64::from(emitter.share[i]));
+                let share = low + fraction * (high - low);
+                let lines = emitter.lines.iter();
+                lines.map(move |&(line_kev, per_absorption)| (line_kev, share * per_absorption))
+            })
     }
 }
 

@@ -102,6 +102,11 @@ impl MaterialTables {
         self.fluorescence.sample(energy_kev, u)
     }
 
+    /// Energies in keV of the K photons above 5 keV that may follow photoelectric absorption, with the probability of each.
+    pub(crate) fn k_lines(&self, energy_kev: f64) -> impl Iterator<Item = (f64, f64)> {
+        self.fluorescence.lines(energy_kev)
+    }
+
     /// Energy in keV of a photon that Compton scattering turned by θ, with numbers of `uniform` in [0, 1).
     #[inline]
     pub fn compton_energy_at(

@@ -5,6 +5,7 @@ pub(crate) mod calibration_error;
 pub(crate) mod graded_mixture;
 pub(crate) mod histogram;
 pub(crate) mod hu;
+pub(crate) mod interpolation;
 pub(crate) mod lattice;
 pub(crate) mod segment;
 pub(crate) mod segmentation;

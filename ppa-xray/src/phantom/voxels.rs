@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use crate::matter::material::Material;
 use crate::phantom::calibration_error::CalibrationError;
 use crate::phantom::hu::HuCalibration;
+use crate::phantom::interpolation::Interpolation;
 use crate::phantom::segmentation::Segmentation;
 
 /// Why a voxel phantom cannot be made.
@@ -72,17 +73,18 @@ pub(crate) fn voxel_mm3(grid: &Grid) -> f64 {
 
 /// Materials and densities on the lattice of a CT; vacuum outside it.
 ///
-/// Every voxel is homogeneous. Memory order is that of [`Grid::index`], i fastest.
+/// [`Interpolation`] says what lies between the centres of voxels. Memory order is that of [`Grid::index`], i fastest.
 #[derive(Debug, Clone)]
 pub struct VoxelPhantom {
     grid: Grid,
     material: Vec<u8>,
     density_g_cm3: Vec<f32>,
     materials: Vec<Material>,
+    interpolation: Interpolation,
 }
 
 impl VoxelPhantom {
-    /// A phantom from one material index and one density in g/cm³ per voxel.
+    /// A phantom of homogeneous voxels, from one material index and one density in g/cm³ each.
     ///
     /// # Errors
     /// [`PhantomError`] naming the voxel or the count at fault.
@@ -132,10 +134,20 @@ impl VoxelPhantom {
             material,
             density_g_cm3,
             materials,
+            interpolation: Interpolation::Nearest,
         })
     }
 
-    /// A phantom from Hounsfield units; voxels outside `mask` (one flag per voxel) become what the lowest HU stand for,
+    /// The same voxels with another density between their centres.
+    #[must_use]
+    pub fn with_interpolation(self, interpolation: Interpolation) -> Self {
+        Self {
+            interpolation,
+            ..self
+        }
+    }
+
+    /// A phantom from Hounsfield units, trilinear between the centres of voxels; voxels outside `mask` (one flag per voxel) become what the lowest HU stand for,
     /// air. [`HuCalibration::audit`] lists what became of the voxels.
     ///
     /// # Errors
@@ -186,12 +198,18 @@ impl VoxelPhantom {
                 (renumbered[voxel.material], voxel.density_g_cm3)
             })
             .unzip();
-        Self::new(volume.grid().clone(), material, density, materials)
+        let phantom = Self::new(volume.grid().clone(), material, density, materials)?;
+        Ok(phantom.with_interpolation(Interpolation::Trilinear))
     }
 
     /// The lattice, in the `ct` frame.
     pub fn grid(&self) -> &Grid {
         &self.grid
+    }
+
+    /// What lies between the centres of voxels.
+    pub fn interpolation(&self) -> Interpolation {
+        self.interpolation
     }
 
     /// Index into [`VoxelPhantom::materials`] of every voxel.

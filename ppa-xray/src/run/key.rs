@@ -29,9 +29,10 @@ pub(crate) fn key(
     };
     write!(
         hash,
-        "{} {spectrum:?} {projection:?} {settings:?} {dose:?} {:?} {:?}",
+        "{} {spectrum:?} {projection:?} {settings:?} {dose:?} {:?} {:?} {:?}",
         env!("CARGO_PKG_VERSION"),
         phantom.grid(),
+        phantom.interpolation(),
         phantom.materials(),
     )
     .expect("hashing does not fail");

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::transport::voxel_codes::VoxelCode;
+use crate::transport::voxel_codes::VoxelCodes;
 
 /// Classes of blocks at most.
 pub(super) const MOST_CLASSES: usize = 64;
@@ -10,25 +10,31 @@ pub(super) const MOST_CLASSES: usize = 64;
 /// A bound below this would let the free path overflow; mm⁻¹.
 const VACUUM: f32 = 1e-12;
 
-/// Largest density of every material in every block, g/cm³.
+/// Largest density of every material in every block and `halo` voxels around it, g/cm³.
 pub(super) fn densest_per_block(
-    codes: &[VoxelCode],
-    size: [usize; 3],
+    codes: &VoxelCodes,
+    halo: usize,
     (edge, blocks): (usize, [usize; 3]),
     materials: usize,
 ) -> Vec<f32> {
+    // Places in the codes: the rim takes the first.
+    let places = |block: usize, axis: usize| {
+        let first = 1 + block * edge;
+        first - halo..(first + edge + halo).min(codes.size()[axis] - 1 + halo)
+    };
     let mut densest = vec![0.0_f32; blocks.iter().product::<usize>() * materials];
     densest
-        .par_chunks_exact_mut(blocks[0] * blocks[1] * materials)
-        .zip(codes.par_chunks(size[0] * size[1] * edge))
-        .for_each(|(layer, codes)| {
-            for (line, codes) in codes.chunks_exact(size[0]).enumerate() {
-                let row = line % size[1] / edge * blocks[0];
-                for (i, codes) in codes.chunks(edge).enumerate() {
-                    let block = &mut layer[(row + i) * materials..][..materials];
-                    for code in codes {
-                        let largest = &mut block[usize::from(code.material())];
-                        *largest = largest.max(code.density_g_cm3());
+        .par_chunks_exact_mut(blocks[0] * materials)
+        .enumerate()
+        .for_each(|(row, densest)| {
+            for z in places(row / blocks[1], 2) {
+                for y in places(row % blocks[1], 1) {
+                    let line = &codes.all()[codes.index([0, y, z])..][..codes.size()[0]];
+                    for (i, block) in densest.chunks_exact_mut(materials).enumerate() {
+                        for code in &line[places(i, 0)] {
+                            let largest = &mut block[usize::from(code.material())];
+                            *largest = largest.max(code.density_g_cm3());
+                        }
                     }
                 }
             }

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::transport::attenuation::{Attenuation, EnergyNode, NODES};
 use crate::transport::block_classes::{classify, densest_per_block, strongest};
-use crate::transport::voxel_codes::VoxelCode;
+use crate::transport::voxel_codes::VoxelCodes;
 
 /// Voxels along the edge of a block.
 const EDGE: u32 = 8;
@@ -43,27 +43,22 @@ pub(crate) struct Region {
 }
 
 impl Majorants {
-    /// Bounds for a box of `size` voxels with a mean side of `voxel_mm`, in blocks of [`EDGE`].
-    pub fn new(
-        codes: &[VoxelCode],
-        size: [usize; 3],
-        voxel_mm: f64,
-        attenuation: &Attenuation,
-    ) -> Self {
-        Self::in_blocks(EDGE, codes, size, voxel_mm, attenuation)
+    /// Bounds for a box of voxels with a mean side of `voxel_mm`, in blocks of [`EDGE`]; they cover `halo` voxels around each block.
+    pub fn new(codes: &VoxelCodes, halo: usize, voxel_mm: f64, attenuation: &Attenuation) -> Self {
+        Self::in_blocks(EDGE, codes, halo, voxel_mm, attenuation)
     }
 
     /// As [`Majorants::new`], in blocks of `edge` voxels.
     pub fn in_blocks(
         edge: u32,
-        codes: &[VoxelCode],
-        size: [usize; 3],
+        codes: &VoxelCodes,
+        halo: usize,
         voxel_mm: f64,
         attenuation: &Attenuation,
     ) -> Self {
-        let blocks = size.map(|n| n.div_ceil(edge as usize));
+        let blocks = codes.size().map(|n| (n - 2).div_ceil(edge as usize));
         let materials = attenuation.materials();
-        let densest = densest_per_block(codes, size, (edge as usize, blocks), materials);
+        let densest = densest_per_block(codes, halo, (edge as usize, blocks), materials);
         let row_of = |energy: EnergyNode| energy.node as usize / NODES_PER_ROW;
         let typical = row_of(attenuation.locate(TYPICAL_KEV));
         let (class, members) = classify(&densest, &largest_in_row(attenuation, typical));
@@ -173,6 +168,7 @@ mod tests {
     use crate::matter::sampler::MaterialTables;
     use crate::transport::block_classes::MOST_CLASSES;
     use crate::transport::tally::Category;
+    use crate::transport::voxel_codes::VoxelCode;
 
     /// Woodcock tracking is right only if no voxel exceeds the bound of any cube that holds it.
     #[test]
@@ -185,53 +181,59 @@ mod tests {
         let coordinates = |n: usize| [n % 61, n / 61 % 83, n / (61 * 83)];
         // Many densities, so that blocks must share classes.
         let scramble = |n: usize| (n.wrapping_mul(2_654_435_761) >> 7) % 10_007;
-        let codes: Vec<VoxelCode> = (0..size.iter().product())
-            .map(|n| {
-                let [i, j, k] = coordinates(n);
-                let region = if k < 35 {
-                    0
-                } else {
-                    scramble(i / 5 + j / 5 + k / 5)
-                };
-                let density = if k < 35 {
-                    0.001
-                } else {
-                    scramble(n) as f32 / 4_000.0
-                };
-                VoxelCode::new((region % 4) as u8, density)
-            })
-            .collect();
-        let majorants = Majorants::new(&codes, size, 1.0, &attenuation);
-        assert!((20..=MOST_CLASSES).contains(&majorants.classes));
-        let blocks = majorants.blocks.map(|n| n as usize);
-        let mut far_reaching = 0;
-        for energy_kev in [5.0, 5.03, 33.17, 59.999, 149.99, 150.0] {
-            let energy = attenuation.locate(energy_kev);
-            let row = majorants.row(energy);
-            for voxel in (0..codes.len()).step_by(7) {
-                let total = attenuation.at(codes[voxel].material(), energy).total;
-                let mu = codes[voxel].density_g_cm3() * total;
-                let home = coordinates(voxel).map(|v| v / EDGE as usize);
-                // Every block whose cube reaches the voxel.
-                for n in 0..majorants.regions.len() {
-                    let at = [
-                        n % blocks[0],
-                        n / blocks[0] % blocks[1],
-                        n / (blocks[0] * blocks[1]),
-                    ];
-                    let region = majorants.region(n as u32);
-                    let reaches =
-                        (0..3).all(|a| at[a].abs_diff(home[a]) <= usize::from(region.reach));
-                    let bound = majorants.bound(row, region);
-                    assert!(
-                        !reaches || mu <= bound * (1.0 + 1e-6),
-                        "{energy_kev} keV, voxel {voxel}, block {n}: {mu} {bound}"
-                    );
-                    far_reaching += usize::from(reaches && region.reach > 0);
+        let code = |n: usize| {
+            let [i, j, k] = coordinates(n);
+            let region = if k < 35 {
+                0
+            } else {
+                scramble(i / 5 + j / 5 + k / 5)
+            };
+            let density = if k < 35 {
+                0.001
+            } else {
+                scramble(n) as f32 / 4_000.0
+            };
+            VoxelCode::new((region % 4) as u8, density)
+        };
+        let codes = VoxelCodes::from_voxels(size, code);
+        for halo in [0, 1] {
+            let majorants = Majorants::new(&codes, halo, 1.0, &attenuation);
+            assert!((20..=MOST_CLASSES).contains(&majorants.classes));
+            let blocks = majorants.blocks.map(|n| n as usize);
+            let mut far_reaching = 0;
+            for energy_kev in [5.0, 5.03, 33.17, 59.999, 149.99, 150.0] {
+                let energy = attenuation.locate(energy_kev);
+                let row = majorants.row(energy);
+                for voxel in (0..size.iter().product()).step_by(7) {
+                    let total = attenuation.at(code(voxel).material(), energy).total;
+                    let mu = code(voxel).density_g_cm3() * total;
+                    let home = coordinates(voxel);
+                    // Every block whose cube reaches the voxel.
+                    for n in 0..majorants.regions.len() {
+                        let at = [
+                            n % blocks[0],
+                            n / blocks[0] % blocks[1],
+                            n / (blocks[0] * blocks[1]),
+                        ];
+                        let region = majorants.region(n as u32);
+                        let reach = usize::from(region.reach);
+                        let edge = EDGE as usize;
+                        let reaches = (0..3).all(|a| {
+                            let first = at[a].saturating_sub(reach) * edge;
+                            let end = (at[a] + reach + 1) * edge;
+                            (first.saturating_sub(halo)..end + halo).contains(&home[a])
+                        });
+                        let bound = majorants.bound(row, region);
+                        assert!(
+                            !reaches || mu <= bound * (1.0 + 1e-6),
+                            "{energy_kev} keV, voxel {voxel}, block {n}: {mu} {bound}"
+                        );
+                        far_reaching += usize::from(reaches && region.reach > 0);
+                    }
                 }
             }
+            assert!(far_reaching > 0, "no cube of more than one block");
         }
-        assert!(far_reaching > 0, "no cube of more than one block");
     }
 
     /// The image of 3e5 histories in blocks of 1, 4 and 64 voxels against blocks of 8: 12 differences of sums beyond 4.5
@@ -246,7 +248,7 @@ mod tests {
             let majorants = Majorants::in_blocks(
                 edge,
                 &tables.codes,
-                phantom.grid().size(),
+                0,
                 phantom.grid().spacing_mm().mean(),
                 &tables.attenuation,
             );

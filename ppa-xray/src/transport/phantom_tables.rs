@@ -3,21 +3,24 @@
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
+use nalgebra::Vector3;
+use ppa_core::random::Philox;
 use rayon::prelude::*;
 
 use crate::matter::compton::ComptonModel;
 use crate::matter::sampler::MaterialTables;
+use crate::phantom::interpolation::Interpolation;
 use crate::phantom::voxels::{VoxelPhantom, voxel_mm3};
 use crate::transport::attenuation::Attenuation;
 use crate::transport::majorants::Majorants;
-use crate::transport::voxel_codes::{VoxelCode, voxel_codes};
+use crate::transport::voxel_codes::{VoxelCode, VoxelCodes};
 
 /// A phantom with the tables of its materials and voxels.
 pub(crate) struct PhantomTables<'a> {
     pub phantom: Arc<Cow<'a, VoxelPhantom>>,
     pub attenuation: Attenuation,
     pub samplers: Vec<MaterialTables>,
-    pub codes: Vec<VoxelCode>,
+    pub codes: VoxelCodes,
     majorants: OnceLock<Majorants>,
 }
 
@@ -31,19 +34,34 @@ impl<'a> PhantomTables<'a> {
         Self {
             attenuation: Attenuation::new(&samplers),
             samplers,
-            codes: voxel_codes(&phantom),
+            codes: VoxelCodes::new(&phantom),
             majorants: OnceLock::new(),
             phantom,
         }
     }
 
-    /// Bounds for Woodcock tracking. The fast engine never asks for them.
+    /// Bounds for Woodcock tracking.
     pub fn majorants(&self) -> &Majorants {
         self.majorants.get_or_init(|| {
-            let grid = self.phantom.grid();
-            let voxel_mm = voxel_mm3(grid).cbrt();
-            Majorants::new(&self.codes, grid.size(), voxel_mm, &self.attenuation)
+            let voxel_mm = voxel_mm3(self.phantom.grid()).cbrt();
+            let halo = self.phantom.interpolation().halo();
+            Majorants::new(&self.codes, halo, voxel_mm, &self.attenuation)
         })
+    }
+
+    /// What a photon meets at a place in the box, in cells from its corner.
+    ///
+    /// Trilinear interpolation is the mean of the voxels at this place plus an offset that is uniform over one voxel. So one of the eight
+    /// neighbours, each with the probability of its weight, stands for the density of all materials there.
+    #[inline]
+    pub fn draw_code(&self, cell: &Vector3<f64>, rng: &mut Philox) -> VoxelCode {
+        let corner = match self.phantom.interpolation() {
+            Interpolation::Nearest => Vector3::repeat(1.0),
+            Interpolation::Trilinear => Vector3::from_fn(|_, _| rng.unit() + 0.5),
+        };
+        let size = self.codes.size();
+        let at = [0, 1, 2].map(|axis| ((cell[axis] + corner[axis]) as usize).min(size[axis] - 1));
+        self.codes.all()[self.codes.index(at)]
     }
 
     #[cfg(test)]

@@ -10,6 +10,7 @@ mod exposure;
 mod exposure_index;
 mod fast_engine;
 mod files;
+mod interpolation;
 mod mcgpu;
 mod noise_power;
 mod placement;

@@ -1,5 +1,6 @@
 //! Outcome of tentative collisions: none, absorption with or without a K x-ray, or scattering.
 
+use crate::phantom::interpolation::Interpolation;
 use crate::transport::lanes::Lanes;
 use crate::transport::lanes::advance::{Blocks, Steps};
 use crate::transport::lanes::draws::{Depths, unit};
@@ -25,6 +26,22 @@ impl Site {
     }
 }
 
+/// One of the eight voxels with centres around a position, each with the probability of its trilinear weight, counted from the
+/// corner of the rim: that at the position plus an offset that is uniform over one voxel.
+///
+/// The offsets take the low bytes of random `words` whose other uses drop them, in steps of 2⁻⁸.
+#[inline(always)]
+fn neighbour(position: [f32; 3], voxel: [usize; 3], words: [u32; 4]) -> [usize; 3] {
+    let [x, _, y, z] = words;
+    let words = [x, y, z];
+    std::array::from_fn(|axis| {
+        let offset = ((words[axis] & 0xFF) as f32 + 0.5) * (1.0 / 256.0);
+        // In [0, 2): below a half the voxel before, from one and a half on the next.
+        let from_before = position[axis] - voxel[axis] as f32 + offset;
+        voxel[axis] + usize::from(from_before >= 0.5) + usize::from(from_before >= 1.5)
+    })
+}
+
 impl Lanes<'_, '_> {
     /// Accepts or rejects tentative collisions and carries out the accepted ones.
     pub(super) fn collide(
@@ -35,19 +52,31 @@ impl Lanes<'_, '_> {
         steps: &Steps,
         score: &mut impl Score,
     ) {
+        self.draw(tentative);
         let mut site = [Site::default(); LANES];
-        let size = self.transport.lattice.size;
-        for (site, lane) in site.iter_mut().zip(tentative.iter()) {
-            let [x, y, z] = each(&steps.voxel, lane);
-            let voxel = x as usize + size[0] * (y as usize + size[1] * z as usize);
-            prefetch(&self.transport.tables.codes, voxel);
-            *site = Site {
+        let mut place = [0; LANES];
+        let tables = &self.transport.tables;
+        let (size, codes) = (self.transport.lattice.size, &tables.codes);
+        let interpolation = tables.phantom.interpolation();
+        for (i, lane) in tentative.iter().enumerate() {
+            let voxel = each(&steps.voxel, lane).map(|index| index as usize);
+            // Counted from the corner of the rim.
+            let at = match interpolation {
+                Interpolation::Nearest => voxel.map(|index| index + 1),
+                Interpolation::Trilinear => {
+                    let position = each(&self.flights.position, lane);
+                    neighbour(position, voxel, self.draws.block(i))
+                }
+            };
+            place[i] = codes.index(at);
+            prefetch(codes.all(), place[i]);
+            let [x, y, z] = [0, 1, 2].map(|axis| at[axis].clamp(1, size[axis]) - 1);
+            site[i] = Site {
                 lane: lane as u8,
-                voxel,
+                voxel: x + size[0] * (y + size[1] * z),
                 code: VoxelCode::default(),
             };
         }
-        self.draw(tentative);
         let mut depths = [0.0; LANES];
         self.isa.run(Depths {
             word: &self.draws.block[1],
@@ -57,7 +86,7 @@ impl Lanes<'_, '_> {
         let (mut compton, mut rayleigh, mut k_rays) = (Picked::new(), Picked::new(), Picked::new());
         for (i, lane) in tentative.iter().enumerate() {
             let photon = &self.photons[lane];
-            let code = self.transport.tables.codes[site[i].voxel];
+            let code = self.transport.tables.codes.all()[place[i]];
             site[i].code = code;
             let sums = self
                 .transport
