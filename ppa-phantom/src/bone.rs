@@ -6,6 +6,7 @@ use super::bounds::Bounds;
 use super::placement::Placement;
 use super::sdf::Shape;
 use super::smooth::{smooth_max, smooth_step};
+use super::trabeculae::Trabeculae;
 
 /// How sharply a joint surface meets the rest of the bone, mm.
 const EDGE_MM: f64 = 0.8;
@@ -29,11 +30,12 @@ pub(super) struct Filling {
     pub knots: Vec<Knot>,
     /// HU of trabecular bone far from the surface.
     pub trabecular_hu: f64,
+    pub trabeculae: Trabeculae,
 }
 
 impl Filling {
     /// The same everywhere: a thin shell over trabecular bone.
-    pub(super) fn spongy(cortex_mm: f64, trabecular_hu: f64) -> Self {
+    pub(super) fn spongy(cortex_mm: f64, trabecular_hu: f64, trabeculae: Trabeculae) -> Self {
         Self {
             origin: Point3::origin(),
             direction: Vector3::z_axis(),
@@ -43,6 +45,7 @@ impl Filling {
                 marrow: 0.0,
             }],
             trabecular_hu,
+            trabeculae,
         }
     }
 
@@ -52,6 +55,7 @@ impl Filling {
         to: [f64; 3],
         shaft_cortex_mm: f64,
         trabecular_hu: f64,
+        trabeculae: Trabeculae,
     ) -> Self {
         let (origin, end): (Point3<f64>, Point3<f64>) = (from.into(), to.into());
         let length = (end - origin).norm();
@@ -60,9 +64,10 @@ impl Filling {
             cortex_mm,
             marrow,
         };
+        let direction = Unit::new_normalize(end - origin);
         Self {
             origin,
-            direction: Unit::new_normalize(end - origin),
+            direction,
             knots: vec![
                 knot(0.1, 0.8, 0.0),
                 knot(0.35, shaft_cortex_mm, 0.8),
@@ -70,6 +75,7 @@ impl Filling {
                 knot(0.85, 0.8, 0.0),
             ],
             trabecular_hu,
+            trabeculae: trabeculae.along(&direction),
         }
     }
 
@@ -86,6 +92,7 @@ impl Filling {
             direction: to.isometry.rotation * self.direction,
             knots: knots.collect(),
             trabecular_hu: self.trabecular_hu,
+            trabeculae: self.trabeculae.placed(to),
         }
     }
 

@@ -4,15 +4,14 @@ use nalgebra::Point3;
 
 use super::bone::Knot;
 use super::limb::Limb;
-use super::texture::texture;
 use super::tissue::Tissue;
+use super::trabeculae::MARROW_HU;
 
 const AIR_HU: f64 = -1000.0;
 const SKIN_HU: f64 = 60.0;
 const FAT_HU: f64 = -100.0;
 const SOFT_HU: f64 = 50.0;
 const TENDON_HU: f64 = 85.0;
-const MARROW_HU: f64 = -40.0;
 /// Titanium is denser; scanners that store 12 bits clip it here.
 const TITANIUM_HU: f64 = 3071.0;
 /// Thin shells of the joints and thick walls of the shafts.
@@ -137,7 +136,10 @@ impl Limb {
             let mut spongy =
                 filling.trabecular_hu + SUBCHONDRAL_HU * (-depth / SUBCHONDRAL_MM).exp();
             if self.texture_hu > 0.0 && core > 0.0 && marrow < 1.0 {
-                spongy += self.texture_hu * texture(self.texture_seed, p);
+                let trabeculae = &filling.trabeculae;
+                let place = trabeculae.place(p);
+                let texture = self.texture.at(&place, trabeculae.width(width_mm));
+                spongy += self.texture_hu * trabeculae.gain() * texture;
             }
             let core_hu = spongy + marrow * (MARROW_HU - spongy);
             bone_share += share;

@@ -12,7 +12,7 @@ pub(super) enum Purpose {
     LeftSide = 2,
     /// The same for a phantom drawn by seed.
     LeftSideOfSeed = 3,
-    /// Spongy bone at a lattice point.
+    /// Seed of an octave of the texture of spongy bone, and its number at a lattice point.
     Texture = 4,
     /// Noise of a voxel.
     ScannerNoise = 5,
@@ -22,9 +22,30 @@ pub(super) enum Purpose {
     TextureOfSeed = 7,
 }
 
+/// The random numbers of one seed and purpose, by index.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stream(u64);
+
+impl Stream {
+    pub(super) fn new(seed: u64, purpose: Purpose) -> Self {
+        Self(split_mix(split_mix(seed) ^ u64::from(purpose as u8)))
+    }
+
+    /// 64 random bits.
+    pub(super) fn bits(self, index: u64) -> u64 {
+        split_mix(self.0 ^ index)
+    }
+
+    /// A number with mean 0 and variance 1, evenly distributed.
+    pub(super) fn even(self, index: u64) -> f64 {
+        const SCALE: f64 = 1.732_050_807_568_877_2 / (1_u64 << 63) as f64;
+        self.bits(index) as i64 as f64 * SCALE
+    }
+}
+
 /// 64 random bits.
 pub(super) fn bits(seed: u64, purpose: Purpose, index: u64) -> u64 {
-    split_mix(split_mix(split_mix(seed) ^ u64::from(purpose as u8)) ^ index)
+    Stream::new(seed, purpose).bits(index)
 }
 
 /// Two independent numbers above 0 and up to 1 from 64 bits.

@@ -6,6 +6,7 @@ use super::bone::{Bone, Filling, Gap};
 use super::parameters::Parameters;
 use super::placement::Placement;
 use super::sdf::{Cone, Plane, Shape};
+use super::trabeculae::Trabeculae;
 
 /// The ankle mortise: medial, posterior and proximal axes turned out from the limb by the mortise angle,
 /// origin in the middle of the superior gutter.
@@ -167,12 +168,15 @@ pub(super) fn talus(p: &Parameters, mortise: &Mortise) -> Bone {
             ),
         ],
     );
+    let mean_hu = p.spongy_hu(380.0);
+    // Along the leg, as the load (DeSilva and Devlin 2012: well ordered all over the talus); numbers assumed.
+    let trabeculae = Trabeculae::new(mean_hu, 0.55, 1.6);
     Bone {
         name: "talus",
         solid,
         hollows: vec![],
         yields_to: vec![],
-        filling: Filling::spongy(1.1, p.spongy_hu(380.0)),
+        filling: Filling::spongy(1.1, mean_hu, trabeculae),
     }
 }
 
@@ -194,12 +198,20 @@ pub(super) fn calcaneus(p: &Parameters, talus: usize) -> Bone {
             Shape::ellipsoid([9.0, -4.0, floor + 26.0], [11.0, 10.0, 5.5]),
         ],
     );
+    let mean_hu = p.spongy_hu(230.0);
+    // From the posterior facet down and back to the tuberosity, where they run backwards (Souzanchi 2012, PMC3500573).
+    // Anisotropy in radiographs 1.72 ± 0.18 (BMC Med Imaging 2005;5:4); a separation of 0.67 mm is assumed.
+    let trabeculae = Trabeculae::new(mean_hu, 0.67, 1.7).around(
+        Point3::new(-4.0, 60.0, floor + 62.0),
+        &Vector3::x_axis(),
+        Point3::new(-4.0, 18.0, floor + 21.0),
+    );
     let bone = Bone {
         name: "calcaneus",
         solid,
         hollows: vec![],
         yields_to: vec![(talus, Gap::even(p.small_joint_mm))],
-        filling: Filling::spongy(1.0, p.spongy_hu(230.0)),
+        filling: Filling::spongy(1.0, mean_hu, trabeculae),
     };
     bone.placed(&heel_valgus(p))
 }

@@ -8,6 +8,8 @@ use super::envelope::{Bounded, Cover, Envelope};
 use super::limb::{Limb, ScanRange};
 use super::loft::{End, Loft, Section};
 use super::sdf::{Plane, Shape};
+use super::texture::Texture;
+use super::trabeculae::Trabeculae;
 
 /// Station above the joint line, centre (medial, posterior) and semi-axes of the femur. Width over the condyles 80 mm, of
 /// the tibial plateau 75 mm, shafts of 28 mm: chosen as those of an average man, without a source.
@@ -68,6 +70,11 @@ fn loft(sections: &[(f64, [f64; 2], [f64; 2])], ends: [End; 2]) -> Shape {
     )))
 }
 
+/// Trabeculae along the leg, assumed to be as far apart as in the tarsal bones.
+fn trabeculae(mean_hu: f64) -> Trabeculae {
+    Trabeculae::new(mean_hu, 0.6, 1.6)
+}
+
 /// Cortex and marrow of a shaft that begins at the joint, where the direction points.
 fn shaft(away: Vector3<f64>, cortex_mm: f64) -> Filling {
     let knot = |station_mm, cortex_mm, marrow| Knot {
@@ -84,6 +91,7 @@ fn shaft(away: Vector3<f64>, cortex_mm: f64) -> Filling {
             knot(130.0, cortex_mm, 1.0),
         ],
         trabecular_hu: 220.0,
+        trabeculae: trabeculae(220.0),
     }
 }
 
@@ -140,7 +148,12 @@ fn skeleton() -> Skeleton {
     Skeleton::new(vec![
         femur,
         bone("tibia", tibia, &[0], shaft(-Vector3::z(), 4.5)),
-        bone("patella", patella, &[0], Filling::spongy(1.2, 260.0)),
+        bone(
+            "patella",
+            patella,
+            &[0],
+            Filling::spongy(1.2, 260.0, trabeculae(260.0)),
+        ),
         fibula,
     ])
 }
@@ -194,7 +207,7 @@ impl Limb {
             },
             table_top_y: JOINT_CENTRE_MM[1] + TABLE_DEPTH_MM,
             texture_hu: 45.0,
-            texture_seed: 0,
+            texture: Texture::new(0),
         }
     }
 }

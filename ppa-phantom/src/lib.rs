@@ -55,6 +55,7 @@ mod texture;
 mod tibia_fibula;
 mod tibia_fibula_table;
 mod tissue;
+mod trabeculae;
 mod truth;
 mod voxelise;
 

@@ -6,6 +6,7 @@ use ppa_core::Side;
 use super::bone::Skeleton;
 use super::envelope::Envelope;
 use super::plate::Plate;
+use super::texture::Texture;
 use super::tissue::Tissue;
 
 /// The part of the world that a scan shows, mm from the middle of the joint along x, y and z.
@@ -31,10 +32,10 @@ pub struct Limb {
     pub(super) scan: ScanRange,
     /// Height of the table top, `ct` y in mm.
     pub(super) table_top_y: f64,
-    /// Standard deviation of spongy bone from place to place, HU.
+    /// Standard deviation of spongy bone between voxels of 0.8 mm, HU.
     pub(super) texture_hu: f64,
-    /// Seed of the places where it is denser.
-    pub(super) texture_seed: u64,
+    /// Where it is denser.
+    pub(super) texture: Texture,
 }
 
 impl Limb {

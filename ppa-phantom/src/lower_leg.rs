@@ -14,6 +14,7 @@ use super::parameters::{P01, Parameters, Sex};
 use super::placement::Placement;
 use super::plate::Plate;
 use super::sdf::{Plane, Shape};
+use super::texture::Texture;
 use super::{hindfoot, midfoot_forefoot, tibia_fibula};
 
 /// A lower leg and foot of known shape; as a [`Limb`] it can be voxelised and asked for its tissues.
@@ -36,7 +37,7 @@ impl Deref for LowerLeg {
 
 /// Indices of the bones, in the order in which they are made.
 pub(super) const TALUS: usize = 0;
-const CALCANEUS: usize = 1;
+pub(super) const CALCANEUS: usize = 1;
 pub(super) const TIBIA: usize = 2;
 pub(super) const FIBULA: usize = 3;
 
@@ -112,7 +113,7 @@ impl LowerLeg {
             },
             table_top_y: ct_from_limb.translation.y + rest.depth_mm,
             texture_hu: parameters.trabecular_texture_hu,
-            texture_seed: parameters.texture_seed,
+            texture: Texture::new(parameters.texture_seed),
         };
         Self {
             mortise: Mortise::new(&parameters),

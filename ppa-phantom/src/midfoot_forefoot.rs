@@ -9,6 +9,7 @@ use super::bone::{Bone, Filling, Gap};
 use super::forefoot_table::{FOREFOOT, Metatarsal};
 use super::parameters::{Parameters, TABLES};
 use super::sdf::Shape;
+use super::trabeculae::Trabeculae;
 
 /// Indices of the bones that carry the midfoot.
 pub(super) struct Hindfoot {
@@ -63,7 +64,16 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
         });
         bones.len() - 1
     };
-    let spongy = || Filling::spongy(0.9, p.spongy_hu(260.0));
+    // Assumed: as in the talus, along the foot.
+    let trabeculae = |mean_hu| Trabeculae::new(mean_hu, 0.6, 1.6).along(&-Vector3::y_axis());
+    let spongy = || {
+        let mean_hu = p.spongy_hu(260.0);
+        Filling::spongy(0.9, mean_hu, trabeculae(mean_hu))
+    };
+    let tubular = |from, to, shaft_cortex_mm, p01_hu| {
+        let mean_hu = p.spongy_hu(p01_hu);
+        Filling::tubular(from, to, shaft_cortex_mm, mean_hu, trabeculae(mean_hu))
+    };
     // Turned about the foot's length by the transverse arch, then forward and down with the longitudinal one.
     let arched = |transverse: f64, longitudinal: f64| {
         Rotation3::from_axis_angle(&Vector3::x_axis(), longitudinal.to_radians())
@@ -159,7 +169,7 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
             metatarsal.name.as_str(),
             metatarsal.solid(head),
             &neighbours,
-            Filling::tubular(metatarsal.base, head, 2.0, p.spongy_hu(220.0)),
+            tubular(metatarsal.base, head, 2.0, 220.0),
         );
         previous = Some(last);
         let distal = toe.phalanges.len() - 1;
@@ -170,7 +180,7 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
                 &bone.name,
                 phalanx(base, end, waist),
                 &[(last, 0.8 * gap)],
-                Filling::tubular(base, end, 1.2, p.spongy_hu(180.0)),
+                tubular(base, end, 1.2, 180.0),
             );
         }
     }

@@ -17,6 +17,7 @@ mod sdf;
 mod skin;
 mod tables;
 mod tendon;
+mod texture;
 mod variants;
 mod voxels;
 

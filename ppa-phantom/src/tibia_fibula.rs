@@ -10,6 +10,7 @@ use super::placement::Placement;
 use super::sdf::Shape;
 use super::smooth::smooth_step;
 use super::tibia_fibula_table::{TIBIA_FIBULA, TibiaSection};
+use super::trabeculae::Trabeculae;
 
 /// Half the distance between the places where the front and the back of the syndesmosis are measured.
 const SYNDESMOSIS_REACH_MM: f64 = 6.0;
@@ -17,7 +18,10 @@ const SYNDESMOSIS_REACH_MM: f64 = 6.0;
 const INCISURA_FLOOR: f64 = 1.0;
 
 /// Profile of cortex and marrow along the leg.
+///
+/// Trabeculae run along the leg (distal tibia: PMC3818375). They are assumed 0.5 mm apart and 1.6 times as long as wide.
 fn shaft(p: &Parameters, knots: &[(f64, f64, f64)]) -> Filling {
+    let trabecular_hu = p.spongy_hu(280.0);
     Filling {
         origin: Point3::origin(),
         direction: Vector3::z_axis(),
@@ -29,7 +33,8 @@ fn shaft(p: &Parameters, knots: &[(f64, f64, f64)]) -> Filling {
                 marrow,
             })
             .collect(),
-        trabecular_hu: p.spongy_hu(280.0),
+        trabecular_hu,
+        trabeculae: Trabeculae::new(trabecular_hu, 0.5, 1.6),
     }
 }
 
