@@ -6,6 +6,7 @@ use super::bounds::Bounds;
 use super::placement::Placement;
 use super::sdf::Shape;
 use super::smooth::{smooth_max, smooth_step};
+use super::subchondral::{JointSurface, plate_near};
 use super::trabeculae::Trabeculae;
 
 /// How sharply a joint surface meets the rest of the bone, mm.
@@ -15,7 +16,7 @@ const EDGE_MM: f64 = 0.8;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Knot {
     pub station_mm: f64,
-    /// Thickness of the cortex.
+    /// Thickness of the cortex away from joints.
     pub cortex_mm: f64,
     /// Share of fatty marrow in the core; the rest is trabecular bone.
     pub marrow: f64,
@@ -162,6 +163,8 @@ pub(super) struct Bone {
     /// Neighbours that are there first, and the joint space they keep.
     pub yields_to: Vec<(usize, Gap)>,
     pub filling: Filling,
+    /// Where the cortex is the plate below a joint.
+    pub joints: Vec<JointSurface>,
 }
 
 impl Bone {
@@ -177,6 +180,7 @@ impl Bone {
                 .map(|(other, gap)| (*other, gap.placed(to)))
                 .collect(),
             filling: self.filling.placed(to),
+            joints: self.joints.iter().map(|j| j.placed(to)).collect(),
         }
     }
 }
@@ -209,6 +213,29 @@ impl Skeleton {
     /// Distance to the box around a bone: a lower bound of the distance to the bone.
     pub(super) fn box_distance(&self, bone: usize, p: &Point3<f64>) -> f64 {
         self.bounds[bone].distance(p)
+    }
+
+    /// Thickness of the cortex of a bone at a point at this signed distance to its surface, where that may matter within
+    /// `reach_mm` of the point; deeper the thickness away from joints.
+    pub(super) fn cortex_mm(
+        &self,
+        bone: usize,
+        p: &Point3<f64>,
+        distance_mm: f64,
+        reach_mm: f64,
+    ) -> f64 {
+        let bone = &self.bones[bone];
+        let shell_mm = bone.filling.at(p).cortex_mm;
+        if !plate_near(distance_mm, reach_mm) {
+            return shell_mm;
+        }
+        let near =
+            |joint: &&JointSurface| self.box_distance(joint.other, p) < joint.farthest_mm(reach_mm);
+        let plates = bone.joints.iter().filter(near).map(|joint| {
+            let apart_mm = distance_mm + self.distance(joint.other, p);
+            joint.cortex_mm(p, shell_mm, apart_mm)
+        });
+        plates.fold(shell_mm, f64::max)
     }
 
     /// Signed distance to a bone in mm.

@@ -51,12 +51,9 @@ impl Limb {
             return Tissue::Titanium;
         }
         if let Some((bone, distance)) = self.skeleton.bone_at(p) {
-            let Knot {
-                cortex_mm, marrow, ..
-            } = self.skeleton.bones()[bone].filling.at(p);
-            return if distance > -cortex_mm {
+            return if distance > -self.skeleton.cortex_mm(bone, p, distance, 0.0) {
                 Tissue::Cortical
-            } else if marrow > 0.5 {
+            } else if self.skeleton.bones()[bone].filling.at(p).marrow > 0.5 {
                 Tissue::Marrow
             } else {
                 Tissue::Trabecular
@@ -109,7 +106,7 @@ impl Limb {
             || local.bones.iter().any(|&(bone, distance)| {
                 distance.abs() < reach_mm
                     || (distance < 0.0 && {
-                        let cortex_mm = self.skeleton.bones()[bone].filling.at(p).cortex_mm;
+                        let cortex_mm = self.skeleton.cortex_mm(bone, p, distance, reach_mm);
                         (distance + cortex_mm).abs() < reach_mm
                     })
             })
@@ -129,10 +126,14 @@ impl Limb {
             }
             let filling = &self.skeleton.bones()[index].filling;
             let Knot {
-                cortex_mm, marrow, ..
+                cortex_mm: shell_mm,
+                marrow,
+                ..
             } = filling.at(p);
+            let cortex_mm = self.skeleton.cortex_mm(index, p, distance, width_mm);
             let core = share_inside(distance + cortex_mm, width_mm);
-            let depth = (-distance - cortex_mm).max(0.0);
+            // Below the shell, not the plate, whose thickness is known near the surface only.
+            let depth = (-distance - shell_mm).max(0.0);
             let mut spongy =
                 filling.trabecular_hu + SUBCHONDRAL_HU * (-depth / SUBCHONDRAL_MM).exp();
             if self.texture_hu > 0.0 && core > 0.0 && marrow < 1.0 {

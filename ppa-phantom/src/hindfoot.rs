@@ -176,7 +176,8 @@ pub(super) fn talus(p: &Parameters, mortise: &Mortise) -> Bone {
         solid,
         hollows: vec![],
         yields_to: vec![],
-        filling: Filling::spongy(1.1, mean_hu, trabeculae),
+        filling: Filling::spongy(0.8, mean_hu, trabeculae),
+        joints: vec![],
     }
 }
 
@@ -211,7 +212,8 @@ pub(super) fn calcaneus(p: &Parameters, talus: usize) -> Bone {
         solid,
         hollows: vec![],
         yields_to: vec![(talus, Gap::even(p.small_joint_mm))],
-        filling: Filling::spongy(1.0, mean_hu, trabeculae),
+        filling: Filling::spongy(0.8, mean_hu, trabeculae),
+        joints: vec![],
     };
     bone.placed(&heel_valgus(p))
 }

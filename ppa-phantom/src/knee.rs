@@ -105,6 +105,7 @@ fn bone(name: &'static str, solid: Shape, yields_to: &[usize], filling: Filling)
             .map(|&other| (other, Gap::even(JOINT_MM)))
             .collect(),
         filling,
+        joints: vec![],
     }
 }
 

@@ -23,6 +23,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod ankle_joints;
 mod bone;
 mod bone_labels;
 mod bounds;
@@ -50,6 +51,7 @@ mod scanner;
 mod sdf;
 mod section;
 mod smooth;
+mod subchondral;
 mod table_list;
 mod texture;
 mod tibia_fibula;

@@ -5,6 +5,7 @@ use std::ops::Deref;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use ppa_core::Side;
 
+use super::ankle_joints::{self, AnkleBones};
 use super::bone::Skeleton;
 use super::family::{self, UnknownPhantom};
 use super::hindfoot::Mortise;
@@ -88,6 +89,13 @@ impl LowerLeg {
             calcaneus: CALCANEUS,
         };
         midfoot_forefoot::append(&mut bones, p, &hindfoot);
+        let ankle = AnkleBones {
+            talus: TALUS,
+            calcaneus: CALCANEUS,
+            tibia: TIBIA,
+            fibula: FIBULA,
+        };
+        ankle_joints::add_plates(&mut bones, p, &drawn_mortise, &ankle);
         let bones = bones.iter().enumerate().map(|(index, bone)| {
             let leg = [TIBIA, FIBULA].contains(&index);
             bone.placed(if leg { &resized } else { &foot_placement })

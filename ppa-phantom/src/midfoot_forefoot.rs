@@ -61,6 +61,7 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
                 .map(|&(bone, gap_mm)| (bone, Gap::even(gap_mm)))
                 .collect(),
             filling,
+            joints: vec![],
         });
         bones.len() - 1
     };

@@ -152,7 +152,8 @@ impl Limb {
             let distance = self.skeleton.distance(bone, p);
             clearance = clearance.min(distance.abs().max(far));
             if distance < 0.0 {
-                let cortex_mm = self.skeleton.bones()[bone].filling.at(p).cortex_mm;
+                let skeleton = &self.skeleton;
+                let cortex_mm = skeleton.cortex_mm(bone, p, distance, STEP_IN_BONE_MM);
                 clearance = clearance
                     .min((distance + cortex_mm).abs())
                     .min(STEP_IN_BONE_MM);

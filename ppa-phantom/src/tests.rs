@@ -3,6 +3,7 @@
 mod anatomy;
 mod apart;
 mod bone_points;
+mod cortex;
 mod foot_turns;
 mod gauge;
 mod knee;

@@ -160,6 +160,7 @@ pub(super) fn tibia(p: &Parameters, mortise: &Mortise, flexion: &Placement, talu
                 (CORTEX_LEVELS_MM[2], 4.8 * middle, 1.0),
             ],
         ),
+        joints: vec![],
     }
 }
 
@@ -220,6 +221,7 @@ pub(super) fn fibula(
                 (100.0, 2.4 * distal, 1.0),
             ],
         ),
+        joints: vec![],
     }
 }
 
