@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::bounds::Bounds;
+use super::physeal_scar::PhysealScar;
 use super::placement::Placement;
 use super::sdf::Shape;
 use super::smooth::{smooth_max, smooth_step};
@@ -32,6 +33,7 @@ pub(super) struct Filling {
     /// HU of trabecular bone far from the surface.
     pub trabecular_hu: f64,
     pub trabeculae: Trabeculae,
+    pub scar: Option<PhysealScar>,
 }
 
 impl Filling {
@@ -47,6 +49,7 @@ impl Filling {
             }],
             trabecular_hu,
             trabeculae,
+            scar: None,
         }
     }
 
@@ -77,6 +80,7 @@ impl Filling {
             ],
             trabecular_hu,
             trabeculae: trabeculae.along(&direction),
+            scar: None,
         }
     }
 
@@ -94,6 +98,7 @@ impl Filling {
             knots: knots.collect(),
             trabecular_hu: self.trabecular_hu,
             trabeculae: self.trabeculae.placed(to),
+            scar: self.scar.as_ref().map(|scar| scar.placed(to)),
         }
     }
 

@@ -136,6 +136,9 @@ impl Limb {
             let depth = (-distance - shell_mm).max(0.0);
             let mut spongy =
                 filling.trabecular_hu + SUBCHONDRAL_HU * (-depth / SUBCHONDRAL_MM).exp();
+            if let Some(scar) = &filling.scar {
+                spongy += scar.hu(p, width_mm);
+            }
             if self.texture_hu > 0.0 && core > 0.0 && marrow < 1.0 {
                 let trabeculae = &filling.trabeculae;
                 let place = trabeculae.place(p);

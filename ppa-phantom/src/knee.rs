@@ -92,6 +92,7 @@ fn shaft(away: Vector3<f64>, cortex_mm: f64) -> Filling {
         ],
         trabecular_hu: 220.0,
         trabeculae: trabeculae(220.0),
+        scar: None,
     }
 }
 

@@ -43,6 +43,7 @@ mod lower_leg_skin;
 mod lower_leg_skin_table;
 mod midfoot_forefoot;
 mod parameters;
+mod physeal_scar;
 mod placed;
 mod placement;
 mod plate;

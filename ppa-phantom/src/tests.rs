@@ -10,6 +10,7 @@ mod knee;
 mod leg_and_foot;
 mod loft;
 mod measured;
+mod physeal_scar;
 mod plate;
 mod proportions;
 mod rays;

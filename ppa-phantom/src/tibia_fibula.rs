@@ -6,6 +6,7 @@ use super::bone::{Bone, Filling, Gap, Knot};
 use super::hindfoot::{Mortise, WIDTH_LEVEL_MM};
 use super::loft::{End, Loft, Section};
 use super::parameters::{P01, Parameters};
+use super::physeal_scar::PhysealScar;
 use super::placement::Placement;
 use super::sdf::Shape;
 use super::smooth::smooth_step;
@@ -35,6 +36,7 @@ fn shaft(p: &Parameters, knots: &[(f64, f64, f64)]) -> Filling {
             .collect(),
         trabecular_hu,
         trabeculae: Trabeculae::new(trabecular_hu, 0.5, 1.6),
+        scar: None,
     }
 }
 
@@ -144,22 +146,33 @@ pub(super) fn tibia(p: &Parameters, mortise: &Mortise, flexion: &Placement, talu
         [-0.45, 0.0, -0.89],
         [-14.0 - p.lateral_shift_mm(), 0.0, -3.0],
     );
+    // Assumed 12.5 mm above the joint, with a hump in front and medially (Poland's).
+    let scar = PhysealScar {
+        below_hump: at(9.0, -8.0, 12.5).into(),
+        axis: Vector3::z_axis(),
+        hump_mm: 3.0,
+        size: 1.0,
+    };
     let [thin, distal, middle] = cortex_shares(p);
+    let filling = shaft(
+        p,
+        &[
+            (5.0, 1.0 * thin, 0.0),
+            (CORTEX_LEVELS_MM[0], 1.2 * thin, 0.0),
+            (60.0, 2.5 * distal, 0.7),
+            (CORTEX_LEVELS_MM[1], 3.6 * distal, 1.0),
+            (CORTEX_LEVELS_MM[2], 4.8 * middle, 1.0),
+        ],
+    );
     Bone {
         name: "tibia",
         solid: Shape::common(2.0, vec![solid, below_tubercles]),
         hollows: vec![mortise_space],
         yields_to: vec![(talus, Gap::even(0.8 * p.medial_gutter_mm))],
-        filling: shaft(
-            p,
-            &[
-                (5.0, 1.0 * thin, 0.0),
-                (CORTEX_LEVELS_MM[0], 1.2 * thin, 0.0),
-                (60.0, 2.5 * distal, 0.7),
-                (CORTEX_LEVELS_MM[1], 3.6 * distal, 1.0),
-                (CORTEX_LEVELS_MM[2], 4.8 * middle, 1.0),
-            ],
-        ),
+        filling: Filling {
+            scar: Some(scar),
+            ..filling
+        },
         joints: vec![],
     }
 }
