@@ -1,4 +1,4 @@
-//! Navicular, cuboid, cuneiforms, metatarsals and phalanges.
+//! Navicular, cuboid, cuneiforms, metatarsals, phalanges and sesamoids.
 //!
 //! Solids overlap on purpose: each yields a joint space to its neighbours, which gives the flat and
 //! cupped faces of the real bones.
@@ -16,6 +16,13 @@ pub(super) struct Hindfoot {
     pub talus: usize,
     pub calcaneus: usize,
 }
+
+/// Sesamoids below the head of the first metatarsal: centre and semi-axes in P01. Sizes are assumed: 12 mm long, the
+/// medial one wider; cut to the head above them.
+const SESAMOIDS: [(&str, [f64; 3], [f64; 3]); 2] = [
+    ("medial sesamoid", [32.2, -131.0, -75.2], [4.8, 6.0, 3.2]),
+    ("lateral sesamoid", [20.8, -131.5, -75.2], [4.2, 5.6, 3.2]),
+];
 
 impl Metatarsal {
     fn solid(&self, head: [f64; 3]) -> Shape {
@@ -159,6 +166,7 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
     );
     let tarsals = [medial, intermediate, lateral, cuboid, navicular].map(|t| (t, gap));
 
+    let mut hallux = vec![];
     let mut previous: Option<usize> = None;
     let rays = FOREFOOT.metatarsals.iter().zip(&FOREFOOT.toes);
     for ((metatarsal, toe), forward) in rays.zip(ray_shifts_mm(p)) {
@@ -173,6 +181,9 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
             tubular(metatarsal.base, head, 2.0, 220.0),
         );
         previous = Some(last);
+        if hallux.is_empty() {
+            hallux = vec![(last, 0.8 * gap), (last + 1, gap)];
+        }
         let distal = toe.phalanges.len() - 1;
         for (place, bone) in toe.phalanges.iter().enumerate() {
             let [base, end] = [bone.base, bone.end].map(moved);
@@ -184,5 +195,12 @@ pub(super) fn append(bones: &mut Vec<Bone>, p: &Parameters, hindfoot: &Hindfoot)
                 tubular(base, end, 1.2, 180.0),
             );
         }
+    }
+
+    let [first, ..] = ray_shifts_mm(p);
+    for (name, [x, y, z], semi) in SESAMOIDS {
+        let centre = [x, y - first, z];
+        let sesamoid = push(name, Shape::ellipsoid(centre, semi), &hallux, spongy());
+        hallux.push((sesamoid, gap));
     }
 }

@@ -15,7 +15,7 @@ fn bones_of_p01_have_the_volumes_of_a_man() {
     for bone in lattice(&LIMB, step_mm).filter_map(|p| LIMB.bone(&p)) {
         *volume_ml.entry(bone).or_default() += step_mm.powi(3) / 1000.0;
     }
-    assert_eq!(volume_ml.len(), 28, "{volume_ml:?}");
+    assert_eq!(volume_ml.len(), 30, "{volume_ml:?}");
     // Adult men; the leg bones as far as the scan shows them.
     for (name, low, high) in [
         ("talus", 30.0, 48.0),
@@ -24,6 +24,8 @@ fn bones_of_p01_have_the_volumes_of_a_man() {
         ("cuboid", 10.0, 20.0),
         ("tibia", 130.0, 220.0),
         ("fibula", 25.0, 50.0),
+        ("medial sesamoid", 0.25, 0.6),
+        ("lateral sesamoid", 0.2, 0.5),
     ] {
         let ml = volume_ml[name];
         assert!((low..high).contains(&ml), "{name} of {ml} ml");

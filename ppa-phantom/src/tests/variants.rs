@@ -222,7 +222,7 @@ fn the_left_limb_of_a_phantom_differs_by_about_a_percent() {
 fn labels_name_the_bone_at_every_voxel() {
     let ct = LIMB.voxelise(4.0, TableTop::Absent).unwrap();
     let (labels, names) = (LIMB.bone_labels(ct.grid()), LIMB.bone_names());
-    assert_eq!((labels.len(), names.len()), (ct.hu().len(), 28));
+    assert_eq!((labels.len(), names.len()), (ct.hu().len(), 30));
     for (index, label) in labels.iter().enumerate() {
         let p = ct.grid().centre(ct.grid().voxel(index).map(|v| v as f64));
         let name = label.checked_sub(1).map(|n| names[usize::from(n)]);
