@@ -185,9 +185,15 @@ pub(super) fn envelope(
     let from_leg = leg_placement.inverse();
     let insertion = from_leg * (heel * Point3::new(-3.0, 44.0, -42.0));
     let achilles = achilles(p, insertion);
-    // Between tibia and tendon, with which it moves.
+    // Kager's fat, between the tendon, with which it moves, and the deep flexors behind the tibia.
     let [_, back, _] = below_the_back(p, &SKIN.shank[3], 17.5);
-    let kager = Shape::ellipsoid([-2.0, back, 18.0], [13.0, 12.0, 38.0]);
+    let kager = Shape::common(
+        3.0,
+        vec![
+            Shape::ellipsoid([-2.0, back, 18.0], [13.0, 12.0, 38.0]),
+            mortise.wall([0.0, -1.0, 0.0], [0.0, 23.5, 0.0]),
+        ],
+    );
     let heel_pad = Shape::ellipsoid([-3.0, 27.0, 6.0 - SOLE_DEPTH_MM], [26.0, 30.0, 16.0]);
     let size = leg_placement.scaling();
     let sole = sole().placed(foot_placement);

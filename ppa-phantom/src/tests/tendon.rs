@@ -1,6 +1,6 @@
-//! The Achilles tendon.
+//! The Achilles tendon and the fat in front of it.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Unit, Vector3};
 
 use super::family;
 use crate::*;
@@ -49,4 +49,24 @@ fn the_achilles_tendon_follows_the_skin() {
         }
     }
     assert!(off.is_empty(), "{off:#?}");
+}
+
+/// From behind towards the tibia: skin, tendon, Kager's fat of 8 to 30 mm, the deep flexors, bone.
+#[test]
+fn kagers_fat_lies_between_tendon_and_flexors() {
+    for (name, leg) in family() {
+        let size = leg.parameters.size;
+        for height in [15.0, 25.0, 35.0] {
+            let behind = leg.mortise_point(0.0, 0.0, height * size) + Vector3::y() * 90.0;
+            let forward = Unit::new_unchecked(-Vector3::y());
+            let chords = leg.chords(&behind, &forward, 120.0);
+            let tendon = chords.iter().position(|c| c.tissue == Tissue::Tendon);
+            let inwards = &chords[tendon.expect("a tendon") + 1..][..3];
+            let tissues = [Tissue::Fat, Tissue::SoftTissue, Tissue::Cortical];
+            let found: Vec<Tissue> = inwards.iter().map(|c| c.tissue).collect();
+            assert_eq!(found, tissues, "{name} at {height}: {chords:?}");
+            let fat_mm = inwards[0].length_mm() / size;
+            assert!((8.0..30.0).contains(&fat_mm), "{name}: {fat_mm}");
+        }
+    }
 }
