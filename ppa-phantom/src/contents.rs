@@ -139,11 +139,12 @@ impl Limb {
             if let Some(scar) = &filling.scar {
                 spongy += scar.hu(p, width_mm);
             }
-            if self.texture_hu > 0.0 && core > 0.0 && marrow < 1.0 {
+            if self.texture_share > 0.0 && core > 0.0 && marrow < 1.0 {
                 let trabeculae = &filling.trabeculae;
                 let place = trabeculae.place(p);
                 let texture = self.texture.at(&place, trabeculae.width(width_mm));
-                spongy += self.texture_hu * trabeculae.gain() * texture;
+                let trabecular = filling.trabecular_hu - MARROW_HU;
+                spongy += self.texture_share * trabecular * trabeculae.gain() * texture;
             }
             let core_hu = spongy + marrow * (MARROW_HU - spongy);
             bone_share += share;

@@ -208,7 +208,7 @@ impl Limb {
                 cut: [Some(-REACH_MM), Some(REACH_MM)],
             },
             table_top_y: JOINT_CENTRE_MM[1] + TABLE_DEPTH_MM,
-            texture_hu: 45.0,
+            texture_share: 0.22,
             texture: Texture::new(0),
         }
     }

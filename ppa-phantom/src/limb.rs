@@ -32,8 +32,8 @@ pub struct Limb {
     pub(super) scan: ScanRange,
     /// Height of the table top, `ct` y in mm.
     pub(super) table_top_y: f64,
-    /// Standard deviation of spongy bone between voxels of 0.8 mm, HU.
-    pub(super) texture_hu: f64,
+    /// Standard deviation of spongy bone between voxels of 0.8 mm, over what its trabeculae add to marrow.
+    pub(super) texture_share: f64,
     /// Where it is denser.
     pub(super) texture: Texture,
 }

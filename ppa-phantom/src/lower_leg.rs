@@ -16,6 +16,7 @@ use super::placement::Placement;
 use super::plate::Plate;
 use super::sdf::{Plane, Shape};
 use super::texture::Texture;
+use super::trabeculae::MARROW_HU;
 use super::{hindfoot, midfoot_forefoot, tibia_fibula};
 
 /// A lower leg and foot of known shape; as a [`Limb`] it can be voxelised and asked for its tissues.
@@ -120,7 +121,8 @@ impl LowerLeg {
                 cut: [None, Some(top)],
             },
             table_top_y: ct_from_limb.translation.y + rest.depth_mm,
-            texture_hu: parameters.trabecular_texture_hu,
+            texture_share: parameters.trabecular_texture_hu
+                / (parameters.trabecular_hu - MARROW_HU),
             texture: Texture::new(parameters.texture_seed),
         };
         Self {

@@ -62,7 +62,7 @@ pub(super) struct Parameters {
     pub tibia_cortex_mm: [f64; 3],
     /// HU of spongy bone in the distal tibia; 290 mg/cm³ (PubMed 23103330). Other bones in proportion.
     pub trabecular_hu: f64,
-    /// Standard deviation of spongy bone between voxels of 0.8 mm, HU.
+    /// Standard deviation of spongy bone in the distal tibia between voxels of 0.8 mm, HU; other bones in proportion.
     pub trabecular_texture_hu: f64,
     /// Seed of the places where spongy bone is denser.
     pub texture_seed: u64,
@@ -106,7 +106,7 @@ pub(super) const P01: Parameters = Parameters {
     metatarsal_heads_mm: [-0.5, -4.5, -11.0, -19.5],
     tibia_cortex_mm: [1.2, 3.6, 4.8],
     trabecular_hu: 280.0,
-    trabecular_texture_hu: 45.0,
+    trabecular_texture_hu: 70.0,
     texture_seed: 0,
     ankle_girth: 1.0,
     calf_girth: 1.0,

@@ -146,11 +146,18 @@ pub(super) fn tibia(p: &Parameters, mortise: &Mortise, flexion: &Placement, talu
         [-0.45, 0.0, -0.89],
         [-14.0 - p.lateral_shift_mm(), 0.0, -3.0],
     );
-    // Assumed 12.5 mm above the joint, with a hump in front and medially (Poland's).
+    // Assumed 12.5 mm above the joint, with a hump in front and medially (Poland's), wavy elsewhere.
+    let scar_mm = 12.5;
+    let hump = |medial, posterior, mm| (at(medial, posterior, scar_mm).into(), mm);
     let scar = PhysealScar {
-        below_hump: at(9.0, -8.0, 12.5).into(),
+        humps: vec![
+            hump(9.0, -8.0, 3.0),
+            hump(-9.0, 9.0, -1.6),
+            hump(-10.0, -7.0, 1.2),
+            hump(8.0, 10.0, 1.0),
+        ],
         axis: Vector3::z_axis(),
-        hump_mm: 3.0,
+        level: at(0.0, 0.0, scar_mm).into(),
         size: 1.0,
     };
     let [thin, distal, middle] = cortex_shares(p);

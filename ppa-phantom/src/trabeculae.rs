@@ -9,7 +9,7 @@ use super::texture::variance_seen;
 pub(super) const MARROW_HU: f64 = -40.0;
 /// HU of the tissue of trabeculae, of about 2 g/cm³; assumed.
 const TRABECULA_HU: f64 = 1960.0;
-/// Voxels in which the texture of a bone has the standard deviation of the parameters, mm.
+/// Voxels in which the texture has the standard deviation of the parameters, mm.
 const TEXTURE_VOXEL_MM: f64 = 0.8;
 
 /// Lines that trabeculae follow.

@@ -22,7 +22,7 @@ fn peak(leg: &LowerLeg, [medial, posterior, proximal]: [f64; 3], voxel_mm: f64) 
     [-3.0 + highest.expect("voxels") as f64 * voxel_mm, sum]
 }
 
-/// 12.5 mm above the joint, 15.5 mm on top of the hump; 300 HU with a profile of 0.4 mm standard deviation sum up to 301 HU mm. The
+/// 12.5 mm above the joint, 15.5 mm on top of the hump; 220 HU with a profile of 0.4 mm standard deviation sum up to 221 HU mm. The
 /// density around it is not quite linear.
 #[test]
 fn physeal_scar_crosses_the_tibia_above_the_joint() {
@@ -31,12 +31,12 @@ fn physeal_scar_crosses_the_tibia_above_the_joint() {
         ..P01
     };
     let even = LowerLeg::new(even, Side::Right);
-    for place in [[-6.0, 4.0, 12.5], [9.0, -8.0, 15.5]] {
+    for place in [[0.0, 1.0, 12.5], [9.0, -8.0, 15.5]] {
         for voxel_mm in [0.25, 1.0] {
             let [found, sum] = peak(&even, place, voxel_mm);
             println!("{place:?}: {found} mm, {sum:.0} HU mm in voxels of {voxel_mm} mm");
             assert!(found.abs() < 0.4 + 0.5 * voxel_mm, "{found}");
-            assert!((sum - 301.0).abs() < 60.0, "{sum}");
+            assert!((sum - 221.0).abs() < 50.0, "{sum}");
         }
     }
     // With the texture of P01 it still is the densest line across the bone.
