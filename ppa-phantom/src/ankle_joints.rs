@@ -1,7 +1,7 @@
 //! Subchondral plates of the ankle and of the subtalar joint.
 //!
-//! Thicknesses are assumed within 0.5 to 1.5 mm. That they vary from place to place, in many tali with maxima on the medial and on the
-//! lateral side of the trochlea, is known from micro CT of ten of them (Surg Radiol Anat 2013;35:283).
+//! Thicknesses are assumed within 0.5 to 1.5 mm. They vary from place to place: bone below the trochlea is densest on its medial
+//! and its lateral side, or in one place (micro CT of ten tali, Surg Radiol Anat 2013;35:283).
 
 use nalgebra::{Unit, Vector3};
 

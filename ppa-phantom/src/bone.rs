@@ -33,6 +33,7 @@ pub(super) struct Filling {
     /// HU of trabecular bone far from the surface.
     pub trabecular_hu: f64,
     pub trabeculae: Trabeculae,
+    /// Where the bone has grown in length.
     pub scar: Option<PhysealScar>,
 }
 

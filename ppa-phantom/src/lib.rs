@@ -1,7 +1,8 @@
 //! Analytic phantoms: limbs built from signed-distance shapes, whose true shape is known everywhere.
 //!
 //! [`LowerLeg`] is a lower leg and foot, supine on a table top with the toes up: tibia and fibula, a talus with a real
-//! trochlea in its mortise, the other twenty-five bones of the foot, two sesamoids, muscle, fat and skin. [`LowerLeg::p01`] is that of an average adult man; P02 to P17 and any further by seed spread over published means and standard
+//! trochlea in its mortise, the other twenty-five bones of the foot, two sesamoids, muscle, fat and skin. [`LowerLeg::p01`]
+//! is that of an average adult man; P02 to P17 and any further by seed spread over published means and standard
 //! deviations (`data/family.toml` names the sources). [`Limb::knee`] is another joint. They are phantoms, not persons:
 //! what goes together with what in people is mostly unknown and left out.
 //!

@@ -17,7 +17,7 @@ const OCTAVES: usize = 5;
 /// distance along a line across the trabeculae.
 const FINEST_CELL: f64 = 0.35;
 /// Variance of an octave over that of the next finer one. Equal variances would make the exponent a little
-/// more than 3; less in the coarse ones makes it about 2.8, within the 2.6 to 3 of projected bone.
+/// more than 3; less in the coarse ones makes it about 2.8, in the middle of the 2.6 to 3 assumed for projected bone.
 const COARSER: f64 = 0.7;
 
 /// One octave of the field.

@@ -13,8 +13,8 @@ fn first_cortex_mm(leg: &LowerLeg, from: &Point3<f64>, along: &Unit<Vector3<f64>
     cortex.expect("bone within 60 mm").length_mm()
 }
 
-/// From the middle of the superior gutter up and down: 1.0 mm in the middle, with the square of the distance to 1.5 mm at the facets. The
-/// trochlea is inclined by up to 15° there.
+/// From the middle of the superior gutter up and down: 1.0 mm in the middle, and with the square of the distance 1.5 mm at the
+/// facets. The trochlea is inclined by up to 15° there.
 #[test]
 fn plates_of_the_ankle_thicken_towards_both_sides() {
     for (name, leg) in family().filter(|(name, _)| ["P01", "P06", "P13"].contains(&&**name)) {

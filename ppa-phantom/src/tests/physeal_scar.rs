@@ -6,8 +6,8 @@ use super::LIMB;
 use crate::parameters::{P01, Parameters};
 use crate::*;
 
-/// How far above a place in the tibia the densest voxel of a column around it lies, mm, and the sum over the column of what lies above
-/// its ends, HU mm.
+/// How far above a place in the tibia the densest voxel of a column around it lies, mm, and the sum over the column of what lies
+/// above its ends, HU mm.
 fn peak(leg: &LowerLeg, [medial, posterior, proximal]: [f64; 3], voxel_mm: f64) -> [f64; 2] {
     let low = leg.mortise_point(medial, posterior, proximal) - Vector3::z() * 3.0;
     let high = low + Vector3::z() * 6.0 + Vector3::repeat(1e-6);
