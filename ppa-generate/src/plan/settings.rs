@@ -97,7 +97,7 @@ pub struct XraySettings {
     /// Largest voxel that photons travel through, mm: thicker slices are interpolated, so that
     /// bone edges do not come out as stairs.
     pub max_voxel_mm: f64,
-    /// What lies between the centres of these voxels.
+    /// Density between the centres of these voxels.
     pub interpolation: Interpolation,
     /// HU to material and density, written out as `[[xray.calibration.segment]]`.
     pub calibration: HuCalibration,

@@ -191,7 +191,7 @@ fn coarse_voxels_show_the_mean_of_fine_ones() {
     assert!(alike > 0.85, "{alike}");
 }
 
-/// In every bone, with the texture of several seeds, and with volume fractions as published: calcaneus 0.13 to 0.2.
+/// In every bone, with the texture of several seeds, and with volume fractions in assumed ranges: calcaneus 0.13 to 0.2.
 #[test]
 fn texture_leaves_the_mean_density_of_spongy_bone() {
     let even = p01(0, 0.0).voxelise(2.0, TableTop::Absent).unwrap();
