@@ -75,14 +75,15 @@ fn loss(network: &EfficientNetB0, io: &HashMap<String, Tensor>) -> (f64, GradSto
 #[ignore = "needs the reference values of PyTorch in PPA_SHARED"]
 fn evaluation_is_that_of_pytorch() {
     let (network, io) = (network(), tensors("b0_seed1_io.safetensors"));
-    for (input, expected) in [
-        ("input", "eval_output_f64"),
-        ("extra0_input", "extra0_eval_output"),
+    // PyTorch computed the second one in `f32`: both round, and ours depends on the processor's vector instructions.
+    for (input, expected, tolerance) in [
+        ("input", "eval_output_f64", 1e-5),
+        ("extra0_input", "extra0_eval_output", 3e-5),
     ] {
         let out = network.forward(&io[input], Mode::Eval).unwrap();
         let error = largest_difference(&out, &io[expected]);
         println!("{input}: {error:.1e}");
-        assert!(error < 1e-5, "{input}: {error}");
+        assert!(error < tolerance, "{input}: {error}");
     }
 }
 
