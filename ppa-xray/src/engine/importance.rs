@@ -8,8 +8,9 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::engine::attenuation_basis::LANES;
+use crate::engine::cell_walk::Step;
 use crate::engine::collision_map::CollisionMap;
-use crate::engine::paths::{Paths, Step};
+use crate::engine::paths::Paths;
 use crate::engine::scatter_table::ScatterTable;
 use crate::engine::site::Site;
 use crate::matter::scatter_density::ScatterDensities;

@@ -11,6 +11,7 @@ pub(crate) mod analog;
 pub(crate) mod analog_image;
 mod attenuation_basis;
 mod cdf;
+mod cell_walk;
 mod coarse_cells;
 mod collision_map;
 mod delta_tracking;
