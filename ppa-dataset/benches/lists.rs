@@ -35,6 +35,8 @@ fn row(patient: u32, step: u32) -> FileRow {
         patient_from_ct: still,
         room_from_patient: still,
         ct_from_device: Some(still),
+        mas: None,
+        exposure_index: None,
         seed: Some(u64::from(step)),
     }
 }

@@ -63,6 +63,13 @@ pub struct FileRow {
     /// Radiographs: pose of the x-ray device in the scan.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub ct_from_device: Option<TransformRows>,
+    /// Radiographs: tube load whose noise the image carries, mAs; left out for the expected image and where the fluence of the tube is
+    /// unknown.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub mas: Option<f64>,
+    /// Radiographs: exposure index of IEC 62494-1.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub exposure_index: Option<f64>,
     /// Seed of a radiograph's histories and noise, or of a depth sensor's noise.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub seed: Option<u64>,

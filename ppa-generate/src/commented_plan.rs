@@ -123,6 +123,16 @@ const KEYS: &[(&str, &str, &str)] = &[
         "a limb is refused if more of a region of interest is cut",
     ),
     ("xray", "kvp", "tube voltage"),
+    (
+        "xray.tube_load",
+        "mas",
+        "replaces dose_histories; or exposure_index = 250",
+    ),
+    (
+        "xray.source",
+        "blades_mm",
+        "from the focal spot to the collimator blades",
+    ),
     ("xray", "anode_angle_deg", "of the tungsten anode"),
     ("xray", "filters", "MATERIAL:mm"),
     (
@@ -240,6 +250,7 @@ const OFF: &[(&str, &[&str])] = &[
         "xray",
         &[
             "#analog = { histories = 20000000 }    # analog Monte Carlo in place of [xray.engine]: photons followed per radiograph",
+            "#tube_load = { exposure_index = 250 }    # automatic exposure control, or { mas = 4 }; replaces dose_histories below",
             "#max_cut_share = 0.01    # a limb is refused if more of the rays around the joint pass through a cut face",
             "#calibration_file = \"hu.toml\"    # HU to material and density from a file, instead of the table below",
         ],
@@ -247,6 +258,7 @@ const OFF: &[(&str, &[&str])] = &[
     (
         "xray.source",
         &[
+            "#blades_mm = 250    # from the focal spot to the collimator blades: the field gets a half-shadow",
             "#heel_effect = { anode_towards_deg = -90 }    # from the device's x towards its y; -90 is the head's side",
         ],
     ),
@@ -334,6 +346,7 @@ impl Plan {
 
 /// A plan as TOML with comments.
 fn commented(toml: &str) -> String {
+    let given: toml::Table = toml.parse().expect("what was just written");
     let mut text = HEADER.to_owned();
     let mut table = String::new();
     let mut is_calibration = false;
@@ -341,7 +354,7 @@ fn commented(toml: &str) -> String {
         if line.starts_with('[') {
             text.truncate(text.trim_end().len());
             text.push('\n');
-            off(&mut text, &table);
+            off(&mut text, &table, &given);
             text.push('\n');
             let began = is_calibration;
             table = line.trim_matches(['[', ']']).to_owned();
@@ -368,14 +381,25 @@ fn commented(toml: &str) -> String {
     }
     text.truncate(text.trim_end().len());
     text.push('\n');
-    off(&mut text, &table);
+    off(&mut text, &table, &given);
     text + OFF_TABLES
 }
 
-/// Adds the settings of a table that are off.
-fn off(text: &mut String, table: &str) {
+/// Adds the settings of a table that are off; `given` holds those that are not.
+fn off(text: &mut String, table: &str, given: &toml::Table) {
+    let mut keys = Some(given);
+    for name in table.split('.').filter(|name| !name.is_empty()) {
+        keys = keys.and_then(|keys| keys.get(name)?.as_table());
+    }
+    let is_given = |line: &str| {
+        let key = line.trim_start_matches('#').split(" = ").next();
+        keys.is_some_and(|keys| key.is_some_and(|key| keys.contains_key(key)))
+    };
     let lines = OFF.iter().filter(|(of, _)| *of == table);
-    for line in lines.flat_map(|(_, lines)| *lines) {
+    for line in lines
+        .flat_map(|(_, lines)| *lines)
+        .filter(|line| !is_given(line))
+    {
         text.push_str(line);
         text.push('\n');
     }
@@ -384,6 +408,7 @@ fn off(text: &mut String, table: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::technique::Technique;
 
     fn plan() -> Plan {
         Plan::new(vec![PlanCase {
@@ -424,6 +449,22 @@ mod tests {
         assert!(read.room_file.is_some() && read.room.table.is_some());
         assert!(read.depth.sensor.is_some() && read.xray.receptor.grid.is_some());
         assert_eq!(read.xray.calibration, plan().xray.calibration);
+    }
+
+    /// Switched on, a setting would stand there twice.
+    #[test]
+    fn settings_of_a_technique_are_not_among_those_off() {
+        for (_, technique) in Technique::ALL {
+            let mut plan = plan();
+            technique.apply(&mut plan.xray);
+            let text = commented(&to_toml(&plan, Path::new("plan.toml")).unwrap());
+            let read: Plan = toml::from_str(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+            assert_eq!(read.xray, plan.xray);
+            for key in ["#tube_load", "#heel_effect", "#blades_mm", "#blur"] {
+                assert!(!text.contains(key), "{key}\n{text}");
+            }
+            assert!(text.contains("#grid"));
+        }
     }
 
     /// Serde names the keys that it expects when it meets another one.

@@ -91,6 +91,24 @@ impl<'a> ExposableLimb<'a> {
 }
 
 impl PosedExposure<'_> {
+    /// The settings with the histories of the plan's tube load, if it has one.
+    ///
+    /// # Errors
+    /// As [`PreparedPhantom::histories`].
+    pub fn fast_settings(&self, settings: FastSettings) -> Result<FastSettings, TransportError> {
+        let ExposableLimb {
+            phantom, spectrum, ..
+        } = self.limb;
+        let Some(load) = self.limb.settings().tube_load else {
+            return Ok(settings);
+        };
+        let dose_histories = phantom.histories(load, spectrum, &self.projection, &settings)?;
+        Ok(FastSettings {
+            dose_histories,
+            ..settings
+        })
+    }
+
     /// The radiograph by the plan's engine.
     ///
     /// # Errors
@@ -106,7 +124,7 @@ impl PosedExposure<'_> {
                 ppa_xray::analog(phantom.phantom(), spectrum, &self.projection, &settings)
             }
             None => {
-                let settings = FastSettings { seed, ..*engine };
+                let settings = self.fast_settings(FastSettings { seed, ..*engine })?;
                 phantom.fast(spectrum, &self.projection, &settings)
             }
         }

@@ -56,6 +56,7 @@ mod shaped_skin;
 mod staging;
 mod status;
 mod survey;
+mod technique;
 mod toml_file;
 mod verify;
 
@@ -89,4 +90,5 @@ pub use scene_setup::{
 pub use shaped_skin::{ShapeSettings, body_shape};
 pub use status::{LimbStatus, Status, status};
 pub use survey::DatasetDiffers;
+pub use technique::Technique;
 pub use verify::{Verification, VerifyError, verify};

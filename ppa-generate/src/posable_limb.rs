@@ -258,11 +258,15 @@ impl<'a> PosableLimb<'a> {
         radiograph.write_png(&prepare_folder(root, &png)?, &self.plan.xray.presentation)?;
         let exr = self.id.radiograph_exr(pose.step);
         radiograph.write_exr(&root.join(&exr))?;
+        let receptor = &exposure.projection.receptor;
+        let exposure_index = radiograph.exposure_index(receptor).ok().flatten();
         let row = |file, kind| {
             Ok::<_, PoseError>(FileRow {
                 ct_from_device: Some(rows_from_isometry(&exposure.projection.ct_from_device)),
                 seed: Some(seed),
                 cut_share: (cut > 0.0).then_some(cut),
+                mas: radiograph.mas().filter(|mas| mas.is_finite()),
+                exposure_index,
                 ..self.row(root, file, kind, pose, &exposure.placement)?
             })
         };
@@ -300,6 +304,8 @@ impl<'a> PosableLimb<'a> {
                 .to_homogeneous_rows(),
             room_from_patient: placement.room_from_patient.to_homogeneous_rows(),
             ct_from_device: None,
+            mas: None,
+            exposure_index: None,
             seed: None,
         })
     }

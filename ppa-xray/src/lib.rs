@@ -89,6 +89,7 @@ pub use engine::fast::fast;
 pub use engine::fast_settings::FastSettings;
 pub use engine::prepared_phantom::PreparedPhantom;
 pub use engine::raytrace::primary;
+pub use engine::tube_load::TubeLoad;
 #[cfg(feature = "dicom")]
 pub use image::dx::{
     DxExposure, DxIntent,

@@ -25,6 +25,7 @@ pub mod qa;
 pub mod scene;
 pub mod stats;
 pub mod status;
+mod technique;
 pub mod train;
 pub mod verify;
 pub mod xray;

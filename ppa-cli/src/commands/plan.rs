@@ -9,6 +9,7 @@ use ppa_generate::{Forecast, Plan, forecast};
 use serde::Serialize;
 
 use super::generate::dataset_folder;
+use super::technique::TechniqueArgs;
 use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::{Output, bytes};
 use crate::output_files::ReplaceArgs;
@@ -43,6 +44,8 @@ struct InitArgs {
     /// Cases written by `ppa prepare`; those of one scan become limbs of one patient
     #[arg(required = true)]
     cases: Vec<PathBuf>,
+    #[command(flatten)]
+    technique: TechniqueArgs,
     /// Plan file to write
     #[arg(long, default_value = "plan.toml")]
     out: PathBuf,
@@ -63,6 +66,8 @@ struct Estimate {
 struct Begun {
     plan: PathBuf,
     limbs: usize,
+    #[serde(skip)]
+    settings: String,
 }
 
 pub fn run(args: &PlanArgs, output: Output) -> anyhow::Result<()> {
@@ -76,17 +81,20 @@ pub fn run(args: &PlanArgs, output: Output) -> anyhow::Result<()> {
 fn init(args: &InitArgs, output: Output) -> anyhow::Result<()> {
     let mut outputs = args.replace.outputs();
     outputs.file("--out", &args.out, &[".toml"])?;
-    let plan = Plan::of_cases(args.cases.iter().map(PathBuf::as_path))?;
+    let mut plan = Plan::of_cases(args.cases.iter().map(PathBuf::as_path))?;
+    args.technique.apply(&mut plan.xray);
     plan.write_commented(&args.out)?;
     let begun = Begun {
         plan: args.out.clone(),
         limbs: plan.cases.len(),
+        settings: args.technique.describe(),
     };
     output.print(&begun, |begun| {
         let plan = begun.plan.display();
         format!(
-            "{plan}: {}, all settings at their defaults; ppa plan {plan} estimates its cost",
-            count(begun.limbs, "limb")
+            "{plan}: {}, {}; ppa plan {plan} estimates its cost",
+            count(begun.limbs, "limb"),
+            begun.settings
         )
     })
 }

@@ -222,6 +222,8 @@ fn row(pose_job: &PoseJob, file: String, kind: FileKind, shape: BodyShape, to: &
         patient_from_ct: POSE,
         room_from_patient: POSE,
         ct_from_device: None,
+        mas: None,
+        exposure_index: None,
         seed: None,
     }
 }

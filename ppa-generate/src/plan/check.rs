@@ -62,6 +62,13 @@ impl Plan {
         if self.xray.engine.seed != 0 {
             return Err("xray.engine.seed is given, but the plan's seed decides".to_owned());
         }
+        if let Some(load) = &self.xray.tube_load {
+            load.check()
+                .map_err(|error| format!("xray.tube_load: {error}"))?;
+            if self.xray.analog.is_some() {
+                return Err("xray.tube_load is given with xray.analog, whose histories are followed one by one".to_owned());
+            }
+        }
         if let Some(analog) = &self.xray.analog {
             if analog.seed != 0 {
                 return Err("xray.analog.seed is given, but the plan's seed decides".to_owned());

@@ -7,7 +7,7 @@ use ppa_depth::{RigSpec, SensorSpec, WallDepth};
 use ppa_scene::{PlaneSettings, RoomSpec};
 use ppa_xray::{
     AnalogSettings, Detector, FastSettings, HuCalibration, Interpolation, Presentation, Receptor,
-    Source,
+    Source, TubeLoad,
 };
 use serde::{Deserialize, Serialize};
 
@@ -104,6 +104,9 @@ pub struct XraySettings {
     /// HU to material and density from a file instead; reading the plan puts its contents in place of the path.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration_file: Option<PathBuf>,
+    /// Tube load of a radiograph, which replaces the histories of `engine`: mAs, or an exposure index for automatic exposure control.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tube_load: Option<TubeLoad>,
     /// The fast engine.
     pub engine: FastSettings,
     /// Analog Monte Carlo in place of the fast engine, which is used when this is left out.
@@ -131,6 +134,7 @@ impl Default for XraySettings {
             interpolation: Interpolation::Trilinear,
             calibration: HuCalibration::default(),
             calibration_file: None,
+            tube_load: None,
             engine: FastSettings::default(),
             analog: None,
             presentation: Presentation::default(),

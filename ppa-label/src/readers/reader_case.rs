@@ -108,6 +108,8 @@ mod tests {
             patient_from_ct: [[0.0; 4]; 4],
             room_from_patient: [[0.0; 4]; 4],
             ct_from_device: None,
+            mas: None,
+            exposure_index: None,
             seed: None,
         };
         Manifest {

@@ -3,6 +3,7 @@
 use nalgebra::{Point2, Point3, Vector3};
 use ppa_core::random::Philox;
 
+use crate::beam::blades::Blades;
 use crate::beam::field::Field;
 use crate::beam::heel::{Heel, Mixture, lattice_on};
 use crate::beam::projection::Projection;
@@ -29,6 +30,8 @@ pub(crate) struct Emitter {
     spectrum: Spectrum,
     spot: FocalSpot,
     plane: SpotPlane,
+    blades: Blades,
+    /// What photons from any point of the spot reach.
     field: Field,
     distance_mm: f64,
     /// Smallest distance from the spot to the detector plane, along z.
@@ -49,8 +52,14 @@ impl Emitter {
         projection.validate()?;
         let spot = projection.source.focal_spot;
         let plane = SpotPlane::square_to(&projection.central_ray);
-        let field = projection.field();
         let distance_mm = projection.source_detector_mm;
+        let blades = Blades::new(
+            projection.field(),
+            distance_mm,
+            projection.source.blades_mm,
+            [plane.axes[0].x, plane.axes[1].y],
+        );
+        let field = blades.reached(&spot);
         let tilt: f64 = plane.axes.iter().map(|axis| axis.z.abs()).sum();
         // A spot of 2 % of the distance, the largest there is, takes less than a tenth of it away.
         let nearest_mm = distance_mm - spot.reach_mm() * tilt;
@@ -67,6 +76,7 @@ impl Emitter {
             spectrum: spectrum.clone(),
             spot,
             plane,
+            blades,
             field,
             distance_mm,
             nearest_mm,
@@ -81,16 +91,17 @@ impl Emitter {
     /// ∫ I dΩ over the field for photons from one point of the spot.
     fn emitted_from_sr(&self, spot: &Point3<f64>) -> f64 {
         let height_mm = self.distance_mm - spot.z;
+        let field = self.blades.field_from(spot);
         if self.heel.is_none() {
-            return self.field.solid_angle_sr(spot.xy(), height_mm);
+            return field.solid_angle_sr(spot.xy(), height_mm);
         }
-        let size = self.field.size_mm();
+        let size = field.size_mm();
         let share = |i: u32| (f64::from(i) + 0.5) / f64::from(FIELD_POINTS);
         let cell_mm2 = size[0] * size[1] / f64::from(FIELD_POINTS * FIELD_POINTS);
         (0..FIELD_POINTS * FIELD_POINTS)
             .map(|n| {
-                let x = self.field.low_mm[0] + size[0] * share(n % FIELD_POINTS);
-                let y = self.field.low_mm[1] + size[1] * share(n / FIELD_POINTS);
+                let x = field.low_mm[0] + size[0] * share(n % FIELD_POINTS);
+                let y = field.low_mm[1] + size[1] * share(n / FIELD_POINTS);
                 self.intensity_per_mm2(spot, Point2::new(x, y)) * cell_mm2
             })
             .sum()
@@ -121,6 +132,9 @@ impl Emitter {
                 (Point3::origin(), Vector3::new(x, y, d), 1.0)
             } else {
                 let origin_mm = self.plane.at(spot);
+                if !self.lights(&origin_mm, Point2::new(x, y)) {
+                    continue;
+                }
                 let ray = Point3::new(x, y, d) - origin_mm;
                 (origin_mm, ray, (self.nearest_mm / ray.z).powi(2))
             };
@@ -154,9 +168,25 @@ impl Emitter {
         (self.spot.is_point() && self.heel.is_none()).then_some(&self.spectrum)
     }
 
-    /// Field of the beam in the detector plane: no photon is sent outside it.
+    /// Field of the beam in the detector plane, half-shadow included: no photon is sent outside it.
     pub fn field(&self) -> &Field {
         &self.field
+    }
+
+    /// What the whole focal spot lights.
+    pub fn fully_lit(&self) -> Field {
+        self.blades.fully_lit(&self.spot)
+    }
+
+    /// Whether the blades let photons from a point of the focal spot through to a place of the detector plane.
+    #[inline]
+    pub fn lights(&self, spot: &Point3<f64>, at: Point2<f64>) -> bool {
+        self.blades.field_from(spot).contains(&at)
+    }
+
+    /// Share of a strip of the focal spot, of `count` along each axis as in [`FocalSpot::strips_mm`], that the blades let through.
+    pub fn lit_share(&self, strips: [usize; 2], count: usize, at: Point2<f64>) -> f64 {
+        self.blades.lit_share(&self.spot, strips, count, at)
     }
 
     /// The focal spot.
@@ -182,7 +212,7 @@ impl Emitter {
     }
 
     /// Photons per cm² and history at device (x, y) of the bare detector plane if all left from `spot`,
-    /// inside the field; how many of them come from which spectrum says [`Emitter::mixture`].
+    /// where [`Emitter::lights`]; how many of them come from which spectrum says [`Emitter::mixture`].
     pub fn open_fluence_cm2(&self, spot: &Point3<f64>, at: Point2<f64>) -> f64 {
         100.0 * self.intensity_per_mm2(spot, at) / self.emitted_sr
     }
@@ -306,9 +336,10 @@ mod tests {
                 let share = [n % fine, n / fine].map(|i| (i as f64 + 0.5) / fine as f64);
                 let at = Point2::from([0, 1].map(|a| field.low_mm[a] + share[a] * size[a]));
                 let cm2 = size[0] * size[1] / 100.0 / (fine * fine) as f64;
-                for spot in &spots {
+                for (index, spot) in spots.iter().enumerate() {
+                    let lit = emitter.lit_share([index % 6, index / 6], 6, at);
                     expected[6 * n / fine % 6 + 6 * (6 * (n / fine) / fine)] +=
-                        cm2 * emitter.open_fluence_cm2(spot, at) / spots.len() as f64;
+                        cm2 * lit * emitter.open_fluence_cm2(spot, at) / spots.len() as f64;
                 }
             }
             let sum: f64 = expected.iter().sum();

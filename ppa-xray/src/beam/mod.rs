@@ -1,5 +1,6 @@
 //! What leaves the focal spot, and towards where.
 
+pub(crate) mod blades;
 pub(crate) mod emitter;
 pub(crate) mod field;
 pub(crate) mod heel;

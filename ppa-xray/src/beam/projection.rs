@@ -194,6 +194,7 @@ impl Projection {
                 size_mm: field.size_mm(),
             });
         }
+        self.check_blades(&field)?;
         for (what, rectangle) in [("detector", self.detector.field()), ("x-ray field", field)] {
             let reach_mm = rectangle.low_mm.iter().chain(&rectangle.high_mm);
             let reach_mm = reach_mm.fold(0.0, |most: f64, mm| most.max(mm.abs()));
@@ -213,7 +214,27 @@ impl Projection {
         Ok(())
     }
 
-    /// The field of the beam in the detector plane.
+    /// Refuses blades that leave no part of the field to the whole focal spot.
+    fn check_blades(&self, field: &Field) -> Result<(), ProjectionError> {
+        let Some(blades_mm) = self.source.blades_mm else {
+            return Ok(());
+        };
+        let source_detector_mm = self.source_detector_mm;
+        // The edges of the field move by D/b − 1 per mm of the spot.
+        let half_mm = 0.5 * field.size_mm()[0].min(field.size_mm()[1]);
+        let reach_mm = self.source.focal_spot.shadow_reach_mm();
+        let least_mm = source_detector_mm * reach_mm / (half_mm + reach_mm);
+        if blades_mm > least_mm && blades_mm <= source_detector_mm {
+            return Ok(());
+        }
+        Err(ProjectionError::Blades {
+            blades_mm,
+            least_mm,
+            source_detector_mm,
+        })
+    }
+
+    /// The field of the beam in the detector plane, as the middle of the focal spot sees it.
     pub(crate) fn field(&self) -> Field {
         let collimation = self.source.collimation;
         collimation.field(self.detector.field(), self.source_detector_mm)

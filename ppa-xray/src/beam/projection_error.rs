@@ -55,6 +55,18 @@ pub enum ProjectionError {
         /// Distance from the source to the detector plane, mm.
         source_detector_mm: f64,
     },
+    /// Blades behind the detector, or so close to the spot that their half-shadow fills the field.
+    #[error(
+        "the collimator blades are {blades_mm} mm from the focal spot, expected {least_mm:.1} to {source_detector_mm} mm: from where their half-shadow fills the field to the distance of the detector"
+    )]
+    Blades {
+        /// Distance from the focal spot, mm.
+        blades_mm: f64,
+        /// Where the half-shadow fills the field, mm.
+        least_mm: f64,
+        /// Distance from the source to the detector plane, mm.
+        source_detector_mm: f64,
+    },
     /// Opening angles of the fan.
     #[error("the x-ray field opens by {} x {} degrees, expected above 0 and below 170", found_deg[0], found_deg[1])]
     FanAngle {

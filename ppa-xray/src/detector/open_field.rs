@@ -20,7 +20,7 @@ pub(crate) struct OpenField {
     low_mm: [f64; 2],
     high_mm: [f64; 2],
     source_detector_mm: f64,
-    /// What the collimator leaves open.
+    /// What the collimator leaves open to the whole focal spot.
     field: Field,
     side: usize,
     /// Row by row over the detector's rectangle.
@@ -53,7 +53,7 @@ impl OpenField {
             low_mm,
             high_mm,
             source_detector_mm,
-            field: *emitter.field(),
+            field: emitter.fully_lit(),
             side,
             ratio: vec![1.0; side * side],
         };

@@ -55,7 +55,7 @@ pub(crate) fn entrance_gy_per_history(transport: &Transport) -> Option<f64> {
     let central = projection.central_ray;
     let foot_mm = projection.source_detector_mm / central.z;
     let foot = (central.xy() * foot_mm).into();
-    if !transport.emitter.field().contains(&foot) {
+    if !transport.emitter.fully_lit().contains(&foot) {
         return None;
     }
     let ray = lattice.ray(&Point3::origin(), &central);

@@ -66,7 +66,8 @@ pub(crate) fn primary_moments(
         .collect();
     let aimed = |lit: Field, scratch: &mut Scratch| {
         rays.aim_from_table(&open_beam, centre(lit), scratch);
-        rays.behind(&Point3::origin(), centre(lit), scratch)
+        let behind = rays.behind(&Point3::origin(), centre(lit), scratch);
+        behind.scaled(transport.emitter.lit_share([0; 2], 1, centre(lit)))
     };
     let columns = transport.projection.detector.columns as usize;
     let rows = transport.projection.detector.rows as usize;
@@ -199,10 +200,10 @@ fn largest_about(values: &[f32], pixel: usize, columns: usize, reach: usize) -> 
     largest.copied().fold(0.0_f32, f32::max).into()
 }
 
-/// Whether a pixel and its neighbours lie in the field.
+/// Whether a pixel and its neighbours lie in the field, out of the half-shadow of the blades.
 fn is_wholly_lit(rays: &PrimaryRays, pixel: usize) -> bool {
     let pixel = rays.pixel(pixel);
-    let field = rays.transport.emitter.field();
+    let field = rays.transport.emitter.fully_lit();
     (0..2).all(|axis| {
         let side = pixel.size_mm()[axis];
         pixel.low_mm[axis] - side >= field.low_mm[axis]
@@ -307,9 +308,14 @@ impl Cut<'_> {
 
     fn ray(&self, part: &Part, scratch: &mut Scratch) -> Moments {
         let strips_mm = &self.strips_mm[part.cuts];
-        let spot = part.strips.map(|strip| strips_mm[strip]);
-        let spot = self.rays.transport.emitter.spot_at(spot);
-        self.rays.behind(&spot, centre(part.field), scratch)
+        let emitter = &self.rays.transport.emitter;
+        let at = centre(part.field);
+        let lit = emitter.lit_share(part.strips, strips_mm.len(), at);
+        if lit == 0.0 {
+            return Moments::default();
+        }
+        let spot = emitter.spot_at(part.strips.map(|strip| strips_mm[strip]));
+        self.rays.behind(&spot, at, scratch).scaled(lit)
     }
 }
 

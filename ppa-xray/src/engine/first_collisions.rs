@@ -99,6 +99,9 @@ impl FirstFlights<'_> {
             tables, emitter, ..
         } = self.transport;
         let code = tables.draw_code(&cell, rng);
+        if !emitter.lights(&collision.spot, collision.aim) {
+            return; // the blades cover that point of the spot
+        }
         let emitted_per_mm2 = emitter.open_fluence_cm2(&collision.spot, collision.aim) / 100.0;
         let density = f64::from(code.density_g_cm3());
         let weight = weight * emitted_per_mm2 * collision.mm3 * density;

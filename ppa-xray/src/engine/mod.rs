@@ -50,4 +50,5 @@ mod site;
 pub(crate) mod small_limb;
 mod spectral_quadrature;
 mod trilinear;
+pub(crate) mod tube_load;
 mod uniform_blocks;

@@ -65,7 +65,7 @@ impl<'a> PrimaryRays<'a> {
         Field::centred([centre.x, centre.y], [detector.pixel_mm; 2])
     }
 
-    /// The part of a pixel that lies in the field: its edges are sharp.
+    /// The part of a pixel that photons reach.
     pub fn lit(&self, pixel: usize) -> Option<Field> {
         self.pixel(pixel).overlap(self.transport.emitter.field())
     }

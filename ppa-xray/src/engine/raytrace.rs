@@ -69,14 +69,19 @@ fn sampled(
     let size = lit.size_mm();
     let along = |i: u32| (f64::from(i) + 0.5) / f64::from(samples_per_side);
     let samples = samples_per_side * samples_per_side;
+    let emitter = &rays.transport.emitter;
+    let per_side = spots.len().isqrt();
     let mut sum = Moments::default();
     for sample in 0..samples {
         let at = [sample % samples_per_side, sample / samples_per_side];
         let at = [0, 1].map(|axis| lit.low_mm[axis] + along(at[axis]) * size[axis]);
         let at = Point2::from(at);
-        for spot in spots {
+        for (index, spot) in spots.iter().enumerate() {
+            let strips = [index % per_side, index / per_side];
+            let lit = emitter.lit_share(strips, per_side, at);
             rays.aim(std::slice::from_ref(spot), at, scratch);
-            sum = [sum, rays.behind(spot, at, scratch)].into_iter().sum();
+            let behind = rays.behind(spot, at, scratch).scaled(lit);
+            sum = [sum, behind].into_iter().sum();
         }
     }
     sum.scaled(area_cm2(lit) / f64::from(samples) / spots.len() as f64)

@@ -28,8 +28,18 @@ impl Radiograph {
     /// # Errors
     /// [`ReceptorError`] for a receptor that makes no sense.
     pub fn exposure_index(&self, receptor: &Receptor) -> Result<Option<f64>, ReceptorError> {
-        let signal_ev_cm2 = self.histories * self.value_of_interest_ev_cm2();
-        let kerma_ugy = signal_ev_cm2 / signal_ev_cm2_per_ugy(receptor)?;
+        let per_history = self.exposure_index_per_history(receptor)?;
+        Ok(per_history
+            .map(|index| self.histories * index)
+            .filter(|index| index.is_finite()))
+    }
+
+    /// Exposure index of one history; `None` where nothing is read.
+    pub(crate) fn exposure_index_per_history(
+        &self,
+        receptor: &Receptor,
+    ) -> Result<Option<f64>, ReceptorError> {
+        let kerma_ugy = self.value_of_interest_ev_cm2() / signal_ev_cm2_per_ugy(receptor)?;
         let index = INDEX_PER_UGY * kerma_ugy;
         Ok((index.is_finite() && index > 0.0).then_some(index))
     }

@@ -53,6 +53,12 @@ pub enum TransportError {
         /// Model that the phantom was prepared for.
         prepared: ComptonModel,
     },
+    /// A tube load cannot be turned into histories.
+    #[error("no number of histories for the tube load: {why}")]
+    TubeLoad {
+        /// What is missing.
+        why: &'static str,
+    },
     /// The observer of the progress has cancelled the work.
     #[error("the simulation was cancelled")]
     Cancelled,

@@ -50,6 +50,7 @@ fn demanding() -> Projection {
         heel_effect: Some(HeelEffect {
             anode_towards_deg: 90.0,
         }),
+        blades_mm: Some(250.0),
     };
     projection.receptor = Receptor {
         model: DetectorModel::Csi {
@@ -186,6 +187,68 @@ fn the_penumbra_is_as_wide_as_geometry_says() {
         (found / expected - 1.0).abs() < 0.06,
         "{found} mm, expected {expected} mm"
     );
+}
+
+/// The edge of the field in vacuum: standard deviation s/√12 · (D/b − 1) for blades at b; nothing is lost, only spread.
+#[test]
+fn blades_blur_the_edges_of_the_field() {
+    let vacuum = slab(10.0, 1e-9);
+    let spectrum = Spectrum::monoenergetic(50.0).unwrap();
+    let mut projection = frontal(200, 0.1);
+    projection.detector.rows = 1;
+    projection.detector.centre_mm = [50.0, 0.0];
+    projection.source.collimation = Collimation::Rectangle {
+        size_mm: [100.0; 2],
+        centre_mm: [0.0; 2],
+    };
+    let sharp = primary(&vacuum, &spectrum, &projection, 8).unwrap();
+    projection.source.focal_spot.size_mm = 1.2;
+    projection.source.blades_mm = Some(275.0);
+    let image = primary(&vacuum, &spectrum, &projection, 8).unwrap();
+    let settings = FastSettings {
+        dose_histories: f64::INFINITY,
+        scatter_histories: 320,
+        ..FastSettings::default()
+    };
+    let by_fast = fast(&vacuum, &spectrum, &projection, &settings).unwrap();
+    for (pixel, value) in by_fast.total().into_iter().enumerate() {
+        let error = f64::from(value) - image[pixel];
+        assert!(error.abs() < 2e-3 * image[0], "pixel {pixel}: {error}");
+    }
+    let steps: Vec<f64> = image.windows(2).map(|pair| pair[0] - pair[1]).collect();
+    let moment = |power: i32| -> f64 {
+        // The bare field is not quite even: 2 mm from the edge nothing is left of it.
+        let terms = steps.iter().enumerate().take(120).skip(80);
+        terms
+            .map(|(i, step)| step * (0.1 * i as f64).powi(power))
+            .sum::<f64>()
+            / (image[80] - image[120])
+    };
+    let found_mm = (moment(2) - moment(1).powi(2)).sqrt();
+    let expected_mm = 1.2 / 12.0_f64.sqrt() * 3.0;
+    assert!(
+        (found_mm / expected_mm - 1.0).abs() < 0.02,
+        "{found_mm} mm, expected {expected_mm} mm"
+    );
+    let (sharp, blurred) = (sharp.iter().sum::<f64>(), image.iter().sum::<f64>());
+    assert!((blurred / sharp - 1.0).abs() < 2e-3, "{blurred} {sharp}");
+}
+
+#[test]
+fn blades_whose_shadow_fills_the_field_are_refused() {
+    let mut projection = frontal(10, 1.0);
+    projection.source.focal_spot.size_mm = 2.0;
+    let refused = |blades_mm: f64| {
+        let mut projection = projection.clone();
+        projection.source.blades_mm = Some(blades_mm);
+        projection.validate()
+    };
+    // 1100 mm · 1 mm / (5 mm + 1 mm).
+    assert!(refused(183.4).is_ok() && refused(1_100.0).is_ok());
+    for blades_mm in [183.3, 0.0, 1_100.1, f64::NAN] {
+        let error = refused(blades_mm).unwrap_err().to_string();
+        assert!(error.contains("183.3 to 1100 mm"), "{error}");
+    }
 }
 
 /// Outside the field nothing arrives but scatter; the pixel that the edge cuts reads its share; photons that miss the

@@ -130,7 +130,7 @@ fn scatter_is_that_of_analog() {
 #[test]
 fn scatter_of_a_demanding_source_is_that_of_analog() {
     let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
-    let projection = Projection {
+    let mut projection = Projection {
         source: demanding_source(),
         ..frontal(24, 6.0)
     };
@@ -154,6 +154,19 @@ fn scatter_of_a_demanding_source_is_that_of_analog() {
         expected.sums.of(Category::Primary),
     );
     assert!((a - b).abs() < 4.5 * se, "primary {a}, {b} ± {se}"); // 7e-6
+    // The half-shadow of the blades is 16 mm wide (standard deviation).
+    let primaries = |image: &Radiograph| blocks(image, Category::Primary, 6);
+    let (found, expected) = (primaries(&image), primaries(&expected));
+    let terms = found.iter().zip(&expected);
+    let chi2: f64 = terms
+        .map(|((found, _), (expected, variance))| (found - expected).powi(2) / variance)
+        .sum();
+    assert!(chi2 < 79.0, "chi² = {chi2:.1} with 36 degrees of freedom"); // 5e-5
+    projection.source.blades_mm = None;
+    let settings = expected_image(320, 14);
+    let sharp = fast(&phantom, &spectrum, &projection, &settings).unwrap();
+    let share = found[0].0 / primaries(&sharp)[0].0;
+    assert!((0.4..0.8).contains(&share), "{share} of the corner is left");
 }
 
 /// Rays that are added where they are needed, and few energies for the spectrum, against 64 x 64 rays per pixel and all energies.

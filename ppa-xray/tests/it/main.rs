@@ -4,6 +4,7 @@ mod attenuation;
 mod beer_lambert;
 mod case_a;
 mod dose;
+mod dqe;
 #[cfg(feature = "dicom")]
 mod dx;
 mod exposure;

@@ -12,15 +12,15 @@ use ppa_xray::{
 
 use crate::scenes::{frontal, limb, sixty_kvp, slab};
 
-const SIDE: usize = 64;
+pub const SIDE: usize = 64;
 const PIXEL_MM: f64 = 0.3;
 const H_MM2: f64 = 0.45;
 const BANDS: usize = 8;
 const HISTORIES: u64 = 200_000;
 
-/// Noise power over that of white noise at a frequency in cycles per pixel.
-fn expected_power(blurred: bool, fx: f64, fy: f64) -> f64 {
-    if !blurred {
+/// Noise power over that of white noise at a frequency in cycles per pixel; `h_mm2` is 0 without blur.
+pub fn expected_power(h_mm2: f64, pixel_mm: f64, fx: f64, fy: f64) -> f64 {
+    if h_mm2 == 0.0 {
         return 1.0;
     }
     let sinc = |f: f64| {
@@ -34,14 +34,18 @@ fn expected_power(blurred: bool, fx: f64, fy: f64) -> f64 {
     aliases()
         .flat_map(|x| aliases().map(move |y| (fx + x, fy + y)))
         .map(|(x, y)| {
-            let mtf = 1.0 / (1.0 + H_MM2 * (x * x + y * y) / (PIXEL_MM * PIXEL_MM));
+            let mtf = 1.0 / (1.0 + h_mm2 * (x * x + y * y) / (pixel_mm * pixel_mm));
             (mtf * sinc(x) * sinc(y)).powi(2)
         })
         .sum()
 }
 
+fn power_of_blur(blurred: bool, fx: f64, fy: f64) -> f64 {
+    expected_power(if blurred { H_MM2 } else { 0.0 }, PIXEL_MM, fx, fy)
+}
+
 /// Squared coefficients of an image of [`SIDE`]² pixels in orthonormal cosine waves.
-fn spectrum(image: &[f32]) -> Vec<f64> {
+pub fn spectrum(image: &[f32]) -> Vec<f64> {
     let wave = |k: usize, at: usize| {
         let scale = if k == 0 { 1.0_f64 } else { 2.0 };
         (scale / SIDE as f64).sqrt() * (PI * k as f64 * (at as f64 + 0.5) / SIDE as f64).cos()
@@ -68,7 +72,7 @@ fn measured(images: &[Radiograph], blurred: bool) -> ([(f64, f64); BANDS], [f64;
         for (i, power) in spectrum(&image.total()).into_iter().enumerate().skip(1) {
             let [fx, fy] = [i % SIDE, i / SIDE].map(|k| 0.5 * k as f64 / SIDE as f64);
             let ring = (fx.hypot(fy) / 0.5_f64.sqrt() * BANDS as f64) as usize;
-            bands[ring].0 += power / white / expected_power(blurred, fx, fy);
+            bands[ring].0 += power / white / power_of_blur(blurred, fx, fy);
             bands[ring].1 += 1.0;
             variance += power / white;
         }
@@ -102,7 +106,7 @@ fn assert_power(name: &str, images: &[Radiograph], blurred: bool, slack: f64) {
         let frequency = |k: usize| 0.5 * (k as f64 + shift) / SIDE as f64;
         let waves = (0..SIDE * SIDE).map(|i| (frequency(i % SIDE), frequency(i / SIDE)));
         waves
-            .map(|(fx, fy)| expected_power(blurred, fx, fy))
+            .map(|(fx, fy)| power_of_blur(blurred, fx, fy))
             .collect()
     };
     let of_waves = powers(0.0);

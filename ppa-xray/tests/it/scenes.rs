@@ -68,7 +68,7 @@ pub fn limb(pose: &Isometry3<f64>) -> VoxelPhantom {
     VoxelPhantom::new(grid, material, density, materials).unwrap()
 }
 
-/// A focal spot of 8 mm and a heel effect.
+/// A focal spot of 8 mm behind blades at 200 mm, and a heel effect.
 pub fn demanding_source() -> Source {
     Source {
         focal_spot: FocalSpot {
@@ -78,6 +78,7 @@ pub fn demanding_source() -> Source {
         heel_effect: Some(HeelEffect {
             anode_towards_deg: 30.0,
         }),
+        blades_mm: Some(200.0),
         ..Source::default()
     }
 }

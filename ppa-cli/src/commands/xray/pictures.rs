@@ -6,7 +6,7 @@ use clap::Args;
 use ppa_generate::{Case, PosedExposure, XraySettings, tube};
 use ppa_scene::{LimbKind, Side};
 use ppa_xray::{
-    DxExposure, DxIntent, Examination, Laterality, Presentation, Radiograph, Region, View,
+    DxExposure, DxIntent, Examination, Laterality, Presentation, Radiograph, Region, TubeLoad, View,
 };
 
 use crate::output_files::OutputFiles;
@@ -27,7 +27,7 @@ pub struct PictureArgs {
     for_processing: bool,
     /// Exposure index that the examination aims at, for the deviation index of IEC 62494-1; no standard gives one
     #[arg(long, value_name = "EI", value_parser = target_exposure_index)]
-    pub target_exposure_index: Option<f64>,
+    target_exposure_index: Option<f64>,
 }
 
 fn target_exposure_index(text: &str) -> Result<f64, String> {
@@ -56,6 +56,15 @@ impl PictureArgs {
         } else {
             fixed
         })
+    }
+
+    /// The exposure index aimed at: the one given, or that of automatic exposure control.
+    pub fn target_exposure_index(&self, settings: &XraySettings) -> Option<f64> {
+        let controlled = match settings.tube_load {
+            Some(TubeLoad::ExposureIndex(index)) => Some(index),
+            _ => None,
+        };
+        self.target_exposure_index.or(controlled)
     }
 
     /// Declares the DICOM image.
@@ -93,7 +102,7 @@ impl PictureArgs {
             tube: &tube(exposure.limb.settings())?,
             examination: examination(case, exposure.limb.prepared.landmarks.limb, angle_deg),
             source_patient_mm: Some(exposure.limb.table.source_table_mm()),
-            target_exposure_index: self.target_exposure_index,
+            target_exposure_index: self.target_exposure_index(exposure.limb.settings()),
             study: &case.source.volume_sha256,
         };
         Ok(radiograph.write_dicom(path, &exposure, intent)?)

@@ -7,13 +7,14 @@ use clap::{Args, ValueEnum};
 use ppa_ct::write_nifti;
 use ppa_generate::{Case, ExposableLimb, Plan, Table, spectrum};
 use ppa_scene::Contact;
-use ppa_xray::FastSettings;
+use ppa_xray::{FastSettings, TubeLoad};
 use serde::Serialize;
 
 use super::BeamArgs;
 use super::follow::AnalogArgs;
 use super::pictures::PictureArgs;
 use super::report::Report;
+use crate::commands::technique::TechniqueArgs;
 use crate::findings::prepared;
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
 use crate::output::{Output, Stopwatch, bar, working};
@@ -38,6 +39,8 @@ pub struct SimulateArgs {
     #[arg(long)]
     plan: Option<PathBuf>,
     #[command(flatten)]
+    technique: TechniqueArgs,
+    #[command(flatten)]
     beam: BeamArgs,
     /// Engine
     #[arg(long, value_enum, default_value = "fast")]
@@ -45,6 +48,12 @@ pub struct SimulateArgs {
     /// Histories: followed (analog) or whose noise the image carries (fast) [default: 2e7 or 2e10]
     #[arg(long)]
     histories: Option<f64>,
+    /// Tube load in mAs, in place of histories
+    #[arg(long, conflicts_with = "histories")]
+    mas: Option<f64>,
+    /// Automatic exposure control: tube load that gives this exposure index
+    #[arg(long, value_name = "EI", conflicts_with_all = ["histories", "mas"])]
+    aec: Option<f64>,
     /// Seed of histories and noise
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -90,10 +99,22 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
         Some(path) => Plan::read(path)?,
         None => Plan::new(Vec::new()),
     };
+    args.technique.apply(&mut plan.xray);
     args.beam.apply(&mut plan.xray);
     plan.xray.analog = None; // --engine decides.
+    let given = args.mas.map(TubeLoad::Mas);
+    let given = given.or(args.aec.map(TubeLoad::ExposureIndex));
+    if let Some(load) = &given {
+        anyhow::ensure!(
+            matches!(args.engine, EngineName::Fast),
+            "--mas and --aec need --engine fast: analog histories are followed one by one"
+        );
+        load.check()?;
+    }
+    plan.xray.tube_load = given.or(plan.xray.tube_load);
     if let (EngineName::Fast, Some(histories)) = (args.engine, args.histories) {
         plan.xray.engine.dose_histories = histories;
+        plan.xray.tube_load = None;
     }
     let case = Case::read(&args.case)?;
     let working = working("preparing the limb");
@@ -111,10 +132,10 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
             working.finish_and_clear();
             let bar = bar("simulating");
             bar.set_length(100);
-            let settings = FastSettings {
+            let settings = exposure.fast_settings(FastSettings {
                 seed: args.seed,
                 ..plan.xray.engine
-            };
+            })?;
             let observe = |share: f64| {
                 bar.set_position((100.0 * share) as u64);
                 ControlFlow::Continue(())
@@ -156,7 +177,7 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
     let index = radiograph.exposure_index(&exposure.projection.receptor)?;
     let result = Simulated {
         report: Report::new(&radiograph, dose.as_ref(), seconds)
-            .with_exposure_index(index, args.pictures.target_exposure_index),
+            .with_exposure_index(index, args.pictures.target_exposure_index(&plan.xray)),
         contact: exposure.placement.contact,
     };
     output.print(&result, |result| result.report.describe(&written))

@@ -1,0 +1,146 @@
+//! Half-shadow that the collimator blades cast on the detector plane.
+
+use nalgebra::{Point2, Point3};
+
+use crate::beam::field::Field;
+use crate::beam::source::FocalSpot;
+
+/// The field of the beam as seen from every point of the focal spot.
+///
+/// Blades at the distance b from the spot are openings in a plane square to device z. On the detector plane, at the distance D, the
+/// edges of the field move by D/b − 1 for every mm of the spot, the other way. The depth of a tilted spot is neglected: it moves an
+/// edge by less than a tenth of the half-shadow.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Blades {
+    /// From the middle of the spot.
+    field: Field,
+    /// D/b − 1; 0 for sharp edges.
+    edge_per_spot: f64,
+    /// Components of the axes of the spot's plane along device x and y.
+    axes: [f64; 2],
+}
+
+impl Blades {
+    /// Blades that leave `field` open on a plane `plane_mm` away; at the distance of that plane if `blades_mm` is none. `axes`
+    /// are the components along device x and y of those of the spot's plane.
+    pub fn new(field: Field, plane_mm: f64, blades_mm: Option<f64>, axes: [f64; 2]) -> Self {
+        Self {
+            field,
+            edge_per_spot: blades_mm.map_or(0.0, |blades_mm| plane_mm / blades_mm - 1.0),
+            axes,
+        }
+    }
+
+    /// What photons from a point of the spot can reach.
+    pub fn field_from(&self, spot: &Point3<f64>) -> Field {
+        let shift = [0, 1].map(|axis| self.edge_per_spot * spot[axis]);
+        Field {
+            low_mm: [0, 1].map(|axis| self.field.low_mm[axis] - shift[axis]),
+            high_mm: [0, 1].map(|axis| self.field.high_mm[axis] - shift[axis]),
+        }
+    }
+
+    /// What any point of the spot can reach.
+    pub fn reached(&self, spot: &FocalSpot) -> Field {
+        self.grown(self.edge_per_spot * spot.reach_mm())
+    }
+
+    /// What the whole spot lights, but for the last 3e-3 of a Gaussian one; sides are negative where there is no such place.
+    pub fn fully_lit(&self, spot: &FocalSpot) -> Field {
+        self.grown(-self.edge_per_spot * spot.shadow_reach_mm())
+    }
+
+    /// The shares of a strip of the spot along device x and y that light a place; `strips` name the strips, of `count` equally
+    /// strong ones along each axis.
+    pub fn lit_share(
+        &self,
+        spot: &FocalSpot,
+        strips: [usize; 2],
+        count: usize,
+        at: Point2<f64>,
+    ) -> f64 {
+        if self.edge_per_spot == 0.0 || spot.is_point() {
+            return f64::from(u8::from(self.field.contains(&at)));
+        }
+        let along = |axis: usize| {
+            // Spot positions s that light x: low − k s ≤ x ≤ high − k s.
+            let per_mm = 1.0 / (self.edge_per_spot * self.axes[axis]);
+            let first = spot.share_below((self.field.low_mm[axis] - at[axis]) * per_mm);
+            let last = spot.share_below((self.field.high_mm[axis] - at[axis]) * per_mm);
+            let strip = strips[axis] as f64;
+            let [first, last] =
+                [first, last].map(|share| (share * count as f64).clamp(strip, strip + 1.0));
+            last - first
+        };
+        along(0) * along(1)
+    }
+
+    /// The field grown by the same length on all sides.
+    fn grown(&self, by_mm: f64) -> Field {
+        let by = self.axes.map(|axis| by_mm * axis);
+        Field {
+            low_mm: [0, 1].map(|axis| self.field.low_mm[axis] - by[axis]),
+            high_mm: [0, 1].map(|axis| self.field.high_mm[axis] + by[axis]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::beam::source::SpotShape;
+
+    fn blades(blades_mm: Option<f64>) -> Blades {
+        Blades::new(
+            Field::centred([0.0, 10.0], [100.0, 60.0]),
+            1_000.0,
+            blades_mm,
+            [1.0; 2],
+        )
+    }
+
+    /// A strip edge of a spot of 1.2 mm behind blades at 250 mm: 3.6 mm from dark to full, half at the edge; the strips add up.
+    #[test]
+    fn the_half_shadow_is_as_wide_as_geometry_says() {
+        let blades = blades(Some(250.0));
+        for shape in [SpotShape::Uniform, SpotShape::Gaussian] {
+            let spot = FocalSpot {
+                size_mm: 1.2,
+                shape,
+            };
+            let share =
+                |x_mm: f64| blades.lit_share(&spot, [0; 2], 1, Point2::new(50.0 + x_mm, 12.0));
+            assert!((share(0.0) - 0.5).abs() < 1e-6);
+            assert!((share(-0.9) + share(0.9) - 1.0).abs() < 1e-6);
+            if shape == SpotShape::Uniform {
+                assert!((share(-0.9) - 0.75).abs() < 1e-9);
+                assert_eq!((share(-1.81), share(1.81)), (1.0, 0.0));
+            } else {
+                // 3.6 mm are 2.3548 standard deviations; Φ(−1) = 0.158655.
+                let sigma_mm = 3.6 / 2.354_820_045;
+                assert!((share(sigma_mm) - 0.158_655).abs() < 1e-6);
+            }
+            let at = Point2::new(50.7, 40.4);
+            let sum: f64 = (0..16)
+                .map(|n| blades.lit_share(&spot, [n % 4, n / 4], 4, at) / 16.0)
+                .sum();
+            assert!((sum - blades.lit_share(&spot, [0; 2], 1, at)).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn without_a_distance_edges_are_sharp() {
+        let blades = blades(None);
+        let spot = FocalSpot {
+            size_mm: 1.2,
+            ..FocalSpot::default()
+        };
+        let field = blades.reached(&spot);
+        assert_eq!(field, blades.fully_lit(&spot));
+        assert_eq!(field, blades.field_from(&Point3::new(0.5, 0.5, 0.0)));
+        for (x_mm, share) in [(49.99, 1.0), (50.01, 0.0)] {
+            let at = Point2::new(x_mm, 0.0);
+            assert_eq!(blades.lit_share(&spot, [0; 2], 1, at), share);
+        }
+    }
+}
