@@ -134,7 +134,7 @@ fn mtf_measured_with_an_edge_is_that_of_the_model() {
 /// DQE = MTF² / (Q NNPS) with Q photons per mm²; the model's is absorption times Swank factor, less electronic noise at high frequencies.
 #[test]
 fn dqe_measured_with_an_even_field_is_that_of_the_model() {
-    const IMAGES: u64 = 40;
+    const IMAGES: u64 = 16;
     let vacuum = prepared(slab(10.0, 1e-9));
     let (photons, electronic_kev) = (600.0, 90.0);
     let mm2 = (SIDE as f64 * PIXEL_MM).powi(2);
