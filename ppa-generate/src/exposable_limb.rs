@@ -103,10 +103,7 @@ impl PosedExposure<'_> {
             return Ok(settings);
         };
         let dose_histories = phantom.histories(load, spectrum, &self.projection, &settings)?;
-        Ok(FastSettings {
-            dose_histories,
-            ..settings
-        })
+        Ok(settings.with_dose_histories(dose_histories))
     }
 
     /// The radiograph by the plan's engine.
@@ -120,11 +117,11 @@ impl PosedExposure<'_> {
         let XraySettings { engine, analog, .. } = self.limb.settings();
         match *analog {
             Some(settings) => {
-                let settings = AnalogSettings { seed, ..settings };
+                let settings = settings.with_seed(seed);
                 ppa_xray::analog(phantom.phantom(), spectrum, &self.projection, &settings)
             }
             None => {
-                let settings = self.fast_settings(FastSettings { seed, ..*engine })?;
+                let settings = self.fast_settings(engine.with_seed(seed))?;
                 phantom.fast(spectrum, &self.projection, &settings)
             }
         }

@@ -74,13 +74,11 @@ pub fn projection(
     device: &XrayDevice,
     settings: &XraySettings,
 ) -> Projection {
-    Projection {
-        source: settings.source,
-        receptor: settings.receptor.clone(),
-        ..Projection::new(
-            *ct_from_device(placement, landmarks, device).isometry(),
-            device.source_detector_mm,
-            settings.detector,
-        )
-    }
+    Projection::new(
+        *ct_from_device(placement, landmarks, device).isometry(),
+        device.source_detector_mm,
+        settings.detector,
+    )
+    .with_source(settings.source)
+    .with_receptor(settings.receptor.clone())
 }

@@ -239,11 +239,11 @@ impl SceneSetup {
 /// [`SceneSetupError::Spectrum`] for a filter that cannot be read.
 pub fn tube(settings: &XraySettings) -> Result<TubeSpec, SceneSetupError> {
     let filters = settings.filters.iter().map(|filter| filter.parse());
-    Ok(TubeSpec {
-        kvp: settings.kvp,
-        anode_angle_deg: settings.anode_angle_deg,
-        filters: filters.collect::<Result<_, ppa_xray::SpectrumError>>()?,
-    })
+    Ok(TubeSpec::new(
+        settings.kvp,
+        settings.anode_angle_deg,
+        filters.collect::<Result<_, ppa_xray::SpectrumError>>()?,
+    ))
 }
 
 /// The beam of a plan.

@@ -33,31 +33,24 @@ impl Technique {
             kvp,
             anode_angle_deg: 12.0,
             filters: vec!["Al:2.5".to_owned()],
-            source: Source {
-                focal_spot: FocalSpot {
-                    size_mm: 0.6,
-                    ..FocalSpot::default()
-                },
-                collimation: Collimation::Rectangle {
+            source: Source::default()
+                .with_focal_spot(FocalSpot::default().with_size_mm(0.6))
+                .with_collimation(Collimation::Rectangle {
                     size_mm: field_mm,
                     centre_mm: [0.0; 2],
-                },
-                blades_mm: Some(250.0),
+                })
+                .with_blades_mm(Some(250.0))
                 // The head's side.
-                heel_effect: Some(HeelEffect {
-                    anode_towards_deg: -90.0,
-                }),
-            },
+                .with_heel_effect(Some(HeelEffect::new(-90.0))),
             detector: Detector::centred(1_504, 1_504, 0.148),
-            receptor: Receptor {
-                model: DetectorModel::Csi {
+            receptor: Receptor::default()
+                .with_model(DetectorModel::Csi {
                     thickness_um: 600.0,
                     packing: 0.8,
-                },
-                grid: None,
-                blur: Some(Blur::Lorentzian { h_mm2: 0.45 }),
-                electronic_noise_kev: 90.0,
-            },
+                })
+                .with_grid(None)
+                .with_blur(Some(Blur::Lorentzian { h_mm2: 0.45 }))
+                .with_electronic_noise_kev(90.0),
             tube_load: Some(TubeLoad::Mas(mas)),
             analog: None,
             ..settings.clone()

@@ -13,11 +13,7 @@ fn tube() -> TubeSpec {
         "Al:2.5".parse().expect("a filter"),
         "Cu:0.1".parse().expect("a filter"),
     ];
-    TubeSpec {
-        kvp: 62.0,
-        anode_angle_deg: 11.0,
-        filters,
-    }
+    TubeSpec::new(62.0, 11.0, filters)
 }
 
 /// Numbers from 0 to 1 that fill the interval evenly and jump about.

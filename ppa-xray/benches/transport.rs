@@ -43,11 +43,7 @@ fn projection(pixels: u32) -> Projection {
 
 fn spectrum() -> Spectrum {
     let filters = vec!["Al:2.5".parse().unwrap()];
-    let tube = TubeSpec {
-        kvp: 60.0,
-        anode_angle_deg: 12.0,
-        filters,
-    };
+    let tube = TubeSpec::new(60.0, 12.0, filters);
     Spectrum::tungsten(&tube).unwrap()
 }
 
@@ -75,11 +71,9 @@ fn histories(criterion: &mut Criterion<ProcessorTime>) {
     let spectrum = spectrum();
     let (leg, before_leg) = ankle(true, Detector::centred(300, 300, 0.8));
     let mut group = criterion.benchmark_group("analog");
-    let settings = AnalogSettings {
-        histories: 2_000_000,
-        seed: 1,
-        ..AnalogSettings::default()
-    };
+    let settings = AnalogSettings::default()
+        .with_histories(2_000_000)
+        .with_seed(1);
     group.throughput(Throughput::Elements(settings.histories));
     group.sample_size(10);
     let scenes = [
@@ -105,11 +99,7 @@ fn preparation(criterion: &mut Criterion<ProcessorTime>) {
     let spectrum = spectrum();
     let (leg, before_leg) = ankle(true, Detector::centred(300, 300, 0.8));
     let mut group = criterion.benchmark_group("preparation");
-    let settings = AnalogSettings {
-        histories: 1,
-        seed: 1,
-        ..AnalogSettings::default()
-    };
+    let settings = AnalogSettings::default().with_histories(1).with_seed(1);
     group.throughput(Throughput::Elements(leg.grid().len() as u64));
     group.sample_size(10);
     group.bench_function("ankle", |b| {
@@ -147,27 +137,18 @@ fn exposures(criterion: &mut Criterion<ProcessorTime>) {
     for (pixels, pixel_mm) in [(448, 0.5), (1_500, 0.15)] {
         let (_, ideal) = ankle(false, Detector::centred(pixels, pixels, pixel_mm));
         let mut real = ideal.clone();
-        real.source = Source {
-            focal_spot: FocalSpot {
-                size_mm: 0.6,
-                ..FocalSpot::default()
-            },
-            heel_effect: Some(HeelEffect {
-                anode_towards_deg: -90.0,
-            }),
-            collimation: Collimation::Rectangle {
+        real.source = Source::default()
+            .with_focal_spot(FocalSpot::default().with_size_mm(0.6))
+            .with_heel_effect(Some(HeelEffect::new(-90.0)))
+            .with_collimation(Collimation::Rectangle {
                 size_mm: [180.0, 220.0],
                 centre_mm: [0.0; 2],
-            },
-        };
+            });
         real.receptor.model = DetectorModel::Csi {
             thickness_um: 600.0,
             packing: 0.8,
         };
-        real.receptor.grid = Some(AntiScatterGrid {
-            focus_mm: Some(1_100.0),
-            ..AntiScatterGrid::new(8.0, 40.0)
-        });
+        real.receptor.grid = Some(AntiScatterGrid::new(8.0, 40.0).with_focus_mm(Some(1_100.0)));
         for (name, exposure) in [("ideal", &ideal), ("real", &real)] {
             group.bench_with_input(BenchmarkId::new(name, pixels), exposure, |b, at| {
                 b.iter(|| fast(&phantom, &spectrum, at, &settings).unwrap())

@@ -23,11 +23,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let volume = limb.voxelise(1.5, TableTop::Absent)?;
     let voxels = VoxelPhantom::from_volume(&volume, &HuCalibration::default(), None)?;
     let phantom = PreparedPhantom::new(voxels, ComptonModel::default());
-    let spectrum = Spectrum::tungsten(&TubeSpec {
-        kvp: 70.0,
-        anode_angle_deg: 12.0,
-        filters: vec!["Al:2.5".parse()?, "Cu:0.1".parse()?],
-    })?;
+    let spectrum = Spectrum::tungsten(&TubeSpec::new(
+        70.0,
+        12.0,
+        vec!["Al:2.5".parse()?, "Cu:0.1".parse()?],
+    ))?;
     let isocentre = Translation3::from(limb.truth().joint_centre);
     // The beam from anterior (ct −y), detector columns along ct x.
     let from_front = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[
@@ -46,11 +46,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             1_100.0,
             Detector::centred(200, 200, 1.5),
         );
-        let settings = FastSettings {
-            scatter_histories: 20_000,
-            seed: view.into(),
-            ..FastSettings::default()
-        };
+        let settings = FastSettings::default()
+            .with_scatter_histories(20_000)
+            .with_seed(view.into());
         let never = |_| ControlFlow::Continue(());
         let preview = phantom.preview(&spectrum, &projection, &settings, &never)?;
         let image = phantom.fast(&spectrum, &projection, &settings)?;

@@ -41,11 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .collect::<Result<Vec<_>, _>>()?;
     let voxels = VoxelPhantom::new(grid, material, density, materials)?;
     let phantom = PreparedPhantom::new(voxels, ComptonModel::default());
-    let spectrum = Spectrum::tungsten(&TubeSpec {
-        kvp: 120.0,
-        anode_angle_deg: 12.0,
-        filters: vec!["Al:6".parse()?],
-    })?;
+    let spectrum = Spectrum::tungsten(&TubeSpec::new(120.0, 12.0, vec!["Al:6".parse()?]))?;
     // Columns along ct x, rows along ct z, source at ct −y.
     let from_front = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[
         Vector3::x(),
@@ -62,12 +58,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             1_040.0,
             Detector::centred(120, 40, 2.0),
         );
-        let settings = FastSettings {
-            dose_histories: f64::INFINITY,
-            scatter_histories: 40_000,
-            seed: view.into(),
-            ..FastSettings::default()
-        };
+        let settings = FastSettings::default()
+            .with_dose_histories(f64::INFINITY)
+            .with_scatter_histories(40_000)
+            .with_seed(view.into());
         let image = phantom.fast(&spectrum, &projection, &settings)?;
         let (primary, total) = (&image.layer(Category::Primary).value, image.total());
         let middle = 20 * 120 + 60;

@@ -19,11 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let limb = LowerLeg::p01();
     let volume = limb.voxelise(1.0, TableTop::Absent)?;
     let phantom = VoxelPhantom::from_volume(&volume, &HuCalibration::default(), None)?;
-    let spectrum = Spectrum::tungsten(&TubeSpec {
-        kvp: 60.0,
-        anode_angle_deg: 12.0,
-        filters: vec!["Al:2.5".parse()?],
-    })?;
+    let spectrum = Spectrum::tungsten(&TubeSpec::new(60.0, 12.0, vec!["Al:2.5".parse()?]))?;
 
     // Beam from anterior (ct −y) through the joint; turning the device outwards is turning the limb inwards.
     let from_front = Matrix3::from_columns(&[Vector3::x(), -Vector3::z(), Vector3::y()]);

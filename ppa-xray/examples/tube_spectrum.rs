@@ -9,11 +9,7 @@ use ppa_xray::{Material, Spectrum, TubeSpec};
 fn main() -> Result<(), Box<dyn Error>> {
     let water = Material::named("water")?;
     for kvp in [50.0, 60.0, 80.0, 120.0] {
-        let spectrum = Spectrum::tungsten(&TubeSpec {
-            kvp,
-            anode_angle_deg: 12.0,
-            filters: vec!["Al:2.5".parse()?],
-        })?;
+        let spectrum = Spectrum::tungsten(&TubeSpec::new(kvp, 12.0, vec!["Al:2.5".parse()?]))?;
         let mean_kev = spectrum.mean_energy_kev();
         let attenuation = water.total_cm2_g(mean_kev)? * water.density_g_cm3();
         println!(

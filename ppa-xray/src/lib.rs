@@ -8,7 +8,7 @@
 //! exposure that the settings give. A [`PreparedPhantom`] keeps what the exposures of one phantom share, reports progress, and gives a preview. An [`AnalogRun`] follows photons in parts that can be interrupted and resumed, until the image is
 //! precise enough, and counts the [`Dose`].
 //!
-//! [`mcgpu`] runs input files of MC-GPU v1.3.
+//! `mcgpu` runs input files of MC-GPU v1.3.
 //!
 //! Units: mm, radians, keV, g/cm³, mass attenuation in cm²/g, images in eV/cm² per history. Frames: the phantom stands in
 //! `ct` (DICOM LPS); `device` has the source at the origin and z towards the detector. The device is moved, never the
@@ -30,10 +30,10 @@
 //! let rod = |[i, j, _]: [usize; 3]| (13..17).contains(&i) && (13..17).contains(&j);
 //! let hu = (0..grid.len()).map(|n| if rod(grid.voxel(n)) { 1200.0 } else { 50.0 }).collect();
 //! let phantom = VoxelPhantom::from_volume(&Volume::new(grid, hu)?, &HuCalibration::default(), None)?;
-//! let tube = TubeSpec { kvp: 60.0, anode_angle_deg: 12.0, filters: vec!["Al:2.5".parse()?] };
+//! let tube = TubeSpec::new(60.0, 12.0, vec!["Al:2.5".parse()?]);
 //! let ct_from_device = Isometry3::translation(0.0, 0.0, -1000.0);
 //! let exposure = Projection::new(ct_from_device, 1100.0, Detector::centred(50, 50, 2.0));
-//! let settings = FastSettings { scatter_histories: 20_000, ..FastSettings::default() };
+//! let settings = FastSettings::default().with_scatter_histories(20_000);
 //! let radiograph = fast(&phantom, &Spectrum::tungsten(&tube)?, &exposure, &settings)?;
 //! let reading = radiograph.total();
 //! assert!(reading[25 * 50 + 25] < 0.25 * reading[25 * 50 + 10]); // behind the rod, beside it
@@ -41,16 +41,23 @@
 //! # }
 //! ```
 
+#![cfg_attr(
+    not(feature = "files"),
+    expect(dead_code, reason = "bytes of tallies serve files alone")
+)]
+
 mod beam;
 mod detector;
 mod dose;
 mod engine;
 mod image;
 mod matter;
+#[cfg(feature = "files")]
 pub mod mcgpu;
 mod octaves;
 mod phantom;
 mod run;
+mod setters;
 mod transport;
 mod vector_math;
 
@@ -96,6 +103,7 @@ pub use image::dx::{
     examination::{Examination, Laterality, Region, View},
 };
 pub use image::exposure_index::deviation_index;
+#[cfg(feature = "files")]
 pub use image::output::{EXR_ATTRIBUTE, OutputError};
 pub use image::presentation::{Presentation, PresentationError};
 pub use image::radiograph::{CategorySums, Engine, Radiograph};
@@ -119,6 +127,7 @@ pub use phantom::voxels::{PhantomError, VoxelPhantom};
 pub use run::analog_run::AnalogRun;
 pub use run::analog_tally::AnalogTally;
 pub use run::progress::{Progress, Stop, Stopped};
+#[cfg(feature = "files")]
 pub use run::tally_error::TallyError;
 pub use transport::tally::Category;
 pub use transport::tracking::TransportError;

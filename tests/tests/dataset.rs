@@ -149,10 +149,7 @@ fn analog_radiographs_are_planned_made_and_verified() {
     let mut plan = plan();
     plan.rotation.to_deg = 0.0;
     plan.shapes.variants = vec![BodyShape::Orig];
-    plan.xray.analog = Some(AnalogSettings {
-        histories: 20_000,
-        ..AnalogSettings::default()
-    });
+    plan.xray.analog = Some(AnalogSettings::default().with_histories(20_000));
     let folder = tempfile::tempdir().unwrap();
     let (file, root) = (folder.path().join("plan.toml"), folder.path().join("data"));
     plan.write_commented(&file).unwrap();

@@ -45,11 +45,9 @@ fn shadow(
     let lead = Material::named("lead").unwrap();
     let phantom = VoxelPhantom::new(grid, vec![0; density.len()], density, vec![lead]).unwrap();
     let exposure = projection(placement, landmarks, &setup.table.room.device, &plan.xray);
-    let settings = FastSettings {
-        dose_histories: f64::INFINITY,
-        scatter_histories: 2_000,
-        ..FastSettings::default()
-    };
+    let settings = FastSettings::default()
+        .with_dose_histories(f64::INFINITY)
+        .with_scatter_histories(2_000);
     let image = fast(&phantom, &setup.spectrum, &exposure, &settings).unwrap();
     let primary = &image.layer(Category::Primary).value;
     let Detector {

@@ -61,13 +61,12 @@ fn radiographs_rank_poses_as_geometry_does() {
             .map(|(device, seed)| {
                 let detector = Detector::centred(100, 100, 0.8);
                 let projection = Projection::new(*device, SOURCE_DETECTOR_MM, detector);
-                let engine = FastSettings {
-                    dose_histories,
-                    scatter_histories: 5_000,
-                    samples_per_side: 2,
-                    seed,
-                    ..settings.engine
-                };
+                let engine = settings
+                    .engine
+                    .with_dose_histories(dose_histories)
+                    .with_scatter_histories(5_000)
+                    .with_samples_per_side(2)
+                    .with_seed(seed);
                 let radiograph = fast(&phantom, &spectrum, &projection, &engine).unwrap();
                 let reading = Reading {
                     detector: &detector,

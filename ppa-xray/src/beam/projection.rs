@@ -8,6 +8,7 @@ use crate::beam::projection_error::ProjectionError;
 use crate::beam::raster::{MAX_PIXELS, Raster};
 use crate::beam::receptor::Receptor;
 use crate::beam::source::{Collimation, Source};
+use crate::setters::setters;
 
 /// A flat detector square to device z; columns run along device x, rows along device y.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -79,6 +80,7 @@ impl Detector {
 ///
 /// The device frame has the source (the middle of the focal spot) at the origin and z square to the detector plane.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Projection {
     /// Pose of the device in the `ct` frame, mm.
     pub ct_from_device: Isometry3<f64>,
@@ -94,6 +96,15 @@ pub struct Projection {
     /// Grid and converter in the detector plane.
     pub receptor: Receptor,
 }
+
+setters!(Projection {
+    with_ct_from_device: ct_from_device = Isometry3<f64>,
+    with_source_detector_mm: source_detector_mm = f64,
+    with_detector: detector = Detector,
+    with_central_ray: central_ray = Unit<Vector3<f64>>,
+    with_source: source = Source,
+    with_receptor: receptor = Receptor,
+});
 
 impl Projection {
     /// A point source that sends photons evenly in solid angle, all to the detector, which takes all their energy.

@@ -2,9 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::setters::setters;
+
 /// What stands in the detector plane. The default takes the whole energy of every photon.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Receptor {
     /// What turns photons into signal.
     pub model: DetectorModel,
@@ -20,6 +23,7 @@ pub struct Receptor {
 /// the image has by itself.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum Blur {
     /// 1 / (1 + H f²), as scintillators have it.
     ///
@@ -42,6 +46,7 @@ pub enum Blur {
 /// Energy that a photon leaves in the detector.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum DetectorModel {
     /// All of it.
     #[default]
@@ -70,6 +75,7 @@ fn default_packing() -> f64 {
 /// as a moving grid is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct AntiScatterGrid {
     /// Height of the strips over the width of the spaces between them.
     pub ratio: f64,
@@ -92,6 +98,23 @@ pub struct AntiScatterGrid {
     pub lines_along: LinesAlong,
 }
 
+setters!(Receptor {
+    with_model: model = DetectorModel,
+    with_grid: grid = impl Into<Option<AntiScatterGrid>>,
+    with_blur: blur = impl Into<Option<Blur>>,
+    with_electronic_noise_kev: electronic_noise_kev = f64,
+});
+
+setters!(AntiScatterGrid {
+    with_strip_mm: strip_mm = f64,
+    with_strip: strip = impl Into<String>,
+    with_interspace: interspace = impl Into<String>,
+    with_focus_mm: focus_mm = impl Into<Option<f64>>,
+    with_ratio: ratio = f64,
+    with_lines_per_cm: lines_per_cm = f64,
+    with_lines_along: lines_along = LinesAlong,
+});
+
 impl AntiScatterGrid {
     /// A grid with strips of 0.05 mm of lead along device y, spaces of aluminium and parallel strips, as plans assume by default.
     #[must_use]
@@ -111,6 +134,7 @@ impl AntiScatterGrid {
 /// Device axis that the strips of a grid run along.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum LinesAlong {
     /// Device x, as rows of pixels.
     X,

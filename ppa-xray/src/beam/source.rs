@@ -5,12 +5,14 @@ use ppa_core::random::Philox;
 use serde::{Deserialize, Serialize};
 
 use crate::beam::field::Field;
+use crate::setters::setters;
 
 /// What the tube adds to a point that sends the same photons everywhere.
 ///
 /// The default is that point, collimated to the detector.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Source {
     /// The area that photons leave from.
     pub focal_spot: FocalSpot,
@@ -27,6 +29,7 @@ pub struct Source {
 /// The effective focal spot: as seen along the central ray, in a plane square to it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct FocalSpot {
     /// Side of the square, or full width at half maximum of the Gaussian, mm; 0 is a point.
     pub size_mm: f64,
@@ -37,6 +40,7 @@ pub struct FocalSpot {
 /// Distribution of the intensity over the focal spot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum SpotShape {
     /// Even over a square.
     #[default]
@@ -48,6 +52,7 @@ pub enum SpotShape {
 /// Field of the beam in the detector plane, as the middle of the focal spot sees it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Collimation {
     /// Exactly the detector.
     #[default]
@@ -70,6 +75,7 @@ pub enum Collimation {
 /// Anode heel effect: photons that leave close to the anode's face lose more of themselves in it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct HeelEffect {
     /// Where the anode is seen from the cathode: degrees from device x towards device y.
     pub anode_towards_deg: f64,
@@ -80,6 +86,25 @@ const FWHM_PER_SIGMA: f64 = 2.354_820_045_030_949;
 
 /// No standard normal number is farther from 0: random numbers come in steps of 2⁻³², and √(2 ln 2³²) is 6.66.
 const WIDEST: f64 = 6.67;
+
+setters!(Source {
+    with_focal_spot: focal_spot = FocalSpot,
+    with_collimation: collimation = Collimation,
+    with_blades_mm: blades_mm = impl Into<Option<f64>>,
+    with_heel_effect: heel_effect = impl Into<Option<HeelEffect>>,
+});
+
+setters!(FocalSpot {
+    with_size_mm: size_mm = f64,
+    with_shape: shape = SpotShape,
+});
+
+impl HeelEffect {
+    /// The anode seen from the cathode: degrees from device x towards device y.
+    pub const fn new(anode_towards_deg: f64) -> Self {
+        Self { anode_towards_deg }
+    }
+}
 
 impl FocalSpot {
     pub(crate) fn is_point(&self) -> bool {

@@ -49,6 +49,7 @@ impl std::str::FromStr for Filter {
 
 /// A tungsten-anode tube and what its beam passes before the phantom.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct TubeSpec {
     /// Tube voltage in kV, constant potential.
     pub kvp: f64,
@@ -56,6 +57,17 @@ pub struct TubeSpec {
     pub anode_angle_deg: f64,
     /// Layers in the beam, air included if it matters; any order.
     pub filters: Vec<Filter>,
+}
+
+impl TubeSpec {
+    /// A tube of `kvp` kV, its anode's face `anode_angle_deg` from the central beam, behind `filters`.
+    pub const fn new(kvp: f64, anode_angle_deg: f64, filters: Vec<Filter>) -> Self {
+        Self {
+            kvp,
+            anode_angle_deg,
+            filters,
+        }
+    }
 }
 
 impl Spectrum {

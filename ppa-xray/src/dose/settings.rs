@@ -3,9 +3,12 @@
 use ppa_ct::Grid;
 use serde::{Deserialize, Serialize};
 
+use crate::setters::setters;
+
 /// What is counted besides the energy imparted to every material and to the whole phantom.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct DoseSettings {
     /// Boxes of voxels, each counted as a whole. They may overlap.
     pub regions: Vec<VoxelBox>,
@@ -41,6 +44,11 @@ pub enum DoseError {
         size: [usize; 3],
     },
 }
+
+setters!(DoseSettings {
+    with_regions: regions = Vec<VoxelBox>,
+    with_voxels: voxels = impl Into<Option<VoxelBox>>,
+});
 
 impl VoxelBox {
     /// All voxels of a lattice.

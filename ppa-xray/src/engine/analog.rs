@@ -19,6 +19,7 @@ use crate::engine::exposure::Exposure;
 use crate::image::radiograph::Radiograph;
 use crate::matter::compton::ComptonModel;
 use crate::phantom::voxels::VoxelPhantom;
+use crate::setters::setters;
 use crate::transport::score::{Arrival, Score};
 use crate::transport::tally::{MOST_HISTORIES, Tally, TallyBuffer};
 use crate::transport::tracking::TransportError;
@@ -26,6 +27,7 @@ use crate::transport::tracking::TransportError;
 /// How long the analog engine runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct AnalogSettings {
     /// Photons emitted into the field.
     pub histories: u64,
@@ -68,6 +70,12 @@ pub fn analog(
     let tally = run(&exposure, projection.detector.raster(), settings);
     Ok(ImageSetup::new(&exposure).radiograph(&tally, settings.histories, settings.seed))
 }
+
+setters!(AnalogSettings {
+    with_histories: histories = u64,
+    with_seed: seed = u64,
+    with_compton_model: compton_model = ComptonModel,
+});
 
 impl AnalogSettings {
     /// Most histories of a run; no sum overflows, even if all of them meet in one pixel.

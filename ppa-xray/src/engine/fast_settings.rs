@@ -5,11 +5,13 @@ use serde::{Deserialize, Serialize};
 use crate::beam::projection::Detector;
 use crate::engine::raytrace::check_samples;
 use crate::matter::compton::ComptonModel;
+use crate::setters::setters;
 use crate::transport::tracking::TransportError;
 
 /// What the fast engine spends, and the exposure its image stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct FastSettings {
     /// Histories whose quantum noise the image carries; infinite gives the expected image.
     pub dose_histories: f64,
@@ -39,6 +41,15 @@ impl Default for FastSettings {
         }
     }
 }
+
+setters!(FastSettings {
+    with_dose_histories: dose_histories = f64,
+    with_scatter_histories: scatter_histories = u64,
+    with_scatter_pixel_mm: scatter_pixel_mm = f64,
+    with_samples_per_side: samples_per_side = u32,
+    with_compton_model: compton_model = ComptonModel,
+    with_seed: seed = u64,
+});
 
 impl FastSettings {
     /// Most histories that the noise of an image may stand for, if not infinitely many: a tube load of 3e7 mAs.

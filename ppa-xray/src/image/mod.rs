@@ -9,6 +9,7 @@ mod latitude;
 mod layer_sizes;
 mod log_exposure;
 pub(crate) mod memory;
+#[cfg(feature = "files")]
 pub(crate) mod output;
 pub(crate) mod presentation;
 pub(crate) mod pyramid;

@@ -56,6 +56,7 @@ pub enum PresentationError {
 /// In a file it is a table of these numbers, or a name and what differs from it: `{ protocol = "ankle_lateral", width = 4.5 }`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "PresentationTable")]
+#[non_exhaustive]
 pub struct Presentation {
     /// Middle of the window in log exposure.
     pub centre: f64,

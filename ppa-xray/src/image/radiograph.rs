@@ -10,6 +10,7 @@ use crate::transport::tally::Category;
 /// How a radiograph was computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Engine {
     /// Analog Monte Carlo, no variance reduction.
     Analog,
@@ -22,6 +23,7 @@ pub enum Engine {
 /// The fast engine finds all scatter from the same collisions: the error of a sum of categories is larger than that of
 /// independent ones, up to the sum of their errors.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct CategorySums {
     /// Photons without interaction.
     pub primary_ev_per_history: f64,
@@ -92,6 +94,7 @@ impl CategorySums {
 /// device y. Values are eV/cm² per history, the unit of MC-GPU: summed over the pixels and
 /// multiplied by the pixel area they give eV per history.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Radiograph {
     /// Pixels and their size.
     pub detector: Detector,

@@ -12,6 +12,7 @@ use crate::{
 /// How photons scatter off electrons. Both take the total cross section of the data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum ComptonModel {
     /// Binding and Doppler broadening shell by shell, from one-electron Compton profiles, as PENELOPE and MC-GPU do.
     #[default]

@@ -1,20 +1,16 @@
 //! From Hounsfield units to material and mass density: a table per scanner.
 
-use std::path::Path;
-
 use serde::{Deserialize, Serialize};
 
+use crate::phantom::built_in_calibration;
 use crate::phantom::calibration_error::CalibrationError;
 use crate::phantom::segment::Segment;
-
-/// The built-in table, which is also an example of the file format.
-const BUILT_IN: &str = include_str!("../../data/hu_calibration.toml");
 
 /// A table that turns HU into material and density, after Schneider, Bortfeld and Schlegel, Phys. Med. Biol. 45 (2000) 459.
 ///
 /// The Hounsfield scale is cut into segments. Each has one material, or a mixture of two that changes gradually, and a
 /// density curve, so that the density is continuous within a segment. Which HU stands for which density depends on
-/// scanner, tube voltage and kernel: a table can be read from a TOML file ([`HuCalibration::read`]); the default is
+/// scanner, tube voltage and kernel: a table can be read from a TOML file (`HuCalibration::read`, feature `files`); the default is
 /// `data/hu_calibration.toml` of this crate.
 ///
 /// ```
@@ -55,7 +51,9 @@ pub struct HuCalibration {
 
 impl Default for HuCalibration {
     fn default() -> Self {
-        Self::parse(BUILT_IN).expect("the built-in table is checked by a test")
+        Self {
+            segments: built_in_calibration::segments(),
+        }
     }
 }
 
@@ -64,7 +62,8 @@ impl HuCalibration {
     ///
     /// # Errors
     /// [`CalibrationError`] naming the file, and the line or the segment at fault.
-    pub fn read(path: &Path) -> Result<Self, CalibrationError> {
+    #[cfg(feature = "files")]
+    pub fn read(path: &std::path::Path) -> Result<Self, CalibrationError> {
         let in_file = |source| CalibrationError::File {
             path: path.into(),
             source: Box::new(source),
@@ -79,6 +78,7 @@ impl HuCalibration {
     ///
     /// # Errors
     /// [`CalibrationError`] naming the line or the segment at fault.
+    #[cfg(feature = "files")]
     pub fn parse(text: &str) -> Result<Self, CalibrationError> {
         let table: Self = toml::from_str(text).map_err(|error| CalibrationError::Syntax {
             line: error
@@ -131,11 +131,13 @@ impl HuCalibration {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "files"))]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    const BUILT_IN: &str = include_str!("../../data/hu_calibration.toml");
 
     #[test]
     fn landmarks_of_the_scale_get_their_density_and_segment() {
@@ -170,6 +172,12 @@ mod tests {
             let jump = calibration.density_g_cm3(a + 1.0) - calibration.density_g_cm3(a);
             prop_assert!(jump < 1.1e-3, "{jump}");
         }
+    }
+
+    #[test]
+    fn the_example_file_is_the_built_in_table() {
+        let calibration = HuCalibration::parse(BUILT_IN).unwrap();
+        assert_eq!(calibration, HuCalibration::default());
     }
 
     #[test]

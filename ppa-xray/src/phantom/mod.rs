@@ -1,6 +1,7 @@
 //! The patient: materials and densities on a lattice of voxels.
 
 pub(crate) mod audit;
+mod built_in_calibration;
 pub(crate) mod calibration_error;
 pub(crate) mod graded_mixture;
 pub(crate) mod histogram;

@@ -1,6 +1,7 @@
 //! A run of the analog engine, in batches of histories between checks of when to stop.
 
 use std::ops::ControlFlow;
+#[cfg(feature = "files")]
 use std::path::Path;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
@@ -20,6 +21,7 @@ use crate::phantom::voxels::VoxelPhantom;
 use crate::run::analog_tally::{AnalogTally, RunSetup};
 use crate::run::key::key;
 use crate::run::progress::{Progress, Stop, Stopped, is_check, next_check};
+#[cfg(feature = "files")]
 use crate::run::tally_error::TallyError;
 use crate::transport::tracking::{Transport, TransportError};
 
@@ -126,11 +128,13 @@ impl<'a> AnalogRun<'a> {
     ///
     /// # Errors
     /// [`TallyError`] when the file cannot be read, is damaged, or is of another simulation or part.
+    #[cfg(feature = "files")]
     pub fn read(&self, path: &Path, part: Part) -> Result<AnalogTally, TallyError> {
         self.resume(AnalogTally::read(path)?, path, part)
     }
 
     /// As [`Self::read`], with the tally that was read from `path`.
+    #[cfg(feature = "files")]
     pub(crate) fn resume(
         &self,
         mut tally: AnalogTally,

@@ -19,11 +19,9 @@ fn water_mu_per_mm() -> f64 {
 
 fn simulate(phantom: &VoxelPhantom, projection: &Projection, histories: u64) -> Radiograph {
     let spectrum = Spectrum::monoenergetic(ENERGY_KEV).unwrap();
-    let settings = AnalogSettings {
-        histories,
-        seed: 21,
-        ..AnalogSettings::default()
-    };
+    let settings = AnalogSettings::default()
+        .with_histories(histories)
+        .with_seed(21);
     analog(phantom, &spectrum, projection, &settings).unwrap()
 }
 

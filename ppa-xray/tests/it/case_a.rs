@@ -118,11 +118,9 @@ fn assert_agrees(image: &Radiograph, reference: &Value, se_to_reference: Option<
 #[test]
 #[ignore = "needs ../shared/reference/xray"]
 fn analog_agrees_with_mcgpu() {
-    let settings = AnalogSettings {
-        histories: 10_000_000,
-        seed: 1,
-        ..AnalogSettings::default()
-    };
+    let settings = AnalogSettings::default()
+        .with_histories(10_000_000)
+        .with_seed(1);
     let image = analog(&phantom(), &spectrum(), &projection(), &settings).unwrap();
     assert_agrees(&image, &reference(), None);
 }
@@ -130,12 +128,10 @@ fn analog_agrees_with_mcgpu() {
 #[test]
 #[ignore = "needs ../shared/reference/xray"]
 fn fast_agrees_with_mcgpu() {
-    let settings = FastSettings {
-        scatter_histories: 320_000,
-        dose_histories: f64::INFINITY,
-        seed: 2,
-        ..FastSettings::default()
-    };
+    let settings = FastSettings::default()
+        .with_scatter_histories(320_000)
+        .with_dose_histories(f64::INFINITY)
+        .with_seed(2);
     let image = fast(&phantom(), &spectrum(), &projection(), &settings).unwrap();
     assert_agrees(&image, &reference(), Some(2.0));
 }

@@ -33,8 +33,8 @@ fn materials_voxels_and_regions_add_up() {
     let phantom = limb(&Isometry3::identity());
     let size = phantom.grid().size();
     let whole = VoxelBox::whole(phantom.grid());
-    let doses = DoseSettings {
-        regions: vec![
+    let doses = DoseSettings::default()
+        .with_regions(vec![
             whole,
             VoxelBox {
                 low: [0; 3],
@@ -44,14 +44,11 @@ fn materials_voxels_and_regions_add_up() {
                 low: [17, 0, 0],
                 high: size,
             },
-        ],
-        voxels: Some(whole),
-    };
-    let settings = AnalogSettings {
-        histories: 60_000,
-        seed: 2,
-        ..AnalogSettings::default()
-    };
+        ])
+        .with_voxels(Some(whole));
+    let settings = AnalogSettings::default()
+        .with_histories(60_000)
+        .with_seed(2);
     let dose = dose(&phantom, &sixty_kvp(), &frontal(20, 5.0), settings, &doses);
     let all = dose.phantom.ev_per_history.value;
     let close = |value: f64| (value / all - 1.0).abs() < 1e-6;
@@ -100,21 +97,18 @@ fn standard_errors_are_those_of_whole_histories() {
         low: [16, 16, 2],
         high: [24, 24, 14],
     };
-    let doses = DoseSettings {
-        regions: vec![cube],
-        voxels: Some(VoxelBox {
+    let doses = DoseSettings::default()
+        .with_regions(vec![cube])
+        .with_voxels(Some(VoxelBox {
             low: [19, 19, 4],
             high: [21, 21, 6],
-        }),
-    };
+        }));
     let seeds = 40;
     let results: Vec<Dose> = (0..seeds)
         .map(|seed| {
-            let settings = AnalogSettings {
-                histories: 4_000,
-                seed,
-                ..AnalogSettings::default()
-            };
+            let settings = AnalogSettings::default()
+                .with_histories(4_000)
+                .with_seed(seed);
             dose(&phantom, &spectrum, &projection, settings, &doses)
         })
         .collect();
@@ -152,11 +146,9 @@ fn standard_errors_are_those_of_whole_histories() {
 #[test]
 fn air_kerma_is_that_of_the_beam() {
     let (spectrum, projection) = (sixty_kvp(), frontal(20, 5.0));
-    let settings = AnalogSettings {
-        histories: 200_000,
-        seed: 6,
-        ..AnalogSettings::default()
-    };
+    let settings = AnalogSettings::default()
+        .with_histories(200_000)
+        .with_seed(6);
     let none = DoseSettings::default();
     let bare = dose(&slab(100.0, 0.0), &spectrum, &projection, settings, &none);
     assert_eq!(bare.entrance_air_kerma_gy_per_history, None);
@@ -194,21 +186,16 @@ fn air_kerma_is_that_of_the_beam() {
 #[test]
 fn regions_outside_the_phantom_are_refused() {
     let (phantom, spectrum, projection) = (slab(100.0, 1.0), sixty_kvp(), frontal(20, 5.0));
-    let settings = AnalogSettings {
-        histories: 1,
-        seed: 0,
-        ..AnalogSettings::default()
-    };
+    let settings = AnalogSettings::default().with_histories(1).with_seed(0);
     for (low, high) in [
         ([0, 0, 0], [31, 1, 1]),
         ([3, 3, 3], [3, 4, 4]),
         ([5, 5, 5], [4, 6, 6]),
     ] {
         let run = AnalogRun::new(&phantom, &spectrum, &projection, &settings).unwrap();
-        let doses = DoseSettings {
-            regions: vec![VoxelBox { low, high }],
-            voxels: None,
-        };
+        let doses = DoseSettings::default()
+            .with_regions(vec![VoxelBox { low, high }])
+            .with_voxels(None);
         let error = run.with_dose(&doses).err().unwrap();
         assert!(
             matches!(error, DoseError::Box { .. })

@@ -19,12 +19,7 @@ const FREQUENCIES_PER_MM: [f64; 6] = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
 
 /// RQA5 of IEC 61267.
 fn rqa5() -> Spectrum {
-    Spectrum::tungsten(&TubeSpec {
-        kvp: 70.0,
-        anode_angle_deg: 12.0,
-        filters: vec!["Al:23.5".parse().unwrap()],
-    })
-    .unwrap()
+    Spectrum::tungsten(&TubeSpec::new(70.0, 12.0, vec!["Al:23.5".parse().unwrap()])).unwrap()
 }
 
 fn exposure(pixels: usize, blurred: bool, electronic_noise_kev: f64) -> Projection {
@@ -44,13 +39,11 @@ fn image(
     histories: f64,
     seed: u64,
 ) -> Radiograph {
-    let settings = FastSettings {
-        dose_histories: histories,
-        scatter_histories: 32,
-        samples_per_side: 8,
-        seed,
-        ..FastSettings::default()
-    };
+    let settings = FastSettings::default()
+        .with_dose_histories(histories)
+        .with_scatter_histories(32)
+        .with_samples_per_side(8)
+        .with_seed(seed);
     phantom.fast(&rqa5(), projection, &settings).unwrap()
 }
 

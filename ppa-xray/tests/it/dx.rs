@@ -12,11 +12,11 @@ use ppa_xray::{
 use crate::scenes::{frontal, limb};
 
 fn tube() -> TubeSpec {
-    TubeSpec {
-        kvp: 60.0,
-        anode_angle_deg: 12.0,
-        filters: vec!["Al:2.5".parse().unwrap(), "Cu:0.1".parse().unwrap()],
-    }
+    TubeSpec::new(
+        60.0,
+        12.0,
+        vec!["Al:2.5".parse().unwrap(), "Cu:0.1".parse().unwrap()],
+    )
 }
 
 /// A limb with the field collimated to 30 × 40 of 60 × 60 pixels.
@@ -26,10 +26,7 @@ fn exposed() -> (Projection, Radiograph) {
         size_mm: [90.0, 120.0],
         centre_mm: [0.0, 0.0],
     };
-    let settings = FastSettings {
-        scatter_histories: 50_000,
-        ..FastSettings::default()
-    };
+    let settings = FastSettings::default().with_scatter_histories(50_000);
     let phantom = limb(&Isometry3::identity());
     let spectrum = Spectrum::tungsten(&tube()).unwrap();
     let radiograph = fast(&phantom, &spectrum, &projection, &settings).unwrap();

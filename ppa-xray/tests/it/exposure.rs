@@ -11,24 +11,16 @@ use ppa_xray::{
 use crate::scenes::{frontal, slab};
 
 fn spectrum() -> Spectrum {
-    Spectrum::tungsten(&TubeSpec {
-        kvp: 75.0,
-        anode_angle_deg: 12.0,
-        filters: vec!["Al:3".parse().unwrap()],
-    })
-    .unwrap()
+    Spectrum::tungsten(&TubeSpec::new(75.0, 12.0, vec!["Al:3".parse().unwrap()])).unwrap()
 }
 
 fn grid() -> AntiScatterGrid {
-    AntiScatterGrid {
-        ratio: 8.0,
-        lines_per_cm: 40.0,
-        strip_mm: 0.05,
-        strip: "lead".to_owned(),
-        interspace: "aluminium".to_owned(),
-        focus_mm: Some(900.0),
-        lines_along: Default::default(),
-    }
+    AntiScatterGrid::new(8.0, 40.0)
+        .with_strip_mm(0.05)
+        .with_strip("lead".to_owned())
+        .with_interspace("aluminium".to_owned())
+        .with_focus_mm(Some(900.0))
+        .with_lines_along(Default::default())
 }
 
 /// Everything at once: focal spot, heel effect, field off the detector's edges, detector off the axis and turned,
@@ -38,28 +30,24 @@ fn demanding() -> Projection {
     projection.detector.centre_mm = [15.0, -10.0];
     projection = projection.with_detector_turned(0.1, -0.05);
     let [x, y] = projection.detector.centre_mm;
-    projection.source = Source {
-        focal_spot: FocalSpot {
-            size_mm: 3.0,
-            shape: SpotShape::Uniform,
-        },
-        collimation: Collimation::Rectangle {
+    projection.source = Source::default()
+        .with_focal_spot(
+            FocalSpot::default()
+                .with_size_mm(3.0)
+                .with_shape(SpotShape::Uniform),
+        )
+        .with_collimation(Collimation::Rectangle {
             size_mm: [210.0, 330.0],
             centre_mm: [x + 25.0, y],
-        },
-        heel_effect: Some(HeelEffect {
-            anode_towards_deg: 90.0,
-        }),
-        blades_mm: Some(250.0),
-    };
-    projection.receptor = Receptor {
-        model: DetectorModel::Csi {
+        })
+        .with_heel_effect(Some(HeelEffect::new(90.0)))
+        .with_blades_mm(Some(250.0));
+    projection.receptor = Receptor::default()
+        .with_model(DetectorModel::Csi {
             thickness_um: 500.0,
             packing: 0.8,
-        },
-        grid: Some(grid()),
-        ..Receptor::default()
-    };
+        })
+        .with_grid(Some(grid()));
     projection
 }
 
@@ -73,15 +61,10 @@ fn a_few_energies_know_the_edges_of_the_detector() {
         thickness_um: 600.0,
         packing: 0.8,
     };
-    projection.receptor.grid = Some(AntiScatterGrid {
-        strip: "tungsten".to_owned(),
-        ..grid()
-    });
-    let settings = FastSettings {
-        dose_histories: f64::INFINITY,
-        scatter_histories: 1,
-        ..FastSettings::default()
-    };
+    projection.receptor.grid = Some(grid().with_strip("tungsten".to_owned()));
+    let settings = FastSettings::default()
+        .with_dose_histories(f64::INFINITY)
+        .with_scatter_histories(1);
     let all = primary(&phantom, &spectrum(), &projection, 2).unwrap();
     let few = fast(&phantom, &spectrum(), &projection, &settings).unwrap();
     let few = &few.layer(Category::Primary).value;
@@ -100,19 +83,15 @@ fn engines_agree_on_source_and_detector() {
         &phantom,
         &spectrum,
         &projection,
-        &AnalogSettings {
-            histories,
-            seed: 5,
-            ..AnalogSettings::default()
-        },
+        &AnalogSettings::default()
+            .with_histories(histories)
+            .with_seed(5),
     );
-    let settings = FastSettings {
-        dose_histories: f64::INFINITY,
-        scatter_histories: 300_000,
-        seed: 6,
-        samples_per_side: 4,
-        ..FastSettings::default()
-    };
+    let settings = FastSettings::default()
+        .with_dose_histories(f64::INFINITY)
+        .with_scatter_histories(300_000)
+        .with_seed(6)
+        .with_samples_per_side(4);
     let expected = fast(&phantom, &spectrum, &projection, &settings).unwrap();
     let tallied = tallied.unwrap();
     for category in Category::ALL {
@@ -205,11 +184,9 @@ fn blades_blur_the_edges_of_the_field() {
     projection.source.focal_spot.size_mm = 1.2;
     projection.source.blades_mm = Some(275.0);
     let image = primary(&vacuum, &spectrum, &projection, 8).unwrap();
-    let settings = FastSettings {
-        dose_histories: f64::INFINITY,
-        scatter_histories: 320,
-        ..FastSettings::default()
-    };
+    let settings = FastSettings::default()
+        .with_dose_histories(f64::INFINITY)
+        .with_scatter_histories(320);
     let by_fast = fast(&vacuum, &spectrum, &projection, &settings).unwrap();
     for (pixel, value) in by_fast.total().into_iter().enumerate() {
         let error = f64::from(value) - image[pixel];
@@ -270,11 +247,9 @@ fn the_field_has_sharp_edges() {
     // 45 x 400 mm instead of 100 x 100 mm take the same photons: 1.8 times the area, less obliquity.
     let share = row[5] / open[55];
     assert!((share - 1.0 / 1.8).abs() < 0.01, "{share}");
-    let settings = AnalogSettings {
-        histories: 40_000,
-        seed: 1,
-        ..AnalogSettings::default()
-    };
+    let settings = AnalogSettings::default()
+        .with_histories(40_000)
+        .with_seed(1);
     let tallied = analog(&vacuum, &spectrum, &projection, &settings).unwrap();
     let on_detector = tallied.sums.primary_ev_per_history / 50e3;
     let expected: f64 = image.iter().sum::<f64>() / 50e3;
@@ -292,10 +267,7 @@ fn readings_per_mas_follow_the_inverse_square() {
         projection.source.collimation = Collimation::Fan {
             angles_deg: [8.0, 6.0],
         };
-        let settings = FastSettings {
-            scatter_histories: 1,
-            ..FastSettings::default()
-        };
+        let settings = FastSettings::default().with_scatter_histories(1);
         let image = fast(&slab(10.0, 1e-9), &spectrum, &projection, &settings).unwrap();
         (
             image.open_field_ev_cm2 * image.histories_per_mas.unwrap(),
@@ -329,17 +301,13 @@ fn noise_of_a_scintillator_is_compound_poisson() {
         &vacuum,
         &spectrum,
         &projection,
-        &AnalogSettings {
-            histories,
-            seed: 3,
-            ..AnalogSettings::default()
-        },
+        &AnalogSettings::default()
+            .with_histories(histories)
+            .with_seed(3),
     );
-    let settings = FastSettings {
-        dose_histories: histories as f64,
-        scatter_histories: 1,
-        ..FastSettings::default()
-    };
+    let settings = FastSettings::default()
+        .with_dose_histories(histories as f64)
+        .with_scatter_histories(1);
     let drawn = fast(&vacuum, &spectrum, &projection, &settings).unwrap();
     let of = |values: &[f32]| {
         let n = values.len() as f64;
@@ -371,11 +339,9 @@ fn readings_scatter_as_their_standard_errors_say() {
     let spectrum = Spectrum::monoenergetic(60.0).unwrap();
     let mut projection = frontal(100, 0.3);
     let histories = 400_000;
-    let settings = AnalogSettings {
-        histories,
-        seed: 3,
-        ..AnalogSettings::default()
-    };
+    let settings = AnalogSettings::default()
+        .with_histories(histories)
+        .with_seed(3);
     let sharp = analog(&vacuum, &spectrum, &projection, &settings).unwrap();
     projection.receptor.blur = Some(Blur::Lorentzian { h_mm2: 0.45 });
     projection.receptor.electronic_noise_kev = 200.0;
@@ -383,11 +349,9 @@ fn readings_scatter_as_their_standard_errors_say() {
     // Shares of photons are counted to 1/64 eV.
     let kept = followed.sums.total_ev_per_history() / sharp.sums.total_ev_per_history();
     assert!((kept - 1.0).abs() < 1e-6, "{kept}");
-    let dose = FastSettings {
-        dose_histories: histories as f64,
-        scatter_histories: 1,
-        ..FastSettings::default()
-    };
+    let dose = FastSettings::default()
+        .with_dose_histories(histories as f64)
+        .with_scatter_histories(1);
     let drawn = fast(&vacuum, &spectrum, &projection, &dose).unwrap();
     for image in [followed, drawn] {
         let (total, sigma) = (image.total(), image.sigma());
@@ -410,10 +374,7 @@ fn readings_scatter_as_their_standard_errors_say() {
         let sum: f64 = electronic.value.iter().map(|&v| f64::from(v)).sum();
         assert!(sum.abs() < 4.0 * n.sqrt() * f64::from(electronic.sigma[0]));
     }
-    let expected = FastSettings {
-        dose_histories: f64::INFINITY,
-        ..dose
-    };
+    let expected = dose.with_dose_histories(f64::INFINITY);
     let clean = fast(&vacuum, &spectrum, &projection, &expected).unwrap();
     assert!(
         clean.electronic.is_none(),

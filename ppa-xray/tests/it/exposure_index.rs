@@ -13,11 +13,11 @@ const SIDE_MM: f64 = 60.0;
 const DISTANCE_MM: f64 = 1_100.0;
 
 fn rqa5() -> Spectrum {
-    let tube = TubeSpec {
-        kvp: 70.0,
-        anode_angle_deg: 12.0,
-        filters: vec!["Al:2.5".parse().unwrap(), "Al:21".parse().unwrap()],
-    };
+    let tube = TubeSpec::new(
+        70.0,
+        12.0,
+        vec!["Al:2.5".parse().unwrap(), "Al:21".parse().unwrap()],
+    );
     Spectrum::tungsten(&tube).unwrap()
 }
 
@@ -32,22 +32,14 @@ fn receptors() -> [Receptor; 3] {
             thickness_um: 500.0,
         },
     ];
-    models.map(|model| Receptor {
-        model,
-        ..Receptor::default()
-    })
+    models.map(|model| Receptor::default().with_model(model))
 }
 
 fn expose(phantom: &VoxelPhantom, receptor: &Receptor, histories: f64) -> Radiograph {
-    let projection = Projection {
-        receptor: receptor.clone(),
-        ..frontal(40, SIDE_MM / 40.0)
-    };
-    let settings = FastSettings {
-        dose_histories: histories,
-        scatter_histories: 20_000,
-        ..FastSettings::default()
-    };
+    let projection = frontal(40, SIDE_MM / 40.0).with_receptor(receptor.clone());
+    let settings = FastSettings::default()
+        .with_dose_histories(histories)
+        .with_scatter_histories(20_000);
     fast(phantom, &rqa5(), &projection, &settings).unwrap()
 }
 
@@ -81,19 +73,13 @@ fn index_of_2_5_ugy_of_rqa5_is_250() {
 #[test]
 fn a_grid_lowers_the_index_by_its_transmission() {
     let [_, csi, _] = receptors();
-    let grid = AntiScatterGrid {
-        ratio: 8.0,
-        lines_per_cm: 36.0,
-        strip_mm: 0.06,
-        strip: "lead".to_owned(),
-        interspace: "polyethylene".to_owned(),
-        focus_mm: Some(DISTANCE_MM),
-        lines_along: LinesAlong::X,
-    };
-    let with_grid = Receptor {
-        grid: Some(grid),
-        ..csi.clone()
-    };
+    let grid = AntiScatterGrid::new(8.0, 36.0)
+        .with_strip_mm(0.06)
+        .with_strip("lead".to_owned())
+        .with_interspace("polyethylene".to_owned())
+        .with_focus_mm(Some(DISTANCE_MM))
+        .with_lines_along(LinesAlong::X);
+    let with_grid = csi.clone().with_grid(Some(grid));
     let histories = histories_of_2_5_ugy();
     let open = |receptor: &Receptor| expose(&vacuum(), receptor, histories).open_field_ev_cm2;
     let expected = open(&with_grid) / open(&csi);

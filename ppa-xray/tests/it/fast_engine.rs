@@ -13,20 +13,16 @@ const SCATTER: [Category; 3] = [Category::Compton, Category::Rayleigh, Category:
 
 /// The expected image, without quantum noise.
 fn expected_image(scatter_histories: u64, seed: u64) -> FastSettings {
-    FastSettings {
-        dose_histories: f64::INFINITY,
-        scatter_histories,
-        seed,
-        ..FastSettings::default()
-    }
+    FastSettings::default()
+        .with_dose_histories(f64::INFINITY)
+        .with_scatter_histories(scatter_histories)
+        .with_seed(seed)
 }
 
 fn analog_settings(histories: u64, seed: u64) -> AnalogSettings {
-    AnalogSettings {
-        histories,
-        seed,
-        ..AnalogSettings::default()
-    }
+    AnalogSettings::default()
+        .with_histories(histories)
+        .with_seed(seed)
 }
 
 /// Energy per history in `side`² blocks of the detector, and its variance if the pixels are independent.
@@ -130,10 +126,7 @@ fn scatter_is_that_of_analog() {
 #[test]
 fn scatter_of_a_demanding_source_is_that_of_analog() {
     let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
-    let mut projection = Projection {
-        source: demanding_source(),
-        ..frontal(24, 6.0)
-    };
+    let mut projection = frontal(24, 6.0).with_source(demanding_source());
     let expected = analog(
         &phantom,
         &spectrum,
@@ -176,10 +169,7 @@ fn primary_is_that_of_many_rays() {
     for (pixels, pixel_mm, usual, worst) in [(20, 5.0, 4e-3, 1e-2), (24, 0.5, 4e-3, 1.5e-2)] {
         let projection = frontal(pixels, pixel_mm);
         let exact = primary(&phantom, &spectrum, &projection, 64).unwrap();
-        let settings = FastSettings {
-            samples_per_side: 64,
-            ..expected_image(320, 1)
-        };
+        let settings = expected_image(320, 1).with_samples_per_side(64);
         let image = fast(&phantom, &spectrum, &projection, &settings).unwrap();
         let mut errors: Vec<f64> = exact
             .iter()
@@ -204,7 +194,7 @@ fn primary_of_a_focal_spot_is_that_of_many_rays() {
         (10.0, SpotShape::Uniform),
     ] {
         let mut projection = frontal(16, 0.8);
-        projection.source.focal_spot = FocalSpot { size_mm, shape };
+        projection.source.focal_spot = FocalSpot::default().with_size_mm(size_mm).with_shape(shape);
         let exact = primary(&phantom, &spectrum, &projection, 8).unwrap();
         let image = fast(&phantom, &spectrum, &projection, &expected_image(320, 1)).unwrap();
         let errors: Vec<f64> = exact
@@ -268,10 +258,8 @@ fn errors_are_what_twenty_seeds_show() {
     let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
     let projection = frontal(32, 5.0);
     let sums = |scatter_histories: u64, scatter_pixel_mm: f64, seed: u64| {
-        let settings = FastSettings {
-            scatter_pixel_mm,
-            ..expected_image(scatter_histories, seed)
-        };
+        let settings =
+            expected_image(scatter_histories, seed).with_scatter_pixel_mm(scatter_pixel_mm);
         let image = fast(&phantom, &spectrum, &projection, &settings).unwrap();
         SCATTER.map(|category| image.sums.of(category))
     };
@@ -320,11 +308,9 @@ fn noise_is_white_and_as_large_as_that_of_analog() {
     let (spectrum, projection) = (sixty_kvp(), frontal(48, 2.0));
     let histories = 4e6;
     let image = |dose_histories: f64, seed: u64| {
-        let settings = FastSettings {
-            dose_histories,
-            samples_per_side: 2,
-            ..expected_image(320, seed)
-        };
+        let settings = expected_image(320, seed)
+            .with_dose_histories(dose_histories)
+            .with_samples_per_side(2);
         fast(&phantom, &spectrum, &projection, &settings).unwrap()
     };
     let (noisy, smooth) = (image(histories, 5), image(f64::INFINITY, 5));
@@ -388,31 +374,19 @@ fn settings_beyond_all_sense_are_refused() {
     let usual = expected_image(320, 1);
     for (settings, said) in [
         (
-            FastSettings {
-                dose_histories: 1e300,
-                ..usual
-            },
+            usual.with_dose_histories(1e300),
             "the number of histories for the noise is 1e300, expected 1 to 1e18, or infinite for none",
         ),
         (
-            FastSettings {
-                dose_histories: 1e-300,
-                ..usual
-            },
+            usual.with_dose_histories(1e-300),
             "the number of histories for the noise is 1e-300, expected 1 to 1e18, or infinite for none",
         ),
         (
-            FastSettings {
-                scatter_histories: u64::MAX,
-                ..usual
-            },
+            usual.with_scatter_histories(u64::MAX),
             "the number of histories for the scatter is 1.8446744073709552e19, expected 1 to 1e8",
         ),
         (
-            FastSettings {
-                scatter_pixel_mm: 0.01,
-                ..usual
-            },
+            usual.with_scatter_pixel_mm(0.01),
             "the distance of the scatter points in mm is 0.01, expected a positive length that sets at most 100000 points on the detector",
         ),
     ] {

@@ -7,11 +7,9 @@ use ppa_xray::{Category, EXR_ATTRIBUTE, FastSettings, Presentation, Radiograph, 
 use crate::scenes::{frontal, limb};
 
 fn radiograph() -> Radiograph {
-    let settings = FastSettings {
-        scatter_histories: 50_000,
-        seed: 77,
-        ..FastSettings::default()
-    };
+    let settings = FastSettings::default()
+        .with_scatter_histories(50_000)
+        .with_seed(77);
     let spectrum = Spectrum::monoenergetic(40.0).unwrap();
     fast(
         &limb(&Isometry3::identity()),

@@ -19,17 +19,13 @@ fn smooth_limb() -> VoxelPhantom {
 #[test]
 fn engines_agree_on_a_trilinear_limb() {
     let (phantom, spectrum, projection) = (smooth_limb(), sixty_kvp(), frontal(32, 5.0));
-    let analog_settings = AnalogSettings {
-        histories: 1_000_000,
-        seed: 21,
-        ..AnalogSettings::default()
-    };
-    let fast_settings = FastSettings {
-        dose_histories: f64::INFINITY,
-        scatter_histories: 60_000,
-        seed: 22,
-        ..FastSettings::default()
-    };
+    let analog_settings = AnalogSettings::default()
+        .with_histories(1_000_000)
+        .with_seed(21);
+    let fast_settings = FastSettings::default()
+        .with_dose_histories(f64::INFINITY)
+        .with_scatter_histories(60_000)
+        .with_seed(22);
     let expected = analog(&phantom, &spectrum, &projection, &analog_settings).unwrap();
     let image = fast(&phantom, &spectrum, &projection, &fast_settings).unwrap();
     for category in Category::ALL {
@@ -62,11 +58,9 @@ fn primary_of_fine_pixels_is_that_of_many_rays() {
         let mut projection = frontal(pixels, pixel_mm);
         projection.source.focal_spot.size_mm = 0.6;
         let exact = primary(&phantom, &spectrum, &projection, 8).unwrap();
-        let settings = FastSettings {
-            dose_histories: f64::INFINITY,
-            scatter_histories: 320,
-            ..FastSettings::default()
-        };
+        let settings = FastSettings::default()
+            .with_dose_histories(f64::INFINITY)
+            .with_scatter_histories(320);
         let image = fast(&phantom, &spectrum, &projection, &settings).unwrap();
         let mut errors: Vec<f64> = exact
             .iter()
@@ -102,11 +96,9 @@ fn step_between_two_voxels_is_a_ramp_one_voxel_wide() {
     .with_interpolation(Interpolation::Trilinear);
     let spectrum = Spectrum::monoenergetic(60.0).unwrap();
     // From so far away and so close to the detector that rays are as good as parallel.
-    let projection = Projection {
-        source_detector_mm: 9_006.0,
-        ct_from_device: Isometry3::translation(0.0, 0.0, -9_000.0),
-        ..frontal(37, 0.1)
-    };
+    let projection = frontal(37, 0.1)
+        .with_source_detector_mm(9_006.0)
+        .with_ct_from_device(Isometry3::translation(0.0, 0.0, -9_000.0));
     let image = primary(&phantom, &spectrum, &projection, 8).unwrap();
     let mu = water.cross_sections(60.0).unwrap().total() / 10.0;
     let row = &image[18 * 37..19 * 37];

@@ -132,13 +132,11 @@ fn drawn(blurred: bool, seeds: u64) -> Vec<Radiograph> {
     let (vacuum, projection) = (slab(10.0, 1e-9), exposure(blurred));
     let spectrum = Spectrum::monoenergetic(60.0).unwrap();
     let image = |seed| {
-        let settings = FastSettings {
-            dose_histories: HISTORIES as f64,
-            scatter_histories: 1,
-            samples_per_side: 1,
-            seed,
-            ..FastSettings::default()
-        };
+        let settings = FastSettings::default()
+            .with_dose_histories(HISTORIES as f64)
+            .with_scatter_histories(1)
+            .with_samples_per_side(1)
+            .with_seed(seed);
         fast(&vacuum, &spectrum, &projection, &settings).unwrap()
     };
     (0..seeds).map(image).collect()
@@ -148,11 +146,9 @@ fn counted(blurred: bool, seeds: u64) -> Vec<Radiograph> {
     let (vacuum, projection) = (slab(10.0, 1e-9), exposure(blurred));
     let spectrum = Spectrum::monoenergetic(60.0).unwrap();
     let image = |seed| {
-        let settings = AnalogSettings {
-            histories: HISTORIES,
-            seed,
-            ..AnalogSettings::default()
-        };
+        let settings = AnalogSettings::default()
+            .with_histories(HISTORIES)
+            .with_seed(seed);
         analog(&vacuum, &spectrum, &projection, &settings).unwrap()
     };
     (0..seeds).map(image).collect()
@@ -178,19 +174,15 @@ fn noise_behind_blur_has_the_power_of_the_detector() {
 fn quanta_of_every_category_are_those_of_analog() {
     let (phantom, spectrum, projection) =
         (limb(&Isometry3::identity()), sixty_kvp(), frontal(16, 10.0));
-    let settings = AnalogSettings {
-        histories: 1_000_000,
-        seed: 21,
-        ..AnalogSettings::default()
-    };
+    let settings = AnalogSettings::default()
+        .with_histories(1_000_000)
+        .with_seed(21);
     let counted = analog(&phantom, &spectrum, &projection, &settings).unwrap();
     // So few that the error of the scatter estimate is nothing beside the noise.
-    let settings = FastSettings {
-        dose_histories: 100.0,
-        scatter_histories: 20_000,
-        seed: 22,
-        ..FastSettings::default()
-    };
+    let settings = FastSettings::default()
+        .with_dose_histories(100.0)
+        .with_scatter_histories(20_000)
+        .with_seed(22);
     let drawn = fast(&phantom, &spectrum, &projection, &settings).unwrap();
     for category in Category::ALL {
         let quantum_kev = |image: &Radiograph| {

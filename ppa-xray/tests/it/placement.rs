@@ -12,11 +12,7 @@ fn refused(change: impl FnOnce(&mut ppa_xray::Projection)) -> ProjectionError {
     let mut projection = frontal(20, 10.0);
     change(&mut projection);
     let spectrum = Spectrum::monoenergetic(50.0).unwrap();
-    let settings = AnalogSettings {
-        histories: 10,
-        seed: 0,
-        ..AnalogSettings::default()
-    };
+    let settings = AnalogSettings::default().with_histories(10).with_seed(0);
     match analog(&slab(100.0, 1.0), &spectrum, &projection, &settings) {
         Err(TransportError::Projection(error)) => error,
         other => panic!("expected a refusal, got {other:?}"),
@@ -65,9 +61,7 @@ fn impossible_sources_and_receptors_are_named() {
     assert!(sentence(|p| p.source.focal_spot.size_mm = f64::NAN).contains("NaN"));
     assert!(sentence(|p| p.source.focal_spot.size_mm = 100.0).contains("focal spot"));
     let heel = sentence(|p| {
-        p.source.heel_effect = Some(HeelEffect {
-            anode_towards_deg: 0.0,
-        });
+        p.source.heel_effect = Some(HeelEffect::new(0.0));
     });
     assert!(heel.contains("tube model"), "{heel}"); // the spectrum is a line
     for (collimation, word) in [
@@ -113,33 +107,16 @@ fn settings_out_of_range_are_named() {
     let (phantom, projection) = (slab(100.0, 1.0), frontal(20, 10.0));
     let spectrum = Spectrum::monoenergetic(50.0).unwrap();
     for (settings, word) in [
+        (FastSettings::default().with_dose_histories(0.0), "noise"),
+        (FastSettings::default().with_scatter_histories(0), "scatter"),
         (
-            FastSettings {
-                dose_histories: 0.0,
-                ..FastSettings::default()
-            },
-            "noise",
-        ),
-        (
-            FastSettings {
-                scatter_histories: 0,
-                ..FastSettings::default()
-            },
-            "scatter",
-        ),
-        (
-            FastSettings {
-                scatter_pixel_mm: f64::NAN,
-                ..FastSettings::default()
-            },
+            FastSettings::default().with_scatter_pixel_mm(f64::NAN),
             "points",
         ),
         (
-            FastSettings {
-                samples_per_side: 0,
-                scatter_histories: 1,
-                ..FastSettings::default()
-            },
+            FastSettings::default()
+                .with_samples_per_side(0)
+                .with_scatter_histories(1),
             "rays",
         ),
     ] {
@@ -147,11 +124,7 @@ fn settings_out_of_range_are_named() {
         assert!(error.to_string().contains(word), "{error}");
     }
     let soft = Spectrum::monoenergetic(3.0).unwrap();
-    let one = AnalogSettings {
-        histories: 1,
-        seed: 0,
-        ..AnalogSettings::default()
-    };
+    let one = AnalogSettings::default().with_histories(1).with_seed(0);
     assert!(matches!(
         analog(&phantom, &soft, &projection, &one),
         Err(TransportError::Spectrum { .. })

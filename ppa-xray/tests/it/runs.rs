@@ -30,16 +30,15 @@ impl Scene {
 
     fn run(&self, histories: u64, seed: u64) -> AnalogRun<'_> {
         let settings = settings(histories, seed);
-        let dose = DoseSettings {
-            regions: vec![VoxelBox {
+        let dose = DoseSettings::default()
+            .with_regions(vec![VoxelBox {
                 low: [10, 10, 10],
                 high: [20, 20, 30],
-            }],
-            voxels: Some(VoxelBox {
+            }])
+            .with_voxels(Some(VoxelBox {
                 low: [12, 8, 5],
                 high: [24, 20, 35],
-            }),
-        };
+            }));
         AnalogRun::new(&self.phantom, &self.spectrum, &self.projection, &settings)
             .unwrap()
             .with_dose(&dose)
@@ -61,11 +60,9 @@ impl Scene {
 }
 
 fn settings(histories: u64, seed: u64) -> AnalogSettings {
-    AnalogSettings {
-        histories,
-        seed,
-        ..AnalogSettings::default()
-    }
+    AnalogSettings::default()
+        .with_histories(histories)
+        .with_seed(seed)
 }
 
 fn go_on() -> ControlFlow<()> {

@@ -70,25 +70,17 @@ pub fn limb(pose: &Isometry3<f64>) -> VoxelPhantom {
 
 /// A focal spot of 8 mm behind blades at 200 mm, and a heel effect.
 pub fn demanding_source() -> Source {
-    Source {
-        focal_spot: FocalSpot {
-            size_mm: 8.0,
-            shape: SpotShape::Gaussian,
-        },
-        heel_effect: Some(HeelEffect {
-            anode_towards_deg: 30.0,
-        }),
-        blades_mm: Some(200.0),
-        ..Source::default()
-    }
+    Source::default()
+        .with_focal_spot(
+            FocalSpot::default()
+                .with_size_mm(8.0)
+                .with_shape(SpotShape::Gaussian),
+        )
+        .with_heel_effect(Some(HeelEffect::new(30.0)))
+        .with_blades_mm(Some(200.0))
 }
 
 /// A tungsten tube at 60 kVp behind 2.5 mm of aluminium.
 pub fn sixty_kvp() -> Spectrum {
-    Spectrum::tungsten(&TubeSpec {
-        kvp: 60.0,
-        anode_angle_deg: 12.0,
-        filters: vec!["Al:2.5".parse().unwrap()],
-    })
-    .unwrap()
+    Spectrum::tungsten(&TubeSpec::new(60.0, 12.0, vec!["Al:2.5".parse().unwrap()])).unwrap()
 }

@@ -18,12 +18,7 @@ fn quality(kvp: f64, anode_angle_deg: f64, filters: &str) -> Quality {
         .split_whitespace()
         .map(|filter| filter.parse().unwrap())
         .collect();
-    let spectrum = Spectrum::tungsten(&TubeSpec {
-        kvp,
-        anode_angle_deg,
-        filters,
-    })
-    .unwrap();
+    let spectrum = Spectrum::tungsten(&TubeSpec::new(kvp, anode_angle_deg, filters)).unwrap();
     [
         spectrum.mean_energy_kev(),
         spectrum.hvl1_mm_al(),
@@ -202,11 +197,7 @@ fn reference_spectra_agree_with_spekpy() {
 #[test]
 fn settings_outside_the_model_are_refused() {
     let tube = |kvp, anode_angle_deg, filters| {
-        Spectrum::tungsten(&TubeSpec {
-            kvp,
-            anode_angle_deg,
-            filters,
-        })
+        Spectrum::tungsten(&TubeSpec::new(kvp, anode_angle_deg, filters))
     };
     assert!(matches!(
         tube(30.0, 12.0, vec![]),

@@ -14,11 +14,9 @@ fn images(histories: u64) -> Vec<Radiograph> {
     let projection = frontal(8, 13.0);
     (0..SEEDS)
         .map(|seed| {
-            let settings = AnalogSettings {
-                histories,
-                seed,
-                ..AnalogSettings::default()
-            };
+            let settings = AnalogSettings::default()
+                .with_histories(histories)
+                .with_seed(seed);
             analog(&phantom, &spectrum, &projection, &settings).unwrap()
         })
         .collect()

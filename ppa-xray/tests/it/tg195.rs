@@ -58,15 +58,12 @@ fn dose(
     histories: u64,
     regions: Vec<VoxelBox>,
 ) -> Dose {
-    let settings = AnalogSettings {
-        histories,
-        seed: 195,
-        ..AnalogSettings::default()
-    };
-    let regions = DoseSettings {
-        regions,
-        voxels: None,
-    };
+    let settings = AnalogSettings::default()
+        .with_histories(histories)
+        .with_seed(195);
+    let regions = DoseSettings::default()
+        .with_regions(regions)
+        .with_voxels(None);
     let run = AnalogRun::new(phantom, spectrum, projection, &settings).unwrap();
     let run = run.with_dose(&regions).unwrap();
     let mut tally = run.tally(Part::WHOLE);
@@ -201,13 +198,10 @@ fn case_4_1(name: &str, spectrum_name: &str, slit_mm: f64, histories: u64) {
     let (isocentre_mm, detector_mm) = (600.0, 1_000.0);
     let detector = Detector::centred(10, 10, 50.0);
     let mut projection = Projection::new(Isometry3::identity(), detector_mm, detector);
-    projection.source = Source {
-        collimation: Collimation::Rectangle {
-            size_mm: [320.0, slit_mm].map(|side| side * detector_mm / isocentre_mm),
-            centre_mm: [0.0; 2],
-        },
-        ..Source::default()
-    };
+    projection.source = Source::default().with_collimation(Collimation::Rectangle {
+        size_mm: [320.0, slit_mm].map(|side| side * detector_mm / isocentre_mm),
+        centre_mm: [0.0; 2],
+    });
     let disc = |cm: usize| VoxelBox {
         low: [0, 50 + cm, 215],
         high: [160, 51 + cm, 375],

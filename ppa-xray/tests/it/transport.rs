@@ -6,11 +6,9 @@ use ppa_xray::{AnalogSettings, Category, FastSettings, Material, Spectrum, analo
 use crate::scenes::{frontal, limb, sixty_kvp, slab};
 
 fn settings(histories: u64, seed: u64) -> AnalogSettings {
-    AnalogSettings {
-        histories,
-        seed,
-        ..AnalogSettings::default()
-    }
+    AnalogSettings::default()
+        .with_histories(histories)
+        .with_seed(seed)
 }
 
 fn in_pool<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
@@ -138,10 +136,7 @@ fn threads_change_no_bit() {
     let projection = frontal(16, 6.0);
     let both = |threads| {
         in_pool(threads, || {
-            let fast_settings = FastSettings {
-                scatter_histories: 20_000,
-                ..FastSettings::default()
-            };
+            let fast_settings = FastSettings::default().with_scatter_histories(20_000);
             (
                 analog(&phantom, &spectrum, &projection, &settings(20_000, 9)).unwrap(),
                 fast(&phantom, &spectrum, &projection, &fast_settings).unwrap(),
@@ -156,11 +151,9 @@ fn added_noise_has_the_stated_error() {
     let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
     let projection = frontal(64, 2.0);
     let image = |dose_histories| {
-        let settings = FastSettings {
-            dose_histories,
-            scatter_histories: 20_000,
-            ..FastSettings::default()
-        };
+        let settings = FastSettings::default()
+            .with_dose_histories(dose_histories)
+            .with_scatter_histories(20_000);
         fast(&phantom, &spectrum, &projection, &settings).unwrap()
     };
     let (noisy, expected) = (image(1e7), image(f64::INFINITY));

@@ -136,15 +136,13 @@ impl AnalogArgs {
         destination: &TallyDestination,
     ) -> anyhow::Result<AnalogTally> {
         let stop = self.stop()?;
-        let settings = AnalogSettings {
-            histories: match histories {
+        let settings = AnalogSettings::default()
+            .with_histories(match histories {
                 Some(histories) => whole_number(histories)?,
                 None if stop == Stop::default() => AnalogSettings::default().histories,
                 None => AnalogSettings::MOST_HISTORIES,
-            },
-            seed,
-            ..AnalogSettings::default()
-        };
+            })
+            .with_seed(seed);
         let ExposableLimb {
             phantom, spectrum, ..
         } = exposure.limb;
@@ -152,10 +150,11 @@ impl AnalogArgs {
         let mut run = AnalogRun::new(phantom, spectrum, &exposure.projection, &settings)?;
         if self.dose || self.dose_map.is_some() {
             let whole = VoxelBox::whole(phantom.grid());
-            run = run.with_dose(&DoseSettings {
-                regions: Vec::new(),
-                voxels: self.dose_map.is_some().then_some(whole),
-            })?;
+            run = run.with_dose(
+                &DoseSettings::default()
+                    .with_regions(Vec::new())
+                    .with_voxels(self.dose_map.is_some().then_some(whole)),
+            )?;
         }
         let mut tally = self.start(&run, destination)?;
         let interrupt = Interrupt::listen()?;

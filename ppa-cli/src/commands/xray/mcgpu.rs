@@ -263,11 +263,9 @@ impl McgpuArgs {
         let RunLength::Histories(histories) = length else {
             anyhow::bail!("{file} limits the time of a run; --engine fast needs --histories");
         };
-        let settings = FastSettings {
-            dose_histories: histories as f64,
-            seed: simulation.seed(station),
-            ..FastSettings::default()
-        };
+        let settings = FastSettings::default()
+            .with_dose_histories(histories as f64)
+            .with_seed(simulation.seed(station));
         let projection = simulation.projection(station);
         Ok(fast(
             simulation.phantom(),

@@ -132,10 +132,7 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
             working.finish_and_clear();
             let bar = bar("simulating");
             bar.set_length(100);
-            let settings = exposure.fast_settings(FastSettings {
-                seed: args.seed,
-                ..plan.xray.engine
-            })?;
+            let settings = exposure.fast_settings(plan.xray.engine.with_seed(args.seed))?;
             let observe = |share: f64| {
                 bar.set_position((100.0 * share) as u64);
                 ControlFlow::Continue(())
