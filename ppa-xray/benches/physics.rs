@@ -96,7 +96,7 @@ fn scattering(criterion: &mut Criterion) {
         let tables = MaterialTables::new(&material, ComptonModel::default());
         group.bench_function(format!("rayleigh/{name}"), |b| {
             b.iter(|| {
-                let one = |&e: &f64| tables.rayleigh_scattering(black_box(e), &mut uniform);
+                let one = |&e: &f64| tables.rayleigh_sin2_half_theta(black_box(e), &mut uniform);
                 energies.iter().map(one).sum::<f64>()
             })
         });

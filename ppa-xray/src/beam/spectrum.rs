@@ -29,16 +29,14 @@ impl Spectrum {
     /// Spectrum from n + 1 bin edges in keV and n weights; empty bins at both ends are dropped.
     ///
     /// # Errors
-    /// Edges that do not ascend; weights that are negative or not finite, or all zero; a filled bin outside 1 to 150 keV.
-    ///
-    /// # Panics
-    /// If there is not exactly one edge more than weights.
+    /// Other than one edge more than weights; edges that do not ascend; weights that are negative or not finite, or all zero; a filled bin outside 1 to 150 keV.
     pub fn from_bins(edges_kev: &[f64], weights: &[f64]) -> Result<Self, SpectrumError> {
-        assert_eq!(
-            edges_kev.len(),
-            weights.len() + 1,
-            "n bins have n + 1 edges"
-        );
+        if edges_kev.len() != weights.len() + 1 {
+            return Err(SpectrumError::Count {
+                edges: edges_kev.len(),
+                weights: weights.len(),
+            });
+        }
         for (bin, (edges, &weight)) in edges_kev.windows(2).zip(weights).enumerate() {
             if edges[0].partial_cmp(&edges[1]) != Some(std::cmp::Ordering::Less)
                 || !edges[1].is_finite()

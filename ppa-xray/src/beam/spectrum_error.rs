@@ -11,6 +11,16 @@ use crate::{
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpectrumError {
+    /// Other than one edge more than weights.
+    #[error(
+        "a spectrum has {edges} edges and {weights} weights, expected one edge more than weights"
+    )]
+    Count {
+        /// Number of edges.
+        edges: usize,
+        /// Number of weights.
+        weights: usize,
+    },
     /// The tube voltage is outside the tube model.
     #[error("tube voltage {found} kV is outside the tube model, which goes from {min} to {max} kV")]
     TubeVoltage {

@@ -7,3 +7,4 @@ pub(crate) mod score;
 pub(crate) mod settings;
 pub(crate) mod setup;
 pub(crate) mod tally;
+pub(crate) mod voxel_labels;

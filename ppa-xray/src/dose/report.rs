@@ -29,6 +29,7 @@ pub struct Imparted {
 /// Everything is per history; [`Dose::histories_per_mas`] times as much is per mAs. Electrons deposit where they are
 /// born, so kerma and dose are one in voxels larger than their range (0.3 mm of water at 150 keV).
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Dose {
     /// Histories counted.
     pub histories: u64,
@@ -40,6 +41,8 @@ pub struct Dose {
     pub materials: Vec<(String, Imparted)>,
     /// The regions asked for, in their order.
     pub regions: Vec<(VoxelBox, Imparted)>,
+    /// The labels asked for, in ascending order.
+    pub labels: Vec<(u8, Imparted)>,
     /// The voxels asked for.
     pub voxels: Option<VoxelDose>,
     /// Air kerma free in air (without backscatter) where the central ray enters the patient, Gy per history: at the first

@@ -6,6 +6,7 @@ use crate::beam::raster::Raster;
 use crate::dose::air_kerma::AirKerma;
 use crate::dose::settings::VoxelBox;
 use crate::dose::tally::{DoseSums, DoseTally, STEPS_PER_KEV, Sum};
+use crate::dose::voxel_labels::LabelNumbers;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::score::{Arrival, Score};
 use crate::transport::tally::nearest;
@@ -18,6 +19,8 @@ const GRAZING_COS: f64 = 0.1;
 pub(crate) struct DoseTarget<'a> {
     pub phantom: &'a VoxelPhantom,
     pub regions: &'a [VoxelBox],
+    /// Labels of the voxels, with the number of those that are counted.
+    pub labels: Option<(&'a [u8], LabelNumbers)>,
     pub tally: &'a DoseTally,
     pub air: &'a AirKerma,
     /// The detector.
@@ -36,18 +39,23 @@ pub(crate) struct DoseScore<'a, I> {
     materials: Vec<u64>,
     /// The same by region.
     regions: Vec<u64>,
+    /// The same by label.
+    labels: Vec<u64>,
 }
 
 impl<'a, I: Score> DoseScore<'a, I> {
     pub fn new(image: I, target: &'a DoseTarget<'a>) -> Self {
         let (materials, regions) = (target.phantom.materials().len(), target.regions.len());
+        let labels = target.labels.as_ref();
+        let labels = labels.map_or(0, |(_, numbers)| numbers.count());
         Self {
             image,
             target,
-            sums: DoseSums::new(materials, regions),
+            sums: DoseSums::new(materials, regions, labels),
             slots: Vec::new(),
             materials: vec![0; materials],
             regions: vec![0; regions],
+            labels: vec![0; labels],
         }
     }
 
@@ -106,6 +114,7 @@ impl<I: Score> Score for DoseScore<'_, I> {
             let DoseTarget {
                 phantom,
                 regions,
+                labels,
                 tally,
                 ..
             } = self.target;
@@ -114,6 +123,11 @@ impl<I: Score> Score for DoseScore<'_, I> {
             for (voxel, steps) in deposits.drain(..) {
                 all += steps;
                 self.materials[usize::from(phantom.material()[voxel])] += steps;
+                if let Some((labels, numbers)) = labels
+                    && let Some(number) = numbers.get(labels[voxel])
+                {
+                    self.labels[number] += steps;
+                }
                 if places {
                     let voxel = phantom.grid().voxel(voxel);
                     tally.score_voxel(voxel, steps);
@@ -127,6 +141,7 @@ impl<I: Score> Score for DoseScore<'_, I> {
             self.sums.phantom.count(all);
             take_into(&mut self.sums.materials, &mut self.materials);
             take_into(&mut self.sums.regions, &mut self.regions);
+            take_into(&mut self.sums.labels, &mut self.labels);
         }
         self.image.finish(slot);
     }

@@ -3,6 +3,7 @@
 use ppa_ct::Grid;
 use serde::{Deserialize, Serialize};
 
+use crate::dose::voxel_labels::VoxelLabels;
 use crate::setters::setters;
 
 /// What is counted besides the energy imparted to every material and to the whole phantom.
@@ -12,6 +13,8 @@ use crate::setters::setters;
 pub struct DoseSettings {
     /// Boxes of voxels, each counted as a whole. They may overlap.
     pub regions: Vec<VoxelBox>,
+    /// Labels of the voxels: those of every label but 0 are counted together. A mask has the label 1 where it is set.
+    pub labels: Option<VoxelLabels>,
     /// Box whose voxels are counted one by one; 16 bytes per voxel.
     pub voxels: Option<VoxelBox>,
 }
@@ -43,10 +46,19 @@ pub enum DoseError {
         /// Voxels of the phantom.
         size: [usize; 3],
     },
+    /// Not as many labels as voxels.
+    #[error("the dose is asked for by {found} labels, expected one for each of {expected} voxels")]
+    Labels {
+        /// Number of labels.
+        found: usize,
+        /// Number of voxels.
+        expected: usize,
+    },
 }
 
 setters!(DoseSettings {
     with_regions: regions = Vec<VoxelBox>,
+    with_labels: labels = impl Into<Option<VoxelLabels>>,
     with_voxels: voxels = impl Into<Option<VoxelBox>>,
 });
 
@@ -96,6 +108,14 @@ impl DoseSettings {
             if (0..3).any(|axis| low[axis] >= high[axis] || high[axis] > size[axis]) {
                 return Err(DoseError::Box { low, high, size });
             }
+        }
+        if let Some(VoxelLabels(labels)) = &self.labels
+            && labels.len() != grid.len()
+        {
+            return Err(DoseError::Labels {
+                found: labels.len(),
+                expected: grid.len(),
+            });
         }
         Ok(())
     }

@@ -16,6 +16,8 @@ pub(crate) struct DoseSetup {
     phantom_g: f64,
     materials: Vec<(String, f64)>,
     regions: Vec<(VoxelBox, f64)>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    labels: Vec<(u8, f64)>,
     voxels: Option<VoxelBox>,
     /// Of the voxels; kept apart from the numbers that are written as text.
     #[serde(skip)]
@@ -41,6 +43,16 @@ impl DoseSetup {
         for (voxel, &material) in phantom.material().iter().enumerate() {
             materials[usize::from(material)].1 += grams(voxel);
         }
+        let labels = settings.labels.as_ref().map_or_else(Vec::new, |labels| {
+            let mut masses = [0.0; 256];
+            for (voxel, &label) in labels.0.iter().enumerate() {
+                masses[usize::from(label)] += grams(voxel);
+            }
+            let found = labels.found().into_iter();
+            found
+                .map(|label| (label, masses[usize::from(label)]))
+                .collect()
+        });
         let inside = |region: VoxelBox| -> Vec<f64> {
             let voxels = region.voxels();
             voxels.map(|voxel| grams(grid.index(voxel))).collect()
@@ -54,6 +66,7 @@ impl DoseSetup {
                 .iter()
                 .map(|region| (*region, inside(*region).iter().sum()))
                 .collect(),
+            labels,
             voxels: settings.voxels,
             voxel_g: settings
                 .voxels
@@ -68,7 +81,17 @@ impl DoseSetup {
 
     /// An empty tally.
     pub fn tally(&self) -> DoseTally {
-        DoseTally::new(self.materials.len(), self.regions.len(), self.voxels)
+        DoseTally::new(
+            self.materials.len(),
+            self.regions.len(),
+            self.labels.len(),
+            self.voxels,
+        )
+    }
+
+    /// The labels that are counted, in their order.
+    pub fn labels(&self) -> Vec<u8> {
+        self.labels.iter().map(|(label, _)| *label).collect()
     }
 
     pub fn regions(&self) -> Vec<VoxelBox> {
@@ -88,7 +111,7 @@ impl DoseSetup {
             Some(voxels) => possible(voxels)? as u64,
             None => 0,
         };
-        let few = 32 * (2 + self.materials.len() + self.regions.len()) as u64;
+        let few = 32 * (2 + self.materials.len() + self.regions.len() + self.labels.len()) as u64;
         voxels.checked_mul(4 + 16)?.checked_add(few)
     }
 
@@ -140,6 +163,12 @@ impl DoseSetup {
                 .iter()
                 .zip(&sums.regions)
                 .map(|((region, mass_g), sum)| (*region, imparted(*mass_g, sum)))
+                .collect(),
+            labels: self
+                .labels
+                .iter()
+                .zip(&sums.labels)
+                .map(|((label, mass_g), sum)| (*label, imparted(*mass_g, sum)))
                 .collect(),
             voxels,
             entrance_air_kerma_gy_per_history: self.entrance_air_kerma_gy_per_history,

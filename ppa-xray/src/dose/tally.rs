@@ -61,15 +61,18 @@ pub(crate) struct DoseSums {
     pub materials: Vec<Sum>,
     /// By region.
     pub regions: Vec<Sum>,
+    /// By label.
+    pub labels: Vec<Sum>,
 }
 
 impl DoseSums {
-    pub fn new(materials: usize, regions: usize) -> Self {
+    pub fn new(materials: usize, regions: usize, labels: usize) -> Self {
         Self {
             phantom: Sum::default(),
             detector_kerma: Sum::default(),
             materials: vec![Sum::default(); materials],
             regions: vec![Sum::default(); regions],
+            labels: vec![Sum::default(); labels],
         }
     }
 
@@ -78,6 +81,7 @@ impl DoseSums {
             .into_iter()
             .chain(&self.materials)
             .chain(&self.regions)
+            .chain(&self.labels)
     }
 
     fn each_mut(&mut self) -> impl Iterator<Item = &mut Sum> {
@@ -85,6 +89,7 @@ impl DoseSums {
             .into_iter()
             .chain(&mut self.materials)
             .chain(&mut self.regions)
+            .chain(&mut self.labels)
     }
 
     /// `None` on overflow.
@@ -97,9 +102,9 @@ impl DoseSums {
 }
 
 impl DoseTally {
-    pub fn new(materials: usize, regions: usize, voxels: Option<VoxelBox>) -> Self {
+    pub fn new(materials: usize, regions: usize, labels: usize, voxels: Option<VoxelBox>) -> Self {
         Self {
-            sums: Mutex::new(DoseSums::new(materials, regions)),
+            sums: Mutex::new(DoseSums::new(materials, regions, labels)),
             voxels: voxels.map(|voxels| {
                 let count = voxels.size().iter().product();
                 (voxels, (0..count).map(|_| Default::default()).collect())

@@ -30,6 +30,24 @@ pub struct MaterialTables {
     fluorescence: Fluorescence,
 }
 
+/// A Compton scattering.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ComptonScattering {
+    /// sin²(θ/2) of the scattering angle θ.
+    pub sin2_half_theta: f64,
+    /// Energy of the scattered photon, keV.
+    pub energy_kev: f64,
+}
+
+impl ComptonScattering {
+    /// Cosine of the scattering angle.
+    #[inline]
+    #[must_use]
+    pub fn cos_theta(&self) -> f64 {
+        1.0 - 2.0 * self.sin2_half_theta
+    }
+}
+
 impl MaterialTables {
     /// Prepares a material for Compton scattering by a model.
     #[must_use]
@@ -73,25 +91,28 @@ impl MaterialTables {
 
     /// sin²(θ/2) of a Rayleigh scattering angle, with numbers of `uniform` in [0, 1).
     #[inline]
-    pub fn rayleigh_scattering(&self, energy_kev: f64, mut uniform: impl FnMut() -> f64) -> f64 {
+    pub fn rayleigh_sin2_half_theta(
+        &self,
+        energy_kev: f64,
+        mut uniform: impl FnMut() -> f64,
+    ) -> f64 {
         let sin2_half_theta = self.rayleigh.sample(energy_kev as f32, || uniform() as f32);
         f64::from(sin2_half_theta)
     }
 
-    /// sin²(θ/2) of a Compton scattering angle and the energy of the scattered photon in keV, with numbers of `uniform` in
-    /// [0, 1).
+    /// A Compton scattering, with numbers of `uniform` in [0, 1).
     #[inline]
     pub fn compton_scattering(
         &self,
         energy_kev: f64,
         mut uniform: impl FnMut() -> f64,
-    ) -> (f64, f64) {
+    ) -> ComptonScattering {
         let (sin2_half_theta, scattered_kev) =
             self.compton.sample(energy_kev as f32, || uniform() as f32);
-        (
-            f64::from(sin2_half_theta),
-            f64::from(scattered_kev).min(energy_kev),
-        )
+        ComptonScattering {
+            sin2_half_theta: f64::from(sin2_half_theta),
+            energy_kev: f64::from(scattered_kev).min(energy_kev),
+        }
     }
 
     /// Energy in keV of the K photon that follows photoelectric absorption, if one does above 5 keV; it leaves in any
@@ -142,15 +163,14 @@ impl MaterialTables {
     /// Cosine of a Rayleigh scattering angle.
     #[inline]
     pub(crate) fn sample_rayleigh(&self, energy_kev: f64, random: &mut Philox) -> f64 {
-        1.0 - 2.0 * self.rayleigh_scattering(energy_kev, || random.unit())
+        1.0 - 2.0 * self.rayleigh_sin2_half_theta(energy_kev, || random.unit())
     }
 
     /// Cosine of a Compton scattering angle and the energy of the scattered photon in keV.
     #[inline]
     pub(crate) fn sample_compton(&self, energy_kev: f64, random: &mut Philox) -> (f64, f64) {
-        let (sin2_half_theta, scattered_kev) =
-            self.compton_scattering(energy_kev, || random.unit());
-        (1.0 - 2.0 * sin2_half_theta, scattered_kev)
+        let scattering = self.compton_scattering(energy_kev, || random.unit());
+        (scattering.cos_theta(), scattering.energy_kev)
     }
 }
 

@@ -247,10 +247,10 @@ mod tests {
                     let bin = |sin2_half_theta: f64| {
                         ((sin2_half_theta.sqrt() * BINS as f64) as usize).min(BINS - 1)
                     };
-                    let rayleigh = tables.rayleigh_scattering(energy_kev, || random.unit());
+                    let rayleigh = tables.rayleigh_sin2_half_theta(energy_kev, || random.unit());
                     counts[0][bin(rayleigh)] += 1;
-                    let (compton, _) = tables.compton_scattering(energy_kev, || random.unit());
-                    counts[1][bin(compton)] += 1;
+                    let compton = tables.compton_scattering(energy_kev, || random.unit());
+                    counts[1][bin(compton.sin2_half_theta)] += 1;
                 }
                 for (kind, counts) in counts.iter().enumerate() {
                     if kind == 0 && !with_rayleigh {

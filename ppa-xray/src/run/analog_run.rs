@@ -14,6 +14,7 @@ use crate::dose::air_kerma::AirKerma;
 use crate::dose::score::DoseTarget;
 use crate::dose::settings::{DoseError, DoseSettings};
 use crate::dose::setup::DoseSetup;
+use crate::dose::voxel_labels::LabelNumbers;
 use crate::engine::analog::{AnalogSettings, count, count_with_dose};
 use crate::engine::analog_image::ImageSetup;
 use crate::engine::exposure::Exposure;
@@ -250,10 +251,19 @@ impl<'a> AnalogRun<'a> {
         let histories = tally.done.end..end;
         let (exposure, seed) = (&self.exposure, self.settings.seed);
         match (&self.dose, &tally.dose) {
-            (Some(DoseCounting { setup, air, .. }), Some(dose)) => {
+            (
+                Some(DoseCounting {
+                    setup,
+                    air,
+                    settings,
+                }),
+                Some(dose),
+            ) => {
+                let labels = settings.labels.as_ref();
                 let target = DoseTarget {
                     phantom: &exposure.transport.tables.phantom,
                     regions: &setup.regions(),
+                    labels: labels.map(|labels| (&*labels.0, LabelNumbers::of(&setup.labels()))),
                     tally: dose,
                     air,
                     raster: tally.image.raster,

@@ -36,6 +36,9 @@ pub(crate) fn key(
         phantom.materials(),
     )
     .expect("hashing does not fail");
+    if let Some(labels) = dose.and_then(|dose| dose.labels.as_ref()) {
+        hash.0.update(&labels.0);
+    }
     hash.0.update(phantom.material());
     for densities in phantom.density_g_cm3().chunks(4_096) {
         let bytes: Vec<u8> = densities.iter().flat_map(|d| d.to_le_bytes()).collect();

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;
 use ppa_xray::{
     AnalogRun, AnalogSettings, Dose, DoseError, DoseSettings, Material, Part, Projection, Spectrum,
-    Stop, VoxelBox, VoxelPhantom,
+    Stop, VoxelBox, VoxelLabels, VoxelPhantom,
 };
 
 use crate::scenes::{frontal, limb, sixty_kvp, slab};
@@ -202,4 +202,28 @@ fn regions_outside_the_phantom_are_refused() {
                 && error.to_string().contains("30 x 30 x 10 voxels")
         );
     }
+}
+
+/// Labels are counted like materials when they are those of the materials; label 0 is left out.
+#[test]
+fn dose_by_label_is_that_of_its_voxels() {
+    let phantom = limb(&Isometry3::identity());
+    let labels = VoxelLabels(phantom.material().iter().map(|&m| 40 * m).collect());
+    let settings = AnalogSettings::default()
+        .with_histories(20_000)
+        .with_seed(3);
+    let doses = DoseSettings::default().with_labels(labels.clone());
+    let projection = frontal(10, 20.0);
+    let found = dose(&phantom, &sixty_kvp(), &projection, settings, &doses);
+    let names: Vec<u8> = found.labels.iter().map(|(label, _)| *label).collect();
+    assert_eq!(names, [40, 80, 120]);
+    for ((_, by_label), (_, by_material)) in found.labels.iter().zip(&found.materials[1..]) {
+        assert_eq!(by_label, by_material);
+        assert!(by_label.ev_per_history.value > 0.0);
+    }
+    let short = DoseSettings::default().with_labels(VoxelLabels(labels.0[1..].to_vec()));
+    let run = AnalogRun::new(&phantom, &sixty_kvp(), &projection, &settings)
+        .map(|run| run.with_dose(&short).err());
+    let (expected, found) = (labels.0.len(), labels.0.len() - 1);
+    assert_eq!(run.unwrap(), Some(DoseError::Labels { found, expected }));
 }

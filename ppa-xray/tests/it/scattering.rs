@@ -54,7 +54,8 @@ fn free_electrons_at_rest_give_klein_nishina() {
         let samples = 100_000;
         let (mut sum, mut squares) = (0.0, 0.0);
         for _ in 0..samples {
-            let (half, scattered_kev) = tables.compton_scattering(energy_kev, &mut uniform);
+            let scattered = tables.compton_scattering(energy_kev, &mut uniform);
+            let (half, scattered_kev) = (scattered.sin2_half_theta, scattered.energy_kev);
             assert!((scattered_kev / at_rest(energy_kev, half) - 1.0).abs() < 1e-6);
             sum += 1.0 - 2.0 * half;
             squares += (1.0 - 2.0 * half).powi(2);
@@ -83,7 +84,8 @@ fn no_photon_keeps_more_than_the_binding_energy_leaves() {
     for energy_kev in [25.0, 60.0, 100.0] {
         let mut largest = 0.0_f64;
         for _ in 0..50_000 {
-            let (half, scattered_kev) = tables.compton_scattering(energy_kev, &mut uniform);
+            let scattered = tables.compton_scattering(energy_kev, &mut uniform);
+            let (half, scattered_kev) = (scattered.sin2_half_theta, scattered.energy_kev);
             assert!(half > 0.0 && scattered_kev > 0.0);
             largest = largest.max(scattered_kev);
         }
