@@ -265,6 +265,7 @@ const OFF: &[(&str, &[&str])] = &[
     (
         "xray.receptor",
         &[
+            "#collection_swank = 0.92    # noise of the collection of light in CsI; needs a converter",
             "#grid = { ratio = 8, lines_per_cm = 40, focus_mm = 1100 }    # anti-scatter grid",
             "#blur = { lorentzian = { h_mm2 = 0.45 } }    # of the converter",
         ],

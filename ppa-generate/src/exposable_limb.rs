@@ -2,9 +2,7 @@
 
 use ppa_mesh::Mesh;
 use ppa_scene::{PlaceError, Placement};
-use ppa_xray::{
-    AnalogSettings, FastSettings, PreparedPhantom, Projection, Radiograph, Spectrum, TransportError,
-};
+use ppa_xray::{FastSettings, PreparedPhantom, Projection, Radiograph, Spectrum, TransportError};
 
 use crate::plan::{Plan, XraySettings};
 use crate::prepare::PreparedLimb;

@@ -48,7 +48,7 @@ impl Technique {
                     thickness_um: 600.0,
                     packing: 0.8,
                 })
-                .with_grid(None)
+                .with_collection_swank(0.92)
                 .with_blur(Some(Blur::Lorentzian { h_mm2: 0.45 }))
                 .with_electronic_noise_kev(90.0),
             tube_load: Some(TubeLoad::Mas(mas)),

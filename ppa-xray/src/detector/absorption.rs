@@ -1,6 +1,6 @@
 //! Energy that a photon leaves in a converter layer: its mean and its mean square.
 
-use crate::beam::receptor::{DetectorModel, ReceptorError, require};
+use crate::beam::receptor::{DetectorModel, Receptor, ReceptorError, require};
 use crate::detector::energy_nodes::EnergyNodes;
 use crate::detector::layer::Layer;
 use crate::detector::layer_response::LayerResponse;
@@ -30,10 +30,15 @@ impl Absorption {
     /// None for the ideal detector, which keeps everything.
     ///
     /// # Errors
-    /// [`ReceptorError`] naming a thickness or packing out of range.
-    pub fn of(model: &DetectorModel) -> Result<Option<Self>, ReceptorError> {
-        let layer = match *model {
-            DetectorModel::Ideal => return Ok(None),
+    /// [`ReceptorError`] naming a thickness, packing or Swank factor out of range.
+    pub fn of(receptor: &Receptor) -> Result<Option<Self>, ReceptorError> {
+        let swank = receptor.collection_swank;
+        let what = "the Swank factor of the collection of light or charge";
+        let layer = match receptor.model {
+            DetectorModel::Ideal => {
+                require(what, swank, 1.0..=1.0, "1 for an ideal detector")?;
+                return Ok(None);
+            }
             DetectorModel::Csi {
                 thickness_um,
                 packing,
@@ -48,7 +53,13 @@ impl Absorption {
                 Layer::new("a_selenium", thickness_um)
             }
         };
-        Ok(Some(Self::of_layer(&layer)))
+        require(what, swank, 0.1..=1.0, "0.1 to 1")?;
+        let mut absorption = Self::of_layer(&layer);
+        // ⟨ε²⟩ of every deposit grows by the spread of its collection.
+        for [_, square] in absorption.shares.as_flattened_mut() {
+            *square /= swank;
+        }
+        Ok(Some(absorption))
     }
 
     fn of_layer(layer: &Layer) -> Self {
@@ -114,6 +125,29 @@ mod tests {
     use ppa_core::random::Philox;
 
     use super::*;
+
+    /// The Swank factor of the collection multiplies that of the absorption, and leaves the signal.
+    #[test]
+    fn collection_adds_its_noise() {
+        let receptor = Receptor::default().with_model(DetectorModel::Selenium {
+            thickness_um: 500.0,
+        });
+        let moments = |swank: f64| {
+            let receptor = receptor.clone().with_collection_swank(swank);
+            let absorption = Absorption::of(&receptor).unwrap().unwrap();
+            absorption.moments(50.0, 0.9)
+        };
+        let (quiet, noisy) = (moments(1.0), moments(0.8));
+        assert_eq!(quiet.mean_kev, noisy.mean_kev);
+        assert!((quiet.square_kev2 / noisy.square_kev2 - 0.8).abs() < 1e-12);
+        for (model, swank) in [(receptor.model, 1.1), (DetectorModel::Ideal, 0.9)] {
+            let receptor = Receptor::default()
+                .with_model(model)
+                .with_collection_swank(swank);
+            let error = Absorption::of(&receptor).unwrap_err().to_string();
+            assert!(error.contains("Swank factor"), "{error}");
+        }
+    }
     use crate::beam::spectrum::Spectrum;
     use crate::beam::tube::TubeSpec;
     use crate::matter::cross_sections::ELECTRON_REST_KEV;
@@ -126,12 +160,16 @@ mod tests {
             thickness_um,
             packing,
         };
-        Absorption::of(&model).unwrap().unwrap()
+        Absorption::of(&Receptor::default().with_model(model))
+            .unwrap()
+            .unwrap()
     }
 
     fn selenium(thickness_um: f64) -> Absorption {
         let model = DetectorModel::Selenium { thickness_um };
-        Absorption::of(&model).unwrap().unwrap()
+        Absorption::of(&Receptor::default().with_model(model))
+            .unwrap()
+            .unwrap()
     }
 
     /// Below the K edges nothing of note gets out: what is left is absorption, E (1 − exp(−μ t / cos)). Densities and
@@ -277,14 +315,18 @@ mod tests {
     fn layers_that_make_no_sense_are_refused() {
         for thickness_um in [0.0, -600.0, f64::NAN, 1e9] {
             let model = DetectorModel::Selenium { thickness_um };
-            let error = Absorption::of(&model).unwrap_err().to_string();
+            let error = Absorption::of(&Receptor::default().with_model(model))
+                .unwrap_err()
+                .to_string();
             assert!(error.contains("thickness"), "{error}");
         }
         let model = DetectorModel::Csi {
             thickness_um: 600.0,
             packing: 1.2,
         };
-        let error = Absorption::of(&model).unwrap_err().to_string();
+        let error = Absorption::of(&Receptor::default().with_model(model))
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("packing"), "{error}");
     }
 }

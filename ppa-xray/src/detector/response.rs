@@ -27,7 +27,7 @@ impl Response {
     pub fn new(receptor: &Receptor, centre_mm: [f64; 2]) -> Result<Self, ReceptorError> {
         let grid = receptor.grid.as_ref();
         Ok(Self {
-            absorption: Absorption::of(&receptor.model)?,
+            absorption: Absorption::of(receptor)?,
             grid: grid.map(|grid| Grid::new(grid, centre_mm)).transpose()?,
         })
     }
