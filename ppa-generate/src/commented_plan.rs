@@ -151,6 +151,11 @@ const KEYS: &[(&str, &str, &str)] = &[
         "between centres of voxels; or \"nearest\"",
     ),
     (
+        "xray",
+        "form_factors",
+        "of coherent scattering; or \"molecular\"",
+    ),
+    (
         "xray.source",
         "collimation",
         "or { rectangle = { size_mm = [180, 240] } }",

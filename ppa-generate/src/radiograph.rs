@@ -64,7 +64,9 @@ pub fn joint_phantom(
     let limb = Volume::new(cropped.grid().clone(), hu.collect())?;
     let fine = limb.refined(settings.max_voxel_mm)?;
     let phantom = VoxelPhantom::from_volume(&fine, &settings.calibration, None)?;
-    Ok(phantom.with_interpolation(settings.interpolation))
+    Ok(phantom
+        .with_interpolation(settings.interpolation)
+        .with_form_factors(settings.form_factors))
 }
 
 /// The exposure of a placed limb: the device moves into the scan, the voxels stay.

@@ -2,7 +2,7 @@
 //!
 //! A [`Spectrum`] says which photons leave the source, a [`Material`] what a gram of matter does to them:
 //! photoelectric absorption, Rayleigh scattering with form factors, Compton scattering off bound and moving electrons
-//! (or, by [`ComptonModel`], Klein–Nishina × S(q)).
+//! (or, by [`ComptonModel`], Klein–Nishina × S(q)). By [`FormFactors`], Rayleigh scattering follows measured form factors of tissues.
 //! A [`VoxelPhantom`] is the patient, a [`Projection`] the exposure. Two engines make a [`Radiograph`] of them:
 //! [`analog`] follows every photon, [`fast`] ray-traces the primary, estimates the scatter, and adds the noise of the
 //! exposure that the settings give. A [`PreparedPhantom`] keeps what the exposures of one phantom share, reports progress, and gives a preview. An [`AnalogRun`] follows photons in parts that can be interrupted and resumed, until the image is
@@ -113,6 +113,7 @@ pub use matter::cross_sections::CrossSections;
 pub use matter::electron_shell::Shell;
 pub use matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV};
 pub use matter::fluorescence::FluorescenceLine;
+pub use matter::form_factors::FormFactors;
 pub use matter::material::Material;
 pub use matter::material_error::MaterialError;
 pub use matter::photon_tables::PhotonTables;

@@ -6,8 +6,8 @@ use ppa_core::TransformRows;
 use ppa_depth::{RigSpec, SensorSpec, WallDepth};
 use ppa_scene::{PlaneSettings, RoomSpec};
 use ppa_xray::{
-    AnalogSettings, Detector, FastSettings, HuCalibration, Interpolation, Presentation, Receptor,
-    Source, TubeLoad,
+    AnalogSettings, Detector, FastSettings, FormFactors, HuCalibration, Interpolation,
+    Presentation, Receptor, Source, TubeLoad,
 };
 use serde::{Deserialize, Serialize};
 
@@ -99,6 +99,8 @@ pub struct XraySettings {
     pub max_voxel_mm: f64,
     /// Density between the centres of these voxels.
     pub interpolation: Interpolation,
+    /// Form factors of Rayleigh scattering.
+    pub form_factors: FormFactors,
     /// HU to material and density, written out as `[[xray.calibration.segment]]`.
     pub calibration: HuCalibration,
     /// HU to material and density from a file instead; reading the plan puts its contents in place of the path.
@@ -132,6 +134,7 @@ impl Default for XraySettings {
             half_length_mm: 120.0,
             max_voxel_mm: 1.0,
             interpolation: Interpolation::Trilinear,
+            form_factors: FormFactors::default(),
             calibration: HuCalibration::default(),
             calibration_file: None,
             tube_load: None,

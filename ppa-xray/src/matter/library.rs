@@ -4,6 +4,7 @@
 use crate::{
     matter::element::{atomic_number, density_g_cm3, symbol},
     matter::material::Material,
+    matter::molecular_form_factors::Measured,
 };
 
 struct Entry {
@@ -193,6 +194,34 @@ const MIXTURES: &[(&str, &[Entry])] = &[
     ("stoichiometry of the usual make", EQUIPMENT),
 ];
 
+/// Materials for which measured form factors stand, with their shares of the mass.
+///
+/// Soft tissue (ICRP) and red marrow (ICRU 46) are muscle and fat in the ratio that gives their carbon. Bone, skin, brain and lung have
+/// no measurement.
+const MEASURED: &[(&str, &[(Measured, f64)])] = &[
+    ("water", &[(Measured::Water, 1.0)]),
+    ("muscle", &[(Measured::Muscle, 1.0)]),
+    ("muscle_icru44", &[(Measured::Muscle, 1.0)]),
+    ("muscle_striated", &[(Measured::Muscle, 1.0)]),
+    ("soft_tissue_icru4", &[(Measured::Muscle, 1.0)]),
+    ("soft_tissue_icru44", &[(Measured::Muscle, 1.0)]),
+    (
+        "soft_tissue",
+        &[(Measured::Muscle, 0.765), (Measured::Fat, 0.235)],
+    ),
+    (
+        "marrow_red",
+        &[(Measured::Muscle, 0.42), (Measured::Fat, 0.58)],
+    ),
+    ("marrow_yellow", &[(Measured::Fat, 1.0)]),
+    ("adipose", &[(Measured::Fat, 1.0)]),
+    ("adipose_icru44", &[(Measured::Fat, 1.0)]),
+    ("blood", &[(Measured::Blood, 1.0)]),
+    ("blood_icru44", &[(Measured::Blood, 1.0)]),
+    ("breast_icru44", &[(Measured::Breast, 1.0)]),
+    ("pmma", &[(Measured::Pmma, 1.0)]),
+];
+
 /// Where the data of pure elements comes from.
 const ELEMENT_SOURCE: &str = "element, density as in xraylib 4.3.0";
 
@@ -238,8 +267,11 @@ pub(crate) fn names_and_sources() -> impl Iterator<Item = (&'static str, &'stati
 /// Material of a name or an element symbol, in any case.
 pub(crate) fn find(name: &str) -> Option<Material> {
     if let Some((_, entry)) = mixtures().find(|(_, entry)| entry.name.eq_ignore_ascii_case(name)) {
-        return Material::from_composition(entry.name, entry.density_g_cm3, entry.mass_fractions)
-            .ok();
+        let material =
+            Material::from_composition(entry.name, entry.density_g_cm3, entry.mass_fractions);
+        let measured = MEASURED.iter().find(|(name, _)| *name == entry.name);
+        let shares = measured.map_or(&[][..], |(_, shares)| shares);
+        return Some(material.ok()?.measured_as(shares));
     }
     let element = ELEMENT_NAMES
         .iter()

@@ -9,8 +9,11 @@ use crate::{
     matter::energy_nodes::energy_nodes,
     matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
     matter::fluorescence::{FluorescenceLine, KFluorescence},
+    matter::form_factors::FormFactors,
     matter::library,
     matter::material_error::MaterialError,
+    matter::molecular_form_factors::Measured,
+    matter::molecular_scatter::{MolecularScatter, Part},
     matter::photon_tables::PhotonTables,
     matter::tabulated_matter::TabulatedMatter,
 };
@@ -30,6 +33,10 @@ pub struct Material {
     name: String,
     density_g_cm3: f64,
     matter: Matter,
+    /// Shares of the mass with and without a measured form factor; empty if there is none.
+    parts: Vec<Part>,
+    /// Coherent scattering by molecular form factors, if chosen.
+    molecular: Option<Arc<MolecularScatter>>,
 }
 
 /// Where the photon data comes from.
@@ -68,6 +75,8 @@ impl Material {
             name,
             density_g_cm3,
             matter: Matter::Elements(composition?),
+            parts: Vec::new(),
+            molecular: None,
         })
     }
 
@@ -87,7 +96,48 @@ impl Material {
             name,
             density_g_cm3: tables.density_g_cm3,
             matter,
+            parts: Vec::new(),
+            molecular: None,
         })
+    }
+
+    /// The same elements, for which measured form factors stand in these shares of the mass.
+    pub(crate) fn measured_as(mut self, shares: &[(Measured, f64)]) -> Self {
+        if let Matter::Elements(composition) = &self.matter {
+            let part = |&(measured, share): &(Measured, f64)| Part {
+                share,
+                composition: composition.clone(),
+                measured: Some(measured),
+            };
+            self.parts = shares.iter().map(part).collect();
+        }
+        self
+    }
+
+    /// The same material with Rayleigh scattering by other form factors.
+    ///
+    /// [`FormFactors::Molecular`] changes materials of the library that have a measured form factor, and mixtures of them. Their Rayleigh
+    /// cross section becomes the integral of Thomson's law times the square of that form factor. Other
+    /// materials, and those made from tables, stay as they are.
+    #[must_use]
+    pub fn with_form_factors(mut self, form_factors: FormFactors) -> Self {
+        self.molecular = match form_factors {
+            FormFactors::Molecular if !self.parts.is_empty() => {
+                Some(Arc::new(MolecularScatter::new(&self.parts)))
+            }
+            _ => None,
+        };
+        self
+    }
+
+    /// The form factors that its Rayleigh scattering follows; [`FormFactors::Molecular`] if a measured one has a share in it.
+    #[must_use]
+    pub fn form_factors(&self) -> FormFactors {
+        if self.molecular.is_some() {
+            FormFactors::Molecular
+        } else {
+            FormFactors::IndependentAtoms
+        }
     }
 
     /// Material from text such as `Ca:0.4,O:0.6`: symbols and mass fractions.
@@ -104,7 +154,7 @@ impl Material {
         Self::from_elements(name, density_g_cm3, composition)
     }
 
-    /// Materials mixed by mass fraction.
+    /// Materials mixed by mass fraction. The mixture scatters by molecular form factors if one of its parts does.
     ///
     /// # Errors
     /// Everything [`Material::from_composition`] refuses, and a part made from tables, whose elements are not known.
@@ -125,7 +175,14 @@ impl Material {
             }
         }
         let mass: Vec<_> = mass.into_iter().collect();
-        Self::from_composition(name, density_g_cm3, &mass)
+        let mut mixture = Self::from_composition(name, density_g_cm3, &mass)?;
+        mixture.parts = mixed(parts);
+        let molecular = |(part, _): &(&Self, f64)| part.molecular.is_some();
+        Ok(if parts.iter().any(molecular) {
+            mixture.with_form_factors(FormFactors::Molecular)
+        } else {
+            mixture
+        })
     }
 
     /// Material of the library, such as `water`, `bone_cortical` or `titanium`, or a pure element by symbol, such as `Al`.
@@ -213,18 +270,29 @@ impl Material {
     /// As [`Material::cross_sections`] at an energy known to be inside 1 to 150 keV; beyond tables of its own, the values
     /// at their nearer end.
     pub(crate) fn cross_sections_unchecked(&self, energy_kev: f64) -> CrossSections {
-        match &self.matter {
+        let sections = match &self.matter {
             Matter::Elements(composition) => composition.cross_sections(energy_kev),
             Matter::Tables(tables) => tables.cross_sections(energy_kev),
+        };
+        match &self.molecular {
+            Some(molecular) => CrossSections {
+                rayleigh: molecular.rayleigh_cm2_g(energy_kev),
+                ..sections
+            },
+            None => sections,
         }
     }
 
     /// [`Material::cross_sections_unchecked`] at [`energy_nodes`].
     pub(crate) fn cross_sections_at_nodes(&self) -> Vec<CrossSections> {
-        match &self.matter {
+        let mut sections = match &self.matter {
             Matter::Elements(composition) => composition.cross_sections_at_nodes(),
             Matter::Tables(tables) => energy_nodes().map(|e| tables.cross_sections(e)).collect(),
+        };
+        if let Some(molecular) = &self.molecular {
+            molecular.replace_at_nodes(&mut sections);
         }
+        sections
     }
 
     /// Photoelectric absorption in cm²/g.
@@ -267,8 +335,11 @@ impl Material {
         }
     }
 
-    /// Σ w/A · F²(q), independent atoms, up to a constant.
+    /// F²(q) per unit mass up to a constant, Σ w/A · F² for independent atoms.
     pub(crate) fn form_factor_squared_per_gram(&self, q: f64) -> f64 {
+        if let Some(molecular) = &self.molecular {
+            return molecular.form_factor_squared(q);
+        }
         match &self.matter {
             Matter::Elements(composition) => composition.form_factor_squared(q),
             Matter::Tables(tables) => tables.form_factor_squared(q),
@@ -312,6 +383,33 @@ impl Material {
             Matter::Tables(tables) => tables.edges_kev().collect(),
         }
     }
+}
+
+/// The parts of a mixture by mass fraction; none if nothing in it has a measured form factor.
+fn mixed(materials: &[(&Material, f64)]) -> Vec<Part> {
+    if materials
+        .iter()
+        .all(|(material, _)| material.parts.is_empty())
+    {
+        return Vec::new();
+    }
+    let sum: f64 = materials.iter().map(|(_, share)| share).sum();
+    let mut mixed = Vec::new();
+    for (material, share) in materials {
+        let share = share / sum;
+        match &material.matter {
+            Matter::Elements(composition) if material.parts.is_empty() => mixed.push(Part {
+                share,
+                composition: composition.clone(),
+                measured: None,
+            }),
+            _ => mixed.extend(material.parts.iter().map(|part| Part {
+                share: share * part.share,
+                ..part.clone()
+            })),
+        }
+    }
+    mixed
 }
 
 fn check_density(name: &str, density_g_cm3: f64) -> Result<(), MaterialError> {

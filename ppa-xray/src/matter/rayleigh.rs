@@ -1,14 +1,17 @@
-//! Rayleigh scattering: Thomson's law times the squared form factor of independent atoms.
+//! Rayleigh scattering: Thomson's law times the squared form factor.
 
 use crate::{
     matter::cross_sections::HC_KEV_ANGSTROM,
     matter::energy_range::{MAX_ENERGY_KEV, MIN_ENERGY_KEV},
+    matter::form_factors::FormFactors,
     matter::material::Material,
     octaves::Octaves,
 };
 
-/// Quantile bins per octave of the probability that lies beyond, as a power of two.
+/// Quantile bins per octave of the probability that lies beyond, as a power of two: of free atoms, and of measured form factors with
+/// their peaks.
 const TAIL_BITS: u32 = 6;
+const TAIL_BITS_OF_PEAKS: u32 = 8;
 /// Energy bins per octave, as a power of two.
 const ENERGY_BITS: u32 = 5;
 /// Integration steps per octave of q², as a power of two.
@@ -27,6 +30,8 @@ pub(crate) struct Rayleigh {
     quantiles: Vec<f32>,
     /// Bits of the first tail share, shifted.
     first_tail: u32,
+    /// Bits of a tail share below its bin.
+    tail_shift: u32,
     /// Share of ∫F² dx beyond backward scattering, by energy.
     beyond_backward: Vec<f32>,
     energies: Octaves,
@@ -63,14 +68,20 @@ impl Rayleigh {
             .map(|energy| cumulative.tail_at(backward(energy)) as f32)
             .collect();
         let smallest = f64::from(beyond_backward[beyond_backward.len() - 1]);
-        let shares = Octaves::covering(smallest, 1.0, TAIL_BITS);
+        let tail_bits = match material.form_factors() {
+            FormFactors::IndependentAtoms => TAIL_BITS,
+            FormFactors::Molecular => TAIL_BITS_OF_PEAKS,
+        };
+        let tail_shift = f32::MANTISSA_DIGITS - 1 - tail_bits;
+        let shares = Octaves::covering(smallest, 1.0, tail_bits);
         let quantiles: Vec<f32> = shares
             .nodes()
             .map(|share| cumulative.x_at(share.min(1.0)) as f32)
             .collect();
         Self {
             quantiles,
-            first_tail: key(shares.first() as f32),
+            first_tail: (shares.first() as f32).to_bits() >> tail_shift,
+            tail_shift,
             beyond_backward,
             energies,
         }
@@ -96,19 +107,13 @@ impl Rayleigh {
     /// x beyond which the share `tail` of ∫F² dx lies.
     #[inline(always)]
     fn x(&self, tail: f32) -> f32 {
-        const FRACTION: u32 = (1 << TAIL_SHIFT) - 1;
-        let bin = (key(tail).wrapping_sub(self.first_tail) as usize).min(self.quantiles.len() - 2);
-        let into = (tail.to_bits() & FRACTION) as f32 * (1.0 / (FRACTION + 1) as f32);
+        let width = 1 << self.tail_shift;
+        let bin = (tail.to_bits() >> self.tail_shift).wrapping_sub(self.first_tail) as usize;
+        let bin = bin.min(self.quantiles.len() - 2);
+        let into = (tail.to_bits() & (width - 1)) as f32 / width as f32;
         let [low, high] = [bin, bin + 1].map(|i| self.quantiles[i]);
         low + into * (high - low)
     }
-}
-
-const TAIL_SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - TAIL_BITS;
-
-#[inline(always)]
-fn key(tail: f32) -> u32 {
-    tail.to_bits() >> TAIL_SHIFT
 }
 
 /// F² linear in x between nodes, and the share of its integral beyond each.

@@ -4,6 +4,7 @@ use nalgebra::Point3;
 use ppa_ct::{Grid, Volume};
 use rayon::prelude::*;
 
+use crate::matter::form_factors::FormFactors;
 use crate::matter::material::Material;
 use crate::phantom::calibration_error::CalibrationError;
 use crate::phantom::hu::HuCalibration;
@@ -145,6 +146,16 @@ impl VoxelPhantom {
             interpolation,
             ..self
         }
+    }
+
+    /// The same voxels with Rayleigh scattering by other form factors, as [`Material::with_form_factors`].
+    #[must_use]
+    pub fn with_form_factors(mut self, form_factors: FormFactors) -> Self {
+        let materials = self.materials.into_iter();
+        self.materials = materials
+            .map(|material| material.with_form_factors(form_factors))
+            .collect();
+        self
     }
 
     /// A phantom from Hounsfield units, trilinear between the centres of voxels; voxels outside `mask` (one flag per voxel) become what the lowest HU stand for,

@@ -40,7 +40,7 @@ fn blocks(image: &Radiograph, category: Category, side: usize) -> Vec<(f64, f64)
 }
 
 /// 4 x 4 blocks of three kinds of scatter: χ² with 48 degrees of freedom, and the three sums.
-fn assert_scatter_agrees(image: &Radiograph, expected: &Radiograph) {
+pub fn assert_scatter_agrees(image: &Radiograph, expected: &Radiograph) {
     let mut chi2 = 0.0;
     for category in SCATTER {
         let (a, se_a) = image.sums.of(category);

@@ -13,6 +13,7 @@ mod fast_engine;
 mod files;
 mod interpolation;
 mod mcgpu;
+mod molecular_scatter;
 mod noise_power;
 mod placement;
 mod runs;
