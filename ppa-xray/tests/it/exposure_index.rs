@@ -2,8 +2,8 @@
 
 use nalgebra::Isometry3;
 use ppa_xray::{
-    AntiScatterGrid, DetectorModel, FastSettings, LinesAlong, Projection, Radiograph, Receptor,
-    Spectrum, TubeSpec, VoxelPhantom, deviation_index, fast,
+    AntiScatterGrid, DetectorModel, FastSettings, LinesAlong, Radiograph, Receptor, Spectrum,
+    TubeSpec, VoxelPhantom, deviation_index, fast,
 };
 
 use crate::scenes::{frontal, limb, slab};

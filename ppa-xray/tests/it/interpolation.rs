@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Point3, UnitVector3, Vector3};
 use ppa_ct::Grid;
 use ppa_xray::{
-    AnalogSettings, Category, FastSettings, Interpolation, Material, Projection, Spectrum,
-    VoxelPhantom, analog, fast, primary,
+    AnalogSettings, Category, FastSettings, Interpolation, Material, Spectrum, VoxelPhantom,
+    analog, fast, primary,
 };
 
 use crate::scenes::{frontal, limb, sixty_kvp};

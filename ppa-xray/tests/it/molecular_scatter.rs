@@ -34,7 +34,7 @@ fn sampled_form_factor_squared(material: &Material, energy_kev: f64, samples: u3
     let mut uniform = uniforms(71);
     let mut bins = vec![0.0; 100];
     for _ in 0..samples {
-        let sin2_half_theta = tables.rayleigh_scattering(energy_kev, &mut uniform);
+        let sin2_half_theta = tables.rayleigh_sin2_half_theta(energy_kev, &mut uniform);
         let q = sin2_half_theta.sqrt() * energy_kev / HC_KEV_ANGSTROM;
         let cos = 1.0 - 2.0 * sin2_half_theta;
         let bin = (100.0 * q + 0.5) as usize;
@@ -102,18 +102,14 @@ fn molecular_scatter_of_the_fast_engine_is_that_of_analog() {
     let atoms = limb(&Isometry3::identity());
     let phantom = atoms.clone().with_form_factors(FormFactors::Molecular);
     let (spectrum, projection) = (sixty_kvp(), frontal(32, 5.0));
-    let settings = AnalogSettings {
-        histories: 1_000_000,
-        seed: 13,
-        ..AnalogSettings::default()
-    };
+    let settings = AnalogSettings::default()
+        .with_histories(1_000_000)
+        .with_seed(13);
     let expected = analog(&phantom, &spectrum, &projection, &settings).unwrap();
-    let settings = FastSettings {
-        dose_histories: f64::INFINITY,
-        scatter_histories: 80_000,
-        seed: 14,
-        ..FastSettings::default()
-    };
+    let settings = FastSettings::default()
+        .with_dose_histories(f64::INFINITY)
+        .with_scatter_histories(80_000)
+        .with_seed(14);
     let [image, of_atoms] =
         [&phantom, &atoms].map(|p| fast(p, &spectrum, &projection, &settings).unwrap());
     assert_scatter_agrees(&image, &expected);
