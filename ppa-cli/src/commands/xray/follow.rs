@@ -152,7 +152,6 @@ impl AnalogArgs {
             let whole = VoxelBox::whole(phantom.grid());
             run = run.with_dose(
                 &DoseSettings::default()
-                    .with_regions(Vec::new())
                     .with_voxels(self.dose_map.is_some().then_some(whole)),
             )?;
         }

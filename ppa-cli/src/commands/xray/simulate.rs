@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use ppa_ct::write_nifti;
 use ppa_generate::{Case, ExposableLimb, Plan, Table, spectrum};
 use ppa_scene::Contact;
-use ppa_xray::{FastSettings, TubeLoad};
+use ppa_xray::TubeLoad;
 use serde::Serialize;
 
 use super::BeamArgs;
