@@ -263,7 +263,7 @@ const OFF: &[(&str, &[&str])] = &[
     (
         "xray.source",
         &[
-            "#blades_mm = 250    # from the focal spot to the collimator blades: the field gets a half-shadow",
+            "#blades_mm = 250    # from the focal spot to the collimator blades: the field gets a penumbra",
             "#heel_effect = { anode_towards_deg = -90 }    # from the device's x towards its y; -90 is the head's side",
         ],
     ),

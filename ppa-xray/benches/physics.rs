@@ -88,7 +88,7 @@ fn scattering(criterion: &mut Criterion) {
                     energies
                         .iter()
                         .map(one)
-                        .map(|(half, e)| half * e)
+                        .map(|found| found.sin2_half_theta * found.energy_kev)
                         .sum::<f64>()
                 })
             });

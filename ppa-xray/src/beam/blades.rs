@@ -1,4 +1,4 @@
-//! Half-shadow that the collimator blades cast on the detector plane.
+//! Penumbra that the collimator blades cast on the detector plane.
 
 use nalgebra::{Point2, Point3};
 
@@ -9,7 +9,7 @@ use crate::beam::source::FocalSpot;
 ///
 /// Blades at the distance b from the spot are openings in a plane square to device z. On the detector plane, at the distance D, the
 /// edges of the field move by D/b − 1 for every mm of the spot, the other way. The depth of a tilted spot is neglected: it moves an
-/// edge by less than a tenth of the half-shadow.
+/// edge by less than a tenth of the penumbra.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Blades {
     /// From the middle of the spot.
@@ -101,7 +101,7 @@ mod tests {
 
     /// A strip edge of a spot of 1.2 mm behind blades at 250 mm: 3.6 mm from dark to full, half at the edge; the strips add up.
     #[test]
-    fn the_half_shadow_is_as_wide_as_geometry_says() {
+    fn the_penumbra_is_as_wide_as_geometry_says() {
         let blades = blades(Some(250.0));
         for shape in [SpotShape::Uniform, SpotShape::Gaussian] {
             let spot = FocalSpot {

@@ -168,7 +168,7 @@ impl Emitter {
         (self.spot.is_point() && self.heel.is_none()).then_some(&self.spectrum)
     }
 
-    /// Field of the beam in the detector plane, half-shadow included: no photon is sent outside it.
+    /// Field of the beam in the detector plane, penumbra included: no photon is sent outside it.
     pub fn field(&self) -> &Field {
         &self.field
     }

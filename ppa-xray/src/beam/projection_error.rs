@@ -55,14 +55,14 @@ pub enum ProjectionError {
         /// Distance from the source to the detector plane, mm.
         source_detector_mm: f64,
     },
-    /// Blades behind the detector, or so close to the spot that their half-shadow fills the field.
+    /// Blades behind the detector, or so close to the spot that their penumbra fills the field.
     #[error(
-        "the collimator blades are {blades_mm} mm from the focal spot, expected {least_mm:.1} to {source_detector_mm} mm: from where their half-shadow fills the field to the distance of the detector"
+        "the collimator blades are {blades_mm} mm from the focal spot, expected {least_mm:.1} to {source_detector_mm} mm: from where their penumbra fills the field to the distance of the detector"
     )]
     Blades {
         /// Distance from the focal spot, mm.
         blades_mm: f64,
-        /// Where the half-shadow fills the field, mm.
+        /// Where the penumbra fills the field, mm.
         least_mm: f64,
         /// Distance from the source to the detector plane, mm.
         source_detector_mm: f64,

@@ -18,7 +18,7 @@ pub struct Source {
     pub focal_spot: FocalSpot,
     /// Which part of the detector plane photons are sent to.
     pub collimation: Collimation,
-    /// Distance of the collimator blades from the focal spot along device z, mm: an extended spot gives the field a half-shadow.
+    /// Distance of the collimator blades from the focal spot along device z, mm: an extended spot gives the field a penumbra.
     /// None for sharp edges.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blades_mm: Option<f64>,
@@ -119,7 +119,7 @@ impl FocalSpot {
         }
     }
 
-    /// Largest offset along an axis that counts for half-shadows, mm: 2.7e-3 of a Gaussian spot lie beyond.
+    /// Largest offset along an axis that counts for penumbrae, mm: 2.7e-3 of a Gaussian spot lie beyond.
     pub(crate) fn shadow_reach_mm(&self) -> f64 {
         match self.shape {
             SpotShape::Uniform => 0.5 * self.size_mm,

@@ -37,7 +37,7 @@ const NOISE_SHARE: f64 = 0.4;
 /// Points per side of the focal spot over which fluence and response of the detector, which vary slowly, are averaged.
 const OPEN_POINTS: usize = 2;
 
-/// How far the half-shadow of an edge reaches, in its standard deviations, and how far it may reach beyond a pixel before the
+/// How far the penumbra of an edge reaches, in its standard deviations, and how far it may reach beyond a pixel before the
 /// pixels next to it are looked at for edges, in pixels.
 const REACH: f64 = 3.0;
 const NEAR: f64 = 0.25;
@@ -200,7 +200,7 @@ fn largest_about(values: &[f32], pixel: usize, columns: usize, reach: usize) -> 
     largest.copied().fold(0.0_f32, f32::max).into()
 }
 
-/// Whether a pixel and its neighbours lie in the field, out of the half-shadow of the blades.
+/// Whether a pixel and its neighbours lie in the field, out of the penumbra of the blades.
 fn is_wholly_lit(rays: &PrimaryRays, pixel: usize) -> bool {
     let pixel = rays.pixel(pixel);
     let field = rays.transport.emitter.fully_lit();
@@ -225,7 +225,7 @@ fn voxels_per_pixel(transport: &Transport) -> f64 {
     transport.projection.detector.pixel_mm / spacing_mm
 }
 
-/// Standard deviation of the half-shadow of what lies nearest to the focal spot, in pixels.
+/// Standard deviation of the penumbra of what lies nearest to the focal spot, in pixels.
 fn shadow_sigma_pixels(transport: &Transport) -> f64 {
     let projection = transport.projection;
     let device_from_ct = projection.ct_from_device.inverse();

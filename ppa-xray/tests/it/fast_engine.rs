@@ -147,7 +147,7 @@ fn scatter_of_a_demanding_source_is_that_of_analog() {
         expected.sums.of(Category::Primary),
     );
     assert!((a - b).abs() < 4.5 * se, "primary {a}, {b} ± {se}"); // 7e-6
-    // The half-shadow of the blades is 16 mm wide (standard deviation).
+    // The penumbra of the blades is 16 mm wide (standard deviation).
     let primaries = |image: &Radiograph| blocks(image, Category::Primary, 6);
     let (found, expected) = (primaries(&image), primaries(&expected));
     let terms = found.iter().zip(&expected);
@@ -183,7 +183,7 @@ fn primary_is_that_of_many_rays() {
     }
 }
 
-/// A focal spot whose half-shadow is a fifth of a pixel, a half and two pixels wide, against 64 rays per pixel from each of
+/// A focal spot whose penumbra is a fifth of a pixel, a half and two pixels wide, against 64 rays per pixel from each of
 /// 64 points of the spot. The pin's edges are nine tenths of the signal high.
 #[test]
 fn primary_of_a_focal_spot_is_that_of_many_rays() {
@@ -211,7 +211,7 @@ fn primary_of_a_focal_spot_is_that_of_many_rays() {
     }
 }
 
-/// A straight edge whose half-shadow is three pixels wide darkens pixels that rays from the middle of the spot find even. The
+/// A straight edge whose penumbra is three pixels wide darkens pixels that rays from the middle of the spot find even. The
 /// edge is half of the signal high.
 #[test]
 fn the_shadow_of_an_edge_reaches_pixels_beside_it() {

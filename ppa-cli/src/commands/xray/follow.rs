@@ -151,8 +151,7 @@ impl AnalogArgs {
         if self.dose || self.dose_map.is_some() {
             let whole = VoxelBox::whole(phantom.grid());
             run = run.with_dose(
-                &DoseSettings::default()
-                    .with_voxels(self.dose_map.is_some().then_some(whole)),
+                &DoseSettings::default().with_voxels(self.dose_map.is_some().then_some(whole)),
             )?;
         }
         let mut tally = self.start(&run, destination)?;
