@@ -116,22 +116,22 @@ impl Case2 {
 /// at 15° to the middle of the detector, which the beam fills in both.
 ///
 /// The phantom holds the air from 1 cm behind the source to the detector, but none beside the field, where only photons
-/// come that have left the box. The four cubes beside the middle are alike; together their standard error is half.
+/// come that have left the box. The four cubes beside the middle are alike at 0°; together their standard error is half.
 fn case_2(spectrum_name: &str, angle_deg: f64, expected: &Case2) {
     let reference = reference();
     let voxel_mm = 5.0;
     let detector_mm = 1_800.0;
     let shift_mm = detector_mm * angle_deg.to_radians().tan();
-    let grid = grid(
-        [-195.0, shift_mm - 195.0, 10.0],
-        [voxel_mm; 3],
-        [78, 78, 358],
-    );
+    // Voxels of air between the foot of the source and the box.
+    let aside = (shift_mm / voxel_mm).ceil() as usize;
+    let low_mm = [-195.0, shift_mm - 195.0 - voxel_mm * aside as f64, 10.0];
+    let grid = grid(low_mm, [voxel_mm; 3], [78, 78 + aside, 358]);
     let box_from = (1_550 - 10) / 5;
-    let (box_low, box_high) = ([0, 0, box_from], [78, 78, box_from + 40]);
+    let (box_low, box_high) = ([0, aside, box_from], [78, aside + 78, box_from + 40]);
     let (material_index, density) = (0..grid.len())
         .map(|index| {
-            let in_box = (box_low[2]..box_high[2]).contains(&grid.voxel(index)[2]);
+            let [_, j, k] = grid.voxel(index);
+            let in_box = j >= aside && (box_low[2]..box_high[2]).contains(&k);
             if in_box { (1, 1.03) } else { (0, 0.001_205) }
         })
         .unzip();
@@ -152,7 +152,7 @@ fn case_2(spectrum_name: &str, angle_deg: f64, expected: &Case2) {
         [0, 0, 6],
     ];
     let cube = |centre_cm: [i32; 3]| {
-        let middle = [39, 39, box_from as i32 + 20];
+        let middle = [39, 39 + aside as i32, box_from as i32 + 20];
         let low = [0, 1, 2].map(|axis| (middle[axis] + 2 * centre_cm[axis] - 3) as usize);
         VoxelBox {
             low,
