@@ -6,7 +6,7 @@ use ppa_generate::XraySettings;
 use ppa_label::{AnkleBones, Exposure, JointSpace, Openness, Reading, Visibility};
 use ppa_metrics::spearman;
 use ppa_phantom::{LowerLeg, Side, TableTop};
-use ppa_xray::{Detector, FastSettings, Projection, VoxelPhantom, fast};
+use ppa_xray::{Detector, Projection, VoxelPhantom, fast};
 
 const SOURCE_JOINT_MM: f64 = 1050.0;
 const SOURCE_DETECTOR_MM: f64 = 1150.0;

@@ -224,6 +224,15 @@ fn every_command_keeps_its_keys() {
     let [index, target, deviation] = indices.map(|key| exposed[key].as_f64().unwrap());
     assert_eq!(target, 400.0);
     assert!((deviation - 10.0 * (index / 400.0).log10()).abs() < 1e-9);
+    // The exposure index of automatic exposure control is the target; half the tube load gives half of it.
+    let controlled = object("xray simulate p01.toml --out z.png --aec 300", &indices);
+    let deviation = controlled["deviation_index"].as_f64().unwrap();
+    assert!(deviation.abs() < 0.1, "{controlled}");
+    let mas = controlled["projections"][0]["mas"].as_f64().unwrap();
+    let half = format!("xray simulate p01.toml --out half.png --mas {}", 0.5 * mas);
+    let half = object(&half, &indices);
+    let [whole, half] = [controlled, half].map(|found| found["exposure_index"].as_f64().unwrap());
+    assert!((half / whole - 0.5).abs() < 0.01, "{half} of {whole}");
     for category in ["primary", "compton", "rayleigh", "multiple"] {
         for suffix in ["", "_se"] {
             let key = format!("{category}_ev_per_history{suffix}");

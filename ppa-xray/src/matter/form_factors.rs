@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Written in snake case in plans: `"independent_atoms"`, `"molecular"`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum FormFactors {
     /// Those of free atoms, as in MC-GPU and in the codes of AAPM Report 195.
     #[default]
