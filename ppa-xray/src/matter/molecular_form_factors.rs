@@ -2,7 +2,7 @@
 //!
 //! The numbers are those that EGSnrc distributes with permission (`HEN_HOUSE/data/molecular_form_factors`), which lists F/√M with
 //! M in g/mol over q = sin(θ/2)/λ in 1/Å, up to 0.9/Å; beyond that its tables hold free atoms. Values below 0.1/Å of tissues of mostly water, and below
-//! 0.05/Å of fat, are constant: they were not measured. That of water, 0.5871, is the limit of q = 0 which its compressibility sets.
+//! 0.05/Å of fat, are constant: the tables extrapolate there. That of water, 0.5871, is the limit of q = 0 which its compressibility sets.
 
 /// A substance whose form factor was measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,6 +7,7 @@ use ppa_xray::{
 };
 
 use crate::fast_engine::assert_scatter_agrees;
+use crate::scattering::uniforms;
 use crate::scenes::{frontal, limb, sixty_kvp};
 
 const HC_KEV_ANGSTROM: f64 = 12.398_42;
@@ -15,17 +16,6 @@ fn molecular(name: &str) -> Material {
     Material::named(name)
         .unwrap()
         .with_form_factors(FormFactors::Molecular)
-}
-
-/// SplitMix64 (Steele, Lea, Flood 2014).
-fn uniforms(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ (mixed >> 31)) >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0)
-    }
 }
 
 /// F² of sampled angles, in bins of 0.01/Å around q: counts over 1 + cos²θ and the width in q².

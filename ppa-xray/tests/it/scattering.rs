@@ -12,7 +12,7 @@ const ATOMIC_MOMENTA_PER_MC: f64 = 137.036;
 const HC_KEV_ANGSTROM: f64 = 12.398_42;
 
 /// SplitMix64 (Steele, Lea, Flood 2014).
-fn uniforms(seed: u64) -> impl FnMut() -> f64 {
+pub fn uniforms(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
