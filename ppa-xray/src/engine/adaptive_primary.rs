@@ -200,10 +200,10 @@ fn largest_about(values: &[f32], pixel: usize, columns: usize, reach: usize) -> 
     largest.copied().fold(0.0_f32, f32::max).into()
 }
 
-/// Whether a pixel and its neighbours lie in the field, out of the penumbra of the blades.
+/// Whether photons reach all of a pixel and of its neighbours. The penumbra of blades is part of that: it is smooth like the rest.
 fn is_wholly_lit(rays: &PrimaryRays, pixel: usize) -> bool {
     let pixel = rays.pixel(pixel);
-    let field = rays.transport.emitter.fully_lit();
+    let field = rays.transport.emitter.field();
     (0..2).all(|axis| {
         let side = pixel.size_mm()[axis];
         pixel.low_mm[axis] - side >= field.low_mm[axis]
