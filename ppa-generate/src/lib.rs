@@ -41,6 +41,7 @@ mod merge;
 mod overview;
 mod part_file;
 mod plan;
+mod plan_comments;
 mod planned;
 mod posable_limb;
 mod pose_error;

@@ -25,9 +25,9 @@ impl Technique {
 
     /// Sets tube, field, detector and tube load of the examination; materials, voxels, engine and presentation stay.
     pub fn apply(self, settings: &mut XraySettings) {
-        let (kvp, mas, field_mm) = match self {
-            Self::Ankle => (55.0, 4.0, [180.0, 220.0]),
-            Self::Knee => (65.0, 8.5, [180.0, 220.0]),
+        let (kvp, mas) = match self {
+            Self::Ankle => (55.0, 4.0),
+            Self::Knee => (65.0, 8.5),
         };
         *settings = XraySettings {
             kvp,
@@ -36,7 +36,7 @@ impl Technique {
             source: Source::default()
                 .with_focal_spot(FocalSpot::default().with_size_mm(0.6))
                 .with_collimation(Collimation::Rectangle {
-                    size_mm: field_mm,
+                    size_mm: [180.0, 220.0],
                     centre_mm: [0.0; 2],
                 })
                 .with_blades_mm(Some(250.0))

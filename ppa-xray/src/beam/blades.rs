@@ -99,7 +99,7 @@ mod tests {
         )
     }
 
-    /// A strip edge of a spot of 1.2 mm behind blades at 250 mm: 3.6 mm from dark to full, half at the edge; the strips add up.
+    /// A spot of 1.2 mm behind blades at 250 mm: 3.6 mm from dark to full, half at the edge; the strips add up.
     #[test]
     fn the_penumbra_is_as_wide_as_geometry_says() {
         let blades = blades(Some(250.0));

@@ -1,0 +1,305 @@
+//! What stands beside the keys of a plan: headings, meanings, and settings that are off. A new key gets its line here.
+
+/// The first lines.
+pub(crate) const HEADER: &str = "\
+# Plan of a dataset: `ppa plan` estimates its cost, `ppa generate` generates it.
+# Every key is listed with its default; a line may be deleted. Lines that begin with # and no
+# space are optional settings: remove the # to use them. Lengths in mm, angles in degrees.
+# Relative paths start at this file.
+
+";
+
+/// What a table is for; the key is its name in the file.
+pub(crate) const TABLES: &[(&str, &str)] = &[
+    ("[[case]]", "The limbs. Cases come from `ppa prepare`."),
+    (
+        "[rotation]",
+        "Medial rotations about the limb's axis, multiples of 0.5 between 0 and 180.",
+    ),
+    (
+        "[shapes]",
+        "Body shapes: the skin of the scan and changed ones.",
+    ),
+    (
+        "[soft_tissue]",
+        "How far heel and calf sink in where they rest; 0 is a rigid skin.",
+    ),
+    (
+        "[room]",
+        "The x-ray room. `ppa scene room --toml room.toml` writes a room file instead.",
+    ),
+    (
+        "[room.parametric]",
+        "The built-in room; source_detector_mm also holds for a recorded one.",
+    ),
+    ("[depth]", "Depth images of both cameras."),
+    ("[xray]", "Radiographs."),
+    ("[xray.source]", "Where photons leave from, and where to."),
+    ("[xray.source.focal_spot]", ""),
+    ("[xray.detector]", "Pixels of the radiograph."),
+    ("[xray.receptor]", "What the detector makes of photons."),
+    (
+        "[xray.engine]",
+        "How much is computed; the plan's seed decides, not this one.",
+    ),
+    (
+        "[xray.analog]",
+        "Analog Monte Carlo, which makes the radiographs in place of [xray.engine].",
+    ),
+    (
+        "[xray.presentation]",
+        "Window and contrast of the 16-bit radiograph.",
+    ),
+    ("[xray.calibration]", ""),
+];
+
+/// What a key means, by table and key.
+pub(crate) const KEYS: &[(&str, &str, &str)] = &[
+    ("", "version", "format of this file"),
+    ("", "seed", "everything random follows from it"),
+    ("case", "file", "what `ppa prepare` wrote"),
+    (
+        "case",
+        "patient",
+        "N of the folder patient_N; both limbs of a person share it",
+    ),
+    ("shapes", "variants", "orig is the skin of the scan"),
+    (
+        "shapes",
+        "offset_mm",
+        "big is the skin moved out by this, small in",
+    ),
+    ("shapes", "bumps", "bumps of bumps_a and of bumps_b"),
+    (
+        "room.parametric",
+        "table_foot_mm",
+        "table beyond the central beam on the feet's side",
+    ),
+    (
+        "room.parametric",
+        "source_detector_mm",
+        "from the x-ray source to the detector",
+    ),
+    (
+        "room.parametric",
+        "table_detector_mm",
+        "from the table top down to the detector",
+    ),
+    (
+        "room.parametric",
+        "column_distance_mm",
+        "from the central beam towards -x, as back_wall_mm",
+    ),
+    (
+        "room.parametric",
+        "head_wall_mm",
+        "from the central beam towards +y",
+    ),
+    (
+        "room.parametric",
+        "point_spacing_mm",
+        "of the room's point cloud",
+    ),
+    (
+        "depth",
+        "roi_mm",
+        "side of the square around the joint, at the joint",
+    ),
+    (
+        "depth",
+        "cut_faces",
+        "pixels that see a cut face of the scan: \"invalid\" or \"flat\"",
+    ),
+    (
+        "depth",
+        "max_cut_share",
+        "a limb is refused if more of a region of interest is cut",
+    ),
+    ("xray", "kvp", "tube voltage"),
+    (
+        "xray.tube_load",
+        "mas",
+        "replaces dose_histories; or exposure_index = 250",
+    ),
+    (
+        "xray.source",
+        "blades_mm",
+        "from the focal spot to the collimator blades",
+    ),
+    ("xray", "anode_angle_deg", "of the tungsten anode"),
+    ("xray", "filters", "MATERIAL:mm"),
+    (
+        "xray",
+        "half_length_mm",
+        "limb kept on either side of the joint",
+    ),
+    (
+        "xray",
+        "max_voxel_mm",
+        "thicker slices are interpolated to this",
+    ),
+    (
+        "xray",
+        "interpolation",
+        "between centres of voxels; or \"nearest\"",
+    ),
+    (
+        "xray",
+        "form_factors",
+        "of coherent scattering; or \"molecular\"",
+    ),
+    (
+        "xray.source",
+        "collimation",
+        "or { rectangle = { size_mm = [180, 240] } }",
+    ),
+    ("xray.source.focal_spot", "size_mm", "0 is a point"),
+    ("xray.source.focal_spot", "shape", "or \"gaussian\""),
+    (
+        "xray.detector",
+        "centre_mm",
+        "from the central beam, device x and y",
+    ),
+    (
+        "xray.receptor",
+        "model",
+        "or { csi = { thickness_um = 600 } }",
+    ),
+    (
+        "xray.receptor",
+        "electronic_noise_kev",
+        "standard deviation per pixel",
+    ),
+    (
+        "xray.engine",
+        "dose_histories",
+        "whose quantum noise the image carries; inf: no noise",
+    ),
+    ("xray.engine", "scatter_histories", "followed for scatter"),
+    (
+        "xray.engine",
+        "scatter_pixel_mm",
+        "distance of the points where scatter is computed",
+    ),
+    (
+        "xray.engine",
+        "samples_per_side",
+        "rays per pixel side at edges, at most",
+    ),
+    (
+        "xray.engine",
+        "compton_model",
+        "how photons scatter off electrons",
+    ),
+    ("xray.engine", "seed", "stays 0"),
+    (
+        "xray.analog",
+        "histories",
+        "photons followed per radiograph",
+    ),
+    (
+        "xray.analog",
+        "compton_model",
+        "how photons scatter off electrons",
+    ),
+    ("xray.analog", "seed", "stays 0"),
+    (
+        "xray.presentation",
+        "centre",
+        "of the window in log exposure",
+    ),
+    (
+        "xray.presentation",
+        "width",
+        "of the window in log exposure",
+    ),
+    (
+        "xray.presentation",
+        "latitude_reduction",
+        "large areas lose contrast by 1 + this x log exposure",
+    ),
+    (
+        "xray.presentation",
+        "detail",
+        "contrast of faint detail that is added",
+    ),
+];
+
+/// Settings that are off by default, as they are written below the keys of their table.
+pub(crate) const OFF: &[(&str, &[&str])] = &[
+    (
+        "",
+        &["#room_file = \"room.toml\"    # room, device, detector and cameras from a file"],
+    ),
+    (
+        "room",
+        &[
+            "#ply = \"recorded.ply\"    # a recorded room in place of the built-in furniture",
+            "#room_from_device = [[1, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 1040], [0, 0, 0, 1]]    # in it: row-major 4x4",
+        ],
+    ),
+    (
+        "depth",
+        &[
+            "#rig = \"rig.json\"    # other cameras; or both written out as [depth.cameras], as in a room file",
+        ],
+    ),
+    (
+        "xray",
+        &[
+            "#analog = { histories = 20000000 }    # analog Monte Carlo in place of [xray.engine]: photons followed per radiograph",
+            "#tube_load = { exposure_index = 250 }    # automatic exposure control, or { mas = 4 }; replaces dose_histories below",
+            "#max_cut_share = 0.01    # a limb is refused if more of the rays around the joint pass through a cut face",
+            "#calibration_file = \"hu.toml\"    # HU to material and density from a file, instead of the table below",
+        ],
+    ),
+    (
+        "xray.source",
+        &[
+            "#blades_mm = 250    # from the focal spot to the collimator blades: the field gets a penumbra",
+            "#heel_effect = { anode_towards_deg = -90 }    # from the device's x towards its y; -90 is the head's side",
+        ],
+    ),
+    (
+        "xray.receptor",
+        &[
+            "#collection_swank = 0.92    # noise of the collection of light in CsI; needs a converter",
+            "#grid = { ratio = 8, lines_per_cm = 40, focus_mm = 1100 }    # anti-scatter grid",
+            "#blur = { lorentzian = { h_mm2 = 0.45 } }    # of the converter",
+        ],
+    ),
+    (
+        "xray.presentation",
+        &[
+            "#protocol = \"limb\"    # a presentation by name; keys above that differ from it take precedence",
+        ],
+    ),
+];
+
+/// Tables that are off by default, at the end of the file.
+pub(crate) const OFF_TABLES: &str = "
+# How the table top is searched; left out, it is what the central beam hits first.
+#[room.table]
+#threshold_mm = 10.0    # from the plane up to which a point belongs to it
+#iterations = 1000
+#up = [0.0, 0.0, 1.0]
+#max_tilt_deg = 20.0
+#cell_mm = 60.0    # of the lattice that separates patches
+#min_area_mm2 = 60000.0
+#region = [[-500, -500, -100], [500, 1500, 100]]    # low and high corner of where it is looked for
+#beam = [[0, 0, 1040], [0, 0, -1]]    # source and direction of the central beam
+#min_beam_mm = 300.0    # from the source
+
+# Errors of the cameras' sensors; left out, depth images are ideal. These are the limits of the
+# Azure Kinect; `ppa depth fit-noise` finds those of a device.
+#[depth.sensor]
+#random = { floor_mm = 0, at_unit_signal_mm = 1.14 }
+#systematic = { offset_mm = 5.5, per_metre_mm = 0.5, fixed_pattern_mm = 0 }
+#mixed = { modulation_mhz = 200 }
+#invalid = { min_signal = 0.067, max_angle_deg = 85, min_contrast = 0.9 }
+#multipath = { albedo = 0.5, modulation_mhz = 200 }
+";
+
+/// What is written before the table of materials, which is long and rarely changed.
+pub(crate) const CALIBRATION: &str =
+    "# HU to material and density, the built-in table: remove all # below to change it.\n";
