@@ -209,18 +209,17 @@ impl<'a> Paths<'a> {
         }
     }
 
-    /// Adds lengths in eight materials. Two sums do not wait for each other, and the mass is touched once.
+    /// Adds lengths in eight materials. Two sums do not wait for each other, and the mass is touched once. Loops, since
+    /// closures over the corners are not always inlined here.
     #[inline(always)]
     fn add_corners(&self, mass: &mut BasisMass, corners: &[(VoxelCode, f32); 8]) {
-        let corners = corners.map(|(code, length_mm)| {
-            let shares = self.basis.shares(code.material());
-            (shares, code.density_g_cm3() * length_mm)
-        });
         for (group, mass) in mass.iter_mut().enumerate() {
             let mut sums = [[0.0_f32; LANES]; 2];
-            for (corner, (shares, amount)) in corners.iter().enumerate() {
+            for (corner, (code, length_mm)) in corners.iter().enumerate() {
+                let shares = &self.basis.shares(code.material())[group];
+                let amount = code.density_g_cm3() * length_mm;
                 for lane in 0..LANES {
-                    sums[corner % 2][lane] += shares[group][lane] * amount;
+                    sums[corner % 2][lane] += shares[lane] * amount;
                 }
             }
             for lane in 0..LANES {
