@@ -263,15 +263,13 @@ impl PointImportance {
     #[inline]
     fn depth(&self, along: &Vector3<f32>, r: f32) -> f32 {
         let scale = -1.0 / (r + along.z);
-        let [(i, right), (j, up)] = [0, 1].map(|axis| {
-            let at = (along[axis] * scale - self.low[axis]) * self.per_unit[axis];
-            let at = at.clamp(0.0, (RAYS - 1) as f32);
-            let ray = (at as usize).min(RAYS - 2);
-            (ray, at - ray as f32)
-        });
-        let at = ((r - self.near_mm) * self.depths_per_mm).clamp(0.0, (DEPTHS - 1) as f32);
-        let k = (at as usize).min(DEPTHS - 2);
-        let deep = at - k as f32;
+        let [i, j, k] = [
+            (along.x * scale - self.low[0]) * self.per_unit[0],
+            (along.y * scale - self.low[1]) * self.per_unit[1],
+            (r - self.near_mm) * self.depths_per_mm,
+        ];
+        let ((i, right), (j, up)) = (between_nodes(i, RAYS), between_nodes(j, RAYS));
+        let (k, deep) = between_nodes(k, DEPTHS);
         let on_ray = |i: usize, j: usize| {
             let ray = (j * RAYS + i) * DEPTHS + k;
             let (low, high) = (self.depths[ray], self.depths[ray + 1]);
@@ -281,6 +279,14 @@ impl PointImportance {
         let above = on_ray(i, j + 1) + right * (on_ray(i + 1, j + 1) - on_ray(i, j + 1));
         below + up * (above - below)
     }
+}
+
+/// The lower of the two of `count` nodes about a place, and how far from there to the upper one it is.
+#[inline(always)]
+fn between_nodes(at: f32, count: usize) -> (usize, f32) {
+    let at = at.clamp(0.0, (count - 1) as f32);
+    let node = (at as usize).min(count - 2);
+    (node, at - node as f32)
 }
 
 /// Coordinates of a direction towards −z.
