@@ -164,7 +164,13 @@ mod tests {
             let text = commented(&to_toml(&plan, Path::new("plan.toml")).unwrap());
             let read: Plan = toml::from_str(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
             assert_eq!(read.xray, plan.xray);
-            for key in ["#tube_load", "#heel_effect", "#blades_mm", "#blur"] {
+            for key in [
+                "#tube_load",
+                "#marker",
+                "#heel_effect",
+                "#blades_mm",
+                "#blur",
+            ] {
                 assert!(!text.contains(key), "{key}\n{text}");
             }
             assert!(text.contains("#grid"));

@@ -80,7 +80,9 @@ pub use generate::{GenerateError, GenerateSettings, generate};
 pub use job::{JobError, Progress, Summary};
 pub use merge::{MergeError, merge};
 pub use part_file::held_part;
-pub use plan::{DepthSettings, Plan, PlanCase, PlanError, PlanRoom, RoomFile, XraySettings};
+pub use plan::{
+    DepthSettings, MarkerPlace, Plan, PlanCase, PlanError, PlanRoom, RoomFile, XraySettings,
+};
 pub use pose_error::PoseError;
 pub use prepare::{PrepareError, PreparedLimb, prepare};
 pub use radiograph::{JointError, projection};

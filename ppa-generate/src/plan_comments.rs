@@ -122,6 +122,11 @@ pub(crate) const KEYS: &[(&str, &str, &str)] = &[
         "replaces dose_histories; or exposure_index = 250",
     ),
     (
+        "xray.marker",
+        "centre_mm",
+        "of the letter R on the detector; the L of left limbs has the opposite x",
+    ),
+    (
         "xray.source",
         "blades_mm",
         "from the focal spot to the collimator blades",
@@ -249,6 +254,7 @@ pub(crate) const OFF: &[(&str, &[&str])] = &[
         &[
             "#analog = { histories = 20000000 }    # analog Monte Carlo in place of [xray.engine]: photons followed per radiograph",
             "#tube_load = { exposure_index = 250 }    # automatic exposure control, or { mas = 4 }; replaces dose_histories below",
+            "#marker = { centre_mm = [-75, -95] }    # the letter L or R on the detector; x is that of right limbs",
             "#max_cut_share = 0.01    # a limb is refused if more of the rays around the joint pass through a cut face",
             "#calibration_file = \"hu.toml\"    # HU to material and density from a file, instead of the table below",
         ],

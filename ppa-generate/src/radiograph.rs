@@ -83,4 +83,5 @@ pub fn projection(
     )
     .with_source(settings.source)
     .with_receptor(settings.receptor.clone())
+    .with_marker(settings.marker.map(|place| place.of(landmarks.side)))
 }

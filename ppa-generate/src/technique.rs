@@ -4,13 +4,13 @@ use ppa_xray::{
     Blur, Collimation, Detector, DetectorModel, FocalSpot, HeelEffect, Receptor, Source, TubeLoad,
 };
 
-use crate::plan::XraySettings;
+use crate::plan::{MarkerPlace, XraySettings};
 
 /// An examination with usual exposure factors.
 ///
 /// Tube voltage and load are in the middle of the ranges that Radiopaedia states for adults (articles "Ankle (mortise view)": 50 to 60 kVp, 3 to 5
 /// mAs; "Knee (AP view)": 60 to 70 kVp, 7 to 10 mAs; both at 100 cm and without a grid). Filtration is the least that IEC 60601-1-3
-/// allows. The detector is 0.6 mm of caesium iodide with pixels of 0.148 mm, as flat panels of 43 cm have them.
+/// allows. The letter of the side lies in the upper corner beside the fibula. The detector is 0.6 mm of caesium iodide with pixels of 0.148 mm, as flat panels of 43 cm have them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Technique {
     /// Ankle and hindfoot, without a grid.
@@ -51,6 +51,7 @@ impl Technique {
                 .with_collection_swank(0.92)
                 .with_blur(Some(Blur::Lorentzian { h_mm2: 0.45 }))
                 .with_electronic_noise_kev(90.0),
+            marker: Some(MarkerPlace::new([-75.0, -95.0])),
             tube_load: Some(TubeLoad::Mas(mas)),
             analog: None,
             ..settings.clone()

@@ -76,9 +76,11 @@ pub use nalgebra;
 /// Grids and volumes of this crate's interface, in the version that it takes.
 pub use ppa_ct;
 
-pub use ppa_core::{Part, PartError};
+pub use ppa_core::{Part, PartError, Side};
 
-pub use beam::projection::{Detector, Projection};
+pub use beam::detector::Detector;
+pub use beam::marker::SideMarker;
+pub use beam::projection::Projection;
 pub use beam::projection_error::ProjectionError;
 pub use beam::receptor::{
     AntiScatterGrid, Blur, DetectorModel, LinesAlong, Receptor, ReceptorError,

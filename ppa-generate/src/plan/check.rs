@@ -1,5 +1,6 @@
 //! Checks of a plan before anything is made.
 
+use ppa_core::Side;
 use ppa_xray::AnalogSettings;
 
 use super::Plan;
@@ -67,6 +68,12 @@ impl Plan {
                 .map_err(|error| format!("xray.tube_load: {error}"))?;
             if self.xray.analog.is_some() {
                 return Err("xray.tube_load is given with xray.analog, whose histories are followed one by one".to_owned());
+            }
+        }
+        if let Some(place) = &self.xray.marker {
+            for side in Side::ALL {
+                let marker = place.of(side).check(&self.xray.detector);
+                marker.map_err(|error| format!("xray.marker: {error} (for {side} limbs)"))?;
             }
         }
         if let Some(analog) = &self.xray.analog {

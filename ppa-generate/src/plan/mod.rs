@@ -2,6 +2,7 @@
 
 mod check;
 mod error;
+mod marker;
 mod room_file;
 mod settings;
 #[cfg(test)]
@@ -15,6 +16,7 @@ use ppa_xray::HuCalibration;
 use serde::{Deserialize, Serialize};
 
 pub use self::error::PlanError;
+pub use self::marker::MarkerPlace;
 pub use self::room_file::RoomFile;
 pub use self::settings::{DepthSettings, PlanRoom, XraySettings};
 use crate::shaped_skin::ShapeSettings;

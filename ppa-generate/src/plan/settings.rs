@@ -12,6 +12,7 @@ use ppa_xray::{
 use serde::{Deserialize, Serialize};
 
 use crate::cut_error::MAX_CUT_SHARE;
+use crate::plan::marker::MarkerPlace;
 
 /// The x-ray room: built in, or a recorded one.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -92,6 +93,9 @@ pub struct XraySettings {
     pub detector: Detector,
     /// Anti-scatter grid and converter; none and an ideal one when left out.
     pub receptor: Receptor,
+    /// The letter L or R on the detector; none when left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub marker: Option<MarkerPlace>,
     /// Length of limb kept on either side of the joint, mm.
     pub half_length_mm: f64,
     /// Largest voxel that photons travel through, mm: thicker slices are interpolated, so that
@@ -131,6 +135,7 @@ impl Default for XraySettings {
             source: Source::default(),
             detector: Detector::centred(448, 448, 0.5),
             receptor: Receptor::default(),
+            marker: None,
             half_length_mm: 120.0,
             max_voxel_mm: 1.0,
             interpolation: Interpolation::Trilinear,

@@ -155,3 +155,12 @@ fn a_plan_that_is_written_elsewhere_names_the_same_files() {
     assert_eq!(canonical(&again.cases[0].file), here.join("a.case.toml"));
     assert_eq!(canonical(&again.depth.rig.unwrap()), here.join("rig.json"));
 }
+
+/// 448 pixels of 0.5 mm reach 112 mm to either side.
+#[test]
+fn a_marker_off_the_detector_is_refused() {
+    let marker = |x: f64| read(&format!("[xray]\nmarker = {{ centre_mm = [{x}, -95] }}\n"));
+    assert!(marker(-75.0).unwrap().xray.marker.is_some());
+    let error = marker(-120.0).unwrap_err().to_string();
+    assert!(error.contains("xray.marker"), "{error}");
+}

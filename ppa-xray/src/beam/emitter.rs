@@ -274,7 +274,7 @@ mod tests {
     use nalgebra::Isometry3;
 
     use super::*;
-    use crate::beam::projection::Detector;
+    use crate::beam::detector::Detector;
     use crate::beam::source::{Collimation, Source};
     use crate::beam::tube::TubeSpec;
     use crate::scenes::demanding_source;

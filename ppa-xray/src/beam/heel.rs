@@ -139,8 +139,9 @@ mod tests {
     use nalgebra::Isometry3;
 
     use super::*;
+    use crate::beam::detector::Detector;
     use crate::beam::emitter::Emitter;
-    use crate::beam::projection::{Detector, Projection};
+    use crate::beam::projection::Projection;
     use crate::beam::source::Source;
 
     /// 70 kV, 14° anode, 2.5 mm Al: photons per solid angle and mean energy beside the central ray over those on it,

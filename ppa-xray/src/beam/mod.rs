@@ -1,9 +1,11 @@
 //! What leaves the focal spot, and towards where.
 
 pub(crate) mod blades;
+pub(crate) mod detector;
 pub(crate) mod emitter;
 pub(crate) mod field;
 pub(crate) mod heel;
+pub(crate) mod marker;
 pub(crate) mod projection;
 pub(crate) mod projection_error;
 pub(crate) mod raster;

@@ -1,80 +1,15 @@
-//! Source, field and rectangular detector of one exposure, and where they stand in the CT.
+//! Source, field and detector of one exposure, and where they stand in the CT.
 
-use nalgebra::{Isometry3, Point2, Point3, Unit, UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
+use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 
+use crate::beam::detector::Detector;
 use crate::beam::field::Field;
+use crate::beam::marker::SideMarker;
 use crate::beam::projection_error::ProjectionError;
-use crate::beam::raster::{MAX_PIXELS, Raster};
+use crate::beam::raster::MAX_PIXELS;
 use crate::beam::receptor::Receptor;
 use crate::beam::source::{Collimation, Source};
 use crate::setters::setters;
-
-/// A flat detector square to device z; columns run along device x, rows along device y.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Detector {
-    /// Pixels along device x.
-    pub columns: u32,
-    /// Pixels along device y.
-    pub rows: u32,
-    /// Side of the square pixels, mm.
-    pub pixel_mm: f64,
-    /// Centre in device x and y, mm from the foot of the perpendicular through the source.
-    #[serde(default)]
-    pub centre_mm: [f64; 2],
-}
-
-impl Detector {
-    /// A detector whose centre faces the source.
-    pub const fn centred(columns: u32, rows: u32, pixel_mm: f64) -> Self {
-        Self {
-            columns,
-            rows,
-            pixel_mm,
-            centre_mm: [0.0; 2],
-        }
-    }
-
-    /// Number of pixels.
-    pub fn pixels(&self) -> usize {
-        self.columns as usize * self.rows as usize
-    }
-
-    /// Centre of a pixel (row-major index) in device x and y, mm.
-    pub fn pixel_centre_mm(&self, pixel: usize) -> Point2<f64> {
-        let columns = self.columns as usize;
-        let [left, top] = self.field().low_mm;
-        Point2::new(
-            left + ((pixel % columns) as f64 + 0.5) * self.pixel_mm,
-            top + ((pixel / columns) as f64 + 0.5) * self.pixel_mm,
-        )
-    }
-
-    /// Area of one pixel, cm².
-    pub(crate) fn pixel_cm2(&self) -> f64 {
-        self.pixel_mm * self.pixel_mm / 100.0
-    }
-
-    /// Extent along device x and y, mm.
-    pub(crate) fn size_mm(&self) -> [f64; 2] {
-        [self.columns, self.rows].map(|pixels| f64::from(pixels) * self.pixel_mm)
-    }
-
-    /// The rectangle it covers.
-    pub(crate) fn field(&self) -> Field {
-        Field::centred(self.centre_mm, self.size_mm())
-    }
-
-    pub(crate) fn raster(&self) -> Raster {
-        Raster {
-            columns: self.columns as usize,
-            rows: self.rows as usize,
-            centre_mm: self.centre_mm,
-            extent_mm: self.size_mm(),
-        }
-    }
-}
 
 /// One exposure: source, field and detector, and where they stand in the CT.
 ///
@@ -95,6 +30,8 @@ pub struct Projection {
     pub source: Source,
     /// Grid and converter in the detector plane.
     pub receptor: Receptor,
+    /// Letter of lead on the detector.
+    pub marker: Option<SideMarker>,
 }
 
 setters!(Projection {
@@ -104,6 +41,7 @@ setters!(Projection {
     with_central_ray: central_ray = Unit<Vector3<f64>>,
     with_source: source = Source,
     with_receptor: receptor = Receptor,
+    with_marker: marker = impl Into<Option<SideMarker>>,
 });
 
 impl Projection {
@@ -120,6 +58,7 @@ impl Projection {
             central_ray: Vector3::z_axis(),
             source: Source::default(),
             receptor: Receptor::default(),
+            marker: None,
         }
     }
 
@@ -206,6 +145,9 @@ impl Projection {
             });
         }
         self.check_blades(&field)?;
+        if let Some(marker) = &self.marker {
+            marker.check(&self.detector)?;
+        }
         for (what, rectangle) in [("detector", self.detector.field()), ("x-ray field", field)] {
             let reach_mm = rectangle.low_mm.iter().chain(&rectangle.high_mm);
             let reach_mm = reach_mm.fold(0.0, |most: f64, mm| most.max(mm.abs()));

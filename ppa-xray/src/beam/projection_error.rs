@@ -102,6 +102,19 @@ pub enum ProjectionError {
         /// Angle between central ray and device z, degrees.
         angle_deg: f64,
     },
+    /// A side marker of invalid size, or off the detector.
+    #[error(
+        "the side marker is {height_mm} mm high about ({}, {}) mm, expected 1 to 100 mm high about a place from ({}, {}) to ({}, {}) mm, on the detector",
+        centre_mm[0], centre_mm[1], detector_mm[0][0], detector_mm[0][1], detector_mm[1][0], detector_mm[1][1]
+    )]
+    Marker {
+        /// Height of the letter, mm.
+        height_mm: f64,
+        /// Its middle in device x and y, mm.
+        centre_mm: [f64; 2],
+        /// Lowest and highest x and y of the detector, mm.
+        detector_mm: [[f64; 2]; 2],
+    },
     /// Direction of the anode.
     #[error("the anode lies towards {found_deg} degrees, expected a number")]
     Anode {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::beam::projection::Detector;
+use crate::beam::detector::Detector;
 use crate::beam::receptor::{Receptor, ReceptorError, require};
 use crate::detector::blur::Spread;
 

@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use crate::beam::projection::Detector;
+use crate::beam::detector::Detector;
 use crate::engine::fast_progress::{Monitor, PRIMARY_DONE, SINGLE_DONE};
 use crate::engine::first_collisions::ESTIMATES;
 use crate::engine::node_grid::NodeGrid;

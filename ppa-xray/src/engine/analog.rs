@@ -5,10 +5,12 @@
 
 use std::ops::Range;
 
+use nalgebra::Point2;
 use ppa_core::random::Philox;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::beam::marker::SideMarker;
 use crate::beam::projection::Projection;
 use crate::beam::raster::Raster;
 use crate::beam::spectrum::Spectrum;
@@ -134,6 +136,7 @@ fn in_batches(histories: Range<u64>, follow: impl Fn(Range<u64>) + Sync) {
 
 /// Counts what photons leave in the detector, nothing else.
 struct DetectorScore<'a> {
+    marker: Option<SideMarker>,
     response: &'a Response,
     /// Side of the square over which a photon's energy is spread, in pixels.
     spot_pixels: f64,
@@ -143,6 +146,7 @@ struct DetectorScore<'a> {
 impl<'a> DetectorScore<'a> {
     fn new(exposure: &'a Exposure, tally: &'a Tally) -> Self {
         Self {
+            marker: exposure.transport.projection.marker,
             response: &exposure.response,
             spot_pixels: exposure.readout.spot_pixels(),
             buffer: TallyBuffer::new(tally),
@@ -154,6 +158,10 @@ impl Score for DetectorScore<'_> {
     #[inline]
     fn arrive(&mut self, _slot: usize, arrival: &Arrival, rng: &mut Philox) {
         let Arrival { x_mm, y_mm, .. } = *arrival;
+        let at = Point2::new(x_mm, y_mm);
+        if self.marker.is_some_and(|marker| marker.covers(at)) {
+            return;
+        }
         let energy_kev = self.response.detect(arrival, rng);
         if self.spot_pixels == 0.0 {
             self.buffer.score(x_mm, y_mm, arrival.category, energy_kev);

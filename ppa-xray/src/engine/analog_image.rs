@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::beam::projection::Detector;
+use crate::beam::detector::Detector;
 use crate::detector::open_field::OpenField;
 use crate::detector::readout::{Layer, Readout};
 use crate::engine::exposure::Exposure;

@@ -5,7 +5,8 @@ use ppa_core::random::Philox;
 use ppa_ct::Grid;
 use proptest::prelude::*;
 
-use crate::beam::projection::{Detector, Projection};
+use crate::beam::detector::Detector;
+use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
 use crate::engine::exposure::Exposure;
 use crate::matter::compton::ComptonModel;

@@ -18,6 +18,7 @@ use crate::engine::first_collisions::{ESTIMATES, FirstFlights};
 use crate::engine::importance::ImportanceModel;
 use crate::engine::later_collisions::{Histories, VarianceReduction};
 use crate::engine::lines::Lines;
+use crate::engine::marker_shadow::shade;
 use crate::engine::multiple_scatter::MultipleScatter;
 use crate::engine::node_grid::NodeGrid;
 use crate::engine::noise::{self, ExpectedLayer};
@@ -140,7 +141,7 @@ fn expose(
     let detector = &projection.detector;
     let paths = Paths::with_tables(transport, tables.paths.clone());
     let lines = compressed(&exposure, PRIMARY_ENERGIES);
-    let primary = primary_moments(
+    let mut primary = primary_moments(
         &exposure,
         &paths,
         lines,
@@ -166,8 +167,11 @@ fn expose(
     );
     monitor.check()?;
     let [compton, rayleigh, _] = &scatter.fields;
-    let shared = compton.covariance_kev2(rayleigh, detector);
-    let scattered = scatter.fields.map(|field| field.on_pixels(detector));
+    let mut shared = compton.covariance_kev2(rayleigh, detector);
+    let mut scattered = scatter.fields.map(|field| field.on_pixels(detector));
+    if let Some(marker) = &projection.marker {
+        shade(marker, detector, &mut primary, &mut scattered, &mut shared);
+    }
     let primary_kev = primary.iter().map(|pixel| pixel.mean_kev).sum::<f64>();
     let sums = CategorySums::from_kev(|category| match category {
         Category::Primary => (primary_kev, 0.0),

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::beam::projection::Detector;
+use crate::beam::detector::Detector;
 use crate::engine::raytrace::check_samples;
 use crate::matter::compton::ComptonModel;
 use crate::setters::setters;

@@ -3,7 +3,8 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;
 
-use crate::beam::projection::{Detector, Projection};
+use crate::beam::detector::Detector;
+use crate::beam::projection::Projection;
 use crate::detector::open_field::OpenField;
 use crate::engine::adaptive_primary::primary_moments;
 use crate::engine::exposure::Exposure;

@@ -28,6 +28,7 @@ mod invariance;
 mod later_collisions;
 mod line_scattering;
 mod lines;
+mod marker_shadow;
 mod multiple_scatter;
 mod node_grid;
 pub(crate) mod noise;

@@ -4,7 +4,7 @@
 
 use nalgebra::Point2;
 
-use crate::beam::projection::Detector;
+use crate::beam::detector::Detector;
 
 /// Nodes in even steps over the whole detector, its edges included.
 #[derive(Debug, Clone, Copy, PartialEq)]

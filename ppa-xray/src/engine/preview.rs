@@ -1,6 +1,6 @@
 //! What a preview of a fast exposure simulates: larger pixels, fewer histories for the scatter.
 
-use crate::beam::projection::Detector;
+use crate::beam::detector::Detector;
 use crate::engine::fast_settings::FastSettings;
 
 /// Fewest pixels along the shorter side of a preview, unless the image has fewer.

@@ -4,7 +4,7 @@
 
 use nalgebra::{Point2, Point3};
 
-use crate::beam::projection::Detector;
+use crate::beam::detector::Detector;
 use crate::engine::node_grid::NodeGrid;
 use crate::transport::tally::Moments;
 use crate::transport::tracking::Transport;

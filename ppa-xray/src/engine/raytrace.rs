@@ -39,11 +39,15 @@ pub fn primary(
     let rays = PrimaryRays::new(&exposure, &paths, transport.emitter.lines());
     let spots = transport.emitter.spot_points(SPOT_POINTS);
     let ev_cm2 = 1e3 / projection.detector.pixel_cm2();
-    let moments = rays.per_pixel(|pixel, scratch| {
+    let mut moments = rays.per_pixel(|pixel, scratch| {
         rays.lit(pixel).map_or_else(Moments::default, |lit| {
             sampled(&rays, &spots, lit, samples_per_side, scratch)
         })
     });
+    let marker = projection.marker.iter();
+    for (pixel, share) in marker.flat_map(|marker| marker.covered(&projection.detector)) {
+        moments[pixel] = moments[pixel].scaled(1.0 - share);
+    }
     Ok(moments.iter().map(|m| m.mean_kev * ev_cm2).collect())
 }
 

@@ -2,7 +2,7 @@
 //!
 //! docs/physics.md, "Fast engine", precision.
 
-use crate::beam::projection::Detector;
+use crate::beam::detector::Detector;
 use crate::engine::node_grid::NodeGrid;
 use crate::transport::tally::Moments;
 

@@ -11,7 +11,8 @@ use std::f64::consts::PI;
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;
 
-use crate::beam::projection::{Detector, Projection};
+use crate::beam::detector::Detector;
+use crate::beam::projection::Projection;
 use crate::beam::source::{Collimation, Source};
 use crate::beam::spectrum::Spectrum;
 use crate::engine::analog::{AnalogSettings, analog};

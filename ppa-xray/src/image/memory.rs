@@ -1,6 +1,6 @@
 //! Memory check of an image before the first history.
 
-use crate::beam::projection::Detector;
+use crate::beam::detector::Detector;
 use crate::beam::projection_error::ProjectionError;
 
 /// Bytes per pixel at the height of the work of either engine: sums or moments of four categories, noise, and the planes of

@@ -5,7 +5,8 @@ use std::path::Path;
 use ppa_core::random::Philox;
 use rayon::prelude::*;
 
-use crate::beam::projection::{Detector, Projection};
+use crate::beam::detector::Detector;
+use crate::beam::projection::Projection;
 use crate::beam::source::{Collimation, Source};
 use crate::beam::spectrum::Spectrum;
 use crate::matter::material::Material;

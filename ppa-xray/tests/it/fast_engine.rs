@@ -80,7 +80,7 @@ fn contrast_medium() -> VoxelPhantom {
     VoxelPhantom::new(grid, material, density, vec![water, contrast.unwrap()]).unwrap()
 }
 
-/// Three sums and 48 blocks, as for tissue; without K x-rays multiple scatter would be LACK % too low.
+/// Three sums and 48 blocks, as for tissue; without K x-rays multiple scatter would be 70 % too low.
 #[test]
 fn k_x_rays_behind_contrast_medium_are_those_of_analog() {
     let (phantom, spectrum) = (contrast_medium(), Spectrum::monoenergetic(50.0).unwrap());

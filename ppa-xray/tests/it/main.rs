@@ -12,6 +12,7 @@ mod exposure_index;
 mod fast_engine;
 mod files;
 mod interpolation;
+mod marker;
 mod mcgpu;
 mod molecular_scatter;
 mod noise_power;

@@ -6,7 +6,8 @@ mod plain_histories;
 use nalgebra::Isometry3;
 
 use super::*;
-use crate::beam::projection::{Detector, Projection};
+use crate::beam::detector::Detector;
+use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
 use crate::engine::exposure::Exposure;
 use crate::matter::compton::ComptonModel;

@@ -5,7 +5,7 @@ use ppa_core::random::Philox;
 use ppa_ct::Grid;
 
 use super::projection;
-use crate::beam::projection::Detector;
+use crate::beam::detector::Detector;
 use crate::beam::spectrum::Spectrum;
 use crate::engine::exposure::Exposure;
 use crate::matter::compton::ComptonModel;
