@@ -14,7 +14,8 @@ const GROUPS: &[(&str, &[&str])] = &[
     (
         "Dataset",
         &[
-            "plan", "generate", "status", "merge", "verify", "dataset", "qa", "export",
+            "plan", "generate", "submit", "status", "cancel", "merge", "verify", "dataset", "qa",
+            "export",
         ],
     ),
     ("Labels", &["label"]),

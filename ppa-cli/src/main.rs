@@ -3,6 +3,7 @@
 //! Parses, calls the libraries, prints. Results go to stdout, everything else to stderr.
 
 mod allocator;
+mod cluster_report;
 mod commands;
 mod findings;
 mod help;
@@ -80,8 +81,13 @@ enum Command {
     Plan(commands::plan::PlanArgs),
     /// Make or resume the dataset of a plan
     Generate(commands::generate::GenerateArgs),
-    /// Show the progress of a dataset
+    /// Make a plan on a cluster
+    #[command(subcommand)]
+    Submit(Box<commands::submit::SubmitCommand>),
+    /// Show the progress of a dataset, or of the jobs that make it
     Status(commands::status::StatusArgs),
+    /// Cancel the jobs of a plan on a cluster
+    Cancel(commands::cancel::CancelArgs),
     /// Join the shards of a plan
     Merge(commands::merge::MergeArgs),
     /// Check all files of a dataset and recompute a sample of its poses
@@ -140,7 +146,9 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Xray(command) => commands::xray::run(&command, output),
         Command::Plan(args) => commands::plan::run(&args, output),
         Command::Generate(args) => commands::generate::run(&args, output),
+        Command::Submit(command) => commands::submit::run(&command, output),
         Command::Status(args) => commands::status::run(&args, output),
+        Command::Cancel(args) => commands::cancel::run(&args, output),
         Command::Merge(args) => commands::merge::run(&args, output),
         Command::Verify(args) => commands::verify::run(&args, output),
         Command::Dataset(command) => commands::dataset::run(&command, output),

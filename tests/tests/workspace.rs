@@ -51,6 +51,7 @@ const ARROWS: &[(&str, &[&str])] = &[
         ],
     ),
     ("ppa-metrics", &[]),
+    ("ppa-cluster", &["ppa-core"]),
     ("ppa-learn", &["ppa-core", "ppa-dataset", "ppa-metrics"]),
     (
         "ppa-cli",
@@ -64,6 +65,7 @@ const ARROWS: &[(&str, &[&str])] = &[
             "ppa-xray",
             "ppa-dataset",
             "ppa-generate",
+            "ppa-cluster",
             "ppa-label",
             "ppa-report",
             "ppa-learn",
@@ -87,6 +89,7 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
     ("ppa-xray", &["dicom", "nifti", "candle", "clap"]),
     ("ppa-dataset", &["dicom", "nifti", "clap", "candle"]),
     ("ppa-generate", &["clap", "indicatif", "candle"]),
+    ("ppa-cluster", &["dicom", "nifti", "candle", "clap", "rayon"]),
 ];
 
 fn root() -> PathBuf {

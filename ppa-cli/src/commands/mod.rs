@@ -1,6 +1,7 @@
 //! One file per command.
 
 pub mod calibrate;
+pub mod cancel;
 pub mod case;
 pub mod completions;
 pub mod ct;
@@ -25,6 +26,7 @@ pub mod qa;
 pub mod scene;
 pub mod stats;
 pub mod status;
+pub mod submit;
 mod technique;
 pub mod train;
 pub mod verify;

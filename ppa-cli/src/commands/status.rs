@@ -1,21 +1,42 @@
 //! `ppa status`: generation progress.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
+use ppa_cluster::{ClusterFolder, FolderError, Slurm, Submission};
 use ppa_core::text::count;
 use ppa_generate::{Status, status};
 
+use crate::cluster_report::ClusterReport;
 use crate::output::{Output, bytes};
+use crate::stderr;
 
 #[derive(Debug, Args)]
 pub struct StatusArgs {
-    /// Folder of a dataset, or of a shard
+    /// Folder of a dataset, of a shard, or of the jobs of `ppa submit`
     dataset: PathBuf,
 }
 
 pub fn run(args: &StatusArgs, output: Output) -> anyhow::Result<()> {
+    if ClusterFolder::is_one(&args.dataset) {
+        return jobs(&args.dataset, output);
+    }
     output.print(&status(&args.dataset)?, describe)
+}
+
+/// The shards of a plan on a cluster.
+fn jobs(root: &Path, output: Output) -> anyhow::Result<()> {
+    let folder = ClusterFolder::open(root)?;
+    let submission = Submission::read(&folder.submission())?;
+    let submission = submission.ok_or_else(|| FolderError::NotSubmitted(root.to_owned()))?;
+    let queue = Slurm.queue(&folder.job_name()).unwrap_or_else(|error| {
+        stderr::warning(&format!(
+            "shards that run or wait are shown as failed or missing: {error}"
+        ));
+        Vec::new()
+    });
+    let report = ClusterReport::of(&folder, &submission, &queue)?;
+    output.print(&report, ClusterReport::describe)
 }
 
 fn describe(status: &Status) -> String {

@@ -1,0 +1,38 @@
+//! Writes the job scripts of a plan of 362 poses and prints the command that would submit them.
+
+use std::path::Path;
+
+use ppa_cluster::{
+    ClusterFolder, CostSource, DEFAULT_MAX_ARRAY_SIZE, PoseCost, Scripts, Submission, TaskSettings,
+    bundle, shard_commands, split,
+};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let root = std::env::temp_dir().join(format!("job_scripts_{}", std::process::id()));
+    let folder = ClusterFolder::create(&root)?;
+    let settings = TaskSettings {
+        partition: None,
+        account: None,
+        time: "2:00:00".parse()?,
+        cpus: 2,
+        mem: None,
+        max_tasks: None,
+        setup: None,
+    };
+    let cost = PoseCost {
+        pose_cpu_s: 60.0,
+        limb_cpu_s: 10.0,
+    };
+    let bundle = bundle(362, cost, settings.cpus, settings.time)?;
+    let (plan, hash) = ("plan.toml".into(), "0".repeat(64));
+    let cost = (cost, CostSource::Given);
+    let submission = Submission::new(plan, hash, 362, cost, bundle, settings);
+    let scripts = Scripts::new(&folder, &submission, Path::new("/usr/bin/ppa"))?;
+    println!("{}", scripts.shard);
+    let shards: Vec<_> = (1..=bundle.shards).collect();
+    for command in shard_commands(&folder, &split(&shards, DEFAULT_MAX_ARRAY_SIZE), None)? {
+        println!("{command}");
+    }
+    std::fs::remove_dir_all(&root)?;
+    Ok(())
+}

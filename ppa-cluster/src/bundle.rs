@@ -1,0 +1,186 @@
+//! How many shards a plan is divided into, from the time of a pose.
+
+use serde::{Deserialize, Serialize};
+
+use crate::time_limit::TimeLimit;
+
+/// The time that a task is to take, seconds. Shards of equal size then take from half of it on: 20 to 40 minutes.
+const TARGET_S: f64 = 40.0 * 60.0;
+
+/// How much longer than estimated a task may take before it meets its time limit.
+const RESERVE: f64 = 1.5;
+
+/// Slurm sends the signal up to a minute earlier than asked, and not later than it is asked for, seconds.
+const SIGNAL_S: f64 = 60.0;
+
+/// Processor time of the work, seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PoseCost {
+    /// Mean processor time of a pose, seconds.
+    pub pose_cpu_s: f64,
+    /// Processor time to read and shape a limb before its first pose, seconds.
+    pub limb_cpu_s: f64,
+}
+
+/// A division of a plan into shards.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Bundle {
+    /// Number of shards.
+    pub shards: u64,
+    /// Poses of the largest shard.
+    pub poses_per_shard: u64,
+    /// Estimated wall-clock time of the largest shard, seconds.
+    pub task_s: f64,
+    /// How long before its time limit a task is told to stop, seconds: enough to finish the poses at hand.
+    pub warning_s: u64,
+}
+
+/// Why a plan cannot be divided.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BundleError {
+    /// There is nothing to make.
+    #[error("the plan has no poses")]
+    NoPoses,
+    /// A time that is none.
+    #[error("a pose takes {found} s of processor time, expected a positive number")]
+    Cost {
+        /// Seconds.
+        found: f64,
+    },
+    /// Not one pose fits into a task.
+    #[error(
+        "the time limit {limit} is too short: one pose takes about {pose_s:.0} s with the preparation of its limb, and a \
+         task stops {warning_s} s before its limit; give at least --time {least}"
+    )]
+    TooShort {
+        /// The time limit.
+        limit: TimeLimit,
+        /// Estimated time of one pose, seconds.
+        pose_s: f64,
+        /// How long before the limit a task stops, seconds.
+        warning_s: u64,
+        /// The shortest limit that takes one pose.
+        least: TimeLimit,
+    },
+}
+
+/// Divides `poses` into shards that take 20 to 40 minutes each on `cpus` processors, or two thirds of the time limit where
+/// that is less. A plan that takes less is one shard.
+///
+/// # Errors
+/// [`BundleError`], above all for a time limit that is too short for one pose.
+pub fn bundle(
+    poses: u64,
+    cost: PoseCost,
+    cpus: u32,
+    limit: TimeLimit,
+) -> Result<Bundle, BundleError> {
+    if poses == 0 {
+        return Err(BundleError::NoPoses);
+    }
+    for found in [cost.pose_cpu_s, cost.limb_cpu_s] {
+        if !(0.0..=1e9).contains(&found) {
+            return Err(BundleError::Cost { found });
+        }
+    }
+    let warning = warning_s(cost);
+    let first_s = cost.limb_cpu_s + cost.pose_cpu_s;
+    let usable_s = limit.seconds() as f64 - warning as f64;
+    if usable_s < first_s {
+        let least = warning as f64 + first_s;
+        return Err(BundleError::TooShort {
+            limit,
+            pose_s: first_s,
+            warning_s: warning,
+            least: TimeLimit::from_seconds((least / 60.0).ceil() as u64 * 60),
+        });
+    }
+    // Poses are made side by side, one on each processor; a limb is prepared before the first of them.
+    let pose_s = (cost.pose_cpu_s / f64::from(cpus.max(1))).max(1e-3);
+    let target_s = TARGET_S.min(usable_s / RESERVE);
+    let most = ((target_s - cost.limb_cpu_s) / pose_s).floor().max(1.0) as u64;
+    let shards = poses.div_ceil(most.min(poses));
+    let poses_per_shard = poses.div_ceil(shards);
+    Ok(Bundle {
+        shards,
+        poses_per_shard,
+        task_s: cost.limb_cpu_s + pose_s * poses_per_shard as f64,
+        warning_s: warning,
+    })
+}
+
+/// A pose at hand keeps one processor at the least, and the preparation of a limb is not stopped.
+fn warning_s(cost: PoseCost) -> u64 {
+    (SIGNAL_S + 2.0 * (cost.pose_cpu_s + cost.limb_cpu_s)).ceil() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const TWO_HOURS: TimeLimit = TimeLimit::from_seconds(7200);
+
+    fn cost(pose_cpu_s: f64) -> PoseCost {
+        PoseCost {
+            pose_cpu_s,
+            limb_cpu_s: 0.0,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn large_plans_give_tasks_of_20_to_60_minutes(
+            poses in 1_000_u64..100_000, pose_s in 10.0..300.0_f64, cpus in 1_u32..4
+        ) {
+            let found = bundle(poses, cost(pose_s), cpus, TWO_HOURS).unwrap();
+            let smallest = (poses / found.shards) as f64 * pose_s / f64::from(cpus);
+            prop_assert!(smallest > 19.0 * 60.0 && found.task_s < 3600.0, "{found:?}");
+            prop_assert!(found.shards <= poses);
+        }
+    }
+
+    #[test]
+    fn a_short_plan_is_one_task() {
+        let found = bundle(5, cost(2.0), 1, TWO_HOURS).unwrap();
+        assert_eq!((found.shards, found.poses_per_shard), (1, 5));
+        assert_eq!(found.task_s, 10.0);
+    }
+
+    #[test]
+    fn long_poses_are_tasks_of_their_own() {
+        let limit = TimeLimit::from_seconds(24 * 3600);
+        let found = bundle(5, cost(3600.0), 1, limit).unwrap();
+        assert_eq!((found.shards, found.poses_per_shard), (5, 1));
+        assert_eq!(found.warning_s, 60 + 7200);
+    }
+
+    #[test]
+    fn a_short_limit_makes_shorter_tasks() {
+        let limit = TimeLimit::from_seconds(15 * 60);
+        let found = bundle(1000, cost(10.0), 1, limit).unwrap();
+        assert!(found.task_s <= (900.0 - 80.0) / 1.5, "{found:?}");
+    }
+
+    #[test]
+    fn a_limit_below_one_pose_is_refused() {
+        let limit = TimeLimit::from_seconds(120);
+        let said = bundle(5, cost(100.0), 4, limit).unwrap_err().to_string();
+        assert!(said.contains("00:02:00 is too short"), "{said}");
+        let least = said.split("--time ").nth(1).unwrap().parse().unwrap();
+        assert!(bundle(5, cost(100.0), 4, least).is_ok(), "{said}");
+    }
+
+    #[test]
+    fn costs_that_are_no_numbers_are_refused() {
+        for bad in [f64::NAN, -1.0, f64::INFINITY] {
+            assert!(bundle(5, cost(bad), 1, TWO_HOURS).is_err());
+        }
+        assert_eq!(
+            bundle(0, cost(1.0), 1, TWO_HOURS),
+            Err(BundleError::NoPoses)
+        );
+    }
+}

@@ -1,0 +1,115 @@
+//! Why a folder or Slurm cannot be used.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a folder of jobs cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FolderError {
+    /// The system refused a file or folder.
+    #[error("cannot {action} {}", path.display())]
+    File {
+        /// `read`, `write`, `create` …
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The folder above is missing.
+    #[error("{} cannot be created: {} does not exist or is not a folder", path.display(), parent.display())]
+    NoParent {
+        /// The folder of jobs.
+        path: PathBuf,
+        /// The missing folder.
+        parent: PathBuf,
+    },
+    /// It holds something else.
+    #[error("{} is neither empty nor a folder that ppa submit began; choose another folder", .0.display())]
+    Occupied(PathBuf),
+    /// No jobs were submitted from here.
+    #[error("{} holds no slurm/submission.json: nothing was submitted from it", .0.display())]
+    NotSubmitted(PathBuf),
+    /// The list of what was submitted is damaged or of another version.
+    #[error("{} is damaged or of another version of ppa: {found}", path.display())]
+    Submission {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        found: String,
+    },
+    /// Another `ppa submit` works on the folder.
+    #[error("{} is in use by another ppa submit; wait for its end", .0.display())]
+    Busy(PathBuf),
+    /// The path cannot stand in a job script.
+    #[error("{} is not valid UTF-8, which a job script needs", .0.display())]
+    NotUnicode(PathBuf),
+}
+
+impl FolderError {
+    /// Adds action and path to an error of the system, for `map_err`.
+    pub(crate) fn at<'a>(
+        action: &'static str,
+        path: &'a Path,
+    ) -> impl FnOnce(io::Error) -> Self + 'a {
+        move |source| Self::File {
+            action,
+            path: path.to_owned(),
+            source,
+        }
+    }
+}
+
+/// Why Slurm could not be asked, or refused.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SlurmError {
+    /// A program of Slurm is not installed.
+    #[error(
+        "Slurm is not on this machine: there is no program {program} in PATH; submit from a machine of the cluster, or \
+         write the scripts with --dry-run"
+    )]
+    NotInstalled {
+        /// `sbatch`, `squeue` …
+        program: &'static str,
+    },
+    /// A program of Slurm could not be started.
+    #[error("cannot run {program}")]
+    Run {
+        /// `sbatch`, `squeue` …
+        program: &'static str,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A program of Slurm failed.
+    #[error("{program} failed: {said}")]
+    Refused {
+        /// `sbatch`, `squeue` …
+        program: &'static str,
+        /// The message of Slurm, in one line.
+        said: String,
+    },
+    /// An answer of Slurm that is not in the expected form.
+    #[error("{program} answered \"{found}\", expected {expected}")]
+    Answer {
+        /// `sbatch`, `squeue` …
+        program: &'static str,
+        /// The line at fault.
+        found: String,
+        /// The expected form.
+        expected: &'static str,
+    },
+    /// The configuration does not state the size of arrays.
+    #[error("scontrol show config states no MaxArraySize as a whole number, but {found}")]
+    NoArraySize {
+        /// Its value, or that the line is missing.
+        found: String,
+    },
+    /// The cluster takes no arrays.
+    #[error("the cluster takes no job arrays: its MaxArraySize is {found}, expected 2 or more")]
+    NoArrays {
+        /// MaxArraySize.
+        found: u64,
+    },
+}

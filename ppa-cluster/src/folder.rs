@@ -1,0 +1,208 @@
+//! The folder of a plan on a cluster: where its files lie.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use crate::error::FolderError;
+
+/// The folder that `ppa submit` fills: `slurm/` with plan, scripts and logs, `shards/` and `dataset/`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ClusterFolder {
+    root: PathBuf,
+}
+
+/// Held while a command submits jobs from a folder; released when dropped or when the process dies.
+#[derive(Debug)]
+pub struct FolderLock(#[expect(dead_code, reason = "holds the lock")] fs::File);
+
+impl ClusterFolder {
+    /// Creates the folder, or opens one that is empty or that `ppa submit` began. The folder above must exist.
+    ///
+    /// # Errors
+    /// [`FolderError`] for a folder that is missing above, cannot be written, or holds something else.
+    pub fn create(root: &Path) -> Result<Self, FolderError> {
+        let parent = match root.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        if !root.is_dir() {
+            if !parent.is_dir() {
+                return Err(FolderError::NoParent {
+                    path: root.to_owned(),
+                    parent: parent.to_owned(),
+                });
+            }
+            fs::create_dir(root).map_err(FolderError::at("create", root))?;
+        }
+        let folder = Self::canonical(root)?;
+        let mut entries = fs::read_dir(root).map_err(FolderError::at("read", root))?;
+        if entries.next().is_some() && !folder.slurm().is_dir() {
+            return Err(FolderError::Occupied(root.to_owned()));
+        }
+        for made in [folder.logs(), folder.root.join("shards")] {
+            fs::create_dir_all(&made).map_err(FolderError::at("create", &made))?;
+        }
+        Ok(folder)
+    }
+
+    /// Opens a folder that jobs were submitted from.
+    ///
+    /// # Errors
+    /// [`FolderError::NotSubmitted`] for any other folder.
+    pub fn open(root: &Path) -> Result<Self, FolderError> {
+        if !Self::is_one(root) {
+            return Err(FolderError::NotSubmitted(root.to_owned()));
+        }
+        Self::canonical(root)
+    }
+
+    /// Whether jobs were submitted from a folder, or their scripts written into it.
+    pub fn is_one(root: &Path) -> bool {
+        root.join("slurm/submission.json").is_file()
+    }
+
+    fn canonical(root: &Path) -> Result<Self, FolderError> {
+        let root = root.canonicalize().map_err(FolderError::at("find", root))?;
+        crate::quote::unicode(&root)?;
+        Ok(Self { root })
+    }
+
+    /// Keeps other processes from submitting jobs from this folder.
+    ///
+    /// # Errors
+    /// [`FolderError::Busy`] while another process holds it.
+    pub fn lock(&self) -> Result<FolderLock, FolderError> {
+        let path = self.slurm().join("lock");
+        let mut options = fs::OpenOptions::new();
+        let options = options.write(true).create(true).truncate(false);
+        let file = options
+            .open(&path)
+            .map_err(FolderError::at("create", &path))?;
+        match file.try_lock() {
+            Ok(()) => Ok(FolderLock(file)),
+            Err(fs::TryLockError::WouldBlock) => Err(FolderError::Busy(self.root.clone())),
+            Err(fs::TryLockError::Error(error)) => Err(FolderError::at("lock", &path)(error)),
+        }
+    }
+
+    /// Its absolute path.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// Plan, scripts, logs and the list of what was submitted.
+    pub fn slurm(&self) -> PathBuf {
+        self.root.join("slurm")
+    }
+
+    /// The plan that the jobs read.
+    pub fn plan(&self) -> PathBuf {
+        self.slurm().join("plan.toml")
+    }
+
+    /// The script of the array of shards.
+    pub fn shard_script(&self) -> PathBuf {
+        self.slurm().join("shard.sh")
+    }
+
+    /// The script of the merge.
+    pub fn merge_script(&self) -> PathBuf {
+        self.slurm().join("merge.sh")
+    }
+
+    /// Settings and division of what was submitted.
+    pub fn submission(&self) -> PathBuf {
+        self.slurm().join("submission.json")
+    }
+
+    /// Logs of all jobs.
+    pub fn logs(&self) -> PathBuf {
+        self.slurm().join("logs")
+    }
+
+    /// The log of the merge.
+    pub fn merge_log(&self) -> PathBuf {
+        self.logs().join("merge.log")
+    }
+
+    /// The folder of a shard, counted from 1.
+    pub fn shard(&self, number: u64) -> PathBuf {
+        self.root.join("shards").join(number.to_string())
+    }
+
+    /// The merged dataset.
+    pub fn dataset(&self) -> PathBuf {
+        self.root.join("dataset")
+    }
+
+    /// Whether the merged dataset was verified.
+    ///
+    /// # Errors
+    /// [`FolderError::File`] when the system cannot tell.
+    pub fn is_verified(&self) -> Result<bool, FolderError> {
+        let path = self.root.join(VERIFIED);
+        match path.metadata() {
+            Ok(_) => Ok(true),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+            Err(error) => Err(FolderError::at("read", &path)(error)),
+        }
+    }
+
+    /// The name of all its jobs, which no other folder has.
+    pub fn job_name(&self) -> String {
+        let hash = Sha256::digest(self.root.as_os_str().as_encoded_bytes());
+        let digits: String = hash[..6].iter().map(|byte| format!("{byte:02x}")).collect();
+        format!("ppa-{digits}")
+    }
+}
+
+/// The merge writes this file, as seen from the folder, once the dataset is verified.
+pub(crate) const VERIFIED: &str = "slurm/verified";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_below_a_missing_one_is_refused() {
+        let above = tempfile::tempdir().unwrap();
+        let root = above.path().join("nowhere/jobs");
+        let said = ClusterFolder::create(&root).unwrap_err().to_string();
+        assert!(said.contains("nowhere does not exist"), "{said}");
+        assert!(!above.path().join("nowhere").exists());
+    }
+
+    #[test]
+    fn a_folder_with_other_files_is_refused() {
+        let root = tempfile::tempdir().unwrap();
+        fs::write(root.path().join("notes.txt"), "kept").unwrap();
+        let said = ClusterFolder::create(root.path()).unwrap_err().to_string();
+        assert!(said.contains("neither empty nor"), "{said}");
+        assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_folder_is_locked_by_one_process() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = ClusterFolder::create(root.path()).unwrap();
+        let lock = folder.lock().unwrap();
+        assert!(matches!(folder.lock(), Err(FolderError::Busy(_))));
+        drop(lock);
+        folder.lock().unwrap();
+        assert!(matches!(
+            ClusterFolder::open(root.path()),
+            Err(FolderError::NotSubmitted(_))
+        ));
+    }
+
+    #[test]
+    fn the_name_of_jobs_follows_from_the_folder() {
+        let name = |root: &str| ClusterFolder { root: root.into() }.job_name();
+        assert_eq!(name("/a b"), name("/a b"));
+        assert_ne!(name("/a b"), name("/a"));
+        assert_eq!(name("/a b").len(), 16);
+    }
+}

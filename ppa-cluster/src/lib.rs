@@ -1,0 +1,31 @@
+#![doc = include_str!("../README.md")]
+
+mod array;
+mod bundle;
+mod error;
+mod folder;
+mod limits;
+mod logs;
+mod queue;
+mod quote;
+mod sbatch;
+mod scripts;
+mod shard_state;
+mod slurm;
+mod submission;
+mod time_limit;
+
+pub use array::{ArrayChunk, index_list, split};
+pub use bundle::{Bundle, BundleError, PoseCost, bundle};
+pub use error::{FolderError, SlurmError};
+pub use folder::{ClusterFolder, FolderLock};
+pub use limits::{DEFAULT_MAX_ARRAY_SIZE, max_array_size};
+pub use logs::{last_line, logged_shards};
+pub use queue::{JobKind, QueuedJob, parse_queue};
+pub use quote::shell_quoted;
+pub use sbatch::{SbatchCommand, merge_command, shard_commands};
+pub use scripts::{ScriptError, Scripts};
+pub use shard_state::{ShardState, shard_state};
+pub use slurm::Slurm;
+pub use submission::{CostSource, Submission, TaskSettings};
+pub use time_limit::{TimeLimit, TimeLimitError};

@@ -1,0 +1,101 @@
+//! Logs of the tasks, one file for each shard, to which every attempt appends.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::{Path, PathBuf};
+
+use crate::error::FolderError;
+
+/// What is read of the end of a log, bytes.
+const TAIL: u64 = 16 * 1024;
+
+/// The log of one chunk of an array as `sbatch --output` takes it; Slurm puts the index in place of `%a`.
+pub(crate) fn log_pattern(offset: u64) -> String {
+    match offset {
+        0 => "shard_%a.log".to_owned(),
+        offset => format!("shard_{offset}+%a.log"),
+    }
+}
+
+/// The shard of a log's name.
+fn shard_of(name: &str) -> Option<u64> {
+    let number = name.strip_prefix("shard_")?.strip_suffix(".log")?;
+    let (offset, index) = number.split_once('+').unwrap_or(("0", number));
+    let (offset, index): (u64, u64) = (offset.parse().ok()?, index.parse().ok()?);
+    offset.checked_add(index)
+}
+
+/// The newest log of every shard that was started, by its number. A folder that is missing holds none.
+///
+/// # Errors
+/// [`FolderError::File`] when the folder cannot be read.
+pub fn logged_shards(logs: &Path) -> Result<BTreeMap<u64, PathBuf>, FolderError> {
+    let failed = |error| FolderError::at("read", logs)(error);
+    let entries = match fs::read_dir(logs) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(BTreeMap::new()),
+        entries => entries.map_err(failed)?,
+    };
+    let mut newest = BTreeMap::new();
+    for entry in entries {
+        let entry = entry.map_err(failed)?;
+        let Some(shard) = entry.file_name().to_str().and_then(shard_of) else {
+            continue;
+        };
+        let written = entry.metadata().and_then(|found| found.modified()).ok();
+        let log = (written, entry.path());
+        let known = newest.entry(shard).or_insert_with(|| log.clone());
+        if known.0 < written {
+            *known = log;
+        }
+    }
+    let paths = newest.into_iter().map(|(shard, (_, path))| (shard, path));
+    Ok(paths.collect())
+}
+
+/// The last line of a log that is not empty; `None` where there is none.
+pub fn last_line(log: &Path) -> Option<String> {
+    let mut file = File::open(log).ok()?;
+    let size = file.metadata().ok()?.len();
+    file.seek(SeekFrom::Start(size.saturating_sub(TAIL))).ok()?;
+    let mut tail = Vec::new();
+    file.take(TAIL).read_to_end(&mut tail).ok()?;
+    let text = String::from_utf8_lossy(&tail);
+    let mut lines = text.lines().map(str::trim).rev();
+    lines.find(|line| !line.is_empty()).map(str::to_owned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn logs_are_found_by_shard_in_every_chunk() {
+        let folder = tempfile::tempdir().unwrap();
+        let logs = folder.path().join("logs");
+        assert!(logged_shards(&logs).unwrap().is_empty());
+        fs::create_dir(&logs).unwrap();
+        for name in [
+            log_pattern(0).replace("%a", "7"),
+            log_pattern(1000).replace("%a", "7"),
+            "merge.log".to_owned(),
+            "shard_x.log".to_owned(),
+        ] {
+            fs::write(logs.join(name), "begun\nlast\n\n").unwrap();
+        }
+        let found = logged_shards(&logs).unwrap();
+        assert_eq!(found.keys().collect::<Vec<_>>(), [&7, &1007]);
+        assert_eq!(last_line(&found[&1007]).unwrap(), "last");
+    }
+
+    #[test]
+    fn the_last_line_of_a_long_log_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = folder.path().join("log");
+        fs::write(&log, format!("{}\nthe end\n", "é".repeat(20_000))).unwrap();
+        assert_eq!(last_line(&log).unwrap(), "the end");
+        fs::write(&log, "\n \n").unwrap();
+        assert_eq!(last_line(&log), None);
+        assert_eq!(last_line(&folder.path().join("none")), None);
+    }
+}

@@ -1,0 +1,145 @@
+//! The commands that submit the scripts of a folder.
+
+use std::fmt;
+
+use crate::array::{ArrayChunk, index_list};
+use crate::error::FolderError;
+use crate::folder::ClusterFolder;
+use crate::logs::log_pattern;
+use crate::queue::JobKind;
+use crate::quote::{shell_quoted, unicode};
+
+/// One call of `sbatch`; prints as a line of shell.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SbatchCommand {
+    arguments: Vec<String>,
+    /// The script and its arguments.
+    script: Vec<String>,
+}
+
+impl SbatchCommand {
+    /// The same job after others, whether they succeed or fail; `after` holds their identifiers.
+    #[must_use]
+    pub fn after(mut self, after: &[String]) -> Self {
+        if !after.is_empty() {
+            self.arguments
+                .push(format!("--dependency=afterany:{}", after.join(":")));
+            // A job whose dependency cannot be met would wait for ever.
+            self.arguments.push("--kill-on-invalid-dep=yes".to_owned());
+        }
+        self
+    }
+
+    /// Arguments of `sbatch`.
+    pub fn arguments(&self) -> impl Iterator<Item = &str> {
+        let all = self.arguments.iter().chain(&self.script);
+        all.map(String::as_str)
+    }
+}
+
+impl fmt::Display for SbatchCommand {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("sbatch")?;
+        for argument in self.arguments() {
+            write!(f, " {}", shell_quoted(argument))?;
+        }
+        Ok(())
+    }
+}
+
+/// The command that submits one chunk of shards; at most `max_tasks` of them run at a time.
+///
+/// # Errors
+/// [`FolderError::NotUnicode`].
+pub fn shard_commands(
+    folder: &ClusterFolder,
+    chunks: &[ArrayChunk],
+    max_tasks: Option<u64>,
+) -> Result<Vec<SbatchCommand>, FolderError> {
+    let script = folder.shard_script();
+    let script = unicode(&script)?;
+    let command = |chunk: &ArrayChunk| {
+        let most = max_tasks.map_or(String::new(), |most| format!("%{most}"));
+        let array = format!("--array={}{most}", index_list(&chunk.indices));
+        let mut command = command(folder, Some(chunk.offset), &log_pattern(chunk.offset))?;
+        command.arguments.push(array);
+        command.script = vec![script.to_owned(), chunk.offset.to_string()];
+        Ok(command)
+    };
+    chunks.iter().map(command).collect()
+}
+
+/// The command that submits the merge.
+///
+/// # Errors
+/// [`FolderError::NotUnicode`].
+pub fn merge_command(folder: &ClusterFolder) -> Result<SbatchCommand, FolderError> {
+    let script = folder.merge_script();
+    let mut command = command(folder, None, "merge.log")?;
+    command.script = vec![unicode(&script)?.to_owned()];
+    Ok(command)
+}
+
+fn command(
+    folder: &ClusterFolder,
+    offset: Option<u64>,
+    log: &str,
+) -> Result<SbatchCommand, FolderError> {
+    Ok(SbatchCommand {
+        arguments: vec![
+            "--parsable".to_owned(),
+            format!("--chdir={}", unicode(folder.root())?),
+            format!("--comment={}", JobKind::comment(offset)),
+            // As seen from the folder, since Slurm puts numbers in place of % in the whole path.
+            format!("--output=slurm/logs/{log}"),
+        ],
+        script: Vec::new(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::array::split;
+
+    #[test]
+    fn chunks_of_shards_are_arrays_with_their_offset() {
+        let above = tempfile::tempdir().unwrap();
+        let folder = ClusterFolder::create(&above.path().join("a b")).unwrap();
+        let chunks = split(&[1, 2, 3, 5, 1001], 1001);
+        let commands = shard_commands(&folder, &chunks, Some(4)).unwrap();
+        let said: Vec<_> = commands.iter().map(ToString::to_string).collect();
+        assert_eq!(said.len(), 2);
+        let root = folder.root().display();
+        for part in [
+            "sbatch --parsable ",
+            &format!("'--chdir={root}'"),
+            "'--comment=shards 0'",
+            "--output=slurm/logs/shard_%a.log",
+            "--array=1-3,5%4",
+            &format!("'{root}/slurm/shard.sh' 0"),
+        ] {
+            assert!(said[0].contains(part), "{part}: {}", said[0]);
+        }
+        assert!(
+            said[1].contains("shard_1000+%a.log --array=1%4"),
+            "{}",
+            said[1]
+        );
+        assert!(said[1].ends_with("shard.sh' 1000"), "{}", said[1]);
+    }
+
+    #[test]
+    fn the_merge_waits_for_all_arrays() {
+        let above = tempfile::tempdir().unwrap();
+        let folder = ClusterFolder::create(&above.path().join("ab")).unwrap();
+        let merge = merge_command(&folder).unwrap();
+        assert!(!merge.to_string().contains("dependency"));
+        let after = merge.after(&["7".to_owned(), "9".to_owned()]).to_string();
+        assert!(
+            after.contains("--dependency=afterany:7:9 --kill-on-invalid-dep=yes"),
+            "{after}"
+        );
+        assert!(after.ends_with("slurm/merge.sh"), "{after}");
+    }
+}
