@@ -89,7 +89,10 @@ const FORBIDDEN: &[(&str, &[&str])] = &[
     ("ppa-xray", &["dicom", "nifti", "candle", "clap"]),
     ("ppa-dataset", &["dicom", "nifti", "clap", "candle"]),
     ("ppa-generate", &["clap", "indicatif", "candle"]),
-    ("ppa-cluster", &["dicom", "nifti", "candle", "clap", "rayon"]),
+    (
+        "ppa-cluster",
+        &["dicom", "nifti", "candle", "clap", "rayon"],
+    ),
 ];
 
 fn root() -> PathBuf {

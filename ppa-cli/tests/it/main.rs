@@ -4,6 +4,7 @@ mod auto_labels;
 mod bad_geometry;
 mod bad_input;
 mod case_files;
+mod cluster;
 mod constants;
 mod conversion;
 mod coverage;

@@ -1,0 +1,203 @@
+//! Plans as jobs of Slurm: scripts without Slurm, and submissions to programs that answer as Slurm does.
+//! `.ci/slurm` runs jobs on a real one.
+#![cfg(unix)]
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+use crate::{contains, ppa, write_plan};
+
+/// A folder with the quick plan of five poses, and a folder `bin` for programs of Slurm.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    write_plan(folder.path(), "");
+    fs::create_dir(folder.path().join("bin")).unwrap();
+    folder
+}
+
+/// Programs that answer as those of Slurm: arrays of two tasks, the queue in the file `queue`, and the arguments of each
+/// sbatch and scancel as a line of the file `calls`.
+fn with_slurm() -> tempfile::TempDir {
+    let folder = folder();
+    let log = "echo \"${0##*/} $*\" >>calls";
+    for (name, text) in [
+        ("scontrol", "echo 'MaxArraySize            = 3'".to_owned()),
+        ("squeue", "[ ! -e queue ] || cat queue".to_owned()),
+        ("scancel", log.to_owned()),
+        (
+            "sbatch",
+            format!(
+                "if [ \"$1\" = --test-only ]; then [ ! -e refuse ] || {{ cat refuse >&2; exit 1; }}; exit; fi\n\
+                 {log}\nwc -l <calls"
+            ),
+        ),
+    ] {
+        let path = folder.path().join("bin").join(name);
+        fs::write(&path, format!("#!/bin/sh\nPATH=/usr/bin:/bin\n{text}\n")).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+    folder
+}
+
+/// `ppa` with no other programs than those of the folder `bin`.
+fn isolated(folder: &Path, arguments: &str) -> Command {
+    let mut command = ppa(folder, arguments);
+    command.env("PATH", folder.join("bin"));
+    command
+}
+
+fn succeed(folder: &Path, arguments: &str) -> Value {
+    let output = isolated(folder, &format!("{arguments} --json")).output();
+    let output = output.unwrap();
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "ppa {arguments}: {stderr}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn fail(folder: &Path, arguments: &str) -> String {
+    let output = isolated(folder, arguments).output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success(), "ppa {arguments} succeeded");
+    assert_eq!(stderr.trim_end().lines().count(), 1, "{stderr}");
+    stderr
+}
+
+fn calls(folder: &Path) -> Vec<String> {
+    let text = fs::read_to_string(folder.join("calls")).unwrap_or_default();
+    text.lines().map(str::to_owned).collect()
+}
+
+/// Times of a pose and limits that give three shards.
+const THREE: &str = "submit slurm plan.toml --out jobs --pose-seconds 1200";
+
+#[test]
+fn a_dry_run_writes_scripts_without_slurm() {
+    let folder = folder();
+    let here = folder.path();
+    let said = succeed(
+        here,
+        "submit slurm plan.toml --out jobs --partition main --cpus 2 --dry-run",
+    );
+    assert_eq!((&said["shards"], &said["units"]), (&1.into(), &5.into()));
+    assert_eq!(said["cost_source"], "measured");
+    assert_eq!(said["commands"].as_array().unwrap().len(), 2);
+    let script = fs::read_to_string(here.join("jobs/slurm/shard.sh")).unwrap();
+    contains(
+        &script,
+        &[
+            "#SBATCH --partition=main",
+            "--signal=B:TERM@",
+            "--threads 2 generate",
+        ],
+    );
+    // The plan may still be edited, and options changed.
+    fs::write(
+        here.join("plan.toml"),
+        fs::read_to_string(here.join("plan.toml"))
+            .unwrap()
+            .replace("to_deg = 10.0", "to_deg = 7.5"),
+    )
+    .unwrap();
+    let said = succeed(here, &format!("{THREE} --cpus 1 --dry-run"));
+    assert_eq!((&said["shards"], &said["units"]), (&2.into(), &4.into()));
+    let report = succeed(here, "status jobs");
+    assert_eq!(report["states"]["missing"], 2);
+    assert_eq!(report["merge"]["state"], "missing");
+}
+
+#[test]
+fn what_cannot_work_is_refused_before_anything_is_queued() {
+    let folder = with_slurm();
+    let here = folder.path();
+    for (arguments, words) in [
+        ("--out nowhere/jobs", "nowhere does not exist"),
+        ("--out bin", "neither empty nor a folder"),
+        ("--out jobs --pose-seconds 1200 --time 5", "too short"),
+        ("--out jobs --pose-seconds 0", "--pose-seconds is 0"),
+        ("--out jobs --pose-seconds 1 --account a;b", "--account is"),
+    ] {
+        let said = fail(here, &format!("submit slurm plan.toml {arguments}"));
+        assert!(said.contains(words), "{said}");
+    }
+    fs::write(
+        here.join("refuse"),
+        "invalid partition specified: nowhere\n",
+    )
+    .unwrap();
+    let said = fail(here, THREE);
+    assert!(said.contains("invalid partition"), "{said}");
+    assert!(calls(here).is_empty());
+    fs::remove_file(here.join("bin/scontrol")).unwrap();
+    let said = fail(here, "submit slurm plan.toml --out other");
+    contains(&said, &["Slurm is not on this machine", "--dry-run"]);
+    assert!(!here.join("other").exists());
+}
+
+#[test]
+fn only_missing_shards_are_submitted_again() {
+    let folder = with_slurm();
+    let here = folder.path();
+    let said = succeed(here, &format!("{THREE} --setup true"));
+    assert_eq!(said["jobs"], serde_json::json!(["1", "2", "3"]));
+    let first = calls(here);
+    assert!(first[0].contains("--array=1-2 "), "{first:?}");
+    assert!(first[1].ends_with("shard.sh 2"), "{first:?}");
+    assert!(first[2].contains("--dependency=afterany:1:2 --kill-on-invalid-dep=yes"));
+
+    // One shard is made, one runs, one is lost; the merge waits.
+    crate::succeed(
+        here,
+        "generate jobs/slurm/plan.toml --shard 1/3 --out jobs/shards/1",
+    );
+    fs::write(here.join("jobs/slurm/logs/shard_2.log"), "begun\nkilled\n").unwrap();
+    fs::write(
+        here.join("queue"),
+        "2_1|RUNNING|n1|None|shards 2\n3|PENDING||Dependency|merge\n",
+    )
+    .unwrap();
+    let report = succeed(here, "status jobs");
+    let shard = |shard: usize| &report["shards"][shard - 1];
+    assert_eq!(shard(1)["state"], "done");
+    assert_eq!(
+        (&shard(2)["state"], &shard(2)["last_line"]),
+        (&"failed".into(), &"killed".into())
+    );
+    assert_eq!(
+        (&shard(3)["state"], &shard(3)["node"]),
+        (&"running".into(), &"n1".into())
+    );
+    assert_eq!(report["merge"]["reason"], "Dependency");
+
+    let said = succeed(here, "submit slurm plan.toml --out jobs");
+    assert_eq!(said["submitted"], serde_json::json!([2]));
+    let again = &calls(here)[first.len()..];
+    assert!(again[0].contains("--array=2 "), "{again:?}");
+    assert_eq!(again[1], "scancel 3");
+    assert!(again[2].contains("--dependency=afterany:2:4 "), "{again:?}");
+    let script = fs::read_to_string(here.join("jobs/slurm/shard.sh")).unwrap();
+    assert!(script.lines().any(|line| line == "true"), "{script}");
+
+    let text = fs::read_to_string(here.join("plan.toml")).unwrap();
+    fs::write(here.join("plan.toml"), text.replace("10.0", "7.5")).unwrap();
+    let said = fail(here, "submit slurm plan.toml --out jobs");
+    assert!(
+        said.contains("differs from the plan that was submitted"),
+        "{said}"
+    );
+
+    let said = succeed(here, "cancel jobs");
+    assert_eq!(said["cancelled"], serde_json::json!(["2", "3"]));
+}
+
+#[test]
+fn arrays_follow_each_other_where_tasks_are_limited() {
+    let folder = with_slurm();
+    succeed(folder.path(), &format!("{THREE} --max-tasks 1"));
+    let calls = calls(folder.path());
+    assert!(calls[0].contains("--array=1-2%1 "), "{calls:?}");
+    assert!(calls[1].contains("--dependency=afterany:1 "), "{calls:?}");
+}
