@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 use ppa_cluster::{
     ClusterFolder, CostSource, DEFAULT_MAX_ARRAY_SIZE, JobKind, PoseCost, QueuedJob, SbatchCommand,
     Scripts, ShardState, Slurm, Submission, TaskSettings, TimeLimit, bundle, merge_command,
-    shard_commands, split,
+    shard_commands, shell_quoted, split,
 };
 use ppa_core::text::count;
 use ppa_dataset::files::{remove_if_there, sha256_of_file};
@@ -372,8 +372,9 @@ fn describe(submitted: &Submitted) -> String {
             lines.extend(submitted.commands.iter().cloned());
         }
         (false, false) => lines.push(format!(
-            "submitted {shards}: jobs {}; ppa status {out} shows them",
-            submitted.jobs.join(", ")
+            "submitted {shards}: jobs {}; ppa status {} shows them",
+            submitted.jobs.join(", "),
+            shell_quoted(&out.to_string())
         )),
     }
     lines.join("\n")
