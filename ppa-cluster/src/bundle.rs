@@ -10,7 +10,8 @@ const TARGET_S: f64 = 40.0 * 60.0;
 /// How much longer than estimated a task may take before it meets its time limit.
 const RESERVE: f64 = 1.5;
 
-/// Slurm sends the signal up to a minute earlier than asked, and not later than it is asked for, seconds.
+/// Slack of the warning before the time limit, for the start of the program and slow disks, seconds. Slurm may warn up to a
+/// minute earlier than asked.
 const SIGNAL_S: f64 = 60.0;
 
 /// Processor time of the work, seconds.

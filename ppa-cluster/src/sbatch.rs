@@ -47,7 +47,7 @@ impl fmt::Display for SbatchCommand {
     }
 }
 
-/// The command that submits one chunk of shards; at most `max_tasks` of them run at a time.
+/// The commands that submit chunks of shards, one for each; at most `max_tasks` tasks of a chunk run at a time.
 ///
 /// # Errors
 /// [`FolderError::NotUnicode`].

@@ -355,10 +355,10 @@ fn describe(submitted: &Submitted) -> String {
         false => "",
     };
     let mut lines = vec![format!(
-        "{out}: {} in {} of up to {:.0} minutes{short}; {:.1} s of processor time a pose, {source}",
+        "{out}: {} in {} of up to {}{short}; {:.1} s of processor time a pose, {source}",
         count(submitted.poses, "pose"),
         count(submitted.shards, "shard"),
-        (submitted.task_s / 60.0).max(1.0),
+        count((submitted.task_s / 60.0).ceil().max(1.0) as u64, "minute"),
         submitted.cpu_s_per_unit,
     )];
     let shards = count(submitted.submitted.len(), "shard");
