@@ -104,7 +104,7 @@ pub enum ProjectionError {
     },
     /// A side marker of invalid size, or off the detector.
     #[error(
-        "the side marker is {height_mm} mm high about ({}, {}) mm, expected 1 to 100 mm high about a place from ({}, {}) to ({}, {}) mm, on the detector",
+        "the side marker is {height_mm} mm high with its middle at ({}, {}) mm, expected a height of 1 to 100 mm and a middle on the detector, from ({:.1}, {:.1}) to ({:.1}, {:.1}) mm",
         centre_mm[0], centre_mm[1], detector_mm[0][0], detector_mm[0][1], detector_mm[1][0], detector_mm[1][1]
     )]
     Marker {
