@@ -1,12 +1,23 @@
 //! The side marker takes the same from the images of both engines.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3, Vector3};
+use ppa_ct::Grid;
 use ppa_xray::{
-    AnalogSettings, Category, FastSettings, Radiograph, Side, SideMarker, analog, fast, primary,
+    AnalogSettings, Category, FastSettings, Material, Radiograph, Side, SideMarker, VoxelPhantom,
+    analog, fast, primary,
 };
 
 use crate::fast_engine::assert_scatter_agrees;
 use crate::scenes::{frontal, limb, sixty_kvp};
+
+/// 30 mm of water over the whole field: light is even within a pixel.
+fn slab() -> VoxelPhantom {
+    let first = Point3::new(-95.0, -95.0, -10.0);
+    let grid = Grid::axis_aligned([20, 20, 3], Vector3::repeat(10.0), first).unwrap();
+    let water = Material::named("water").unwrap();
+    let voxels = grid.len();
+    VoxelPhantom::new(grid, vec![0; voxels], vec![1.0; voxels], vec![water]).unwrap()
+}
 
 fn total(image: &Radiograph) -> Vec<f64> {
     image
@@ -16,10 +27,10 @@ fn total(image: &Radiograph) -> Vec<f64> {
         .collect()
 }
 
-/// Primary in about 80 pixels that the letter covers in part: χ² over its degrees of freedom above 1.9 by chance once in 1e5.
+/// Primary in about 50 pixels that the letter covers by less than 70 %: χ² over its degrees of freedom above 2.1 by chance once in 1e5.
 #[test]
 fn both_engines_leave_the_same_beside_the_letter() {
-    let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
+    let (phantom, spectrum) = (slab(), sixty_kvp());
     let bare = frontal(32, 5.0);
     let marker = SideMarker::new(Side::Right, [12.0, -15.0]).with_height_mm(90.0);
     let marked = bare.clone().with_marker(marker);
@@ -45,14 +56,16 @@ fn both_engines_leave_the_same_beside_the_letter() {
             // Slivers narrower than a sixteenth of a pixel may be free.
             let counted = f64::from(counted.total()[pixel]);
             assert!(counted < 0.02 * light[pixel], "{counted}");
-        } else if (0.05..0.99).contains(&(found[pixel] / light[pixel])) {
+        } else if (0.3..0.99).contains(&(found[pixel] / light[pixel])) {
             let [counted, expected] = [0, 1].map(|n| f64::from(layers[n].value[pixel]));
-            chi2 += ((counted - expected) / f64::from(layers[0].sigma[pixel])).powi(2);
+            let sigma = f64::from(layers[0].sigma[pixel]);
+            assert!(sigma > 0.0, "no photon in pixel {pixel}");
+            chi2 += ((counted - expected) / sigma).powi(2);
             pixels += 1.0;
         }
     }
     println!("χ² {:.2} of {pixels} pixels", chi2 / pixels);
-    assert!(pixels > 60.0 && chi2 / pixels < 1.9, "{chi2} of {pixels}");
+    assert!(pixels > 30.0 && chi2 / pixels < 2.1, "{chi2} of {pixels}");
 }
 
 /// Sums of layers are those of their pixels, and the ray-traced primary has the letter too.
