@@ -32,7 +32,7 @@ pub struct Bundle {
     pub poses_per_shard: u64,
     /// Estimated wall-clock time of the largest shard, seconds.
     pub task_s: f64,
-    /// How long before its time limit a task is told to stop, seconds: enough to finish the poses at hand.
+    /// Interval between TERM and the time limit of a task, seconds: enough to finish the poses in progress.
     pub warning_s: u64,
 }
 
@@ -43,7 +43,7 @@ pub enum BundleError {
     /// There is nothing to make.
     #[error("the plan has no poses")]
     NoPoses,
-    /// A time that is none.
+    /// Invalid processor time.
     #[error("a pose takes {found} s of processor time, expected a positive number")]
     Cost {
         /// Seconds.
@@ -59,7 +59,7 @@ pub enum BundleError {
         limit: TimeLimit,
         /// Estimated time of one pose, seconds.
         pose_s: f64,
-        /// How long before the limit a task stops, seconds.
+        /// Interval between TERM and the time limit, seconds.
         warning_s: u64,
         /// The shortest limit that takes one pose.
         least: TimeLimit,
@@ -111,7 +111,7 @@ pub fn bundle(
     })
 }
 
-/// A pose at hand keeps one processor at the least, and the preparation of a limb is not stopped.
+/// A pose in progress keeps at least one processor, and the preparation of a limb is not interrupted.
 fn warning_s(cost: PoseCost) -> u64 {
     (SIGNAL_S + 2.0 * (cost.pose_cpu_s + cost.limb_cpu_s)).ceil() as u64
 }

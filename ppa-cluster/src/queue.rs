@@ -18,7 +18,7 @@ pub enum JobKind {
 }
 
 impl JobKind {
-    /// The comment of a job array, which tells its chunk, or of the merge.
+    /// The comment of a job array, which names its chunk, or of the merge.
     pub(crate) fn comment(offset: Option<u64>) -> String {
         match offset {
             Some(offset) => format!("shards {offset}"),

@@ -149,7 +149,7 @@ fn word<'a>(option: &'static str, value: &'a str) -> Result<&'a str, ScriptError
 
 /// Functions of both scripts. A job that its time limit stops again and again, as one that finishes no pose, ends after 20 restarts.
 const RUN: &str = r#"
-# Runs a command. TERM, which Slurm sends before the time limit, is passed on once: ppa finishes the poses at hand.
+# Runs a command. TERM, which Slurm sends before the time limit, is passed on once: ppa finishes the poses in progress.
 run() {
     stopped=
     trap '[ -n "$stopped" ] || kill -TERM "$child" 2>/dev/null; stopped=1' TERM

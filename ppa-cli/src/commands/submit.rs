@@ -43,7 +43,7 @@ of 20 to 40 minutes, or two thirds of --time where that is shorter; a plan that 
 
 DIR/slurm holds the plan that the jobs read, the scripts shard.sh and merge.sh, and logs; DIR/shards/K holds shard K, \
 DIR/dataset the merged and verified dataset. Options that are not given again keep their values; a script that was edited is \
-used as it is. Before its time limit a task finishes the poses at hand, and is queued again.")]
+used as it is. Before its time limit a task finishes the poses in progress and is requeued.")]
 pub struct SlurmArgs {
     /// Plan file
     plan: PathBuf,
