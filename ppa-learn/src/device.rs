@@ -54,7 +54,9 @@ impl DeviceName {
         match self {
             Self::Cpu => Ok(Device::Cpu),
             Self::Cuda(_) if !cfg!(feature = "cuda") => Err(DeviceError::NotBuilt { name: self }),
-            Self::Cuda(number) => Device::new_cuda(number)
+            // With one stream for all threads, as networks of two cameras run on two: of `new_cuda` each thread has a stream
+            // of its own, and none waits for what another still computes.
+            Self::Cuda(number) => Device::new_cuda_with_stream(number)
                 .map_err(|source| DeviceError::Unavailable { name: self, source }),
         }
     }

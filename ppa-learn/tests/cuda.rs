@@ -4,7 +4,9 @@
 use std::time::Instant;
 
 use candle_core::{DType, Device, Tensor};
-use ppa_learn::{DeviceName, EfficientNetB0, Mode, Options};
+use ppa_learn::{
+    DeviceName, EfficientNetB0, Fusion, FusionKind, Mode, Options, QualityNetwork, Targets,
+};
 
 fn device() -> Device {
     DeviceName::Cuda(0).open().unwrap()
@@ -89,6 +91,42 @@ fn a_step_on_the_device_is_that_of_the_cpu() {
         assert!(
             error < allowed,
             "{name}: {error:.1e}, allowed {allowed:.1e}"
+        );
+    }
+}
+
+/// The two networks run on two threads, and the layers behind them on a third.
+#[test]
+#[ignore = "needs an NVIDIA device"]
+fn networks_of_two_cameras_on_the_device_are_those_of_the_cpu() {
+    let fusion = Fusion {
+        kind: FusionKind::Late,
+        branch_dropout: 0.0,
+        ..Fusion::default()
+    };
+    let options = Options::default();
+    let network = QualityNetwork::new(6, options, Some(fusion), Targets::Quality).unwrap();
+    let on_device = network.to_device(&device()).unwrap();
+    let run = |network: &QualityNetwork, step| {
+        let images = [1, 2].map(|moments| {
+            let images = waves(&[2 * moments, 1, 97, 65], network.device());
+            images.narrow(0, 2 * moments - 2, 2).unwrap()
+        });
+        let output = network.forward(&images, Mode::Train { step }).unwrap();
+        let loss = output.sqr().unwrap().mean_all().unwrap();
+        let store = loss.backward().unwrap();
+        let gradients = network.variables().into_iter();
+        let gradients = gradients.flat_map(|v| values(store.get(v).unwrap()));
+        (values(&output), gradients.collect::<Vec<_>>())
+    };
+    for step in 0..5 {
+        let (found, expected) = (run(&on_device, step), run(&network, step));
+        let of_output = distance(&found.0, &expected.0) / length(&expected.0);
+        let of_gradient = distance(&found.1, &expected.1) / length(&expected.1);
+        println!("two cameras: output {of_output:.1e}, gradient {of_gradient:.1e}");
+        assert!(
+            of_output < 1e-4 && of_gradient < 1e-3,
+            "{of_output:.1e}, {of_gradient:.1e}"
         );
     }
 }
