@@ -1,6 +1,7 @@
 //! A CT volume: Hounsfield units on a [`Grid`].
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use nalgebra::Point3;
 use rayon::prelude::*;
@@ -10,10 +11,12 @@ use crate::values::{Values, Voxels, with_room};
 use crate::volume_error::VolumeError;
 
 /// Hounsfield units on a lattice; i runs fastest in memory.
+///
+/// A clone shares the voxels.
 #[derive(Debug, Clone)]
 pub struct Volume {
     grid: Grid,
-    voxels: Voxels,
+    voxels: Arc<Voxels>,
 }
 
 impl PartialEq for Volume {
@@ -52,7 +55,10 @@ impl Volume {
         {
             return Err(VolumeError::NotFinite(grid.voxel(bad)));
         }
-        Ok(Self { grid, voxels })
+        Ok(Self {
+            grid,
+            voxels: Arc::new(voxels),
+        })
     }
 
     /// The lattice.
@@ -133,11 +139,14 @@ impl Volume {
     /// [`VolumeError::Grid`] when the range is empty or leaves the volume, [`VolumeError::Memory`].
     pub fn crop(&self, low: [usize; 3], high: [usize; 3]) -> Result<Self, VolumeError> {
         let grid = self.grid.crop(low, high)?;
-        let voxels = match &self.voxels {
+        let voxels = match &*self.voxels {
             Voxels::I16(hu) => Voxels::I16(cut(hu, &self.grid, low, high)?),
             Voxels::F32(hu) => Voxels::F32(cut(hu, &self.grid, low, high)?),
         };
-        Ok(Self { grid, voxels })
+        Ok(Self {
+            grid,
+            voxels: Arc::new(voxels),
+        })
     }
 
     /// The smallest block of voxels that holds every voxel whose centre lies in the world box
