@@ -10,6 +10,7 @@ use ppa_scene::{LandmarkOverrides, Landmarks, Side};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
+use crate::toml_edits::with_keys;
 use crate::toml_file::{other_version, relative_to, to_toml};
 use ppa_dataset::labels::BoneFile;
 
@@ -163,15 +164,46 @@ impl Case {
     /// # Errors
     /// [`CaseError::File`], also for a scan path that is not UTF-8, which TOML cannot hold.
     pub fn write(&self, path: &Path) -> Result<(), CaseError> {
+        let text = with_open_choices(self.keys(path)?, self);
+        Ok(write_whole(path, format!("{HEADER}{text}").as_bytes())?)
+    }
+
+    /// Writes the case as [`Self::write`] does, but starts from the text of an earlier version and keeps its comments.
+    ///
+    /// # Errors
+    /// [`CaseError`] as [`Self::write`], and for an earlier version that is no TOML.
+    pub fn write_edited(&self, earlier: &str, path: &Path) -> Result<(), CaseError> {
+        let edited = with_keys(&without_open_choices(earlier), &self.keys(path)?);
+        let edited = edited.map_err(|error| CaseError::Parse {
+            path: path.to_owned(),
+            message: error.to_string().trim_end().to_owned(),
+        })?;
+        Ok(write_whole(
+            path,
+            with_open_choices(edited, self).as_bytes(),
+        )?)
+    }
+
+    /// All keys and values, in a file at `path`.
+    fn keys(&self, path: &Path) -> Result<String, CaseError> {
         let mut case = self.clone();
         let folder = path.parent().unwrap_or(Path::new(""));
         case.source.path = relative_to(&case.source.path, folder)?;
         if let Some(bones) = &mut case.bones {
             bones.path = relative_to(&bones.path, folder)?;
         }
-        let text = with_open_choices(to_toml(&case, path)?, &case);
-        Ok(write_whole(path, format!("{HEADER}{text}").as_bytes())?)
+        Ok(to_toml(&case, path)?)
     }
+}
+
+/// A case's text without the lines that [`with_open_choices`] added.
+fn without_open_choices(text: &str) -> String {
+    let Some((before, after)) = text.split_once(OPEN_CHOICES) else {
+        return text.to_owned();
+    };
+    let added = |line: &&str| line.starts_with('#') && line.contains(" = ");
+    let kept = after.split_inclusive('\n').skip_while(added);
+    before.chars().chain(kept.flat_map(str::chars)).collect()
 }
 
 /// Adds to `[choices]` the keys that a person may still choose, switched off, with the values that were found.

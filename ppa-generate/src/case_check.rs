@@ -9,7 +9,7 @@ use ppa_scene::{Landmarks, Plane};
 use serde::{Deserialize, Serialize};
 
 use crate::case::{Case, CaseError};
-use crate::prepare::{PrepareError, PreparedLimb};
+use crate::prepared_limb::{PrepareError, PreparedLimb};
 
 /// Why a case cannot be used.
 #[derive(Debug, thiserror::Error)]

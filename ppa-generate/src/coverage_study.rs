@@ -10,7 +10,7 @@ use ppa_scene::{PlaceError, place};
 use serde::Serialize;
 
 use crate::closed_skin::closed_skin;
-use crate::prepare::PreparedLimb;
+use crate::prepared_limb::PreparedLimb;
 use crate::scene_setup::{SceneSetup, SceneSetupError};
 
 /// Why places of a camera cannot be compared.

@@ -1,15 +1,19 @@
 //! Depth images of a limb at one angle from the cameras of a plan, as in the plan's dataset.
 
+use std::sync::Arc;
+
+use nalgebra::Isometry3;
 use ppa_dataset::BodyShape;
 use ppa_dataset::layout::View;
-use ppa_depth::{Camera, DepthImage, PlacedBody};
+use ppa_depth::{Body, Camera, DepthImage, PlacedBody, WallDepth};
+use ppa_scene::Placement;
 
 use crate::closed_skin::closed_skin;
 use crate::plan::Plan;
 use crate::posable_limb::depth_image;
 use crate::pose_error::PoseError;
-use crate::prepare::PreparedLimb;
-use crate::scene_setup::SceneSetup;
+use crate::prepared_limb::PreparedLimb;
+use crate::scene_setup::{PlacedCamera, SceneSetup};
 
 /// What one camera sees.
 #[derive(Debug, Clone)]
@@ -22,50 +26,98 @@ pub struct DepthView {
     pub image: DepthImage,
 }
 
-/// Depth images of a limb, its skin as in the scan, turned by `angle_deg` and laid on the table of a scene setup; left camera first.
-/// Pixels that see a cut face of the field of view are as [`DepthSettings::cut_faces`](crate::DepthSettings) says.
-///
-/// `plan` is the plan of the scene setup. Ideal images are those of the plan's dataset; those of a sensor have noise of `seed`.
-///
-/// # Errors
-/// [`PoseError`] when the limb does not rest on the table, hides a camera, or a sensor measures nothing.
-pub fn depth_views(
-    setup: &SceneSetup,
-    plan: &Plan,
-    limb: &PreparedLimb,
-    angle_deg: f64,
-    seed: u64,
-) -> Result<Vec<DepthView>, PoseError> {
-    let (skin, landmarks) = (&limb.limb.mesh, &limb.landmarks);
-    let angle_rad = angle_deg.to_radians();
-    let placement = (setup.table).place(skin, landmarks, angle_rad, &plan.soft_tissue)?;
-    let room_from_ct = placement.room_from_patient * landmarks.patient_from_ct();
-    let is_soft = placement.flattening.is_some();
-    let vertices = limb.limb.walls.vertices(skin);
-    let body = if is_soft {
-        closed_skin(
-            &placement.in_room(&vertices, landmarks),
-            skin,
-            &limb.limb.walls,
-        )?
-    } else {
-        closed_skin(&vertices, skin, &limb.limb.walls)?
-    };
-    let see = |placed: &crate::scene_setup::PlacedCamera| {
-        let camera_from_body = if is_soft {
-            placed.camera_from_room
+/// A limb with its skin as in the scan, ready to be rendered in any pose.
+pub struct VisibleLimb {
+    prepared: Arc<PreparedLimb>,
+    /// The closed skin in the `ct` frame.
+    rigid: Arc<Body>,
+}
+
+/// The skin of a placed limb, as in the scan, for any number of cameras.
+pub struct PosedSkin {
+    body: Arc<Body>,
+    room_from_body: Isometry3<f64>,
+    cut_faces: WallDepth,
+}
+
+impl VisibleLimb {
+    /// Closes the skin of a limb.
+    ///
+    /// # Errors
+    /// [`PoseError`] for a skin that cannot be rendered.
+    pub fn new(prepared: impl Into<Arc<PreparedLimb>>) -> Result<Self, PoseError> {
+        let prepared = prepared.into();
+        let (skin, walls) = (&prepared.limb.mesh, &prepared.limb.walls);
+        let rigid = Arc::new(closed_skin(&walls.vertices(skin), skin, walls)?);
+        Ok(Self { prepared, rigid })
+    }
+
+    /// The limb.
+    pub fn prepared(&self) -> &Arc<PreparedLimb> {
+        &self.prepared
+    }
+
+    /// The skin where the limb lies; flattened if soft tissue gives way.
+    ///
+    /// Pixels that see a cut face of the field of view are as [`DepthSettings::cut_faces`](crate::DepthSettings) of `plan` says.
+    ///
+    /// # Errors
+    /// [`PoseError`] when the skin cannot be rendered.
+    pub fn posed(&self, placement: &Placement, plan: &Plan) -> Result<PosedSkin, PoseError> {
+        let PreparedLimb {
+            limb, landmarks, ..
+        } = &*self.prepared;
+        let (body, room_from_body) = if placement.flattening.is_some() {
+            let in_room = placement.in_room(&limb.walls.vertices(&limb.mesh), landmarks);
+            let body = closed_skin(&in_room, &limb.mesh, &limb.walls)?;
+            (Arc::new(body), Isometry3::identity())
         } else {
-            placed.camera_from_room * room_from_ct.isometry()
+            let room_from_ct = placement.room_from_patient * landmarks.patient_from_ct();
+            (self.rigid.clone(), *room_from_ct.isometry())
         };
+        Ok(PosedSkin {
+            body,
+            room_from_body,
+            cut_faces: plan.depth.cut_faces,
+        })
+    }
+
+    /// Depth images of the limb, turned by `angle_deg` and laid on the table of a scene setup; left camera first.
+    ///
+    /// `plan` is the plan of the scene setup. Ideal images are those of the plan's dataset; those of a sensor have noise of `seed`.
+    ///
+    /// # Errors
+    /// [`PoseError`] when the limb does not rest on the table, hides a camera, or a sensor measures nothing.
+    pub fn depth_views(
+        &self,
+        setup: &SceneSetup,
+        plan: &Plan,
+        angle_deg: f64,
+        seed: u64,
+    ) -> Result<Vec<DepthView>, PoseError> {
+        let (skin, landmarks) = (&self.prepared.limb.mesh, &self.prepared.landmarks);
+        let angle_rad = angle_deg.to_radians();
+        let placement = (setup.table).place(skin, landmarks, angle_rad, &plan.soft_tissue)?;
+        let skin = self.posed(&placement, plan)?;
+        let cameras = setup.cameras.iter();
+        cameras.map(|camera| skin.seen_by(camera, seed)).collect()
+    }
+}
+
+impl PosedSkin {
+    /// What a camera sees of it; a sensor has noise of `seed`.
+    ///
+    /// # Errors
+    /// [`PoseError`] when the limb hides the camera, or its sensor measures nothing.
+    pub fn seen_by(&self, placed: &PlacedCamera, seed: u64) -> Result<DepthView, PoseError> {
         let body = PlacedBody {
-            body: &body,
-            camera_from_body,
+            body: &self.body,
+            camera_from_body: placed.camera_from_room * self.room_from_body,
         };
         Ok(DepthView {
             view: placed.view,
             camera: placed.camera.clone(),
-            image: depth_image(BodyShape::Orig, body, placed, seed, plan.depth.cut_faces)?.image,
+            image: depth_image(BodyShape::Orig, body, placed, seed, self.cut_faces)?.image,
         })
-    };
-    setup.cameras.iter().map(see).collect()
+    }
 }

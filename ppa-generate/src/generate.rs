@@ -18,7 +18,7 @@ use crate::limb_jobs::{LimbJobs, PlannedLimb, jobs_of_part};
 use crate::plan::Plan;
 use crate::posable_limb::PosableLimb;
 use crate::pose_error::PoseError;
-use crate::prepare::{PrepareError, PreparedLimb};
+use crate::prepared_limb::{PrepareError, PreparedLimb};
 use crate::record::Record;
 use crate::scene_setup::{SceneSetup, SceneSetupError};
 use crate::staging::staging_folder;

@@ -3,7 +3,7 @@
 //! [`prepare`] turns a CT into a [`Case`] that records every preprocessing decision; a [`Plan`] names cases, room, cameras, beam,
 //! rotations and body shapes; [`generate`] makes the dataset in the layout of `ppa-dataset`, pose by pose; [`merge`] joins the
 //! parts that several machines made; [`check`] and [`verify`] look for damage; [`forecast`] estimates time and disk.
-//! [`ExposableLimb`] and [`depth_views`] make the images of a single pose.
+//! [`ExposableLimb`] and [`VisibleLimb`] make the images of a single pose.
 //!
 //! Units: mm, degrees in files; 16-bit depth in mm, 0 invalid. Frames: as in `ppa-scene`.
 //! Repeatable: the same plan and seed give the same bytes for any number of threads and after any interruption.
@@ -37,6 +37,7 @@ mod limb_jobs;
 mod lists;
 #[cfg(test)]
 mod load;
+mod loaded_scan;
 mod merge;
 mod overview;
 mod part_file;
@@ -47,6 +48,7 @@ mod posable_limb;
 mod pose_error;
 mod pose_id;
 mod prepare;
+mod prepared_limb;
 mod radiograph;
 mod record;
 mod scene_setup;
@@ -58,6 +60,7 @@ mod staging;
 mod status;
 mod survey;
 mod technique;
+mod toml_edits;
 mod toml_file;
 mod verify;
 
@@ -70,22 +73,24 @@ pub use coverage_study::{
 };
 pub use cut_error::{CutError, PoseImage};
 pub use dataset_lock::FolderError;
-pub use depth_views::{DepthView, depth_views};
+pub use depth_views::{DepthView, PosedSkin, VisibleLimb};
 pub use differences::KeyDifference;
-pub use exposable_limb::{ExposableLimb, PosedExposure};
+pub use exposable_limb::{ExposableLimb, ExposureError, PosedExposure};
 pub use forecast::{Forecast, ForecastError, forecast, free_bytes};
 pub use frames::Frames;
 pub use gates::NotALimb;
 pub use generate::{GenerateError, GenerateSettings, generate};
 pub use job::{JobError, Progress, Summary};
+pub use loaded_scan::LoadedScan;
 pub use merge::{MergeError, merge};
 pub use part_file::held_part;
 pub use plan::{
     DepthSettings, MarkerPlace, Plan, PlanCase, PlanError, PlanRoom, RoomFile, XraySettings,
 };
 pub use pose_error::PoseError;
-pub use prepare::{PrepareError, PreparedLimb, prepare};
-pub use radiograph::{JointError, projection};
+pub use prepare::{prepare, prepare_scan};
+pub use prepared_limb::{PrepareError, PreparedLimb};
+pub use radiograph::{JointError, prepared_phantom, projection};
 pub use scene_setup::{
     PlacedCamera, SceneSetup, SceneSetupError, Table, body_of_cloud, body_of_contents, spectrum,
     tube,

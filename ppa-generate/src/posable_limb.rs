@@ -21,7 +21,7 @@ use crate::cut_share::{self, CutFaces, PoseCuts};
 use crate::exposable_limb::{ExposableLimb, PosedExposure};
 use crate::plan::Plan;
 use crate::pose_error::PoseError;
-use crate::prepare::PreparedLimb;
+use crate::prepared_limb::PreparedLimb;
 use crate::scene_setup::{PlacedCamera, SceneSetup};
 use crate::seed::{Purpose, item_seed};
 use crate::shaped_skin::body_shape;
@@ -49,7 +49,7 @@ pub(crate) struct PosableLimb<'a> {
     id: LimbId,
     plan: &'a Plan,
     setup: &'a SceneSetup,
-    limb: ExposableLimb<'a>,
+    limb: ExposableLimb,
     shapes: Vec<ShapedSkin>,
     cut_faces: CutFaces,
     /// How much of each image is cut, by pose of the plan; empty if no face of the scan cuts the limb.
@@ -85,7 +85,7 @@ impl<'a> PosableLimb<'a> {
             plan,
             setup,
             shapes: shapes.collect::<Result<_, _>>()?,
-            limb: ExposableLimb::new(prepared, plan, &setup.table, &setup.spectrum)?,
+            limb: ExposableLimb::new(prepared, plan, setup.table.clone(), setup.spectrum.clone())?,
             cut_faces,
             cuts: Vec::new(),
         };

@@ -3,10 +3,10 @@
 use nalgebra::{Point3, Unit, Vector3};
 use ppa_ct::Volume;
 use ppa_scene::{Landmarks, Placement, XrayDevice, ct_from_device};
-use ppa_xray::{Projection, VoxelPhantom};
+use ppa_xray::{PreparedPhantom, Projection, VoxelPhantom};
 
 use crate::plan::XraySettings;
-use crate::prepare::PreparedLimb;
+use crate::prepared_limb::PreparedLimb;
 
 const AIR_HU: f32 = -1000.0;
 
@@ -32,7 +32,7 @@ pub enum JointError {
 ///
 /// # Errors
 /// [`JointError`] when there is no limb near the joint or the HU calibration is unusable.
-pub fn joint_phantom(
+fn joint_phantom(
     prepared: &PreparedLimb,
     settings: &XraySettings,
 ) -> Result<VoxelPhantom, JointError> {
@@ -67,6 +67,18 @@ pub fn joint_phantom(
     Ok(phantom
         .with_interpolation(settings.interpolation)
         .with_form_factors(settings.form_factors))
+}
+
+/// The limb around the joint as voxels of material and density, ready for exposures in any pose. Of the settings, voxels, interpolation, calibration, form factors and Compton model count.
+///
+/// # Errors
+/// [`JointError`] when there is no limb near the joint or the HU calibration is unusable.
+pub fn prepared_phantom(
+    prepared: &PreparedLimb,
+    settings: &XraySettings,
+) -> Result<PreparedPhantom<'static>, JointError> {
+    let voxels = joint_phantom(prepared, settings)?;
+    Ok(PreparedPhantom::new(voxels, settings.engine.compton_model))
 }
 
 /// The exposure of a placed limb: the device moves into the scan, the voxels stay.

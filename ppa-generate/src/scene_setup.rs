@@ -1,6 +1,7 @@
 //! Scene common to all limbs of a plan: room, table, x-ray device, cameras, beam.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use nalgebra::Isometry3;
 use ppa_dataset::layout::View;
@@ -68,6 +69,34 @@ pub struct PlacedCamera {
     pub background: DepthImage,
     /// The sensor, if it is not ideal, and the empty room as it needs it.
     pub sensor: Option<(Sensor, Backdrop)>,
+}
+
+impl PlacedCamera {
+    /// A camera before the furniture of a room.
+    pub fn new(
+        view: View,
+        camera: Camera,
+        camera_from_room: Isometry3<f64>,
+        furniture: &Body,
+        sensor: Option<Sensor>,
+    ) -> Self {
+        let empty_room = PlacedBody {
+            body: furniture,
+            camera_from_body: camera_from_room,
+        };
+        let sensor = sensor.map(|sensor| (sensor, Backdrop::new(&camera, &[empty_room])));
+        let background = match &sensor {
+            Some((_, backdrop)) => backdrop.image.clone(),
+            None => ppa_depth::render(&camera, &[empty_room]),
+        };
+        Self {
+            view,
+            camera,
+            camera_from_room,
+            background,
+            sensor,
+        }
+    }
 }
 
 /// Room, table and x-ray device: all that placing a limb needs.
@@ -165,11 +194,11 @@ pub fn body_of_cloud(cloud: &PointCloud) -> Result<Body, SceneSetupError> {
 /// Everything that is fixed while the limb turns.
 pub struct SceneSetup {
     /// Room, table and device.
-    pub table: Table,
+    pub table: Arc<Table>,
     /// Both cameras, left first.
     pub cameras: Vec<PlacedCamera>,
     /// The beam.
-    pub spectrum: Spectrum,
+    pub spectrum: Arc<Spectrum>,
 }
 
 impl SceneSetup {
@@ -197,38 +226,28 @@ impl SceneSetup {
                 .pose()
                 .map_err(|source| RigError::Pose { side, source })?;
             let room_from_camera = device.room_from_device.isometry() * device_from_camera;
-            let camera_from_room = room_from_camera.inverse();
-            let empty_room = PlacedBody {
-                body: &furniture,
-                camera_from_body: camera_from_room,
-            };
             let sensor = plan.depth.sensor.clone().map(|spec| {
                 // Both cameras have errors of their own.
                 let seed = plan_seed(plan.seed, Purpose::DepthSensor).wrapping_add(view as u64);
-                let sensor = Sensor::new(spec, seed)?;
-                Ok::<_, SensorError>((sensor, Backdrop::new(&camera, &[empty_room])))
+                Sensor::new(spec, seed)
             });
-            let sensor = sensor.transpose()?;
-            let background = match &sensor {
-                Some((_, backdrop)) => backdrop.image.clone(),
-                None => ppa_depth::render(&camera, &[empty_room]),
-            };
-            Ok::<_, SceneSetupError>(PlacedCamera {
+            let camera_from_room = room_from_camera.inverse();
+            Ok::<_, SceneSetupError>(PlacedCamera::new(
                 view,
                 camera,
                 camera_from_room,
-                background,
-                sensor,
-            })
+                &furniture,
+                sensor.transpose()?,
+            ))
         };
         let cameras = vec![
             place(View::Left, "left", &rig.left)?,
             place(View::Right, "right", &rig.right)?,
         ];
         Ok(Self {
-            table,
+            table: Arc::new(table),
             cameras,
-            spectrum: spectrum(&plan.xray)?,
+            spectrum: Arc::new(spectrum(&plan.xray)?),
         })
     }
 }

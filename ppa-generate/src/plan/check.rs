@@ -17,6 +17,14 @@ impl Plan {
         if self.cases.is_empty() {
             return Err("no [[case]]: a plan needs at least one limb".to_owned());
         }
+        self.check_settings()
+    }
+
+    /// Checks all but the limbs.
+    ///
+    /// # Errors
+    /// The key at fault, what was found there and what was expected.
+    pub fn check_settings(&self) -> Result<(), String> {
         if self.shapes.variants.is_empty() {
             return Err("shapes.variants is empty: at least \"orig\" is needed".to_owned());
         }

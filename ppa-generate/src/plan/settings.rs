@@ -151,6 +151,18 @@ impl Default for XraySettings {
     }
 }
 
+impl XraySettings {
+    /// Whether [`prepared_phantom`](crate::prepared_phantom) gives the same for both.
+    pub fn same_voxels(&self, other: &Self) -> bool {
+        self.half_length_mm == other.half_length_mm
+            && self.max_voxel_mm == other.max_voxel_mm
+            && self.interpolation == other.interpolation
+            && self.form_factors == other.form_factors
+            && self.calibration == other.calibration
+            && self.engine.compton_model == other.engine.compton_model
+    }
+}
+
 #[expect(
     clippy::trivially_copy_pass_by_ref,
     reason = "serde calls it with a reference"

@@ -25,7 +25,7 @@ fn prepared(volume: Volume, choices: &LandmarkOverrides) -> PreparedLimb {
     let landmarks = find_landmarks(&volume, &limb.mesh, &limb.mask, Side::Right, choices).unwrap();
     PreparedLimb {
         volume,
-        limb,
+        limb: limb.into(),
         landmarks,
         findings: Vec::new(),
     }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use ppa_dataset::layout::View;
-use ppa_generate::{Case, DepthView, PreparedLimb, SceneSetup, depth_views};
+use ppa_generate::{Case, DepthView, PreparedLimb, SceneSetup, VisibleLimb};
 use serde::Serialize;
 
 use super::render::{RenderArgs, name, of_view, read_sensor, write_others};
@@ -62,7 +62,8 @@ pub fn run(path: &Path, args: &RenderArgs, output: Output) -> anyhow::Result<()>
     let limb = PreparedLimb::of_case(&case)
         .with_context(|| format!("cannot prepare the limb of {}", path.display()))?;
     let angle_deg = args.of_case.angle.unwrap_or_default();
-    let mut views = depth_views(&setup, &plan, &limb, angle_deg, args.seed)?;
+    let limb = VisibleLimb::new(limb)?;
+    let mut views = limb.depth_views(&setup, &plan, angle_deg, args.seed)?;
     let wanted = args.of_case.view();
     views.retain(|seen| wanted.is_none_or(|view| view == seen.view));
     let mut written = Vec::new();

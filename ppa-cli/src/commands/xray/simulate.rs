@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::{Args, ValueEnum};
 use ppa_ct::write_nifti;
@@ -119,9 +120,9 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
     let case = Case::read(&args.case)?;
     let working = working("preparing the limb");
     let prepared = prepared(&case, &args.case)?;
-    let table = Table::of_plan(&plan)?;
-    let spectrum = spectrum(&plan.xray)?;
-    let limb = ExposableLimb::new(prepared, &plan, &table, &spectrum)?;
+    let table = Arc::new(Table::of_plan(&plan)?);
+    let spectrum = Arc::new(spectrum(&plan.xray)?);
+    let limb = ExposableLimb::new(prepared, &plan, table, spectrum)?;
     let exposure = limb.pose(args.angle.to_radians())?;
 
     working.set_message("following photons");
@@ -139,7 +140,7 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
             };
             let (phantom, projection) = (&limb.phantom, &exposure.projection);
             let radiograph =
-                phantom.fast_with_progress(&spectrum, projection, &settings, &observe)?;
+                phantom.fast_with_progress(&limb.spectrum, projection, &settings, &observe)?;
             bar.finish_and_clear();
             (radiograph, None)
         }
