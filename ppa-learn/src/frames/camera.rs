@@ -7,7 +7,7 @@ use ppa_core::Roi;
 use ppa_dataset::layout::View;
 use ppa_dataset::published::GrayImage16;
 
-use crate::data::{DataError, Raster, SampleImage, evaluation_input};
+use crate::data::{DataError, Raster, SampleImage, evaluation_input, prepare};
 
 /// A camera whose frames all show the joint in the same region.
 #[derive(Debug)]
@@ -28,6 +28,17 @@ impl Camera {
             mirrored,
             size: OnceLock::new(),
         }
+    }
+
+    /// The same camera whose frames show the joint in another region.
+    pub fn with_region(&self, roi: Roi) -> Self {
+        Self::new(self.view, roi, self.mirrored)
+    }
+
+    /// An image as a network of `side` x `side` inputs sees it.
+    pub fn input_of(&self, image: &Raster<u16>, side: usize) -> Result<Raster<f32>, DataError> {
+        let prepared = prepare(image, self.roi, self.mirrored, side)?;
+        Ok(evaluation_input(&prepared, side))
     }
 
     /// A frame as a network of `side` x `side` inputs sees it.

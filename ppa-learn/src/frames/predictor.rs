@@ -1,6 +1,7 @@
 //! Predictions on the frames of both cameras.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use candle_core::{Device, Tensor};
 use ppa_core::Roi;
@@ -13,6 +14,7 @@ use super::confidence::Confidence;
 use super::error::FramesError;
 use super::networks::Networks;
 use crate::DeviceName;
+use crate::data::{DataError, Raster};
 use crate::train::TrainError;
 
 /// Quality of a pose from 1 (ideal) to 3 (inadequate), as networks see it.
@@ -74,12 +76,12 @@ impl Trust {
 /// The networks that judge the frames of both cameras.
 #[derive(Debug)]
 pub struct PairPredictor {
-    networks: Networks,
+    networks: Arc<Networks>,
     /// The camera of the left and of the right input.
     inputs: [Camera; 2],
     /// Place of each input's frame in a pair: exchanged for limbs that are mirrored.
     frames: [usize; 2],
-    confidence: Option<Confidence>,
+    confidence: Option<Arc<Confidence>>,
 }
 
 impl PairPredictor {
@@ -107,7 +109,7 @@ impl PairPredictor {
         let views = [View::Left, View::Right];
         let frames = if mirrored { [1, 0] } else { [0, 1] };
         Ok(Self {
-            networks,
+            networks: Arc::new(networks),
             inputs: frames.map(|frame| Camera::new(views[frame], regions[frame], mirrored)),
             frames,
             confidence: None,
@@ -119,8 +121,20 @@ impl PairPredictor {
     /// # Errors
     /// [`FramesError::Confidence`].
     pub fn with_confidence(self, path: &Path) -> Result<Self, FramesError> {
-        let confidence = Some(Confidence::read(path, &self.networks)?);
+        let confidence = Some(Arc::new(Confidence::read(path, &self.networks)?));
         Ok(Self { confidence, ..self })
+    }
+
+    /// The same networks for frames that show the joint elsewhere.
+    #[must_use]
+    pub fn with_regions(&self, regions: [Roi; 2]) -> Self {
+        let input = |input: usize| self.inputs[input].with_region(regions[self.frames[input]]);
+        Self {
+            networks: self.networks.clone(),
+            inputs: [input(0), input(1)],
+            frames: self.frames,
+            confidence: self.confidence.clone(),
+        }
     }
 
     /// Reads the left and the right camera's frame and judges them, each on a thread of its own where there are two.
@@ -128,11 +142,37 @@ impl PairPredictor {
     /// # Errors
     /// [`FramesError`] naming the frame that cannot be used.
     pub fn predict(&self, frames: [&Path; 2]) -> Result<PairPrediction, FramesError> {
+        let image = |input: usize, side: usize| {
+            let frame = frames[self.frames[input]];
+            self.inputs[input].input(frame, side)
+        };
+        self.judge(image, frames.map(Path::to_owned))
+    }
+
+    /// Judges depth images of the left and the right camera, mm, 0 invalid.
+    ///
+    /// # Errors
+    /// [`FramesError`] for a region outside an image, or images unlike those of the training.
+    pub fn predict_images(&self, images: [&Raster<u16>; 2]) -> Result<PairPrediction, FramesError> {
+        let image = |input: usize, side: usize| {
+            let image = images[self.frames[input]];
+            self.inputs[input].input_of(image, side)
+        };
+        let names = ["the left camera's image", "the right camera's image"];
+        self.judge(image, names.map(PathBuf::from))
+    }
+
+    /// Judges what the networks see at their inputs, `image` of an input and of the side that its network wants; `frames` are for messages.
+    fn judge(
+        &self,
+        image: impl Fn(usize, usize) -> Result<Raster<f32>, DataError> + Sync,
+        frames: [PathBuf; 2],
+    ) -> Result<PairPrediction, FramesError> {
         let networks = self.networks.of_inputs();
         let image = |input: usize| {
             let of = networks[input];
-            let frame = frames[self.frames[input]];
-            self.inputs[input].image(frame, of.config.side, of.network.device())
+            let side = of.config.side;
+            tensor(image(input, side)?, side, of.network.device())
         };
         let (left, right) = rayon::join(|| image(0), || image(1));
         let moment = self.networks.moments(&[left?, right?])?.remove(0);
@@ -140,13 +180,13 @@ impl PairPredictor {
             let distances = confidence.relative_distances(&moment.images);
             for (input, distance) in distances.into_iter().enumerate() {
                 if distance > 1.0 {
-                    let frame = frames[self.frames[input]].to_owned();
+                    let frame = frames[self.frames[input]].clone();
                     return Err(FramesError::OutOfDistribution { frame, distance });
                 }
             }
         }
         let quality = moment.prediction.quality;
-        let interval = |confidence: &Confidence| confidence.intervals().interval(quality);
+        let interval = |confidence: &Arc<Confidence>| confidence.intervals().interval(quality);
         Ok(PairPrediction {
             left: moment.alone.map(|alone| alone[self.frames[0]]),
             right: moment.alone.map(|alone| alone[self.frames[1]]),
@@ -157,10 +197,8 @@ impl PairPredictor {
     }
 }
 
-impl Camera {
-    /// A frame as a tensor [1, 1, side, side] on a device.
-    fn image(&self, frame: &Path, side: usize, device: &Device) -> Result<Tensor, TrainError> {
-        let values = self.input(frame, side)?.into_values();
-        Ok(Tensor::from_vec(values, (1, 1, side, side), device)?)
-    }
+/// An image as a tensor [1, 1, side, side] on a device.
+fn tensor(image: Raster<f32>, side: usize, device: &Device) -> Result<Tensor, TrainError> {
+    let values = image.into_values();
+    Ok(Tensor::from_vec(values, (1, 1, side, side), device)?)
 }
