@@ -3,7 +3,6 @@
 //! With `--json` each is one line of JSON.
 
 use std::ffi::OsStr;
-use std::process::ExitCode;
 use std::sync::OnceLock;
 
 use anstream::AutoStream;
@@ -120,7 +119,7 @@ pub fn failure(error: &anyhow::Error) -> u8 {
 }
 
 /// Says why the command line cannot be used, or prints the help or version it asks for.
-pub fn usage(error: &clap::Error) -> ExitCode {
+pub fn usage(error: &clap::Error) -> u8 {
     let exit_code = u8::try_from(error.exit_code()).unwrap_or(FAILED);
     if is_json() && error.use_stderr() {
         end(&Failure {
@@ -132,7 +131,7 @@ pub fn usage(error: &clap::Error) -> ExitCode {
         // Nobody may be there any more to read the help, as after `ppa --help | head`.
         let _ = error.print();
     }
-    ExitCode::from(exit_code)
+    exit_code
 }
 
 fn end(failure: &Failure) {

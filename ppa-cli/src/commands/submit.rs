@@ -98,13 +98,13 @@ struct Submitted {
     jobs: Vec<String>,
 }
 
-pub fn run(command: &SubmitCommand, output: Output) -> anyhow::Result<()> {
+pub fn run(command: &SubmitCommand, program: &Path, output: Output) -> anyhow::Result<()> {
     match command {
-        SubmitCommand::Slurm(args) => slurm(args, output),
+        SubmitCommand::Slurm(args) => slurm(args, program, output),
     }
 }
 
-fn slurm(args: &SlurmArgs, output: Output) -> anyhow::Result<()> {
+fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()> {
     let plan = Plan::read(&args.plan)?;
     let max_array_size = match (Slurm.max_array_size(), args.dry_run) {
         (Ok(size), _) => size,
@@ -115,8 +115,7 @@ fn slurm(args: &SlurmArgs, output: Output) -> anyhow::Result<()> {
     let _lock = folder.lock()?;
     let recorded = Submission::read(&folder.submission())?;
     let mut submission = submission(args, &plan, &folder, recorded)?;
-    let program = std::env::current_exe().context("cannot find the program that runs")?;
-    let scripts = Scripts::new(&folder, &submission, &program)?;
+    let scripts = Scripts::new(&folder, &submission, program)?;
     for (path, text) in [
         (folder.shard_script(), &scripts.shard),
         (folder.merge_script(), &scripts.merge),
