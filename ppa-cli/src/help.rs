@@ -8,7 +8,7 @@ use crate::Cli;
 
 /// Headings of `ppa --help`, and the commands below each of them.
 const GROUPS: &[(&str, &[&str])] = &[
-    ("Start here", &["demo"]),
+    ("Start here", &["demo", "studio"]),
     ("Scan and case", &["ct", "prepare", "case", "mesh"]),
     ("Scene, depth and radiograph", &["scene", "depth", "xray"]),
     (
@@ -52,7 +52,11 @@ fn template(command: &Command) -> String {
     for (heading, names) in GROUPS {
         let _ = writeln!(text, "{header}{heading}:{header:#}");
         for name in *names {
-            let about = built.find_subcommand(name).and_then(Command::get_about);
+            // Absent where its feature is off.
+            let Some(subcommand) = built.find_subcommand(name) else {
+                continue;
+            };
+            let about = subcommand.get_about();
             let about = about.map_or(String::new(), ToString::to_string);
             let _ = writeln!(text, "  {literal}{name:<width$}{literal:#}  {about}");
         }

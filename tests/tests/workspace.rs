@@ -54,6 +54,22 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("ppa-cluster", &["ppa-core"]),
     ("ppa-learn", &["ppa-core", "ppa-dataset", "ppa-metrics"]),
     (
+        "ppa-studio",
+        &[
+            "ppa-core",
+            "ppa-ct",
+            "ppa-phantom",
+            "ppa-mesh",
+            "ppa-scene",
+            "ppa-depth",
+            "ppa-xray",
+            "ppa-dataset",
+            "ppa-generate",
+            "ppa-label",
+            "ppa-cluster",
+        ],
+    ),
+    (
         "ppa-cli",
         &[
             "ppa-core",
@@ -70,6 +86,7 @@ const ARROWS: &[(&str, &[&str])] = &[
             "ppa-report",
             "ppa-learn",
             "ppa-metrics",
+            "ppa-studio",
         ],
     ),
 ];

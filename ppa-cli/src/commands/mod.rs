@@ -26,6 +26,8 @@ pub mod qa;
 pub mod scene;
 pub mod stats;
 pub mod status;
+#[cfg(feature = "studio")]
+pub mod studio;
 pub mod submit;
 mod technique;
 pub mod train;

@@ -155,6 +155,9 @@ fn no_output_identifies_the_source() {
     fs::write(&plan, settings).unwrap();
     run(&format!("generate {} --out dataset --json", plan.display()));
 
+    #[cfg(feature = "studio")]
+    assert_page_clean(&out, &case, &scan);
+
     // What a command prints may name the file it writes, no other.
     for path in [&case, &plan.display().to_string()] {
         said = said.replace(path.as_str(), "");
@@ -167,6 +170,30 @@ fn no_output_identifies_the_source() {
     // The case is a working file: the place of the scan, and nothing else.
     let case = fs::read_to_string(case).unwrap();
     assert_eq!(leak(case.replace(&scan, "").as_bytes()), None, "in: {case}");
+}
+
+/// All that the page of a case gets from the program, which may name the files that were opened, no other.
+#[cfg(feature = "studio")]
+fn assert_page_clean(folder: &Path, case: &str, scan: &str) {
+    let served = crate::studio::Served::start(folder, case);
+    let what_if = r#"{"angle_deg": 18.0}"#;
+    let answers = [
+        served.get("/"),
+        served.get("/api/state"),
+        served.get("/api/skin"),
+        served.get("/api/slice/2/3"),
+        served.post("/api/room", what_if),
+        served.post("/api/depth", what_if),
+        served.post("/api/radiograph/first", what_if),
+        served.post("/api/commands", what_if),
+    ];
+    let private = Path::new(case).parent().unwrap().display().to_string();
+    for answer in answers {
+        assert!(answer.starts_with(b"HTTP/1.1 200"));
+        let text = String::from_utf8_lossy(&answer);
+        let text = text.replace(scan, "").replace(&private, "");
+        assert_eq!(leak(text.as_bytes()), None, "in: {text}");
+    }
 }
 
 /// The search sees through each wrapping that an output might have.

@@ -32,6 +32,8 @@ mod resume;
 mod room_file;
 mod shards;
 mod soft_tissue;
+#[cfg(feature = "studio")]
+mod studio;
 mod tallies;
 mod terminal;
 mod training;

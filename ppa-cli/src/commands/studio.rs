@@ -1,0 +1,100 @@
+//! `ppa studio`: the browser interface.
+
+use std::io::Write;
+use std::net::{IpAddr, Ipv4Addr, TcpListener};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::sync::mpsc::channel;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use ppa_studio::{Opening, Studio, serve};
+use serde::Serialize;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use crate::output::{Output, working};
+use crate::side_name::SideName;
+use crate::stderr::warning;
+
+#[derive(Debug, Args)]
+pub struct StudioArgs {
+    /// Scan, case or plan to open [default: the built-in phantom, in the folder ppa-studio]
+    path: Option<PathBuf>,
+    /// Side of the limb; needed for a scan without a case
+    #[arg(long, value_enum)]
+    side: Option<SideName>,
+    /// Port to listen on [default: a free one]
+    #[arg(long, default_value_t = 0, hide_default_value = true)]
+    port: u16,
+    /// Address to listen on; any other than this machine's own needs --i-know
+    #[arg(long, value_name = "IP", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
+    bind: IpAddr,
+    /// Listen on an address that other machines reach
+    #[arg(long)]
+    i_know: bool,
+    /// Do not open a browser
+    #[arg(long)]
+    no_open: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct Served {
+    address: String,
+}
+
+pub fn run(args: &StudioArgs, output: Output) -> anyhow::Result<()> {
+    if !args.bind.is_loopback() {
+        const MEANING: &str = "who reaches this address and learns the token, which travels unencrypted, sees the scan and can change its case";
+        if !args.i_know {
+            bail!(
+                "--bind {} is not this machine alone: {MEANING}; forward a port over ssh instead, or give --i-know",
+                args.bind
+            );
+        }
+        warning(MEANING);
+    }
+    let listener = TcpListener::bind((args.bind, args.port))
+        .with_context(|| format!("cannot listen on {}, port {}", args.bind, args.port))?;
+    let working = working("finding the limb");
+    let studio = Studio::open(&Opening {
+        path: args.path.clone(),
+        side: args.side.map(Into::into),
+    })?;
+    working.finish_and_clear();
+    let mut signals = Signals::new([SIGINT, SIGTERM]).context("cannot listen for Ctrl-C")?;
+    let served = Served {
+        address: studio.address(listener.local_addr()?),
+    };
+    output.print(&served, |served| {
+        format!("{}\nCtrl-C ends the program", served.address)
+    })?;
+    std::io::stdout().flush()?;
+    if !args.no_open {
+        open_browser(&served.address);
+    }
+    let (stop, stopped) = channel();
+    std::thread::spawn(move || {
+        signals.forever().next();
+        // Dropped, it ends the service.
+        drop(stop);
+    });
+    serve(studio, listener, stopped)?;
+    Ok(())
+}
+
+/// Opens the page in the person's browser, where there is one; the address is printed in any case.
+fn open_browser(address: &str) {
+    let opener = if cfg!(target_os = "macos") {
+        "open"
+    } else {
+        "xdg-open"
+    };
+    let silent = Stdio::null;
+    let _ = Command::new(opener)
+        .arg(address)
+        .stdin(silent())
+        .stdout(silent())
+        .stderr(silent())
+        .spawn();
+}

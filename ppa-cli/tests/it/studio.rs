@@ -1,0 +1,131 @@
+//! `ppa studio` as a process: its address, its end, and what it refuses to open.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+use crate::{contains, fail, phantom, ppa};
+
+/// A running studio, and the cookie of a browser that has opened its address.
+pub struct Served {
+    child: Child,
+    host: String,
+    cookie: String,
+}
+
+impl Served {
+    pub fn start(folder: &Path, arguments: &str) -> Self {
+        let mut command = ppa(folder, &format!("studio --no-open {arguments}"));
+        let command = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let mut address = String::new();
+        let mut lines = BufReader::new(child.stdout.as_mut().unwrap());
+        lines.read_line(&mut address).unwrap();
+        let address = address.trim().strip_prefix("http://").unwrap_or_else(|| {
+            let mut said = String::new();
+            let stderr = child.stderr.as_mut().unwrap();
+            stderr.read_to_string(&mut said).unwrap();
+            panic!("no address: {said}")
+        });
+        let (host, path) = address.split_once('/').unwrap();
+        let mut served = Self {
+            child,
+            host: host.to_owned(),
+            cookie: String::new(),
+        };
+        let entered = String::from_utf8(served.get(&format!("/{path}"))).unwrap();
+        let cookie = entered.split("set-cookie: ").nth(1).unwrap();
+        cookie
+            .split(';')
+            .next()
+            .unwrap()
+            .clone_into(&mut served.cookie);
+        served
+    }
+
+    /// The whole answer to a request, headers included.
+    pub fn get(&self, path: &str) -> Vec<u8> {
+        self.send(&format!("GET {path} HTTP/1.1\r\n"), "")
+    }
+
+    pub fn post(&self, path: &str, json: &str) -> Vec<u8> {
+        let head = format!(
+            "POST {path} HTTP/1.1\r\norigin: http://{}\r\ncontent-type: application/json\r\ncontent-length: {}\r\n",
+            self.host,
+            json.len()
+        );
+        self.send(&head, json)
+    }
+
+    fn send(&self, head: &str, body: &str) -> Vec<u8> {
+        let mut stream = TcpStream::connect(&self.host).unwrap();
+        let (host, cookie) = (&self.host, &self.cookie);
+        let head =
+            format!("{head}host: {host}\r\ncookie: {cookie}\r\nconnection: close\r\n\r\n{body}");
+        stream.write_all(head.as_bytes()).unwrap();
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).unwrap();
+        answer
+    }
+
+    /// Sends Ctrl-C and waits; the exit status.
+    pub fn stop(mut self) -> Option<i32> {
+        let mut kill = Command::new("kill");
+        kill.args(["-INT", &self.child.id().to_string()]);
+        assert!(kill.status().unwrap().success());
+        self.child.wait().unwrap().code()
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[test]
+fn a_studio_serves_until_ctrl_c() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = phantom().join("p01.toml");
+    let served = Served::start(folder.path(), &case.display().to_string());
+    let page = String::from_utf8(served.get("/")).unwrap();
+    contains(&page, &["HTTP/1.1 200", "<title>ppa studio</title>"]);
+    let state = String::from_utf8(served.get("/api/state")).unwrap();
+    contains(&state, &["\"name\":\"p01.toml\"", "\"limb\":\"lower_leg\""]);
+    assert_eq!(served.stop(), Some(0));
+}
+
+#[test]
+fn the_case_of_an_opened_scan_is_saved_on_request() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = phantom().join("p01.nii");
+    let served = Served::start(folder.path(), &format!("{} --side r", scan.display()));
+    let file = folder.path().join("p01.case.toml");
+    assert!(!file.exists());
+    let saved = String::from_utf8(served.post("/api/save", "{}")).unwrap();
+    contains(&saved, &["HTTP/1.1 200", "\"is_saved\":true"]);
+    let prepared = std::fs::read_to_string(phantom().join("p01.toml")).unwrap();
+    let choices = |text: &str| text.split("[choices]").nth(1).unwrap().to_owned();
+    let case = std::fs::read_to_string(&file).unwrap();
+    assert_eq!(choices(&case), choices(&prepared));
+}
+
+#[test]
+fn a_studio_refuses_what_it_cannot_show_in_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let scan = phantom().join("p01.nii");
+    let refused = fail(folder, &format!("studio {}", scan.display()));
+    contains(&refused, &["p01.nii is a scan", "--side"]);
+    contains(
+        &fail(folder, "studio absent.case.toml"),
+        &["absent.case.toml"],
+    );
+    let refused = fail(folder, "studio --bind 0.0.0.0");
+    contains(&refused, &["0.0.0.0", "unencrypted", "--i-know"]);
+    let plan = "version = 1\n[[case]]\nfile = \"gone.case.toml\"\npatient = 0\n";
+    std::fs::write(folder.join("plan.toml"), plan).unwrap();
+    contains(&fail(folder, "studio plan.toml"), &["gone.case.toml"]);
+}

@@ -1,0 +1,156 @@
+//! Commands that do the same as the page, to copy.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use ppa_cluster::shell_quoted;
+use ppa_generate::Case;
+use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind};
+use serde::Serialize;
+
+use crate::what_if::WhatIf;
+
+/// Commands for a state of the page.
+#[derive(Debug, Serialize)]
+pub(crate) struct Commands {
+    /// Makes the case with the decisions so far.
+    pub prepare: String,
+}
+
+/// Commands for the sliders.
+#[derive(Debug, Serialize)]
+pub(crate) struct ImageCommands {
+    pub depth: String,
+    pub radiograph: String,
+    /// The plan that they read has to be saved first: it holds changes that no option makes.
+    pub need_saved_plan: bool,
+}
+
+/// The decisions of a case as a command.
+pub(crate) fn of_case(case: &Case, out: &Path) -> Commands {
+    let mut line = format!("ppa prepare {}", quoted(&case.source.path));
+    let _ = write!(line, " --side {}", case.side.letter());
+    if let Some(series) = case.source.series {
+        let _ = write!(line, " --series {series}");
+    }
+    for (flag, given) in [
+        ("--fill-gaps", case.source.fill_gaps),
+        ("--force", case.source.force),
+    ] {
+        if given {
+            let _ = write!(line, " {flag}");
+        }
+    }
+    let surface = &case.surface;
+    if surface.iso_hu != ppa_mesh::LimbSettings::default().iso_hu {
+        let _ = write!(line, " --iso-hu {}", surface.iso_hu);
+    }
+    if let Some(crop) = surface.crop {
+        let ends = (0..3).map(|axis| format!("{},{}", crop.low[axis], crop.high[axis]));
+        let _ = write!(line, " --crop {}", ends.collect::<Vec<_>>().join(","));
+    }
+    if let Some(point) = surface.inside {
+        let _ = write!(line, " --inside={}", list(&point));
+    }
+    line += &of_choices(&case.choices);
+    let _ = write!(line, " --out {}", quoted(out));
+    Commands { prepare: line }
+}
+
+fn of_choices(choices: &LandmarkOverrides) -> String {
+    let mut line = String::new();
+    if let Some(limb) = choices.limb {
+        let name = match limb {
+            LimbKind::LowerLeg => "lower-leg",
+            LimbKind::Knee => "knee",
+            LimbKind::Other => "other",
+        };
+        let _ = write!(line, " --limb {name}");
+    }
+    match choices.axis_source {
+        Some(AxisSource::Bone) => line += " --axis-source bone",
+        Some(AxisSource::Limb) => line += " --axis-source limb",
+        // Two points given by --axis.
+        Some(AxisSource::Given) | None => {}
+    }
+    let lists = [
+        ("--joint", choices.joint_centre.as_ref().map(|p| &p[..])),
+        (
+            "--joint-region",
+            choices.joint_region.as_ref().map(|p| &p[..]),
+        ),
+        (
+            "--calf-region",
+            choices.calf_region.as_ref().map(|p| &p[..]),
+        ),
+        ("--anterior", choices.anterior.as_ref().map(|p| &p[..])),
+    ];
+    for (flag, values) in lists {
+        if let Some(values) = values {
+            let _ = write!(line, " {flag}={}", list(values));
+        }
+    }
+    if let Some([a, b]) = choices.axis {
+        let _ = write!(line, " --axis {} {}", list(&a), list(&b));
+    }
+    for point in choices.plane_points.iter().flatten() {
+        let _ = write!(line, " --plane-point={}", list(point));
+    }
+    line
+}
+
+/// Images of the page as commands. `opened` is the plan that was opened, if any; `saved` is where a plan with the changes is saved.
+pub(crate) fn of_images(
+    case: &Path,
+    opened: Option<&Path>,
+    saved: &Path,
+    what_if: &WhatIf,
+) -> ImageCommands {
+    let need_saved_plan = what_if.needs_plan();
+    let plan = if need_saved_plan { Some(saved) } else { opened };
+    let plan = plan.map_or(String::new(), |plan| format!(" --plan {}", quoted(plan)));
+    let pose = format!("{}{plan} --angle {}", quoted(case), what_if.angle_deg);
+    let mut depth = format!("ppa depth render {pose}");
+    if what_if.sensor && !need_saved_plan {
+        depth += " --sensor default";
+    }
+    depth += " --out depth.png";
+    let mut radiograph = format!("ppa xray simulate {pose}");
+    if !need_saved_plan {
+        radiograph += &of_exposure(what_if);
+    }
+    radiograph += " --out radiograph.png";
+    ImageCommands {
+        depth,
+        radiograph,
+        need_saved_plan,
+    }
+}
+
+fn of_exposure(what_if: &WhatIf) -> String {
+    let mut line = String::new();
+    if let Some(technique) = &what_if.technique {
+        let _ = write!(line, " --technique {}", shell_quoted(technique));
+    }
+    if let Some(kvp) = what_if.kvp {
+        let _ = write!(line, " --kvp {kvp}");
+    }
+    for filter in what_if.filters.iter().flatten() {
+        let _ = write!(line, " --filter {}", shell_quoted(filter));
+    }
+    if let Some(mas) = what_if.mas {
+        let _ = write!(line, " --mas {mas}");
+    } else if let Some(index) = what_if.exposure_index {
+        let _ = write!(line, " --aec {index}");
+    }
+    line
+}
+
+fn quoted(path: &Path) -> String {
+    shell_quoted(&path.to_string_lossy())
+}
+
+fn list(values: &[f64]) -> String {
+    let values = values.iter().map(f64::to_string);
+    values.collect::<Vec<_>>().join(",")
+}

@@ -1,0 +1,87 @@
+//! A skin with fewer triangles, for display only.
+
+use std::collections::HashMap;
+
+use nalgebra::{Point3, Vector3};
+use ppa_mesh::Mesh;
+
+/// Side of the cells whose vertices become one, mm. A lower leg then has about 50,000 triangles.
+const CELL_MM: f32 = 2.5;
+
+/// A mesh whose vertices within a cell of 2.5 mm are merged to their mean.
+pub(crate) fn display_mesh(skin: &Mesh) -> Mesh {
+    let cell = |p: &Point3<f32>| [p.x, p.y, p.z].map(|x| (x / CELL_MM).floor() as i32);
+    let mut merged = HashMap::new();
+    let mut sums: Vec<(Vector3<f32>, Vector3<f32>, f32)> = Vec::new();
+    let mut indices = Vec::with_capacity(skin.vertices.len());
+    for (vertex, normal) in skin.vertices.iter().zip(&skin.normals) {
+        let index = *merged.entry(cell(vertex)).or_insert_with(|| {
+            sums.push(Default::default());
+            sums.len() - 1
+        });
+        let (position, direction, count) = &mut sums[index];
+        *position += vertex.coords;
+        *direction += normal;
+        *count += 1.0;
+        indices.push(index as u32);
+    }
+    let corners = skin.triangles.iter();
+    let corners = corners.map(|triangle| triangle.map(|id| indices[id as usize]));
+    Mesh {
+        vertices: sums.iter().map(|(sum, _, n)| (sum / *n).into()).collect(),
+        normals: sums
+            .iter()
+            .map(|(_, sum, _)| sum.try_normalize(0.0).unwrap_or_default())
+            .collect(),
+        triangles: corners
+            .filter(|[a, b, c]| a != b && b != c && c != a)
+            .collect(),
+    }
+}
+
+/// The mesh as little-endian bytes: counts of vertices and triangles (u32), positions and normals (f32), corners (u32).
+pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
+    let counts = [mesh.vertices.len() as u32, mesh.triangles.len() as u32];
+    let positions = mesh.vertices.iter().flat_map(|v| [v.x, v.y, v.z]);
+    let normals = mesh.normals.iter().flat_map(|n| [n.x, n.y, n.z]);
+    let mut bytes: Vec<u8> = counts.iter().flat_map(|n| n.to_le_bytes()).collect();
+    bytes.extend(positions.chain(normals).flat_map(f32::to_le_bytes));
+    bytes.extend(
+        mesh.triangles
+            .iter()
+            .flatten()
+            .flat_map(|id| id.to_le_bytes()),
+    );
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn merged_vertices_stay_within_a_cell_of_the_skin() {
+        // A sheet of squares of 1 mm.
+        let point = |n: u32| Point3::new((n % 40) as f32, (n / 40) as f32, 0.3);
+        let corners = (0..39 * 39).map(|n| n % 39 + 40 * (n / 39));
+        let skin = Mesh {
+            vertices: (0..1600).map(point).collect(),
+            normals: vec![Vector3::z(); 1600],
+            triangles: corners
+                .flat_map(|a| [[a, a + 1, a + 41], [a, a + 41, a + 40]])
+                .collect(),
+        };
+        let shown = display_mesh(&skin);
+        assert!(shown.triangles.len() * 4 < skin.triangles.len());
+        for vertex in &shown.vertices {
+            assert!((vertex.z - 0.3).abs() < 1e-6);
+            let near = skin.vertices.iter().map(|v| (v - vertex).norm());
+            assert!(near.fold(f32::INFINITY, f32::min) < CELL_MM);
+        }
+        let size = bytes(&shown).len();
+        assert_eq!(
+            size,
+            8 + 24 * shown.vertices.len() + 12 * shown.triangles.len()
+        );
+    }
+}

@@ -1,0 +1,112 @@
+//! Who may use the page: a browser that was given the address, through a loopback host, from the page itself.
+
+use std::sync::Arc;
+
+use axum::body::Body;
+use axum::extract::{Request, State as Extracted};
+use axum::http::header::{
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, COOKIE, HOST, HeaderName, LOCATION, ORIGIN,
+    REFERRER_POLICY, SET_COOKIE, X_CONTENT_TYPE_OPTIONS,
+};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+
+use crate::state::State;
+use crate::token::Token;
+
+/// What the page may load: only what this program serves, no inline script or style.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
+                      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+const HEADERS: [(HeaderName, &str); 4] = [
+    (CONTENT_SECURITY_POLICY, POLICY),
+    (X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    (REFERRER_POLICY, "no-referrer"),
+    (CACHE_CONTROL, "no-store"),
+];
+
+/// Refuses requests of others, exchanges the token for a cookie, and adds the headers that protect the page.
+pub(crate) async fn guard(
+    Extracted(state): Extracted<Arc<State>>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let mut response = match judged(&state.token, &request) {
+        Judged::Known => next.run(request).await,
+        Judged::Enters => admit(&state.token),
+        Judged::Refused(why) => (StatusCode::FORBIDDEN, why).into_response(),
+    };
+    let headers = response.headers_mut();
+    for (name, value) in HEADERS {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+/// Who sends a request.
+enum Judged {
+    /// A browser with the cookie.
+    Known,
+    /// A browser that opens the address with the token.
+    Enters,
+    /// Somebody else, with the reason.
+    Refused(&'static str),
+}
+
+fn judged(token: &Token, request: &Request) -> Judged {
+    let headers = request.headers();
+    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
+    // A name that resolves to this machine, but belongs to a page of somebody else, is refused (DNS rebinding).
+    let host = text(HOST).unwrap_or_default();
+    if !is_loopback(host) {
+        return Judged::Refused("this page is served to localhost only");
+    }
+    if text(ORIGIN).is_some_and(|origin| origin.strip_prefix("http://") != Some(host)) {
+        return Judged::Refused("requests of other pages are refused");
+    }
+    if *request.method() != Method::GET && text(ORIGIN).is_none() {
+        return Judged::Refused("a change must come from the page itself");
+    }
+    if has_cookie(headers, token) {
+        return Judged::Known;
+    }
+    let given = request.uri().query().and_then(|q| q.strip_prefix("token="));
+    if request.uri().path() == "/" && given.is_some_and(|given| token.is(given)) {
+        return Judged::Enters;
+    }
+    Judged::Refused("the address needs its token: open the address that `ppa studio` printed")
+}
+
+/// Whether a Host header names this machine; the port may be that of a forwarding.
+fn is_loopback(host: &str) -> bool {
+    let name = match host.rsplit_once(':') {
+        Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,
+        _ => host,
+    };
+    matches!(name, "localhost" | "127.0.0.1" | "[::1]")
+}
+
+fn has_cookie(headers: &HeaderMap, token: &Token) -> bool {
+    let texts = headers.get_all(COOKIE).iter();
+    texts
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|text| text.split(';'))
+        .filter_map(|cookie| cookie.trim().split_once('='))
+        .any(|(key, value)| key == token.cookie() && token.is(value))
+}
+
+/// Gives the cookie, and leads to the page without the token in its address.
+fn admit(token: &Token) -> Response {
+    let cookie = format!(
+        "{}={token}; HttpOnly; SameSite=Strict; Path=/",
+        token.cookie()
+    );
+    let mut response = Response::new(Body::empty());
+    *response.status_mut() = StatusCode::SEE_OTHER;
+    let headers = response.headers_mut();
+    headers.insert(LOCATION, HeaderValue::from_static("/"));
+    let value = HeaderValue::from_str(&cookie).expect("hexadecimal digits");
+    headers.insert(SET_COOKIE, value);
+    response
+}

@@ -1,0 +1,36 @@
+//! The files of the page, part of the program.
+
+use axum::extract::Path;
+use axum::http::StatusCode;
+use axum::http::header::{CONTENT_TYPE, HeaderValue};
+use axum::response::{IntoResponse, Response};
+
+const INDEX: &str = include_str!("page/index.html");
+
+const FILES: &[(&str, &str)] = &[
+    ("style.css", include_str!("page/style.css")),
+    ("main.js", include_str!("page/main.js")),
+    ("server.js", include_str!("page/server.js")),
+    ("geometry.js", include_str!("page/geometry.js")),
+    ("slices.js", include_str!("page/slices.js")),
+    ("surface.js", include_str!("page/surface.js")),
+    ("view3d.js", include_str!("page/view3d.js")),
+    ("landmarks.js", include_str!("page/landmarks.js")),
+    ("whatif.js", include_str!("page/whatif.js")),
+];
+
+pub(crate) async fn index() -> Response {
+    typed("text/html; charset=utf-8", INDEX)
+}
+
+pub(crate) async fn file(Path(name): Path<String>) -> Response {
+    match FILES.iter().find(|(known, _)| *known == name) {
+        Some((name, text)) if name.ends_with(".css") => typed("text/css; charset=utf-8", text),
+        Some((_, text)) => typed("text/javascript; charset=utf-8", text),
+        None => StatusCode::NOT_FOUND.into_response(),
+    }
+}
+
+fn typed(kind: &'static str, text: &'static str) -> Response {
+    ([(CONTENT_TYPE, HeaderValue::from_static(kind))], text).into_response()
+}

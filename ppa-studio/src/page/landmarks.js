@@ -1,0 +1,134 @@
+// Axis, joint and plane: what was found and what was chosen.
+
+import { COLOURS } from "/page/slices.js";
+import { add, angleDeg, fixed, norm, planeNormal, point, scale, sub } from "/page/geometry.js";
+
+const byId = (id) => document.getElementById(id);
+const REGIONS = [["joint_region", "Region at the joint"], ["calf_region", "Region away from it"]];
+const KINDS = { lower_leg: "Lower leg with an ankle", knee: "Knee", other: "Neither an ankle nor a knee was recognised: joint, axis and plane can be set by hand" };
+const PICKS = ["distal plane point", "proximal plane point 1", "proximal plane point 2"];
+
+export class LandmarkPanel {
+  constructor(store, actions) {
+    this.store = store;
+    this.actions = actions;
+    this.picking = null;
+    byId("axis-source").addEventListener("change", (event) => actions.choose({ axis_source: event.target.value }));
+    PICKS.forEach((label, corner) => {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.textContent = label;
+      button.setAttribute("aria-pressed", "false");
+      button.addEventListener("click", () => this.pick(this.picking === corner ? null : corner));
+      byId("picks").append(button);
+    });
+    for (const [key, label] of REGIONS) byId("regions").append(this.regionInputs(key, label));
+  }
+
+  regionInputs(key, label) {
+    const row = document.createElement("div");
+    row.className = "pair";
+    const name = document.createElement("span");
+    name.textContent = label;
+    row.append(name);
+    for (const [end, word] of ["from", "to"].entries()) {
+      const input = document.createElement("input");
+      input.type = "number";
+      input.step = "1";
+      input.id = `${key}-${word}`;
+      input.setAttribute("aria-label", `${label}, ${word}, mm`);
+      input.addEventListener("change", () => {
+        const range = [...this.store.doc.landmarks[key].range_mm];
+        range[end] = Number(input.value);
+        this.actions.choose({ [key]: range });
+      });
+      row.append(input);
+    }
+    return row;
+  }
+
+  pick(corner) {
+    this.picking = corner;
+    [...byId("picks").children].forEach((button, i) => button.setAttribute("aria-pressed", String(i === corner)));
+  }
+
+  // A point of the skin was clicked. Returns whether it was for this panel.
+  picked(place) {
+    if (this.picking === null) return false;
+    const points = this.store.doc.landmarks.plane_points.map((p, i) => (i === this.picking ? place : p));
+    this.pick(null);
+    this.actions.choose({ plane_points: points });
+    return true;
+  }
+
+  show() {
+    const { doc } = this.store;
+    byId("limb-kind").textContent = KINDS[doc.limb];
+    byId("axis-source").value = doc.landmarks.axis_source;
+    for (const [key] of REGIONS) {
+      doc.landmarks[key].range_mm.forEach((mm, end) => { byId(`${key}-${["from", "to"][end]}`).value = fixed(mm); });
+    }
+    byId("landmark-table").tBodies[0].replaceChildren(...this.rows().map((row) => this.row(row)));
+  }
+
+  // Each landmark with its value, the keys that choose it, and how far it is from what is found.
+  rows() {
+    const { landmarks: now, automatic } = this.store.doc;
+    const away = (text) => (automatic ? text() : "");
+    return [
+      { name: "Joint", value: `${point(now.joint_centre)} mm`, keys: ["joint_centre"],
+        away: away(() => `${fixed(norm(sub(now.joint_centre, automatic.joint_centre)))} mm`) },
+      { name: "Axis", value: point(now.axis_direction, 4), keys: ["axis", "joint_region", "calf_region", "axis_source"],
+        away: away(() => `${fixed(angleDeg(now.axis_direction, automatic.axis_direction), 2)}°`) },
+      { name: "Anterior", value: point(now.anterior, 3), keys: ["anterior"],
+        away: away(() => `${fixed(angleDeg(now.anterior, automatic.anterior), 2)}°`) },
+      { name: "Plane", value: now.plane_points.map((p) => point(p)).join("; "), keys: ["plane_points"],
+        away: away(() => `${fixed(angleDeg(planeNormal(now.plane_points), planeNormal(automatic.plane_points)), 2)}°`) },
+    ];
+  }
+
+  row({ name, value, keys, away }) {
+    const { choices } = this.store.doc;
+    const chosen = keys.filter((key) => choices[key] !== undefined && choices[key] !== null);
+    const row = document.createElement("tr");
+    const head = document.createElement("th");
+    head.scope = "row";
+    head.textContent = name;
+    const what = document.createElement("td");
+    what.textContent = value;
+    const state = document.createElement("td");
+    if (chosen.length === 0) {
+      state.textContent = "found";
+    } else {
+      state.className = "chosen";
+      state.textContent = `chosen, ${away} from what is found `;
+      const again = document.createElement("button");
+      again.type = "button";
+      again.textContent = "Find again";
+      again.setAttribute("aria-label", `Find again: ${name}`);
+      again.addEventListener("click", () => this.actions.choose(Object.fromEntries(chosen.map((key) => [key, null]))));
+      state.append(again);
+    }
+    row.append(head, what, state);
+    return row;
+  }
+
+  // Lines and points for the view in three dimensions, ct frame.
+  drawing() {
+    const { landmarks } = this.store.doc;
+    const along = (s) => add(landmarks.axis_point, scale(landmarks.axis_direction, s));
+    const [a, b, c] = landmarks.plane_points;
+    const jointTo = (p) => add(landmarks.joint_centre, scale(p, 60));
+    return {
+      lines: [
+        { points: [along(-300), along(300)], colour: COLOURS.axis, through: true },
+        { points: [a, b, b, c, c, a], colour: COLOURS.plane, through: true },
+        { points: [landmarks.joint_centre, jointTo(landmarks.anterior)], colour: COLOURS.joint, through: true },
+      ],
+      points: [
+        { points: landmarks.plane_points, colour: COLOURS.plane, through: true },
+        { points: [landmarks.joint_centre], colour: COLOURS.joint, through: true },
+      ],
+    };
+  }
+}

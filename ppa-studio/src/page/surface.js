@@ -1,0 +1,55 @@
+// The skin as triangles.
+
+import { getBytes, post } from "/page/server.js";
+import { cross, dot, sub } from "/page/geometry.js";
+
+export async function loadSurface() {
+  return surfaceOf(await getBytes("skin"));
+}
+
+// The coarse surface of everything in the scan at a HU.
+export async function surfaceAt(isoHu) {
+  return surfaceOf(await (await post("surface_at", { iso_hu: isoHu })).arrayBuffer());
+}
+
+function surfaceOf(bytes) {
+  const [vertices, triangles] = new Uint32Array(bytes, 0, 2);
+  const positions = new Float32Array(bytes, 8, 3 * vertices);
+  const normals = new Float32Array(bytes, 8 + 12 * vertices, 3 * vertices);
+  const corners = new Uint32Array(bytes, 8 + 24 * vertices, 3 * triangles);
+  return { positions, normals, corners };
+}
+
+const vertex = (surface, id) => surface.positions.subarray(3 * id, 3 * id + 3);
+
+// Where a ray first meets the surface; null where it does not.
+export function hit(surface, origin, direction) {
+  let nearest = Infinity;
+  const { corners } = surface;
+  for (let t = 0; t < corners.length; t += 3) {
+    const [a, b, c] = [corners[t], corners[t + 1], corners[t + 2]].map((id) => Array.from(vertex(surface, id)));
+    const [u, v] = [sub(b, a), sub(c, a)];
+    const h = cross(direction, v);
+    const det = dot(u, h);
+    if (Math.abs(det) < 1e-9) continue;
+    const s = sub(origin, a);
+    const p = dot(s, h) / det;
+    if (p < 0 || p > 1) continue;
+    const q = cross(s, u);
+    const r = dot(direction, q) / det;
+    if (r < 0 || p + r > 1) continue;
+    const distance = dot(v, q) / det;
+    if (distance > 1e-6 && distance < nearest) nearest = distance;
+  }
+  return nearest < Infinity ? [0, 1, 2].map((i) => origin[i] + nearest * direction[i]) : null;
+}
+
+export function bounds(surface) {
+  const low = [Infinity, Infinity, Infinity];
+  const high = [-Infinity, -Infinity, -Infinity];
+  surface.positions.forEach((x, i) => {
+    low[i % 3] = Math.min(low[i % 3], x);
+    high[i % 3] = Math.max(high[i % 3], x);
+  });
+  return { low, high };
+}

@@ -1,0 +1,216 @@
+// The skin, the landmarks and the room in three dimensions (WebGL 2).
+
+import { IDENTITY, add, cross, dot, inverse, norm, rotate, scale, sub, transform, unit } from "/page/geometry.js";
+import { bounds, hit } from "/page/surface.js";
+
+const VERTEX = `#version 300 es
+uniform mat4 screenFromModel;
+uniform mat3 eyeFromModel;
+in vec3 position;
+in vec3 normal;
+out vec3 facing;
+void main() {
+  gl_Position = screenFromModel * vec4(position, 1.0);
+  gl_PointSize = 11.0;
+  facing = eyeFromModel * normal;
+}`;
+
+const FRAGMENT = `#version 300 es
+precision mediump float;
+uniform vec4 colour;
+uniform float shaded;
+in vec3 facing;
+out vec4 pixel;
+void main() {
+  float light = shaded > 0.5 ? 0.25 + 0.75 * abs(normalize(facing).z) : 1.0;
+  pixel = vec4(colour.rgb * light, colour.a);
+}`;
+
+const FIELD_OF_VIEW = 30 * Math.PI / 180;
+
+export class View3d {
+  constructor(figure, actions) {
+    this.canvas = figure.querySelector("canvas");
+    this.caption = figure.querySelector("figcaption");
+    this.actions = actions;
+    this.surface = null;
+    this.worldFromCt = IDENTITY;
+    this.lines = [];
+    this.points = [];
+    this.turn = { azimuth: -0.6, elevation: 0.25 };
+    this.centre = [0, 0, 0];
+    this.distance = 1000;
+    this.gl = this.canvas.getContext("webgl2", { antialias: true });
+    if (!this.gl) {
+      this.caption.textContent = "This browser has no WebGL 2: slices and images still work.";
+      return;
+    }
+    this.prepare();
+    this.listen(figure);
+  }
+
+  prepare() {
+    const { gl } = this;
+    const compile = (kind, source) => {
+      const shader = gl.createShader(kind);
+      gl.shaderSource(shader, source);
+      gl.compileShader(shader);
+      return shader;
+    };
+    this.program = gl.createProgram();
+    gl.attachShader(this.program, compile(gl.VERTEX_SHADER, VERTEX));
+    gl.attachShader(this.program, compile(gl.FRAGMENT_SHADER, FRAGMENT));
+    gl.bindAttribLocation(this.program, 0, "position");
+    gl.bindAttribLocation(this.program, 1, "normal");
+    gl.linkProgram(this.program);
+    this.uniform = (name) => gl.getUniformLocation(this.program, name);
+    this.buffers = { positions: gl.createBuffer(), normals: gl.createBuffer(), corners: gl.createBuffer(), lines: gl.createBuffer() };
+  }
+
+  listen(figure) {
+    new ResizeObserver(() => this.draw()).observe(figure);
+    let held = null;
+    this.canvas.addEventListener("pointerdown", (event) => {
+      this.canvas.setPointerCapture(event.pointerId);
+      held = { x: event.offsetX, y: event.offsetY, moved: 0, ...this.turn };
+    });
+    this.canvas.addEventListener("pointermove", (event) => {
+      if (!held) return;
+      const [dx, dy] = [event.offsetX - held.x, event.offsetY - held.y];
+      held.moved = Math.max(held.moved, Math.hypot(dx, dy));
+      this.turn.azimuth = held.azimuth - 0.008 * dx;
+      this.turn.elevation = Math.max(-1.55, Math.min(1.55, held.elevation + 0.008 * dy));
+      this.draw();
+    });
+    this.canvas.addEventListener("pointerup", (event) => {
+      if (held && held.moved < 4) this.pick(event.offsetX, event.offsetY);
+      held = null;
+    });
+    this.canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.distance *= Math.exp(0.001 * event.deltaY);
+      this.draw();
+    }, { passive: false });
+    this.canvas.addEventListener("keydown", (event) => {
+      const by = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] }[event.key];
+      const zoom = { "+": 0.9, "-": 1.1 }[event.key];
+      if (!by && !zoom) return;
+      event.preventDefault();
+      if (by) {
+        this.turn.azimuth += by[0];
+        this.turn.elevation = Math.max(-1.55, Math.min(1.55, this.turn.elevation + by[1]));
+      }
+      this.distance *= zoom ?? 1;
+      this.draw();
+    });
+  }
+
+  show(surface) {
+    this.surface = surface;
+    if (!this.gl) return;
+    const { gl, buffers } = this;
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.positions);
+    gl.bufferData(gl.ARRAY_BUFFER, surface.positions, gl.STATIC_DRAW);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.normals);
+    gl.bufferData(gl.ARRAY_BUFFER, surface.normals, gl.STATIC_DRAW);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.corners);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, surface.corners, gl.STATIC_DRAW);
+  }
+
+  // Looks at the whole skin, or at a place in the room.
+  frame(centre = null, distance = null) {
+    const { low, high } = bounds(this.surface);
+    this.centre = centre ?? transform(this.worldFromCt, scale(add(low, high), 0.5));
+    this.distance = distance ?? 1.1 * norm(sub(high, low)) / (2 * Math.tan(FIELD_OF_VIEW / 2));
+    this.draw();
+  }
+
+  // Eye, and the directions right, up and backwards on the screen, in the world.
+  eye() {
+    const { azimuth, elevation } = this.turn;
+    const back = [Math.cos(elevation) * Math.sin(azimuth), -Math.cos(elevation) * Math.cos(azimuth), Math.sin(elevation)];
+    const right = unit(cross([0, 0, 1], back));
+    return { at: add(this.centre, scale(back, this.distance)), right, up: cross(back, right), back };
+  }
+
+  screenFromWorld({ at, right, up, back }) {
+    const aspect = this.canvas.clientWidth / this.canvas.clientHeight;
+    const f = 1 / Math.tan(FIELD_OF_VIEW / 2);
+    const [near, far] = [this.distance / 50, this.distance * 20];
+    const view = [right, up, back].map((row) => [...row, -dot(row, at)]);
+    const [a, b] = [(far + near) / (near - far), 2 * far * near / (near - far)];
+    const row = (r, s) => r.map((x) => x * s);
+    return [row(view[0], f / aspect), row(view[1], f), [...row(view[2], a).slice(0, 3), a * view[2][3] + b], row(view[2], -1)];
+  }
+
+  draw() {
+    const { gl, canvas } = this;
+    if (!gl || !this.surface || !canvas.clientWidth || !canvas.clientHeight) return;
+    const ratio = window.devicePixelRatio || 1;
+    canvas.width = canvas.clientWidth * ratio;
+    canvas.height = canvas.clientHeight * ratio;
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    gl.clearColor(0.04, 0.05, 0.07, 1);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST);
+    gl.useProgram(this.program);
+    const eye = this.eye();
+    const screen = this.screenFromWorld(eye);
+    this.place(screen, eye, this.worldFromCt);
+    this.paint([0.86, 0.68, 0.58, 1], 1);
+    this.attribute(0, this.buffers.positions);
+    this.attribute(1, this.buffers.normals);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers.corners);
+    gl.drawElements(gl.TRIANGLES, this.surface.corners.length, gl.UNSIGNED_INT, 0);
+    this.place(screen, eye, IDENTITY);
+    gl.disableVertexAttribArray(1);
+    for (const { points, colour, through } of this.lines) this.segments(gl.LINES, points, colour, through);
+    for (const { points, colour, through } of this.points) this.segments(gl.POINTS, points, colour, through);
+  }
+
+  segments(kind, points, colour, through) {
+    const { gl } = this;
+    // Landmarks inside the limb are seen through the skin.
+    if (through) gl.disable(gl.DEPTH_TEST); else gl.enable(gl.DEPTH_TEST);
+    this.paint([1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16) / 255).concat(1), 0);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers.lines);
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(points.flat()), gl.DYNAMIC_DRAW);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
+    gl.drawArrays(kind, 0, points.length);
+  }
+
+  attribute(index, buffer) {
+    const { gl } = this;
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+    gl.enableVertexAttribArray(index);
+    gl.vertexAttribPointer(index, 3, gl.FLOAT, false, 0, 0);
+  }
+
+  paint(colour, shaded) {
+    this.gl.uniform4fv(this.uniform("colour"), colour);
+    this.gl.uniform1f(this.uniform("shaded"), shaded);
+  }
+
+  place(screen, eye, worldFromModel) {
+    const columns = [0, 1, 2].map((j) => worldFromModel.map((row) => row[j]).slice(0, 3));
+    const origin = worldFromModel.map((row) => row[3]).slice(0, 3);
+    const model = [...columns.map((c) => screen.map((row) => dot(row, c))), screen.map((row) => dot(row, origin) + row[3])];
+    this.gl.uniformMatrix4fv(this.uniform("screenFromModel"), false, model.flat());
+    const facing = columns.map((c) => [dot(eye.right, c), dot(eye.up, c), dot(eye.back, c)]);
+    this.gl.uniformMatrix3fv(this.uniform("eyeFromModel"), false, facing.flat());
+  }
+
+  // The point of the skin under the pointer, in the ct frame.
+  pick(x, y) {
+    if (!this.surface) return;
+    const { at, right, up, back } = this.eye();
+    const half = Math.tan(FIELD_OF_VIEW / 2);
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const [u, v] = [(2 * x / width - 1) * half * width / height, (1 - 2 * y / height) * half];
+    const direction = unit(add(add(scale(right, u), scale(up, v)), scale(back, -1)));
+    const ctFromWorld = inverse(this.worldFromCt);
+    const point = hit(this.surface, transform(ctFromWorld, at), rotate(ctFromWorld, direction));
+    if (point) this.actions.picked(point.map((c) => Math.round(10 * c) / 10));
+  }
+}

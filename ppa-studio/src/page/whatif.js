@@ -1,0 +1,254 @@
+// Sliders of pose and exposure, and the images that follow them.
+
+import { Refused, newest, post, postJson, postPicture } from "/page/server.js";
+import { fixed } from "/page/geometry.js";
+
+const byId = (id) => document.getElementById(id);
+
+// Pause after the last change before a radiograph begins, ms.
+const SETTLED_MS = 250;
+
+const SLIDERS = [
+  { key: "angle_deg", label: "Medial rotation", unit: "°", min: -30, max: 120, step: 0.5, start: 0 },
+  { key: "distal_mm", label: "Heel sinks in", unit: " mm", min: 0, max: 20, step: 0.5 },
+  { key: "proximal_mm", label: "Calf sinks in", unit: " mm", min: 0, max: 20, step: 0.5 },
+  { key: "kvp", label: "Tube voltage", unit: " kV", min: 40, max: 120, step: 1 },
+  { key: "aluminium_mm", label: "Aluminium", unit: " mm", min: 0, max: 10, step: 0.1 },
+  { key: "mas", label: "Tube load", unit: " mAs", min: 0.1, max: 20, step: 0.1 },
+];
+
+const gutterText = (gutter) => `${gutter.name} gutter ${fixed(100 * gutter.openness, 0)} % open, grade ${fixed(gutter.grade)}`;
+
+export class WhatIfPanel {
+  constructor(store, actions) {
+    this.store = store;
+    this.actions = actions;
+    this.values = { angle_deg: 0 };
+    this.sliders = [];
+    this.sensor = false;
+    this.grid = null;
+    this.technique = null;
+    this.sweeping = false;
+    this.depths = newest((whatIf) => this.depth(whatIf));
+    this.rooms = newest((whatIf) => this.room(whatIf));
+    this.labels = newest((whatIf) => this.label(whatIf));
+    this.build();
+    byId("sweep").addEventListener("click", () => this.sweep());
+    byId("save-plan").addEventListener("click", () => this.savePlan(false));
+  }
+
+  build() {
+    const form = byId("whatif-form");
+    form.addEventListener("submit", (event) => event.preventDefault());
+    for (const slider of SLIDERS) form.append(this.slider(slider));
+    form.append(this.select("technique", "Technique", [["", "that of the plan"], ["ankle", "ankle"], ["knee", "knee"]], (value) => { this.technique = value || null; }));
+    form.append(this.select("grid", "Anti-scatter grid", [["", "that of the plan"], ["yes", "8:1, 40 lines per cm"], ["no", "none"]],
+      (value) => { this.grid = value === "" ? null : value === "yes"; }));
+    const label = document.createElement("label");
+    label.className = "check";
+    const box = document.createElement("input");
+    box.type = "checkbox";
+    box.id = "sensor";
+    box.addEventListener("change", () => { this.sensor = box.checked; this.changed(); });
+    label.append(box, " Errors of a Time-of-Flight sensor");
+    form.append(label);
+  }
+
+  // A slider; one that has not been moved shows what the plan says.
+  slider({ key, label, unit, min, max, step, start }) {
+    const row = document.createElement("div");
+    row.className = "row";
+    const name = document.createElement("label");
+    name.htmlFor = `slider-${key}`;
+    const output = document.createElement("output");
+    const input = document.createElement("input");
+    Object.assign(input, { type: "range", id: name.htmlFor, min, max, step, value: start ?? min });
+    const show = () => {
+      const value = this.values[key];
+      const planned = this.planned(key);
+      if (value === undefined && planned !== undefined) input.value = planned;
+      const shown = value ?? planned;
+      const text = shown === undefined ? "set by the histories" : `${fixed(shown, step < 1 ? 1 : 0)}${unit}`;
+      output.textContent = value === undefined ? `${text}, from the plan` : text;
+    };
+    this.sliders.push(show);
+    input.addEventListener("input", () => {
+      this.values[key] = Number(input.value);
+      show();
+      this.changed();
+    });
+    this.setAngle ??= (angle) => { input.value = angle; this.values[key] = angle; show(); };
+    name.append(`${label} `, output);
+    row.append(name, input);
+    show();
+    return row;
+  }
+
+  // What the plan says, if it is a number that a slider shows.
+  planned(key) {
+    const planned = this.store.doc?.planned;
+    if (!planned) return undefined;
+    if (key === "mas") return planned.tube_load?.mas;
+    if (key !== "aluminium_mm") return planned[key];
+    const [only, ...others] = planned.filters;
+    return others.length === 0 && only?.startsWith("Al:") ? Number(only.slice(3)) : undefined;
+  }
+
+  show() {
+    this.sliders.forEach((show) => show());
+  }
+
+  select(id, label, options, set) {
+    const row = document.createElement("div");
+    row.className = "row";
+    const name = document.createElement("label");
+    name.htmlFor = id;
+    name.textContent = label;
+    const input = document.createElement("select");
+    input.id = id;
+    for (const [value, text] of options) input.append(new Option(text, value));
+    input.addEventListener("change", () => { set(input.value); this.changed(); });
+    row.append(name, input);
+    return row;
+  }
+
+  whatIf() {
+    const { aluminium_mm, ...values } = this.values;
+    const whatIf = { ...values, sensor: this.sensor };
+    if (aluminium_mm !== undefined) whatIf.filters = aluminium_mm > 0 ? [`Al:${aluminium_mm}`] : [];
+    if (this.technique) whatIf.technique = this.technique;
+    if (this.grid !== null) whatIf.grid = this.grid;
+    return whatIf;
+  }
+
+  isShown() {
+    return this.store.step === "whatif" || this.store.step === "room";
+  }
+
+  // Pose or exposure have changed: everything that shows them follows.
+  changed() {
+    if (!this.store.doc || !this.isShown()) return;
+    this.cancelRadiograph();
+    const whatIf = this.whatIf();
+    this.depths(whatIf);
+    this.rooms(whatIf);
+    this.actions.commands(whatIf);
+    if (this.store.step !== "whatif" || this.sweeping) return;
+    this.timer = setTimeout(() => {
+      this.labels(whatIf);
+      this.radiograph(whatIf);
+    }, SETTLED_MS);
+  }
+
+  cancelRadiograph() {
+    clearTimeout(this.timer);
+    this.exposing?.abort();
+    this.exposing = null;
+  }
+
+  async depth(whatIf) {
+    const started = performance.now();
+    try {
+      const { picture, report } = await postPicture("depth", whatIf);
+      await this.put("depth", picture);
+      const ms = Math.round(performance.now() - started);
+      byId("depth").querySelector("figcaption").textContent =
+        `left and right camera, ${fixed(report.range_mm[0], 0)} (red) to ${fixed(report.range_mm[1], 0)} mm or more (blue), ${ms} ms`;
+    } catch (error) {
+      this.failed(error);
+    }
+  }
+
+  async room(whatIf) {
+    try {
+      this.actions.room(await postJson("room", whatIf));
+    } catch (error) {
+      this.failed(error);
+    }
+  }
+
+  // The computed label; without bones in the case there is none.
+  async label(whatIf) {
+    try {
+      const label = await postJson("label", whatIf);
+      byId("label").textContent = label
+        ? `Computed label ${fixed(label.label)} ± ${fixed(label.std)} (${label.label < 2.5 ? "diagnostic" : "not diagnostic"}): ${label.gutters.map(gutterText).join(", ")}`
+        : "No computed label: the case names no bones (ppa prepare --bones or --segment-bones)";
+    } catch (error) {
+      this.failed(error);
+    }
+  }
+
+  // A first radiograph within a second, then all of it.
+  async radiograph(whatIf) {
+    const exposing = new AbortController();
+    this.exposing = exposing;
+    const started = performance.now();
+    try {
+      for (const pass of ["first", "final"]) {
+        byId("radiograph").querySelector("figcaption").textContent = pass === "first" ? "simulating …" : "first image; simulating all pixels …";
+        const { picture, report } = await postPicture(`radiograph/${pass}`, whatIf, exposing.signal);
+        await this.put("radiograph", picture);
+        const seconds = (performance.now() - started) / 1000;
+        this.showReport(pass, report, seconds);
+      }
+    } catch (error) {
+      if (error.name !== "AbortError") this.failed(error);
+    }
+  }
+
+  showReport(pass, report, seconds) {
+    const parts = [`${pass} image in ${fixed(seconds)} s`];
+    if (report.mas) parts.push(`${fixed(report.mas, 2)} mAs`);
+    if (report.exposure_index) parts.push(`exposure index ${fixed(report.exposure_index, 0)}`);
+    byId("radiograph").querySelector("figcaption").textContent = parts.join(", ");
+    byId("radiograph").dataset.pass = pass;
+  }
+
+  async put(id, picture) {
+    const image = byId(id).querySelector("img");
+    const before = image.src;
+    image.src = URL.createObjectURL(picture);
+    try { await image.decode(); } catch { /* replaced meanwhile */ }
+    if (before) URL.revokeObjectURL(before);
+  }
+
+  // A request that a later one replaced is no failure.
+  failed(error) {
+    if (error instanceof Refused && error.status === 409) return;
+    this.actions.fail(error);
+  }
+
+  // All angles from 0 to 90 degrees, each as soon as the one before is shown.
+  async sweep() {
+    this.sweeping = !this.sweeping;
+    byId("sweep").textContent = this.sweeping ? "Stop" : "Play 0 to 90°";
+    if (!this.sweeping) return;
+    this.cancelRadiograph();
+    const started = performance.now();
+    let frames = 0;
+    for (let angle = 0; angle <= 90 && this.sweeping; angle += 1) {
+      this.setAngle(angle);
+      await this.depth(this.whatIf());
+      frames += 1;
+    }
+    const rate = 1000 * frames / (performance.now() - started);
+    byId("whatif-facts").textContent = `${fixed(rate)} pairs of depth images per second`;
+    this.sweeping = false;
+    byId("sweep").textContent = "Play 0 to 90°";
+    this.changed();
+  }
+
+  async savePlan(replace) {
+    try {
+      const response = await post("plan", { what_if: this.whatIf(), replace });
+      this.actions.tell(`Saved ${(await response.json()).file}`);
+      this.actions.commands(this.whatIf());
+    } catch (error) {
+      if (error instanceof Refused && error.status === 409 && !replace && window.confirm(`${error.message}. Replace it?`)) {
+        return this.savePlan(true);
+      }
+      this.actions.fail(error);
+    }
+  }
+}

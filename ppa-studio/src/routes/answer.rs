@@ -1,0 +1,64 @@
+//! Answers: JSON, bytes, or one sentence about what went wrong.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::http::StatusCode;
+use axum::http::header::{CONTENT_TYPE, HeaderName, HeaderValue};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+
+use crate::error::StudioError;
+use crate::state::State;
+
+/// Header with what is known of an image, JSON.
+pub(super) const REPORT: HeaderName = HeaderName::from_static("x-report");
+
+/// A sentence for the person at the page.
+#[derive(Serialize)]
+struct Sentence {
+    error: String,
+}
+
+/// Does work that takes longer than a moment, outside the threads that serve requests.
+pub(super) async fn work<T: Send + 'static>(
+    state: Arc<State>,
+    work: impl FnOnce(&State) -> Result<T, StudioError> + Send + 'static,
+) -> Result<T, Response> {
+    match tokio::task::spawn_blocking(move || work(&state)).await {
+        Ok(done) => done.map_err(failed),
+        // A panic is a bug; it must not take the page down.
+        Err(error) => Err(sentence(
+            StatusCode::INTERNAL_SERVER_ERROR,
+            format!("internal error: {error}"),
+        )),
+    }
+}
+
+/// An error as an answer.
+pub(super) fn failed(error: StudioError) -> Response {
+    let status = match error {
+        StudioError::Superseded | StudioError::ChangedElsewhere(_) | StudioError::Exists(_) => {
+            StatusCode::CONFLICT
+        }
+        _ => StatusCode::UNPROCESSABLE_ENTITY,
+    };
+    sentence(status, ppa_core::text::error_chain(&error))
+}
+
+pub(super) fn sentence(status: StatusCode, error: String) -> Response {
+    (status, Json(Sentence { error })).into_response()
+}
+
+/// An image with its report.
+pub(super) fn picture(png: Vec<u8>, report: &impl Serialize) -> Response {
+    let report = serde_json::to_string(report).unwrap_or_default();
+    let report = HeaderValue::from_str(&report).unwrap_or(HeaderValue::from_static("{}"));
+    let kind = HeaderValue::from_static("image/png");
+    ([(CONTENT_TYPE, kind), (REPORT, report)], png).into_response()
+}
+
+pub(super) fn bytes(bytes: Vec<u8>) -> Response {
+    let kind = HeaderValue::from_static("application/octet-stream");
+    ([(CONTENT_TYPE, kind)], bytes).into_response()
+}

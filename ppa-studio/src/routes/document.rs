@@ -1,0 +1,254 @@
+//! The limb with its landmarks: state, changes, undo, saving.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State as Extracted;
+use axum::response::Response;
+use ppa_dataset::{Finding, FindingCode};
+use ppa_generate::Case;
+use ppa_mesh::LimbReport;
+use ppa_scene::{LandmarkOverrides, Landmarks, LimbKind, Side};
+use ppa_xray::TubeLoad;
+use serde::{Deserialize, Serialize};
+
+use super::answer::work;
+use crate::commands::{self, Commands};
+use crate::error::StudioError;
+use crate::state::State;
+use crate::what_if::WhatIf;
+
+/// All that the page shows of the limb, but for images.
+#[derive(Serialize)]
+pub(super) struct Document {
+    revision: u64,
+    /// The opened file, without its folder.
+    name: String,
+    side: Side,
+    limb: LimbKind,
+    grid: GridState,
+    iso_hu: f64,
+    /// The highest HU that the surface may have.
+    core_hu: f64,
+    choices: LandmarkOverrides,
+    landmarks: Landmarks,
+    /// What is found where nobody chooses.
+    automatic: Option<Landmarks>,
+    findings: Vec<Finding>,
+    acknowledged: Vec<FindingCode>,
+    report: LimbReport,
+    files: Files,
+    can_undo: bool,
+    can_redo: bool,
+    commands: Commands,
+    planned: Planned,
+}
+
+/// What the plan says where no slider is moved.
+#[derive(Serialize)]
+struct Planned {
+    distal_mm: f64,
+    proximal_mm: f64,
+    kvp: f64,
+    filters: Vec<String>,
+    tube_load: Option<TubeLoad>,
+}
+
+#[derive(Serialize)]
+struct GridState {
+    size: [usize; 3],
+    spacing_mm: [f64; 3],
+    /// Rows of the transform from voxel indices to the `ct` frame.
+    ct_from_voxel: [[f64; 4]; 4],
+}
+
+#[derive(Serialize)]
+struct Files {
+    original: String,
+    edited: String,
+    has_edits: bool,
+    /// Whether the original is there: a scan that was opened has no case yet.
+    is_saved: bool,
+    plan: Option<String>,
+    saved_plan: String,
+}
+
+type Answer = Result<Json<Document>, Response>;
+
+pub(super) async fn state(Extracted(state): Extracted<Arc<State>>) -> Answer {
+    work(state, |state| Ok(Json(document(state)))).await
+}
+
+/// Landmarks to choose; keys that are left out are found.
+pub(super) async fn choices(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(choices): Json<LandmarkOverrides>,
+) -> Answer {
+    edit(state, move |case| Case { choices, ..case }).await
+}
+
+/// How the skin is found.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SurfaceChange {
+    iso_hu: Option<f64>,
+    side: Option<Side>,
+    /// A point in the wanted limb, or `null` for the automatic choice.
+    #[serde(default, with = "double_option")]
+    inside: Option<Option<[f64; 3]>>,
+}
+
+/// Tells an absent key from `null`.
+mod double_option {
+    use serde::{Deserialize, Deserializer};
+
+    pub fn deserialize<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<Option<T>>, D::Error> {
+        Option::deserialize(deserializer).map(Some)
+    }
+}
+
+pub(super) async fn surface(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(change): Json<SurfaceChange>,
+) -> Answer {
+    edit(state, move |mut case| {
+        case.surface.iso_hu = change.iso_hu.unwrap_or(case.surface.iso_hu);
+        case.surface.inside = change.inside.unwrap_or(case.surface.inside);
+        case.side = change.side.unwrap_or(case.side);
+        case
+    })
+    .await
+}
+
+pub(super) async fn acknowledged(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(codes): Json<Vec<FindingCode>>,
+) -> Answer {
+    edit(state, move |case| Case {
+        acknowledged: codes,
+        ..case
+    })
+    .await
+}
+
+pub(super) async fn undo(Extracted(state): Extracted<Arc<State>>) -> Answer {
+    work(state, |state| {
+        state.edit(|desk| desk.undo())?;
+        Ok(Json(document(state)))
+    })
+    .await
+}
+
+pub(super) async fn redo(Extracted(state): Extracted<Arc<State>>) -> Answer {
+    work(state, |state| {
+        state.edit(|desk| desk.redo())?;
+        Ok(Json(document(state)))
+    })
+    .await
+}
+
+/// Writes the case over the one that was opened.
+pub(super) async fn save(Extracted(state): Extracted<Arc<State>>) -> Answer {
+    work(state, |state| {
+        let case = state.shown().case.clone();
+        state.case_file().save(&case)?;
+        Ok(Json(document(state)))
+    })
+    .await
+}
+
+/// A plan to save.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PlanToSave {
+    what_if: WhatIf,
+    /// Whether the person agreed to replace the file that is there.
+    #[serde(default)]
+    replace: bool,
+}
+
+#[derive(Serialize)]
+pub(super) struct SavedPlan {
+    file: String,
+}
+
+/// Saves a plan with the page's changes.
+pub(super) async fn plan(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(PlanToSave { what_if, replace }): Json<PlanToSave>,
+) -> Result<Json<SavedPlan>, Response> {
+    work(state, move |state| {
+        let (plan, file) = (state.plan_with(&what_if)?, state.saved_plan());
+        if file.exists() && !replace {
+            return Err(StudioError::Exists(file));
+        }
+        plan.write(&file)?;
+        let file = file.to_string_lossy().into_owned();
+        Ok(Json(SavedPlan { file }))
+    })
+    .await
+}
+
+async fn edit(state: Arc<State>, change: impl FnOnce(Case) -> Case + Send + 'static) -> Answer {
+    work(state, |state| {
+        state.edit(|desk| {
+            let case = desk.shown().case.clone();
+            desk.change(change(case))
+        })?;
+        Ok::<_, StudioError>(Json(document(state)))
+    })
+    .await
+}
+
+fn document(state: &State) -> Document {
+    let [can_undo, can_redo] = state.desk().can_step();
+    let shown = state.shown();
+    let prepared = shown.prepared();
+    let grid = prepared.volume.grid();
+    let matrix = grid.ct_from_voxel().to_homogeneous();
+    let row = |i: usize| [0, 1, 2, 3].map(|j| matrix[(i, j)]);
+    let saved_plan = state.saved_plan();
+    let file = state.case_file();
+    let original = file.original();
+    let name = original.file_name().unwrap_or_default().to_string_lossy();
+    let text = |path: &std::path::Path| path.to_string_lossy().into_owned();
+    Document {
+        revision: shown.revision,
+        name: name.into_owned(),
+        side: shown.case.side,
+        limb: prepared.landmarks.limb,
+        grid: GridState {
+            size: grid.size(),
+            spacing_mm: grid.spacing_mm().into(),
+            ct_from_voxel: [0, 1, 2, 3].map(row),
+        },
+        iso_hu: shown.case.surface.iso_hu,
+        core_hu: shown.case.surface.core_hu,
+        choices: shown.case.choices.clone(),
+        landmarks: prepared.landmarks.clone(),
+        automatic: shown.automatic.clone(),
+        findings: prepared.findings.clone(),
+        acknowledged: shown.case.acknowledged.clone(),
+        report: prepared.limb.report.clone(),
+        commands: commands::of_case(&shown.case, original),
+        files: Files {
+            original: text(original),
+            edited: text(file.edited()),
+            has_edits: file.has_edits(),
+            is_saved: original.exists(),
+            plan: state.plan_file.as_deref().map(text),
+            saved_plan: text(&saved_plan),
+        },
+        can_undo,
+        can_redo,
+        planned: Planned {
+            distal_mm: state.plan.soft_tissue.distal_mm,
+            proximal_mm: state.plan.soft_tissue.proximal_mm,
+            kvp: state.plan.xray.kvp,
+            filters: state.plan.xray.filters.clone(),
+            tube_load: state.plan.xray.tube_load,
+        },
+    }
+}

@@ -1,0 +1,69 @@
+//! Depth images and radiographs of a pose.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::{Path, State as Extracted};
+use axum::http::StatusCode;
+use axum::response::Response;
+
+use super::answer::{picture, sentence, work};
+use crate::commands::{ImageCommands, of_images};
+use crate::newest::CancelOnDrop;
+use crate::scene::Pass;
+use crate::state::State;
+use crate::what_if::WhatIf;
+
+/// Both depth images; of several requests only the newest is answered. Ends the radiograph under way, which is of another pose.
+pub(super) async fn depth(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(what_if): Json<WhatIf>,
+) -> Result<Response, Response> {
+    state.radiograph.cancel();
+    let ticket = state.depth.enter();
+    let made = work(state, move |state| {
+        let _turn = state.depth.turn(&ticket)?;
+        state.scenes.depth(&state.shown(), &state.plan, &what_if)
+    })
+    .await?;
+    Ok(picture(made.png, &made.report))
+}
+
+/// A radiograph, `first` with larger pixels or `final`; ends when another is asked for or nobody waits any more.
+pub(super) async fn radiograph(
+    Extracted(state): Extracted<Arc<State>>,
+    Path(pass): Path<String>,
+    Json(what_if): Json<WhatIf>,
+) -> Result<Response, Response> {
+    let pass = match &*pass {
+        "first" => Pass::First,
+        "final" => Pass::Final,
+        _ => {
+            let error = "expected first or final".to_owned();
+            return Err(sentence(StatusCode::NOT_FOUND, error));
+        }
+    };
+    let ticket = state.radiograph.enter();
+    let _cancel = CancelOnDrop(ticket.clone());
+    let made = work(state, move |state| {
+        let _turn = state.radiograph.turn(&ticket)?;
+        let (scenes, shown) = (&state.scenes, state.shown());
+        scenes.radiograph(&shown, &state.plan, &what_if, pass, &ticket)
+    })
+    .await?;
+    Ok(picture(made.png, &made.report))
+}
+
+/// The commands that make these images.
+pub(super) async fn commands(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(what_if): Json<WhatIf>,
+) -> Json<ImageCommands> {
+    let (case, saved) = (state.case_on_disk(), state.saved_plan());
+    Json(of_images(
+        &case,
+        state.plan_file.as_deref(),
+        &saved,
+        &what_if,
+    ))
+}

@@ -1,0 +1,96 @@
+//! Slices of the scan, and the skin.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::{Path, State as Extracted};
+use axum::response::Response;
+use ppa_generate::PreparedLimb;
+use serde::Deserialize;
+
+use super::answer::{bytes, work};
+use crate::display_mesh::{self, display_mesh};
+use crate::error::StudioError;
+use crate::state::State;
+
+/// A slice across a voxel axis: HU as little-endian i16, then one byte a voxel, 1 inside the limb; rows along the later axis.
+pub(super) async fn slice(
+    Extracted(state): Extracted<Arc<State>>,
+    Path((axis, index)): Path<(usize, usize)>,
+) -> Result<Response, Response> {
+    work(state, move |state| {
+        let shown = state.shown();
+        plane(shown.prepared(), axis, index)
+    })
+    .await
+    .map(bytes)
+}
+
+fn plane(limb: &PreparedLimb, axis: usize, index: usize) -> Result<Vec<u8>, StudioError> {
+    let grid = limb.volume.grid();
+    let size = grid.size();
+    if axis > 2 || index >= size[axis] {
+        let [i, j, k] = size;
+        return Err(StudioError::Invalid(format!(
+            "slice {index} across axis {axis} is outside the scan of {i} x {j} x {k} voxels"
+        )));
+    }
+    let (column, row) = match axis {
+        0 => (1, 2),
+        1 => (0, 2),
+        _ => (0, 1),
+    };
+    let pixels = (0..size[row]).flat_map(|r| (0..size[column]).map(move |c| (r, c)));
+    let voxels = pixels.map(|(r, c)| {
+        let mut voxel = [index; 3];
+        (voxel[column], voxel[row]) = (c, r);
+        voxel
+    });
+    let voxels: Vec<[usize; 3]> = voxels.collect();
+    // Saturates: displays show no HU beyond 16 bits.
+    let hu = voxels
+        .iter()
+        .map(|&voxel| limb.volume.at(voxel).round() as i16);
+    let mut plane: Vec<u8> = hu.flat_map(i16::to_le_bytes).collect();
+    let inside = voxels
+        .iter()
+        .map(|&voxel| limb.limb.mask[grid.index(voxel)]);
+    plane.extend(inside.map(u8::from));
+    Ok(plane)
+}
+
+/// The skin with fewer triangles, for display.
+pub(super) async fn skin(Extracted(state): Extracted<Arc<State>>) -> Result<Response, Response> {
+    work(state, |state| {
+        let shown = state.shown();
+        Ok(display_mesh::bytes(&display_mesh(
+            &shown.prepared().limb.mesh,
+        )))
+    })
+    .await
+    .map(bytes)
+}
+
+/// A HU.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SurfaceAt {
+    iso_hu: f32,
+}
+
+/// The surface of everything in the scan at a HU, coarse, to be seen while a slider moves.
+pub(super) async fn surface_at(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(SurfaceAt { iso_hu }): Json<SurfaceAt>,
+) -> Result<Response, Response> {
+    let ticket = state.surface.enter();
+    work(state, move |state| {
+        let _turn = state.surface.turn(&ticket)?;
+        let surface = state
+            .coarse
+            .surface(&state.shown().prepared().volume, iso_hu)?;
+        Ok(display_mesh::bytes(&surface))
+    })
+    .await
+    .map(bytes)
+}

@@ -1,0 +1,239 @@
+//! Images of a pose, and what they share between requests: room, cameras, beam and voxels.
+
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use image::{DynamicImage, GrayImage, ImageFormat, RgbImage};
+use ppa_depth::{DepthImage, false_colour};
+use ppa_generate::{ExposableLimb, Plan, SceneSetup, XraySettings, prepared_phantom};
+use ppa_scene::Contact;
+use ppa_xray::{PreparedPhantom, Radiograph};
+use serde::Serialize;
+
+use crate::desk::Shown;
+use crate::error::StudioError;
+use crate::newest::Ticket;
+use crate::what_if::WhatIf;
+
+/// A room with its cameras and beam, and the plan it was made from.
+struct KeptSetup {
+    plan: Plan,
+    setup: Arc<SceneSetup>,
+}
+
+/// Voxels of a limb around its joint, and what they were made from.
+struct KeptPhantom {
+    revision: u64,
+    xray: XraySettings,
+    phantom: Arc<PreparedPhantom<'static>>,
+}
+
+/// Scenes and voxels kept for the next request.
+#[derive(Default)]
+pub(crate) struct Scenes {
+    setup: Mutex<Option<KeptSetup>>,
+    phantom: Mutex<Option<KeptPhantom>>,
+}
+
+/// Both depth images of a pose.
+pub(crate) struct DepthPicture {
+    /// In false colour, left camera at the left, PNG.
+    pub png: Vec<u8>,
+    pub report: DepthReport,
+}
+
+/// What is known of depth images.
+#[derive(Debug, Serialize)]
+pub(crate) struct DepthReport {
+    /// Pixels with a depth, left camera first.
+    pub valid_pixels: Vec<usize>,
+    /// First and last depth of the colours, mm.
+    pub range_mm: [f64; 2],
+}
+
+/// A radiograph for viewing.
+pub(crate) struct RadiographPicture {
+    pub png: Vec<u8>,
+    pub report: RadiographReport,
+}
+
+/// What is known of a radiograph.
+#[derive(Debug, Serialize)]
+pub(crate) struct RadiographReport {
+    pub exposure_index: Option<f64>,
+    pub mas: Option<f64>,
+    pub contact: Contact,
+}
+
+/// Which image of an exposure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Pass {
+    /// Larger pixels and fewer histories, within a tenth of the time.
+    First,
+    /// All pixels.
+    Final,
+}
+
+impl Scenes {
+    /// Room, cameras and beam of a plan: those of the request before, if nothing they depend on has changed.
+    pub fn setup(&self, plan: &Plan) -> Result<Arc<SceneSetup>, StudioError> {
+        let mut kept = self.setup.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(kept) = &*kept
+            && same_setup(&kept.plan, plan)
+        {
+            return Ok(kept.setup.clone());
+        }
+        let setup = Arc::new(SceneSetup::of_plan(plan)?);
+        *kept = Some(KeptSetup {
+            plan: plan.clone(),
+            setup: setup.clone(),
+        });
+        Ok(setup)
+    }
+
+    /// What both cameras see.
+    pub fn depth(
+        &self,
+        shown: &Shown,
+        plan: &Plan,
+        what_if: &WhatIf,
+    ) -> Result<DepthPicture, StudioError> {
+        let plan = what_if.plan(plan)?;
+        let setup = self.setup(&plan)?;
+        let views = (shown.limb).depth_views(&setup, &plan, what_if.angle_deg, plan.seed)?;
+        let images: Vec<&DepthImage> = views.iter().map(|view| &view.image).collect();
+        let range_mm = range_mm(&images);
+        Ok(DepthPicture {
+            png: png(DynamicImage::ImageRgb8(side_by_side(&images, range_mm)))?,
+            report: DepthReport {
+                valid_pixels: images.iter().map(|image| image.valid_pixels()).collect(),
+                range_mm,
+            },
+        })
+    }
+
+    /// The radiograph, until a later request replaces this one.
+    pub fn radiograph(
+        &self,
+        shown: &Shown,
+        plan: &Plan,
+        what_if: &WhatIf,
+        pass: Pass,
+        ticket: &Ticket,
+    ) -> Result<RadiographPicture, StudioError> {
+        let plan = &what_if.plan(plan)?;
+        let setup = self.setup(plan)?;
+        let phantom = self.phantom(shown, &plan.xray)?;
+        let (table, spectrum) = (setup.table.clone(), setup.spectrum.clone());
+        let prepared = shown.prepared().clone();
+        let limb = ExposableLimb::with_phantom(prepared, phantom, plan, table, spectrum);
+        let spectrum = &setup.spectrum;
+        let exposure = limb.pose(what_if.angle_deg.to_radians())?;
+        let settings = exposure.fast_settings(plan.xray.engine.with_seed(plan.seed))?;
+        let observe = |_share: f64| {
+            if ticket.is_newest() {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break(())
+            }
+        };
+        let projection = &exposure.projection;
+        let phantom = &limb.phantom;
+        let radiograph = match pass {
+            Pass::First => phantom.preview(spectrum, projection, &settings, &observe),
+            Pass::Final => phantom.fast_with_progress(spectrum, projection, &settings, &observe),
+        };
+        let radiograph = radiograph.map_err(|error| match error {
+            ppa_xray::TransportError::Cancelled => StudioError::Superseded,
+            error => error.into(),
+        })?;
+        Ok(RadiographPicture {
+            png: radiograph_png(&radiograph, &plan.xray)?,
+            report: RadiographReport {
+                exposure_index: radiograph.exposure_index(&projection.receptor)?,
+                mas: radiograph.mas().filter(|mas| mas.is_finite()),
+                contact: exposure.placement.contact,
+            },
+        })
+    }
+
+    /// Voxels around the joint: those of the request before, if nothing they depend on has changed.
+    fn phantom(
+        &self,
+        shown: &Shown,
+        xray: &XraySettings,
+    ) -> Result<Arc<PreparedPhantom<'static>>, StudioError> {
+        let mut kept = self.phantom.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(kept) = &*kept
+            && kept.revision == shown.revision
+            && kept.xray.same_voxels(xray)
+        {
+            return Ok(kept.phantom.clone());
+        }
+        // Freed first: both would need the memory of two.
+        *kept = None;
+        let phantom = Arc::new(prepared_phantom(shown.prepared(), xray)?);
+        *kept = Some(KeptPhantom {
+            revision: shown.revision,
+            xray: xray.clone(),
+            phantom: phantom.clone(),
+        });
+        Ok(phantom)
+    }
+}
+
+/// Whether [`SceneSetup::of_plan`] gives the same for both.
+fn same_setup(a: &Plan, b: &Plan) -> bool {
+    let beam = |plan: &Plan| (plan.xray.kvp, plan.xray.anode_angle_deg);
+    a.seed == b.seed
+        && a.room == b.room
+        && a.depth == b.depth
+        && beam(a) == beam(b)
+        && a.xray.filters == b.xray.filters
+}
+
+/// Depths that the colours span, mm: from the nearest of all images on, enough for a limb on its table.
+fn range_mm(images: &[&DepthImage]) -> [f64; 2] {
+    let depths = images.iter().flat_map(|image| image.z_mm.iter());
+    let seen = depths.map(|z| f64::from(*z)).filter(|z| *z > 0.0);
+    let near = seen.fold(f64::INFINITY, f64::min);
+    let near = if near.is_finite() { near } else { 0.0 };
+    [near, near + COLOURED_MM]
+}
+
+/// Length of the range of depths that the colours span.
+const COLOURED_MM: f64 = 350.0;
+
+fn side_by_side(images: &[&DepthImage], range_mm: [f64; 2]) -> RgbImage {
+    let width: u32 = images.iter().map(|image| image.width).sum();
+    let height = images.iter().map(|image| image.height).max().unwrap_or(0);
+    let mut picture = RgbImage::new(width, height);
+    let mut left = 0;
+    for image in images {
+        for y in 0..image.height {
+            for x in 0..image.width {
+                let z_mm = f64::from(image.z_mm[(y * image.width + x) as usize]);
+                if z_mm > 0.0 {
+                    let colour = image::Rgb(false_colour(z_mm, range_mm));
+                    picture.put_pixel(left + x, y, colour);
+                }
+            }
+        }
+        left += image.width;
+    }
+    picture
+}
+
+fn radiograph_png(radiograph: &Radiograph, xray: &XraySettings) -> Result<Vec<u8>, StudioError> {
+    let grey = radiograph.present(&xray.presentation)?;
+    let bytes = grey.iter().map(|value| (value >> 8) as u8).collect();
+    let (columns, rows) = (radiograph.columns() as u32, radiograph.rows() as u32);
+    let picture = GrayImage::from_raw(columns, rows, bytes).expect("one value for each pixel");
+    png(DynamicImage::ImageLuma8(picture))
+}
+
+fn png(picture: DynamicImage) -> Result<Vec<u8>, StudioError> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, ImageFormat::Png)?;
+    Ok(bytes.into_inner())
+}

@@ -1,0 +1,138 @@
+//! What the sliders of the page change in a plan.
+
+use ppa_generate::{Plan, Technique};
+use ppa_xray::{AntiScatterGrid, TubeLoad};
+use serde::{Deserialize, Serialize};
+
+use crate::error::StudioError;
+
+/// A pose and an exposure. Keys that are left out are those of the plan.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(crate) struct WhatIf {
+    /// Medial rotation.
+    pub angle_deg: f64,
+    /// How deep the distal contact sinks in.
+    pub distal_mm: Option<f64>,
+    /// How deep the proximal contact sinks in.
+    pub proximal_mm: Option<f64>,
+    /// Whether the depth cameras have the errors of an Azure Kinect.
+    pub sensor: bool,
+    /// An examination with its usual exposure; the keys below change it.
+    pub technique: Option<String>,
+    pub kvp: Option<f64>,
+    /// Filters, `MATERIAL:mm`.
+    pub filters: Option<Vec<String>>,
+    pub mas: Option<f64>,
+    pub exposure_index: Option<f64>,
+    /// An anti-scatter grid.
+    pub grid: Option<bool>,
+}
+
+impl WhatIf {
+    /// The plan with these changes.
+    pub fn plan(&self, plan: &Plan) -> Result<Plan, StudioError> {
+        if !(-360.0..=360.0).contains(&self.angle_deg) {
+            return Err(StudioError::Invalid(format!(
+                "the rotation is {} degrees, expected -360 to 360",
+                self.angle_deg
+            )));
+        }
+        let mut plan = plan.clone();
+        let sinks = &mut plan.soft_tissue;
+        sinks.distal_mm = self.distal_mm.unwrap_or(sinks.distal_mm);
+        sinks.proximal_mm = self.proximal_mm.unwrap_or(sinks.proximal_mm);
+        plan.soft_tissue.check()?;
+        if self.sensor && plan.depth.sensor.is_none() {
+            plan.depth.sensor = Some(ppa_depth::SensorSpec::default());
+        }
+        if let Some(name) = &self.technique {
+            technique(name)?.apply(&mut plan.xray);
+        }
+        let xray = &mut plan.xray;
+        xray.kvp = self.kvp.unwrap_or(xray.kvp);
+        if let Some(filters) = &self.filters {
+            xray.filters.clone_from(filters);
+        }
+        let load = self.mas.map(TubeLoad::Mas);
+        let load = load.or(self.exposure_index.map(TubeLoad::ExposureIndex));
+        xray.tube_load = load.or(xray.tube_load);
+        if let Some(load) = xray.tube_load {
+            load.check()?;
+        }
+        match self.grid {
+            Some(true) if xray.receptor.grid.is_none() => xray.receptor.grid = Some(usual_grid()),
+            Some(false) => xray.receptor.grid = None,
+            _ => {}
+        }
+        // The page shows images while they are computed, which the analog engine cannot do.
+        xray.analog = None;
+        plan.check_settings().map_err(StudioError::Invalid)?;
+        Ok(plan)
+    }
+}
+
+impl WhatIf {
+    /// Whether it has changes that no option of a command makes.
+    pub fn needs_plan(&self) -> bool {
+        self.distal_mm.is_some() || self.proximal_mm.is_some() || self.grid.is_some()
+    }
+}
+
+/// A common grid of Bucky tables.
+fn usual_grid() -> AntiScatterGrid {
+    AntiScatterGrid::new(8.0, 40.0).with_focus_mm(1100.0)
+}
+
+fn technique(name: &str) -> Result<Technique, StudioError> {
+    let found = Technique::ALL.into_iter().find(|(known, _)| *known == name);
+    found.map(|(_, technique)| technique).ok_or_else(|| {
+        let names = Technique::ALL.map(|(name, _)| name).join(", ");
+        StudioError::Invalid(format!("technique {name} is unknown, expected {names}"))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_that_are_left_out_are_those_of_the_plan() {
+        let mut plan = Plan::new(Vec::new());
+        plan.xray.kvp = 66.0;
+        plan.soft_tissue.distal_mm = 3.0;
+        assert_eq!(WhatIf::default().plan(&plan).unwrap(), plan);
+        let what_if = WhatIf {
+            kvp: Some(70.0),
+            mas: Some(4.0),
+            grid: Some(true),
+            ..WhatIf::default()
+        };
+        let changed = what_if.plan(&plan).unwrap();
+        assert_eq!(changed.xray.kvp, 70.0);
+        assert_eq!(changed.xray.tube_load, Some(TubeLoad::Mas(4.0)));
+        assert!(changed.xray.receptor.grid.is_some());
+        assert_eq!(changed.soft_tissue, plan.soft_tissue);
+    }
+
+    #[test]
+    fn values_out_of_range_are_refused_by_name() {
+        let plan = Plan::new(Vec::new());
+        let refused = |what_if: WhatIf| what_if.plan(&plan).unwrap_err().to_string();
+        let sunk = WhatIf {
+            distal_mm: Some(99.0),
+            ..WhatIf::default()
+        };
+        assert!(refused(sunk).contains("distal_mm"));
+        let technique = WhatIf {
+            technique: Some("elbow".to_owned()),
+            ..WhatIf::default()
+        };
+        assert!(refused(technique).contains("expected ankle, knee"));
+        let angle = WhatIf {
+            angle_deg: f64::NAN,
+            ..WhatIf::default()
+        };
+        assert!(refused(angle).contains("expected -360 to 360"));
+    }
+}

@@ -1,0 +1,208 @@
+//! Chromium with the page of a phantom, driven as a person would.
+
+use std::net::TcpListener;
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use fantoccini::wd::WebDriverCompatibleCommand;
+use fantoccini::{Client, ClientBuilder, Locator};
+use hyper_util::client::legacy::connect::HttpConnector;
+use ppa_studio::{Opening, Studio, serve};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use crate::browser::{FINE_MM, phantom};
+
+/// How long anything on the page may take.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A served phantom and the browser that shows it.
+pub struct Page {
+    pub client: Client,
+    pub folder: TempDir,
+    served: Served,
+    driver: Driver,
+}
+
+struct Served {
+    stop: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.stop = None;
+        if let Some(thread) = self.thread.take() {
+            thread.join().unwrap();
+        }
+    }
+}
+
+struct Driver(Child);
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Page {
+    pub async fn open() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let case = phantom(folder.path(), FINE_MM);
+        let studio = Studio::open(&Opening::of(&case)).unwrap();
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = studio.address(listener.local_addr().unwrap());
+        let (stop, stopped) = channel();
+        let thread = std::thread::spawn(move || serve(studio, listener, stopped).unwrap());
+        let served = Served {
+            stop: Some(stop),
+            thread: Some(thread),
+        };
+        let (driver, client) = browser().await;
+        client.goto(&address).await.unwrap();
+        let page = Self {
+            client,
+            folder,
+            served,
+            driver,
+        };
+        page.wait("document.getElementById('name').textContent === 'p01.case.toml'")
+            .await;
+        page
+    }
+
+    /// Waits until an expression of the page is true.
+    pub async fn wait(&self, expression: &str) {
+        let started = Instant::now();
+        while self.value(expression).await != json!(true) {
+            let message = self
+                .value("document.getElementById('message')?.textContent")
+                .await;
+            assert!(
+                started.elapsed() < PATIENCE,
+                "{expression} is not true; the page says {message}"
+            );
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    }
+
+    pub async fn value(&self, expression: &str) -> Value {
+        let script = format!("return {expression};");
+        self.client.execute(&script, vec![]).await.unwrap()
+    }
+
+    pub async fn click(&self, selector: &str) {
+        let found = self.client.find(Locator::Css(selector)).await;
+        found
+            .unwrap_or_else(|error| panic!("{selector}: {error}"))
+            .click()
+            .await
+            .unwrap();
+    }
+
+    /// Types into a field in place of what it holds, and leaves it.
+    pub async fn fill(&self, selector: &str, text: &str) {
+        let field = self.client.find(Locator::Css(selector)).await.unwrap();
+        field.click().await.unwrap();
+        let select_all = "\u{e009}a\u{e000}";
+        field
+            .send_keys(&format!("{select_all}{text}\u{e004}"))
+            .await
+            .unwrap();
+    }
+
+    /// Moves a slider, as dragging does.
+    pub async fn slide(&self, id: &str, value: f64) {
+        self.client
+            .execute(
+                "const s = document.getElementById(arguments[0]); s.value = arguments[1]; \
+                 s.dispatchEvent(new Event('input', {bubbles: true})); s.dispatchEvent(new Event('change', {bubbles: true}));",
+                vec![json!(id), json!(value)],
+            )
+            .await
+            .unwrap();
+    }
+
+    /// Saves what is seen, in the folder `PPA_PAGE_PICTURES` if it is set.
+    pub async fn picture(&self, name: &str) {
+        if let Some(folder) = std::env::var_os("PPA_PAGE_PICTURES") {
+            let png = self.client.screenshot().await.unwrap();
+            std::fs::write(PathBuf::from(folder).join(format!("{name}.png")), png).unwrap();
+        }
+    }
+
+    /// Ends the browser; nothing may have gone wrong in its console.
+    pub async fn close(self) {
+        let log = self.client.issue_cmd(ConsoleLog).await.unwrap();
+        let severe: Vec<&Value> = (log.as_array().unwrap().iter())
+            .filter(|entry| entry["level"] == "SEVERE")
+            // Answers that a later request replaced are expected.
+            .filter(|entry| {
+                !entry["message"]
+                    .as_str()
+                    .unwrap_or_default()
+                    .contains("409")
+            })
+            .collect();
+        assert!(severe.is_empty(), "{severe:?}");
+        self.client.close().await.unwrap();
+        drop(self.served);
+        drop(self.driver);
+    }
+}
+
+async fn browser() -> (Driver, Client) {
+    let free = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = free.local_addr().unwrap().port();
+    drop(free);
+    let mut command = Command::new("chromedriver");
+    command.arg(format!("--port={port}"));
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    let driver = Driver(command.spawn().expect("chromedriver is installed"));
+    let arguments = [
+        "--headless=new",
+        "--no-sandbox",
+        "--window-size=1280,800",
+        "--force-device-scale-factor=1",
+        "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader",
+    ];
+    let options = json!({ "args": arguments });
+    let wishes =
+        json!({ "goog:chromeOptions": options, "goog:loggingPrefs": { "browser": "ALL" } });
+    let wishes = wishes.as_object().unwrap().clone();
+    let address = format!("http://127.0.0.1:{port}");
+    let started = Instant::now();
+    loop {
+        let mut builder = ClientBuilder::new(HttpConnector::new());
+        match builder.capabilities(wishes.clone()).connect(&address).await {
+            Ok(client) => return (driver, client),
+            Err(error) => assert!(started.elapsed() < PATIENCE, "{error}"),
+        }
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+}
+
+/// Chromium's own command for the messages of the console.
+#[derive(Debug)]
+struct ConsoleLog;
+
+impl WebDriverCompatibleCommand for ConsoleLog {
+    fn endpoint(
+        &self,
+        base: &url::Url,
+        session: Option<&str>,
+    ) -> Result<url::Url, url::ParseError> {
+        base.join(&format!("session/{}/se/log", session.unwrap_or_default()))
+    }
+
+    fn method_and_body(&self, _: &url::Url) -> (http::Method, Option<String>) {
+        let body = json!({ "type": "browser" });
+        (http::Method::POST, Some(body.to_string()))
+    }
+}

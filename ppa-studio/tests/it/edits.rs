@@ -1,0 +1,108 @@
+//! Landmarks that a person changes, and the files that hold them.
+
+use axum::http::StatusCode;
+use ppa_generate::{Case, Plan, PreparedLimb};
+use serde_json::json;
+
+use crate::browser::Browser;
+
+#[test]
+fn a_choice_is_saved_beside_the_case_with_its_comments() {
+    let browser = Browser::new();
+    let before = std::fs::read_to_string(&browser.case).unwrap();
+    let commented = before.replace("\n[surface]\n", "\n# Looked at on Monday.\n[surface]\n");
+    std::fs::write(&browser.case, &commented).unwrap();
+
+    let state = browser.get("/api/state").json();
+    let mut joint: [f64; 3] =
+        serde_json::from_value(state["landmarks"]["joint_centre"].clone()).unwrap();
+    joint[0] += 4.0;
+    let state = browser
+        .post("/api/choices", &json!({ "joint_centre": joint }))
+        .json();
+    assert_eq!(state["choices"]["joint_centre"], json!(joint));
+    assert_eq!(state["can_undo"], true);
+
+    // The commands find what the page shows.
+    assert_eq!(std::fs::read_to_string(&browser.case).unwrap(), commented);
+    let edited = browser.folder.path().join("p01.edited.case.toml");
+    let text = std::fs::read_to_string(&edited).unwrap();
+    assert!(text.contains("# Looked at on Monday."), "{text}");
+    let case = Case::read(&edited).unwrap();
+    assert_eq!(case.choices.joint_centre, Some(joint));
+    let found = PreparedLimb::of_case(&case).unwrap().landmarks;
+    let found = serde_json::to_value(&found).unwrap();
+    assert_eq!(found, state["landmarks"]);
+
+    let state = browser.post("/api/undo", &json!({})).json();
+    assert_eq!(state["landmarks"], state["automatic"]);
+    let state = browser.post("/api/redo", &json!({})).json();
+    assert_eq!(state["choices"]["joint_centre"], json!(joint));
+
+    // Saved over the original on request alone.
+    let state = browser.post("/api/save", &json!({})).json();
+    assert_eq!(state["files"]["has_edits"], false);
+    assert!(!edited.exists());
+    let text = std::fs::read_to_string(&browser.case).unwrap();
+    assert!(text.contains("# Looked at on Monday."));
+    assert_eq!(Case::read(&browser.case).unwrap(), case);
+}
+
+#[test]
+fn changes_are_taken_up_again_by_the_next_studio() {
+    let browser = Browser::new();
+    let changed = json!({ "joint_region": [8.0, 20.0] });
+    browser.post("/api/choices", &changed).json();
+    let Browser { folder, case, .. } = browser;
+    let next = Browser::of(folder, case);
+    let state = next.get("/api/state").json();
+    assert_eq!(state["choices"]["joint_region"], json!([8.0, 20.0]));
+    assert_eq!(state["files"]["has_edits"], true);
+}
+
+#[test]
+fn what_finds_nothing_changes_nothing() {
+    let browser = Browser::new();
+    let before = browser.get("/api/state").json();
+    let refused = browser.post("/api/choices", &json!({ "joint_region": [20.0, 8.0] }));
+    assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert!(!refused.text().is_empty());
+    let refused = browser.post("/api/surface", &json!({ "iso_hu": 3000.0 }));
+    assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert_eq!(browser.get("/api/state").json(), before);
+}
+
+#[test]
+fn a_file_that_another_program_changed_is_kept() {
+    let browser = Browser::new();
+    let edited = browser.folder.path().join("p01.edited.case.toml");
+    std::fs::write(&edited, "somebody else's").unwrap();
+    let refused = browser.post("/api/choices", &json!({ "joint_region": [8.0, 20.0] }));
+    assert_eq!(refused.status, StatusCode::CONFLICT);
+    assert!(
+        refused.text().contains("another program"),
+        "{}",
+        refused.text()
+    );
+    assert_eq!(std::fs::read_to_string(&edited).unwrap(), "somebody else's");
+}
+
+#[test]
+fn a_saved_plan_holds_the_sliders_and_is_not_replaced_unasked() {
+    let browser = Browser::new();
+    let what_if = json!({ "angle_deg": 18.0, "distal_mm": 3.0, "kvp": 55.0, "mas": 4.0, "grid": true, "sensor": true });
+    let saved = browser
+        .post("/api/plan", &json!({ "what_if": what_if }))
+        .json();
+    let file = saved["file"].as_str().unwrap();
+    let plan = Plan::read(file.as_ref()).unwrap();
+    assert_eq!(plan.soft_tissue.distal_mm, 3.0);
+    assert_eq!(plan.xray.kvp, 55.0);
+    assert!(plan.xray.receptor.grid.is_some() && plan.depth.sensor.is_some());
+    assert_eq!(plan.cases.len(), 1);
+    let again = browser.post("/api/plan", &json!({ "what_if": {} }));
+    assert_eq!(again.status, StatusCode::CONFLICT);
+    assert_eq!(Plan::read(file.as_ref()).unwrap(), plan);
+    let replaced = json!({ "what_if": {}, "replace": true });
+    assert_eq!(browser.post("/api/plan", &replaced).status, StatusCode::OK);
+}

@@ -1,0 +1,180 @@
+//! Slices, skin, depth images and radiographs.
+
+use axum::http::StatusCode;
+use image::GenericImageView;
+use ppa_depth::false_colour;
+use ppa_generate::{Case, Plan, PreparedLimb, SceneSetup, VisibleLimb};
+use serde_json::json;
+
+use crate::browser::{Answer, Browser, FINE_MM, phantom};
+
+fn picture(answer: &Answer) -> image::DynamicImage {
+    assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
+    image::load_from_memory(&answer.body).unwrap()
+}
+
+#[test]
+fn a_slice_holds_the_voxels_of_the_scan_and_the_limb() {
+    let browser = Browser::new();
+    let limb = PreparedLimb::of_case(&Case::read(&browser.case).unwrap()).unwrap();
+    let grid = limb.volume.grid();
+    let [ni, nj, nk] = grid.size();
+    for (axis, index, columns, rows) in [(2, nk / 2, ni, nj), (1, nj / 2, ni, nk), (0, 3, nj, nk)] {
+        let slice = browser.get(&format!("/api/slice/{axis}/{index}"));
+        assert_eq!(slice.body.len(), 3 * columns * rows);
+        for (column, row) in [(0, 0), (columns - 1, 0), (columns / 2, rows / 2)] {
+            let voxel = match axis {
+                0 => [index, column, row],
+                1 => [column, index, row],
+                _ => [column, row, index],
+            };
+            let at = row * columns + column;
+            let hu = i16::from_le_bytes([slice.body[2 * at], slice.body[2 * at + 1]]);
+            assert_eq!(f32::from(hu), limb.volume.at(voxel));
+            let inside = slice.body[2 * columns * rows + at] == 1;
+            assert_eq!(inside, limb.limb.mask[grid.index(voxel)]);
+        }
+    }
+    let outside = browser.get(&format!("/api/slice/2/{nk}"));
+    assert_eq!(outside.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert!(outside.text().contains("outside the scan"));
+}
+
+#[test]
+fn depth_images_are_those_of_the_library_in_false_colour() {
+    let browser = Browser::new();
+    let answer = browser.post(
+        "/api/depth",
+        &json!({ "angle_deg": 18.0, "distal_mm": 2.0 }),
+    );
+    let shown = picture(&answer);
+    let mut plan = Plan::new(Vec::new());
+    plan.soft_tissue.distal_mm = 2.0;
+    let setup = SceneSetup::of_plan(&plan).unwrap();
+    let limb = PreparedLimb::of_case(&Case::read(&browser.case).unwrap()).unwrap();
+    let limb = VisibleLimb::new(limb).unwrap();
+    let views = limb.depth_views(&setup, &plan, 18.0, plan.seed).unwrap();
+    let [left, right] = &views[..] else { panic!() };
+    assert_eq!(shown.width(), left.image.width + right.image.width);
+    let report: serde_json::Value =
+        serde_json::from_slice(answer.headers["x-report"].as_bytes()).unwrap();
+    let range: [f64; 2] = serde_json::from_value(report["range_mm"].clone()).unwrap();
+    for (x, y) in [(300, 280), (320, 300), (1000, 250)] {
+        let (view, column) = if x < left.image.width {
+            (left, x)
+        } else {
+            (right, x - left.image.width)
+        };
+        let z_mm = view.image.z_mm[(y * view.image.width + column) as usize];
+        assert_eq!(
+            shown.get_pixel(x, y).0[..3],
+            false_colour(f64::from(z_mm), range)
+        );
+    }
+}
+
+#[test]
+fn of_many_depth_requests_at_once_few_are_computed() {
+    let browser = Browser::new();
+    let requests = (0..100).map(|angle| {
+        let what_if = json!({ "angle_deg": angle });
+        browser.posting("/api/depth", what_if.to_string())
+    });
+    let answers = browser.send_all(requests.collect());
+    let count = |status| answers.iter().filter(|a| a.status == status).count();
+    // The newest, and those that began before the next one came.
+    assert!((1..20).contains(&count(StatusCode::OK)));
+    assert_eq!(count(StatusCode::OK) + count(StatusCode::CONFLICT), 100);
+    let next = browser.post("/api/depth", &json!({ "angle_deg": 3.0 }));
+    assert_eq!(next.status, StatusCode::OK);
+}
+
+#[test]
+fn a_radiograph_is_first_coarse_and_then_whole() {
+    let browser = Browser::new();
+    let what_if = json!({ "angle_deg": 18.0, "mas": 4.0 });
+    let first = picture(&browser.post("/api/radiograph/first", &what_if));
+    assert!(first.width() < 200);
+    let last = browser.post("/api/radiograph/final", &what_if);
+    assert_eq!(picture(&last).dimensions(), (448, 448));
+    let report = last.headers["x-report"].to_str().unwrap();
+    assert!(report.contains("\"mas\":4.0"), "{report}");
+    assert_eq!(
+        browser.post("/api/radiograph/best", &what_if).status,
+        StatusCode::NOT_FOUND
+    );
+}
+
+#[test]
+fn a_change_of_the_pose_ends_the_radiograph_under_way() {
+    let browser = Browser::new();
+    let what_if = json!({ "angle_deg": 18.0 }).to_string();
+    let requests = vec![
+        browser.posting("/api/radiograph/final", what_if.clone()),
+        browser.posting("/api/depth", what_if),
+    ];
+    let answers = browser.send_all(requests);
+    assert_eq!(answers[0].status, StatusCode::CONFLICT);
+    assert_eq!(answers[1].status, StatusCode::OK);
+}
+
+#[test]
+fn commands_name_the_files_and_options_of_the_page() {
+    let browser = Browser::new();
+    let what_if = json!({ "angle_deg": 18.5, "kvp": 55.0, "filters": ["Al:3"], "mas": 4.0 });
+    let commands = browser.post("/api/commands", &what_if).json();
+    let radiograph = commands["radiograph"].as_str().unwrap();
+    assert!(radiograph.starts_with("ppa xray simulate "));
+    assert!(
+        radiograph.contains("--angle 18.5 --kvp 55 --filter Al:3 --mas 4 --out radiograph.png")
+    );
+    assert_eq!(commands["need_saved_plan"], false);
+    let commands = browser
+        .post("/api/commands", &json!({ "distal_mm": 2.0 }))
+        .json();
+    assert_eq!(commands["need_saved_plan"], true);
+    assert!(
+        commands["depth"]
+            .as_str()
+            .unwrap()
+            .contains("p01.studio.plan.toml")
+    );
+}
+
+#[test]
+fn the_label_of_a_pose_follows_its_rotation() {
+    // Gutters need finer voxels.
+    let folder = tempfile::tempdir().unwrap();
+    let case = phantom(folder.path(), FINE_MM);
+    let browser = Browser::of(folder, case);
+    let label = |angle_deg: f64| {
+        let label = browser.post("/api/label", &json!({ "angle_deg": angle_deg }));
+        label.json()["label"].as_f64().unwrap()
+    };
+    // The mortise view of P01 is at 18 degrees.
+    assert!(label(18.0) < 2.5);
+    assert_eq!(label(70.0), 3.0);
+    let mut case = Case::read(&browser.case).unwrap();
+    case.bones = None;
+    case.write(&browser.case).unwrap();
+    let Browser { folder, case, .. } = browser;
+    let without_bones = Browser::of(folder, case);
+    let label = without_bones.post("/api/label", &json!({ "angle_deg": 18.0 }));
+    assert_eq!(label.json(), serde_json::Value::Null);
+}
+
+#[test]
+fn a_surface_at_another_hu_shows_all_of_the_scan() {
+    let browser = Browser::new();
+    let vertices = |hu: f64| {
+        let surface = browser.post("/api/surface_at", &json!({ "iso_hu": hu }));
+        assert_eq!(surface.status, StatusCode::OK, "{}", surface.text());
+        let count =
+            |at: usize| u32::from_le_bytes(surface.body[at..at + 4].try_into().unwrap()) as usize;
+        assert_eq!(surface.body.len(), 8 + 24 * count(0) + 12 * count(4));
+        count(0)
+    };
+    assert!(vertices(300.0) > 1000 && vertices(-500.0) > 1000);
+    let refused = browser.post("/api/surface_at", &json!({ "iso_hu": 9000.0 }));
+    assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
+}

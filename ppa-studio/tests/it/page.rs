@@ -1,0 +1,150 @@
+//! The page in Chromium: each step as a person takes it.
+
+use fantoccini::Locator;
+use ppa_generate::Case;
+use serde_json::json;
+
+use crate::chromium::Page;
+
+fn run(test: impl Future<Output = ()>) {
+    let mut runtime = tokio::runtime::Builder::new_multi_thread();
+    runtime.enable_all().build().unwrap().block_on(test);
+}
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn slices_follow_keys_and_the_window() {
+    run(async {
+        let page = Page::open().await;
+        let caption = "document.querySelector('[data-axis=\"2\"] figcaption').textContent";
+        page.wait(&format!("{caption}.startsWith('k = ')")).await;
+        let before = page.value(caption).await;
+        page.picture("scan").await;
+        let canvas = Locator::Css("[data-axis='2'] canvas");
+        let canvas = page.client.find(canvas).await.unwrap();
+        canvas.send_keys("\u{e013}").await.unwrap(); // arrow up
+        page.wait(&format!("{caption} !== {before}")).await;
+        // Brighter through a lower level.
+        let light = "(() => { const c = document.querySelector('[data-axis=\"2\"] canvas'); \
+                     const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; \
+                     let s = 0; for (let i = 0; i < d.length; i += 4) s += d[i]; return s; })()";
+        let dark = page.value(light).await.as_f64().unwrap();
+        page.slide("level", -400.0).await;
+        assert!(page.value(light).await.as_f64().unwrap() > 1.2 * dark);
+        page.close().await;
+    });
+}
+
+/// Middle of the joint's mark in the slice across the second axis: of the pixels that have its colour.
+const JOINT: &str = "(() => { const c = document.querySelector('[data-axis=\"1\"] canvas'); \
+                     const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let [n, x, y] = [0, 0, 0]; \
+                     for (let i = 0; i < d.length; i += 4) if (d[i] === 255 && d[i + 1] === 122 && d[i + 2] === 217) \
+                       { n += 1; x += (i / 4) % c.width; y += Math.floor(i / 4 / c.width); } \
+                     return [x / n, y / n]; })()";
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn a_dragged_landmark_is_saved_and_undone() {
+    run(async {
+        let page = Page::open().await;
+        page.click("#tab-landmarks").await;
+        let joint = "document.querySelector('#landmark-table tbody tr').textContent";
+        page.wait(&format!("!{joint}.includes('chosen')")).await;
+        page.picture("landmarks").await;
+        let at = page.value(JOINT).await;
+        let drag = "const [x, y] = arguments[0]; const c = document.querySelector('[data-axis=\"1\"] canvas'); \
+                    c.setPointerCapture = () => {}; const r = c.getBoundingClientRect(); \
+                    for (const [type, dx] of [['pointerdown', 0], ['pointermove', 12], ['pointerup', 12]]) \
+                      c.dispatchEvent(new PointerEvent(type, {bubbles: true, pointerId: 1, clientX: r.x + x + dx, clientY: r.y + y}));";
+        page.client.execute(drag, vec![at]).await.unwrap();
+        page.wait(&format!("{joint}.includes('chosen')")).await;
+        let edited = page.folder.path().join("p01.edited.case.toml");
+        let chosen = Case::read(&edited).unwrap().choices.joint_centre.unwrap();
+        page.picture("landmarks_chosen").await;
+
+        // A reload shows the same; the keyboard undoes it.
+        page.client.refresh().await.unwrap();
+        page.wait(&format!(
+            "!!document.querySelector('#landmark-table tbody tr') && {joint}.includes('chosen')"
+        ))
+        .await;
+        assert_eq!(
+            Case::read(&edited).unwrap().choices.joint_centre,
+            Some(chosen)
+        );
+        let body = page.client.find(Locator::Css("body")).await.unwrap();
+        body.send_keys("\u{e009}z\u{e000}").await.unwrap();
+        page.wait(&format!("!{joint}.includes('chosen')")).await;
+        assert_eq!(Case::read(&edited).unwrap().choices.joint_centre, None);
+
+        // A region by its number, found again by its button.
+        page.fill("#joint_region-from", "9").await;
+        page.wait(
+            "document.querySelectorAll('#landmark-table tbody tr')[1].textContent.includes('chosen')",
+        )
+        .await;
+        assert!(Case::read(&edited).unwrap().choices.joint_region.is_some());
+        page.click("[aria-label='Find again: Axis']").await;
+        page.wait(
+            "document.querySelectorAll('#landmark-table tbody tr')[1].textContent.includes('chosen') === false",
+        )
+        .await;
+        page.close().await;
+    });
+}
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn the_skin_follows_the_iso_value() {
+    run(async {
+        let page = Page::open().await;
+        page.click("#tab-skin").await;
+        let points = "document.querySelector('#skin-facts').textContent";
+        page.wait(&format!("{points}.includes('Points')")).await;
+        let before = page.value(points).await;
+        page.slide("iso", -300.0).await;
+        page.wait(&format!("{points} !== {before}")).await;
+        page.picture("skin").await;
+        let edited = page.folder.path().join("p01.edited.case.toml");
+        assert_eq!(Case::read(&edited).unwrap().surface.iso_hu, -300.0);
+        page.close().await;
+    });
+}
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn images_follow_the_sliders_and_the_newest_wins() {
+    run(async {
+        let page = Page::open().await;
+        page.click("#tab-whatif").await;
+        page.wait("document.querySelector('#radiograph').dataset.pass === 'final'")
+            .await;
+        page.wait("!!document.querySelector('#depth img').src")
+            .await;
+        page.picture("whatif").await;
+        // A hundred events within a second: the last one is what is shown.
+        for step in 0..100 {
+            page.slide("slider-angle_deg", f64::from(step) * 0.5).await;
+        }
+        page.slide("slider-angle_deg", 18.0).await;
+        page.wait("document.querySelector('#command-list').textContent.includes('--angle 18 ')")
+            .await;
+        page.wait("document.querySelector('#radiograph figcaption').textContent.startsWith('final image')").await;
+        page.picture("whatif_18").await;
+        page.slide("slider-distal_mm", 30.0).await;
+        assert_eq!(
+            page.value("document.getElementById('slider-distal_mm').value")
+                .await,
+            json!("20")
+        );
+
+        // The steps are addresses: back leads to the one before.
+        page.click("#tab-room").await;
+        page.wait("document.querySelector('#room-facts').textContent.includes('Focal spot')")
+            .await;
+        page.picture("room").await;
+        page.client.back().await.unwrap();
+        page.wait("document.body.dataset.step === 'whatif'").await;
+        page.close().await;
+    });
+}
