@@ -1,0 +1,82 @@
+"""Pictures by matplotlib, which is imported when the first is drawn."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ._ppa import Case, DepthImage, Pose, Radiograph
+
+#: Triangles beyond which a skin is drawn from every n-th one.
+_MOST_TRIANGLES = 6000
+
+
+def _axes(ax: Any, **options: Any) -> Any:
+    if ax is not None:
+        return ax
+    pyplot: Any = importlib.import_module("matplotlib.pyplot")
+    return pyplot.figure().add_subplot(**options)
+
+
+def radiograph(image: Radiograph, ax: Any) -> Any:
+    """The picture in grey, with the detector in mm."""
+    axes = _axes(ax)
+    rows, columns = image.total.shape
+    width, height = columns * image.pixel_mm / 2, rows * image.pixel_mm / 2
+    axes.imshow(image.picture(), cmap="gray", extent=(-width, width, height, -height))
+    axes.set(xlabel="x of the detector / mm", ylabel="y of the detector / mm")
+    return axes
+
+
+def depth(image: DepthImage, ax: Any) -> Any:
+    """Depths in colour; white where nothing is seen."""
+    axes = _axes(ax)
+    depths = np.ma.masked_equal(image.z_mm, 0)
+    drawn = axes.imshow(depths, cmap="viridis_r")
+    axes.figure.colorbar(drawn, ax=axes, label="depth / mm")
+    axes.set(xlabel="column", ylabel="row")
+    return axes
+
+
+def _skin(axes: Any, vertices: Any, triangles: Any) -> None:
+    step = max(1, len(triangles) // _MOST_TRIANGLES)
+    axes.plot_trisurf(
+        vertices[:, 0], vertices[:, 1], vertices[:, 2], triangles=triangles[::step], color="tan", alpha=0.7
+    )
+    axes.set_box_aspect(np.ptp(vertices, axis=0))
+
+
+def case(limb: Case, ax: Any) -> Any:
+    """The skin in the scan with joint, axis and the points of the supporting plane."""
+    axes = _axes(ax, projection="3d")
+    _skin(axes, limb.vertices, limb.triangles)
+    along = limb.axis[1] - limb.axis[0]
+    ends = limb.joint + np.outer([-1.0, 2.0], along)
+    axes.plot(*ends.T, color="tab:blue", label="axis")
+    axes.scatter(*limb.joint, color="tab:red", label="joint")
+    axes.scatter(*limb.plane.T, color="tab:green", label="plane")
+    axes.set(xlabel="left / mm", ylabel="posterior / mm", zlabel="superior / mm")
+    axes.legend()
+    return axes
+
+
+def pose(posed: Pose, ax: Any) -> Any:
+    """The skin in the room with x-ray source, detector and cameras."""
+    axes = _axes(ax, projection="3d")
+    vertices = posed.vertices
+    _skin(axes, vertices, posed.triangles)
+    frames = posed.frames
+    device = frames["room_from_device"]
+    distance = posed.source_detector_mm
+    beam = np.array([device @ (0.0, 0.0, z, 1.0) for z in (0.0, distance)])[:, :3]
+    axes.plot(*beam.T, color="tab:blue", label="central beam")
+    for name in ("left", "right"):
+        axes.scatter(*frames[f"room_from_{name}"][:3, 3], label=f"{name} camera")
+    axes.set(xlabel="x / mm", ylabel="y / mm", zlabel="z / mm")
+    everything = np.concatenate([vertices, beam])
+    axes.set_box_aspect(np.maximum(np.ptp(everything, axis=0), 1.0))
+    axes.legend()
+    return axes

@@ -1,0 +1,192 @@
+//! Arrays of numpy: what is taken from Python is checked first, what is given out is not copied where its owner lives on.
+
+use numpy::ndarray::{ArrayView, Dimension, ShapeBuilder};
+use numpy::{
+    Element, IntoPyArray, PyArray, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+
+/// The type and the shape of an array, as messages name them.
+fn described(array: &Bound<'_, PyUntypedArray>) -> String {
+    let dtype = array.dtype().to_string();
+    format!("{dtype} of shape {}", shape(array.shape()))
+}
+
+/// A shape as numpy prints it.
+fn shape(sizes: &[usize]) -> String {
+    let sizes: Vec<String> = sizes.iter().map(ToString::to_string).collect();
+    match &sizes[..] {
+        [only] => format!("({only},)"),
+        _ => format!("({})", sizes.join(", ")),
+    }
+}
+
+/// An array of any type: anything else is refused.
+pub fn untyped<'a, 'py>(
+    object: &'a Bound<'py, PyAny>,
+    name: &str,
+) -> PyResult<&'a Bound<'py, PyUntypedArray>> {
+    object.cast::<PyUntypedArray>().map_err(|_| {
+        let found = object.get_type().name().map(|name| name.to_string());
+        PyTypeError::new_err(format!(
+            "{name} is of type {}, expected a numpy array",
+            found.unwrap_or_default()
+        ))
+    })
+}
+
+/// The elements of an array of exactly the type `T` and `dimensions` dimensions, the first index fastest.
+///
+/// Elements in the memory order of C are put into that order; those that are not contiguous are refused.
+pub fn first_fastest<T: Element + Copy>(
+    object: &Bound<'_, PyAny>,
+    name: &str,
+    dimensions: usize,
+) -> PyResult<(Vec<T>, Vec<usize>)> {
+    let array = untyped(object, name)?;
+    let typed: Option<PyReadonlyArrayDyn<'_, T>> = object.extract().ok();
+    let Some(typed) = typed.filter(|typed| typed.ndim() == dimensions) else {
+        return Err(PyValueError::new_err(format!(
+            "{name} is an array of {}, expected {} with {dimensions} dimensions",
+            described(array),
+            T::get_dtype(object.py())
+        )));
+    };
+    let sizes = typed.shape().to_vec();
+    if !typed.is_fortran_contiguous() && !typed.is_c_contiguous() {
+        return Err(PyValueError::new_err(format!(
+            "{name} is not contiguous (strides of {:?} bytes), expected numpy.ascontiguousarray(…) of it",
+            array.strides()
+        )));
+    }
+    let Ok(elements) = typed.as_slice() else {
+        return Err(PyValueError::new_err(format!(
+            "{name} does not begin at a multiple of the size of its elements, expected a copy of it"
+        )));
+    };
+    if typed.is_fortran_contiguous() {
+        return Ok((elements.to_vec(), sizes));
+    }
+    let reversed = typed.as_array().reversed_axes();
+    Ok((reversed.iter().copied().collect(), sizes))
+}
+
+/// An array of a type, or of its own, whose elements lie where the processor wants them; copied if they do not.
+pub fn required<'py>(
+    object: &Bound<'py, PyAny>,
+    dtype: Option<&str>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let numpy = object.py().import("numpy")?;
+    numpy.call_method1("require", (object, dtype, ["ALIGNED"]))
+}
+
+/// Numbers in any form that numpy understands, as float64 with a given shape; sizes of 0 take any length.
+pub fn numbers(object: &Bound<'_, PyAny>, name: &str, expected: &[usize]) -> PyResult<Vec<f64>> {
+    let py = object.py();
+    let array = required(object, Some("float64")).map_err(|error| {
+        let refused = PyTypeError::new_err(format!("{name} is no array of numbers"));
+        refused.set_cause(py, Some(error));
+        refused
+    })?;
+    let typed: PyReadonlyArrayDyn<'_, f64> = array.extract()?;
+    let fits = typed.shape().len() == expected.len()
+        && (typed.shape().iter().zip(expected)).all(|(found, size)| *size == 0 || found == size);
+    if !fits {
+        let any = shape(expected).replace("(0", "(n");
+        return Err(PyValueError::new_err(format!(
+            "{name} has the shape {}, expected {any}",
+            shape(typed.shape())
+        )));
+    }
+    let values: Vec<f64> = typed.as_array().iter().copied().collect();
+    Ok(values)
+}
+
+/// As [`numbers`], all of them finite.
+pub fn finite<const N: usize>(
+    object: &Bound<'_, PyAny>,
+    name: &str,
+    expected: &[usize],
+) -> PyResult<[f64; N]> {
+    let values = numbers(object, name, expected)?;
+    if let Some(bad) = values.iter().find(|value| !value.is_finite()) {
+        return Err(PyValueError::new_err(format!(
+            "{name} contains {bad}, expected finite numbers"
+        )));
+    }
+    Ok(values.try_into().expect("as many as the shape holds"))
+}
+
+/// A point or direction.
+pub fn point(object: &Bound<'_, PyAny>, name: &str) -> PyResult<[f64; 3]> {
+    finite(object, name, &[3])
+}
+
+/// Points, one in a row.
+pub fn points<const N: usize>(object: &Bound<'_, PyAny>, name: &str) -> PyResult<[[f64; 3]; N]> {
+    let values = numbers(object, name, &[N, 3])?;
+    if let Some(bad) = values.iter().find(|value| !value.is_finite()) {
+        return Err(PyValueError::new_err(format!(
+            "{name} contains {bad}, expected finite numbers"
+        )));
+    }
+    Ok(std::array::from_fn(|row| {
+        std::array::from_fn(|axis| values[3 * row + axis])
+    }))
+}
+
+/// Rows of a 4 x 4 matrix.
+pub fn matrix(object: &Bound<'_, PyAny>, name: &str) -> PyResult<[[f64; 4]; 4]> {
+    let values: [f64; 16] = finite(object, name, &[4, 4])?;
+    Ok(std::array::from_fn(|row| {
+        std::array::from_fn(|column| values[4 * row + column])
+    }))
+}
+
+/// An array of one row for each item.
+pub fn of_rows<T: Element, const N: usize>(
+    py: Python<'_>,
+    rows: Vec<[T; N]>,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let count = rows.len();
+    rows.into_flattened().into_pyarray(py).reshape([count, N])
+}
+
+/// A read-only view of elements that belong to `owner`: no copy.
+///
+/// # Safety
+/// The elements must stay where they are, unchanged, as long as `owner` lives.
+#[allow(unsafe_code)]
+pub unsafe fn view<'py, T: Element, D: Dimension>(
+    owner: Bound<'py, PyAny>,
+    elements: &[T],
+    shape: impl ShapeBuilder<Dim = D>,
+) -> PyResult<Bound<'py, PyArray<T, D>>> {
+    let elements = ArrayView::from_shape(shape, elements).expect("as many as the shape holds");
+    // SAFETY: numpy keeps `owner` alive as long as the array; the caller promises that the elements live as long and do not
+    // change, and the array is made read-only before anyone else sees it.
+    let array = unsafe { PyArray::borrow_from_array(&elements, owner) };
+    array.call_method1("setflags", (false,))?;
+    Ok(array)
+}
+
+/// What `__array__` gives: the array, of another type if one is asked for; NumPy 2 asks with `copy` for one, or for none.
+pub fn converted<'py>(
+    array: Bound<'py, PyAny>,
+    dtype: Option<&Bound<'py, PyAny>>,
+    copy: Option<bool>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let of_type = match dtype {
+        Some(dtype) => array.call_method1("astype", (dtype,))?,
+        None => array.clone(),
+    };
+    match (copy, of_type.is(&array)) {
+        (Some(true), true) => array.call_method0("copy"),
+        (Some(false), false) => Err(PyValueError::new_err(
+            "another type needs a copy, but copy=False was given",
+        )),
+        _ => Ok(of_type),
+    }
+}

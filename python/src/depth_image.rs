@@ -1,0 +1,111 @@
+//! `ppa.DepthImage`: depths of one camera.
+
+use std::path::PathBuf;
+
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
+use ppa_depth::{Camera, DepthImage};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::arrays::{of_rows, view};
+use crate::errors::OrRaise;
+use crate::values::plain;
+
+/// Depths in mm, z of the camera's frame; 0 where nothing is seen.
+#[pyclass(frozen, module = "ppa", name = "DepthImage")]
+pub struct PyDepthImage {
+    pub image: DepthImage,
+    pub camera: Camera,
+}
+
+impl PyDepthImage {
+    fn shape(&self) -> [usize; 2] {
+        [self.image.height as usize, self.image.width as usize]
+    }
+}
+
+#[pymethods]
+impl PyDepthImage {
+    /// numpy.ndarray, shape (rows, columns), float32: depths in mm, 0 where nothing is seen. A read-only view.
+    #[getter]
+    #[allow(unsafe_code)]
+    fn z_mm<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let image = this.get();
+        // SAFETY: the image is never changed, and stays where it is in its frozen object.
+        unsafe { view(this.clone().into_any(), &image.image.z_mm, image.shape()) }
+    }
+
+    /// numpy.ndarray, shape (rows, columns), uint16: depths in whole mm, as PNG files hold them.
+    fn to_uint16<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u16>>> {
+        let whole = self.image.to_u16();
+        whole.z_mm.into_pyarray(py).reshape(self.shape())
+    }
+
+    /// numpy.ndarray, shape (n, 3): the points that are seen, in the camera's frame, mm.
+    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let points = self.image.points(&self.camera).or_raise()?;
+        of_rows(py, points.iter().map(|p| [p.x, p.y, p.z]).collect())
+    }
+
+    /// dict: the lens of the camera, as its JSON.
+    #[getter]
+    fn lens<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        plain(py, self.camera.spec())
+    }
+
+    /// Write the image: 16-bit PNG in mm, OpenEXR, or the points that are seen as PLY. A file that is there is replaced.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     .png, .exr or .ply
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        let extension = path
+            .extension()
+            .map(|e| e.to_string_lossy().to_ascii_lowercase());
+        match extension.as_deref() {
+            Some("png") => self.image.write_png(&path).map(drop).or_raise(),
+            Some("exr") => self.image.write_exr(&path).or_raise(),
+            Some("ply") => self.image.write_points(&self.camera, &path).or_raise(),
+            _ => Err(PyValueError::new_err(format!(
+                "{} does not end in .png, .exr or .ply",
+                path.display()
+            ))),
+        }
+    }
+
+    /// Write the image in false colour, near red, far blue, as PNG; a file that is there is replaced.
+    fn save_preview(&self, path: PathBuf) -> PyResult<()> {
+        self.image.write_preview(&path).or_raise()
+    }
+
+    /// Draw the image with matplotlib, on axes that are given or in a new figure, which are returned.
+    #[pyo3(signature = (ax=None))]
+    fn plot<'py>(
+        this: &Bound<'py, Self>,
+        ax: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let plots = this.py().import("ppa._plots")?;
+        plots.call_method1("depth", (this, ax))
+    }
+
+    fn _repr_png_<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let display = this.py().import("ppa._display")?;
+        display.call_method1("depth", (this,))
+    }
+
+    #[pyo3(signature = (dtype=None, copy=None))]
+    fn __array__<'py>(
+        this: &Bound<'py, Self>,
+        dtype: Option<&Bound<'py, PyAny>>,
+        copy: Option<bool>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        crate::arrays::converted(Self::z_mm(this)?.into_any(), dtype, copy)
+    }
+
+    fn __repr__(&self) -> String {
+        let (width, height) = (self.image.width, self.image.height);
+        let valid = self.image.valid_pixels();
+        format!("<ppa.DepthImage of {width} x {height} pixels, {valid} of them see a surface>")
+    }
+}

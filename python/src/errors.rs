@@ -1,0 +1,50 @@
+//! Exceptions: the sentence of a library's error, with the causes behind it.
+
+use std::error::Error;
+use std::io;
+
+use ppa_core::text::error_chain;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::{PyErr, create_exception};
+
+create_exception!(
+    ppa,
+    PpaError,
+    PyValueError,
+    "What ppa refuses: what was found, what was expected, and where."
+);
+
+create_exception!(
+    ppa,
+    InternalError,
+    PyRuntimeError,
+    "A defect of ppa: a computation ended where it should not have."
+);
+
+/// The exception of a library's error: `OSError`, or one of its kinds such as `FileNotFoundError`, where the system refused
+/// something, else [`PpaError`].
+pub fn raised(error: impl Error + 'static) -> PyErr {
+    let sentence = error_chain(&error);
+    let mut cause: Option<&(dyn Error + 'static)> = Some(&error);
+    while let Some(error) = cause {
+        if let Some(system) = error.downcast_ref::<io::Error>()
+            && system.raw_os_error().is_some()
+        {
+            return io::Error::new(system.kind(), sentence).into();
+        }
+        cause = error.source();
+    }
+    PpaError::new_err(sentence)
+}
+
+/// Turns a library's result into Python's.
+pub trait OrRaise<T> {
+    /// The value, or the exception of the error.
+    fn or_raise(self) -> Result<T, PyErr>;
+}
+
+impl<T, E: Error + 'static> OrRaise<T> for Result<T, E> {
+    fn or_raise(self) -> Result<T, PyErr> {
+        self.map_err(raised)
+    }
+}

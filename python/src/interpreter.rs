@@ -1,0 +1,24 @@
+//! One interpreter of a process: the threads and caches of the module belong to it.
+
+use std::sync::atomic::{AtomicI64, Ordering};
+
+use pyo3::exceptions::PyImportError;
+use pyo3::{PyResult, Python, ffi};
+
+/// No interpreter has this number.
+const NONE: i64 = -1;
+
+/// Refuses every interpreter but the first that imports the module. Since Python 3.12 the interpreter does so by itself.
+#[allow(unsafe_code)]
+pub fn require_first(_: Python<'_>) -> PyResult<()> {
+    static FIRST: AtomicI64 = AtomicI64::new(NONE);
+    // SAFETY: this thread is attached to an interpreter, which is what both functions ask for.
+    let id = unsafe { ffi::PyInterpreterState_GetID(ffi::PyInterpreterState_Get()) };
+    match FIRST.compare_exchange(NONE, id, Ordering::Relaxed, Ordering::Relaxed) {
+        Ok(_) => Ok(()),
+        Err(first) if first == id => Ok(()),
+        Err(_) => Err(PyImportError::new_err(
+            "ppa was imported by another interpreter of this process, and works in one interpreter only",
+        )),
+    }
+}

@@ -1,0 +1,119 @@
+//! `ppa.phantom`: a CT of a limb whose true shape is known.
+
+use ppa_core::Side;
+use ppa_phantom::{Limb, LowerLeg, Scanner, TableTop};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::background::run;
+use crate::errors::OrRaise;
+use crate::values::plain;
+use crate::volume::PyVolume;
+
+/// A lower leg of the table, or drawn by a seed.
+fn lower_leg(name: &str, seed: Option<u64>, side: Side, plate: bool) -> PyResult<LowerLeg> {
+    let leg = match seed {
+        Some(seed) => LowerLeg::from_seed(seed, side),
+        None => LowerLeg::family(name, side).or_raise()?,
+    };
+    Ok(if plate { leg.with_plate() } else { leg })
+}
+
+/// A CT of a limb made of shapes, not of a person.
+///
+/// Parameters
+/// ----------
+/// name : str
+///     Lower leg of the table, "P01" to "P17", or "knee".
+/// side : {"r", "l"}
+///     Side of the body.
+/// seed : int, optional
+///     Lower leg drawn by this seed, instead of one of the table.
+/// plate : bool
+///     A titanium plate with five screws on the fibula.
+/// spacing_mm : float
+///     Side of the cubic voxels.
+/// table : bool
+///     Let the limb lie on a table top.
+/// blur_mm : float
+///     Blur of a scanner: full width at half maximum, mm.
+/// noise_hu : float
+///     Noise of a scanner: standard deviation, HU.
+/// noise_seed : int
+///     Seed of the noise.
+/// threads : int, optional
+///     Worker threads; one per core by default.
+///
+/// Returns
+/// -------
+/// Volume
+#[pyfunction]
+#[pyo3(signature = (name="P01", side="r", *, seed=None, plate=false, spacing_mm=0.8, table=false, blur_mm=0.0, noise_hu=0.0, noise_seed=0, threads=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
+pub fn phantom(
+    py: Python<'_>,
+    name: &str,
+    side: &str,
+    seed: Option<u64>,
+    plate: bool,
+    spacing_mm: f64,
+    table: bool,
+    blur_mm: f64,
+    noise_hu: f64,
+    noise_seed: u64,
+    threads: Option<usize>,
+) -> PyResult<PyVolume> {
+    let side = crate::side::side(side)?;
+    let knee = name.eq_ignore_ascii_case("knee");
+    if knee && (seed.is_some() || plate) {
+        return Err(PyValueError::new_err(
+            "the knee is one shape: it takes neither seed nor plate",
+        ));
+    }
+    let limb = match knee {
+        true => Limb::knee(side),
+        false => lower_leg(name, seed, side, plate)?.into_limb(),
+    };
+    let table = match table {
+        true => TableTop::Present,
+        false => TableTop::Absent,
+    };
+    let scanner = (blur_mm != 0.0 || noise_hu != 0.0).then_some(Scanner {
+        blur_fwhm_mm: blur_mm,
+        noise_hu,
+        seed: noise_seed,
+    });
+    let volume = run(py, threads, None, move |_| {
+        let volume = limb.voxelise(spacing_mm, table)?;
+        match scanner {
+            Some(scanner) => scanner.scan(&volume),
+            None => Ok(volume),
+        }
+    })?;
+    Ok(PyVolume {
+        volume: volume.or_raise()?,
+        file: None,
+    })
+}
+
+/// What a measurement on a phantom's lower leg should find: frame ct (LPS), mm and radians.
+///
+/// Parameters
+/// ----------
+/// name, side, seed
+///     As for :func:`phantom`.
+///
+/// Returns
+/// -------
+/// dict
+#[pyfunction]
+#[pyo3(signature = (name="P01", side="r", *, seed=None))]
+pub fn phantom_truth<'py>(
+    py: Python<'py>,
+    name: &str,
+    side: &str,
+    seed: Option<u64>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let leg = lower_leg(name, seed, crate::side::side(side)?, false)?;
+    plain(py, &leg.truth())
+}

@@ -1,0 +1,139 @@
+//! `ppa.prepare`: from a scan to a case.
+
+use std::path::PathBuf;
+
+use ppa_ct::{Acquisition, ReadOptions, Scan, Volume, read_with};
+use ppa_generate::prepare_scan;
+use ppa_mesh::{LimbSettings, VoxelBox};
+use ppa_scene::LandmarkOverrides;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::arrays::{finite, point, points};
+use crate::background::run;
+use crate::case::PyCase;
+use crate::errors::OrRaise;
+use crate::posable_case::PosableCase;
+use crate::values::word;
+use crate::volume::PyVolume;
+
+/// A scan without a file.
+fn of_memory(volume: Volume) -> Scan {
+    Scan {
+        volume,
+        modality: None,
+        series: Vec::new(),
+        acquisition: Acquisition::default(),
+        warnings: Vec::new(),
+    }
+}
+
+/// Find skin, axis, joint and supporting plane of a limb.
+///
+/// Parameters
+/// ----------
+/// volume : Volume or path
+///     The scan.
+/// side : {"r", "l"}
+///     Side of the limb; if the scan shows two side by side, the one on this side of the patient is used.
+/// limb : {"lower_leg", "knee", "other"}, optional
+///     Kind of limb; a lower leg where an ankle is found, else a knee where one is.
+/// iso_hu : float
+///     Hounsfield units of the skin; -500 by default.
+/// crop : sequence of int, shape (3, 2), optional
+///     Keep only this box of voxels: first and one past the last along i, j and k.
+/// inside : array_like, shape (3,), optional
+///     A point inside the wanted limb when the scan shows several, ct frame, mm.
+/// joint : array_like, shape (3,), optional
+///     Centre of the joint, ct frame, mm.
+/// axis_source : {"bone", "limb"}, optional
+///     Which centres in the two regions define the axis.
+/// joint_region, calf_region : array_like, shape (2,), optional
+///     Regions whose centres define the axis, mm from the joint towards proximal.
+/// axis : array_like, shape (2, 3), optional
+///     Two points that the axis runs through, ct frame, mm, instead of the centres of two regions.
+/// anterior : array_like, shape (3,), optional
+///     Direction that faces up at angle 0, ct frame.
+/// plane : array_like, shape (3, 3), optional
+///     Three points of the plane under the limb, ct frame, mm: one distal, two proximal.
+/// threads : int, optional
+///     Worker threads; one per core by default.
+///
+/// Returns
+/// -------
+/// Case
+#[pyfunction]
+#[pyo3(signature = (volume, side, *, limb=None, iso_hu=-500.0, crop=None, inside=None, joint=None, axis_source=None, joint_region=None, calf_region=None, axis=None, anterior=None, plane=None, threads=None))]
+#[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
+pub fn prepare(
+    py: Python<'_>,
+    volume: &Bound<'_, PyAny>,
+    side: &str,
+    limb: Option<&str>,
+    iso_hu: f64,
+    crop: Option<[[usize; 2]; 3]>,
+    inside: Option<&Bound<'_, PyAny>>,
+    joint: Option<&Bound<'_, PyAny>>,
+    axis_source: Option<&str>,
+    joint_region: Option<&Bound<'_, PyAny>>,
+    calf_region: Option<&Bound<'_, PyAny>>,
+    axis: Option<&Bound<'_, PyAny>>,
+    anterior: Option<&Bound<'_, PyAny>>,
+    plane: Option<&Bound<'_, PyAny>>,
+    threads: Option<usize>,
+) -> PyResult<PyCase> {
+    if axis.is_some() && (axis_source.is_some() || joint_region.is_some() || calf_region.is_some())
+    {
+        return Err(PyValueError::new_err(
+            "axis stands instead of axis_source, joint_region and calf_region: give one or the other",
+        ));
+    }
+    let side = crate::side::side(side)?;
+    let surface = LimbSettings {
+        iso_hu,
+        inside: inside.map(|inside| point(inside, "inside")).transpose()?,
+        crop: crop.map(|crop| VoxelBox {
+            low: crop.map(|[low, _]| low),
+            high: crop.map(|[_, high]| high),
+        }),
+        ..LimbSettings::default()
+    };
+    let region = |region: Option<&Bound<'_, PyAny>>, name| {
+        region
+            .map(|region| finite::<2>(region, name, &[2]))
+            .transpose()
+    };
+    let choices = LandmarkOverrides {
+        limb: limb.map(|limb| word(limb, "limb")).transpose()?,
+        joint_centre: joint.map(|joint| point(joint, "joint")).transpose()?,
+        joint_region: region(joint_region, "joint_region")?,
+        calf_region: region(calf_region, "calf_region")?,
+        axis_source: axis_source
+            .map(|source| word(source, "axis_source"))
+            .transpose()?,
+        axis: axis.map(|axis| points::<2>(axis, "axis")).transpose()?,
+        anterior: anterior.map(|up| point(up, "anterior")).transpose()?,
+        plane_points: plane.map(|plane| points::<3>(plane, "plane")).transpose()?,
+    };
+    let (scan, path, reading) = match volume.cast::<PyVolume>() {
+        Ok(volume) => match &volume.get().file {
+            Some(file) => (
+                Some(file.scan.clone()),
+                file.path.clone(),
+                file.reading.clone(),
+            ),
+            None => {
+                let scan = of_memory(volume.get().volume.clone());
+                (Some(scan), PathBuf::new(), ReadOptions::default())
+            }
+        },
+        Err(_) => (None, volume.extract()?, ReadOptions::default()),
+    };
+    let limb = run(py, threads, None, move |_| {
+        let scan = scan.map_or_else(|| read_with(&path, &reading), Ok)?;
+        let kept = scan.clone();
+        let (case, prepared) = prepare_scan(scan, &path, &reading, side, &surface, &choices)?;
+        Ok::<_, ppa_generate::PrepareError>(PosableCase::new(case, kept, prepared))
+    })?;
+    PyCase::of(limb.or_raise()?)
+}

@@ -1,0 +1,76 @@
+"""What the tests share: a small phantom, its case, and the program of the command line."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+import ppa
+
+#: A detector and a room's settings that take little time.
+QUICK_XRAY = {
+    "detector": {"columns": 48, "rows": 40, "pixel_mm": 5.0},
+    "engine": {"scatter_histories": 4000, "dose_histories": 1e9},
+    "max_voxel_mm": 4.0,
+}
+
+
+@dataclass
+class Files:
+    """A scan, its case and a plan, as files."""
+
+    folder: Path
+    scan: Path
+    case: Path
+    plan: Path
+
+
+@pytest.fixture(scope="session")
+def volume() -> ppa.Volume:
+    return ppa.phantom("P01", spacing_mm=2.0)
+
+
+@pytest.fixture(scope="session")
+def case(volume: ppa.Volume) -> ppa.Case:
+    return ppa.prepare(volume, "r")
+
+
+@pytest.fixture(scope="session")
+def scene() -> ppa.Scene:
+    return ppa.Scene(ppa.Plan(xray=QUICK_XRAY))
+
+
+@pytest.fixture(scope="session")
+def files(tmp_path_factory: pytest.TempPathFactory, volume: ppa.Volume) -> Files:
+    folder = tmp_path_factory.mktemp("files")
+    scan, case, plan = folder / "p01.nii.gz", folder / "p01.case.toml", folder / "plan.toml"
+    volume.save(scan)
+    ppa.prepare(ppa.Volume.read(scan), "r").save(case)
+    ppa.Plan(
+        [(case, 0)],
+        seed=5,
+        rotation={"from_deg": 0, "to_deg": 20, "step_deg": 10},
+        shapes={"variants": ["orig", "bumps_a"]},
+        depth={"sensor": {"random": {"floor_mm": 1.0, "at_unit_signal_mm": 2.0}}},
+        xray=QUICK_XRAY,
+    ).save(plan)
+    return Files(folder, scan, case, plan)
+
+
+def program() -> str:
+    """The program to compare with: one that cargo built, or that of the package."""
+    return os.environ.get("PPA_PROGRAM") or str(Path(sys.executable).parent / "ppa")
+
+
+def command(*arguments: object) -> str:
+    """Runs a command line, and gives what it prints."""
+    ran = subprocess.run(
+        [program(), *map(str, arguments)], capture_output=True, text=True, check=False
+    )
+    assert ran.returncode == 0, ran.stderr
+    return ran.stdout

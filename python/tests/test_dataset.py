@@ -1,0 +1,122 @@
+"""Datasets as PyTorch reads them, and networks."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import pickle
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import ppa
+
+from conftest import Files, command, program
+
+
+@pytest.fixture(scope="module")
+def dataset(files: Files, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A dataset with labels, as readers would leave them."""
+    folder = tmp_path_factory.mktemp("labelled") / "data"
+    ppa.generate(files.plan, folder)
+    radiographs = sorted((folder / "patient_0" / "xray" / "r").glob("*.png"))
+    steps = {path.name: int(path.stem.rpartition("_")[2]) for path in radiographs}
+    rows = {name: {"label": 1.0 + step / 20, "std": 0.0, "step": step} for name, step in steps.items()}
+    labels = folder / "patient_0" / "labels" / "r" / "labels.json"
+    labels.parent.mkdir(parents=True, exist_ok=True)
+    labels.write_text(json.dumps(rows))
+    return folder
+
+
+def test_samples_are_images_and_labels(dataset: Path) -> None:
+    samples = ppa.Dataset(dataset, side=64)
+    assert len(samples) == 3 * 2
+    image, label = samples[0]
+    assert image.shape == (2, 64, 64) and image.dtype == np.float32
+    assert -0.5 <= image.min() < image.max() <= 0.5
+    assert label == samples.labels[0] == samples.rows[0]["label"]
+    np.testing.assert_array_equal(samples[-1][0], samples[len(samples) - 1][0])
+    assert sorted({row["angle_deg"] for row in samples.rows}) == [0.0, 10.0, 20.0]
+    assert len(list(samples)) == len(samples)
+    with pytest.raises(IndexError):
+        samples[len(samples)]
+
+
+def test_samples_can_be_selected(dataset: Path) -> None:
+    assert len(ppa.Dataset(dataset, views="unified")) == 3 * 2 * 2
+    assert len(ppa.Dataset(dataset, views="left", shapes=["orig"], every_pose=2)) == 2
+    assert ppa.Dataset(dataset, views="left", side=32)[0][0].shape == (1, 32, 32)
+    assert ppa.Dataset(dataset, transform=lambda image: image.sum())[0][0].shape == ()
+    for refused in [{"patients": [7]}, {"shapes": ["round"]}, {"views": "above"}, {"side": 0}, {"every_pose": 0}, {"labels": "x"}]:
+        with pytest.raises((ValueError, OSError)):
+            ppa.Dataset(dataset, **refused)
+
+
+def first_pixel(arguments: tuple[ppa.Dataset, int]) -> float:
+    samples, index = arguments
+    return float(samples[index][0].sum())
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_workers_read_the_same_samples(dataset: Path, method: str) -> None:
+    samples = ppa.Dataset(dataset, side=32)
+    again = pickle.loads(pickle.dumps(samples))
+    np.testing.assert_array_equal(samples[1][0], again[1][0])
+    with multiprocessing.get_context(method).Pool(2) as pool:
+        sums = pool.map_async(first_pixel, [(samples, i) for i in range(4)]).get(timeout=120)
+    assert sums == [first_pixel((samples, i)) for i in range(4)]
+
+
+def test_a_folder_without_a_training_is_refused(dataset: Path) -> None:
+    with pytest.raises((ValueError, OSError)) as refused:
+        ppa.Network.load(dataset)
+    assert str(dataset) in str(refused.value)
+
+
+@pytest.fixture(scope="module")
+def training(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a training of few and small steps on two persons with the same images."""
+    folder = tmp_path_factory.mktemp("training")
+    for patient in (0, 1):
+        shutil.copytree(dataset / "patient_0", folder / "data" / f"patient_{patient}")
+    (folder / "train.toml").write_text(
+        'preset = "quick"\nside = 32\nsteps = 4\nbatch_size = 4\nlog_every = 1\nviews = "pairs"\n'
+        '[[training]]\ndataset = "data"\npatients = [0]\n[[evaluation]]\ndataset = "data"\npatients = [1]\n'
+    )
+    command("train", folder / "train.toml", "--out", folder / "run")
+    return folder
+
+
+def test_networks_say_what_the_command_line_says(training: Path) -> None:
+    png = pytest.importorskip("PIL.Image")
+    frames = [training / f"data/patient_0/depth/r/orig/depth_cam_{view}_10.0.png" for view in ("left", "right")]
+    regions = [(200, 150, 220), (210, 160, 200)]
+    options = [",".join(map(str, region)) for region in regions]
+    printed = subprocess.run(
+        [program(), "predict", str(training / "run"), "--stdin", "--side", "r",
+         "--roi-left", options[0], "--roi-right", options[1]],
+        input="\t".join(map(str, frames)) + "\n", capture_output=True, text=True, check=True,
+    ).stdout
+    network = ppa.Network.load(training / "run", side="r")
+    left, right = (np.array(png.open(frame)).astype(np.uint16) for frame in frames)
+    answer = network.predict(left, right, roi_left=regions[0], roi_right=regions[1])
+    assert answer["quality"] == json.loads(printed)["quality"]
+    # Rows that are not contiguous are the same rows.
+    wide = np.repeat(left, 2, axis=1)[:, ::2]
+    assert network.predict(wide, right, roi_left=regions[0], roi_right=regions[1]) == answer
+    square = network.predict(left[150:370, 200:420], right[160:360, 210:410])
+    assert square["quality"] == pytest.approx(answer["quality"])
+    for bad, says in [
+        ((left.astype(np.int32), right), "depth_left is an array of int32"),
+        ((left, right), "give roi_left"),
+        ((left[:0], right), "depth_left has no pixels"),
+    ]:
+        with pytest.raises(ValueError, match=says):
+            network.predict(*bad)
+    with pytest.raises(ValueError, match="outside"):
+        network.predict(left, right, roi_left=(900, 0, 10), roi_right=regions[1])
+    with pytest.raises(ValueError, match='side="l" or "r"'):
+        ppa.Network.load(training / "run")
