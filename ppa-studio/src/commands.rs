@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use ppa_cluster::shell_quoted;
+use ppa_dataset::labels::{BoneFile, BoneNumbers};
 use ppa_generate::Case;
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind};
 use serde::Serialize;
@@ -53,8 +54,28 @@ pub(crate) fn of_case(case: &Case, out: &Path) -> Commands {
         let _ = write!(line, " --inside={}", list(&point));
     }
     line += &of_choices(&case.choices);
+    if let Some(bones) = &case.bones {
+        line += &of_bones(bones);
+    }
     let _ = write!(line, " --out {}", quoted(out));
     Commands { prepare: line }
+}
+
+fn of_bones(bones: &BoneFile) -> String {
+    let path = quoted(&bones.path);
+    if bones.segmented {
+        return format!(" --segment-bones {path}");
+    }
+    let mut line = format!(" --bones {path}");
+    if bones.numbers != BoneNumbers::default() {
+        let BoneNumbers {
+            tibia,
+            fibula,
+            talus,
+        } = bones.numbers;
+        let _ = write!(line, " --bone-numbers {tibia},{fibula},{talus}");
+    }
+    line
 }
 
 fn of_choices(choices: &LandmarkOverrides) -> String {

@@ -51,7 +51,9 @@ impl Opening {
                 Opened::with_default_plan(path.clone())
             };
         }
-        if path.is_dir() && (path.join("dataset.json").exists() || path.join("run.json").exists()) {
+        // A dataset or a training.
+        let has = |name| path.join(name).exists();
+        if has("dataset.json") || has("config.toml") {
             return Err(StudioError::NotAScan(path.clone()));
         }
         let side = self.side.ok_or_else(|| StudioError::NoSide(path.clone()))?;

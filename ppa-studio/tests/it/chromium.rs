@@ -17,7 +17,7 @@ use tempfile::TempDir;
 use crate::browser::{FINE_MM, phantom};
 
 /// How long anything on the page may take.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A served phantom and the browser that shows it.
 pub struct Page {

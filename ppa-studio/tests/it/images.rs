@@ -129,6 +129,9 @@ fn commands_name_the_files_and_options_of_the_page() {
         radiograph.contains("--angle 18.5 --kvp 55 --filter Al:3 --mas 4 --out radiograph.png")
     );
     assert_eq!(commands["need_saved_plan"], false);
+    let state = browser.get("/api/state").json();
+    let prepare = state["commands"]["prepare"].as_str().unwrap();
+    assert!(prepare.contains("p01.nii --side r --bones "), "{prepare}");
     let commands = browser
         .post("/api/commands", &json!({ "distal_mm": 2.0 }))
         .json();
