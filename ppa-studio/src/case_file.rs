@@ -17,7 +17,7 @@ pub(crate) struct CaseFile {
 impl CaseFile {
     /// `leg.case.toml`, whose changes go to `leg.edited.case.toml`.
     pub fn new(original: PathBuf) -> Self {
-        let edited = edited_name(&original);
+        let edited = beside(&original, "edited.case.toml");
         let known = std::fs::read_to_string(&edited).ok();
         Self {
             original,
@@ -32,6 +32,11 @@ impl CaseFile {
 
     pub fn edited(&self) -> &Path {
         &self.edited
+    }
+
+    /// Where a plan with the page's changes is saved: beside the original.
+    pub fn plan(&self) -> PathBuf {
+        beside(&self.original, "studio.plan.toml")
     }
 
     /// Whether changes are saved beside the original.
@@ -74,11 +79,12 @@ impl CaseFile {
     }
 }
 
-fn edited_name(original: &Path) -> PathBuf {
-    let name = original.file_name().unwrap_or_default().to_string_lossy();
+/// A file beside a case, named after it: `leg.case.toml` and `edited.case.toml` give `leg.edited.case.toml`.
+fn beside(case: &Path, ending: &str) -> PathBuf {
+    let name = case.file_name().unwrap_or_default().to_string_lossy();
     let stem = name.strip_suffix(".toml").unwrap_or(&name);
     let stem = stem.strip_suffix(".case").unwrap_or(stem);
-    original.with_file_name(format!("{stem}.edited.case.toml"))
+    case.with_file_name(format!("{stem}.{ending}"))
 }
 
 #[cfg(test)]
@@ -87,7 +93,7 @@ mod tests {
 
     #[test]
     fn changes_are_named_after_the_case() {
-        let edited = |name: &str| edited_name(Path::new(name));
+        let edited = |name: &str| beside(Path::new(name), "edited.case.toml");
         assert_eq!(
             edited("a/leg.case.toml"),
             Path::new("a/leg.edited.case.toml")

@@ -96,11 +96,7 @@ impl State {
 
     /// Where a plan with changes is saved: beside the case.
     pub fn saved_plan(&self) -> PathBuf {
-        let case = self.case_file().original().to_owned();
-        let name = case.file_name().unwrap_or_default().to_string_lossy();
-        let stem = name.strip_suffix(".toml").unwrap_or(&name);
-        let stem = stem.strip_suffix(".case").unwrap_or(stem);
-        case.with_file_name(format!("{stem}.studio.plan.toml"))
+        self.case_file().plan()
     }
 
     /// The plan with changes, of the case that is shown.
