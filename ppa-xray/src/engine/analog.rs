@@ -104,7 +104,7 @@ pub(crate) fn run(exposure: &Exposure, raster: Raster, settings: &AnalogSettings
 
 /// Follows `histories` and counts what arrives.
 pub(crate) fn count(exposure: &Exposure, seed: u64, histories: Range<u64>, tally: &Tally) {
-    in_batches(histories, |batch| {
+    in_batches(exposure, histories, |batch| {
         let mut score = DetectorScore::new(exposure, tally);
         exposure.transport.follow(seed, batch, &mut score);
     });
@@ -118,7 +118,7 @@ pub(crate) fn count_with_dose(
     tally: &Tally,
     target: &DoseTarget,
 ) {
-    in_batches(histories, |batch| {
+    in_batches(exposure, histories, |batch| {
         let mut score = DoseScore::new(DetectorScore::new(exposure, tally), target);
         exposure.transport.follow(seed, batch, &mut score);
         score.hand_in();
@@ -126,7 +126,8 @@ pub(crate) fn count_with_dose(
 }
 
 /// Deals `histories` out to the threads.
-fn in_batches(histories: Range<u64>, follow: impl Fn(Range<u64>) + Sync) {
+fn in_batches(exposure: &Exposure, histories: Range<u64>, follow: impl Fn(Range<u64>) + Sync) {
+    exposure.transport.tables.majorants();
     let batches = (histories.end - histories.start).div_ceil(BATCH);
     (0..batches).into_par_iter().for_each(|batch| {
         let first = histories.start + batch * BATCH;

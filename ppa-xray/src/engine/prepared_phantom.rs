@@ -1,7 +1,7 @@
 //! A phantom with the tables that all its fast exposures share.
 
 use std::borrow::Cow;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
@@ -14,11 +14,11 @@ use crate::transport::tracking::TransportError;
 
 /// A phantom with the tables that all its fast exposures share, whatever their pose, beam and detector are.
 ///
-/// They are made for the first exposure. For a hundred million voxels they take 2 CPU seconds and 400 MB.
+/// For a hundred million voxels they take 2 CPU seconds and 400 MB.
 pub struct PreparedPhantom<'a> {
     phantom: Arc<Cow<'a, VoxelPhantom>>,
     compton_model: ComptonModel,
-    tables: OnceLock<FastTables<'a>>,
+    tables: FastTables<'a>,
 }
 
 /// What the fast engine needs of a phantom.
@@ -44,10 +44,21 @@ impl<'a> From<&'a VoxelPhantom> for Cow<'a, VoxelPhantom> {
 impl<'a> PreparedPhantom<'a> {
     /// Prepares a phantom, borrowed or owned, for exposures with `compton_model`.
     pub fn new(phantom: impl Into<Cow<'a, VoxelPhantom>>, compton_model: ComptonModel) -> Self {
+        let phantom = Arc::new(phantom.into());
+        let transport = PhantomTables::new(phantom.clone(), compton_model);
+        transport.majorants();
+        let materials = phantom.materials().par_iter();
+        let tables = FastTables {
+            paths: PathTables::new(&transport),
+            densities: materials
+                .map(|material| ScatterDensities::new(material, compton_model))
+                .collect(),
+            transport: Arc::new(transport),
+        };
         Self {
-            phantom: Arc::new(phantom.into()),
+            phantom,
             compton_model,
-            tables: OnceLock::new(),
+            tables,
         }
     }
 
@@ -57,17 +68,7 @@ impl<'a> PreparedPhantom<'a> {
     }
 
     pub(super) fn tables(&self) -> &FastTables<'a> {
-        self.tables.get_or_init(|| {
-            let transport = PhantomTables::new(self.phantom.clone(), self.compton_model);
-            let materials = self.phantom.materials().par_iter();
-            FastTables {
-                paths: PathTables::new(&transport),
-                densities: materials
-                    .map(|material| ScatterDensities::new(material, self.compton_model))
-                    .collect(),
-                transport: Arc::new(transport),
-            }
-        })
+        &self.tables
     }
 
     /// # Errors

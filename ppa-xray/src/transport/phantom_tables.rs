@@ -40,13 +40,16 @@ impl<'a> PhantomTables<'a> {
         }
     }
 
-    /// Bounds for Woodcock tracking.
+    /// Bounds for Woodcock tracking. Ask for them once before threads follow histories, or each thread computes them.
     pub fn majorants(&self) -> &Majorants {
-        self.majorants.get_or_init(|| {
-            let voxel_mm = voxel_mm3(self.phantom.grid()).cbrt();
-            let halo = self.phantom.interpolation().halo();
-            Majorants::new(&self.codes, halo, voxel_mm, &self.attenuation)
-        })
+        if let Some(majorants) = self.majorants.get() {
+            return majorants;
+        }
+        // Made before the cell is locked: a thread that waits for others meanwhile may be handed histories that need the cell.
+        let voxel_mm = voxel_mm3(self.phantom.grid()).cbrt();
+        let halo = self.phantom.interpolation().halo();
+        let majorants = Majorants::new(&self.codes, halo, voxel_mm, &self.attenuation);
+        self.majorants.get_or_init(|| majorants)
     }
 
     /// What a photon meets at a place in the box, in cells from its corner.

@@ -24,4 +24,5 @@ mod shared;
 mod spectra;
 mod statistics;
 mod tg195;
+mod threads;
 mod transport;
