@@ -103,7 +103,8 @@ pub fn forecast(
     let work = Work::of_plan(plan)?;
     let poses = plan.rotation.poses().map_err(GenerateError::from)?;
     let limbs = jobs_of_part(work.planned(), &poses, Part::WHOLE);
-    let findings = work.findings(&limbs, root)?;
+    // None stays prepared: the time of all of them is measured.
+    let findings = work.findings(&limbs, root, 0)?;
     progress(Progress::Findings(&findings));
     let of_limb = ((poses.len() as f64 * fraction).round() as usize).max(1);
     progress(Progress::Total(limbs.len() * of_limb));

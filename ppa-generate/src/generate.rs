@@ -21,6 +21,7 @@ use crate::pose_error::PoseError;
 use crate::prepared_limb::{PrepareError, PreparedLimb};
 use crate::record::Record;
 use crate::scene_setup::{SceneSetup, SceneSetupError};
+use crate::several_limbs::{for_each_limb, limbs_at_once};
 use crate::staging::staging_folder;
 
 /// Why a dataset could not be made. What was finished before stays and is not made again.
@@ -150,7 +151,8 @@ pub fn generate(
     let work = Work::of_plan(plan)?;
     let poses = plan.rotation.poses()?;
     let limbs = jobs_of_part(work.planned(), &poses, settings.part);
-    progress(Progress::Findings(&work.findings(&limbs, root)?));
+    let findings = work.findings(&limbs, root, limbs_at_once())?;
+    progress(Progress::Findings(&findings));
     let staging = staging_folder(root);
     let job = Job {
         root,
@@ -162,6 +164,7 @@ pub fn generate(
         progress,
     };
     job.complete(|limb| {
+        settings.stop.map_or(Ok(()), go_on)?;
         let make = work.prepare(limb.limb, &staging)?;
         let make: MakePose<GenerateError> = Box::new(move |pose_job| {
             settings.stop.map_or(Ok(()), go_on)?;
@@ -178,9 +181,8 @@ pub(crate) struct Work<'a> {
     setup: SceneSetup,
     /// `dataset.json`.
     pub description: String,
-    /// The first limb that was prepared for its findings, until its poses are made. The others are prepared twice, since
-    /// memory may not hold them all.
-    prepared: Mutex<Option<(LimbId, PreparedLimb)>>,
+    /// Limbs that were prepared for their findings, until their poses are made.
+    prepared: Mutex<Vec<(LimbId, PreparedLimb)>>,
 }
 
 struct CasedLimb {
@@ -217,31 +219,42 @@ impl<'a> Work<'a> {
     }
 
     /// What is doubted about limbs, before any pose of them is made. Limbs that have a pose in the folder `root` are not
-    /// prepared for it.
-    pub fn findings(&self, limbs: &[LimbJobs], root: &Path) -> Result<Findings, GenerateError> {
-        let mut findings = Findings::default();
-        for limb in limbs {
+    /// prepared for it. The first `keep` limbs stay prepared for their poses; the others are prepared twice, since memory may not
+    /// hold them all.
+    pub fn findings(
+        &self,
+        limbs: &[LimbJobs],
+        root: &Path,
+        keep: usize,
+    ) -> Result<Findings, GenerateError> {
+        let of_limbs = for_each_limb(limbs, |index, limb| {
             let made = limb.pose_jobs().find_map(|pose_job| {
                 let record = Record::read(root, &pose_job).ok()?;
                 (record.key == pose_job.key()).then_some(record.findings)
             });
-            let of_limb = match made {
-                Some(findings) => findings,
-                None => self.findings_of(limb.limb)?,
-            };
-            findings.add(limb.limb, &limb.acknowledged, &of_limb);
+            match made {
+                Some(findings) => Ok(findings),
+                None => self.findings_of(limb.limb, index < keep),
+            }
+        })?;
+        let mut findings = Findings::default();
+        for (limb, of_limb) in limbs.iter().zip(&of_limbs) {
+            findings.add(limb.limb, &limb.acknowledged, of_limb);
         }
         Ok(findings)
     }
 
-    fn findings_of(&self, id: LimbId) -> Result<Vec<Finding>, GenerateError> {
+    /// The findings of a limb, which stays prepared for its poses if `keep` says so.
+    fn findings_of(&self, id: LimbId, keep: bool) -> Result<Vec<Finding>, GenerateError> {
         let prepared = self.limb(id).prepared()?;
         let findings = prepared.findings.clone();
-        self.kept().get_or_insert((id, prepared));
+        if keep {
+            self.kept().push((id, prepared));
+        }
         Ok(findings)
     }
 
-    fn kept(&self) -> MutexGuard<'_, Option<(LimbId, PreparedLimb)>> {
+    fn kept(&self) -> MutexGuard<'_, Vec<(LimbId, PreparedLimb)>> {
         self.prepared.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -258,7 +271,7 @@ impl<'a> Work<'a> {
     ) -> Result<MakePose<'m, GenerateError>, GenerateError> {
         let limb = self.limb(id);
         let case = || limb.file.clone();
-        let kept = self.kept().take_if(|(kept, _)| *kept == id);
+        let kept = self.kept().extract_if(.., |(kept, _)| *kept == id).next();
         let prepared = match kept {
             Some((_, prepared)) => prepared,
             None => limb.prepared()?,

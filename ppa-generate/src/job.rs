@@ -19,6 +19,7 @@ use crate::overview::Overview;
 use crate::part_file::require_part;
 use crate::posable_limb::Images;
 use crate::record::{FoundRecord, PoseJob, Record};
+use crate::several_limbs::for_each_limb;
 use crate::staging::{Staging, staging_folder};
 use crate::survey::Survey;
 
@@ -103,10 +104,10 @@ pub(crate) struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Makes what is missing, several poses at a time; `prepare` is called once per limb.
+    /// Makes what is missing, several poses and limbs at a time; `prepare` is called once per limb.
     pub fn complete<'m, E: From<JobError> + Send>(
         &self,
-        prepare: impl Fn(&LimbJobs) -> Result<MakePose<'m, E>, E>,
+        prepare: impl Fn(&LimbJobs) -> Result<MakePose<'m, E>, E> + Sync,
     ) -> Result<Summary, E> {
         let staging = Staging::new(self.root);
         let overview = Overview::new(self.root, self.description, self.part, &staging);
@@ -115,19 +116,21 @@ impl Job<'_> {
         (self.progress)(Progress::Total(pose_jobs));
 
         let used = AtomicU64::new(0);
-        let mut made = 0;
+        let mut unfinished = Vec::new();
         for limb in &self.limbs {
             let missing = self.missing(limb, &overview, &used);
             let missing = missing.map_err(JobError::from)?;
-            if missing.is_empty() {
-                continue;
+            if !missing.is_empty() {
+                unfinished.push((limb, missing));
             }
+        }
+        for_each_limb(&unfinished, |_, (limb, missing)| {
             let make = prepare(limb)?;
             missing
                 .par_iter()
-                .try_for_each(|&pose| self.make(&limb.pose_job(pose), &make, &overview, &used))?;
-            made += missing.len();
-        }
+                .try_for_each(|&pose| self.make(&limb.pose_job(pose), &make, &overview, &used))
+        })?;
+        let made = unfinished.iter().map(|(_, missing)| missing.len()).sum();
         self.remove_others(&survey, &overview)
             .map_err(JobError::from)?;
         let lists = self.finish(&overview).map_err(JobError::from)?;

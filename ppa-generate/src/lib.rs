@@ -55,6 +55,7 @@ mod scene_setup;
 mod seal;
 mod seed;
 mod set_aside;
+mod several_limbs;
 mod shaped_skin;
 mod staging;
 mod status;

@@ -18,6 +18,7 @@ use crate::limb_jobs::LimbJobs;
 use crate::plan::Plan;
 use crate::record::{PoseJob, Record};
 use crate::seed::{Purpose, item_seed};
+use crate::several_limbs::for_each_limb;
 
 /// Why a dataset could not be verified.
 #[derive(Debug, thiserror::Error)]
@@ -96,8 +97,7 @@ pub fn verify(
     let remade = sample.iter().map(|(_, poses)| poses.len()).sum();
     progress(Progress::Total(remade));
     let scratch = tempfile::tempdir().map_err(FileError::at("create", &std::env::temp_dir()))?;
-    let mut different = Vec::new();
-    for (limb, poses) in sample {
+    let different = for_each_limb(&sample, |_, (limb, poses)| {
         go_on(stop)?;
         let make = work.prepare(limb.limb, scratch.path())?;
         let compare = |&pose: &PoseAngle| {
@@ -107,12 +107,12 @@ pub fn verify(
             Ok::<_, VerifyError>(found)
         };
         let found = poses.par_iter().map(compare);
-        different.extend(found.collect::<Result<Vec<_>, _>>()?.concat());
-    }
+        Ok::<_, VerifyError>(found.collect::<Result<Vec<_>, _>>()?.concat())
+    })?;
     Ok(Verification {
         check,
         remade,
-        different,
+        different: different.concat(),
         findings,
     })
 }
