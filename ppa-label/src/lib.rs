@@ -7,21 +7,25 @@
 //! validated.
 //! [`segment_bones`] separates tibia, fibula and talus where nobody did; [`AnkleBones`] are their surfaces; [`JointSpace`] finds
 //! the three gutters between them; its `openness` follows the rays of an [`Exposure`]; a [`LabelScale`] makes a grade of it;
-//! [`compute_labels`] does so for a dataset.
+//! [`compute_labels`] does so for a dataset, [`PoseLabel`] for one exposure; [`check_bones`] refuses bones of a case that are of no use.
 
+mod case_bones;
 mod computation;
 mod computed;
 mod described;
 mod openness;
+mod pose_label;
 mod readers;
 mod segment;
 mod table;
 mod tallies;
 
+pub use case_bones::{CaseBonesError, check_bones, check_segmented_name, segment_checked_bones};
 pub use computed::{
     AutoLabelError, CaseBones, ComputedLabels, ComputedRow, LabelledLimb, compute_labels,
 };
 pub use openness::*;
+pub use pose_label::{GutterLabel, PoseLabel};
 pub use readers::*;
 pub use segment::{SegmentError, SegmentedBones, segment_bones};
 pub use table::TableError;

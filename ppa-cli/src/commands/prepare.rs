@@ -1,16 +1,15 @@
 //! `ppa prepare`: find skin, axis and plane of a limb and write them down as a case.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::bail;
+use anyhow::Context;
 use clap::{Args, ValueEnum};
-use nalgebra::Point3;
 use ppa_core::text::number;
-use ppa_ct::{Format, Volume, write};
+use ppa_ct::write;
 use ppa_dataset::Severity;
 use ppa_dataset::labels::{BoneFile, BoneNumbers};
-use ppa_generate::{Case, Found, PreparedLimb, prepare};
-use ppa_label::{AnkleBones, JointSpace, read_bones, segment_bones};
+use ppa_generate::{Case, Found, prepare};
+use ppa_label::{check_bones, check_segmented_name, segment_checked_bones};
 use ppa_mesh::{LimbSettings, VoxelBox, write_mesh_file};
 use ppa_report::{case_picture, write_picture};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
@@ -125,7 +124,7 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
     };
     let mut outputs = args.replace.outputs();
     if let Some(bones) = &args.segment_bones {
-        check_bones_name(bones, &args.scan.path)?;
+        check_segmented_name(bones, &args.scan.path).context("--segment-bones")?;
         outputs.file("--segment-bones", bones, NUMBERS)?;
     }
     outputs.file_in_new_folder("--out", &args.out, &[".toml"])?;
@@ -175,30 +174,31 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
         &surface,
         &choices,
     )?;
-    let names_bones = args.bones.is_some() || args.segment_bones.is_some();
-    if names_bones && prepared.landmarks.limb == LimbKind::Knee {
-        bail!(
-            "the scan was prepared as a knee, but bones are for the labels of ankles: leave out --bones and --segment-bones"
-        );
-    }
     if let Some(path) = &args.bones {
         let bones = BoneFile {
             path: path.clone(),
             numbers: args.bone_numbers,
             segmented: false,
         };
-        // Refused now rather than after the dataset was made.
-        read_bones(&bones, &prepared.landmarks.joint_centre.into())?;
+        check_bones(&bones, &prepared.landmarks)?;
         case.bones = Some(bones);
     }
     let segmented = match &args.segment_bones {
-        Some(path) => Some((path, segmented(path, &prepared)?)),
+        Some(path) => {
+            let (limb, landmarks) = (&prepared.limb.mask, &prepared.landmarks);
+            let bones = segment_checked_bones(&prepared.volume, limb, landmarks)?;
+            Some((path, bones))
+        }
         None => None,
     };
     drop(stoppable);
-    if let Some((path, (volume, bones))) = segmented {
-        write(path, &volume)?;
-        case.bones = Some(bones);
+    if let Some((path, bones)) = segmented {
+        write(path, &bones)?;
+        case.bones = Some(BoneFile {
+            path: path.clone(),
+            numbers: BoneNumbers::default(),
+            segmented: true,
+        });
     }
     if let Some(ply) = &args.ply {
         write_mesh_file(ply, &prepared.limb.mesh)?;
@@ -210,38 +210,6 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
     }
     working.finish_and_clear();
     output.print(&case, |case| describe(case, args))
-}
-
-/// The bones that can be separated in a scan, once it is sure that labels can be computed from them.
-fn segmented(path: &Path, prepared: &PreparedLimb) -> anyhow::Result<(Volume, BoneFile)> {
-    let ct_from_patient = prepared.landmarks.patient_from_ct().inverse();
-    let ct_from_patient = ct_from_patient.isometry();
-    let bones = segment_bones(&prepared.volume, &prepared.limb.mask, ct_from_patient)?;
-    let numbers = BoneNumbers::default();
-    let joint = ct_from_patient * Point3::origin();
-    let surfaces = AnkleBones::new(&bones.grid, &bones.labels, numbers, &joint)?;
-    JointSpace::new(surfaces, ct_from_patient)?;
-    let file = BoneFile {
-        path: path.to_owned(),
-        numbers,
-        segmented: true,
-    };
-    Ok((bones.volume()?, file))
-}
-
-/// Refuses names under which nothing, or the scan no more, would be found later.
-fn check_bones_name(bones: &Path, scan: &Path) -> anyhow::Result<()> {
-    if Format::of_name(bones)? == Format::Dicom {
-        bail!(
-            "--segment-bones {} would be a DICOM CT in Hounsfield units, but labels are numbers of bones: write NIfTI, NRRD or MetaImage",
-            bones.display()
-        );
-    }
-    let same = bones.canonicalize().ok() == scan.canonicalize().ok();
-    if bones.exists() && same {
-        bail!("--segment-bones {} is the scan itself", bones.display());
-    }
-    Ok(())
 }
 
 fn describe(case: &Case, args: &PrepareArgs) -> String {

@@ -11,11 +11,19 @@ impl TrainConfig {
     /// # Errors
     /// [`ConfigError`] naming file and key.
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        Self::of_keys(read_table(path)?, path)
+    }
+
+    /// The configuration whose keys a file at `path` would hold, which need not be there.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn of_keys(keys: toml::Table, path: &Path) -> Result<Self, ConfigError> {
         let unreadable = |source| ConfigError::Read {
             path: path.to_owned(),
             source,
         };
-        let mut config = Self::from_table(read_table(path)?, path)?;
+        let mut config = Self::from_table(keys, path)?;
         // Whole paths, so that the echo in another folder says the same.
         let whole = std::path::absolute(path).map_err(unreadable)?;
         let folder = whole.parent().unwrap_or(Path::new(""));
