@@ -28,10 +28,14 @@ from ._ppa import (
     __version__,
     evaluate,
     generate,
+    label,
     permutation_test,
     phantom,
+    phantom_bones,
     phantom_truth,
     prepare,
+    train,
+    training_log,
 )
 
 __all__ = [
@@ -53,8 +57,12 @@ __all__ = [
     "__version__",
     "evaluate",
     "generate",
+    "label",
     "permutation_test",
     "phantom",
+    "phantom_bones",
     "phantom_truth",
     "prepare",
+    "train",
+    "training_log",
 ]

@@ -10,8 +10,8 @@ import numpy as np
 if TYPE_CHECKING:
     from ._ppa import Case, DepthImage, Pose, Radiograph
 
-#: Triangles beyond which a skin is drawn from every n-th one.
-_MOST_TRIANGLES = 6000
+#: Edge of the cubes in which the vertices of a skin are drawn as one, mm.
+_COARSE_MM = 8.0
 
 
 def _axes(ax: Any, **options: Any) -> Any:
@@ -41,12 +41,21 @@ def depth(image: DepthImage, ax: Any) -> Any:
     return axes
 
 
+def _coarse(vertices: Any, triangles: Any) -> tuple[Any, Any]:
+    """A skin whose vertices in each cube are replaced by their mean: matplotlib draws some thousand triangles, not 10⁵."""
+    _, cube, count = np.unique(np.floor(vertices / _COARSE_MM), axis=0, return_inverse=True, return_counts=True)
+    cube = cube.ravel()
+    means = np.stack([np.bincount(cube, column) / count for column in vertices.T], axis=1)
+    corners = cube[triangles]
+    differ = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    return means, corners[differ]
+
+
 def _skin(axes: Any, vertices: Any, triangles: Any) -> None:
-    step = max(1, len(triangles) // _MOST_TRIANGLES)
-    axes.plot_trisurf(
-        vertices[:, 0], vertices[:, 1], vertices[:, 2], triangles=triangles[::step], color="tan", alpha=0.7
-    )
+    coarse, corners = _coarse(vertices, triangles)
+    axes.plot_trisurf(*coarse.T, triangles=corners, color="tan", alpha=0.5)
     axes.set_box_aspect(np.ptp(vertices, axis=0))
+    axes.locator_params(nbins=4)
 
 
 def case(limb: Case, ax: Any) -> Any:
@@ -59,7 +68,7 @@ def case(limb: Case, ax: Any) -> Any:
     axes.scatter(*limb.joint, color="tab:red", label="joint")
     axes.scatter(*limb.plane.T, color="tab:green", label="plane")
     axes.set(xlabel="left / mm", ylabel="posterior / mm", zlabel="superior / mm")
-    axes.legend()
+    axes.legend(loc="upper left")
     return axes
 
 
@@ -78,5 +87,5 @@ def pose(posed: Pose, ax: Any) -> Any:
     axes.set(xlabel="x / mm", ylabel="y / mm", zlabel="z / mm")
     everything = np.concatenate([vertices, beam])
     axes.set_box_aspect(np.maximum(np.ptp(everything, axis=0), 1.0))
-    axes.legend()
+    axes.legend(loc="upper left")
     return axes

@@ -12,6 +12,8 @@ _Side: TypeAlias = Literal["l", "r", "left", "right"]
 _Settings: TypeAlias = dict[str, Any]
 _Progress: TypeAlias = bool | Callable[[float, float], object] | None
 _Technique: TypeAlias = Literal["ankle", "knee"]
+_Scale: TypeAlias = Literal["graded", "strict"]
+_Source: TypeAlias = _Path | dict[str, Any]
 _Engine: TypeAlias = Literal["fast", "analog"]
 _F32: TypeAlias = npt.NDArray[np.float32]
 _F64: TypeAlias = npt.NDArray[np.float64]
@@ -92,6 +94,8 @@ class Case:
     def landmarks(self) -> dict[str, Any]: ...
     @property
     def findings(self) -> list[dict[str, Any]]: ...
+    @property
+    def bones(self) -> dict[str, Any] | None: ...
     @property
     def patient_from_ct(self) -> _F64: ...
     def place(
@@ -179,6 +183,13 @@ class Pose:
         progress: _Progress = None,
         threads: int | None = None,
     ) -> Radiograph: ...
+    def label(
+        self,
+        *,
+        scale: _Scale = "graded",
+        thresholds: _Settings | _Path | None = None,
+        threads: int | None = None,
+    ) -> dict[str, Any]: ...
     def plot(self, ax: Any = None) -> Any: ...
 
 @final
@@ -193,6 +204,8 @@ class DepthImage:
     def save_preview(self, path: _Path) -> None: ...
     def plot(self, ax: Any = None) -> Any: ...
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> npt.NDArray[Any]: ...
+    def __dlpack__(self, **options: Any) -> Any: ...
+    def __dlpack_device__(self) -> tuple[int, int]: ...
 
 @final
 class Radiograph:
@@ -231,6 +244,8 @@ class Radiograph:
     ) -> None: ...
     def plot(self, ax: Any = None) -> Any: ...
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> npt.NDArray[Any]: ...
+    def __dlpack__(self, **options: Any) -> Any: ...
+    def __dlpack_device__(self) -> tuple[int, int]: ...
 
 @final
 class Spectrum:
@@ -334,6 +349,14 @@ class Dataset:
     ) -> Dataset: ...
     def __len__(self) -> int: ...
     def __getitem__(self, index: int, /) -> tuple[Any, float]: ...
+    def drawn(
+        self,
+        place: int,
+        *,
+        seed: int = 1,
+        balanced: bool = True,
+        augmentation: _Settings | None = None,
+    ) -> tuple[Any, float]: ...
     @property
     def labels(self) -> _F64: ...
     @property
@@ -373,6 +396,9 @@ def phantom(
     noise_seed: int = 0,
     threads: int | None = None,
 ) -> Volume: ...
+def phantom_bones(
+    volume: Volume, name: str = "P01", side: _Side = "r", *, seed: int | None = None, threads: int | None = None
+) -> Volume: ...
 def phantom_truth(name: str = "P01", side: _Side = "r", *, seed: int | None = None) -> dict[str, Any]: ...
 def prepare(
     volume: Volume | _Path,
@@ -389,6 +415,10 @@ def prepare(
     axis: npt.ArrayLike | None = None,
     anterior: npt.ArrayLike | None = None,
     plane: npt.ArrayLike | None = None,
+    bones: _Path | None = None,
+    bone_numbers: Sequence[int] = ...,
+    segment_bones: _Path | None = None,
+    replace: bool = False,
     threads: int | None = None,
 ) -> Case: ...
 def generate(
@@ -402,6 +432,29 @@ def generate(
     progress: _Progress = None,
     threads: int | None = None,
 ) -> dict[str, Any]: ...
+def label(
+    dataset: _Path,
+    plan: Plan | _Path | None = None,
+    *,
+    scale: _Scale = "graded",
+    name: str | None = None,
+    thresholds: _Settings | _Path | None = None,
+    replace: bool = False,
+    progress: _Progress = None,
+    threads: int | None = None,
+) -> dict[str, Any]: ...
+def train(
+    training: _Source | list[_Source],
+    out: _Path,
+    *,
+    evaluation: _Source | list[_Source] | None = None,
+    preset: Literal["quick", "standard", "paper"] = "standard",
+    seed: int | None = None,
+    progress: _Progress = None,
+    threads: int | None = None,
+    **settings: Any,
+) -> dict[str, Any]: ...
+def training_log(run: _Path) -> list[dict[str, Any]]: ...
 def evaluate(labels: npt.ArrayLike, predictions: npt.ArrayLike) -> dict[str, Any]: ...
 def permutation_test(
     a: npt.ArrayLike,

@@ -5,8 +5,9 @@ use numpy::{
     Element, IntoPyArray, PyArray, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods,
 };
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyBufferError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 /// The type and the shape of an array, as messages name them.
 fn described(array: &Bound<'_, PyUntypedArray>) -> String {
@@ -189,4 +190,30 @@ pub fn converted<'py>(
         )),
         _ => Ok(of_type),
     }
+}
+
+/// What `__dlpack__` gives: a copy of the array, since others may write to what they are given; `options` are numpy's.
+pub fn exported<'py>(
+    array: &Bound<'py, PyAny>,
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let options = match options {
+        Some(options) => options.copy()?,
+        None => PyDict::new(array.py()),
+    };
+    if let Some(copy) = options.get_item("copy")? {
+        if !copy.is_none() && !copy.is_truthy()? {
+            return Err(PyBufferError::new_err(
+                "arrays of ppa are read-only: they are copied, but copy=False was given",
+            ));
+        }
+        options.del_item("copy")?;
+    }
+    let copied = array.call_method0("copy")?;
+    copied.call_method("__dlpack__", (), Some(&options))
+}
+
+/// What `__dlpack_device__` gives.
+pub fn device<'py>(array: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    array.call_method0("__dlpack_device__")
 }

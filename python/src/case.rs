@@ -237,6 +237,12 @@ impl PyCase {
         plain(py, &self.limb().prepared.findings)
     }
 
+    /// dict: the file that labels the bones, ``path``, ``numbers`` and whether it was ``segmented`` here; None without.
+    #[getter]
+    fn bones<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        plain(py, &self.limb().case.bones)
+    }
+
     /// numpy.ndarray, shape (4, 4): from the scan to the patient frame, T^P_CT, mm.
     #[getter]
     fn patient_from_ct<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {

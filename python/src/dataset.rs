@@ -8,8 +8,10 @@ use numpy::{IntoPyArray, PyArray1, PyArray3, PyArrayMethods};
 use ppa_dataset::BodyShape;
 use ppa_dataset::labels::LabelName;
 use ppa_learn::data::{
-    DataError, FRAMES_PER_POSE, Sample, Selection, Views, evaluation_input, read_samples,
+    Augmentation, Balanced, DataError, FRAMES_PER_POSE, Raster, Sample, Selection, Views,
+    evaluation_input, read_samples,
 };
+use ppa_learn::train::TrainConfig;
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -17,7 +19,7 @@ use pyo3::types::{PyDict, PyList};
 use crate::background::run;
 use crate::errors::OrRaise;
 use crate::side::letter;
-use crate::values::word;
+use crate::values::{from_table, table, to_table, word};
 
 /// A dataset as PyTorch's map-style datasets: ``dataset[i]`` is a pair of image and label, ``len(dataset)`` their number.
 ///
@@ -147,21 +149,11 @@ impl PyDataset {
         py: Python<'py>,
         index: isize,
     ) -> PyResult<(Bound<'py, PyAny>, f64)> {
-        let sample = self.sample(index)?;
-        let (side, images) = (self.side, &sample.images);
-        let values = py.detach(|| {
-            let mut values = Vec::with_capacity(images.len() * side * side);
-            for image in images {
-                values.extend(evaluation_input(&image.load(side)?, side).into_values());
-            }
-            Ok::<_, DataError>(values)
-        });
-        let array: Bound<'py, PyArray3<f32>> =
-            (values.or_raise()?.into_pyarray(py)).reshape([self.cameras, side, side])?;
-        let image = match &self.transform {
-            Some(transform) => transform.bind(py).call1((array,))?,
-            None => array.into_any(),
-        };
+        let (sample, side) = (self.sample(index)?, self.side);
+        let image = self.image(py, sample, |images| {
+            let images = images.iter();
+            images.map(|image| evaluation_input(image, side)).collect()
+        })?;
         Ok((image, sample.label))
     }
 
@@ -169,6 +161,55 @@ impl PyDataset {
     #[getter]
     fn labels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_vec(py, self.samples.iter().map(|sample| sample.label).collect())
+    }
+
+    /// What a training sees at a place of its endless sequence of samples: a sample that was drawn, and its image as it was changed.
+    ///
+    /// Step ``s`` of a training with batches of ``b`` sees the places from ``s * b`` on. Another program can so train on the same batches as
+    /// :func:`train`, whose ``training`` selects the same samples.
+    ///
+    /// Parameters
+    /// ----------
+    /// place : int
+    ///     From 0.
+    /// seed : int
+    ///     Seed of the training; 1 is that of the presets.
+    /// balanced : bool
+    ///     Draw rare labels as often as others, as "quick" and "paper" do.
+    /// augmentation : dict, optional
+    ///     How images are changed, as ``[augmentation]`` of a configuration; a key that is left out is that of "quick". A random crop is
+    ///     always made.
+    ///
+    /// Returns
+    /// -------
+    /// image, label
+    ///     As of ``dataset[i]``.
+    #[pyo3(signature = (place, *, seed=1, balanced=true, augmentation=None))]
+    fn drawn<'py>(
+        &self,
+        py: Python<'py>,
+        place: u64,
+        seed: u64,
+        balanced: bool,
+        augmentation: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<(Bound<'py, PyAny>, f64)> {
+        let mut keys = to_table(&TrainConfig::quick().augmentation)?;
+        if let Some(given) = augmentation {
+            keys.extend(table(given, "augmentation")?);
+        }
+        let augmentation: Augmentation = from_table(keys, "augmentation")?;
+        let order = Balanced::new(&self.samples).or_raise()?;
+        let order = match balanced {
+            true => order,
+            false => order.unbalanced(),
+        };
+        let sample = &self.samples[order.pick(seed, place)];
+        let side = self.side;
+        let image = self.image(py, sample, |images| {
+            let images: Vec<_> = images.iter().collect();
+            augmentation.apply(&images, side, seed, place)
+        })?;
+        Ok((image, sample.label))
     }
 
     /// list of dict: what is known of each sample, for a ``pandas.DataFrame``: ``id`` (path of its first image), ``patient``, ``side``,
@@ -206,6 +247,27 @@ impl PyDataset {
 }
 
 impl PyDataset {
+    /// What networks see of a sample, or what `transform` makes of it; `input` takes the prepared images of its cameras.
+    fn image<'py>(
+        &self,
+        py: Python<'py>,
+        sample: &Sample,
+        input: impl Fn(&[Raster<u16>]) -> Vec<Raster<f32>> + Send + Sync,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let side = self.side;
+        let values = py.detach(|| {
+            let prepared = sample.images.iter().map(|image| image.load(side));
+            let inputs = input(&prepared.collect::<Result<Vec<_>, _>>()?).into_iter();
+            Ok::<Vec<f32>, DataError>(inputs.flat_map(Raster::into_values).collect())
+        });
+        let array: Bound<'py, PyArray3<f32>> =
+            (values.or_raise()?.into_pyarray(py)).reshape([self.cameras, side, side])?;
+        match &self.transform {
+            Some(transform) => transform.bind(py).call1((array,)),
+            None => Ok(array.into_any()),
+        }
+    }
+
     /// A sample by its number; negative ones count from the end.
     fn sample(&self, index: isize) -> PyResult<&Sample> {
         let count = self.samples.len();

@@ -6,8 +6,9 @@ use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
 use ppa_depth::{Camera, DepthImage};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
-use crate::arrays::{of_rows, view};
+use crate::arrays::{converted, device, exported, of_rows, view};
 use crate::errors::OrRaise;
 use crate::values::plain;
 
@@ -100,7 +101,19 @@ impl PyDepthImage {
         dtype: Option<&Bound<'py, PyAny>>,
         copy: Option<bool>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        crate::arrays::converted(Self::z_mm(this)?.into_any(), dtype, copy)
+        converted(Self::z_mm(this)?.into_any(), dtype, copy)
+    }
+
+    #[pyo3(signature = (**options))]
+    fn __dlpack__<'py>(
+        this: &Bound<'py, Self>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        exported(&Self::z_mm(this)?.into_any(), options)
+    }
+
+    fn __dlpack_device__<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        device(&Self::z_mm(this)?.into_any())
     }
 
     fn __repr__(&self) -> String {

@@ -11,6 +11,7 @@ mod errors;
 mod exposure;
 mod generate;
 mod interpreter;
+mod label;
 mod material;
 mod metrics;
 mod network;
@@ -24,6 +25,7 @@ mod radiograph;
 mod scene;
 mod side;
 mod spectrum;
+mod train;
 mod transport;
 mod values;
 mod volume;
@@ -53,9 +55,13 @@ fn _ppa(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(prepare::prepare, module)?)?;
     module.add_function(wrap_pyfunction!(command::run_program, module)?)?;
     module.add_function(wrap_pyfunction!(generate::generate, module)?)?;
+    module.add_function(wrap_pyfunction!(label::label, module)?)?;
     module.add_function(wrap_pyfunction!(metrics::evaluate, module)?)?;
     module.add_function(wrap_pyfunction!(metrics::permutation_test, module)?)?;
     module.add_function(wrap_pyfunction!(phantom::phantom, module)?)?;
+    module.add_function(wrap_pyfunction!(phantom::phantom_bones, module)?)?;
     module.add_function(wrap_pyfunction!(phantom::phantom_truth, module)?)?;
+    module.add_function(wrap_pyfunction!(train::train, module)?)?;
+    module.add_function(wrap_pyfunction!(train::training_log, module)?)?;
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! `ppa.phantom`: a CT of a limb whose true shape is known.
 
 use ppa_core::Side;
+use ppa_ct::Volume;
 use ppa_phantom::{Limb, LowerLeg, Scanner, TableTop};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -17,6 +18,20 @@ fn lower_leg(name: &str, seed: Option<u64>, side: Side, plate: bool) -> PyResult
         None => LowerLeg::family(name, side).or_raise()?,
     };
     Ok(if plate { leg.with_plate() } else { leg })
+}
+
+/// The knee, or a lower leg.
+fn limb(name: &str, seed: Option<u64>, side: Side, plate: bool) -> PyResult<Limb> {
+    let knee = name.eq_ignore_ascii_case("knee");
+    if knee && (seed.is_some() || plate) {
+        return Err(PyValueError::new_err(
+            "the knee is one shape: it takes neither seed nor plate",
+        ));
+    }
+    match knee {
+        true => Ok(Limb::knee(side)),
+        false => Ok(lower_leg(name, seed, side, plate)?.into_limb()),
+    }
 }
 
 /// A CT of a limb made of shapes, not of a person.
@@ -63,17 +78,7 @@ pub fn phantom(
     noise_seed: u64,
     threads: Option<usize>,
 ) -> PyResult<PyVolume> {
-    let side = crate::side::side(side)?;
-    let knee = name.eq_ignore_ascii_case("knee");
-    if knee && (seed.is_some() || plate) {
-        return Err(PyValueError::new_err(
-            "the knee is one shape: it takes neither seed nor plate",
-        ));
-    }
-    let limb = match knee {
-        true => Limb::knee(side),
-        false => lower_leg(name, seed, side, plate)?.into_limb(),
-    };
+    let limb = limb(name, seed, crate::side::side(side)?, plate)?;
     let table = match table {
         true => TableTop::Present,
         false => TableTop::Absent,
@@ -92,6 +97,43 @@ pub fn phantom(
     })?;
     Ok(PyVolume {
         volume: volume.or_raise()?,
+        file: None,
+    })
+}
+
+/// Which bone of a phantom each voxel of a volume belongs to, for ``bones`` of :func:`prepare`.
+///
+/// Parameters
+/// ----------
+/// volume : Volume
+///     The lattice: a CT of the same phantom.
+/// name, side, seed
+///     As for :func:`phantom`.
+/// threads : int, optional
+///     Worker threads; one per core by default.
+///
+/// Returns
+/// -------
+/// Volume
+///     0 for none; of a lower leg 3 is the tibia, 4 the fibula and 1 the talus.
+#[pyfunction]
+#[pyo3(signature = (volume, name="P01", side="r", *, seed=None, threads=None))]
+pub fn phantom_bones(
+    py: Python<'_>,
+    volume: &PyVolume,
+    name: &str,
+    side: &str,
+    seed: Option<u64>,
+    threads: Option<usize>,
+) -> PyResult<PyVolume> {
+    let limb = limb(name, seed, crate::side::side(side)?, false)?;
+    let grid = volume.volume.grid().clone();
+    let numbers = run(py, threads, None, move |_| {
+        let numbers = limb.bone_labels(&grid).into_iter().map(i16::from);
+        Volume::from_i16(grid, numbers.collect())
+    })?;
+    Ok(PyVolume {
+        volume: numbers.or_raise()?,
         file: None,
     })
 }

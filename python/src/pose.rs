@@ -6,7 +6,8 @@ use numpy::PyArray2;
 use ppa_dataset::layout::View;
 use ppa_depth::{DepthImage, SensorSpec};
 use ppa_generate::{Frames, PlacedCamera, PoseError, SceneSetupError, VisibleLimb};
-use ppa_scene::Placement;
+use ppa_label::{Exposure as LabelExposure, PoseLabel};
+use ppa_scene::{Placement, ct_from_device};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -17,8 +18,9 @@ use crate::camera::PyCamera;
 use crate::depth_image::PyDepthImage;
 use crate::errors::OrRaise;
 use crate::exposure::{ExposeError, Exposure, fast};
+use crate::label::scale_of;
 use crate::plan::xray_settings;
-use crate::posable_case::PosableCase;
+use crate::posable_case::{LabelError, PosableCase};
 use crate::progress::observer;
 use crate::radiograph::{Made, PyRadiograph};
 use crate::scene::{Scene, frames};
@@ -307,6 +309,44 @@ impl PyPose {
             })
         })?;
         Ok(PyRadiograph::new(made.or_raise()?))
+    }
+
+    /// Grade how well a radiograph of the pose would show the joint space of the ankle, computed from the bones of the case.
+    ///
+    /// No reader has confirmed these labels.
+    ///
+    /// Parameters
+    /// ----------
+    /// scale : {"graded", "strict"}
+    ///     As for :func:`label`.
+    /// thresholds : dict or path of a TOML file, optional
+    ///     As for :func:`label`.
+    /// threads : int, optional
+    ///     Worker threads; one per core by default.
+    ///
+    /// Returns
+    /// -------
+    /// dict
+    ///     ``label`` from 1 (ideal) to 3 (inadequate), its ``std``, and ``gutters``: ``name``, ``openness`` and ``grade`` of each.
+    #[pyo3(signature = (*, scale="graded", thresholds=None, threads=None))]
+    fn label<'py>(
+        &self,
+        py: Python<'py>,
+        scale: &str,
+        thresholds: Option<&Bound<'py, PyAny>>,
+        threads: Option<usize>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let scale = scale_of(scale, thresholds)?;
+        let (limb, scene, placement) = (self.limb.clone(), self.scene.clone(), self.placement);
+        let label = run(py, threads, None, move |_| {
+            let landmarks = &limb.prepared.landmarks;
+            let device = ct_from_device(&placement, landmarks, &scene.table.room.device);
+            let joint = landmarks.joint_centre.into();
+            let exposure = LabelExposure::of_device(device.isometry(), joint);
+            let space = limb.joint_space()?;
+            Ok::<_, LabelError>(PoseLabel::new(&space, exposure, &scale)?)
+        })?;
+        plain(py, &label.or_raise()?)
     }
 
     /// Draw the limb in the room with matplotlib, on axes that are given or in a new figure, which are returned.

@@ -1,16 +1,19 @@
 //! `ppa.prepare`: from a scan to a case.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 
-use ppa_ct::{Acquisition, ReadOptions, Scan, Volume, read_with};
-use ppa_generate::prepare_scan;
+use ppa_ct::{Acquisition, ReadError, ReadOptions, Scan, Volume, WriteError, read_with, write};
+use ppa_dataset::labels::{BoneFile, BoneNumbers};
+use ppa_generate::{Case, PrepareError, PreparedLimb, prepare_scan};
+use ppa_label::{CaseBonesError, check_bones, check_segmented_name, segment_checked_bones};
 use ppa_mesh::{LimbSettings, VoxelBox};
 use ppa_scene::LandmarkOverrides;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyFileExistsError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arrays::{finite, point, points};
-use crate::background::run;
+use crate::background::{Watch, run};
 use crate::case::PyCase;
 use crate::errors::OrRaise;
 use crate::posable_case::PosableCase;
@@ -26,6 +29,73 @@ fn of_memory(volume: Volume) -> Scan {
         acquisition: Acquisition::default(),
         warnings: Vec::new(),
     }
+}
+
+/// Why there is no case.
+#[derive(Debug, thiserror::Error)]
+enum PreparationError {
+    #[error(transparent)]
+    Limb(#[from] PrepareError),
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    #[error(transparent)]
+    Bones(#[from] CaseBonesError),
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    #[error("the call was interrupted, nothing was written")]
+    Interrupted,
+}
+
+/// Bones of a file that a person or another program made.
+fn labelled(path: PathBuf, [tibia, fibula, talus]: [u8; 3]) -> BoneFile {
+    BoneFile {
+        path,
+        numbers: BoneNumbers {
+            tibia,
+            fibula,
+            talus,
+        },
+        segmented: false,
+    }
+}
+
+/// Bones that are separated in the scan and written to `target`.
+fn separated(target: PathBuf, scan: &Path, replace: bool) -> PyResult<BoneFile> {
+    check_segmented_name(&target, scan).or_raise()?;
+    if target.exists() && !replace {
+        return Err(PyFileExistsError::new_err(format!(
+            "{} exists: give replace=True to replace it",
+            target.display()
+        )));
+    }
+    Ok(BoneFile {
+        path: target,
+        numbers: BoneNumbers::default(),
+        segmented: true,
+    })
+}
+
+/// A case that names its bones, once it is sure that labels can be computed from them.
+fn with_bones(
+    case: Case,
+    prepared: &PreparedLimb,
+    bones: BoneFile,
+    watch: &Watch,
+) -> Result<Case, PreparationError> {
+    if bones.segmented {
+        let (limb, landmarks) = (&prepared.limb.mask, &prepared.landmarks);
+        let separated = segment_checked_bones(&prepared.volume, limb, landmarks)?;
+        if watch.stop().load(Ordering::Relaxed) {
+            return Err(PreparationError::Interrupted);
+        }
+        write(&bones.path, &separated)?;
+    } else {
+        check_bones(&bones, &prepared.landmarks)?;
+    }
+    Ok(Case {
+        bones: Some(bones),
+        ..case
+    })
 }
 
 /// Find skin, axis, joint and supporting plane of a limb.
@@ -56,6 +126,14 @@ fn of_memory(volume: Volume) -> Scan {
 ///     Direction that faces up at angle 0, ct frame.
 /// plane : array_like, shape (3, 3), optional
 ///     Three points of the plane under the limb, ct frame, mm: one distal, two proximal.
+/// bones : str or os.PathLike, optional
+///     Which bone each voxel belongs to, for labels: NIfTI, NRRD or MetaImage in the scan's frame.
+/// bone_numbers : (int, int, int)
+///     Numbers of tibia, fibula and talus in ``bones``.
+/// segment_bones : str or os.PathLike, optional
+///     Separate the bones in the scan and write them here: NIfTI, NRRD or MetaImage. Refused, with the place, where they touch.
+/// replace : bool
+///     Replace a file of segmented bones that is there.
 /// threads : int, optional
 ///     Worker threads; one per core by default.
 ///
@@ -63,7 +141,7 @@ fn of_memory(volume: Volume) -> Scan {
 /// -------
 /// Case
 #[pyfunction]
-#[pyo3(signature = (volume, side, *, limb=None, iso_hu=-500.0, crop=None, inside=None, joint=None, axis_source=None, joint_region=None, calf_region=None, axis=None, anterior=None, plane=None, threads=None))]
+#[pyo3(signature = (volume, side, *, limb=None, iso_hu=-500.0, crop=None, inside=None, joint=None, axis_source=None, joint_region=None, calf_region=None, axis=None, anterior=None, plane=None, bones=None, bone_numbers=[3, 4, 1], segment_bones=None, replace=false, threads=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub fn prepare(
     py: Python<'_>,
@@ -80,6 +158,10 @@ pub fn prepare(
     axis: Option<&Bound<'_, PyAny>>,
     anterior: Option<&Bound<'_, PyAny>>,
     plane: Option<&Bound<'_, PyAny>>,
+    bones: Option<PathBuf>,
+    bone_numbers: [u8; 3],
+    segment_bones: Option<PathBuf>,
+    replace: bool,
     threads: Option<usize>,
 ) -> PyResult<PyCase> {
     if axis.is_some() && (axis_source.is_some() || joint_region.is_some() || calf_region.is_some())
@@ -129,11 +211,25 @@ pub fn prepare(
         },
         Err(_) => (None, volume.extract()?, ReadOptions::default()),
     };
-    let limb = run(py, threads, None, move |_| {
+    let bones = match (bones, segment_bones) {
+        (None, None) => None,
+        (Some(path), None) => Some(labelled(path, bone_numbers)),
+        (None, Some(target)) => Some(separated(target, &path, replace)?),
+        (Some(_), Some(_)) => {
+            return Err(PyValueError::new_err(
+                "bones are those of a file, segment_bones separates them: give one or the other",
+            ));
+        }
+    };
+    let limb = run(py, threads, None, move |watch| {
         let scan = scan.map_or_else(|| read_with(&path, &reading), Ok)?;
         let kept = scan.clone();
         let (case, prepared) = prepare_scan(scan, &path, &reading, side, &surface, &choices)?;
-        Ok::<_, ppa_generate::PrepareError>(PosableCase::new(case, kept, prepared))
+        let case = match bones {
+            Some(bones) => with_bones(case, &prepared, bones, watch)?,
+            None => case,
+        };
+        Ok::<_, PreparationError>(PosableCase::new(case, kept, prepared))
     })?;
     PyCase::of(limb.or_raise()?)
 }

@@ -9,7 +9,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{converted, view};
+use crate::arrays::{converted, device, exported, view};
 use crate::errors::OrRaise;
 use crate::values::{from_table, plain, table};
 use crate::volume::PyVolume;
@@ -301,6 +301,18 @@ impl PyRadiograph {
         copy: Option<bool>,
     ) -> PyResult<Bound<'py, PyAny>> {
         converted(self.total(py)?.into_any(), dtype, copy)
+    }
+
+    #[pyo3(signature = (**options))]
+    fn __dlpack__<'py>(
+        this: &Bound<'py, Self>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        exported(&this.get().total(this.py())?.into_any(), options)
+    }
+
+    fn __dlpack_device__<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        device(&this.get().total(this.py())?.into_any())
     }
 
     fn __repr__(&self) -> String {

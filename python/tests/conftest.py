@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
+import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -60,6 +63,28 @@ def files(tmp_path_factory: pytest.TempPathFactory, volume: ppa.Volume) -> Files
         xray=QUICK_XRAY,
     ).save(plan)
     return Files(folder, scan, case, plan)
+
+
+@pytest.fixture(scope="session")
+def labelled(files: Files, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A dataset with labels, as readers would leave them."""
+    folder = tmp_path_factory.mktemp("labelled") / "data"
+    ppa.generate(files.plan, folder)
+    radiographs = sorted((folder / "patient_0" / "xray" / "r").glob("*.png"))
+    steps = {path.name: int(path.stem.rpartition("_")[2]) for path in radiographs}
+    rows = {name: {"label": 1.0 + step / 20, "std": 0.0, "step": step} for name, step in steps.items()}
+    labels = folder / "patient_0" / "labels" / "r" / "labels.json"
+    labels.parent.mkdir(parents=True, exist_ok=True)
+    labels.write_text(json.dumps(rows))
+    return folder
+
+
+@pytest.fixture
+def listen() -> Iterator[None]:
+    """Ctrl-C raises KeyboardInterrupt, even where the shell that started the tests ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def program() -> str:

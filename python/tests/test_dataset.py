@@ -14,25 +14,11 @@ import pytest
 
 import ppa
 
-from conftest import Files, command, program
+from conftest import command, program
 
 
-@pytest.fixture(scope="module")
-def dataset(files: Files, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A dataset with labels, as readers would leave them."""
-    folder = tmp_path_factory.mktemp("labelled") / "data"
-    ppa.generate(files.plan, folder)
-    radiographs = sorted((folder / "patient_0" / "xray" / "r").glob("*.png"))
-    steps = {path.name: int(path.stem.rpartition("_")[2]) for path in radiographs}
-    rows = {name: {"label": 1.0 + step / 20, "std": 0.0, "step": step} for name, step in steps.items()}
-    labels = folder / "patient_0" / "labels" / "r" / "labels.json"
-    labels.parent.mkdir(parents=True, exist_ok=True)
-    labels.write_text(json.dumps(rows))
-    return folder
-
-
-def test_samples_are_images_and_labels(dataset: Path) -> None:
-    samples = ppa.Dataset(dataset, side=64)
+def test_samples_are_images_and_labels(labelled: Path) -> None:
+    samples = ppa.Dataset(labelled, side=64)
     assert len(samples) == 3 * 2
     image, label = samples[0]
     assert image.shape == (2, 64, 64) and image.dtype == np.float32
@@ -45,14 +31,14 @@ def test_samples_are_images_and_labels(dataset: Path) -> None:
         samples[len(samples)]
 
 
-def test_samples_can_be_selected(dataset: Path) -> None:
-    assert len(ppa.Dataset(dataset, views="unified")) == 3 * 2 * 2
-    assert len(ppa.Dataset(dataset, views="left", shapes=["orig"], every_pose=2)) == 2
-    assert ppa.Dataset(dataset, views="left", side=32)[0][0].shape == (1, 32, 32)
-    assert ppa.Dataset(dataset, transform=lambda image: image.sum())[0][0].shape == ()
+def test_samples_can_be_selected(labelled: Path) -> None:
+    assert len(ppa.Dataset(labelled, views="unified")) == 3 * 2 * 2
+    assert len(ppa.Dataset(labelled, views="left", shapes=["orig"], every_pose=2)) == 2
+    assert ppa.Dataset(labelled, views="left", side=32)[0][0].shape == (1, 32, 32)
+    assert ppa.Dataset(labelled, transform=lambda image: image.sum())[0][0].shape == ()
     for refused in [{"patients": [7]}, {"shapes": ["round"]}, {"views": "above"}, {"side": 0}, {"every_pose": 0}, {"labels": "x"}]:
         with pytest.raises((ValueError, OSError)):
-            ppa.Dataset(dataset, **refused)
+            ppa.Dataset(labelled, **refused)
 
 
 def first_pixel(arguments: tuple[ppa.Dataset, int]) -> float:
@@ -61,8 +47,8 @@ def first_pixel(arguments: tuple[ppa.Dataset, int]) -> float:
 
 
 @pytest.mark.parametrize("method", ["fork", "spawn"])
-def test_workers_read_the_same_samples(dataset: Path, method: str) -> None:
-    samples = ppa.Dataset(dataset, side=32)
+def test_workers_read_the_same_samples(labelled: Path, method: str) -> None:
+    samples = ppa.Dataset(labelled, side=32)
     again = pickle.loads(pickle.dumps(samples))
     np.testing.assert_array_equal(samples[1][0], again[1][0])
     with multiprocessing.get_context(method).Pool(2) as pool:
@@ -70,18 +56,18 @@ def test_workers_read_the_same_samples(dataset: Path, method: str) -> None:
     assert sums == [first_pixel((samples, i)) for i in range(4)]
 
 
-def test_a_folder_without_a_training_is_refused(dataset: Path) -> None:
+def test_a_folder_without_a_training_is_refused(labelled: Path) -> None:
     with pytest.raises((ValueError, OSError)) as refused:
-        ppa.Network.load(dataset)
-    assert str(dataset) in str(refused.value)
+        ppa.Network.load(labelled)
+    assert str(labelled) in str(refused.value)
 
 
 @pytest.fixture(scope="module")
-def training(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def training(labelled: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a training of few and small steps on two persons with the same images."""
     folder = tmp_path_factory.mktemp("training")
     for patient in (0, 1):
-        shutil.copytree(dataset / "patient_0", folder / "data" / f"patient_{patient}")
+        shutil.copytree(labelled / "patient_0", folder / "data" / f"patient_{patient}")
     (folder / "train.toml").write_text(
         'preset = "quick"\nside = 32\nsteps = 4\nbatch_size = 4\nlog_every = 1\nviews = "pairs"\n'
         '[[training]]\ndataset = "data"\npatients = [0]\n[[evaluation]]\ndataset = "data"\npatients = [1]\n'

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +19,7 @@ import ppa
 from conftest import QUICK_XRAY, Files
 
 
-@pytest.fixture(autouse=True)
-def listen() -> Iterator[None]:
-    """Ctrl-C raises KeyboardInterrupt, even where the shell that started the tests ignores it."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
+pytestmark = pytest.mark.usefixtures("listen")
 
 
 def seconds_until_interrupted(call: Callable[[], Any], after: float) -> float:
