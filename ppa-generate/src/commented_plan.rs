@@ -38,13 +38,42 @@ impl Plan {
     /// # Errors
     /// [`PlanError::File`], also for a path that is not UTF-8, which TOML cannot hold.
     pub fn write_commented(&self, path: &Path) -> Result<(), PlanError> {
+        Ok(write_whole(path, self.commented_text(path)?.as_bytes())?)
+    }
+
+    /// What [`Plan::write_commented`] writes into the file `path`.
+    ///
+    /// # Errors
+    /// [`PlanError::File`] for a path that is not UTF-8, which TOML cannot hold.
+    pub fn commented_text(&self, path: &Path) -> Result<String, PlanError> {
         let mut plan = self.clone();
         let folder = path.parent().unwrap_or(Path::new(""));
         for file in plan.files_mut() {
             *file = relative_to(file, folder)?;
         }
-        let text = commented(&to_toml(&plan, path)?);
-        Ok(write_whole(path, text.as_bytes())?)
+        Ok(commented(&to_toml(&plan, path)?))
+    }
+
+    /// Settings that are off by default: key, and an example of a value in TOML.
+    pub fn optional_settings() -> impl Iterator<Item = (String, &'static str)> {
+        let below = |table: &str, line: &'static str| {
+            let (key, value) = line.strip_prefix('#')?.split_once(" = ")?;
+            let dot = if table.is_empty() { "" } else { "." };
+            let value = value.split("    # ").next().unwrap_or(value);
+            Some((format!("{table}{dot}{key}"), value))
+        };
+        let off = OFF
+            .iter()
+            .flat_map(move |(table, lines)| lines.iter().map(move |line| (*table, *line)));
+        let mut table = "";
+        let tables = OFF_TABLES.lines().map(move |line| {
+            if let Some(name) = line.strip_prefix("#[") {
+                table = name.trim_end_matches(']');
+            }
+            (table, line)
+        });
+        off.chain(tables)
+            .filter_map(move |(table, line)| below(table, line))
     }
 }
 
@@ -153,6 +182,26 @@ mod tests {
         assert!(read.room_file.is_some() && read.room.table.is_some());
         assert!(read.depth.sensor.is_some() && read.xray.receptor.grid.is_some());
         assert_eq!(read.xray.calibration, plan().xray.calibration);
+    }
+
+    #[test]
+    fn each_optional_setting_is_named_with_a_value() {
+        let settings: Vec<_> = Plan::optional_settings().collect();
+        let value = |key: &str| settings.iter().find(|(k, _)| k == key).map(|(_, v)| *v);
+        assert_eq!(value("room_file"), Some("\"room.toml\""));
+        let grid = "{ ratio = 8, lines_per_cm = 40, focus_mm = 1100 }";
+        assert_eq!(value("xray.receptor.grid"), Some(grid));
+        assert_eq!(
+            value("depth.sensor.mixed"),
+            Some("{ modulation_mhz = 200 }")
+        );
+        assert_eq!(value("room.table.iterations"), Some("1000"));
+        for (key, value) in settings {
+            assert!(
+                format!("x = {value}").parse::<toml::Table>().is_ok(),
+                "{key}"
+            );
+        }
     }
 
     /// Switched on, a setting would stand there twice.

@@ -38,6 +38,7 @@ mod lists;
 #[cfg(test)]
 mod load;
 mod loaded_scan;
+mod made_images;
 mod merge;
 mod overview;
 mod part_file;
@@ -83,6 +84,7 @@ pub use gates::NotALimb;
 pub use generate::{GenerateError, GenerateSettings, generate};
 pub use job::{JobError, Progress, Summary};
 pub use loaded_scan::LoadedScan;
+pub use made_images::{MadeImages, made_images};
 pub use merge::{MergeError, merge};
 pub use part_file::held_part;
 pub use plan::{

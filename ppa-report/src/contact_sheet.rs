@@ -7,9 +7,10 @@ use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 use ppa_dataset::BodyShape;
 use ppa_dataset::files::FileError;
 use ppa_dataset::layout::{LimbId, View, angle_text};
-use ppa_dataset::manifest::{FileKind, FileRow, Manifest, RoiRow};
+use ppa_dataset::manifest::{FileKind, FileRow, Manifest, RoiFile, RoiRow};
 use ppa_dataset::published::{GrayImage16, ImageFileError};
 use ppa_depth::false_colour;
+use ppa_generate::{FolderError, made_images};
 
 use crate::drawing::write_text;
 
@@ -30,6 +31,9 @@ pub enum ContactSheetError {
     /// A file of the dataset cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
+    /// The folder of a dataset that is being made.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
     /// The dataset shows no poses of this limb.
     #[error("{} holds no depth images of {limb}", root.display())]
     Empty {
@@ -57,6 +61,20 @@ pub fn contact_sheet(
     Ok(draw(&tiles(root, limb, columns)?))
 }
 
+/// The contact sheet of the poses that are made so far, while `generate` makes the others.
+///
+/// # Errors
+/// [`ContactSheetError`] when `root` holds no dataset, or no pose of the limb is made.
+pub fn growing_contact_sheet(
+    root: &Path,
+    limb: LimbId,
+    columns: usize,
+) -> Result<RgbImage, ContactSheetError> {
+    let made = made_images(root, limb)?;
+    let tiles = tiles_of(root, limb, columns, &made.files, &made.rois)?;
+    Ok(draw(&tiles))
+}
+
 /// Evenly chosen poses of one limb as rows of small pictures.
 pub(crate) struct Tiles {
     /// Half degrees of rotation, one per column.
@@ -71,8 +89,18 @@ pub(crate) struct Tiles {
 pub(crate) fn tiles(root: &Path, limb: LimbId, columns: usize) -> Result<Tiles, ContactSheetError> {
     let manifest = Manifest::read(root)?;
     let rois = manifest.rois(limb)?;
+    tiles_of(root, limb, columns, &manifest.files, &rois)
+}
+
+fn tiles_of(
+    root: &Path,
+    limb: LimbId,
+    columns: usize,
+    files: &[FileRow],
+    rois: &RoiFile,
+) -> Result<Tiles, ContactSheetError> {
     let of_limb = |kind| {
-        let rows = manifest.files.iter();
+        let rows = files.iter();
         rows.filter(move |row| row.kind == kind && row.limb == limb)
     };
     let mut steps: Vec<u32> = of_limb(FileKind::Depth).map(|row| row.step).collect();

@@ -1,7 +1,7 @@
 //! Pictures and pages for inspecting cases, poses and datasets.
 //!
-//! [`audit_page`] shows a scan, [`case_picture`] and [`pose_picture`] show one limb, [`contact_sheet`] a dataset on one picture, [`qa_page`] the quality report
-//! of a dataset, [`coverage_plot`] where a camera sees most of a joint; [`learning_curve`], [`confusion`] and others chart an evaluation,
+//! [`audit_page`] shows a scan, [`case_picture`] and [`pose_picture`] show one limb, [`contact_sheet`] a dataset on one picture ([`growing_contact_sheet`] while it is made), [`qa_page`] the quality report
+//! of a dataset and [`pose_rows`] what it draws, [`coverage_plot`] where a camera sees most of a joint; [`learning_curve`], [`confusion`] and others chart an evaluation,
 //! [`experiments_page`] shows the paper's experiments.
 
 mod audit_page;
@@ -17,11 +17,11 @@ mod qa;
 
 pub use audit_page::audit_page;
 pub use chart::{Chart, Mark, Series, Tile};
-pub use contact_sheet::{ContactSheetError, contact_sheet};
+pub use contact_sheet::{ContactSheetError, contact_sheet, growing_contact_sheet};
 pub use coverage_plot::{RankedView, coverage_plot};
 pub use evaluation::{
     calibration, confusion, errors_by_amount, errors_by_angle, learning_curve, predictions_by_label,
 };
 pub use experiments::{ExperimentPart, ResultCell, WorstPose, experiments_page};
 pub use pictures::{PosedLimb, case_picture, pose_picture, write_picture};
-pub use qa::{QaError, qa_page};
+pub use qa::{PoseRow, QaError, pose_rows, qa_page};

@@ -17,7 +17,7 @@ pub(crate) struct CaseFile {
 impl CaseFile {
     /// `leg.case.toml`, whose changes go to `leg.edited.case.toml`.
     pub fn new(original: PathBuf) -> Self {
-        let edited = beside(&original, "edited.case.toml");
+        let edited = edited_case(&original);
         let known = std::fs::read_to_string(&edited).ok();
         Self {
             original,
@@ -77,6 +77,23 @@ impl CaseFile {
         self.known = None;
         Ok(())
     }
+}
+
+/// Where the plan of a dataset with a case is saved, if none was opened.
+pub(crate) fn new_plan(case: &Path) -> PathBuf {
+    beside(case, "plan.toml")
+}
+
+/// Where the changes of a case are saved.
+pub(crate) fn edited_case(original: &Path) -> PathBuf {
+    beside(original, "edited.case.toml")
+}
+
+/// The case that a file with changes belongs to; `None` for any other file.
+pub(crate) fn original_case(edited: &Path) -> Option<PathBuf> {
+    let name = edited.file_name()?.to_str()?;
+    let stem = name.strip_suffix(".edited.case.toml")?;
+    Some(edited.with_file_name(format!("{stem}.case.toml")))
 }
 
 /// A file beside a case, named after it: `leg.case.toml` and `edited.case.toml` give `leg.edited.case.toml`.

@@ -27,6 +27,40 @@ pub(crate) struct ImageCommands {
     pub need_saved_plan: bool,
 }
 
+/// Commands that make the dataset of a plan.
+#[derive(Debug, Serialize)]
+pub(crate) struct PlanCommands {
+    pub forecast: String,
+    pub generate: String,
+    pub status: String,
+}
+
+/// The dataset of a plan file as commands.
+pub(crate) fn of_plan(plan: &Path, dataset: &Path) -> PlanCommands {
+    let (plan, dataset) = (quoted(plan), quoted(dataset));
+    PlanCommands {
+        forecast: format!("ppa plan {plan} --out {dataset}"),
+        generate: format!("ppa generate {plan} --out {dataset}"),
+        status: format!("ppa status {dataset}"),
+    }
+}
+
+/// Commands that look at a dataset.
+#[derive(Debug, Serialize)]
+pub(crate) struct DatasetCommands {
+    pub quality: String,
+    pub check: String,
+}
+
+/// A dataset as commands.
+pub(crate) fn of_dataset(dataset: &Path) -> DatasetCommands {
+    let dataset = quoted(dataset);
+    DatasetCommands {
+        quality: format!("ppa qa {dataset}"),
+        check: format!("ppa dataset check {dataset}"),
+    }
+}
+
 /// The decisions of a case as a command.
 pub(crate) fn of_case(case: &Case, out: &Path) -> Commands {
     let mut line = format!("ppa prepare {}", quoted(&case.source.path));

@@ -2,7 +2,13 @@
 
 use std::path::PathBuf;
 
-use ppa_generate::{CaseError, JointError, PlanError, PoseError, PrepareError, SceneSetupError};
+use ppa_dataset::files::FileError;
+use ppa_dataset::layout::LimbId;
+use ppa_generate::{
+    CaseError, FolderError, ForecastError, JointError, PlanError, PoseError, PrepareError,
+    SceneSetupError,
+};
+use ppa_report::ContactSheetError;
 
 /// Why the studio cannot be opened, or cannot do what the page asks for.
 #[derive(Debug, thiserror::Error)]
@@ -14,9 +20,29 @@ pub enum StudioError {
     /// A plan names no case.
     #[error("{} names no case", .0.display())]
     NoCase(PathBuf),
-    /// A dataset or a training, which the page cannot show.
-    #[error("{} is a folder without a scan: a scan, a case or a plan can be opened", .0.display())]
-    NotAScan(PathBuf),
+    /// A training, which the page cannot show.
+    #[error("{} is a training: a scan, a case, a plan or a dataset can be opened", .0.display())]
+    Training(PathBuf),
+    /// A dataset is open, but none of its limbs.
+    #[error(
+        "no limb is open: the dataset has no plan beside it, or none of its limbs was opened yet"
+    )]
+    NoLimb,
+    /// A limb whose case is not known.
+    #[error("the plan beside the dataset names no case of {0}")]
+    NotInPlan(LimbId),
+    /// The quality report of a dataset.
+    #[error(transparent)]
+    Qa(#[from] ppa_report::QaError),
+    /// The images and lists of a dataset.
+    #[error(transparent)]
+    Published(#[from] ppa_dataset::published::PublishedError),
+    /// An image of a dataset.
+    #[error(transparent)]
+    Image(#[from] ppa_dataset::published::ImageFileError),
+    /// A split of a dataset.
+    #[error(transparent)]
+    Split(#[from] ppa_dataset::SplitError),
     /// The built-in phantom.
     #[error("the built-in phantom cannot be written")]
     Phantom(#[source] Box<dyn std::error::Error + Send + Sync>),
@@ -62,6 +88,33 @@ pub enum StudioError {
     /// Its surface.
     #[error(transparent)]
     Surface(#[from] ppa_mesh::SurfaceError),
+    /// The text of a plan.
+    #[error("the plan is not TOML")]
+    Toml(#[source] toml::de::Error),
+    /// The text of a plan, to be changed.
+    #[error(transparent)]
+    TomlEdit(#[from] toml_edit::TomlError),
+    /// A file.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The folder of a dataset.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// The folder of the jobs of a cluster.
+    #[error(transparent)]
+    Cluster(#[from] ppa_cluster::FolderError),
+    /// The forecast of a plan.
+    #[error(transparent)]
+    Forecast(#[from] ForecastError),
+    /// The contact sheet of a dataset.
+    #[error(transparent)]
+    ContactSheet(#[from] ContactSheetError),
+    /// A run is under way.
+    #[error("{} is being made: pause it first", .0.display())]
+    Generating(PathBuf),
+    /// Threads for a run.
+    #[error("no threads can be started")]
+    Threads(#[source] rayon::ThreadPoolBuildError),
     /// A picture.
     #[error("the picture cannot be encoded")]
     Picture(#[from] image::ImageError),

@@ -1,10 +1,12 @@
-//! What the studio opens: a scan, a case, a plan, or the built-in phantom.
+//! What the studio opens: a scan, a case, a plan, a dataset, or the built-in phantom.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use ppa_ct::{ReadOptions, Volume, write_nifti};
+use ppa_dataset::files::FileError;
 use ppa_dataset::labels::{BoneFile, BoneNumbers};
+use ppa_dataset::manifest::DESCRIPTION_FILE;
 use ppa_generate::{Case, Plan, prepare};
 use ppa_mesh::LimbSettings;
 use ppa_phantom::{LowerLeg, TableTop};
@@ -15,7 +17,7 @@ use crate::error::StudioError;
 /// What to open.
 #[derive(Debug, Clone, Default)]
 pub struct Opening {
-    /// A scan, a case or a plan; the built-in phantom when absent.
+    /// A scan, a case, a plan or a dataset; the built-in phantom when absent.
     pub path: Option<PathBuf>,
     /// Side of the limb, for a scan.
     pub side: Option<Side>,
@@ -28,7 +30,7 @@ const PHANTOM_FOLDER: &str = "ppa-studio";
 const PHANTOM_SPACING_MM: f64 = 1.0;
 
 impl Opening {
-    /// A scan, a case or a plan.
+    /// A scan, a case, a plan or a dataset.
     pub fn of(path: &Path) -> Self {
         Self {
             path: Some(path.to_owned()),
@@ -36,10 +38,10 @@ impl Opening {
         }
     }
 
-    /// The case, the place of its file, and the plan whose room and exposure it is shown with.
+    /// What is to be shown first.
     pub(crate) fn read(&self) -> Result<Opened, StudioError> {
         let Some(path) = &self.path else {
-            return Opened::with_default_plan(phantom()?);
+            return Opened::of_case(phantom()?);
         };
         if path
             .extension()
@@ -48,46 +50,45 @@ impl Opening {
             return if is_plan(path) {
                 of_plan(path)
             } else {
-                Opened::with_default_plan(path.clone())
+                Opened::of_case(path.clone())
             };
         }
-        // A dataset or a training.
-        let has = |name| path.join(name).exists();
-        if has("dataset.json") || has("config.toml") {
-            return Err(StudioError::NotAScan(path.clone()));
+        if path.join(DESCRIPTION_FILE).exists() {
+            return of_dataset(path);
+        }
+        if path.join("config.toml").exists() {
+            return Err(StudioError::Training(path.clone()));
         }
         let side = self.side.ok_or_else(|| StudioError::NoSide(path.clone()))?;
         let file = case_name(path);
         if file.exists() {
-            return Opened::with_default_plan(file);
+            return Opened::of_case(file);
         }
         let (surface, choices) = (LimbSettings::default(), LandmarkOverrides::default());
         let (case, _) = prepare(path, &ReadOptions::default(), side, &surface, &choices)?;
         Ok(Opened {
-            case,
-            case_file: file,
-            plan: Plan::new(Vec::new()),
+            limb: Some((file, case)),
             plan_file: None,
+            dataset: None,
         })
     }
 }
 
 /// What was opened.
 pub(crate) struct Opened {
-    pub case: Case,
-    /// Where the case is or will be written.
-    pub case_file: PathBuf,
-    pub plan: Plan,
+    /// A case, and the file that it is or will be written to.
+    pub limb: Option<(PathBuf, Case)>,
     pub plan_file: Option<PathBuf>,
+    pub dataset: Option<PathBuf>,
 }
 
 impl Opened {
-    fn with_default_plan(case_file: PathBuf) -> Result<Self, StudioError> {
+    fn of_case(file: PathBuf) -> Result<Self, StudioError> {
+        let case = Case::read(&file)?;
         Ok(Self {
-            case: Case::read(&case_file)?,
-            case_file,
-            plan: Plan::new(Vec::new()),
+            limb: Some((file, case)),
             plan_file: None,
+            dataset: None,
         })
     }
 }
@@ -95,14 +96,26 @@ impl Opened {
 fn of_plan(path: &Path) -> Result<Opened, StudioError> {
     let plan = Plan::read(path)?;
     let case = plan.cases.first();
-    let case_file = case
-        .map(|case| case.file.clone())
-        .ok_or_else(|| StudioError::NoCase(path.to_owned()))?;
+    let case = case.ok_or_else(|| StudioError::NoCase(path.to_owned()))?;
     Ok(Opened {
-        case: Case::read(&case_file)?,
-        case_file,
-        plan,
         plan_file: Some(path.to_owned()),
+        ..Opened::of_case(case.file.clone())?
+    })
+}
+
+/// A dataset, and the plan that it has the name of, which may be there.
+fn of_dataset(path: &Path) -> Result<Opened, StudioError> {
+    let root = match path.file_name() {
+        Some(_) => path.to_owned(),
+        // As `.`.
+        None => path.canonicalize().map_err(FileError::at("find", path))?,
+    };
+    let mut name = root.file_name().unwrap_or_default().to_owned();
+    name.push(".toml");
+    Ok(Opened {
+        limb: None,
+        plan_file: Some(root.with_file_name(name)),
+        dataset: Some(root),
     })
 }
 

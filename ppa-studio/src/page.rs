@@ -17,6 +17,13 @@ const FILES: &[(&str, &str)] = &[
     ("view3d.js", include_str!("page/view3d.js")),
     ("landmarks.js", include_str!("page/landmarks.js")),
     ("whatif.js", include_str!("page/whatif.js")),
+    ("scan.js", include_str!("page/scan.js")),
+    ("room.js", include_str!("page/room.js")),
+    ("elements.js", include_str!("page/elements.js")),
+    ("plan.js", include_str!("page/plan.js")),
+    ("generation.js", include_str!("page/generation.js")),
+    ("dataset.js", include_str!("page/dataset.js")),
+    ("charts.js", include_str!("page/charts.js")),
 ];
 
 pub(crate) async fn index() -> Response {

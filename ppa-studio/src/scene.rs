@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use image::{DynamicImage, GrayImage, ImageFormat, RgbImage};
-use ppa_depth::{DepthImage, false_colour};
+use image::{DynamicImage, GrayImage, ImageFormat};
+use ppa_depth::DepthImage;
 use ppa_generate::{ExposableLimb, Plan, SceneSetup, XraySettings, prepared_phantom};
 use ppa_scene::Contact;
 use ppa_xray::{PreparedPhantom, Radiograph};
@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use crate::desk::Shown;
 use crate::error::StudioError;
+use crate::false_colours::side_by_side;
 use crate::newest::Ticket;
 use crate::what_if::WhatIf;
 
@@ -102,9 +103,9 @@ impl Scenes {
         let setup = self.setup(&plan)?;
         let views = (shown.limb).depth_views(&setup, &plan, what_if.angle_deg, plan.seed)?;
         let images: Vec<&DepthImage> = views.iter().map(|view| &view.image).collect();
-        let range_mm = range_mm(&images);
+        let (picture, range_mm) = side_by_side(&images);
         Ok(DepthPicture {
-            png: png(DynamicImage::ImageRgb8(side_by_side(&images, range_mm)))?,
+            png: png(DynamicImage::ImageRgb8(picture))?,
             report: DepthReport {
                 valid_pixels: images.iter().map(|image| image.valid_pixels()).collect(),
                 range_mm,
@@ -190,38 +191,6 @@ fn same_setup(a: &Plan, b: &Plan) -> bool {
         && a.depth == b.depth
         && beam(a) == beam(b)
         && a.xray.filters == b.xray.filters
-}
-
-/// Depths that the colours span, mm: from the nearest of all images on, enough for a limb on its table.
-fn range_mm(images: &[&DepthImage]) -> [f64; 2] {
-    let depths = images.iter().flat_map(|image| image.z_mm.iter());
-    let seen = depths.map(|z| f64::from(*z)).filter(|z| *z > 0.0);
-    let near = seen.fold(f64::INFINITY, f64::min);
-    let near = if near.is_finite() { near } else { 0.0 };
-    [near, near + COLOURED_MM]
-}
-
-/// Length of the range of depths that the colours span.
-const COLOURED_MM: f64 = 350.0;
-
-fn side_by_side(images: &[&DepthImage], range_mm: [f64; 2]) -> RgbImage {
-    let width: u32 = images.iter().map(|image| image.width).sum();
-    let height = images.iter().map(|image| image.height).max().unwrap_or(0);
-    let mut picture = RgbImage::new(width, height);
-    let mut left = 0;
-    for image in images {
-        for y in 0..image.height {
-            for x in 0..image.width {
-                let z_mm = f64::from(image.z_mm[(y * image.width + x) as usize]);
-                if z_mm > 0.0 {
-                    let colour = image::Rgb(false_colour(z_mm, range_mm));
-                    picture.put_pixel(left + x, y, colour);
-                }
-            }
-        }
-        left += image.width;
-    }
-    picture
 }
 
 fn radiograph_png(radiograph: &Radiograph, xray: &XraySettings) -> Result<Vec<u8>, StudioError> {

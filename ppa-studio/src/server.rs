@@ -6,7 +6,7 @@ use std::sync::mpsc::Receiver;
 use crate::error::StudioError;
 use crate::studio::Studio;
 
-/// Serves a studio until `stop` receives something or loses its sender, and the answers under way are sent.
+/// Serves a studio until `stop` receives something or loses its sender, the poses under way are finished and the answers under way are sent.
 ///
 /// # Errors
 /// [`StudioError::Serve`] when the socket cannot be used.
@@ -19,9 +19,12 @@ pub fn serve(studio: Studio, listener: TcpListener, stop: Receiver<()>) -> Resul
         .map_err(StudioError::Serve)?;
     let router = studio.router();
     let stopped = async move {
-        // Both ends of the channel mean the same.
-        let _ = tokio::task::spawn_blocking(move || stop.recv()).await;
-        studio.cancel_images();
+        let wait = move || {
+            // Both ends of the channel mean the same.
+            let _ = stop.recv();
+            studio.stop();
+        };
+        let _ = tokio::task::spawn_blocking(wait).await;
     };
     let served = runtime.block_on(async {
         listener.set_nonblocking(true)?;

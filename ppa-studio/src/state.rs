@@ -1,80 +1,116 @@
 //! All state of a running studio.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use ppa_generate::{Case, LoadedScan, Plan, PlanCase};
+use ppa_dataset::layout::LimbId;
+use ppa_generate::{Case, Plan, PlanCase};
 
-use crate::case_file::CaseFile;
-use crate::coarse_scan::CoarseScan;
-use crate::desk::{Desk, Shown};
+use crate::case_file::new_plan;
+use crate::desk::Desk;
 use crate::error::StudioError;
+use crate::generation::Generation;
+use crate::limb::Limb;
 use crate::newest::Newest;
 use crate::opening::Opening;
-use crate::pose_label::Labels;
-use crate::scene::Scenes;
+use crate::plan_file::PlanFile;
+use crate::stoppable::Stoppable;
 use crate::token::Token;
 use crate::what_if::WhatIf;
 
-/// The limb that is shown, its files, and the work under way.
+/// What is open, and the work under way.
 pub(crate) struct State {
     pub token: Token,
-    pub plan: Plan,
-    pub plan_file: Option<PathBuf>,
-    pub scenes: Scenes,
     /// Depth images under way.
     pub depth: Newest,
     /// The radiograph under way.
     pub radiograph: Newest,
-    pub coarse: CoarseScan,
     /// The surface of the coarse scan under way.
     pub surface: Newest,
-    pub labels: Labels,
     /// The label under way.
     pub label: Newest,
-    desk: Mutex<Desk>,
-    case_file: Mutex<CaseFile>,
+    /// The dataset that is being made.
+    pub generation: Generation,
+    /// The forecast under way.
+    pub forecast: Stoppable,
+    /// The contact sheet under way.
+    pub sheet: Newest,
+    /// The list of poses under way.
+    pub quality: Newest,
+    /// The check of all images under way.
+    pub check: Newest,
+    /// The dataset that was opened, if it is one.
+    pub opened_dataset: Option<PathBuf>,
+    plan: Mutex<Arc<Plan>>,
+    plan_file: Mutex<PlanFile>,
+    limb: Mutex<Option<Arc<Limb>>>,
 }
 
 impl State {
-    /// Opens a scan, a case or a plan, and takes up the changes that were saved beside the case.
+    /// Opens a scan, a case, a plan or a dataset, and takes up the changes that were saved beside them.
     pub fn open(opening: &Opening) -> Result<Self, StudioError> {
         let opened = opening.read()?;
-        let case_file = CaseFile::new(opened.case_file);
-        let case = if case_file.has_edits() {
-            Case::read(case_file.edited())?
-        } else {
-            opened.case
+        let plan_file = match (opened.plan_file, &opened.limb) {
+            (Some(file), _) => file,
+            (None, Some((file, _))) => new_plan(file),
+            (None, None) => return Err(StudioError::NoLimb),
         };
-        let desk = Desk::new(LoadedScan::of_case(&case)?, case)?;
+        let plan_file = PlanFile::new(plan_file);
+        let plan = if plan_file.current().exists() {
+            Plan::read(plan_file.current())?
+        } else {
+            Plan::new(Vec::new())
+        };
+        let limb = opened.limb.map(|(file, case)| Limb::open(file, case));
+        let limb = limb.transpose()?.map(Arc::new);
         Ok(Self {
             token: Token::random()?,
-            plan: opened.plan,
-            plan_file: opened.plan_file,
-            scenes: Scenes::default(),
             depth: Newest::default(),
             radiograph: Newest::default(),
-            coarse: CoarseScan::default(),
             surface: Newest::default(),
-            labels: Labels::default(),
             label: Newest::default(),
-            desk: Mutex::new(desk),
-            case_file: Mutex::new(case_file),
+            generation: Generation::default(),
+            forecast: Stoppable::default(),
+            sheet: Newest::default(),
+            quality: Newest::default(),
+            check: Newest::default(),
+            opened_dataset: opened.dataset,
+            plan: Mutex::new(Arc::new(plan)),
+            plan_file: Mutex::new(plan_file),
+            limb: Mutex::new(limb),
         })
     }
 
-    pub fn shown(&self) -> Arc<Shown> {
-        self.desk().shown()
+    /// The limb that is open.
+    ///
+    /// # Errors
+    /// [`StudioError::NoLimb`] for a dataset of which no limb was opened yet.
+    pub fn limb(&self) -> Result<Arc<Limb>, StudioError> {
+        let limb = self.limb.lock();
+        let limb = limb.unwrap_or_else(PoisonError::into_inner).clone();
+        limb.ok_or(StudioError::NoLimb)
     }
 
-    pub fn desk(&self) -> MutexGuard<'_, Desk> {
-        self.desk.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    pub fn case_file(&self) -> MutexGuard<'_, CaseFile> {
-        self.case_file
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
+    /// Opens another limb of the plan.
+    ///
+    /// # Errors
+    /// [`StudioError::NotInPlan`] for a limb that the plan does not name.
+    pub fn open_limb(&self, id: LimbId) -> Result<(), StudioError> {
+        let found = self.plan().cases.iter().find_map(|planned| {
+            let case = Case::read(&planned.file).ok()?;
+            let of = LimbId {
+                patient: planned.patient,
+                side: case.side,
+            };
+            (of == id).then(|| (planned.file.clone(), case))
+        });
+        let (file, case) = found.ok_or(StudioError::NotInPlan(id))?;
+        self.depth.cancel();
+        self.radiograph.cancel();
+        let limb = Arc::new(Limb::open(file, case)?);
+        let mut open = self.limb.lock().unwrap_or_else(PoisonError::into_inner);
+        *open = Some(limb);
+        Ok(())
     }
 
     /// Changes what is shown and saves it beside the case.
@@ -84,41 +120,93 @@ impl State {
     ) -> Result<(), StudioError> {
         self.depth.cancel();
         self.radiograph.cancel();
-        let mut desk = self.desk();
-        let before = desk.shown().revision;
-        change(&mut desk)?;
-        let shown = desk.shown();
-        if shown.revision != before {
-            self.case_file().save_edits(&shown.case)?;
+        self.limb()?.edit(change)
+    }
+
+    /// The plan whose room and exposure are shown.
+    pub fn plan(&self) -> Arc<Plan> {
+        let plan = self.plan.lock();
+        plan.unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    pub fn plan_file(&self) -> MutexGuard<'_, PlanFile> {
+        let file = self.plan_file.lock();
+        file.unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The file that holds the case as it is shown.
+    pub fn case_on_disk(&self) -> Result<PathBuf, StudioError> {
+        Ok(self.limb()?.case_on_disk())
+    }
+
+    /// The file of the plan as it is shown; none where no file holds it yet.
+    pub fn opened_plan(&self) -> Option<PathBuf> {
+        let file = self.plan_file().current().to_owned();
+        file.exists().then_some(file)
+    }
+
+    /// Changes the text of the plan and saves it beside the original.
+    pub fn edit_plan(
+        &self,
+        change: impl FnOnce(&PlanFile, &str) -> Result<(String, Plan), StudioError>,
+    ) -> Result<(), StudioError> {
+        let mut file = self.plan_file();
+        let before = file.text(|| self.case_on_disk())?;
+        let (text, plan) = change(&file, &before)?;
+        if text != before {
+            file.save_edits(text)?;
+            self.show_plan(plan);
         }
         Ok(())
     }
 
-    /// Where a plan with changes is saved: beside the case.
-    pub fn saved_plan(&self) -> PathBuf {
-        self.case_file().plan()
+    /// Takes a plan for room and exposure.
+    fn show_plan(&self, plan: Plan) {
+        let shown = self.plan.lock();
+        *shown.unwrap_or_else(PoisonError::into_inner) = Arc::new(plan);
+    }
+
+    /// The plan as it is shown, in a file that commands read: written now if there is none yet.
+    pub fn plan_on_disk(&self) -> Result<(PathBuf, Arc<Plan>), StudioError> {
+        let mut file = self.plan_file();
+        if !file.current().exists() {
+            let text = file.text(|| self.case_on_disk())?;
+            let plan = Plan::of_text(&text, file.original())?;
+            file.save(&text)?;
+            self.show_plan(plan);
+        }
+        Ok((file.current().to_owned(), self.plan()))
+    }
+
+    /// The folder of a dataset beside the plan.
+    ///
+    /// # Errors
+    /// [`StudioError::Invalid`] for anything but the name of a folder there.
+    pub fn dataset(&self, name: &str) -> Result<PathBuf, StudioError> {
+        let opened = self.opened_dataset.as_ref();
+        if let Some(root) = opened.filter(|root| root.file_name().is_some_and(|of| of == name)) {
+            return Ok(root.clone());
+        }
+        let mut parts = Path::new(name).components();
+        let is_name = matches!(parts.next(), Some(Component::Normal(part)) if part == name);
+        let root = self.plan_file().folder().join(name);
+        if !is_name || root.is_symlink() {
+            return Err(StudioError::Invalid(format!(
+                "{name} is not the name of a folder beside the plan"
+            )));
+        }
+        Ok(root)
     }
 
     /// The plan with changes, of the case that is shown.
     pub fn plan_with(&self, what_if: &WhatIf) -> Result<Plan, StudioError> {
-        let mut plan = what_if.plan(&self.plan)?;
+        let mut plan = what_if.plan(&self.plan())?;
         if plan.cases.is_empty() {
             plan.cases.push(PlanCase {
-                file: self.case_on_disk(),
+                file: self.case_on_disk()?,
                 patient: 0,
             });
         }
         Ok(plan)
-    }
-
-    /// The file that holds the case as it is shown.
-    pub fn case_on_disk(&self) -> PathBuf {
-        let file = self.case_file();
-        let path: &Path = if file.has_edits() {
-            file.edited()
-        } else {
-            file.original()
-        };
-        path.to_owned()
     }
 }

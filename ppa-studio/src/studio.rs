@@ -14,7 +14,7 @@ use crate::state::State;
 pub struct Studio(Arc<State>);
 
 impl Studio {
-    /// Opens a scan, a case or a plan, and finds what the case says; changes that were saved beside the case are taken up again.
+    /// Opens a scan, a case, a plan or a dataset, and finds what the case says; changes that were saved beside case and plan are taken up again.
     ///
     /// # Errors
     /// [`StudioError`] naming the file at fault.
@@ -27,10 +27,12 @@ impl Studio {
         format!("http://{listening}/?token={}", self.0.token)
     }
 
-    /// Ends the images under way.
-    pub(crate) fn cancel_images(&self) {
+    /// Ends the images and the forecast under way, and a run after the poses under way.
+    pub(crate) fn stop(&self) {
         self.0.depth.cancel();
         self.0.radiograph.cancel();
+        self.0.forecast.stop();
+        self.0.generation.finish();
     }
 
     /// All that the page asks for. It answers only requests with the token or the cookie that the token gives, to a loopback host.

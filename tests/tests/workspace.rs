@@ -66,6 +66,7 @@ const ARROWS: &[(&str, &[&str])] = &[
             "ppa-dataset",
             "ppa-generate",
             "ppa-label",
+            "ppa-report",
             "ppa-cluster",
         ],
     ),

@@ -19,7 +19,7 @@ use crate::stderr::warning;
 
 #[derive(Debug, Args)]
 pub struct StudioArgs {
-    /// Scan, case or plan to open [default: the built-in phantom, in the folder ppa-studio]
+    /// Scan, case, plan or dataset to open [default: the built-in phantom, in the folder ppa-studio]
     path: Option<PathBuf>,
     /// Side of the limb; needed for a scan without a case
     #[arg(long, value_enum)]
@@ -45,7 +45,7 @@ struct Served {
 
 pub fn run(args: &StudioArgs, output: Output) -> anyhow::Result<()> {
     if !args.bind.is_loopback() {
-        const MEANING: &str = "who reaches this address and learns the token, which travels unencrypted, sees the scan and can change its case";
+        const MEANING: &str = "who reaches this address and learns the token, which travels unencrypted, sees the scan, can change case and plan, and make datasets beside the plan";
         if !args.i_know {
             bail!(
                 "--bind {} is not this machine alone: {MEANING}; forward a port over ssh instead, or give --i-know",

@@ -156,7 +156,11 @@ fn no_output_identifies_the_source() {
     run(&format!("generate {} --out dataset --json", plan.display()));
 
     #[cfg(feature = "studio")]
-    assert_page_clean(&out, &case, &scan);
+    {
+        assert_page_clean(&out, &case, &scan);
+        assert_page_of_plan_clean(&out, &plan, &scan);
+        assert_page_of_dataset_clean(&out, &scan);
+    }
 
     // What a command prints may name the file it writes, no other.
     for path in [&case, &plan.display().to_string()] {
@@ -188,12 +192,56 @@ fn assert_page_clean(folder: &Path, case: &str, scan: &str) {
         served.post("/api/commands", what_if),
     ];
     let private = Path::new(case).parent().unwrap().display().to_string();
+    assert_answers_clean(&answers, &[scan, &private]);
+}
+
+/// Nothing is in the answers but the files that were opened.
+#[cfg(feature = "studio")]
+fn assert_answers_clean(answers: &[Vec<u8>], opened: &[&str]) {
     for answer in answers {
-        assert!(answer.starts_with(b"HTTP/1.1 200"));
-        let text = String::from_utf8_lossy(&answer);
-        let text = text.replace(scan, "").replace(&private, "");
+        let mut text = String::from_utf8_lossy(answer).into_owned();
+        assert!(text.starts_with("HTTP/1.1 200"), "{text}");
+        for path in opened {
+            text = text.replace(path, "");
+        }
         assert_eq!(leak(text.as_bytes()), None, "in: {text}");
     }
+}
+
+/// The same of a plan, whose dataset is made and shown.
+#[cfg(feature = "studio")]
+fn assert_page_of_plan_clean(folder: &Path, plan: &Path, scan: &str) {
+    let served = crate::studio::Served::start(folder, &plan.display().to_string());
+    let dataset = r#"{"folder": "from_page"}"#;
+    let mut answers = vec![
+        served.get("/api/plan/form"),
+        served.post("/api/plan/key", r#"{"key": "seed", "value": "5"}"#),
+        served.post("/api/forecast", dataset),
+        served.post("/api/generation", dataset),
+    ];
+    let running = |answer: &[u8]| String::from_utf8_lossy(answer).contains("\"running\"");
+    while answers.last().is_some_and(|answer| running(answer)) {
+        std::thread::sleep(std::time::Duration::from_millis(200));
+        answers.push(served.get("/api/generation?folder=from_page"));
+    }
+    answers.push(served.get("/api/contact_sheet/3/r?folder=from_page"));
+    answers.push(served.get("/api/generation/shards?folder=from_page"));
+    let private = plan.parent().unwrap().display().to_string();
+    assert_answers_clean(&answers, &[scan, &private]);
+}
+
+/// The same of a dataset.
+#[cfg(feature = "studio")]
+fn assert_page_of_dataset_clean(folder: &Path, scan: &str) {
+    let served = crate::studio::Served::start(folder, "dataset");
+    let answers = [
+        served.get("/api/opened"),
+        served.get("/api/dataset?folder=dataset"),
+        served.post("/api/dataset/check", r#"{"folder": "dataset"}"#),
+        served.get("/api/dataset/depth/3/r/orig/0?folder=dataset"),
+        served.get("/api/dataset/radiograph/3/r/0?folder=dataset"),
+    ];
+    assert_answers_clean(&answers, &[scan]);
 }
 
 /// The search sees through each wrapping that an output might have.

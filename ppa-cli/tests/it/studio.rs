@@ -4,8 +4,9 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
 
-use crate::{contains, fail, phantom, ppa};
+use crate::{contains, contents, fail, phantom, ppa, succeed, write_plan};
 
 /// A running studio, and the cookie of a browser that has opened its address.
 pub struct Served {
@@ -110,6 +111,37 @@ fn the_case_of_an_opened_scan_is_saved_on_request() {
     let choices = |text: &str| text.split("[choices]").nth(1).unwrap().to_owned();
     let case = std::fs::read_to_string(&file).unwrap();
     assert_eq!(choices(&case), choices(&prepared));
+}
+
+#[test]
+fn a_dataset_of_the_page_is_that_of_the_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    write_plan(folder, "");
+    let served = Served::start(folder, "plan.toml");
+    let begun = served.post("/api/generation", r#"{"folder": "by_page"}"#);
+    contains(&String::from_utf8(begun).unwrap(), &["HTTP/1.1 200"]);
+    let started = Instant::now();
+    let command = loop {
+        let state = served.get("/api/generation?folder=by_page");
+        let state = String::from_utf8(state).unwrap();
+        if state.contains(r#""phase":"complete""#) {
+            break state
+                .split(r#""generate":"ppa "#)
+                .nth(1)
+                .unwrap()
+                .to_owned();
+        }
+        assert!(started.elapsed() < Duration::from_secs(300), "{state}");
+        std::thread::sleep(Duration::from_millis(100));
+    };
+    // The command that the page shows, into another folder.
+    let command = command.split('"').next().unwrap();
+    succeed(folder, &command.replace("by_page", "by_command"));
+    let expected = contents(&folder.join("by_command"));
+    assert!(expected.len() > 15, "{}", expected.len());
+    assert!(contents(&folder.join("by_page")) == expected);
+    assert_eq!(served.stop(), Some(0));
 }
 
 #[test]

@@ -92,12 +92,19 @@ impl Plan {
     /// # Errors
     /// [`PlanError`] naming the file and the line, key or value at fault.
     pub fn read(path: &Path) -> Result<Self, PlanError> {
-        let text = read_text(path)?;
-        if let Some(found) = other_version(&text) {
+        Self::of_text(&read_text(path)?, path)
+    }
+
+    /// The plan in a text that stands in the file `path`, or will.
+    ///
+    /// # Errors
+    /// As of [`Plan::read`].
+    pub fn of_text(text: &str, path: &Path) -> Result<Self, PlanError> {
+        if let Some(found) = other_version(text) {
             let path = path.to_owned();
             return Err(PlanError::Version { path, found });
         }
-        let mut plan: Self = toml::from_str(&text).map_err(|error| PlanError::Parse {
+        let mut plan: Self = toml::from_str(text).map_err(|error| PlanError::Parse {
             path: path.to_owned(),
             message: error.to_string().trim_end().to_owned(),
         })?;

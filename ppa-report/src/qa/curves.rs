@@ -100,38 +100,45 @@ pub(super) struct Sweeps {
     pub outliers: usize,
 }
 
+/// What is followed from pose to pose, with its unit.
+pub(super) const COURSES: [[&str; 2]; 2] = [
+    ["height of the joint", "mm"],
+    ["tilt of the axis", "degrees"],
+];
+
+/// One quantity over the poses of a body shape.
+pub(super) struct Course {
+    /// Angle and value of each pose.
+    pub points: Vec<[f64; 2]>,
+    /// Positions of the outliers.
+    pub odd: Vec<usize>,
+}
+
+/// A quantity of [`COURSES`] over poses by angle.
+pub(super) fn course(scene: &Scene, rows: &[&FileRow], quantity: usize) -> Course {
+    let point = |row: &&FileRow| [row.angle_deg, scene.height_and_tilt(row)[quantity]];
+    let points: Vec<[f64; 2]> = rows.iter().map(point).collect();
+    let odd = if points.len() < LEAST_POSES {
+        Vec::new()
+    } else {
+        outliers(&points, FLOOR[quantity])
+    };
+    Course { points, odd }
+}
+
 /// How height and tilt of a limb change from pose to pose.
 pub(super) fn heights_and_tilts(scene: &Scene, sweeps: &[(BodyShape, Vec<&FileRow>)]) -> Sweeps {
     let (mut charts, mut sentences) = (Vec::new(), Vec::new());
-    for (i, [what, unit]) in [
-        ["height of the joint", "mm"],
-        ["tilt of the axis", "degrees"],
-    ]
-    .into_iter()
-    .enumerate()
-    {
+    for (i, [what, unit]) in COURSES.into_iter().enumerate() {
         let mut series = Vec::new();
         for (shape, rows) in sweeps {
-            let values: Vec<f64> = rows
-                .iter()
-                .map(|row| scene.height_and_tilt(row)[i])
-                .collect();
-            let points: Vec<_> = rows
-                .iter()
-                .zip(&values)
-                .map(|(row, value)| [row.angle_deg, *value])
-                .collect();
-            let odd = if values.len() < LEAST_POSES {
-                Vec::new()
-            } else {
-                outliers(&points, FLOOR[i])
-            };
+            let Course { points, odd } = course(scene, rows, i);
             sentences.extend(odd.iter().map(|&at| {
                 let angle = angle_text(rows[at].step);
                 format!(
                     "{}, {angle} degrees: {what} {:.2} {unit} does not follow from the poses beside it",
                     shape.name(),
-                    number(values[at])
+                    number(points[at][1])
                 )
             }));
             series.push(Series {

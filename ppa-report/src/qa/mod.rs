@@ -11,9 +11,11 @@ mod histogram;
 mod limb;
 mod outliers;
 mod page;
+mod poses;
 mod scale;
 mod scene;
 mod verdict;
 
 pub use self::error::QaError;
 pub use self::page::qa_page;
+pub use self::poses::{PoseRow, pose_rows};

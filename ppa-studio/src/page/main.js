@@ -7,20 +7,44 @@ import { loadSurface, surfaceAt } from "/page/surface.js";
 import { View3d } from "/page/view3d.js";
 import { LandmarkPanel } from "/page/landmarks.js";
 import { WhatIfPanel } from "/page/whatif.js";
+import { PlanPanel } from "/page/plan.js";
+import { GenerationPanel } from "/page/generation.js";
+import { DatasetPanel } from "/page/dataset.js";
+import { showScan, showSkin } from "/page/scan.js";
+import { drawRoom, roomFacts } from "/page/room.js";
+import { button, commandRows } from "/page/elements.js";
 
 const byId = (id) => document.getElementById(id);
-const STEPS = ["scan", "skin", "landmarks", "room", "whatif"];
+const STEPS = ["scan", "skin", "landmarks", "room", "whatif", "generation", "dataset"];
+// Steps that show the limb.
+const OF_LIMB = STEPS.slice(0, 5);
 const WINDOWS = [["Soft tissue", 40, 400], ["Bone", 400, 1800], ["Skin", -300, 1200], ["All", 200, 3000]];
 
 const store = { doc: null, step: "scan", cursor: [0, 0, 0], window: { level: 200, width: 1600 }, showRemoved: true };
 
-const actions = { choose, cursor: setCursor, window: setWindow, point: showReading, picked, fail, tell, room: showRoom, commands: showImageCommands };
+const actions = { change, choose, cursor: setCursor, place: setPlace, window: setWindow, point: showReading, picked, fail, tell, room: showRoom, commands: showImageCommands };
 
 const slices = [...document.querySelectorAll(".view[data-axis]")].map((figure) => new SliceView(figure, store, actions));
 const view3d = new View3d(byId("view3d"), actions);
 const landmarks = new LandmarkPanel(store, actions);
 const whatIf = new WhatIfPanel(store, actions);
+const plan = new PlanPanel({
+  fail,
+  tell,
+  folder: () => generation.show(),
+  changed: planChanged,
+});
+const generation = new GenerationPanel({
+  fail,
+  tell,
+  folder: () => plan.folder(),
+  // A plan that was in no file has one now.
+  started: () => plan.load(),
+});
+const dataset = new DatasetPanel({ fail, tell, folder: () => opened?.dataset ?? plan.folder(), opened: openedLimb });
 let room = null;
+// What the program has opened: limb, plan, dataset.
+let opened = null;
 
 function tell(text) {
   byId("message").className = "quiet";
@@ -66,12 +90,12 @@ async function show(doc) {
   byId("save").disabled = is_saved && !has_edits;
   byId("save").textContent = is_saved ? "Save over the case" : "Save the case";
   byId("saved").textContent = has_edits ? `changes saved in ${edited}` : is_saved ? "no changes" : `${original} is not saved yet`;
-  if (!before) setCursor(transform(inverse(doc.grid.ct_from_voxel), doc.landmarks.joint_centre));
+  if (!before) setPlace(doc.landmarks.joint_centre);
   const skinChanged = !before || before.iso_hu !== doc.iso_hu || before.side !== doc.side
     || JSON.stringify(before.report) !== JSON.stringify(doc.report);
   if (skinChanged) slices.forEach((view) => view.forget());
-  showScan(doc);
-  showSkin(doc);
+  showScan(doc, actions);
+  showSkin(doc, actions);
   landmarks.show();
   showCommands();
   slices.forEach((view) => view.update());
@@ -108,84 +132,8 @@ function drawLandmarks() {
   view3d.draw();
 }
 
-function facts(id, pairs) {
-  byId(id).replaceChildren(...pairs.flatMap(([name, value]) => {
-    const [dt, dd] = [document.createElement("dt"), document.createElement("dd")];
-    dt.textContent = name;
-    dd.textContent = value;
-    return [dt, dd];
-  }));
-}
-
-function showScan(doc) {
-  facts("scan-facts", [
-    ["Voxels", doc.grid.size.join(" × ")],
-    ["Spacing", `${doc.grid.spacing_mm.map((x) => fixed(x, 3)).join(" × ")} mm`],
-    ["Side", doc.side === "r" ? "right" : "left"],
-  ]);
-  const items = doc.findings.map((finding) => {
-    const item = document.createElement("li");
-    item.className = finding.severity;
-    item.textContent = `${finding.severity} [${finding.code}] ${finding.text} `;
-    if (finding.place_mm) item.append(button("Show", () => setCursor(transform(inverse(doc.grid.ct_from_voxel), finding.place_mm)), `Show ${finding.code}`));
-    if (finding.severity === "severe") {
-      const known = doc.acknowledged.includes(finding.code);
-      const codes = known ? doc.acknowledged.filter((code) => code !== finding.code) : [...doc.acknowledged, finding.code];
-      item.append(button(known ? "Acknowledged" : "Acknowledge", () => change("acknowledged", codes), `Acknowledge ${finding.code}`));
-    }
-    return item;
-  });
-  if (items.length === 0) {
-    const none = document.createElement("li");
-    none.textContent = "none";
-    items.push(none);
-  }
-  byId("findings").replaceChildren(...items);
-}
-
-function button(text, act, label = text) {
-  const made = document.createElement("button");
-  made.type = "button";
-  made.textContent = text;
-  made.setAttribute("aria-label", label);
-  made.addEventListener("click", act);
-  return made;
-}
-
-function showSkin(doc) {
-  byId("iso").max = doc.core_hu;
-  byId("iso").value = doc.iso_hu;
-  byId("iso-value").textContent = fixed(doc.iso_hu, 0);
-  byId("side").value = doc.side;
-  const { report } = doc;
-  byId("bodies").replaceChildren(...report.bodies.slice(0, 8).map((body) => {
-    const item = document.createElement("li");
-    item.textContent = `${body.chosen ? "taken: " : ""}${fixed(body.core_mm3 / 1000, 0)} ml around ${point(body.centre_mm, 0)} mm `;
-    item.append(button("Show", () => setCursor(transform(inverse(doc.grid.ct_from_voxel), body.centre_mm))));
-    return item;
-  }));
-  facts("skin-facts", [
-    ["Limb", `${fixed(report.limb_mm3 / 1000, 0)} ml`],
-    ["Couch removed", `${report.couch_voxels} voxels`],
-    ["Other removed", `${report.other_voxels} voxels`],
-    ["Points of skin", String(report.points)],
-    ["Cut by faces", String(report.cut_faces.length)],
-  ]);
-}
-
-function commandRows(commands) {
-  return commands.map((command) => {
-    const row = document.createElement("div");
-    row.className = "command";
-    const code = document.createElement("code");
-    code.textContent = command;
-    row.append(code, button("Copy", () => navigator.clipboard.writeText(command), `Copy: ${command}`));
-    return row;
-  });
-}
-
 function showCommands() {
-  if (store.step === "whatif" || store.step === "room") return;
+  if (!["scan", "skin", "landmarks"].includes(store.step)) return;
   byId("command-list").replaceChildren(...commandRows([store.doc.commands.prepare]));
 }
 
@@ -208,6 +156,11 @@ function setCursor(voxel) {
   slices.forEach((view) => view.update());
 }
 
+// The crosshair at a place in the scan, mm.
+function setPlace(place) {
+  setCursor(transform(inverse(store.doc.grid.ct_from_voxel), place));
+}
+
 function setWindow(next) {
   store.window = next;
   byId("level").value = next.level;
@@ -224,38 +177,14 @@ function showReading(reading) {
 // A click on the surface: a landmark, or the crosshair.
 function picked(place) {
   if (store.step === "landmarks" && landmarks.picked(place)) return;
-  setCursor(transform(inverse(store.doc.grid.ct_from_voxel), place));
+  setPlace(place);
 }
 
 function showRoom(next) {
   const first = !room;
   room = next;
-  facts("room-facts", [
-    ["Gap under the limb", `${fixed(next.contact.gap_mm, 2)} mm`],
-    ["Depth in the table", `${fixed(next.contact.penetration_mm, 2)} mm`],
-    ["Focal spot to table", `${fixed(next.source[2] - next.table_centre[2], 0)} mm`],
-  ]);
-  if (store.step !== "room" && store.step !== "whatif") return;
-  view3d.worldFromCt = next.room_from_ct;
-  const ring = (points) => points.flatMap((p, i) => [p, points[(i + 1) % points.length]]);
-  const [w, l] = next.table_size_mm;
-  const [x, y, z] = next.table_centre;
-  const table = [[x - w / 2, y - 450, z], [x + w / 2, y - 450, z], [x + w / 2, y + l - 450, z], [x - w / 2, y + l - 450, z]];
-  view3d.lines = [
-    { points: ring(table), colour: "#8c96a3" },
-    { points: ring(next.detector), colour: "#7ee787" },
-    { points: next.detector.flatMap((corner) => [next.source, corner]), colour: "#ffd479" },
-    ...next.cameras.map((camera, i) => ({
-      points: [...ring(camera.corners), ...camera.corners.flatMap((corner) => [camera.centre, corner])],
-      colour: ["#6cb6ff", "#ff7ad9"][i],
-    })),
-  ];
-  view3d.points = [
-    { points: [next.source], colour: "#ffd479" },
-    { points: next.cameras.map((camera) => camera.centre), colour: "#ffffff" },
-  ];
-  if (first) view3d.frame(next.table_centre, 3200);
-  else view3d.draw();
+  roomFacts(next);
+  if (store.step === "room" || store.step === "whatif") drawRoom(view3d, next, first);
 }
 
 function go(step) {
@@ -267,6 +196,9 @@ function go(step) {
     tab.tabIndex = chosen ? 0 : -1;
   }
   if (location.hash.slice(1) !== step) history.pushState(null, "", `#${step}`);
+  if (step !== "generation") generation.hide();
+  if (step === "generation") showGeneration();
+  if (step === "dataset") showDataset();
   if (!store.doc) return;
   showCommands();
   slices.forEach((view) => view.update());
@@ -281,24 +213,81 @@ function go(step) {
   }
 }
 
+async function showGeneration() {
+  byId("command-list").replaceChildren();
+  await plan.load();
+  await generation.show();
+}
+
+// Forecast and progress are of the plan as it is now, and the sliders of step 5 show what it says.
+async function planChanged() {
+  if (store.step === "generation") generation.show();
+  if (!store.doc) return;
+  try {
+    store.doc.planned = (await getJson("state")).planned;
+    whatIf.show();
+  } catch (error) {
+    fail(error);
+  }
+}
+
+async function showDataset() {
+  byId("command-list").replaceChildren();
+  if (!opened.dataset && !plan.folder()) await plan.load();
+  await dataset.load();
+}
+
+// A limb of the dataset was opened: shown as it lies in a pose.
+async function openedLimb(doc, angleDeg) {
+  store.doc = null;
+  allow({ ...opened, limb: true });
+  await show(doc);
+  tell("");
+  whatIf.setAngle(angleDeg);
+  go("whatif");
+}
+
+// Steps without anything to show are not offered.
+function allow(next) {
+  opened = next;
+  for (const tab of document.querySelectorAll("[role=tab]")) {
+    const { step } = tab.dataset;
+    tab.disabled = OF_LIMB.includes(step) ? !opened.limb : step === "generation" && !opened.plan;
+    tab.title = tab.disabled ? (step === "generation" ? "No plan lies beside the dataset" : "No limb is open: open one from a pose in step 7") : "";
+  }
+}
+
+async function begin() {
+  allow(await getJson("opened"));
+  if (opened.dataset) {
+    byId("name").textContent = opened.dataset;
+    document.title = `${opened.dataset} - ppa studio`;
+  }
+  go(stepInAddress());
+  if (opened.limb) await show(await getJson("state"));
+}
+
+// The step that the address names, or the first one where that has nothing to show.
 function stepInAddress() {
   const step = location.hash.slice(1);
-  return STEPS.includes(step) ? step : "scan";
+  if (STEPS.includes(step) && !byId(`tab-${step}`).disabled) return step;
+  return opened?.limb ? "scan" : "dataset";
 }
 
 function listen() {
   const tabs = [...document.querySelectorAll("[role=tab]")];
-  for (const [i, tab] of tabs.entries()) {
+  for (const tab of tabs) {
     tab.addEventListener("click", () => go(tab.dataset.step));
     tab.addEventListener("keydown", (event) => {
       const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
       if (!by) return;
-      const next = tabs[(i + by + tabs.length) % tabs.length];
+      const offered = tabs.filter((one) => !one.disabled);
+      const next = offered[(offered.indexOf(tab) + by + offered.length) % offered.length];
       next.focus();
       go(next.dataset.step);
     });
   }
-  window.addEventListener("popstate", () => go(stepInAddress()));
+  window.addEventListener("popstate", () => { if (opened) go(stepInAddress()); });
   byId("undo").addEventListener("click", () => change("undo"));
   byId("redo").addEventListener("click", () => change("redo"));
   byId("save").addEventListener("click", () => {
@@ -329,5 +318,4 @@ function listen() {
 
 listen();
 setWindow(store.window);
-go(stepInAddress());
-getJson("state").then(show).catch(fail);
+begin().catch(fail);

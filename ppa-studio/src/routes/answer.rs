@@ -38,9 +38,10 @@ pub(super) async fn work<T: Send + 'static>(
 /// An error as an answer.
 pub(super) fn failed(error: StudioError) -> Response {
     let status = match error {
-        StudioError::Superseded | StudioError::ChangedElsewhere(_) | StudioError::Exists(_) => {
-            StatusCode::CONFLICT
-        }
+        StudioError::Superseded
+        | StudioError::ChangedElsewhere(_)
+        | StudioError::Exists(_)
+        | StudioError::Generating(_) => StatusCode::CONFLICT,
         _ => StatusCode::UNPROCESSABLE_ENTITY,
     };
     sentence(status, ppa_core::text::error_chain(&error))

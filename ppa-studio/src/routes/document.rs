@@ -76,7 +76,7 @@ struct Files {
 type Answer = Result<Json<Document>, Response>;
 
 pub(super) async fn state(Extracted(state): Extracted<Arc<State>>) -> Answer {
-    work(state, |state| Ok(Json(document(state)))).await
+    work(state, |state| document(state).map(Json)).await
 }
 
 /// Landmarks to choose; keys that are left out are found.
@@ -136,7 +136,7 @@ pub(super) async fn acknowledged(
 pub(super) async fn undo(Extracted(state): Extracted<Arc<State>>) -> Answer {
     work(state, |state| {
         state.edit(|desk| desk.undo())?;
-        Ok(Json(document(state)))
+        document(state).map(Json)
     })
     .await
 }
@@ -144,7 +144,7 @@ pub(super) async fn undo(Extracted(state): Extracted<Arc<State>>) -> Answer {
 pub(super) async fn redo(Extracted(state): Extracted<Arc<State>>) -> Answer {
     work(state, |state| {
         state.edit(|desk| desk.redo())?;
-        Ok(Json(document(state)))
+        document(state).map(Json)
     })
     .await
 }
@@ -152,9 +152,10 @@ pub(super) async fn redo(Extracted(state): Extracted<Arc<State>>) -> Answer {
 /// Writes the case over the one that was opened.
 pub(super) async fn save(Extracted(state): Extracted<Arc<State>>) -> Answer {
     work(state, |state| {
-        let case = state.shown().case.clone();
-        state.case_file().save(&case)?;
-        Ok(Json(document(state)))
+        let limb = state.limb()?;
+        let case = limb.shown().case.clone();
+        limb.case_file().save(&case)?;
+        document(state).map(Json)
     })
     .await
 }
@@ -180,7 +181,7 @@ pub(super) async fn plan(
     Json(PlanToSave { what_if, replace }): Json<PlanToSave>,
 ) -> Result<Json<SavedPlan>, Response> {
     work(state, move |state| {
-        let (plan, file) = (state.plan_with(&what_if)?, state.saved_plan());
+        let (plan, file) = (state.plan_with(&what_if)?, state.limb()?.saved_plan());
         if file.exists() && !replace {
             return Err(StudioError::Exists(file));
         }
@@ -197,24 +198,26 @@ async fn edit(state: Arc<State>, change: impl FnOnce(Case) -> Case + Send + 'sta
             let case = desk.shown().case.clone();
             desk.change(change(case))
         })?;
-        Ok::<_, StudioError>(Json(document(state)))
+        document(state).map(Json)
     })
     .await
 }
 
-fn document(state: &State) -> Document {
-    let [can_undo, can_redo] = state.desk().can_step();
-    let shown = state.shown();
+/// All that the page shows of the limb.
+pub(super) fn document(state: &State) -> Result<Document, StudioError> {
+    let limb = state.limb()?;
+    let [can_undo, can_redo] = limb.desk().can_step();
+    let shown = limb.shown();
     let prepared = shown.prepared();
     let grid = prepared.volume.grid();
     let matrix = grid.ct_from_voxel().to_homogeneous();
     let row = |i: usize| [0, 1, 2, 3].map(|j| matrix[(i, j)]);
-    let saved_plan = state.saved_plan();
-    let file = state.case_file();
+    let (saved_plan, plan) = (limb.saved_plan(), state.plan());
+    let file = limb.case_file();
     let original = file.original();
     let name = original.file_name().unwrap_or_default().to_string_lossy();
     let text = |path: &std::path::Path| path.to_string_lossy().into_owned();
-    Document {
+    Ok(Document {
         revision: shown.revision,
         name: name.into_owned(),
         side: shown.case.side,
@@ -238,17 +241,17 @@ fn document(state: &State) -> Document {
             edited: text(file.edited()),
             has_edits: file.has_edits(),
             is_saved: original.exists(),
-            plan: state.plan_file.as_deref().map(text),
+            plan: state.opened_plan().as_deref().map(text),
             saved_plan: text(&saved_plan),
         },
         can_undo,
         can_redo,
         planned: Planned {
-            distal_mm: state.plan.soft_tissue.distal_mm,
-            proximal_mm: state.plan.soft_tissue.proximal_mm,
-            kvp: state.plan.xray.kvp,
-            filters: state.plan.xray.filters.clone(),
-            tube_load: state.plan.xray.tube_load,
+            distal_mm: plan.soft_tissue.distal_mm,
+            proximal_mm: plan.soft_tissue.proximal_mm,
+            kvp: plan.xray.kvp,
+            filters: plan.xray.filters.clone(),
+            tube_load: plan.xray.tube_load,
         },
-    }
+    })
 }

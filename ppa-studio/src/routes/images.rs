@@ -23,7 +23,8 @@ pub(super) async fn depth(
     let ticket = state.depth.enter();
     let made = work(state, move |state| {
         let _turn = state.depth.turn(&ticket)?;
-        state.scenes.depth(&state.shown(), &state.plan, &what_if)
+        let limb = state.limb()?;
+        limb.scenes.depth(&limb.shown(), &state.plan(), &what_if)
     })
     .await?;
     Ok(picture(made.png, &made.report))
@@ -47,8 +48,9 @@ pub(super) async fn radiograph(
     let _cancel = CancelOnDrop(ticket.clone());
     let made = work(state, move |state| {
         let _turn = state.radiograph.turn(&ticket)?;
-        let (scenes, shown) = (&state.scenes, state.shown());
-        scenes.radiograph(&shown, &state.plan, &what_if, pass, &ticket)
+        let limb = state.limb()?;
+        let scenes = &limb.scenes;
+        scenes.radiograph(&limb.shown(), &state.plan(), &what_if, pass, &ticket)
     })
     .await?;
     Ok(picture(made.png, &made.report))
@@ -58,12 +60,12 @@ pub(super) async fn radiograph(
 pub(super) async fn commands(
     Extracted(state): Extracted<Arc<State>>,
     Json(what_if): Json<WhatIf>,
-) -> Json<ImageCommands> {
-    let (case, saved) = (state.case_on_disk(), state.saved_plan());
-    Json(of_images(
-        &case,
-        state.plan_file.as_deref(),
-        &saved,
-        &what_if,
-    ))
+) -> Result<Json<ImageCommands>, Response> {
+    work(state, move |state| {
+        let limb = state.limb()?;
+        let (case, saved) = (limb.case_on_disk(), limb.saved_plan());
+        let plan = state.opened_plan();
+        Ok(Json(of_images(&case, plan.as_deref(), &saved, &what_if)))
+    })
+    .await
 }

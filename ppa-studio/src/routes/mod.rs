@@ -1,8 +1,11 @@
 //! What the page asks for, and the answers.
 
 mod answer;
+mod dataset;
 mod document;
+mod generation;
 mod images;
+mod plan;
 mod room;
 mod scan;
 
@@ -37,7 +40,32 @@ pub(crate) fn router(state: Arc<State>) -> Router {
         .route("/depth", post(images::depth))
         .route("/radiograph/{pass}", post(images::radiograph))
         .route("/label", post(room::label))
-        .route("/commands", post(images::commands));
+        .route("/commands", post(images::commands))
+        .route("/plan/form", get(plan::form))
+        .route("/plan/key", post(plan::key))
+        .route("/plan/case", post(plan::case))
+        .route("/plan/save", post(plan::save))
+        .route("/forecast", post(generation::forecast))
+        .route("/generation", get(generation::state))
+        .route("/generation", post(generation::start))
+        .route("/generation/pause", post(generation::pause))
+        .route("/generation/shards", get(generation::shards))
+        .route(
+            "/contact_sheet/{patient}/{side}",
+            get(generation::contact_sheet),
+        )
+        .route("/opened", get(dataset::opened))
+        .route("/dataset", get(dataset::quality))
+        .route("/dataset/check", post(dataset::check))
+        .route("/dataset/open", post(dataset::open))
+        .route(
+            "/dataset/depth/{patient}/{side}/{shape}/{step}",
+            get(dataset::depth),
+        )
+        .route(
+            "/dataset/radiograph/{patient}/{side}/{step}",
+            get(dataset::radiograph),
+        );
     Router::new()
         .route("/", get(page::index))
         .route("/page/{name}", get(page::file))

@@ -10,13 +10,13 @@ use ppa_core::TransformRows;
 use ppa_dataset::layout::View;
 use ppa_depth::rows_from_isometry;
 use ppa_generate::{Plan, SceneSetup};
+use ppa_label::PoseLabel;
 use ppa_scene::{Contact, Placement, ct_from_device};
 use serde::Serialize;
 
 use super::answer::work;
 use crate::desk::Shown;
 use crate::error::StudioError;
-use crate::pose_label::PoseLabel;
 use crate::state::State;
 use crate::what_if::WhatIf;
 
@@ -51,16 +51,17 @@ pub(super) async fn label(
     let ticket = state.label.enter();
     work(state, move |state| {
         let _turn = state.label.turn(&ticket)?;
-        let plan = what_if.plan(&state.plan)?;
-        let setup = state.scenes.setup(&plan)?;
-        let shown = state.shown();
+        let plan = what_if.plan(&state.plan())?;
+        let limb = state.limb()?;
+        let setup = limb.scenes.setup(&plan)?;
+        let shown = limb.shown();
         let (placement, landmarks) = (
             place(&setup, &shown, &plan, &what_if)?,
             &shown.prepared().landmarks,
         );
         let device = &setup.table.room.device;
         let ct_from_device = ct_from_device(&placement, landmarks, device);
-        let label = state.labels.of(&shown, ct_from_device.isometry())?;
+        let label = limb.labels.of(&shown, ct_from_device.isometry())?;
         Ok(Json(label))
     })
     .await
@@ -84,9 +85,10 @@ pub(super) async fn room(
     Json(what_if): Json<WhatIf>,
 ) -> Result<Json<Room>, Response> {
     work(state, move |state| {
-        let plan = what_if.plan(&state.plan)?;
-        let setup = state.scenes.setup(&plan)?;
-        let shown = state.shown();
+        let plan = what_if.plan(&state.plan())?;
+        let limb = state.limb()?;
+        let setup = limb.scenes.setup(&plan)?;
+        let shown = limb.shown();
         let landmarks = &shown.prepared().landmarks;
         let placement = place(&setup, &shown, &plan, &what_if)?;
         let table = &setup.table;

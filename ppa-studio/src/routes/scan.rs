@@ -19,7 +19,7 @@ pub(super) async fn slice(
     Path((axis, index)): Path<(usize, usize)>,
 ) -> Result<Response, Response> {
     work(state, move |state| {
-        let shown = state.shown();
+        let shown = state.limb()?.shown();
         plane(shown.prepared(), axis, index)
     })
     .await
@@ -62,7 +62,7 @@ fn plane(limb: &PreparedLimb, axis: usize, index: usize) -> Result<Vec<u8>, Stud
 /// The skin with fewer triangles, for display.
 pub(super) async fn skin(Extracted(state): Extracted<Arc<State>>) -> Result<Response, Response> {
     work(state, |state| {
-        let shown = state.shown();
+        let shown = state.limb()?.shown();
         Ok(display_mesh::bytes(&display_mesh(
             &shown.prepared().limb.mesh,
         )))
@@ -86,9 +86,10 @@ pub(super) async fn surface_at(
     let ticket = state.surface.enter();
     work(state, move |state| {
         let _turn = state.surface.turn(&ticket)?;
-        let surface = state
+        let limb = state.limb()?;
+        let surface = limb
             .coarse
-            .surface(&state.shown().prepared().volume, iso_hu)?;
+            .surface(&limb.shown().prepared().volume, iso_hu)?;
         Ok(display_mesh::bytes(&surface))
     })
     .await

@@ -22,7 +22,7 @@ pub const HOST: &str = "127.0.0.1:8123";
 pub struct Browser {
     pub folder: TempDir,
     pub case: PathBuf,
-    router: Router,
+    pub router: Router,
     cookie: String,
     runtime: tokio::runtime::Runtime,
 }

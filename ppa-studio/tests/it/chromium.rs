@@ -1,7 +1,7 @@
 //! Chromium with the page of a phantom, driven as a person would.
 
 use std::net::TcpListener;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
@@ -18,6 +18,12 @@ use crate::browser::{FINE_MM, phantom};
 
 /// How long anything on the page may take.
 const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Drives a browser.
+pub fn run(test: impl Future<Output = ()>) {
+    let mut runtime = tokio::runtime::Builder::new_multi_thread();
+    runtime.enable_all().build().unwrap().block_on(test);
+}
 
 /// A served phantom and the browser that shows it.
 pub struct Page {
@@ -54,7 +60,12 @@ impl Page {
     pub async fn open() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let case = phantom(folder.path(), FINE_MM);
-        let studio = Studio::open(&Opening::of(&case)).unwrap();
+        Self::of(folder, &case).await
+    }
+
+    /// A scan, case, plan or dataset in a folder.
+    pub async fn of(folder: TempDir, path: &Path) -> Self {
+        let studio = Studio::open(&Opening::of(path)).unwrap();
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = studio.address(listener.local_addr().unwrap());
         let (stop, stopped) = channel();
@@ -71,7 +82,7 @@ impl Page {
             served,
             driver,
         };
-        page.wait("document.getElementById('name').textContent === 'p01.case.toml'")
+        page.wait("document.getElementById('name').textContent !== ''")
             .await;
         page
     }
@@ -87,6 +98,15 @@ impl Page {
                 started.elapsed() < PATIENCE,
                 "{expression} is not true; the page says {message}"
             );
+            tokio::time::sleep(Duration::from_millis(50)).await;
+        }
+    }
+
+    /// Waits until something outside the page is true, such as the contents of a file.
+    pub async fn until(&self, is: impl Fn() -> bool) {
+        let started = Instant::now();
+        while !is() {
+            assert!(started.elapsed() < PATIENCE);
             tokio::time::sleep(Duration::from_millis(50)).await;
         }
     }
@@ -141,12 +161,11 @@ impl Page {
         let log = self.client.issue_cmd(ConsoleLog).await.unwrap();
         let severe: Vec<&Value> = (log.as_array().unwrap().iter())
             .filter(|entry| entry["level"] == "SEVERE")
-            // Answers that a later request replaced are expected.
+            // Answers that a later request replaced, and values that a field refused, are expected.
             .filter(|entry| {
-                !entry["message"]
-                    .as_str()
-                    .unwrap_or_default()
-                    .contains("409")
+                let message = entry["message"].as_str().unwrap_or_default();
+                !(message.contains("409")
+                    || message.contains("/plan/key") && message.contains("422"))
             })
             .collect();
         assert!(severe.is_empty(), "{severe:?}");

@@ -2,7 +2,14 @@
 
 mod browser;
 mod chromium;
+mod dataset;
 mod edits;
+mod generation;
 mod images;
 mod page;
+mod page_access;
+mod page_dataset;
+mod page_generation;
+mod plan_form;
+mod plans;
 mod protection;

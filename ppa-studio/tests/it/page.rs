@@ -4,12 +4,7 @@ use fantoccini::Locator;
 use ppa_generate::Case;
 use serde_json::json;
 
-use crate::chromium::Page;
-
-fn run(test: impl Future<Output = ()>) {
-    let mut runtime = tokio::runtime::Builder::new_multi_thread();
-    runtime.enable_all().build().unwrap().block_on(test);
-}
+use crate::chromium::{Page, run};
 
 #[test]
 #[ignore = "needs chromium and chromedriver"]

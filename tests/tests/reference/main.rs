@@ -84,6 +84,30 @@ fn reference_pages_are_those_of_the_types() {
     }
 }
 
+/// The form of `ppa studio` for plans is made from this file: key, type, meaning, and names with their meanings.
+#[test]
+fn the_form_of_plans_has_the_keys_of_the_types() {
+    let plan: Page = ("plan.md", "", &PAGES[0].2[..1]);
+    let page = Sources::read().page(&plan);
+    let mut text = String::new();
+    for row in &page.rows {
+        let names = row.names.iter().flat_map(|(name, docs)| [name, docs]);
+        let columns = [&row.key, &row.kind, &row.meaning].into_iter().chain(names);
+        text += &columns.map(String::as_str).collect::<Vec<_>>().join("\t");
+        text += "\n";
+    }
+    let path = root().join("ppa-studio/src/plan_keys.tsv");
+    if std::env::var_os("PPA_WRITE_REFERENCE").is_some() {
+        fs::write(&path, &text).unwrap();
+    }
+    let found = fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        found == text,
+        "{} is out of date; {REWRITE} rewrites it",
+        path.display()
+    );
+}
+
 #[test]
 fn every_key_that_a_case_may_have_is_on_the_page() {
     let sources = Sources::read();

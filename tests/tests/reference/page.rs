@@ -15,8 +15,19 @@ pub type Root = (&'static str, &'static str, &'static str);
 pub struct Table {
     pub text: String,
     pub keys: BTreeSet<String>,
+    /// Rows without markup.
+    pub rows: Vec<Row>,
     /// Whether ppa writes the files and no person does.
     pub is_written: bool,
+}
+
+/// A key, what it holds, and what it is for.
+pub struct Row {
+    pub key: String,
+    pub kind: String,
+    pub meaning: String,
+    /// The names that it may have, with what each of them means.
+    pub names: Vec<(String, String)>,
 }
 
 impl Sources {
@@ -87,11 +98,19 @@ impl Sources {
                 Some(_) => "table",
                 None => "text",
             };
+            let mut row = Row {
+                key: format!("{key}{list}"),
+                kind: kind(shown, named),
+                meaning: meaning.clone(),
+                names: Vec::new(),
+            };
             let below = match word {
                 Some(below) if below.is_enum => {
-                    for variant in &below.item.fields {
-                        let name = variant_name(below, variant);
-                        let _ = write!(meaning, " `{name}`: {}", one_line(&variant.docs));
+                    let named = below.item.fields.iter();
+                    let name = |variant| (variant_name(below, variant), one_line(&variant.docs));
+                    row.names = named.map(name).collect();
+                    for (name, docs) in &row.names {
+                        let _ = write!(meaning, " `{name}`: {docs}");
                     }
                     None
                 }
@@ -100,8 +119,9 @@ impl Sources {
             let _ = writeln!(
                 page.text,
                 "| `{key}{list}` | {} | {default} | {meaning} |",
-                kind(shown, named)
+                row.kind
             );
+            page.rows.push(row);
             page.keys.insert(key.clone());
             assert!(
                 !meaning.is_empty(),
@@ -133,6 +153,7 @@ impl Sources {
         let mut page = Table {
             text,
             keys: BTreeSet::new(),
+            rows: Vec::new(),
             is_written,
         };
         let column = if is_written { "present" } else { "default" };

@@ -1,0 +1,87 @@
+//! The limb that is open: its decisions, its files, and what its images share.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use ppa_generate::{Case, LoadedScan};
+
+use crate::case_file::CaseFile;
+use crate::coarse_scan::CoarseScan;
+use crate::desk::{Desk, Shown};
+use crate::error::StudioError;
+use crate::pose_label::Labels;
+use crate::scene::Scenes;
+
+/// The limb that is open.
+pub(crate) struct Limb {
+    pub scenes: Scenes,
+    pub coarse: CoarseScan,
+    pub labels: Labels,
+    desk: Mutex<Desk>,
+    case_file: Mutex<CaseFile>,
+}
+
+impl Limb {
+    /// Opens a case that stands in a file, or will, and takes up the changes that were saved beside it.
+    pub fn open(file: PathBuf, case: Case) -> Result<Self, StudioError> {
+        let case_file = CaseFile::new(file);
+        let case = if case_file.has_edits() {
+            Case::read(case_file.edited())?
+        } else {
+            case
+        };
+        let desk = Desk::new(LoadedScan::of_case(&case)?, case)?;
+        Ok(Self {
+            scenes: Scenes::default(),
+            coarse: CoarseScan::default(),
+            labels: Labels::default(),
+            desk: Mutex::new(desk),
+            case_file: Mutex::new(case_file),
+        })
+    }
+
+    pub fn shown(&self) -> Arc<Shown> {
+        self.desk().shown()
+    }
+
+    pub fn desk(&self) -> MutexGuard<'_, Desk> {
+        self.desk.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub fn case_file(&self) -> MutexGuard<'_, CaseFile> {
+        self.case_file
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Changes what is shown and saves it beside the case.
+    pub fn edit(
+        &self,
+        change: impl FnOnce(&mut Desk) -> Result<(), StudioError>,
+    ) -> Result<(), StudioError> {
+        let mut desk = self.desk();
+        let before = desk.shown().revision;
+        change(&mut desk)?;
+        let shown = desk.shown();
+        if shown.revision != before {
+            self.case_file().save_edits(&shown.case)?;
+        }
+        Ok(())
+    }
+
+    /// Where a plan with changes is saved: beside the case.
+    pub fn saved_plan(&self) -> PathBuf {
+        self.case_file().plan()
+    }
+
+    /// The file that holds the case as it is shown.
+    pub fn case_on_disk(&self) -> PathBuf {
+        let file = self.case_file();
+        let path: &Path = if file.has_edits() {
+            file.edited()
+        } else {
+            file.original()
+        };
+        path.to_owned()
+    }
+}

@@ -1,0 +1,67 @@
+// Charts of points against the rotation, as SVG: lines, spreads, and points that can be clicked.
+
+const SPACE = "http://www.w3.org/2000/svg";
+const [WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM] = [440, 250, 52, 12, 12, 36];
+
+// Colours that colour-blind people tell apart (Okabe and Ito), light enough for the dark page.
+export const COLOURS = ["#56b4e9", "#e69f00", "#2fc39b", "#f0e442", "#cc79a7", "#ff8a4c", "#9fb4ff", "#e8e8e8"];
+
+// More points than these are drawn as a line only.
+const MOST_POINTS = 3000;
+
+function node(name, attributes, text = "") {
+  const made = document.createElementNS(SPACE, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.textContent = text;
+  return made;
+}
+
+function ticks([low, high], most) {
+  const step = (high - low) / most;
+  const power = 10 ** Math.floor(Math.log10(step));
+  const nice = [1, 2, 5, 10].map((n) => n * power).find((n) => n >= step);
+  const found = [];
+  for (let at = Math.ceil(low / nice) * nice; at <= high + 1e-9; at += nice) found.push(Number(at.toPrecision(6)));
+  return found;
+}
+
+function range(values) {
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  const margin = 0.06 * (high - low) || 1;
+  return [low - margin, high + margin];
+}
+
+// `series`: { colour, points: [{ x, y, spread, ringed, of }] }; a click on a point calls `picked` with what it is of.
+export function chart(title, unit, series, yRange, picked) {
+  const all = series.flatMap((one) => one.points);
+  const svg = node("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": `${title}, ${unit}, against the medial rotation in degrees` });
+  if (all.length === 0) return svg;
+  const [xs, ys] = [range(all.map((p) => p.x)), yRange ?? range(all.map((p) => p.y))];
+  const x = (value) => LEFT + (value - xs[0]) / (xs[1] - xs[0]) * (WIDTH - LEFT - RIGHT);
+  const y = (value) => HEIGHT - BOTTOM - (value - ys[0]) / (ys[1] - ys[0]) * (HEIGHT - TOP - BOTTOM);
+  for (const at of ticks(xs, 8)) {
+    svg.append(node("path", { d: `M${x(at)} ${TOP}V${HEIGHT - BOTTOM}`, class: "grid" }), node("text", { x: x(at), y: HEIGHT - BOTTOM + 14, "text-anchor": "middle" }, String(at)));
+  }
+  for (const at of ticks(ys, 5)) {
+    svg.append(node("path", { d: `M${LEFT} ${y(at)}H${WIDTH - RIGHT}`, class: "grid" }), node("text", { x: LEFT - 5, y: y(at) + 4, "text-anchor": "end" }, String(at)));
+  }
+  svg.append(node("text", { x: (LEFT + WIDTH) / 2, y: HEIGHT - 5, "text-anchor": "middle" }, "medial rotation, degrees"));
+  svg.append(node("text", { x: 12, y: TOP + (HEIGHT - TOP - BOTTOM) / 2, "text-anchor": "middle", transform: `rotate(-90 12 ${TOP + (HEIGHT - TOP - BOTTOM) / 2})` }, unit));
+  for (const { colour, points } of series) {
+    if (points.some((p) => p.spread)) {
+      const within = (value) => y(Math.max(ys[0], Math.min(ys[1], value)));
+      const there = points.map((p) => `${x(p.x)},${within(p.y + p.spread)}`);
+      const back = points.map((p) => `${x(p.x)},${within(p.y - p.spread)}`).reverse();
+      svg.append(node("polygon", { points: [...there, ...back].join(" "), fill: colour, "fill-opacity": 0.25 }));
+    }
+    svg.append(node("polyline", { points: points.map((p) => `${x(p.x)},${y(p.y)}`).join(" "), fill: "none", stroke: colour, "stroke-width": 1.3 }));
+    for (const p of points) {
+      if (p.ringed) svg.append(node("circle", { cx: x(p.x), cy: y(p.y), r: 8, fill: "none", stroke: "#ff8f8f", "stroke-width": 2 }));
+      if (all.length > MOST_POINTS && !p.ringed) continue;
+      const dot = node("circle", { cx: x(p.x), cy: y(p.y), r: 3, fill: colour, class: "pose" });
+      dot.addEventListener("click", () => picked(p.of));
+      svg.append(dot);
+    }
+  }
+  return svg;
+}

@@ -1,0 +1,157 @@
+// The form of the plan: a field for each key, as the types of the plan declare them.
+
+import { Refused, getJson, postJson } from "/page/server.js";
+import { button, element } from "/page/elements.js";
+
+const byId = (id) => document.getElementById(id);
+
+// Tables whose keys most plans change.
+const OPEN = ["rotation", "shapes", "soft_tissue"];
+
+// Each gives an element and how a value, or none, is put into it.
+const INPUTS = { name: nameInput, names: namesInput };
+
+function textInput(field, id, set) {
+  const placeholder = field.default ?? (field.example ? `off; such as ${field.example}` : "off");
+  const input = element("input", "", { id, placeholder, type: "text", autocomplete: "off", spellcheck: "false" });
+  if (field.kind === "number") input.inputMode = "decimal";
+  input.addEventListener("change", () => set(input.value.trim() || null));
+  return [input, (value) => { input.value = value ?? ""; }];
+}
+
+function nameInput(field, id, set) {
+  const select = element("select", "", { id });
+  select.append(new Option(`default: ${field.default}`, ""), ...field.names.map(([name, meaning]) => new Option(`${name}: ${meaning}`, name)));
+  select.addEventListener("change", () => set(select.value || null));
+  return [select, (value) => { select.value = value ?? ""; }];
+}
+
+function namesInput(field, id, set) {
+  const group = element("div", "", { role: "group", "aria-labelledby": `${id}:name`, class: "names" });
+  const boxes = field.names.map(([name, meaning]) => {
+    const label = element("label", "", { title: meaning });
+    const box = element("input", "", { type: "checkbox", id: `${id}:${name}`, value: name });
+    box.addEventListener("change", () => set(boxes.filter((one) => one.checked).map((one) => one.value).join(" ")));
+    label.append(box, ` ${name}`);
+    group.append(label);
+    return box;
+  });
+  return [group, (value) => {
+    const chosen = (value ?? field.default ?? "").split(" ");
+    for (const box of boxes) box.checked = chosen.includes(box.value);
+  }];
+}
+
+export class PlanPanel {
+  constructor(actions) {
+    this.actions = actions;
+    this.plan = null;
+    this.updates = [];
+    byId("plan-save").addEventListener("click", () => this.save());
+    byId("plan-folder").addEventListener("change", () => actions.folder());
+  }
+
+  async load() {
+    try {
+      this.show(await getJson("plan/form"));
+    } catch (error) {
+      this.actions.fail(error);
+    }
+  }
+
+  folder() {
+    return byId("plan-folder").value.trim();
+  }
+
+  async change(path, body) {
+    try {
+      this.show(await postJson(path, body));
+      this.actions.tell("");
+      this.actions.changed();
+    } catch (error) {
+      this.actions.fail(error);
+    }
+  }
+
+  show(plan) {
+    this.plan = plan;
+    byId("plan-file").textContent = plan.has_edits ? `changes saved in ${plan.current}`
+      : plan.is_saved ? `${plan.original}, no changes` : `${plan.original} is not saved yet`;
+    byId("plan-save").textContent = plan.is_saved ? "Save over the plan" : "Save the plan";
+    byId("plan-save").disabled = plan.is_saved && !plan.has_edits;
+    if (!byId("plan-folder").value) byId("plan-folder").value = plan.dataset;
+    byId("plan-limbs").replaceChildren(...plan.limbs.map((limb, number) => this.limb(limb, number)));
+    if (this.updates.length === 0) byId("plan-form").append(...this.groups(plan.fields));
+    for (const update of this.updates) update(new Map(plan.fields.map((field) => [field.key, field])));
+  }
+
+  limb(limb, number) {
+    const item = element("li", `patient ${limb.patient}: ${limb.case} `);
+    if (limb.has_edits) {
+      const text = limb.uses_edits ? "Use the case without changes" : "Use the changed case";
+      item.append(button(text, () => this.change("plan/case", { number, edits: !limb.uses_edits }), `${text} for patient ${limb.patient}`));
+    }
+    return item;
+  }
+
+  // Keys of a table in a group of its own, which opens and closes. Made once: later changes are put into its fields.
+  groups(fields) {
+    const top = element("div");
+    const groups = new Map([["", top]]);
+    for (const field of fields) {
+      const at = field.key.lastIndexOf(".");
+      const parent = groups.get(at < 0 ? "" : field.key.slice(0, at)) ?? top;
+      const made = field.kind === "heading" ? this.group(field) : this.row(field);
+      if (field.kind === "heading") groups.set(field.key, made);
+      parent.append(made);
+    }
+    return [top];
+  }
+
+  group({ key, meaning }) {
+    const group = element("details");
+    group.open = OPEN.includes(key);
+    const summary = element("summary");
+    group.append(summary, element("p", meaning, { class: "hint" }));
+    this.updates.push((fields) => {
+      const given = [...fields.values()].filter((field) => field.value !== null && field.kind !== "heading" && field.key.startsWith(`${key}.`));
+      summary.textContent = given.length ? `${key}, ${given.length} given` : key;
+    });
+    return group;
+  }
+
+  row(field) {
+    const id = `plan:${field.key}`;
+    const error = element("p", "", { class: "refused", id: `${id}:refused`, role: "alert" });
+    const set = async (value) => {
+      error.textContent = "";
+      try {
+        this.show(await postJson("plan/key", { key: field.key, value }));
+        this.actions.tell("");
+        this.actions.changed();
+      } catch (refusal) {
+        if (refusal instanceof Refused) error.textContent = refusal.message;
+        else this.actions.fail(refusal);
+      }
+    };
+    const [input, put] = (INPUTS[field.kind] ?? textInput)(field, id, set);
+    input.setAttribute("aria-describedby", `${id}:hint ${id}:refused`);
+    const name = field.key.slice(field.key.lastIndexOf(".") + 1);
+    const label = field.kind === "names" ? element("span", name, { id: `${id}:name` }) : element("label", name, { for: id });
+    const standard = button("Default", () => set(null), `Default of ${field.key}`);
+    const row = element("div", "", { class: "field" });
+    row.append(label, input, standard, element("p", field.meaning, { class: "hint", id: `${id}:hint` }), error);
+    this.updates.push((fields) => {
+      const { value } = fields.get(field.key);
+      row.classList.toggle("given", value !== null);
+      standard.hidden = value === null;
+      put(value);
+    });
+    return row;
+  }
+
+  save() {
+    const { is_saved, original } = this.plan;
+    if (!is_saved || window.confirm(`Replace ${original} with the changed plan?`)) this.change("plan/save");
+  }
+}

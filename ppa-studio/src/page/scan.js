@@ -1,0 +1,45 @@
+// What is known of the scan and of the skin in it.
+
+import { button, element, facts } from "/page/elements.js";
+import { fixed, point } from "/page/geometry.js";
+
+const byId = (id) => document.getElementById(id);
+
+export function showScan(doc, actions) {
+  facts(byId("scan-facts"), [
+    ["Voxels", doc.grid.size.join(" × ")],
+    ["Spacing", `${doc.grid.spacing_mm.map((x) => fixed(x, 3)).join(" × ")} mm`],
+    ["Side", doc.side === "r" ? "right" : "left"],
+  ]);
+  const items = doc.findings.map((finding) => {
+    const item = element("li", `${finding.severity} [${finding.code}] ${finding.text} `, { class: finding.severity });
+    if (finding.place_mm) item.append(button("Show", () => actions.place(finding.place_mm), `Show ${finding.code}`));
+    if (finding.severity === "severe") {
+      const known = doc.acknowledged.includes(finding.code);
+      const codes = known ? doc.acknowledged.filter((code) => code !== finding.code) : [...doc.acknowledged, finding.code];
+      item.append(button(known ? "Acknowledged" : "Acknowledge", () => actions.change("acknowledged", codes), `Acknowledge ${finding.code}`));
+    }
+    return item;
+  });
+  byId("findings").replaceChildren(...(items.length ? items : [element("li", "none")]));
+}
+
+export function showSkin(doc, actions) {
+  byId("iso").max = doc.core_hu;
+  byId("iso").value = doc.iso_hu;
+  byId("iso-value").textContent = fixed(doc.iso_hu, 0);
+  byId("side").value = doc.side;
+  const { report } = doc;
+  byId("bodies").replaceChildren(...report.bodies.slice(0, 8).map((body) => {
+    const item = element("li", `${body.chosen ? "taken: " : ""}${fixed(body.core_mm3 / 1000, 0)} ml around ${point(body.centre_mm, 0)} mm `);
+    item.append(button("Show", () => actions.place(body.centre_mm)));
+    return item;
+  }));
+  facts(byId("skin-facts"), [
+    ["Limb", `${fixed(report.limb_mm3 / 1000, 0)} ml`],
+    ["Couch removed", `${report.couch_voxels} voxels`],
+    ["Other removed", `${report.other_voxels} voxels`],
+    ["Points of skin", String(report.points)],
+    ["Cut by faces", String(report.cut_faces.length)],
+  ]);
+}

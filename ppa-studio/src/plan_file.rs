@@ -1,0 +1,317 @@
+//! The file of the plan: the original, and the changes beside it.
+
+use std::path::{Component, Path, PathBuf};
+
+use ppa_dataset::files::{FileError, read_text, write_whole};
+use ppa_generate::{Plan, PlanCase};
+use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
+
+use crate::error::StudioError;
+use crate::plan_form::{FieldKind, kind_of};
+
+/// Where a plan stands, and where its changes are saved as they are made.
+pub(crate) struct PlanFile {
+    original: PathBuf,
+    edited: PathBuf,
+    /// The edited file as this program knows it; `None` while there is none.
+    known: Option<String>,
+}
+
+impl PlanFile {
+    /// `plan.toml`, whose changes go to `plan.edited.toml`.
+    pub fn new(original: PathBuf) -> Self {
+        let edited = original.with_extension("edited.toml");
+        let known = std::fs::read_to_string(&edited).ok();
+        Self {
+            original,
+            edited,
+            known,
+        }
+    }
+
+    pub fn original(&self) -> &Path {
+        &self.original
+    }
+
+    /// The file that holds the plan as it is shown.
+    pub fn current(&self) -> &Path {
+        if self.has_edits() {
+            &self.edited
+        } else {
+            &self.original
+        }
+    }
+
+    /// Whether changes are saved beside the original.
+    pub fn has_edits(&self) -> bool {
+        self.known.is_some()
+    }
+
+    /// The folder that its datasets are in.
+    pub fn folder(&self) -> &Path {
+        let parent = self.original.parent();
+        parent
+            .filter(|folder| !folder.as_os_str().is_empty())
+            .unwrap_or(Path::new("."))
+    }
+
+    /// Its text; while there is no file, that of a plan with the defaults for a case.
+    pub fn text(
+        &self,
+        case: impl FnOnce() -> Result<PathBuf, StudioError>,
+    ) -> Result<String, StudioError> {
+        if let Some(text) = &self.known {
+            return Ok(text.clone());
+        }
+        if self.original.exists() {
+            return Ok(read_text(&self.original)?);
+        }
+        let plan = Plan::new(vec![PlanCase {
+            file: case()?,
+            patient: 0,
+        }]);
+        Ok(plan.commented_text(&self.original)?)
+    }
+
+    /// The text with another value of a key, or without the key; the plan in it.
+    pub fn changed(
+        &self,
+        text: &str,
+        key: &str,
+        value: Option<&str>,
+    ) -> Result<(String, Plan), StudioError> {
+        let kind = kind_of(key);
+        let kind = kind.ok_or_else(|| StudioError::Invalid(format!("the form has no {key}")))?;
+        let mut document: DocumentMut = text.parse()?;
+        let value = match value {
+            Some(value) => Some(self.value(kind, key, value)?),
+            None => None,
+        };
+        put(document.as_table_mut(), key, value)
+            .ok_or_else(|| StudioError::Invalid(format!("{key} is not in a table of the file")))?;
+        self.read(&document)
+    }
+
+    /// The text with another case file of one of its limbs; the plan in it.
+    pub fn with_case(
+        &self,
+        text: &str,
+        number: usize,
+        other: impl FnOnce(&Path) -> PathBuf,
+    ) -> Result<(String, Plan), StudioError> {
+        let mut document: DocumentMut = text.parse()?;
+        let cases = document.get_mut("case");
+        let cases = cases.and_then(Item::as_array_of_tables_mut);
+        let case = cases.and_then(|cases| cases.get_mut(number));
+        let file = |case: &Table| Some(other(Path::new(case.get("file")?.as_str()?)));
+        let changed = case.and_then(|case| {
+            let file = file(case)?;
+            put(case, "file", Some(file.to_str()?.into()))
+        });
+        changed.ok_or_else(|| StudioError::Invalid(format!("the plan has no limb {number}")))?;
+        self.read(&document)
+    }
+
+    fn read(&self, document: &DocumentMut) -> Result<(String, Plan), StudioError> {
+        let text = document.to_string();
+        let plan = self.plan(&text)?;
+        Ok((text, plan))
+    }
+
+    /// The plan in a text of the file.
+    pub fn plan(&self, text: &str) -> Result<Plan, StudioError> {
+        Ok(Plan::of_text(text, self.current())?)
+    }
+
+    /// Saves a changed text beside the original.
+    ///
+    /// # Errors
+    /// [`StudioError::ChangedElsewhere`] if the file is no longer the one that was saved last.
+    pub fn save_edits(&mut self, text: String) -> Result<(), StudioError> {
+        if std::fs::read_to_string(&self.edited).ok() != self.known {
+            return Err(StudioError::ChangedElsewhere(self.edited.clone()));
+        }
+        write_whole(&self.edited, text.as_bytes())?;
+        self.known = Some(text);
+        Ok(())
+    }
+
+    /// Writes a text over the original, which the person has asked for, and removes the changes beside it.
+    pub fn save(&mut self, text: &str) -> Result<(), StudioError> {
+        write_whole(&self.original, text.as_bytes())?;
+        if self.has_edits() && std::fs::read_to_string(&self.edited).ok() == self.known {
+            // The original holds all of it now; a file that cannot be removed is shown as changes again.
+            let _ = std::fs::remove_file(&self.edited);
+        }
+        self.known = None;
+        Ok(())
+    }
+
+    /// What a person typed into a field, as a value of TOML.
+    fn value(&self, kind: FieldKind, key: &str, typed: &str) -> Result<Value, StudioError> {
+        match kind {
+            FieldKind::Text | FieldKind::Name => Ok(typed.into()),
+            FieldKind::Path => {
+                self.is_below_folder(Path::new(typed))?;
+                Ok(typed.into())
+            }
+            FieldKind::Names => Ok(typed.split_whitespace().collect()),
+            FieldKind::Heading | FieldKind::Number | FieldKind::Toml => {
+                let value = typed.trim().parse();
+                value.map_err(|_| {
+                    StudioError::Invalid(format!("{key} is {typed}, which is not a value of TOML"))
+                })
+            }
+        }
+    }
+
+    /// Refuses files that are not below the folder of the plan.
+    fn is_below_folder(&self, path: &Path) -> Result<(), StudioError> {
+        let folder = self.folder();
+        let downwards = path
+            .components()
+            .all(|part| matches!(part, Component::Normal(_)));
+        let target = folder.join(path);
+        let real = |path: &Path| {
+            let real = path.canonicalize();
+            real.map_err(FileError::at("find", path))
+        };
+        // Links may lead out.
+        if downwards && real(&target)?.starts_with(real(folder)?) {
+            return Ok(());
+        }
+        Err(StudioError::Invalid(format!(
+            "{} is not below the folder of the plan; other files are named in the plan by hand",
+            path.display()
+        )))
+    }
+}
+
+/// Puts a value in the place of a key with dots, or removes the key; comments stay. `None` where something else than a table is on
+/// the way.
+fn put(table: &mut dyn TableLike, key: &str, value: Option<Value>) -> Option<()> {
+    if let Some((first, rest)) = key.split_once('.') {
+        if !table.contains_key(first) {
+            if value.is_none() {
+                return Some(());
+            }
+            table.insert(first, Item::Table(implicit()));
+        }
+        return put(table.get_mut(first)?.as_table_like_mut()?, rest, value);
+    }
+    match (value, table.get_mut(key)) {
+        (None, _) => {
+            table.remove(key);
+        }
+        (Some(mut value), Some(Item::Value(old))) => {
+            *value.decor_mut() = old.decor().clone();
+            *old = value;
+        }
+        (Some(value), _) => {
+            table.insert(key, Item::Value(value));
+        }
+    }
+    Some(())
+}
+
+/// A table without a line of its own while it holds only other tables.
+fn implicit() -> Table {
+    let mut table = Table::new();
+    table.set_implicit(true);
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "\
+# A plan.
+version = 1
+seed = 1    # of the house
+
+[[case]]
+file = \"leg.case.toml\"
+patient = 0
+
+[rotation]
+step_deg = 5.0    # coarse
+to_deg = 20.0
+";
+
+    fn file(folder: &Path) -> PlanFile {
+        PlanFile::new(folder.join("plan.toml"))
+    }
+
+    fn changed(key: &str, value: Option<&str>) -> Result<(String, Plan), StudioError> {
+        let folder = tempfile::tempdir().unwrap();
+        file(folder.path()).changed(TEXT, key, value)
+    }
+
+    #[test]
+    fn a_changed_key_keeps_comments_and_other_keys() {
+        let (text, plan) = changed("rotation.step_deg", Some("2.5")).unwrap();
+        assert_eq!(text, TEXT.replace("5.0 ", "2.5 "));
+        assert_eq!(plan.rotation.step_deg, 2.5);
+        let (text, plan) = changed(
+            "xray.receptor.grid",
+            Some("{ ratio = 8, lines_per_cm = 40 }"),
+        )
+        .unwrap();
+        assert!(plan.xray.receptor.grid.is_some());
+        assert!(text.starts_with(TEXT), "{text}");
+        assert!(
+            text.ends_with("\n[xray.receptor]\ngrid = { ratio = 8, lines_per_cm = 40 }\n"),
+            "{text}"
+        );
+        let (text, plan) = changed("rotation.to_deg", None).unwrap();
+        assert_eq!(
+            (text, plan.rotation.to_deg),
+            (TEXT.replace("to_deg = 20.0\n", ""), 90.0)
+        );
+        let (_, plan) = changed("shapes.variants", Some("orig big")).unwrap();
+        assert_eq!(plan.shapes.variants.len(), 2);
+    }
+
+    #[test]
+    fn values_that_the_plan_refuses_are_named() {
+        let refused = |key: &str, value: &str| {
+            let error = changed(key, Some(value)).unwrap_err();
+            ppa_core::text::error_chain(&error)
+        };
+        assert!(refused("rotation.step_deg", "0.3").contains("step_deg"));
+        assert!(refused("depth.roi_mm", "-3").contains("depth.roi_mm is -3"));
+        assert!(refused("depth.roi_mm", "wide").contains("not a value of TOML"));
+        assert!(refused("shapes.variants", "").contains("shapes.variants is empty"));
+        assert!(refused("case.file", "x").contains("the form has no case.file"));
+    }
+
+    #[test]
+    fn files_outside_the_folder_of_the_plan_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let outside = tempfile::NamedTempFile::new().unwrap();
+        let inside = folder.path().join("rig.json");
+        std::fs::write(&inside, "{}").unwrap();
+        let file = file(folder.path());
+        let set = |path: &str| file.changed(TEXT, "depth.rig", Some(path));
+        assert!(set("rig.json").is_ok());
+        for path in [
+            outside.path().to_str().unwrap(),
+            "../rig.json",
+            "/etc/passwd",
+            ".",
+        ] {
+            assert!(set(path).is_err(), "{path}");
+        }
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(outside.path(), folder.path().join("link.json")).unwrap();
+            assert!(
+                set("link.json")
+                    .unwrap_err()
+                    .to_string()
+                    .contains("not below")
+            );
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! The dataset: its poses, findings and splits, images of a pose, and its limbs.
+
+use std::io::Cursor;
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::{Path, Query, State as Extracted};
+use axum::http::header::{CONTENT_TYPE, HeaderValue};
+use axum::response::{IntoResponse, Response};
+use image::ImageFormat;
+use ppa_dataset::layout::{LimbId, Side, View};
+use ppa_dataset::published::{GrayImage16, inspect};
+use ppa_dataset::split::Split;
+use ppa_dataset::{BodyShape, Findings, LimbFinding};
+use ppa_generate::Case;
+use ppa_report::{PoseRow, pose_rows};
+use serde::Serialize;
+
+use super::answer::work;
+use super::document::{Document, document};
+use super::generation::Dataset;
+use crate::commands::{DatasetCommands, of_dataset};
+use crate::error::StudioError;
+use crate::false_colours::side_by_side;
+use crate::generation::own_threads;
+use crate::state::State;
+
+/// What is open.
+#[derive(Serialize)]
+pub(super) struct Opened {
+    limb: bool,
+    plan: bool,
+    /// Name of the dataset that was opened, if it is one.
+    dataset: Option<String>,
+}
+
+pub(super) async fn opened(Extracted(state): Extracted<Arc<State>>) -> Json<Opened> {
+    let dataset = state.opened_dataset.as_ref();
+    let name = dataset.and_then(|root| root.file_name());
+    let limb = state.limb().is_ok();
+    Json(Opened {
+        limb,
+        plan: limb || state.opened_plan().is_some(),
+        dataset: name.map(|name| name.to_string_lossy().into_owned()),
+    })
+}
+
+/// What the quality report draws, as numbers.
+#[derive(Serialize)]
+pub(super) struct Quality {
+    poses: Vec<PoseRow>,
+    findings: Vec<LimbFinding>,
+    splits: Vec<SplitState>,
+    /// Limbs whose cases the plan names: they can be opened.
+    at_hand: Vec<LimbId>,
+    commands: DatasetCommands,
+}
+
+#[derive(Serialize)]
+struct SplitState {
+    name: String,
+    /// Parts with their persons.
+    parts: Vec<(String, Vec<u32>)>,
+    /// Why it cannot be used.
+    error: Option<String>,
+}
+
+impl SplitState {
+    fn of(name: String, root: &std::path::Path, patients: &[u32]) -> Self {
+        let read = Split::read(&Split::path(root, &name));
+        match read.and_then(|split| split.check(patients).map(|()| split)) {
+            Ok(split) => Self {
+                name,
+                parts: split.parts.into_iter().collect(),
+                error: None,
+            },
+            Err(error) => Self {
+                name,
+                parts: Vec::new(),
+                error: Some(ppa_core::text::error_chain(&error)),
+            },
+        }
+    }
+}
+
+pub(super) async fn quality(
+    Extracted(state): Extracted<Arc<State>>,
+    Query(Dataset { folder }): Query<Dataset>,
+) -> Result<Json<Quality>, Response> {
+    let ticket = state.quality.enter();
+    work(state, move |state| {
+        let _turn = state.quality.turn(&ticket)?;
+        let root = state.dataset(&folder)?;
+        let poses = pose_rows(&root)?;
+        let mut patients: Vec<u32> = poses.iter().map(|pose| pose.limb.patient).collect();
+        patients.dedup();
+        let names = Split::names(&root)?;
+        let splits = names
+            .into_iter()
+            .map(|name| SplitState::of(name, &root, &patients));
+        Ok(Json(Quality {
+            findings: Findings::read(&root)?.0,
+            splits: splits.collect(),
+            at_hand: at_hand(state),
+            commands: of_dataset(&root),
+            poses,
+        }))
+    })
+    .await
+}
+
+/// Limbs of the plan whose cases can be read.
+fn at_hand(state: &State) -> Vec<LimbId> {
+    let plan = state.plan();
+    let limbs = plan.cases.iter().filter_map(|planned| {
+        let (case, patient) = (Case::read(&planned.file).ok()?, planned.patient);
+        let side = case.side;
+        Some(LimbId { patient, side })
+    });
+    limbs.collect()
+}
+
+/// What is wrong with files of a dataset.
+#[derive(Serialize)]
+pub(super) struct Checked {
+    depth_images: usize,
+    radiographs: usize,
+    flaws: Vec<String>,
+}
+
+/// Decodes all images and compares them with the lists; of several requests the newest is answered.
+pub(super) async fn check(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(Dataset { folder }): Json<Dataset>,
+) -> Result<Json<Checked>, Response> {
+    let ticket = state.check.enter();
+    work(state, move |state| {
+        let _turn = state.check.turn(&ticket)?;
+        let root = state.dataset(&folder)?;
+        let found = own_threads()?.install(|| inspect(&root))?;
+        let flaws = found.flaws.iter();
+        Ok(Json(Checked {
+            depth_images: found.depth_images,
+            radiographs: found.radiographs,
+            flaws: flaws
+                .map(|flaw| ppa_core::text::error_chain(flaw))
+                .collect(),
+        }))
+    })
+    .await
+}
+
+/// Images of both cameras of a pose in false colour, PNG.
+pub(super) async fn depth(
+    Extracted(state): Extracted<Arc<State>>,
+    Path((patient, side, shape, step)): Path<(u32, Side, BodyShape, u32)>,
+    Query(Dataset { folder }): Query<Dataset>,
+) -> Result<Response, Response> {
+    let png = work(state, move |state| {
+        let root = state.dataset(&folder)?;
+        let limb = LimbId { patient, side };
+        let images =
+            View::ALL.map(|view| GrayImage16::read(&root.join(limb.depth(shape, view, step))));
+        let images: Vec<GrayImage16> = images.into_iter().collect::<Result<_, _>>()?;
+        let (picture, _) = side_by_side(&images);
+        let mut png = Cursor::new(Vec::new());
+        picture.write_to(&mut png, ImageFormat::Png)?;
+        Ok::<_, StudioError>(png.into_inner())
+    })
+    .await?;
+    Ok(picture(png))
+}
+
+/// The radiograph of a pose, PNG.
+pub(super) async fn radiograph(
+    Extracted(state): Extracted<Arc<State>>,
+    Path((patient, side, step)): Path<(u32, Side, u32)>,
+    Query(Dataset { folder }): Query<Dataset>,
+) -> Result<Response, Response> {
+    let png = work(state, move |state| {
+        let file = LimbId { patient, side }.radiograph_png(step);
+        let path = state.dataset(&folder)?.join(file);
+        let read = ppa_core::regular_file::read(&path);
+        let read = read.map_err(ppa_dataset::files::FileError::at("read", &path));
+        Ok::<_, StudioError>(read?)
+    })
+    .await?;
+    Ok(picture(png))
+}
+
+fn picture(png: Vec<u8>) -> Response {
+    ([(CONTENT_TYPE, HeaderValue::from_static("image/png"))], png).into_response()
+}
+
+/// Opens a limb of the plan, so that steps 1 to 5 show it.
+pub(super) async fn open(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(limb): Json<LimbId>,
+) -> Result<Json<Document>, Response> {
+    work(state, move |state| {
+        state.open_limb(limb)?;
+        document(state).map(Json)
+    })
+    .await
+}

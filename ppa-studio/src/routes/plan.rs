@@ -1,0 +1,148 @@
+//! The plan: its form, changes, and saving.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State as Extracted;
+use axum::response::Response;
+use ppa_generate::PlanCase;
+use serde::{Deserialize, Serialize};
+
+use super::answer::work;
+use crate::case_file::{edited_case, original_case};
+use crate::error::StudioError;
+use crate::plan_form::{Field, fields};
+use crate::state::State;
+
+/// A plan with its files.
+#[derive(Serialize)]
+pub(super) struct PlanForm {
+    original: String,
+    /// The file that holds the plan as it is shown.
+    current: String,
+    has_edits: bool,
+    /// Whether the original is there: a case that was opened may have no plan yet.
+    is_saved: bool,
+    /// Name of the folder that `ppa generate` makes of the original.
+    dataset: String,
+    limbs: Vec<Limb>,
+    fields: Vec<Field>,
+}
+
+/// A limb of the plan.
+#[derive(Serialize)]
+struct Limb {
+    patient: u32,
+    /// The file of its case, without the folder.
+    case: String,
+    uses_edits: bool,
+    /// Whether there is a file of each kind, to choose from.
+    has_edits: bool,
+}
+
+type Answer = Result<Json<PlanForm>, Response>;
+
+pub(super) async fn form(Extracted(state): Extracted<Arc<State>>) -> Answer {
+    work(state, |state| plan_form(state).map(Json)).await
+}
+
+/// Another value of a key.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct KeyChange {
+    key: String,
+    /// What was typed; `null` leaves the key out, so that its default holds.
+    value: Option<String>,
+}
+
+pub(super) async fn key(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(KeyChange { key, value }): Json<KeyChange>,
+) -> Answer {
+    work(state, move |state| {
+        state.edit_plan(|file, text| file.changed(text, &key, value.as_deref()))?;
+        plan_form(state).map(Json)
+    })
+    .await
+}
+
+/// The case of a limb as it was, or with the changes beside it.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CaseChange {
+    number: usize,
+    edits: bool,
+}
+
+pub(super) async fn case(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(CaseChange { number, edits }): Json<CaseChange>,
+) -> Answer {
+    work(state, move |state| {
+        state.edit_plan(|file, text| {
+            file.with_case(text, number, |case| {
+                let original = original_case(case).unwrap_or_else(|| case.to_owned());
+                if edits {
+                    edited_case(&original)
+                } else {
+                    original
+                }
+            })
+        })?;
+        plan_form(state).map(Json)
+    })
+    .await
+}
+
+/// Writes the plan over the one that was opened.
+pub(super) async fn save(Extracted(state): Extracted<Arc<State>>) -> Answer {
+    work(state, |state| {
+        let mut file = state.plan_file();
+        let text = file.text(|| state.case_on_disk())?;
+        file.save(&text)?;
+        drop(file);
+        plan_form(state).map(Json)
+    })
+    .await
+}
+
+fn plan_form(state: &State) -> Result<PlanForm, StudioError> {
+    let file = state.plan_file();
+    let text = file.text(|| state.case_on_disk())?;
+    let plan = file.plan(&text)?;
+    let shown = |path: &Path| path.to_string_lossy().into_owned();
+    let dataset = file.original().with_extension("");
+    Ok(PlanForm {
+        original: shown(file.original()),
+        current: shown(file.current()),
+        has_edits: file.has_edits(),
+        is_saved: file.original().exists(),
+        dataset: dataset
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned(),
+        limbs: plan.cases.iter().map(limb).collect(),
+        fields: fields(&text)?,
+    })
+}
+
+fn limb(planned: &PlanCase) -> Limb {
+    let original = original_case(&planned.file);
+    let other = match &original {
+        Some(original) => original.clone(),
+        None => edited_case(&planned.file),
+    };
+    Limb {
+        patient: planned.patient,
+        case: planned
+            .file
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned(),
+        uses_edits: original.is_some(),
+        has_edits: other.exists(),
+    }
+}

@@ -1,0 +1,74 @@
+//! Step 6 of the page in Chromium: plan and generation.
+
+use ppa_generate::Plan;
+
+use crate::chromium::{Page, run};
+use crate::plans::plan;
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn a_plan_is_changed_and_its_dataset_made() {
+    run(async {
+        let folder = tempfile::tempdir().unwrap();
+        let file = plan(folder.path());
+        let page = Page::of(folder, &file).await;
+        page.click("#tab-generation").await;
+        page.wait("document.getElementById('phase').textContent === 'Nothing is made yet.'")
+            .await;
+        page.picture("plan").await;
+
+        // A value that the plan refuses is said at its field.
+        page.fill("[id='plan:rotation.step_deg']", "0.3").await;
+        let refused = "document.getElementById('plan:rotation.step_deg:refused').textContent";
+        page.wait(&format!("{refused}.includes('step_deg')")).await;
+        page.fill("[id='plan:rotation.step_deg']", "2.5").await;
+        let edited = page.folder.path().join("ankles.edited.toml");
+        page.wait(
+            "document.getElementById('plan-file').textContent.includes('ankles.edited.toml')",
+        )
+        .await;
+        assert_eq!(Plan::read(&edited).unwrap().rotation.step_deg, 2.5);
+        page.click("[id='plan:shapes.variants:big']").await;
+        page.until(|| Plan::read(&edited).unwrap().shapes.variants.len() == 2)
+            .await;
+        page.click("[aria-label='Default of rotation.step_deg']")
+            .await;
+        page.wait("document.getElementById('plan:rotation.step_deg').value === ''")
+            .await;
+        page.fill("[id='plan:rotation.step_deg']", "5").await;
+        page.wait("document.getElementById('plan:rotation.step_deg').value === '5'")
+            .await;
+
+        page.click("#forecast").await;
+        page.wait(
+            "document.getElementById('forecast-facts').textContent.includes('24 depth images')",
+        )
+        .await;
+        page.click("#generate").await;
+        page.wait("Number(document.getElementById('progress').value) > 0")
+            .await;
+        page.wait("!!document.getElementById('sheet-image').src")
+            .await;
+        page.picture("generation").await;
+        page.click("#pause").await;
+        page.wait(
+            "['Paused.', 'Complete.'].includes(document.getElementById('phase').textContent)",
+        )
+        .await;
+        page.picture("generation_paused").await;
+        page.wait("document.getElementById('command-list').textContent.includes('ppa generate')")
+            .await;
+
+        // A reload shows what the files hold; the run goes on from there.
+        page.client.refresh().await.unwrap();
+        page.wait(
+            "['Paused.', 'Complete.'].includes(document.getElementById('phase').textContent)",
+        )
+        .await;
+        page.click("#generate:enabled").await;
+        page.wait("document.getElementById('phase').textContent === 'Complete.'")
+            .await;
+        page.picture("generation_complete").await;
+        page.close().await;
+    });
+}
