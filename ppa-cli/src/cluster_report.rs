@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use ppa_cluster::{
-    ClusterFolder, JobKind, QueuedJob, ShardState, Submission, last_line, logged_shards,
+    ClusterFolder, CoreHours, JobKind, QueuedJob, ShardState, Submission, last_line, logged_shards,
     shard_state,
 };
 use ppa_core::text::count;
@@ -48,6 +48,7 @@ pub struct ClusterReport {
     pub made: usize,
     /// Shards by state.
     pub states: BTreeMap<ShardState, usize>,
+    pub core_hours: CoreHours,
     pub shards: Vec<ShardReport>,
     pub merge: JobReport,
 }
@@ -75,12 +76,18 @@ impl ClusterReport {
         for shard in &shards {
             *states.entry(shard.report.state).or_insert(0) += 1;
         }
+        let made = shards.iter().map(|shard| shard.report.made).sum();
+        let with = |state| states.get(&state).copied().unwrap_or(0);
+        let (done, running) = (with(ShardState::Done), with(ShardState::Running));
+        let finished = (made as u64, done as u64);
+        let core_hours = CoreHours::of(submission, finished, running, &folder.logs())?;
         let log = folder.merge_log();
         let log = log.is_file().then_some(log);
         Ok(Self {
             poses: submission.poses,
-            made: shards.iter().map(|shard| shard.report.made).sum(),
+            made,
             states,
+            core_hours,
             shards,
             merge: report(
                 &folder.dataset(),
@@ -98,6 +105,29 @@ impl ClusterReport {
         lost.map(|shard| shard.shard).collect()
     }
 
+    /// Whether a task or the merge runs or waits, be it for a shard that is made again.
+    pub fn is_under_way(&self) -> bool {
+        let reports = self.shards.iter().map(|shard| &shard.report);
+        let mut reports = reports.chain([&self.merge]);
+        reports.any(|report| report.job.is_some() || report.state == ShardState::Running)
+    }
+
+    fn core_hours(&self) -> String {
+        let hours = &self.core_hours;
+        let left = match hours.left_hours {
+            Some(wall) => format!(
+                ", {:.2} left: {wall:.2} hours if as many tasks run as now",
+                hours.left
+            ),
+            None if hours.left > 0.0 => format!(", {:.2} left", hours.left),
+            None => String::new(),
+        };
+        format!(
+            "core hours {:.2} estimated, {:.2} used by tasks that have ended{left}",
+            hours.estimated, hours.used
+        )
+    }
+
     /// The report in words: a line for each shard that is not done, since there may be thousands.
     pub fn describe(&self) -> String {
         let states = self.states.iter();
@@ -109,6 +139,7 @@ impl ClusterReport {
             self.made,
             count(self.poses, "pose")
         )];
+        lines.push(self.core_hours());
         for shard in &self.shards {
             if shard.report.state != ShardState::Done {
                 lines.push(line(&format!("shard {}", shard.shard), &shard.report));

@@ -6,6 +6,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use crate::error::FolderError;
+use crate::usage::core_s;
 
 /// What is read of the end of a log, bytes.
 const TAIL: u64 = 16 * 1024;
@@ -53,7 +54,7 @@ pub fn logged_shards(logs: &Path) -> Result<BTreeMap<u64, PathBuf>, FolderError>
     Ok(paths.collect())
 }
 
-/// The last line of a log that is not empty; `None` where there is none.
+/// The last line of a log that is neither empty nor the one that each task leaves when it ends; `None` where there is none.
 pub fn last_line(log: &Path) -> Option<String> {
     let mut file = File::open(log).ok()?;
     let size = file.metadata().ok()?.len();
@@ -62,7 +63,8 @@ pub fn last_line(log: &Path) -> Option<String> {
     file.take(TAIL).read_to_end(&mut tail).ok()?;
     let text = String::from_utf8_lossy(&tail);
     let mut lines = text.lines().map(str::trim).rev();
-    lines.find(|line| !line.is_empty()).map(str::to_owned)
+    let says_why = |line: &&str| !line.is_empty() && core_s(line).is_none();
+    lines.find(says_why).map(str::to_owned)
 }
 
 #[cfg(test)]
@@ -94,6 +96,8 @@ mod tests {
         let log = folder.path().join("log");
         fs::write(&log, format!("{}\nthe end\n", "é".repeat(20_000))).unwrap();
         assert_eq!(last_line(&log).unwrap(), "the end");
+        fs::write(&log, "the cause\njob 7_1 ended after 35 s with 2 cores\n").unwrap();
+        assert_eq!(last_line(&log).unwrap(), "the cause");
         fs::write(&log, "\n \n").unwrap();
         assert_eq!(last_line(&log), None);
         assert_eq!(last_line(&folder.path().join("none")), None);

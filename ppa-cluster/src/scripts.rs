@@ -7,6 +7,7 @@ use crate::error::FolderError;
 use crate::folder::{ClusterFolder, VERIFIED};
 use crate::quote::{shell_quoted, unicode};
 use crate::submission::{Submission, TaskSettings};
+use crate::usage::ended_line;
 
 /// The scripts of one folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -49,6 +50,7 @@ impl Scripts {
         let shards = submission.bundle.shards;
         let head = head(folder, submission, program)?;
         let cpus = submission.settings.cpus;
+        let ended = ended_line(cpus);
         let shard = format!(
             "#!/bin/bash\n\
              # Makes one shard of {shards}: argument 1 plus the index of the task. Written by ppa submit.\n\
@@ -56,6 +58,7 @@ impl Scripts {
              shard=$(($1 + SLURM_ARRAY_TASK_ID))\n\
              task=${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}\n\
              echo \"shard $shard of {shards}: job $task on $SLURMD_NODENAME, restart ${{SLURM_RESTART_COUNT:-0}}\"\n\
+             trap 'echo \"{ended}\"' EXIT\n\
              {RUN}\n\
              # The shard is given: indices of the array are not those of the shards.\n\
              run env -u SLURM_ARRAY_TASK_ID \"$ppa\" --threads {cpus} generate slurm/plan.toml \\\n    \
@@ -67,6 +70,7 @@ impl Scripts {
              {head}\n\
              task=$SLURM_JOB_ID\n\
              echo \"merge: job $task on $SLURMD_NODENAME, restart ${{SLURM_RESTART_COUNT:-0}}\"\n\
+             trap 'echo \"{ended}\"' EXIT\n\
              {RUN}\n\
              # This job starts after all tasks, failed ones included: the merge refuses shards that are missing.\n\
              missing=\n\

@@ -22,6 +22,9 @@ pub struct TimeLimitError {
 }
 
 impl TimeLimit {
+    /// The limit of tasks where none is given: two hours.
+    pub const DEFAULT: Self = Self::from_seconds(2 * 3600);
+
     /// A limit of whole seconds.
     pub const fn from_seconds(seconds: u64) -> Self {
         Self { seconds }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::{Args, Subcommand};
+use ppa_cluster::{ClusterSize, Makespan, PoseCost, bundle, makespan};
 use ppa_core::text::count;
 use ppa_generate::{Forecast, Plan, forecast};
 use serde::Serialize;
@@ -29,6 +30,9 @@ pub struct PlanArgs {
     /// Share of the poses to make in a temporary folder and measure; at least one of every limb
     #[arg(long, default_value_t = 0.0)]
     fraction: f64,
+    /// Also estimate how long it takes on a cluster: nodes=N,cores=N (of each node)[,cpus=N (of a task)][,time=LIMIT (of a task)]
+    #[arg(long, value_name = "SIZE")]
+    cluster: Option<ClusterSize>,
     #[command(flatten)]
     progress: ProgressArgs,
 }
@@ -60,6 +64,8 @@ struct Estimate {
     threads: usize,
     /// On threads that have a core each.
     wall_hours: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cluster: Option<Makespan>,
 }
 
 #[derive(Debug, Serialize)]
@@ -115,11 +121,27 @@ fn forecast_of(file: &Path, args: &PlanArgs, output: Output) -> anyhow::Result<(
     let estimate = Estimate {
         wall_hours: forecast.cpu_hours / threads as f64,
         threads,
+        cluster: match &args.cluster {
+            Some(size) => Some(on_cluster(&forecast, size)?),
+            None => None,
+        },
         forecast,
     };
     output.print(&estimate, describe)?;
     // What was measured is reported even then.
     Ok(estimate.forecast.fits(&root)?)
+}
+
+/// The plan as `ppa submit` would divide it.
+fn on_cluster(forecast: &Forecast, size: &ClusterSize) -> anyhow::Result<Makespan> {
+    let cost = PoseCost {
+        pose_cpu_s: forecast.cpu_s_per_unit,
+        limb_cpu_s: forecast.cpu_s_per_limb,
+    };
+    let divided = bundle(forecast.pose_jobs as u64, cost, size.cpus, size.time)?;
+    let error = forecast.cpu_s_per_unit_error.unwrap_or(0.0);
+    let pose_sd_s = error * (forecast.measured as f64).sqrt();
+    Ok(makespan(&divided, pose_sd_s, size))
 }
 
 fn describe(estimate: &Estimate) -> String {
@@ -128,10 +150,23 @@ fn describe(estimate: &Estimate) -> String {
     let error = error.map_or(String::new(), |error| format!(" ± {error:.2}"));
     let free = f.free_bytes;
     let free = free.map_or(String::new(), |free| format!(", {} are free", bytes(free)));
+    let cluster = estimate.cluster.map(|found| {
+        format!(
+            "\ncluster    {} of up to {:.0} minutes, {} at a time: {:.2} hours without queue and merge, of which {:.2} for the slowest; \
+             {:.2} core hours; {} of disk until the shards are removed",
+            count(found.shards, "shard"),
+            (found.task_s / 60.0).ceil(),
+            found.at_once,
+            found.hours,
+            found.straggler_hours,
+            found.core_hours,
+            bytes(2 * f.bytes)
+        )
+    });
     format!(
         "plan       {}, {}, {}, {}\n\
          measured   {}: {:.2}{error} s of processor time each; {:.1} s to prepare a limb\n\
-         forecast   {:.2} CPU hours, {:.2} hours on {}; {} of disk{free}",
+         forecast   {:.2} CPU hours, {:.2} hours on {}; {} of disk{free}{}",
         count(f.limbs, "limb"),
         count(f.pose_jobs, "pose"),
         count(f.depth_images, "depth image"),
@@ -142,6 +177,7 @@ fn describe(estimate: &Estimate) -> String {
         f.cpu_hours,
         estimate.wall_hours,
         count(estimate.threads, "thread"),
-        bytes(f.bytes)
+        bytes(f.bytes),
+        cluster.unwrap_or_default()
     )
 }

@@ -1,6 +1,7 @@
 //! `ppa status`: generation progress.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::Args;
 use ppa_cluster::{ClusterFolder, FolderError, Slurm, Submission};
@@ -15,17 +16,33 @@ use crate::stderr;
 pub struct StatusArgs {
     /// Folder of a dataset, of a shard, or of the jobs of `ppa submit`
     dataset: PathBuf,
+    /// Repeat every ten seconds until nothing runs or waits
+    #[arg(long)]
+    watch: bool,
 }
+
+/// Time between two reports of `--watch`.
+const PAUSE: Duration = Duration::from_secs(10);
 
 pub fn run(args: &StatusArgs, output: Output) -> anyhow::Result<()> {
-    if ClusterFolder::is_one(&args.dataset) {
-        return jobs(&args.dataset, output);
+    loop {
+        let under_way = match ClusterFolder::is_one(&args.dataset) {
+            true => jobs(&args.dataset, output)?,
+            false => {
+                let status = status(&args.dataset)?;
+                output.print(&status, describe)?;
+                status.running
+            }
+        };
+        if !(args.watch && under_way) {
+            return Ok(());
+        }
+        std::thread::sleep(PAUSE);
     }
-    output.print(&status(&args.dataset)?, describe)
 }
 
-/// The shards of a plan on a cluster.
-fn jobs(root: &Path, output: Output) -> anyhow::Result<()> {
+/// Reports the shards of a plan on a cluster, and says whether any of them runs or waits.
+fn jobs(root: &Path, output: Output) -> anyhow::Result<bool> {
     let folder = ClusterFolder::open(root)?;
     let submission = Submission::read(&folder.submission())?;
     let submission = submission.ok_or_else(|| FolderError::NotSubmitted(root.to_owned()))?;
@@ -36,7 +53,8 @@ fn jobs(root: &Path, output: Output) -> anyhow::Result<()> {
         Vec::new()
     });
     let report = ClusterReport::of(&folder, &submission, &queue)?;
-    output.print(&report, ClusterReport::describe)
+    output.print(&report, ClusterReport::describe)?;
+    Ok(report.is_under_way())
 }
 
 fn describe(status: &Status) -> String {

@@ -12,16 +12,13 @@ use ppa_cluster::{
 };
 use ppa_core::text::count;
 use ppa_dataset::files::{remove_if_there, sha256_of_file};
-use ppa_generate::{Plan, forecast};
+use ppa_generate::{Plan, check, forecast};
 use serde::Serialize;
 
 use crate::cluster_report::ClusterReport;
 use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::{Output, working};
 use crate::stderr;
-
-/// Time limit of a task where none is given.
-const TIME: TimeLimit = TimeLimit::from_seconds(2 * 3600);
 
 /// Tasks below this are mostly start-up for the scheduler, seconds.
 const SHORT_S: f64 = 20.0 * 60.0;
@@ -74,6 +71,9 @@ pub struct SlurmArgs {
     /// Processor time of a pose in seconds, as `ppa plan` measures it; nothing is measured then
     #[arg(long, value_name = "SECONDS")]
     pose_seconds: Option<f64>,
+    /// Compare the files of shards that are done with their records, and make damaged ones again
+    #[arg(long)]
+    check: bool,
     /// Write the scripts and print the commands, but queue nothing; needs no Slurm
     #[arg(long)]
     dry_run: bool,
@@ -91,7 +91,7 @@ struct Submitted {
     task_s: f64,
     max_array_size: u64,
     dry_run: bool,
-    /// Shards that are not made and have no job.
+    /// Shards that are not made, or damaged, and have no job.
     submitted: Vec<u64>,
     commands: Vec<String>,
     /// Of the commands, in their order.
@@ -135,7 +135,11 @@ fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()>
         (Err(error), false) => return Err(error.into()),
     };
     let report = ClusterReport::of(&folder, &submission, &queue)?;
-    let lost = report.lost();
+    let mut lost = report.lost();
+    if args.check {
+        lost.extend(damaged(&folder, &report)?);
+        lost.sort_unstable();
+    }
     let chunks = split(&lost, max_array_size);
     let arrays = shard_commands(&folder, &chunks, submission.settings.max_tasks)?;
     let merges =
@@ -186,6 +190,21 @@ fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()>
         queued.add(merge.after(&after))?;
     }
     output.print(&submitted, describe)
+}
+
+/// Shards that are done and whose files are not as they were made.
+fn damaged(folder: &ClusterFolder, report: &ClusterReport) -> anyhow::Result<Vec<u64>> {
+    let mut damaged = Vec::new();
+    let shards = report.shards.iter();
+    for shard in shards.filter(|shard| shard.report.state == ShardState::Done) {
+        let found = check(&folder.shard(shard.shard))?;
+        if let Some(problem) = found.problems.first() {
+            let number = shard.shard;
+            stderr::note(&format!("shard {number} is made again: {problem}"));
+            damaged.push(number);
+        }
+    }
+    Ok(damaged)
 }
 
 /// The submission of the plan, as it was divided before or is divided now; writes the plan into the folder.
@@ -275,7 +294,10 @@ fn settings(args: &SlurmArgs, before: Option<&TaskSettings>) -> TaskSettings {
     TaskSettings {
         partition: or_before(&args.partition, |s| &s.partition),
         account: or_before(&args.account, |s| &s.account),
-        time: args.time.or(before.map(|s| s.time)).unwrap_or(TIME),
+        time: args
+            .time
+            .or(before.map(|s| s.time))
+            .unwrap_or(TimeLimit::DEFAULT),
         cpus: match args.cpus {
             Some(cpus) => cpus.get(),
             None => before.map_or(1, |s| s.cpus),

@@ -153,7 +153,8 @@ fn only_missing_shards_are_submitted_again() {
         here,
         "generate jobs/slurm/plan.toml --shard 1/3 --out jobs/shards/1",
     );
-    fs::write(here.join("jobs/slurm/logs/shard_2.log"), "begun\nkilled\n").unwrap();
+    let log = "begun\nkilled\njob 1_2 ended after 1800 s with 1 cores\n";
+    fs::write(here.join("jobs/slurm/logs/shard_2.log"), log).unwrap();
     fs::write(
         here.join("queue"),
         "2_1|RUNNING|n1|None|shards 2\n3|PENDING||Dependency|merge\n",
@@ -171,6 +172,20 @@ fn only_missing_shards_are_submitted_again() {
         (&"running".into(), &"n1".into())
     );
     assert_eq!(report["merge"]["reason"], "Dependency");
+    // Five poses of 1200 s, one of them made, on one core.
+    let hours = &report["core_hours"];
+    for (key, expected_s) in [
+        ("estimated", 6000.0),
+        ("used", 1800.0),
+        ("left", 4800.0),
+        ("left_hours", 4800.0),
+    ] {
+        assert_eq!(
+            hours[key].as_f64(),
+            Some(expected_s / 3600.0),
+            "{key}: {hours}"
+        );
+    }
 
     let said = succeed(here, "submit slurm plan.toml --out jobs");
     assert_eq!(said["submitted"], serde_json::json!([2]));
@@ -200,4 +215,40 @@ fn arrays_follow_each_other_where_tasks_are_limited() {
     let calls = calls(folder.path());
     assert!(calls[0].contains("--array=1-2%1 "), "{calls:?}");
     assert!(calls[1].contains("--dependency=afterany:1 "), "{calls:?}");
+}
+
+#[test]
+fn a_damaged_shard_is_submitted_again_after_a_check() {
+    let folder = with_slurm();
+    let here = folder.path();
+    succeed(here, THREE);
+    for shard in 1..=3 {
+        let made =
+            format!("generate jobs/slurm/plan.toml --shard {shard}/3 --out jobs/shards/{shard}");
+        crate::succeed(here, &made);
+    }
+    let submitted = |arguments: &str| {
+        succeed(
+            here,
+            &format!("submit slurm plan.toml --out jobs{arguments}"),
+        )["submitted"]
+            .clone()
+    };
+    assert_eq!(submitted(" --check"), serde_json::json!([]));
+    let whole = crate::contents(&here.join("jobs/shards/2"));
+    let (image, bytes) = whole
+        .iter()
+        .find(|(file, _)| file.extension().is_some_and(|of| of == "png"))
+        .unwrap();
+    let mut flipped = bytes.clone();
+    *flipped.last_mut().unwrap() ^= 1;
+    fs::write(here.join("jobs/shards/2").join(image), flipped).unwrap();
+    assert_eq!(submitted(""), serde_json::json!([]));
+    assert_eq!(submitted(" --check"), serde_json::json!([2]));
+    // What the task runs makes the image again.
+    crate::succeed(
+        here,
+        "generate jobs/slurm/plan.toml --shard 2/3 --out jobs/shards/2",
+    );
+    assert_eq!(submitted(" --check"), serde_json::json!([]));
 }

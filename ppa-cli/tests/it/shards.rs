@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use crate::{contents, fail, ppa, succeed, write_plan};
+use crate::{QUICK_XRAY, contents, fail, ppa, succeed, write_plan};
 
 /// Writes a plan of five quick poses and two body shapes.
 pub fn write_quick_plan(folder: &Path) {
@@ -206,6 +206,42 @@ fn a_task_of_an_array_that_runs_again_keeps_its_shard() {
 }
 
 #[test]
+fn limbs_made_at_once_have_the_bytes_of_one_after_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mut cases = String::new();
+    for (patient, name) in ["P01", "P02", "P03"].iter().enumerate() {
+        succeed(
+            folder,
+            &format!("ct phantom --name {name} --out {name}.nii --spacing-mm 2 --table"),
+        );
+        succeed(
+            folder,
+            &format!("prepare {name}.nii --side r --out {name}.toml"),
+        );
+        cases += &format!("[[case]]\nfile = \"{name}.toml\"\npatient = {patient}\n");
+    }
+    let plan = format!(
+        "version = 1\n{cases}[rotation]\nfrom_deg = 0.0\nto_deg = 10.0\nstep_deg = 10.0\n{QUICK_XRAY}"
+    );
+    fs::write(folder.join("plan.toml"), plan).unwrap();
+    // One limb at a time for every four threads.
+    for threads in [1, 12] {
+        succeed(
+            folder,
+            &format!("generate plan.toml --out of_{threads} --threads {threads}"),
+        );
+    }
+    let one_after_another = contents(&folder.join("of_1"));
+    assert!(one_after_another.len() > 60, "{}", one_after_another.len());
+    assert!(contents(&folder.join("of_12")) == one_after_another);
+    succeed(
+        folder,
+        "verify of_12 --plan plan.toml --fraction 1 --threads 12",
+    );
+}
+
+#[test]
 fn images_stay_below_the_disk_limit() {
     let folder = tempfile::tempdir().unwrap();
     let plan = whole().join("plan.toml").display().to_string();
@@ -234,7 +270,10 @@ fn images_stay_below_the_disk_limit() {
 fn a_plan_tells_what_it_takes_or_why_it_cannot_work() {
     let folder = tempfile::tempdir().unwrap();
     write_quick_plan(folder.path());
-    let said = succeed(folder.path(), "plan plan.toml --fraction 0.4 --json");
+    let said = succeed(
+        folder.path(),
+        "plan plan.toml --fraction 0.4 --cluster nodes=2,cores=4,cpus=2 --json",
+    );
     let report: Value = serde_json::from_str(&said).unwrap();
     let counts = ["limbs", "units", "depth_images", "radiographs", "measured"];
     assert_eq!(
@@ -247,6 +286,12 @@ fn a_plan_tells_what_it_takes_or_why_it_cannot_work() {
         (number("cpu_hours") / expected - 1.0).abs() < 1e-9,
         "{report}"
     );
+    // A short plan is one task, on two cores.
+    let cluster = |key: &str| report["cluster"][key].as_f64().unwrap();
+    assert_eq!((cluster("shards"), cluster("at_once")), (1.0, 1.0));
+    let task_s = number("cpu_s_per_limb") + 2.5 * number("cpu_s_per_unit");
+    assert!((cluster("task_s") / task_s - 1.0).abs() < 1e-6, "{report}");
+    assert!(cluster("core_hours") >= 2.0 * task_s / 3600.0, "{report}");
     assert_eq!(
         crate::names(folder.path()),
         ["plan.toml"],

@@ -1,0 +1,134 @@
+//! Core hours of tasks: those that ended tasks have used, by the line that each leaves in its log, and those of the estimate.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::error::FolderError;
+use crate::submission::Submission;
+
+/// Core hours of a plan: allocated processors times hours.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CoreHours {
+    /// Of the whole plan, estimated from the time of a pose.
+    pub estimated: f64,
+    /// Of tasks that have ended, by their logs. Tasks that run, and tasks that were killed, are not counted.
+    pub used: f64,
+    /// Of poses that are not made, estimated.
+    pub left: f64,
+    /// Hours until they are made if as many tasks run as now; absent while none runs.
+    pub left_hours: Option<f64>,
+}
+
+impl CoreHours {
+    /// `made` are the poses and shards that are done, `running` the tasks that run now, `logs` the folder of the logs.
+    ///
+    /// # Errors
+    /// [`FolderError::File`] when the logs cannot be read.
+    pub fn of(
+        submission: &Submission,
+        made: (u64, u64),
+        running: usize,
+        logs: &Path,
+    ) -> Result<Self, FolderError> {
+        let cost = submission.cost;
+        let hours = |poses: u64, shards: u64| {
+            (cost.pose_cpu_s * poses as f64 + cost.limb_cpu_s * shards as f64) / 3600.0
+        };
+        let (poses, shards) = (submission.poses, submission.bundle.shards);
+        let left = hours(poses.saturating_sub(made.0), shards.saturating_sub(made.1));
+        let cores = running as f64 * f64::from(submission.settings.cpus);
+        Ok(Self {
+            estimated: hours(poses, shards),
+            used: used_core_s(logs)? / 3600.0,
+            left,
+            left_hours: (running > 0).then(|| left / cores),
+        })
+    }
+}
+
+/// What a job script prints when it ends, killed ones excepted; `$task` and `$SECONDS` are variables of the script.
+pub(crate) fn ended_line(cpus: u32) -> String {
+    format!("job $task ended after $SECONDS s with {cpus} cores")
+}
+
+/// Cores times seconds of a line that a task has left when it ended; `None` for all other lines.
+pub(crate) fn core_s(line: &str) -> Option<f64> {
+    let words: Vec<&str> = line.split(' ').collect();
+    let &[
+        "job",
+        _,
+        "ended",
+        "after",
+        seconds,
+        "s",
+        "with",
+        cores,
+        "cores",
+    ] = words.as_slice()
+    else {
+        return None;
+    };
+    let (seconds, cores): (u64, u32) = (seconds.parse().ok()?, cores.parse().ok()?);
+    Some(seconds as f64 * f64::from(cores))
+}
+
+fn used_core_s(logs: &Path) -> Result<f64, FolderError> {
+    let entries = match fs::read_dir(logs) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0.0),
+        entries => entries.map_err(FolderError::at("read", logs))?,
+    };
+    let mut used = 0.0;
+    for entry in entries {
+        let path = entry.map_err(FolderError::at("read", logs))?.path();
+        let text = fs::read(&path).map_err(FolderError::at("read", &path))?;
+        used += String::from_utf8_lossy(&text)
+            .lines()
+            .filter_map(core_s)
+            .sum::<f64>();
+    }
+    Ok(used)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::submission::tests::submission;
+
+    #[test]
+    fn ended_tasks_are_counted_whoever_wrote_besides() {
+        let folder = tempfile::tempdir().unwrap();
+        let line = |task: &str, seconds: &str| {
+            ended_line(2)
+                .replace("$task", task)
+                .replace("$SECONDS", seconds)
+        };
+        let log = format!("begun\n{}\n{}\n", line("1_1", "600"), line("1_1", "1200"));
+        fs::write(folder.path().join("shard_1.log"), log).unwrap();
+        let log = format!("\u{fffd}job 3 ended\n{}", line("3", "1800"));
+        fs::write(folder.path().join("merge.log"), log).unwrap();
+        assert_eq!(used_core_s(folder.path()).unwrap(), 2.0 * 3600.0);
+        assert_eq!(used_core_s(&folder.path().join("none")).unwrap(), 0.0);
+    }
+
+    #[test]
+    fn what_is_left_is_shared_by_the_tasks_that_run() {
+        let mut submission = submission();
+        submission.poses = 100;
+        submission.cost.pose_cpu_s = 72.0;
+        submission.cost.limb_cpu_s = 36.0;
+        submission.bundle.shards = 10;
+        submission.settings.cpus = 2;
+        let logs = tempfile::tempdir().unwrap();
+        let hours = |made, running| CoreHours::of(&submission, made, running, logs.path()).unwrap();
+        let begun = hours((0, 0), 0);
+        assert!((begun.estimated - 2.1).abs() < 1e-12 && begun.left == begun.estimated);
+        assert_eq!(begun.left_hours, None);
+        let half = hours((50, 5), 5);
+        assert!((half.left - 1.05).abs() < 1e-12);
+        assert!((half.left_hours.unwrap() - 0.105).abs() < 1e-12);
+        assert_eq!(hours((100, 10), 0).left, 0.0);
+    }
+}
