@@ -22,7 +22,7 @@ pub(crate) struct Limb {
 }
 
 impl Limb {
-    /// Opens a case that stands in a file, or will, and takes up the changes that were saved beside it.
+    /// Opens a case with the changes that were saved beside its file, which need not exist yet.
     pub fn open(file: PathBuf, case: Case) -> Result<Self, StudioError> {
         let case_file = CaseFile::new(file);
         let case = if case_file.has_edits() {

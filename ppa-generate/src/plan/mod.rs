@@ -95,7 +95,7 @@ impl Plan {
         Self::of_text(&read_text(path)?, path)
     }
 
-    /// The plan in a text that stands in the file `path`, or will.
+    /// Parses the text of a plan; `path` is its file, which need not exist yet.
     ///
     /// # Errors
     /// As of [`Plan::read`].

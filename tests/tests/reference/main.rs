@@ -8,6 +8,7 @@ mod sources;
 
 use std::collections::BTreeSet;
 use std::fs;
+use std::path::Path;
 
 use declarations::value;
 use page::Page;
@@ -66,21 +67,26 @@ const PAGES: &[Page] = &[
     ),
 ];
 
+/// Fails unless a file has this text; writes it first where `PPA_WRITE_REFERENCE` is set.
+fn require_current(path: &Path, text: &str) {
+    if std::env::var_os("PPA_WRITE_REFERENCE").is_some() {
+        fs::write(path, text).unwrap();
+    }
+    let found = fs::read_to_string(path).unwrap_or_default();
+    assert!(
+        found == text,
+        "{} is out of date; {REWRITE} rewrites it",
+        path.display()
+    );
+}
+
 #[test]
 fn reference_pages_are_those_of_the_types() {
     let sources = Sources::read();
     for page in PAGES {
         let path = root().join("docs/book/reference").join(page.0);
         let text = sources.page(page).text;
-        if std::env::var_os("PPA_WRITE_REFERENCE").is_some() {
-            fs::write(&path, &text).unwrap();
-        }
-        let found = fs::read_to_string(&path).unwrap_or_default();
-        assert!(
-            found == text,
-            "{} is out of date; {REWRITE} rewrites it",
-            path.display()
-        );
+        require_current(&path, &text);
     }
 }
 
@@ -97,15 +103,7 @@ fn the_form_of_plans_has_the_keys_of_the_types() {
         text += "\n";
     }
     let path = root().join("ppa-studio/src/plan_keys.tsv");
-    if std::env::var_os("PPA_WRITE_REFERENCE").is_some() {
-        fs::write(&path, &text).unwrap();
-    }
-    let found = fs::read_to_string(&path).unwrap_or_default();
-    assert!(
-        found == text,
-        "{} is out of date; {REWRITE} rewrites it",
-        path.display()
-    );
+    require_current(&path, &text);
 }
 
 #[test]
