@@ -313,12 +313,7 @@ mod tests {
         };
         // 200 x 160 mm, moved along with what it shows; in one image the pixels are many, in the other few.
         for (columns, rows, pixel_mm) in [(2000, 1600, 0.1), (100, 80, 2.0)] {
-            let detector = Detector {
-                columns,
-                rows,
-                pixel_mm,
-                centre_mm: [20.0, 0.0],
-            };
+            let detector = Detector::centred(columns, rows, pixel_mm).with_centre_mm([20.0, 0.0]);
             let cut = CutFaces::new(&walls, &skin, &detector, 1000.0).unwrap();
             let before = Isometry3::translation(0.0, 0.0, -500.0);
             let of = |roi_mm, x| cut.in_radiograph(&before, &Point3::new(x, 0.0, 0.0), roi_mm);

@@ -5,10 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::beam::field::Field;
 use crate::beam::raster::Raster;
+use crate::setters::setters;
 
 /// A flat detector square to device z; columns run along device x, rows along device y.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Detector {
     /// Pixels along device x.
     pub columns: u32,
@@ -20,6 +22,10 @@ pub struct Detector {
     #[serde(default)]
     pub centre_mm: [f64; 2],
 }
+
+setters!(Detector {
+    with_centre_mm: centre_mm = [f64; 2],
+});
 
 impl Detector {
     /// A detector whose centre faces the source.

@@ -41,18 +41,15 @@ fn write(
 ) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("image.dcm");
-    let exposure = DxExposure {
-        projection,
-        tube: &tube(),
-        examination: Examination {
-            region: Region::Ankle,
-            side: Laterality::Right,
-            view: View::AnteroPosteriorOblique,
-        },
-        source_patient_mm: Some(1_000.0),
-        target_exposure_index: Some(400.0),
-        study,
+    let examination = Examination {
+        region: Region::Ankle,
+        side: Laterality::Right,
+        view: View::AnteroPosteriorOblique,
     };
+    let tube = tube();
+    let exposure = DxExposure::new(projection, &tube, examination, study)
+        .with_source_patient_mm(Some(1_000.0))
+        .with_target_exposure_index(Some(400.0));
     radiograph.write_dicom(&path, &exposure, intent).unwrap();
     std::fs::read(&path).unwrap()
 }
@@ -256,18 +253,13 @@ fn identifiers_follow_from_the_radiograph() {
 fn an_image_too_large_for_dicom_is_refused() {
     let (projection, mut radiograph) = exposed();
     radiograph.detector.columns = 65_536;
-    let exposure = DxExposure {
-        projection: &projection,
-        tube: &tube(),
-        examination: Examination {
-            region: Region::Ankle,
-            side: Laterality::Left,
-            view: View::AnteroPosterior,
-        },
-        source_patient_mm: None,
-        target_exposure_index: None,
-        study: "",
+    let examination = Examination {
+        region: Region::Ankle,
+        side: Laterality::Left,
+        view: View::AnteroPosterior,
     };
+    let tube = tube();
+    let exposure = DxExposure::new(&projection, &tube, examination, "");
     let path = std::path::Path::new("never-written.dcm");
     let error = radiograph.write_dicom(path, &exposure, DxIntent::Processing);
     assert!(matches!(

@@ -97,14 +97,13 @@ impl PictureArgs {
         } else {
             DxIntent::Presentation(presentation)
         };
-        let exposure = DxExposure {
-            projection: &exposure.projection,
-            tube: &tube(exposure.limb.settings())?,
-            examination: examination(case, exposure.limb.prepared.landmarks.limb, angle_deg),
-            source_patient_mm: Some(exposure.limb.table.source_table_mm()),
-            target_exposure_index: self.target_exposure_index(exposure.limb.settings()),
-            study: &case.source.volume_sha256,
-        };
+        let limb = &exposure.limb;
+        let tube = tube(limb.settings())?;
+        let examination = examination(case, limb.prepared.landmarks.limb, angle_deg);
+        let study = &case.source.volume_sha256;
+        let exposure = DxExposure::new(&exposure.projection, &tube, examination, study)
+            .with_source_patient_mm(Some(limb.table.source_table_mm()))
+            .with_target_exposure_index(self.target_exposure_index(limb.settings()));
         Ok(radiograph.write_dicom(path, &exposure, intent)?)
     }
 }

@@ -27,6 +27,7 @@ const LOG_OF_ZERO: f64 = -1.0;
 
 /// What is not in the radiograph but belongs into its DICOM header.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct DxExposure<'a> {
     /// The exposure the radiograph was made with.
     pub projection: &'a Projection,
@@ -40,6 +41,43 @@ pub struct DxExposure<'a> {
     pub target_exposure_index: Option<f64>,
     /// Images with the same words here share a study, such as the hash of a scan. Nothing of it can be read from the file.
     pub study: &'a str,
+}
+
+impl<'a> DxExposure<'a> {
+    /// An exposure of which nothing else is known; images with the same `study` share a study.
+    pub fn new(
+        projection: &'a Projection,
+        tube: &'a TubeSpec,
+        examination: Examination,
+        study: &'a str,
+    ) -> Self {
+        Self {
+            projection,
+            tube,
+            examination,
+            source_patient_mm: None,
+            target_exposure_index: None,
+            study,
+        }
+    }
+
+    /// Sets [`source_patient_mm`](Self::source_patient_mm).
+    #[must_use]
+    pub fn with_source_patient_mm(self, source_patient_mm: Option<f64>) -> Self {
+        Self {
+            source_patient_mm,
+            ..self
+        }
+    }
+
+    /// Sets [`target_exposure_index`](Self::target_exposure_index).
+    #[must_use]
+    pub fn with_target_exposure_index(self, target_exposure_index: Option<f64>) -> Self {
+        Self {
+            target_exposure_index,
+            ..self
+        }
+    }
 }
 
 /// What a DICOM image is for.
