@@ -51,6 +51,7 @@ mod detector;
 mod dose;
 mod engine;
 mod image;
+mod isa;
 mod matter;
 #[cfg(feature = "files")]
 pub mod mcgpu;

@@ -12,11 +12,14 @@ pub(crate) mod analog_image;
 mod attenuation_basis;
 mod cdf;
 mod cell_walk;
+mod centre_rays;
 mod coarse_cells;
 mod collision_map;
 mod delta_tracking;
+mod depth_table;
 #[cfg(test)]
 mod energy_balance;
+mod expected_scores;
 pub(crate) mod exposure;
 pub(crate) mod fast;
 mod fast_progress;

@@ -114,6 +114,26 @@ impl<'a> Paths<'a> {
         })
     }
 
+    /// Device z, mm, below which all blocks are uniform air; infinite if all blocks are.
+    pub fn nearest_z_mm(&self) -> f64 {
+        let z = self.lattice.device_from_cell().row(2).into_owned();
+        let along = [0, 1, 2].map(|axis| z[axis]);
+        let nearest_corner: f64 = along.iter().map(|mm| EDGE as f64 * mm.min(0.0)).sum();
+        let before = cells_before(self.interpolation);
+        let blocks = self.blocks.denser_than_air();
+        blocks
+            .map(|first| {
+                let first = first.map(|cell| cell as f64 - before);
+                z[3] + first
+                    .iter()
+                    .zip(along)
+                    .map(|(cell, mm)| cell * mm)
+                    .sum::<f64>()
+            })
+            .fold(f64::INFINITY, f64::min)
+            + nearest_corner
+    }
+
     /// Where a path of `length_mm` is inside the box; nowhere is an empty stretch.
     pub fn inside(
         &self,
@@ -329,13 +349,18 @@ impl<'a> Paths<'a> {
 /// A ray of the box in cells of the codes, counted from the corner of the rim, or from the centre of the voxel there.
 #[inline(always)]
 fn cells(in_box: Ray, interpolation: Interpolation) -> Ray {
-    let shift = match interpolation {
+    Ray {
+        origin: in_box.origin.add_scalar(cells_before(interpolation)),
+        ..in_box
+    }
+}
+
+/// Cells of the codes before the corner of the box.
+#[inline(always)]
+fn cells_before(interpolation: Interpolation) -> f64 {
+    match interpolation {
         Interpolation::Nearest => 1.0,
         Interpolation::Trilinear => 0.5,
-    };
-    Ray {
-        origin: in_box.origin.add_scalar(shift),
-        ..in_box
     }
 }
 
@@ -396,6 +421,26 @@ mod tests {
         } else {
             (0, 0.001_2)
         }
+    }
+
+    /// The ball, in blocks of 16 voxels of 2 mm, begins at most one block behind the z that is found, and not before it.
+    #[test]
+    fn nothing_but_air_lies_below_the_nearest_z() {
+        exposed(Interpolation::Trilinear, ball, |paths, _| {
+            let device_from_ct = small_limb::exposure().2.ct_from_device.inverse();
+            let centre = device_from_ct * Point3::new(-20.0, -10.0, -15.0);
+            let nearest_mm = centre.z - 18.0;
+            let found_mm = paths.nearest_z_mm();
+            let diagonal_mm = 32.0 * 3.0_f64.sqrt();
+            assert!(
+                (nearest_mm - diagonal_mm - 2.0..=nearest_mm).contains(&found_mm),
+                "{found_mm} {nearest_mm}"
+            );
+        });
+        let air = |_| (0, 0.001_2);
+        exposed(Interpolation::Trilinear, air, |paths, _| {
+            assert_eq!(paths.nearest_z_mm(), f64::INFINITY);
+        });
     }
 
     /// Masses of random paths, with uniform blocks in one step and cell by cell.

@@ -44,11 +44,14 @@ impl<'a> PrimaryRays<'a> {
         }
     }
 
-    pub fn per_pixel(&self, of: impl Fn(usize, &mut Scratch) -> Moments + Sync) -> Vec<Moments> {
-        let detector = self.transport.projection.detector;
-        (0..detector.pixels())
-            .into_par_iter()
-            .with_min_len((detector.columns as usize).min(64))
+    pub fn per_pixel(
+        &self,
+        pixels: impl IndexedParallelIterator<Item = usize>,
+        of: impl Fn(usize, &mut Scratch) -> Moments + Sync,
+    ) -> Vec<Moments> {
+        let columns = self.transport.projection.detector.columns as usize;
+        pixels
+            .with_min_len(columns.min(64))
             .map_init(
                 || Scratch {
                     mass: vec![[0.0; LANES]; self.paths.basis.groups],

@@ -3,6 +3,7 @@
 //! docs/physics.md, "Fast engine", primary.
 
 use nalgebra::{Point2, Point3};
+use rayon::prelude::*;
 
 use crate::beam::field::Field;
 use crate::beam::projection::Projection;
@@ -39,7 +40,8 @@ pub fn primary(
     let rays = PrimaryRays::new(&exposure, &paths, transport.emitter.lines());
     let spots = transport.emitter.spot_points(SPOT_POINTS);
     let ev_cm2 = 1e3 / projection.detector.pixel_cm2();
-    let mut moments = rays.per_pixel(|pixel, scratch| {
+    let pixels = 0..projection.detector.pixels();
+    let mut moments = rays.per_pixel(pixels.into_par_iter(), |pixel, scratch| {
         rays.lit(pixel).map_or_else(Moments::default, |lit| {
             sampled(&rays, &spots, lit, samples_per_side, scratch)
         })

@@ -9,7 +9,7 @@ use crate::matter::scatter_density::ScatterDensities;
 use crate::transport::attenuation::Coefficients;
 
 /// Steps of sin(θ/2), in which forward peaks are wide: at 150 keV the Rayleigh peak of heavy elements covers 10 of them.
-const STEPS: usize = 512;
+pub(super) const STEPS: usize = 512;
 
 /// Interval, in steps, at which the mean energy after Compton scattering is computed, and the number of draws for it.
 const ENERGY_STEPS: usize = 8;
@@ -19,13 +19,6 @@ const DRAWS: u32 = 32;
 #[derive(Debug)]
 pub(crate) struct ScatterTable {
     rows: Vec<[f32; 3]>,
-}
-
-/// Values of a [`ScatterTable`] at one angle.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Scattering {
-    pub compton: f64,
-    pub rayleigh: f64,
 }
 
 impl ScatterTable {
@@ -79,13 +72,11 @@ impl ScatterTable {
         &self.rows
     }
 
-    #[inline]
-    pub fn at(&self, (step, fraction): (usize, f32)) -> Scattering {
-        let (low, high) = (&self.rows[step], &self.rows[step + 1]);
-        let mix = |i: usize| f64::from(low[i] + fraction * (high[i] - low[i]));
-        Scattering {
-            compton: mix(0),
-            rayleigh: mix(1),
-        }
+    /// Compton and Rayleigh scattering together, step by step.
+    pub fn in_all(&self) -> Vec<f32> {
+        self.rows
+            .iter()
+            .map(|[compton, rayleigh, _]| compton + rayleigh)
+            .collect()
     }
 }

@@ -10,8 +10,9 @@ use ppa_core::random::Philox;
 
 use crate::detector::tabulated_response::{Incidence, TabulatedResponse};
 use crate::engine::attenuation_basis::{BasisMass, LANES, exponents};
+use crate::engine::expected_scores::Subset;
 use crate::engine::first_collisions::{ESTIMATES, FirstCollisions};
-use crate::engine::importance::{Draws, ImportanceModel, PointImportance, Subset};
+use crate::engine::importance::{Draws, ImportanceModel, PointImportance};
 use crate::engine::line_scattering::LinesAtAngle;
 use crate::engine::lines::Lines;
 use crate::engine::paths::Paths;

@@ -7,6 +7,9 @@ use crate::transport::voxel_codes::{VoxelCode, VoxelCodes};
 /// Cells along the edge of a block.
 pub(super) const EDGE: usize = 16;
 
+/// Density up to which a block is taken for air, g/cm³.
+const AIR_G_CM3: f32 = 2e-3;
+
 /// Blocks of [`EDGE`]³ cells, and which of them are uniform: of one material and density.
 pub(super) struct UniformBlocks {
     /// Blocks along each axis.
@@ -49,6 +52,19 @@ impl UniformBlocks {
             size,
             code: vec![None; size.iter().product()],
         }
+    }
+
+    /// The first cell of every block that is not uniform air.
+    pub fn denser_than_air(&self) -> impl Iterator<Item = [usize; 3]> {
+        let size = self.size;
+        let is_air = |code: VoxelCode| code.density_g_cm3() <= AIR_G_CM3;
+        let blocks = self.code.iter().enumerate();
+        blocks
+            .filter(move |(_, code)| !code.is_some_and(is_air))
+            .map(move |(block, _)| {
+                let layer = block / size[0];
+                [block % size[0], layer % size[1], layer / size[1]].map(|at| at * EDGE)
+            })
     }
 
     /// Material and density of a block, if it is uniform.

@@ -1,8 +1,8 @@
 //! One step of every flight: to a tentative collision, or to the end of the cube over which its majorant holds.
 
-use crate::transport::lanes::elementary::{floor, greatest, least};
+use crate::isa::Kernel;
 use crate::transport::lanes::flights::{Box32, Each, Flights, LANES};
-use crate::transport::lanes::isa::Kernel;
+use crate::vector_math::{floor, greatest, least};
 
 /// Where the flights stand in the lattice of blocks.
 #[derive(Debug)]

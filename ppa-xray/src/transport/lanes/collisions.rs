@@ -1,11 +1,11 @@
 //! Outcome of tentative collisions: none, absorption with or without a K x-ray, or scattering.
 
+use crate::isa::prefetch;
 use crate::phantom::interpolation::Interpolation;
 use crate::transport::lanes::Lanes;
 use crate::transport::lanes::advance::{Blocks, Steps};
 use crate::transport::lanes::draws::{Depths, unit};
 use crate::transport::lanes::flights::{LANES, each};
-use crate::transport::lanes::isa::prefetch;
 use crate::transport::lanes::picked::Picked;
 use crate::transport::score::Score;
 use crate::transport::tally::Category;

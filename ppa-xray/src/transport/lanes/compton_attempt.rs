@@ -1,10 +1,10 @@
 //! Compton scattering of many photons off bound electrons, one attempt each.
 
+use crate::isa::Kernel;
 use crate::matter::impulse_approximation::BoundElectron;
 use crate::transport::lanes::draws::unit;
-use crate::transport::lanes::elementary::least;
 use crate::transport::lanes::flights::{Each, LANES};
-use crate::transport::lanes::isa::Kernel;
+use crate::vector_math::least;
 
 /// Attempts at Compton scattering in the impulse approximation.
 #[derive(Debug)]

@@ -2,9 +2,9 @@
 
 use ppa_core::random::philox;
 
+use crate::isa::Kernel;
 use crate::matter::natural_log::ln;
 use crate::transport::lanes::flights::{Each, LANES};
-use crate::transport::lanes::isa::Kernel;
 use crate::transport::stream::Stream;
 
 /// Random numbers of many histories: one Philox block each.

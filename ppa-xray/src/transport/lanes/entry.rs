@@ -5,9 +5,9 @@
     reason = "one index runs through all arrays of a photon"
 )]
 
-use crate::transport::lanes::elementary::{greatest, least};
+use crate::isa::Kernel;
 use crate::transport::lanes::flights::{Box32, Each, Flights, LANES, each};
-use crate::transport::lanes::isa::Kernel;
+use crate::vector_math::{greatest, least};
 
 /// Finds slopes and the way to the detector plane from positions and directions.
 pub(super) struct Aim<'a> {

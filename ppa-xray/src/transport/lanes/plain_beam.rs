@@ -1,8 +1,8 @@
 //! Photons of a point source without heel effect.
 
+use crate::isa::Kernel;
 use crate::transport::lanes::draws::unit;
 use crate::transport::lanes::flights::{Each, Flights, LANES};
-use crate::transport::lanes::isa::Kernel;
 
 /// Sends photons from the origin towards the field, evenly in solid angle.
 pub(super) struct PlainBeam<'a> {
@@ -45,8 +45,8 @@ mod tests {
 
     use super::*;
     use crate::beam::field::Field;
+    use crate::isa::Isa;
     use crate::transport::lanes::draws::{Draw, Draws};
-    use crate::transport::lanes::isa::Isa;
     use crate::transport::stream::Stream;
 
     /// Of photons even on a wide field, those kept are in proportion to the solid angle of the whole field and of a quarter

@@ -1,9 +1,9 @@
 //! New directions of many photons.
 
+use crate::isa::Kernel;
 use crate::transport::lanes::draws::unit;
-use crate::transport::lanes::elementary::{greatest, sin_cos_turn};
 use crate::transport::lanes::flights::{Each, LANES, each};
-use crate::transport::lanes::isa::Kernel;
+use crate::vector_math::{greatest, sin_cos_turn};
 
 /// A polar angle and an azimuth about the old direction.
 #[derive(Debug)]

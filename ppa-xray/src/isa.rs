@@ -5,7 +5,7 @@
 ///
 /// Every kernel rounds each operation on its own (no fused multiply-add), so all sets give the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Isa(Set);
+pub(crate) struct Isa(Set);
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Set {
@@ -49,7 +49,7 @@ impl Isa {
     }
 
     #[inline(always)]
-    pub(super) fn run(self, kernel: impl Kernel) {
+    pub(crate) fn run(self, kernel: impl Kernel) {
         match self.0 {
             Set::Baseline => kernel.run(),
             // SAFETY: `available` alone makes this value, and only where the instructions were detected.
@@ -64,7 +64,7 @@ impl Isa {
 
 /// Asks for the memory of an element that will be read soon, without waiting for it.
 #[inline(always)]
-pub(super) fn prefetch<T>(slice: &[T], index: usize) {
+pub(crate) fn prefetch<T>(slice: &[T], index: usize) {
     #[cfg(target_arch = "x86_64")]
     if let Some(element) = slice.get(index) {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
@@ -75,8 +75,8 @@ pub(super) fn prefetch<T>(slice: &[T], index: usize) {
     let _ = (slice, index);
 }
 
-/// Straight-line work on many photons at once. `run` is `#[inline(always)]`, so that it is compiled into each copy.
-pub(super) trait Kernel {
+/// Straight-line work on many elements at once. `run` is `#[inline(always)]`, so that it is compiled into each copy.
+pub(crate) trait Kernel {
     fn run(self);
 }
 
