@@ -36,6 +36,7 @@ mod multiple_scatter;
 mod node_grid;
 pub(crate) mod noise;
 mod open_beam;
+mod path_tables;
 mod paths;
 pub(crate) mod prepared_phantom;
 mod preview;

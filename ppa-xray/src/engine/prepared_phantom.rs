@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::engine::paths::PathTables;
+use crate::engine::path_tables::PathTables;
 use crate::matter::compton::ComptonModel;
 use crate::matter::scatter_density::ScatterDensities;
 use crate::phantom::voxels::VoxelPhantom;
