@@ -6,6 +6,8 @@ mod segmented;
 mod slab;
 mod views;
 
+use std::sync::OnceLock;
+
 use super::*;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Vector3};
 use ppa_ct::Grid;
@@ -22,7 +24,10 @@ fn ct_from_patient(joint: Point3<f64>, axis: Vector3<f64>) -> Isometry3<f64> {
 
 /// A phantom's bones on a lattice around its joint.
 fn labelled(name: &str, side: Side, spacing_mm: f64) -> (Grid, Vec<u8>, Truth) {
-    let leg = LowerLeg::family(name, side).unwrap();
+    labels_of(&LowerLeg::family(name, side).unwrap(), spacing_mm)
+}
+
+fn labels_of(leg: &LowerLeg, spacing_mm: f64) -> (Grid, Vec<u8>, Truth) {
     let truth = leg.truth();
     let low = truth.joint_centre - Vector3::from_element(62.0);
     let n = (124.0 / spacing_mm) as usize;
@@ -33,10 +38,53 @@ fn labelled(name: &str, side: Side, spacing_mm: f64) -> (Grid, Vec<u8>, Truth) {
 
 fn mortise(name: &str, side: Side, spacing_mm: f64) -> (JointSpace, Truth) {
     let (grid, labels, truth) = labelled(name, side, spacing_mm);
+    (joint_space(&grid, &labels, &truth), truth)
+}
+
+/// The joint space between labelled bones of a phantom.
+fn joint_space(grid: &Grid, labels: &[u8], truth: &Truth) -> JointSpace {
     let joint = truth.joint_centre;
-    let bones = AnkleBones::new(&grid, &labels, BoneNumbers::default(), &joint).unwrap();
-    let patient = ct_from_patient(joint, truth.axis_direction.into_inner());
-    (JointSpace::new(bones, &patient).unwrap(), truth)
+    let bones = AnkleBones::new(grid, labels, BoneNumbers::default(), &joint).unwrap();
+    JointSpace::new(bones, &patient(truth)).unwrap()
+}
+
+fn patient(truth: &Truth) -> Isometry3<f64> {
+    ct_from_patient(truth.joint_centre, truth.axis_direction.into_inner())
+}
+
+/// A phantom's right ankle, by its true bones.
+struct Ankle {
+    leg: LowerLeg,
+    truth: Truth,
+    grid: Grid,
+    labels: Vec<u8>,
+    space: JointSpace,
+}
+
+/// Spacing of the voxels of [`ankle`].
+const ANKLE_SPACING_MM: f64 = 0.8;
+
+/// The ankle of a phantom of the family, P01 to P17, made once. Not to be called from a thread of rayon: one that waits for the voxels
+/// would take up work that asks for the same ankle, and wait for itself.
+fn ankle(number: usize) -> &'static Ankle {
+    static ANKLES: [OnceLock<Ankle>; 17] = [const { OnceLock::new() }; 17];
+    ANKLES[number - 1].get_or_init(|| {
+        let leg = LowerLeg::family(&format!("P{number:02}"), Side::Right).unwrap();
+        let (grid, labels, truth) = labels_of(&leg, ANKLE_SPACING_MM);
+        let space = joint_space(&grid, &labels, &truth);
+        Ankle {
+            leg,
+            truth,
+            grid,
+            labels,
+            space,
+        }
+    })
+}
+
+/// All seventeen, in order.
+fn family() -> Vec<&'static Ankle> {
+    (1..=17).map(ankle).collect()
 }
 
 /// The limb turned inwards: the tube goes the other way round.

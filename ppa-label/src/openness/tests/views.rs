@@ -7,7 +7,7 @@ use super::*;
 fn left_and_right_give_one_curve() {
     use Side::{Left, Right};
     let (grid, labels, truth) = labelled("P01", Right, 1.0);
-    let (space, _) = mortise("P01", Right, 1.0);
+    let space = joint_space(&grid, &labels, &truth);
     let [nx, ..] = grid.size();
     let mirrored: Vec<u8> = (0..grid.len())
         .map(|index| {
