@@ -45,9 +45,10 @@ impl Subject {
             None => bone_along(-1.0),
         };
         let near = iso_surface(&volume, -500.0, Border::Open).unwrap();
-        let skin = near.vertices.iter().map(|vertex| {
-            // Newton's steps along the normal end on the surface.
-            (0..3).fold(vertex.cast::<f64>(), |p, _| {
+        // Every third one: a plane that touches the skin between two of them lies 0.03 mm deeper. Newton's steps along the normal,
+        // from within 0.2 mm, end on the surface.
+        let skin = near.vertices.iter().step_by(3).map(|vertex| {
+            (0..2).fold(vertex.cast::<f64>(), |p, _| {
                 p - leg.skin_normal(&p).into_inner() * leg.skin_distance_mm(&p)
             })
         });
@@ -154,15 +155,14 @@ fn a_leaning_leg_is_measured_across_its_shaft() {
     check(&subject, &twenty_degrees(1, -1.0));
 }
 
-/// Feet from 2 degrees up to 12 degrees down, as they lie and turned about one of the axes.
+/// Feet from 2 degrees up to 12 degrees down, as they lie and turned about one of the axes: left and right legs either way about each.
 #[test]
 #[ignore = "a minute"]
 fn seventeen_legs_turned_about_an_axis_each() {
     (1..=17).into_par_iter().for_each(|number| {
         let subject = Subject::numbered(number);
         check(&subject, &Rotation3::identity());
-        for sign in [-1.0, 1.0] {
-            check(&subject, &twenty_degrees(number as usize % 3, sign));
-        }
+        let sign = if number / 6 % 2 == 0 { 1.0 } else { -1.0 };
+        check(&subject, &twenty_degrees(number as usize % 3, sign));
     });
 }
