@@ -1,4 +1,4 @@
-//! Test: the bookkeeping of 100 000 pose jobs.
+//! Test: the bookkeeping of 20 000 pose jobs.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -12,11 +12,11 @@ use crate::job::{Job, JobError, MakePose, Progress};
 use crate::limb_jobs::{LimbJobs, PlannedLimb, jobs_of_part};
 use crate::posable_limb::Images;
 
-/// 100 000 poses without images: all are made, and a second run finds every one of them. The times are
-/// printed, not tested: on a busy disk the last tenth took three times as long as the first.
+/// 20 000 poses without images: all are made, and a second run finds every one of them. The times are
+/// printed, not tested: each record is synced, so that the disk sets the pace.
 #[test]
-#[ignore = "writes 100 000 files; takes a minute or two"]
-fn a_hundred_thousand_poses_are_made_and_found_again() {
+#[ignore = "writes and syncs 20 000 files; takes half a minute"]
+fn twenty_thousand_poses_are_made_and_found_again() {
     let folder = tempfile::tempdir().unwrap();
     let poses = Sweep {
         to_deg: 180.0,
@@ -31,7 +31,7 @@ fn a_hundred_thousand_poses_are_made_and_found_again() {
             acknowledged: Vec::new(),
         }
     };
-    let limbs: Vec<_> = (0..278).map(limb).collect();
+    let limbs: Vec<_> = (0..56).map(limb).collect();
     let job = |progress| Job {
         root: folder.path(),
         description: "{}",
@@ -59,11 +59,11 @@ fn a_hundred_thousand_poses_are_made_and_found_again() {
     };
     let summary = job(&count).complete(make).unwrap();
     eprintln!("made in {:?}", begun.elapsed());
-    assert_eq!((summary.pose_jobs, summary.made), (100_358, 100_358));
-    assert_eq!(made.load(Ordering::Relaxed), 100_358);
+    assert_eq!((summary.pose_jobs, summary.made), (20_216, 20_216));
+    assert_eq!(made.load(Ordering::Relaxed), 20_216);
 
     let begun = Instant::now();
     let summary = job(&|_| {}).complete(make).unwrap();
     eprintln!("found again in {:?}", begun.elapsed());
-    assert_eq!((summary.pose_jobs, summary.made), (100_358, 0));
+    assert_eq!((summary.pose_jobs, summary.made), (20_216, 0));
 }
