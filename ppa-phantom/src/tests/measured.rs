@@ -179,17 +179,20 @@ fn measure(name: &str, phantom: &LowerLeg, voxel_mm: f64) {
     assert!(failed.is_empty(), "{name}: {failed:#?}");
 }
 
+/// The phantoms that every run of the tests measures.
+const THREE: [&str; 3] = ["P01", "P06", "P13"];
+
 #[test]
 fn parameters_of_three_phantoms_are_found_in_their_voxels() {
-    for (name, phantom) in family().filter(|(name, _)| ["P01", "P06", "P13"].contains(&&**name)) {
+    for (name, phantom) in family().filter(|(name, _)| THREE.contains(&&**name)) {
         measure(&name, &phantom, 0.8);
     }
 }
 
 #[test]
 #[ignore = "takes half a minute"]
-fn parameters_of_the_whole_family_are_found_in_their_voxels() {
-    for (name, phantom) in family() {
+fn parameters_of_every_other_phantom_are_found_in_their_voxels() {
+    for (name, phantom) in family().filter(|(name, _)| !THREE.contains(&&**name)) {
         measure(&name, &phantom, 0.8);
     }
 }
