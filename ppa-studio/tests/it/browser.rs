@@ -1,6 +1,7 @@
 //! A phantom that is open in a studio, and requests as the page sends them.
 
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use axum::Router;
 use axum::body::{Body, Bytes};
@@ -45,14 +46,38 @@ impl Answer {
     }
 }
 
-/// Voxels of most tests, mm: the coarsest in which the ankle is recognised.
-pub const SPACING_MM: f64 = 2.0;
+/// The case of P01 in a folder, in voxels for most tests.
+pub fn phantom(folder: &Path) -> PathBuf {
+    static MADE: LazyLock<TempDir> = LazyLock::new(|| made(2.0)); // the coarsest in which the ankle is recognised
+    copy(MADE.path(), folder);
+    folder.join("p01.case.toml")
+}
 
-/// Voxels fine enough for the gutters of the ankle, mm.
-pub const FINE_MM: f64 = 1.25;
+/// The case of P01 in a folder, in voxels fine enough for the gutters of the ankle.
+pub fn fine_phantom(folder: &Path) -> PathBuf {
+    static MADE: LazyLock<TempDir> = LazyLock::new(|| made(1.25));
+    copy(MADE.path(), folder);
+    folder.join("p01.case.toml")
+}
 
-/// The case of P01 in a folder of its own.
-pub fn phantom(folder: &Path, spacing_mm: f64) -> PathBuf {
+/// Copies what a folder holds into another one.
+pub fn copy(from: &Path, to: &Path) {
+    for entry in std::fs::read_dir(from).unwrap() {
+        let path = entry.unwrap().path();
+        let target = to.join(path.file_name().unwrap());
+        if path.is_dir() {
+            std::fs::create_dir(&target).unwrap();
+            copy(&path, &target);
+        } else {
+            std::fs::copy(&path, &target).unwrap();
+        }
+    }
+}
+
+/// A folder with P01, its bones and its case, which names them relative to itself.
+fn made(spacing_mm: f64) -> TempDir {
+    let made = tempfile::tempdir().unwrap();
+    let folder = made.path();
     let (scan, file) = (folder.join("p01.nii"), folder.join("p01.case.toml"));
     let leg = LowerLeg::p01();
     let volume = leg.voxelise(spacing_mm, TableTop::Absent).unwrap();
@@ -70,13 +95,13 @@ pub fn phantom(folder: &Path, spacing_mm: f64) -> PathBuf {
         segmented: false,
     });
     case.write(&file).unwrap();
-    file
+    made
 }
 
 impl Browser {
     pub fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let case = phantom(folder.path(), SPACING_MM);
+        let case = phantom(folder.path());
         Self::of(folder, case)
     }
 

@@ -14,7 +14,7 @@ use ppa_studio::{Opening, Studio, serve};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use crate::browser::{FINE_MM, phantom};
+use crate::browser::fine_phantom;
 
 /// How long anything on the page may take.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -59,7 +59,7 @@ impl Drop for Driver {
 impl Page {
     pub async fn open() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let case = phantom(folder.path(), FINE_MM);
+        let case = fine_phantom(folder.path());
         Self::of(folder, &case).await
     }
 

@@ -6,7 +6,7 @@ use ppa_depth::false_colour;
 use ppa_generate::{Case, Plan, PreparedLimb, SceneSetup, VisibleLimb};
 use serde_json::json;
 
-use crate::browser::{Answer, Browser, FINE_MM, phantom};
+use crate::browser::{Answer, Browser, fine_phantom};
 
 fn picture(answer: &Answer) -> image::DynamicImage {
     assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
@@ -148,7 +148,7 @@ fn commands_name_the_files_and_options_of_the_page() {
 fn the_label_of_a_pose_follows_its_rotation() {
     // Gutters need finer voxels.
     let folder = tempfile::tempdir().unwrap();
-    let case = phantom(folder.path(), FINE_MM);
+    let case = fine_phantom(folder.path());
     let browser = Browser::of(folder, case);
     let label = |angle_deg: f64| {
         let label = browser.post("/api/label", &json!({ "angle_deg": angle_deg }));

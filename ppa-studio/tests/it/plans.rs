@@ -9,7 +9,7 @@ use ppa_generate::{Case, GenerateSettings, Plan, generate};
 use ppa_label::{CaseBones, LabelScale, ScaleName, compute_labels};
 use tempfile::TempDir;
 
-use crate::browser::{FINE_MM, SPACING_MM, phantom};
+use crate::browser::{copy, fine_phantom, phantom};
 
 /// Six poses with one body shape and small radiographs; with comments.
 const PLAN: &str = "\
@@ -48,11 +48,11 @@ pub const POSES: usize = 6;
 
 /// The phantom and its plan in a folder.
 pub fn plan(folder: &Path) -> PathBuf {
-    plan_with(folder, SPACING_MM)
+    phantom(folder);
+    write_plan(folder)
 }
 
-fn plan_with(folder: &Path, spacing_mm: f64) -> PathBuf {
-    phantom(folder, spacing_mm);
+fn write_plan(folder: &Path) -> PathBuf {
     let file = folder.join("ankles.toml");
     std::fs::write(&file, PLAN).unwrap();
     file
@@ -70,21 +70,9 @@ pub fn dataset(folder: &Path) -> PathBuf {
     folder.join("ankles")
 }
 
-fn copy(from: &Path, to: &Path) {
-    for entry in std::fs::read_dir(from).unwrap() {
-        let path = entry.unwrap().path();
-        let target = to.join(path.file_name().unwrap());
-        if path.is_dir() {
-            std::fs::create_dir(&target).unwrap();
-            copy(&path, &target);
-        } else {
-            std::fs::copy(&path, &target).unwrap();
-        }
-    }
-}
-
 fn make_dataset(folder: &Path) {
-    let file = plan_with(folder, FINE_MM);
+    fine_phantom(folder);
+    let file = write_plan(folder);
     let text = std::fs::read_to_string(&file).unwrap();
     std::fs::write(&file, text.replace("step_deg = 5.0 ", "step_deg = 2.5 ")).unwrap();
     let (plan, root) = (Plan::read(&file).unwrap(), folder.join("ankles"));
