@@ -5,10 +5,10 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::{QUICK_XRAY, fail, succeed};
+use crate::{QUICK_DEPTH, QUICK_XRAY, fail, succeed};
 
 /// A coarse phantom with its bones, its case and a dataset of radiographs from 0 to 36 degrees, `plan`. The labels
-/// follow from the poses alone, so the radiographs are quick ones.
+/// follow from the poses alone, so the images are quick ones.
 fn dataset(here: &Path) {
     succeed(
         here,
@@ -22,7 +22,7 @@ fn dataset(here: &Path) {
         "version = 1\n[[case]]\nfile = \"p01.toml\"\npatient = 3\n\
                 [rotation]\nfrom_deg = 0.0\nto_deg = 36.0\nstep_deg = 4.5\n\
                 [shapes]\nvariants = [\"orig\"]\n\
-                {QUICK_XRAY}"
+                {QUICK_XRAY}{QUICK_DEPTH}"
     );
     fs::write(here.join("plan.toml"), plan).unwrap();
     succeed(here, "generate plan.toml");

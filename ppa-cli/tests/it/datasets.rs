@@ -6,14 +6,15 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use crate::{contents, fail, names, ppa, succeed, write_plan};
+use crate::{QUICK_DEPTH, contents, fail, names, ppa, succeed, write_plan};
 
 /// A dataset of one limb and five poses in the folder `data`.
 fn dataset() -> &'static Path {
     static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
-        write_plan(folder.path(), "[shapes]\nvariants = [\"orig\", \"big\"]\n");
+        let shapes = "[shapes]\nvariants = [\"orig\", \"big\"]\n";
+        write_plan(folder.path(), &format!("{shapes}{QUICK_DEPTH}"));
         succeed(folder.path(), "generate plan.toml --out data");
         folder
     });

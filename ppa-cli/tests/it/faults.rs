@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::shards::write_quick_plan;
+use crate::shards::{whole, write_quick_plan};
 use crate::{contents, ppa, succeed};
 
 /// Marsaglia's xorshift: which moments are tried stays the same from run to run.
@@ -90,15 +90,14 @@ fn fifty_kills_and_refused_writes_change_no_byte() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     write_quick_plan(here);
-    succeed(here, "generate plan.toml --out whole --progress quiet");
-    let expected = contents(&here.join("whole"));
+    let expected = contents(&whole().join("whole"));
     let run = "generate plan.toml --out data --progress quiet";
     let root = here.join("data");
 
     let mut moments = Moments(0x9E37_79B9_7F4A_7C15);
     let (mut kills, mut refusals) = (0, 0);
     while kills < 50 {
-        let wait = Duration::from_millis(moments.below(1500));
+        let wait = Duration::from_millis(moments.below(1000));
         if kill_after(here, run, wait) {
             kills += 1;
             assert_records_are_true(&root);
@@ -107,7 +106,7 @@ fn fifty_kills_and_refused_writes_change_no_byte() {
         }
         if kills % 5 == 0 {
             lose_an_image(&root, &mut moments);
-            let output = run_with_small_files(here, run, moments.below(40));
+            let output = run_with_small_files(here, run, moments.below(8));
             let said = String::from_utf8(output.stderr).unwrap();
             if !output.status.success() {
                 refusals += 1;

@@ -77,7 +77,7 @@ fn interrupted(folder: &Path, arguments: &str, signal: &str) -> (Option<i32>, St
 fn a_stopped_dataset_resumes_to_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    write_plan(here, "");
+    write_quick_plan(here);
     let run = "generate plan.toml --threads 1 --progress quiet --out";
     for (signal, code, name) in [("INT", 130, "int"), ("TERM", 143, "term")] {
         let root = here.join(name);
@@ -102,9 +102,11 @@ fn a_second_ctrl_c_ends_at_once() {
     let plan = write_plan(here, "");
     let text = fs::read_to_string(&plan).unwrap();
     let endless = text.replace("scatter_histories = 100", "scatter_histories = 100000000");
+    assert_ne!(endless, text);
     fs::write(&plan, endless).unwrap();
     let mut run = start(here, "generate plan.toml --out data --progress quiet");
-    wait_for(&mut run, || here.join("data/dataset.json").exists());
+    // The folder of its images shows that a pose is under way; before that the first Ctrl-C would end the run.
+    wait_for(&mut run, || here.join("data/.ppa/new/patient_3").exists());
     send(&run, "INT");
     std::thread::sleep(Duration::from_millis(500));
     assert!(run.try_wait().unwrap().is_none(), "the pose is under way");

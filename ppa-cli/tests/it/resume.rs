@@ -4,7 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-use crate::{contents, ppa, succeed, write_plan};
+use crate::shards::{whole, write_quick_plan};
+use crate::{contents, ppa, succeed};
 
 /// Number of poses finished so far.
 pub fn records(root: &Path) -> usize {
@@ -19,8 +20,7 @@ pub fn records(root: &Path) -> usize {
 #[test]
 fn a_killed_run_resumes_to_the_same_dataset() {
     let folder = tempfile::tempdir().unwrap();
-    write_plan(folder.path(), "");
-    succeed(folder.path(), "generate plan.toml --out whole --threads 2");
+    write_quick_plan(folder.path());
 
     let killed = folder.path().join("killed");
     let mut run = ppa(folder.path(), "generate plan.toml --out killed --threads 1");
@@ -44,5 +44,5 @@ fn a_killed_run_resumes_to_the_same_dataset() {
     let summary: serde_json::Value = serde_json::from_str(&said).unwrap();
     assert_eq!(summary["units"], 5);
     assert_eq!(summary["made"], 5 - before);
-    assert!(contents(&killed) == contents(&folder.path().join("whole")));
+    assert!(contents(&killed) == contents(&whole().join("whole")));
 }
