@@ -38,14 +38,14 @@ fn one_batch_can_be_learned_by_heart() {
 /// Images of 32 pixels are one pixel to the last blocks: batches of four pairs, some of them drawn twice, would be normalised there by
 /// too few values for a pair to have one answer.
 #[test]
-#[ignore = "four trainings, three minutes of processor time"]
+#[ignore = "four trainings, a minute of processor time"]
 fn each_fusion_learns_four_pairs_by_heart() {
     let data = dataset(1, &[0, 60, 120, 180]);
     for kind in [FusionKind::Score, FusionKind::Late] {
         for shared_weights in [false, true] {
             let folder = tempfile::tempdir().unwrap();
             let config = TrainConfig {
-                steps: 100,
+                steps: 70,
                 batch_size: n(16),
                 rate_schedule: RateSchedule::Cosine,
                 recompute_statistics: 4,
