@@ -1,4 +1,6 @@
-//! Images per second of training, inference or loading: `speed train|infer|load|augment THREADS BATCH SIZE STEPS`.
+//! Images per second of training, inference or loading: `speed train|infer|load|augment THREADS BATCH SIZE STEPS [DEVICE]`.
+//!
+//! DEVICE is where `train` and `infer` compute, `cpu` by default; steps on a device wait for each other through the loss.
 //!
 //! `load` makes training batches with the paper's augmentation from depth images of 640 x 576 pixels on disk, read anew each time;
 //! `augment` from those that were read before. THREADS are the loader's then.
@@ -11,13 +13,15 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Context;
-use candle_core::{Device, Tensor};
+use candle_core::Tensor;
 use cpu_time::ProcessTime;
 use ppa_core::Roi;
 use ppa_dataset::layout::{LimbId, Side, View};
 use ppa_learn::data::{Augmentation, Balanced, Images, Loader, Order, Sample, SampleImage};
 use ppa_learn::train::Adam;
-use ppa_learn::{EfficientNetB0, InferenceNetwork, Mode, Options, QualityNetwork, Targets};
+use ppa_learn::{
+    DeviceName, EfficientNetB0, InferenceNetwork, Mode, Options, QualityNetwork, Targets,
+};
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -25,6 +29,10 @@ fn main() -> anyhow::Result<()> {
         anyhow::bail!(
             "expected train, infer, load or augment, then threads, batch, size and steps"
         );
+    };
+    let (device, numbers) = match numbers {
+        [numbers @ .., device] if numbers.len() == 4 => (device.parse()?, numbers),
+        _ => (DeviceName::Cpu, numbers),
     };
     let numbers: Vec<usize> = numbers
         .iter()
@@ -47,20 +55,17 @@ fn main() -> anyhow::Result<()> {
     let values: Vec<f32> = (0..batch * size * size)
         .map(|i| ((i % 8191) as f32 * 0.37).sin())
         .collect();
-    let images = Tensor::from_vec(values, (batch, 1, size, size), &Device::Cpu)?;
+    let device = device.open()?;
+    let images = Tensor::from_vec(values, (batch, 1, size, size), &device)?;
     let targets: Vec<f32> = (0..batch)
         .map(|i| 1.0 + 2.0 * i as f32 / batch as f32)
         .collect();
-    let targets = Tensor::from_vec(targets, (batch, 1), &Device::Cpu)?;
-    let network = EfficientNetB0::new(0, Options::default())?;
-    let inference = InferenceNetwork::new(&QualityNetwork::new(
-        0,
-        Options::default(),
-        None,
-        Targets::Quality,
-    )?)?;
+    let targets = Tensor::from_vec(targets, (batch, 1), &device)?;
+    let network = EfficientNetB0::new(0, Options::default())?.to_device(&device)?;
+    let quality = QualityNetwork::new(0, Options::default(), None, Targets::Quality)?;
+    let inference = InferenceNetwork::new(&quality.to_device(&device)?)?;
     let variables = network.variables();
-    let mut adam = Adam::new(variables.iter().map(|variable| variable.elem_count()));
+    let mut adam = Adam::new(&variables)?;
 
     let mut step = |number: usize| -> anyhow::Result<f32> {
         if what == "infer" {

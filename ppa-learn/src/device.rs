@@ -1,5 +1,7 @@
 //! Where networks compute, as configurations and commands name it.
 
+pub mod launch;
+
 use std::fmt;
 use std::str::FromStr;
 
@@ -13,7 +15,7 @@ pub enum DeviceName {
     /// The processor, with our kernels.
     #[default]
     Cpu,
-    /// An NVIDIA device by its number, with operations of candle.
+    /// An NVIDIA device by its number, with kernels of ours and matrix products of candle.
     Cuda(usize),
 }
 
@@ -53,10 +55,10 @@ impl DeviceName {
     pub fn open(self) -> Result<Device, DeviceError> {
         match self {
             Self::Cpu => Ok(Device::Cpu),
-            Self::Cuda(_) if !cfg!(feature = "cuda") => Err(DeviceError::NotBuilt { name: self }),
-            // With one stream for all threads, as networks of two cameras run on two: of `new_cuda` each thread has a stream
-            // of its own, and none waits for what another still computes.
-            Self::Cuda(number) => Device::new_cuda_with_stream(number)
+            #[cfg(not(feature = "cuda"))]
+            Self::Cuda(_) => Err(DeviceError::NotBuilt { name: self }),
+            #[cfg(feature = "cuda")]
+            Self::Cuda(number) => launch::open(number)
                 .map_err(|source| DeviceError::Unavailable { name: self, source }),
         }
     }

@@ -8,14 +8,14 @@ mod forward;
 mod fusion;
 #[cfg(test)]
 mod gradient_tests;
-mod graph;
-#[cfg(test)]
-mod graph_tests;
 mod inference;
 mod inference_network;
 mod initialise;
 mod layers;
 mod norm;
+mod on_device;
+#[cfg(test)]
+mod on_device_tests;
 mod operation;
 mod quality;
 #[cfg(test)]
@@ -193,7 +193,7 @@ impl EfficientNetB0 {
         }
         // Our kernels know the CPU only.
         if !self.device().is_cpu() {
-            return Ok(graph::features(self, images, mode)?);
+            return Ok(on_device::features(self, images, mode)?);
         }
         let operation = Backbone::new(self, mode);
         Ok(images.contiguous()?.apply_op2(&self.backbone, operation)?)

@@ -1,7 +1,5 @@
-//! The network on an NVIDIA device beside our kernels on the CPU, and its images per second:
+//! The network on an NVIDIA device beside our kernels on the CPU:
 //! `cargo test --release -p ppa-learn --features cuda --test cuda -- --ignored --nocapture`.
-
-use std::time::Instant;
 
 use candle_core::{DType, Device, Tensor};
 use ppa_learn::{
@@ -129,37 +127,4 @@ fn networks_of_two_cameras_on_the_device_are_those_of_the_cpu() {
             "{of_output:.1e}, {of_gradient:.1e}"
         );
     }
-}
-
-#[test]
-#[ignore = "needs an NVIDIA device; measures"]
-fn images_per_second_on_the_device() {
-    let network = EfficientNetB0::new(5, Options::default()).unwrap();
-    let device = device();
-    let network = network.to_device(&device).unwrap();
-    let images = waves(&[16, 1, 336, 336], network.device());
-    // A loss that has come back to the CPU has been computed.
-    let train = |step| {
-        let output = network.forward(&images, Mode::Train { step }).unwrap();
-        let loss = output.sqr().unwrap().mean_all().unwrap();
-        loss.backward().unwrap();
-        loss.to_scalar::<f32>().unwrap()
-    };
-    let infer = |_| {
-        let output = network.forward(&images, Mode::Eval).unwrap();
-        output.sum_all().unwrap().to_scalar::<f32>().unwrap()
-    };
-    let measure = |what: &str, run: &dyn Fn(u64) -> f32| {
-        run(0);
-        device.synchronize().unwrap();
-        let (steps, started) = (10, Instant::now());
-        for step in 1..=steps {
-            assert!(run(step).is_finite());
-        }
-        device.synchronize().unwrap();
-        let rate = (16 * steps) as f64 / started.elapsed().as_secs_f64();
-        println!("{what}: {rate:.1} images per second of 336 x 336 in batches of 16");
-    };
-    measure("forward and backward", &train);
-    measure("inference", &infer);
 }

@@ -3,37 +3,74 @@
 use std::sync::{Mutex, PoisonError};
 
 use candle_core::backprop::GradStore;
-use candle_core::{CpuStorage, Device, Error, InplaceOp2, Layout, Var};
+use candle_core::{CpuStorage, Device, Error, InplaceOp2, Layout, Tensor, Var};
+
+use crate::device::launch::Launch;
 
 const BETA_1: f64 = 0.9;
 const BETA_2: f64 = 0.999;
 const EPSILON: f64 = 1e-8;
 
 /// Adam (Kingma and Ba 2015, arXiv:1412.6980, algorithm 1) without weight decay, with β₁ = 0.9, β₂ = 0.999, ε = 10⁻⁸.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Adam {
     /// Steps made.
     pub steps: u64,
-    /// For each variable the running means of its gradient.
-    pub first: Vec<Vec<f32>>,
-    /// For each variable the running means of its squared gradient.
-    pub second: Vec<Vec<f32>>,
+    /// Of each variable.
+    moments: Vec<Moments>,
+}
+
+/// The running means of a variable's gradient and of its square, where the variable is.
+#[derive(Debug, Clone)]
+enum Moments {
+    Cpu {
+        first: Vec<f32>,
+        second: Vec<f32>,
+    },
+    /// [first and second, values]
+    Device(Tensor),
 }
 
 impl Adam {
-    /// The state before the first step on flat variables of some lengths.
-    pub fn new(lengths: impl IntoIterator<Item = usize>) -> Self {
-        let zeros: Vec<Vec<f32>> = lengths.into_iter().map(|n| vec![0.0; n]).collect();
-        Self {
+    /// The state before the first step on flat variables.
+    ///
+    /// # Errors
+    /// If a device has no memory for it.
+    pub fn new(variables: &[&Var]) -> Result<Self, Error> {
+        let zeros = variables.iter().map(|variable| {
+            let zeros = vec![0.0; variable.elem_count()];
+            Moments::new(zeros.clone(), zeros, variable.device())
+        });
+        Ok(Self {
             steps: 0,
-            first: zeros.clone(),
-            second: zeros,
-        }
+            moments: zeros.collect::<Result<_, _>>()?,
+        })
     }
 
-    /// Moves flat variables against their gradients, which are on the CPU; what has no gradient stays.
-    ///
-    /// A variable on another device is moved as a copy here, so that moments and their arithmetic are the same everywhere.
+    /// The state after some steps, with the two moments of each variable.
+    pub(super) fn resume(
+        steps: u64,
+        moments: impl IntoIterator<Item = [Vec<f32>; 2]>,
+        device: &Device,
+    ) -> Result<Self, Error> {
+        let moments = moments.into_iter();
+        let moments = moments.map(|[first, second]| Moments::new(first, second, device));
+        Ok(Self {
+            steps,
+            moments: moments.collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// The two moments of each variable.
+    pub(super) fn moments(&self) -> Result<Vec<[Vec<f32>; 2]>, Error> {
+        let values = |moments: &Moments| match moments {
+            Moments::Cpu { first, second } => Ok([first.clone(), second.clone()]),
+            Moments::Device(both) => Ok([both.get(0)?.to_vec1()?, both.get(1)?.to_vec1()?]),
+        };
+        self.moments.iter().map(values).collect()
+    }
+
+    /// Moves flat variables against their gradients; what has no gradient stays.
     ///
     /// # Errors
     /// If a variable has another length than its moments.
@@ -46,28 +83,60 @@ impl Adam {
         self.steps += 1;
         // Above 2³¹ steps both corrections are 1 anyway.
         let t = i32::try_from(self.steps).unwrap_or(i32::MAX);
-        let moments = self.first.iter_mut().zip(&mut self.second);
-        for (variable, (first, second)) in variables.iter().zip(moments) {
+        let scale = (learning_rate / (1.0 - BETA_1.powi(t))) as f32;
+        let correction = (1.0 - BETA_2.powi(t)).sqrt() as f32;
+        for (variable, moments) in variables.iter().zip(&mut self.moments) {
             let Some(gradient) = gradients.get(variable) else {
                 continue;
             };
-            let update = Update {
-                moments: Mutex::new((first, second)),
-                scale: (learning_rate / (1.0 - BETA_1.powi(t))) as f32,
-                correction: (1.0 - BETA_2.powi(t)).sqrt() as f32,
-            };
             let gradient = gradient.contiguous()?;
-            match variable.device() {
-                Device::Cpu => variable.inplace_op2(&gradient, &update)?,
-                device => {
-                    let moved = variable.as_detached_tensor().to_device(&Device::Cpu)?;
-                    moved.inplace_op2(&gradient, &update)?;
-                    variable.set(&moved.to_device(device)?)?;
+            match moments {
+                Moments::Cpu { first, second } => {
+                    let update = Update {
+                        moments: Mutex::new((first, second)),
+                        scale,
+                        correction,
+                    };
+                    variable.inplace_op2(&gradient, &update)?;
+                }
+                Moments::Device(moments) => {
+                    check_lengths(
+                        moments.dim(1)?,
+                        variable.elem_count(),
+                        gradient.elem_count(),
+                    )?;
+                    let launch =
+                        Launch::new("adam_moments", moments.shape(), gradient.elem_count(), &[]);
+                    let shares = [1.0 - BETA_1, 1.0 - BETA_2].map(|share| share as f32);
+                    *moments = launch.with(&shares).run(&[moments, &gradient])?;
+                    let launch = Launch::of_values("adam_step", variable.shape(), &[]);
+                    let launch = launch.with(&[scale, correction, EPSILON as f32]);
+                    let moved = launch.run(&[variable.as_tensor(), moments])?;
+                    variable.set(&moved)?;
                 }
             }
         }
         Ok(())
     }
+}
+
+impl Moments {
+    fn new(first: Vec<f32>, second: Vec<f32>, device: &Device) -> Result<Self, Error> {
+        if device.is_cpu() {
+            return Ok(Self::Cpu { first, second });
+        }
+        let shape = (2, first.len());
+        Tensor::from_vec([first, second].concat(), shape, device).map(Self::Device)
+    }
+}
+
+fn check_lengths(moments: usize, variable: usize, gradient: usize) -> Result<(), Error> {
+    if variable == moments && gradient == moments {
+        return Ok(());
+    }
+    Err(Error::Msg(format!(
+        "Adam has moments of {moments} values, the variable has {variable}, its gradient {gradient}"
+    )))
 }
 
 /// One step of a variable, in place: copies of four million values would cost as much as the step itself.
@@ -103,14 +172,7 @@ impl InplaceOp2 for Update<'_> {
         let gradient = &gradient.as_slice::<f32>()?[contiguous(gradient_layout)?];
         let mut moments = self.moments.lock().unwrap_or_else(PoisonError::into_inner);
         let (first, second) = &mut *moments;
-        if values.len() != first.len() || values.len() != gradient.len() {
-            return Err(Error::Msg(format!(
-                "Adam has moments of {} values, the variable has {}, its gradient {}",
-                first.len(),
-                values.len(),
-                gradient.len()
-            )));
-        }
+        check_lengths(first.len(), values.len(), gradient.len())?;
         let moments = first.iter_mut().zip(second.iter_mut());
         for ((value, g), (m, v)) in values.iter_mut().zip(gradient).zip(moments) {
             *m += (g - *m) * (1.0 - BETA_1) as f32;
@@ -123,13 +185,25 @@ impl InplaceOp2 for Update<'_> {
 
 #[cfg(test)]
 mod tests {
+    use candle_core::DType;
+
     use super::*;
 
     #[test]
     fn the_first_steps_by_hand() {
+        let on_cpu = Moments::new(vec![0.0], vec![0.0], &Device::Cpu).unwrap();
+        let zeros = Tensor::zeros((2, 1), DType::F32, &Device::Cpu).unwrap();
+        steps_are_those_by_hand(on_cpu);
+        steps_are_those_by_hand(Moments::Device(zeros));
+    }
+
+    fn steps_are_those_by_hand(moments: Moments) {
         // f = x² / 2 from x = 1: the gradient is x. The first step of Adam is the rate, whatever the gradient.
         let x = Var::new(&[1.0_f32], &Device::Cpu).unwrap();
-        let mut adam = Adam::new([1]);
+        let mut adam = Adam {
+            steps: 0,
+            moments: vec![moments],
+        };
         let (mut m, mut v, mut expected) = (0.0_f64, 0.0_f64, 1.0_f64);
         for t in 1..=50 {
             let loss = (x.sqr().unwrap() / 2.0).unwrap().sum_all().unwrap();

@@ -1,6 +1,8 @@
 //! The exponential moving average of the weights.
 
-use candle_core::{Device, Error, Storage, Tensor, Var};
+use candle_core::{CpuStorage, Device, Error, InplaceOp2, Layout, Tensor, Var};
+
+use crate::device::launch::Launch;
 
 /// The decay at a step t: at most (1 + t) / (10 + t), as in TensorFlow's `ExponentialMovingAverage`, so that the average lags by a
 /// tenth of the steps made at most and soon forgets the first values.
@@ -9,37 +11,45 @@ fn decay(most: f64, step: u64) -> f64 {
 }
 
 /// Averages of flat variables (Polyak and Juditsky 1992, with weights that decay by step).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub(super) struct Average {
-    /// One for each variable.
-    pub values: Vec<Vec<f32>>,
+    /// One for each variable, where the variable is.
+    values: Vec<Tensor>,
 }
 
 impl Average {
     /// The values of variables before the first step.
     pub fn new(variables: &[&Var]) -> Result<Self, Error> {
-        let values = variables.iter().map(|variable| values_of(variable));
+        let values = variables
+            .iter()
+            .map(|variable| variable.as_detached_tensor().copy());
         Ok(Self {
             values: values.collect::<Result<_, _>>()?,
         })
     }
 
+    /// The averages after some steps.
+    pub fn resume(values: Vec<Vec<f32>>, device: &Device) -> Result<Self, Error> {
+        let values = values
+            .iter()
+            .map(|values| Tensor::new(values.as_slice(), device));
+        Ok(Self {
+            values: values.collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// The average of each variable.
+    pub fn values(&self) -> Result<Vec<Vec<f32>>, Error> {
+        self.values.iter().map(Tensor::to_vec1).collect()
+    }
+
     /// Adds the values after a step, `steps` having been made.
     pub fn add(&mut self, variables: &[&Var], most_decay: f64, steps: u64) -> Result<(), Error> {
         let share = (1.0 - decay(most_decay, steps)) as f32;
-        let add = |average: &mut [f32], values: &[f32]| {
-            for (average, value) in average.iter_mut().zip(values) {
-                *average += share * (value - *average);
-            }
-        };
         for (average, variable) in self.values.iter_mut().zip(variables) {
-            let (storage, layout) = variable.storage_and_layout();
-            match (&*storage, layout.contiguous_offsets()) {
-                // Without a copy of four million values.
-                (Storage::Cpu(values), Some((start, end))) => {
-                    add(average, &values.as_slice::<f32>()?[start..end]);
-                }
-                _ => add(average, &values_of(variable)?),
+            match average.device() {
+                Device::Cpu => average.inplace_op2(variable, &Move { share })?,
+                _ => *average = moved(average, variable.as_tensor(), share)?,
             }
         }
         Ok(())
@@ -48,14 +58,62 @@ impl Average {
     /// Sets variables to the averages.
     pub fn assign(&self, variables: &[&Var]) -> Result<(), Error> {
         for (average, variable) in self.values.iter().zip(variables) {
-            variable.set(&Tensor::new(average.as_slice(), variable.device())?)?;
+            variable.set(average)?;
         }
         Ok(())
     }
 }
 
-fn values_of(variable: &Var) -> Result<Vec<f32>, Error> {
-    variable.to_device(&Device::Cpu)?.to_vec1()
+/// An average after a step, on a device.
+fn moved(average: &Tensor, values: &Tensor, share: f32) -> Result<Tensor, Error> {
+    check_lengths(average.elem_count(), values.elem_count())?;
+    let launch = Launch::of_values("move_average", average.shape(), &[]);
+    launch.with(&[share]).run(&[average, values])
+}
+
+fn check_lengths(averages: usize, values: usize) -> Result<(), Error> {
+    match averages == values {
+        true => Ok(()),
+        false => Err(Error::Msg(format!(
+            "{averages} averages of {values} values"
+        ))),
+    }
+}
+
+/// One step of an average, in place: a copy of four million values would cost more than the step itself.
+struct Move {
+    share: f32,
+}
+
+impl InplaceOp2 for Move {
+    fn name(&self) -> &'static str {
+        "move-average"
+    }
+
+    fn cpu_fwd(
+        &self,
+        average: &mut CpuStorage,
+        layout: &Layout,
+        values: &CpuStorage,
+        values_layout: &Layout,
+    ) -> Result<(), Error> {
+        let contiguous = |layout: &Layout| {
+            let (start, end) = layout
+                .contiguous_offsets()
+                .ok_or_else(|| Error::RequiresContiguous { op: self.name() }.bt())?;
+            Ok::<_, Error>(start..end)
+        };
+        let CpuStorage::F32(average) = average else {
+            return Err(Error::Msg("averages are of f32 only".to_owned()));
+        };
+        let average = &mut average[contiguous(layout)?];
+        let values = &values.as_slice::<f32>()?[contiguous(values_layout)?];
+        check_lengths(average.len(), values.len())?;
+        for (average, value) in average.iter_mut().zip(values) {
+            *average += self.share * (value - *average);
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -66,6 +124,7 @@ mod tests {
     fn an_average_follows_its_recursion() {
         let variable = Var::new(&[1.0_f32, 0.0], &Device::Cpu).unwrap();
         let mut average = Average::new(&[&variable]).unwrap();
+        let mut on_device = average.values[0].copy().unwrap();
         let mut expected = 1.0_f64;
         for step in 1..=200_u32 {
             let value = f64::from(step);
@@ -74,18 +133,24 @@ mod tests {
                 .unwrap();
             average.add(&[&variable], 0.9, step.into()).unwrap();
             let decay = f64::min(0.9, (1.0 + value) / (10.0 + value));
+            on_device = moved(&on_device, &variable, (1.0 - decay) as f32).unwrap();
             expected = decay * expected + (1.0 - decay) * value;
-            let found = f64::from(average.values[0][0]);
+            let found = f64::from(average.values().unwrap()[0][0]);
             assert!(
                 (found - expected).abs() < 1e-3,
                 "{step}: {found}, {expected}"
             );
         }
+        assert_eq!(
+            on_device.to_vec1::<f32>().unwrap(),
+            average.values().unwrap()[0]
+        );
+        assert!(moved(&on_device.narrow(0, 0, 1).unwrap(), &variable, 0.1).is_err());
         // A line is followed at a distance of decay / (1 - decay) steps.
         assert!((expected - 191.0).abs() < 1e-5, "{expected}");
         average.assign(&[&variable]).unwrap();
         let set = variable.to_vec1::<f32>().unwrap();
-        assert_eq!(set, average.values[0]);
+        assert_eq!(set, average.values().unwrap()[0]);
         assert_eq!(set[1], 0.0);
     }
 }

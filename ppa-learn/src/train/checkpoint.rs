@@ -19,6 +19,10 @@ use super::error::{TrainError, at};
 
 /// Name of the network in checkpoints.
 const ARCHITECTURE: &str = "efficientnet_b0";
+/// Names of Adam's moments and of averages, each followed by the number of its variable.
+const FIRST: &str = "adam.first";
+const SECOND: &str = "adam.second";
+const AVERAGE: &str = "average";
 /// Key of what is not a tensor; a single one, so that equal trainings give equal bytes.
 const METADATA: &str = "ppa";
 
@@ -48,12 +52,19 @@ pub(super) fn save(
     let state = serde_json::to_string(&state).expect("names and numbers are JSON");
     let named = network.tensors()?.into_iter();
     let mut tensors: Vec<_> = named.map(|named| (named.name, named.tensor)).collect();
-    let averages = average.map(|average| ("average", &average.values));
-    let moments = [("adam.first", &adam.first), ("adam.second", &adam.second)];
-    for (name, values) in moments.into_iter().chain(averages) {
-        for (i, values) in values.iter().enumerate() {
-            let values = Tensor::new(values.as_slice(), &Device::Cpu)?;
-            tensors.push((format!("{name}.{i}"), values));
+    let mut add = |name: &str, i: usize, values: Vec<f32>| {
+        let length = values.len();
+        let values = Tensor::from_vec(values, length, &Device::Cpu)?;
+        tensors.push((format!("{name}.{i}"), values));
+        Ok::<_, TrainError>(())
+    };
+    for (i, [first, second]) in adam.moments()?.into_iter().enumerate() {
+        add(FIRST, i, first)?;
+        add(SECOND, i, second)?;
+    }
+    if let Some(average) = average {
+        for (i, values) in average.values()?.into_iter().enumerate() {
+            add(AVERAGE, i, values)?;
         }
     }
     write(path, tensors, Some([(METADATA.to_owned(), state)].into()))
@@ -104,33 +115,34 @@ pub(super) fn load(
     }
     let tensors = candle_core::safetensors::load_buffer(&bytes, &Device::Cpu)
         .map_err(|e| wrong(e.to_string()))?;
-    let mut adam = Adam::new(network.variables().iter().map(|v| v.elem_count()));
-    adam.steps = state.steps;
-    let mut average = (config.weight_average > 0.0).then(|| Average {
-        values: adam.first.clone(),
-    });
-    let averages = average
-        .as_mut()
-        .map(|average| ("average", &mut average.values));
-    let moments = [
-        ("adam.first", &mut adam.first),
-        ("adam.second", &mut adam.second),
-    ];
-    for (name, values) in moments.into_iter().chain(averages) {
-        for (i, values) in values.iter_mut().enumerate() {
-            let name = format!("{name}.{i}");
-            let tensor = tensors
-                .get(&name)
-                .ok_or_else(|| wrong(format!("{name} is missing")))?;
-            if tensor.elem_count() != values.len() {
-                let (found, expected) = (tensor.elem_count(), values.len());
-                return Err(wrong(format!(
-                    "{name} has {found} values, expected {expected}"
-                )));
-            }
-            *values = tensor.flatten_all()?.to_vec1()?;
+    let variables = network.variables();
+    let stored = |name: &str, i: usize| {
+        let (name, expected) = (format!("{name}.{i}"), variables[i].elem_count());
+        let tensor = tensors
+            .get(&name)
+            .ok_or_else(|| wrong(format!("{name} is missing")))?;
+        if tensor.elem_count() != expected {
+            let found = tensor.elem_count();
+            return Err(wrong(format!(
+                "{name} has {found} values, expected {expected}"
+            )));
         }
-    }
+        Ok(tensor.flatten_all()?.to_vec1()?)
+    };
+    let all = 0..variables.len();
+    let moments = all
+        .clone()
+        .map(|i| Ok([stored(FIRST, i)?, stored(SECOND, i)?]));
+    let moments: Vec<_> = moments.collect::<Result<_, TrainError>>()?;
+    let adam = Adam::resume(state.steps, moments, network.device())?;
+    let average = match config.weight_average > 0.0 {
+        true => {
+            let values = all.map(|i| stored(AVERAGE, i));
+            let values = values.collect::<Result<_, TrainError>>()?;
+            Some(Average::resume(values, network.device())?)
+        }
+        false => None,
+    };
     let assigned = network.assign(&tensors);
     assigned.map_err(|error| error.in_file(path, &[]))?;
     Ok((adam, average))

@@ -92,8 +92,7 @@ pub fn train(
         }
         let variables = network.variables();
         let average = (config.weight_average > 0.0).then(|| Average::new(&variables));
-        let adam = Adam::new(variables.iter().map(|v| v.elem_count()));
-        (adam, average.transpose()?)
+        (Adam::new(&variables)?, average.transpose()?)
     };
     write_whole(&folder.join("config.toml"), echoed.as_bytes())?;
     let log = Log::resume(&folder.join("log.jsonl"), adam.steps)?;

@@ -5,7 +5,6 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use candle_core::Device;
 use ppa_dataset::write_whole;
 
 use crate::data::Images;
@@ -52,13 +51,7 @@ impl Run<'_> {
     pub fn step(&mut self, batch: Outputs) -> Result<Progress, TrainError> {
         let step = self.adam.steps;
         let loss = loss(&batch, self.config.correction_weight)?;
-        let mut gradients = loss.backward()?;
-        for variable in self.network.variables() {
-            // Adam's moments are on the CPU wherever the network is.
-            if let Some(gradient) = gradients.remove(variable) {
-                gradients.insert(variable, gradient.to_device(&Device::Cpu)?);
-            }
-        }
+        let gradients = loss.backward()?;
         let loss = loss.to_scalar::<f32>()?;
         let mut finite = loss.is_finite();
         for variable in self.network.variables() {

@@ -1,4 +1,4 @@
-//! The network in operations of candle compared with our kernels and with PyTorch, on the CPU.
+//! The network as devices compute it, by emulated kernels, beside our kernels of the CPU and PyTorch.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -34,11 +34,11 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// The features as another device would compute them.
-fn by_graph(network: &EfficientNetB0, images: &Tensor, mode: Mode) -> Result<Tensor> {
-    graph::features(network, images, mode)
+fn device_features(network: &EfficientNetB0, images: &Tensor, mode: Mode) -> Result<Tensor> {
+    on_device::features(network, images, mode)
 }
 
-fn by_kernels(network: &EfficientNetB0, images: &Tensor, mode: Mode) -> Result<Tensor> {
+fn cpu_features(network: &EfficientNetB0, images: &Tensor, mode: Mode) -> Result<Tensor> {
     Ok(network.features(images, mode).unwrap())
 }
 
@@ -89,34 +89,34 @@ fn disturbed(options: Options) -> EfficientNetB0 {
 }
 
 #[test]
-fn graph_and_kernels_agree_in_outputs_and_gradients() {
+fn device_and_cpu_agree_in_outputs_and_gradients() {
     let network = disturbed(Options::default());
     let twin = network.to_device(&Device::Cpu).unwrap();
     // Not square; sides are odd before some blocks and even before others, and 3 x 2 pixels in the end.
     let input = random(&[4, 1, 65, 47], 7);
     let targets = random(&[4, 1], 8);
-    let of_graph = trained(&network, &input, &targets, by_graph);
-    let of_kernels = trained(&twin, &input, &targets, by_kernels);
+    let on_device = trained(&network, &input, &targets, device_features);
+    let on_cpu = trained(&twin, &input, &targets, cpu_features);
 
-    let error = length(&difference(&of_graph.output, &of_kernels.output));
-    let size = length(&of_kernels.output);
+    let error = length(&difference(&on_device.output, &on_cpu.output));
+    let size = length(&on_cpu.output);
     println!("outputs {error:.1e} of {size:.1}");
     assert!(error < 1e-4 * size, "outputs {error:.1e} of {size}");
 
-    let statistics = difference(&of_graph.statistics, &of_kernels.statistics);
+    let statistics = difference(&on_device.statistics, &on_cpu.statistics);
     let relative = |(error, value): (&f64, &f64)| error.abs() / (1.0 + value.abs());
-    let errors = statistics.iter().zip(&of_kernels.statistics).map(relative);
+    let errors = statistics.iter().zip(&on_cpu.statistics).map(relative);
     let worst = errors.fold(0.0, f64::max);
     println!("statistics {worst:.1e}");
     assert!(worst < 1e-5, "statistics {worst:.1e}");
 
-    let all = of_kernels.gradients.iter().flat_map(|(_, g)| g.clone());
+    let all = on_cpu.gradients.iter().flat_map(|(_, g)| g.clone());
     let whole = length(&all.collect::<Vec<f64>>());
-    let pairs = of_graph.gradients.iter().zip(&of_kernels.gradients);
-    let errors = pairs.map(|((name, graph), (_, kernels))| {
+    let pairs = on_device.gradients.iter().zip(&on_cpu.gradients);
+    let errors = pairs.map(|((name, device), (_, cpu))| {
         // Sums that cancel in f32, such as those of biases before another normalisation, err by the gradient of the whole.
-        let allowed = length(kernels) + 1e-2 * whole;
-        (length(&difference(graph, kernels)) / allowed, name)
+        let allowed = length(cpu) + 1e-2 * whole;
+        (length(&difference(device, cpu)) / allowed, name)
     });
     let (worst, name) = errors.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
     println!("gradients {worst:.1e} at {name}");
@@ -124,25 +124,26 @@ fn graph_and_kernels_agree_in_outputs_and_gradients() {
     assert!(worst < 1e-3, "gradient of {name}: {worst:.1e}");
 
     // By the running statistics, which training moved from 0 and 1.
-    let [graph, kernels] = [by_graph as Features, by_kernels].map(|f| evaluated(&twin, &input, f));
-    let error = length(&difference(&graph, &kernels));
-    println!("evaluation {error:.1e} of {:.1}", length(&kernels));
-    assert!(error < 1e-5 * length(&kernels), "evaluation {error:.1e}");
+    let [device, cpu] =
+        [device_features as Features, cpu_features].map(|f| evaluated(&twin, &input, f));
+    let error = length(&difference(&device, &cpu));
+    println!("evaluation {error:.1e} of {:.1}", length(&cpu));
+    assert!(error < 1e-5 * length(&cpu), "evaluation {error:.1e}");
 }
 
 #[test]
-fn graph_and_kernels_agree_in_the_mean_of_statistics() {
+fn device_and_cpu_agree_in_the_mean_of_statistics() {
     let network = disturbed(Options::default());
     let twin = network.to_device(&Device::Cpu).unwrap();
     for batches in 0..2 {
         let input = random(&[4, 1, 65, 47], 7 + batches);
         let mode = Mode::Statistics { batches };
-        by_graph(&network, &input, mode).unwrap();
-        by_kernels(&twin, &input, mode).unwrap();
+        device_features(&network, &input, mode).unwrap();
+        cpu_features(&twin, &input, mode).unwrap();
     }
-    let [graph, kernels] = [&network, &twin].map(|n| values(n.statistics_variable()));
-    let relative = |(graph, kernels): (&f64, &f64)| (graph - kernels).abs() / (1.0 + kernels.abs());
-    let worst = graph.iter().zip(&kernels).map(relative).fold(0.0, f64::max);
+    let [device, cpu] = [&network, &twin].map(|n| values(n.statistics_variable()));
+    let relative = |(device, cpu): (&f64, &f64)| (device - cpu).abs() / (1.0 + cpu.abs());
+    let worst = device.iter().zip(&cpu).map(relative).fold(0.0, f64::max);
     // Ten times what a training step is allowed, of which a tenth enters.
     assert!(worst < 1e-4, "{worst:.1e}");
 }
@@ -156,7 +157,7 @@ fn reference(name: &str) -> PathBuf {
 
 #[test]
 #[ignore = "needs the reference values of PyTorch in PPA_SHARED"]
-fn graph_is_that_of_pytorch() {
+fn device_is_that_of_pytorch() {
     let load = |name| candle_core::safetensors::load(reference(name), &Device::Cpu).unwrap();
     let io: HashMap<String, Tensor> = load("b0_seed1_io.safetensors");
     let still = Options {
@@ -171,13 +172,13 @@ fn graph_is_that_of_pytorch() {
         ("input", "eval_output_f64"),
         ("extra0_input", "extra0_eval_output"),
     ] {
-        let output = evaluated(&network, &io[input], by_graph);
+        let output = evaluated(&network, &io[input], device_features);
         let error = largest_difference(&output, &values(&io[expected]));
         println!("{input}: {error:.1e}");
         assert!(error < 1e-5, "{input}: {error}");
     }
     let target = &io["target"];
-    let trained = trained(&network, &io["input"], target, by_graph);
+    let trained = trained(&network, &io["input"], target, device_features);
     let loss = |output: &[f64]| {
         let errors = difference(output, &values(target));
         errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64

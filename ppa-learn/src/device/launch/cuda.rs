@@ -7,12 +7,21 @@ use candle_core::backend::BackendStorage;
 use candle_core::cuda_backend::WrapErr;
 use candle_core::cuda_backend::cudarc::driver::{LaunchConfig, PushKernelArg};
 use candle_core::cuda_backend::cudarc::nvrtc::compile_ptx;
-use candle_core::{CudaStorage, Error, Result};
+use candle_core::{CudaStorage, Device, Error, Result};
 
 use super::{Given, KERNELS, Launch};
 
 /// Threads of a block.
 const BLOCK: u32 = 256;
+
+/// A device with one stream for all threads, as networks of two cameras run on two: of `Device::new_cuda` each thread has a stream
+/// of its own, and none waits for what another still computes.
+pub fn open(number: usize) -> Result<Device> {
+    let device = Device::new_cuda_with_stream(number)?;
+    // SAFETY: events order the work of several streams, and this device has one. To record them costs as much as a launch.
+    unsafe { device.as_cuda_device()?.disable_event_tracking() };
+    Ok(device)
+}
 
 pub fn run(launch: &Launch, given: &Given<CudaStorage>) -> Result<CudaStorage> {
     let device = given.inputs[0].0.device().clone();
@@ -31,13 +40,17 @@ pub fn run(launch: &Launch, given: &Given<CudaStorage>) -> Result<CudaStorage> {
     for integer in &given.integers {
         builder.arg(integer);
     }
+    for float in given.floats {
+        builder.arg(float);
+    }
     let config = LaunchConfig {
         grid_dim: ((launch.threads as u32).div_ceil(BLOCK), 1, 1),
         block_dim: (BLOCK, 1, 1),
         shared_mem_bytes: 0,
     };
-    // SAFETY: the arguments are in the order of the kernel's own, and all inputs are of f32. That a kernel stays within
-    // them is tested: the same launches run on the CPU with every access checked (`emulated.rs`).
+    // SAFETY: the arguments are in the order of the kernel's own, and all inputs are of f32 on this device. The functions that
+    // build launches derive sizes from the shapes of their tensors, so that a kernel stays within them; tests of all kernels on
+    // odd shapes check every access on the CPU, with AddressSanitizer where the compiler has it (`emulated.rs`).
     unsafe { builder.launch(config) }.w()?;
     Ok(CudaStorage::wrap_cuda_slice(out, device))
 }
@@ -65,7 +78,7 @@ mod tests {
             declared.split_once('(').map(|(name, _)| name)
         });
         let names: Vec<&str> = names.collect();
-        assert_eq!(names.len(), 9);
+        assert_eq!(names.len(), 17);
         for name in names {
             assert!(ptx.contains(&format!(".visible .entry {name}(")), "{name}");
         }

@@ -10,7 +10,7 @@ use candle_core::{CpuStorage, Result};
 use super::{Given, KERNELS, Launch};
 
 /// A program that runs one kernel after the other: what it reads is the number of a kernel, the length of the output, the
-/// inputs, each behind its length, and the integers; what it writes is the output.
+/// inputs, each behind its length, the integers and the floats; what it writes is the output.
 static EMULATOR: LazyLock<Mutex<Child>> = LazyLock::new(|| Mutex::new(start()));
 
 const BEFORE: &str = "
@@ -19,6 +19,7 @@ const BEFORE: &str = "
 #include <stdlib.h>
 static int number;
 #define KERNEL static void
+#define INLINE static inline
 #define THREAD number
 ";
 
@@ -34,36 +35,41 @@ static float *take_input(void) {
     take(input, length);
     return input;
 }
-#define RUN(INPUTS, INTEGERS, CALL) \\
+#define RUN(INPUTS, INTEGERS, FLOATS, CALL) \\
     for (int i = 0; i < INPUTS; i++) in[i] = take_input(); \\
     take(n, INTEGERS); \\
+    take(f, FLOATS); \\
     for (number = 0; number < (n[0] + 255) / 256 * 256; number++) CALL; \\
     break;
 int main(void) {
     for (;;) {
         int kernel, length, n[16];
-        float *in[3] = {NULL, NULL, NULL};
+        float *in[6] = {NULL}, f[4];
         take(&kernel, 1);
         take(&length, 1);
         float *out = malloc(4 * (size_t)length);
         for (int i = 0; i < length; i++) out[i] = NAN;
         switch (kernel) { CASES }
         if (fwrite(out, 4, length, stdout) != (size_t)length || fflush(stdout)) return 1;
-        for (int i = 0; i < 3; i++) free(in[i]);
+        for (int i = 0; i < 6; i++) free(in[i]);
         free(out);
     }
 }
 ";
 
 pub fn run(launch: &Launch, given: &Given<CpuStorage>) -> Result<CpuStorage> {
-    let Given { inputs, integers } = given;
+    let Given {
+        inputs,
+        integers,
+        floats,
+    } = given;
     let declared = declared();
     let kernel = declared
         .iter()
         .position(|(name, ..)| *name == launch.kernel);
     let kernel = kernel.unwrap_or_else(|| panic!("there is no kernel {}", launch.kernel));
-    let expected = (launch.kernel, inputs.len(), integers.len());
-    assert_eq!(declared[kernel], expected, "name, inputs and integers");
+    let expected = (launch.kernel, inputs.len(), integers.len(), floats.len());
+    assert_eq!(declared[kernel], expected, "name, inputs, integers, floats");
 
     let length = launch.out.elem_count();
     let head = [kernel as i32, length as i32].map(i32::to_le_bytes);
@@ -74,6 +80,7 @@ pub fn run(launch: &Launch, given: &Given<CpuStorage>) -> Result<CpuStorage> {
         request.extend(values.iter().flat_map(|value| value.to_le_bytes()));
     }
     request.extend(integers.iter().flat_map(|integer| integer.to_le_bytes()));
+    request.extend(floats.iter().flat_map(|float| float.to_le_bytes()));
 
     let mut emulator = EMULATOR.lock().unwrap_or_else(PoisonError::into_inner);
     let pipe = "both were asked for";
@@ -86,13 +93,14 @@ pub fn run(launch: &Launch, given: &Given<CpuStorage>) -> Result<CpuStorage> {
     Ok(CpuStorage::F32(values))
 }
 
-/// The name of each kernel, its inputs and its integers.
-fn declared() -> Vec<(&'static str, usize, usize)> {
+/// The name of each kernel, and the numbers of its inputs, integers and floats.
+fn declared() -> Vec<(&'static str, usize, usize, usize)> {
     let declaration = |text: &'static str| {
         let (name, parameters) = text.split_once('(').expect("parameters");
         let (parameters, _) = parameters.split_once(')').expect("parameters");
         let count = |what| parameters.matches(what).count();
-        (name, count("const float *"), count("int "))
+        let floats = count("float ") - count("float *");
+        (name, count("const float *"), count("int "), floats)
     };
     KERNELS
         .split("\nKERNEL ")
@@ -103,13 +111,12 @@ fn declared() -> Vec<(&'static str, usize, usize)> {
 
 fn start() -> Child {
     let cases = declared().into_iter().enumerate();
-    let cases = cases.map(|(number, (name, inputs, integers))| {
-        let given = (0..inputs).map(|i| format!("in[{i}]"));
-        let arguments: Vec<String> = given
-            .chain((0..integers).map(|i| format!("n[{i}]")))
-            .collect();
+    let cases = cases.map(|(number, (name, inputs, integers, floats))| {
+        let named = |array, count| (0..count).map(move |i| format!("{array}[{i}]"));
+        let given = named("in", inputs).chain(named("n", integers));
+        let arguments: Vec<String> = given.chain(named("f", floats)).collect();
         let call = format!("{name}(out, {})", arguments.join(", "));
-        format!("case {number}: RUN({inputs}, {integers}, {call})")
+        format!("case {number}: RUN({inputs}, {integers}, {floats}, {call})")
     });
     let cases: Vec<String> = cases.collect();
     let after = AFTER.replace("CASES", &cases.join("\n"));

@@ -10,8 +10,10 @@ mod nowhere;
 use std::ops::Range;
 
 use candle_core::op::BackpropOp;
-use candle_core::{CpuStorage, CudaStorage, Error, Layout, Result, Shape, Storage, Tensor};
+use candle_core::{Error, Layout, Result, Shape, Storage, Tensor};
 
+#[cfg(feature = "cuda")]
+pub use cuda::open;
 #[cfg(feature = "cuda")]
 use cuda::run as on_cuda;
 #[cfg(test)]
@@ -28,16 +30,14 @@ const KERNELS: &str = include_str!("kernels.cu");
 /// Values of a tensor: indices are of 32 bits with their sign, and may run past the end by a step before they are compared.
 const MOST_VALUES: usize = 1 << 30;
 
-/// One run of a kernel, which takes (out, inputs, threads, sizes).
+/// One run of a kernel, which takes (out, inputs, threads, sizes, floats).
 #[derive(Debug)]
 pub struct Launch {
-    /// Its name.
-    pub kernel: &'static str,
-    pub threads: usize,
-    /// What it takes behind the number of threads, in its order.
-    pub sizes: Vec<usize>,
-    /// The shape of what it writes.
-    pub out: Shape,
+    kernel: &'static str,
+    threads: usize,
+    sizes: Vec<usize>,
+    floats: Vec<f32>,
+    out: Shape,
 }
 
 /// What a kernel is given, checked.
@@ -50,11 +50,50 @@ struct Given<'a, S> {
     inputs: Vec<(&'a S, Range<usize>)>,
     /// Threads and sizes.
     integers: Vec<i32>,
+    floats: &'a [f32],
 }
 
 impl Launch {
-    /// What the kernel makes of contiguous inputs, without a gradient.
+    /// A run of a kernel by so many threads, which take `sizes` in the kernel's order and write a tensor of the shape `out`.
+    pub fn new(
+        kernel: &'static str,
+        out: impl Into<Shape>,
+        threads: usize,
+        sizes: &[usize],
+    ) -> Self {
+        Self {
+            kernel,
+            threads,
+            sizes: sizes.to_vec(),
+            floats: Vec::new(),
+            out: out.into(),
+        }
+    }
+
+    /// A run with a thread for each value that it writes.
+    pub fn of_values(kernel: &'static str, out: impl Into<Shape>, sizes: &[usize]) -> Self {
+        let out = out.into();
+        let threads = out.elem_count();
+        Self::new(kernel, out, threads, sizes)
+    }
+
+    /// The same run with numbers behind its sizes.
+    pub fn with(self, floats: &[f32]) -> Self {
+        Self {
+            floats: floats.to_vec(),
+            ..self
+        }
+    }
+
+    /// What the kernel makes of contiguous inputs on one device, without a gradient.
     pub fn run(&self, inputs: &[&Tensor]) -> Result<Tensor> {
+        let device = inputs[0].device();
+        if inputs
+            .iter()
+            .any(|input| !input.device().same_device(device))
+        {
+            return Err(elsewhere());
+        }
         let given: Vec<_> = inputs.iter().map(|x| x.storage_and_layout()).collect();
         let (mut cpu, mut cuda) = (Vec::new(), Vec::new());
         for (storage, layout) in &given {
@@ -65,9 +104,10 @@ impl Launch {
             }
         }
         let storage = if cuda.len() == inputs.len() {
-            Storage::Cuda(self.cuda(&cuda)?.0)
+            Storage::Cuda(on_cuda(self, &self.given(&cuda)?)?)
         } else if cpu.len() == inputs.len() {
-            Storage::Cpu(self.cpu(&cpu)?.0)
+            // Only in tests: on the CPU the network has kernels of its own.
+            Storage::Cpu(on_cpu(self, &self.given(&cpu)?)?)
         } else {
             return Err(elsewhere());
         };
@@ -80,18 +120,8 @@ impl Launch {
         ))
     }
 
-    /// The same of storages on an NVIDIA device.
-    pub fn cuda(&self, inputs: &[(&CudaStorage, &Layout)]) -> Result<(CudaStorage, Shape)> {
-        Ok((on_cuda(self, &self.given(inputs)?)?, self.out.clone()))
-    }
-
-    /// The same on the CPU, which only tests do: there the network has kernels of its own.
-    pub fn cpu(&self, inputs: &[(&CpuStorage, &Layout)]) -> Result<(CpuStorage, Shape)> {
-        Ok((on_cpu(self, &self.given(inputs)?)?, self.out.clone()))
-    }
-
     /// What the kernel takes, if it can address all of it.
-    fn given<'a, S>(&self, inputs: &[(&'a S, &Layout)]) -> Result<Given<'a, S>> {
+    fn given<'a, S>(&'a self, inputs: &[(&'a S, &Layout)]) -> Result<Given<'a, S>> {
         let lengths = inputs.iter().map(|(_, layout)| layout.shape().elem_count());
         let mut lengths = lengths.chain([self.out.elem_count(), self.threads]);
         if let Some(length) = lengths.find(|&length| MOST_VALUES < length) {
@@ -109,6 +139,7 @@ impl Launch {
         Ok(Given {
             inputs: inputs.iter().map(place).collect::<Result<_>>()?,
             integers: integers.map(|integer| integer as i32).collect(),
+            floats: &self.floats,
         })
     }
 }
@@ -120,19 +151,17 @@ pub fn elsewhere() -> Error {
 
 #[cfg(test)]
 mod tests {
+    use candle_core::CpuStorage;
+
     use super::*;
 
     #[test]
     fn what_kernels_cannot_address_is_refused() {
-        let of = |images: usize| Launch {
-            kernel: "depthwise",
-            threads: 1,
-            sizes: vec![336, 336],
-            out: (images, 168, 168, 96).into(),
-        };
-        let given = |images| of(images).given::<CpuStorage>(&[]);
-        assert_eq!(given(396).unwrap().integers, [1, 336, 336]);
-        let error = given(397).err().unwrap().to_string();
+        let of = |images: usize| Launch::new("depthwise", (images, 168, 168, 96), 1, &[336, 336]);
+        let fits = of(396);
+        let given = fits.given::<CpuStorage>(&[]).unwrap();
+        assert_eq!(given.integers, [1, 336, 336]);
+        let error = of(397).given::<CpuStorage>(&[]).err().unwrap().to_string();
         let expected = "at most 1073741824 values, found 1075673088";
         assert!(error.contains(expected), "{error}");
     }
