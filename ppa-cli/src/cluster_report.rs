@@ -1,21 +1,21 @@
-//! Where the shards of a plan on a cluster stand: from their files, their logs and the queue.
+//! Where the tasks of a submission stand: from their files, their logs and the queue.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use ppa_cluster::{
-    ClusterFolder, CoreHours, JobKind, QueuedJob, ShardState, Submission, last_line, logged_shards,
-    shard_state,
+    ClusterFolder, CoreHours, JobKind, QueuedJob, ShardState, Submission, Work, last_line,
+    logged_tasks, shard_state,
 };
 use ppa_core::text::count;
 use ppa_generate::status;
 use serde::Serialize;
 
-/// One shard, or the merge.
+/// One task, or the last job.
 #[derive(Debug, Serialize)]
 pub struct JobReport {
     pub state: ShardState,
-    /// Poses that are made.
+    /// Poses that are made, or trainings that are finished.
     pub made: usize,
     /// Slurm's identifier, while it is in the queue.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -30,26 +30,30 @@ pub struct JobReport {
     pub last_line: Option<String>,
 }
 
-/// A shard by its number.
+/// A task by its number.
 #[derive(Debug, Serialize)]
 pub struct ShardReport {
     pub shard: u64,
+    /// The folder of the training that it makes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub training: Option<String>,
     #[serde(flatten)]
     pub report: JobReport,
 }
 
-/// All shards of a folder, and their merge.
+/// All tasks of a folder, and the last job.
 #[derive(Debug, Serialize)]
 pub struct ClusterReport {
-    /// Poses of the plan.
+    /// Poses or trainings of the plan.
     #[serde(rename = "units")]
-    pub poses: u64,
-    /// Poses that are made.
+    pub all: u64,
+    /// Of these, those that are made.
     pub made: usize,
-    /// Shards by state.
+    /// Tasks by state.
     pub states: BTreeMap<ShardState, usize>,
     pub core_hours: CoreHours,
     pub shards: Vec<ShardReport>,
+    /// The merge, or the tables.
     pub merge: JobReport,
 }
 
@@ -61,17 +65,28 @@ impl ClusterReport {
         queue: &[QueuedJob],
     ) -> anyhow::Result<Self> {
         let job_of = |kind| queue.iter().find(|job| job.kind == kind);
-        let logs = logged_shards(&folder.logs())?;
-        let shard = |shard: u64| {
-            let (root, log) = (folder.shard(shard), logs.get(&shard));
-            let job = job_of(JobKind::Shard(shard));
-            let log = log.map(|log| log.as_path());
+        let logs = logged_tasks(&folder.logs())?;
+        let task = |shard: u64, training: Option<&str>| {
+            let log = logs.get(&shard).map(|log| log.as_path());
+            let found = match training {
+                Some(training) => Found::training(folder, training),
+                None => Found::dataset(&folder.shard(shard)),
+            };
             ShardReport {
                 shard,
-                report: report(&root, true, job, log),
+                training: training.map(str::to_owned),
+                report: report(&found, job_of(JobKind::Shard(shard)), log),
             }
         };
-        let shards: Vec<_> = (1..=submission.bundle.shards).map(shard).collect();
+        let shards: Vec<_> = match &submission.work {
+            Work::Poses(work) => (1..=work.bundle.shards)
+                .map(|shard| task(shard, None))
+                .collect(),
+            Work::Trainings(work) => (1..)
+                .zip(work.trainings())
+                .map(|(number, training)| task(number, Some(training)))
+                .collect(),
+        };
         let mut states = BTreeMap::new();
         for shard in &shards {
             *states.entry(shard.report.state).or_insert(0) += 1;
@@ -81,24 +96,36 @@ impl ClusterReport {
         let (done, running) = (with(ShardState::Done), with(ShardState::Running));
         let finished = (made as u64, done as u64);
         let core_hours = CoreHours::of(submission, finished, running, &folder.logs())?;
-        let log = folder.merge_log();
+        let log = folder.last_log(&submission.work);
         let log = log.is_file().then_some(log);
+        let is_done = folder.is_done()?;
+        let last = match &submission.work {
+            Work::Poses(_) => {
+                let merged = Found::dataset(&folder.dataset());
+                Found {
+                    complete: merged.complete && is_done,
+                    ..merged
+                }
+            }
+            Work::Trainings(_) => Found {
+                complete: is_done,
+                ..Found::default()
+            },
+        };
         Ok(Self {
-            poses: submission.poses,
+            all: match &submission.work {
+                Work::Poses(work) => work.poses,
+                Work::Trainings(_) => submission.work.tasks(),
+            },
             made,
             states,
             core_hours,
             shards,
-            merge: report(
-                &folder.dataset(),
-                folder.is_verified()?,
-                job_of(JobKind::Merge),
-                log.as_deref(),
-            ),
+            merge: report(&last, job_of(JobKind::Merge), log.as_deref()),
         })
     }
 
-    /// Shards that no job makes and that are not complete.
+    /// Tasks that are not done and have no job.
     pub fn lost(&self) -> Vec<u64> {
         let is_lost = |state| matches!(state, ShardState::Failed | ShardState::Missing);
         let lost = self.shards.iter().filter(|s| is_lost(s.report.state));
@@ -113,56 +140,95 @@ impl ClusterReport {
     }
 
     fn core_hours(&self) -> String {
-        let hours = &self.core_hours;
-        let left = match hours.left_hours {
+        let used = format!("{:.2} used by tasks that have ended", self.core_hours.used);
+        let Some(estimate) = &self.core_hours.estimate else {
+            return format!("core hours {used}");
+        };
+        let left = match estimate.left_hours {
             Some(wall) => format!(
                 ", {:.2} left: {wall:.2} hours if as many tasks run as now",
-                hours.left
+                estimate.left
             ),
-            None if hours.left > 0.0 => format!(", {:.2} left", hours.left),
+            None if estimate.left > 0.0 => format!(", {:.2} left", estimate.left),
             None => String::new(),
         };
         format!(
-            "core hours {:.2} estimated, {:.2} used by tasks that have ended{left}",
-            hours.estimated, hours.used
+            "core hours {:.2} estimated, {used}{left}",
+            estimate.estimated
         )
     }
 
-    /// The report in words: a line for each shard that is not done, since there may be thousands.
+    /// The report in words: a line for each task that is not done, since there may be thousands.
     pub fn describe(&self) -> String {
         let states = self.states.iter();
         let states: Vec<_> = states.map(|(state, n)| format!("{n} {state}")).collect();
-        let mut lines = vec![format!(
-            "{}: {}; {} of {} made",
-            count(self.shards.len(), "shard"),
-            states.join(", "),
-            self.made,
-            count(self.poses, "pose")
-        )];
+        let states = states.join(", ");
+        let trains = self.shards.iter().any(|shard| shard.training.is_some());
+        let mut lines = vec![match trains {
+            true => format!("{}: {states}", count(self.all, "training")),
+            false => format!(
+                "{}: {states}; {} of {} made",
+                count(self.shards.len(), "shard"),
+                self.made,
+                count(self.all, "pose")
+            ),
+        }];
         lines.push(self.core_hours());
         for shard in &self.shards {
             if shard.report.state != ShardState::Done {
-                lines.push(line(&format!("shard {}", shard.shard), &shard.report));
+                let name = match &shard.training {
+                    Some(training) => format!("{} {training}", shard.shard),
+                    None => format!("shard {}", shard.shard),
+                };
+                lines.push(line(&name, &shard.report));
             }
         }
-        lines.push(line("merge", &self.merge));
+        lines.push(line(if trains { "tables" } else { "merge" }, &self.merge));
         lines.join("\n")
     }
 }
 
-fn report(dataset: &Path, also: bool, job: Option<&QueuedJob>, log: Option<&Path>) -> JobReport {
-    // A folder that was not begun or is damaged holds nothing that counts.
-    let found = status(dataset).ok();
-    let complete = also && found.as_ref().is_some_and(|found| found.complete);
-    let made_elsewhere = job.is_none() && found.as_ref().is_some_and(|found| found.running);
-    let started = log.is_some() || found.is_some();
+/// What the files of a task show.
+#[derive(Default)]
+struct Found {
+    complete: bool,
+    begun: bool,
+    made: usize,
+    /// Whether some process writes it.
+    written_now: bool,
+}
+
+impl Found {
+    /// A folder that was not begun or is damaged holds nothing that counts.
+    fn dataset(root: &Path) -> Self {
+        status(root).map_or(Self::default(), |found| Self {
+            complete: found.complete,
+            begun: true,
+            made: found.made,
+            written_now: found.running,
+        })
+    }
+
+    fn training(folder: &ClusterFolder, training: &str) -> Self {
+        let complete = folder.is_trained(training);
+        Self {
+            complete,
+            begun: folder.is_begun(training),
+            made: complete.into(),
+            written_now: false,
+        }
+    }
+}
+
+fn report(found: &Found, job: Option<&QueuedJob>, log: Option<&Path>) -> JobReport {
+    let started = log.is_some() || found.begun;
     let text = |of: fn(&QueuedJob) -> &String| job.map(of).cloned().unwrap_or_default();
     JobReport {
-        state: match made_elsewhere {
+        state: match job.is_none() && found.written_now {
             true => ShardState::Running,
-            false => shard_state(complete, job, started),
+            false => shard_state(found.complete, job, started),
         },
-        made: found.map_or(0, |found| found.made),
+        made: found.made,
         job: job.map(|job| job.id.clone()),
         node: text(|job| &job.node),
         reason: text(|job| &job.reason),

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use ppa_cluster::{
-    ClusterFolder, CostSource, DEFAULT_MAX_ARRAY_SIZE, PoseCost, Scripts, Submission, TaskSettings,
-    bundle, shard_commands, split,
+    ClusterFolder, CostSource, DEFAULT_MAX_ARRAY_SIZE, PoseCost, PoseWork, Scripts, Submission,
+    TaskSettings, Work, bundle, split, task_commands,
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -16,6 +16,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         time: "2:00:00".parse()?,
         cpus: 2,
         mem: None,
+        gres: None,
         max_tasks: None,
         setup: None,
     };
@@ -24,13 +25,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         limb_cpu_s: 10.0,
     };
     let bundle = bundle(362, cost, settings.cpus, settings.time)?;
+    let work = Work::Poses(PoseWork {
+        poses: 362,
+        cost,
+        cost_source: CostSource::Given,
+        bundle,
+    });
     let (plan, hash) = ("plan.toml".into(), "0".repeat(64));
-    let cost = (cost, CostSource::Given);
-    let submission = Submission::new(plan, hash, 362, cost, bundle, settings);
+    let submission = Submission::new(plan, hash, work, settings);
     let scripts = Scripts::new(&folder, &submission, Path::new("/usr/bin/ppa"))?;
-    println!("{}", scripts.shard);
+    println!("{}", scripts.task);
     let shards: Vec<_> = (1..=bundle.shards).collect();
-    for command in shard_commands(&folder, &split(&shards, DEFAULT_MAX_ARRAY_SIZE), None)? {
+    let chunks = split(&shards, DEFAULT_MAX_ARRAY_SIZE);
+    for command in task_commands(&folder, &submission, &chunks)? {
         println!("{command}");
     }
     std::fs::remove_dir_all(&root)?;

@@ -1,4 +1,4 @@
-//! The folder of a plan on a cluster: where its files lie.
+//! The folder of a submission: where its files lie.
 
 use std::fs;
 use std::io;
@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 
 use crate::error::FolderError;
+use crate::submission::Work;
 
-/// The folder that `ppa submit` fills: `slurm/` with plan, scripts and logs, `shards/` and `dataset/`.
+/// The folder that `ppa submit` fills: `slurm/` with plan, scripts and logs; `shards/` and `dataset/`, or `runs/` with trainings and tables.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ClusterFolder {
     root: PathBuf,
@@ -42,10 +43,21 @@ impl ClusterFolder {
         if entries.next().is_some() && !folder.slurm().is_dir() {
             return Err(FolderError::Occupied(root.to_owned()));
         }
-        for made in [folder.logs(), folder.root.join("shards")] {
-            fs::create_dir_all(&made).map_err(FolderError::at("create", &made))?;
-        }
+        let logs = folder.logs();
+        fs::create_dir_all(&logs).map_err(FolderError::at("create", &logs))?;
         Ok(folder)
+    }
+
+    /// Creates the folder that the tasks write into.
+    ///
+    /// # Errors
+    /// [`FolderError::File`].
+    pub fn create_results(&self, work: &Work) -> Result<(), FolderError> {
+        let made = match work {
+            Work::Poses(_) => self.root.join("shards"),
+            Work::Trainings(_) => self.runs(),
+        };
+        fs::create_dir_all(&made).map_err(FolderError::at("create", &made))
     }
 
     /// Opens a folder that jobs were submitted from.
@@ -103,14 +115,14 @@ impl ClusterFolder {
         self.slurm().join("plan.toml")
     }
 
-    /// The script of the array of shards.
-    pub fn shard_script(&self) -> PathBuf {
-        self.slurm().join("shard.sh")
+    /// The script of the array, which makes a shard or a training.
+    pub fn task_script(&self, work: &Work) -> PathBuf {
+        self.slurm().join(format!("{}.sh", task_name(work)))
     }
 
-    /// The script of the merge.
-    pub fn merge_script(&self) -> PathBuf {
-        self.slurm().join("merge.sh")
+    /// The script of the last job, which merges the shards or writes the tables.
+    pub fn last_script(&self, work: &Work) -> PathBuf {
+        self.slurm().join(format!("{}.sh", last_name(work)))
     }
 
     /// Settings and division of what was submitted.
@@ -123,9 +135,9 @@ impl ClusterFolder {
         self.slurm().join("logs")
     }
 
-    /// The log of the merge.
-    pub fn merge_log(&self) -> PathBuf {
-        self.logs().join("merge.log")
+    /// The log of the last job.
+    pub fn last_log(&self, work: &Work) -> PathBuf {
+        self.logs().join(format!("{}.log", last_name(work)))
     }
 
     /// The folder of a shard, counted from 1.
@@ -138,12 +150,27 @@ impl ClusterFolder {
         self.root.join("dataset")
     }
 
-    /// Whether the merged dataset was verified.
+    /// Trainings and tables of experiments.
+    pub fn runs(&self) -> PathBuf {
+        self.root.join("runs")
+    }
+
+    /// Whether a training is finished, by its folder as seen from [`ClusterFolder::runs`].
+    pub fn is_trained(&self, training: &str) -> bool {
+        self.runs().join(training).join(FINISHED).is_file()
+    }
+
+    /// Whether a training was begun.
+    pub fn is_begun(&self, training: &str) -> bool {
+        self.runs().join(training).is_dir()
+    }
+
+    /// Whether the last job has done its work: the merged dataset is verified, or the tables are written.
     ///
     /// # Errors
     /// [`FolderError::File`] when the system cannot tell.
-    pub fn is_verified(&self) -> Result<bool, FolderError> {
-        let path = self.root.join(VERIFIED);
+    pub fn is_done(&self) -> Result<bool, FolderError> {
+        let path = self.root.join(DONE);
         match path.metadata() {
             Ok(_) => Ok(true),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
@@ -159,8 +186,27 @@ impl ClusterFolder {
     }
 }
 
-/// The merge writes this file, as seen from the folder, once the dataset is verified.
-pub(crate) const VERIFIED: &str = "slurm/verified";
+/// The last job writes this file, as seen from the folder, when it has done its work: verified a dataset, or written the tables.
+pub(crate) const DONE: &str = "slurm/verified";
+
+/// The file that shows that a training is finished; `ppa experiment` writes it last.
+pub(crate) const FINISHED: &str = "finished.json";
+
+/// What a task makes.
+pub(crate) fn task_name(work: &Work) -> &'static str {
+    match work {
+        Work::Poses(_) => "shard",
+        Work::Trainings(_) => "training",
+    }
+}
+
+/// What the last job is called.
+pub(crate) fn last_name(work: &Work) -> &'static str {
+    match work {
+        Work::Poses(_) => "merge",
+        Work::Trainings(_) => "tables",
+    }
+}
 
 #[cfg(test)]
 mod tests {

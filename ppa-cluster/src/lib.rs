@@ -22,14 +22,16 @@ pub use bundle::{Bundle, BundleError, PoseCost, bundle};
 pub use error::{FolderError, SlurmError};
 pub use folder::{ClusterFolder, FolderLock};
 pub use limits::{DEFAULT_MAX_ARRAY_SIZE, max_array_size};
-pub use logs::{last_line, logged_shards};
+pub use logs::{last_line, logged_tasks};
 pub use makespan::{ClusterSize, ClusterSizeError, Makespan, makespan};
 pub use queue::{JobKind, QueuedJob, parse_queue};
 pub use quote::shell_quoted;
-pub use sbatch::{SbatchCommand, merge_command, shard_commands};
+pub use sbatch::{SbatchCommand, last_command, task_commands};
 pub use scripts::{ScriptError, Scripts};
 pub use shard_state::{ShardState, shard_state};
 pub use slurm::Slurm;
-pub use submission::{CostSource, Submission, TaskSettings};
+pub use submission::{
+    CostSource, ExperimentTrainings, PoseWork, Submission, TaskSettings, TrainingWork, Work,
+};
 pub use time_limit::{TimeLimit, TimeLimitError};
-pub use usage::CoreHours;
+pub use usage::{CoreHours, Estimate};

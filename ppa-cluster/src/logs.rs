@@ -1,4 +1,4 @@
-//! Logs of the tasks, one file for each shard, to which every attempt appends.
+//! Logs of the tasks, one file for each, to which every attempt appends.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -6,32 +6,38 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use crate::error::FolderError;
+use crate::folder::task_name;
+use crate::submission::Work;
 use crate::usage::core_s;
 
 /// What is read of the end of a log, bytes.
 const TAIL: u64 = 16 * 1024;
 
 /// The log of one chunk of an array as `sbatch --output` takes it; Slurm puts the index in place of `%a`.
-pub(crate) fn log_pattern(offset: u64) -> String {
+pub(crate) fn log_pattern(work: &Work, offset: u64) -> String {
+    let name = task_name(work);
     match offset {
-        0 => "shard_%a.log".to_owned(),
-        offset => format!("shard_{offset}+%a.log"),
+        0 => format!("{name}_%a.log"),
+        offset => format!("{name}_{offset}+%a.log"),
     }
 }
 
-/// The shard of a log's name.
-fn shard_of(name: &str) -> Option<u64> {
-    let number = name.strip_prefix("shard_")?.strip_suffix(".log")?;
+/// The number of the task of a log's name.
+fn task_of(name: &str) -> Option<u64> {
+    let number = name
+        .strip_prefix("shard_")
+        .or(name.strip_prefix("training_"))?;
+    let number = number.strip_suffix(".log")?;
     let (offset, index) = number.split_once('+').unwrap_or(("0", number));
     let (offset, index): (u64, u64) = (offset.parse().ok()?, index.parse().ok()?);
     offset.checked_add(index)
 }
 
-/// The newest log of every shard that was started, by its number. A folder that is missing holds none.
+/// The newest log of every task that was started, by its number. A folder that is missing holds none.
 ///
 /// # Errors
 /// [`FolderError::File`] when the folder cannot be read.
-pub fn logged_shards(logs: &Path) -> Result<BTreeMap<u64, PathBuf>, FolderError> {
+pub fn logged_tasks(logs: &Path) -> Result<BTreeMap<u64, PathBuf>, FolderError> {
     let failed = |error| FolderError::at("read", logs)(error);
     let entries = match fs::read_dir(logs) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(BTreeMap::new()),
@@ -40,17 +46,17 @@ pub fn logged_shards(logs: &Path) -> Result<BTreeMap<u64, PathBuf>, FolderError>
     let mut newest = BTreeMap::new();
     for entry in entries {
         let entry = entry.map_err(failed)?;
-        let Some(shard) = entry.file_name().to_str().and_then(shard_of) else {
+        let Some(task) = entry.file_name().to_str().and_then(task_of) else {
             continue;
         };
         let written = entry.metadata().and_then(|found| found.modified()).ok();
         let log = (written, entry.path());
-        let known = newest.entry(shard).or_insert_with(|| log.clone());
+        let known = newest.entry(task).or_insert_with(|| log.clone());
         if known.0 < written {
             *known = log;
         }
     }
-    let paths = newest.into_iter().map(|(shard, (_, path))| (shard, path));
+    let paths = newest.into_iter().map(|(task, (_, path))| (task, path));
     Ok(paths.collect())
 }
 
@@ -70,23 +76,25 @@ pub fn last_line(log: &Path) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::submission::tests::{submission, trainings};
 
     #[test]
-    fn logs_are_found_by_shard_in_every_chunk() {
+    fn logs_are_found_by_task_in_every_chunk() {
         let folder = tempfile::tempdir().unwrap();
         let logs = folder.path().join("logs");
-        assert!(logged_shards(&logs).unwrap().is_empty());
+        assert!(logged_tasks(&logs).unwrap().is_empty());
         fs::create_dir(&logs).unwrap();
         for name in [
-            log_pattern(0).replace("%a", "7"),
-            log_pattern(1000).replace("%a", "7"),
+            log_pattern(&submission().work, 0).replace("%a", "7"),
+            log_pattern(&submission().work, 1000).replace("%a", "7"),
+            log_pattern(&trainings().work, 0).replace("%a", "9"),
             "merge.log".to_owned(),
             "shard_x.log".to_owned(),
         ] {
             fs::write(logs.join(name), "begun\nlast\n\n").unwrap();
         }
-        let found = logged_shards(&logs).unwrap();
-        assert_eq!(found.keys().collect::<Vec<_>>(), [&7, &1007]);
+        let found = logged_tasks(&logs).unwrap();
+        assert_eq!(found.keys().collect::<Vec<_>>(), [&7, &9, &1007]);
         assert_eq!(last_line(&found[&1007]).unwrap(), "last");
     }
 

@@ -4,10 +4,11 @@ use std::fmt;
 
 use crate::array::{ArrayChunk, index_list};
 use crate::error::FolderError;
-use crate::folder::ClusterFolder;
+use crate::folder::{ClusterFolder, last_name};
 use crate::logs::log_pattern;
 use crate::queue::JobKind;
 use crate::quote::{shell_quoted, unicode};
+use crate::submission::{Submission, Work};
 
 /// One call of `sbatch`; prints as a line of shell.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -47,21 +48,26 @@ impl fmt::Display for SbatchCommand {
     }
 }
 
-/// The commands that submit chunks of shards, one for each; at most `max_tasks` tasks of a chunk run at a time.
+/// The commands that submit chunks of tasks, one for each; at most `max_tasks` tasks of a chunk run at a time.
 ///
 /// # Errors
 /// [`FolderError::NotUnicode`].
-pub fn shard_commands(
+pub fn task_commands(
     folder: &ClusterFolder,
+    submission: &Submission,
     chunks: &[ArrayChunk],
-    max_tasks: Option<u64>,
 ) -> Result<Vec<SbatchCommand>, FolderError> {
-    let script = folder.shard_script();
+    let script = folder.task_script(&submission.work);
     let script = unicode(&script)?;
+    let max_tasks = submission.settings.max_tasks;
     let command = |chunk: &ArrayChunk| {
         let most = max_tasks.map_or(String::new(), |most| format!("%{most}"));
         let array = format!("--array={}{most}", index_list(&chunk.indices));
-        let mut command = command(folder, Some(chunk.offset), &log_pattern(chunk.offset))?;
+        let mut command = command(
+            folder,
+            Some(chunk.offset),
+            &log_pattern(&submission.work, chunk.offset),
+        )?;
         command.arguments.push(array);
         command.script = vec![script.to_owned(), chunk.offset.to_string()];
         Ok(command)
@@ -69,13 +75,13 @@ pub fn shard_commands(
     chunks.iter().map(command).collect()
 }
 
-/// The command that submits the merge.
+/// The command that submits the last job, the merge or the tables.
 ///
 /// # Errors
 /// [`FolderError::NotUnicode`].
-pub fn merge_command(folder: &ClusterFolder) -> Result<SbatchCommand, FolderError> {
-    let script = folder.merge_script();
-    let mut command = command(folder, None, "merge.log")?;
+pub fn last_command(folder: &ClusterFolder, work: &Work) -> Result<SbatchCommand, FolderError> {
+    let script = folder.last_script(work);
+    let mut command = command(folder, None, &format!("{}.log", last_name(work)))?;
     command.script = vec![unicode(&script)?.to_owned()];
     Ok(command)
 }
@@ -101,13 +107,16 @@ fn command(
 mod tests {
     use super::*;
     use crate::array::split;
+    use crate::submission::tests::{submission, trainings};
 
     #[test]
     fn chunks_of_shards_are_arrays_with_their_offset() {
         let above = tempfile::tempdir().unwrap();
         let folder = ClusterFolder::create(&above.path().join("a b")).unwrap();
         let chunks = split(&[1, 2, 3, 5, 1001], 1001);
-        let commands = shard_commands(&folder, &chunks, Some(4)).unwrap();
+        let mut submission = submission();
+        submission.settings.max_tasks = Some(4);
+        let commands = task_commands(&folder, &submission, &chunks).unwrap();
         let said: Vec<_> = commands.iter().map(ToString::to_string).collect();
         assert_eq!(said.len(), 2);
         let root = folder.root().display();
@@ -133,7 +142,9 @@ mod tests {
     fn the_merge_waits_for_all_arrays() {
         let above = tempfile::tempdir().unwrap();
         let folder = ClusterFolder::create(&above.path().join("ab")).unwrap();
-        let merge = merge_command(&folder).unwrap();
+        let tables = last_command(&folder, &trainings().work).unwrap();
+        assert!(tables.to_string().ends_with("slurm/tables.sh"), "{tables}");
+        let merge = last_command(&folder, &submission().work).unwrap();
         assert!(!merge.to_string().contains("dependency"));
         let after = merge.after(&["7".to_owned(), "9".to_owned()]).to_string();
         assert!(

@@ -4,18 +4,18 @@ use std::fmt::Write;
 use std::path::Path;
 
 use crate::error::FolderError;
-use crate::folder::{ClusterFolder, VERIFIED};
+use crate::folder::{ClusterFolder, DONE, FINISHED, last_name, task_name};
 use crate::quote::{shell_quoted, unicode};
-use crate::submission::{Submission, TaskSettings};
+use crate::submission::{Submission, TaskSettings, TrainingWork, Work};
 use crate::usage::ended_line;
 
 /// The scripts of one folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Scripts {
-    /// Script of the array: one shard a task. Its argument is the number to add to the index of a task.
-    pub shard: String,
-    /// Script of the job that merges and verifies.
-    pub merge: String,
+    /// Script of the array: one shard or training a task. Its argument is the number to add to the index of a task.
+    pub task: String,
+    /// Script of the job that merges and verifies, or writes tables.
+    pub last: String,
 }
 
 /// Why no script can be written.
@@ -27,7 +27,7 @@ pub enum ScriptError {
         "--{option} is \"{found}\", expected a name without spaces, quotes or other special characters"
     )]
     Word {
-        /// `partition`, `account` or `mem`.
+        /// `partition`, `account`, `mem` or `gres`.
         option: &'static str,
         /// What was given.
         found: String,
@@ -47,32 +47,64 @@ impl Scripts {
         submission: &Submission,
         program: &Path,
     ) -> Result<Self, ScriptError> {
-        let shards = submission.bundle.shards;
         let head = head(folder, submission, program)?;
-        let cpus = submission.settings.cpus;
-        let ended = ended_line(cpus);
-        let shard = format!(
-            "#!/bin/bash\n\
-             # Makes one shard of {shards}: argument 1 plus the index of the task. Written by ppa submit.\n\
-             {head}\n\
-             shard=$(($1 + SLURM_ARRAY_TASK_ID))\n\
-             task=${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}\n\
-             echo \"shard $shard of {shards}: job $task on $SLURMD_NODENAME, restart ${{SLURM_RESTART_COUNT:-0}}\"\n\
-             trap 'echo \"{ended}\"' EXIT\n\
-             {RUN}\n\
-             # The shard is given: indices of the array are not those of the shards.\n\
+        let (task, last) = match &submission.work {
+            Work::Poses(work) => of_poses(work.bundle.shards, submission.settings.cpus),
+            Work::Trainings(work) => of_trainings(work, submission.settings.cpus),
+        };
+        let whole = |parts: Parts, named: &str| {
+            let ended = ended_line(submission.settings.cpus);
+            let Parts { title, number, run } = parts;
+            format!(
+                "#!/bin/bash\n\
+                 # {title} Written by ppa submit.\n\
+                 {head}\n\
+                 {number}\
+                 echo \"{named}: job $task on $SLURMD_NODENAME, restart ${{SLURM_RESTART_COUNT:-0}}\"\n\
+                 trap 'echo \"{ended}\"' EXIT\n\
+                 {RUN}\n\
+                 {run}"
+            )
+        };
+        let (work, tasks) = (&submission.work, submission.work.tasks());
+        Ok(Self {
+            task: whole(task, &format!("{} $number of {tasks}", task_name(work))),
+            last: whole(last, last_name(work)),
+        })
+    }
+}
+
+/// What differs between scripts.
+struct Parts {
+    /// What the script does, in a sentence.
+    title: String,
+    /// Shell variables: the number of the task, and Slurm's name of the job.
+    number: &'static str,
+    /// The work.
+    run: String,
+}
+
+/// Variables of a task of the array, and of the last job.
+const OF_TASK: &str = "number=$(($1 + SLURM_ARRAY_TASK_ID))\n\
+                       task=${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID}\n";
+const OF_LAST: &str = "task=$SLURM_JOB_ID\n";
+
+/// The scripts of the shards of a plan.
+fn of_poses(shards: u64, cpus: u32) -> (Parts, Parts) {
+    let task = Parts {
+        title: format!("Makes one shard of {shards}: argument 1 plus the index of the task."),
+        number: OF_TASK,
+        run: format!(
+            "# The shard is given: indices of the array are not those of the shards.\n\
              run env -u SLURM_ARRAY_TASK_ID \"$ppa\" --threads {cpus} generate slurm/plan.toml \\\n    \
-             --shard \"$shard/{shards}\" --out \"shards/$shard\" --progress plain\n"
-        );
-        let merge = format!(
-            "#!/bin/bash\n\
-             # Merges {shards} shards and verifies the dataset. Written by ppa submit.\n\
-             {head}\n\
-             task=$SLURM_JOB_ID\n\
-             echo \"merge: job $task on $SLURMD_NODENAME, restart ${{SLURM_RESTART_COUNT:-0}}\"\n\
-             trap 'echo \"{ended}\"' EXIT\n\
-             {RUN}\n\
-             # This job starts after all tasks, failed ones included: the merge refuses shards that are missing.\n\
+             --shard \"$number/{shards}\" --out \"shards/$number\" --progress plain\n"
+        ),
+    };
+    let last = Parts {
+        title: format!("Merges {shards} shards and verifies the dataset."),
+        number: OF_LAST,
+        run: format!(
+            "# This job starts after all tasks, failed ones included: the merge refuses shards that are missing.\n\
              missing=\n\
              shards=()\n\
              for ((shard = 1; shard <= {shards}; shard++)); do\n    \
@@ -85,10 +117,66 @@ impl Scripts {
              fi\n\
              run \"$ppa\" --threads {cpus} merge \"${{shards[@]}}\" --out dataset --progress plain\n\
              run \"$ppa\" --threads {cpus} verify dataset --plan slurm/plan.toml --progress plain\n\
-             : >{VERIFIED}\n"
+             : >{DONE}\n"
+        ),
+    };
+    (task, last)
+}
+
+/// The scripts of the trainings of experiments.
+fn of_trainings(work: &TrainingWork, cpus: u32) -> (Parts, Parts) {
+    let all = work.trainings().count();
+    let mut choice = String::new();
+    let mut before = 0;
+    for one in &work.experiments {
+        let (experiment, count) = (&one.experiment, one.trainings.len());
+        let word = if before == 0 { "if" } else { "elif" };
+        let _ = write!(
+            choice,
+            "{word} [ \"$number\" -le {} ]; then\n    \
+             experiment={experiment} part=$((number - {before}))/{count}\n",
+            before + count
         );
-        Ok(Self { shard, merge })
+        before += count;
     }
+    let task = Parts {
+        title: format!("Makes one training of {all}: argument 1 plus the index of the task."),
+        number: OF_TASK,
+        run: format!(
+            "{choice}fi\n\
+             # A training that others need is made by the first of them; the others wait for it.\n\
+             run env -u SLURM_ARRAY_TASK_ID \"$ppa\" --threads {cpus} experiment \"$experiment\" slurm/plan.toml \\\n    \
+             --shard \"$part\" --out runs\n"
+        ),
+    };
+    let needed = work.needed.iter().map(String::as_str);
+    let folders: Vec<&str> = needed.chain(work.trainings()).collect();
+    let count = folders.len();
+    let folders: String = folders.iter().map(|name| format!("{name}\n")).collect();
+    let names = work.experiments.iter().map(|one| one.experiment.as_str());
+    let names = names.collect::<Vec<_>>().join(" ");
+    let last = Parts {
+        title: format!("Writes the tables of {all} trainings."),
+        number: OF_LAST,
+        run: format!(
+            "# This job starts after all tasks, failed ones included. It trains nothing itself.\n\
+             missing=()\n\
+             while read -r training; do\n    \
+             [ -f \"runs/$training/{FINISHED}\" ] || missing+=(\"$training\")\n\
+             done <<'END'\n\
+             {folders}END\n\
+             if [ ${{#missing[@]}} -gt 0 ]; then\n    \
+             echo \"no tables: ${{#missing[@]}} of {count} trainings are not finished, such as ${{missing[0]}}\"\n    \
+             exit 1\n\
+             fi\n\
+             for experiment in {names}; do\n    \
+             run \"$ppa\" --threads {cpus} experiment \"$experiment\" slurm/plan.toml --out runs --replace\n\
+             done\n\
+             run \"$ppa\" --threads {cpus} experiment report slurm/plan.toml --runs runs --out experiments.html --replace\n\
+             : >{DONE}\n"
+        ),
+    };
+    (task, last)
 }
 
 /// What both scripts begin with: requests to Slurm, folder, program, setup and the check of the plan.
@@ -103,6 +191,7 @@ fn head(
         time,
         cpus,
         mem,
+        gres,
         max_tasks: _,
         setup,
     } = &submission.settings;
@@ -111,7 +200,12 @@ fn head(
         let _ = writeln!(text, "#SBATCH --{what}");
     };
     request(format!("job-name={}", folder.job_name()));
-    for (option, value) in [("partition", partition), ("account", account), ("mem", mem)] {
+    for (option, value) in [
+        ("partition", partition),
+        ("account", account),
+        ("mem", mem),
+        ("gres", gres),
+    ] {
         if let Some(value) = value {
             request(format!("{option}={}", word(option, value)?));
         }
@@ -121,7 +215,7 @@ fn head(
     request("ntasks=1".to_owned());
     request(format!("cpus-per-task={cpus}"));
     // Only to the script, which passes it on.
-    request(format!("signal=B:TERM@{}", submission.bundle.warning_s));
+    request(format!("signal=B:TERM@{}", submission.work.warning_s()));
     request("requeue".to_owned());
     request("open-mode=append".to_owned());
     let root = shell_quoted(unicode(folder.root())?);
@@ -132,7 +226,7 @@ fn head(
     }
     let _ = write!(
         text,
-        "\n# An edited plan makes shards that do not fit together.\n\
+        "\n# An edited plan makes results that do not fit together.\n\
          echo '{}  slurm/plan.toml' | sha256sum --check --quiet || exit 1\n",
         submission.plan_sha256
     );
@@ -153,7 +247,7 @@ fn word<'a>(option: &'static str, value: &'a str) -> Result<&'a str, ScriptError
 
 /// Functions of both scripts. A job that its time limit stops again and again, as one that finishes no pose, ends after 20 restarts.
 const RUN: &str = r#"
-# Runs a command. TERM, which Slurm sends before the time limit, is passed on once: ppa finishes the poses in progress.
+# Runs a command. TERM, which Slurm sends before the time limit, is passed on once: ppa finishes the poses or the step in progress.
 run() {
     stopped=
     trap '[ -n "$stopped" ] || kill -TERM "$child" 2>/dev/null; stopped=1' TERM
@@ -191,7 +285,7 @@ mod tests {
     use std::process::Command;
 
     use super::*;
-    use crate::submission::tests::submission;
+    use crate::submission::tests::{submission, trainings};
 
     fn folder(name: &str) -> (tempfile::TempDir, ClusterFolder) {
         let above = tempfile::tempdir().unwrap();
@@ -203,7 +297,7 @@ mod tests {
     fn settings_stand_as_requests_in_both_scripts() {
         let (_above, folder) = folder("jobs");
         let scripts = Scripts::new(&folder, &submission(), Path::new("/opt/ppa")).unwrap();
-        for script in [&scripts.shard, &scripts.merge] {
+        for script in [&scripts.task, &scripts.last] {
             for line in [
                 "#SBATCH --partition=main",
                 "#SBATCH --mem=4G",
@@ -218,19 +312,39 @@ mod tests {
             }
             assert!(!script.contains("--account"));
         }
-        assert!(scripts.shard.contains("--shard \"$shard/2\""));
+        assert!(scripts.task.contains("--shard \"$number/2\""));
+    }
+
+    #[test]
+    fn each_task_makes_its_training() {
+        let (_above, folder) = folder("jobs");
+        let scripts = Scripts::new(&folder, &trainings(), Path::new("ppa")).unwrap();
+        assert!(scripts.task.contains("#SBATCH --gres=gpu:1\n"));
+        let from = scripts.task.find("if [ \"$number\"").unwrap();
+        let choice = scripts.task[from..].split_inclusive("\nfi\n").next();
+        let choice = choice.unwrap();
+        for (number, expected) in [(1, "1 1/2"), (2, "1 2/2"), (3, "2a 1/1")] {
+            let script =
+                format!("number={number}\n{choice}printf '%s %s' \"$experiment\" \"$part\"");
+            let said = Command::new("bash").args(["-c", &script]).output().unwrap();
+            assert_eq!(String::from_utf8(said.stdout).unwrap(), expected);
+        }
+        // The one that they need counts as well.
+        let last = &scripts.last;
+        assert!(last.contains("<<'END'\np\na\nb\nc\nEND\n"), "{last}");
     }
 
     #[test]
     fn bash_accepts_scripts_of_paths_with_spaces() {
         let (_above, folder) = folder("two words, it's $HOME");
         let program = Path::new("/opt/my programs/ppa's");
-        let scripts = Scripts::new(&folder, &submission(), program).unwrap();
-        for script in [&scripts.shard, &scripts.merge] {
+        let of = |submission: &Submission| Scripts::new(&folder, submission, program).unwrap();
+        let [poses, trainings] = [of(&submission()), of(&trainings())];
+        for script in [poses.task, poses.last, trainings.task, trainings.last] {
             // As far as the program is named, then what was read.
             let head = script.split("module load").next().unwrap();
             let script_file = folder.slurm().join("test.sh");
-            fs::write(&script_file, script).unwrap();
+            fs::write(&script_file, &script).unwrap();
             let checked = Command::new("bash").arg("-n").arg(&script_file).output();
             let checked = checked.unwrap();
             assert!(checked.status.success(), "{checked:?}");

@@ -1,4 +1,4 @@
-//! `slurm/submission.json`: how a plan was divided, and the settings of its jobs.
+//! `slurm/submission.json`: how the work was divided into tasks, and their settings.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -6,7 +6,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use ppa_core::whole_file;
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::bundle::{Bundle, PoseCost};
@@ -30,6 +31,9 @@ pub struct TaskSettings {
     pub cpus: u32,
     /// Memory of a task as Slurm writes it, such as `4G`; the cluster's default when absent.
     pub mem: Option<String>,
+    /// Generic resources of a task, such as `gpu:1`; none when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gres: Option<String>,
     /// Tasks that run at the same time; no limit when absent.
     pub max_tasks: Option<u64>,
     /// Shell commands that run before the work, such as `module load`.
@@ -46,15 +50,31 @@ pub enum CostSource {
     Given,
 }
 
-/// A plan as it was submitted. Its division stays the same for all later submissions, since shards that are made follow it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Submission {
-    version: u32,
-    /// The plan file that the copy in the folder was made from.
-    pub plan: PathBuf,
-    /// SHA-256 of that copy.
-    pub plan_sha256: String,
+/// What the tasks make. Its division stays the same for all later submissions, since tasks that are done follow it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Work {
+    /// Shards of a plan, one a task.
+    Poses(PoseWork),
+    /// Trainings of experiments, one a task.
+    Trainings(TrainingWork),
+}
+
+impl<'de> Deserialize<'de> for Work {
+    /// Not derived: serde would not say which key of an untagged variant is missing.
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = serde_json::Value::deserialize(deserializer)?;
+        let work = match value.get("experiments") {
+            Some(_) => serde_json::from_value(value).map(Self::Trainings),
+            None => serde_json::from_value(value).map(Self::Poses),
+        };
+        work.map_err(D::Error::custom)
+    }
+}
+
+/// The poses of a plan.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PoseWork {
     /// Poses of all limbs.
     pub poses: u64,
     /// Time of a pose and of a limb.
@@ -63,6 +83,66 @@ pub struct Submission {
     pub cost_source: CostSource,
     /// The division into shards.
     pub bundle: Bundle,
+}
+
+/// The trainings of experiments.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TrainingWork {
+    /// The experiments, in the order of the tasks.
+    pub experiments: Vec<ExperimentTrainings>,
+    /// Folders of other trainings that these begin with or test.
+    pub needed: Vec<String>,
+}
+
+/// The trainings of one experiment.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ExperimentTrainings {
+    /// Its name, as `ppa experiment` takes it.
+    pub experiment: String,
+    /// The folder of each training, as seen from the folder of all trainings. Task k makes number k of them.
+    pub trainings: Vec<String>,
+}
+
+impl Work {
+    /// Tasks, counted from 1.
+    pub fn tasks(&self) -> u64 {
+        match self {
+            Self::Poses(work) => work.bundle.shards,
+            Self::Trainings(work) => work.trainings().count() as u64,
+        }
+    }
+
+    /// Interval between TERM and the time limit of a task, seconds: enough to finish the poses in progress, or a step and its checkpoint.
+    pub fn warning_s(&self) -> u64 {
+        match self {
+            Self::Poses(work) => work.bundle.warning_s,
+            Self::Trainings(_) => STEP_S,
+        }
+    }
+}
+
+/// Longer than a step, its checkpoint and Slurm's early warning, seconds.
+const STEP_S: u64 = 180;
+
+impl TrainingWork {
+    /// The folders of the trainings, in the order of the tasks.
+    pub fn trainings(&self) -> impl Iterator<Item = &str> {
+        let all = self.experiments.iter();
+        all.flat_map(|one| one.trainings.iter().map(String::as_str))
+    }
+}
+
+/// Work as it was submitted.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Submission {
+    version: u32,
+    /// The plan file that the copy in the folder was made from.
+    pub plan: PathBuf,
+    /// SHA-256 of that copy.
+    pub plan_sha256: String,
+    /// What is made.
+    #[serde(flatten)]
+    pub work: Work,
     /// What the jobs ask for.
     pub settings: TaskSettings,
     /// Whether jobs were queued, and not only their scripts written: from then on plan and division stay.
@@ -73,22 +153,12 @@ pub struct Submission {
 
 impl Submission {
     /// The first submission of a plan, before any job is queued.
-    pub fn new(
-        plan: PathBuf,
-        plan_sha256: String,
-        poses: u64,
-        cost: (PoseCost, CostSource),
-        bundle: Bundle,
-        settings: TaskSettings,
-    ) -> Self {
+    pub fn new(plan: PathBuf, plan_sha256: String, work: Work, settings: TaskSettings) -> Self {
         Self {
             version: VERSION,
             plan,
             plan_sha256,
-            poses,
-            cost: cost.0,
-            cost_source: cost.1,
-            bundle,
+            work,
             settings,
             submitted: false,
             scripts: BTreeMap::new(),
@@ -116,13 +186,18 @@ impl Submission {
                 read.version
             )));
         }
-        if !(1..=read.poses).contains(&read.bundle.shards) {
-            return Err(unusable(format!(
-                "it has {} shards of {} poses",
-                read.bundle.shards, read.poses
-            )));
+        match &read.work {
+            Work::Poses(PoseWork { poses, bundle, .. })
+                if !(1..=*poses).contains(&bundle.shards) =>
+            {
+                let shards = bundle.shards;
+                Err(unusable(format!("it has {shards} shards of {poses} poses")))
+            }
+            Work::Trainings(work) if work.trainings().next().is_none() => {
+                Err(unusable("it has no trainings".to_owned()))
+            }
+            _ => Ok(Some(read)),
         }
-        Ok(Some(read))
     }
 
     /// Writes the file, whole or not at all.
@@ -167,30 +242,51 @@ fn sha256(bytes: &[u8]) -> String {
 pub(crate) mod tests {
     use super::*;
 
-    pub(crate) fn submission() -> Submission {
-        let settings = TaskSettings {
+    pub(crate) fn settings() -> TaskSettings {
+        TaskSettings {
             partition: Some("main".to_owned()),
             account: None,
             time: TimeLimit::from_seconds(7200),
             cpus: 2,
             mem: Some("4G".to_owned()),
+            gres: None,
             max_tasks: Some(3),
             setup: Some("module load ppa".to_owned()),
-        };
+        }
+    }
+
+    /// Five poses in two shards.
+    pub(crate) fn submission() -> Submission {
+        let settings = settings();
         let cost = PoseCost {
             pose_cpu_s: 1200.0,
             limb_cpu_s: 0.1,
         };
         let bundle = crate::bundle(5, cost, 2, settings.time).unwrap();
-        let cost = (cost, CostSource::Given);
-        Submission::new(
-            "plan.toml".into(),
-            "ab".repeat(32),
-            5,
+        let work = Work::Poses(PoseWork {
+            poses: 5,
             cost,
+            cost_source: CostSource::Given,
             bundle,
-            settings,
-        )
+        });
+        Submission::new("plan.toml".into(), "ab".repeat(32), work, settings)
+    }
+
+    /// Three trainings of two experiments, on a GPU.
+    pub(crate) fn trainings() -> Submission {
+        let experiment = |experiment: &str, trainings: &[&str]| ExperimentTrainings {
+            experiment: experiment.to_owned(),
+            trainings: trainings.iter().map(|&name| name.to_owned()).collect(),
+        };
+        let work = Work::Trainings(TrainingWork {
+            experiments: vec![experiment("1", &["a", "b"]), experiment("2a", &["c"])],
+            needed: vec!["p".to_owned()],
+        });
+        let settings = TaskSettings {
+            gres: Some("gpu:1".to_owned()),
+            ..settings()
+        };
+        Submission::new("experiments.toml".into(), "cd".repeat(32), work, settings)
     }
 
     #[test]
@@ -198,12 +294,15 @@ pub(crate) mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("submission.json");
         assert_eq!(Submission::read(&path).unwrap(), None);
+        trainings().write(&path).unwrap();
+        assert_eq!(Submission::read(&path).unwrap(), Some(trainings()));
         submission().write(&path).unwrap();
         assert_eq!(Submission::read(&path).unwrap(), Some(submission()));
         let text = fs::read_to_string(&path).unwrap();
         for (from, to, words) in [
             ("\"version\": 1", "\"version\": 2", "version is 2"),
             ("\"poses\": 5", "\"poses\": 0", "of 0 poses"),
+            ("\"bundle\"", "\"bundled\"", "missing field `bundle`"),
             ("{", "", "damaged"),
         ] {
             fs::write(&path, text.replacen(from, to, 1)).unwrap();

@@ -7,16 +7,24 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::error::FolderError;
-use crate::submission::Submission;
+use crate::submission::{PoseWork, Submission, Work};
 
-/// Core hours of a plan: allocated processors times hours.
+/// Core hours of a submission: allocated processors times hours.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CoreHours {
-    /// Of the whole plan, estimated from the time of a pose.
-    pub estimated: f64,
     /// Of tasks that have ended, by their logs. Tasks that run, and tasks that were killed, are not counted.
     pub used: f64,
-    /// Of poses that are not made, estimated.
+    /// Of the poses, from the time of one; trainings have no estimate.
+    #[serde(flatten)]
+    pub estimate: Option<Estimate>,
+}
+
+/// Estimated core hours.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Of the whole plan.
+    pub estimated: f64,
+    /// Of poses that are not made.
     pub left: f64,
     /// Hours until they are made if as many tasks run as now; absent while none runs.
     pub left_hours: Option<f64>,
@@ -33,19 +41,33 @@ impl CoreHours {
         running: usize,
         logs: &Path,
     ) -> Result<Self, FolderError> {
-        let cost = submission.cost;
-        let hours = |poses: u64, shards: u64| {
-            (cost.pose_cpu_s * poses as f64 + cost.limb_cpu_s * shards as f64) / 3600.0
+        let estimate = match &submission.work {
+            Work::Poses(work) => {
+                let cores = running as f64 * f64::from(submission.settings.cpus);
+                Some(Estimate::of(work, made, cores))
+            }
+            Work::Trainings(_) => None,
         };
-        let (poses, shards) = (submission.poses, submission.bundle.shards);
-        let left = hours(poses.saturating_sub(made.0), shards.saturating_sub(made.1));
-        let cores = running as f64 * f64::from(submission.settings.cpus);
         Ok(Self {
-            estimated: hours(poses, shards),
             used: used_core_s(logs)? / 3600.0,
-            left,
-            left_hours: (running > 0).then(|| left / cores),
+            estimate,
         })
+    }
+}
+
+impl Estimate {
+    /// `made` are the poses and shards that are done, `cores` those of the tasks that run now.
+    fn of(work: &PoseWork, made: (u64, u64), cores: f64) -> Self {
+        let hours = |poses: u64, shards: u64| {
+            (work.cost.pose_cpu_s * poses as f64 + work.cost.limb_cpu_s * shards as f64) / 3600.0
+        };
+        let (poses, shards) = (work.poses, work.bundle.shards);
+        let left = hours(poses.saturating_sub(made.0), shards.saturating_sub(made.1));
+        Self {
+            estimated: hours(poses, shards),
+            left,
+            left_hours: (cores > 0.0).then(|| left / cores),
+        }
     }
 }
 
@@ -95,7 +117,7 @@ fn used_core_s(logs: &Path) -> Result<f64, FolderError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::submission::tests::submission;
+    use crate::submission::tests::{submission, trainings};
 
     #[test]
     fn ended_tasks_are_counted_whoever_wrote_besides() {
@@ -116,13 +138,19 @@ mod tests {
     #[test]
     fn what_is_left_is_shared_by_the_tasks_that_run() {
         let mut submission = submission();
-        submission.poses = 100;
-        submission.cost.pose_cpu_s = 72.0;
-        submission.cost.limb_cpu_s = 36.0;
-        submission.bundle.shards = 10;
+        let Work::Poses(work) = &mut submission.work else {
+            panic!("poses")
+        };
+        work.poses = 100;
+        work.cost.pose_cpu_s = 72.0;
+        work.cost.limb_cpu_s = 36.0;
+        work.bundle.shards = 10;
         submission.settings.cpus = 2;
         let logs = tempfile::tempdir().unwrap();
-        let hours = |made, running| CoreHours::of(&submission, made, running, logs.path()).unwrap();
+        let hours = |made, running| {
+            let hours = CoreHours::of(&submission, made, running, logs.path());
+            hours.unwrap().estimate.unwrap()
+        };
         let begun = hours((0, 0), 0);
         assert!((begun.estimated - 2.1).abs() < 1e-12 && begun.left == begun.estimated);
         assert_eq!(begun.left_hours, None);
@@ -130,5 +158,15 @@ mod tests {
         assert!((half.left - 1.05).abs() < 1e-12);
         assert!((half.left_hours.unwrap() - 0.105).abs() < 1e-12);
         assert_eq!(hours((100, 10), 0).left, 0.0);
+    }
+
+    #[test]
+    fn trainings_have_no_estimate() {
+        let logs = tempfile::tempdir().unwrap();
+        let hours = CoreHours::of(&trainings(), (1, 1), 1, logs.path()).unwrap();
+        assert_eq!(
+            serde_json::to_value(hours).unwrap(),
+            serde_json::json!({"used": 0.0})
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ppa_cluster::{ClusterFolder, Submission};
+use ppa_cluster::{ClusterFolder, Submission, Work};
 use ppa_core::Part;
 use ppa_dataset::files::FileError;
 use ppa_generate::status;
@@ -37,10 +37,11 @@ pub(crate) fn shards(root: &Path) -> Result<Vec<ShardState>, StudioError> {
 
 fn of_cluster(root: &Path) -> Result<Vec<(Part, PathBuf)>, StudioError> {
     let folder = ClusterFolder::open(root)?;
-    let Some(submission) = Submission::read(&folder.submission())? else {
+    let submission = Submission::read(&folder.submission())?;
+    let Some(Work::Poses(work)) = submission.map(|submission| submission.work) else {
         return Ok(Vec::new());
     };
-    let count = submission.bundle.shards;
+    let count = work.bundle.shards;
     let parts = (1..=count).filter_map(|number| {
         let part: Part = format!("{number}/{count}").parse().ok()?;
         Some((part, folder.shard(number)))

@@ -1,50 +1,58 @@
-//! `ppa submit`: a plan as jobs of a cluster.
+//! `ppa submit`: a plan, or a plan of experiments, as jobs of a cluster.
+
+mod division;
 
 use std::num::{NonZeroU32, NonZeroU64};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, ensure};
+use anyhow::bail;
 use clap::{Args, Subcommand};
 use ppa_cluster::{
-    ClusterFolder, CostSource, DEFAULT_MAX_ARRAY_SIZE, JobKind, PoseCost, QueuedJob, SbatchCommand,
-    Scripts, ShardState, Slurm, Submission, TaskSettings, TimeLimit, bundle, merge_command,
-    shard_commands, shell_quoted, split,
+    ClusterFolder, CostSource, DEFAULT_MAX_ARRAY_SIZE, JobKind, PoseWork, QueuedJob, SbatchCommand,
+    Scripts, ShardState, Slurm, Submission, TimeLimit, Work, last_command, shell_quoted, split,
+    task_commands,
 };
 use ppa_core::text::count;
-use ppa_dataset::files::{remove_if_there, sha256_of_file};
-use ppa_generate::{Plan, check, forecast};
+use ppa_generate::check;
+use ppa_learn::experiment::Experiment;
 use serde::Serialize;
 
 use crate::cluster_report::ClusterReport;
-use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
-use crate::output::{Output, working};
+use crate::output::Output;
 use crate::stderr;
+use division::{AnyPlan, submission};
 
 /// Tasks below this are mostly start-up for the scheduler, seconds.
 const SHORT_S: f64 = 20.0 * 60.0;
 
 #[derive(Debug, Subcommand)]
 pub enum SubmitCommand {
-    /// Submit a plan to Slurm: an array of shards, then their merge
+    /// Submit to Slurm: a plan as shards and their merge, or experiments as trainings and their tables
     Slurm(SlurmArgs),
 }
 
 #[derive(Debug, Args)]
 #[command(after_long_help = "\
-One pose of the first limb is made here to measure its time, unless --pose-seconds gives it. Poses are bundled into shards \
-of 20 to 40 minutes, or two thirds of --time where that is shorter; a plan that takes less is one shard.
-
   ppa submit slurm plan.toml --out jobs --cpus 4 --time 2:00:00
   ppa status jobs
   ppa submit slurm plan.toml --out jobs      # again: only shards that are missing
 
-DIR/slurm holds the plan that the jobs read, the scripts shard.sh and merge.sh, and logs; DIR/shards/K holds shard K, \
-DIR/dataset the merged and verified dataset. Options that are not given again keep their values; a script that was edited is \
-used as it is. Before its time limit a task finishes the poses in progress and is requeued.")]
+Of a plan, one pose of the first limb is made here to measure its time, unless --pose-seconds gives it. Poses are bundled \
+into shards of 20 to 40 minutes, or two thirds of --time where that is shorter; a plan that takes less is one shard. \
+DIR/shards/K holds shard K, DIR/dataset the merged and verified dataset. Before its time limit a task finishes the poses in \
+progress and is requeued.
+
+  ppa submit slurm experiments.toml --out jobs --cpus 4 --gres gpu:1 --time 8:00:00
+
+Of experiments, each training is a task. DIR/runs holds the trainings and the tables, DIR/experiments.html the report. Before \
+its time limit a task writes a checkpoint and is requeued.
+
+DIR/slurm holds the plan that the jobs read, their scripts and logs. Options that are not given again keep their values; a \
+script that was edited is used as it is.")]
 pub struct SlurmArgs {
-    /// Plan file
+    /// Plan, as of `ppa generate` or `ppa experiment`
     plan: PathBuf,
-    /// Folder of the jobs and of the dataset, on a disk that all nodes see; created if the folder above exists
+    /// Folder of the jobs and of what they make, on a disk that all nodes see; created if the folder above exists
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Partition [default: the cluster's]
@@ -62,16 +70,22 @@ pub struct SlurmArgs {
     /// Memory of a task as sbatch takes it, such as 4G [default: the cluster's]
     #[arg(long, value_name = "SIZE")]
     mem: Option<String>,
+    /// Generic resources of a task as sbatch takes them, such as gpu:1
+    #[arg(long, value_name = "LIST")]
+    gres: Option<String>,
     /// Run at most this many tasks at a time
     #[arg(long, value_name = "K")]
     max_tasks: Option<NonZeroU64>,
     /// Shell commands that each job runs first, such as 'module load gcc'
     #[arg(long, value_name = "COMMANDS")]
     setup: Option<String>,
-    /// Processor time of a pose in seconds, as `ppa plan` measures it; nothing is measured then
+    /// Of a plan of poses, processor time of a pose in seconds, as `ppa plan` measures it; nothing is measured then
     #[arg(long, value_name = "SECONDS")]
     pose_seconds: Option<f64>,
-    /// Compare the files of shards that are done with their records, and make damaged ones again
+    /// Of a plan of experiments only these, such as 1,2a [default: all that it has data for]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    experiments: Vec<Experiment>,
+    /// Of a plan of poses, compare the files of shards that are done with their records, and make damaged ones again
     #[arg(long)]
     check: bool,
     /// Write the scripts and print the commands, but queue nothing; needs no Slurm
@@ -82,20 +96,47 @@ pub struct SlurmArgs {
 #[derive(Debug, Serialize)]
 struct Submitted {
     folder: PathBuf,
+    /// Tasks: shards or trainings.
     shards: u64,
+    #[serde(flatten)]
+    poses: Option<SubmittedPoses>,
+    max_array_size: u64,
+    dry_run: bool,
+    /// Tasks that are not done, or whose shards are damaged, and that have no job.
+    submitted: Vec<u64>,
+    commands: Vec<String>,
+    /// Of the commands, in their order.
+    jobs: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct SubmittedPoses {
     #[serde(rename = "units")]
     poses: u64,
     cpu_s_per_unit: f64,
     cost_source: CostSource,
     /// Estimated time of the largest shard.
     task_s: f64,
-    max_array_size: u64,
-    dry_run: bool,
-    /// Shards that are not made, or damaged, and have no job.
-    submitted: Vec<u64>,
-    commands: Vec<String>,
-    /// Of the commands, in their order.
-    jobs: Vec<String>,
+}
+
+impl SubmittedPoses {
+    fn of(work: &Work) -> Option<Self> {
+        let Work::Poses(PoseWork {
+            poses,
+            cost,
+            cost_source,
+            bundle,
+        }) = work
+        else {
+            return None;
+        };
+        Some(Self {
+            poses: *poses,
+            cpu_s_per_unit: cost.pose_cpu_s,
+            cost_source: *cost_source,
+            task_s: bundle.task_s,
+        })
+    }
 }
 
 pub fn run(command: &SubmitCommand, program: &Path, output: Output) -> anyhow::Result<()> {
@@ -105,7 +146,23 @@ pub fn run(command: &SubmitCommand, program: &Path, output: Output) -> anyhow::R
 }
 
 fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()> {
-    let plan = Plan::read(&args.plan)?;
+    let plan = AnyPlan::read(&args.plan)?;
+    let (kind, of_other_plans): (_, &[(&str, bool)]) = match plan {
+        AnyPlan::Poses(_) => ("poses", &[("--experiments", !args.experiments.is_empty())]),
+        AnyPlan::Experiments(_) => (
+            "experiments",
+            &[
+                ("--pose-seconds", args.pose_seconds.is_some()),
+                ("--check", args.check),
+            ],
+        ),
+    };
+    if let Some((option, _)) = of_other_plans.iter().find(|(_, given)| *given) {
+        bail!(
+            "{option} does not apply to {}, a plan of {kind}",
+            args.plan.display()
+        );
+    }
     let max_array_size = match (Slurm.max_array_size(), args.dry_run) {
         (Ok(size), _) => size,
         (Err(_), true) => DEFAULT_MAX_ARRAY_SIZE,
@@ -115,10 +172,11 @@ fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()>
     let _lock = folder.lock()?;
     let recorded = Submission::read(&folder.submission())?;
     let mut submission = submission(args, &plan, &folder, recorded)?;
+    folder.create_results(&submission.work)?;
     let scripts = Scripts::new(&folder, &submission, program)?;
     for (path, text) in [
-        (folder.shard_script(), &scripts.shard),
-        (folder.merge_script(), &scripts.merge),
+        (folder.task_script(&submission.work), &scripts.task),
+        (folder.last_script(&submission.work), &scripts.last),
     ] {
         if submission.write_script(&path, text)? {
             stderr::note(&format!(
@@ -141,20 +199,17 @@ fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()>
         lost.sort_unstable();
     }
     let chunks = split(&lost, max_array_size);
-    let arrays = shard_commands(&folder, &chunks, submission.settings.max_tasks)?;
-    let merges =
+    let arrays = task_commands(&folder, &submission, &chunks)?;
+    let needs_last =
         !lost.is_empty() || matches!(report.merge.state, ShardState::Failed | ShardState::Missing);
-    let merge = match merges {
-        true => Some(merge_command(&folder)?),
+    let last = match needs_last {
+        true => Some(last_command(&folder, &submission.work)?),
         false => None,
     };
     let mut submitted = Submitted {
         folder: args.out.clone(),
-        shards: submission.bundle.shards,
-        poses: submission.poses,
-        cpu_s_per_unit: submission.cost.pose_cpu_s,
-        cost_source: submission.cost_source,
-        task_s: submission.bundle.task_s,
+        shards: submission.work.tasks(),
+        poses: SubmittedPoses::of(&submission.work),
         max_array_size,
         dry_run: args.dry_run,
         submitted: lost,
@@ -162,7 +217,7 @@ fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()>
         jobs: Vec::new(),
     };
     if !args.dry_run {
-        for command in arrays.iter().chain(&merge) {
+        for command in arrays.iter().chain(&last) {
             Slurm.check(command)?;
         }
         if !submission.submitted {
@@ -177,17 +232,17 @@ fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()>
         submitted: &mut submitted,
     };
     for command in arrays {
-        let last = queued.submitted.jobs.last().filter(|_| one_by_one);
-        let after: Vec<_> = last.cloned().into_iter().collect();
+        let before = queued.submitted.jobs.last().filter(|_| one_by_one);
+        let after: Vec<_> = before.cloned().into_iter().collect();
         queued.add(command.after(&after))?;
     }
-    if let Some(merge) = merge {
+    if let Some(last) = last {
         let mut after = waits_for(&queue);
         after.extend(queued.submitted.jobs.iter().cloned());
         if !args.dry_run {
-            cancel_waiting_merge(&queue)?;
+            cancel_waiting_last(&queue)?;
         }
-        queued.add(merge.after(&after))?;
+        queued.add(last.after(&after))?;
     }
     output.print(&submitted, describe)
 }
@@ -207,125 +262,6 @@ fn damaged(folder: &ClusterFolder, report: &ClusterReport) -> anyhow::Result<Vec
     Ok(damaged)
 }
 
-/// The submission of the plan, as it was divided before or is divided now; writes the plan into the folder.
-fn submission(
-    args: &SlurmArgs,
-    plan: &Plan,
-    folder: &ClusterFolder,
-    recorded: Option<Submission>,
-) -> anyhow::Result<Submission> {
-    let settings = settings(args, recorded.as_ref().map(|recorded| &recorded.settings));
-    // Beside its place, since it names cases from there.
-    let copy = folder.slurm().join(".new.plan.toml");
-    plan.write(&copy)?;
-    let made = divided(args, plan, &copy, folder, recorded, settings);
-    let placed = made.and_then(|made| {
-        std::fs::rename(&copy, folder.plan())
-            .with_context(|| format!("cannot write {}", folder.plan().display()))?;
-        Ok(made)
-    });
-    if placed.is_err() {
-        // What failed first is what counts.
-        let _ = remove_if_there(&copy);
-    }
-    placed
-}
-
-fn divided(
-    args: &SlurmArgs,
-    plan: &Plan,
-    copy: &Path,
-    folder: &ClusterFolder,
-    recorded: Option<Submission>,
-    settings: TaskSettings,
-) -> anyhow::Result<Submission> {
-    let sha256 = sha256_of_file(copy)?;
-    let (time, cpus) = (settings.time, settings.cpus);
-    if let Some(mut kept) = recorded
-        .as_ref()
-        .filter(|recorded| recorded.submitted)
-        .cloned()
-    {
-        ensure!(
-            kept.plan_sha256 == sha256,
-            "{} differs from the plan that was submitted, {}: undo the edit, or choose another --out",
-            args.plan.display(),
-            folder.plan().display()
-        );
-        ensure!(
-            args.pose_seconds.is_none(),
-            "the plan is divided into {} already, which --pose-seconds cannot change; choose another --out",
-            count(kept.bundle.shards, "shard")
-        );
-        bundle(kept.poses, kept.cost, cpus, time)?;
-        kept.settings = settings;
-        return Ok(kept);
-    }
-    let known = recorded.filter(|recorded| recorded.plan_sha256 == sha256);
-    let cost = match (args.pose_seconds, &known) {
-        (Some(pose_cpu_s), _) => {
-            ensure!(
-                pose_cpu_s > 0.0 && pose_cpu_s.is_finite(),
-                "--pose-seconds is {pose_cpu_s}, expected a positive number"
-            );
-            let limb_cpu_s = 0.0;
-            let cost = PoseCost {
-                pose_cpu_s,
-                limb_cpu_s,
-            };
-            (cost, CostSource::Given)
-        }
-        (None, Some(known)) => (known.cost, known.cost_source),
-        (None, None) => (measured(plan, folder)?, CostSource::Measured),
-    };
-    let poses = (plan.rotation.poses()?.len() * plan.cases.len()) as u64;
-    let bundle = bundle(poses, cost.0, cpus, time)?;
-    let mut first = Submission::new(args.plan.clone(), sha256, poses, cost, bundle, settings);
-    // Scripts of a dry run are known as such.
-    first.scripts = known.map(|known| known.scripts).unwrap_or_default();
-    Ok(first)
-}
-
-/// Options as given, else as before, else their defaults.
-fn settings(args: &SlurmArgs, before: Option<&TaskSettings>) -> TaskSettings {
-    let or_before = |given: &Option<String>, of: fn(&TaskSettings) -> &Option<String>| {
-        given.clone().or_else(|| before.and_then(|s| of(s).clone()))
-    };
-    TaskSettings {
-        partition: or_before(&args.partition, |s| &s.partition),
-        account: or_before(&args.account, |s| &s.account),
-        time: args
-            .time
-            .or(before.map(|s| s.time))
-            .unwrap_or(TimeLimit::DEFAULT),
-        cpus: match args.cpus {
-            Some(cpus) => cpus.get(),
-            None => before.map_or(1, |s| s.cpus),
-        },
-        mem: or_before(&args.mem, |s| &s.mem),
-        max_tasks: match args.max_tasks {
-            Some(most) => Some(most.get()),
-            None => before.and_then(|s| s.max_tasks),
-        },
-        setup: or_before(&args.setup, |s| &s.setup),
-    }
-}
-
-/// The time of a pose in the middle of the sweep of the first limb.
-fn measured(plan: &Plan, folder: &ClusterFolder) -> anyhow::Result<PoseCost> {
-    let mut one = plan.clone();
-    one.cases.truncate(1);
-    let interrupt = Interrupt::listen()?;
-    let working = working("measuring one pose");
-    let found = forecast(&one, &folder.dataset(), 0.0, interrupt.flag(), &|_| {});
-    working.finish_and_clear();
-    let found = interrupt.or_how(found, || NOTHING_WRITTEN.to_owned())?;
-    Ok(PoseCost {
-        pose_cpu_s: found.cpu_s_per_unit,
-        limb_cpu_s: found.cpu_s_per_limb,
-    })
-}
-
 struct Queueing<'a> {
     dry_run: bool,
     submitted: &'a mut Submitted,
@@ -343,7 +279,7 @@ impl Queueing<'_> {
     }
 }
 
-/// Jobs of earlier submissions that a merge must wait for: arrays, and a merge that runs.
+/// Jobs of earlier submissions that the last one must wait for: arrays, and another last one that runs.
 fn waits_for(queue: &[QueuedJob]) -> Vec<String> {
     let counts = |job: &&QueuedJob| job.kind != JobKind::Merge || !job.is_pending();
     let ids = queue.iter().filter(counts).map(QueuedJob::array_id);
@@ -353,8 +289,8 @@ fn waits_for(queue: &[QueuedJob]) -> Vec<String> {
     ids
 }
 
-/// A merge that waits for earlier tasks alone would find shards missing.
-fn cancel_waiting_merge(queue: &[QueuedJob]) -> anyhow::Result<()> {
+/// A last job that waits for earlier tasks alone would find results missing.
+fn cancel_waiting_last(queue: &[QueuedJob]) -> anyhow::Result<()> {
     let waiting = queue
         .iter()
         .filter(|job| job.kind == JobKind::Merge && job.is_pending());
@@ -367,33 +303,45 @@ fn cancel_waiting_merge(queue: &[QueuedJob]) -> anyhow::Result<()> {
 
 fn describe(submitted: &Submitted) -> String {
     let out = submitted.folder.display();
-    let source = match submitted.cost_source {
-        CostSource::Measured => "measured on one pose of the first limb",
-        CostSource::Given => "as --pose-seconds says",
+    let tasks = |n: usize| match submitted.poses {
+        Some(_) => count(n, "shard"),
+        None => count(n, "training"),
     };
-    let short = match submitted.task_s < SHORT_S {
-        true => ", less than the 20 minutes that suit a scheduler",
-        false => "",
-    };
-    let mut lines = vec![format!(
-        "{out}: {} in {} of up to {}{short}; {:.1} s of processor time a pose, {source}",
-        count(submitted.poses, "pose"),
-        count(submitted.shards, "shard"),
-        count((submitted.task_s / 60.0).ceil().max(1.0) as u64, "minute"),
-        submitted.cpu_s_per_unit,
-    )];
-    let shards = count(submitted.submitted.len(), "shard");
+    let all = tasks(submitted.shards as usize);
+    let mut lines = vec![match &submitted.poses {
+        Some(poses) => {
+            let source = match poses.cost_source {
+                CostSource::Measured => "measured on one pose of the first limb",
+                CostSource::Given => "as --pose-seconds says",
+            };
+            let short = match poses.task_s < SHORT_S {
+                true => ", less than the 20 minutes that suit a scheduler",
+                false => "",
+            };
+            format!(
+                "{out}: {} in {all} of up to {}{short}; {:.1} s of processor time a pose, {source}",
+                count(poses.poses, "pose"),
+                count((poses.task_s / 60.0).ceil().max(1.0) as u64, "minute"),
+                poses.cpu_s_per_unit,
+            )
+        }
+        None => format!("{out}: {all}, each a task"),
+    }];
+    let new = tasks(submitted.submitted.len());
     match (submitted.jobs.is_empty(), submitted.dry_run) {
-        (true, _) => lines.push("nothing to submit: each shard is made or has a job".to_owned()),
+        (true, _) => lines.push(match submitted.poses {
+            Some(_) => "nothing to submit: each shard is made or has a job".to_owned(),
+            None => "nothing to submit: each training is finished or has a job".to_owned(),
+        }),
         (false, true) => {
             lines.push(format!(
-                "not submitted: {shards}; arrays have fewer than {} tasks; JOBn is the number that command n prints",
+                "not submitted: {new}; arrays have fewer than {} tasks; JOBn is the number that command n prints",
                 submitted.max_array_size
             ));
             lines.extend(submitted.commands.iter().cloned());
         }
         (false, false) => lines.push(format!(
-            "submitted {shards}: jobs {}; ppa status {} shows them",
+            "submitted {new}: jobs {}; ppa status {} shows them",
             submitted.jobs.join(", "),
             shell_quoted(&out.to_string())
         )),

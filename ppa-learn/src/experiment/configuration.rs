@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::num::NonZeroUsize;
+use std::str::FromStr;
 
 use ppa_core::text::count;
 use ppa_dataset::BodyShape;
@@ -105,6 +106,23 @@ pub struct Configuration {
     pub shapes: Shapes,
     /// How the networks differ from those of experiment 1.
     pub variation: Variation,
+}
+
+/// A name that no experiment has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "there is no experiment {0:?}; expected 1, 2a, 2b, 2c, persons, poses, shapes or ablations"
+)]
+pub struct UnknownExperiment(String);
+
+impl FromStr for Experiment {
+    type Err = UnknownExperiment;
+
+    fn from_str(name: &str) -> Result<Self, UnknownExperiment> {
+        let mut all = Self::OF_PAPER.into_iter().chain(Self::OTHERS);
+        let found = all.find(|experiment| experiment.name() == name);
+        found.ok_or_else(|| UnknownExperiment(name.to_owned()))
+    }
 }
 
 impl Experiment {
@@ -360,6 +378,7 @@ mod tests {
     fn names_are_unique_within_an_experiment() {
         let others = [Experiment::Shapes, Experiment::Ablations];
         for experiment in Experiment::OF_PAPER.into_iter().chain(others) {
+            assert_eq!(experiment.name().parse(), Ok(experiment));
             let columns = experiment.configurations();
             let names: BTreeSet<_> = columns.iter().map(|c| c.name()).collect();
             assert_eq!(names.len(), columns.len());

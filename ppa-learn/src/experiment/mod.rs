@@ -20,7 +20,9 @@ mod run;
 mod table;
 mod training;
 
-pub use configuration::{Configuration, Experiment, Shapes, Start, Variation, ViewChoice};
+pub use configuration::{
+    Configuration, Experiment, Shapes, Start, UnknownExperiment, Variation, ViewChoice,
+};
 pub use error::ExperimentError;
 pub use folds::{FoldError, cross_validation, folds_of_limbs};
 pub use metric::Metric;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use ppa_dataset::labels::LabelName;
 use ppa_dataset::published::Published;
+use ppa_dataset::write_whole;
 use ppa_metrics::MAX_PAIRS;
 use serde::{Deserialize, Serialize};
 
@@ -123,6 +124,14 @@ fn first_seed() -> u64 {
 }
 
 impl ExperimentPlan {
+    /// Whether a file is a plan of experiments, valid or not, and no other plan of ppa: only these have a table `training`.
+    pub fn is_in(path: &Path) -> bool {
+        let text = ppa_core::regular_file::read_to_string(path).unwrap_or_default();
+        let table: toml::Table = toml::from_str(&text).unwrap_or_default();
+        // An array of tables in the configuration of a training.
+        table.get("training").is_some_and(toml::Value::is_table)
+    }
+
     /// Reads a TOML file; folders in it are from the folder of the file.
     ///
     /// # Errors
@@ -158,6 +167,18 @@ impl ExperimentPlan {
         plan.training_config()?;
         plan.finetuning_config()?;
         Ok(plan)
+    }
+
+    /// Writes the plan as TOML, with whole paths.
+    ///
+    /// # Errors
+    /// [`ExperimentError`] naming the file.
+    pub fn write(&self, path: &Path) -> Result<(), ExperimentError> {
+        let text = toml::to_string(self).map_err(|e| ExperimentError::Plan {
+            path: path.to_owned(),
+            message: e.to_string(),
+        })?;
+        Ok(write_whole(path, text.as_bytes())?)
     }
 
     /// How networks are trained, without data.

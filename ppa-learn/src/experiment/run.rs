@@ -1,10 +1,12 @@
 //! Carries out the trainings of an experiment, each in a folder of its own, and gathers their results.
 
 use std::collections::BTreeSet;
-use std::fs::{File, create_dir_all, remove_file};
+use std::fs::{File, TryLockError, create_dir_all, remove_file};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::sleep;
+use std::time::Duration;
 
 use ppa_dataset::layout::View;
 use ppa_dataset::{BodyShape, sha256_of_file, write_whole};
@@ -146,7 +148,15 @@ impl<'a> Runner<'a> {
         create_dir_all(&folder).map_err(file("create", &folder))?;
         let path = folder.join("lock");
         let lock = File::create(&path).map_err(file("create", &path))?;
-        lock.lock().map_err(file("lock", &path))?;
+        // Not with `lock`, which a signal does not end.
+        loop {
+            match lock.try_lock() {
+                Ok(()) => break,
+                Err(TryLockError::Error(error)) => return Err(file("lock", &path)(error).into()),
+                Err(TryLockError::WouldBlock) if stop.load(Ordering::Relaxed) => return Ok(false),
+                Err(TryLockError::WouldBlock) => sleep(Duration::from_millis(500)),
+            }
+        }
 
         let config = self.config(training)?;
         let record = self.record(training, &config).map_err(named)?;
