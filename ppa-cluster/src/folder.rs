@@ -192,7 +192,7 @@ pub(crate) const DONE: &str = "slurm/verified";
 /// The file that shows that a training is finished; `ppa experiment` writes it last.
 pub(crate) const FINISHED: &str = "finished.json";
 
-/// What a task makes.
+/// Name of the work of a task.
 pub(crate) fn task_name(work: &Work) -> &'static str {
     match work {
         Work::Poses(_) => "shard",
@@ -200,7 +200,7 @@ pub(crate) fn task_name(work: &Work) -> &'static str {
     }
 }
 
-/// What the last job is called.
+/// Name of the last job.
 pub(crate) fn last_name(work: &Work) -> &'static str {
     match work {
         Work::Poses(_) => "merge",

@@ -140,7 +140,7 @@ pub struct Submission {
     pub plan: PathBuf,
     /// SHA-256 of that copy.
     pub plan_sha256: String,
-    /// What is made.
+    /// Poses or trainings.
     #[serde(flatten)]
     pub work: Work,
     /// What the jobs ask for.

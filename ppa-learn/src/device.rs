@@ -15,7 +15,7 @@ pub enum DeviceName {
     /// The processor, with our kernels.
     #[default]
     Cpu,
-    /// An NVIDIA device by its number, with kernels of ours and matrix products of candle.
+    /// An NVIDIA device by its number, with our kernels and candle's matrix products.
     Cuda(usize),
 }
 

@@ -54,7 +54,7 @@ struct Given<'a, S> {
 }
 
 impl Launch {
-    /// A run of a kernel by so many threads, which take `sizes` in the kernel's order and write a tensor of the shape `out`.
+    /// A run of a kernel with `threads` threads and its `sizes`, in the order of its parameters; it writes a tensor of shape `out`.
     pub fn new(
         kernel: &'static str,
         out: impl Into<Shape>,
@@ -130,10 +130,7 @@ impl Launch {
             return Err(Error::msg(error).bt());
         }
         let place = |(storage, layout): &(&'a S, &Layout)| {
-            let (start, end) = layout
-                .contiguous_offsets()
-                .ok_or_else(|| Error::RequiresContiguous { op: self.kernel }.bt())?;
-            Ok((*storage, start..end))
+            Ok((*storage, contiguous_range(layout, self.kernel)?))
         };
         let integers = [self.threads].into_iter().chain(self.sizes.clone());
         Ok(Given {
@@ -144,7 +141,14 @@ impl Launch {
     }
 }
 
-/// What is said of inputs and outputs that lie on different devices.
+/// Where the values of a contiguous tensor lie in its storage.
+pub fn contiguous_range(layout: &Layout, op: &'static str) -> Result<Range<usize>> {
+    let offsets = layout.contiguous_offsets();
+    let (start, end) = offsets.ok_or_else(|| Error::RequiresContiguous { op }.bt())?;
+    Ok(start..end)
+}
+
+/// The error of inputs and outputs that lie on different devices.
 pub fn elsewhere() -> Error {
     Error::msg("inputs and outputs of an operation lie on different devices").bt()
 }

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use candle_core::backprop::GradStore;
 use candle_core::{CpuStorage, Device, Error, InplaceOp2, Layout, Tensor, Var};
 
-use crate::device::launch::Launch;
+use crate::device::launch::{Launch, contiguous_range};
 
 const BETA_1: f64 = 0.9;
 const BETA_2: f64 = 0.999;
@@ -159,17 +159,12 @@ impl InplaceOp2 for Update<'_> {
         gradient: &CpuStorage,
         gradient_layout: &Layout,
     ) -> Result<(), Error> {
-        let contiguous = |layout: &Layout| {
-            let (start, end) = layout
-                .contiguous_offsets()
-                .ok_or_else(|| Error::RequiresContiguous { op: "adam" }.bt())?;
-            Ok::<_, Error>(start..end)
-        };
         let CpuStorage::F32(values) = variable else {
             return Err(Error::Msg("Adam moves variables of f32 only".to_owned()));
         };
-        let values = &mut values[contiguous(layout)?];
-        let gradient = &gradient.as_slice::<f32>()?[contiguous(gradient_layout)?];
+        let values = &mut values[contiguous_range(layout, self.name())?];
+        let gradient =
+            &gradient.as_slice::<f32>()?[contiguous_range(gradient_layout, self.name())?];
         let mut moments = self.moments.lock().unwrap_or_else(PoisonError::into_inner);
         let (first, second) = &mut *moments;
         check_lengths(first.len(), values.len(), gradient.len())?;

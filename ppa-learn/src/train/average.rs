@@ -2,7 +2,7 @@
 
 use candle_core::{CpuStorage, Device, Error, InplaceOp2, Layout, Tensor, Var};
 
-use crate::device::launch::Launch;
+use crate::device::launch::{Launch, contiguous_range};
 
 /// The decay at a step t: at most (1 + t) / (10 + t), as in TensorFlow's `ExponentialMovingAverage`, so that the average lags by a
 /// tenth of the steps made at most and soon forgets the first values.
@@ -97,17 +97,11 @@ impl InplaceOp2 for Move {
         values: &CpuStorage,
         values_layout: &Layout,
     ) -> Result<(), Error> {
-        let contiguous = |layout: &Layout| {
-            let (start, end) = layout
-                .contiguous_offsets()
-                .ok_or_else(|| Error::RequiresContiguous { op: self.name() }.bt())?;
-            Ok::<_, Error>(start..end)
-        };
         let CpuStorage::F32(average) = average else {
             return Err(Error::Msg("averages are of f32 only".to_owned()));
         };
-        let average = &mut average[contiguous(layout)?];
-        let values = &values.as_slice::<f32>()?[contiguous(values_layout)?];
+        let average = &mut average[contiguous_range(layout, self.name())?];
+        let values = &values.as_slice::<f32>()?[contiguous_range(values_layout, self.name())?];
         check_lengths(average.len(), values.len())?;
         for (average, value) in average.iter_mut().zip(values) {
             *average += self.share * (value - *average);

@@ -1,4 +1,4 @@
-//! What is submitted, and its division into tasks.
+//! The plan to submit, and its division into tasks.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -17,7 +17,7 @@ use super::SlurmArgs;
 use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::working;
 
-/// A task reads its images anew, and is told to stop three minutes before its time limit.
+/// Shortest time limit of a training, seconds: each start reads all images, and Slurm sends TERM three minutes before the limit.
 const SHORTEST_S: u64 = 10 * 60;
 
 /// A plan of poses, or of experiments.

@@ -12,7 +12,7 @@ const COLUMNS: usize = 4;
 
 /// [images, rows, columns, channels] of x [images, height, width, channels] and weights [channels, kernel * kernel].
 ///
-/// An x of one channel is taken for every channel.
+/// If x has one channel, every output channel reads it.
 pub fn depthwise(x: &Tensor, weights: &Tensor, window: Window) -> Result<Tensor> {
     check(window)?;
     let (images, height, width, inputs) = x.dims4()?;

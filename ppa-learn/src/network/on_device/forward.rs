@@ -1,4 +1,4 @@
-//! Layers of the network by kernels of ours and products of candle, on channels-last images [images, height, width, channels].
+//! Layers of the network, computed by our kernels and candle's matrix products on channels-last images [images, height, width, channels].
 
 use candle_core::{Error, Result, Tensor};
 

@@ -15,7 +15,7 @@ impl Parameters<'_> {
         self.0.narrow(0, range.start, range.len())
     }
 
-    /// A matrix of so many rows.
+    /// A matrix with `rows` rows.
     pub fn rows(&self, range: &Range<usize>, rows: usize) -> Result<Tensor> {
         self.values(range)?.reshape((rows, ()))
     }
