@@ -10,7 +10,7 @@ use ppa_dataset::files::{FileError, hex, write_whole};
 use ppa_dataset::stop::{Stopped, go_on};
 use sha2::{Digest, Sha256};
 
-use crate::dataset_lock::{DatasetLock, FolderError, lock_existing};
+use crate::dataset_lock::{FolderError, lock_existing};
 use crate::differences::differences;
 use crate::job::{Job, JobError, Progress, Summary};
 use crate::limb_jobs::LimbJobs;
@@ -131,7 +131,6 @@ pub fn merge(
 }
 
 struct Shards<'a> {
-    _locks: Vec<DatasetLock>,
     planned: Planned,
     /// The folder that holds the record of a pose.
     holder: HashMap<PoseId, &'a Path>,
@@ -146,7 +145,6 @@ impl<'a> Shards<'a> {
         let pose_jobs: HashMap<_, _> = pose_jobs
             .map(|pose_job| (pose_job.id(), pose_job))
             .collect();
-        let mut claims = Vec::new();
         let mut holder = HashMap::new();
         for folder in folders {
             if same_folder(folder, root) {
@@ -161,6 +159,9 @@ impl<'a> Shards<'a> {
                     key: key.map_or("the text of dataset.json".to_owned(), |key| key.key),
                 });
             }
+            // Refuses a shard that is written now. The lock is not kept, since there may be more shards than files may be open;
+            // a pose that changes later fails by its hash.
+            lock_existing(folder)?;
             for pose in record_names(&folder.join(FOLDER))? {
                 let Some(pose_job) = pose_jobs.get(&pose) else {
                     let (root, record) = (folder.clone(), pose.record_name());
@@ -174,13 +175,8 @@ impl<'a> Shards<'a> {
                     });
                 }
             }
-            claims.push(lock_existing(folder)?);
         }
-        Ok(Self {
-            _locks: claims,
-            planned,
-            holder,
-        })
+        Ok(Self { planned, holder })
     }
 
     fn require_all(&self, limbs: &[LimbJobs]) -> Result<(), MergeError> {

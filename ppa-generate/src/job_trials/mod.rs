@@ -6,6 +6,7 @@ mod interrupted;
 #[cfg(unix)]
 mod looking;
 mod replaced;
+mod tasks;
 
 use std::collections::BTreeMap;
 use std::fs;
