@@ -134,5 +134,7 @@ pub use run::analog_tally::AnalogTally;
 pub use run::progress::{Progress, Stop, Stopped};
 #[cfg(feature = "files")]
 pub use run::tally_error::TallyError;
+#[cfg(feature = "files")]
+pub use run::tally_file::TallyHistories;
 pub use transport::tally::Category;
 pub use transport::tracking::TransportError;

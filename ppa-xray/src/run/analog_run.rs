@@ -142,26 +142,14 @@ impl<'a> AnalogRun<'a> {
         path: &Path,
         part: Part,
     ) -> Result<AnalogTally, TallyError> {
-        if tally.setup.key != self.key() {
-            return Err(TallyError::Key {
-                path: path.into(),
-                found: tally.setup.key,
-                expected: self.key().to_owned(),
-            });
-        }
+        self.check_key(&tally, path)?;
         let (histories, share) = (self.settings.histories, part.share(self.settings.histories));
         if tally.is_whole_run() && part == Part::WHOLE && tally.done.end <= histories {
             tally.setup.histories = histories;
             tally.part = share;
             return Ok(tally);
         }
-        if tally.setup.histories != histories {
-            return Err(TallyError::Histories {
-                path: path.into(),
-                found: tally.setup.histories,
-                expected: histories,
-            });
-        }
+        self.check_histories(&tally, path)?;
         if tally.part != share {
             return Err(TallyError::Part {
                 path: path.into(),
@@ -170,6 +158,37 @@ impl<'a> AnalogRun<'a> {
             });
         }
         Ok(tally)
+    }
+
+    /// Refuses a tally, read from `path`, that is not of all histories of this run.
+    #[cfg(feature = "files")]
+    pub(crate) fn check_whole(&self, tally: &AnalogTally, path: &Path) -> Result<(), TallyError> {
+        self.check_key(tally, path)?;
+        self.check_histories(tally, path)
+    }
+
+    #[cfg(feature = "files")]
+    fn check_key(&self, tally: &AnalogTally, path: &Path) -> Result<(), TallyError> {
+        match tally.setup.key == self.key() {
+            true => Ok(()),
+            false => Err(TallyError::Key {
+                path: path.into(),
+                found: tally.setup.key.clone(),
+                expected: self.key().to_owned(),
+            }),
+        }
+    }
+
+    #[cfg(feature = "files")]
+    fn check_histories(&self, tally: &AnalogTally, path: &Path) -> Result<(), TallyError> {
+        match tally.setup.histories == self.settings.histories {
+            true => Ok(()),
+            false => Err(TallyError::Histories {
+                path: path.into(),
+                found: tally.setup.histories,
+                expected: self.settings.histories,
+            }),
+        }
     }
 
     /// SHA-256 of everything that decides what a history leaves.

@@ -105,6 +105,41 @@ impl Frame {
         found: u64,
         sums_len: impl FnOnce(&H) -> Option<u64>,
     ) -> Result<(H, Vec<u8>), TallyError> {
+        let damaged = |what: &str| TallyError::Damaged {
+            path: path.into(),
+            what: what.to_owned(),
+        };
+        let (header, before_sums) = self.read_header(path, &mut file, found, sums_len)?;
+        let mut sums = Vec::with_capacity(found as usize - before_sums.len());
+        let failed = |source| TallyError::Read {
+            path: path.into(),
+            source,
+        };
+        file.take(found).read_to_end(&mut sums).map_err(failed)?;
+        let hash = sums
+            .len()
+            .checked_sub(HASH_LEN)
+            .map(|sums_len| sums.split_off(sums_len))
+            .filter(|_| (before_sums.len() + sums.len() + HASH_LEN) as u64 == found)
+            .ok_or_else(|| damaged("it changed while it was read"))?;
+        let digest = Sha256::new()
+            .chain_update(&before_sums)
+            .chain_update(&sums)
+            .finalize();
+        if digest[..] != hash[..] {
+            return Err(damaged("its checksum does not fit"));
+        }
+        Ok((header, sums))
+    }
+
+    /// As [`Self::read`], without the sums: the header and the bytes that were read.
+    pub fn read_header<H: DeserializeOwned>(
+        &self,
+        path: &Path,
+        mut file: impl Read,
+        found: u64,
+        sums_len: impl FnOnce(&H) -> Option<u64>,
+    ) -> Result<(H, Vec<u8>), TallyError> {
         let failed = |source| TallyError::Read {
             path: path.into(),
             source,
@@ -119,17 +154,17 @@ impl Frame {
             found,
             expected,
         };
-        let mut start = [0; START_LEN];
+        let mut bytes = vec![0; START_LEN];
         // Whatever is too short for the first numbers is not a tally.
-        file.read_exact(&mut start)
+        file.read_exact(&mut bytes)
             .map_err(|source| match source.kind() {
                 ErrorKind::UnexpectedEof => foreign(),
                 _ => failed(source),
             })?;
-        if start[..8] != self.magic {
+        if bytes[..8] != self.magic {
             return Err(foreign());
         }
-        let word = |at: usize| u32::from_le_bytes(start[at..at + 4].try_into().expect("4 bytes"));
+        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("4 bytes"));
         if word(8) != self.format {
             return Err(TallyError::Format {
                 path: path.into(),
@@ -142,32 +177,16 @@ impl Frame {
         if header_len > LONGEST_HEADER || before_sums > found {
             return Err(size(before_sums));
         }
-        let mut header_bytes = vec![0; header_len as usize];
-        file.read_exact(&mut header_bytes).map_err(failed)?;
-        let header =
-            serde_json::from_slice(&header_bytes).map_err(|error| damaged(&error.to_string()))?;
+        bytes.resize(before_sums as usize, 0);
+        file.read_exact(&mut bytes[START_LEN..]).map_err(failed)?;
+        let header = serde_json::from_slice(&bytes[START_LEN..])
+            .map_err(|error| damaged(&error.to_string()))?;
         let expected = sums_len(&header)
             .and_then(|sums| sums.checked_add(before_sums + HASH_LEN as u64))
             .ok_or_else(|| damaged("its header announces sums of a size that makes no sense"))?;
         if found != expected {
             return Err(size(expected));
         }
-        let mut sums = Vec::with_capacity((found - before_sums) as usize);
-        file.take(found).read_to_end(&mut sums).map_err(failed)?;
-        let hash = sums
-            .len()
-            .checked_sub(HASH_LEN)
-            .map(|sums_len| sums.split_off(sums_len))
-            .filter(|_| (sums.len() + HASH_LEN) as u64 + before_sums == found)
-            .ok_or_else(|| damaged("it changed while it was read"))?;
-        let digest = Sha256::new()
-            .chain_update(start)
-            .chain_update(&header_bytes)
-            .chain_update(&sums)
-            .finalize();
-        if digest[..] != hash[..] {
-            return Err(damaged("its checksum does not fit"));
-        }
-        Ok((header, sums))
+        Ok((header, bytes))
     }
 }

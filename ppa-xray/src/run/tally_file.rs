@@ -27,6 +27,36 @@ struct Header {
     run: RunSetup,
 }
 
+/// Histories of a tally file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TallyHistories {
+    /// Those that the tally is for.
+    pub part: Range<u64>,
+    /// Those that are counted, from the start of the part on.
+    pub done: Range<u64>,
+    /// Number of histories of the whole run.
+    pub of_run: u64,
+}
+
+impl Header {
+    fn histories(&self, path: &Path) -> Result<TallyHistories, TallyError> {
+        let Self { part, done, run } = self;
+        let ordered = part.start <= part.end && part.end <= run.histories;
+        if !(ordered && done.start == part.start && done.end >= done.start && done.end <= part.end)
+        {
+            return Err(TallyError::Damaged {
+                path: path.into(),
+                what: "its ranges of histories contradict each other".to_owned(),
+            });
+        }
+        Ok(TallyHistories {
+            part: part.clone(),
+            done: done.clone(),
+            of_run: run.histories,
+        })
+    }
+}
+
 impl AnalogTally {
     /// Writes the tally; the file appears whole or not at all.
     ///
@@ -77,6 +107,17 @@ impl AnalogTally {
         Self::read_from(path, file, found)
     }
 
+    /// The histories of a tally file. Its sums are not read, so that damage to them is not found.
+    ///
+    /// # Errors
+    /// [`TallyError`] for a file that is not a tally, or cut off.
+    pub fn read_histories(path: &Path) -> Result<TallyHistories, TallyError> {
+        let (file, found) = open(path)?;
+        let sums_len = |header: &Header| header.run.sums_len();
+        let (header, _) = FRAME.read_header(path, file, found, sums_len)?;
+        header.histories(path)
+    }
+
     /// As [`Self::read`], from `found` bytes that belong to the file `path`.
     pub(crate) fn read_from(path: &Path, file: impl Read, found: u64) -> Result<Self, TallyError> {
         let damaged = |what: &str| TallyError::Damaged {
@@ -84,12 +125,9 @@ impl AnalogTally {
             what: what.to_owned(),
         };
         let sums_len = |header: &Header| header.run.sums_len();
-        let (Header { part, done, run }, sums) = FRAME.read(path, file, found, sums_len)?;
-        let ordered = part.start <= part.end && part.end <= run.histories;
-        if !(ordered && done.start == part.start && done.end >= done.start && done.end <= part.end)
-        {
-            return Err(damaged("its ranges of histories contradict each other"));
-        }
+        let (header, sums) = FRAME.read(path, file, found, sums_len)?;
+        header.histories(path)?;
+        let Header { part, done, run } = header;
         let mut tally = Self::empty(run, part);
         tally.done = done;
         let (image, rest) = sums.split_at(tally.image.byte_len());

@@ -7,8 +7,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use nalgebra::{Isometry3, Vector3};
-use ppa_xray::mcgpu::{McgpuError, RunLength, Scan, ScanDose, Simulation, Station};
-use ppa_xray::{Category, Engine, Radiograph};
+use ppa_xray::mcgpu::{McgpuError, RunLength, Scan, ScanDose, ScanPart, Simulation, Station};
+use ppa_xray::{AnalogTally, Category, Engine, Progress, Radiograph};
 use serde_json::Value;
 
 use crate::shared;
@@ -470,6 +470,61 @@ fn a_scan_cut_into_pieces_writes_the_same_files() {
     scan_dose.write(&whole, &simulation).unwrap();
     assert_eq!(resumed_dose, scan_dose);
     assert!(files(&resumed) == files(&whole));
+}
+
+#[test]
+fn interrupted_parts_merge_to_the_projection_of_one_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut simulation = simulation(folder.path(), &SCAN).unwrap();
+    let histories = 60_000;
+    let station = &{ simulation.input().stations()[1] };
+    let out = [folder.path().join("1"), folder.path().join("2")];
+    let part = |number: usize, replace| ScanPart {
+        histories,
+        part: format!("{number}/2").parse().unwrap(),
+        folder: &out[number - 1],
+        replace,
+    };
+    let mut pieces = 0;
+    for number in [1, 2] {
+        fs::create_dir(&out[number - 1]).unwrap();
+        let missing = simulation.missing_part_bytes(&part(number, false)).unwrap();
+        loop {
+            pieces += 1;
+            let stop = |_: &Progress| ControlFlow::Break(());
+            let part = part(number, false);
+            let followed = simulation.follow_part(station, &part, Duration::ZERO, stop);
+            if followed.unwrap() {
+                break;
+            }
+        }
+        let tally = Simulation::part_tally(&out[number - 1], station);
+        let found = AnalogTally::read_histories(&tally).unwrap();
+        assert_eq!(found.done, found.part);
+        assert_eq!(found.of_run, histories);
+        let left = simulation.missing_part_bytes(&part(number, false)).unwrap();
+        // Numbers of histories in its header take a few digits more or less.
+        let written = fs::metadata(&tally).unwrap().len();
+        assert!((missing - left).abs_diff(written) < 100);
+    }
+    assert!(pieces > 2, "{pieces}");
+    let (image, dose) = simulation.merge_parts(station, histories, &out).unwrap();
+    let length = RunLength::Histories(histories);
+    let whole = simulation.analog(station, length, |_| ControlFlow::Continue(()));
+    assert_eq!((image, dose), whole.unwrap());
+    let refused = simulation.merge_parts(station, histories + 1, &out);
+    assert!(refused.unwrap_err().to_string().contains("60001"));
+
+    // The tally of another seed is continued by nothing, and replaced on request.
+    simulation.set_seed(99);
+    let follow = |replace| {
+        simulation.follow_part(station, &part(1, replace), Duration::MAX, |_| {
+            ControlFlow::Continue(())
+        })
+    };
+    let refused = follow(false).unwrap_err().to_string();
+    assert!(refused.contains("is of another simulation"), "{refused}");
+    assert!(follow(true).unwrap());
 }
 
 #[test]

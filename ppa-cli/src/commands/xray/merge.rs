@@ -16,9 +16,9 @@ pub struct MergeArgs {
     /// Tallies of all parts of one run, in any order
     #[arg(required = true)]
     tallies: Vec<PathBuf>,
-    /// Radiograph to write: 16-bit PNG
-    #[arg(long)]
-    out: PathBuf,
+    /// Radiograph to write: 16-bit PNG; may be left out if something else is written
+    #[arg(long, required_unless_present_any = ["exr", "tally"])]
+    out: Option<PathBuf>,
     /// Tallies to write: OpenEXR with one layer per category
     #[arg(long)]
     exr: Option<PathBuf>,
@@ -34,7 +34,7 @@ pub struct MergeArgs {
 
 pub fn run(args: &MergeArgs, output: Output) -> anyhow::Result<()> {
     let mut outputs = args.replace.outputs();
-    outputs.file("--out", &args.out, &[".png"])?;
+    outputs.optional("--out", args.out.as_ref(), &[".png"])?;
     outputs.optional("--exr", args.exr.as_ref(), &[".exr"])?;
     outputs.optional("--tally", args.tally.as_ref(), &[])?;
     let stoppable = ends_at_once(NOTHING_WRITTEN)?;
@@ -47,8 +47,11 @@ pub fn run(args: &MergeArgs, output: Output) -> anyhow::Result<()> {
     let tally = AnalogTally::merge(&args.tallies)?;
     let radiograph = tally.radiograph();
     drop(stoppable);
-    radiograph.write_png(&args.out, &plan.xray.presentation)?;
-    let mut written: Vec<&Path> = vec![&args.out];
+    let mut written: Vec<&Path> = Vec::new();
+    if let Some(out) = &args.out {
+        radiograph.write_png(out, &plan.xray.presentation)?;
+        written.push(out);
+    }
     if let Some(exr) = &args.exr {
         radiograph.write_exr(exr)?;
         written.push(exr);
