@@ -19,6 +19,7 @@ mod delta_tracking;
 mod depth_table;
 #[cfg(test)]
 mod energy_balance;
+mod entrance_kerma;
 mod expected_scores;
 pub(crate) mod exposure;
 pub(crate) mod fast;

@@ -5,8 +5,8 @@ use std::ops::ControlFlow;
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;
 use ppa_xray::{
-    AnalogRun, AnalogSettings, Dose, DoseError, DoseSettings, Material, Part, Projection, Spectrum,
-    Stop, VoxelBox, VoxelLabels, VoxelPhantom,
+    AnalogRun, AnalogSettings, Dose, DoseError, DoseSettings, Material, Part, PreparedPhantom,
+    Projection, Spectrum, Stop, VoxelBox, VoxelLabels, VoxelPhantom,
 };
 
 use crate::scenes::{frontal, limb, sixty_kvp, slab};
@@ -165,12 +165,13 @@ fn air_kerma_is_that_of_the_beam() {
     ); // 7e-6
 
     let entrance = |density| {
-        let dose = dose(
-            &slab(100.0, density),
-            &spectrum,
-            &projection,
-            settings,
-            &none,
+        let phantom = slab(100.0, density);
+        let dose = dose(&phantom, &spectrum, &projection, settings, &none);
+        let prepared = PreparedPhantom::new(&phantom, settings.compton_model);
+        let without_photons = prepared.entrance_air_kerma_gy_per_history(&spectrum, &projection);
+        assert_eq!(
+            without_photons.unwrap(),
+            dose.entrance_air_kerma_gy_per_history
         );
         dose.entrance_air_kerma_gy_per_history
             .map(|gray| gray * per_mas)

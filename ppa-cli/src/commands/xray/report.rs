@@ -17,6 +17,8 @@ pub struct Report {
     #[serde(flatten)]
     exposure: ExposureReport,
     #[serde(flatten)]
+    entrance: EntranceReport,
+    #[serde(flatten)]
     dose: Option<DoseReport>,
     #[serde(flatten)]
     seconds: Seconds,
@@ -51,11 +53,29 @@ struct DoseReport {
     material_dose_ev_per_history: Vec<f64>,
     material_dose_ev_per_history_se: Vec<f64>,
     material_dose_gy_per_history: Vec<f64>,
-    entrance_air_kerma_gy_per_history: Option<f64>,
     detector_air_kerma_gy_per_history: f64,
     detector_air_kerma_gy_per_history_se: f64,
-    entrance_air_kerma_ugy_per_mas: Option<f64>,
     detector_air_kerma_ugy_per_mas: Option<f64>,
+}
+
+/// Incident air kerma at the skin; null where the central ray meets no patient, or it is not known.
+#[derive(Debug, Default, Serialize)]
+struct EntranceReport {
+    entrance_air_kerma_gy_per_history: Option<f64>,
+    entrance_air_kerma_ugy_per_mas: Option<f64>,
+    /// Of the tube load whose quantum noise the image carries.
+    entrance_air_kerma_ugy: Option<f64>,
+}
+
+impl EntranceReport {
+    fn new(radiograph: &Radiograph, gy_per_history: Option<f64>) -> Self {
+        let ugy = |histories: f64| gy_per_history.map(|gray| 1e6 * gray * histories);
+        Self {
+            entrance_air_kerma_gy_per_history: gy_per_history,
+            entrance_air_kerma_ugy_per_mas: radiograph.histories_per_mas.and_then(ugy),
+            entrance_air_kerma_ugy: ugy(radiograph.histories).filter(|ugy| ugy.is_finite()),
+        }
+    }
 }
 
 impl Report {
@@ -77,8 +97,20 @@ impl Report {
             histories: radiograph.histories,
             engine: radiograph.engine,
             exposure: ExposureReport::default(),
+            entrance: EntranceReport::new(
+                radiograph,
+                dose.and_then(|dose| dose.entrance_air_kerma_gy_per_history),
+            ),
             dose: dose.map(DoseReport::new),
             seconds,
+        }
+    }
+
+    /// Adds the incident air kerma at the skin.
+    pub fn with_entrance_kerma(self, radiograph: &Radiograph, gy_per_history: Option<f64>) -> Self {
+        Self {
+            entrance: EntranceReport::new(radiograph, gy_per_history),
+            ..self
         }
     }
 
@@ -109,14 +141,16 @@ impl Report {
             for (name, (value, se)) in dose.materials.iter().zip(values) {
                 text += &format!("{name:<24}{value:>12.3} ± {se:.3}\n");
             }
-            for (place, kerma) in [
-                ("skin", dose.entrance_air_kerma_ugy_per_mas),
-                ("detector", dose.detector_air_kerma_ugy_per_mas),
-            ] {
-                if let Some(kerma) = kerma {
-                    text += &format!("air kerma at the {place} {kerma:.4e} µGy/mAs\n");
-                }
+            if let Some(kerma) = dose.detector_air_kerma_ugy_per_mas {
+                text += &format!("air kerma at the detector {kerma:.4e} µGy/mAs\n");
             }
+        }
+        if let Some(per_mas) = self.entrance.entrance_air_kerma_ugy_per_mas {
+            text += &format!("air kerma at the skin {per_mas:.4e} µGy/mAs");
+            if let Some(ugy) = self.entrance.entrance_air_kerma_ugy {
+                text += &format!(", {ugy:.4e} µGy");
+            }
+            text.push('\n');
         }
         if let Some(index) = self.exposure.exposure_index {
             text += &format!("exposure index {index:.3}");
@@ -145,7 +179,6 @@ impl DoseReport {
         let imparted = || dose.materials.iter().map(|(_, imparted)| imparted);
         let per_mas = |gray: f64| Some(1e6 * gray * dose.histories_per_mas?);
         let detector = dose.detector_air_kerma_gy_per_history;
-        let entrance = dose.entrance_air_kerma_gy_per_history;
         Self {
             materials: dose
                 .materials
@@ -156,10 +189,8 @@ impl DoseReport {
             material_dose_ev_per_history: imparted().map(|m| m.ev_per_history.value).collect(),
             material_dose_ev_per_history_se: imparted().map(|m| m.ev_per_history.se).collect(),
             material_dose_gy_per_history: imparted().map(|m| m.gy_per_history().value).collect(),
-            entrance_air_kerma_gy_per_history: entrance,
             detector_air_kerma_gy_per_history: detector.value,
             detector_air_kerma_gy_per_history_se: detector.se,
-            entrance_air_kerma_ugy_per_mas: entrance.and_then(per_mas),
             detector_air_kerma_ugy_per_mas: per_mas(detector.value),
         }
     }
