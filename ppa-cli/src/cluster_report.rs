@@ -1,22 +1,23 @@
 //! Where the tasks of a submission stand: from their files, their logs and the queue.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use ppa_cluster::{
-    ClusterFolder, CoreHours, JobKind, QueuedJob, ShardState, Submission, Work, last_line,
-    logged_tasks, shard_state,
+    ClusterFolder, CoreHours, HistoryWork, JobKind, QueuedJob, ShardState, Submission, Work,
+    last_line, logged_tasks, shard_state,
 };
 use ppa_core::text::count;
 use ppa_generate::status;
+use ppa_xray::AnalogTally;
 use serde::Serialize;
 
 /// One task, or the last job.
 #[derive(Debug, Serialize)]
 pub struct JobReport {
     pub state: ShardState,
-    /// Poses that are made, or trainings that are finished.
-    pub made: usize,
+    /// Poses that are made, trainings that are finished, or histories that are followed.
+    pub made: u64,
     /// Slurm's identifier, while it is in the queue.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub job: Option<String>,
@@ -44,17 +45,36 @@ pub struct ShardReport {
 /// All tasks of a folder, and the last job.
 #[derive(Debug, Serialize)]
 pub struct ClusterReport {
-    /// Poses or trainings of the plan.
+    /// Poses, trainings or histories of all tasks.
     #[serde(rename = "units")]
     pub all: u64,
     /// Of these, those that are made.
-    pub made: usize,
+    pub made: u64,
     /// Tasks by state.
     pub states: BTreeMap<ShardState, usize>,
     pub core_hours: CoreHours,
     pub shards: Vec<ShardReport>,
     /// The merge, or the tables.
     pub merge: JobReport,
+    #[serde(skip)]
+    names: Names,
+}
+
+/// Names of the work of a task and of the last job, and what the tasks make.
+#[derive(Debug)]
+struct Names {
+    task: &'static str,
+    last: &'static str,
+    made: Made,
+}
+
+/// What the tasks make.
+#[derive(Debug)]
+enum Made {
+    Poses,
+    /// One a task.
+    Trainings,
+    Histories,
 }
 
 impl ClusterReport {
@@ -66,25 +86,27 @@ impl ClusterReport {
     ) -> anyhow::Result<Self> {
         let job_of = |kind| queue.iter().find(|job| job.kind == kind);
         let logs = logged_tasks(&folder.logs())?;
-        let task = |shard: u64, training: Option<&str>| {
+        let task = |shard: u64, training: Option<&str>, found: &Found| {
             let log = logs.get(&shard).map(|log| log.as_path());
-            let found = match training {
-                Some(training) => Found::training(folder, training),
-                None => Found::dataset(&folder.shard(shard)),
-            };
             ShardReport {
                 shard,
                 training: training.map(str::to_owned),
-                report: report(&found, job_of(JobKind::Shard(shard)), log),
+                report: report(found, job_of(JobKind::Shard(shard)), log),
             }
         };
+        let numbers = 1..=submission.work.tasks();
         let shards: Vec<_> = match &submission.work {
-            Work::Poses(work) => (1..=work.bundle.shards)
-                .map(|shard| task(shard, None))
+            Work::Poses(_) => numbers
+                .map(|shard| task(shard, None, &Found::dataset(&folder.shard(shard))))
                 .collect(),
-            Work::Trainings(work) => (1..)
+            Work::Trainings(work) => numbers
                 .zip(work.trainings())
-                .map(|(number, training)| task(number, Some(training)))
+                .map(|(number, training)| {
+                    task(number, Some(training), &Found::training(folder, training))
+                })
+                .collect(),
+            Work::Histories(work) => numbers
+                .map(|number| task(number, None, &Found::histories(&folder.part(number), work)))
                 .collect(),
         };
         let mut states = BTreeMap::new();
@@ -94,7 +116,7 @@ impl ClusterReport {
         let made = shards.iter().map(|shard| shard.report.made).sum();
         let with = |state| states.get(&state).copied().unwrap_or(0);
         let (done, running) = (with(ShardState::Done), with(ShardState::Running));
-        let finished = (made as u64, done as u64);
+        let finished = (made, done as u64);
         let core_hours = CoreHours::of(submission, finished, running, &folder.logs())?;
         let log = folder.last_log(&submission.work);
         let log = log.is_file().then_some(log);
@@ -107,21 +129,32 @@ impl ClusterReport {
                     ..merged
                 }
             }
-            Work::Trainings(_) => Found {
+            Work::Trainings(_) | Work::Histories(_) => Found {
                 complete: is_done,
                 ..Found::default()
             },
         };
+        let work = &submission.work;
         Ok(Self {
-            all: match &submission.work {
+            all: match work {
                 Work::Poses(work) => work.poses,
-                Work::Trainings(_) => submission.work.tasks(),
+                Work::Trainings(_) => work.tasks(),
+                Work::Histories(work) => work.all_histories(),
             },
             made,
             states,
             core_hours,
             shards,
             merge: report(&last, job_of(JobKind::Merge), log.as_deref()),
+            names: Names {
+                task: work.task_name(),
+                last: work.last_name(),
+                made: match work {
+                    Work::Poses(_) => Made::Poses,
+                    Work::Trainings(_) => Made::Trainings,
+                    Work::Histories(_) => Made::Histories,
+                },
+            },
         })
     }
 
@@ -163,27 +196,30 @@ impl ClusterReport {
         let states = self.states.iter();
         let states: Vec<_> = states.map(|(state, n)| format!("{n} {state}")).collect();
         let states = states.join(", ");
-        let trains = self.shards.iter().any(|shard| shard.training.is_some());
-        let mut lines = vec![match trains {
-            true => format!("{}: {states}", count(self.all, "training")),
-            false => format!(
-                "{}: {states}; {} of {} made",
-                count(self.shards.len(), "shard"),
-                self.made,
-                count(self.all, "pose")
-            ),
-        }];
+        let Names { task, last, made } = &self.names;
+        let made = match made {
+            Made::Trainings => String::new(),
+            Made::Histories => {
+                let (made, all) = (self.made as f64, self.all as f64);
+                format!("; {made:.4e} of {all:.4e} histories followed")
+            }
+            Made::Poses => format!("; {} of {} made", self.made, count(self.all, "pose")),
+        };
+        let mut lines = vec![format!(
+            "{}: {states}{made}",
+            count(self.shards.len(), task)
+        )];
         lines.push(self.core_hours());
         for shard in &self.shards {
             if shard.report.state != ShardState::Done {
                 let name = match &shard.training {
                     Some(training) => format!("{} {training}", shard.shard),
-                    None => format!("shard {}", shard.shard),
+                    None => format!("{task} {}", shard.shard),
                 };
                 lines.push(line(&name, &shard.report));
             }
         }
-        lines.push(line(if trains { "tables" } else { "merge" }, &self.merge));
+        lines.push(line(last, &self.merge));
         lines.join("\n")
     }
 }
@@ -193,7 +229,7 @@ impl ClusterReport {
 struct Found {
     complete: bool,
     begun: bool,
-    made: usize,
+    made: u64,
     /// Whether some process writes it.
     written_now: bool,
 }
@@ -204,7 +240,7 @@ impl Found {
         status(root).map_or(Self::default(), |found| Self {
             complete: found.complete,
             begun: true,
-            made: found.made,
+            made: found.made as u64,
             written_now: found.running,
         })
     }
@@ -218,6 +254,33 @@ impl Found {
             written_now: false,
         }
     }
+
+    /// By the headers of the tallies of a part. One that cannot be read holds nothing that counts.
+    fn histories(part: &Path, work: &HistoryWork) -> Self {
+        let tallies = tallies(part).filter_map(|path| AnalogTally::read_histories(&path).ok());
+        let tallies = tallies.filter(|found| found.of_run == work.histories);
+        let tallies: Vec<_> = tallies.collect();
+        let complete = tallies
+            .iter()
+            .filter(|found| found.done == found.part)
+            .count();
+        Self {
+            complete: complete as u64 == work.projections,
+            begun: part.is_dir(),
+            made: tallies
+                .iter()
+                .map(|found| found.done.end - found.done.start)
+                .sum(),
+            written_now: false,
+        }
+    }
+}
+
+/// The tallies in the folder of a part; none where it cannot be read.
+pub fn tallies(part: &Path) -> impl Iterator<Item = PathBuf> {
+    let entries = std::fs::read_dir(part).into_iter().flatten().flatten();
+    let tallies = entries.map(|entry| entry.path());
+    tallies.filter(|path| path.extension().is_some_and(|end| end == "tally"))
 }
 
 fn report(found: &Found, job: Option<&QueuedJob>, log: Option<&Path>) -> JobReport {

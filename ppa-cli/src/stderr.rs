@@ -140,7 +140,7 @@ fn end(failure: &Failure) {
 }
 
 /// clap's message without its usage: lines joined by spaces, tips after semicolons.
-fn in_one_line(error: &clap::Error) -> String {
+pub fn in_one_line(error: &clap::Error) -> String {
     if let ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand | ErrorKind::MissingSubcommand =
         error.kind()
     {

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use ppa_cluster::{
-    ClusterFolder, CostSource, DEFAULT_MAX_ARRAY_SIZE, PoseCost, PoseWork, Scripts, Submission,
-    TaskSettings, Work, bundle, split, task_commands,
+    ClusterFolder, CostSource, DEFAULT_MAX_ARRAY_SIZE, PoseCost, PoseWork, Program, Scripts,
+    Submission, TaskSettings, Work, bundle, split, task_commands,
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -33,7 +33,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     });
     let (plan, hash) = ("plan.toml".into(), "0".repeat(64));
     let submission = Submission::new(plan, hash, work, settings);
-    let scripts = Scripts::new(&folder, &submission, Path::new("/usr/bin/ppa"))?;
+    let program = Program {
+        path: Path::new("/usr/bin/ppa"),
+        sha256: &"cd".repeat(32),
+    };
+    let scripts = Scripts::new(&folder, &submission, &program)?;
     println!("{}", scripts.task);
     let shards: Vec<_> = (1..=bundle.shards).collect();
     let chunks = split(&shards, DEFAULT_MAX_ARRAY_SIZE);

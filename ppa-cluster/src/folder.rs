@@ -9,7 +9,8 @@ use sha2::{Digest, Sha256};
 use crate::error::FolderError;
 use crate::submission::Work;
 
-/// The folder that `ppa submit` fills: `slurm/` with plan, scripts and logs; `shards/` and `dataset/`, or `runs/` with trainings and tables.
+/// The folder that `ppa submit` fills: `slurm/` with plan, scripts and logs; `shards/` and `dataset/`, `runs/` with
+/// trainings and tables, or `parts/` with tallies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ClusterFolder {
     root: PathBuf,
@@ -56,6 +57,7 @@ impl ClusterFolder {
         let made = match work {
             Work::Poses(_) => self.root.join("shards"),
             Work::Trainings(_) => self.runs(),
+            Work::Histories(_) => self.root.join(PARTS),
         };
         fs::create_dir_all(&made).map_err(FolderError::at("create", &made))
     }
@@ -115,14 +117,14 @@ impl ClusterFolder {
         self.slurm().join("plan.toml")
     }
 
-    /// The script of the array, which makes a shard or a training.
+    /// The script of the array, which makes a shard, a training or a part.
     pub fn task_script(&self, work: &Work) -> PathBuf {
-        self.slurm().join(format!("{}.sh", task_name(work)))
+        self.slurm().join(format!("{}.sh", work.task_name()))
     }
 
-    /// The script of the last job, which merges the shards or writes the tables.
+    /// The script of the last job, which merges or writes the tables.
     pub fn last_script(&self, work: &Work) -> PathBuf {
-        self.slurm().join(format!("{}.sh", last_name(work)))
+        self.slurm().join(format!("{}.sh", work.last_name()))
     }
 
     /// Settings and division of what was submitted.
@@ -137,12 +139,17 @@ impl ClusterFolder {
 
     /// The log of the last job.
     pub fn last_log(&self, work: &Work) -> PathBuf {
-        self.logs().join(format!("{}.log", last_name(work)))
+        self.logs().join(format!("{}.log", work.last_name()))
     }
 
     /// The folder of a shard, counted from 1.
     pub fn shard(&self, number: u64) -> PathBuf {
         self.root.join("shards").join(number.to_string())
+    }
+
+    /// The folder of the tallies of a part, counted from 1.
+    pub fn part(&self, number: u64) -> PathBuf {
+        self.root.join(PARTS).join(number.to_string())
     }
 
     /// The merged dataset.
@@ -165,7 +172,7 @@ impl ClusterFolder {
         self.runs().join(training).is_dir()
     }
 
-    /// Whether the last job has done its work: the merged dataset is verified, or the tables are written.
+    /// Whether the last job has done its work: the merged dataset is verified, or tables or images are written.
     ///
     /// # Errors
     /// [`FolderError::File`] when the system cannot tell.
@@ -186,27 +193,18 @@ impl ClusterFolder {
     }
 }
 
-/// The last job writes this file, as seen from the folder, when it has done its work: verified a dataset, or written the tables.
+/// The last job writes this file, as seen from the folder, when it has done its work: verified a dataset, or written
+/// tables or images.
 pub(crate) const DONE: &str = "slurm/verified";
+
+/// The folder of the parts, as seen from the folder.
+pub(crate) const PARTS: &str = "parts";
+
+/// The tally of a part of a radiograph, as seen from the folder of the part.
+pub(crate) const TALLY: &str = "radiograph.tally";
 
 /// The file that shows that a training is finished; `ppa experiment` writes it last.
 pub(crate) const FINISHED: &str = "finished.json";
-
-/// Name of the work of a task.
-pub(crate) fn task_name(work: &Work) -> &'static str {
-    match work {
-        Work::Poses(_) => "shard",
-        Work::Trainings(_) => "training",
-    }
-}
-
-/// Name of the last job.
-pub(crate) fn last_name(work: &Work) -> &'static str {
-    match work {
-        Work::Poses(_) => "merge",
-        Work::Trainings(_) => "tables",
-    }
-}
 
 #[cfg(test)]
 mod tests {

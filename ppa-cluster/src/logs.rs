@@ -6,7 +6,6 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use crate::error::FolderError;
-use crate::folder::task_name;
 use crate::submission::Work;
 use crate::usage::core_s;
 
@@ -15,7 +14,7 @@ const TAIL: u64 = 16 * 1024;
 
 /// The log of one chunk of an array as `sbatch --output` takes it; Slurm puts the index in place of `%a`.
 pub(crate) fn log_pattern(work: &Work, offset: u64) -> String {
-    let name = task_name(work);
+    let name = work.task_name();
     match offset {
         0 => format!("{name}_%a.log"),
         offset => format!("{name}_{offset}+%a.log"),
@@ -26,7 +25,8 @@ pub(crate) fn log_pattern(work: &Work, offset: u64) -> String {
 fn task_of(name: &str) -> Option<u64> {
     let number = name
         .strip_prefix("shard_")
-        .or(name.strip_prefix("training_"))?;
+        .or(name.strip_prefix("training_"))
+        .or(name.strip_prefix("part_"))?;
     let number = number.strip_suffix(".log")?;
     let (offset, index) = number.split_once('+').unwrap_or(("0", number));
     let (offset, index): (u64, u64) = (offset.parse().ok()?, index.parse().ok()?);

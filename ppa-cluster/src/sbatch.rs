@@ -4,7 +4,7 @@ use std::fmt;
 
 use crate::array::{ArrayChunk, index_list};
 use crate::error::FolderError;
-use crate::folder::{ClusterFolder, last_name};
+use crate::folder::ClusterFolder;
 use crate::logs::log_pattern;
 use crate::queue::JobKind;
 use crate::quote::{shell_quoted, unicode};
@@ -81,7 +81,7 @@ pub fn task_commands(
 /// [`FolderError::NotUnicode`].
 pub fn last_command(folder: &ClusterFolder, work: &Work) -> Result<SbatchCommand, FolderError> {
     let script = folder.last_script(work);
-    let mut command = command(folder, None, &format!("{}.log", last_name(work)))?;
+    let mut command = command(folder, None, &format!("{}.log", work.last_name()))?;
     command.script = vec![unicode(&script)?.to_owned()];
     Ok(command)
 }

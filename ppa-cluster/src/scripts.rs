@@ -4,17 +4,27 @@ use std::fmt::Write;
 use std::path::Path;
 
 use crate::error::FolderError;
-use crate::folder::{ClusterFolder, DONE, FINISHED, last_name, task_name};
+use crate::folder::ClusterFolder;
 use crate::quote::{shell_quoted, unicode};
-use crate::submission::{Submission, TaskSettings, TrainingWork, Work};
+use crate::script_body::{ScriptBody, of_histories, of_poses, of_trainings};
+use crate::submission::{Submission, TaskSettings, Work};
 use crate::usage::ended_line;
+
+/// The ppa that the jobs run.
+#[derive(Debug, Clone, Copy)]
+pub struct Program<'a> {
+    /// Its absolute path.
+    pub path: &'a Path,
+    /// SHA-256 of the file, in hexadecimal; a node whose file differs refuses the work.
+    pub sha256: &'a str,
+}
 
 /// The scripts of one folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Scripts {
-    /// Script of the array: one shard or training a task. Its argument is the number to add to the index of a task.
+    /// Script of the array: one shard, training or part a task. Its argument is the number to add to the index of a task.
     pub task: String,
-    /// Script of the job that merges and verifies, or writes tables.
+    /// Script of the job that merges, or writes tables.
     pub last: String,
 }
 
@@ -38,23 +48,24 @@ pub enum ScriptError {
 }
 
 impl Scripts {
-    /// The scripts of a submission; `program` is the ppa that the jobs run.
+    /// The scripts of a submission.
     ///
     /// # Errors
     /// [`ScriptError`] for settings and paths that a script cannot hold.
     pub fn new(
         folder: &ClusterFolder,
         submission: &Submission,
-        program: &Path,
+        program: &Program,
     ) -> Result<Self, ScriptError> {
         let head = head(folder, submission, program)?;
         let (task, last) = match &submission.work {
             Work::Poses(work) => of_poses(work.bundle.shards, submission.settings.cpus),
             Work::Trainings(work) => of_trainings(work, submission.settings.cpus),
+            Work::Histories(work) => of_histories(work, submission.settings.cpus)?,
         };
-        let whole = |parts: Parts, named: &str| {
+        let whole = |parts: ScriptBody, named: &str| {
             let ended = ended_line(submission.settings.cpus);
-            let Parts { title, number, run } = parts;
+            let ScriptBody { title, number, run } = parts;
             format!(
                 "#!/bin/bash\n\
                  # {title} Written by ppa submit.\n\
@@ -68,122 +79,17 @@ impl Scripts {
         };
         let (work, tasks) = (&submission.work, submission.work.tasks());
         Ok(Self {
-            task: whole(task, &format!("{} $number of {tasks}", task_name(work))),
-            last: whole(last, last_name(work)),
+            task: whole(task, &format!("{} $number of {tasks}", work.task_name())),
+            last: whole(last, work.last_name()),
         })
     }
-}
-
-/// What differs between scripts.
-struct Parts {
-    /// What the script does, in a sentence.
-    title: String,
-    /// Shell variables: the number of the task, and Slurm's name of the job.
-    number: &'static str,
-    /// The work.
-    run: String,
-}
-
-/// Variables of a task of the array, and of the last job.
-const OF_TASK: &str = "number=$(($1 + SLURM_ARRAY_TASK_ID))\n\
-                       task=${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID}\n";
-const OF_LAST: &str = "task=$SLURM_JOB_ID\n";
-
-/// The scripts of the shards of a plan.
-fn of_poses(shards: u64, cpus: u32) -> (Parts, Parts) {
-    let task = Parts {
-        title: format!("Makes one shard of {shards}: argument 1 plus the index of the task."),
-        number: OF_TASK,
-        run: format!(
-            "# The shard is given: indices of the array are not those of the shards.\n\
-             run env -u SLURM_ARRAY_TASK_ID \"$ppa\" --threads {cpus} generate slurm/plan.toml \\\n    \
-             --shard \"$number/{shards}\" --out \"shards/$number\" --progress plain\n"
-        ),
-    };
-    let last = Parts {
-        title: format!("Merges {shards} shards and verifies the dataset."),
-        number: OF_LAST,
-        run: format!(
-            "# This job starts after all tasks, failed ones included: the merge refuses shards that are missing.\n\
-             missing=\n\
-             shards=()\n\
-             for ((shard = 1; shard <= {shards}; shard++)); do\n    \
-             [ -d \"shards/$shard/.ppa\" ] || missing+=\" $shard\"\n    \
-             shards+=(\"shards/$shard\")\n\
-             done\n\
-             if [ -n \"$missing\" ]; then\n    \
-             echo \"no dataset: these shards were never begun:$missing\"\n    \
-             exit 1\n\
-             fi\n\
-             run \"$ppa\" --threads {cpus} merge \"${{shards[@]}}\" --out dataset --progress plain\n\
-             run \"$ppa\" --threads {cpus} verify dataset --plan slurm/plan.toml --progress plain\n\
-             : >{DONE}\n"
-        ),
-    };
-    (task, last)
-}
-
-/// The scripts of the trainings of experiments.
-fn of_trainings(work: &TrainingWork, cpus: u32) -> (Parts, Parts) {
-    let all = work.trainings().count();
-    let mut choice = String::new();
-    let mut before = 0;
-    for one in &work.experiments {
-        let (experiment, count) = (&one.experiment, one.trainings.len());
-        let word = if before == 0 { "if" } else { "elif" };
-        let _ = write!(
-            choice,
-            "{word} [ \"$number\" -le {} ]; then\n    \
-             experiment={experiment} part=$((number - {before}))/{count}\n",
-            before + count
-        );
-        before += count;
-    }
-    let task = Parts {
-        title: format!("Makes one training of {all}: argument 1 plus the index of the task."),
-        number: OF_TASK,
-        run: format!(
-            "{choice}fi\n\
-             # A training that others need is made by the first of them; the others wait for it.\n\
-             run env -u SLURM_ARRAY_TASK_ID \"$ppa\" --threads {cpus} experiment \"$experiment\" slurm/plan.toml \\\n    \
-             --shard \"$part\" --out runs\n"
-        ),
-    };
-    let needed = work.needed.iter().map(String::as_str);
-    let folders: Vec<&str> = needed.chain(work.trainings()).collect();
-    let count = folders.len();
-    let folders: String = folders.iter().map(|name| format!("{name}\n")).collect();
-    let names = work.experiments.iter().map(|one| one.experiment.as_str());
-    let names = names.collect::<Vec<_>>().join(" ");
-    let last = Parts {
-        title: format!("Writes the tables of {all} trainings."),
-        number: OF_LAST,
-        run: format!(
-            "# This job starts after all tasks, failed ones included. It trains nothing itself.\n\
-             missing=()\n\
-             while read -r training; do\n    \
-             [ -f \"runs/$training/{FINISHED}\" ] || missing+=(\"$training\")\n\
-             done <<'END'\n\
-             {folders}END\n\
-             if [ ${{#missing[@]}} -gt 0 ]; then\n    \
-             echo \"no tables: ${{#missing[@]}} of {count} trainings are not finished, such as ${{missing[0]}}\"\n    \
-             exit 1\n\
-             fi\n\
-             for experiment in {names}; do\n    \
-             run \"$ppa\" --threads {cpus} experiment \"$experiment\" slurm/plan.toml --out runs --replace\n\
-             done\n\
-             run \"$ppa\" --threads {cpus} experiment report slurm/plan.toml --runs runs --out experiments.html --replace\n\
-             : >{DONE}\n"
-        ),
-    };
-    (task, last)
 }
 
 /// What both scripts begin with: requests to Slurm, folder, program, setup and the check of the plan.
 fn head(
     folder: &ClusterFolder,
     submission: &Submission,
-    program: &Path,
+    program: &Program,
 ) -> Result<String, ScriptError> {
     let TaskSettings {
         partition,
@@ -219,16 +125,29 @@ fn head(
     request("requeue".to_owned());
     request("open-mode=append".to_owned());
     let root = shell_quoted(unicode(folder.root())?);
-    let program = shell_quoted(unicode(program)?);
-    let _ = write!(text, "\ncd {root} || exit 1\nppa={program}\n");
+    let program_path = unicode(program.path)?;
+    let quoted = shell_quoted(program_path);
+    let _ = write!(text, "\ncd {root} || exit 1\nppa={quoted}\n");
     if let Some(setup) = setup {
         let _ = writeln!(text, "{}", setup.trim_end());
     }
+    let guarded = match &submission.work {
+        Work::Histories(_) => unicode(&submission.plan)?,
+        Work::Poses(_) | Work::Trainings(_) => "slurm/plan.toml",
+    };
+    let guard = [
+        format!("{}  {guarded}", submission.plan_sha256),
+        format!("{}  {program_path}", program.sha256),
+    ];
     let _ = write!(
         text,
-        "\n# An edited plan makes results that do not fit together.\n\
-         echo '{}  slurm/plan.toml' | sha256sum --check --quiet || exit 1\n",
-        submission.plan_sha256
+        "\n# Results of an edited plan or of another program do not fit together.\n\
+         if ! printf '%s\\n' {} {} | sha256sum --check --quiet; then\n    \
+         echo \"on $SLURMD_NODENAME, one of these files is not the one that was submitted: run ppa submit again\"\n    \
+         exit 1\n\
+         fi\n",
+        shell_quoted(&guard[0]),
+        shell_quoted(&guard[1])
     );
     Ok(text)
 }
@@ -285,7 +204,7 @@ mod tests {
     use std::process::Command;
 
     use super::*;
-    use crate::submission::tests::{submission, trainings};
+    use crate::submission::tests::{histories, submission, trainings};
 
     fn folder(name: &str) -> (tempfile::TempDir, ClusterFolder) {
         let above = tempfile::tempdir().unwrap();
@@ -293,10 +212,42 @@ mod tests {
         (above, folder)
     }
 
+    fn program(path: &str) -> Program<'_> {
+        let sha256 = "0123";
+        let path = Path::new(path);
+        Program { path, sha256 }
+    }
+
+    #[test]
+    fn an_edited_plan_or_another_program_is_refused() {
+        let (_above, folder) = folder("jobs");
+        let path = folder.root().join("p p");
+        for name in ["p p", "slurm/plan.toml"] {
+            fs::write(folder.root().join(name), "a").unwrap();
+        }
+        let sha256 = "ca978112ca1bbdcafac231b39a23dc4da786eff8147c4e72b9807785afee48bb";
+        let mut submission = submission();
+        submission.plan_sha256 = sha256.to_owned();
+        let path = path.as_path();
+        let scripts = Scripts::new(&folder, &submission, &Program { path, sha256 }).unwrap();
+        let head = scripts.last.split_once("\ntask=").unwrap().0;
+        let head = head.replace("module load ppa", "");
+        let accepts = || {
+            let said = Command::new("bash").args(["-c", &head]).output().unwrap();
+            said.status.success()
+        };
+        assert!(accepts(), "{head}");
+        fs::write(path, "b").unwrap();
+        assert!(!accepts());
+        fs::write(path, "a").unwrap();
+        fs::write(folder.plan(), "b").unwrap();
+        assert!(!accepts());
+    }
+
     #[test]
     fn settings_stand_as_requests_in_both_scripts() {
         let (_above, folder) = folder("jobs");
-        let scripts = Scripts::new(&folder, &submission(), Path::new("/opt/ppa")).unwrap();
+        let scripts = Scripts::new(&folder, &submission(), &program("/opt/ppa")).unwrap();
         for script in [&scripts.task, &scripts.last] {
             for line in [
                 "#SBATCH --partition=main",
@@ -318,7 +269,7 @@ mod tests {
     #[test]
     fn each_task_makes_its_training() {
         let (_above, folder) = folder("jobs");
-        let scripts = Scripts::new(&folder, &trainings(), Path::new("ppa")).unwrap();
+        let scripts = Scripts::new(&folder, &trainings(), &program("ppa")).unwrap();
         assert!(scripts.task.contains("#SBATCH --gres=gpu:1\n"));
         let from = scripts.task.find("if [ \"$number\"").unwrap();
         let choice = scripts.task[from..].split_inclusive("\nfi\n").next();
@@ -335,12 +286,34 @@ mod tests {
     }
 
     #[test]
+    fn outputs_are_written_by_the_last_job_only() {
+        let (_above, folder) = folder("jobs");
+        let mut submission = histories();
+        let scripts = Scripts::new(&folder, &submission, &program("ppa")).unwrap();
+        assert!(!scripts.task.contains("leg.png"), "{}", scripts.task);
+        let last = "xray simulate leg.toml --engine analog --out leg.png \\\n";
+        assert!(scripts.last.contains(last), "{}", scripts.last);
+        assert!(scripts.last.contains("cd '/home/a b' || exit 1\n"));
+        let Work::Histories(work) = &mut submission.work else {
+            panic!("histories")
+        };
+        // The voxels of a dose map are counted by the tasks.
+        work.outputs.push("--dose-map=dose.nii".to_owned());
+        let scripts = Scripts::new(&folder, &submission, &program("ppa")).unwrap();
+        assert!(scripts.task.contains("--dose-map \"$part/dose_map.nii\""));
+    }
+
+    #[test]
     fn bash_accepts_scripts_of_paths_with_spaces() {
         let (_above, folder) = folder("two words, it's $HOME");
-        let program = Path::new("/opt/my programs/ppa's");
-        let of = |submission: &Submission| Scripts::new(&folder, submission, program).unwrap();
-        let [poses, trainings] = [of(&submission()), of(&trainings())];
-        for script in [poses.task, poses.last, trainings.task, trainings.last] {
+        let path = Path::new("/opt/my programs/ppa's");
+        let program = program("/opt/my programs/ppa's");
+        let of = |submission: &Submission| Scripts::new(&folder, submission, &program).unwrap();
+        let all = [submission(), trainings(), histories()];
+        for script in all.iter().flat_map(|one| {
+            let Scripts { task, last } = of(one);
+            [task, last]
+        }) {
             // As far as the program is named, then what was read.
             let head = script.split("module load").next().unwrap();
             let script_file = folder.slurm().join("test.sh");
@@ -352,7 +325,7 @@ mod tests {
             let read = Command::new("bash").args(["-c", &read]).output().unwrap();
             assert_eq!(
                 String::from_utf8(read.stdout).unwrap(),
-                format!("{}|{}", folder.root().display(), program.display())
+                format!("{}|{}", folder.root().display(), path.display())
             );
         }
     }
@@ -363,7 +336,7 @@ mod tests {
         for bad in ["two words", "a\nb", "", "x;y", "$x"] {
             let mut submission = submission();
             submission.settings.partition = Some(bad.to_owned());
-            let refused = Scripts::new(&folder, &submission, Path::new("ppa")).unwrap_err();
+            let refused = Scripts::new(&folder, &submission, &program("ppa")).unwrap_err();
             assert!(
                 refused.to_string().starts_with("--partition is"),
                 "{refused}"

@@ -12,6 +12,7 @@ use sha2::{Digest, Sha256};
 
 use crate::bundle::{Bundle, PoseCost};
 use crate::error::FolderError;
+use crate::histories::{self, HistoryWork};
 use crate::time_limit::TimeLimit;
 
 /// Format of the file.
@@ -58,15 +59,19 @@ pub enum Work {
     Poses(PoseWork),
     /// Trainings of experiments, one a task.
     Trainings(TrainingWork),
+    /// Parts of the histories of a command, one a task.
+    Histories(HistoryWork),
 }
 
 impl<'de> Deserialize<'de> for Work {
     /// Not derived: serde would not say which key of an untagged variant is missing.
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let value = serde_json::Value::deserialize(deserializer)?;
-        let work = match value.get("experiments") {
-            Some(_) => serde_json::from_value(value).map(Self::Trainings),
-            None => serde_json::from_value(value).map(Self::Poses),
+        let has = |key| value.get(key).is_some();
+        let work = match (has("experiments"), has("command")) {
+            (true, _) => serde_json::from_value(value).map(Self::Trainings),
+            (_, true) => serde_json::from_value(value).map(Self::Histories),
+            _ => serde_json::from_value(value).map(Self::Poses),
         };
         work.map_err(D::Error::custom)
     }
@@ -104,19 +109,39 @@ pub struct ExperimentTrainings {
 }
 
 impl Work {
+    /// Name of the work of a task.
+    pub fn task_name(&self) -> &'static str {
+        match self {
+            Self::Poses(_) => "shard",
+            Self::Trainings(_) => "training",
+            Self::Histories(_) => "part",
+        }
+    }
+
+    /// Name of the last job.
+    pub fn last_name(&self) -> &'static str {
+        match self {
+            Self::Poses(_) | Self::Histories(_) => "merge",
+            Self::Trainings(_) => "tables",
+        }
+    }
+
     /// Tasks, counted from 1.
     pub fn tasks(&self) -> u64 {
         match self {
             Self::Poses(work) => work.bundle.shards,
             Self::Trainings(work) => work.trainings().count() as u64,
+            Self::Histories(work) => work.parts,
         }
     }
 
-    /// Interval between TERM and the time limit of a task, seconds: enough to finish the poses in progress, or a step and its checkpoint.
+    /// Interval between TERM and the time limit of a task, seconds: enough to finish the poses in progress, a step and its
+    /// checkpoint, or a tally.
     pub fn warning_s(&self) -> u64 {
         match self {
             Self::Poses(work) => work.bundle.warning_s,
             Self::Trainings(_) => STEP_S,
+            Self::Histories(_) => histories::WARNING_S,
         }
     }
 }
@@ -136,11 +161,11 @@ impl TrainingWork {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Submission {
     version: u32,
-    /// The plan file that the copy in the folder was made from.
+    /// The plan file that the copy in the folder was made from; of histories, the absolute path of the case or input file.
     pub plan: PathBuf,
-    /// SHA-256 of that copy.
+    /// SHA-256 of that copy, or of the case or input file.
     pub plan_sha256: String,
-    /// Poses or trainings.
+    /// Poses, trainings or histories.
     #[serde(flatten)]
     pub work: Work,
     /// What the jobs ask for.
@@ -196,6 +221,14 @@ impl Submission {
             Work::Trainings(work) if work.trainings().next().is_none() => {
                 Err(unusable("it has no trainings".to_owned()))
             }
+            Work::Histories(work) if !(1..=work.histories).contains(&work.parts) => {
+                let HistoryWork {
+                    parts, histories, ..
+                } = work;
+                Err(unusable(format!(
+                    "it has {parts} parts of {histories} histories"
+                )))
+            }
             _ => Ok(Some(read)),
         }
     }
@@ -241,6 +274,7 @@ fn sha256(bytes: &[u8]) -> String {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::histories::HistoryCommand;
 
     pub(crate) fn settings() -> TaskSettings {
         TaskSettings {
@@ -289,6 +323,28 @@ pub(crate) mod tests {
         Submission::new("experiments.toml".into(), "cd".repeat(32), work, settings)
     }
 
+    /// A radiograph in two parts.
+    pub(crate) fn histories() -> Submission {
+        let words = |words: &str| words.split(' ').map(str::to_owned).collect();
+        let work = Work::Histories(HistoryWork {
+            command: HistoryCommand::Simulate,
+            words: words("xray simulate leg.toml --engine analog"),
+            outputs: words("--out leg.png"),
+            folder: "/home/a b".into(),
+            histories: 1000,
+            projections: 1,
+            parts: 2,
+            program_sha256: "ab".repeat(32),
+            cost: None,
+        });
+        Submission::new(
+            "/home/a b/leg.toml".into(),
+            "ef".repeat(32),
+            work,
+            settings(),
+        )
+    }
+
     #[test]
     fn a_submission_is_read_back() {
         let folder = tempfile::tempdir().unwrap();
@@ -296,6 +352,8 @@ pub(crate) mod tests {
         assert_eq!(Submission::read(&path).unwrap(), None);
         trainings().write(&path).unwrap();
         assert_eq!(Submission::read(&path).unwrap(), Some(trainings()));
+        histories().write(&path).unwrap();
+        assert_eq!(Submission::read(&path).unwrap(), Some(histories()));
         submission().write(&path).unwrap();
         assert_eq!(Submission::read(&path).unwrap(), Some(submission()));
         let text = fs::read_to_string(&path).unwrap();

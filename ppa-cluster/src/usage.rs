@@ -7,14 +7,14 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::error::FolderError;
-use crate::submission::{PoseWork, Submission, Work};
+use crate::submission::{Submission, Work};
 
 /// Core hours of a submission: allocated processors times hours.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CoreHours {
     /// Of tasks that have ended, by their logs. Tasks that run, and tasks that were killed, are not counted.
     pub used: f64,
-    /// Of the poses, from the time of one; trainings have no estimate.
+    /// Of poses or histories, from the time that one was measured to take; trainings have no estimate.
     #[serde(flatten)]
     pub estimate: Option<Estimate>,
 }
@@ -24,14 +24,15 @@ pub struct CoreHours {
 pub struct Estimate {
     /// Of the whole plan.
     pub estimated: f64,
-    /// Of poses that are not made.
+    /// Of what is not made.
     pub left: f64,
-    /// Hours until they are made if as many tasks run as now; absent while none runs.
+    /// Hours until it is made if as many tasks run as now; absent while none runs.
     pub left_hours: Option<f64>,
 }
 
 impl CoreHours {
-    /// `made` are the poses and shards that are done, `running` the tasks that run now, `logs` the folder of the logs.
+    /// `made` are the poses or histories, and the tasks, that are done, `running` the tasks that run now, `logs` the folder of the
+    /// logs.
     ///
     /// # Errors
     /// [`FolderError::File`] when the logs cannot be read.
@@ -41,11 +42,25 @@ impl CoreHours {
         running: usize,
         logs: &Path,
     ) -> Result<Self, FolderError> {
+        let cores = running as f64 * f64::from(submission.settings.cpus);
         let estimate = match &submission.work {
             Work::Poses(work) => {
-                let cores = running as f64 * f64::from(submission.settings.cpus);
-                Some(Estimate::of(work, made, cores))
+                let cpu_s = |poses: u64, shards: u64| {
+                    work.cost.pose_cpu_s * poses as f64 + work.cost.limb_cpu_s * shards as f64
+                };
+                Some(Estimate::of(
+                    (work.poses, work.bundle.shards),
+                    made,
+                    cores,
+                    cpu_s,
+                ))
             }
+            Work::Histories(work) => work.cost.map(|cost| {
+                let all = (work.all_histories(), work.parts);
+                Estimate::of(all, made, cores, |histories, parts| {
+                    cost.total_cpu_s(histories, parts)
+                })
+            }),
             Work::Trainings(_) => None,
         };
         Ok(Self {
@@ -56,15 +71,12 @@ impl CoreHours {
 }
 
 impl Estimate {
-    /// `made` are the poses and shards that are done, `cores` those of the tasks that run now.
-    fn of(work: &PoseWork, made: (u64, u64), cores: f64) -> Self {
-        let hours = |poses: u64, shards: u64| {
-            (work.cost.pose_cpu_s * poses as f64 + work.cost.limb_cpu_s * shards as f64) / 3600.0
-        };
-        let (poses, shards) = (work.poses, work.bundle.shards);
-        let left = hours(poses.saturating_sub(made.0), shards.saturating_sub(made.1));
+    /// From `all` poses or histories and their tasks, those `made`, the `cores` of the tasks that run now, and the processor time of
+    /// poses or histories and tasks, seconds.
+    fn of(all: (u64, u64), made: (u64, u64), cores: f64, cpu_s: impl Fn(u64, u64) -> f64) -> Self {
+        let left = cpu_s(all.0.saturating_sub(made.0), all.1.saturating_sub(made.1)) / 3600.0;
         Self {
-            estimated: hours(poses, shards),
+            estimated: cpu_s(all.0, all.1) / 3600.0,
             left,
             left_hours: (cores > 0.0).then(|| left / cores),
         }
@@ -117,7 +129,8 @@ fn used_core_s(logs: &Path) -> Result<f64, FolderError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::submission::tests::{submission, trainings};
+    use crate::histories::HistoryCost;
+    use crate::submission::tests::{histories, submission, trainings};
 
     #[test]
     fn ended_tasks_are_counted_whoever_wrote_besides() {
@@ -158,6 +171,27 @@ mod tests {
         assert!((half.left - 1.05).abs() < 1e-12);
         assert!((half.left_hours.unwrap() - 0.105).abs() < 1e-12);
         assert_eq!(hours((100, 10), 0).left, 0.0);
+    }
+
+    #[test]
+    fn histories_are_estimated_where_their_cost_was_measured() {
+        let logs = tempfile::tempdir().unwrap();
+        let mut submission = histories();
+        let estimate = |submission: &Submission| {
+            let hours = CoreHours::of(submission, (500, 1), 1, logs.path());
+            hours.unwrap().estimate
+        };
+        assert_eq!(estimate(&submission), None);
+        let Work::Histories(work) = &mut submission.work else {
+            panic!("histories")
+        };
+        work.cost = Some(HistoryCost {
+            million_cpu_s: 3.6e6,
+            preparation_cpu_s: 36.0,
+        });
+        let estimate = estimate(&submission).unwrap();
+        assert!((estimate.estimated - 1.02).abs() < 1e-12);
+        assert!((estimate.left - 0.51).abs() < 1e-12);
     }
 
     #[test]

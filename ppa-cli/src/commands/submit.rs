@@ -1,6 +1,8 @@
-//! `ppa submit`: a plan, or a plan of experiments, as jobs of a cluster.
+//! `ppa submit`: a plan, a plan of experiments, or the histories of a command as jobs of a cluster.
 
+mod divisible_command;
 mod division;
+mod histories;
 
 use std::num::{NonZeroU32, NonZeroU64};
 use std::path::{Path, PathBuf};
@@ -8,11 +10,12 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::{Args, Subcommand};
 use ppa_cluster::{
-    ClusterFolder, CostSource, DEFAULT_MAX_ARRAY_SIZE, JobKind, PoseWork, QueuedJob, SbatchCommand,
-    Scripts, ShardState, Slurm, Submission, TimeLimit, Work, last_command, shell_quoted, split,
-    task_commands,
+    ClusterFolder, CostSource, DEFAULT_MAX_ARRAY_SIZE, JobKind, PoseWork, Program, QueuedJob,
+    SbatchCommand, Scripts, ShardState, Slurm, Submission, TimeLimit, Work, last_command,
+    shell_quoted, split, task_commands,
 };
 use ppa_core::text::count;
+use ppa_dataset::files::sha256_of_file;
 use ppa_generate::check;
 use ppa_learn::experiment::Experiment;
 use serde::Serialize;
@@ -20,14 +23,15 @@ use serde::Serialize;
 use crate::cluster_report::ClusterReport;
 use crate::output::Output;
 use crate::stderr;
-use division::{AnyPlan, submission};
+use division::{Input, submission};
+use histories::damaged_tally;
 
 /// Tasks below this are mostly start-up for the scheduler, seconds.
 const SHORT_S: f64 = 20.0 * 60.0;
 
 #[derive(Debug, Subcommand)]
 pub enum SubmitCommand {
-    /// Submit to Slurm: a plan as shards and their merge, or experiments as trainings and their tables
+    /// Submit to Slurm: the shards of a plan, the trainings of experiments, or parts of the histories of a command
     Slurm(SlurmArgs),
 }
 
@@ -37,21 +41,29 @@ pub enum SubmitCommand {
   ppa status jobs
   ppa submit slurm plan.toml --out jobs      # again: only shards that are missing
 
-Of a plan, one pose of the first limb is made here to measure its time, unless --pose-seconds gives it. Poses are bundled \
+For a plan, one pose of the first limb is made here to measure its time, unless --pose-seconds gives it. Poses are bundled \
 into shards of 20 to 40 minutes, or two thirds of --time where that is shorter; a plan that takes less is one shard. \
 DIR/shards/K holds shard K, DIR/dataset the merged and verified dataset. Before its time limit a task finishes the poses in \
 progress and is requeued.
 
   ppa submit slurm experiments.toml --out jobs --cpus 4 --gres gpu:1 --time 8:00:00
 
-Of experiments, each training is a task. DIR/runs holds the trainings and the tables, DIR/experiments.html the report. Before \
+For experiments, each training is a task. DIR/runs holds the trainings and the tables, DIR/experiments.html the report. Before \
 its time limit a task writes a checkpoint and is requeued.
+
+  ppa submit slurm --out jobs --cpus 4 -- xray simulate leg.case.toml --engine analog --histories 2e10 --out leg.png
+  ppa submit slurm --out jobs --cpus 4 -- xray mcgpu scan.in --out scan
+
+For a command that follows analog histories, each task follows a part of them, and the last job writes the outputs of the \
+command, the same bytes as without tasks. Some histories are followed here to measure their time, unless --tasks is given. \
+DIR/parts holds the tallies. Before its time limit a task saves its tallies and is requeued.
 
 DIR/slurm holds the plan that the jobs read, their scripts and logs. Options that are not given again keep their values; a \
 script that was edited is used as it is.")]
 pub struct SlurmArgs {
     /// Plan, as of `ppa generate` or `ppa experiment`
-    plan: PathBuf,
+    #[arg(required_unless_present = "command")]
+    plan: Option<PathBuf>,
     /// Folder of the jobs and of what they make, on a disk that all nodes see; created if the folder above exists
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -79,29 +91,40 @@ pub struct SlurmArgs {
     /// Shell commands that each job runs first, such as 'module load gcc'
     #[arg(long, value_name = "COMMANDS")]
     setup: Option<String>,
-    /// Of a plan of poses, processor time of a pose in seconds, as `ppa plan` measures it; nothing is measured then
+    /// For a plan of poses: processor time of a pose in seconds, as `ppa plan` measures it; nothing is measured then
     #[arg(long, value_name = "SECONDS")]
     pose_seconds: Option<f64>,
-    /// Of a plan of experiments only these, such as 1,2a [default: all that it has data for]
+    /// For a plan of experiments: only these, such as 1,2a [default: all that it has data for]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     experiments: Vec<Experiment>,
-    /// Of a plan of poses, compare the files of shards that are done with their records, and make damaged ones again
+    /// Read all files of shards or parts that are done, and make damaged ones again; a damaged tally is renamed *.damaged
     #[arg(long)]
     check: bool,
+    /// For a command: divide its histories into this many tasks; nothing is measured then
+    #[arg(long, value_name = "N")]
+    tasks: Option<NonZeroU64>,
     /// Write the scripts and print the commands, but queue nothing; needs no Slurm
     #[arg(long)]
     dry_run: bool,
+    /// In place of a plan, `xray simulate --engine analog` or `xray mcgpu` with all their options
+    #[arg(last = true, value_name = "COMMAND", conflicts_with = "plan")]
+    command: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
 struct Submitted {
     folder: PathBuf,
-    /// Tasks: shards or trainings.
+    /// Tasks: shards, trainings or parts.
     shards: u64,
     #[serde(flatten)]
     poses: Option<SubmittedPoses>,
+    #[serde(flatten)]
+    histories: Option<SubmittedHistories>,
     max_array_size: u64,
     dry_run: bool,
+    /// Name of the work of a task.
+    #[serde(skip)]
+    task: &'static str,
     /// Tasks that are not done, or whose shards are damaged, and that have no job.
     submitted: Vec<u64>,
     commands: Vec<String>,
@@ -139,6 +162,26 @@ impl SubmittedPoses {
     }
 }
 
+#[derive(Debug, Serialize)]
+struct SubmittedHistories {
+    /// Of all projections.
+    histories: u64,
+    /// As it was measured; absent where --tasks was given.
+    cpu_s_per_million: Option<f64>,
+}
+
+impl SubmittedHistories {
+    fn of(work: &Work) -> Option<Self> {
+        let Work::Histories(work) = work else {
+            return None;
+        };
+        Some(Self {
+            histories: work.all_histories(),
+            cpu_s_per_million: work.cost.map(|cost| cost.million_cpu_s),
+        })
+    }
+}
+
 pub fn run(command: &SubmitCommand, program: &Path, output: Output) -> anyhow::Result<()> {
     match command {
         SubmitCommand::Slurm(args) => slurm(args, program, output),
@@ -146,22 +189,22 @@ pub fn run(command: &SubmitCommand, program: &Path, output: Output) -> anyhow::R
 }
 
 fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()> {
-    let plan = AnyPlan::read(&args.plan)?;
-    let (kind, of_other_plans): (_, &[(&str, bool)]) = match plan {
-        AnyPlan::Poses(_) => ("poses", &[("--experiments", !args.experiments.is_empty())]),
-        AnyPlan::Experiments(_) => (
-            "experiments",
-            &[
-                ("--pose-seconds", args.pose_seconds.is_some()),
-                ("--check", args.check),
-            ],
-        ),
+    let program = Program {
+        path: program,
+        sha256: &sha256_of_file(program)?,
     };
-    if let Some((option, _)) = of_other_plans.iter().find(|(_, given)| *given) {
-        bail!(
-            "{option} does not apply to {}, a plan of {kind}",
-            args.plan.display()
-        );
+    let work = Input::read(args, &program)?;
+    let experiments = ("--experiments", !args.experiments.is_empty());
+    let pose_seconds = ("--pose-seconds", args.pose_seconds.is_some());
+    let check = ("--check", args.check);
+    let tasks = ("--tasks", args.tasks.is_some());
+    let (kind, of_others) = match work {
+        Input::Poses(..) => ("a plan of poses", vec![experiments, tasks]),
+        Input::Experiments(..) => ("a plan of experiments", vec![pose_seconds, check, tasks]),
+        Input::Command(_) => ("a command", vec![experiments, pose_seconds]),
+    };
+    if let Some((option, _)) = of_others.iter().find(|(_, given)| *given) {
+        bail!("{option} does not apply to {kind}");
     }
     let max_array_size = match (Slurm.max_array_size(), args.dry_run) {
         (Ok(size), _) => size,
@@ -171,9 +214,9 @@ fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()>
     let folder = ClusterFolder::create(&args.out)?;
     let _lock = folder.lock()?;
     let recorded = Submission::read(&folder.submission())?;
-    let mut submission = submission(args, &plan, &folder, recorded)?;
+    let mut submission = submission(args, &work, &folder, recorded)?;
     folder.create_results(&submission.work)?;
-    let scripts = Scripts::new(&folder, &submission, program)?;
+    let scripts = Scripts::new(&folder, &submission, &program)?;
     for (path, text) in [
         (folder.task_script(&submission.work), &scripts.task),
         (folder.last_script(&submission.work), &scripts.last),
@@ -195,13 +238,17 @@ fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()>
     let report = ClusterReport::of(&folder, &submission, &queue)?;
     let mut lost = report.lost();
     if args.check {
-        lost.extend(damaged(&folder, &report)?);
+        lost.extend(damaged(&folder, &report, &submission.work, args.dry_run)?);
         lost.sort_unstable();
+        lost.dedup();
     }
     let chunks = split(&lost, max_array_size);
     let arrays = task_commands(&folder, &submission, &chunks)?;
-    let needs_last =
-        !lost.is_empty() || matches!(report.merge.state, ShardState::Failed | ShardState::Missing);
+    // Outputs of a command are the user's once they are written.
+    let is_over =
+        matches!(submission.work, Work::Histories(_)) && report.merge.state == ShardState::Done;
+    let has_no_last = matches!(report.merge.state, ShardState::Failed | ShardState::Missing);
+    let needs_last = !is_over && (!lost.is_empty() || has_no_last);
     let last = match needs_last {
         true => Some(last_command(&folder, &submission.work)?),
         false => None,
@@ -210,6 +257,8 @@ fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()>
         folder: args.out.clone(),
         shards: submission.work.tasks(),
         poses: SubmittedPoses::of(&submission.work),
+        histories: SubmittedHistories::of(&submission.work),
+        task: submission.work.task_name(),
         max_array_size,
         dry_run: args.dry_run,
         submitted: lost,
@@ -247,15 +296,34 @@ fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()>
     output.print(&submitted, describe)
 }
 
-/// Shards that are done and whose files are not as they were made.
-fn damaged(folder: &ClusterFolder, report: &ClusterReport) -> anyhow::Result<Vec<u64>> {
+/// Tasks without a job whose files are not as they were made. Damaged tallies are renamed, but not in a dry run.
+fn damaged(
+    folder: &ClusterFolder,
+    report: &ClusterReport,
+    work: &Work,
+    dry_run: bool,
+) -> anyhow::Result<Vec<u64>> {
     let mut damaged = Vec::new();
-    let shards = report.shards.iter();
-    for shard in shards.filter(|shard| shard.report.state == ShardState::Done) {
-        let found = check(&folder.shard(shard.shard))?;
-        if let Some(problem) = found.problems.first() {
-            let number = shard.shard;
-            stderr::note(&format!("shard {number} is made again: {problem}"));
+    for shard in report
+        .shards
+        .iter()
+        .filter(|shard| shard.report.job.is_none())
+    {
+        let number = shard.shard;
+        let problem = match work {
+            Work::Histories(_) => damaged_tally(&folder.part(number), !dry_run)?,
+            // A shard that is not done is made again anyway.
+            _ if shard.report.state != ShardState::Done => None,
+            Work::Poses(_) | Work::Trainings(_) => {
+                let found = check(&folder.shard(number))?;
+                found.problems.first().map(ToString::to_string)
+            }
+        };
+        if let Some(problem) = problem {
+            stderr::note(&format!(
+                "{} {number} is made again: {problem}",
+                work.task_name()
+            ));
             damaged.push(number);
         }
     }
@@ -303,13 +371,10 @@ fn cancel_waiting_last(queue: &[QueuedJob]) -> anyhow::Result<()> {
 
 fn describe(submitted: &Submitted) -> String {
     let out = submitted.folder.display();
-    let tasks = |n: usize| match submitted.poses {
-        Some(_) => count(n, "shard"),
-        None => count(n, "training"),
-    };
+    let tasks = |n: usize| count(n, submitted.task);
     let all = tasks(submitted.shards as usize);
-    let mut lines = vec![match &submitted.poses {
-        Some(poses) => {
+    let mut lines = vec![match (&submitted.poses, &submitted.histories) {
+        (Some(poses), _) => {
             let source = match poses.cost_source {
                 CostSource::Measured => "measured on one pose of the first limb",
                 CostSource::Given => "as --pose-seconds says",
@@ -325,14 +390,24 @@ fn describe(submitted: &Submitted) -> String {
                 poses.cpu_s_per_unit,
             )
         }
-        None => format!("{out}: {all}, each a task"),
+        (None, Some(histories)) => {
+            let measured = histories.cpu_s_per_million;
+            let measured = measured.map_or(String::new(), |cpu_s| {
+                format!("; {cpu_s:.2} s of processor time a million, measured")
+            });
+            format!(
+                "{out}: {:.4e} histories in {all}{measured}",
+                histories.histories as f64
+            )
+        }
+        (None, None) => format!("{out}: {all}, each a task"),
     }];
     let new = tasks(submitted.submitted.len());
     match (submitted.jobs.is_empty(), submitted.dry_run) {
-        (true, _) => lines.push(match submitted.poses {
-            Some(_) => "nothing to submit: each shard is made or has a job".to_owned(),
-            None => "nothing to submit: each training is finished or has a job".to_owned(),
-        }),
+        (true, _) => lines.push(format!(
+            "nothing to submit: each {} is finished or has a job",
+            submitted.task
+        )),
         (false, true) => {
             lines.push(format!(
                 "not submitted: {new}; arrays have fewer than {} tasks; JOBn is the number that command n prints",

@@ -50,6 +50,18 @@ fn parts_and_resumed_runs_end_in_the_bytes_of_one_run() {
             > report["detector_air_kerma_ugy_per_mas"].as_f64()
     );
 
+    // The fast engine states the same kerma, and that of its tube load.
+    let case = phantom().join("p01.toml");
+    let fast = format!(
+        "xray simulate {} --plan plan.toml --mas 2 --out fast.png --json",
+        case.display()
+    );
+    let fast: Value = serde_json::from_str(&succeed(folder, &fast)).unwrap();
+    let per_mas = &report["entrance_air_kerma_ugy_per_mas"];
+    assert_eq!(&fast["entrance_air_kerma_ugy_per_mas"], per_mas);
+    let (ugy, per_mas) = (fast["entrance_air_kerma_ugy"].as_f64(), per_mas.as_f64());
+    assert!((ugy.unwrap() / (2.0 * per_mas.unwrap()) - 1.0).abs() < 1e-9);
+
     for part in ["2/3", "1/3", "3/3"] {
         let name = part.replace('/', "of");
         simulate(

@@ -1,12 +1,12 @@
-//! The plan to submit, and its division into tasks.
+//! The plan or command to submit, and its division into tasks.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use ppa_cluster::{
-    ClusterFolder, CostSource, ExperimentTrainings, PoseCost, PoseWork, Submission, TaskSettings,
-    TimeLimit, TrainingWork, Work, bundle,
+    ClusterFolder, CostSource, ExperimentTrainings, PoseCost, PoseWork, Program, Submission,
+    TaskSettings, TimeLimit, TrainingWork, Work, bundle,
 };
 use ppa_core::text::count;
 use ppa_dataset::files::{remove_if_there, sha256_of_file};
@@ -14,47 +14,66 @@ use ppa_generate::{Plan, forecast};
 use ppa_learn::experiment::{Experiment, ExperimentPlan, Runner};
 
 use super::SlurmArgs;
+use super::histories::HistoriesInput;
 use crate::interrupt::{Interrupt, NOTHING_WRITTEN};
 use crate::output::working;
 
 /// Shortest time limit of a training, seconds: each start reads all images, and Slurm sends TERM three minutes before the limit.
 const SHORTEST_S: u64 = 10 * 60;
 
-/// A plan of poses, or of experiments.
-pub enum AnyPlan {
-    Poses(Box<Plan>),
-    Experiments(Box<ExperimentPlan>),
+/// A plan of poses or of experiments, with the path of its file, or a command that follows histories.
+pub enum Input {
+    Poses(PathBuf, Box<Plan>),
+    Experiments(PathBuf, Box<ExperimentPlan>),
+    Command(Box<HistoriesInput>),
 }
 
-impl AnyPlan {
-    pub fn read(path: &Path) -> anyhow::Result<Self> {
+impl Input {
+    pub fn read(args: &SlurmArgs, program: &Program) -> anyhow::Result<Self> {
+        let Some(path) = &args.plan else {
+            let command = HistoriesInput::read(&args.command, program.sha256)?;
+            return Ok(Self::Command(Box::new(command)));
+        };
         Ok(match ExperimentPlan::is_in(path) {
-            true => Self::Experiments(Box::new(ExperimentPlan::read(path)?)),
-            false => Self::Poses(Box::new(Plan::read(path)?)),
+            true => Self::Experiments(path.clone(), Box::new(ExperimentPlan::read(path)?)),
+            false => Self::Poses(path.clone(), Box::new(Plan::read(path)?)),
         })
     }
-
-    fn write(&self, path: &Path) -> anyhow::Result<()> {
-        match self {
-            Self::Poses(plan) => plan.write(path)?,
-            Self::Experiments(plan) => plan.write(path)?,
-        }
-        Ok(())
-    }
 }
 
-/// The submission of a plan, as it was divided before or is divided now; writes the plan into the folder.
+/// The submission of a plan or command, as it was divided before or is divided now; writes a plan into the folder.
 pub fn submission(
     args: &SlurmArgs,
-    plan: &AnyPlan,
+    input: &Input,
     folder: &ClusterFolder,
     recorded: Option<Submission>,
 ) -> anyhow::Result<Submission> {
     let settings = settings(args, recorded.as_ref().map(|recorded| &recorded.settings));
     // Beside its place, since a plan names cases from there.
     let copy = folder.slurm().join(".new.plan.toml");
-    plan.write(&copy)?;
-    let made = divided(args, plan, &copy, folder, recorded, settings);
+    let path = match input {
+        Input::Poses(path, plan) => {
+            plan.write(&copy)?;
+            path
+        }
+        Input::Experiments(path, plan) => {
+            plan.write(&copy)?;
+            path
+        }
+        Input::Command(command) => {
+            let sha256 = sha256_of_file(&command.input)?;
+            let source = Source {
+                path: &command.input,
+                sha256,
+            };
+            return divided(args, input, source, folder, recorded, settings);
+        }
+    };
+    let source = Source {
+        path,
+        sha256: sha256_of_file(&copy)?,
+    };
+    let made = divided(args, input, source, folder, recorded, settings);
     let placed = made.and_then(|made| {
         std::fs::rename(&copy, folder.plan())
             .with_context(|| format!("cannot write {}", folder.plan().display()))?;
@@ -67,25 +86,53 @@ pub fn submission(
     placed
 }
 
+/// The file that must not change between tasks.
+struct Source<'a> {
+    path: &'a Path,
+    /// Of the copy of a plan, or of the file itself.
+    sha256: String,
+}
+
 fn divided(
     args: &SlurmArgs,
-    plan: &AnyPlan,
-    copy: &Path,
+    input: &Input,
+    source: Source,
     folder: &ClusterFolder,
     recorded: Option<Submission>,
     settings: TaskSettings,
 ) -> anyhow::Result<Submission> {
-    let sha256 = sha256_of_file(copy)?;
+    let Source { path, sha256 } = source;
+    let what = match input {
+        Input::Command(_) => "file",
+        Input::Poses(..) | Input::Experiments(..) => "plan",
+    };
     if let Some(mut kept) = recorded
         .as_ref()
         .filter(|recorded| recorded.submitted)
         .cloned()
     {
+        let is_same_kind = matches!(
+            (&kept.work, input),
+            (Work::Poses(_), Input::Poses(..))
+                | (Work::Trainings(_), Input::Experiments(..))
+                | (Work::Histories(_), Input::Command(_))
+        );
+        ensure!(
+            is_same_kind,
+            "{} holds other work, {} of {}: choose another --out",
+            folder.root().display(),
+            count(kept.work.tasks(), kept.work.task_name()),
+            kept.plan.display()
+        );
+        if let (Work::Histories(work), Input::Command(command)) = (&kept.work, input) {
+            command.check_same(work, args.tasks, &settings)?;
+        }
         ensure!(
             kept.plan_sha256 == sha256,
-            "{} differs from the plan that was submitted, {}: undo the edit, or choose another --out",
-            args.plan.display(),
-            folder.plan().display()
+            "{} differs from the {} that was submitted to {}: undo the edit, or choose another --out",
+            path.display(),
+            what,
+            folder.root().display()
         );
         match &kept.work {
             Work::Trainings(work) => {
@@ -109,22 +156,27 @@ fn divided(
                 );
                 bundle(work.poses, work.cost, settings.cpus, settings.time)?;
             }
+            Work::Histories(_) => {}
         }
         kept.settings = settings;
         return Ok(kept);
     }
     let known = recorded.filter(|recorded| recorded.plan_sha256 == sha256);
-    let work = match plan {
-        AnyPlan::Poses(plan) => {
+    let work = match input {
+        Input::Poses(_, plan) => {
             let known = known.as_ref().map(|known| &known.work);
             Work::Poses(poses(args, plan, folder, known, &settings)?)
         }
-        AnyPlan::Experiments(plan) => {
+        Input::Experiments(_, plan) => {
             check_time(&settings)?;
             Work::Trainings(trainings(plan, &args.experiments, folder)?)
         }
+        Input::Command(command) => {
+            let known = known.as_ref().map(|known| &known.work);
+            Work::Histories(command.divided(args.tasks, known, &settings)?)
+        }
     };
-    let mut first = Submission::new(args.plan.clone(), sha256, work, settings);
+    let mut first = Submission::new(path.to_owned(), sha256, work, settings);
     // Scripts of a dry run are known as such.
     first.scripts = known.map(|known| known.scripts).unwrap_or_default();
     Ok(first)

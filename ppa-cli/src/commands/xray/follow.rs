@@ -11,6 +11,7 @@ use ppa_xray::{
     AnalogRun, AnalogSettings, AnalogTally, DoseSettings, Part, Stop, Stopped, VoxelBox,
 };
 
+use super::divisible::refuse_given;
 use crate::interrupt::Interrupt;
 use crate::output::bar;
 use crate::output_files::{OutputFiles, ReplaceArgs, require_room};
@@ -127,6 +128,49 @@ impl AnalogArgs {
             .map(|(_, name)| name)
     }
 
+    /// Refuses options that a command whose histories are divided cannot have.
+    pub fn refuse_undividable(&self) -> anyhow::Result<()> {
+        refuse_given(&[
+            ("--time", self.time.is_some()),
+            ("--target-error", self.target_error.is_some()),
+            ("--part", self.part.is_some()),
+            ("--tally", self.tally.is_some()),
+            ("--resume", self.resume),
+        ])
+    }
+
+    /// Histories to follow at most, of those that `--histories` asks for.
+    pub fn histories(&self, given: Option<f64>) -> anyhow::Result<u64> {
+        match given {
+            Some(histories) => whole_number(histories),
+            None if self.stop()? == Stop::default() => Ok(AnalogSettings::default().histories),
+            None => Ok(AnalogSettings::MOST_HISTORIES),
+        }
+    }
+
+    /// The run of an exposure, with the doses that are asked for.
+    pub fn run<'a>(
+        &self,
+        exposure: &'a PosedExposure,
+        histories: u64,
+        seed: u64,
+    ) -> anyhow::Result<AnalogRun<'a>> {
+        let settings = AnalogSettings::default()
+            .with_histories(histories)
+            .with_seed(seed);
+        let ExposableLimb {
+            phantom, spectrum, ..
+        } = exposure.limb;
+        let phantom = phantom.phantom();
+        let run = AnalogRun::new(phantom, spectrum, &exposure.projection, &settings)?;
+        if !self.dose && self.dose_map.is_none() {
+            return Ok(run);
+        }
+        let whole = VoxelBox::whole(phantom.grid());
+        let voxels = self.dose_map.is_some().then_some(whole);
+        Ok(run.with_dose(&DoseSettings::default().with_voxels(voxels))?)
+    }
+
     /// Follows photons under a progress bar. Ctrl-C and TERM keep what was counted and end the command.
     pub fn follow(
         &self,
@@ -136,24 +180,7 @@ impl AnalogArgs {
         destination: &TallyDestination,
     ) -> anyhow::Result<AnalogTally> {
         let stop = self.stop()?;
-        let settings = AnalogSettings::default()
-            .with_histories(match histories {
-                Some(histories) => whole_number(histories)?,
-                None if stop == Stop::default() => AnalogSettings::default().histories,
-                None => AnalogSettings::MOST_HISTORIES,
-            })
-            .with_seed(seed);
-        let ExposableLimb {
-            phantom, spectrum, ..
-        } = exposure.limb;
-        let phantom = phantom.phantom();
-        let mut run = AnalogRun::new(phantom, spectrum, &exposure.projection, &settings)?;
-        if self.dose || self.dose_map.is_some() {
-            let whole = VoxelBox::whole(phantom.grid());
-            run = run.with_dose(
-                &DoseSettings::default().with_voxels(self.dose_map.is_some().then_some(whole)),
-            )?;
-        }
+        let run = self.run(exposure, self.histories(histories)?, seed)?;
         let mut tally = self.start(&run, destination)?;
         let interrupt = Interrupt::listen()?;
         let bar = bar("following photons");

@@ -8,11 +8,15 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use indicatif::ProgressBar;
-use ppa_xray::mcgpu::{RunLength, Scan, ScanDose, Simulation, Station};
-use ppa_xray::{CategorySums, Engine, FastSettings, Imparted, Radiograph, fast};
+use ppa_cluster::HistoryCost;
+use ppa_core::Part;
+use ppa_xray::mcgpu::{RunLength, Scan, ScanDose, ScanPart, Simulation, Station};
+use ppa_xray::{AnalogSettings, CategorySums, Engine, FastSettings, Imparted, Radiograph, fast};
 use serde::Serialize;
 
+use super::divisible::{Divisible, MEASURE, refuse_given};
 use super::follow::SAVE_EVERY;
+use super::mcgpu_part::follow_part;
 use super::simulate::EngineName;
 use crate::interrupt::Interrupt;
 use crate::output::{Output, Seconds, Stopwatch, working};
@@ -35,6 +39,12 @@ pub struct McgpuArgs {
     /// folder keeps what is simulated; the same command resumes from it
     #[arg(long)]
     out: PathBuf,
+    /// Follow only part k of n of the histories of each projection; --out gets tallies for --merge, no images
+    #[arg(long, value_name = "K/N")]
+    part: Option<Part>,
+    /// Take the histories from these folders of --part, all of them, and follow none
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "part")]
+    merge: Vec<PathBuf>,
     #[command(flatten)]
     replace: ReplaceArgs,
 }
@@ -75,17 +85,19 @@ struct MaterialDose {
 
 pub fn run(args: &McgpuArgs, output: Output) -> anyhow::Result<()> {
     let working = working("reading the input files");
-    let mut simulation = Simulation::read(&args.input)?;
-    if let Some(seed) = args.seed {
-        simulation.set_seed(seed);
-    }
+    let simulation = args.read()?;
     let length = args.length(simulation.input().run_length)?;
     let stations = simulation.input().stations();
-    anyhow::ensure!(
-        !stations.is_empty(),
-        "{}: no projection has an angle of interest",
-        args.input.display()
-    );
+    if let Some(part) = args.part {
+        let histories = args.histories(length, "--part")?;
+        let scan_part = ScanPart {
+            histories,
+            part,
+            folder: &args.out,
+            replace: args.replace.is_given(),
+        };
+        return follow_part(&simulation, &scan_part, output);
+    }
     let scan = args.start(&simulation, length)?;
     let written = scan.written();
     args.declare(&simulation, &stations, &scan, &written)?;
@@ -162,6 +174,10 @@ impl McgpuArgs {
             let which = format!("projection {} of {}", index + 1, stations.len());
             working.set_message(which.clone());
             let simulated = match self.engine {
+                _ if !self.merge.is_empty() => {
+                    let histories = self.histories(scan.length(station), "--merge")?;
+                    Some(simulation.merge_parts(station, histories, &self.merge)?)
+                }
                 EngineName::Analog => scan.analog(station, SAVE_EVERY, |progress| {
                     if let Some(left) = progress.remaining {
                         working.set_message(format!("{which}, {:.0} s left", left.as_secs_f64()));
@@ -231,6 +247,61 @@ impl McgpuArgs {
         require_room(&self.out, LEAST_PIXEL_BYTES * pixels * missing as u64)
     }
 
+    /// The histories of this command, to be divided.
+    pub fn divisible(&self) -> anyhow::Result<Divisible> {
+        refuse_given(&[
+            ("--part", self.part.is_some()),
+            ("--merge", !self.merge.is_empty()),
+        ])?;
+        let simulation = self.read()?;
+        let length = self.length(simulation.input().run_length)?;
+        let histories = self.histories(length, "a division into tasks")?;
+        Ok(Divisible {
+            input: self.input.clone(),
+            histories,
+            projections: simulation.input().stations().len() as u64,
+        })
+    }
+
+    /// Refuses outputs that could not be written in the end.
+    pub fn check_outputs(&self) -> anyhow::Result<()> {
+        let simulation = self.read()?;
+        let length = self.length(simulation.input().run_length)?;
+        let scan = self.start(&simulation, length)?;
+        let stations = simulation.input().stations();
+        self.declare(&simulation, &stations, &scan, &scan.written())
+    }
+
+    /// Processor time of its histories, measured on some of the first projection.
+    pub fn cost(&self) -> anyhow::Result<HistoryCost> {
+        let watch = Stopwatch::start();
+        let simulation = self.read()?;
+        let stations = simulation.input().stations();
+        let station = (stations.first()).expect("read refuses a scan without projections");
+        let preparation_cpu_s = watch.read().cpu_s;
+        let length = RunLength::Seconds(MEASURE.as_secs_f64());
+        let (radiograph, _) = simulation.analog(station, length, |_| ControlFlow::Continue(()))?;
+        let follow_cpu_s = watch.read().cpu_s - preparation_cpu_s;
+        Ok(HistoryCost {
+            million_cpu_s: follow_cpu_s * 1e6 / radiograph.histories,
+            preparation_cpu_s,
+        })
+    }
+
+    /// Reads the input file and all that it names; it has a projection.
+    fn read(&self) -> anyhow::Result<Simulation> {
+        let mut simulation = Simulation::read(&self.input)?;
+        if let Some(seed) = self.seed {
+            simulation.set_seed(seed);
+        }
+        anyhow::ensure!(
+            !simulation.input().stations().is_empty(),
+            "{}: no projection has an angle of interest",
+            self.input.display()
+        );
+        Ok(simulation)
+    }
+
     fn engine(&self) -> Engine {
         match self.engine {
             EngineName::Analog => Engine::Analog,
@@ -247,6 +318,27 @@ impl McgpuArgs {
             "--histories is {histories}, expected 1 to 1e15"
         );
         Ok(RunLength::Histories(histories as u64))
+    }
+
+    /// The histories of each projection for an option that needs their number, and the analog engine.
+    fn histories(&self, length: RunLength, option: &str) -> anyhow::Result<u64> {
+        anyhow::ensure!(
+            matches!(self.engine, EngineName::Analog),
+            "{option} needs --engine analog"
+        );
+        match length {
+            RunLength::Histories(histories) if histories <= AnalogSettings::MOST_HISTORIES => {
+                Ok(histories)
+            }
+            RunLength::Histories(histories) => anyhow::bail!(
+                "{histories} histories of each projection, expected at most {:e} for the analog engine",
+                AnalogSettings::MOST_HISTORIES as f64
+            ),
+            RunLength::Seconds(_) => anyhow::bail!(
+                "{} limits the time of a run; {option} needs --histories",
+                self.input.display()
+            ),
+        }
     }
 
     fn fast(

@@ -1,14 +1,20 @@
 //! `ppa xray`: radiographs, spectra and materials.
 
 mod audit;
+mod divisible;
 mod follow;
 mod materials;
 mod mcgpu;
+mod mcgpu_part;
 mod merge;
 mod pictures;
 mod report;
 mod simulate;
 mod spectrum;
+
+pub use divisible::Divisible;
+pub use mcgpu::McgpuArgs;
+pub use simulate::SimulateArgs;
 
 use clap::{Args, Subcommand};
 use ppa_generate::XraySettings;

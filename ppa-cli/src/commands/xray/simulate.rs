@@ -5,14 +5,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::{Args, ValueEnum};
+use ppa_cluster::HistoryCost;
+use ppa_core::Part;
 use ppa_ct::write_nifti;
 use ppa_generate::{Case, ExposableLimb, Plan, Table, spectrum};
 use ppa_scene::Contact;
-use ppa_xray::TubeLoad;
+use ppa_xray::{Stop, TubeLoad};
 use serde::Serialize;
 
 use super::BeamArgs;
-use super::follow::AnalogArgs;
+use super::divisible::{Divisible, MEASURE};
+use super::follow::{AnalogArgs, TallyDestination};
 use super::pictures::PictureArgs;
 use super::report::Report;
 use crate::commands::technique::TechniqueArgs;
@@ -79,50 +82,109 @@ struct Simulated {
     contact: Contact,
 }
 
-pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
-    if matches!(args.engine, EngineName::Fast)
-        && let Some(option) = args.analog.given()
-    {
-        anyhow::bail!("{option} needs --engine analog");
+impl SimulateArgs {
+    /// Declares all outputs, and says where the histories of the analog engine are kept.
+    fn declare(&self) -> anyhow::Result<Option<TallyDestination>> {
+        if matches!(self.engine, EngineName::Fast)
+            && let Some(option) = self.analog.given()
+        {
+            anyhow::bail!("{option} needs --engine analog");
+        }
+        // A resumed run replaces the images of the one before.
+        let mut outputs = self.replace.or(self.analog.goes_on()).outputs();
+        outputs.optional("--out", self.out.as_ref(), &[".png"])?;
+        outputs.optional("--exr", self.exr.as_ref(), &[".exr"])?;
+        self.pictures.declare(&mut outputs)?;
+        let images = [&self.out, &self.exr, &self.pictures.dicom];
+        let image = images.into_iter().flatten().next().map(PathBuf::as_path);
+        Ok(match self.engine {
+            EngineName::Fast => None,
+            EngineName::Analog => Some(self.analog.declare(&mut outputs, image, self.replace)?),
+        })
     }
-    // A resumed run replaces the images of the one before.
-    let mut outputs = args.replace.or(args.analog.goes_on()).outputs();
-    outputs.optional("--out", args.out.as_ref(), &[".png"])?;
-    outputs.optional("--exr", args.exr.as_ref(), &[".exr"])?;
-    args.pictures.declare(&mut outputs)?;
-    let images = [&args.out, &args.exr, &args.pictures.dicom];
-    let image = images.into_iter().flatten().next().map(PathBuf::as_path);
-    let destination = match args.engine {
-        EngineName::Fast => None,
-        EngineName::Analog => Some(args.analog.declare(&mut outputs, image, args.replace)?),
-    };
-    let mut plan = match &args.plan {
-        Some(path) => Plan::read(path)?,
-        None => Plan::new(Vec::new()),
-    };
-    args.technique.apply(&mut plan.xray);
-    args.beam.apply(&mut plan.xray);
-    plan.xray.analog = None; // --engine decides.
-    let given = args.mas.map(TubeLoad::Mas);
-    let given = given.or(args.aec.map(TubeLoad::ExposureIndex));
-    if let Some(load) = &given {
+
+    /// The plan with what the command line changes.
+    fn plan(&self) -> anyhow::Result<Plan> {
+        let mut plan = match &self.plan {
+            Some(path) => Plan::read(path)?,
+            None => Plan::new(Vec::new()),
+        };
+        self.technique.apply(&mut plan.xray);
+        self.beam.apply(&mut plan.xray);
+        plan.xray.analog = None; // --engine decides.
+        let given = self.mas.map(TubeLoad::Mas);
+        let given = given.or(self.aec.map(TubeLoad::ExposureIndex));
+        if let Some(load) = &given {
+            anyhow::ensure!(
+                matches!(self.engine, EngineName::Fast),
+                "--mas and --aec need --engine fast: analog histories are followed one by one"
+            );
+            load.check()?;
+        }
+        plan.xray.tube_load = given.or(plan.xray.tube_load);
+        if let (EngineName::Fast, Some(histories)) = (self.engine, self.histories) {
+            plan.xray.engine.dose_histories = histories;
+            plan.xray.tube_load = None;
+        }
+        Ok(plan)
+    }
+
+    fn limb(&self, case: &Case, plan: &Plan) -> anyhow::Result<ExposableLimb> {
+        let prepared = prepared(case, &self.case)?;
+        let table = Arc::new(Table::of_plan(plan)?);
+        let spectrum = Arc::new(spectrum(&plan.xray)?);
+        Ok(ExposableLimb::new(prepared, plan, table, spectrum)?)
+    }
+
+    /// The histories of this command, to be divided.
+    pub fn divisible(&self) -> anyhow::Result<Divisible> {
         anyhow::ensure!(
-            matches!(args.engine, EngineName::Fast),
-            "--mas and --aec need --engine fast: analog histories are followed one by one"
+            matches!(self.engine, EngineName::Analog),
+            "only analog histories can be divided into tasks: give --engine analog"
         );
-        load.check()?;
+        self.analog.refuse_undividable()?;
+        self.plan()?;
+        Case::read(&self.case)?;
+        Ok(Divisible {
+            input: self.case.clone(),
+            histories: self.analog.histories(self.histories)?,
+            projections: 1,
+        })
     }
-    plan.xray.tube_load = given.or(plan.xray.tube_load);
-    if let (EngineName::Fast, Some(histories)) = (args.engine, args.histories) {
-        plan.xray.engine.dose_histories = histories;
-        plan.xray.tube_load = None;
+
+    /// Refuses outputs that could not be written in the end.
+    pub fn check_outputs(&self) -> anyhow::Result<()> {
+        self.declare().map(|_| ())
     }
+
+    /// Processor time of its histories, measured on some.
+    pub fn cost(&self) -> anyhow::Result<HistoryCost> {
+        let watch = Stopwatch::start();
+        let limb = self.limb(&Case::read(&self.case)?, &self.plan()?)?;
+        let exposure = limb.pose(self.angle.to_radians())?;
+        let histories = self.analog.histories(self.histories)?;
+        let run = self.analog.run(&exposure, histories, self.seed)?;
+        let mut tally = run.tally(Part::WHOLE);
+        let preparation_cpu_s = watch.read().cpu_s;
+        let stop = Stop {
+            time: Some(MEASURE),
+            ..Stop::default()
+        };
+        run.follow(&mut tally, &stop, |_, _| ControlFlow::Continue(()));
+        let follow_cpu_s = watch.read().cpu_s - preparation_cpu_s;
+        Ok(HistoryCost {
+            million_cpu_s: follow_cpu_s * 1e6 / tally.done().end as f64,
+            preparation_cpu_s,
+        })
+    }
+}
+
+pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
+    let destination = args.declare()?;
+    let plan = args.plan()?;
     let case = Case::read(&args.case)?;
     let working = working("preparing the limb");
-    let prepared = prepared(&case, &args.case)?;
-    let table = Arc::new(Table::of_plan(&plan)?);
-    let spectrum = Arc::new(spectrum(&plan.xray)?);
-    let limb = ExposableLimb::new(prepared, &plan, table, spectrum)?;
+    let limb = args.limb(&case, &plan)?;
     let exposure = limb.pose(args.angle.to_radians())?;
 
     working.set_message("following photons");
@@ -172,9 +234,12 @@ pub fn run(args: &SimulateArgs, output: Output) -> anyhow::Result<()> {
         written.push(path);
     }
     working.finish_and_clear();
+    let kerma =
+        (limb.phantom).entrance_air_kerma_gy_per_history(&limb.spectrum, &exposure.projection)?;
     let index = radiograph.exposure_index(&exposure.projection.receptor)?;
     let result = Simulated {
         report: Report::new(&radiograph, dose.as_ref(), seconds)
+            .with_entrance_kerma(&radiograph, kerma)
             .with_exposure_index(index, args.pictures.target_exposure_index(&plan.xray)),
         contact: exposure.placement.contact,
     };

@@ -1,0 +1,96 @@
+//! A command line of `ppa xray` whose histories are divided.
+
+use clap::Parser;
+use ppa_cluster::{HistoryCommand, HistoryCost};
+
+use crate::commands::xray::{Divisible, McgpuArgs, SimulateArgs, XrayCommand};
+use crate::stderr::in_one_line;
+
+/// A command of `ppa xray` that follows histories.
+pub enum DivisibleCommand {
+    Simulate(Box<SimulateArgs>),
+    Mcgpu(McgpuArgs),
+}
+
+/// The command line behind `ppa`.
+#[derive(Debug, Parser)]
+#[command(name = "xray", disable_help_subcommand = true)]
+struct CommandLine {
+    #[command(subcommand)]
+    command: XrayCommand,
+}
+
+impl DivisibleCommand {
+    /// Parses the words of a command line behind `ppa`.
+    pub fn parse(words: &[String]) -> anyhow::Result<Self> {
+        anyhow::ensure!(
+            !words.iter().any(|word| word == "--"),
+            "the command after -- contains another --"
+        );
+        let parsed = CommandLine::try_parse_from(words)
+            .map_err(|error| anyhow::anyhow!("in the command after --: {}", in_one_line(&error)));
+        match (words.first().map(String::as_str), parsed) {
+            (Some("xray"), Ok(CommandLine { command })) => match command {
+                XrayCommand::Simulate(args) => return Ok(Self::Simulate(args)),
+                XrayCommand::Mcgpu(args) => return Ok(Self::Mcgpu(args)),
+                _ => {}
+            },
+            (Some("xray"), Err(error)) => return Err(error),
+            _ => {}
+        }
+        anyhow::bail!(
+            "the command after -- is \"{}\", expected xray simulate or xray mcgpu",
+            words.join(" ")
+        )
+    }
+
+    /// Which command it is.
+    pub fn kind(&self) -> HistoryCommand {
+        match self {
+            Self::Simulate(_) => HistoryCommand::Simulate,
+            Self::Mcgpu(_) => HistoryCommand::Mcgpu,
+        }
+    }
+
+    /// Its options that concern outputs only: those with a value, and those without.
+    pub fn output_options(&self) -> (&'static [&'static str], &'static [&'static str]) {
+        match self {
+            Self::Simulate(_) => (
+                &[
+                    "--out",
+                    "--exr",
+                    "--dicom",
+                    "--dose-map",
+                    "--protocol",
+                    "--target-exposure-index",
+                ],
+                &["--replace", "--for-processing", "--autoscale"],
+            ),
+            Self::Mcgpu(_) => (&["--out"], &["--replace"]),
+        }
+    }
+
+    /// Its histories.
+    pub fn divisible(&self) -> anyhow::Result<Divisible> {
+        match self {
+            Self::Simulate(args) => args.divisible(),
+            Self::Mcgpu(args) => args.divisible(),
+        }
+    }
+
+    /// Refuses outputs that could not be written in the end.
+    pub fn check_outputs(&self) -> anyhow::Result<()> {
+        match self {
+            Self::Simulate(args) => args.check_outputs(),
+            Self::Mcgpu(args) => args.check_outputs(),
+        }
+    }
+
+    /// Processor time of its histories, measured on some.
+    pub fn cost(&self) -> anyhow::Result<HistoryCost> {
+        match self {
+            Self::Simulate(args) => args.cost(),
+            Self::Mcgpu(args) => args.cost(),
+        }
+    }
+}

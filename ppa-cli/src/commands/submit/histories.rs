@@ -1,0 +1,206 @@
+//! A command whose histories are divided into tasks.
+
+use std::fs;
+use std::num::NonZeroU64;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+use ppa_cluster::{HistoryCost, HistoryWork, TaskSettings, Work, divide_histories};
+use ppa_core::text::count;
+use ppa_xray::{AnalogTally, TallyError};
+
+use super::divisible_command::DivisibleCommand;
+use crate::cluster_report::tallies;
+use crate::commands::xray::Divisible;
+use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
+use crate::output::working;
+
+/// A command that follows histories, checked.
+pub struct HistoriesInput {
+    /// Absolute path of its case or input file.
+    pub input: PathBuf,
+    command: DivisibleCommand,
+    words: Vec<String>,
+    outputs: Vec<String>,
+    folder: PathBuf,
+    histories: u64,
+    projections: u64,
+    program_sha256: String,
+}
+
+impl HistoriesInput {
+    /// Parses the words of a command line behind `ppa`, and looks at what they name.
+    pub fn read(all_words: &[String], program_sha256: &str) -> anyhow::Result<Self> {
+        let command = DivisibleCommand::parse(all_words)?;
+        let (words, outputs) = without_outputs(all_words, command.output_options());
+        let Divisible {
+            input,
+            histories,
+            projections,
+        } = command.divisible()?;
+        Ok(Self {
+            input: std::path::absolute(&input)
+                .with_context(|| format!("cannot find {}", input.display()))?,
+            command,
+            words,
+            outputs,
+            folder: std::env::current_dir().context("cannot find the current folder")?,
+            histories,
+            projections,
+            program_sha256: program_sha256.to_owned(),
+        })
+    }
+
+    /// The division into parts: as given, known from a dry run, or by the time of histories that are followed now.
+    pub fn divided(
+        &self,
+        tasks: Option<NonZeroU64>,
+        known: Option<&Work>,
+        settings: &TaskSettings,
+    ) -> anyhow::Result<HistoryWork> {
+        self.command.check_outputs()?;
+        let known = known.and_then(|known| match known {
+            Work::Histories(work) if self.is_same_command(work) => Some((work.parts, work.cost)),
+            _ => None,
+        });
+        let (parts, cost) = match (tasks, known) {
+            (Some(tasks), _) => (tasks.get(), None),
+            (None, Some((parts, None))) => (parts, None),
+            (None, known) => {
+                let cost = match known.and_then(|(_, cost)| cost) {
+                    Some(cost) => cost,
+                    None => self.measured()?,
+                };
+                let all = self.histories.saturating_mul(self.projections);
+                let parts = divide_histories(all, cost, settings.cpus, settings.time)?;
+                (parts.min(self.histories), Some(cost))
+            }
+        };
+        ensure!(
+            parts <= self.histories,
+            "{parts} tasks are more than {} histories",
+            self.histories
+        );
+        Ok(HistoryWork {
+            command: self.command.kind(),
+            words: self.words.clone(),
+            outputs: self.outputs.clone(),
+            folder: self.folder.clone(),
+            histories: self.histories,
+            projections: self.projections,
+            parts,
+            program_sha256: self.program_sha256.clone(),
+            cost,
+        })
+    }
+
+    fn measured(&self) -> anyhow::Result<HistoryCost> {
+        let _stoppable = ends_at_once(NOTHING_WRITTEN)?;
+        let working = working("measuring histories");
+        let cost = self.command.cost()?;
+        working.finish_and_clear();
+        Ok(cost)
+    }
+
+    /// Refuses another command than the one that was submitted, and what would make parts that do not fit together.
+    pub fn check_same(
+        &self,
+        submitted: &HistoryWork,
+        tasks: Option<NonZeroU64>,
+        settings: &TaskSettings,
+    ) -> anyhow::Result<()> {
+        ensure!(
+            self.is_same_command(submitted),
+            "the command differs from the one that was submitted, ppa {} {}: choose another --out",
+            submitted.words.join(" "),
+            submitted.outputs.join(" ")
+        );
+        ensure!(
+            self.folder == submitted.folder,
+            "the command was submitted from {}, where its paths start: repeat it there, or choose another --out",
+            submitted.folder.display()
+        );
+        ensure!(
+            self.program_sha256 == submitted.program_sha256,
+            "ppa is not the program that was submitted, and tallies of two programs do not fit together: choose another --out"
+        );
+        ensure!(
+            tasks.is_none_or(|tasks| tasks.get() == submitted.parts),
+            "the histories are divided into {} already, which --tasks cannot change; choose another --out",
+            count(submitted.parts, "part")
+        );
+        if let Some(cost) = submitted.cost {
+            let all = submitted.all_histories();
+            divide_histories(all, cost, settings.cpus, settings.time)?;
+        }
+        Ok(())
+    }
+
+    fn is_same_command(&self, other: &HistoryWork) -> bool {
+        self.words == other.words
+            && self.outputs == other.outputs
+            && (self.histories, self.projections) == (other.histories, other.projections)
+    }
+}
+
+/// The first damaged tally of a part, as a sentence; damaged tallies are renamed if `rename` is set, since their task would resume them.
+pub fn damaged_tally(part: &Path, rename: bool) -> anyhow::Result<Option<String>> {
+    let mut first = None;
+    for tally in tallies(part) {
+        let error = match AnalogTally::read(&tally) {
+            Ok(_) => continue,
+            Err(
+                error @ (TallyError::Damaged { .. }
+                | TallyError::Size { .. }
+                | TallyError::Foreign { .. }),
+            ) => error,
+            Err(error) => return Err(error.into()),
+        };
+        if rename {
+            let mut names = (1..).map(|n| tally.with_extension(format!("tally.damaged{n}")));
+            let free = names.find(|name| !name.exists()).expect("a free name");
+            fs::rename(&tally, &free)
+                .with_context(|| format!("cannot rename {}", tally.display()))?;
+        }
+        first.get_or_insert(error.to_string());
+    }
+    Ok(first)
+}
+
+/// Words of a command line without those that name outputs, and these; options are given with and without a value.
+fn without_outputs(
+    words: &[String],
+    (options, flags): (&[&str], &[&str]),
+) -> (Vec<String>, Vec<String>) {
+    let (mut others, mut outputs) = (Vec::new(), Vec::new());
+    let mut words = words.iter();
+    while let Some(word) = words.next() {
+        let name = word.split_once('=').map_or(&**word, |(name, _)| name);
+        let is_option = options.contains(&name);
+        match is_option || flags.contains(&&**word) {
+            true => outputs.push(word.clone()),
+            false => others.push(word.clone()),
+        }
+        if is_option && name == word {
+            outputs.extend(words.next().cloned());
+        }
+    }
+    (others, outputs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outputs_are_found_with_and_without_equals_sign() {
+        let words =
+            |text: &str| -> Vec<String> { text.split_whitespace().map(str::to_owned).collect() };
+        let (others, outputs) = without_outputs(
+            &words("xray simulate --out a.png leg.toml --exr=a.exr --replace --angle -3"),
+            (&["--out", "--exr"], &["--replace"]),
+        );
+        assert_eq!(others, words("xray simulate leg.toml --angle -3"));
+        assert_eq!(outputs, words("--out a.png --exr=a.exr --replace"));
+    }
+}

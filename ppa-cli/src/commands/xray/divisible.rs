@@ -1,0 +1,27 @@
+//! Commands whose histories `ppa submit` divides into tasks.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// How long histories are followed to measure their time.
+pub(super) const MEASURE: Duration = Duration::from_secs(3);
+
+/// The histories of a command.
+pub struct Divisible {
+    /// Its case or input file.
+    pub input: PathBuf,
+    /// Histories of each projection.
+    pub histories: u64,
+    /// Projections; 1 of a radiograph.
+    pub projections: u64,
+}
+
+/// Refuses the first option that is given though `ppa submit` gives it to tasks, or it depends on all histories.
+pub(super) fn refuse_given(options: &[(&str, bool)]) -> anyhow::Result<()> {
+    match options.iter().find(|(_, given)| *given) {
+        Some((option, _)) => anyhow::bail!(
+            "{option} cannot be given for a command whose histories ppa submit divides"
+        ),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,193 @@
+//! What the job scripts of each kind of work run.
+
+use std::fmt::Write;
+
+use crate::error::FolderError;
+use crate::folder::{DONE, FINISHED, PARTS, TALLY};
+use crate::histories::{HistoryCommand, HistoryWork};
+use crate::quote::{shell_quoted, unicode};
+use crate::submission::TrainingWork;
+
+/// What differs between scripts.
+pub(crate) struct ScriptBody {
+    /// What the script does, in a sentence.
+    pub title: String,
+    /// Shell variables: the number of the task, and Slurm's name of the job.
+    pub number: &'static str,
+    /// The work.
+    pub run: String,
+}
+
+/// Variables of a task of the array, and of the last job.
+const OF_TASK: &str = "number=$(($1 + SLURM_ARRAY_TASK_ID))\n\
+                       task=${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID}\n";
+const OF_LAST: &str = "task=$SLURM_JOB_ID\n";
+
+/// The scripts of the shards of a plan.
+pub(crate) fn of_poses(shards: u64, cpus: u32) -> (ScriptBody, ScriptBody) {
+    let task = ScriptBody {
+        title: format!("Makes one shard of {shards}: argument 1 plus the index of the task."),
+        number: OF_TASK,
+        run: format!(
+            "# The shard is given: indices of the array are not those of the shards.\n\
+             run env -u SLURM_ARRAY_TASK_ID \"$ppa\" --threads {cpus} generate slurm/plan.toml \\\n    \
+             --shard \"$number/{shards}\" --out \"shards/$number\" --progress plain\n"
+        ),
+    };
+    let last = ScriptBody {
+        title: format!("Merges {shards} shards and verifies the dataset."),
+        number: OF_LAST,
+        run: format!(
+            "# This job starts after all tasks, failed ones included: the merge refuses shards that are missing.\n\
+             missing=\n\
+             shards=()\n\
+             for ((shard = 1; shard <= {shards}; shard++)); do\n    \
+             [ -d \"shards/$shard/.ppa\" ] || missing+=\" $shard\"\n    \
+             shards+=(\"shards/$shard\")\n\
+             done\n\
+             if [ -n \"$missing\" ]; then\n    \
+             echo \"no dataset: these shards were never begun:$missing\"\n    \
+             exit 1\n\
+             fi\n\
+             run \"$ppa\" --threads {cpus} merge \"${{shards[@]}}\" --out dataset --progress plain\n\
+             run \"$ppa\" --threads {cpus} verify dataset --plan slurm/plan.toml --progress plain\n\
+             : >{DONE}\n"
+        ),
+    };
+    (task, last)
+}
+
+/// The scripts of the trainings of experiments.
+pub(crate) fn of_trainings(work: &TrainingWork, cpus: u32) -> (ScriptBody, ScriptBody) {
+    let all = work.trainings().count();
+    let mut choice = String::new();
+    let mut before = 0;
+    for one in &work.experiments {
+        let (experiment, count) = (&one.experiment, one.trainings.len());
+        let word = if before == 0 { "if" } else { "elif" };
+        let _ = write!(
+            choice,
+            "{word} [ \"$number\" -le {} ]; then\n    \
+             experiment={experiment} part=$((number - {before}))/{count}\n",
+            before + count
+        );
+        before += count;
+    }
+    let task = ScriptBody {
+        title: format!("Makes one training of {all}: argument 1 plus the index of the task."),
+        number: OF_TASK,
+        run: format!(
+            "{choice}fi\n\
+             # A training that others need is made by the first of them; the others wait for it.\n\
+             run env -u SLURM_ARRAY_TASK_ID \"$ppa\" --threads {cpus} experiment \"$experiment\" slurm/plan.toml \\\n    \
+             --shard \"$part\" --out runs\n"
+        ),
+    };
+    let needed = work.needed.iter().map(String::as_str);
+    let folders: Vec<&str> = needed.chain(work.trainings()).collect();
+    let count = folders.len();
+    let folders: String = folders.iter().map(|name| format!("{name}\n")).collect();
+    let names = work.experiments.iter().map(|one| one.experiment.as_str());
+    let names = names.collect::<Vec<_>>().join(" ");
+    let last = ScriptBody {
+        title: format!("Writes the tables of {all} trainings."),
+        number: OF_LAST,
+        run: format!(
+            "# This job starts after all tasks, failed ones included. It trains nothing itself.\n\
+             missing=()\n\
+             while read -r training; do\n    \
+             [ -f \"runs/$training/{FINISHED}\" ] || missing+=(\"$training\")\n\
+             done <<'END'\n\
+             {folders}END\n\
+             if [ ${{#missing[@]}} -gt 0 ]; then\n    \
+             echo \"no tables: ${{#missing[@]}} of {count} trainings are not finished, such as ${{missing[0]}}\"\n    \
+             exit 1\n\
+             fi\n\
+             for experiment in {names}; do\n    \
+             run \"$ppa\" --threads {cpus} experiment \"$experiment\" slurm/plan.toml --out runs --replace\n\
+             done\n\
+             run \"$ppa\" --threads {cpus} experiment report slurm/plan.toml --runs runs --out experiments.html --replace\n\
+             : >{DONE}\n"
+        ),
+    };
+    (task, last)
+}
+
+/// The scripts of the parts of a command that follows histories.
+pub(crate) fn of_histories(
+    work: &HistoryWork,
+    cpus: u32,
+) -> Result<(ScriptBody, ScriptBody), FolderError> {
+    let parts = work.parts;
+    let quoted = |words: &[String]| -> String {
+        let words = words.iter().map(|word| shell_quoted(word));
+        words.collect::<Vec<_>>().join(" ")
+    };
+    let (words, outputs) = (quoted(&work.words), quoted(&work.outputs));
+    let enter = format!(
+        "# Paths of the command start from the folder that it was submitted from.\n\
+         jobs=$PWD\n\
+         cd {} || exit 1\n",
+        shell_quoted(unicode(&work.folder)?)
+    );
+    let named = |option: &str| {
+        let mut words = work.outputs.iter();
+        words.any(|word| word == option || word.starts_with(&format!("{option}=")))
+    };
+    // Voxels are counted where their dose is asked for; the map of a part alone is not kept.
+    let dose_map = match named("--dose-map") {
+        true => [
+            "--dose-map \"$part/dose_map.nii\"",
+            "rm -f \"$part/dose_map.nii\"\n",
+        ],
+        false => ["", ""],
+    };
+    let followed = match work.command {
+        HistoryCommand::Simulate => {
+            format!("--tally \"$part/{TALLY}\" --resume {}", dose_map[0])
+        }
+        HistoryCommand::Mcgpu => "--out \"$part\"".to_owned(),
+    };
+    let task = ScriptBody {
+        title: format!("Follows one part of {parts}: argument 1 plus the index of the task."),
+        number: OF_TASK,
+        run: format!(
+            "{enter}\
+             part=$jobs/{PARTS}/$number\n\
+             mkdir -p \"$part\" || exit 1\n\
+             {}\
+             run \"$ppa\" --threads {cpus} {words} \\\n    \
+             --part \"$number/{parts}\" {}\n\
+             {}",
+            dose_map[1],
+            followed.trim_end(),
+            dose_map[1]
+        ),
+    };
+    let merged = match work.command {
+        HistoryCommand::Simulate => format!(
+            "run \"$ppa\" --threads {cpus} xray merge \"${{parts[@]/%//{TALLY}}}\" --tally \"$jobs/{TALLY}\" --replace\n\
+             # All histories are in the tally: none is followed.\n\
+             run \"$ppa\" --threads {cpus} {words} {outputs} \\\n    \
+             --tally \"$jobs/{TALLY}\" --resume\n"
+        ),
+        HistoryCommand::Mcgpu => {
+            format!("run \"$ppa\" --threads {cpus} {words} {outputs} --merge \"${{parts[@]}}\"\n")
+        }
+    };
+    let last = ScriptBody {
+        title: format!("Merges {parts} parts and writes the results."),
+        number: OF_LAST,
+        run: format!(
+            "# This job starts after all tasks, failed ones included: the merge refuses parts that are missing.\n\
+             {enter}\
+             parts=()\n\
+             for ((part = 1; part <= {parts}; part++)); do\n    \
+             parts+=(\"$jobs/{PARTS}/$part\")\n\
+             done\n\
+             {merged}\
+             : >\"$jobs/{DONE}\"\n"
+        ),
+    };
+    Ok((task, last))
+}
