@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Point3};
 use ppa_dataset::BodyShape;
 use ppa_dataset::layout::View;
-use ppa_depth::{Body, Camera, DepthImage, PlacedBody, WallDepth};
+use ppa_depth::{Body, Camera, DepthImage, PlacedBody, Roi, WallDepth, roi_around};
 use ppa_scene::Placement;
 
 use crate::closed_skin::closed_skin;
@@ -24,6 +24,8 @@ pub struct DepthView {
     pub camera: Camera,
     /// The limb in the room; depths in mm, 0 where nothing is seen.
     pub image: DepthImage,
+    /// Square around the joint, as in `roi_depth.json`; none where it is not in the image.
+    pub region: Option<Roi>,
 }
 
 /// A limb with its skin as in the scan, ready to be rendered in any pose.
@@ -38,6 +40,9 @@ pub struct PosedSkin {
     body: Arc<Body>,
     room_from_body: Isometry3<f64>,
     cut_faces: WallDepth,
+    joint_in_room: Point3<f64>,
+    /// Side of the square around the joint, mm.
+    region_mm: f64,
 }
 
 impl VisibleLimb {
@@ -67,18 +72,21 @@ impl VisibleLimb {
         let PreparedLimb {
             limb, landmarks, ..
         } = &*self.prepared;
+        let room_from_ct = placement.room_from_patient * landmarks.patient_from_ct();
+        let room_from_ct = *room_from_ct.isometry();
         let (body, room_from_body) = if placement.flattening.is_some() {
             let in_room = placement.in_room(&limb.walls.vertices(&limb.mesh), landmarks);
             let body = closed_skin(&in_room, &limb.mesh, &limb.walls)?;
             (Arc::new(body), Isometry3::identity())
         } else {
-            let room_from_ct = placement.room_from_patient * landmarks.patient_from_ct();
-            (self.rigid.clone(), *room_from_ct.isometry())
+            (self.rigid.clone(), room_from_ct)
         };
         Ok(PosedSkin {
             body,
             room_from_body,
             cut_faces: plan.depth.cut_faces,
+            joint_in_room: room_from_ct * Point3::from(landmarks.joint_centre),
+            region_mm: plan.depth.roi_mm,
         })
     }
 
@@ -114,7 +122,9 @@ impl PosedSkin {
             body: &self.body,
             camera_from_body: placed.camera_from_room * self.room_from_body,
         };
+        let joint = placed.camera_from_room * self.joint_in_room;
         Ok(DepthView {
+            region: roi_around(&placed.camera, &joint, self.region_mm).ok(),
             view: placed.view,
             camera: placed.camera.clone(),
             image: depth_image(BodyShape::Orig, body, placed, seed, self.cut_faces)?.image,

@@ -43,6 +43,9 @@ pub enum StudioError {
     /// A split of a dataset.
     #[error(transparent)]
     Split(#[from] ppa_dataset::SplitError),
+    /// Networks that cannot be used.
+    #[error(transparent)]
+    Network(#[from] ppa_learn::frames::FramesError),
     /// The built-in phantom.
     #[error("the built-in phantom cannot be written")]
     Phantom(#[source] Box<dyn std::error::Error + Send + Sync>),

@@ -10,6 +10,7 @@ mod false_colours;
 mod generation;
 mod guard;
 mod limb;
+mod network;
 mod newest;
 mod opening;
 mod page;
@@ -28,6 +29,7 @@ mod token;
 mod what_if;
 
 pub use error::StudioError;
+pub use network::Networks;
 pub use opening::Opening;
 pub use server::serve;
 pub use studio::Studio;

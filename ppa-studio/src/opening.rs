@@ -13,6 +13,7 @@ use ppa_phantom::{LowerLeg, TableTop};
 use ppa_scene::{LandmarkOverrides, Side};
 
 use crate::error::StudioError;
+use crate::network::Networks;
 
 /// What to open.
 #[derive(Debug, Clone, Default)]
@@ -21,6 +22,8 @@ pub struct Opening {
     pub path: Option<PathBuf>,
     /// Side of the limb, for a scan.
     pub side: Option<Side>,
+    /// Networks that judge the poses.
+    pub networks: Option<Networks>,
 }
 
 /// Folder of the phantom that is opened when nothing is given, in the current one.
@@ -34,7 +37,7 @@ impl Opening {
     pub fn of(path: &Path) -> Self {
         Self {
             path: Some(path.to_owned()),
-            side: None,
+            ..Self::default()
         }
     }
 

@@ -13,6 +13,7 @@ use serde::Serialize;
 use crate::desk::Shown;
 use crate::error::StudioError;
 use crate::false_colours::side_by_side;
+use crate::network::{Network, NetworkAnswer};
 use crate::newest::Ticket;
 use crate::what_if::WhatIf;
 
@@ -50,6 +51,9 @@ pub(crate) struct DepthReport {
     pub valid_pixels: Vec<usize>,
     /// First and last depth of the colours, mm.
     pub range_mm: [f64; 2],
+    /// What networks say of them, if any are open.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub network: Option<NetworkAnswer>,
 }
 
 /// A radiograph for viewing.
@@ -63,6 +67,8 @@ pub(crate) struct RadiographPicture {
 pub(crate) struct RadiographReport {
     pub exposure_index: Option<f64>,
     pub mas: Option<f64>,
+    /// Incident air kerma at the skin, µGy.
+    pub entrance_air_kerma_ugy: Option<f64>,
     pub contact: Contact,
 }
 
@@ -92,23 +98,26 @@ impl Scenes {
         Ok(setup)
     }
 
-    /// What both cameras see.
+    /// What both cameras see, and what networks say of it.
     pub fn depth(
         &self,
         shown: &Shown,
         plan: &Plan,
         what_if: &WhatIf,
+        network: Option<&Network>,
     ) -> Result<DepthPicture, StudioError> {
         let plan = what_if.plan(plan)?;
         let setup = self.setup(&plan)?;
         let views = (shown.limb).depth_views(&setup, &plan, what_if.angle_deg, plan.seed)?;
         let images: Vec<&DepthImage> = views.iter().map(|view| &view.image).collect();
         let (picture, range_mm) = side_by_side(&images);
+        let answer = network.map(|network| network.answer(shown.case.side, &views));
         Ok(DepthPicture {
             png: png(DynamicImage::ImageRgb8(picture))?,
             report: DepthReport {
                 valid_pixels: images.iter().map(|image| image.valid_pixels()).collect(),
                 range_mm,
+                network: answer,
             },
         })
     }
@@ -148,11 +157,14 @@ impl Scenes {
             ppa_xray::TransportError::Cancelled => StudioError::Superseded,
             error => error.into(),
         })?;
+        let kerma = phantom.entrance_air_kerma_gy_per_history(spectrum, projection)?;
+        let kerma_ugy = kerma.map(|gray| 1e6 * gray * radiograph.histories);
         Ok(RadiographPicture {
             png: radiograph_png(&radiograph, &plan.xray)?,
             report: RadiographReport {
                 exposure_index: radiograph.exposure_index(&projection.receptor)?,
                 mas: radiograph.mas().filter(|mas| mas.is_finite()),
+                entrance_air_kerma_ugy: kerma_ugy.filter(|ugy| ugy.is_finite()),
                 contact: exposure.placement.contact,
             },
         })

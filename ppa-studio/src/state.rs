@@ -11,6 +11,7 @@ use crate::desk::Desk;
 use crate::error::StudioError;
 use crate::generation::Generation;
 use crate::limb::Limb;
+use crate::network::Network;
 use crate::newest::Newest;
 use crate::opening::Opening;
 use crate::plan_file::PlanFile;
@@ -39,6 +40,8 @@ pub(crate) struct State {
     pub quality: Newest,
     /// The check of all images under way.
     pub check: Newest,
+    /// Networks that judge the poses, if there are any.
+    pub network: Option<Network>,
     /// The dataset that was opened, if it is one.
     pub opened_dataset: Option<PathBuf>,
     plan: Mutex<Arc<Plan>>,
@@ -49,6 +52,8 @@ pub(crate) struct State {
 impl State {
     /// Opens a scan, a case, a plan or a dataset, and takes up the changes that were saved beside them.
     pub fn open(opening: &Opening) -> Result<Self, StudioError> {
+        // First: what is opened may have to be made.
+        let network = opening.networks.clone().map(Network::open).transpose()?;
         let opened = opening.read()?;
         let plan_file = match (opened.plan_file, &opened.limb) {
             (Some(file), _) => file,
@@ -74,6 +79,7 @@ impl State {
             sheet: Newest::default(),
             quality: Newest::default(),
             check: Newest::default(),
+            network,
             opened_dataset: opened.dataset,
             plan: Mutex::new(Arc::new(plan)),
             plan_file: Mutex::new(plan_file),

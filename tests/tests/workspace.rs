@@ -68,6 +68,7 @@ const ARROWS: &[(&str, &[&str])] = &[
             "ppa-label",
             "ppa-report",
             "ppa-cluster",
+            "ppa-learn",
         ],
     ),
     (

@@ -8,7 +8,7 @@ use std::sync::mpsc::channel;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use ppa_studio::{Opening, Studio, serve};
+use ppa_studio::{Networks, Opening, Studio, serve};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
@@ -24,6 +24,12 @@ pub struct StudioArgs {
     /// Side of the limb; needed for a scan without a case
     #[arg(long, value_enum)]
     side: Option<SideName>,
+    /// After PATH: folders of finished trainings that judge the poses in step 5, of the left and the right camera's network, or of one for both
+    #[arg(long, value_name = "DIR", num_args = 1..=2)]
+    run: Vec<PathBuf>,
+    /// File that `ppa calibrate` wrote for these networks
+    #[arg(long, value_name = "FILE", requires = "run")]
+    confidence: Option<PathBuf>,
     /// Port to listen on [default: a free one]
     #[arg(long, default_value_t = 0, hide_default_value = true)]
     port: u16,
@@ -43,6 +49,22 @@ struct Served {
     address: String,
 }
 
+impl StudioArgs {
+    fn networks(&self) -> anyhow::Result<Option<Networks>> {
+        let (left, right) = match &*self.run {
+            [] => return Ok(None),
+            [left] => (left, None),
+            [left, right] => (left, Some(right)),
+            more => bail!("--run names {} folders, expected one or two", more.len()),
+        };
+        Ok(Some(Networks {
+            left: left.clone(),
+            right: right.cloned(),
+            confidence: self.confidence.clone(),
+        }))
+    }
+}
+
 pub fn run(args: &StudioArgs, output: Output) -> anyhow::Result<()> {
     if !args.bind.is_loopback() {
         const MEANING: &str = "who reaches this address and learns the token, which travels unencrypted, sees the scan, can change case and plan, and make datasets beside the plan";
@@ -60,6 +82,7 @@ pub fn run(args: &StudioArgs, output: Output) -> anyhow::Result<()> {
     let studio = Studio::open(&Opening {
         path: args.path.clone(),
         side: args.side.map(Into::into),
+        networks: args.networks()?,
     })?;
     working.finish_and_clear();
     let mut signals = Signals::new([SIGINT, SIGTERM]).context("cannot listen for Ctrl-C")?;

@@ -19,6 +19,20 @@ const SLIDERS = [
 
 const gutterText = (gutter) => `${gutter.name} gutter ${fixed(100 * gutter.openness, 0)} % open, grade ${fixed(gutter.grade)}`;
 
+const VERDICTS = { yes: "diagnostic", no: "not diagnostic", not_sure: "not sure whether diagnostic" };
+
+// What networks say of the depth images; nothing if none are open.
+function networkText(answer) {
+  if (!answer) return "";
+  if (answer.refused) return `Networks: no answer, since ${answer.refused}`;
+  const { quality, left, right, interval, diagnostic, correction_deg } = answer.prediction;
+  const parts = [VERDICTS[diagnostic ?? (quality < 2.5 ? "yes" : "no")]];
+  if (interval) parts.push(`interval ${fixed(interval[0])} to ${fixed(interval[1])}`);
+  if (left !== undefined) parts.push(`left camera ${fixed(left)}`, `right camera ${fixed(right)}`);
+  if (correction_deg !== undefined) parts.push(`best after ${fixed(Math.abs(correction_deg), 0)}° more of ${correction_deg < 0 ? "lateral" : "medial"} rotation`);
+  return `Networks ${fixed(quality)}: ${parts.join(", ")}`;
+}
+
 export class WhatIfPanel {
   constructor(store, actions) {
     this.store = store;
@@ -151,6 +165,7 @@ export class WhatIfPanel {
     try {
       const { picture, report } = await postPicture("depth", whatIf);
       await this.put("depth", picture);
+      byId("network").textContent = networkText(report.network);
       const ms = Math.round(performance.now() - started);
       byId("depth").querySelector("figcaption").textContent =
         `left and right camera, ${fixed(report.range_mm[0], 0)} (red) to ${fixed(report.range_mm[1], 0)} mm or more (blue), ${ms} ms`;
@@ -200,6 +215,7 @@ export class WhatIfPanel {
   showReport(pass, report, seconds) {
     const parts = [`${pass} image in ${fixed(seconds)} s`];
     if (report.mas) parts.push(`${fixed(report.mas, 2)} mAs`);
+    if (report.entrance_air_kerma_ugy) parts.push(`${fixed(report.entrance_air_kerma_ugy, 0)} µGy at the skin`);
     if (report.exposure_index) parts.push(`exposure index ${fixed(report.exposure_index, 0)}`);
     byId("radiograph").querySelector("figcaption").textContent = parts.join(", ");
     byId("radiograph").dataset.pass = pass;

@@ -24,7 +24,8 @@ pub(super) async fn depth(
     let made = work(state, move |state| {
         let _turn = state.depth.turn(&ticket)?;
         let limb = state.limb()?;
-        limb.scenes.depth(&limb.shown(), &state.plan(), &what_if)
+        let network = state.network.as_ref();
+        (limb.scenes).depth(&limb.shown(), &state.plan(), &what_if, network)
     })
     .await?;
     Ok(picture(made.png, &made.report))

@@ -106,7 +106,13 @@ impl Browser {
     }
 
     pub fn of(folder: TempDir, case: PathBuf) -> Self {
-        let studio = Studio::open(&Opening::of(&case)).unwrap();
+        Self::opened(folder, &Opening::of(&case))
+    }
+
+    /// A case with what else is to be opened.
+    pub fn opened(folder: TempDir, opening: &Opening) -> Self {
+        let case = opening.path.clone().unwrap();
+        let studio = Studio::open(opening).unwrap();
         let router = studio.router();
         let runtime = tokio::runtime::Runtime::new().unwrap();
         let address = studio.address(HOST.parse().unwrap());

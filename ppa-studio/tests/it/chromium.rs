@@ -65,7 +65,11 @@ impl Page {
 
     /// A scan, case, plan or dataset in a folder.
     pub async fn of(folder: TempDir, path: &Path) -> Self {
-        let studio = Studio::open(&Opening::of(path)).unwrap();
+        Self::opened(folder, &Opening::of(path)).await
+    }
+
+    pub async fn opened(folder: TempDir, opening: &Opening) -> Self {
+        let studio = Studio::open(opening).unwrap();
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = studio.address(listener.local_addr().unwrap());
         let (stop, stopped) = channel();

@@ -99,6 +99,7 @@ fn a_radiograph_is_first_coarse_and_then_whole() {
     assert_eq!(picture(&last).dimensions(), (448, 448));
     let report = last.headers["x-report"].to_str().unwrap();
     assert!(report.contains("\"mas\":4.0"), "{report}");
+    assert!(report.contains("\"entrance_air_kerma_ugy\":"), "{report}");
     assert_eq!(
         browser.post("/api/radiograph/best", &what_if).status,
         StatusCode::NOT_FOUND

@@ -6,6 +6,7 @@ mod dataset;
 mod edits;
 mod generation;
 mod images;
+mod networks;
 mod page;
 mod page_access;
 mod page_dataset;

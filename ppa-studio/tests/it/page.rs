@@ -2,9 +2,12 @@
 
 use fantoccini::Locator;
 use ppa_generate::Case;
+use ppa_studio::Opening;
 use serde_json::json;
 
+use crate::browser::fine_phantom;
 use crate::chromium::{Page, run};
+use crate::networks::networks;
 
 #[test]
 #[ignore = "needs chromium and chromedriver"]
@@ -110,8 +113,15 @@ fn the_skin_follows_the_iso_value() {
 #[ignore = "needs chromium and chromedriver"]
 fn images_follow_the_sliders_and_the_newest_wins() {
     run(async {
-        let page = Page::open().await;
+        let folder = tempfile::tempdir().unwrap();
+        let opening = Opening {
+            networks: Some(networks()),
+            ..Opening::of(&fine_phantom(folder.path()))
+        };
+        let page = Page::opened(folder, &opening).await;
         page.click("#tab-whatif").await;
+        page.wait("/^Networks -?[0-9.]+: .*left camera/.test(document.getElementById('network').textContent)")
+            .await;
         page.wait("document.querySelector('#radiograph').dataset.pass === 'final'")
             .await;
         page.wait("!!document.querySelector('#depth img').src")

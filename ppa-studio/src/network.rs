@@ -1,0 +1,104 @@
+//! What trained networks say of the pose that is shown.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use ppa_core::{Roi, Side};
+use ppa_generate::DepthView;
+use ppa_learn::DeviceName;
+use ppa_learn::data::Raster;
+use ppa_learn::frames::{FramesError, PairPrediction, PairPredictor};
+use ppa_learn::train::TrainError;
+use serde::Serialize;
+
+use crate::error::StudioError;
+
+/// The networks of both cameras, as `ppa predict` takes them.
+#[derive(Debug, Clone, Default)]
+pub struct Networks {
+    /// Folder of the finished training of the left camera's network, or of one network of both cameras.
+    pub left: PathBuf,
+    /// Folder of the right camera's network, if it has one of its own.
+    pub right: Option<PathBuf>,
+    /// File of `ppa calibrate` for these networks.
+    pub confidence: Option<PathBuf>,
+}
+
+/// Networks that are open.
+pub(crate) struct Network {
+    networks: Networks,
+    /// Those for limbs of a side.
+    kept: Mutex<(Side, Arc<PairPredictor>)>,
+}
+
+/// An answer of networks.
+#[derive(Debug, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum NetworkAnswer {
+    /// What they say.
+    Prediction(PairPrediction),
+    /// Why they say nothing.
+    Refused(String),
+}
+
+impl Network {
+    /// Opens networks.
+    ///
+    /// # Errors
+    /// [`StudioError::Network`] naming the training that cannot be used.
+    pub fn open(networks: Networks) -> Result<Self, StudioError> {
+        let side = Side::Right;
+        let kept = Mutex::new((side, Arc::new(networks.predictor(side)?)));
+        Ok(Self { networks, kept })
+    }
+
+    /// What they say of the depth images of a limb, left camera first.
+    pub fn answer(&self, side: Side, views: &[DepthView]) -> NetworkAnswer {
+        let [left, right] = views else {
+            return NetworkAnswer::Refused(format!("{} cameras, expected two", views.len()));
+        };
+        let (Some(left_region), Some(right_region)) = (left.region, right.region) else {
+            return NetworkAnswer::Refused("a camera does not see the joint".to_owned());
+        };
+        let predicted = self.of_side(side).and_then(|predictor| {
+            let predictor = predictor.with_regions([left_region, right_region]);
+            predictor.predict_images([&raster(left)?, &raster(right)?])
+        });
+        match predicted {
+            Ok(prediction) => NetworkAnswer::Prediction(prediction),
+            Err(error) => NetworkAnswer::Refused(error.to_string()),
+        }
+    }
+
+    fn of_side(&self, side: Side) -> Result<Arc<PairPredictor>, FramesError> {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if kept.0 != side {
+            *kept = (side, Arc::new(self.networks.predictor(side)?));
+        }
+        Ok(kept.1.clone())
+    }
+}
+
+impl Networks {
+    fn predictor(&self, side: Side) -> Result<PairPredictor, FramesError> {
+        // Each pose has regions of its own.
+        let regions = [Roi {
+            x_start: 0,
+            y_start: 0,
+            size: 1,
+        }; 2];
+        let (left, right) = (&self.left, self.right.as_deref());
+        let predictor = PairPredictor::new(left, right, regions, Some(side), DeviceName::Cpu)?;
+        match &self.confidence {
+            Some(file) => predictor.with_confidence(file),
+            None => Ok(predictor),
+        }
+    }
+}
+
+/// A depth image in whole millimetres, as in the files that networks are trained with.
+fn raster(view: &DepthView) -> Result<Raster<u16>, FramesError> {
+    let rounded = view.image.to_u16();
+    let (width, height) = (rounded.width as usize, rounded.height as usize);
+    Ok(Raster::new(width, height, rounded.z_mm).map_err(TrainError::from)?)
+}
