@@ -3,24 +3,37 @@
 # Needs the program ppa on the PATH, an hour and a half of processor time and about 3 GB in FOLDER. What is there is not made again.
 set -eu
 plans=$(cd "$(dirname "$0")" && pwd)
-mkdir -p "$1"
-cd "$1"
 
-# A foot: its name, number and what is special about its phantom and scanner. Odd numbers are right feet, even ones left.
-foot() {
+# Makes the scan and the case of a foot: its name, number and what is special about its phantom and scanner. Odd numbers are right feet,
+# even ones left.
+make_foot() {
     foot=$1; number=$2; shift 2
     side=$([ $((number % 2)) = 1 ] && echo r || echo l)
     # A scan without a case is one whose case was not finished.
-    if [ ! -e "$foot.case.toml" ]; then
-        ppa ct phantom --replace --side "$side" --spacing-mm 1 --table "$@" --out "$foot.nii.gz" --labels "$foot.bones.nii.gz"
-        ppa prepare "$foot.nii.gz" --side "$side" --bones "$foot.bones.nii.gz" --out "$foot.case.toml"
-    fi
-    printf '\n[[case]]\nfile = "%s.case.toml"\npatient = %s\n' "$foot" "$number" >> "$set.toml.part"
+    [ ! -e "$foot.case.toml" ] || return 0
+    ppa ct phantom --replace --side "$side" --spacing-mm 1 --table "$@" --out "$foot.nii.gz" --labels "$foot.bones.nii.gz"
+    ppa prepare "$foot.nii.gz" --side "$side" --bones "$foot.bones.nii.gz" --out "$foot.case.toml"
+}
+if [ "${1:?expected a folder}" = --foot ]; then
+    shift
+    make_foot "$@"
+    exit
+fi
+
+mkdir -p "$1"
+cd "$1"
+
+# A foot of the dataset, with the arguments of make_foot.
+foot() {
+    echo "$*" >> "$set.feet"
+    printf '\n[[case]]\nfile = "%s.case.toml"\npatient = %s\n' "$1" "$2" >> "$set.toml.part"
 }
 
-# A dataset: the plan with the feet that were made, its images and its labels.
-begin() { set=$1; cp "$plans/$set.toml" "$set.toml.part"; }
+# A dataset: the plan with its feet, which are made side by side, one for each processor, and its images.
+begin() { set=$1; cp "$plans/$set.toml" "$set.toml.part"; : > "$set.feet"; }
 finish() {
+    xargs -P "$(getconf _NPROCESSORS_ONLN)" -L 1 "$plans/make_data.sh" --foot < "$set.feet"
+    rm "$set.feet"
     mv "$set.toml.part" "$set.toml"
     [ "$set" = synthetic ] || cp "$plans/$set.rig.json" .
     ppa generate "$set.toml" --out "$set"
