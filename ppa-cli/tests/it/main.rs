@@ -5,6 +5,8 @@ mod bad_geometry;
 mod bad_input;
 mod case_files;
 mod cluster;
+mod cluster_experiments;
+mod cluster_histories;
 mod constants;
 mod conversion;
 mod coverage;

@@ -14,6 +14,7 @@ mod files;
 mod interpolation;
 mod marker;
 mod mcgpu;
+mod mcgpu_scans;
 mod molecular_scatter;
 mod noise_power;
 mod placement;
