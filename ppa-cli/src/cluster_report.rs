@@ -139,7 +139,7 @@ impl ClusterReport {
             all: match work {
                 Work::Poses(work) => work.poses,
                 Work::Trainings(_) => work.tasks(),
-                Work::Histories(work) => work.all_histories(),
+                Work::Histories(work) => work.divided.all_histories(),
             },
             made,
             states,
@@ -258,14 +258,14 @@ impl Found {
     /// By the headers of the tallies of a part. One that cannot be read holds nothing that counts.
     fn histories(part: &Path, work: &HistoryWork) -> Self {
         let tallies = tallies(part).filter_map(|path| AnalogTally::read_histories(&path).ok());
-        let tallies = tallies.filter(|found| found.of_run == work.histories);
+        let tallies = tallies.filter(|found| found.of_run == work.divided.histories);
         let tallies: Vec<_> = tallies.collect();
         let complete = tallies
             .iter()
             .filter(|found| found.done == found.part)
             .count();
         Self {
-            complete: complete as u64 == work.projections,
+            complete: complete as u64 == work.divided.projections,
             begun: part.is_dir(),
             made: tallies
                 .iter()

@@ -8,7 +8,7 @@ use crate::time_limit::TimeLimit;
 const TARGET_S: f64 = 40.0 * 60.0;
 
 /// How much longer than estimated a task may take before it meets its time limit.
-const RESERVE: f64 = 1.5;
+pub(crate) const RESERVE: f64 = 1.5;
 
 /// Slack of the warning before the time limit, for the start of the program and slow disks, seconds. Slurm may warn up to a
 /// minute earlier than asked.

@@ -4,13 +4,11 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use crate::bundle::RESERVE;
 use crate::time_limit::TimeLimit;
 
 /// The time that a task is to take, seconds.
 const TARGET_S: f64 = 30.0 * 60.0;
-
-/// How much longer than estimated a task may take before it meets its time limit.
-const RESERVE: f64 = 1.5;
 
 /// Interval between TERM and the time limit of a task, seconds: histories end within a second, but a tally of many voxels takes
 /// its time to be written, and Slurm may warn up to a minute earlier than asked.
@@ -29,9 +27,21 @@ pub enum HistoryCommand {
 /// A command that follows histories, one part a task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct HistoryWork {
-    /// Which one it is.
+    /// The command.
+    #[serde(flatten)]
+    pub divided: DividedCommand,
+    /// Parts of the histories of each projection, one a task.
+    pub parts: u64,
+    /// Processor time as it was measured; absent where the user gave the number of tasks.
+    pub cost: Option<HistoryCost>,
+}
+
+/// A command line whose histories are divided.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DividedCommand {
+    /// Which command it is.
     pub command: HistoryCommand,
-    /// Its words behind `ppa`, without those in `outputs`.
+    /// Its words after `ppa`, without those in `outputs`.
     pub words: Vec<String>,
     /// The words that name outputs, for the last job only.
     pub outputs: Vec<String>,
@@ -41,15 +51,11 @@ pub struct HistoryWork {
     pub histories: u64,
     /// Projections; 1 of a radiograph.
     pub projections: u64,
-    /// Parts of the histories of each projection, one a task.
-    pub parts: u64,
     /// SHA-256 of the program: tallies of two programs do not fit together.
     pub program_sha256: String,
-    /// Processor time as it was measured; absent where the user gave the number of tasks.
-    pub cost: Option<HistoryCost>,
 }
 
-impl HistoryWork {
+impl DividedCommand {
     /// Histories of all projections.
     pub fn all_histories(&self) -> u64 {
         self.histories.saturating_mul(self.projections)

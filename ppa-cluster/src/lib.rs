@@ -23,7 +23,9 @@ pub use array::{ArrayChunk, index_list, split};
 pub use bundle::{Bundle, BundleError, PoseCost, bundle};
 pub use error::{FolderError, SlurmError};
 pub use folder::{ClusterFolder, FolderLock};
-pub use histories::{HistoriesError, HistoryCommand, HistoryCost, HistoryWork, divide_histories};
+pub use histories::{
+    DividedCommand, HistoriesError, HistoryCommand, HistoryCost, HistoryWork, divide_histories,
+};
 pub use limits::{DEFAULT_MAX_ARRAY_SIZE, max_array_size};
 pub use logs::{last_line, logged_tasks};
 pub use makespan::{ClusterSize, ClusterSizeError, Makespan, makespan};

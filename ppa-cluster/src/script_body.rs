@@ -118,20 +118,20 @@ pub(crate) fn of_histories(
     work: &HistoryWork,
     cpus: u32,
 ) -> Result<(ScriptBody, ScriptBody), FolderError> {
-    let parts = work.parts;
+    let HistoryWork { divided, parts, .. } = work;
     let quoted = |words: &[String]| -> String {
         let words = words.iter().map(|word| shell_quoted(word));
         words.collect::<Vec<_>>().join(" ")
     };
-    let (words, outputs) = (quoted(&work.words), quoted(&work.outputs));
+    let (words, outputs) = (quoted(&divided.words), quoted(&divided.outputs));
     let enter = format!(
         "# Paths of the command start from the folder that it was submitted from.\n\
          jobs=$PWD\n\
          cd {} || exit 1\n",
-        shell_quoted(unicode(&work.folder)?)
+        shell_quoted(unicode(&divided.folder)?)
     );
     let named = |option: &str| {
-        let mut words = work.outputs.iter();
+        let mut words = divided.outputs.iter();
         words.any(|word| word == option || word.starts_with(&format!("{option}=")))
     };
     // Voxels are counted where their dose is asked for; the map of a part alone is not kept.
@@ -142,7 +142,7 @@ pub(crate) fn of_histories(
         ],
         false => ["", ""],
     };
-    let followed = match work.command {
+    let followed = match divided.command {
         HistoryCommand::Simulate => {
             format!("--tally \"$part/{TALLY}\" --resume {}", dose_map[0])
         }
@@ -164,7 +164,7 @@ pub(crate) fn of_histories(
             dose_map[1]
         ),
     };
-    let merged = match work.command {
+    let merged = match divided.command {
         HistoryCommand::Simulate => format!(
             "run \"$ppa\" --threads {cpus} xray merge \"${{parts[@]/%//{TALLY}}}\" --tally \"$jobs/{TALLY}\" --replace\n\
              # All histories are in the tally: none is followed.\n\

@@ -298,7 +298,7 @@ mod tests {
             panic!("histories")
         };
         // The voxels of a dose map are counted by the tasks.
-        work.outputs.push("--dose-map=dose.nii".to_owned());
+        work.divided.outputs.push("--dose-map=dose.nii".to_owned());
         let scripts = Scripts::new(&folder, &submission, &program("ppa")).unwrap();
         assert!(scripts.task.contains("--dose-map \"$part/dose_map.nii\""));
     }

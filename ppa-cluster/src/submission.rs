@@ -221,10 +221,10 @@ impl Submission {
             Work::Trainings(work) if work.trainings().next().is_none() => {
                 Err(unusable("it has no trainings".to_owned()))
             }
-            Work::Histories(work) if !(1..=work.histories).contains(&work.parts) => {
-                let HistoryWork {
-                    parts, histories, ..
-                } = work;
+            Work::Histories(HistoryWork { divided, parts, .. })
+                if !(1..=divided.histories).contains(parts) =>
+            {
+                let histories = divided.histories;
                 Err(unusable(format!(
                     "it has {parts} parts of {histories} histories"
                 )))
@@ -274,7 +274,7 @@ fn sha256(bytes: &[u8]) -> String {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::histories::HistoryCommand;
+    use crate::histories::{DividedCommand, HistoryCommand};
 
     pub(crate) fn settings() -> TaskSettings {
         TaskSettings {
@@ -327,14 +327,16 @@ pub(crate) mod tests {
     pub(crate) fn histories() -> Submission {
         let words = |words: &str| words.split(' ').map(str::to_owned).collect();
         let work = Work::Histories(HistoryWork {
-            command: HistoryCommand::Simulate,
-            words: words("xray simulate leg.toml --engine analog"),
-            outputs: words("--out leg.png"),
-            folder: "/home/a b".into(),
-            histories: 1000,
-            projections: 1,
+            divided: DividedCommand {
+                command: HistoryCommand::Simulate,
+                words: words("xray simulate leg.toml --engine analog"),
+                outputs: words("--out leg.png"),
+                folder: "/home/a b".into(),
+                histories: 1000,
+                projections: 1,
+                program_sha256: "ab".repeat(32),
+            },
             parts: 2,
-            program_sha256: "ab".repeat(32),
             cost: None,
         });
         Submission::new(

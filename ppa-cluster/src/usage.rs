@@ -56,7 +56,7 @@ impl CoreHours {
                 ))
             }
             Work::Histories(work) => work.cost.map(|cost| {
-                let all = (work.all_histories(), work.parts);
+                let all = (work.divided.all_histories(), work.parts);
                 Estimate::of(all, made, cores, |histories, parts| {
                     cost.total_cpu_s(histories, parts)
                 })

@@ -176,7 +176,7 @@ impl SubmittedHistories {
             return None;
         };
         Some(Self {
-            histories: work.all_histories(),
+            histories: work.divided.all_histories(),
             cpu_s_per_million: work.cost.map(|cost| cost.million_cpu_s),
         })
     }

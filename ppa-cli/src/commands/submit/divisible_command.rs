@@ -1,5 +1,6 @@
 //! A command line of `ppa xray` whose histories are divided.
 
+use anyhow::{anyhow, ensure};
 use clap::Parser;
 use ppa_cluster::{HistoryCommand, HistoryCost};
 
@@ -12,7 +13,7 @@ pub enum DivisibleCommand {
     Mcgpu(McgpuArgs),
 }
 
-/// The command line behind `ppa`.
+/// The command line after `ppa`.
 #[derive(Debug, Parser)]
 #[command(name = "xray", disable_help_subcommand = true)]
 struct CommandLine {
@@ -21,27 +22,26 @@ struct CommandLine {
 }
 
 impl DivisibleCommand {
-    /// Parses the words of a command line behind `ppa`.
+    /// Parses the words of a command line after `ppa`.
     pub fn parse(words: &[String]) -> anyhow::Result<Self> {
-        anyhow::ensure!(
+        ensure!(
             !words.iter().any(|word| word == "--"),
             "the command after -- contains another --"
         );
-        let parsed = CommandLine::try_parse_from(words)
-            .map_err(|error| anyhow::anyhow!("in the command after --: {}", in_one_line(&error)));
-        match (words.first().map(String::as_str), parsed) {
-            (Some("xray"), Ok(CommandLine { command })) => match command {
-                XrayCommand::Simulate(args) => return Ok(Self::Simulate(args)),
-                XrayCommand::Mcgpu(args) => return Ok(Self::Mcgpu(args)),
-                _ => {}
-            },
-            (Some("xray"), Err(error)) => return Err(error),
-            _ => {}
+        let other = || {
+            let words = words.join(" ");
+            anyhow!("the command after -- is \"{words}\", expected xray simulate or xray mcgpu")
+        };
+        if words.first().is_none_or(|first| first != "xray") {
+            return Err(other());
         }
-        anyhow::bail!(
-            "the command after -- is \"{}\", expected xray simulate or xray mcgpu",
-            words.join(" ")
-        )
+        let parsed = CommandLine::try_parse_from(words)
+            .map_err(|error| anyhow!("in the command after --: {}", in_one_line(&error)))?;
+        match parsed.command {
+            XrayCommand::Simulate(args) => Ok(Self::Simulate(args)),
+            XrayCommand::Mcgpu(args) => Ok(Self::Mcgpu(args)),
+            _ => Err(other()),
+        }
     }
 
     /// Which command it is.

@@ -5,7 +5,7 @@ use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use ppa_cluster::{HistoryCost, HistoryWork, TaskSettings, Work, divide_histories};
+use ppa_cluster::{DividedCommand, HistoryCost, HistoryWork, TaskSettings, Work, divide_histories};
 use ppa_core::text::count;
 use ppa_xray::{AnalogTally, TallyError};
 
@@ -19,35 +19,33 @@ use crate::output::working;
 pub struct HistoriesInput {
     /// Absolute path of its case or input file.
     pub input: PathBuf,
-    command: DivisibleCommand,
-    words: Vec<String>,
-    outputs: Vec<String>,
-    folder: PathBuf,
-    histories: u64,
-    projections: u64,
-    program_sha256: String,
+    arguments: DivisibleCommand,
+    divided: DividedCommand,
 }
 
 impl HistoriesInput {
-    /// Parses the words of a command line behind `ppa`, and looks at what they name.
+    /// Parses the words of a command line after `ppa`, and reads what they name.
     pub fn read(all_words: &[String], program_sha256: &str) -> anyhow::Result<Self> {
-        let command = DivisibleCommand::parse(all_words)?;
-        let (words, outputs) = without_outputs(all_words, command.output_options());
+        let arguments = DivisibleCommand::parse(all_words)?;
+        let (words, outputs) = without_outputs(all_words, arguments.output_options());
         let Divisible {
             input,
             histories,
             projections,
-        } = command.divisible()?;
+        } = arguments.divisible()?;
         Ok(Self {
             input: std::path::absolute(&input)
                 .with_context(|| format!("cannot find {}", input.display()))?,
-            command,
-            words,
-            outputs,
-            folder: std::env::current_dir().context("cannot find the current folder")?,
-            histories,
-            projections,
-            program_sha256: program_sha256.to_owned(),
+            divided: DividedCommand {
+                command: arguments.kind(),
+                words,
+                outputs,
+                folder: std::env::current_dir().context("cannot find the current folder")?,
+                histories,
+                projections,
+                program_sha256: program_sha256.to_owned(),
+            },
+            arguments,
         })
     }
 
@@ -58,7 +56,7 @@ impl HistoriesInput {
         known: Option<&Work>,
         settings: &TaskSettings,
     ) -> anyhow::Result<HistoryWork> {
-        self.command.check_outputs()?;
+        self.arguments.check_outputs()?;
         let known = known.and_then(|known| match known {
             Work::Histories(work) if self.is_same_command(work) => Some((work.parts, work.cost)),
             _ => None,
@@ -71,25 +69,19 @@ impl HistoriesInput {
                     Some(cost) => cost,
                     None => self.measured()?,
                 };
-                let all = self.histories.saturating_mul(self.projections);
+                let all = self.divided.all_histories();
                 let parts = divide_histories(all, cost, settings.cpus, settings.time)?;
-                (parts.min(self.histories), Some(cost))
+                (parts.min(self.divided.histories), Some(cost))
             }
         };
         ensure!(
-            parts <= self.histories,
+            parts <= self.divided.histories,
             "{parts} tasks are more than {} histories",
-            self.histories
+            self.divided.histories
         );
         Ok(HistoryWork {
-            command: self.command.kind(),
-            words: self.words.clone(),
-            outputs: self.outputs.clone(),
-            folder: self.folder.clone(),
-            histories: self.histories,
-            projections: self.projections,
+            divided: self.divided.clone(),
             parts,
-            program_sha256: self.program_sha256.clone(),
             cost,
         })
     }
@@ -97,7 +89,7 @@ impl HistoriesInput {
     fn measured(&self) -> anyhow::Result<HistoryCost> {
         let _stoppable = ends_at_once(NOTHING_WRITTEN)?;
         let working = working("measuring histories");
-        let cost = self.command.cost()?;
+        let cost = self.arguments.cost()?;
         working.finish_and_clear();
         Ok(cost)
     }
@@ -109,19 +101,20 @@ impl HistoriesInput {
         tasks: Option<NonZeroU64>,
         settings: &TaskSettings,
     ) -> anyhow::Result<()> {
+        let before = &submitted.divided;
         ensure!(
             self.is_same_command(submitted),
             "the command differs from the one that was submitted, ppa {} {}: choose another --out",
-            submitted.words.join(" "),
-            submitted.outputs.join(" ")
+            before.words.join(" "),
+            before.outputs.join(" ")
         );
         ensure!(
-            self.folder == submitted.folder,
+            self.divided.folder == before.folder,
             "the command was submitted from {}, where its paths start: repeat it there, or choose another --out",
-            submitted.folder.display()
+            before.folder.display()
         );
         ensure!(
-            self.program_sha256 == submitted.program_sha256,
+            self.divided.program_sha256 == before.program_sha256,
             "ppa is not the program that was submitted, and tallies of two programs do not fit together: choose another --out"
         );
         ensure!(
@@ -130,16 +123,17 @@ impl HistoriesInput {
             count(submitted.parts, "part")
         );
         if let Some(cost) = submitted.cost {
-            let all = submitted.all_histories();
+            let all = before.all_histories();
             divide_histories(all, cost, settings.cpus, settings.time)?;
         }
         Ok(())
     }
 
+    /// Whether the words and what they ask for are the same; folder and program may differ.
     fn is_same_command(&self, other: &HistoryWork) -> bool {
-        self.words == other.words
-            && self.outputs == other.outputs
-            && (self.histories, self.projections) == (other.histories, other.projections)
+        let (own, other) = (&self.divided, &other.divided);
+        (&own.words, &own.outputs) == (&other.words, &other.outputs)
+            && (own.histories, own.projections) == (other.histories, other.projections)
     }
 }
 

@@ -129,7 +129,7 @@ impl AnalogArgs {
     }
 
     /// Refuses options that a command whose histories are divided cannot have.
-    pub fn refuse_undividable(&self) -> anyhow::Result<()> {
+    pub fn check_divisible(&self) -> anyhow::Result<()> {
         refuse_given(&[
             ("--time", self.time.is_some()),
             ("--target-error", self.target_error.is_some()),

@@ -142,7 +142,7 @@ impl SimulateArgs {
             matches!(self.engine, EngineName::Analog),
             "only analog histories can be divided into tasks: give --engine analog"
         );
-        self.analog.refuse_undividable()?;
+        self.analog.check_divisible()?;
         self.plan()?;
         Case::read(&self.case)?;
         Ok(Divisible {
