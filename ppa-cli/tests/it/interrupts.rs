@@ -114,7 +114,8 @@ fn a_second_ctrl_c_ends_at_once() {
     let began = Instant::now();
     let (code, said) = ended(run);
     assert_eq!((code, said.as_str()), (Some(130), ""));
-    assert!(began.elapsed() < Duration::from_secs(5));
+    // The pose would take minutes.
+    assert!(began.elapsed() < Duration::from_secs(20));
 }
 
 #[test]

@@ -111,10 +111,12 @@ impl Browser {
 
     /// A case with what else is to be opened.
     pub fn opened(folder: TempDir, opening: &Opening) -> Self {
-        let case = opening.path.clone().unwrap();
+        let case = opening.path.clone().unwrap_or_default();
         let studio = Studio::open(opening).unwrap();
         let router = studio.router();
-        let runtime = tokio::runtime::Runtime::new().unwrap();
+        // One thread, so that requests begin in the order in which they are sent.
+        let mut runtime = tokio::runtime::Builder::new_current_thread();
+        let runtime = runtime.enable_all().build().unwrap();
         let address = studio.address(HOST.parse().unwrap());
         let query = address.split_once('?').unwrap().1;
         let enter = request("GET", &format!("/?{query}"), "").header("host", HOST);
