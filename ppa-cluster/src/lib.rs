@@ -10,6 +10,7 @@ mod logs;
 mod makespan;
 mod queue;
 mod quote;
+mod results;
 mod sbatch;
 mod script_body;
 mod scripts;

@@ -6,6 +6,7 @@ use crate::error::FolderError;
 use crate::folder::{DONE, FINISHED, PARTS, TALLY};
 use crate::histories::{HistoryCommand, HistoryWork};
 use crate::quote::{shell_quoted, unicode};
+use crate::results::Results;
 use crate::submission::TrainingWork;
 
 /// What differs between scripts.
@@ -123,7 +124,8 @@ pub(crate) fn of_histories(
         let words = words.iter().map(|word| shell_quoted(word));
         words.collect::<Vec<_>>().join(" ")
     };
-    let (words, outputs) = (quoted(&divided.words), quoted(&divided.outputs));
+    let words = quoted(&divided.words);
+    let results = Results::of(divided);
     let enter = format!(
         "# Paths of the command start from the folder that it was submitted from.\n\
          jobs=$PWD\n\
@@ -168,10 +170,12 @@ pub(crate) fn of_histories(
         HistoryCommand::Simulate => format!(
             "run \"$ppa\" --threads {cpus} xray merge \"${{parts[@]/%//{TALLY}}}\" --tally \"$jobs/{TALLY}\" --replace\n\
              # All histories are in the tally: none is followed.\n\
-             run \"$ppa\" --threads {cpus} {words} {outputs} \\\n    \
-             --tally \"$jobs/{TALLY}\" --resume\n"
+             run \"$ppa\" --threads {cpus} {words} {} \\\n    \
+             --tally \"$jobs/{TALLY}\" --resume\n",
+            results.words
         ),
         HistoryCommand::Mcgpu => {
+            let outputs = &results.words;
             format!("run \"$ppa\" --threads {cpus} {words} {outputs} --merge \"${{parts[@]}}\"\n")
         }
     };
@@ -185,8 +189,11 @@ pub(crate) fn of_histories(
              for ((part = 1; part <= {parts}; part++)); do\n    \
              parts+=(\"$jobs/{PARTS}/$part\")\n\
              done\n\
+             {}\
              {merged}\
-             : >\"$jobs/{DONE}\"\n"
+             {}\
+             : >\"$jobs/{DONE}\"\n",
+            results.before, results.after
         ),
     };
     Ok((task, last))

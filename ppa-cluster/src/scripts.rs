@@ -291,8 +291,10 @@ mod tests {
         let mut submission = histories();
         let scripts = Scripts::new(&folder, &submission, &program("ppa")).unwrap();
         assert!(!scripts.task.contains("leg.png"), "{}", scripts.task);
-        let last = "xray simulate leg.toml --engine analog --out leg.png \\\n";
+        let last = "xray simulate leg.toml --engine analog --out \"$results\"/out/leg.png \\\n";
         assert!(scripts.last.contains(last), "{}", scripts.last);
+        let published = "publish \"$results\"/out/leg.png leg.png\n";
+        assert!(scripts.last.contains(published), "{}", scripts.last);
         assert!(scripts.last.contains("cd '/home/a b' || exit 1\n"));
         let Work::Histories(work) = &mut submission.work else {
             panic!("histories")

@@ -66,8 +66,19 @@ fn a_radiograph_in_tasks_has_the_bytes_of_one_run() {
     assert_eq!(said["submitted"], serde_json::json!([2]));
     let output = run_script(here, "jobs/slurm/part.sh", Some(2));
     assert!(output.status.success(), "{output:?}");
+    // What somebody has put there since stays.
+    let exr = here.join("parts.exr");
+    fs::write(&exr, "of somebody").unwrap();
+    let output = run_script(here, "jobs/slurm/merge.sh", None);
+    assert!(!output.status.success(), "{output:?}");
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(said.contains("parts.exr was created since"), "{said}");
+    assert_eq!(fs::read(&exr).unwrap(), b"of somebody");
+    assert!(!here.join("jobs/slurm/verified").exists());
+    fs::remove_file(&exr).unwrap();
     let output = run_script(here, "jobs/slurm/merge.sh", None);
     assert!(output.status.success(), "{output:?}");
+    assert!(!here.join("jobs/slurm/results").exists());
     for ending in ["png", "exr", "nii", "dcm"] {
         let read = |name: &str| fs::read(here.join(format!("{name}.{ending}"))).unwrap();
         assert!(read("parts") == read("one"), "{ending}");
@@ -132,6 +143,10 @@ fn a_scan_in_tasks_has_the_bytes_of_one_run() {
         let output = run_script(here, "two/slurm/part.sh", Some(task));
         assert!(output.status.success(), "{output:?}");
     }
+    let output = run_script(here, "two/slurm/merge.sh", None);
+    assert!(output.status.success(), "{output:?}");
+    assert!(crate::contents(&here.join("parts")) == crate::contents(&here.join("one")));
+    // As if it had been killed before its last line.
     let output = run_script(here, "two/slurm/merge.sh", None);
     assert!(output.status.success(), "{output:?}");
     assert!(crate::contents(&here.join("parts")) == crate::contents(&here.join("one")));
