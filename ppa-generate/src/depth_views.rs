@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3};
 use ppa_dataset::BodyShape;
-use ppa_dataset::layout::View;
+use ppa_dataset::layout::{LimbId, View};
 use ppa_depth::{Body, Camera, DepthImage, PlacedBody, Roi, WallDepth, roi_around};
+use ppa_mesh::Mesh;
 use ppa_scene::Placement;
 
 use crate::closed_skin::closed_skin;
@@ -14,6 +15,7 @@ use crate::posable_limb::depth_image;
 use crate::pose_error::PoseError;
 use crate::prepared_limb::PreparedLimb;
 use crate::scene_setup::{PlacedCamera, SceneSetup};
+use crate::shaped_skin::body_shape;
 
 /// What one camera sees.
 #[derive(Debug, Clone)]
@@ -28,15 +30,19 @@ pub struct DepthView {
     pub region: Option<Roi>,
 }
 
-/// A limb with its skin as in the scan, ready to be rendered in any pose.
+/// A limb with its skin as in the scan or in another body shape, ready to be rendered in any pose.
 pub struct VisibleLimb {
     prepared: Arc<PreparedLimb>,
+    shape: BodyShape,
+    /// The skin of another body shape.
+    shaped: Option<Mesh>,
     /// The closed skin in the `ct` frame.
     rigid: Arc<Body>,
 }
 
-/// The skin of a placed limb, as in the scan, for any number of cameras.
+/// The skin of a placed limb, for any number of cameras.
 pub struct PosedSkin {
+    shape: BodyShape,
     body: Arc<Body>,
     room_from_body: Isometry3<f64>,
     cut_faces: WallDepth,
@@ -54,7 +60,38 @@ impl VisibleLimb {
         let prepared = prepared.into();
         let (skin, walls) = (&prepared.limb.mesh, &prepared.limb.walls);
         let rigid = Arc::new(closed_skin(&walls.vertices(skin), skin, walls)?);
-        Ok(Self { prepared, rigid })
+        Ok(Self {
+            prepared,
+            shape: BodyShape::Orig,
+            shaped: None,
+            rigid,
+        })
+    }
+
+    /// The same limb in a body shape of a plan's dataset, where it is `limb`.
+    ///
+    /// # Errors
+    /// [`PoseError`] for a skin that has no such shape or cannot be rendered.
+    pub fn with_shape(
+        &self,
+        shape: BodyShape,
+        plan: &Plan,
+        limb: LimbId,
+    ) -> Result<Self, PoseError> {
+        let (skin, walls) = (&self.prepared.limb.mesh, &self.prepared.limb.walls);
+        let (landmarks, settings) = (&self.prepared.landmarks, &plan.shapes);
+        let shaped = body_shape(skin, landmarks, shape, settings, limb, plan.seed)?;
+        let rigid = Arc::new(closed_skin(&walls.vertices(&shaped), &shaped, walls)?);
+        Ok(Self {
+            prepared: self.prepared.clone(),
+            shape,
+            shaped: Some(shaped),
+            rigid,
+        })
+    }
+
+    fn skin(&self) -> &Mesh {
+        self.shaped.as_ref().unwrap_or(&self.prepared.limb.mesh)
     }
 
     /// The limb.
@@ -69,19 +106,19 @@ impl VisibleLimb {
     /// # Errors
     /// [`PoseError`] when the skin cannot be rendered.
     pub fn posed(&self, placement: &Placement, plan: &Plan) -> Result<PosedSkin, PoseError> {
-        let PreparedLimb {
-            limb, landmarks, ..
-        } = &*self.prepared;
+        let (skin, landmarks) = (self.skin(), &self.prepared.landmarks);
         let room_from_ct = placement.room_from_patient * landmarks.patient_from_ct();
         let room_from_ct = *room_from_ct.isometry();
         let (body, room_from_body) = if placement.flattening.is_some() {
-            let in_room = placement.in_room(&limb.walls.vertices(&limb.mesh), landmarks);
-            let body = closed_skin(&in_room, &limb.mesh, &limb.walls)?;
+            let walls = &self.prepared.limb.walls;
+            let in_room = placement.in_room(&walls.vertices(skin), landmarks);
+            let body = closed_skin(&in_room, skin, walls)?;
             (Arc::new(body), Isometry3::identity())
         } else {
             (self.rigid.clone(), room_from_ct)
         };
         Ok(PosedSkin {
+            shape: self.shape,
             body,
             room_from_body,
             cut_faces: plan.depth.cut_faces,
@@ -103,10 +140,16 @@ impl VisibleLimb {
         angle_deg: f64,
         seed: u64,
     ) -> Result<Vec<DepthView>, PoseError> {
-        let (skin, landmarks) = (&self.prepared.limb.mesh, &self.prepared.landmarks);
+        let landmarks = &self.prepared.landmarks;
         let angle_rad = angle_deg.to_radians();
-        let placement = (setup.table).place(skin, landmarks, angle_rad, &plan.soft_tissue)?;
-        let skin = self.posed(&placement, plan)?;
+        let place = |skin| (setup.table).place(skin, landmarks, angle_rad, &plan.soft_tissue);
+        let mut skin = self.posed(&place(self.skin())?, plan)?;
+        if self.shaped.is_some() {
+            // The skin of the scan decides the regions, as in the dataset.
+            let of_scan = place(&self.prepared.limb.mesh)?;
+            let room_from_ct = of_scan.room_from_patient * landmarks.patient_from_ct();
+            skin.joint_in_room = *room_from_ct.isometry() * Point3::from(landmarks.joint_centre);
+        }
         let cameras = setup.cameras.iter();
         cameras.map(|camera| skin.seen_by(camera, seed)).collect()
     }
@@ -127,7 +170,7 @@ impl PosedSkin {
             region: roi_around(&placed.camera, &joint, self.region_mm).ok(),
             view: placed.view,
             camera: placed.camera.clone(),
-            image: depth_image(BodyShape::Orig, body, placed, seed, self.cut_faces)?.image,
+            image: depth_image(self.shape, body, placed, seed, self.cut_faces)?.image,
         })
     }
 }

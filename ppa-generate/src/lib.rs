@@ -13,6 +13,7 @@
 
 mod case;
 mod case_check;
+mod case_names;
 mod check;
 mod closed_skin;
 mod commented_plan;
@@ -68,6 +69,7 @@ mod verify;
 
 pub use case::{Case, CaseError, Found, Source};
 pub use case_check::{CaseCheck, CaseCheckError, Drift};
+pub use case_names::{beside_case, edited_case, original_case};
 pub use check::{Check, Problem, check};
 pub use closed_skin::closed_skin;
 pub use coverage_study::{

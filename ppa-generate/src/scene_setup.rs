@@ -208,48 +208,64 @@ impl SceneSetup {
     /// [`SceneSetupError`] naming the room, table, camera or beam at fault.
     pub fn of_plan(plan: &Plan) -> Result<Self, SceneSetupError> {
         let table = Table::of_plan(plan)?;
-        let rig = plan.depth.cameras()?;
-        let furniture = match (table.furniture(), &plan.room.ply) {
-            (Err(source), Some(path)) => {
-                return Err(SceneSetupError::RoomFile {
-                    path: path.clone(),
-                    source: source.into(),
-                });
-            }
-            (furniture, _) => furniture?,
-        };
-        let device = &table.room.device;
-        let place = |view, side, mounted: &MountedCamera| {
-            let camera = Camera::try_from(mounted.camera.clone())
-                .map_err(|source| RigError::Camera { side, source })?;
-            let device_from_camera = mounted
-                .pose()
-                .map_err(|source| RigError::Pose { side, source })?;
-            let room_from_camera = device.room_from_device.isometry() * device_from_camera;
-            let sensor = plan.depth.sensor.clone().map(|spec| {
-                // Both cameras have errors of their own.
-                let seed = plan_seed(plan.seed, Purpose::DepthSensor).wrapping_add(view as u64);
-                Sensor::new(spec, seed)
-            });
-            let camera_from_room = room_from_camera.inverse();
-            Ok::<_, SceneSetupError>(PlacedCamera::new(
-                view,
-                camera,
-                camera_from_room,
-                &furniture,
-                sensor.transpose()?,
-            ))
-        };
-        let cameras = vec![
-            place(View::Left, "left", &rig.left)?,
-            place(View::Right, "right", &rig.right)?,
-        ];
         Ok(Self {
+            cameras: place_cameras(&table, plan)?,
             table: Arc::new(table),
-            cameras,
             spectrum: Arc::new(spectrum(&plan.xray)?),
         })
     }
+
+    /// The same room and beam with the cameras of a plan.
+    ///
+    /// # Errors
+    /// [`SceneSetupError`] naming the camera at fault.
+    pub fn with_cameras(&self, plan: &Plan) -> Result<Self, SceneSetupError> {
+        Ok(Self {
+            cameras: place_cameras(&self.table, plan)?,
+            table: self.table.clone(),
+            spectrum: self.spectrum.clone(),
+        })
+    }
+}
+
+/// The cameras of a plan before the furniture of a room, left first.
+fn place_cameras(table: &Table, plan: &Plan) -> Result<Vec<PlacedCamera>, SceneSetupError> {
+    let rig = plan.depth.cameras()?;
+    let furniture = match (table.furniture(), &plan.room.ply) {
+        (Err(source), Some(path)) => {
+            return Err(SceneSetupError::RoomFile {
+                path: path.clone(),
+                source: source.into(),
+            });
+        }
+        (furniture, _) => furniture?,
+    };
+    let device = &table.room.device;
+    let place = |view, side, mounted: &MountedCamera| {
+        let camera = Camera::try_from(mounted.camera.clone())
+            .map_err(|source| RigError::Camera { side, source })?;
+        let device_from_camera = mounted
+            .pose()
+            .map_err(|source| RigError::Pose { side, source })?;
+        let room_from_camera = device.room_from_device.isometry() * device_from_camera;
+        let sensor = plan.depth.sensor.clone().map(|spec| {
+            // Both cameras have errors of their own.
+            let seed = plan_seed(plan.seed, Purpose::DepthSensor).wrapping_add(view as u64);
+            Sensor::new(spec, seed)
+        });
+        let camera_from_room = room_from_camera.inverse();
+        Ok::<_, SceneSetupError>(PlacedCamera::new(
+            view,
+            camera,
+            camera_from_room,
+            &furniture,
+            sensor.transpose()?,
+        ))
+    };
+    Ok(vec![
+        place(View::Left, "left", &rig.left)?,
+        place(View::Right, "right", &rig.right)?,
+    ])
 }
 
 /// The tube of a plan and its filters.

@@ -68,7 +68,7 @@ pub struct AugmentArgs {
     replace: ReplaceArgs,
 }
 
-fn body_shape_named(name: &str) -> Result<BodyShape, String> {
+pub(super) fn body_shape_named(name: &str) -> Result<BodyShape, String> {
     let known = BodyShape::ALL
         .into_iter()
         .find(|shape| shape.name() == name);

@@ -19,6 +19,7 @@ pub use self::error::PlanError;
 pub use self::marker::MarkerPlace;
 pub use self::room_file::RoomFile;
 pub use self::settings::{DepthSettings, PlanRoom, XraySettings};
+use crate::case_names::original_case;
 use crate::shaped_skin::ShapeSettings;
 use crate::toml_file::{other_version, relative_to, to_toml};
 
@@ -85,6 +86,18 @@ impl Plan {
             depth: DepthSettings::default(),
             xray: XraySettings::default(),
         }
+    }
+
+    /// The person whose limb a case file is, with its changes or without; none if the plan does not name the file.
+    pub fn patient_of(&self, case_file: &Path) -> Option<u32> {
+        let original = |file: &Path| {
+            let file = original_case(file).unwrap_or_else(|| file.to_owned());
+            file.canonicalize().unwrap_or(file)
+        };
+        let wanted = original(case_file);
+        let mut cases = self.cases.iter();
+        let planned = cases.find(|planned| original(&planned.file) == wanted)?;
+        Some(planned.patient)
     }
 
     /// Reads a plan and makes its paths relative to the current folder.

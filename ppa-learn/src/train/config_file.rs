@@ -39,7 +39,7 @@ impl TrainConfig {
     ///
     /// # Errors
     /// As [`read`](Self::read).
-    pub(super) fn read_run(folder: &Path) -> Result<Self, ConfigError> {
+    pub fn read_run(folder: &Path) -> Result<Self, ConfigError> {
         let path = folder.join("config.toml");
         let mut given = read_table(&path)?;
         // Programs that did not know the key showed limbs as they are, whatever the preset says now.

@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
+use ppa_dataset::BodyShape;
 use ppa_dataset::layout::View;
 use ppa_depth::{Camera, DepthImage, SensorSpec};
 
+use crate::commands::mesh::body_shape_named;
 use crate::commands::scene::WhichRoom;
 use crate::output_files::ReplaceArgs;
 
@@ -18,6 +20,9 @@ pub(super) struct OfCase {
     /// One of the two cameras of a case's room [default: both]
     #[arg(long, value_enum)]
     view: Option<ViewName>,
+    /// Body shape of a case: orig, big, small, bumps_a or bumps_b, as in a dataset of --plan; bumps are those of the case's person there, else of person 0 [default: orig]
+    #[arg(long, value_parser = body_shape_named)]
+    pub(super) shape: Option<BodyShape>,
     #[command(flatten)]
     pub(super) room: WhichRoom,
 }
@@ -34,6 +39,7 @@ impl OfCase {
         let given = [
             ("--angle", self.angle.is_some()),
             ("--view", self.view.is_some()),
+            ("--shape", self.shape.is_some()),
             ("--plan or --room", self.room.is_given()),
         ];
         given

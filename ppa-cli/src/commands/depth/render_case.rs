@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use ppa_dataset::layout::View;
+use ppa_dataset::BodyShape;
+use ppa_dataset::layout::{LimbId, View};
 use ppa_generate::{Case, DepthView, PreparedLimb, SceneSetup, VisibleLimb};
 use serde::Serialize;
 
@@ -63,6 +64,14 @@ pub fn run(path: &Path, args: &RenderArgs, output: Output) -> anyhow::Result<()>
         .with_context(|| format!("cannot prepare the limb of {}", path.display()))?;
     let angle_deg = args.of_case.angle.unwrap_or_default();
     let limb = VisibleLimb::new(limb)?;
+    let limb = match args.of_case.shape {
+        None | Some(BodyShape::Orig) => limb,
+        Some(shape) => {
+            let patient = plan.patient_of(path).unwrap_or(0);
+            let side = case.side;
+            limb.with_shape(shape, &plan, LimbId { patient, side })?
+        }
+    };
     let mut views = limb.depth_views(&setup, &plan, angle_deg, args.seed)?;
     let wanted = args.of_case.view();
     views.retain(|seen| wanted.is_none_or(|view| view == seen.view));

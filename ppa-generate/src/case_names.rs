@@ -1,0 +1,41 @@
+//! Names of files beside a case.
+
+use std::path::{Path, PathBuf};
+
+/// Where changes of a case are saved until they replace it: `leg.edited.case.toml` of `leg.case.toml`.
+pub fn edited_case(original: &Path) -> PathBuf {
+    beside_case(original, "edited.case.toml")
+}
+
+/// The case that a file with changes belongs to; `None` for any other file.
+pub fn original_case(edited: &Path) -> Option<PathBuf> {
+    let name = edited.file_name()?.to_str()?;
+    let stem = name.strip_suffix(".edited.case.toml")?;
+    Some(edited.with_file_name(format!("{stem}.case.toml")))
+}
+
+/// A file beside a case, named after it: `leg.case.toml` and `plan.toml` give `leg.plan.toml`.
+pub fn beside_case(case: &Path, ending: &str) -> PathBuf {
+    let name = case.file_name().unwrap_or_default().to_string_lossy();
+    let stem = name.strip_suffix(".toml").unwrap_or(&name);
+    let stem = stem.strip_suffix(".case").unwrap_or(stem);
+    case.with_file_name(format!("{stem}.{ending}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_are_named_after_the_case() {
+        let edited = |name: &str| edited_case(Path::new(name));
+        let expected = Path::new("a/leg.edited.case.toml");
+        assert_eq!(edited("a/leg.case.toml"), expected);
+        assert_eq!(edited("leg.toml"), Path::new("leg.edited.case.toml"));
+        assert_eq!(
+            original_case(expected).unwrap(),
+            Path::new("a/leg.case.toml")
+        );
+        assert_eq!(original_case(Path::new("leg.case.toml")), None);
+    }
+}
