@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ppa_generate::Case;
+use ppa_generate::{Case, beside_case, edited_case};
 
 use crate::error::StudioError;
 
@@ -36,7 +36,12 @@ impl CaseFile {
 
     /// Where a plan with the page's changes is saved: beside the original.
     pub fn plan(&self) -> PathBuf {
-        beside(&self.original, "studio.plan.toml")
+        beside_case(&self.original, "studio.plan.toml")
+    }
+
+    /// Where moved cameras are saved: beside the original.
+    pub fn cameras(&self) -> PathBuf {
+        beside_case(&self.original, "studio.rig.json")
     }
 
     /// Whether changes are saved beside the original.
@@ -81,40 +86,5 @@ impl CaseFile {
 
 /// Where the plan of a dataset with a case is saved, if none was opened.
 pub(crate) fn new_plan(case: &Path) -> PathBuf {
-    beside(case, "plan.toml")
-}
-
-/// Where the changes of a case are saved.
-pub(crate) fn edited_case(original: &Path) -> PathBuf {
-    beside(original, "edited.case.toml")
-}
-
-/// The case that a file with changes belongs to; `None` for any other file.
-pub(crate) fn original_case(edited: &Path) -> Option<PathBuf> {
-    let name = edited.file_name()?.to_str()?;
-    let stem = name.strip_suffix(".edited.case.toml")?;
-    Some(edited.with_file_name(format!("{stem}.case.toml")))
-}
-
-/// A file beside a case, named after it: `leg.case.toml` and `edited.case.toml` give `leg.edited.case.toml`.
-fn beside(case: &Path, ending: &str) -> PathBuf {
-    let name = case.file_name().unwrap_or_default().to_string_lossy();
-    let stem = name.strip_suffix(".toml").unwrap_or(&name);
-    let stem = stem.strip_suffix(".case").unwrap_or(stem);
-    case.with_file_name(format!("{stem}.{ending}"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn changes_are_named_after_the_case() {
-        let edited = |name: &str| beside(Path::new(name), "edited.case.toml");
-        assert_eq!(
-            edited("a/leg.case.toml"),
-            Path::new("a/leg.edited.case.toml")
-        );
-        assert_eq!(edited("leg.toml"), Path::new("leg.edited.case.toml"));
-    }
+    beside_case(case, "plan.toml")
 }

@@ -4,11 +4,14 @@ use std::fmt::Write;
 use std::path::Path;
 
 use ppa_cluster::shell_quoted;
+use ppa_core::{Roi, Side};
 use ppa_dataset::labels::{BoneFile, BoneNumbers};
 use ppa_generate::Case;
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind};
 use serde::Serialize;
 
+use crate::live::Watch;
+use crate::network::Networks;
 use crate::what_if::WhatIf;
 
 /// Commands for a state of the page.
@@ -23,6 +26,7 @@ pub(crate) struct Commands {
 pub(crate) struct ImageCommands {
     pub depth: String,
     pub radiograph: String,
+    pub coverage: String,
     /// The plan that they read has to be saved first: it holds changes that no option makes.
     pub need_saved_plan: bool,
 }
@@ -59,6 +63,42 @@ pub(crate) fn of_dataset(dataset: &Path) -> DatasetCommands {
         quality: format!("ppa qa {dataset}"),
         check: format!("ppa dataset check {dataset}"),
     }
+}
+
+/// The evaluation of a training as a command.
+pub(crate) fn of_training(run: &Path) -> String {
+    format!("ppa eval {}", quoted(run))
+}
+
+/// The judgement of a folder of frames as a command.
+pub(crate) fn of_watch(networks: &Networks, watch: &Watch) -> String {
+    let predict = predict(networks, watch.side, watch.regions);
+    format!("{predict} --watch {}", quoted(&watch.folder))
+}
+
+/// The judgement of the depth images that the command of [`ImageCommands`] writes.
+pub(crate) fn of_prediction(networks: &Networks, side: Side, regions: [Roi; 2]) -> String {
+    let predict = predict(networks, Some(side), regions);
+    format!("printf 'depth_left.png\\tdepth_right.png\\n' | {predict} --stdin")
+}
+
+/// `ppa predict`, but for its frames.
+fn predict(networks: &Networks, side: Option<Side>, regions: [Roi; 2]) -> String {
+    let mut line = format!("ppa predict {}", quoted(&networks.left));
+    if let Some(right) = &networks.right {
+        let _ = write!(line, " {}", quoted(right));
+    }
+    if let Some(side) = side {
+        let _ = write!(line, " --side {}", side.letter());
+    }
+    for (flag, region) in ["--roi-left", "--roi-right"].iter().zip(regions) {
+        let (x, y, size) = (region.x_start, region.y_start, region.size);
+        let _ = write!(line, " {flag} {x},{y},{size}");
+    }
+    if let Some(confidence) = &networks.confidence {
+        let _ = write!(line, " --confidence {}", quoted(confidence));
+    }
+    line
 }
 
 /// The decisions of a case as a command.
@@ -154,11 +194,13 @@ fn of_choices(choices: &LandmarkOverrides) -> String {
     line
 }
 
-/// Images of the page as commands. `opened` is the plan that was opened, if any; `saved` is where a plan with the changes is saved.
+/// Images of the page as commands. `opened` is the plan that was opened, if any; `saved` is where a plan with the changes is saved;
+/// `seed` is that of the plan.
 pub(crate) fn of_images(
     case: &Path,
     opened: Option<&Path>,
     saved: &Path,
+    seed: u64,
     what_if: &WhatIf,
 ) -> ImageCommands {
     let need_saved_plan = what_if.needs_plan();
@@ -169,6 +211,12 @@ pub(crate) fn of_images(
     if what_if.sensor && !need_saved_plan {
         depth += " --sensor default";
     }
+    if what_if.sensor && seed != 0 {
+        let _ = write!(depth, " --seed {seed}");
+    }
+    if let Some(shape) = what_if.shape {
+        let _ = write!(depth, " --shape {}", shape.name());
+    }
     depth += " --out depth.png";
     let mut radiograph = format!("ppa xray simulate {pose}");
     if !need_saved_plan {
@@ -176,6 +224,7 @@ pub(crate) fn of_images(
     }
     radiograph += " --out radiograph.png";
     ImageCommands {
+        coverage: format!("ppa depth coverage {pose}"),
         depth,
         radiograph,
         need_saved_plan,

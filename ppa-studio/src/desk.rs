@@ -105,8 +105,8 @@ fn shown(
         None => scan.prepare(&case)?,
     };
     let automatic = match kept {
-        Some(shown) => shown.automatic.clone(),
-        None => automatic(scan, &case, &prepared),
+        Some(shown) if shown.case.choices.limb == case.choices.limb => shown.automatic.clone(),
+        _ => automatic(scan, &case, &prepared),
     };
     let found = Some(Found::of(&prepared));
     Ok(Shown {
@@ -117,13 +117,17 @@ fn shown(
     })
 }
 
-/// What is found of a limb where nobody chooses; nothing where that is not possible.
+/// What is found of a limb of this kind where nobody chooses; nothing where that is not possible.
 fn automatic(scan: &LoadedScan, case: &Case, prepared: &PreparedLimb) -> Option<Landmarks> {
-    if case.choices == LandmarkOverrides::default() {
+    let choices = LandmarkOverrides {
+        limb: case.choices.limb,
+        ..LandmarkOverrides::default()
+    };
+    if case.choices == choices {
         return Some(prepared.landmarks.clone());
     }
     let untouched = Case {
-        choices: LandmarkOverrides::default(),
+        choices,
         ..case.clone()
     };
     let found = scan.find_landmarks_again(&untouched, prepared.limb.clone());

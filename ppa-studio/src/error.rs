@@ -20,13 +20,11 @@ pub enum StudioError {
     /// A plan names no case.
     #[error("{} names no case", .0.display())]
     NoCase(PathBuf),
-    /// A training, which the page cannot show.
-    #[error("{} is a training: a scan, a case, a plan or a dataset can be opened", .0.display())]
-    Training(PathBuf),
-    /// A dataset is open, but none of its limbs.
-    #[error(
-        "no limb is open: the dataset has no plan beside it, or none of its limbs was opened yet"
-    )]
+    /// Frames are to be judged without networks.
+    #[error("frames are watched, but no networks judge them")]
+    NoNetworks,
+    /// A dataset, trainings or frames are open, but no limb.
+    #[error("no limb is open")]
     NoLimb,
     /// A limb whose case is not known.
     #[error("the plan beside the dataset names no case of {0}")]
@@ -46,6 +44,15 @@ pub enum StudioError {
     /// Networks that cannot be used.
     #[error(transparent)]
     Network(#[from] ppa_learn::frames::FramesError),
+    /// A training, or the images of its evaluation.
+    #[error(transparent)]
+    Train(#[from] ppa_learn::train::TrainError),
+    /// An image of a training.
+    #[error(transparent)]
+    TrainingData(#[from] ppa_learn::data::DataError),
+    /// The evaluation of a training.
+    #[error(transparent)]
+    Evaluate(#[from] ppa_learn::evaluate::EvaluateError),
     /// The built-in phantom.
     #[error("the built-in phantom cannot be written")]
     Phantom(#[source] Box<dyn std::error::Error + Send + Sync>),
@@ -61,6 +68,9 @@ pub enum StudioError {
     /// Room, table, cameras or beam.
     #[error(transparent)]
     Scene(#[from] SceneSetupError),
+    /// What the cameras see of the joint.
+    #[error(transparent)]
+    Coverage(#[from] ppa_generate::CoverageStudyError),
     /// The pose.
     #[error(transparent)]
     Pose(#[from] PoseError),

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod camera_move;
 mod case_file;
 mod coarse_scan;
 mod commands;
@@ -10,6 +11,7 @@ mod false_colours;
 mod generation;
 mod guard;
 mod limb;
+mod live;
 mod network;
 mod newest;
 mod opening;
@@ -17,6 +19,7 @@ mod page;
 mod plan_file;
 mod plan_form;
 mod plan_keys;
+mod png;
 mod pose_label;
 mod routes;
 mod scene;
@@ -26,9 +29,12 @@ mod state;
 mod stoppable;
 mod studio;
 mod token;
+mod training_errors;
+mod trainings;
 mod what_if;
 
 pub use error::StudioError;
+pub use live::Watch;
 pub use network::Networks;
 pub use opening::Opening;
 pub use server::serve;

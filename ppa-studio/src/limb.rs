@@ -74,6 +74,11 @@ impl Limb {
         self.case_file().plan()
     }
 
+    /// Where moved cameras are saved: beside the case.
+    pub fn saved_cameras(&self) -> PathBuf {
+        self.case_file().cameras()
+    }
+
     /// The file that holds the case as it is shown.
     pub fn case_on_disk(&self) -> PathBuf {
         let file = self.case_file();

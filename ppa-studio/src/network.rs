@@ -13,6 +13,13 @@ use serde::Serialize;
 
 use crate::error::StudioError;
 
+/// Replaced by those of each pose.
+const NO_REGIONS: [Roi; 2] = [Roi {
+    x_start: 0,
+    y_start: 0,
+    size: 1,
+}; 2];
+
 /// The networks of both cameras, as `ppa predict` takes them.
 #[derive(Debug, Clone, Default)]
 pub struct Networks {
@@ -26,7 +33,7 @@ pub struct Networks {
 
 /// Networks that are open.
 pub(crate) struct Network {
-    networks: Networks,
+    pub networks: Networks,
     /// Those for limbs of a side.
     kept: Mutex<(Side, Arc<PairPredictor>)>,
 }
@@ -48,7 +55,7 @@ impl Network {
     /// [`StudioError::Network`] naming the training that cannot be used.
     pub fn open(networks: Networks) -> Result<Self, StudioError> {
         let side = Side::Right;
-        let kept = Mutex::new((side, Arc::new(networks.predictor(side)?)));
+        let kept = Mutex::new((side, Arc::new(networks.predictor(NO_REGIONS, Some(side))?)));
         Ok(Self { networks, kept })
     }
 
@@ -73,22 +80,24 @@ impl Network {
     fn of_side(&self, side: Side) -> Result<Arc<PairPredictor>, FramesError> {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if kept.0 != side {
-            *kept = (side, Arc::new(self.networks.predictor(side)?));
+            *kept = (
+                side,
+                Arc::new(self.networks.predictor(NO_REGIONS, Some(side))?),
+            );
         }
         Ok(kept.1.clone())
     }
 }
 
 impl Networks {
-    fn predictor(&self, side: Side) -> Result<PairPredictor, FramesError> {
-        // Each pose has regions of its own.
-        let regions = [Roi {
-            x_start: 0,
-            y_start: 0,
-            size: 1,
-        }; 2];
+    /// The networks for frames of a limb that show the joint in these regions of the left and the right camera.
+    pub(crate) fn predictor(
+        &self,
+        regions: [Roi; 2],
+        side: Option<Side>,
+    ) -> Result<PairPredictor, FramesError> {
         let (left, right) = (&self.left, self.right.as_deref());
-        let predictor = PairPredictor::new(left, right, regions, Some(side), DeviceName::Cpu)?;
+        let predictor = PairPredictor::new(left, right, regions, side, DeviceName::Cpu)?;
         match &self.confidence {
             Some(file) => predictor.with_confidence(file),
             None => Ok(predictor),

@@ -1,4 +1,4 @@
-//! What the studio opens: a scan, a case, a plan, a dataset, or the built-in phantom.
+//! What the studio opens: a scan, a case, a plan, a dataset, trainings, or the built-in phantom.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -7,23 +7,27 @@ use ppa_ct::{ReadOptions, Volume, write_nifti};
 use ppa_dataset::files::FileError;
 use ppa_dataset::labels::{BoneFile, BoneNumbers};
 use ppa_dataset::manifest::DESCRIPTION_FILE;
-use ppa_generate::{Case, Plan, prepare};
+use ppa_generate::{Case, Plan, PrepareError, prepare, prepare_scan};
 use ppa_mesh::LimbSettings;
 use ppa_phantom::{LowerLeg, TableTop};
-use ppa_scene::{LandmarkOverrides, Side};
+use ppa_scene::{LandmarkOverrides, LimbKind, Side};
 
 use crate::error::StudioError;
+use crate::live::Watch;
 use crate::network::Networks;
+use crate::trainings::Trainings;
 
 /// What to open.
 #[derive(Debug, Clone, Default)]
 pub struct Opening {
-    /// A scan, a case, a plan or a dataset; the built-in phantom when absent.
+    /// A scan, a case, a plan, a dataset, a training or a folder of trainings; the built-in phantom when absent, unless frames are watched.
     pub path: Option<PathBuf>,
-    /// Side of the limb, for a scan.
+    /// Side of the limb in a scan.
     pub side: Option<Side>,
     /// Networks that judge the poses.
     pub networks: Option<Networks>,
+    /// Frames that the networks judge as they come.
+    pub watch: Option<Watch>,
 }
 
 /// Folder of the phantom that is opened when nothing is given, in the current one.
@@ -33,7 +37,7 @@ const PHANTOM_FOLDER: &str = "ppa-studio";
 const PHANTOM_SPACING_MM: f64 = 1.0;
 
 impl Opening {
-    /// A scan, a case, a plan or a dataset.
+    /// What is at a path.
     pub fn of(path: &Path) -> Self {
         Self {
             path: Some(path.to_owned()),
@@ -44,7 +48,10 @@ impl Opening {
     /// What is to be shown first.
     pub(crate) fn read(&self) -> Result<Opened, StudioError> {
         let Some(path) = &self.path else {
-            return Opened::of_case(phantom()?);
+            return match self.watch {
+                Some(_) => Ok(Opened::default()),
+                None => Opened::of_case(phantom()?),
+            };
         };
         if path
             .extension()
@@ -59,30 +66,39 @@ impl Opening {
         if path.join(DESCRIPTION_FILE).exists() {
             return of_dataset(path);
         }
-        if path.join("config.toml").exists() {
-            return Err(StudioError::Training(path.clone()));
+        if path.is_dir() {
+            let trainings = Trainings::below(path);
+            if !trainings.is_empty()? {
+                return Ok(Opened {
+                    trainings: Some(trainings),
+                    ..Opened::default()
+                });
+            }
         }
         let side = self.side.ok_or_else(|| StudioError::NoSide(path.clone()))?;
         let file = case_name(path);
         if file.exists() {
             return Opened::of_case(file);
         }
-        let (surface, choices) = (LimbSettings::default(), LandmarkOverrides::default());
-        let (case, _) = prepare(path, &ReadOptions::default(), side, &surface, &choices)?;
+        let (case, note) = case_of_scan(path, side)?;
         Ok(Opened {
             limb: Some((file, case)),
-            plan_file: None,
-            dataset: None,
+            note,
+            ..Opened::default()
         })
     }
 }
 
 /// What was opened.
+#[derive(Default)]
 pub(crate) struct Opened {
     /// A case, and the file that it is or will be written to.
     pub limb: Option<(PathBuf, Case)>,
     pub plan_file: Option<PathBuf>,
     pub dataset: Option<PathBuf>,
+    pub trainings: Option<Trainings>,
+    /// Why landmarks have to be set by hand.
+    pub note: Option<String>,
 }
 
 impl Opened {
@@ -90,8 +106,7 @@ impl Opened {
         let case = Case::read(&file)?;
         Ok(Self {
             limb: Some((file, case)),
-            plan_file: None,
-            dataset: None,
+            ..Self::default()
         })
     }
 }
@@ -106,6 +121,24 @@ fn of_plan(path: &Path) -> Result<Opened, StudioError> {
     })
 }
 
+/// A new case; where landmarks are not found, one whose landmarks are set by hand, and why.
+fn case_of_scan(path: &Path, side: Side) -> Result<(Case, Option<String>), StudioError> {
+    let reading = ReadOptions::default();
+    let scan = ppa_ct::read_with(path, &reading).map_err(PrepareError::from)?;
+    let prepared = |choices: &LandmarkOverrides| {
+        let surface = LimbSettings::default();
+        prepare_scan(scan.clone(), path, &reading, side, &surface, choices)
+    };
+    let by_hand = LandmarkOverrides {
+        limb: Some(LimbKind::Other),
+        ..LandmarkOverrides::default()
+    };
+    match prepared(&LandmarkOverrides::default()) {
+        Err(PrepareError::Landmarks(error)) => Ok((prepared(&by_hand)?.0, Some(error.to_string()))),
+        found => Ok((found?.0, None)),
+    }
+}
+
 /// A dataset, and the plan that it has the name of, which may be there.
 fn of_dataset(path: &Path) -> Result<Opened, StudioError> {
     let root = match path.file_name() {
@@ -116,9 +149,9 @@ fn of_dataset(path: &Path) -> Result<Opened, StudioError> {
     let mut name = root.file_name().unwrap_or_default().to_owned();
     name.push(".toml");
     Ok(Opened {
-        limb: None,
         plan_file: Some(root.with_file_name(name)),
         dataset: Some(root),
+        ..Opened::default()
     })
 }
 

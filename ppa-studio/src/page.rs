@@ -18,11 +18,15 @@ const FILES: &[(&str, &str)] = &[
     ("landmarks.js", include_str!("page/landmarks.js")),
     ("whatif.js", include_str!("page/whatif.js")),
     ("scan.js", include_str!("page/scan.js")),
+    ("crop.js", include_str!("page/crop.js")),
+    ("cameras.js", include_str!("page/cameras.js")),
     ("room.js", include_str!("page/room.js")),
     ("elements.js", include_str!("page/elements.js")),
     ("plan.js", include_str!("page/plan.js")),
     ("generation.js", include_str!("page/generation.js")),
     ("dataset.js", include_str!("page/dataset.js")),
+    ("training.js", include_str!("page/training.js")),
+    ("live.js", include_str!("page/live.js")),
     ("charts.js", include_str!("page/charts.js")),
 ];
 

@@ -15,6 +15,9 @@ pub(crate) struct PlanFile {
     edited: PathBuf,
     /// The edited file as this program knows it; `None` while there is none.
     known: Option<String>,
+    /// Texts before and after this one, to undo and redo changes.
+    earlier: Vec<String>,
+    later: Vec<String>,
 }
 
 impl PlanFile {
@@ -26,6 +29,8 @@ impl PlanFile {
             original,
             edited,
             known,
+            earlier: Vec::new(),
+            later: Vec::new(),
         }
     }
 
@@ -123,11 +128,49 @@ impl PlanFile {
         Ok(Plan::of_text(text, self.current())?)
     }
 
-    /// Saves a changed text beside the original.
+    /// Saves a changed text beside the original, and keeps the one `before`.
     ///
     /// # Errors
     /// [`StudioError::ChangedElsewhere`] if the file is no longer the one that was saved last.
-    pub fn save_edits(&mut self, text: String) -> Result<(), StudioError> {
+    pub fn change(&mut self, before: String, text: String) -> Result<(), StudioError> {
+        self.save_edits(text)?;
+        self.earlier.push(before);
+        self.later.clear();
+        Ok(())
+    }
+
+    /// Saves the text before the one of `now` again; `None` if nothing was changed.
+    ///
+    /// # Errors
+    /// As of [`Self::change`].
+    pub fn undo(&mut self, now: String) -> Result<Option<String>, StudioError> {
+        let Some(text) = self.earlier.last().cloned() else {
+            return Ok(None);
+        };
+        self.save_edits(text)?;
+        self.later.push(now);
+        Ok(self.earlier.pop())
+    }
+
+    /// Saves the text that was undone last; `None` if nothing was undone.
+    ///
+    /// # Errors
+    /// As of [`Self::change`].
+    pub fn redo(&mut self, now: String) -> Result<Option<String>, StudioError> {
+        let Some(text) = self.later.last().cloned() else {
+            return Ok(None);
+        };
+        self.save_edits(text)?;
+        self.earlier.push(now);
+        Ok(self.later.pop())
+    }
+
+    /// Whether there is something to undo, and to redo.
+    pub fn can_step(&self) -> [bool; 2] {
+        [!self.earlier.is_empty(), !self.later.is_empty()]
+    }
+
+    fn save_edits(&mut self, text: String) -> Result<(), StudioError> {
         if std::fs::read_to_string(&self.edited).ok() != self.known {
             return Err(StudioError::ChangedElsewhere(self.edited.clone()));
         }

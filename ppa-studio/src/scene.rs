@@ -3,18 +3,24 @@
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use image::{DynamicImage, GrayImage, ImageFormat};
+use image::GrayImage;
+use ppa_dataset::BodyShape;
+use ppa_dataset::layout::LimbId;
 use ppa_depth::DepthImage;
-use ppa_generate::{ExposableLimb, Plan, SceneSetup, XraySettings, prepared_phantom};
+use ppa_generate::{
+    ExposableLimb, Plan, SceneSetup, ShapeSettings, VisibleLimb, XraySettings, prepared_phantom,
+};
 use ppa_scene::Contact;
 use ppa_xray::{PreparedPhantom, Radiograph};
 use serde::Serialize;
 
+use crate::commands::of_prediction;
 use crate::desk::Shown;
 use crate::error::StudioError;
 use crate::false_colours::side_by_side;
 use crate::network::{Network, NetworkAnswer};
 use crate::newest::Ticket;
+use crate::png::png;
 use crate::what_if::WhatIf;
 
 /// A room with its cameras and beam, and the plan it was made from.
@@ -30,9 +36,20 @@ struct KeptPhantom {
     phantom: Arc<PreparedPhantom<'static>>,
 }
 
+/// A limb in another body shape, and what it was made from.
+struct KeptShape {
+    revision: u64,
+    shape: BodyShape,
+    of: LimbId,
+    settings: ShapeSettings,
+    seed: u64,
+    limb: Arc<VisibleLimb>,
+}
+
 /// Scenes and voxels kept for the next request.
 #[derive(Default)]
 pub(crate) struct Scenes {
+    shape: Mutex<Option<KeptShape>>,
     setup: Mutex<Option<KeptSetup>>,
     phantom: Mutex<Option<KeptPhantom>>,
 }
@@ -54,6 +71,9 @@ pub(crate) struct DepthReport {
     /// What networks say of them, if any are open.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub network: Option<NetworkAnswer>,
+    /// The command that asks them, if both cameras see the joint.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub network_command: Option<String>,
 }
 
 /// A radiograph for viewing.
@@ -86,11 +106,16 @@ impl Scenes {
     pub fn setup(&self, plan: &Plan) -> Result<Arc<SceneSetup>, StudioError> {
         let mut kept = self.setup.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(kept) = &*kept
-            && same_setup(&kept.plan, plan)
+            && kept.plan.depth == plan.depth
+            && same_room_and_beam(&kept.plan, plan)
         {
             return Ok(kept.setup.clone());
         }
-        let setup = Arc::new(SceneSetup::of_plan(plan)?);
+        let setup = Arc::new(match &*kept {
+            // Only cameras have changed: room and beam are kept.
+            Some(kept) if same_room_and_beam(&kept.plan, plan) => kept.setup.with_cameras(plan)?,
+            _ => SceneSetup::of_plan(plan)?,
+        });
         *kept = Some(KeptSetup {
             plan: plan.clone(),
             setup: setup.clone(),
@@ -104,22 +129,64 @@ impl Scenes {
         shown: &Shown,
         plan: &Plan,
         what_if: &WhatIf,
+        patient: u32,
         network: Option<&Network>,
     ) -> Result<DepthPicture, StudioError> {
         let plan = what_if.plan(plan)?;
         let setup = self.setup(&plan)?;
-        let views = (shown.limb).depth_views(&setup, &plan, what_if.angle_deg, plan.seed)?;
+        let views =
+            |limb: &VisibleLimb| limb.depth_views(&setup, &plan, what_if.angle_deg, plan.seed);
+        let side = shown.case.side;
+        let views = match what_if.shape {
+            None | Some(BodyShape::Orig) => views(&shown.limb)?,
+            Some(shape) => views(&*self.shaped(shown, shape, &plan, LimbId { patient, side })?)?,
+        };
         let images: Vec<&DepthImage> = views.iter().map(|view| &view.image).collect();
         let (picture, range_mm) = side_by_side(&images);
-        let answer = network.map(|network| network.answer(shown.case.side, &views));
+        let answer = network.map(|network| network.answer(side, &views));
+        let regions = match &*views {
+            [left, right] => left.region.zip(right.region),
+            _ => None,
+        };
+        let network_command = network
+            .zip(regions)
+            .map(|(network, (left, right))| of_prediction(&network.networks, side, [left, right]));
         Ok(DepthPicture {
-            png: png(DynamicImage::ImageRgb8(picture))?,
+            png: png(picture)?,
             report: DepthReport {
                 valid_pixels: images.iter().map(|image| image.valid_pixels()).collect(),
                 range_mm,
                 network: answer,
+                network_command,
             },
         })
+    }
+
+    /// The limb in another body shape: that of the request before, if nothing it depends on has changed.
+    fn shaped(
+        &self,
+        shown: &Shown,
+        shape: BodyShape,
+        plan: &Plan,
+        of: LimbId,
+    ) -> Result<Arc<VisibleLimb>, StudioError> {
+        let mut kept = self.shape.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(kept) = &*kept
+            && (kept.revision, kept.shape, kept.of) == (shown.revision, shape, of)
+            && (&kept.settings, kept.seed) == (&plan.shapes, plan.seed)
+        {
+            return Ok(kept.limb.clone());
+        }
+        let limb = Arc::new(shown.limb.with_shape(shape, plan, of)?);
+        *kept = Some(KeptShape {
+            revision: shown.revision,
+            shape,
+            of,
+            settings: plan.shapes.clone(),
+            seed: plan.seed,
+            limb: limb.clone(),
+        });
+        Ok(limb)
     }
 
     /// The radiograph, until a later request replaces this one.
@@ -195,14 +262,10 @@ impl Scenes {
     }
 }
 
-/// Whether [`SceneSetup::of_plan`] gives the same for both.
-fn same_setup(a: &Plan, b: &Plan) -> bool {
+/// Whether [`SceneSetup::of_plan`] gives the same room and beam for both.
+fn same_room_and_beam(a: &Plan, b: &Plan) -> bool {
     let beam = |plan: &Plan| (plan.xray.kvp, plan.xray.anode_angle_deg);
-    a.seed == b.seed
-        && a.room == b.room
-        && a.depth == b.depth
-        && beam(a) == beam(b)
-        && a.xray.filters == b.xray.filters
+    a.seed == b.seed && a.room == b.room && beam(a) == beam(b) && a.xray.filters == b.xray.filters
 }
 
 fn radiograph_png(radiograph: &Radiograph, xray: &XraySettings) -> Result<Vec<u8>, StudioError> {
@@ -210,11 +273,5 @@ fn radiograph_png(radiograph: &Radiograph, xray: &XraySettings) -> Result<Vec<u8
     let bytes = grey.iter().map(|value| (value >> 8) as u8).collect();
     let (columns, rows) = (radiograph.columns() as u32, radiograph.rows() as u32);
     let picture = GrayImage::from_raw(columns, rows, bytes).expect("one value for each pixel");
-    png(DynamicImage::ImageLuma8(picture))
-}
-
-fn png(picture: DynamicImage) -> Result<Vec<u8>, StudioError> {
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, ImageFormat::Png)?;
-    Ok(bytes.into_inner())
+    Ok(png(picture)?)
 }

@@ -11,12 +11,15 @@ use crate::desk::Desk;
 use crate::error::StudioError;
 use crate::generation::Generation;
 use crate::limb::Limb;
+use crate::live::Live;
 use crate::network::Network;
 use crate::newest::Newest;
 use crate::opening::Opening;
 use crate::plan_file::PlanFile;
 use crate::stoppable::Stoppable;
 use crate::token::Token;
+use crate::training_errors::TrainingErrors;
+use crate::trainings::Trainings;
 use crate::what_if::WhatIf;
 
 /// What is open, and the work under way.
@@ -30,6 +33,8 @@ pub(crate) struct State {
     pub surface: Newest,
     /// The label under way.
     pub label: Newest,
+    /// What the cameras see of the joint, under way.
+    pub coverage: Newest,
     /// The dataset that is being made.
     pub generation: Generation,
     /// The forecast under way.
@@ -42,6 +47,14 @@ pub(crate) struct State {
     pub check: Newest,
     /// Networks that judge the poses, if there are any.
     pub network: Option<Network>,
+    /// Frames that they judge as they come, if there are any.
+    pub live: Option<Live>,
+    /// Trainings that were opened, or lie beside the plan.
+    pub trainings: Trainings,
+    /// Their errors.
+    pub training_errors: TrainingErrors,
+    /// Why landmarks of the scan that was opened have to be set by hand, if so.
+    pub note: Option<String>,
     /// The dataset that was opened, if it is one.
     pub opened_dataset: Option<PathBuf>,
     plan: Mutex<Arc<Plan>>,
@@ -50,17 +63,31 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// Opens a scan, a case, a plan or a dataset, and takes up the changes that were saved beside them.
+    /// Opens what there is, and takes up the changes that were saved beside them.
     pub fn open(opening: &Opening) -> Result<Self, StudioError> {
         // First: what is opened may have to be made.
         let network = opening.networks.clone().map(Network::open).transpose()?;
+        let live = match (&opening.networks, opening.watch.clone()) {
+            (_, None) => None,
+            (Some(networks), Some(watch)) => Some(Live::open(networks, watch)?),
+            (None, Some(_)) => return Err(StudioError::NoNetworks),
+        };
         let opened = opening.read()?;
         let plan_file = match (opened.plan_file, &opened.limb) {
             (Some(file), _) => file,
             (None, Some((file, _))) => new_plan(file),
-            (None, None) => return Err(StudioError::NoLimb),
+            // No file: a plan is made for a limb only, and none can be opened.
+            (None, None) => PathBuf::new(),
         };
         let plan_file = PlanFile::new(plan_file);
+        let trainings = match (opened.trainings, &opening.networks) {
+            (Some(trainings), _) => trainings,
+            // Nothing is open but networks.
+            (None, Some(networks)) if opened.limb.is_none() && opened.dataset.is_none() => {
+                Trainings::beside(&networks.left)
+            }
+            (None, _) => Trainings::beside(plan_file.original()),
+        };
         let plan = if plan_file.current().exists() {
             Plan::read(plan_file.current())?
         } else {
@@ -74,12 +101,17 @@ impl State {
             radiograph: Newest::default(),
             surface: Newest::default(),
             label: Newest::default(),
+            coverage: Newest::default(),
             generation: Generation::default(),
             forecast: Stoppable::default(),
             sheet: Newest::default(),
             quality: Newest::default(),
             check: Newest::default(),
             network,
+            live,
+            trainings,
+            training_errors: TrainingErrors::default(),
+            note: opened.note,
             opened_dataset: opened.dataset,
             plan: Mutex::new(Arc::new(plan)),
             plan_file: Mutex::new(plan_file),
@@ -145,6 +177,12 @@ impl State {
         Ok(self.limb()?.case_on_disk())
     }
 
+    /// The person of the limb that is open: as the plan says, else 0 as in a new plan.
+    pub fn patient(&self) -> Result<u32, StudioError> {
+        let file = self.limb()?.case_file().original().to_owned();
+        Ok(self.plan().patient_of(&file).unwrap_or(0))
+    }
+
     /// The file of the plan as it is shown; none where no file holds it yet.
     pub fn opened_plan(&self) -> Option<PathBuf> {
         let file = self.plan_file().current().to_owned();
@@ -160,8 +198,21 @@ impl State {
         let before = file.text(|| self.case_on_disk())?;
         let (text, plan) = change(&file, &before)?;
         if text != before {
-            file.save_edits(text)?;
+            file.change(before, text)?;
             self.show_plan(plan);
+        }
+        Ok(())
+    }
+
+    /// Takes up the text of the plan that [`PlanFile::undo`] or [`PlanFile::redo`] gives.
+    pub fn step_plan(
+        &self,
+        step: impl FnOnce(&mut PlanFile, String) -> Result<Option<String>, StudioError>,
+    ) -> Result<(), StudioError> {
+        let mut file = self.plan_file();
+        let now = file.text(|| self.case_on_disk())?;
+        if let Some(text) = step(&mut file, now)? {
+            self.show_plan(file.plan(&text)?);
         }
         Ok(())
     }

@@ -14,7 +14,7 @@ use crate::state::State;
 pub struct Studio(Arc<State>);
 
 impl Studio {
-    /// Opens a scan, a case, a plan or a dataset, and finds what the case says; changes that were saved beside case and plan are taken up again.
+    /// Opens a scan, a case, a plan, a dataset or trainings, and finds what the case says; changes that were saved beside case and plan are taken up again.
     ///
     /// # Errors
     /// [`StudioError`] naming the file at fault.
@@ -32,6 +32,7 @@ impl Studio {
         self.0.depth.cancel();
         self.0.radiograph.cancel();
         self.0.forecast.stop();
+        self.0.training_errors.turn.cancel();
         self.0.generation.finish();
     }
 

@@ -1,9 +1,12 @@
 //! What the sliders of the page change in a plan.
 
-use ppa_generate::{Plan, Technique};
+use ppa_dataset::BodyShape;
+use ppa_depth::{RigError, RigSpec};
+use ppa_generate::{Plan, SceneSetupError, Technique};
 use ppa_xray::{AntiScatterGrid, TubeLoad};
 use serde::{Deserialize, Serialize};
 
+use crate::camera_move::CameraMove;
 use crate::error::StudioError;
 
 /// A pose and an exposure. Keys that are left out are those of the plan.
@@ -16,6 +19,8 @@ pub(crate) struct WhatIf {
     pub distal_mm: Option<f64>,
     /// How deep the proximal contact sinks in.
     pub proximal_mm: Option<f64>,
+    /// Body shape that the depth cameras see; that of the scan if left out.
+    pub shape: Option<BodyShape>,
     /// Whether the depth cameras have the errors of an Azure Kinect.
     pub sensor: bool,
     /// An examination with its usual exposure; the keys below change it.
@@ -27,6 +32,8 @@ pub(crate) struct WhatIf {
     pub exposure_index: Option<f64>,
     /// An anti-scatter grid.
     pub grid: Option<bool>,
+    /// How the left and the right camera are moved.
+    pub cameras: Option<[CameraMove; 2]>,
 }
 
 impl WhatIf {
@@ -45,6 +52,10 @@ impl WhatIf {
         plan.soft_tissue.check()?;
         if self.sensor && plan.depth.sensor.is_none() {
             plan.depth.sensor = Some(ppa_depth::SensorSpec::default());
+        }
+        if let Some(moves) = &self.cameras {
+            plan.depth.cameras = Some(moved(plan.depth.cameras(), moves)?);
+            plan.depth.rig = None;
         }
         if let Some(name) = &self.technique {
             technique(name)?.apply(&mut plan.xray);
@@ -75,8 +86,23 @@ impl WhatIf {
 impl WhatIf {
     /// Whether it has changes that no option of a command makes.
     pub fn needs_plan(&self) -> bool {
-        self.distal_mm.is_some() || self.proximal_mm.is_some() || self.grid.is_some()
+        self.distal_mm.is_some()
+            || self.proximal_mm.is_some()
+            || self.grid.is_some()
+            || self.cameras.is_some()
     }
+}
+
+/// A rig whose left and right camera are moved.
+fn moved(rig: Result<RigSpec, RigError>, moves: &[CameraMove; 2]) -> Result<RigSpec, StudioError> {
+    let mut rig = rig.map_err(SceneSetupError::from)?;
+    let cameras = [("left", &mut rig.left), ("right", &mut rig.right)];
+    for ((side, camera), moves) in cameras.into_iter().zip(moves) {
+        moves.check()?;
+        let applied = moves.apply(camera);
+        applied.map_err(|source| SceneSetupError::from(RigError::Pose { side, source }))?;
+    }
+    Ok(rig)
 }
 
 /// A common grid of Bucky tables.

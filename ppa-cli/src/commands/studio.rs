@@ -8,20 +8,22 @@ use std::sync::mpsc::channel;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use ppa_studio::{Networks, Opening, Studio, serve};
+use ppa_core::Roi;
+use ppa_studio::{Networks, Opening, Studio, Watch, serve};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
+use crate::number_lists::square;
 use crate::output::{Output, working};
 use crate::side_name::SideName;
 use crate::stderr::warning;
 
 #[derive(Debug, Args)]
 pub struct StudioArgs {
-    /// Scan, case, plan or dataset to open [default: the built-in phantom, in the folder ppa-studio]
+    /// Scan, case, plan, dataset, training or folder of trainings to open [default: the built-in phantom, in the folder ppa-studio; nothing with --watch]
     path: Option<PathBuf>,
-    /// Side of the limb; needed for a scan without a case
+    /// Side of the limb; needed for a scan without a case, and with --watch by networks that were trained with `mirror = true`
     #[arg(long, value_enum)]
     side: Option<SideName>,
     /// After PATH: folders of finished trainings that judge the poses in step 5, of the left and the right camera's network, or of one for both
@@ -30,6 +32,15 @@ pub struct StudioArgs {
     /// File that `ppa calibrate` wrote for these networks
     #[arg(long, value_name = "FILE", requires = "run")]
     confidence: Option<PathBuf>,
+    /// Show in step 8 what the networks say of the newest frames in this folder, which are named as for `ppa predict --watch`
+    #[arg(long, value_name = "DIR", requires_all = ["run", "roi_left", "roi_right"])]
+    watch: Option<PathBuf>,
+    /// Square around the joint in the left camera's frames, in pixels, as in `roi_depth.json`
+    #[arg(long, value_name = "X,Y,SIZE", value_parser = square, requires = "watch")]
+    roi_left: Option<Roi>,
+    /// The same in the right camera's frames
+    #[arg(long, value_name = "X,Y,SIZE", value_parser = square, requires = "watch")]
+    roi_right: Option<Roi>,
     /// Port to listen on [default: a free one]
     #[arg(long, default_value_t = 0, hide_default_value = true)]
     port: u16,
@@ -63,6 +74,14 @@ impl StudioArgs {
             confidence: self.confidence.clone(),
         }))
     }
+
+    fn watched(&self) -> Option<Watch> {
+        Some(Watch {
+            folder: self.watch.clone()?,
+            regions: [self.roi_left?, self.roi_right?],
+            side: self.side.map(Into::into),
+        })
+    }
 }
 
 pub fn run(args: &StudioArgs, output: Output) -> anyhow::Result<()> {
@@ -83,6 +102,7 @@ pub fn run(args: &StudioArgs, output: Output) -> anyhow::Result<()> {
         path: args.path.clone(),
         side: args.side.map(Into::into),
         networks: args.networks()?,
+        watch: args.watched(),
     })?;
     working.finish_and_clear();
     let mut signals = Signals::new([SIGINT, SIGTERM]).context("cannot listen for Ctrl-C")?;

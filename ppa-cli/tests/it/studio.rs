@@ -6,6 +6,9 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use ppa_ct::write_nifti;
+use ppa_phantom::{LowerLeg, TableTop};
+
 use crate::{contains, contents, fail, phantom, ppa, succeed, write_plan};
 
 /// A running studio, and the cookie of a browser that has opened its address.
@@ -114,6 +117,36 @@ fn the_case_of_an_opened_scan_is_saved_on_request() {
 }
 
 #[test]
+fn a_scan_without_a_joint_opens_for_landmarks_by_hand() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let leg = LowerLeg::p01().voxelise(2.5, TableTop::Absent).unwrap();
+    let [i, j, k] = leg.grid().size();
+    let calf = leg.crop([0, 0, 2 * k / 3], [i, j, k]).unwrap();
+    write_nifti(&folder.join("calf.nii"), &calf).unwrap();
+    let served = Served::start(folder, "calf.nii --side r");
+    let answer = |bytes: Vec<u8>| {
+        let text = String::from_utf8(bytes).unwrap();
+        let body = text.split_once("\r\n\r\n").unwrap().1;
+        serde_json::from_str::<serde_json::Value>(&body[body.find('{').unwrap()..]).unwrap()
+    };
+    let state = answer(served.get("/api/state"));
+    assert_eq!(state["choices"]["limb"], "other");
+    assert_eq!(state["automatic"], state["landmarks"]);
+    let note = state["note"].as_str().unwrap();
+    assert!(note.contains("neither an ankle"), "{note}");
+    let mut joint: [f64; 3] =
+        serde_json::from_value(state["landmarks"]["joint_centre"].clone()).unwrap();
+    joint[2] += 20.0;
+    let by_hand = serde_json::json!({ "limb": "other", "joint_centre": joint });
+    let state = answer(served.post("/api/choices", &by_hand.to_string()));
+    assert_eq!(state["landmarks"]["joint_centre"], serde_json::json!(joint));
+    assert_ne!(state["automatic"], state["landmarks"]);
+    let refused = String::from_utf8(served.post("/api/choices", "{}")).unwrap();
+    contains(&refused, &["422", "neither an ankle"]);
+}
+
+#[test]
 fn a_dataset_of_the_page_is_that_of_the_command() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
@@ -160,4 +193,6 @@ fn a_studio_refuses_what_it_cannot_show_in_one_sentence() {
     let plan = "version = 1\n[[case]]\nfile = \"gone.case.toml\"\npatient = 0\n";
     std::fs::write(folder.join("plan.toml"), plan).unwrap();
     contains(&fail(folder, "studio plan.toml"), &["gone.case.toml"]);
+    let watch = "studio --watch frames --run left --roi-left 1,2,30 --roi-right 1,2,30";
+    contains(&fail(folder, watch), &["left/config.toml"]);
 }

@@ -1,4 +1,4 @@
-// Charts of points against the rotation, as SVG: lines, spreads, and points that can be clicked.
+// Charts of points, as SVG: lines, spreads, and points that can be clicked.
 
 const SPACE = "http://www.w3.org/2000/svg";
 const [WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM] = [440, 250, 52, 12, 12, 36];
@@ -9,10 +9,10 @@ export const COLOURS = ["#56b4e9", "#e69f00", "#2fc39b", "#f0e442", "#cc79a7", "
 // More points than these are drawn as a line only.
 const MOST_POINTS = 3000;
 
-function node(name, attributes, text = "") {
+function node(name, attributes, content = "") {
   const made = document.createElementNS(SPACE, name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  made.textContent = text;
+  made.textContent = content;
   return made;
 }
 
@@ -25,28 +25,32 @@ function ticks([low, high], most) {
   return found;
 }
 
+const text = (value) => (Math.abs(value) >= 1e5 ? value.toExponential() : String(value));
+
 function range(values) {
   const [low, high] = [Math.min(...values), Math.max(...values)];
   const margin = 0.06 * (high - low) || 1;
   return [low - margin, high + margin];
 }
 
-// `series`: { colour, points: [{ x, y, spread, ringed, of }] }; a click on a point calls `picked` with what it is of.
-export function chart(title, unit, series, yRange, picked) {
+export const ROTATION = "medial rotation, degrees";
+
+// `axes`: { x, y }, what they show; `series`: { colour, points: [{ x, y, spread, ringed, of }] }; a click on a point calls `picked`, if there is one, with what it is of.
+export function chart(title, axes, series, yRange, picked) {
   const all = series.flatMap((one) => one.points);
-  const svg = node("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": `${title}, ${unit}, against the medial rotation in degrees` });
+  const svg = node("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": `${title}, ${axes.y}, against ${axes.x}` });
   if (all.length === 0) return svg;
   const [xs, ys] = [range(all.map((p) => p.x)), yRange ?? range(all.map((p) => p.y))];
   const x = (value) => LEFT + (value - xs[0]) / (xs[1] - xs[0]) * (WIDTH - LEFT - RIGHT);
   const y = (value) => HEIGHT - BOTTOM - (value - ys[0]) / (ys[1] - ys[0]) * (HEIGHT - TOP - BOTTOM);
   for (const at of ticks(xs, 8)) {
-    svg.append(node("path", { d: `M${x(at)} ${TOP}V${HEIGHT - BOTTOM}`, class: "grid" }), node("text", { x: x(at), y: HEIGHT - BOTTOM + 14, "text-anchor": "middle" }, String(at)));
+    svg.append(node("path", { d: `M${x(at)} ${TOP}V${HEIGHT - BOTTOM}`, class: "grid" }), node("text", { x: x(at), y: HEIGHT - BOTTOM + 14, "text-anchor": "middle" }, text(at)));
   }
   for (const at of ticks(ys, 5)) {
-    svg.append(node("path", { d: `M${LEFT} ${y(at)}H${WIDTH - RIGHT}`, class: "grid" }), node("text", { x: LEFT - 5, y: y(at) + 4, "text-anchor": "end" }, String(at)));
+    svg.append(node("path", { d: `M${LEFT} ${y(at)}H${WIDTH - RIGHT}`, class: "grid" }), node("text", { x: LEFT - 5, y: y(at) + 4, "text-anchor": "end" }, text(at)));
   }
-  svg.append(node("text", { x: (LEFT + WIDTH) / 2, y: HEIGHT - 5, "text-anchor": "middle" }, "medial rotation, degrees"));
-  svg.append(node("text", { x: 12, y: TOP + (HEIGHT - TOP - BOTTOM) / 2, "text-anchor": "middle", transform: `rotate(-90 12 ${TOP + (HEIGHT - TOP - BOTTOM) / 2})` }, unit));
+  svg.append(node("text", { x: (LEFT + WIDTH) / 2, y: HEIGHT - 5, "text-anchor": "middle" }, axes.x));
+  svg.append(node("text", { x: 12, y: TOP + (HEIGHT - TOP - BOTTOM) / 2, "text-anchor": "middle", transform: `rotate(-90 12 ${TOP + (HEIGHT - TOP - BOTTOM) / 2})` }, axes.y));
   for (const { colour, points } of series) {
     if (points.some((p) => p.spread)) {
       const within = (value) => y(Math.max(ys[0], Math.min(ys[1], value)));
@@ -58,10 +62,20 @@ export function chart(title, unit, series, yRange, picked) {
     for (const p of points) {
       if (p.ringed) svg.append(node("circle", { cx: x(p.x), cy: y(p.y), r: 8, fill: "none", stroke: "#ff8f8f", "stroke-width": 2 }));
       if (all.length > MOST_POINTS && !p.ringed) continue;
-      const dot = node("circle", { cx: x(p.x), cy: y(p.y), r: 3, fill: colour, class: "pose" });
-      dot.addEventListener("click", () => picked(p.of));
+      const dot = node("circle", { cx: x(p.x), cy: y(p.y), r: 3, fill: colour });
+      if (picked) {
+        dot.setAttribute("class", "pose");
+        dot.addEventListener("click", () => picked(p.of));
+      }
       svg.append(dot);
     }
   }
+  return svg;
+}
+
+// A dot in the colour of a series.
+export function mark(colour) {
+  const svg = node("svg", { viewBox: "0 0 10 10", "aria-hidden": "true", class: "mark" });
+  svg.append(node("circle", { cx: 5, cy: 5, r: 5, fill: colour }));
   return svg;
 }

@@ -2,7 +2,7 @@
 
 import { Refused, getBytes, getJson, postJson } from "/page/server.js";
 import { button, commandRows, element, table } from "/page/elements.js";
-import { COLOURS, chart } from "/page/charts.js";
+import { COLOURS, ROTATION, chart, mark } from "/page/charts.js";
 import { fixed } from "/page/geometry.js";
 
 const byId = (id) => document.getElementById(id);
@@ -81,13 +81,7 @@ export class DatasetPanel {
     const colour = (name) => COLOURS[names.indexOf(name) % COLOURS.length];
     byId("legend").replaceChildren(...names.slice(0, 24).map((name) => {
       const item = element("li", ` ${name}`);
-      const mark = document.createElementNS("http://www.w3.org/2000/svg", "svg");
-      mark.setAttribute("viewBox", "0 0 10 10");
-      mark.setAttribute("aria-hidden", "true");
-      const dot = document.createElementNS("http://www.w3.org/2000/svg", "circle");
-      for (const [key, value] of [["cx", 5], ["cy", 5], ["r", 5], ["fill", colour(name)]]) dot.setAttribute(key, value);
-      mark.append(dot);
-      item.prepend(mark);
+      item.prepend(mark(colour(name)));
       return item;
     }));
     byId("charts").replaceChildren(...CHARTS.flatMap((kind) => this.chart(kind, sweeps, colour)));
@@ -112,7 +106,7 @@ export class DatasetPanel {
     const largest = Math.max(0, ...series.flatMap((one) => one.points.map((p) => p.y)));
     if (series.length === 0 || (from0 && largest === 0)) return [];
     const figure = element("figure", "", { class: "chart" });
-    figure.append(chart(title, unit, series, from0 ? [0, 1.1 * largest] : range, (pose) => this.show(pose)), element("figcaption", title));
+    figure.append(chart(title, { x: ROTATION, y: unit }, series, from0 ? [0, 1.1 * largest] : range, (pose) => this.show(pose)), element("figcaption", title));
     return [figure];
   }
 

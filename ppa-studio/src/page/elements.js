@@ -26,13 +26,18 @@ export function commandRows(commands) {
   });
 }
 
+// Cells are texts, or elements.
 export function table(heads, rows) {
   const made = element("table");
   const head = element("tr");
   head.append(...heads.map((text) => element("th", text, { scope: "col" })));
   made.append(head, ...rows.map((cells) => {
     const row = element("tr");
-    row.append(...cells.map((text) => element("td", text)));
+    row.append(...cells.map((cell) => {
+      const made = element("td");
+      made.append(cell);
+      return made;
+    }));
     return row;
   }));
   return made;

@@ -5,7 +5,7 @@ import { add, angleDeg, fixed, norm, planeNormal, point, scale, sub } from "/pag
 
 const byId = (id) => document.getElementById(id);
 const REGIONS = [["joint_region", "Region at the joint"], ["calf_region", "Region away from it"]];
-const KINDS = { lower_leg: "Lower leg with an ankle", knee: "Knee", other: "Neither an ankle nor a knee was recognised: joint, axis and plane can be set by hand" };
+const KINDS = { lower_leg: "Lower leg with an ankle", knee: "Knee", other: "Another limb: set joint, axis and plane by hand; the joint found is the middle of the limb" };
 const PICKS = ["distal plane point", "proximal plane point 1", "proximal plane point 2"];
 
 export class LandmarkPanel {
@@ -13,6 +13,7 @@ export class LandmarkPanel {
     this.store = store;
     this.actions = actions;
     this.picking = null;
+    byId("limb-choice").addEventListener("change", (event) => actions.choose({ limb: event.target.value || null }));
     byId("axis-source").addEventListener("change", (event) => actions.choose({ axis_source: event.target.value }));
     PICKS.forEach((label, corner) => {
       const button = document.createElement("button");
@@ -63,7 +64,9 @@ export class LandmarkPanel {
 
   show() {
     const { doc } = this.store;
-    byId("limb-kind").textContent = KINDS[doc.limb];
+    const why = doc.limb === "other" && doc.note ? ` Not recognised: ${doc.note}.` : "";
+    byId("limb-kind").textContent = `${KINDS[doc.limb]}.${why}`;
+    byId("limb-choice").value = doc.choices.limb ?? "";
     byId("axis-source").value = doc.landmarks.axis_source;
     for (const [key] of REGIONS) {
       doc.landmarks[key].range_mm.forEach((mm, end) => { byId(`${key}-${["from", "to"][end]}`).value = fixed(mm); });

@@ -10,23 +10,27 @@ import { WhatIfPanel } from "/page/whatif.js";
 import { PlanPanel } from "/page/plan.js";
 import { GenerationPanel } from "/page/generation.js";
 import { DatasetPanel } from "/page/dataset.js";
+import { TrainingPanel } from "/page/training.js";
+import { LivePanel } from "/page/live.js";
+import { CropPanel, cropOf } from "/page/crop.js";
 import { showScan, showSkin } from "/page/scan.js";
 import { drawRoom, roomFacts } from "/page/room.js";
 import { button, commandRows } from "/page/elements.js";
 
 const byId = (id) => document.getElementById(id);
-const STEPS = ["scan", "skin", "landmarks", "room", "whatif", "generation", "dataset"];
+const STEPS = ["scan", "skin", "landmarks", "room", "whatif", "generation", "dataset", "training"];
 // Steps that show the limb.
 const OF_LIMB = STEPS.slice(0, 5);
 const WINDOWS = [["Soft tissue", 40, 400], ["Bone", 400, 1800], ["Skin", -300, 1200], ["All", 200, 3000]];
 
-const store = { doc: null, step: "scan", cursor: [0, 0, 0], window: { level: 200, width: 1600 }, showRemoved: true };
+const store = { doc: null, step: "scan", cursor: [0, 0, 0], window: { level: 200, width: 1600 }, showRemoved: true, cropping: false };
 
-const actions = { change, choose, cursor: setCursor, place: setPlace, window: setWindow, point: showReading, picked, fail, tell, room: showRoom, commands: showImageCommands };
+const actions = { change, choose, crop: (box) => change("surface", { crop: box && cropOf(store, box) }), redraw: () => slices.forEach((view) => view.draw()), cursor: setCursor, place: setPlace, window: setWindow, point: showReading, picked, fail, tell, room: showRoom, commands: showImageCommands, prediction: showPrediction };
 
 const slices = [...document.querySelectorAll(".view[data-axis]")].map((figure) => new SliceView(figure, store, actions));
 const view3d = new View3d(byId("view3d"), actions);
 const landmarks = new LandmarkPanel(store, actions);
+const crop = new CropPanel(store, actions);
 const whatIf = new WhatIfPanel(store, actions);
 const plan = new PlanPanel({
   fail,
@@ -42,6 +46,8 @@ const generation = new GenerationPanel({
   started: () => plan.load(),
 });
 const dataset = new DatasetPanel({ fail, tell, folder: () => opened?.dataset ?? plan.folder(), opened: openedLimb });
+const training = new TrainingPanel({ fail, tell });
+const live = new LivePanel({ fail, folder: () => opened?.watched });
 let room = null;
 // What the program has opened: limb, plan, dataset.
 let opened = null;
@@ -65,6 +71,7 @@ async function change(path, body) {
   } catch (error) {
     fail(error);
     landmarks.show();
+    crop.show();
     slices.forEach((view) => view.draw());
   } finally {
     document.body.removeAttribute("aria-busy");
@@ -96,6 +103,7 @@ async function show(doc) {
   if (skinChanged) slices.forEach((view) => view.forget());
   showScan(doc, actions);
   showSkin(doc, actions);
+  crop.show();
   landmarks.show();
   showCommands();
   slices.forEach((view) => view.update());
@@ -137,17 +145,27 @@ function showCommands() {
   byId("command-list").replaceChildren(...commandRows([store.doc.commands.prepare]));
 }
 
+// The command that asks the networks follows those of the images that it reads.
+function showPrediction(command) {
+  byId("command-list").querySelector(".prediction")?.remove();
+  if (!command || store.step !== "whatif") return;
+  const [row] = commandRows([command]);
+  row.classList.add("prediction");
+  byId("command-list").append(row);
+}
+
 async function showImageCommands(values) {
   const commands = await postJson("commands", values);
   if (store.step !== "whatif" && store.step !== "room") return;
-  const rows = commandRows([commands.depth, commands.radiograph]);
+  const rows = commandRows([commands.depth, store.step === "room" ? commands.coverage : commands.radiograph]);
   if (commands.need_saved_plan) {
     const note = document.createElement("p");
     note.className = "hint";
     note.textContent = "They read the plan that “Save as plan” writes.";
     rows.unshift(note);
   }
-  byId("command-list").replaceChildren(...rows);
+  const prediction = store.step === "whatif" ? [...byId("command-list").querySelectorAll(".prediction")] : [];
+  byId("command-list").replaceChildren(...rows, ...prediction);
 }
 
 function setCursor(voxel) {
@@ -199,6 +217,11 @@ function go(step) {
   if (step !== "generation") generation.hide();
   if (step === "generation") showGeneration();
   if (step === "dataset") showDataset();
+  if (step !== "training") {
+    training.hide();
+    live.hide();
+  }
+  if (step === "training") showTraining();
   if (!store.doc) return;
   showCommands();
   slices.forEach((view) => view.update());
@@ -237,6 +260,12 @@ async function showDataset() {
   await dataset.load();
 }
 
+async function showTraining() {
+  byId("command-list").replaceChildren();
+  live.show();
+  await training.show();
+}
+
 // A limb of the dataset was opened: shown as it lies in a pose.
 async function openedLimb(doc, angleDeg) {
   store.doc = null;
@@ -252,8 +281,10 @@ function allow(next) {
   opened = next;
   for (const tab of document.querySelectorAll("[role=tab]")) {
     const { step } = tab.dataset;
-    tab.disabled = OF_LIMB.includes(step) ? !opened.limb : step === "generation" && !opened.plan;
-    tab.title = tab.disabled ? (step === "generation" ? "No plan lies beside the dataset" : "No limb is open: open one from a pose in step 7") : "";
+    const needs = OF_LIMB.includes(step) ? "limb" : { generation: "plan", dataset: "dataset" }[step];
+    tab.disabled = needs === "dataset" ? !opened.dataset && !opened.plan : needs !== undefined && !opened[needs];
+    const why = { limb: opened.dataset ? "No limb is open: open one from a pose in step 7" : "No limb is open", plan: "No plan is open", dataset: "No dataset is open" };
+    tab.title = tab.disabled ? why[needs] : "";
   }
 }
 
@@ -262,6 +293,8 @@ async function begin() {
   if (opened.dataset) {
     byId("name").textContent = opened.dataset;
     document.title = `${opened.dataset} - ppa studio`;
+  } else if (!opened.limb) {
+    byId("name").textContent = opened.watched ?? "Trainings";
   }
   go(stepInAddress());
   if (opened.limb) await show(await getJson("state"));
@@ -271,7 +304,8 @@ async function begin() {
 function stepInAddress() {
   const step = location.hash.slice(1);
   if (STEPS.includes(step) && !byId(`tab-${step}`).disabled) return step;
-  return opened?.limb ? "scan" : "dataset";
+  if (opened?.limb) return "scan";
+  return opened?.dataset ? "dataset" : "training";
 }
 
 function listen() {
@@ -307,6 +341,11 @@ function listen() {
     follow(Number(event.target.value));
   });
   byId("iso").addEventListener("change", (event) => change("surface", { iso_hu: Number(event.target.value) }));
+  byId("limb-here").addEventListener("click", () => {
+    const place = transform(store.doc.grid.ct_from_voxel, store.cursor).map((x) => Math.round(10 * x) / 10);
+    change("surface", { inside: place });
+  });
+  byId("limb-find").addEventListener("click", () => change("surface", { inside: null }));
   byId("side").addEventListener("change", (event) => change("surface", { side: event.target.value }));
   byId("show-removed").addEventListener("change", (event) => {
     store.showRemoved = event.target.checked;

@@ -48,6 +48,7 @@ export class PlanPanel {
     this.plan = null;
     this.updates = [];
     byId("plan-save").addEventListener("click", () => this.save());
+    for (const step of ["undo", "redo"]) byId(`plan-${step}`).addEventListener("click", () => this.change(`plan/${step}`, {}));
     byId("plan-folder").addEventListener("change", () => actions.folder());
   }
 
@@ -79,6 +80,8 @@ export class PlanPanel {
       : plan.is_saved ? `${plan.original}, no changes` : `${plan.original} is not saved yet`;
     byId("plan-save").textContent = plan.is_saved ? "Save over the plan" : "Save the plan";
     byId("plan-save").disabled = plan.is_saved && !plan.has_edits;
+    byId("plan-undo").disabled = !plan.can_undo;
+    byId("plan-redo").disabled = !plan.can_redo;
     if (!byId("plan-folder").value) byId("plan-folder").value = plan.dataset;
     byId("plan-limbs").replaceChildren(...plan.limbs.map((limb, number) => this.limb(limb, number)));
     if (this.updates.length === 0) byId("plan-form").append(...this.groups(plan.fields));

@@ -32,9 +32,12 @@ export function showSkin(doc, actions) {
   const { report } = doc;
   byId("bodies").replaceChildren(...report.bodies.slice(0, 8).map((body) => {
     const item = element("li", `${body.chosen ? "taken: " : ""}${fixed(body.core_mm3 / 1000, 0)} ml around ${point(body.centre_mm, 0)} mm `);
-    item.append(button("Show", () => actions.place(body.centre_mm)));
+    const where = `the body around ${point(body.centre_mm, 0)} mm`;
+    item.append(button("Show", () => actions.place(body.centre_mm), `Show ${where}`));
+    if (!body.chosen) item.append(button("Take", () => actions.change("surface", { inside: body.centre_mm }), `Take ${where}`));
     return item;
   }));
+  byId("limb-find").disabled = !doc.inside;
   facts(byId("skin-facts"), [
     ["Limb", `${fixed(report.limb_mm3 / 1000, 0)} ml`],
     ["Couch removed", `${report.couch_voxels} voxels`],

@@ -44,6 +44,13 @@ export async function postPicture(path, body, signal) {
   return { picture: await response.blob(), report };
 }
 
+// The same from an address that may have no image yet: null then.
+export async function getPicture(path, signal) {
+  const response = await answered(await fetch(`/api/${path}`, { signal }));
+  if (response.status === 204) return null;
+  return { picture: await response.blob(), report: JSON.parse(response.headers.get("x-report")) };
+}
+
 // Calls `make` for the newest value only: while one call is under way, later values replace each other.
 export function newest(make) {
   let waiting = null;

@@ -1,6 +1,7 @@
 // Slices of the scan with crosshair, landmarks and what can be dragged.
 
 import { getBytes } from "/page/server.js";
+import { box, drawCrop, grabCrop, moveCrop } from "/page/crop.js";
 import { add, dot, inverse, scale, sub, transform } from "/page/geometry.js";
 
 // Nearer than this a pointer holds what it points to, CSS pixels.
@@ -118,6 +119,8 @@ export class SliceView {
     context.drawImage(this.image, l.x, l.y, l.w, l.h);
     this.drawCross(context, l);
     if (this.store.step === "landmarks" || this.store.step === "scan") this.drawLandmarks(context, l);
+    const crop = this.crops() && (this.held?.crop ?? box(this.store));
+    if (crop) drawCrop(context, this, crop, l);
     this.drawLetters(context, width, height);
     const { size } = this.store.doc.grid;
     this.caption.textContent = `${"ijk"[this.axis]} = ${this.index()} of ${size[this.axis]}`;
@@ -230,8 +233,14 @@ export class SliceView {
     context.fillText(this.down.letters[1], width / 2, height - 11);
   }
 
+  // Whether the step shows which part of the scan is used.
+  crops() {
+    return this.store.step === "scan" || this.store.step === "skin";
+  }
+
   // What lies under the pointer and can be dragged.
   grab(at) {
+    if (this.crops() && this.store.cropping) return grabCrop(this, box(this.store), at, this.layout());
     if (this.store.step !== "landmarks") return null;
     const l = this.layout();
     const found = this.store.doc.landmarks;
@@ -253,6 +262,13 @@ export class SliceView {
   drag(at) {
     const { grid, landmarks } = this.store.doc;
     const voxel = this.toVoxel(at);
+    if (this.held.cropAxis !== undefined) {
+      const { cropAxis, beside } = this.held;
+      const edge = this.toVoxel([at[0] - beside[0], at[1] - beside[1]]);
+      const border = Math.round(edge[cropAxis] + 0.5);
+      this.held.crop = moveCrop(grid, this.held.crop ?? box(this.store), this.held, border);
+      return;
+    }
     const { key, corner, end } = this.held;
     if (end !== undefined) {
       const range = [...landmarks[key].range_mm];
@@ -306,6 +322,7 @@ export class SliceView {
     const held = this.held;
     this.held = null;
     if (held?.choice) this.actions.choose(held.choice);
+    if (held?.crop && JSON.stringify(held.crop) !== JSON.stringify(box(this.store))) this.actions.crop(held.crop);
   }
 
   turn(event) {

@@ -1,6 +1,8 @@
 // Sliders of pose and exposure, and the images that follow them.
 
 import { Refused, newest, post, postJson, postPicture } from "/page/server.js";
+import { facts } from "/page/elements.js";
+import { CameraForm } from "/page/cameras.js";
 import { fixed } from "/page/geometry.js";
 
 const byId = (id) => document.getElementById(id);
@@ -42,19 +44,24 @@ export class WhatIfPanel {
     this.sensor = false;
     this.grid = null;
     this.technique = null;
+    this.shape = null;
     this.sweeping = false;
     this.depths = newest((whatIf) => this.depth(whatIf));
     this.rooms = newest((whatIf) => this.room(whatIf));
     this.labels = newest((whatIf) => this.label(whatIf));
+    this.coverages = newest((whatIf) => this.coverage(whatIf));
+    this.cameras = new CameraForm(() => this.changed());
     this.build();
     byId("sweep").addEventListener("click", () => this.sweep());
-    byId("save-plan").addEventListener("click", () => this.savePlan(false));
+    for (const id of ["save-plan", "room-save-plan"]) byId(id).addEventListener("click", () => this.save("plan", false));
+    byId("cameras-save").addEventListener("click", () => this.save("cameras", false));
   }
 
   build() {
     const form = byId("whatif-form");
     form.addEventListener("submit", (event) => event.preventDefault());
     for (const slider of SLIDERS) form.append(this.slider(slider));
+    form.append(this.select("shape", "Body shape that the cameras see", [["", "that of the scan"], ["big", "big"], ["small", "small"], ["bumps_a", "bumps a"], ["bumps_b", "bumps b"]], (value) => { this.shape = value || null; }));
     form.append(this.select("technique", "Technique", [["", "that of the plan"], ["ankle", "ankle"], ["knee", "knee"]], (value) => { this.technique = value || null; }));
     form.append(this.select("grid", "Anti-scatter grid", [["", "that of the plan"], ["yes", "8:1, 40 lines per cm"], ["no", "none"]],
       (value) => { this.grid = value === "" ? null : value === "yes"; }));
@@ -130,8 +137,11 @@ export class WhatIfPanel {
     const { aluminium_mm, ...values } = this.values;
     const whatIf = { ...values, sensor: this.sensor };
     if (aluminium_mm !== undefined) whatIf.filters = aluminium_mm > 0 ? [`Al:${aluminium_mm}`] : [];
+    if (this.shape) whatIf.shape = this.shape;
     if (this.technique) whatIf.technique = this.technique;
     if (this.grid !== null) whatIf.grid = this.grid;
+    const cameras = this.cameras.moves();
+    if (cameras) whatIf.cameras = cameras;
     return whatIf;
   }
 
@@ -147,8 +157,9 @@ export class WhatIfPanel {
     this.depths(whatIf);
     this.rooms(whatIf);
     this.actions.commands(whatIf);
-    if (this.store.step !== "whatif" || this.sweeping) return;
+    if (this.sweeping) return;
     this.timer = setTimeout(() => {
+      if (this.store.step === "room") return this.coverages(whatIf);
       this.labels(whatIf);
       this.radiograph(whatIf);
     }, SETTLED_MS);
@@ -166,6 +177,7 @@ export class WhatIfPanel {
       const { picture, report } = await postPicture("depth", whatIf);
       await this.put("depth", picture);
       byId("network").textContent = networkText(report.network);
+      this.actions.prediction(report.network_command);
       const ms = Math.round(performance.now() - started);
       byId("depth").querySelector("figcaption").textContent =
         `left and right camera, ${fixed(report.range_mm[0], 0)} (red) to ${fixed(report.range_mm[1], 0)} mm or more (blue), ${ms} ms`;
@@ -177,6 +189,21 @@ export class WhatIfPanel {
   async room(whatIf) {
     try {
       this.actions.room(await postJson("room", whatIf));
+    } catch (error) {
+      this.failed(error);
+    }
+  }
+
+  // What both cameras see of the skin near the joint.
+  async coverage(whatIf) {
+    try {
+      const { places, radius_mm, max_angle_deg } = await postJson("coverage", whatIf);
+      const row = (camera) => {
+        const { visible_share, mm_per_pixel } = places.find(({ name }) => name === `rig cam_${camera}`);
+        const size = mm_per_pixel ? `, ${fixed(mm_per_pixel, 1)} mm a pixel` : "";
+        return [`Seen by the ${camera} one`, `${fixed(100 * visible_share, 0)} %${size}`];
+      };
+      facts(byId("coverage"), [row("left"), row("right"), ["of the skin", `within ${fixed(radius_mm, 0)} mm of the joint, at most ${fixed(max_angle_deg, 0)}° oblique`]]);
     } catch (error) {
       this.failed(error);
     }
@@ -255,14 +282,15 @@ export class WhatIfPanel {
     this.changed();
   }
 
-  async savePlan(replace) {
+  // Saves the plan or the cameras as they are shown.
+  async save(what, replace) {
     try {
-      const response = await post("plan", { what_if: this.whatIf(), replace });
+      const response = await post(what, { what_if: this.whatIf(), replace });
       this.actions.tell(`Saved ${(await response.json()).file}`);
       this.actions.commands(this.whatIf());
     } catch (error) {
       if (error instanceof Refused && error.status === 409 && !replace && window.confirm(`${error.message}. Replace it?`)) {
-        return this.savePlan(true);
+        return this.save(what, true);
       }
       this.actions.fail(error);
     }

@@ -51,9 +51,30 @@ pub(super) fn sentence(status: StatusCode, error: String) -> Response {
     (status, Json(Sentence { error })).into_response()
 }
 
+/// JSON with the escapes of all characters that a header may not hold.
+fn ascii_json(json: &str) -> String {
+    let mut ascii = String::new();
+    for c in json.chars() {
+        match c {
+            ' '..='~' => ascii.push(c),
+            _ => {
+                for unit in c.encode_utf16(&mut [0; 2]) {
+                    ascii += &format!("\\u{unit:04x}");
+                }
+            }
+        }
+    }
+    ascii
+}
+
+/// A PNG file.
+pub(super) fn png_file(png: Vec<u8>) -> Response {
+    ([(CONTENT_TYPE, HeaderValue::from_static("image/png"))], png).into_response()
+}
+
 /// An image with its report.
 pub(super) fn picture(png: Vec<u8>, report: &impl Serialize) -> Response {
-    let report = serde_json::to_string(report).unwrap_or_default();
+    let report = ascii_json(&serde_json::to_string(report).unwrap_or_default());
     let report = HeaderValue::from_str(&report).unwrap_or(HeaderValue::from_static("{}"));
     let kind = HeaderValue::from_static("image/png");
     ([(CONTENT_TYPE, kind), (REPORT, report)], png).into_response()

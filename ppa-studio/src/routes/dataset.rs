@@ -1,13 +1,10 @@
 //! The dataset: its poses, findings and splits, images of a pose, and its limbs.
 
-use std::io::Cursor;
 use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::{Path, Query, State as Extracted};
-use axum::http::header::{CONTENT_TYPE, HeaderValue};
-use axum::response::{IntoResponse, Response};
-use image::ImageFormat;
+use axum::response::Response;
 use ppa_dataset::layout::{LimbId, Side, View};
 use ppa_dataset::published::{GrayImage16, inspect};
 use ppa_dataset::split::Split;
@@ -16,13 +13,14 @@ use ppa_generate::Case;
 use ppa_report::{PoseRow, pose_rows};
 use serde::Serialize;
 
-use super::answer::work;
+use super::answer::{png_file, work};
 use super::document::{Document, document};
 use super::generation::Dataset;
 use crate::commands::{DatasetCommands, of_dataset};
 use crate::error::StudioError;
 use crate::false_colours::side_by_side;
 use crate::generation::own_threads;
+use crate::png::png;
 use crate::state::State;
 
 /// What is open.
@@ -32,6 +30,8 @@ pub(super) struct Opened {
     plan: bool,
     /// Name of the dataset that was opened, if it is one.
     dataset: Option<String>,
+    /// Folder whose frames are judged as they come, if there is one.
+    watched: Option<String>,
 }
 
 pub(super) async fn opened(Extracted(state): Extracted<Arc<State>>) -> Json<Opened> {
@@ -42,6 +42,10 @@ pub(super) async fn opened(Extracted(state): Extracted<Arc<State>>) -> Json<Open
         limb,
         plan: limb || state.opened_plan().is_some(),
         dataset: name.map(|name| name.to_string_lossy().into_owned()),
+        watched: state
+            .live
+            .as_ref()
+            .map(|live| live.watch.folder.display().to_string()),
     })
 }
 
@@ -162,13 +166,10 @@ pub(super) async fn depth(
         let images =
             View::ALL.map(|view| GrayImage16::read(&root.join(limb.depth(shape, view, step))));
         let images: Vec<GrayImage16> = images.into_iter().collect::<Result<_, _>>()?;
-        let (picture, _) = side_by_side(&images);
-        let mut png = Cursor::new(Vec::new());
-        picture.write_to(&mut png, ImageFormat::Png)?;
-        Ok::<_, StudioError>(png.into_inner())
+        Ok::<_, StudioError>(png(side_by_side(&images).0)?)
     })
     .await?;
-    Ok(picture(png))
+    Ok(png_file(png))
 }
 
 /// The radiograph of a pose, PNG.
@@ -185,11 +186,7 @@ pub(super) async fn radiograph(
         Ok::<_, StudioError>(read?)
     })
     .await?;
-    Ok(picture(png))
-}
-
-fn picture(png: Vec<u8>) -> Response {
-    ([(CONTENT_TYPE, HeaderValue::from_static("image/png"))], png).into_response()
+    Ok(png_file(png))
 }
 
 /// Opens a limb of the plan, so that steps 1 to 5 show it.

@@ -1,13 +1,15 @@
 //! The limb with its landmarks: state, changes, undo, saving.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::State as Extracted;
 use axum::response::Response;
+use ppa_dataset::files::write_whole;
 use ppa_dataset::{Finding, FindingCode};
-use ppa_generate::Case;
-use ppa_mesh::LimbReport;
+use ppa_generate::{Case, SceneSetupError};
+use ppa_mesh::{LimbReport, VoxelBox};
 use ppa_scene::{LandmarkOverrides, Landmarks, LimbKind, Side};
 use ppa_xray::TubeLoad;
 use serde::{Deserialize, Serialize};
@@ -26,8 +28,14 @@ pub(super) struct Document {
     name: String,
     side: Side,
     limb: LimbKind,
+    /// Why landmarks have to be set by hand, if they were not found.
+    note: Option<String>,
     grid: GridState,
     iso_hu: f64,
+    /// A point that was chosen to be inside the limb.
+    inside: Option<[f64; 3]>,
+    /// The part of the scan that is used, if not all.
+    crop: Option<VoxelBox>,
     /// The highest HU that the surface may have.
     core_hu: f64,
     choices: LandmarkOverrides,
@@ -96,6 +104,9 @@ pub(super) struct SurfaceChange {
     /// A point in the wanted limb, or `null` for the automatic choice.
     #[serde(default, with = "double_option")]
     inside: Option<Option<[f64; 3]>>,
+    /// The part of the scan to look at, or `null` for all of it.
+    #[serde(default, with = "double_option")]
+    crop: Option<Option<VoxelBox>>,
 }
 
 /// Tells an absent key from `null`.
@@ -116,6 +127,7 @@ pub(super) async fn surface(
     edit(state, move |mut case| {
         case.surface.iso_hu = change.iso_hu.unwrap_or(case.surface.iso_hu);
         case.surface.inside = change.inside.unwrap_or(case.surface.inside);
+        case.surface.crop = change.crop.unwrap_or(case.surface.crop);
         case.side = change.side.unwrap_or(case.side);
         case
     })
@@ -160,10 +172,10 @@ pub(super) async fn save(Extracted(state): Extracted<Arc<State>>) -> Answer {
     .await
 }
 
-/// A plan to save.
+/// A plan or its cameras, to save.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct PlanToSave {
+pub(super) struct ToSave {
     what_if: WhatIf,
     /// Whether the person agreed to replace the file that is there.
     #[serde(default)]
@@ -171,23 +183,48 @@ pub(super) struct PlanToSave {
 }
 
 #[derive(Serialize)]
-pub(super) struct SavedPlan {
+pub(super) struct Saved {
     file: String,
+}
+
+impl Saved {
+    fn of(file: &Path) -> Json<Self> {
+        let file = file.to_string_lossy().into_owned();
+        Json(Self { file })
+    }
 }
 
 /// Saves a plan with the page's changes.
 pub(super) async fn plan(
     Extracted(state): Extracted<Arc<State>>,
-    Json(PlanToSave { what_if, replace }): Json<PlanToSave>,
-) -> Result<Json<SavedPlan>, Response> {
+    Json(ToSave { what_if, replace }): Json<ToSave>,
+) -> Result<Json<Saved>, Response> {
     work(state, move |state| {
         let (plan, file) = (state.plan_with(&what_if)?, state.limb()?.saved_plan());
         if file.exists() && !replace {
             return Err(StudioError::Exists(file));
         }
         plan.write(&file)?;
-        let file = file.to_string_lossy().into_owned();
-        Ok(Json(SavedPlan { file }))
+        Ok(Saved::of(&file))
+    })
+    .await
+}
+
+/// Saves the cameras as they are moved, as a rig that plans and commands read.
+pub(super) async fn cameras(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(ToSave { what_if, replace }): Json<ToSave>,
+) -> Result<Json<Saved>, Response> {
+    work(state, move |state| {
+        let plan = what_if.plan(&state.plan())?;
+        let rig = plan.depth.cameras().map_err(SceneSetupError::from)?;
+        let file = state.limb()?.saved_cameras();
+        if file.exists() && !replace {
+            return Err(StudioError::Exists(file));
+        }
+        let text = serde_json::to_string_pretty(&rig).expect("names and numbers are JSON");
+        write_whole(&file, text.as_bytes())?;
+        Ok(Saved::of(&file))
     })
     .await
 }
@@ -222,12 +259,15 @@ pub(super) fn document(state: &State) -> Result<Document, StudioError> {
         name: name.into_owned(),
         side: shown.case.side,
         limb: prepared.landmarks.limb,
+        note: state.note.clone(),
         grid: GridState {
             size: grid.size(),
             spacing_mm: grid.spacing_mm().into(),
             ct_from_voxel: [0, 1, 2, 3].map(row),
         },
         iso_hu: shown.case.surface.iso_hu,
+        inside: shown.case.surface.inside,
+        crop: shown.case.surface.crop,
         core_hu: shown.case.surface.core_hu,
         choices: shown.case.choices.clone(),
         landmarks: prepared.landmarks.clone(),

@@ -25,7 +25,12 @@ pub(super) async fn depth(
         let _turn = state.depth.turn(&ticket)?;
         let limb = state.limb()?;
         let network = state.network.as_ref();
-        (limb.scenes).depth(&limb.shown(), &state.plan(), &what_if, network)
+        // Bumps differ between persons.
+        let patient = match what_if.shape {
+            Some(_) => state.patient()?,
+            None => 0,
+        };
+        (limb.scenes).depth(&limb.shown(), &state.plan(), &what_if, patient, network)
     })
     .await?;
     Ok(picture(made.png, &made.report))
@@ -66,7 +71,14 @@ pub(super) async fn commands(
         let limb = state.limb()?;
         let (case, saved) = (limb.case_on_disk(), limb.saved_plan());
         let plan = state.opened_plan();
-        Ok(Json(of_images(&case, plan.as_deref(), &saved, &what_if)))
+        let seed = state.plan().seed;
+        Ok(Json(of_images(
+            &case,
+            plan.as_deref(),
+            &saved,
+            seed,
+            &what_if,
+        )))
     })
     .await
 }

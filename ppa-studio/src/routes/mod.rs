@@ -5,9 +5,11 @@ mod dataset;
 mod document;
 mod generation;
 mod images;
+mod live;
 mod plan;
 mod room;
 mod scan;
+mod training;
 
 use std::sync::Arc;
 
@@ -33,6 +35,7 @@ pub(crate) fn router(state: Arc<State>) -> Router {
         .route("/redo", post(document::redo))
         .route("/save", post(document::save))
         .route("/plan", post(document::plan))
+        .route("/cameras", post(document::cameras))
         .route("/slice/{axis}/{index}", get(scan::slice))
         .route("/skin", get(scan::skin))
         .route("/surface_at", post(scan::surface_at))
@@ -40,10 +43,13 @@ pub(crate) fn router(state: Arc<State>) -> Router {
         .route("/depth", post(images::depth))
         .route("/radiograph/{pass}", post(images::radiograph))
         .route("/label", post(room::label))
+        .route("/coverage", post(room::coverage))
         .route("/commands", post(images::commands))
         .route("/plan/form", get(plan::form))
         .route("/plan/key", post(plan::key))
         .route("/plan/case", post(plan::case))
+        .route("/plan/undo", post(plan::undo))
+        .route("/plan/redo", post(plan::redo))
         .route("/plan/save", post(plan::save))
         .route("/forecast", post(generation::forecast))
         .route("/generation", get(generation::state))
@@ -65,7 +71,12 @@ pub(crate) fn router(state: Arc<State>) -> Router {
         .route(
             "/dataset/radiograph/{patient}/{side}/{step}",
             get(dataset::radiograph),
-        );
+        )
+        .route("/trainings", get(training::list))
+        .route("/training/log", get(training::log))
+        .route("/training/errors", post(training::errors))
+        .route("/training/image/{number}", get(training::image))
+        .route("/live/{after}", get(live::newest));
     Router::new()
         .route("/", get(page::index))
         .route("/page/{name}", get(page::file))

@@ -6,12 +6,12 @@ use std::sync::Arc;
 use axum::Json;
 use axum::extract::State as Extracted;
 use axum::response::Response;
-use ppa_generate::PlanCase;
+use ppa_generate::{PlanCase, edited_case, original_case};
 use serde::{Deserialize, Serialize};
 
 use super::answer::work;
-use crate::case_file::{edited_case, original_case};
 use crate::error::StudioError;
+use crate::plan_file::PlanFile;
 use crate::plan_form::{Field, fields};
 use crate::state::State;
 
@@ -27,6 +27,8 @@ pub(super) struct PlanForm {
     /// Name of the folder that `ppa generate` makes of the original.
     dataset: String,
     limbs: Vec<Limb>,
+    can_undo: bool,
+    can_redo: bool,
     fields: Vec<Field>,
 }
 
@@ -95,6 +97,22 @@ pub(super) async fn case(
     .await
 }
 
+pub(super) async fn undo(Extracted(state): Extracted<Arc<State>>) -> Answer {
+    work(state, |state| {
+        state.step_plan(PlanFile::undo)?;
+        plan_form(state).map(Json)
+    })
+    .await
+}
+
+pub(super) async fn redo(Extracted(state): Extracted<Arc<State>>) -> Answer {
+    work(state, |state| {
+        state.step_plan(PlanFile::redo)?;
+        plan_form(state).map(Json)
+    })
+    .await
+}
+
 /// Writes the plan over the one that was opened.
 pub(super) async fn save(Extracted(state): Extracted<Arc<State>>) -> Answer {
     work(state, |state| {
@@ -113,6 +131,7 @@ fn plan_form(state: &State) -> Result<PlanForm, StudioError> {
     let plan = file.plan(&text)?;
     let shown = |path: &Path| path.to_string_lossy().into_owned();
     let dataset = file.original().with_extension("");
+    let [can_undo, can_redo] = file.can_step();
     Ok(PlanForm {
         original: shown(file.original()),
         current: shown(file.current()),
@@ -124,6 +143,8 @@ fn plan_form(state: &State) -> Result<PlanForm, StudioError> {
             .to_string_lossy()
             .into_owned(),
         limbs: plan.cases.iter().map(limb).collect(),
+        can_undo,
+        can_redo,
         fields: fields(&text)?,
     })
 }

@@ -8,8 +8,8 @@ use axum::response::Response;
 use nalgebra::{Point2, Point3};
 use ppa_core::TransformRows;
 use ppa_dataset::layout::View;
-use ppa_depth::rows_from_isometry;
-use ppa_generate::{Plan, SceneSetup};
+use ppa_depth::{CoverageSettings, rows_from_isometry};
+use ppa_generate::{CoverageStudy, JointInRoom, Plan, SceneSetup};
 use ppa_label::PoseLabel;
 use ppa_scene::{Contact, Placement, ct_from_device};
 use serde::Serialize;
@@ -63,6 +63,27 @@ pub(super) async fn label(
         let ct_from_device = ct_from_device(&placement, landmarks, device);
         let label = limb.labels.of(&shown, ct_from_device.isometry())?;
         Ok(Json(label))
+    })
+    .await
+}
+
+/// What both cameras see of the skin near the joint; of several requests the newest is answered.
+pub(super) async fn coverage(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(what_if): Json<WhatIf>,
+) -> Result<Json<CoverageStudy>, Response> {
+    let ticket = state.coverage.enter();
+    work(state, move |state| {
+        let _turn = state.coverage.turn(&ticket)?;
+        let plan = what_if.plan(&state.plan())?;
+        let limb = state.limb()?;
+        let setup = limb.scenes.setup(&plan)?;
+        let shown = limb.shown();
+        let angle_rad = what_if.angle_deg.to_radians();
+        let joint = JointInRoom::new(&setup, shown.prepared(), angle_rad)?;
+        Ok(Json(
+            joint.rank(&joint.rig(), &CoverageSettings::default())?,
+        ))
     })
     .await
 }

@@ -91,7 +91,7 @@ fn a_limb_is_opened_where_the_plan_names_its_case() {
     let found = browser.get("/api/opened").json();
     assert_eq!(
         found,
-        json!({ "limb": false, "plan": true, "dataset": "ankles" })
+        json!({ "limb": false, "plan": true, "watched": null, "dataset": "ankles" })
     );
     let closed = browser.get("/api/state");
     assert_eq!(closed.status, StatusCode::UNPROCESSABLE_ENTITY);
@@ -129,7 +129,7 @@ fn a_dataset_without_its_plan_shows_its_poses_alone() {
     let found = browser.get("/api/opened").json();
     assert_eq!(
         found,
-        json!({ "limb": false, "plan": false, "dataset": "ankles" })
+        json!({ "limb": false, "plan": false, "watched": null, "dataset": "ankles" })
     );
     assert_eq!(quality(&browser)["at_hand"], json!([]));
     assert_eq!(

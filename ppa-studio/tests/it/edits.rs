@@ -106,3 +106,43 @@ fn a_saved_plan_holds_the_sliders_and_is_not_replaced_unasked() {
     let replaced = json!({ "what_if": {}, "replace": true });
     assert_eq!(browser.post("/api/plan", &replaced).status, StatusCode::OK);
 }
+
+#[test]
+fn a_crop_and_a_point_in_the_limb_are_decisions_of_the_case() {
+    let browser = Browser::new();
+    let whole = browser.get("/api/state").json();
+    let size: [usize; 3] = serde_json::from_value(whole["grid"]["size"].clone()).unwrap();
+    // The end of the calf.
+    let crop = json!({ "low": [0, 0, 0], "high": [size[0], size[1], size[2] - 5] });
+    let state = browser
+        .post("/api/surface", &json!({ "crop": crop }))
+        .json();
+    assert_eq!(state["crop"], crop);
+    assert!(state["report"]["limb_voxels"].as_u64() < whole["report"]["limb_voxels"].as_u64());
+    let prepare = state["commands"]["prepare"].as_str().unwrap();
+    assert!(prepare.contains(" --crop 0,"), "{prepare}");
+    let edited = browser.folder.path().join("p01.edited.case.toml");
+    let case = Case::read(&edited).unwrap();
+    let limb = PreparedLimb::of_case(&case).unwrap();
+    assert_eq!(json!(limb.limb.report), state["report"]);
+
+    let centre = whole["report"]["bodies"][0]["centre_mm"].clone();
+    let state = browser
+        .post("/api/surface", &json!({ "crop": null, "inside": centre }))
+        .json();
+    assert_eq!((&state["crop"], &state["inside"]), (&json!(null), &centre));
+    assert_eq!(state["report"], whole["report"]);
+
+    for (change, expected) in [
+        (json!({ "inside": [1e3, 0.0, 0.0] }), "not in solid tissue"),
+        (
+            json!({ "crop": { "low": [0, 0, 0], "high": [1, 1, 9999] } }),
+            "does not fit",
+        ),
+    ] {
+        let refused = browser.post("/api/surface", &change);
+        assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
+        assert!(refused.text().contains(expected), "{}", refused.text());
+    }
+    assert!(Case::read(&edited).unwrap().surface.inside.is_some());
+}

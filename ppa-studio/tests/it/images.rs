@@ -3,7 +3,8 @@
 use axum::http::StatusCode;
 use image::GenericImageView;
 use ppa_depth::false_colour;
-use ppa_generate::{Case, Plan, PreparedLimb, SceneSetup, VisibleLimb};
+use ppa_generate::{Case, GenerateSettings, Plan, PreparedLimb, SceneSetup, VisibleLimb, generate};
+use ppa_studio::Opening;
 use serde_json::json;
 
 use crate::browser::{Answer, Browser, fine_phantom};
@@ -181,4 +182,51 @@ fn a_surface_at_another_hu_shows_all_of_the_scan() {
     assert!(vertices(300.0) > 1000 && vertices(-500.0) > 1000);
     let refused = browser.post("/api/surface_at", &json!({ "iso_hu": 9000.0 }));
     assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
+}
+
+#[test]
+fn a_body_shape_is_that_of_the_plans_dataset() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = crate::plans::plan(folder.path());
+    let text = std::fs::read_to_string(&file).unwrap();
+    let text = text.replace("[\"orig\"]", "[\"orig\", \"bumps_b\"]");
+    std::fs::write(&file, text.replace("to_deg = 25.0", "to_deg = 5.0")).unwrap();
+    let browser = Browser::opened(folder, &Opening::of(&file));
+    let what_if = json!({ "angle_deg": 5.0, "shape": "bumps_b" });
+    let answer = browser.post("/api/depth", &what_if);
+    let shown = picture(&answer).to_rgb8();
+    let report: serde_json::Value =
+        serde_json::from_slice(answer.headers["x-report"].as_bytes()).unwrap();
+    let range: [f64; 2] = serde_json::from_value(report["range_mm"].clone()).unwrap();
+
+    let root = browser.folder.path().join("dataset");
+    let plan = Plan::read(&file).unwrap();
+    generate(&plan, &root, &GenerateSettings::default(), &|_| {}).unwrap();
+    let mut differing = 0;
+    for (camera, left) in [("left", 0), ("right", shown.width() / 2)] {
+        let read = |shape: &str| {
+            let file = format!("patient_4/depth/r/{shape}/depth_cam_{camera}_5.0.png");
+            image::open(root.join(file)).unwrap().to_luma16()
+        };
+        let (bumps, orig) = (read("bumps_b"), read("orig"));
+        for (x, y, z_mm) in bumps.enumerate_pixels() {
+            let pixel = shown.get_pixel(left + x, y).0;
+            if z_mm.0[0] == 0 {
+                continue;
+            }
+            // Files hold whole millimetres.
+            let [low, high] =
+                [-0.51, 0.51].map(|by| false_colour(f64::from(z_mm.0[0]) + by, range));
+            let between = (0..3).all(|c| {
+                let ends = [low[c].min(high[c]), low[c].max(high[c])];
+                (ends[0].saturating_sub(1)..=ends[1].saturating_add(1)).contains(&pixel[c])
+            });
+            assert!(between, "{camera} {x}, {y}: {pixel:?}, {z_mm:?}");
+            differing += usize::from(orig.get_pixel(x, y) != z_mm);
+        }
+    }
+    assert!(differing > 100, "{differing}");
+    let commands = browser.post("/api/commands", &what_if).json();
+    let depth = commands["depth"].as_str().unwrap();
+    assert!(depth.contains(" --shape bumps_b "), "{depth}");
 }

@@ -1,16 +1,20 @@
 //! The studio over HTTP, and its page in Chromium.
 
 mod browser;
+mod cameras;
 mod chromium;
 mod dataset;
 mod edits;
 mod generation;
 mod images;
+mod live;
 mod networks;
 mod page;
 mod page_access;
 mod page_dataset;
 mod page_generation;
+mod page_training;
 mod plan_form;
 mod plans;
 mod protection;
+mod trainings;

@@ -108,6 +108,13 @@ fn answers_are_those_of_predict_for_the_images_in_files() {
         .predict(files.each_ref().map(|file| &**file))
         .unwrap();
     assert_eq!(report["network"]["prediction"], json!(expected));
+    let command = report["network_command"].as_str().unwrap();
+    for (camera, region) in ["left", "right"].iter().zip(regions) {
+        let (x, y, size) = (region.x_start, region.y_start, region.size);
+        let option = format!(" --roi-{camera} {x},{y},{size} ");
+        assert!(command.contains(&option), "{command}");
+    }
+    assert!(command.ends_with(" --stdin"), "{command}");
 }
 
 #[test]

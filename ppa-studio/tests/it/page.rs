@@ -33,6 +33,64 @@ fn slices_follow_keys_and_the_window() {
     });
 }
 
+/// The farthest pixels of the crop's box at the right, in the slice across the third axis.
+const CROP_EDGE: &str = "(() => { const c = document.querySelector('[data-axis=\"2\"] canvas'); \
+                         const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let [x, y] = [0, 0]; \
+                         for (let i = 0; i < d.length; i += 4) if (d[i] > 230 && Math.abs(d[i + 1] - 180) < 20 && d[i + 2] < 110) \
+                           if ((i / 4) % c.width > x) [x, y] = [(i / 4) % c.width, Math.floor(i / 4 / c.width)]; \
+                         return [x, c.height / 2]; })()";
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn a_dragged_edge_crops_the_scan() {
+    run(async {
+        let page = Page::open().await;
+        page.wait("document.getElementById('crop-i-low').value === '0'")
+            .await;
+        let fields =
+            "['i', 'j', 'k'].map((a) => document.getElementById(`crop-${a}-high`).value).join()";
+        let low =
+            "['i', 'j', 'k'].map((a) => document.getElementById(`crop-${a}-low`).value).join()";
+        let whole = [page.value(low).await, page.value(fields).await];
+        page.click("#crop-start").await;
+        let at = page.value(CROP_EDGE).await;
+        let drag = "const [x, y] = arguments[0]; const c = document.querySelector('[data-axis=\"2\"] canvas'); \
+                    c.setPointerCapture = () => {}; const r = c.getBoundingClientRect(); \
+                    for (const [type, dx] of [['pointerdown', 0], ['pointermove', -14], ['pointerup', -14]]) \
+                      c.dispatchEvent(new PointerEvent(type, {bubbles: true, pointerId: 1, clientX: r.x + x + dx, clientY: r.y + y}));";
+        page.client.execute(drag, vec![at]).await.unwrap();
+        let edited = page.folder.path().join("p01.edited.case.toml");
+        page.until(|| edited.exists()).await;
+        let crop = Case::read(&edited).unwrap().surface.crop.unwrap();
+        page.wait("!document.getElementById('crop-all').disabled")
+            .await;
+        assert_eq!(
+            page.value(low).await,
+            json!(crop.low.map(|v| v.to_string()).join(","))
+        );
+        assert_eq!(
+            page.value(fields).await,
+            json!(crop.high.map(|v| (v - 1).to_string()).join(","))
+        );
+        assert_ne!([page.value(low).await, page.value(fields).await], whole);
+        page.picture("crop").await;
+        page.click("#crop-all").await;
+        page.wait("document.getElementById('crop-all').disabled")
+            .await;
+        assert_eq!(Case::read(&edited).unwrap().surface.crop, None);
+        // The limb around the crosshair, which is at the joint.
+        page.click("#tab-skin").await;
+        page.click("#limb-here").await;
+        page.wait("!document.getElementById('limb-find').disabled")
+            .await;
+        assert!(Case::read(&edited).unwrap().surface.inside.is_some());
+        page.click("#limb-find").await;
+        page.wait("document.getElementById('limb-find').disabled")
+            .await;
+        page.close().await;
+    });
+}
+
 /// Middle of the joint's mark in the slice across the second axis: of the pixels that have its colour.
 const JOINT: &str = "(() => { const c = document.querySelector('[data-axis=\"1\"] canvas'); \
                      const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let [n, x, y] = [0, 0, 0]; \
@@ -147,7 +205,14 @@ fn images_follow_the_sliders_and_the_newest_wins() {
         page.click("#tab-room").await;
         page.wait("document.querySelector('#room-facts').textContent.includes('Focal spot')")
             .await;
+        let coverage = "document.getElementById('coverage').textContent";
+        page.wait(&format!("{coverage}.includes('%')")).await;
+        let planned = page.value(coverage).await;
+        page.slide("camera-left-1", 300.0).await;
+        page.wait(&format!("{coverage} !== {planned}")).await;
         page.picture("room").await;
+        page.click("#cameras-back").await;
+        page.wait(&format!("{coverage} === {planned}")).await;
         page.client.back().await.unwrap();
         page.wait("document.body.dataset.step === 'whatif'").await;
         page.close().await;

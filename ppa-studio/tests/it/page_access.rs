@@ -5,7 +5,7 @@ use serde_json::json;
 use crate::chromium::{Page, run};
 use crate::plans::dataset;
 
-const STEPS: [&str; 7] = [
+const STEPS: [&str; 8] = [
     "scan",
     "skin",
     "landmarks",
@@ -13,10 +13,11 @@ const STEPS: [&str; 7] = [
     "whatif",
     "generation",
     "dataset",
+    "training",
 ];
 
 /// Controls that can be seen and have no name for a screen reader.
-const NAMELESS: &str = "[...document.querySelectorAll('button, input, select, canvas, progress, img, [role=group]')] \
+pub const NAMELESS: &str = "[...document.querySelectorAll('button, input, select, canvas, progress, img, [role=group]')] \
     .filter((e) => e.checkVisibility() && !(e.tagName === 'IMG' && !e.src)) \
     .filter((e) => !(e.getAttribute('aria-label') || e.getAttribute('alt') || e.labels?.[0]?.textContent.trim() \
         || document.getElementById(e.getAttribute('aria-labelledby'))?.textContent.trim() \
@@ -24,7 +25,7 @@ const NAMELESS: &str = "[...document.querySelectorAll('button, input, select, ca
     .map((e) => e.outerHTML.slice(0, 120))";
 
 /// Texts whose contrast with their ground is below 4.5 (WCAG 2.2, level AA); controls that are off are exempt.
-const FAINT: &str = "(() => { \
+pub const FAINT: &str = "(() => { \
     const parts = (colour) => colour.match(/[\\d.]+/g).map(Number); \
     const light = (colour) => parts(colour).slice(0, 3).map((v) => v / 255) \
         .map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)) \

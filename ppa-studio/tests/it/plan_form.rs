@@ -51,6 +51,29 @@ fn a_changed_setting_is_saved_beside_the_plan() {
     let browser = Browser::of(folder, case);
     assert_eq!(browser.get("/api/state").json()["planned"]["kvp"], 70.0);
 
+    // A change is undone and redone; the file follows.
+    let edited_text = || std::fs::read_to_string(&edited).unwrap();
+    let form = set(&browser, "xray.kvp", json!("80")).json();
+    assert_eq!(
+        (&form["can_undo"], &form["can_redo"]),
+        (&json!(true), &json!(false))
+    );
+    let form = browser.post("/api/plan/undo", &json!({})).json();
+    assert_eq!(field(&form, "xray.kvp")["value"], "70");
+    assert_eq!(
+        (&form["can_undo"], &form["can_redo"]),
+        (&json!(false), &json!(true))
+    );
+    assert!(edited_text().contains("kvp = 70"), "{}", edited_text());
+    assert_eq!(browser.get("/api/state").json()["planned"]["kvp"], 70.0);
+    let form = browser.post("/api/plan/redo", &json!({})).json();
+    assert_eq!(field(&form, "xray.kvp")["value"], "80");
+    assert_eq!(
+        (&form["can_undo"], &form["can_redo"]),
+        (&json!(true), &json!(false))
+    );
+    assert!(edited_text().contains("kvp = 80"), "{}", edited_text());
+
     // Over the original on request alone; the default of a key is the key left out.
     set(&browser, "xray.kvp", Value::Null).json();
     let form = browser.post("/api/plan/save", &json!({})).json();

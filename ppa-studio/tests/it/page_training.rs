@@ -1,0 +1,124 @@
+//! Step 8 of the page in Chromium: trainings, and frames as they come.
+
+use ppa_studio::Opening;
+use serde_json::json;
+
+use crate::chromium::{Page, run};
+use crate::live::{watching, write_frames};
+use crate::page_access::{FAINT, NAMELESS};
+use crate::trainings::folder_of_trainings;
+
+const ANSWER: &str = "document.getElementById('live-answer').textContent";
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn trainings_are_compared_and_their_errors_shown() {
+    run(async {
+        let folder = tempfile::tempdir().unwrap();
+        folder_of_trainings(folder.path());
+        let runs = folder.path().join("runs");
+        let page = Page::of(folder, &runs).await;
+        page.wait("document.body.dataset.step === 'training'").await;
+        let count = "document.getElementById('training-count').textContent";
+        page.wait(&format!(
+            "{count} === '3 of 3 trainings, 2 finished, 1 running'"
+        ))
+        .await;
+        let lines =
+            "document.querySelectorAll('#training-charts figure:first-child polyline').length";
+        page.wait(&format!("{lines} === 3")).await;
+        page.click("[id='training-of-later/stopped']").await;
+        page.wait(&format!("{lines} === 2")).await;
+        // A training that runs is followed.
+        let log = page.folder.path().join("runs/later/stopped/log.jsonl");
+        let row = r#"{"step":7,"seconds":0.5,"training/loss":0.125}"#;
+        std::fs::write(log, format!("{row}\n")).unwrap();
+        page.wait("document.getElementById('training-table').textContent.includes('7 of')")
+            .await;
+        for name in ["left", "right"] {
+            page.click(&format!("[aria-label='Errors of {name}']"))
+                .await;
+            page.wait(&format!(
+                "document.getElementById('worst-of').textContent === '{name}' \
+                 && [...document.querySelectorAll('#worst img')].every((i) => i.naturalWidth === 50)"
+            ))
+            .await;
+        }
+        let rows = "document.querySelectorAll('#error-table tr').length";
+        assert_eq!(page.value(rows).await, json!(3));
+        page.picture("training").await;
+        assert_eq!(page.value(NAMELESS).await, json!([]));
+        assert_eq!(page.value(FAINT).await, json!([]));
+        page.fill("#training-filter", "stop").await;
+        page.wait(&format!("{count}.startsWith('1 of 3')")).await;
+        page.close().await;
+    });
+}
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn new_frames_are_shown_with_an_answer() {
+    run(async {
+        let folder = tempfile::tempdir().unwrap();
+        let opening: Opening = watching(folder.path());
+        let page = Page::opened(folder, &opening).await;
+        page.wait(&format!("{ANSWER} === 'No frames yet'")).await;
+        write_frames(page.folder.path(), "1", 0);
+        // The answer itself is shown for three seconds only.
+        page.wait("document.getElementById('live-facts').textContent.startsWith('1, pair 1')")
+            .await;
+        page.wait("document.getElementById('live-image').naturalWidth === 100")
+            .await;
+        page.picture("live").await;
+        assert_eq!(page.value(NAMELESS).await, json!([]));
+        assert_eq!(page.value(FAINT).await, json!([]));
+        page.wait(&format!("{ANSWER} === 'No new frames'")).await;
+        write_frames(page.folder.path(), "2", 50);
+        page.wait("document.getElementById('live-facts').textContent.startsWith('2, pair 2')")
+            .await;
+        page.click("#tab-training").await;
+        page.close().await;
+    });
+}
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn answers_tell_an_operator_what_to_do() {
+    run(async {
+        let folder = tempfile::tempdir().unwrap();
+        let opening = watching(folder.path());
+        let page = Page::opened(folder, &opening).await;
+        for (prediction, expected) in [
+            (json!({ "quality": 1.2 }), "Good"),
+            (json!({ "quality": 2.5 }), "Not good"),
+            (
+                json!({ "quality": 2.8, "correction_deg": 6.4 }),
+                "Rotate inwards by about 6°",
+            ),
+            (
+                json!({ "quality": 2.8, "correction_deg": -12.0 }),
+                "Rotate outwards by about 12°",
+            ),
+            (
+                json!({ "quality": 2.3, "interval": [1.9, 2.7], "diagnostic": "not_sure" }),
+                "Not sure",
+            ),
+            (
+                json!({ "quality": 2.3, "interval": [2.0, 2.4], "diagnostic": "yes" }),
+                "Good",
+            ),
+        ] {
+            let answer = json!({ "prediction": prediction });
+            let verdict =
+                format!("import('/page/live.js').then((live) => live.verdict({answer})[0])");
+            assert_eq!(page.value(&verdict).await, json!(expected), "{answer}");
+        }
+        let refused =
+            "import('/page/live.js').then((live) => live.verdict({ refused: 'no limb' }))";
+        assert_eq!(
+            page.value(refused).await,
+            json!(["Not judged", "no limb", "none"])
+        );
+        page.close().await;
+    });
+}
