@@ -90,6 +90,15 @@ impl VisibleLimb {
         })
     }
 
+    fn room_from_ct(&self, placement: &Placement) -> Isometry3<f64> {
+        let patient_from_ct = self.prepared.landmarks.patient_from_ct();
+        *(placement.room_from_patient * patient_from_ct).isometry()
+    }
+
+    fn joint_in_room(&self, placement: &Placement) -> Point3<f64> {
+        self.room_from_ct(placement) * Point3::from(self.prepared.landmarks.joint_centre)
+    }
+
     fn skin(&self) -> &Mesh {
         self.shaped.as_ref().unwrap_or(&self.prepared.limb.mesh)
     }
@@ -107,22 +116,20 @@ impl VisibleLimb {
     /// [`PoseError`] when the skin cannot be rendered.
     pub fn posed(&self, placement: &Placement, plan: &Plan) -> Result<PosedSkin, PoseError> {
         let (skin, landmarks) = (self.skin(), &self.prepared.landmarks);
-        let room_from_ct = placement.room_from_patient * landmarks.patient_from_ct();
-        let room_from_ct = *room_from_ct.isometry();
         let (body, room_from_body) = if placement.flattening.is_some() {
             let walls = &self.prepared.limb.walls;
             let in_room = placement.in_room(&walls.vertices(skin), landmarks);
             let body = closed_skin(&in_room, skin, walls)?;
             (Arc::new(body), Isometry3::identity())
         } else {
-            (self.rigid.clone(), room_from_ct)
+            (self.rigid.clone(), self.room_from_ct(placement))
         };
         Ok(PosedSkin {
             shape: self.shape,
             body,
             room_from_body,
             cut_faces: plan.depth.cut_faces,
-            joint_in_room: room_from_ct * Point3::from(landmarks.joint_centre),
+            joint_in_room: self.joint_in_room(placement),
             region_mm: plan.depth.roi_mm,
         })
     }
@@ -146,9 +153,7 @@ impl VisibleLimb {
         let mut skin = self.posed(&place(self.skin())?, plan)?;
         if self.shaped.is_some() {
             // The skin of the scan decides the regions, as in the dataset.
-            let of_scan = place(&self.prepared.limb.mesh)?;
-            let room_from_ct = of_scan.room_from_patient * landmarks.patient_from_ct();
-            skin.joint_in_room = *room_from_ct.isometry() * Point3::from(landmarks.joint_centre);
+            skin.joint_in_room = self.joint_in_room(&place(&self.prepared.limb.mesh)?);
         }
         let cameras = setup.cameras.iter();
         cameras.map(|camera| skin.seen_by(camera, seed)).collect()

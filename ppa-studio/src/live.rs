@@ -48,8 +48,9 @@ struct Watched {
 /// The newest pair, judged.
 pub(crate) struct LivePair {
     pub report: LiveReport,
-    /// When the later frame was written, as its file says, and when both were found.
+    /// When the later frame was written, as its file says.
     written: SystemTime,
+    /// When both were found.
     found: Instant,
     /// Both frames in false colour with the squares around the joint, PNG; empty if one cannot be read.
     pub png: Vec<u8>,

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use axum::extract::{Path, State as Extracted};
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
-
 use serde::Serialize;
 
 use super::answer::{picture, work};
