@@ -125,16 +125,17 @@ fn manifest(path: &Path) -> toml::Table {
 }
 
 fn members() -> BTreeMap<String, toml::Table> {
-    let mut members = BTreeMap::new();
-    for entry in fs::read_dir(root()).unwrap() {
-        let name = entry.unwrap().file_name().into_string().unwrap();
-        if name.starts_with("ppa-") {
-            let manifest = manifest(&root().join(&name).join("Cargo.toml"));
-            assert_eq!(manifest["package"]["name"].as_str(), Some(name.as_str()));
-            members.insert(name, manifest);
-        }
-    }
-    members
+    let workspace = manifest(&root().join("Cargo.toml"));
+    let names = workspace["workspace"]["members"].as_array().unwrap();
+    let names = names.iter().map(|name| name.as_str().unwrap());
+    names
+        .filter(|name| name.starts_with("ppa-"))
+        .map(|name| {
+            let manifest = manifest(&root().join(name).join("Cargo.toml"));
+            assert_eq!(manifest["package"]["name"].as_str(), Some(name));
+            (name.to_owned(), manifest)
+        })
+        .collect()
 }
 
 fn dependencies<'a>(manifest: &'a toml::Table, section: &str) -> Vec<&'a str> {
@@ -161,6 +162,20 @@ fn crates_depend_only_along_the_arrows() {
                 !dependency.starts_with("ppa-") || allowed.contains(&dependency),
                 "{name} must not depend on {dependency}"
             );
+        }
+    }
+}
+
+/// Else the wheel would compile the dependencies once more.
+#[test]
+fn the_python_package_has_the_profiles_of_the_workspace() {
+    let profiles = |path: &str| manifest(&root().join(path))["profile"].clone();
+    let (workspace, python) = (profiles("Cargo.toml"), profiles("python/Cargo.toml"));
+    for name in ["dev", "release"] {
+        let packages = python[name]["package"].as_table().unwrap();
+        for (package, settings) in packages {
+            let expected = workspace[name]["package"].get(package);
+            assert_eq!(Some(settings), expected, "{name}: {package}");
         }
     }
 }
