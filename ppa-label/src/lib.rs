@@ -1,6 +1,7 @@
 //! Labels of poses: grades of readers, and labels computed from the bones of an ankle.
 //!
-//! Readers see the radiographs of a dataset as [`ReaderCase`]s on a [`grading_page`]; [`import_grades`] makes labels of their grades;
+//! Readers see the radiographs of a dataset as [`ReaderCase`]s on a [`grading_page`], or one by one where a program keeps their
+//! [`GradeSheet`]; [`import_grades`] makes labels of their grades;
 //! [`read_grade_tables`] collects grades by image, for statistics of agreement.
 //!
 //! Computed labels measure the alignment of the joint space of an ankle with the beam. They are a surrogate that no reader has

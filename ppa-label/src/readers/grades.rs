@@ -156,7 +156,15 @@ pub(super) fn is_on_scale(grade: f64) -> bool {
     (1.0..=3.0).contains(&grade) && (2.0 * grade).fract() == 0.0
 }
 
-fn read_grades(path: &Path) -> Result<Vec<Grade>, ImportError> {
+/// Refuses a key that does not belong to the radiographs of a dataset.
+///
+/// # Errors
+/// [`ImportError::Changed`] naming the first radiograph that the dataset does not have, or has with other bytes.
+pub fn check_key(manifest: &Manifest, shown: &[ReaderCase]) -> Result<(), ImportError> {
+    Pictures::of(manifest, shown).map(|_| ())
+}
+
+pub(super) fn read_grades(path: &Path) -> Result<Vec<Grade>, ImportError> {
     let grades: Vec<Grade> = read_table(path)?;
     if let Some(row) = grades.iter().find(|row| is_formula(&row.reader)) {
         return Err(ImportError::Formula {

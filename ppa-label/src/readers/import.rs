@@ -43,7 +43,7 @@ pub struct Imported {
 /// reader graded keep their computed label.
 ///
 /// # Errors
-/// [`ImportError`], before anything is written: grades off the scale, unknown pictures, radiographs that changed since
+/// [`ImportError`], before anything is written: no grades, grades off the scale, unknown pictures, radiographs that changed since
 /// the key was made or the grades were imported, two grades of one picture, files without the grades that are there, and labels
 /// of readers whose grades are not there.
 pub fn import_grades(
@@ -57,6 +57,9 @@ pub fn import_grades(
     let pictures = Pictures::of(manifest, shown)?;
     let before = pictures.all_of(if there { &kept } else { &[] })?;
     let given = pictures.all_of(files)?;
+    if given.is_empty() {
+        return Err(ImportError::Empty);
+    }
     refuse_loss(&path, &before, &given)?;
 
     let readers: HashSet<_> = given.iter().map(|given| &given.grade.reader).collect();

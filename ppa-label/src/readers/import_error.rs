@@ -17,6 +17,9 @@ pub enum ImportError {
     /// A file of grades is none.
     #[error(transparent)]
     Table(#[from] TableError),
+    /// No grade in any file.
+    #[error("there are no grades to import")]
+    Empty,
     /// Off the scale.
     #[error("{}: {reader} grades {image} with {grade}, expected 1, 1.5, 2, 2.5 or 3", path.display())]
     Grade {
@@ -80,8 +83,9 @@ pub enum ImportError {
     },
     /// Grades that are there would be lost.
     #[error(
-        "{} holds {reader}'s grade {grade} of {image}, which none of the given files does: give {} as well",
-        path.display(), path.display()
+        "{} holds {reader}'s grade {grade} of {image}, which none of the given files does: give that file as well or, where the \
+         reader has changed the grade, move it away and give the files of all readers",
+        path.display()
     )]
     Lost {
         /// `grades.csv` of the dataset.

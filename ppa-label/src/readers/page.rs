@@ -6,15 +6,16 @@ use std::path::{Path, PathBuf};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use image::{GrayImage, ImageFormat};
-use ppa_dataset::files::FileError;
+use ppa_dataset::files::{FileError, hex};
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 
 use super::reader_case::ReaderCase;
 
 /// Pictures on one page: radiographs of 448 x 448 pixels make about 30 MB, which any browser takes.
 pub const PICTURES_PER_PAGE: usize = 200;
 
-/// Why a page could not be made.
+/// Why a picture or a page could not be made.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PageError {
@@ -24,6 +25,19 @@ pub enum PageError {
     /// A radiograph cannot be read.
     #[error(transparent)]
     File(#[from] FileError),
+    /// A radiograph has changed since the dataset was made.
+    #[error(
+        "{} has changed since the dataset was made: its hash is {found}, expected {expected}",
+        path.display()
+    )]
+    Changed {
+        /// The radiograph.
+        path: PathBuf,
+        /// SHA-256 of the file.
+        found: String,
+        /// SHA-256 in the lists of the dataset, and in the key.
+        expected: String,
+    },
     /// A radiograph cannot be decoded.
     #[error("cannot decode {}", path.display())]
     Image {
@@ -50,14 +64,43 @@ pub struct PageNumber {
     pub of: usize,
 }
 
+/// The picture of a reader case as an 8-bit PNG. All pictures have one window: black is 0 and white 65535 of the 16-bit
+/// radiographs. Nothing but the pixels gets into it.
+///
+/// # Errors
+/// [`PageError`] naming a radiograph that cannot be read or has changed.
+pub fn reader_picture(root: &Path, reader_case: &ReaderCase) -> Result<Vec<u8>, PageError> {
+    let path = root.join(&reader_case.image);
+    let bytes = ppa_core::regular_file::read(&path).map_err(FileError::at("read", &path))?;
+    let found = hex(&Sha256::digest(&bytes));
+    if found != reader_case.sha256 {
+        let expected = reader_case.sha256.clone();
+        return Err(PageError::Changed {
+            path,
+            found,
+            expected,
+        });
+    }
+    let image = image::load_from_memory_with_format(&bytes, ImageFormat::Png)
+        .map_err(|source| PageError::Image { path, source })?
+        .into_luma16();
+    let narrow = image.pixels().map(|p| (p.0[0] >> 8) as u8).collect();
+    let narrow = GrayImage::from_raw(image.width(), image.height(), narrow)
+        .expect("there is a value for each pixel");
+    let mut png = Cursor::new(Vec::new());
+    narrow
+        .write_to(&mut png, ImageFormat::Png)
+        .expect("memory takes any picture");
+    Ok(png.into_inner())
+}
+
 /// A page of HTML that shows the radiographs one by one, takes a grade of each by key, and saves them as CSV with the
 /// columns image (the name of the reader case), reader and grade.
 ///
-/// All pictures have one window: black is 0 and white 65535 of the 16-bit radiographs. Nothing but names and pictures
-/// gets into the page.
+/// Nothing but names and pictures, those of [`reader_picture`], gets into the page.
 ///
 /// # Errors
-/// [`PageError`] without radiographs, and naming one that cannot be read.
+/// [`PageError`] without radiographs, and naming one that cannot be read or has changed.
 pub fn grading_page(
     root: &Path,
     shown: &[ReaderCase],
@@ -67,19 +110,8 @@ pub fn grading_page(
         return Err(PageError::Empty);
     }
     let picture = |reader_case: &ReaderCase| {
-        let path = root.join(&reader_case.image);
-        let bytes = ppa_core::regular_file::read(&path).map_err(FileError::at("read", &path))?;
-        let image = image::load_from_memory_with_format(&bytes, ImageFormat::Png)
-            .map_err(|source| PageError::Image { path, source })?
-            .into_luma16();
-        let narrow = image.pixels().map(|p| (p.0[0] >> 8) as u8).collect();
-        let narrow = GrayImage::from_raw(image.width(), image.height(), narrow)
-            .expect("there is a value for each pixel");
-        let mut png = Cursor::new(Vec::new());
-        narrow
-            .write_to(&mut png, ImageFormat::Png)
-            .expect("memory takes any picture");
-        Ok(format_picture(&reader_case.name, png.get_ref()))
+        let png = reader_picture(root, reader_case)?;
+        Ok(format_picture(&reader_case.name, &png))
     };
     let pictures: Vec<String> = shown
         .iter()
