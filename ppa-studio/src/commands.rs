@@ -10,6 +10,7 @@ use ppa_generate::Case;
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind};
 use serde::Serialize;
 
+use crate::dose;
 use crate::live::Watch;
 use crate::network::Networks;
 use crate::what_if::WhatIf;
@@ -26,6 +27,7 @@ pub(crate) struct Commands {
 pub(crate) struct ImageCommands {
     pub depth: String,
     pub radiograph: String,
+    pub dose: String,
     pub coverage: String,
     /// The plan that they read has to be saved first: it holds changes that no option makes.
     pub need_saved_plan: bool,
@@ -62,6 +64,25 @@ pub(crate) fn of_dataset(dataset: &Path) -> DatasetCommands {
     DatasetCommands {
         quality: format!("ppa qa {dataset}"),
         check: format!("ppa dataset check {dataset}"),
+    }
+}
+
+/// Commands that do with the grades of readers what the page does.
+#[derive(Debug, Serialize)]
+pub(crate) struct GradingCommands {
+    pub import: String,
+    pub agree: String,
+}
+
+/// The grades of a folder for readers as commands.
+pub(crate) fn of_grading(dataset: &Path, sheets: &Path, key: &Path) -> GradingCommands {
+    let grades = dataset.join("grades.csv");
+    let (dataset, key) = (quoted(dataset), quoted(key));
+    // The shell finds the files of all readers.
+    let sheets = format!("{}/grades_*.csv", quoted(sheets));
+    GradingCommands {
+        import: format!("ppa label import {dataset} --key {key} {sheets}"),
+        agree: format!("ppa label agree {}", quoted(&grades)),
     }
 }
 
@@ -218,20 +239,30 @@ pub(crate) fn of_images(
         let _ = write!(depth, " --shape {}", shape.name());
     }
     depth += " --out depth.png";
-    let mut radiograph = format!("ppa xray simulate {pose}");
+    let mut exposure = format!("ppa xray simulate {pose}");
+    let mut load = String::new();
     if !need_saved_plan {
-        radiograph += &of_exposure(what_if);
+        exposure += &of_beam(what_if);
+        load = of_load(what_if);
     }
-    radiograph += " --out radiograph.png";
+    if seed != 0 {
+        let _ = write!(exposure, " --seed {seed}");
+    }
+    let radiograph = format!("{exposure}{load} --out radiograph.png");
+    // Doses are those of a photon, whatever the tube load.
+    let analog = format!("--engine analog --histories {}", dose::HISTORIES);
+    let dose = format!("{exposure} {analog} --dose --out dose.png --json");
     ImageCommands {
         coverage: format!("ppa depth coverage {pose}"),
         depth,
         radiograph,
+        dose,
         need_saved_plan,
     }
 }
 
-fn of_exposure(what_if: &WhatIf) -> String {
+/// Technique and beam.
+fn of_beam(what_if: &WhatIf) -> String {
     let mut line = String::new();
     if let Some(technique) = &what_if.technique {
         let _ = write!(line, " --technique {}", shell_quoted(technique));
@@ -242,12 +273,15 @@ fn of_exposure(what_if: &WhatIf) -> String {
     for filter in what_if.filters.iter().flatten() {
         let _ = write!(line, " --filter {}", shell_quoted(filter));
     }
-    if let Some(mas) = what_if.mas {
-        let _ = write!(line, " --mas {mas}");
-    } else if let Some(index) = what_if.exposure_index {
-        let _ = write!(line, " --aec {index}");
-    }
     line
+}
+
+fn of_load(what_if: &WhatIf) -> String {
+    match (what_if.mas, what_if.exposure_index) {
+        (Some(mas), _) => format!(" --mas {mas}"),
+        (None, Some(index)) => format!(" --aec {index}"),
+        (None, None) => String::new(),
+    }
 }
 
 fn quoted(path: &Path) -> String {

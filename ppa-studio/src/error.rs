@@ -41,6 +41,18 @@ pub enum StudioError {
     /// A split of a dataset.
     #[error(transparent)]
     Split(#[from] ppa_dataset::SplitError),
+    /// A table of readers.
+    #[error(transparent)]
+    Table(#[from] ppa_label::TableError),
+    /// Pictures for readers.
+    #[error(transparent)]
+    ReaderPicture(#[from] ppa_label::PageError),
+    /// A reader's grades.
+    #[error(transparent)]
+    Grades(#[from] ppa_label::GradeSheetError),
+    /// Labels of readers' grades.
+    #[error(transparent)]
+    Import(#[from] ppa_label::ImportError),
     /// Networks that cannot be used.
     #[error(transparent)]
     Network(#[from] ppa_learn::frames::FramesError),
@@ -83,6 +95,9 @@ pub enum StudioError {
     /// The radiograph.
     #[error(transparent)]
     Transport(#[from] ppa_xray::TransportError),
+    /// Its doses.
+    #[error(transparent)]
+    Dose(#[from] ppa_xray::DoseError),
     /// Its presentation.
     #[error(transparent)]
     Presentation(#[from] ppa_xray::PresentationError),

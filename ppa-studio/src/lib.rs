@@ -6,6 +6,7 @@ mod coarse_scan;
 mod commands;
 mod desk;
 mod display_mesh;
+mod dose;
 mod error;
 mod false_colours;
 mod generation;

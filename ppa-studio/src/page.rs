@@ -25,6 +25,8 @@ const FILES: &[(&str, &str)] = &[
     ("plan.js", include_str!("page/plan.js")),
     ("generation.js", include_str!("page/generation.js")),
     ("dataset.js", include_str!("page/dataset.js")),
+    ("dose.js", include_str!("page/dose.js")),
+    ("grading.js", include_str!("page/grading.js")),
     ("training.js", include_str!("page/training.js")),
     ("live.js", include_str!("page/live.js")),
     ("charts.js", include_str!("page/charts.js")),

@@ -189,6 +189,17 @@ impl Scenes {
         Ok(limb)
     }
 
+    /// The limb with all that an exposure takes.
+    pub fn exposable(&self, shown: &Shown, plan: &Plan) -> Result<ExposableLimb, StudioError> {
+        let setup = self.setup(plan)?;
+        let phantom = self.phantom(shown, &plan.xray)?;
+        let (table, spectrum) = (setup.table.clone(), setup.spectrum.clone());
+        let prepared = shown.prepared().clone();
+        Ok(ExposableLimb::with_phantom(
+            prepared, phantom, plan, table, spectrum,
+        ))
+    }
+
     /// The radiograph, until a later request replaces this one.
     pub fn radiograph(
         &self,
@@ -199,12 +210,7 @@ impl Scenes {
         ticket: &Ticket,
     ) -> Result<RadiographPicture, StudioError> {
         let plan = &what_if.plan(plan)?;
-        let setup = self.setup(plan)?;
-        let phantom = self.phantom(shown, &plan.xray)?;
-        let (table, spectrum) = (setup.table.clone(), setup.spectrum.clone());
-        let prepared = shown.prepared().clone();
-        let limb = ExposableLimb::with_phantom(prepared, phantom, plan, table, spectrum);
-        let spectrum = &setup.spectrum;
+        let limb = self.exposable(shown, plan)?;
         let exposure = limb.pose(what_if.angle_deg.to_radians())?;
         let settings = exposure.fast_settings(plan.xray.engine.with_seed(plan.seed))?;
         let observe = |_share: f64| {
@@ -215,7 +221,7 @@ impl Scenes {
             }
         };
         let projection = &exposure.projection;
-        let phantom = &limb.phantom;
+        let (phantom, spectrum) = (&limb.phantom, &limb.spectrum);
         let radiograph = match pass {
             Pass::First => phantom.preview(spectrum, projection, &settings, &observe),
             Pass::Final => phantom.fast_with_progress(spectrum, projection, &settings, &observe),

@@ -45,6 +45,8 @@ pub(crate) struct State {
     pub quality: Newest,
     /// The check of all images under way.
     pub check: Newest,
+    /// One change of readers' grades at a time.
+    pub grading: Mutex<()>,
     /// Networks that judge the poses, if there are any.
     pub network: Option<Network>,
     /// Frames that they judge as they come, if there are any.
@@ -107,6 +109,7 @@ impl State {
             sheet: Newest::default(),
             quality: Newest::default(),
             check: Newest::default(),
+            grading: Mutex::default(),
             network,
             live,
             trainings,

@@ -89,6 +89,7 @@ impl WhatIf {
         self.distal_mm.is_some()
             || self.proximal_mm.is_some()
             || self.grid.is_some()
+            || self.filters.as_ref().is_some_and(Vec::is_empty)
             || self.cameras.is_some()
     }
 }

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use ppa_ct::write_nifti;
 use ppa_phantom::{LowerLeg, TableTop};
+use serde_json::Value;
 
 use crate::{contains, contents, fail, phantom, ppa, succeed, write_plan};
 
@@ -117,6 +118,64 @@ fn the_case_of_an_opened_scan_is_saved_on_request() {
 }
 
 #[test]
+fn a_dose_of_the_page_is_that_of_its_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = phantom().join("p01.toml");
+    let served = Served::start(folder.path(), &case.display().to_string());
+    let what_if = r#"{"angle_deg": 18, "kvp": 55, "mas": 4}"#;
+    let json = |answer: Vec<u8>| {
+        let text = String::from_utf8(answer).unwrap();
+        contains(&text, &["HTTP/1.1 200"]);
+        let body = text.split_once("\r\n\r\n").unwrap().1;
+        serde_json::from_str::<serde_json::Value>(&body[body.find('{').unwrap()..]).unwrap()
+    };
+    let of_page = json(served.post("/api/dose", what_if));
+    let commands = json(served.post("/api/commands", what_if));
+    let command = commands["dose"].as_str().unwrap();
+    let command = command.strip_prefix("ppa ").unwrap();
+    let of_command: serde_json::Value =
+        serde_json::from_str(&succeed(folder.path(), command)).unwrap();
+    assert_eq!(
+        of_command["histories"].as_f64(),
+        of_page["histories"].as_f64()
+    );
+    let names = of_command["materials"].as_array().unwrap();
+    let column = |key: &str| {
+        of_command[key]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|value| value.as_f64().unwrap())
+    };
+    let rows: Vec<_> = column("material_mass_g")
+        .zip(column("material_dose_gy_per_history"))
+        .collect();
+    let matter = of_page["matter"].as_array().unwrap();
+    // Soft tissue, fat and muscle in several mixtures, muscle, bone; after the row of all voxels.
+    assert_eq!(matter.len(), 5, "{matter:?}");
+    for of in &matter[1..] {
+        let name = of["name"].as_str().unwrap();
+        let is_of = |material: &Value| material.as_str().unwrap().split(',').next() == Some(name);
+        let of_matter = names
+            .iter()
+            .zip(&rows)
+            .filter(|(material, _)| is_of(material));
+        let (mass, energy) = of_matter.fold((0.0, 0.0), |(mass, energy), (_, (g, gray))| {
+            (mass + g, energy + g * gray)
+        });
+        let [mass_g, gray] = ["mass_g", "gy_per_history"].map(|key| of[key].as_f64().unwrap());
+        assert!(
+            (mass_g / mass - 1.0).abs() < 1e-9,
+            "{name}: {mass_g}, {mass}"
+        );
+        assert!(
+            (gray * mass_g / energy - 1.0).abs() < 1e-9,
+            "{name}: {gray}, {energy}"
+        );
+    }
+}
+
+#[test]
 fn a_scan_without_a_joint_opens_for_landmarks_by_hand() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
@@ -175,6 +234,43 @@ fn a_dataset_of_the_page_is_that_of_the_command() {
     assert!(expected.len() > 15, "{}", expected.len());
     assert!(contents(&folder.join("by_page")) == expected);
     assert_eq!(served.stop(), Some(0));
+}
+
+#[test]
+fn grading_in_a_studio_uses_the_key_of_an_export() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_plan(here, "");
+    succeed(here, "generate plan.toml --out data");
+    succeed(here, "label export data --out out --seed 5");
+    let served = Served::start(here, "data");
+    let post = |path: &str, readers: &str, more: &str| {
+        let body =
+            format!(r#"{{"folder": "data", "readers": "{readers}", "reader": "ben", {more}}}"#);
+        let answer = String::from_utf8(served.post(path, &body)).unwrap();
+        contains(&answer, &["HTTP/1.1 200"]);
+        answer
+    };
+    let read = |name: &str| std::fs::read_to_string(here.join(name)).unwrap();
+    post("/api/grading", "new", r#""seed": 5, "every_deg": 0.5"#);
+    assert_eq!(read("new.key.csv"), read("out.key.csv"));
+    let found = post("/api/grading", "out", r#""seed": 6, "every_deg": 45"#);
+    contains(&found, &[r#""key_found":true"#]);
+    let key = read("out.key.csv");
+    for row in key.lines().skip(1) {
+        let name = row.split(',').next().unwrap();
+        post(
+            "/api/grading/grade",
+            "out",
+            &format!(r#""image": "{name}", "grade": 1.5"#),
+        );
+    }
+    let command = found.split(r#""import":"ppa "#).nth(1).unwrap();
+    let command = command.split('"').next().unwrap();
+    assert!(command.ends_with("/grades_*.csv"), "{command}");
+    // As a shell would write it out.
+    succeed(here, &command.replace("grades_*.csv", "grades_ben.csv"));
+    assert!(read("data/grades.csv").contains(",ben,1.5,"));
 }
 
 #[test]

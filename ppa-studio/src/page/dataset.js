@@ -28,6 +28,7 @@ export class DatasetPanel {
     for (const id of ["filter-limb", "filter-shape", "filter-from", "filter-to"]) byId(id).addEventListener("change", () => this.draw());
     byId("dataset-refresh").addEventListener("click", () => this.load());
     byId("dataset-check").addEventListener("click", () => this.check());
+    byId("grading-open").addEventListener("click", () => actions.grade());
     byId("pose-form").addEventListener("submit", (event) => {
       event.preventDefault();
       this.nearest();

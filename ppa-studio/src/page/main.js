@@ -10,6 +10,7 @@ import { WhatIfPanel } from "/page/whatif.js";
 import { PlanPanel } from "/page/plan.js";
 import { GenerationPanel } from "/page/generation.js";
 import { DatasetPanel } from "/page/dataset.js";
+import { GradingPanel } from "/page/grading.js";
 import { TrainingPanel } from "/page/training.js";
 import { LivePanel } from "/page/live.js";
 import { CropPanel, cropOf } from "/page/crop.js";
@@ -18,7 +19,7 @@ import { drawRoom, roomFacts } from "/page/room.js";
 import { button, commandRows } from "/page/elements.js";
 
 const byId = (id) => document.getElementById(id);
-const STEPS = ["scan", "skin", "landmarks", "room", "whatif", "generation", "dataset", "training"];
+const STEPS = ["scan", "skin", "landmarks", "room", "whatif", "generation", "dataset", "grading", "training"];
 // Steps that show the limb.
 const OF_LIMB = STEPS.slice(0, 5);
 const WINDOWS = [["Soft tissue", 40, 400], ["Bone", 400, 1800], ["Skin", -300, 1200], ["All", 200, 3000]];
@@ -45,7 +46,9 @@ const generation = new GenerationPanel({
   // A plan that was in no file has one now.
   started: () => plan.load(),
 });
-const dataset = new DatasetPanel({ fail, tell, folder: () => opened?.dataset ?? plan.folder(), opened: openedLimb });
+const datasetFolder = () => opened?.dataset ?? plan.folder();
+const dataset = new DatasetPanel({ fail, tell, folder: datasetFolder, opened: openedLimb, grade: () => go("grading") });
+const grading = new GradingPanel({ fail });
 const training = new TrainingPanel({ fail, tell });
 const live = new LivePanel({ fail, folder: () => opened?.watched });
 let room = null;
@@ -157,7 +160,7 @@ function showPrediction(command) {
 async function showImageCommands(values) {
   const commands = await postJson("commands", values);
   if (store.step !== "whatif" && store.step !== "room") return;
-  const rows = commandRows([commands.depth, store.step === "room" ? commands.coverage : commands.radiograph]);
+  const rows = commandRows([commands.depth, ...(store.step === "room" ? [commands.coverage] : [commands.radiograph, commands.dose])]);
   if (commands.need_saved_plan) {
     const note = document.createElement("p");
     note.className = "hint";
@@ -217,6 +220,7 @@ function go(step) {
   if (step !== "generation") generation.hide();
   if (step === "generation") showGeneration();
   if (step === "dataset") showDataset();
+  if (step === "grading") showGrading();
   if (step !== "training") {
     training.hide();
     live.hide();
@@ -258,6 +262,11 @@ async function showDataset() {
   byId("command-list").replaceChildren();
   if (!opened.dataset && !plan.folder()) await plan.load();
   await dataset.load();
+}
+
+async function showGrading() {
+  if (!opened.dataset && !plan.folder()) await plan.load();
+  grading.show(datasetFolder());
 }
 
 async function showTraining() {
@@ -303,7 +312,8 @@ async function begin() {
 // The step that the address names, or the first one where that has nothing to show.
 function stepInAddress() {
   const step = location.hash.slice(1);
-  if (STEPS.includes(step) && !byId(`tab-${step}`).disabled) return step;
+  const needed = step === "grading" ? "dataset" : step;
+  if (STEPS.includes(step) && !byId(`tab-${needed}`).disabled) return step;
   if (opened?.limb) return "scan";
   return opened?.dataset ? "dataset" : "training";
 }
@@ -329,7 +339,7 @@ function listen() {
     if (!is_saved || window.confirm(`Replace ${original} with the changed case?`)) change("save");
   });
   document.addEventListener("keydown", (event) => {
-    if (!event.ctrlKey || event.target.matches("input[type=number]")) return;
+    if (!event.ctrlKey || event.target.matches("input[type=number]") || byId("grading").open) return;
     if (event.key === "z" && store.doc?.can_undo) change("undo");
     if (event.key === "y" && store.doc?.can_redo) change("redo");
   });

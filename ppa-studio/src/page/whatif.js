@@ -3,6 +3,7 @@
 import { Refused, newest, post, postJson, postPicture } from "/page/server.js";
 import { facts } from "/page/elements.js";
 import { CameraForm } from "/page/cameras.js";
+import { DoseTable } from "/page/dose.js";
 import { fixed } from "/page/geometry.js";
 
 const byId = (id) => document.getElementById(id);
@@ -51,6 +52,7 @@ export class WhatIfPanel {
     this.labels = newest((whatIf) => this.label(whatIf));
     this.coverages = newest((whatIf) => this.coverage(whatIf));
     this.cameras = new CameraForm(() => this.changed());
+    this.dose = new DoseTable({ whatIf: () => this.whatIf(), failed: (error) => this.failed(error) });
     this.build();
     byId("sweep").addEventListener("click", () => this.sweep());
     for (const id of ["save-plan", "room-save-plan"]) byId(id).addEventListener("click", () => this.save("plan", false));
@@ -169,6 +171,7 @@ export class WhatIfPanel {
     clearTimeout(this.timer);
     this.exposing?.abort();
     this.exposing = null;
+    this.dose.clear();
   }
 
   async depth(whatIf) {
@@ -233,6 +236,7 @@ export class WhatIfPanel {
         await this.put("radiograph", picture);
         const seconds = (performance.now() - started) / 1000;
         this.showReport(pass, report, seconds);
+        if (pass === "final" && !exposing.signal.aborted) this.dose.offer(report.mas);
       }
     } catch (error) {
       if (error.name !== "AbortError") this.failed(error);

@@ -9,6 +9,7 @@ use axum::response::Response;
 
 use super::answer::{picture, sentence, work};
 use crate::commands::{ImageCommands, of_images};
+use crate::dose::{DoseReport, absorbed_dose};
 use crate::newest::CancelOnDrop;
 use crate::scene::Pass;
 use crate::state::State;
@@ -60,6 +61,23 @@ pub(super) async fn radiograph(
     })
     .await?;
     Ok(picture(made.png, &made.report))
+}
+
+/// Absorbed dose; ends when a radiograph is asked for or nobody waits any more.
+pub(super) async fn dose(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(what_if): Json<WhatIf>,
+) -> Result<Json<DoseReport>, Response> {
+    let ticket = state.radiograph.enter();
+    let _cancel = CancelOnDrop(ticket.clone());
+    work(state, move |state| {
+        let _turn = state.radiograph.turn(&ticket)?;
+        let limb = state.limb()?;
+        let plan = what_if.plan(&state.plan())?;
+        let exposable = limb.scenes.exposable(&limb.shown(), &plan)?;
+        absorbed_dose(&exposable, what_if.angle_deg, plan.seed, &ticket).map(Json)
+    })
+    .await
 }
 
 /// The commands that make these images.

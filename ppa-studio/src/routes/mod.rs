@@ -4,6 +4,7 @@ mod answer;
 mod dataset;
 mod document;
 mod generation;
+mod grading;
 mod images;
 mod live;
 mod plan;
@@ -42,6 +43,7 @@ pub(crate) fn router(state: Arc<State>) -> Router {
         .route("/room", post(room::room))
         .route("/depth", post(images::depth))
         .route("/radiograph/{pass}", post(images::radiograph))
+        .route("/dose", post(images::dose))
         .route("/label", post(room::label))
         .route("/coverage", post(room::coverage))
         .route("/commands", post(images::commands))
@@ -72,6 +74,10 @@ pub(crate) fn router(state: Arc<State>) -> Router {
             "/dataset/radiograph/{patient}/{side}/{step}",
             get(dataset::radiograph),
         )
+        .route("/grading", post(grading::begin))
+        .route("/grading/picture/{name}", get(grading::picture))
+        .route("/grading/grade", post(grading::grade))
+        .route("/grading/import", post(grading::import))
         .route("/trainings", get(training::list))
         .route("/training/log", get(training::log))
         .route("/training/errors", post(training::errors))

@@ -140,6 +140,12 @@ impl Page {
             .unwrap();
     }
 
+    /// Presses a key where the keyboard is.
+    pub async fn press(&self, key: &str) {
+        let focused = self.client.active_element().await.unwrap();
+        focused.send_keys(key).await.unwrap();
+    }
+
     /// Moves a slider, as dragging does.
     pub async fn slide(&self, id: &str, value: f64) {
         self.client

@@ -121,6 +121,43 @@ fn a_change_of_the_pose_ends_the_radiograph_under_way() {
 }
 
 #[test]
+fn bone_absorbs_more_per_gram_than_soft_tissue() {
+    let browser = Browser::new();
+    let dose = browser
+        .post("/api/dose", &json!({ "angle_deg": 18.0 }))
+        .json();
+    assert_eq!(dose["histories"], 2_000_000);
+    let matter = dose["matter"].as_array().unwrap();
+    let of = |name: &str| {
+        let found = matter.iter().find(|of| of["name"] == name);
+        let found = found.unwrap_or_else(|| panic!("no {name} in {matter:?}"));
+        let [value, se] = ["gy_per_history", "gy_per_history_se"].map(|key| found[key].as_f64());
+        let (value, se) = (value.unwrap(), se.unwrap());
+        assert!(se > 0.0 && se < 0.02 * value, "{name}: {value} ± {se}");
+        value
+    };
+    let (muscle, bone) = (of("muscle"), of("bone"));
+    // At 60 kV bone has 3 to 5 times the mass energy absorption of muscle, and lies deeper.
+    assert!(bone > 1.5 * muscle, "{bone}, {muscle}");
+    let all = of("all voxels");
+    assert!(muscle < all && all < bone, "{all}");
+    assert!(!matter.iter().any(|of| of["name"] == "air"));
+}
+
+#[test]
+fn a_change_of_the_pose_ends_the_dose_under_way() {
+    let browser = Browser::new();
+    let what_if = json!({ "angle_deg": 18.0 }).to_string();
+    let requests = vec![
+        browser.posting("/api/dose", what_if.clone()),
+        browser.posting("/api/depth", what_if),
+    ];
+    let answers = browser.send_all(requests);
+    assert_eq!(answers[0].status, StatusCode::CONFLICT);
+    assert_eq!(answers[1].status, StatusCode::OK);
+}
+
+#[test]
 fn commands_name_the_files_and_options_of_the_page() {
     let browser = Browser::new();
     let what_if = json!({ "angle_deg": 18.5, "kvp": 55.0, "filters": ["Al:3"], "mas": 4.0 });
@@ -134,6 +171,9 @@ fn commands_name_the_files_and_options_of_the_page() {
     let state = browser.get("/api/state").json();
     let prepare = state["commands"]["prepare"].as_str().unwrap();
     assert!(prepare.contains("p01.nii --side r --bones "), "{prepare}");
+    // No option takes filters away.
+    let bare = browser.post("/api/commands", &json!({ "filters": [] }));
+    assert_eq!(bare.json()["need_saved_plan"], true);
     let commands = browser
         .post("/api/commands", &json!({ "distal_mm": 2.0 }))
         .json();

@@ -6,6 +6,7 @@ mod chromium;
 mod dataset;
 mod edits;
 mod generation;
+mod grading;
 mod images;
 mod live;
 mod networks;

@@ -192,9 +192,17 @@ fn images_follow_the_sliders_and_the_newest_wins() {
         page.slide("slider-angle_deg", 18.0).await;
         page.wait("document.querySelector('#command-list').textContent.includes('--angle 18 ')")
             .await;
-        page.wait("document.querySelector('#radiograph figcaption').textContent.startsWith('final image')").await;
+        // Offered when the radiograph of the newest exposure is whole.
+        page.wait("!document.getElementById('dose-begin').disabled")
+            .await;
         page.picture("whatif_18").await;
+        page.click("#dose-begin").await;
+        page.wait("document.getElementById('dose-table').textContent.includes('bone')")
+            .await;
+        page.picture("whatif_dose").await;
         page.slide("slider-distal_mm", 30.0).await;
+        page.wait("document.getElementById('dose-table').childElementCount === 0")
+            .await;
         assert_eq!(
             page.value("document.getElementById('slider-distal_mm').value")
                 .await,

@@ -3,6 +3,7 @@
 use serde_json::json;
 
 use crate::chromium::{Page, run};
+use crate::page_access::{FAINT, NAMELESS};
 use crate::plans::dataset;
 
 #[test]
@@ -66,6 +67,94 @@ fn an_outlier_is_shown_and_opened_in_its_pose() {
         page.picture("dataset_opened").await;
         page.client.back().await.unwrap();
         page.wait("document.body.dataset.step === 'dataset'").await;
+        page.close().await;
+    });
+}
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn a_reader_grades_by_keys_and_the_labels_follow() {
+    run(async {
+        let folder = tempfile::tempdir().unwrap();
+        let root = dataset(folder.path());
+        let file = folder.path().join("ankles-readers/grades_Anna.csv");
+        let page = Page::of(folder, &root).await;
+        page.click("#grading-open").await;
+        let begin = async || {
+            page.wait("document.getElementById('grading-folder').value === 'ankles-readers'")
+                .await;
+            page.fill("#grading-reader", "Anna").await;
+            page.click("#grading-form button[type=submit]").await;
+        };
+        page.wait("document.body.dataset.step === 'grading'").await;
+        assert_eq!(page.value(NAMELESS).await, json!([]));
+        assert_eq!(page.value(FAINT).await, json!([]));
+        page.picture("grading_step").await;
+        begin().await;
+        let place = "document.getElementById('grading-place').textContent";
+        let shown = "document.querySelector('#grading-picture img').naturalWidth > 0";
+        page.wait(&format!("{place} === 'Picture 1 of 13' && {shown}"))
+            .await;
+        assert_eq!(page.value(NAMELESS).await, json!([]));
+        assert_eq!(page.value(FAINT).await, json!([]));
+        page.picture("grading").await;
+
+        // Q is 1.5; the next picture follows.
+        page.press("q").await;
+        page.wait(&format!("{place} === 'Picture 2 of 13' && {shown}"))
+            .await;
+        page.press("3").await;
+        page.wait(&format!("{place} === 'Picture 3 of 13'")).await;
+        page.press("\u{e012}").await; // arrow left
+        page.press("\u{e012}").await;
+        page.wait(&format!("{place} === 'Picture 1 of 13' && {shown}"))
+            .await;
+        let pressed = "document.querySelector('#grading-grades [aria-pressed=true]').textContent";
+        assert_eq!(page.value(pressed).await, json!("1.5 (key Q)"));
+        page.press("w").await;
+        page.wait(&format!("{place} === 'Picture 2 of 13'")).await;
+        let grades = || {
+            let text = std::fs::read_to_string(&file).unwrap();
+            let grades = text
+                .lines()
+                .skip(1)
+                .map(|row| row.rsplit(',').next().unwrap().to_owned());
+            grades.collect::<Vec<_>>()
+        };
+        assert_eq!(grades(), ["2.5", "3.0"]);
+
+        // Loaded again, the page is still that of a reader, who goes on where they were.
+        page.client.refresh().await.unwrap();
+        begin().await;
+        for n in 3..=13 {
+            page.wait(&format!("{place} === 'Picture {n} of 13' && {shown}"))
+                .await;
+            page.click("#grading-grades button").await;
+        }
+        page.wait("document.getElementById('grading-done').textContent === '13 of 13 graded'")
+            .await;
+        page.click("#grading-end").await;
+        let text = "document.getElementById('grading-text').textContent";
+        page.wait(&format!("{text}.startsWith('13 of 13')")).await;
+        page.wait(
+            "document.getElementById('command-list').textContent.includes('ppa label import')",
+        )
+        .await;
+        page.click("#grading-import").await;
+        page.client.accept_alert().await.unwrap();
+        page.wait(&format!(
+            "{text} === '11 radiographs labelled by 1 reader; 0 keep computed labels, 0 have none'"
+        ))
+        .await;
+        page.picture("grading_end").await;
+        page.click("#tab-dataset").await;
+        page.wait("document.querySelectorAll('.chart').length === 3")
+            .await;
+        page.click("[aria-label='Show patient 4 right, orig, 15.0°']")
+            .await;
+        page.wait("document.getElementById('pose-facts').textContent.includes('(readers)')")
+            .await;
+        page.picture("graded").await;
         page.close().await;
     });
 }
