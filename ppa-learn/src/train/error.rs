@@ -51,6 +51,9 @@ pub enum TrainError {
     /// A folder with weights, but nothing to continue from.
     #[error("{} exists without a checkpoint to resume from; use another folder", .0.display())]
     WeightsAlone(PathBuf),
+    /// A dataset where a training was to be written.
+    #[error("{} is a dataset; choose another folder for the training", .0.display())]
+    Dataset(PathBuf),
     /// A training that is not finished, where a finished one is needed.
     #[error("the training in {} is not finished: {step} of {} are made; repeat `ppa train` to resume", folder.display(), ppa_core::text::count(*steps, "step"))]
     Unfinished {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use ppa_dataset::write_whole;
+use ppa_dataset::{Manifest, write_whole};
 
 use crate::data::{Balanced, Images, check_split};
 
@@ -59,6 +59,9 @@ pub fn train(
     mut report: impl FnMut(&Progress),
 ) -> Result<Ended, TrainError> {
     config.check()?;
+    if folder.join(Manifest::FILE).exists() {
+        return Err(TrainError::Dataset(folder.to_owned()));
+    }
     let device = config.device.open()?;
     let training = samples(config, &config.training)?;
     let evaluation = samples(config, &config.evaluation)?;

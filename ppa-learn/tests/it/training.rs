@@ -8,7 +8,8 @@ use candle_core::Device;
 use cpu_time::ProcessTime;
 use ppa_learn::data::Images;
 use ppa_learn::train::{
-    Layers, RateSchedule, Source, TrainConfig, predict, read_log, read_start, samples, trained,
+    Layers, RateSchedule, Source, TrainConfig, TrainError, predict, read_log, read_start, samples,
+    trained,
 };
 use ppa_learn::{FusionKind, QualityNetwork};
 use tempfile::TempDir;
@@ -312,6 +313,16 @@ fn standard_learns_in_a_tenth_of_its_steps() {
 fn quick_learns_as_it_is() {
     let mae = bars(|quick| quick);
     assert!(mae < 0.25, "{mae}");
+}
+
+#[test]
+fn a_training_into_a_dataset_is_refused() {
+    let data = dataset(2, &[90]);
+    let out = tempfile::tempdir().unwrap();
+    fs::write(out.path().join("manifest.jsonl"), "").unwrap();
+    let refused = run(&config(data.path()), out.path()).unwrap_err();
+    assert!(matches!(refused, TrainError::Dataset(_)), "{refused}");
+    assert_eq!(fs::read_dir(out.path()).unwrap().count(), 1);
 }
 
 #[test]
