@@ -9,13 +9,6 @@ use ppa_generate::{Case, PreparedLimb};
 
 use crate::stderr::warning;
 
-/// Repeats the open findings of a dataset or plan, one line for each code and limb; `of` follows the limb's name.
-pub fn repeat(findings: &Findings, of: &str) {
-    for line in lines(findings, of) {
-        warning(&line);
-    }
-}
-
 /// Repeats those of datasets that are about to be used.
 pub fn repeat_of_datasets<'a>(datasets: impl Iterator<Item = &'a Path>) -> anyhow::Result<()> {
     let mut known: Vec<&Path> = Vec::new();
@@ -25,7 +18,9 @@ pub fn repeat_of_datasets<'a>(datasets: impl Iterator<Item = &'a Path>) -> anyho
         }
         known.push(dataset);
         let findings = Findings::read(dataset)?;
-        repeat(&findings, &format!(" of {}", dataset.display()));
+        for line in lines(&findings, &format!(" of {}", dataset.display())) {
+            warning(&line);
+        }
     }
     Ok(())
 }
@@ -42,7 +37,8 @@ pub fn prepared(case: &Case, file: &Path) -> anyhow::Result<PreparedLimb> {
     Ok(prepared)
 }
 
-fn lines(findings: &Findings, of: &str) -> Vec<String> {
+/// The open findings of a dataset or plan, one line for each code and limb; `of` follows the limb's name.
+pub fn lines(findings: &Findings, of: &str) -> Vec<String> {
     let open: Vec<&LimbFinding> = findings.0.iter().filter(|found| found.is_open()).collect();
     let alike =
         |a: &LimbFinding, b: &LimbFinding| a.limb == b.limb && a.finding.code == b.finding.code;

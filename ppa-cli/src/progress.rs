@@ -12,8 +12,9 @@ use ppa_core::text::count;
 use ppa_generate::Progress;
 use serde::Serialize;
 
-use crate::findings::repeat;
+use crate::findings::lines;
 use crate::output::{Output, bar};
+use crate::stderr::warning;
 
 /// Time between two lines, when progress is not a bar.
 const INTERVAL: Duration = Duration::from_secs(10);
@@ -57,6 +58,8 @@ pub struct Watch {
     bar: ProgressBar,
     state: Arc<Mutex<State>>,
     ticker: Mutex<Option<Ticker>>,
+    /// Lines of findings that were repeated already.
+    repeated: Mutex<Vec<String>>,
 }
 
 struct State {
@@ -152,13 +155,20 @@ impl Watch {
             bar,
             state,
             ticker: Mutex::new(ticker),
+            repeated: Mutex::default(),
         }
     }
 
     /// Counts what a run reports.
     pub fn report(&self, progress: Progress) {
         if let Progress::Findings(findings) = progress {
-            self.bar.suspend(|| repeat(findings, ""));
+            let mut repeated = self.repeated.lock().unwrap_or_else(|e| e.into_inner());
+            for line in lines(findings, "") {
+                if !repeated.contains(&line) {
+                    self.bar.suspend(|| warning(&line));
+                    repeated.push(line);
+                }
+            }
             return;
         }
         let mut state = locked(&self.state);

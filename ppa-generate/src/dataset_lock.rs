@@ -45,7 +45,7 @@ pub enum FolderError {
         asked: Part,
     },
     /// The folder holds something else.
-    #[error("{} is neither empty nor a dataset that ppa generate began", .0.display())]
+    #[error("{} holds no dataset that ppa generate began", .0.display())]
     NotADataset(PathBuf),
     /// The folder holds files of a dataset, but not the records that describe them.
     #[error(

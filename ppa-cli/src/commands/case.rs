@@ -72,7 +72,7 @@ fn check(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
     output.print(&checked, describe)?;
     if !open.is_empty() {
         bail!(
-            "{} has {}; look at them, then change the case or name their codes in `acknowledged`",
+            "{} has {}: change the case or, after a look at it, name the code in `acknowledged`",
             args.case.display(),
             count(open.len(), "severe finding")
         );
@@ -89,12 +89,12 @@ fn describe(checked: &Checked) -> String {
         format!("axis       {dx:.4} {dy:.4} {dz:.4}"),
         format!("changed    {}", changes(checked.changed.as_ref())),
     ];
-    lines.extend(
-        checked
-            .findings
-            .iter()
-            .map(|finding| format!("{:10} {}", finding.severity, finding.text)),
-    );
+    lines.extend(checked.findings.iter().map(|finding| {
+        format!(
+            "{:10} [{}] {}",
+            finding.severity, finding.code, finding.text
+        )
+    }));
     lines.join("\n")
 }
 

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use ppa_core::Part;
 use ppa_core::text::count;
+use ppa_dataset::Findings;
 use ppa_dataset::published::{Published, PublishedError};
-use ppa_generate::{GenerateSettings, Plan, Summary, generate, held_part};
+use ppa_generate::{GenerateSettings, Plan, Progress, Summary, generate, held_part};
 
 use crate::interrupt::Interrupt;
 use crate::output::Output;
@@ -106,6 +107,10 @@ pub fn with_progress(
     interrupt: &Interrupt,
 ) -> anyhow::Result<Summary> {
     let summary = generate(plan, out, settings, &|progress| watch.report(progress));
+    if summary.is_ok() {
+        // Some are found in the poses.
+        watch.report(Progress::Findings(&Findings::read(out)?));
+    }
     watch.finish();
     interrupt.or_how(summary, || watch.how_to_resume())
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 use clap::{Args, Subcommand};
-use ppa_cluster::{ClusterSize, Makespan, PoseCost, bundle, makespan};
+use ppa_cluster::{ClusterSize, Makespan, PoseCost, bundle, makespan, shell_quoted};
 use ppa_core::text::count;
 use ppa_generate::{Forecast, Plan, forecast};
 use serde::Serialize;
@@ -96,11 +96,12 @@ fn init(args: &InitArgs, output: Output) -> anyhow::Result<()> {
         settings: args.technique.describe(),
     };
     output.print(&begun, |begun| {
-        let plan = begun.plan.display();
         format!(
-            "{plan}: {}, {}; ppa plan {plan} estimates its cost",
+            "{}: {}, {}; ppa plan {} estimates its cost",
+            begun.plan.display(),
             count(begun.limbs, "limb"),
-            begun.settings
+            begun.settings,
+            shell_quoted(&begun.plan.to_string_lossy())
         )
     })
 }

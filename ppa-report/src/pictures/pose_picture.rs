@@ -91,7 +91,7 @@ pub fn pose_picture(name: &str, posed: &PosedLimb) -> Result<RgbImage, RigError>
     draw_overview(&mut canvas, overview, &scene);
     let [across, head, up] = [0, 1, 2].map(|i| scene.axes.column(i).into_owned());
     let sides = [
-        ("from the patient's right", head, up),
+        ("from the patient's left", head, up),
         ("from the x-ray source", across, head),
         ("from the feet", across, up),
     ];

@@ -55,7 +55,7 @@ pub fn run(args: &SplitArgs, output: Output) -> anyhow::Result<()> {
     split.write(&args.dataset, name)?;
     output.print(&split, |split| {
         let part = |(name, patients): (&String, &Vec<u32>)| {
-            format!("{name}: {}", numbers(patients.iter().copied()))
+            format!("{name}: patient {}", numbers(patients.iter().copied()))
         };
         let parts: Vec<_> = split.parts.iter().map(part).collect();
         format!("{}: {}", path.display(), parts.join("; "))
