@@ -85,6 +85,32 @@ fn a_severe_finding_is_repeated_until_it_is_acknowledged() {
 }
 
 #[test]
+fn findings_of_poses_are_repeated_once_in_every_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    succeed(folder, "ct phantom --spacing-mm 2 --out leg.nii");
+    // Without the forefoot.
+    succeed(
+        folder,
+        "ct convert --crop 0,73,80,145,0,179 leg.nii cut.nii",
+    );
+    succeed(folder, "prepare cut.nii --side r --out leg.toml");
+    let xray = QUICK_XRAY.replacen("[xray]", "[xray]\nmax_cut_share = 0.9", 1);
+    let plan = format!(
+        "version = 1\n[[case]]\nfile = \"leg.toml\"\npatient = 0\n\
+         [rotation]\nto_deg = 0.0\n[shapes]\nvariants = [\"orig\"]\n\
+         [depth]\nmax_cut_share = 0.9\n{xray}"
+    );
+    fs::write(folder.join("plan.toml"), plan).unwrap();
+    for made in [1, 0] {
+        let (summary, said) = both(folder, "generate plan.toml --out data");
+        contains(&summary, &[&format!("{made} of them made now")]);
+        let open = "severe [cut-in-region] limb r of patient 0";
+        assert_eq!(said.matches(open).count(), 1, "{said}");
+    }
+}
+
+#[test]
 fn an_edited_case_gets_new_findings() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
