@@ -1,6 +1,7 @@
 //! Step 6 of the page in Chromium: plan and generation.
 
 use ppa_generate::Plan;
+use serde_json::json;
 
 use crate::chromium::{Page, run};
 use crate::plans::plan;
@@ -65,7 +66,14 @@ fn a_plan_is_changed_and_its_dataset_made() {
             "['Paused.', 'Complete.'].includes(document.getElementById('phase').textContent)",
         )
         .await;
-        page.click("#generate:enabled").await;
+        // The run may have ended before it was paused.
+        if page
+            .value("!document.getElementById('generate').disabled")
+            .await
+            == json!(true)
+        {
+            page.click("#generate").await;
+        }
         page.wait("document.getElementById('phase').textContent === 'Complete.'")
             .await;
         page.picture("generation_complete").await;
