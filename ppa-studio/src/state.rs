@@ -247,15 +247,7 @@ impl State {
         if let Some(root) = opened.filter(|root| root.file_name().is_some_and(|of| of == name)) {
             return Ok(root.clone());
         }
-        let mut parts = Path::new(name).components();
-        let is_name = matches!(parts.next(), Some(Component::Normal(part)) if part == name);
-        let root = self.plan_file().folder().join(name);
-        if !is_name || root.is_symlink() {
-            return Err(StudioError::Invalid(format!(
-                "{name} is not the name of a folder beside the plan"
-            )));
-        }
-        Ok(root)
+        named_folder(self.plan_file().folder(), name, "the plan")
     }
 
     /// The plan with changes, of the case that is shown.
@@ -269,4 +261,24 @@ impl State {
         }
         Ok(plan)
     }
+}
+
+/// The folder of a name in `folder`; the error says that it is to lie beside `neighbour`.
+///
+/// # Errors
+/// [`StudioError::Invalid`] for anything but a plain name, and for a link.
+pub(crate) fn named_folder(
+    folder: &Path,
+    name: &str,
+    neighbour: &str,
+) -> Result<PathBuf, StudioError> {
+    let mut parts = Path::new(name).components();
+    let is_name = matches!(parts.next(), Some(Component::Normal(part)) if part == name);
+    let found = folder.join(name);
+    if is_name && !found.is_symlink() {
+        return Ok(found);
+    }
+    Err(StudioError::Invalid(format!(
+        "{name:?} is not the name of a folder beside {neighbour}"
+    )))
 }

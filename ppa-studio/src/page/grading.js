@@ -105,12 +105,18 @@ export class GradingPanel {
     return this.pictures.get(name);
   }
 
+  // The picture that can be graded: none until it is decoded.
+  see(name) {
+    this.seen = name;
+    byId("grading-picture").setAttribute("aria-busy", String(!name));
+  }
+
   async draw() {
     const { pictures, grades } = this.found;
     const name = pictures[this.at];
     const image = document.querySelector("#grading-picture img");
     image.removeAttribute("src");
-    this.seen = null;
+    this.see(null);
     this.drawn = name;
     byId("grading-place").textContent = `Picture ${this.at + 1} of ${pictures.length}`;
     byId("grading-done").textContent = `${Object.keys(grades).length} of ${pictures.length} graded`;
@@ -121,7 +127,7 @@ export class GradingPanel {
       image.src = url;
       await image.decode();
       if (this.drawn !== name) return;
-      this.seen = name;
+      this.see(name);
       const next = pictures[this.at + 1];
       if (next) this.picture(next).catch(() => { /* said when it is shown */ });
     } catch (error) {
@@ -165,7 +171,8 @@ export class GradingPanel {
   }
 
   ended() {
-    this.drawn = this.seen = null;
+    this.drawn = null;
+    this.see(null);
     document.querySelector("#grading-picture img").removeAttribute("src");
     this.forget(0);
     const { pictures, grades, file, key_found } = this.found;

@@ -1,7 +1,7 @@
 //! Grading by readers: the pictures of a key one by one, and a reader's grades.
 
 use std::collections::BTreeMap;
-use std::path::{Component, Path as FilePath, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, PoisonError};
 
 use axum::Json;
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::answer::{png_file, work};
 use crate::commands::{GradingCommands, of_grading};
 use crate::error::StudioError;
-use crate::state::State;
+use crate::state::{State, named_folder};
 
 /// A dataset, and the folder for readers beside it.
 #[derive(Deserialize)]
@@ -36,13 +36,11 @@ impl Place {
     /// The folder for readers.
     fn sheets(&self, state: &State) -> Result<PathBuf, StudioError> {
         let root = self.root(state)?;
-        let name = self.readers.as_str();
-        let mut parts = FilePath::new(name).components();
-        let is_name = matches!(parts.next(), Some(Component::Normal(part)) if part == name);
-        let folder = root.with_file_name(name);
-        if !is_name || folder == root || folder.is_symlink() {
+        let beside = root.parent().unwrap_or(&root);
+        let folder = named_folder(beside, &self.readers, "the dataset")?;
+        if folder == root {
             return Err(StudioError::Invalid(format!(
-                "{:?} is not the name of a folder beside the dataset",
+                "{} is the dataset itself",
                 self.readers
             )));
         }

@@ -154,7 +154,7 @@ fn what_cannot_be_graded_is_refused_in_a_sentence() {
     };
     for (key, value, part) in [
         ("readers", json!("../out"), "not the name of a folder"),
-        ("readers", json!("ankles"), "not the name of a folder"),
+        ("readers", json!("ankles"), "is the dataset itself"),
         ("readers", json!(""), "not the name of a folder"),
         ("readers", json!("graded/"), "not the name of a folder"),
         ("readers", json!("graded/."), "not the name of a folder"),

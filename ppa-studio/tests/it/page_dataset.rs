@@ -92,7 +92,7 @@ fn a_reader_grades_by_keys_and_the_labels_follow() {
         page.picture("grading_step").await;
         begin().await;
         let place = "document.getElementById('grading-place').textContent";
-        let shown = "document.querySelector('#grading-picture img').naturalWidth > 0";
+        let shown = "document.getElementById('grading-picture').ariaBusy === 'false'";
         page.wait(&format!("{place} === 'Picture 1 of 13' && {shown}"))
             .await;
         assert_eq!(page.value(NAMELESS).await, json!([]));
