@@ -1,6 +1,6 @@
 //! Choice of the reader for a file or folder.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::error::ReadError;
 use crate::scan::{ReadOptions, Scan, starts_as_dicom};
@@ -31,7 +31,14 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<Scan, ReadError> 
         source,
     };
     if std::fs::metadata(path).map_err(io)?.is_dir() {
-        return read_dicom_folder(path, options);
+        return read_dicom_folder(path, options).map_err(|error| match error {
+            ReadError::NoDicom { path, files, .. } => ReadError::NoDicom {
+                volume: volume_in(&path),
+                path,
+                files,
+            },
+            error => error,
+        });
     }
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let name = name.to_ascii_lowercase();
@@ -44,17 +51,48 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<Scan, ReadError> 
             series: Vec::new(),
         });
     }
-    if name.ends_with(".nii") || name.ends_with(".nii.gz") {
-        read_nifti(path)
-    } else if name.ends_with(".nrrd") || name.ends_with(".nhdr") {
-        read_nrrd(path)
-    } else if name.ends_with(".mha") || name.ends_with(".mhd") {
-        read_meta_image(path, options.force)
-    } else {
-        Err(ReadError::Unsupported {
+    match Format::of_name(&name) {
+        Some(Format::Nifti) => read_nifti(path),
+        Some(Format::Nrrd) => read_nrrd(path),
+        Some(Format::MetaImage) => read_meta_image(path, options.force),
+        None => Err(ReadError::Unsupported {
             path: path.to_owned(),
-        })
+        }),
     }
+}
+
+/// Formats that are recognised by the name of their file.
+enum Format {
+    Nifti,
+    Nrrd,
+    MetaImage,
+}
+
+impl Format {
+    /// The format of a file with this name in lower case.
+    fn of_name(name: &str) -> Option<Self> {
+        let ends_with = |endings: &[&str]| endings.iter().any(|ending| name.ends_with(ending));
+        if ends_with(&[".nii", ".nii.gz"]) {
+            Some(Self::Nifti)
+        } else if ends_with(&[".nrrd", ".nhdr"]) {
+            Some(Self::Nrrd)
+        } else if ends_with(&[".mha", ".mhd"]) {
+            Some(Self::MetaImage)
+        } else {
+            None
+        }
+    }
+}
+
+/// The first file of a folder, by name, that has the name of another format than DICOM.
+fn volume_in(folder: &Path) -> Option<PathBuf> {
+    let entries = std::fs::read_dir(folder).ok()?;
+    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    let is_volume = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        path.is_file() && Format::of_name(&name.to_ascii_lowercase()).is_some()
+    };
+    paths.filter(is_volume).min()
 }
 
 #[cfg(feature = "dicom")]

@@ -144,6 +144,7 @@ impl Sorted {
                 0 => ReadError::NoDicom {
                     path,
                     files: looked_at,
+                    volume: None,
                 },
                 localizers => ReadError::OnlyLocalizers { path, localizers },
             });

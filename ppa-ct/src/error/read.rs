@@ -1,6 +1,6 @@
 //! Why a scan could not be read.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use ppa_core::text::{count, number};
 
@@ -37,12 +37,14 @@ pub enum ReadError {
         feature: &'static str,
     },
     /// A folder without a single DICOM image.
-    #[error("no DICOM image in {} ({files} files looked at, subfolders included)", path.display())]
+    #[error("no DICOM image in {} ({files} files looked at, subfolders included){}", path.display(), other_format(volume.as_deref()))]
     NoDicom {
         /// The folder.
         path: PathBuf,
         /// Files in it.
         files: usize,
+        /// The first file of the folder itself that has the name of another format.
+        volume: Option<PathBuf>,
     },
     /// A DICOMDIR whose files are not there.
     #[error("{} is a DICOM directory; none of the {missing} files that it names lies below it", path.display())]
@@ -293,4 +295,12 @@ fn list_gaps(gaps: &[Gap]) -> String {
         text += &format!(" and {} more", gaps.len() - SHOWN);
     }
     text
+}
+
+/// Which file of a folder without DICOM can be read by itself.
+fn other_format(volume: Option<&Path>) -> String {
+    match volume {
+        Some(file) => format!("; name the file {} itself to read it", file.display()),
+        None => String::new(),
+    }
 }

@@ -331,6 +331,13 @@ fn what_is_no_scan_is_named() {
     ));
     let text = folder.path().join("notes.txt");
     std::fs::write(&text, "not a scan").unwrap();
+    std::fs::write(folder.path().join("leg.nii.gz"), "").unwrap();
+    let error = read(folder.path()).unwrap_err().to_string();
+    let said = format!(
+        "subfolders included); name the file {} itself",
+        folder.path().join("leg.nii.gz").display()
+    );
+    assert!(error.contains(&said), "{error}");
     let error = read(&text).unwrap_err().to_string();
     assert!(
         error.contains("notes.txt") && error.contains(".nii.gz"),
