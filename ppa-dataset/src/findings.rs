@@ -70,6 +70,8 @@ pub enum FindingCode {
     JointOutside,
     /// The joint lies elsewhere than the ankle that the scan shows.
     JointOffAnkle,
+    /// The joint lies outside the radiograph.
+    JointOffDetector,
     /// The joint lay beside the axis that a person gave.
     JointOffAxis,
     /// The scan shows another joint than the one the limb is posed about.

@@ -36,17 +36,23 @@ impl fmt::Display for PoseImage {
     }
 }
 
-/// A region of which more is cut than the plan allows; the worst of a limb.
+/// Regions of which more is cut than the plan allows.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "limb {} of patient {} at {} degrees: {:.1} % of the {image} lies where the field of view of the scan cuts the limb off, but {} allows \
-     {:.1} % ({exceeding} of {poses} poses exceed it); raise {} in the plan, take another camera or other rotations, or a scan \
-     that shows more of the limb",
-    limb.side_letter(), limb.patient, angle_text(*step), 100.0 * share, image.key(), 100.0 * limit, image.key()
+    "limb {} of patient {}: the field of view of the scan cuts off {}; raise the limit in the plan, take another camera or other rotations, \
+     or a scan that shows more of the limb",
+    limb.side_letter(), limb.patient, listed(worst)
 )]
 pub struct CutError {
     /// The limb.
     pub limb: LimbId,
+    /// The worst region of each limit that is exceeded.
+    pub worst: Vec<ExceededLimit>,
+}
+
+/// The region that exceeds a limit most, over all poses of a limb.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExceededLimit {
     /// Half degrees of medial rotation.
     pub step: u32,
     /// The image.
@@ -55,8 +61,29 @@ pub struct CutError {
     pub share: f64,
     /// Largest share that the plan allows.
     pub limit: f64,
-    /// Poses of which such a share is larger than the plan allows.
+    /// Poses that exceed this limit.
     pub exceeding: usize,
     /// Poses of the limb.
     pub poses: usize,
+}
+
+impl fmt::Display for ExceededLimit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{:.1} % of the {} at {} degrees, but {} allows {:.1} % ({} of {} poses exceed it)",
+            100.0 * self.share,
+            self.image,
+            angle_text(self.step),
+            self.image.key(),
+            100.0 * self.limit,
+            self.exceeding,
+            self.poses
+        )
+    }
+}
+
+fn listed(worst: &[ExceededLimit]) -> String {
+    let worst: Vec<String> = worst.iter().map(ExceededLimit::to_string).collect();
+    worst.join(", and ")
 }

@@ -10,7 +10,7 @@ use ppa_depth::{
 use ppa_mesh::{CutWalls, Mesh, WallMeasure};
 use ppa_xray::{Detector, Projection, TransportError};
 
-use crate::cut_error::{CutError, MAX_CUT_SHARE, PoseImage};
+use crate::cut_error::{CutError, ExceededLimit, MAX_CUT_SHARE, PoseImage};
 use crate::pose_error::PoseError;
 use crate::scene_setup::PlacedCamera;
 
@@ -190,7 +190,6 @@ impl PoseCuts {
     /// The image of which most is cut, if that is more than [`MAX_CUT_SHARE`]; shares in whole percent, so that poses
     /// alike have one finding. The place is the centre of the cut nearest to the joint.
     pub fn finding(&self, walls: &CutWalls, skin: &Mesh, joint: &Point3<f64>) -> Option<Finding> {
-        let worse = |a: (PoseImage, f64), b: (PoseImage, f64)| if b.1 > a.1 { b } else { a };
         let (image, share) = self.shares.iter().copied().reduce(worse)?;
         if share <= MAX_CUT_SHARE {
             return None;
@@ -216,35 +215,43 @@ impl PoseCuts {
 
 /// Refuses a limb of which a region is cut by more than its limit: depth images, radiographs.
 pub(crate) fn check(limb: LimbId, poses: &[PoseCuts], limits: [f64; 2]) -> Result<(), CutError> {
-    let limit = |image: PoseImage| match image {
-        PoseImage::Depth(_) => limits[0],
-        PoseImage::Radiograph => limits[1],
-    };
-    let excess = |&(image, share): &(PoseImage, f64)| share - limit(image);
-    let exceeds = |pose: &&PoseCuts| pose.shares.iter().any(|cut| excess(cut) > 0.0);
-    let all = poses
-        .iter()
-        .flat_map(|pose| pose.shares.iter().map(move |cut| (pose.step, cut)));
-    // The first of equal ones, so that the message is always the same.
-    let worst = all.reduce(|worst, next| {
-        if excess(next.1) > excess(worst.1) {
-            next
-        } else {
-            worst
-        }
-    });
-    match worst {
-        Some((step, &(image, share))) if share > limit(image) => Err(CutError {
-            limb,
-            step,
-            image,
-            share,
-            limit: limit(image),
-            exceeding: poses.iter().filter(exceeds).count(),
-            poses: poses.len(),
-        }),
-        _ => Ok(()),
+    let is_radiograph = |image| image == PoseImage::Radiograph;
+    let worst = [false, true].into_iter().zip(limits);
+    let worst: Vec<ExceededLimit> = worst
+        .filter_map(|(radiographs, limit)| {
+            let is_meant = |cut: &&(PoseImage, f64)| is_radiograph(cut.0) == radiographs;
+            let above = |pose: &PoseCuts| {
+                let cuts = pose.shares.iter().filter(is_meant);
+                let above = cuts.filter(|cut| cut.1 > limit).copied();
+                above.reduce(worse)
+            };
+            let above: Vec<_> = poses
+                .iter()
+                .filter_map(|pose| Some((pose.step, above(pose)?)))
+                .collect();
+            // The first of equal ones, so that the message is always the same.
+            let &(step, (image, share)) = above
+                .iter()
+                .reduce(|a, b| if b.1.1 > a.1.1 { b } else { a })?;
+            Some(ExceededLimit {
+                step,
+                image,
+                share,
+                limit,
+                exceeding: above.len(),
+                poses: poses.len(),
+            })
+        })
+        .collect();
+    match worst.is_empty() {
+        true => Ok(()),
+        false => Err(CutError { limb, worst }),
     }
+}
+
+/// The image of which more is cut; the first of equal ones.
+fn worse(a: (PoseImage, f64), b: (PoseImage, f64)) -> (PoseImage, f64) {
+    if b.1 > a.1 { b } else { a }
 }
 
 #[cfg(test)]
@@ -275,10 +282,14 @@ mod tests {
             pose(3, 0.034, 0.0),
         ];
         let error = check(LIMB, &poses, [0.01, 0.02]).unwrap_err();
-        assert_eq!(
-            (error.step, error.image, error.exceeding),
-            (2, PoseImage::Depth(View::Right), 3)
-        );
+        let worst = |error: &CutError| {
+            let worst = error.worst.iter();
+            let worst = worst.map(|worst| (worst.step, worst.image, worst.exceeding));
+            worst.collect::<Vec<_>>()
+        };
+        let depth = (2, PoseImage::Depth(View::Right), 3);
+        let radiograph = (2, PoseImage::Radiograph, 1);
+        assert_eq!(worst(&error), [depth, radiograph]);
         let said = error.to_string();
         for part in [
             "limb r of patient 3",
@@ -288,12 +299,14 @@ mod tests {
             "right camera",
             "3 of 4 poses",
             "depth.max_cut_share",
+            "radiograph",
+            "1 of 4 poses",
+            "xray.max_cut_share",
         ] {
             assert!(said.contains(part), "{part}: {said}");
         }
         let error = check(LIMB, &poses, [0.1, 0.02]).unwrap_err();
-        assert_eq!((error.image, error.exceeding), (PoseImage::Radiograph, 1));
-        assert!(error.to_string().contains("xray.max_cut_share"));
+        assert_eq!(worst(&error), [radiograph]);
         assert_eq!(check(LIMB, &poses, [0.034, 0.03]), Ok(()));
     }
 

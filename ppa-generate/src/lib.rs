@@ -41,6 +41,7 @@ mod load;
 mod loaded_scan;
 mod made_images;
 mod merge;
+mod off_detector;
 mod overview;
 mod part_file;
 mod plan;
@@ -75,7 +76,7 @@ pub use closed_skin::closed_skin;
 pub use coverage_study::{
     CameraPlace, CoverageStudy, CoverageStudyError, JointInRoom, RankedPlace,
 };
-pub use cut_error::{CutError, PoseImage};
+pub use cut_error::{CutError, ExceededLimit, PoseImage};
 pub use dataset_lock::FolderError;
 pub use depth_views::{DepthView, PosedSkin, VisibleLimb};
 pub use differences::KeyDifference;

@@ -19,6 +19,7 @@ use crate::closed_skin::closed_skin;
 use crate::cut_error::PoseImage;
 use crate::cut_share::{self, CutFaces, PoseCuts};
 use crate::exposable_limb::{ExposableLimb, PosedExposure};
+use crate::off_detector::off_detector;
 use crate::plan::Plan;
 use crate::pose_error::PoseError;
 use crate::prepared_limb::PreparedLimb;
@@ -190,6 +191,7 @@ impl<'a> PosableLimb<'a> {
             let (skin, joint) = (&self.limb.prepared.limb.mesh, self.joint());
             cuts.finding(&self.limb.prepared.limb.walls, skin, &joint)
         }));
+        findings.extend(off_detector(&exposure.projection, &self.joint()));
         let rows = self.setup.cameras.iter().zip(&rois);
         let rows = rows.map(|(camera, roi)| roi_row(camera, roi, pose));
         Ok(Images {

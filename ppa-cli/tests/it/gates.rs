@@ -166,6 +166,26 @@ fn a_joint_far_outside_and_a_front_along_the_axis_are_refused() {
 }
 
 #[test]
+fn a_joint_beside_the_ankle_is_doubted() {
+    let scan = crate::phantom().join("p01.nii");
+    let surface = LimbSettings::default();
+    let prepared = |choices: &LandmarkOverrides| {
+        let found = prepare(&scan, &Default::default(), Side::Right, &surface, choices);
+        found.unwrap().1
+    };
+    let found = prepared(&LandmarkOverrides::default());
+    let [x, y, z] = found.landmarks.joint_centre;
+    for (aside_mm, expected) in [(15.0, false), (30.0, true)] {
+        let limb = prepared(&LandmarkOverrides {
+            joint_centre: Some([x, y + aside_mm, z]),
+            ..LandmarkOverrides::default()
+        });
+        let doubted = codes(&limb, Severity::Caution).contains(&FindingCode::JointOffAnkle);
+        assert_eq!(doubted, expected, "{aside_mm} mm: {:#?}", limb.findings);
+    }
+}
+
+#[test]
 fn a_front_to_the_patients_back_is_doubted() {
     let scan = crate::phantom().join("p01.nii");
     let choices = LandmarkOverrides {

@@ -11,6 +11,9 @@ use super::at;
 /// A joint given this far from the ankle that the scan shows is doubted, mm: the talar dome has a radius of about 20.
 const OFF_ANKLE_MM: f64 = 10.0;
 
+/// A joint this far beside the ankle that the scan shows is doubted, mm: an axis through centres of the skin passes up to 13 mm beside it.
+const BESIDE_ANKLE_MM: f64 = 20.0;
+
 /// A joint that was moved farther than this on to a given axis is doubted, mm.
 const BESIDE_AXIS_MM: f64 = 5.0;
 
@@ -22,6 +25,7 @@ pub(super) fn findings(
     let place = landmarks.joint_centre;
     let mut found = Vec::new();
     found.extend(no_joint(volume, report, landmarks));
+    found.extend(beside_ankle(landmarks));
     if landmarks.scan_direction[2] < 0.0 {
         found.push(at(
             place,
@@ -151,6 +155,21 @@ fn off_ankle(place: [f64; 3], depth_hu: f64, joint_above_mm: f64) -> Option<Find
                  than the bone on either side)"
             ),
         )
+    })
+}
+
+/// The joint of a lower leg lies on another line along the limb than its ankle.
+fn beside_ankle(landmarks: &Landmarks) -> Option<Finding> {
+    let place = landmarks.joint_centre;
+    let ankle = landmarks.joints.iter().find(|j| j.joint == Joint::Ankle)?;
+    let off = Point3::from(place) - Point3::from(ankle.centre_mm);
+    let axis = Vector3::from(landmarks.axis_direction);
+    let aside_mm = off.cross(&axis).norm();
+    let is_doubted = landmarks.limb == LimbKind::LowerLeg && aside_mm > BESIDE_ANKLE_MM;
+    is_doubted.then(|| {
+        let text = format!("the joint lies {aside_mm:.0} mm beside the ankle that the scan shows");
+        let (code, severity) = (FindingCode::JointOffAnkle, Severity::Caution);
+        at(place, code, severity, aside_mm, text)
     })
 }
 
