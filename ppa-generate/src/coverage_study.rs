@@ -6,7 +6,7 @@ use ppa_depth::{
     BodyError, Camera, Coverage, CoverageError, CoverageSettings, JointSurface, MeshBody,
     PlacedBody, Viewpoint, rows_from_isometry,
 };
-use ppa_scene::{PlaceError, place};
+use ppa_scene::{PlaceError, PlaceSettings, Positioning};
 use serde::Serialize;
 
 use crate::closed_skin::closed_skin;
@@ -90,16 +90,15 @@ impl<'a> JointInRoom<'a> {
         setup: &'a SceneSetup,
         limb: &'a PreparedLimb,
         angle_rad: f64,
+        positioning: Positioning,
     ) -> Result<Self, PlaceError> {
         let landmarks = &limb.landmarks;
-        let (plane, device) = (&setup.table.plane.plane, &setup.table.room.device);
-        let placement = place(
-            &limb.limb.mesh.vertices,
-            landmarks,
-            angle_rad,
-            plane,
-            device,
-        )?;
+        let settings = PlaceSettings {
+            positioning,
+            ..PlaceSettings::default()
+        };
+        let skin = &limb.limb.mesh;
+        let placement = (setup.table).place(skin, landmarks, angle_rad, &settings)?;
         let room_from_ct = placement.room_from_patient * landmarks.patient_from_ct();
         let room_from_ct = *room_from_ct.isometry();
         let joint_in_ct = Point3::from(landmarks.joint_centre);

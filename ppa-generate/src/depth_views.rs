@@ -149,7 +149,8 @@ impl VisibleLimb {
     ) -> Result<Vec<DepthView>, PoseError> {
         let landmarks = &self.prepared.landmarks;
         let angle_rad = angle_deg.to_radians();
-        let place = |skin| (setup.table).place(skin, landmarks, angle_rad, &plan.soft_tissue);
+        let settings = plan.place_settings();
+        let place = |skin| (setup.table).place(skin, landmarks, angle_rad, &settings);
         let mut skin = self.posed(&place(self.skin())?, plan)?;
         if self.shaped.is_some() {
             // The skin of the scan decides the regions, as in the dataset.

@@ -6,7 +6,7 @@ use ppa_dataset::findings::FindingCode;
 use ppa_dataset::layout::{LimbId, View};
 use ppa_depth::{CameraSpec, RigSpec, SensorSpec, WallDepth, rows_from_isometry};
 use ppa_mesh::LimbSettings;
-use ppa_scene::{LandmarkOverrides, PlaneSettings, RoomSpec, SoftTissue, Sweep};
+use ppa_scene::{LandmarkOverrides, PlaneSettings, Positioning, RoomSpec, SoftTissue, Sweep};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
@@ -30,6 +30,9 @@ pub(crate) struct Settings {
     shapes: ShapeSettings,
     /// How far heel and calf sink in where they rest.
     soft_tissue: SoftTissue,
+    /// Errors of positioning; left out where there are none.
+    #[serde(skip_serializing_if = "Positioning::is_default")]
+    positioning: Positioning,
     /// SHA-256 of the point cloud of a recorded room; `null` for the built-in one.
     room_ply_sha256: Option<String>,
     /// The built-in room, and the x-ray device in either room.
@@ -64,6 +67,7 @@ impl Settings {
             seed: plan.seed,
             shapes: plan.shapes.clone(),
             soft_tissue: plan.soft_tissue,
+            positioning: plan.positioning,
             room_ply_sha256: hash(&plan.room.ply)?,
             room: plan.room.parametric,
             table: plan.room.table.clone(),

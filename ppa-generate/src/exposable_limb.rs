@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use ppa_mesh::Mesh;
-use ppa_scene::{PlaceError, Placement, SoftTissue};
+use ppa_scene::{PlaceError, PlaceSettings, Placement};
 use ppa_xray::{FastSettings, PreparedPhantom, Projection, Radiograph, Spectrum, TransportError};
 
 use crate::plan::{Plan, XraySettings};
@@ -20,9 +20,9 @@ pub struct ExposableLimb {
     pub table: Arc<Table>,
     /// The beam.
     pub spectrum: Arc<Spectrum>,
-    /// The limb around the joint as voxels of material and density, prepared for exposures of all its poses.
+    /// The limb around the central beam as voxels of material and density, prepared for exposures of all its poses.
     pub phantom: Arc<PreparedPhantom<'static>>,
-    soft_tissue: SoftTissue,
+    place_settings: PlaceSettings,
     xray: Arc<XraySettings>,
 }
 
@@ -51,10 +51,10 @@ pub struct PosedExposure<'a> {
 }
 
 impl ExposableLimb {
-    /// Cuts the voxels around the joint out of a limb; `table` and `spectrum` are those of `plan`.
+    /// Cuts the voxels around the central beam out of a limb; `table` and `spectrum` are those of `plan`.
     ///
     /// # Errors
-    /// [`JointError`] when there is no limb near the joint or the HU calibration is unusable.
+    /// [`JointError`] when there is no limb near the beam or the HU calibration is unusable.
     pub fn new(
         prepared: impl Into<Arc<PreparedLimb>>,
         plan: &Plan,
@@ -62,7 +62,7 @@ impl ExposableLimb {
         spectrum: Arc<Spectrum>,
     ) -> Result<Self, JointError> {
         let prepared = prepared.into();
-        let phantom = Arc::new(prepared_phantom(&prepared, &plan.xray)?);
+        let phantom = Arc::new(prepared_phantom(&prepared, plan)?);
         Ok(Self::with_phantom(prepared, phantom, plan, table, spectrum))
     }
 
@@ -80,7 +80,7 @@ impl ExposableLimb {
             table,
             spectrum,
             phantom,
-            soft_tissue: plan.soft_tissue,
+            place_settings: plan.place_settings(),
             xray: Arc::new(plan.xray.clone()),
         }
     }
@@ -115,7 +115,7 @@ impl ExposableLimb {
     /// [`PlaceError`] when it does not rest there.
     pub fn place(&self, skin: &Mesh, angle_rad: f64) -> Result<Placement, PlaceError> {
         let landmarks = &self.prepared.landmarks;
-        (self.table).place(skin, landmarks, angle_rad, &self.soft_tissue)
+        (self.table).place(skin, landmarks, angle_rad, &self.place_settings)
     }
 
     /// The exposure of the limb turned medially by an angle in radians.

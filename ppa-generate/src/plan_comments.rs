@@ -25,6 +25,10 @@ pub(crate) const TABLES: &[(&str, &str)] = &[
         "How far heel and calf sink in where they rest; 0 is a rigid skin.",
     ),
     (
+        "[positioning]",
+        "Errors of positioning; by default the joint lies on the central beam.",
+    ),
+    (
         "[room]",
         "The x-ray room. `ppa scene room --toml room.toml` writes a room file instead.",
     ),
@@ -70,6 +74,16 @@ pub(crate) const KEYS: &[(&str, &str, &str)] = &[
         "big is the skin moved out by this, small in",
     ),
     ("shapes", "bumps", "bumps of bumps_a and of bumps_b"),
+    (
+        "positioning",
+        "tilt_deg",
+        "above 0 lifts the proximal end, below 0 the distal end",
+    ),
+    (
+        "positioning",
+        "beam_shift_mm",
+        "from the joint to the beam: towards the patient's left, towards the head",
+    ),
     (
         "room.parametric",
         "table_foot_mm",
@@ -136,7 +150,7 @@ pub(crate) const KEYS: &[(&str, &str, &str)] = &[
     (
         "xray",
         "half_length_mm",
-        "limb kept on either side of the joint",
+        "limb kept along its axis on either side of the joint, or of the shifted beam",
     ),
     (
         "xray",

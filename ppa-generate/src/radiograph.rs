@@ -1,11 +1,11 @@
-//! The exposure of a posed limb: its voxels around the joint, and the device as the scan sees it.
+//! The exposure of a posed limb: its voxels around the central beam, and the device as the scan sees it.
 
 use nalgebra::{Point3, Unit, Vector3};
 use ppa_ct::Volume;
 use ppa_scene::{Landmarks, Placement, XrayDevice, ct_from_device};
 use ppa_xray::{PreparedPhantom, Projection, VoxelPhantom};
 
-use crate::plan::XraySettings;
+use crate::plan::{Plan, XraySettings};
 use crate::prepared_limb::PreparedLimb;
 
 const AIR_HU: f32 = -1000.0;
@@ -14,8 +14,10 @@ const AIR_HU: f32 = -1000.0;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum JointError {
-    /// No voxel of the limb lies near the joint.
-    #[error("no voxel of the limb lies within {half_length_mm} mm of the joint along its axis")]
+    /// No voxel of the limb lies near the beam.
+    #[error(
+        "no voxel of the limb lies within {half_length_mm} mm of the central beam along the limb's axis"
+    )]
     NoLimb {
         /// Half the length that was looked at.
         half_length_mm: f64,
@@ -28,13 +30,14 @@ pub enum JointError {
     Phantom(#[from] ppa_xray::PhantomError),
 }
 
-/// The limb around the joint as voxels of material and density; couch and sheet become air.
+/// The limb around the central beam as voxels of material and density; couch and sheet become air.
 ///
 /// # Errors
-/// [`JointError`] when there is no limb near the joint or the HU calibration is unusable.
-fn joint_phantom(
+/// [`JointError`] when there is no limb near the beam or the HU calibration is unusable.
+fn limb_phantom(
     prepared: &PreparedLimb,
     settings: &XraySettings,
+    shift_mm: f64,
 ) -> Result<VoxelPhantom, JointError> {
     let (volume, mask) = (&prepared.volume, &prepared.limb.mask);
     let grid = volume.grid();
@@ -45,7 +48,7 @@ fn joint_phantom(
     for index in (0..grid.len()).filter(|&index| mask[index]) {
         let voxel = grid.voxel(index);
         let along_mm = (grid.centre(voxel.map(|v| v as f64)) - joint).dot(&axis);
-        if along_mm.abs() <= half_length_mm {
+        if (along_mm - shift_mm).abs() <= half_length_mm {
             for a in 0..3 {
                 low[a] = low[a].min(voxel[a]);
                 high[a] = high[a].max(voxel[a] + 1);
@@ -69,16 +72,19 @@ fn joint_phantom(
         .with_form_factors(settings.form_factors))
 }
 
-/// The limb around the joint as voxels of material and density, ready for exposures in any pose. Of the settings, voxels, interpolation, calibration, form factors and Compton model count.
+/// The limb around the central beam as voxels of material and density, ready for exposures in any rotation.
+///
+/// Of the plan, the shift of the beam along the limb, voxels, interpolation, calibration, form factors and Compton model count.
 ///
 /// # Errors
-/// [`JointError`] when there is no limb near the joint or the HU calibration is unusable.
+/// [`JointError`] when there is no limb near the beam or the HU calibration is unusable.
 pub fn prepared_phantom(
     prepared: &PreparedLimb,
-    settings: &XraySettings,
+    plan: &Plan,
 ) -> Result<PreparedPhantom<'static>, JointError> {
-    let voxels = joint_phantom(prepared, settings)?;
-    Ok(PreparedPhantom::new(voxels, settings.engine.compton_model))
+    let [_, along_mm] = plan.positioning.beam_shift_mm;
+    let voxels = limb_phantom(prepared, &plan.xray, along_mm)?;
+    Ok(PreparedPhantom::new(voxels, plan.xray.engine.compton_model))
 }
 
 /// The exposure of a placed limb: the device moves into the scan, the voxels stay.

@@ -11,8 +11,8 @@ use ppa_depth::{
 };
 use ppa_mesh::{CloudError, Mesh, MeshContents, PointCloud, estimate_normals, mean_spacing_mm};
 use ppa_scene::{
-    Landmarks, PlaceError, Placement, PlaneSettings, Rigid, RoomError, SoftTissue, TablePlane,
-    XrayDevice, XrayRoom, place_soft, table_plane,
+    Landmarks, PlaceError, PlaceSettings, Placement, PlaneSettings, Rigid, RoomError, TablePlane,
+    XrayDevice, XrayRoom, place_with, table_plane,
 };
 use ppa_xray::{Spectrum, TubeSpec};
 
@@ -121,7 +121,7 @@ impl Table {
         Ok(Self { room, plane })
     }
 
-    /// Lays a skin (`ct` frame) on the table, turned medially by an angle in radians, and lets soft tissue sink in.
+    /// Lays a skin (`ct` frame) on the table, turned medially by an angle in radians.
     ///
     /// # Errors
     /// [`PlaceError`] when the limb does not rest there.
@@ -130,16 +130,16 @@ impl Table {
         skin: &Mesh,
         landmarks: &Landmarks,
         angle_rad: f64,
-        soft_tissue: &SoftTissue,
+        settings: &PlaceSettings,
     ) -> Result<Placement, PlaceError> {
         let (plane, device) = (&self.plane.plane, &self.room.device);
-        place_soft(
+        place_with(
             &skin.vertices,
             landmarks,
             angle_rad,
             plane,
             device,
-            soft_tissue,
+            settings,
         )
     }
 

@@ -27,8 +27,9 @@ pub use landmarks::measures::{Fibula, LimbMeasures, LimbSize, Neighbour, Shaft, 
 pub use landmarks::notes::LandmarkNote;
 pub use placement::error::PlaceError;
 pub use placement::place::{
-    Contact, Placement, ct_from_device, medial_rotation, place, place_soft,
+    Contact, PlaceSettings, Placement, ct_from_device, medial_rotation, place, place_with,
 };
+pub use placement::positioning::Positioning;
 pub use placement::soft_tissue::{Flattening, SoftTissue};
 pub use placement::sweep::{PoseAngle, Sweep, SweepError};
 pub use room::device::XrayDevice;

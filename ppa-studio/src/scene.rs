@@ -29,10 +29,10 @@ struct KeptSetup {
     setup: Arc<SceneSetup>,
 }
 
-/// Voxels of a limb around its joint, and what they were made from.
+/// Voxels of a limb around the central beam, and what they were made from.
 struct KeptPhantom {
     revision: u64,
-    xray: XraySettings,
+    plan: Plan,
     phantom: Arc<PreparedPhantom<'static>>,
 }
 
@@ -192,7 +192,7 @@ impl Scenes {
     /// The limb with all that an exposure takes.
     pub fn exposable(&self, shown: &Shown, plan: &Plan) -> Result<ExposableLimb, StudioError> {
         let setup = self.setup(plan)?;
-        let phantom = self.phantom(shown, &plan.xray)?;
+        let phantom = self.phantom(shown, plan)?;
         let (table, spectrum) = (setup.table.clone(), setup.spectrum.clone());
         let prepared = shown.prepared().clone();
         Ok(ExposableLimb::with_phantom(
@@ -243,25 +243,25 @@ impl Scenes {
         })
     }
 
-    /// Voxels around the joint: those of the request before, if nothing they depend on has changed.
+    /// Voxels around the central beam: those of the request before, if nothing they depend on has changed.
     fn phantom(
         &self,
         shown: &Shown,
-        xray: &XraySettings,
+        plan: &Plan,
     ) -> Result<Arc<PreparedPhantom<'static>>, StudioError> {
         let mut kept = self.phantom.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(kept) = &*kept
             && kept.revision == shown.revision
-            && kept.xray.same_voxels(xray)
+            && kept.plan.same_voxels(plan)
         {
             return Ok(kept.phantom.clone());
         }
         // Freed first: both would need the memory of two.
         *kept = None;
-        let phantom = Arc::new(prepared_phantom(shown.prepared(), xray)?);
+        let phantom = Arc::new(prepared_phantom(shown.prepared(), plan)?);
         *kept = Some(KeptPhantom {
             revision: shown.revision,
-            xray: xray.clone(),
+            plan: plan.clone(),
             phantom: phantom.clone(),
         });
         Ok(phantom)

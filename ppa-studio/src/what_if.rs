@@ -19,6 +19,12 @@ pub(crate) struct WhatIf {
     pub distal_mm: Option<f64>,
     /// How deep the proximal contact sinks in.
     pub proximal_mm: Option<f64>,
+    /// Tilt of the limb; above 0 the proximal end is lifted.
+    pub tilt_deg: Option<f64>,
+    /// From the joint to the central beam, across the table.
+    pub beam_across_mm: Option<f64>,
+    /// From the joint to the central beam, towards the head.
+    pub beam_along_mm: Option<f64>,
     /// Body shape that the depth cameras see; that of the scan if left out.
     pub shape: Option<BodyShape>,
     /// Whether the depth cameras have the errors of an Azure Kinect.
@@ -39,17 +45,19 @@ pub(crate) struct WhatIf {
 impl WhatIf {
     /// The plan with these changes.
     pub fn plan(&self, plan: &Plan) -> Result<Plan, StudioError> {
-        if !(-360.0..=360.0).contains(&self.angle_deg) {
-            return Err(StudioError::Invalid(format!(
-                "the rotation is {} degrees, expected -360 to 360",
-                self.angle_deg
-            )));
-        }
         let mut plan = plan.clone();
         let sinks = &mut plan.soft_tissue;
         sinks.distal_mm = self.distal_mm.unwrap_or(sinks.distal_mm);
         sinks.proximal_mm = self.proximal_mm.unwrap_or(sinks.proximal_mm);
         plan.soft_tissue.check()?;
+        let positioning = &mut plan.positioning;
+        positioning.tilt_deg = self.tilt_deg.unwrap_or(positioning.tilt_deg);
+        let [across_mm, along_mm] = positioning.beam_shift_mm;
+        positioning.beam_shift_mm = [
+            self.beam_across_mm.unwrap_or(across_mm),
+            self.beam_along_mm.unwrap_or(along_mm),
+        ];
+        positioning.check()?;
         if self.sensor && plan.depth.sensor.is_none() {
             plan.depth.sensor = Some(ppa_depth::SensorSpec::default());
         }
@@ -88,6 +96,9 @@ impl WhatIf {
     pub fn needs_plan(&self) -> bool {
         self.distal_mm.is_some()
             || self.proximal_mm.is_some()
+            || self.tilt_deg.is_some()
+            || self.beam_across_mm.is_some()
+            || self.beam_along_mm.is_some()
             || self.grid.is_some()
             || self.filters.as_ref().is_some_and(Vec::is_empty)
             || self.cameras.is_some()
@@ -128,11 +139,13 @@ mod tests {
         let mut plan = Plan::new(Vec::new());
         plan.xray.kvp = 66.0;
         plan.soft_tissue.distal_mm = 3.0;
+        plan.positioning.beam_shift_mm = [5.0, -8.0];
         assert_eq!(WhatIf::default().plan(&plan).unwrap(), plan);
         let what_if = WhatIf {
             kvp: Some(70.0),
             mas: Some(4.0),
             grid: Some(true),
+            beam_along_mm: Some(20.0),
             ..WhatIf::default()
         };
         let changed = what_if.plan(&plan).unwrap();
@@ -140,6 +153,7 @@ mod tests {
         assert_eq!(changed.xray.tube_load, Some(TubeLoad::Mas(4.0)));
         assert!(changed.xray.receptor.grid.is_some());
         assert_eq!(changed.soft_tissue, plan.soft_tissue);
+        assert_eq!(changed.positioning.beam_shift_mm, [5.0, 20.0]);
     }
 
     #[test]
@@ -151,15 +165,18 @@ mod tests {
             ..WhatIf::default()
         };
         assert!(refused(sunk).contains("distal_mm"));
+        let tilted = WhatIf {
+            tilt_deg: Some(-60.0),
+            ..WhatIf::default()
+        };
+        assert_eq!(
+            refused(tilted),
+            "tilt_deg is -60 degrees, expected -45 to 45"
+        );
         let technique = WhatIf {
             technique: Some("elbow".to_owned()),
             ..WhatIf::default()
         };
         assert!(refused(technique).contains("expected ankle, knee"));
-        let angle = WhatIf {
-            angle_deg: f64::NAN,
-            ..WhatIf::default()
-        };
-        assert!(refused(angle).contains("expected -360 to 360"));
     }
 }

@@ -114,6 +114,7 @@ class Plan:
         rotation: _Settings | None = None,
         shapes: _Settings | None = None,
         soft_tissue: _Settings | None = None,
+        positioning: _Settings | None = None,
         room: _Settings | None = None,
         depth: _Settings | None = None,
         xray: _Settings | None = None,

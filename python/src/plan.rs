@@ -22,7 +22,7 @@ use crate::values::{dictionary, from_table, table, to_table};
 ///     Everything random follows from it.
 /// technique : {"ankle", "knee"}, optional
 ///     Usual exposure of an examination; keys of ``xray`` replace its values.
-/// rotation, shapes, soft_tissue, room, depth, xray : dict, optional
+/// rotation, shapes, soft_tissue, positioning, room, depth, xray : dict, optional
 ///     The tables of plan.toml, e.g. ``rotation={"from_deg": 0, "to_deg": 30, "step_deg": 5}``. A key that is left out has its default;
 ///     paths start at the current folder.
 ///
@@ -65,7 +65,7 @@ pub fn xray_settings(
 #[pymethods]
 impl PyPlan {
     #[new]
-    #[pyo3(signature = (cases=Vec::new(), *, seed=0, technique=None, rotation=None, shapes=None, soft_tissue=None, room=None, depth=None, xray=None))]
+    #[pyo3(signature = (cases=Vec::new(), *, seed=0, technique=None, rotation=None, shapes=None, soft_tissue=None, positioning=None, room=None, depth=None, xray=None))]
     #[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
     fn new(
         cases: Vec<(PathBuf, u32)>,
@@ -74,6 +74,7 @@ impl PyPlan {
         rotation: Option<&Bound<'_, PyDict>>,
         shapes: Option<&Bound<'_, PyDict>>,
         soft_tissue: Option<&Bound<'_, PyDict>>,
+        positioning: Option<&Bound<'_, PyDict>>,
         room: Option<&Bound<'_, PyDict>>,
         depth: Option<&Bound<'_, PyDict>>,
         xray: Option<&Bound<'_, PyDict>>,
@@ -86,6 +87,7 @@ impl PyPlan {
             ("rotation", rotation),
             ("shapes", shapes),
             ("soft_tissue", soft_tissue),
+            ("positioning", positioning),
             ("room", room),
             ("depth", depth),
         ] {

@@ -79,8 +79,8 @@ impl PyPose {
                 None => Scene::built_in()?,
             };
             let (skin, landmarks) = (&prepared.limb.mesh, &prepared.landmarks);
-            let (angle_rad, soft_tissue) = (angle_deg.to_radians(), &scene.plan.soft_tissue);
-            let placement = scene.table.place(skin, landmarks, angle_rad, soft_tissue);
+            let (angle_rad, settings) = (angle_deg.to_radians(), scene.plan.place_settings());
+            let placement = scene.table.place(skin, landmarks, angle_rad, &settings);
             Ok::<_, SightError>((scene.clone(), placement.map_err(PoseError::from)?))
         })?
         .or_raise()?;

@@ -59,6 +59,7 @@ def files(tmp_path_factory: pytest.TempPathFactory, volume: ppa.Volume) -> Files
         seed=5,
         rotation={"from_deg": 0, "to_deg": 20, "step_deg": 10},
         shapes={"variants": ["orig", "bumps_a"]},
+        positioning={"tilt_deg": 2.0, "beam_shift_mm": [5.0, -10.0]},
         depth={"sensor": {"random": {"floor_mm": 1.0, "at_unit_signal_mm": 2.0}}},
         xray=QUICK_XRAY,
     ).save(plan)

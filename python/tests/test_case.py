@@ -150,6 +150,7 @@ def test_images_that_make_no_sense_are_refused(case: ppa.Case, scene: ppa.Scene,
         lambda: case.place(float("nan")),
         lambda: ppa.Plan(depth={"roi_mm": -1}),
         lambda: ppa.Plan(rotation={"step_deg": 0}),
+        lambda: ppa.Plan(positioning={"tilt_deg": 90}),
         lambda: ppa.Scene(ppa.Plan(), room="x.toml"),
         lambda: ppa.prepare(ppa.Volume(np.full((20, 20, 20), -1000, np.int16), np.eye(4)), "r"),
     ]:

@@ -31,7 +31,7 @@ pub enum SceneCommand {
 #[derive(Debug, Args)]
 #[group(multiple = false)]
 pub struct WhichRoom {
-    /// Take the room, and soft tissue, from this plan instead of the built-in one
+    /// Take room, soft tissue and positioning from this plan
     #[arg(long)]
     plan: Option<PathBuf>,
     /// Take the room from this room file
@@ -216,20 +216,20 @@ fn place_limb(args: &PlaceArgs, output: Output) -> anyhow::Result<()> {
     outputs.optional("--frames", args.frames.as_ref(), &[".json"])?;
     outputs.optional("--picture", args.picture.as_ref(), PICTURE)?;
     let plan = args.room.plan()?;
-    let soft_tissue = match args.soft_tissue_mm {
-        Some([distal_mm, proximal_mm]) => SoftTissue {
+    let mut settings = plan.place_settings();
+    if let Some([distal_mm, proximal_mm]) = args.soft_tissue_mm {
+        settings.soft_tissue = SoftTissue {
             distal_mm,
             proximal_mm,
-        },
-        None => plan.soft_tissue,
-    };
+        };
+    }
     let case = Case::read(&args.case)?;
     let working = working("preparing the limb");
     let prepared = prepared(&case, &args.case)?;
     let table = Table::of_plan(&plan)?;
     let skin = &prepared.limb.mesh;
     let (landmarks, angle_rad) = (&prepared.landmarks, args.angle.to_radians());
-    let placement = table.place(skin, landmarks, angle_rad, &soft_tissue)?;
+    let placement = table.place(skin, landmarks, angle_rad, &settings)?;
     let patient_from_ct = prepared.landmarks.patient_from_ct();
     if let Some(ply) = &args.ply {
         let room_from_ct = placement.room_from_patient * patient_from_ct;

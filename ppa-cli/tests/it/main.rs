@@ -27,6 +27,7 @@ mod network_files;
 mod outputs;
 mod phantoms;
 mod planted_series;
+mod positioning;
 mod prediction;
 mod reading;
 mod replacing;

@@ -26,7 +26,8 @@ fn a_case_is_rendered_as_its_dataset_shows_it() {
     let folder = folder.path();
     let plan = write_plan(
         folder,
-        "[shapes]\nvariants = [\"orig\"]\n[soft_tissue]\ndistal_mm = 2.0\nproximal_mm = 3.0\n",
+        "[shapes]\nvariants = [\"orig\"]\n[soft_tissue]\ndistal_mm = 2.0\nproximal_mm = 3.0\n\
+         [positioning]\ntilt_deg = -3.0\nbeam_shift_mm = [12.0, 20.0]\n",
     );
     let text = fs::read_to_string(&plan).unwrap();
     let text = text

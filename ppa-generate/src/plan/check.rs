@@ -108,6 +108,9 @@ impl Plan {
         self.soft_tissue
             .check()
             .map_err(|error| format!("soft_tissue: {error}"))?;
+        self.positioning
+            .check()
+            .map_err(|error| format!("positioning.{error}"))?;
         if let Some(sensor) = &self.depth.sensor {
             sensor
                 .check()

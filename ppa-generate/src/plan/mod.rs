@@ -11,7 +11,7 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 use ppa_dataset::files::{read_text, write_whole};
-use ppa_scene::{SoftTissue, Sweep};
+use ppa_scene::{PlaceSettings, Positioning, SoftTissue, Sweep};
 use ppa_xray::HuCalibration;
 use serde::{Deserialize, Serialize};
 
@@ -46,6 +46,9 @@ pub struct Plan {
     /// How far heel and calf sink in where they rest; a rigid skin when left out.
     #[serde(default)]
     pub soft_tissue: SoftTissue,
+    /// Errors of positioning: how far the limb is tilted, and how far its joint lies from the central beam.
+    #[serde(default)]
+    pub positioning: Positioning,
     /// The x-ray room.
     #[serde(default)]
     pub room: PlanRoom,
@@ -81,11 +84,26 @@ impl Plan {
             rotation: Sweep::default(),
             shapes: ShapeSettings::default(),
             soft_tissue: SoftTissue::default(),
+            positioning: Positioning::default(),
             room: PlanRoom::default(),
             room_file: None,
             depth: DepthSettings::default(),
             xray: XraySettings::default(),
         }
+    }
+
+    /// How limbs lie on the table, apart from their rotation.
+    pub fn place_settings(&self) -> PlaceSettings {
+        PlaceSettings {
+            soft_tissue: self.soft_tissue,
+            positioning: self.positioning,
+        }
+    }
+
+    /// Whether [`prepared_phantom`](crate::prepared_phantom) gives the same voxels for both.
+    pub fn same_voxels(&self, other: &Self) -> bool {
+        let [_, along_mm] = self.positioning.beam_shift_mm;
+        along_mm == other.positioning.beam_shift_mm[1] && self.xray.same_voxels(&other.xray)
     }
 
     /// The person whose limb a case file is, with its changes or without; none if the plan does not name the file.

@@ -96,7 +96,7 @@ pub struct XraySettings {
     /// The letter L or R on the detector; none when left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub marker: Option<MarkerPlace>,
-    /// Length of limb kept on either side of the joint, mm.
+    /// Length of limb kept along its axis on either side of the joint, or of the point that the shift of the beam gives, mm.
     pub half_length_mm: f64,
     /// Largest voxel that photons travel through, mm: thicker slices are interpolated, so that
     /// bone edges do not come out as stairs.
@@ -152,8 +152,8 @@ impl Default for XraySettings {
 }
 
 impl XraySettings {
-    /// Whether [`prepared_phantom`](crate::prepared_phantom) gives the same for both.
-    pub fn same_voxels(&self, other: &Self) -> bool {
+    /// Whether a limb has the same voxels with both.
+    pub(crate) fn same_voxels(&self, other: &Self) -> bool {
         self.half_length_mm == other.half_length_mm
             && self.max_voxel_mm == other.max_voxel_mm
             && self.interpolation == other.interpolation

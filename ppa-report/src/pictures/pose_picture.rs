@@ -305,13 +305,24 @@ fn frame(name: &str, posed: &PosedLimb) -> Frame {
         (Swatch::Area(CUT), "cut by the field of view"),
         (Swatch::Line(FAINT), "fainter: hidden"),
     ];
-    let facts = vec![
+    let mut facts = vec![
         format!("rotation {:.1} deg", posed.angle_deg),
         format!("tilt {:.1} deg", contact.tilt_rad.to_degrees()),
-        format!("contacts {:.0} mm apart", contact.apart_mm),
+    ];
+    let positioning = &posed.plan.positioning;
+    if positioning.tilt_deg == 0.0 {
+        facts.push(format!("contacts {:.0} mm apart", contact.apart_mm));
+    } else {
+        facts.push(format!("of it {:.1} deg by the plan", positioning.tilt_deg));
+    }
+    let [across_mm, along_mm] = positioning.beam_shift_mm;
+    if [across_mm, along_mm] != [0.0; 2] {
+        facts.push(format!("beam {across_mm:.0}, {along_mm:.0} mm off"));
+    }
+    facts.extend([
         above("distal", contact.distal_mm),
         above("proximal", contact.proximal_mm),
-    ];
+    ]);
     Frame {
         title: format!(
             "{name}   {}   {:.1} degrees medial",

@@ -26,8 +26,8 @@ pub enum PlaceError {
         /// Its index.
         index: usize,
     },
-    /// The rotation angle is NaN or infinite.
-    #[error("the rotation angle is {0}, expected a finite number of radians")]
+    /// The rotation angle is not a number, or more than a full turn; radians.
+    #[error("the rotation is {} degrees, expected -360 to 360", .0.to_degrees())]
     Angle(f64),
     /// A depth of soft tissue does not make sense.
     #[error("{name} of the soft tissue is {found_mm} mm, expected 0 to 20")]
@@ -36,6 +36,18 @@ pub enum PlaceError {
         name: &'static str,
         /// Its value.
         found_mm: f64,
+    },
+    /// A tilt or a shift of the beam does not make sense.
+    #[error("{name} is {found} {unit}, expected -{most} to {most}")]
+    Positioning {
+        /// Field of [`Positioning`](crate::Positioning).
+        name: &'static str,
+        /// Its value.
+        found: f64,
+        /// Largest amount.
+        most: f64,
+        /// Unit of both.
+        unit: &'static str,
     },
     /// The anterior direction and the axis do not span a plane.
     #[error("the anterior direction runs along the limb's axis, expected one across it")]

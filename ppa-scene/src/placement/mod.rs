@@ -3,5 +3,6 @@
 pub(crate) mod error;
 pub(crate) mod matching;
 pub(crate) mod place;
+pub(crate) mod positioning;
 pub(crate) mod soft_tissue;
 pub(crate) mod sweep;

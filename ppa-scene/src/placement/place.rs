@@ -1,5 +1,7 @@
 //! Laying a rotated limb on the table under the central beam: T_rot, T_mat and T_opt.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use ppa_core::Side;
 use serde::{Deserialize, Serialize};
@@ -10,9 +12,21 @@ use crate::landmarks::contact::Profile;
 use crate::landmarks::found::Landmarks;
 use crate::placement::error::{PlaceError, check_points};
 use crate::placement::matching::{axes_rotation, on_beam, plane_axes, table_axes};
+use crate::placement::positioning::Positioning;
 use crate::placement::soft_tissue::{Flattening, SoftTissue};
 use crate::room::device::XrayDevice;
 use crate::room::plane::Plane;
+
+/// How a limb lies on the table, apart from its rotation.
+///
+/// The default is the paper's: a rigid limb that rests on two places, its joint on the central beam.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PlaceSettings {
+    /// How far it sinks in.
+    pub soft_tissue: SoftTissue,
+    /// Errors of positioning.
+    pub positioning: Positioning,
+}
 
 /// A limb on the table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -25,7 +39,7 @@ pub struct Placement {
     /// onto the central beam.
     pub t_mat: Rigid<Room, Patient>,
     /// Tips the limb about the room's X axis through the joint centre until it rests on two
-    /// places, and moves it onto the table.
+    /// places, or beyond by the tilt of [`Positioning`], and moves it onto the table and away from the beam by its shift.
     pub t_opt: Rigid<Room, Room>,
     /// How soft tissue gives way; `None` for a rigid skin.
     pub flattening: Option<Flattening>,
@@ -44,13 +58,13 @@ pub struct Contact {
     pub distal_mm: f64,
     /// Height of the lowest proximal point, mm.
     pub proximal_mm: f64,
-    /// Distance of both contacts, mm. Next to nothing when the limb rests on its middle: its ends
+    /// Distance of both contacts, before the tilt of [`Positioning`], mm. Next to nothing when the limb rests on its middle: its ends
     /// then hang in the air.
     pub apart_mm: f64,
     /// Where distal ends and proximal begins, from the joint along the table before the limb is
     /// tipped, mm.
     pub split_mm: f64,
-    /// Tilt found by T_opt, radians; + lifts the proximal end.
+    /// Tilt of T_opt, that of [`Positioning`] included, radians; + lifts the proximal end.
     pub tilt_rad: f64,
     /// How often the closest points were looked for.
     pub iterations: u32,
@@ -85,26 +99,33 @@ pub fn place(
     table: &Plane,
     device: &XrayDevice,
 ) -> Result<Placement, PlaceError> {
-    let rigid = SoftTissue::default();
-    place_soft(points_ct, landmarks, angle_rad, table, device, &rigid)
+    let settings = PlaceSettings::default();
+    place_with(points_ct, landmarks, angle_rad, table, device, &settings)
 }
 
-/// [`place`] with soft tissue that gives way where the limb rests: both parts sink in, and
-/// [`Placement::in_room`] is the skin as it then lies.
+/// [`place`] with soft tissue that gives way where the limb rests, and errors of positioning.
+///
+/// Both parts sink in; [`Placement::in_room`] is the skin as it then lies. A tilted limb rests on one of them. The central beam
+/// meets the table where it does without a shift; the limb is what moves.
 ///
 /// # Errors
-/// As [`place`], and for depths that make no sense.
-pub fn place_soft(
+/// As [`place`], and for depths, a tilt or a shift that make no sense.
+pub fn place_with(
     points_ct: &[Point3<f32>],
     landmarks: &Landmarks,
     angle_rad: f64,
     table: &Plane,
     device: &XrayDevice,
-    soft_tissue: &SoftTissue,
+    settings: &PlaceSettings,
 ) -> Result<Placement, PlaceError> {
+    let PlaceSettings {
+        soft_tissue,
+        positioning,
+    } = settings;
     check_points(points_ct)?;
     soft_tissue.check()?;
-    if !angle_rad.is_finite() {
+    positioning.check()?;
+    if !(-TAU..=TAU).contains(&angle_rad) {
         return Err(PlaceError::Angle(angle_rad));
     }
     let patient_from_ct = landmarks.patient_from_ct();
@@ -138,13 +159,16 @@ pub fn place_soft(
             proximal_mm: proximal - low,
         }
     })?;
-    let [distal, proximal] = profile.heights(tilt.angle_rad);
+    let tilt_rad = tilt.angle_rad + positioning.tilt_deg.to_radians();
+    let [distal, proximal] = profile.heights(tilt_rad);
 
     let matched_joint = on_beam(-under_limb.offset_mm, table, device)?;
-    let placed_joint = on_beam(-distal.min(proximal), table, device)?;
+    let [across_mm, along_mm] = positioning.beam_shift_mm;
+    let shift = room_axes.column(0) * across_mm + room_axes.column(1) * along_mm;
+    let placed_joint = on_beam(-distal.min(proximal), table, device)? - shift;
     let t_mat = Rigid::new(Isometry3::from_parts(matched_joint.into(), rotation));
     let room_x = Unit::new_unchecked(room_axes.column(0).into_owned());
-    let about_x = UnitQuaternion::from_axis_angle(&room_x, tilt.angle_rad);
+    let about_x = UnitQuaternion::from_axis_angle(&room_x, tilt_rad);
     let t_opt = Rigid::new(
         Translation3::from(placed_joint) * about_x * Translation3::from(matched_joint).inverse(),
     );
@@ -154,8 +178,10 @@ pub fn place_soft(
     let flattening = if *soft_tissue == SoftTissue::default() {
         None
     } else {
-        lowest_points(points_ct, room_from_ct, table, is_distal)
-            .map(|lowest| Flattening::at(lowest, table, &room_axes))
+        lowest_points(points_ct, room_from_ct, table, is_distal).map(|lowest| {
+            let is_tilted = positioning.tilt_deg != 0.0;
+            Flattening::at(lowest, table, &room_axes, is_tilted)
+        })
     };
     let [distal_mm, proximal_mm] = measure(
         points_ct,
@@ -178,7 +204,7 @@ pub fn place_soft(
             proximal_mm,
             apart_mm: tilt.apart_mm,
             split_mm: profile.split_mm,
-            tilt_rad: tilt.angle_rad,
+            tilt_rad,
             iterations: tilt.iterations,
         },
     })

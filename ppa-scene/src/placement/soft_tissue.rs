@@ -45,6 +45,9 @@ impl SoftTissue {
 /// flatter.
 const KEPT: f64 = 0.4;
 
+/// Contacts of a tilted limb that lie closer to each other along the table are one, mm.
+const ONE_PLACE_MM: f64 = 10.0;
+
 /// What soft tissue does to a limb that was laid into the table by some depth s.
 ///
 /// A layer of thickness T = 2 s / (1 − a), a = 0.4, is pressed into its upper T − s. With
@@ -53,7 +56,8 @@ const KEPT: f64 = 0.4;
 /// ζ′ = a + (1 − a) u; lengths across the table become (x − x₀) / ζ′ about the line x₀ through
 /// both contacts. The tissue swells sideways by as much as it is pressed: the Jacobian is
 /// ζ′ · 1/ζ′ = 1, so that no volume is lost, and no two points meet. Above the layer nothing moves.
-/// s runs linearly along the table from one contact to the other and beyond, but not below 0.
+/// s runs linearly along the table from one contact to the other and beyond, but not below 0. Where a limb is tilted, a part that is
+/// lifted does not sink in, s keeps its values at the contacts beyond them, and what lies deeper than s is moved onto the table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Flattening {
@@ -66,6 +70,9 @@ pub struct Flattening {
     depth_per_mm: f64,
     /// How much the line through both contacts moves across the table per mm towards the head.
     across_per_mm: f64,
+    /// Distance of both contacts along the table for a tilted limb, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    apart_mm: Option<f64>,
 }
 
 impl Flattening {
@@ -74,6 +81,7 @@ impl Flattening {
         [distal, proximal]: [Point3<f64>; 2],
         table: &Plane,
         room_axes: &Matrix3<f64>,
+        is_tilted: bool,
     ) -> Self {
         let rotation = Rotation3::from_matrix_unchecked(*room_axes);
         let room_from_contact = Isometry3::from_parts(
@@ -82,19 +90,42 @@ impl Flattening {
         );
         let depths = [&distal, &proximal].map(|p| -table.signed_distance(p));
         let apart = room_from_contact.inverse_transform_point(&proximal);
+        if is_tilted {
+            let depths = depths.map(|depth| depth.max(0.0));
+            // Lowest points next to each other: all of the limb sinks in alike.
+            let is_one_place = apart.y < ONE_PLACE_MM;
+            let rise = |over: f64| if is_one_place { 0.0 } else { over / apart.y };
+            return Self {
+                room_from_contact,
+                depth_mm: if is_one_place {
+                    depths[0].max(depths[1])
+                } else {
+                    depths[0]
+                },
+                depth_per_mm: rise(depths[1] - depths[0]),
+                across_per_mm: rise(apart.x),
+                apart_mm: Some(apart.y.max(0.0)),
+            };
+        }
         Self {
             room_from_contact,
             depth_mm: depths[0],
             depth_per_mm: (depths[1] - depths[0]) / apart.y,
             across_per_mm: apart.x / apart.y,
+            apart_mm: None,
         }
     }
 
     /// Where a point of the placed limb comes to lie, room frame.
     pub fn flattened(&self, p: &Point3<f64>) -> Point3<f64> {
         let mut at = self.room_from_contact.inverse_transform_point(p);
-        let depth_mm = self.depth_mm + self.depth_per_mm * at.y;
+        let along = self.apart_mm.map_or(at.y, |apart| at.y.clamp(0.0, apart));
+        let depth_mm = self.depth_mm + self.depth_per_mm * along;
         let layer_mm = 2.0 * depth_mm / (1.0 - KEPT);
+        if self.apart_mm.is_some() && depth_mm <= 0.0 {
+            at.z = at.z.max(0.0);
+            return self.room_from_contact * at;
+        }
         if depth_mm <= 0.0 || at.z >= layer_mm - depth_mm {
             return *p;
         }
@@ -102,7 +133,7 @@ impl Flattening {
         let u = ((at.z + depth_mm) / layer_mm).max(0.0);
         let slope = KEPT + (1.0 - KEPT) * u;
         at.z = layer_mm * u * (KEPT + 0.5 * (1.0 - KEPT) * u);
-        let line = self.across_per_mm * at.y;
+        let line = self.across_per_mm * along;
         at.x = line + (at.x - line) / slope;
         self.room_from_contact * at
     }

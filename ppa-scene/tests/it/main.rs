@@ -8,6 +8,7 @@ mod knee;
 mod landmarks;
 mod measures;
 mod placement;
+mod positioning;
 mod real_scans;
 mod recorded_room;
 mod reference;

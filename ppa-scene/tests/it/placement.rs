@@ -248,10 +248,10 @@ fn impossible_placements_are_refused() {
         with(&points[..2], 0.0, &table()),
         PlaceError::TooFewPoints { .. }
     ));
-    assert!(matches!(
-        with(&points, f64::NAN, &table()),
-        PlaceError::Angle(_)
-    ));
+    for degrees in [f64::NAN, 361.0] {
+        let error = with(&points, f64::to_radians(degrees), &table());
+        assert!(matches!(error, PlaceError::Angle(_)), "{error}");
+    }
     let wall = Plane {
         normal: Vector3::x_axis(),
         offset_mm: 0.0,

@@ -3,8 +3,8 @@
 use nalgebra::{Point3, Vector3};
 use ppa_mesh::{Border, Mesh, iso_surface};
 use ppa_scene::{
-    LandmarkOverrides, Landmarks, PlaceError, Placement, Plane, Side, SoftTissue, XrayDevice,
-    place, place_soft,
+    LandmarkOverrides, Landmarks, PlaceError, PlaceSettings, Placement, Plane, Side, SoftTissue,
+    XrayDevice, place, place_with,
 };
 
 use crate::scan::P01;
@@ -27,13 +27,17 @@ fn device() -> XrayDevice {
 
 fn soft(skin: &Mesh, landmarks: &Landmarks, degrees: f64) -> Placement {
     let angle = degrees.to_radians();
-    place_soft(
+    let settings = PlaceSettings {
+        soft_tissue: DEPTHS,
+        ..PlaceSettings::default()
+    };
+    place_with(
         &skin.vertices,
         landmarks,
         angle,
         &table(),
         &device(),
-        &DEPTHS,
+        &settings,
     )
     .unwrap()
 }
@@ -157,12 +161,17 @@ fn impossible_depths_are_refused() {
         .find(Side::Right, &LandmarkOverrides::default())
         .unwrap();
     for bad in [-1.0, 30.0, f64::NAN] {
-        let soft = SoftTissue {
+        let soft_tissue = SoftTissue {
             proximal_mm: bad,
             ..SoftTissue::default()
         };
+        let settings = PlaceSettings {
+            soft_tissue,
+            ..PlaceSettings::default()
+        };
         let points = &P01.skin.vertices;
-        let error = place_soft(points, &landmarks, 0.0, &table(), &device(), &soft).unwrap_err();
+        let placed = place_with(points, &landmarks, 0.0, &table(), &device(), &settings);
+        let error = placed.unwrap_err();
         assert!(
             matches!(
                 error,

@@ -57,6 +57,9 @@ pub(super) struct Document {
 struct Planned {
     distal_mm: f64,
     proximal_mm: f64,
+    tilt_deg: f64,
+    beam_across_mm: f64,
+    beam_along_mm: f64,
     kvp: f64,
     filters: Vec<String>,
     tube_load: Option<TubeLoad>,
@@ -289,6 +292,9 @@ pub(super) fn document(state: &State) -> Result<Document, StudioError> {
         planned: Planned {
             distal_mm: plan.soft_tissue.distal_mm,
             proximal_mm: plan.soft_tissue.proximal_mm,
+            tilt_deg: plan.positioning.tilt_deg,
+            beam_across_mm: plan.positioning.beam_shift_mm[0],
+            beam_along_mm: plan.positioning.beam_shift_mm[1],
             kvp: plan.xray.kvp,
             filters: plan.xray.filters.clone(),
             tube_load: plan.xray.tube_load,

@@ -80,7 +80,7 @@ pub(super) async fn coverage(
         let setup = limb.scenes.setup(&plan)?;
         let shown = limb.shown();
         let angle_rad = what_if.angle_deg.to_radians();
-        let joint = JointInRoom::new(&setup, shown.prepared(), angle_rad)?;
+        let joint = JointInRoom::new(&setup, shown.prepared(), angle_rad, plan.positioning)?;
         Ok(Json(
             joint.rank(&joint.rig(), &CoverageSettings::default())?,
         ))
@@ -98,7 +98,7 @@ fn place(
     let prepared = shown.prepared();
     let (skin, landmarks) = (&prepared.limb.mesh, &prepared.landmarks);
     let angle_rad = what_if.angle_deg.to_radians();
-    Ok((setup.table).place(skin, landmarks, angle_rad, &plan.soft_tissue)?)
+    Ok((setup.table).place(skin, landmarks, angle_rad, &plan.place_settings())?)
 }
 
 pub(super) async fn room(

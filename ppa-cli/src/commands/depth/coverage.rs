@@ -23,7 +23,7 @@ pub struct CoverageArgs {
     /// Medial rotation of the limb in degrees
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     angle: f64,
-    /// Take room, table and rig from this plan
+    /// Take room, table, positioning and rig from this plan
     #[arg(long)]
     plan: Option<PathBuf>,
     /// Camera JSON for the places that are tried [default: an Azure Kinect, 640 x 576]
@@ -80,7 +80,8 @@ pub fn run(args: &CoverageArgs, output: Output) -> anyhow::Result<()> {
     let working = working("looking at the joint from all places");
     let prepared = prepared(&case, &args.case)?;
     let setup = SceneSetup::of_plan(&plan)?;
-    let joint = JointInRoom::new(&setup, &prepared, args.angle.to_radians())?;
+    let angle_rad = args.angle.to_radians();
+    let joint = JointInRoom::new(&setup, &prepared, angle_rad, plan.positioning)?;
     let settings = CoverageSettings {
         radius_mm: args.radius_mm,
         max_angle_deg: args.max_angle_deg,

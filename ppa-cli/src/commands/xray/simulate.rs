@@ -39,7 +39,7 @@ pub struct SimulateArgs {
     /// Medial rotation in degrees
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     angle: f64,
-    /// Take room, device and x-ray settings from this plan
+    /// Take room, positioning and x-ray settings from this plan
     #[arg(long)]
     plan: Option<PathBuf>,
     #[command(flatten)]
