@@ -20,7 +20,7 @@ impl CoarseScan {
     pub fn surface(&self, scan: &Volume, iso_hu: f32) -> Result<Mesh, StudioError> {
         let coarse = self.volume(scan)?;
         let surface = iso_surface(&coarse, iso_hu, Border::Open)?;
-        Ok(display_mesh(&surface))
+        Ok(display_mesh(&surface, &[]).0)
     }
 
     fn volume(&self, scan: &Volume) -> Result<Volume, StudioError> {

@@ -8,12 +8,13 @@ use ppa_mesh::Mesh;
 /// Side of the cells whose vertices become one, mm. A lower leg then has about 50,000 triangles.
 const CELL_MM: f32 = 2.5;
 
-/// A mesh whose vertices within a cell of 2.5 mm are merged to their mean.
-pub(crate) fn display_mesh(skin: &Mesh) -> Mesh {
+/// A mesh whose vertices within a cell of 2.5 mm are merged to their mean, and the means of values at its vertices.
+pub(crate) fn display_mesh(skin: &Mesh, values: &[f32]) -> (Mesh, Vec<f32>) {
     let cell = |p: &Point3<f32>| [p.x, p.y, p.z].map(|x| (x / CELL_MM).floor() as i32);
     let mut merged = HashMap::new();
     let mut sums: Vec<(Vector3<f32>, Vector3<f32>, f32)> = Vec::new();
     let mut indices = Vec::with_capacity(skin.vertices.len());
+    let mut means = Vec::new();
     for (vertex, normal) in skin.vertices.iter().zip(&skin.normals) {
         let index = *merged.entry(cell(vertex)).or_insert_with(|| {
             sums.push(Default::default());
@@ -25,9 +26,15 @@ pub(crate) fn display_mesh(skin: &Mesh) -> Mesh {
         *count += 1.0;
         indices.push(index as u32);
     }
+    if !values.is_empty() {
+        means.resize(sums.len(), 0.0);
+        for (&index, value) in indices.iter().zip(values) {
+            means[index as usize] += value / sums[index as usize].2;
+        }
+    }
     let corners = skin.triangles.iter();
     let corners = corners.map(|triangle| triangle.map(|id| indices[id as usize]));
-    Mesh {
+    let merged = Mesh {
         vertices: sums.iter().map(|(sum, _, n)| (sum / *n).into()).collect(),
         normals: sums
             .iter()
@@ -36,11 +43,13 @@ pub(crate) fn display_mesh(skin: &Mesh) -> Mesh {
         triangles: corners
             .filter(|[a, b, c]| a != b && b != c && c != a)
             .collect(),
-    }
+    };
+    (merged, means)
 }
 
-/// The mesh as little-endian bytes: counts of vertices and triangles (u32), positions and normals (f32), corners (u32).
-pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
+/// The mesh as little-endian bytes: counts of vertices and triangles (u32), positions and normals (f32), corners (u32), and values at
+/// the vertices (f32), if there are any.
+pub(crate) fn bytes(mesh: &Mesh, values: &[f32]) -> Vec<u8> {
     let counts = [mesh.vertices.len() as u32, mesh.triangles.len() as u32];
     let positions = mesh.vertices.iter().flat_map(|v| [v.x, v.y, v.z]);
     let normals = mesh.normals.iter().flat_map(|n| [n.x, n.y, n.z]);
@@ -52,6 +61,7 @@ pub(crate) fn bytes(mesh: &Mesh) -> Vec<u8> {
             .flatten()
             .flat_map(|id| id.to_le_bytes()),
     );
+    bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
     bytes
 }
 
@@ -71,17 +81,25 @@ mod tests {
                 .flat_map(|a| [[a, a + 1, a + 41], [a, a + 41, a + 40]])
                 .collect(),
         };
-        let shown = display_mesh(&skin);
+        let heights: Vec<f32> = skin.vertices.iter().map(|v| v.y).collect();
+        let (shown, values) = display_mesh(&skin, &heights);
         assert!(shown.triangles.len() * 4 < skin.triangles.len());
         for vertex in &shown.vertices {
             assert!((vertex.z - 0.3).abs() < 1e-6);
             let near = skin.vertices.iter().map(|v| (v - vertex).norm());
             assert!(near.fold(f32::INFINITY, f32::min) < CELL_MM);
         }
-        let size = bytes(&shown).len();
+        let pairs = shown.vertices.iter().zip(&values);
+        assert!(pairs.clone().count() == shown.vertices.len());
+        assert!(
+            pairs
+                .into_iter()
+                .all(|(v, value)| (v.y - value).abs() < 1e-3)
+        );
+        let size = bytes(&shown, &values).len();
         assert_eq!(
             size,
-            8 + 24 * shown.vertices.len() + 12 * shown.triangles.len()
+            8 + 28 * shown.vertices.len() + 12 * shown.triangles.len()
         );
     }
 }

@@ -20,6 +20,7 @@ mod page;
 mod plan_file;
 mod plan_form;
 mod plan_keys;
+mod plan_limbs;
 mod png;
 mod pose_label;
 mod routes;

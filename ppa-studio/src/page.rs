@@ -14,6 +14,7 @@ const FILES: &[(&str, &str)] = &[
     ("geometry.js", include_str!("page/geometry.js")),
     ("slices.js", include_str!("page/slices.js")),
     ("surface.js", include_str!("page/surface.js")),
+    ("shape.js", include_str!("page/shape.js")),
     ("view3d.js", include_str!("page/view3d.js")),
     ("landmarks.js", include_str!("page/landmarks.js")),
     ("whatif.js", include_str!("page/whatif.js")),

@@ -8,6 +8,7 @@ use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
 
 use crate::error::StudioError;
 use crate::plan_form::{FieldKind, kind_of};
+use crate::plan_limbs::LimbChange;
 
 /// Where a plan stands, and where its changes are saved as they are made.
 pub(crate) struct PlanFile {
@@ -97,23 +98,20 @@ impl PlanFile {
         self.read(&document)
     }
 
-    /// The text with another case file of one of its limbs; the plan in it.
-    pub fn with_case(
+    /// The text with other limbs; the plan in it.
+    pub fn with_limbs(
         &self,
         text: &str,
-        number: usize,
-        other: impl FnOnce(&Path) -> PathBuf,
+        change: &LimbChange,
     ) -> Result<(String, Plan), StudioError> {
         let mut document: DocumentMut = text.parse()?;
-        let cases = document.get_mut("case");
-        let cases = cases.and_then(Item::as_array_of_tables_mut);
-        let case = cases.and_then(|cases| cases.get_mut(number));
-        let file = |case: &Table| Some(other(Path::new(case.get("file")?.as_str()?)));
-        let changed = case.and_then(|case| {
-            let file = file(case)?;
-            put(case, "file", Some(file.to_str()?.into()))
-        });
-        changed.ok_or_else(|| StudioError::Invalid(format!("the plan has no limb {number}")))?;
+        let limbs = document.get_mut("case");
+        let limbs = limbs.and_then(Item::as_array_of_tables_mut);
+        let limbs = limbs.ok_or_else(|| {
+            let message = "the limbs of this plan are not tables [[case]]: change them in the file";
+            StudioError::Invalid(message.to_owned())
+        })?;
+        change.apply(limbs, &self.plan(text)?, self.folder())?;
         self.read(&document)
     }
 

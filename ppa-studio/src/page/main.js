@@ -3,7 +3,8 @@
 import { getJson, newest, postJson } from "/page/server.js";
 import { fixed, inverse, point, transform, IDENTITY } from "/page/geometry.js";
 import { SliceView } from "/page/slices.js";
-import { loadSurface, surfaceAt } from "/page/surface.js";
+import { surfaceAt } from "/page/surface.js";
+import { ShapePanel } from "/page/shape.js";
 import { View3d } from "/page/view3d.js";
 import { LandmarkPanel } from "/page/landmarks.js";
 import { WhatIfPanel } from "/page/whatif.js";
@@ -32,6 +33,7 @@ const slices = [...document.querySelectorAll(".view[data-axis]")].map((figure) =
 const view3d = new View3d(byId("view3d"), actions);
 const landmarks = new LandmarkPanel(store, actions);
 const crop = new CropPanel(store, actions);
+const shapes = new ShapePanel(store, { surface: () => showSurface(false).then(() => view3d.draw()).catch(fail) });
 const whatIf = new WhatIfPanel(store, actions);
 const plan = new PlanPanel({
   fail,
@@ -52,6 +54,8 @@ const grading = new GradingPanel({ fail });
 const training = new TrainingPanel({ fail, tell });
 const live = new LivePanel({ fail, folder: () => opened?.watched });
 let room = null;
+// Whether the view shows the whole limb that is open.
+let framed = false;
 // What the program has opened: limb, plan, dataset.
 let opened = null;
 
@@ -103,6 +107,8 @@ async function show(doc) {
   if (!before) setPlace(doc.landmarks.joint_centre);
   const skinChanged = !before || before.iso_hu !== doc.iso_hu || before.side !== doc.side
     || JSON.stringify(before.report) !== JSON.stringify(doc.report);
+  // Bumps lie where the landmarks say.
+  const shapeChanged = shapes.asked && JSON.stringify(before?.landmarks) !== JSON.stringify(doc.landmarks);
   if (skinChanged) slices.forEach((view) => view.forget());
   showScan(doc, actions);
   showSkin(doc, actions);
@@ -110,15 +116,19 @@ async function show(doc) {
   landmarks.show();
   showCommands();
   slices.forEach((view) => view.update());
-  if (skinChanged) await showSurface(!before);
+  if (skinChanged || shapeChanged) await showSurface(!before);
   drawLandmarks();
   whatIf.show();
   whatIf.changed();
 }
 
 async function showSurface(first) {
-  view3d.show(await loadSurface());
-  if (first) view3d.frame();
+  if (first) framed = false;
+  const surface = await shapes.load();
+  if (!surface) return;
+  view3d.show(surface);
+  if (!framed) view3d.frame();
+  framed = true;
 }
 
 // While the slider moves: everything in the scan at this HU. The limb follows when it is let go.
@@ -229,6 +239,7 @@ function go(step) {
   if (!store.doc) return;
   showCommands();
   slices.forEach((view) => view.update());
+  if (!shapes.isCurrent()) showSurface(false).then(() => view3d.draw()).catch(fail);
   if (step === "room" || step === "whatif") {
     room = null;
     whatIf.changed();

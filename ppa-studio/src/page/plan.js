@@ -6,7 +6,9 @@ import { button, element } from "/page/elements.js";
 const byId = (id) => document.getElementById(id);
 
 // Tables whose keys most plans change.
-const OPEN = ["rotation", "shapes", "soft_tissue"];
+const OPEN = ["rotation", "shapes", "soft_tissue", "positioning"];
+
+const MOST_PATIENT = 2 ** 32 - 1;
 
 // Each gives an element and how a value, or none, is put into it.
 const INPUTS = { name: nameInput, names: namesInput };
@@ -50,6 +52,7 @@ export class PlanPanel {
     byId("plan-save").addEventListener("click", () => this.save());
     for (const step of ["undo", "redo"]) byId(`plan-${step}`).addEventListener("click", () => this.change(`plan/${step}`, {}));
     byId("plan-folder").addEventListener("change", () => actions.folder());
+    byId("plan-add").addEventListener("click", () => this.change("plan/limbs", { add: { case: byId("plan-cases").value } }));
   }
 
   async load() {
@@ -65,12 +68,18 @@ export class PlanPanel {
   }
 
   async change(path, body) {
+    // Limbs are named by their places, which the change may move.
+    byId("plan-limbs").inert = true;
     try {
       this.show(await postJson(path, body));
       this.actions.tell("");
       this.actions.changed();
     } catch (error) {
+      // What was typed is not in the plan.
+      if (this.plan) this.show(this.plan);
       this.actions.fail(error);
+    } finally {
+      byId("plan-limbs").inert = false;
     }
   }
 
@@ -84,16 +93,28 @@ export class PlanPanel {
     byId("plan-redo").disabled = !plan.can_redo;
     if (!byId("plan-folder").value) byId("plan-folder").value = plan.dataset;
     byId("plan-limbs").replaceChildren(...plan.limbs.map((limb, number) => this.limb(limb, number)));
+    byId("plan-cases").replaceChildren(...plan.other_cases.map((name) => new Option(name)));
+    byId("plan-add").disabled = plan.other_cases.length === 0;
     if (this.updates.length === 0) byId("plan-form").append(...this.groups(plan.fields));
     for (const update of this.updates) update(new Map(plan.fields.map((field) => [field.key, field])));
   }
 
   limb(limb, number) {
-    const item = element("li", `patient ${limb.patient}: ${limb.case} `);
+    const item = element("li", `${limb.case}, patient `);
+    const patient = element("input", "", { type: "number", min: 0, step: 1, value: limb.patient, "aria-label": `Patient of ${limb.case}` });
+    const limbs = (change) => this.change("plan/limbs", change);
+    patient.addEventListener("change", () => {
+      const typed = patient.valueAsNumber;
+      if (Number.isInteger(typed) && typed >= 0 && typed <= MOST_PATIENT) return limbs({ patient: { number, patient: typed } });
+      this.show(this.plan);
+      this.actions.fail(new Error(`A patient is a whole number from 0 to ${MOST_PATIENT}`));
+    });
+    item.append(patient, " ");
     if (limb.has_edits) {
       const text = limb.uses_edits ? "Use the case without changes" : "Use the changed case";
-      item.append(button(text, () => this.change("plan/case", { number, edits: !limb.uses_edits }), `${text} for patient ${limb.patient}`));
+      item.append(button(text, () => limbs({ case: { number, edits: !limb.uses_edits } }), `${text} for ${limb.case}`));
     }
+    if (this.plan.limbs.length > 1) item.append(button("Remove", () => limbs({ remove: { number } }), `Remove ${limb.case}`));
     return item;
   }
 

@@ -12,12 +12,19 @@ export async function surfaceAt(isoHu) {
   return surfaceOf(await (await post("surface_at", { iso_hu: isoHu })).arrayBuffer());
 }
 
+// The skin in a body shape, with how far its vertices moved outwards, mm.
+export async function loadShape(shape) {
+  return surfaceOf(await (await post("body_shape", { shape })).arrayBuffer());
+}
+
 function surfaceOf(bytes) {
   const [vertices, triangles] = new Uint32Array(bytes, 0, 2);
   const positions = new Float32Array(bytes, 8, 3 * vertices);
   const normals = new Float32Array(bytes, 8 + 12 * vertices, 3 * vertices);
   const corners = new Uint32Array(bytes, 8 + 24 * vertices, 3 * triangles);
-  return { positions, normals, corners };
+  const end = 8 + 24 * vertices + 12 * triangles;
+  const outwards = bytes.byteLength > end ? new Float32Array(bytes, end, vertices) : null;
+  return { positions, normals, corners, outwards };
 }
 
 const vertex = (surface, id) => surface.positions.subarray(3 * id, 3 * id + 3);

@@ -8,22 +8,31 @@ uniform mat4 screenFromModel;
 uniform mat3 eyeFromModel;
 in vec3 position;
 in vec3 normal;
+in float outwards;
 out vec3 facing;
+out float moved;
 void main() {
   gl_Position = screenFromModel * vec4(position, 1.0);
   gl_PointSize = 11.0;
   facing = eyeFromModel * normal;
+  moved = outwards;
 }`;
 
 const FRAGMENT = `#version 300 es
 precision mediump float;
 uniform vec4 colour;
 uniform float shaded;
+uniform float mostMoved;
 in vec3 facing;
+in float moved;
 out vec4 pixel;
+const vec3 OUTWARDS = vec3(1.0, 0.45, 0.05);
+const vec3 INWARDS = vec3(0.15, 0.4, 1.0);
 void main() {
   float light = shaded > 0.5 ? 0.25 + 0.75 * abs(normalize(facing).z) : 1.0;
-  pixel = vec4(colour.rgb * light, colour.a);
+  float share = mostMoved > 0.0 ? clamp(abs(moved) / mostMoved, 0.0, 1.0) : 0.0;
+  vec3 painted = mix(colour.rgb, moved > 0.0 ? OUTWARDS : INWARDS, share);
+  pixel = vec4(painted * light, colour.a);
 }`;
 
 const FIELD_OF_VIEW = 30 * Math.PI / 180;
@@ -62,9 +71,10 @@ export class View3d {
     gl.attachShader(this.program, compile(gl.FRAGMENT_SHADER, FRAGMENT));
     gl.bindAttribLocation(this.program, 0, "position");
     gl.bindAttribLocation(this.program, 1, "normal");
+    gl.bindAttribLocation(this.program, 2, "outwards");
     gl.linkProgram(this.program);
     this.uniform = (name) => gl.getUniformLocation(this.program, name);
-    this.buffers = { positions: gl.createBuffer(), normals: gl.createBuffer(), corners: gl.createBuffer(), lines: gl.createBuffer() };
+    this.buffers = { positions: gl.createBuffer(), normals: gl.createBuffer(), outwards: gl.createBuffer(), corners: gl.createBuffer(), lines: gl.createBuffer() };
   }
 
   listen(figure) {
@@ -113,6 +123,9 @@ export class View3d {
     gl.bufferData(gl.ARRAY_BUFFER, surface.positions, gl.STATIC_DRAW);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.normals);
     gl.bufferData(gl.ARRAY_BUFFER, surface.normals, gl.STATIC_DRAW);
+    this.mostMoved = surface.outwards?.reduce((most, mm) => Math.max(most, Math.abs(mm)), 0) ?? 0;
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffers.outwards);
+    gl.bufferData(gl.ARRAY_BUFFER, surface.outwards ?? new Float32Array(surface.positions.length / 3), gl.STATIC_DRAW);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.corners);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, surface.corners, gl.STATIC_DRAW);
   }
@@ -160,10 +173,14 @@ export class View3d {
     this.paint([0.86, 0.68, 0.58, 1], 1);
     this.attribute(0, this.buffers.positions);
     this.attribute(1, this.buffers.normals);
+    this.attribute(2, this.buffers.outwards, 1);
+    gl.uniform1f(this.uniform("mostMoved"), this.mostMoved);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers.corners);
     gl.drawElements(gl.TRIANGLES, this.surface.corners.length, gl.UNSIGNED_INT, 0);
     this.place(screen, eye, IDENTITY);
     gl.disableVertexAttribArray(1);
+    gl.disableVertexAttribArray(2);
+    gl.uniform1f(this.uniform("mostMoved"), 0);
     for (const { points, colour, through } of this.lines) this.segments(gl.LINES, points, colour, through);
     for (const { points, colour, through } of this.points) this.segments(gl.POINTS, points, colour, through);
   }
@@ -180,11 +197,11 @@ export class View3d {
     gl.drawArrays(kind, 0, points.length);
   }
 
-  attribute(index, buffer) {
+  attribute(index, buffer, size = 3) {
     const { gl } = this;
     gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
     gl.enableVertexAttribArray(index);
-    gl.vertexAttribPointer(index, 3, gl.FLOAT, false, 0, 0);
+    gl.vertexAttribPointer(index, size, gl.FLOAT, false, 0, 0);
   }
 
   paint(colour, shaded) {

@@ -1,5 +1,6 @@
 //! The plan: its form, changes, and saving.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -13,6 +14,7 @@ use super::answer::work;
 use crate::error::StudioError;
 use crate::plan_file::PlanFile;
 use crate::plan_form::{Field, fields};
+use crate::plan_limbs::{LimbChange, cases_beside};
 use crate::state::State;
 
 /// A plan with its files.
@@ -27,6 +29,8 @@ pub(super) struct PlanForm {
     /// Name of the folder that `ppa generate` makes of the original.
     dataset: String,
     limbs: Vec<Limb>,
+    /// Cases in the folder of the plan that it does not name.
+    other_cases: BTreeSet<String>,
     can_undo: bool,
     can_redo: bool,
     fields: Vec<Field>,
@@ -69,29 +73,12 @@ pub(super) async fn key(
     .await
 }
 
-/// The case of a limb as it was, or with the changes beside it.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct CaseChange {
-    number: usize,
-    edits: bool,
-}
-
-pub(super) async fn case(
+pub(super) async fn limbs(
     Extracted(state): Extracted<Arc<State>>,
-    Json(CaseChange { number, edits }): Json<CaseChange>,
+    Json(change): Json<LimbChange>,
 ) -> Answer {
     work(state, move |state| {
-        state.edit_plan(|file, text| {
-            file.with_case(text, number, |case| {
-                let original = original_case(case).unwrap_or_else(|| case.to_owned());
-                if edits {
-                    edited_case(&original)
-                } else {
-                    original
-                }
-            })
-        })?;
+        state.edit_plan(|file, text| file.with_limbs(text, &change))?;
         plan_form(state).map(Json)
     })
     .await
@@ -143,6 +130,7 @@ fn plan_form(state: &State) -> Result<PlanForm, StudioError> {
             .to_string_lossy()
             .into_owned(),
         limbs: plan.cases.iter().map(limb).collect(),
+        other_cases: cases_beside(file.folder(), &plan)?,
         can_undo,
         can_redo,
         fields: fields(&text)?,

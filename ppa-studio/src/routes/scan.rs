@@ -5,7 +5,9 @@ use std::sync::Arc;
 use axum::Json;
 use axum::extract::{Path, State as Extracted};
 use axum::response::Response;
-use ppa_generate::PreparedLimb;
+use ppa_dataset::BodyShape;
+use ppa_dataset::layout::LimbId;
+use ppa_generate::{PoseError, PreparedLimb};
 use serde::Deserialize;
 
 use super::answer::{bytes, work};
@@ -63,9 +65,40 @@ fn plane(limb: &PreparedLimb, axis: usize, index: usize) -> Result<Vec<u8>, Stud
 pub(super) async fn skin(Extracted(state): Extracted<Arc<State>>) -> Result<Response, Response> {
     work(state, |state| {
         let shown = state.limb()?.shown();
-        Ok(display_mesh::bytes(&display_mesh(
-            &shown.prepared().limb.mesh,
-        )))
+        let (skin, _) = display_mesh(&shown.prepared().limb.mesh, &[]);
+        Ok(display_mesh::bytes(&skin, &[]))
+    })
+    .await
+    .map(bytes)
+}
+
+/// A body shape.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ShapeOf {
+    shape: BodyShape,
+}
+
+/// The skin in a body shape of the plan's dataset, for display, with how far each vertex lies outside the skin of the scan, mm.
+pub(super) async fn body_shape(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(ShapeOf { shape }): Json<ShapeOf>,
+) -> Result<Response, Response> {
+    work(state, move |state| {
+        let (plan, shown) = (state.plan(), state.limb()?.shown());
+        let limb = shown.prepared();
+        let (skin, landmarks, side) = (&limb.limb.mesh, &limb.landmarks, shown.case.side);
+        let patient = state.patient()?;
+        let id = LimbId { patient, side };
+        let shaped = ppa_generate::body_shape(skin, landmarks, shape, &plan.shapes, id, plan.seed)
+            .map_err(PoseError::from)?;
+        let before = skin.vertices.iter().zip(&skin.normals);
+        let moved = before.zip(&shaped.vertices);
+        let outwards: Vec<f32> = moved
+            .map(|((before, normal), after)| (after - before).dot(normal))
+            .collect();
+        let (shaped, outwards) = display_mesh(&shaped, &outwards);
+        Ok(display_mesh::bytes(&shaped, &outwards))
     })
     .await
     .map(bytes)
@@ -90,7 +123,7 @@ pub(super) async fn surface_at(
         let surface = limb
             .coarse
             .surface(&limb.shown().prepared().volume, iso_hu)?;
-        Ok(display_mesh::bytes(&surface))
+        Ok(display_mesh::bytes(&surface, &[]))
     })
     .await
     .map(bytes)

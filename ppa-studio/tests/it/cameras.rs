@@ -50,7 +50,7 @@ fn moved_cameras_see_what_the_library_renders_from_there() {
     plan.depth.cameras = Some(moved());
     let setup = SceneSetup::of_plan(&plan).unwrap();
     let limb = PreparedLimb::of_case(&Case::read(&browser.case).unwrap()).unwrap();
-    let joint = JointInRoom::new(&setup, &limb, 18_f64.to_radians()).unwrap();
+    let joint = JointInRoom::new(&setup, &limb, 18_f64.to_radians(), plan.positioning).unwrap();
     let expected = joint
         .rank(&joint.rig(), &CoverageSettings::default())
         .unwrap();

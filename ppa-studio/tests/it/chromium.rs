@@ -148,11 +148,20 @@ impl Page {
 
     /// Moves a slider, as dragging does.
     pub async fn slide(&self, id: &str, value: f64) {
+        self.set(id, json!(value)).await;
+    }
+
+    /// Chooses from a list.
+    pub async fn pick(&self, id: &str, value: &str) {
+        self.set(id, json!(value)).await;
+    }
+
+    async fn set(&self, id: &str, value: Value) {
         self.client
             .execute(
                 "const s = document.getElementById(arguments[0]); s.value = arguments[1]; \
                  s.dispatchEvent(new Event('input', {bubbles: true})); s.dispatchEvent(new Event('change', {bubbles: true}));",
-                vec![json!(id), json!(value)],
+                vec![json!(id), value],
             )
             .await
             .unwrap();

@@ -41,16 +41,47 @@ fn a_slice_holds_the_voxels_of_the_scan_and_the_limb() {
     assert!(outside.text().contains("outside the scan"));
 }
 
+/// Counts of vertices and triangles, positions, normals and corners, then how far each vertex moved outwards.
+#[test]
+fn body_shapes_are_shown_with_their_distance_from_the_scan() {
+    let browser = Browser::new();
+    let outwards = |shape: &str| {
+        let body = browser
+            .post("/api/body_shape", &json!({ "shape": shape }))
+            .body;
+        let [vertices, triangles] =
+            [0, 4].map(|at| u32::from_le_bytes(body[at..at + 4].try_into().unwrap()) as usize);
+        let values = &body[8 + 24 * vertices + 12 * triangles..];
+        assert_eq!(values.len(), 4 * vertices);
+        let values = values.chunks(4);
+        values
+            .map(|bytes| f32::from_le_bytes(bytes.try_into().unwrap()))
+            .collect::<Vec<f32>>()
+    };
+    let within = |values: &[f32], low: f32, high: f32| {
+        let inside = values.iter().filter(|mm| (low..=high).contains(*mm));
+        inside.count() as f64 / values.len() as f64
+    };
+    // The plan's default moves the skin by 4 mm.
+    assert!(within(&outwards("big"), 3.5, 4.01) > 0.95);
+    assert!(within(&outwards("small"), -4.01, -3.5) > 0.95);
+    assert_eq!(within(&outwards("orig"), 0.0, 0.0), 1.0);
+    let bumps = outwards("bumps_a");
+    assert!(within(&bumps, -0.1, 0.1) > 0.5 && within(&bumps, 2.0, 30.0) > 0.005);
+}
+
 #[test]
 fn depth_images_are_those_of_the_library_in_false_colour() {
     let browser = Browser::new();
     let answer = browser.post(
         "/api/depth",
-        &json!({ "angle_deg": 18.0, "distal_mm": 2.0 }),
+        &json!({ "angle_deg": 18.0, "distal_mm": 2.0, "tilt_deg": 4.0, "beam_across_mm": -15.0 }),
     );
     let shown = picture(&answer);
     let mut plan = Plan::new(Vec::new());
     plan.soft_tissue.distal_mm = 2.0;
+    plan.positioning.tilt_deg = 4.0;
+    plan.positioning.beam_shift_mm = [-15.0, 0.0];
     let setup = SceneSetup::of_plan(&plan).unwrap();
     let limb = PreparedLimb::of_case(&Case::read(&browser.case).unwrap()).unwrap();
     let limb = VisibleLimb::new(limb).unwrap();
@@ -105,6 +136,16 @@ fn a_radiograph_is_first_coarse_and_then_whole() {
         browser.post("/api/radiograph/best", &what_if).status,
         StatusCode::NOT_FOUND
     );
+}
+
+#[test]
+fn a_radiograph_with_shifted_beam_is_that_of_a_new_studio() {
+    let shifted = json!({ "angle_deg": 18.0, "beam_along_mm": 60.0 });
+    let browser = Browser::new();
+    let centred = browser.post("/api/radiograph/first", &json!({ "angle_deg": 18.0 }));
+    let later = browser.post("/api/radiograph/first", &shifted);
+    let at_once = Browser::new().post("/api/radiograph/first", &shifted);
+    assert!(later.body == at_once.body && later.body != centred.body);
 }
 
 #[test]

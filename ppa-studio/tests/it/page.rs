@@ -169,6 +169,32 @@ fn the_skin_follows_the_iso_value() {
 
 #[test]
 #[ignore = "needs chromium and chromedriver"]
+fn a_body_shape_is_shown_with_its_shift_in_step_2_only() {
+    run(async {
+        let page = Page::open().await;
+        page.click("#tab-skin").await;
+        page.pick("skin-shape", "bumps_a").await;
+        let legend = "document.querySelector('#shape-legend').textContent";
+        page.wait(&format!("{legend}.includes('Moved by')")).await;
+        page.picture("skin-shape").await;
+        page.click("#tab-landmarks").await;
+        page.wait(&format!("{legend} === ''")).await;
+        page.click("#tab-skin").await;
+        page.wait(&format!("{legend}.includes('Moved by')")).await;
+        // Left before the surface has come, the step leaves none behind.
+        page.pick("skin-shape", "big").await;
+        page.click("#tab-landmarks").await;
+        page.wait(&format!("{legend} === ''")).await;
+        page.click("#tab-skin").await;
+        page.wait(&format!("{legend}.includes('Moved by')")).await;
+        page.pick("skin-shape", "").await;
+        page.wait(&format!("{legend} === ''")).await;
+        page.close().await;
+    });
+}
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
 fn images_follow_the_sliders_and_the_newest_wins() {
     run(async {
         let folder = tempfile::tempdir().unwrap();

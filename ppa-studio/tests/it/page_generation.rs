@@ -80,3 +80,36 @@ fn a_plan_is_changed_and_its_dataset_made() {
         page.close().await;
     });
 }
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn a_limb_is_added_given_a_person_and_removed() {
+    run(async {
+        let folder = tempfile::tempdir().unwrap();
+        let file = plan(folder.path());
+        let case = |name: &str| folder.path().join(name);
+        let text = std::fs::read_to_string(case("p01.case.toml")).unwrap();
+        let text = text.replacen("side = \"r\"", "side = \"l\"", 1);
+        std::fs::write(case("left.case.toml"), text).unwrap();
+        let page = Page::of(folder, &file).await;
+        page.click("#tab-generation").await;
+        page.wait("!document.getElementById('plan-add').disabled")
+            .await;
+        page.click("#plan-add").await;
+        page.wait("document.querySelectorAll('#plan-limbs li').length === 2")
+            .await;
+        page.picture("plan_limbs").await;
+        page.fill("[aria-label='Patient of left.case.toml']", "7")
+            .await;
+        let edited = page.folder.path().join("ankles.edited.toml");
+        page.until(|| Plan::read(&edited).unwrap().cases[1].patient == 7)
+            .await;
+        page.wait("!document.getElementById('plan-limbs').inert")
+            .await;
+        page.click("[aria-label='Remove p01.case.toml']").await;
+        page.wait("document.querySelectorAll('#plan-limbs li').length === 1")
+            .await;
+        assert_eq!(Plan::read(&edited).unwrap().cases[0].patient, 7);
+        page.close().await;
+    });
+}

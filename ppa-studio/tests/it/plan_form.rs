@@ -142,8 +142,8 @@ fn the_plan_takes_the_changed_case_on_request() {
         (&json!(true), &json!(false))
     );
     let change = |edits: bool| {
-        let change = json!({ "number": 0, "edits": edits });
-        browser.post("/api/plan/case", &change).json()
+        let change = json!({ "case": { "number": 0, "edits": edits } });
+        browser.post("/api/plan/limbs", &change).json()
     };
     assert_eq!(change(true)["limbs"][0]["case"], "p01.edited.case.toml");
     let edited: &TempDir = &browser.folder;
@@ -156,4 +156,91 @@ fn the_plan_takes_the_changed_case_on_request() {
             .is_some()
     );
     assert_eq!(change(false)["limbs"][0]["case"], "p01.case.toml");
+}
+
+#[test]
+fn limbs_are_added_from_the_folder_and_removed() {
+    let browser = opened();
+    let folder = browser.folder.path();
+    let case = std::fs::read_to_string(folder.join("p01.case.toml")).unwrap();
+    // Another scan by its hash, and the other leg of the same scan.
+    let scan = Case::read(&folder.join("p01.case.toml"))
+        .unwrap()
+        .source
+        .volume_sha256;
+    let other = case.replace(&scan, &"0".repeat(scan.len()));
+    std::fs::write(folder.join("p02.case.toml"), other).unwrap();
+    let left = case.replacen("side = \"r\"", "side = \"l\"", 1);
+    std::fs::write(folder.join("left.case.toml"), left).unwrap();
+    let form = browser.get("/api/plan/form").json();
+    assert_eq!(
+        form["other_cases"],
+        json!(["left.case.toml", "p02.case.toml"])
+    );
+
+    let change = |change: Value| browser.post("/api/plan/limbs", &change);
+    let limbs = |form: &Value| {
+        let limbs = form["limbs"].as_array().unwrap().iter();
+        let limbs = limbs.map(|limb| {
+            let case = limb["case"].as_str().unwrap();
+            (case.to_owned(), limb["patient"].as_u64().unwrap())
+        });
+        limbs.collect::<Vec<_>>()
+    };
+    let named = |case: &str, patient| (case.to_owned(), patient);
+    let first = named("p01.case.toml", 4);
+    // The same scan is the same person, another one the next.
+    change(json!({ "add": { "case": "left.case.toml" } })).json();
+    let form = change(json!({ "add": { "case": "p02.case.toml" } })).json();
+    let left = named("left.case.toml", 4);
+    let expected = [first.clone(), left, named("p02.case.toml", 5)];
+    assert_eq!(limbs(&form), expected);
+    assert_eq!(form["other_cases"], json!([]));
+    let form = change(json!({ "patient": { "number": 2, "patient": 9 } })).json();
+    assert_eq!(limbs(&form)[2], named("p02.case.toml", 9));
+    let form = change(json!({ "remove": { "number": 1 } })).json();
+    assert_eq!(limbs(&form), [first, named("p02.case.toml", 9)]);
+    let text = std::fs::read_to_string(folder.join("ankles.edited.toml")).unwrap();
+    assert!(
+        text.starts_with("# Of the house.") && text.contains("# coarse"),
+        "{text}"
+    );
+    let form = browser.post("/api/plan/undo", &json!({})).json();
+    assert_eq!(limbs(&form).len(), 3);
+
+    for (wrong, says) in [
+        (
+            json!({ "add": { "case": "../p01.case.toml" } }),
+            "not a case file in the plan's folder",
+        ),
+        (
+            json!({ "add": { "case": "p01.case.toml" } }),
+            "not a case file in the plan's folder",
+        ),
+        (json!({ "remove": { "number": 3 } }), "no limb 3"),
+        (
+            json!({ "remove": { "number": 0, "all": true } }),
+            "unknown field",
+        ),
+        (
+            json!({ "patient": { "number": 2, "patient": 4 } }),
+            "p01.case.toml is the right limb of patient 4 already",
+        ),
+    ] {
+        let answer = change(wrong);
+        assert_eq!(answer.status, StatusCode::UNPROCESSABLE_ENTITY);
+        assert!(answer.text().contains(says), "{}", answer.text());
+    }
+}
+
+#[test]
+fn the_last_limb_stays() {
+    let browser = opened();
+    let answer = browser.post("/api/plan/limbs", &json!({ "remove": { "number": 0 } }));
+    assert_eq!(answer.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert!(
+        answer.text().contains("at least one limb"),
+        "{}",
+        answer.text()
+    );
 }
