@@ -31,6 +31,7 @@ mod state;
 mod stoppable;
 mod studio;
 mod token;
+mod toml_value;
 mod training_errors;
 mod trainings;
 mod what_if;

@@ -4,11 +4,12 @@ use std::path::{Component, Path, PathBuf};
 
 use ppa_dataset::files::{FileError, read_text, write_whole};
 use ppa_generate::{Plan, PlanCase};
-use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
+use toml_edit::{DocumentMut, Item, Value};
 
 use crate::error::StudioError;
 use crate::plan_form::{FieldKind, kind_of};
 use crate::plan_limbs::LimbChange;
+use crate::toml_value::put;
 
 /// Where a plan stands, and where its changes are saved as they are made.
 pub(crate) struct PlanFile {
@@ -226,40 +227,6 @@ impl PlanFile {
             path.display()
         )))
     }
-}
-
-/// Puts a value in the place of a key with dots, or removes the key; comments stay. `None` where something else than a table is on
-/// the way.
-fn put(table: &mut dyn TableLike, key: &str, value: Option<Value>) -> Option<()> {
-    if let Some((first, rest)) = key.split_once('.') {
-        if !table.contains_key(first) {
-            if value.is_none() {
-                return Some(());
-            }
-            table.insert(first, Item::Table(implicit()));
-        }
-        return put(table.get_mut(first)?.as_table_like_mut()?, rest, value);
-    }
-    match (value, table.get_mut(key)) {
-        (None, _) => {
-            table.remove(key);
-        }
-        (Some(mut value), Some(Item::Value(old))) => {
-            *value.decor_mut() = old.decor().clone();
-            *old = value;
-        }
-        (Some(value), _) => {
-            table.insert(key, Item::Value(value));
-        }
-    }
-    Some(())
-}
-
-/// A table without a line of its own while it holds only other tables.
-fn implicit() -> Table {
-    let mut table = Table::new();
-    table.set_implicit(true);
-    table
 }
 
 #[cfg(test)]

@@ -7,9 +7,10 @@ use ppa_core::Side;
 use ppa_dataset::files::FileError;
 use ppa_generate::{Case, Plan, edited_case, original_case};
 use serde::Deserialize;
-use toml_edit::{ArrayOfTables, Item, Table, Value, value};
+use toml_edit::{ArrayOfTables, Item, Table, value};
 
 use crate::error::StudioError;
+use crate::toml_value::put;
 
 /// A change of the list of limbs; `number` counts from 0.
 #[derive(Deserialize)]
@@ -66,7 +67,7 @@ impl LimbChange {
                 if let Some(planned) = plan.cases.get(*number) {
                     require_other_limb(&planned.file, *patient, plan, Some(*number))?;
                 }
-                put(limb, "patient", i64::from(*patient).into());
+                put(limb, "patient", Some(i64::from(*patient).into()));
             }
             Self::Case { number, edits } => {
                 let limb = limb_at(limbs, *number)?;
@@ -78,7 +79,11 @@ impl LimbChange {
                 } else {
                     original
                 };
-                put(limb, "file", file.to_string_lossy().into_owned().into());
+                put(
+                    limb,
+                    "file",
+                    Some(file.to_string_lossy().into_owned().into()),
+                );
             }
         }
         Ok(())
@@ -148,12 +153,4 @@ fn require_other_limb(
 fn limb_at(limbs: &mut ArrayOfTables, number: usize) -> Result<&mut Table, StudioError> {
     let limb = limbs.get_mut(number);
     limb.ok_or_else(|| StudioError::Invalid(format!("the plan has no limb {number}")))
-}
-
-/// Puts a value in the place of another one; its comment stays.
-fn put(limb: &mut Table, key: &str, mut new: Value) {
-    if let Some(old) = limb.get(key).and_then(Item::as_value) {
-        *new.decor_mut() = old.decor().clone();
-    }
-    limb.insert(key, Item::Value(new));
 }

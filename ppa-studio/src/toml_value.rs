@@ -1,0 +1,37 @@
+//! Values of a TOML file, put in the place of others; comments stay.
+
+use toml_edit::{Item, Table, TableLike, Value};
+
+/// Puts a value in the place of a key with dots, or removes the key; comments stay. `None` where something else than a table is on
+/// the way.
+pub(crate) fn put(table: &mut dyn TableLike, key: &str, value: Option<Value>) -> Option<()> {
+    if let Some((first, rest)) = key.split_once('.') {
+        if !table.contains_key(first) {
+            if value.is_none() {
+                return Some(());
+            }
+            table.insert(first, Item::Table(implicit()));
+        }
+        return put(table.get_mut(first)?.as_table_like_mut()?, rest, value);
+    }
+    match (value, table.get_mut(key)) {
+        (None, _) => {
+            table.remove(key);
+        }
+        (Some(mut value), Some(Item::Value(old))) => {
+            *value.decor_mut() = old.decor().clone();
+            *old = value;
+        }
+        (Some(value), _) => {
+            table.insert(key, Item::Value(value));
+        }
+    }
+    Some(())
+}
+
+/// A table without a line of its own while it holds only other tables.
+fn implicit() -> Table {
+    let mut table = Table::new();
+    table.set_implicit(true);
+    table
+}
