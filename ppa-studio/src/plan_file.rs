@@ -3,11 +3,12 @@
 use std::path::{Component, Path, PathBuf};
 
 use ppa_dataset::files::{FileError, read_text, write_whole};
-use ppa_generate::{Plan, PlanCase};
+use ppa_generate::{Plan, PlanCase, SceneSetupError};
 use toml_edit::{DocumentMut, Item, Value};
 
 use crate::error::StudioError;
-use crate::plan_form::{FieldKind, kind_of};
+use crate::plan_cameras::{has_cameras, within_cameras, write_out};
+use crate::plan_form::{FieldKind, kind_of, table_instead_of};
 use crate::plan_limbs::LimbChange;
 use crate::toml_value::put;
 
@@ -81,6 +82,9 @@ impl PlanFile {
     }
 
     /// The text with another value of a key, or without the key; the plan in it.
+    ///
+    /// The name of a rig or of a table of materials replaces what the plan holds written out. A value of a camera writes
+    /// out the whole rig in use, unless the plan has it.
     pub fn changed(
         &self,
         text: &str,
@@ -94,8 +98,19 @@ impl PlanFile {
             Some(value) => Some(self.value(kind, key, value)?),
             None => None,
         };
-        put(document.as_table_mut(), key, value)
-            .ok_or_else(|| StudioError::Invalid(format!("{key} is not in a table of the file")))?;
+        let no_table = || StudioError::Invalid(format!("{key} is not in a table of the file"));
+        if let Some(table) = table_instead_of(key) {
+            put(document.as_table_mut(), table, None).ok_or_else(no_table)?;
+        }
+        if within_cameras(key).is_some() && !has_cameras(&document) {
+            if value.is_none() {
+                return self.read(&document);
+            }
+            let rig = self.plan(text)?.depth.cameras();
+            let rig = rig.map_err(SceneSetupError::from)?;
+            write_out(&mut document, &rig).ok_or_else(no_table)?;
+        }
+        put(document.as_table_mut(), key, value).ok_or_else(no_table)?;
         self.read(&document)
     }
 
@@ -193,12 +208,12 @@ impl PlanFile {
     fn value(&self, kind: FieldKind, key: &str, typed: &str) -> Result<Value, StudioError> {
         match kind {
             FieldKind::Text | FieldKind::Name => Ok(typed.into()),
-            FieldKind::Path => {
+            FieldKind::Path | FieldKind::File => {
                 self.is_below_folder(Path::new(typed))?;
                 Ok(typed.into())
             }
             FieldKind::Names => Ok(typed.split_whitespace().collect()),
-            FieldKind::Heading | FieldKind::Number | FieldKind::Toml => {
+            FieldKind::Heading | FieldKind::Number | FieldKind::Rows | FieldKind::Toml => {
                 let value = typed.trim().parse();
                 value.map_err(|_| {
                     StudioError::Invalid(format!("{key} is {typed}, which is not a value of TOML"))
@@ -231,6 +246,9 @@ impl PlanFile {
 
 #[cfg(test)]
 mod tests {
+    use ppa_depth::RigSpec;
+    use ppa_xray::HuCalibration;
+
     use super::*;
 
     const TEXT: &str = "\
@@ -279,6 +297,59 @@ to_deg = 20.0
         );
         let (_, plan) = changed("shapes.variants", Some("orig big")).unwrap();
         assert_eq!(plan.shapes.variants.len(), 2);
+    }
+
+    #[test]
+    fn a_value_of_a_camera_writes_out_the_rig_in_use() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut rig = RigSpec::default();
+        rig.right.camera.cx = 300.25;
+        let text = serde_json::to_string(&rig).unwrap();
+        std::fs::write(folder.path().join("rig.json"), text).unwrap();
+        let file = file(folder.path());
+        let set = |text: &str, key: &str, value| file.changed(text, key, value).unwrap();
+        let (with_file, _) = set(TEXT, "depth.rig", Some("rig.json"));
+        let key = "depth.cameras.left.camera.fx";
+        let (written, plan) = set(&with_file, key, Some("480.0"));
+        rig.left.camera.fx = 480.0;
+        assert_eq!(plan.depth.cameras, Some(rig.clone()));
+        assert_eq!(plan.depth.rig, None);
+        assert!(written.starts_with(TEXT), "{written}");
+        // A second value stands beside the first; the name of a file, or of none, takes the place of both.
+        let (written, plan) = set(&written, "depth.cameras.left.camera.k2", None);
+        rig.left.camera.k2 = 0.0;
+        assert_eq!(plan.depth.cameras, Some(rig));
+        let refused = file.changed(&written, key, None).unwrap_err();
+        let refused = ppa_core::text::error_chain(&refused);
+        assert!(refused.contains("missing field `fx`"), "{refused}");
+        for (value, name) in [(Some("rig.json"), Some("rig.json")), (None, None)] {
+            let (text, plan) = set(&written, "depth.rig", value);
+            assert_eq!(plan.depth.cameras, None);
+            assert_eq!(plan.depth.rig, name.map(|name| folder.path().join(name)));
+            assert!(!text.contains("cameras"), "{text}");
+        }
+        // Nothing is written to leave a key out.
+        assert_eq!(set(TEXT, "depth.cameras.left.camera.k2", None).0, TEXT);
+    }
+
+    #[test]
+    fn a_table_of_materials_takes_the_place_of_one_that_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let air = "[[SEGMENT]]\nname = \"all\"\nmaterial = \"water\"\ndensity = [[0, 1.0]]\n";
+        let table = air.replace("SEGMENT", "segment");
+        std::fs::write(folder.path().join("water.toml"), &table).unwrap();
+        let written = air.replace("SEGMENT", "xray.calibration.segment");
+        let written = format!("{TEXT}{written}");
+        let file = file(folder.path());
+        let set = |value| file.changed(&written, "xray.calibration_file", value);
+        let (text, plan) = set(Some("water.toml")).unwrap();
+        let expected = HuCalibration::parse(&table).unwrap();
+        assert_eq!(plan.xray.calibration, expected);
+        let line = "\n[xray]\ncalibration_file = \"water.toml\"\n";
+        assert_eq!(text, format!("{TEXT}{line}"));
+        let (text, plan) = set(None).unwrap();
+        assert_eq!(text, TEXT);
+        assert_eq!(plan.xray.calibration, HuCalibration::default());
     }
 
     #[test]

@@ -1,11 +1,20 @@
 //! The form of a plan: a field for each setting, with its default, as the types of the plan declare them.
 
+use ppa_depth::RigSpec;
 use ppa_generate::Plan;
 use serde::Serialize;
 use toml::{Table, Value};
 
 use crate::error::StudioError;
+use crate::plan_cameras::{CAMERAS, rig_value, rig_without, rows, within_cameras};
+use crate::plan_files::FilesBeside;
 use crate::plan_keys::{PlanKey, plan_keys};
+
+/// Keys of files that are chosen from those beside the plan, each with the table that the plan may hold instead.
+const CHOSEN_FILES: [(&str, &str); 2] = [
+    ("depth.rig", CAMERAS),
+    ("xray.calibration_file", "xray.calibration"),
+];
 
 /// What a field holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -18,10 +27,14 @@ pub(crate) enum FieldKind {
     Text,
     /// A file below the folder of the plan.
     Path,
+    /// One of the files in the folder of the plan.
+    File,
     /// One of the names.
     Name,
     /// Several of the names.
     Names,
+    /// A matrix, as TOML with a line for each row.
+    Rows,
     /// Any other value, as TOML.
     Toml,
 }
@@ -32,20 +45,32 @@ pub(crate) struct Field {
     pub key: String,
     pub kind: FieldKind,
     pub meaning: String,
-    pub names: Vec<(&'static str, &'static str)>,
+    /// Names or files to choose from, with what each of them means.
+    pub names: Vec<(String, String)>,
     /// What the file holds; `None` where the key is left out.
     pub value: Option<String>,
     /// What holds where the key is left out.
     pub default: Option<String>,
     /// A value of a setting that is off by default.
     pub example: Option<&'static str>,
+    /// Whether the plan needs the key, so that it cannot be left out.
+    pub required: bool,
+    /// The table that the file holds in place of this file's name.
+    pub instead: Option<&'static str>,
 }
 
-/// The fields of a plan file with this text.
-pub(crate) fn fields(text: &str) -> Result<Vec<Field>, StudioError> {
+/// The fields of a plan file with this text. `cameras` are those of the plan, where they can be read; `files` lie beside it.
+pub(crate) fn fields(
+    text: &str,
+    cameras: Option<&RigSpec>,
+    files: &FilesBeside,
+) -> Result<Vec<Field>, StudioError> {
     let table: Table = text.parse().map_err(StudioError::Toml)?;
     let given = Value::Table(table);
+    let has_cameras = at(&given, CAMERAS).is_some();
     let defaults = Value::try_from(Plan::new(Vec::new())).expect("defaults are TOML values");
+    let types = rig_value(&RigSpec::default());
+    let cameras = cameras.map(rig_value);
     let examples: Vec<_> = Plan::optional_settings().collect();
     let mut fields: Vec<Field> = Vec::new();
     for key in plan_keys().filter(is_editable) {
@@ -55,37 +80,59 @@ pub(crate) fn fields(text: &str) -> Result<Vec<Field>, StudioError> {
             continue;
         }
         let name = key.key.trim_end_matches("[]");
-        let default = at(&defaults, name);
-        let kind = kind(&key, default);
+        let camera_key = within_cameras(name);
+        let left_out = camera_key.and_then(rig_without);
+        let kind = match camera_key {
+            Some(camera_key) => kind(&key, at(&types, camera_key)),
+            None if name == CAMERAS => FieldKind::Heading,
+            None => kind(&key, at(&defaults, name)),
+        };
+        // Cameras that are not written out are those of the rig.
+        let default = match camera_key {
+            Some(camera_key) if has_cameras => left_out.as_ref().and_then(|l| at(l, camera_key)),
+            Some(camera_key) => cameras.as_ref().and_then(|c| at(c, camera_key)),
+            None => at(&defaults, name),
+        };
+        let instead = CHOSEN_FILES.into_iter().find(|(file, _)| *file == name);
+        let instead = instead.filter(|(_, table)| at(&given, table).is_some());
         let shown = |value| shown(kind, value);
         let example = examples.iter().find(|(of, _)| of == name);
         fields.push(Field {
             key: name.to_owned(),
             kind,
             meaning: key.meaning.to_owned(),
-            names: key.names,
+            names: names(&key, files),
             value: at(&given, name).map(shown),
             default: default.map(shown),
             example: example.map(|(_, value)| *value),
+            required: has_cameras && camera_key.is_some() && left_out.is_none(),
+            instead: instead.map(|(_, table)| table),
         });
     }
     Ok(fields)
 }
 
+/// The table that a plan may hold in place of a chosen file's name.
+pub(crate) fn table_instead_of(key: &str) -> Option<&'static str> {
+    let found = CHOSEN_FILES.into_iter().find(|(file, _)| *file == key);
+    found.map(|(_, table)| table)
+}
+
 /// The kind of the field of a key; `None` where the form has none.
 pub(crate) fn kind_of(key: &str) -> Option<FieldKind> {
-    let fields = fields("").expect("an empty text is TOML");
+    let fields = fields("", None, &FilesBeside::default());
+    let fields = fields.expect("an empty text is TOML");
     let field = fields.into_iter().find(|field| field.key == key)?;
     (field.kind != FieldKind::Heading).then_some(field.kind)
 }
 
-/// The form has no fields for limbs, which are listed apart, cameras and tables of materials, which have files of their own.
+/// The form has no fields for limbs, which are listed apart, and for segments of the table of materials, which has files of its own.
 fn is_editable(key: &PlanKey) -> bool {
     let within = |table: &str| {
         let rest = key.key.strip_prefix(table);
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
     };
-    let elsewhere = ["version", "case", "depth.cameras", "xray.calibration"];
+    let elsewhere = ["version", "case", "xray.calibration"];
     !elsewhere.into_iter().any(within)
 }
 
@@ -93,6 +140,19 @@ fn is_editable(key: &PlanKey) -> bool {
 fn is_below(key: &PlanKey, field: &Field) -> bool {
     let rest = key.key.strip_prefix(&field.key);
     field.kind == FieldKind::Toml && rest.is_some_and(|rest| rest.starts_with(['.', '[']))
+}
+
+fn names(key: &PlanKey, files: &FilesBeside) -> Vec<(String, String)> {
+    match key.key {
+        "depth.rig" => files.rigs.clone(),
+        "xray.calibration_file" => files.tables.clone(),
+        _ => {
+            let names = key.names.iter();
+            names
+                .map(|(name, meaning)| ((*name).to_owned(), (*meaning).to_owned()))
+                .collect()
+        }
+    }
 }
 
 fn kind(key: &PlanKey, default: Option<&Value>) -> FieldKind {
@@ -104,7 +164,9 @@ fn kind(key: &PlanKey, default: Option<&Value>) -> FieldKind {
         "table" if default.is_some_and(Value::is_table) => FieldKind::Heading,
         "number" | "integer" => FieldKind::Number,
         "text" => FieldKind::Text,
+        "path" if table_instead_of(key.key).is_some() => FieldKind::File,
         "path" => FieldKind::Path,
+        "4 rows of 4 numbers" => FieldKind::Rows,
         "one of the names" if default.is_some_and(is_name) => FieldKind::Name,
         "list of one of the names" => FieldKind::Names,
         _ => FieldKind::Toml,
@@ -119,7 +181,11 @@ fn at<'a>(value: &'a Value, key: &str) -> Option<&'a Value> {
 fn shown(kind: FieldKind, value: &Value) -> String {
     match (kind, value) {
         (FieldKind::Heading, _) => String::new(),
-        (FieldKind::Text | FieldKind::Path | FieldKind::Name, Value::String(text)) => text.clone(),
+        (
+            FieldKind::Text | FieldKind::Path | FieldKind::File | FieldKind::Name,
+            Value::String(text),
+        ) => text.clone(),
+        (FieldKind::Rows, value) => rows(value),
         (FieldKind::Names, Value::Array(names)) => {
             let names: Vec<&str> = names.iter().filter_map(Value::as_str).collect();
             names.join(" ")
@@ -135,7 +201,7 @@ mod tests {
     #[test]
     fn fields_have_defaults_of_the_types_and_values_of_the_file() {
         let text = "version = 1\n[rotation]\nstep_deg = 5\n[xray]\ntube_load = { mas = 4 }\n";
-        let fields = fields(text).unwrap();
+        let fields = fields(text, None, &FilesBeside::default()).unwrap();
         let field = |key: &str| fields.iter().find(|field| field.key == key).unwrap();
         let step = field("rotation.step_deg");
         assert_eq!(
@@ -168,5 +234,40 @@ mod tests {
         for absent in ["case.file", "xray.calibration", "xray.receptor.grid.ratio"] {
             assert!(fields.iter().all(|field| field.key != absent));
         }
+    }
+
+    #[test]
+    fn fields_of_cameras_have_the_rig_that_holds_or_is_written() {
+        let mut rig = RigSpec::default();
+        rig.left.camera.fx = 612.5;
+        let files = FilesBeside::default();
+        let held = fields("", Some(&rig), &files).unwrap();
+        let field = |fields: &[Field], key: &str| {
+            let field = fields.iter().find(|field| field.key == key);
+            field.unwrap_or_else(|| panic!("no {key}")).clone()
+        };
+        let focal = field(&held, "depth.cameras.left.camera.fx");
+        assert_eq!(
+            (focal.kind, focal.default.as_deref(), focal.required),
+            (FieldKind::Number, Some("612.5"), false)
+        );
+        let model = field(&held, "depth.cameras.right.camera.model");
+        assert_eq!((model.kind, model.names.len()), (FieldKind::Name, 3));
+        let pose = field(&held, "depth.cameras.left.device_from_camera");
+        assert_eq!(pose.kind, FieldKind::Rows);
+        assert_eq!(pose.default.unwrap().lines().count(), 4);
+        assert_eq!(field(&held, "depth.cameras.left").kind, FieldKind::Heading);
+
+        let text = "[depth.cameras.left.camera]\nfx = 600\nk1 = 0.2\n";
+        let written = fields(text, Some(&rig), &files).unwrap();
+        let focal = field(&written, "depth.cameras.left.camera.fx");
+        assert_eq!(
+            (focal.value.as_deref(), focal.default, focal.required),
+            (Some("600"), None, true)
+        );
+        let k1 = field(&written, "depth.cameras.left.camera.k1");
+        assert_eq!((k1.default.as_deref(), k1.required), (Some("0.0"), false));
+        assert_eq!(field(&written, "depth.rig").instead, Some(CAMERAS));
+        assert_eq!(field(&held, "depth.rig").instead, None);
     }
 }

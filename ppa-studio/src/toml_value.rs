@@ -30,7 +30,7 @@ pub(crate) fn put(table: &mut dyn TableLike, key: &str, value: Option<Value>) ->
 }
 
 /// A table without a line of its own while it holds only other tables.
-fn implicit() -> Table {
+pub(crate) fn implicit() -> Table {
     let mut table = Table::new();
     table.set_implicit(true);
     table

@@ -1,6 +1,7 @@
 //! Checks of a plan before anything is made.
 
 use ppa_core::Side;
+use ppa_core::text::error_chain;
 use ppa_xray::AnalogSettings;
 
 use super::Plan;
@@ -54,6 +55,11 @@ impl Plan {
         }
         if self.depth.rig.is_some() && self.depth.cameras.is_some() {
             return Err("depth.rig and depth.cameras are both given".to_owned());
+        }
+        if let Some(cameras) = &self.depth.cameras {
+            cameras
+                .check()
+                .map_err(|error| format!("depth.cameras: {}", error_chain(&error)))?;
         }
         let offset_mm = self.shapes.offset_mm;
         if offset_mm > MOST_OFFSET_MM {

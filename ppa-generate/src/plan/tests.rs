@@ -164,3 +164,26 @@ fn a_marker_off_the_detector_is_refused() {
     let error = marker(-120.0).unwrap_err().to_string();
     assert!(error.contains("xray.marker"), "{error}");
 }
+
+#[test]
+fn cameras_that_make_no_sense_are_refused_by_name() {
+    let rig = toml::to_string(&ppa_depth::RigSpec::default()).unwrap();
+    let with_focal_length = |fx: &str| {
+        let table = |line: &str| match line.strip_prefix('[') {
+            Some(rest) => format!("[depth.cameras.{rest}"),
+            None => line.to_owned(),
+        };
+        let line = |line: &str| match line.starts_with("fx = ") {
+            true => format!("fx = {fx}"),
+            false => table(line),
+        };
+        let lines: Vec<String> = rig.lines().map(line).collect();
+        read(&lines.join("\n"))
+    };
+    assert!(with_focal_length("500").unwrap().depth.cameras.is_some());
+    let error = ppa_core::text::error_chain(&with_focal_length("-3").unwrap_err());
+    assert!(
+        error.contains("depth.cameras: left camera of the rig: camera focal length fx is -3"),
+        "{error}"
+    );
+}

@@ -1,31 +1,73 @@
 // The form of the plan: a field for each key, as the types of the plan declare them.
 
 import { Refused, getJson, postJson } from "/page/server.js";
-import { button, element } from "/page/elements.js";
+import { button, element, table } from "/page/elements.js";
 
 const byId = (id) => document.getElementById(id);
 
 // Tables whose keys most plans change.
 const OPEN = ["rotation", "shapes", "soft_tissue", "positioning"];
 
+const HINTS = {
+  "depth.cameras": "The cameras in use. A value that is changed here writes both cameras into the plan, in place of the name of a rig.",
+};
+
 const MOST_PATIENT = 2 ** 32 - 1;
 
-// Each gives an element and how a value, or none, is put into it.
-const INPUTS = { name: nameInput, names: namesInput };
+// Each gives an element and how the value of a field, or none, is put into it.
+const INPUTS = { name: nameInput, names: namesInput, file: fileInput, rows: rowsInput };
+
+// What holds where no file is chosen.
+const WITHOUT_FILE = { "depth.rig": "built-in Azure Kinect pair", "xray.calibration_file": "built-in table" };
+
+const WRITTEN = " written";
+
+const placeholder = ({ default: standard, example }) => standard ?? (example ? `off; such as ${example}` : "off");
+
+function typed(input, set) {
+  input.addEventListener("change", () => set(input.value.trim() || null));
+  return [input, (field) => {
+    input.value = field.value ?? "";
+    input.placeholder = placeholder(field);
+  }];
+}
 
 function textInput(field, id, set) {
-  const placeholder = field.default ?? (field.example ? `off; such as ${field.example}` : "off");
-  const input = element("input", "", { id, placeholder, type: "text", autocomplete: "off", spellcheck: "false" });
+  const input = element("input", "", { id, type: "text", autocomplete: "off", spellcheck: "false" });
   if (field.kind === "number") input.inputMode = "decimal";
-  input.addEventListener("change", () => set(input.value.trim() || null));
-  return [input, (value) => { input.value = value ?? ""; }];
+  return typed(input, set);
+}
+
+function rowsInput(field, id, set) {
+  return typed(element("textarea", "", { id, rows: 4, wrap: "off", autocomplete: "off", spellcheck: "false" }), set);
 }
 
 function nameInput(field, id, set) {
   const select = element("select", "", { id });
-  select.append(new Option(`default: ${field.default}`, ""), ...field.names.map(([name, meaning]) => new Option(`${name}: ${meaning}`, name)));
+  const standard = new Option("", "");
+  select.append(standard, ...field.names.map(([name, meaning]) => new Option(`${name}: ${meaning}`, name)));
   select.addEventListener("change", () => set(select.value || null));
-  return [select, (value) => { select.value = value ?? ""; }];
+  return [select, (field) => {
+    standard.textContent = `default: ${field.default}`;
+    standard.hidden = field.required;
+    select.value = field.value ?? "";
+  }];
+}
+
+// A file beside the plan, nothing, or what the plan holds instead. Files come and go.
+function fileInput(field, id, set) {
+  const select = element("select", "", { id, class: "file" });
+  select.addEventListener("change", () => {
+    if (select.value !== WRITTEN) set(select.value || null);
+  });
+  return [select, ({ key, names, value, instead }) => {
+    const options = [new Option(`default: ${WITHOUT_FILE[key]}`, "")];
+    if (instead) options.push(new Option(`written in the plan as ${instead}`, WRITTEN));
+    options.push(...names.map(([name, meaning]) => new Option(`${name}: ${meaning}`, name)));
+    if (value && !names.some(([name]) => name === value)) options.push(new Option(value));
+    select.replaceChildren(...options);
+    select.value = value ?? (instead ? WRITTEN : "");
+  }];
 }
 
 function namesInput(field, id, set) {
@@ -38,10 +80,15 @@ function namesInput(field, id, set) {
     group.append(label);
     return box;
   });
-  return [group, (value) => {
-    const chosen = (value ?? field.default ?? "").split(" ");
+  return [group, ({ value, default: standard }) => {
+    const chosen = (value ?? standard ?? "").split(" ");
     for (const box of boxes) box.checked = chosen.includes(box.value);
   }];
+}
+
+function materialRow({ segment, from_hu, materials, density }) {
+  const knots = density.map(([hu, g_cm3]) => `${g_cm3} at ${hu}`);
+  return [segment, from_hu === null ? "" : String(from_hu), materials.join(" to "), knots.join(", ")];
 }
 
 export class PlanPanel {
@@ -49,6 +96,7 @@ export class PlanPanel {
     this.actions = actions;
     this.plan = null;
     this.updates = [];
+    this.materials = element("div", "", { id: "plan-materials" });
     byId("plan-save").addEventListener("click", () => this.save());
     for (const step of ["undo", "redo"]) byId(`plan-${step}`).addEventListener("click", () => this.change(`plan/${step}`, {}));
     byId("plan-folder").addEventListener("change", () => actions.folder());
@@ -97,6 +145,7 @@ export class PlanPanel {
     byId("plan-add").disabled = plan.other_cases.length === 0;
     if (this.updates.length === 0) byId("plan-form").append(...this.groups(plan.fields));
     for (const update of this.updates) update(new Map(plan.fields.map((field) => [field.key, field])));
+    this.materials.replaceChildren(table(["Segment", "From HU", "Material", "g/cm³ at HU"], plan.materials.map(materialRow)));
   }
 
   limb(limb, number) {
@@ -128,6 +177,7 @@ export class PlanPanel {
       const made = field.kind === "heading" ? this.group(field) : this.row(field);
       if (field.kind === "heading") groups.set(field.key, made);
       parent.append(made);
+      if (field.key === "xray.calibration_file") parent.append(this.materials);
     }
     return [top];
   }
@@ -136,7 +186,7 @@ export class PlanPanel {
     const group = element("details");
     group.open = OPEN.includes(key);
     const summary = element("summary");
-    group.append(summary, element("p", meaning, { class: "hint" }));
+    group.append(summary, element("p", HINTS[key] ?? meaning, { class: "hint" }));
     this.updates.push((fields) => {
       const given = [...fields.values()].filter((field) => field.value !== null && field.kind !== "heading" && field.key.startsWith(`${key}.`));
       summary.textContent = given.length ? `${key}, ${given.length} given` : key;
@@ -166,10 +216,10 @@ export class PlanPanel {
     const row = element("div", "", { class: "field" });
     row.append(label, input, standard, element("p", field.meaning, { class: "hint", id: `${id}:hint` }), error);
     this.updates.push((fields) => {
-      const { value } = fields.get(field.key);
-      row.classList.toggle("given", value !== null);
-      standard.hidden = value === null;
-      put(value);
+      const now = fields.get(field.key);
+      row.classList.toggle("given", now.value !== null);
+      standard.hidden = now.required || (now.value === null && !now.instead);
+      put(now);
     });
     return row;
   }

@@ -8,11 +8,13 @@ use axum::Json;
 use axum::extract::State as Extracted;
 use axum::response::Response;
 use ppa_generate::{PlanCase, edited_case, original_case};
+use ppa_xray::{Composition, Segment};
 use serde::{Deserialize, Serialize};
 
 use super::answer::work;
 use crate::error::StudioError;
 use crate::plan_file::PlanFile;
+use crate::plan_files::FilesBeside;
 use crate::plan_form::{Field, fields};
 use crate::plan_limbs::{LimbChange, cases_beside};
 use crate::state::State;
@@ -34,6 +36,20 @@ pub(super) struct PlanForm {
     can_undo: bool,
     can_redo: bool,
     fields: Vec<Field>,
+    /// The table of materials in use.
+    materials: Vec<Material>,
+}
+
+/// A row of the table of materials.
+#[derive(Serialize)]
+struct Material {
+    segment: String,
+    /// Lowest HU; none of the first segment.
+    from_hu: Option<f32>,
+    /// One material, or two that are mixed.
+    materials: Vec<String>,
+    /// Knots of the density, HU and g/cm³.
+    density: Vec<[f32; 2]>,
 }
 
 /// A limb of the plan.
@@ -133,8 +149,32 @@ fn plan_form(state: &State) -> Result<PlanForm, StudioError> {
         other_cases: cases_beside(file.folder(), &plan)?,
         can_undo,
         can_redo,
-        fields: fields(&text)?,
+        fields: fields(
+            &text,
+            // A rig that cannot be read is reported where it is used.
+            plan.depth.cameras().ok().as_ref(),
+            &FilesBeside::of(file.folder())?,
+        )?,
+        materials: plan
+            .xray
+            .calibration
+            .segments
+            .iter()
+            .map(material)
+            .collect(),
     })
+}
+
+fn material(segment: &Segment) -> Material {
+    Material {
+        segment: segment.name.clone(),
+        from_hu: segment.from_hu,
+        materials: match &segment.composition {
+            Composition::Pure(material) => vec![material.clone()],
+            Composition::Mixture(ends) => ends.iter().map(|end| end.material.clone()).collect(),
+        },
+        density: segment.density.clone(),
+    }
 }
 
 fn limb(planned: &PlanCase) -> Limb {

@@ -15,6 +15,7 @@ mod page_access;
 mod page_dataset;
 mod page_generation;
 mod page_training;
+mod plan_cameras;
 mod plan_form;
 mod plans;
 mod protection;

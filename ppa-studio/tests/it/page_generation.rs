@@ -4,6 +4,7 @@ use ppa_generate::Plan;
 use serde_json::json;
 
 use crate::chromium::{Page, run};
+use crate::plan_cameras::write_files;
 use crate::plans::plan;
 
 #[test]
@@ -110,6 +111,86 @@ fn a_limb_is_added_given_a_person_and_removed() {
         page.wait("document.querySelectorAll('#plan-limbs li').length === 1")
             .await;
         assert_eq!(Plan::read(&edited).unwrap().cases[0].patient, 7);
+        page.close().await;
+    });
+}
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn cameras_and_materials_are_chosen_and_written_out() {
+    run(async {
+        let folder = tempfile::tempdir().unwrap();
+        let file = plan(folder.path());
+        let rig = write_files(folder.path());
+        let page = Page::of(folder, &file).await;
+        page.click("#tab-generation").await;
+        let field = |key: &str| format!("document.getElementById('plan:{key}')");
+        page.wait(&format!("!!{}", field("depth.rig"))).await;
+        let open = "document.querySelectorAll('#plan-form details').forEach((group) => { group.open = true; })";
+        page.client.execute(open, vec![]).await.unwrap();
+
+        page.pick("plan:depth.rig", "small.rig.json").await;
+        let edited = page.folder.path().join("ankles.edited.toml");
+        page.until(|| edited.exists()).await;
+        // The fields of the cameras show those of the rig.
+        let focal = field("depth.cameras.left.camera.fx");
+        let fx = rig.left.camera.fx;
+        page.wait(&format!("Number({focal}.placeholder) === {fx}"))
+            .await;
+        let place = "document.getElementById('plan:depth.rig').scrollIntoView()";
+        page.client.execute(place, vec![]).await.unwrap();
+        page.picture("plan_rig").await;
+
+        page.pick("plan:depth.cameras.left.camera.model", "pinhole")
+            .await;
+        let refused = field("depth.cameras.left.camera.model:refused");
+        page.wait(&format!(
+            "{refused}.textContent.includes('pinhole with k1')"
+        ))
+        .await;
+        page.fill("[id='plan:depth.cameras.left.camera.fx']", "260.5")
+            .await;
+        page.wait(&format!(
+            "{}.selectedOptions[0].textContent.includes('depth.cameras')",
+            field("depth.rig")
+        ))
+        .await;
+        let cameras = Plan::read(&edited).unwrap().depth.cameras.unwrap();
+        assert_eq!(cameras.left.camera.fx, 260.5);
+        assert_eq!(cameras.right, rig.right);
+        page.wait(&format!(
+            "{}.value.split('\\n').length === 4",
+            field("depth.cameras.left.device_from_camera")
+        ))
+        .await;
+        page.picture("plan_cameras").await;
+        // The page cannot leave a number out that the plan needs.
+        let standard = "document.querySelector(\"[aria-label='Default of depth.cameras.left.camera.fx']\").hidden";
+        assert_eq!(page.value(standard).await, json!(true));
+        page.click("#plan-undo").await;
+        page.wait(&format!(
+            "{}.value === 'small.rig.json'",
+            field("depth.rig")
+        ))
+        .await;
+        assert_eq!(Plan::read(&edited).unwrap().depth.cameras, None);
+
+        page.pick("plan:xray.calibration_file", "water.toml").await;
+        page.wait("document.getElementById('plan-materials').textContent.includes('water')")
+            .await;
+        let place = "document.getElementById('plan:xray.calibration_file').scrollIntoView()";
+        page.client.execute(place, vec![]).await.unwrap();
+        page.picture("plan_materials").await;
+        page.client.set_window_size(600, 900).await.unwrap();
+        page.client.execute(place, vec![]).await.unwrap();
+        page.picture("plan_materials_narrow").await;
+        let place = "document.getElementById('plan:depth.rig').scrollIntoView()";
+        page.client.execute(place, vec![]).await.unwrap();
+        page.picture("plan_cameras_narrow").await;
+        page.click("[aria-label='Default of xray.calibration_file']")
+            .await;
+        page.wait("document.getElementById('plan-materials').textContent.includes('titanium')")
+            .await;
         page.close().await;
     });
 }
