@@ -36,6 +36,8 @@ pub enum FindingCode {
     SeveralLimbs,
     /// Another limb, cut by the image, lies on the side that was asked for.
     OtherLimbOnSide,
+    /// A person kept a further body as a part of the limb.
+    BodyKept,
     /// The limb is too thin or too short for one.
     LimbTooSmall,
     /// The limb is too thick for one: a trunk.

@@ -64,7 +64,11 @@ impl LoadedScan {
         self.with_landmarks(limb, case.side, &case.surface, &case.choices)
     }
 
-    pub(crate) fn extract(&self, side: Side, surface: &LimbSettings) -> Result<Limb, PrepareError> {
+    /// The limb alone, without landmarks.
+    ///
+    /// # Errors
+    /// [`PrepareError`] when the scan holds no limb.
+    pub fn extract(&self, side: Side, surface: &LimbSettings) -> Result<Limb, PrepareError> {
         let surface = LimbSettings {
             towards: surface.towards.or(Some([towards_left(side), 0.0, 0.0])),
             ..surface.clone()

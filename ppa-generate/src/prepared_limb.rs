@@ -73,6 +73,7 @@ impl PreparedLimb {
             .iter()
             .map(of_warning)
             .chain(several_limbs(&limb.report))
+            .chain(bodies_kept(&limb.report))
             .chain(other_on_side(&limb.report, side, surface))
             .chain(cuts(&limb.walls, &limb.mesh, &landmarks))
             .chain(gates::findings(&volume, &limb, &landmarks)?)
@@ -135,7 +136,7 @@ fn other_on_side(report: &LimbReport, side: Side, settings: &LimbSettings) -> Op
         // Within 60 degrees of the side, the same limit as for bodies side by side in the choice of the limb.
         let is_on_side = 2.0 * x * towards_left(side) >= x.hypot(y).hypot(z);
         let may_be_limb = body.bone_mm3 > 0.0 && body.core_mm3 >= LEAST_OF_LIMB * chosen.core_mm3;
-        !body.chosen && !body.alike && is_on_side && may_be_limb
+        !body.chosen && body.kept.is_empty() && !body.alike && is_on_side && may_be_limb
     })?;
     let (name, other) = match side {
         Side::Right => ("right", "left"),
@@ -153,6 +154,23 @@ fn other_on_side(report: &LimbReport, side: Side, settings: &LimbSettings) -> Op
         text,
         value: Some(beside.core_mm3),
         place_mm: Some(beside.centre_mm),
+    })
+}
+
+/// That the limb is more than was found.
+fn bodies_kept(report: &LimbReport) -> Option<Finding> {
+    let kept = report.bodies.iter().filter(|body| !body.kept.is_empty());
+    let largest = kept.clone().next()?;
+    let millilitres: f64 = kept.clone().map(|body| body.core_mm3 * 1e-3).sum();
+    let bodies = ppa_core::text::count_as(kept.count(), "further body", "further bodies");
+    Some(Finding {
+        code: FindingCode::BodyKept,
+        severity: Severity::Note,
+        text: format!(
+            "{bodies} of {millilitres:.0} ml (solid core) belong to the limb, as surface.kept of the case says: skin, placement, body shapes and radiographs include them"
+        ),
+        value: Some(1e3 * millilitres),
+        place_mm: Some(largest.centre_mm),
     })
 }
 
@@ -182,6 +200,7 @@ mod tests {
         Body {
             chosen,
             alike: chosen,
+            kept: Vec::new(),
             core_mm3,
             bone_mm3: 1e-2 * core_mm3,
             side_cut_mm2: 0.0,

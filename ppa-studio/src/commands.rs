@@ -148,6 +148,9 @@ pub(crate) fn of_case(case: &Case, out: &Path) -> Commands {
     if let Some(point) = surface.inside {
         let _ = write!(line, " --inside={}", list(&point));
     }
+    for point in &surface.kept {
+        let _ = write!(line, " --keep={}", list(point));
+    }
     line += &of_choices(&case.choices);
     if let Some(bones) = &case.bones {
         line += &of_bones(bones);

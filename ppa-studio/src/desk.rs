@@ -57,6 +57,28 @@ impl Desk {
         Ok(())
     }
 
+    /// Keeps the body around a point as a part of the limb, or removes it if it is kept.
+    ///
+    /// # Errors
+    /// [`StudioError::Invalid`] for a point in the limb itself.
+    pub fn keep_or_remove(&mut self, point: [f64; 3]) -> Result<(), StudioError> {
+        let mut case = self.shown.case.clone();
+        case.surface.kept.push(point);
+        let limb = self.scan.extract(case.side, &case.surface)?;
+        let mut bodies = limb.report.bodies.iter();
+        let body = bodies.find(|body| body.kept.contains(&point));
+        let body = body.ok_or_else(|| {
+            let [x, y, z] = point;
+            StudioError::Invalid(format!(
+                "the point {x}, {y}, {z} mm is in the limb itself, which stays; another body can be taken as the limb"
+            ))
+        })?;
+        if body.kept.len() > 1 {
+            case.surface.kept.retain(|kept| !body.kept.contains(kept));
+        }
+        self.change(case)
+    }
+
     pub fn undo(&mut self) -> Result<(), StudioError> {
         let Some(case) = self.earlier.last().cloned() else {
             return Ok(());

@@ -65,6 +65,9 @@ pub struct PrepareArgs {
     /// A point inside the wanted limb when the scan shows several, ct frame
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     inside: Option<[f64; 3]>,
+    /// A point inside a further body to keep as a part of the limb, ct frame; may be given several times
+    #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
+    keep: Vec<[f64; 3]>,
     /// Centre of the joint, ct frame
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     joint: Option<[f64; 3]>,
@@ -143,6 +146,7 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
     };
     let mut surface = LimbSettings {
         inside: args.inside,
+        kept: args.keep.clone(),
         crop: args.crop,
         ..LimbSettings::default()
     };

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use ppa_generate::{Plan, PlanCase};
+use ppa_generate::{Case, Plan, PlanCase, PreparedLimb};
 use serde_json::Value;
 
 use crate::{contains, fail, names, phantom, succeed};
@@ -41,6 +41,34 @@ fn switch_on(folder: &Path, key: &str) -> String {
     let line = line.unwrap_or_else(|| panic!("{key} is missing in {text}"));
     edit(folder, line, &line[1..]);
     line[1..].to_owned()
+}
+
+#[test]
+fn kept_bodies_are_named_in_the_case() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    own_case(folder);
+    let case = |name: &str| Case::read(&folder.join(name)).unwrap();
+    let leg = case("leg.case.toml");
+    let text = fs::read_to_string(folder.join("leg.case.toml")).unwrap();
+    assert!(
+        leg.surface.kept.is_empty() && !text.contains("kept"),
+        "{text}"
+    );
+    // A point of the limb itself is written down and changes nothing else.
+    let [x, y, z] = PreparedLimb::of_case(&leg).unwrap().landmarks.joint_centre;
+    let prepare = "prepare p01.nii --side r --no-picture";
+    let keep = format!("{prepare} --keep={x},{y},{z} --out kept.case.toml");
+    succeed(folder, &keep);
+    let kept = case("kept.case.toml");
+    assert_eq!(kept.surface.kept, [[x, y, z]]);
+    let limb = |case: &Case| PreparedLimb::of_case(case).unwrap().limb;
+    assert_eq!(limb(&kept), limb(&leg));
+    let said = fail(
+        folder,
+        &format!("{prepare} --keep=0,0,9000 --out air.case.toml"),
+    );
+    contains(&said, &["(0, 0, 9000) mm", "is not in solid tissue"]);
 }
 
 #[test]

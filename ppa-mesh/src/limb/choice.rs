@@ -27,7 +27,7 @@ pub fn body(
     settings: &LimbSettings,
 ) -> Result<u32, LimbError> {
     if let Some(point) = settings.inside {
-        return body_at(grid, tissue, found, point);
+        return body_at(grid, tissue, found, point).ok_or(LimbError::Inside(point));
     }
     let lattice = &tissue.lattice;
     let weights = weights(lattice, found);
@@ -48,6 +48,36 @@ pub fn body(
         .filter(|(_, offset)| offset.dot(&towards) >= SIDE_BY_SIDE * offset.norm());
     let farthest = beside.max_by(|(_, a), (_, b)| a.dot(&towards).total_cmp(&b.dot(&towards)));
     Ok(farthest.map_or(heaviest, |(body, _)| body) as u32)
+}
+
+/// A further body that is kept as a part of the limb.
+pub struct Kept {
+    pub body: u32,
+    /// The points that were given in it.
+    pub points: Vec<[f64; 3]>,
+}
+
+/// The bodies around the further points that were given; points of the limb itself change nothing.
+pub fn kept(
+    grid: &Grid,
+    tissue: &Tissue,
+    found: &Bodies,
+    settings: &LimbSettings,
+    chosen: u32,
+) -> Result<Vec<Kept>, LimbError> {
+    let mut kept: Vec<Kept> = Vec::new();
+    for &point in &settings.kept {
+        let body = body_at(grid, tissue, found, point).ok_or(LimbError::Kept(point))?;
+        match kept.iter_mut().find(|kept| kept.body == body) {
+            Some(kept) => kept.points.push(point),
+            None if body == chosen => {}
+            None => kept.push(Kept {
+                body,
+                points: vec![point],
+            }),
+        }
+    }
+    Ok(kept)
 }
 
 /// Whether each body weighs enough to be a limb like the heaviest.
@@ -74,22 +104,14 @@ fn weights(lattice: &Lattice, found: &Bodies) -> Vec<f64> {
     weight.collect()
 }
 
-fn body_at(
-    grid: &Grid,
-    tissue: &Tissue,
-    found: &Bodies,
-    point: [f64; 3],
-) -> Result<u32, LimbError> {
+fn body_at(grid: &Grid, tissue: &Tissue, found: &Bodies, point: [f64; 3]) -> Option<u32> {
     let lattice = &tissue.lattice;
     let voxel = grid.voxel_from_ct() * Point3::from(point);
     let place = [0, 1, 2].map(|x| voxel[x].round() - lattice.low[x] as f64);
     if !(0..3).all(|x| (0.0..lattice.size[x] as f64).contains(&place[x])) {
-        return Err(LimbError::Inside(point));
+        return None;
     }
     let strides = lattice.strides();
     let at = (0..3).map(|x| place[x] as usize * strides[x]).sum();
-    if !tissue.is(at, TISSUE) {
-        return Err(LimbError::Inside(point));
-    }
-    Ok(found.labels[at])
+    tissue.is(at, TISSUE).then(|| found.labels[at])
 }

@@ -57,6 +57,40 @@ pub fn keep_largest(lattice: &Lattice, mask: &mut [bool]) -> usize {
     removed
 }
 
+/// As [`keep_largest`] for a limb that consists of several bodies: the piece with the most voxels of each body stays.
+/// `labels` say to which body a voxel belongs. Returns how many voxels were removed, and how many pieces stay.
+pub fn keep_largest_of(
+    lattice: &Lattice,
+    mask: &mut [bool],
+    labels: &[u32],
+    bodies: &[u32],
+) -> (usize, usize) {
+    let pieces = Pieces::of(lattice, |at| mask[at]);
+    let mut sizes = vec![vec![0_usize; pieces.count]; bodies.len()];
+    for (piece, run) in pieces.runs() {
+        for label in &labels[run] {
+            if let Some(body) = bodies.iter().position(|body| body == label) {
+                sizes[body][piece] += 1;
+            }
+        }
+    }
+    let mut stays = vec![false; pieces.count];
+    for sizes in &sizes {
+        let largest = (0..sizes.len()).max_by_key(|&at| (sizes[at], usize::MAX - at));
+        if let Some(piece) = largest.filter(|&piece| sizes[piece] > 0) {
+            stays[piece] = true;
+        }
+    }
+    let mut removed = 0;
+    for (piece, run) in pieces.runs() {
+        if !stays[piece] {
+            removed += run.len();
+            mask[run].fill(false);
+        }
+    }
+    (removed, stays.into_iter().filter(|stays| *stays).count())
+}
+
 /// Adds the voxels that no path outside the mask joins with the border of the box, and returns how
 /// many those were.
 pub fn fill_enclosed(lattice: &Lattice, mask: &mut [bool]) -> usize {

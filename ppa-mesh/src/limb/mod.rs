@@ -32,7 +32,7 @@ use cleaned::cleaned;
 use contact::{Touching, smooth_contacts};
 use couch::couch_columns;
 use distance::{FAR_MM2, spread};
-use growth::{farthest_sq, fill_enclosed, grown_back, keep_largest};
+use growth::{farthest_sq, fill_enclosed, grown_back, keep_largest, keep_largest_of};
 use lattice::Lattice;
 pub use report::{Body, CutFace, LimbReport};
 pub use settings::{LimbSettings, VoxelBox};
@@ -102,6 +102,9 @@ pub enum LimbError {
     /// The chosen point lies outside the volume or in air.
     #[error("the point ({}, {}, {}) mm, said to be inside the limb, is not in solid tissue of the volume", .0[0], .0[1], .0[2])]
     Inside([f64; 3]),
+    /// A point of a body that is to be kept lies outside the volume or in air.
+    #[error("the point ({}, {}, {}) mm of a body to keep is not in solid tissue of the volume", .0[0], .0[1], .0[2])]
+    Kept([f64; 3]),
     /// No surface could be made.
     #[error("the limb has no surface")]
     Surface(#[from] SurfaceError),
@@ -235,22 +238,31 @@ fn within_values<T: Hu>(grid: &Grid, hu: &[T], settings: &LimbSettings) -> Resul
     // bodies matters only near them, but a point given may be anywhere.
     let mut reach_sq: Vec<f32> = found.labels.iter().map(from_body).collect();
     let farthest_sq = farthest_sq(settings.core_radius_mm);
-    let limit_sq = settings.inside.is_none().then_some(farthest_sq);
+    let is_automatic = settings.inside.is_none() && settings.kept.is_empty();
+    let limit_sq = is_automatic.then_some(farthest_sq);
     let (size, spacing_mm) = (lattice.size, lattice.spacing_mm);
     spread(size, spacing_mm, &mut reach_sq, &mut found.labels, limit_sq);
     let chosen = choice::body(grid, &tissue, &found, settings)?;
-    report.describe_bodies(grid, lattice, &found, chosen);
+    let kept = choice::kept(grid, &tissue, &found, settings, chosen)?;
+    report.describe_bodies(grid, lattice, &found, chosen, &kept);
+    let mut of_limb = vec![chosen];
+    of_limb.extend(kept.iter().map(|kept| kept.body));
 
     let grown = grown_back(&tissue, &reach_sq, settings.core_radius_mm);
     drop(reach_sq);
     let mut inside: Vec<bool> = std::iter::zip(&grown, &found.labels)
-        .map(|(grown, body)| *grown && *body == chosen)
+        .map(|(grown, body)| *grown && of_limb.contains(body))
         .collect();
-    drop(found);
+    // Bodies that are kept need not be connected with the limb.
+    let labels = (of_limb.len() > 1).then_some(found.labels);
     smooth_contacts(lattice, &grown, &mut inside);
     report.describe_contact(grid, lattice, Touching::of(lattice, &grown, &inside));
     drop(grown);
-    report.island_voxels = keep_largest(lattice, &mut inside);
+    let (islands, parts) = match labels {
+        None => (keep_largest(lattice, &mut inside), 1),
+        Some(labels) => keep_largest_of(lattice, &mut inside, &labels, &of_limb),
+    };
+    report.island_voxels = islands;
     let tissue_voxels = columns.tissue.iter().map(|&n| n as usize).sum::<usize>();
     let limb_tissue = |at: &usize| inside[*at] && !tissue.is(*at, ENCLOSED);
     let limb_tissue = (0..inside.len()).filter(limb_tissue).count();
@@ -269,7 +281,7 @@ fn within_values<T: Hu>(grid: &Grid, hu: &[T], settings: &LimbSettings) -> Resul
     let part = whole.window_around(report.low, report.high, 2);
     let values = cleaned(&part, hu, &mask, iso);
     let surface = surface_of_part(grid, part.low, part.size, &values, iso)?;
-    let mesh = one_piece(&surface, settings, &mut report);
+    let mesh = largest_pieces(&surface, settings, parts, &mut report);
     let walls = CutWalls::of(grid, &mesh);
     Ok(Limb {
         mesh,
@@ -287,8 +299,13 @@ fn from_body(label: &u32) -> f32 {
     if *label == NO_BODY { FAR_MM2 } else { 0.0 }
 }
 
-/// The largest connected piece of the main cluster of surface points.
-fn one_piece(surface: &Mesh, settings: &LimbSettings, report: &mut LimbReport) -> Mesh {
+/// The largest connected piece of the main cluster of surface points; of a limb in several `parts` the largest pieces, as many.
+fn largest_pieces(
+    surface: &Mesh,
+    settings: &LimbSettings,
+    parts: usize,
+    report: &mut LimbReport,
+) -> Mesh {
     let clusters = dbscan(
         &surface.vertices,
         settings.dbscan_eps_mm,
@@ -303,8 +320,17 @@ fn one_piece(surface: &Mesh, settings: &LimbSettings, report: &mut LimbReport) -
             in_main[piece as usize] += 1;
         }
     }
-    let kept = (0..in_main.len()).max_by_key(|&p| (in_main[p], usize::MAX - p));
-    let keep = |vertex: u32| Some(pieces[vertex as usize] as usize) == kept;
+    let mut order: Vec<usize> = (0..in_main.len()).collect();
+    if parts > 1 {
+        // Parts that lie apart are clusters of their own.
+        in_main.fill(0);
+        pieces
+            .iter()
+            .for_each(|&piece| in_main[piece as usize] += 1);
+    }
+    order.sort_by_key(|&p| (usize::MAX - in_main[p], p));
+    order.truncate(parts);
+    let keep = |vertex: u32| order.contains(&(pieces[vertex as usize] as usize));
     let mesh = surface.restricted(keep);
     report.points = mesh.vertices.len();
     report.points_removed = surface.vertices.len() - mesh.vertices.len();

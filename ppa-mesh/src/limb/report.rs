@@ -4,7 +4,7 @@ use ppa_ct::Grid;
 use serde::{Deserialize, Serialize};
 
 use super::bodies::Bodies;
-use super::choice::alike;
+use super::choice::{Kept, alike};
 use super::contact::Touching;
 use super::lattice::Lattice;
 
@@ -16,6 +16,9 @@ pub struct Body {
     /// Whether it could be one: it holds about as much bone as the body with the most.
     #[serde(default)]
     pub alike: bool,
+    /// The points for which it is kept as a part of the limb; none of other bodies.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub kept: Vec<[f64; 3]>,
     /// Volume of its solid core, mm³.
     pub core_mm3: f64,
     /// Volume of bone in the core, mm³.
@@ -81,6 +84,7 @@ impl LimbReport {
         lattice: &Lattice,
         found: &Bodies,
         chosen: u32,
+        kept: &[Kept],
     ) {
         let alike = alike(lattice, found);
         let basins = found.basins.iter().enumerate();
@@ -88,6 +92,10 @@ impl LimbReport {
             .map(|(at, basin)| Body {
                 chosen: at as u32 == chosen,
                 alike: alike[at],
+                kept: kept
+                    .iter()
+                    .find(|kept| kept.body == at as u32)
+                    .map_or(Vec::new(), |kept| kept.points.clone()),
                 core_mm3: basin.voxels as f64 * lattice.voxel_mm3,
                 bone_mm3: basin.bone_voxels as f64 * lattice.voxel_mm3,
                 side_cut_mm2: basin.side_cut_mm2,

@@ -24,6 +24,10 @@ pub struct LimbSettings {
     /// A point of the wanted limb in the `ct` frame, mm, when the automatic choice is not wanted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inside: Option<[f64; 3]>,
+    /// Points of further bodies that are kept as parts of the limb, `ct` frame, mm: a splint, or a part that only touches the
+    /// limb. Their voxels are those of the limb in all that follows.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub kept: Vec<[f64; 3]>,
     /// Of several limbs alike, side by side in this direction of the `ct` frame, take the one farthest along it;
     /// when absent the one with the most bone.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -54,6 +58,7 @@ impl Default for LimbSettings {
             iso_hu: -500.0,
             crop: None,
             inside: None,
+            kept: Vec::new(),
             towards: None,
             bone_hu: 200.0,
             core_hu: -250.0,

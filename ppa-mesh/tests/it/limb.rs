@@ -119,6 +119,96 @@ fn a_neighbour_and_a_sheet_leave_the_skin_where_it_was() {
     );
 }
 
+/// A block of 30 mm beside the shin, 6 mm of air between them, and its centre.
+fn with_block(scan: &Volume, alone: &Limb) -> (Volume, Point3<f64>) {
+    let grid = scan.grid();
+    let right = alone.mesh.vertices.iter().map(|v| f64::from(v.x));
+    let right = right.fold(f64::INFINITY, f64::min);
+    let size = grid.size();
+    let middle = grid.centre([0, 1, 2].map(|axis| 0.5 * size[axis] as f64));
+    let level = |v: &&Point3<f32>| (f64::from(v.z) - middle.z).abs() < 20.0;
+    let edge = alone.mesh.vertices.iter().filter(level);
+    let edge = edge.map(|v| f64::from(v.x)).fold(f64::INFINITY, f64::min);
+    let centre = Point3::new(edge - 6.0 - 15.0, middle.y, middle.z);
+    // Grid, and the box that it needs.
+    let more = ((right - centre.x + 25.0) / VOXEL_MM).ceil().max(0.0) as usize;
+    let first = grid.centre([0.0; 3]) - nalgebra::Vector3::x() * VOXEL_MM * more as f64;
+    let wide = Grid::axis_aligned(
+        [size[0] + more, size[1], size[2]],
+        [VOXEL_MM; 3].into(),
+        first,
+    );
+    let wide = wide.expect("grid");
+    let hu = (0..wide.len()).map(|at| {
+        let [i, j, k] = wide.voxel(at);
+        let p = wide.centre([i, j, k].map(|v| v as f64));
+        let off = (p - centre).abs().max();
+        let block = if off < 15.0 { 50.0 } else { -1000.0 };
+        let there = i.checked_sub(more).map(|i| scan.at([i, j, k]));
+        there.unwrap_or(-1000.0).max(block)
+    });
+    (
+        Volume::new(wide.clone(), hu.collect()).expect("finite"),
+        centre,
+    )
+}
+
+#[test]
+fn a_body_is_kept_where_a_person_points_at_it() {
+    let leg = LowerLeg::p01();
+    let scan = leg.voxelise(VOXEL_MM, TableTop::Absent).expect("phantom");
+    let alone = extract_limb(&scan, &LimbSettings::default()).expect("limb");
+    let (planted, centre) = with_block(&scan, &alone);
+    let of = |kept: &[Point3<f64>]| {
+        let settings = LimbSettings {
+            kept: kept.iter().map(|p| (*p).into()).collect(),
+            ..LimbSettings::default()
+        };
+        extract_limb(&planted, &settings)
+    };
+    let removed = of(&[]).expect("limb");
+    assert_eq!(removed.report.limb_voxels, alone.report.limb_voxels);
+    let kept = of(&[centre]).expect("limb");
+    // The same voxels of the leg, and those of the block: its sides are 19 to 21 voxels long.
+    let both = removed.mask.iter().zip(&kept.mask);
+    let (mut lost, mut added) = (0, 0);
+    let grid = planted.grid();
+    for (at, (before, after)) in both.enumerate() {
+        let p = grid.centre(grid.voxel(at).map(|v| v as f64));
+        let in_block = (p - centre).abs().max() < 15.0 + VOXEL_MM;
+        lost += usize::from(*before && !after);
+        added += usize::from(!before && *after && in_block);
+        assert!(in_block || before == after, "{p}");
+    }
+    assert_eq!(lost, 0);
+    assert!(
+        (19_usize.pow(3)..=21_usize.pow(3)).contains(&added),
+        "{added}"
+    );
+    assert_eq!(kept.report.limb_voxels, removed.report.limb_voxels + added);
+    let topology = |limb: &Limb| limb.mesh.topology().components;
+    assert_eq!((topology(&removed), topology(&kept)), (1, 2));
+    let points = |limb: &Limb| {
+        let bodies = limb.report.bodies.iter();
+        bodies.map(|body| body.kept.len()).collect::<Vec<_>>()
+    };
+    assert_eq!((points(&removed), points(&kept)), (vec![0, 0], vec![0, 1]));
+
+    // A second point of the block, or one of the leg, changes nothing; one in air is refused.
+    let aside = centre + nalgebra::Vector3::new(3.0, 0.0, 0.0);
+    assert_eq!(of(&[centre, aside]).expect("limb").mask, kept.mask);
+    let in_leg = Point3::from(removed.report.bodies[0].centre_mm);
+    assert_eq!(of(&[in_leg]), Ok(removed));
+    let air = centre - nalgebra::Vector3::new(20.0, 0.0, 0.0);
+    assert_eq!(of(&[air]), Err(LimbError::Kept(air.into())));
+}
+
+#[test]
+fn settings_without_kept_bodies_are_written_as_before() {
+    let text = serde_json::to_string(&LimbSettings::default()).unwrap();
+    assert!(!text.contains("kept"), "{text}");
+}
+
 /// Two legs alike a hand's breadth apart: the direction chooses, not the few voxels of bone by which one is larger.
 #[test]
 fn of_two_limbs_the_one_in_the_wanted_direction_is_taken() {

@@ -14,6 +14,7 @@ import { DatasetPanel } from "/page/dataset.js";
 import { GradingPanel } from "/page/grading.js";
 import { TrainingPanel } from "/page/training.js";
 import { LivePanel } from "/page/live.js";
+import { BodyPicker } from "/page/bodies.js";
 import { CropPanel, cropOf } from "/page/crop.js";
 import { showScan, showSkin } from "/page/scan.js";
 import { drawRoom, roomFacts } from "/page/room.js";
@@ -34,6 +35,7 @@ const view3d = new View3d(byId("view3d"), actions);
 const landmarks = new LandmarkPanel(store, actions);
 const crop = new CropPanel(store, actions);
 const shapes = new ShapePanel(store, { surface: () => showSurface(false).then(() => view3d.draw()).catch(fail) });
+const bodies = new BodyPicker(store, view3d, { change, fail, surface: () => showSurface(false).then(() => view3d.draw()).catch(fail) });
 const whatIf = new WhatIfPanel(store, actions);
 const plan = new PlanPanel({
   fail,
@@ -116,7 +118,10 @@ async function show(doc) {
   landmarks.show();
   showCommands();
   slices.forEach((view) => view.update());
-  if (skinChanged || shapeChanged) await showSurface(!before);
+  if (skinChanged || shapeChanged) {
+    bodies.end();
+    await showSurface(!before);
+  }
   drawLandmarks();
   whatIf.show();
   whatIf.changed();
@@ -125,7 +130,7 @@ async function show(doc) {
 async function showSurface(first) {
   if (first) framed = false;
   const surface = await shapes.load();
-  if (!surface) return;
+  if (!surface || bodies.on) return;
   view3d.show(surface);
   if (!framed) view3d.frame();
   framed = true;
@@ -206,8 +211,9 @@ function showReading(reading) {
 }
 
 // A click on the surface: a landmark, or the crosshair.
-function picked(place) {
+function picked(place, inside) {
   if (store.step === "landmarks" && landmarks.picked(place)) return;
+  if (bodies.picked(inside)) return;
   setPlace(place);
 }
 
@@ -219,6 +225,7 @@ function showRoom(next) {
 }
 
 function go(step) {
+  bodies.set(false);
   store.step = step;
   document.body.dataset.step = step;
   for (const tab of document.querySelectorAll("[role=tab]")) {
@@ -362,10 +369,9 @@ function listen() {
     follow(Number(event.target.value));
   });
   byId("iso").addEventListener("change", (event) => change("surface", { iso_hu: Number(event.target.value) }));
-  byId("limb-here").addEventListener("click", () => {
-    const place = transform(store.doc.grid.ct_from_voxel, store.cursor).map((x) => Math.round(10 * x) / 10);
-    change("surface", { inside: place });
-  });
+  const crosshair = () => transform(store.doc.grid.ct_from_voxel, store.cursor).map((x) => Math.round(10 * x) / 10);
+  byId("limb-here").addEventListener("click", () => change("surface", { inside: crosshair() }));
+  byId("body-here").addEventListener("click", () => change("body", { point: crosshair() }));
   byId("limb-find").addEventListener("click", () => change("surface", { inside: null }));
   byId("side").addEventListener("change", (event) => change("surface", { side: event.target.value }));
   byId("show-removed").addEventListener("change", (event) => {

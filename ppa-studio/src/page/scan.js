@@ -30,11 +30,16 @@ export function showSkin(doc, actions) {
   byId("iso-value").textContent = fixed(doc.iso_hu, 0);
   byId("side").value = doc.side;
   const { report } = doc;
-  byId("bodies").replaceChildren(...report.bodies.slice(0, 8).map((body) => {
-    const item = element("li", `${body.chosen ? "taken: " : ""}${fixed(body.core_mm3 / 1000, 0)} ml around ${point(body.centre_mm, 0)} mm `);
+  byId("bodies").replaceChildren(...report.bodies.filter((body, rank) => rank < 8 || body.kept?.length).map((body) => {
+    const points = body.kept ?? [];
+    const state = body.chosen ? "taken: " : points.length ? "kept: " : "removed: ";
+    const item = element("li", `${state}${fixed(body.core_mm3 / 1000, 0)} ml around ${point(body.centre_mm, 0)} mm `);
     const where = `the body around ${point(body.centre_mm, 0)} mm`;
     item.append(button("Show", () => actions.place(body.centre_mm), `Show ${where}`));
-    if (!body.chosen) item.append(button("Take", () => actions.change("surface", { inside: body.centre_mm }), `Take ${where}`));
+    if (body.chosen) return item;
+    item.append(button("Take", () => actions.change("surface", { inside: body.centre_mm }), `Take ${where}`));
+    const change = points.length ? "Remove" : "Keep";
+    item.append(button(change, () => actions.change("body", { point: points[0] ?? body.centre_mm }), `${change} ${where}`));
     return item;
   }));
   byId("limb-find").disabled = !doc.inside;

@@ -35,6 +35,9 @@ void main() {
   pixel = vec4(painted * light, colour.a);
 }`;
 
+// From a point of a surface into what is below it, along the line of sight; bodies are at least 8 mm thick.
+const INSIDE_MM = 5;
+
 const FIELD_OF_VIEW = 30 * Math.PI / 180;
 
 export class View3d {
@@ -218,7 +221,7 @@ export class View3d {
     this.gl.uniformMatrix3fv(this.uniform("eyeFromModel"), false, facing.flat());
   }
 
-  // The point of the skin under the pointer, in the ct frame.
+  // The point of the skin under the pointer, and one behind it, in the ct frame.
   pick(x, y) {
     if (!this.surface) return;
     const { at, right, up, back } = this.eye();
@@ -228,6 +231,9 @@ export class View3d {
     const direction = unit(add(add(scale(right, u), scale(up, v)), scale(back, -1)));
     const ctFromWorld = inverse(this.worldFromCt);
     const point = hit(this.surface, transform(ctFromWorld, at), rotate(ctFromWorld, direction));
-    if (point) this.actions.picked(point.map((c) => Math.round(10 * c) / 10));
+    if (!point) return;
+    const inside = add(point, scale(rotate(ctFromWorld, direction), INSIDE_MM));
+    const rounded = (place) => place.map((c) => Math.round(10 * c) / 10);
+    this.actions.picked(rounded(point), rounded(inside));
   }
 }

@@ -129,10 +129,33 @@ pub(super) async fn surface(
 ) -> Answer {
     edit(state, move |mut case| {
         case.surface.iso_hu = change.iso_hu.unwrap_or(case.surface.iso_hu);
-        case.surface.inside = change.inside.unwrap_or(case.surface.inside);
+        if let Some(inside) = change.inside {
+            // Bodies were kept as parts of the limb that was taken before.
+            case.surface.inside = inside;
+            case.surface.kept.clear();
+        }
         case.surface.crop = change.crop.unwrap_or(case.surface.crop);
         case.side = change.side.unwrap_or(case.side);
         case
+    })
+    .await
+}
+
+/// A point in a body of the scan, `ct` frame, mm.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct InBody {
+    point: [f64; 3],
+}
+
+/// Keeps a body as a part of the limb, or removes it.
+pub(super) async fn body(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(InBody { point }): Json<InBody>,
+) -> Answer {
+    work(state, move |state| {
+        state.edit(|desk| desk.keep_or_remove(point))?;
+        document(state).map(Json)
     })
     .await
 }

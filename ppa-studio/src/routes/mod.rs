@@ -31,6 +31,7 @@ pub(crate) fn router(state: Arc<State>) -> Router {
         .route("/state", get(document::state))
         .route("/choices", post(document::choices))
         .route("/surface", post(document::surface))
+        .route("/body", post(document::body))
         .route("/acknowledged", post(document::acknowledged))
         .route("/undo", post(document::undo))
         .route("/redo", post(document::redo))

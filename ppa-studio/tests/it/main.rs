@@ -8,6 +8,7 @@ mod edits;
 mod generation;
 mod grading;
 mod images;
+mod kept_bodies;
 mod live;
 mod networks;
 mod page;

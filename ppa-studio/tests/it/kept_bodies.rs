@@ -1,0 +1,211 @@
+//! Bodies beside the limb that are kept as parts of it.
+
+use std::path::{Path, PathBuf};
+
+use axum::http::StatusCode;
+use ppa_ct::{Grid, ReadOptions, Volume, write_nifti};
+use ppa_generate::{Case, PreparedLimb, prepare};
+use ppa_mesh::LimbSettings;
+use ppa_phantom::{LowerLeg, TableTop};
+use ppa_scene::{LandmarkOverrides, Side};
+use serde_json::{Value, json};
+
+use crate::browser::Browser;
+use crate::chromium::{Page, run};
+
+const VOXEL_MM: f64 = 2.0;
+
+/// P01 with a block of 40 mm in the air beside the calf, and its case; the centre of the block.
+fn with_block(folder: &Path) -> (PathBuf, [f64; 3]) {
+    let leg = LowerLeg::p01();
+    let scan = leg.voxelise(VOXEL_MM, TableTop::Absent).unwrap();
+    let size = scan.grid().size();
+    // As many columns again as the block and the air before it need.
+    let more = 32;
+    let spacing = scan.grid().spacing_mm();
+    let origin = scan.grid().centre([-(more as f64), 0.0, 0.0]);
+    let grid = Grid::axis_aligned([size[0] + more, size[1], size[2]], spacing, origin).unwrap();
+    let centre = [11, size[1] / 2, size[2] / 2];
+    let hu = (0..grid.len()).map(|at| {
+        let [i, j, k] = grid.voxel(at);
+        let in_block = [i, j, k]
+            .iter()
+            .zip(centre)
+            .all(|(a, b)| a.abs_diff(b) <= 10);
+        match i.checked_sub(more) {
+            _ if in_block => 60.0,
+            Some(i) => scan.at([i, j, k]),
+            None => -1000.0,
+        }
+    });
+    let volume = Volume::new(grid.clone(), hu.collect()).unwrap();
+    write_nifti(&folder.join("p01.nii"), &volume).unwrap();
+    let file = folder.join("p01.case.toml");
+    prepared(folder, &[]).0.write(&file).unwrap();
+    (file, grid.centre(centre.map(|v| v as f64)).into())
+}
+
+/// The case of the scan as `ppa prepare --keep` makes it.
+fn prepared(folder: &Path, kept: &[[f64; 3]]) -> (Case, PreparedLimb) {
+    let surface = LimbSettings {
+        kept: kept.to_vec(),
+        ..LimbSettings::default()
+    };
+    let (reading, choices) = (ReadOptions::default(), LandmarkOverrides::default());
+    let scan = folder.join("p01.nii");
+    prepare(&scan, &reading, Side::Right, &surface, &choices).unwrap()
+}
+
+fn kept_points(state: &Value) -> usize {
+    let bodies = state["report"]["bodies"].as_array().unwrap().iter();
+    bodies.filter(|body| body.get("kept").is_some()).count()
+}
+
+#[test]
+fn a_kept_body_is_that_of_the_command_and_is_undone() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, block) = with_block(folder.path());
+    let browser = Browser::of(folder, file);
+    let before = browser.get("/api/state").json();
+    assert_eq!(kept_points(&before), 0);
+    let click = |point: [f64; 3]| browser.post("/api/body", &json!({ "point": point }));
+    let state = click(block).json();
+    assert_eq!(kept_points(&state), 1);
+    let codes: Vec<&Value> = state["findings"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|f| &f["code"])
+        .collect();
+    assert!(codes.contains(&&json!("body-kept")), "{codes:?}");
+    let [x, y, z] = block;
+    let command = state["commands"]["prepare"].as_str().unwrap();
+    assert!(
+        command.contains(&format!(" --keep={x},{y},{z}")),
+        "{command}"
+    );
+
+    // The command finds the same, and so does whoever reads the changed case.
+    let (expected, limb) = prepared(browser.folder.path(), &[block]);
+    let edited = Case::read(&browser.folder.path().join("p01.edited.case.toml")).unwrap();
+    assert_eq!(edited.surface, expected.surface);
+    let shown = serde_json::to_value(&limb.limb.report).unwrap();
+    assert_eq!(state["report"], shown);
+    let again = PreparedLimb::of_case(&edited).unwrap();
+    assert_eq!(again.limb, limb.limb);
+    assert_eq!(again.landmarks, limb.landmarks);
+
+    let state = browser.post("/api/undo", &json!({})).json();
+    assert_eq!(state["report"], before["report"]);
+    let state = browser.post("/api/redo", &json!({})).json();
+    assert_eq!(kept_points(&state), 1);
+    // Another point of the same body.
+    let state = click([x - 5.0, y, z]).json();
+    assert_eq!(state["report"], before["report"]);
+    let leg: [f64; 3] =
+        serde_json::from_value(before["landmarks"]["joint_centre"].clone()).unwrap();
+    for (point, says) in [
+        ([x, y + 60.0, z], "is not in solid tissue"),
+        (leg, "is in the limb itself"),
+    ] {
+        let refused = click(point);
+        assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
+        assert!(refused.text().contains(says), "{}", refused.text());
+    }
+    let state = browser.post("/api/undo", &json!({})).json();
+    assert_eq!(kept_points(&state), 1);
+}
+
+/// The place of a point in the canvas in three dimensions, as the page first looks at the skin: 30 degrees wide, turned by -0.6 and
+/// 0.25 rad.
+fn on_screen(point: [f64; 3], skin: &ppa_mesh::Mesh, [width, height]: [f64; 2]) -> [f64; 2] {
+    use nalgebra::{Point3, Vector3};
+    let (azimuth, elevation) = (-0.6_f64, 0.25_f64);
+    let across = elevation.cos();
+    let back = Vector3::new(
+        across * azimuth.sin(),
+        -across * azimuth.cos(),
+        elevation.sin(),
+    );
+    let right = Vector3::z().cross(&back).normalize();
+    let up = back.cross(&right);
+    let corner = |pick: fn(f64, f64) -> f64, from: f64| {
+        let vertices = skin.vertices.iter().map(|v| v.cast::<f64>());
+        vertices.fold(Point3::new(from, from, from), |a, b| {
+            Point3::new(pick(a.x, b.x), pick(a.y, b.y), pick(a.z, b.z))
+        })
+    };
+    let (low, high) = (
+        corner(f64::min, f64::INFINITY),
+        corner(f64::max, f64::NEG_INFINITY),
+    );
+    let half = 15_f64.to_radians().tan();
+    let distance = 1.1 * (high - low).norm() / (2.0 * half);
+    let from_centre = Point3::from(point) - nalgebra::center(&low, &high);
+    let depth = distance - from_centre.dot(&back);
+    let [u, v] = [right, up].map(|axis| from_centre.dot(&axis) / (depth * half));
+    [0.5 * (width + u * height), 0.5 * (1.0 - v) * height]
+}
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn a_body_is_kept_and_removed_by_buttons() {
+    run(async {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, block) = with_block(folder.path());
+        let page = Page::of(folder, &file).await;
+        page.click("#tab-skin").await;
+        let bodies = "document.getElementById('bodies').textContent";
+        page.wait(&format!("{bodies}.includes('removed: ')")).await;
+        page.click("#bodies [aria-label^='Show'] ~ [aria-label^='Keep']")
+            .await;
+        page.wait(&format!("{bodies}.includes('kept: ')")).await;
+        page.wait("document.getElementById('command-list').textContent.includes('--keep=')")
+            .await;
+        page.picture("skin_kept").await;
+        page.click("#undo").await;
+        page.wait(&format!("!{bodies}.includes('kept: ')")).await;
+        page.wait("!document.getElementById('redo').disabled").await;
+        page.click("#redo").await;
+        page.wait(&format!("{bodies}.includes('kept: ')")).await;
+        page.click("#bodies [aria-label^='Remove']").await;
+        page.wait(&format!("!{bodies}.includes('kept: ')")).await;
+
+        // Clicks on the block in three dimensions.
+        let size = page.value("(() => { const c = document.querySelector('#view3d canvas'); return [c.clientWidth, c.clientHeight]; })()").await;
+        let size: [f64; 2] = serde_json::from_value(size).unwrap();
+        let skin = prepared(page.folder.path(), &[]).1.limb.mesh.clone();
+        let click = |point: [f64; 3]| {
+            let at = on_screen(point, &skin, size);
+            let script = "const [x, y] = arguments[0]; const c = document.querySelector('#view3d canvas'); \
+                          c.setPointerCapture = () => {}; const r = c.getBoundingClientRect(); \
+                          for (const kind of ['pointerdown', 'pointerup']) c.dispatchEvent(new PointerEvent(kind, { \
+                            clientX: r.left + x, clientY: r.top + y, bubbles: true }));";
+            page.client.execute(script, vec![json!(at)])
+        };
+        let ready = "document.getElementById('body-pick').ariaPressed === 'true' && !document.getElementById('body-pick').ariaBusy";
+        page.click("#body-pick").await;
+        page.wait(ready).await;
+        page.picture("skin_bodies").await;
+        click(block).await.unwrap();
+        page.wait(&format!("{bodies}.includes('kept: ')")).await;
+        page.wait("document.getElementById('body-pick').ariaPressed === 'false'")
+            .await;
+        page.wait("!document.body.ariaBusy").await;
+        page.picture("skin_clicked").await;
+        page.click("#body-pick").await;
+        page.wait(ready).await;
+        click(block).await.unwrap();
+        page.wait(&format!("!{bodies}.includes('kept: ')")).await;
+        page.wait("!document.body.ariaBusy").await;
+
+        // The body at the crosshair.
+        page.click("#bodies li:not(:first-child) [aria-label^='Show']")
+            .await;
+        page.click("#body-here").await;
+        page.wait(&format!("{bodies}.includes('kept: ')")).await;
+        page.client.set_window_size(600, 900).await.unwrap();
+        page.picture("skin_kept_narrow").await;
+        page.close().await;
+    });
+}
