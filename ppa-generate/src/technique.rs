@@ -49,7 +49,7 @@ impl Technique {
                     packing: 0.8,
                 })
                 .with_collection_swank(0.92)
-                .with_blur(Some(Blur::Lorentzian { h_mm2: 0.45 }))
+                .with_blur(Some(Blur::lorentzian(0.45)))
                 .with_electronic_noise_kev(90.0),
             marker: Some(MarkerPlace::new([-75.0, -95.0])),
             tube_load: Some(TubeLoad::Mas(mas)),

@@ -42,7 +42,7 @@ fn source_and_receptor_are_read_from_the_plan() {
         receptor.model,
         DetectorModel::Csi { packing: 0.8, .. }
     ));
-    assert_eq!(receptor.blur, Some(Blur::Lorentzian { h_mm2: 0.45 }));
+    assert_eq!(receptor.blur, Some(Blur::lorentzian(0.45)));
     assert_eq!(receptor.grid.as_ref().unwrap().strip, "lead");
     let folder = tempfile::tempdir().unwrap();
     let copy = folder.path().join("copy.toml");
@@ -52,6 +52,38 @@ fn source_and_receptor_are_read_from_the_plan() {
         (&again.xray.source, &again.xray.receptor),
         (source, receptor)
     );
+}
+
+/// Keys that are left out are not written, so that plans of earlier programs keep their text and hash.
+#[test]
+fn noise_transfers_are_read_and_written_only_where_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let written = |receptor: &str| {
+        let plan = read(&format!("[xray.receptor]\n{receptor}\n")).unwrap();
+        let copy = folder.path().join("copy.toml");
+        plan.write(&copy).unwrap();
+        assert_eq!(Plan::read(&copy).unwrap().xray.receptor, plan.xray.receptor);
+        let text = std::fs::read_to_string(&copy).unwrap();
+        std::fs::remove_file(copy).unwrap();
+        (plan.xray.receptor.blur.unwrap(), text)
+    };
+    let keys = |text: &str| {
+        let keys = text.lines().filter(|line| !line.starts_with('#'));
+        keys.filter(|line| line.contains("noise_h") || line.starts_with("noise = "))
+            .count()
+    };
+    let (blur, text) = written("blur = { lorentzian = { h_mm2 = 0.45 } }");
+    assert_eq!((blur, keys(&text)), (Blur::lorentzian(0.45), 0));
+    let (blur, text) = written("blur = { lorentzian = { h_mm2 = 0.45, noise_h_mm2 = 0.3 } }");
+    let expected = Blur::Lorentzian {
+        h_mm2: 0.45,
+        noise_h_mm2: Some(0.3),
+    };
+    assert_eq!((blur, keys(&text)), (expected, 1));
+    let table = "blur = { mtf = { per_mm = [1, 2], mtf = [0.7, 0.4], noise = [0.8, 0.6] } }";
+    let (blur, text) = written(table);
+    assert!(matches!(blur, Blur::Mtf { noise: Some(noise), .. } if noise == [0.8, 0.6]));
+    assert_eq!(keys(&text), 1, "{text}");
 }
 
 #[test]

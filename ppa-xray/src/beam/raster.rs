@@ -33,6 +33,20 @@ impl Raster {
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
+    /// The place that lies `step` cells from another along x and y; from the inside of the raster not beyond it, as if it continued as its mirror image.
+    pub fn moved(&self, from_mm: [f64; 2], step: [f64; 2]) -> [f64; 2] {
+        if self.cell_at(from_mm[0], from_mm[1]).is_none() {
+            return from_mm;
+        }
+        [0, 1].map(|axis| {
+            let cells = [self.columns, self.rows][axis] as f64;
+            let side_mm = self.extent_mm[axis] / cells;
+            let low_mm = self.centre_mm[axis] - 0.5 * self.extent_mm[axis];
+            let to = ((from_mm[axis] - low_mm) / side_mm + step[axis]).rem_euclid(2.0 * cells);
+            low_mm + side_mm * to.min(2.0 * cells - to)
+        })
+    }
+
     /// Cells under a square about a point of the raster, and their shares; its side is `spot` cells, at most 1.
     ///
     /// What lies beyond the raster is folded back, as if it continued as its mirror image. None if the point lies outside.
@@ -68,6 +82,19 @@ mod tests {
     use super::*;
 
     proptest! {
+        /// Steps inside the raster are steps; one across an edge is folded back, whatever its length.
+        #[test]
+        fn a_moved_photon_stays_in_the_raster(x in 0.0..6.0_f64, y in 0.0..4.0_f64, step in -30.0..30.0_f64) {
+            let raster = Raster { columns: 12, rows: 8, centre_mm: [3.0, 2.0], extent_mm: [6.0, 4.0] };
+            let [to_x, to_y] = raster.moved([x, y], [step, 0.0]);
+            prop_assert!((to_y - y).abs() < 1e-9);
+            let plain = x + 0.5 * step;
+            prop_assert!((-1e-9..6.0 + 1e-9).contains(&to_x), "{to_x}");
+            let fold = |of: f64| ((of / 6.0 * std::f64::consts::PI).cos() - (to_x / 6.0 * std::f64::consts::PI).cos()).abs();
+            prop_assert!(fold(plain) < 1e-9, "{plain} to {to_x}");
+            prop_assert_eq!(raster.moved([7.0, y], [step, 0.0]), [7.0, y]);
+        }
+
         /// Shares of a spread photon sum to 1, balance about it, and are those of the squares' overlap; beside an edge
         /// they fold back.
         #[test]

@@ -58,6 +58,10 @@ pub enum Blur {
     Lorentzian {
         /// H, mm².
         h_mm2: f64,
+        /// H of the noise, mm², 0 to that of the signal: the normalised noise power of the converter is 1 / (1 + H f²)². Less than that of the signal where
+        /// the blur depends on the depth of the interaction (Lubberts, J. Opt. Soc. Am. 58 (1968) 1475); the DQE falls by the ratio MTF² over noise power. None for the H of the signal.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        noise_h_mm2: Option<f64>,
     },
     /// A measured curve: a presampled MTF divided by sinc(f · pixel).
     Mtf {
@@ -65,7 +69,21 @@ pub enum Blur {
         per_mm: Vec<f64>,
         /// Values, 1 at frequency 0 and falling.
         mtf: Vec<f64>,
+        /// Noise transfer at the frequencies: the root of the normalised noise power of the converter, without aperture and aliases. Nowhere below the MTF. None for the MTF.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        noise: Option<Vec<f64>>,
     },
+}
+
+impl Blur {
+    /// 1 / (1 + H f²) for signal and noise.
+    #[must_use]
+    pub fn lorentzian(h_mm2: f64) -> Self {
+        Self::Lorentzian {
+            h_mm2,
+            noise_h_mm2: None,
+        }
+    }
 }
 
 /// Energy that a photon leaves in the detector.
@@ -207,27 +225,43 @@ pub enum ReceptorError {
         /// Distance from strip to strip.
         pitch_mm: f64,
     },
-    /// A table of an MTF without pairs.
+    /// A table of an MTF or a noise transfer without pairs.
     #[error(
-        "the numbers of frequencies and values of the MTF table are {frequencies} and {values}, expected the same, at least 1"
+        "the numbers of frequencies and values of the {curve} table are {frequencies} and {values}, expected the same, at least 1"
     )]
     MtfTable {
+        /// MTF or noise transfer.
+        curve: &'static str,
         /// Number of frequencies.
         frequencies: usize,
         /// Number of values.
         values: usize,
     },
-    /// An MTF unlike that of a converter.
+    /// An MTF or noise transfer unlike that of a converter.
     #[error(
-        "the MTF of {found} at {per_mm}/mm cannot be that of a converter, whose curve falls steadily: the nearest such curve has {nearest:.3} there"
+        "the {curve} of {found} at {per_mm}/mm cannot be that of a converter, whose curve falls steadily: the nearest such curve has {nearest:.3} there"
     )]
     Mtf {
+        /// MTF, noise transfer, or the ratio of both.
+        curve: &'static str,
         /// Frequency, 1/mm.
         per_mm: f64,
         /// Value there.
         found: f64,
         /// Value of the sum of Gaussians that comes nearest to the whole curve.
         nearest: f64,
+    },
+    /// Noise that is blurred more than the signal.
+    #[error(
+        "the noise transfer of {noise} at {per_mm}/mm is below the MTF of {mtf} there, expected the MTF or more"
+    )]
+    NoiseBelowMtf {
+        /// Frequency, 1/mm.
+        per_mm: f64,
+        /// Noise transfer there.
+        noise: f64,
+        /// MTF there.
+        mtf: f64,
     },
     /// A material that is not in the library.
     #[error("the grid's {part} is of an unknown material: {message}")]

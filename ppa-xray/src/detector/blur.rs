@@ -9,6 +9,9 @@
 //! Blurring pixels that have counted whole photons would give T² instead, too much below the Nyquist frequency: an image
 //! that is drawn has noise and signal spread separately, and one that is counted has each photon spread over a small
 //! square first.
+//!
+//! Where the blur depends on the depth of the interaction, noise is blurred less than the signal: by N in place of T in the sum above, see
+//! [`Lubberts`].
 
 use std::f64::consts::TAU;
 
@@ -17,6 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::beam::receptor::{Blur, ReceptorError};
 use crate::detector::kernel::{Kernel, frequencies};
+use crate::detector::lubberts::{Displacement, Lubberts};
 use crate::detector::mtf::{Mtf, sinc};
 
 /// The blur of a converter on pixels of one size.
@@ -24,6 +28,9 @@ use crate::detector::mtf::{Mtf, sinc};
 #[serde(deny_unknown_fields)]
 pub(crate) struct Spread {
     mtf: Mtf,
+    /// How noise differs from the signal; none where it does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    lubberts: Option<Lubberts>,
     /// Side of the square over which photons that are counted are spread, in pixels; at most 1.
     spot_pixels: f64,
 }
@@ -33,8 +40,14 @@ impl Spread {
     /// [`ReceptorError`] for numbers that make no sense, and for a curve that is not that of a converter.
     pub fn of(blur: &Blur, pixel_mm: f64) -> Result<Self, ReceptorError> {
         let mtf = Mtf::of(blur, pixel_mm)?;
-        let spot_pixels = spot_with_the_right_variance(&mtf);
-        Ok(Self { mtf, spot_pixels })
+        let lubberts = Lubberts::of(blur, pixel_mm)?;
+        let noise = lubberts.as_ref().map_or(&mtf, |lubberts| &lubberts.noise);
+        let spot_pixels = spot_with_the_right_variance(noise);
+        Ok(Self {
+            mtf,
+            lubberts,
+            spot_pixels,
+        })
     }
 
     /// Side of the square over which photons that are counted are spread, in pixels.
@@ -42,26 +55,46 @@ impl Spread {
         self.spot_pixels
     }
 
+    /// How photons are displaced before they are counted; none where they are not.
+    pub fn displacement(&self) -> Option<&Displacement> {
+        self.lubberts
+            .as_ref()
+            .map(|lubberts| &lubberts.displacement)
+    }
+
     /// The kernel for the expected signal of pixels.
     pub fn of_signal(&self) -> Kernel {
         Kernel::of_transfer(self.reach(), |f| self.mtf.plane(f))
     }
 
+    /// The kernel from the expected signal of pixels to what they count of displaced photons; none where photons are not displaced.
+    pub fn of_displacement(&self) -> Option<Kernel> {
+        let displacement = self.displacement()?;
+        Some(Kernel::of_transfer(self.reach(), |f| displacement.plane(f)))
+    }
+
     /// The kernel that turns white noise into that of the detector.
     pub fn of_white_noise(&self) -> Kernel {
-        Kernel::of_transfer(self.reach(), |f| self.mtf.noise_power(f).map(f64::sqrt))
+        Kernel::of_transfer(self.reach(), |f| self.noise().noise_power(f).map(f64::sqrt))
     }
 
     /// The kernel for pixels that have counted photons spread over the spot, and the one for the squares they counted.
     pub fn of_counts(&self) -> [Kernel; 2] {
         let spot = |f: f64| sinc(self.spot_pixels * f);
         let kernel = Kernel::of_transfer(self.reach(), |f| {
-            let plane = self.mtf.plane(f);
+            let plane = self.noise().plane(f);
             plane.map_with_location(|i, j, value| value / (spot(f[i]) * spot(f[j])))
         });
-        let power = counted_power(&self.mtf, self.spot_pixels, &frequencies(FREQUENCIES));
+        let power = counted_power(self.noise(), self.spot_pixels, &frequencies(FREQUENCIES));
         let squares = kernel.squared(power.mean());
         [kernel, squares]
+    }
+
+    /// The transfer of a photon's light, the same for all photons, after their displacement.
+    fn noise(&self) -> &Mtf {
+        self.lubberts
+            .as_ref()
+            .map_or(&self.mtf, |lubberts| &lubberts.noise)
     }
 
     /// Where kernels end. Their transfer functions have a kink at Nyquist, so they continue a little beyond the light.
@@ -118,7 +151,7 @@ mod tests {
             (0.45, 0.15, 1.11),
             (0.45, 0.1, 1.13),
         ] {
-            let spread = Spread::of(&Blur::Lorentzian { h_mm2 }, pixel_mm).unwrap();
+            let spread = Spread::of(&Blur::lorentzian(h_mm2), pixel_mm).unwrap();
             let frequencies = frequencies(FREQUENCIES);
             let expected = spread.mtf.noise_power(&frequencies);
             let found = counted_power(&spread.mtf, spread.spot_pixels, &frequencies);
@@ -141,7 +174,7 @@ mod tests {
     /// Kernels have the sums of squares that their powers have.
     #[test]
     fn kernels_have_the_gain_of_their_power() {
-        let spread = Spread::of(&Blur::Lorentzian { h_mm2: 0.45 }, 0.3).unwrap();
+        let spread = Spread::of(&Blur::lorentzian(0.45), 0.3).unwrap();
         let power = spread.mtf.noise_power(&frequencies(64)).mean();
         let gain = spread.of_white_noise().noise_gain();
         assert!((gain / power - 1.0).abs() < 2e-3, "{gain} {power}");

@@ -8,6 +8,7 @@ pub(crate) mod grid;
 pub(crate) mod kernel;
 mod layer;
 mod layer_response;
+pub(crate) mod lubberts;
 pub(crate) mod mtf;
 pub(crate) mod open_field;
 mod quadrature;

@@ -24,34 +24,78 @@ const ALIASES: i32 = 16;
 /// Largest difference between a curve and its sum of Gaussians that passes.
 const WORST_FIT: f64 = 0.03;
 
+/// A value of a transfer function at a frequency.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CurvePoint {
+    pub per_mm: f64,
+    pub value: f64,
+    /// How much its error counts in a fit, at most 1.
+    pub weight: f64,
+}
+
+impl CurvePoint {
+    fn new(per_mm: f64, value: f64) -> Self {
+        Self {
+            per_mm,
+            value,
+            weight: 1.0,
+        }
+    }
+}
+
+/// Three times the Nyquist frequency, where the first aliases end.
+pub(crate) fn last_per_mm(pixel_mm: f64) -> f64 {
+    1.5 / pixel_mm
+}
+
+/// Points of 1 / (1 + H f²).
+pub(crate) fn lorentzian(h_mm2: f64, last_per_mm: f64) -> Vec<CurvePoint> {
+    let points = (0..=64).map(|i| last_per_mm * f64::from(i) / 64.0);
+    points
+        .map(|f| CurvePoint::new(f, 1.0 / (1.0 + h_mm2 * f * f)))
+        .collect()
+}
+
 impl Mtf {
-    /// Fits the sum up to three times the Nyquist frequency, where the first aliases end.
+    /// The MTF of the signal, fitted up to three times the Nyquist frequency, where the first aliases end.
     ///
     /// # Errors
     /// [`ReceptorError`] for numbers that make no sense, and for a curve that no sum of Gaussians follows within 0.03.
     pub fn of(blur: &Blur, pixel_mm: f64) -> Result<Self, ReceptorError> {
-        let last_per_mm = 1.5 / pixel_mm;
-        let curve: Vec<(f64, f64)> = match blur {
-            Blur::Lorentzian { h_mm2 } => {
+        let last_per_mm = last_per_mm(pixel_mm);
+        let curve = match blur {
+            Blur::Lorentzian { h_mm2, .. } => {
                 let expected = "1e-6 to 1000 mm²";
                 require("H of the MTF 1/(1 + H f²)", *h_mm2, 1e-6..=1e3, expected)?;
-                let points = (0..=64).map(|i| last_per_mm * f64::from(i) / 64.0);
-                points.map(|f| (f, 1.0 / (1.0 + h_mm2 * f * f))).collect()
+                lorentzian(*h_mm2, last_per_mm)
             }
-            Blur::Mtf { per_mm, mtf } => table(per_mm, mtf, last_per_mm)?,
+            Blur::Mtf { per_mm, mtf, .. } => table("MTF", per_mm, mtf, last_per_mm)?,
         };
+        Self::fitted("MTF", &curve, pixel_mm)
+    }
+
+    /// The sum of Gaussians that comes nearest to the points of a curve.
+    ///
+    /// # Errors
+    /// [`ReceptorError::Mtf`] where it is off by more than 0.03 over the weight of the point.
+    pub fn fitted(
+        name: &'static str,
+        curve: &[CurvePoint],
+        pixel_mm: f64,
+    ) -> Result<Self, ReceptorError> {
         let sigma_mm = |i: i32| pixel_mm * 0.05 * 1.35_f64.powi(i);
         let basis: Vec<f64> = std::iter::once(0.0).chain((0..24).map(sigma_mm)).collect();
-        let weights = fit(&curve, &basis);
+        let weights = fit(curve, &basis);
         let sum: f64 = weights.iter().sum();
-        for &(f, expected) in &curve {
+        for point in curve {
             let parts = weights.iter().zip(&basis);
-            let found = parts.map(|(w, sigma)| w / sum * gaussian_mtf(*sigma, f));
+            let found = parts.map(|(w, sigma)| w / sum * gaussian_mtf(*sigma, point.per_mm));
             let found: f64 = found.sum();
-            if (found - expected).abs() > WORST_FIT {
+            if point.weight * (found - point.value).abs() > WORST_FIT {
                 return Err(ReceptorError::Mtf {
-                    per_mm: f,
-                    found: expected,
+                    curve: name,
+                    per_mm: point.per_mm,
+                    found: point.value,
                     nearest: found,
                 });
             }
@@ -63,6 +107,11 @@ impl Mtf {
         Ok(Self {
             terms: terms.collect(),
         })
+    }
+
+    /// Weights and standard deviations of the Gaussians in pixels.
+    pub fn terms(&self) -> &[(f64, f64)] {
+        &self.terms
     }
 
     /// Values at all pairs of `frequencies`, in cycles per pixel.
@@ -134,18 +183,24 @@ fn gaussian_mtf(sigma: f64, f: f64) -> f64 {
 }
 
 /// A measured curve, checked, with (0, 1) in front and without what lies beyond the last frequency.
-fn table(per_mm: &[f64], mtf: &[f64], last_per_mm: f64) -> Result<Vec<(f64, f64)>, ReceptorError> {
-    if per_mm.len() != mtf.len() || per_mm.is_empty() {
+pub(crate) fn table(
+    name: &'static str,
+    per_mm: &[f64],
+    values: &[f64],
+    last_per_mm: f64,
+) -> Result<Vec<CurvePoint>, ReceptorError> {
+    if per_mm.len() != values.len() || per_mm.is_empty() {
         return Err(ReceptorError::MtfTable {
+            curve: name,
             frequencies: per_mm.len(),
-            values: mtf.len(),
+            values: values.len(),
         });
     }
-    let mut curve = vec![(0.0_f64, 1.0_f64)];
-    for (&f, &value) in per_mm.iter().zip(mtf) {
-        let last = curve[curve.len() - 1].0;
+    let mut curve = vec![CurvePoint::new(0.0, 1.0)];
+    for (&f, &value) in per_mm.iter().zip(values) {
+        let last = curve[curve.len() - 1].per_mm;
         if f == 0.0 && curve.len() == 1 {
-            require("the MTF at 0/mm", value, 1.0..=1.0, "1")?;
+            require("MTF or noise transfer at 0/mm", value, 1.0..=1.0, "1")?;
             continue;
         }
         let above = "above the frequency before it";
@@ -155,11 +210,12 @@ fn table(per_mm: &[f64], mtf: &[f64], last_per_mm: f64) -> Result<Vec<(f64, f64)
             last.next_up()..=f64::MAX,
             above,
         )?;
-        require("a value of the MTF table", value, 0.0..=1.0, "0 to 1")?;
-        curve.push((f, value));
+        let what = "a value of the MTF or noise transfer table";
+        require(what, value, 0.0..=1.0, "0 to 1")?;
+        curve.push(CurvePoint::new(f, value));
     }
     // One point beyond it is kept, so that the fit knows where the curve goes.
-    let inside = curve.partition_point(|&(f, _)| f <= last_per_mm);
+    let inside = curve.partition_point(|point| point.per_mm <= last_per_mm);
     curve.truncate(inside + 1);
     Ok(curve)
 }
@@ -167,15 +223,21 @@ fn table(per_mm: &[f64], mtf: &[f64], last_per_mm: f64) -> Result<Vec<(f64, f64)
 /// Non-negative least squares by an active set (Lawson and Hanson, Solving Least Squares Problems, 1974, chapter 23).
 ///
 /// The value at frequency 0 weighs heavily, so that the weights sum to about 1.
-fn fit(curve: &[(f64, f64)], basis: &[f64]) -> Vec<f64> {
+fn fit(curve: &[CurvePoint], basis: &[f64]) -> Vec<f64> {
     const EMPHASIS: f64 = 30.0;
-    let emphasis = |f: f64| if f == 0.0 { EMPHASIS } else { 1.0 };
+    let emphasis = |point: &CurvePoint| {
+        if point.per_mm == 0.0 {
+            EMPHASIS
+        } else {
+            point.weight
+        }
+    };
     let matrix = DMatrix::from_fn(curve.len(), basis.len(), |row, column| {
-        emphasis(curve[row].0) * gaussian_mtf(basis[column], curve[row].0)
+        emphasis(&curve[row]) * gaussian_mtf(basis[column], curve[row].per_mm)
     });
     let target = DVector::from_iterator(
         curve.len(),
-        curve.iter().map(|&(f, value)| emphasis(f) * value),
+        curve.iter().map(|point| emphasis(point) * point.value),
     );
     let mut weights = DVector::<f64>::zeros(basis.len());
     let mut active: Vec<usize> = Vec::new();
@@ -234,7 +296,7 @@ mod tests {
     #[test]
     fn planes_are_those_of_the_curve() {
         for (h_mm2, pixel_mm) in [(0.45, 0.15), (0.45, 0.5), (0.45, 1.0), (0.02, 0.15)] {
-            let mtf = Mtf::of(&Blur::Lorentzian { h_mm2 }, pixel_mm).unwrap();
+            let mtf = Mtf::of(&Blur::lorentzian(h_mm2), pixel_mm).unwrap();
             let curve =
                 |fx: f64, fy: f64| 1.0 / (1.0 + h_mm2 * (fx * fx + fy * fy) / pixel_mm.powi(2));
             let frequencies = [0.0, 0.1, 0.25, 0.4, 0.5];
@@ -261,6 +323,7 @@ mod tests {
             let blur = Blur::Mtf {
                 per_mm: per_mm.to_vec(),
                 mtf: mtf.to_vec(),
+                noise: None,
             };
             Mtf::of(&blur, 0.2).unwrap_err().to_string()
         };
@@ -272,6 +335,7 @@ mod tests {
         let measured = Blur::Mtf {
             per_mm: vec![0.0, 0.5, 1.0, 2.0, 3.0],
             mtf: vec![1.0, 0.85, 0.65, 0.35, 0.2],
+            noise: None,
         };
         assert!(Mtf::of(&measured, 0.15).is_ok());
     }

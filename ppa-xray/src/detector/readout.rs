@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 use crate::beam::detector::Detector;
 use crate::beam::receptor::{Receptor, ReceptorError, require};
 use crate::detector::blur::Spread;
+use crate::detector::lubberts::Displacement;
+use crate::transport::tally::Moments;
 
 /// Blur and electronic noise, ready to be applied.
 ///
@@ -54,6 +56,34 @@ impl Readout {
     /// Side in pixels of the square over which photons are to be spread when they are counted; 0 without blur.
     pub fn spot_pixels(&self) -> f64 {
         self.blur.as_ref().map_or(0.0, Spread::spot_pixels)
+    }
+
+    /// How photons are to be displaced before they are counted; none for those that stay where they are.
+    pub fn displacement(&self) -> Option<&Displacement> {
+        self.blur.as_ref().and_then(Spread::displacement)
+    }
+
+    /// What pixels count of displaced photons in the mean, from what they would count without displacement; none where that is the same.
+    pub fn displaced(&self, moments: &[Moments], columns: usize) -> Option<Vec<Moments>> {
+        let kernel = self.blur.as_ref()?.of_displacement()?;
+        let spread = |of: fn(&Moments) -> f64| {
+            let plane: Vec<f32> = moments.iter().map(|pixel| of(pixel) as f32).collect();
+            kernel.apply(&plane, columns)
+        };
+        let mean_kev = spread(|pixel| pixel.mean_kev);
+        let square_kev2 = spread(|pixel| pixel.square_kev2);
+        let displaced = mean_kev.into_iter().zip(square_kev2).map(|(mean, square)| {
+            // The kernel rings beside sharp edges, to a hair below 0.
+            if mean > 0.0 && square > 0.0 {
+                Moments {
+                    mean_kev: f64::from(mean),
+                    square_kev2: f64::from(square),
+                }
+            } else {
+                Moments::default()
+            }
+        });
+        Some(displaced.collect())
     }
 
     /// What is read out of pixels that have counted photons one by one, with standard errors from the squares they counted.

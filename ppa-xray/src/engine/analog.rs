@@ -14,6 +14,7 @@ use crate::beam::marker::SideMarker;
 use crate::beam::projection::Projection;
 use crate::beam::raster::Raster;
 use crate::beam::spectrum::Spectrum;
+use crate::detector::lubberts::Displacement;
 use crate::detector::response::Response;
 use crate::dose::score::{DoseScore, DoseTarget};
 use crate::engine::analog_image::ImageSetup;
@@ -139,6 +140,8 @@ fn in_batches(exposure: &Exposure, histories: Range<u64>, follow: impl Fn(Range<
 struct DetectorScore<'a> {
     marker: Option<SideMarker>,
     response: &'a Response,
+    /// How photons are displaced before they are counted, and the raster that they stay in.
+    displacement: Option<(&'a Displacement, Raster)>,
     /// Side of the square over which a photon's energy is spread, in pixels.
     spot_pixels: f64,
     buffer: TallyBuffer<'a>,
@@ -149,6 +152,10 @@ impl<'a> DetectorScore<'a> {
         Self {
             marker: exposure.transport.projection.marker,
             response: &exposure.response,
+            displacement: exposure
+                .readout
+                .displacement()
+                .map(|displacement| (displacement, tally.raster)),
             spot_pixels: exposure.readout.spot_pixels(),
             buffer: TallyBuffer::new(tally),
         }
@@ -164,6 +171,10 @@ impl Score for DetectorScore<'_> {
             return;
         }
         let energy_kev = self.response.detect(arrival, rng);
+        let [x_mm, y_mm] = match &self.displacement {
+            None => [x_mm, y_mm],
+            Some((displacement, raster)) => raster.moved([x_mm, y_mm], displacement.draw(rng)),
+        };
         if self.spot_pixels == 0.0 {
             self.buffer.score(x_mm, y_mm, arrival.category, energy_kev);
         } else {

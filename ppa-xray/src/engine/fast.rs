@@ -177,18 +177,21 @@ fn expose(
         Category::Primary => (primary_kev, 0.0),
         _ => scattered[category as usize - 1].sum_kev,
     });
+    let readout = &exposure.readout;
+    let columns = detector.columns as usize;
     let [compton, rayleigh, multiple] = scattered.map(|scatter| ExpectedLayer {
+        counted: readout.displaced(&scatter.moments, columns),
         moments: scatter.moments,
         variance_kev2: scatter.variance_kev2,
     });
     let primary = ExpectedLayer {
+        counted: readout.displaced(&primary, columns),
         variance_kev2: vec![0.0; primary.len()],
         moments: primary,
     };
     let expected = [primary, compton, rayleigh, multiple];
     let ev_cm2 = 1e3 / detector.pixel_cm2();
     let drawn = noise::drawn(&expected, ev_cm2, settings.dose_histories, settings.seed);
-    let readout = &exposure.readout;
     let image = Radiograph {
         detector: projection.detector,
         engine: Engine::Fast,
@@ -198,7 +201,7 @@ fn expose(
         source_detector_mm: projection.source_detector_mm,
         open_field_ev_cm2,
         open_field,
-        layers: readout.drawn(drawn, detector.columns as usize),
+        layers: readout.drawn(drawn, columns),
         single_scatter_covariance: shared
             .into_iter()
             .map(|kev2| (kev2 * ev_cm2 * ev_cm2) as f32)

@@ -12,6 +12,8 @@ use crate::transport::tally::Moments;
 /// What the pixels of a layer hold in the mean.
 pub(crate) struct ExpectedLayer {
     pub moments: Vec<Moments>,
+    /// What they count in the mean, if that differs.
+    pub counted: Option<Vec<Moments>>,
     /// Squared standard error of the mean energy, keV² per history.
     pub variance_kev2: Vec<f64>,
 }
@@ -30,7 +32,7 @@ pub(crate) fn drawn(
             .map(|pixel| {
                 let mut rng = Philox::new(seed, Stream::QuantumNoise as u32, pixel as u64);
                 expected.each_ref().map(|layer| {
-                    let moments = &layer.moments[pixel];
+                    let moments = &layer.counted.as_ref().unwrap_or(&layer.moments)[pixel];
                     let deviation = draw(moments, histories, &mut rng) - moments.mean_kev;
                     let variance = moments.square_kev2 / histories;
                     (
@@ -46,6 +48,7 @@ pub(crate) fn drawn(
         let ExpectedLayer {
             moments,
             variance_kev2,
+            ..
         } = &expected[layer];
         let sigmas = variance_kev2.iter().map(|variance| variance.sqrt());
         DrawnLayer {

@@ -14,6 +14,7 @@ use crate::scenes::{frontal, slab};
 
 const PIXEL_MM: f64 = 0.148;
 const H_MM2: f64 = 0.45;
+const NOISE_H_MM2: f64 = 0.2;
 const TILT_DEG: f64 = 3.0;
 const FREQUENCIES_PER_MM: [f64; 6] = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
 
@@ -22,14 +23,22 @@ fn rqa5() -> Spectrum {
     Spectrum::tungsten(&TubeSpec::new(70.0, 12.0, vec!["Al:23.5".parse().unwrap()])).unwrap()
 }
 
-fn exposure(pixels: usize, blurred: bool, electronic_noise_kev: f64) -> Projection {
+/// Blur of the signal, and of the noise as far as it differs.
+fn blur(noise_h_mm2: Option<f64>) -> Blur {
+    Blur::Lorentzian {
+        h_mm2: H_MM2,
+        noise_h_mm2,
+    }
+}
+
+fn exposure(pixels: usize, blur: Option<Blur>, electronic_noise_kev: f64) -> Projection {
     let mut projection = frontal(pixels as u32, PIXEL_MM);
     projection.receptor.model = DetectorModel::Csi {
         thickness_um: 600.0,
         packing: 0.8,
     };
     projection.receptor.collection_swank = 0.92;
-    projection.receptor.blur = blurred.then_some(Blur::Lorentzian { h_mm2: H_MM2 });
+    projection.receptor.blur = blur;
     projection.receptor.electronic_noise_kev = electronic_noise_kev;
     projection
 }
@@ -113,21 +122,47 @@ fn model_mtf(per_mm: f64) -> f64 {
 /// 1/(1 + H f²) is fitted within 0.012.
 #[test]
 fn mtf_measured_with_an_edge_is_that_of_the_model() {
-    let projection = exposure(120, true, 0.0);
-    let measured = measured_mtf(&image(&prepared(edge()), &projection, f64::INFINITY, 0));
-    for (f, found) in FREQUENCIES_PER_MM.into_iter().zip(measured) {
-        let expected = model_mtf(f);
-        println!("{f}/mm: {found:.4}, model {expected:.4}");
-        assert!(
-            (found - expected).abs() < 0.015,
-            "{f}/mm: {found}, model {expected}"
-        );
+    for noise_h_mm2 in [None, Some(NOISE_H_MM2)] {
+        let projection = exposure(120, Some(blur(noise_h_mm2)), 0.0);
+        let measured = measured_mtf(&image(&prepared(edge()), &projection, f64::INFINITY, 0));
+        for (f, found) in FREQUENCIES_PER_MM.into_iter().zip(measured) {
+            let expected = model_mtf(f);
+            println!("{f}/mm: {found:.4}, model {expected:.4}");
+            assert!(
+                (found - expected).abs() < 0.015,
+                "{f}/mm: {found}, model {expected}"
+            );
+        }
     }
 }
 
 /// DQE = MTF² / (Q NNPS) with Q photons per mm²; the model's is absorption times Swank factor, less electronic noise at high frequencies.
 #[test]
 fn dqe_measured_with_an_even_field_is_that_of_the_model() {
+    assert_dqe(None);
+}
+
+/// The DQE is lower by (MTF / noise transfer)², but for aliases and electronic noise.
+#[test]
+fn dqe_falls_where_noise_is_blurred_less_than_signal() {
+    let (plain, lubberts) = (assert_dqe(None), assert_dqe(Some(NOISE_H_MM2)));
+    for (ring, (plain, lubberts)) in plain.into_iter().zip(lubberts).enumerate() {
+        // At the middle of the ring.
+        let square = ((ring as f64 + 0.5) * 0.1 / PIXEL_MM).powi(2);
+        let expected = ((1.0 + NOISE_H_MM2 * square) / (1.0 + H_MM2 * square)).powi(2);
+        println!("ring {ring}: {:.3}, R {expected:.3}", lubberts / plain);
+        if ring < 3 {
+            assert!(
+                (lubberts / plain / expected - 1.0).abs() < 0.08,
+                "ring {ring}"
+            );
+        }
+        assert!(lubberts < plain, "ring {ring}");
+    }
+}
+
+/// The measured DQE in rings of frequency, after a comparison with the model.
+fn assert_dqe(noise_h_mm2: Option<f64>) -> [f64; 5] {
     const IMAGES: u64 = 16;
     let vacuum = prepared(slab(10.0, 1e-9));
     let (photons, electronic_kev) = (600.0, 90.0);
@@ -137,7 +172,7 @@ fn dqe_measured_with_an_even_field_is_that_of_the_model() {
     let ev = |value: f64| value * PIXEL_MM * PIXEL_MM / 100.0 * histories;
 
     // One pixel without blur: the mean and the variance of what the photons leave.
-    let sharp = image(&vacuum, &exposure(SIDE, false, 0.0), histories, 0);
+    let sharp = image(&vacuum, &exposure(SIDE, None, 0.0), histories, 0);
     let centre = SIDE * SIDE / 2 + SIDE / 2;
     let signal_kev = ev(sharp.open_field_ev_cm2) / 1e3;
     let variance_kev2 = (ev(f64::from(sharp.sigma()[centre])) / 1e3).powi(2);
@@ -147,8 +182,14 @@ fn dqe_measured_with_an_even_field_is_that_of_the_model() {
         "{swank_absorption}"
     );
 
-    let projection = exposure(SIDE, true, electronic_kev);
-    let expected = image(&vacuum, &exposure(SIDE, true, 0.0), f64::INFINITY, 0).total();
+    let projection = exposure(SIDE, Some(blur(noise_h_mm2)), electronic_kev);
+    let expected = image(
+        &vacuum,
+        &exposure(SIDE, Some(blur(noise_h_mm2)), 0.0),
+        f64::INFINITY,
+        0,
+    )
+    .total();
     let mut rings = [(0.0, 0.0, 0.0); 5];
     for seed in 1..=IMAGES {
         let noisy = image(&vacuum, &projection, histories, seed).total();
@@ -158,7 +199,8 @@ fn dqe_measured_with_an_even_field_is_that_of_the_model() {
             let ring = (fx.hypot(fy) * 10.0) as usize;
             if ring < rings.len() {
                 let nps_kev2 = power * (ev(1.0) / 1e3).powi(2);
-                let model_kev2 = variance_kev2 * expected_power(H_MM2, PIXEL_MM, fx, fy)
+                let model_kev2 = variance_kev2
+                    * expected_power(noise_h_mm2.unwrap_or(H_MM2), PIXEL_MM, fx, fy)
                     + electronic_kev * electronic_kev;
                 let per_mm = |f: f64| f / PIXEL_MM;
                 let mtf = 1.0 / (1.0 + H_MM2 * (per_mm(fx).powi(2) + per_mm(fy).powi(2)))
@@ -176,6 +218,7 @@ fn dqe_measured_with_an_even_field_is_that_of_the_model() {
         }
     }
     let mut last = swank_absorption;
+    let mut measured = [0.0; 5];
     for (ring, (ratio, dqe, count)) in rings.into_iter().enumerate() {
         let (ratio, model, error) = (ratio / count, dqe / count, (2.0 / count).sqrt());
         println!(
@@ -191,5 +234,7 @@ fn dqe_measured_with_an_even_field_is_that_of_the_model() {
         );
         assert!(model < last, "the DQE falls with the frequency");
         last = model;
+        measured[ring] = model / ratio;
     }
+    measured
 }

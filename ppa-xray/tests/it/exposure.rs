@@ -343,7 +343,7 @@ fn readings_scatter_as_their_standard_errors_say() {
         .with_histories(histories)
         .with_seed(3);
     let sharp = analog(&vacuum, &spectrum, &projection, &settings).unwrap();
-    projection.receptor.blur = Some(Blur::Lorentzian { h_mm2: 0.45 });
+    projection.receptor.blur = Some(Blur::lorentzian(0.45));
     projection.receptor.electronic_noise_kev = 200.0;
     let followed = analog(&vacuum, &spectrum, &projection, &settings).unwrap();
     // Shares of photons are counted to 1/64 eV.

@@ -98,7 +98,7 @@ fn impossible_sources_and_receptors_are_named() {
             .contains("central ray")
     );
     assert!(sentence(|p| p.receptor.electronic_noise_kev = -1.0).contains("electronic noise"));
-    let blur = sentence(|p| p.receptor.blur = Some(Blur::Lorentzian { h_mm2: f64::NAN }));
+    let blur = sentence(|p| p.receptor.blur = Some(Blur::lorentzian(f64::NAN)));
     assert!(blur.contains("NaN"), "{blur}");
 }
 

@@ -413,7 +413,7 @@ fn the_error_that_ends_a_run_is_that_of_the_image() {
         tally.relative_error()
     };
     let sharp = error(&scene);
-    scene.projection.receptor.blur = Some(Blur::Lorentzian { h_mm2: 0.45 });
+    scene.projection.receptor.blur = Some(Blur::lorentzian(0.45));
     let blurred = error(&scene);
     scene.projection.receptor.electronic_noise_kev = 500.0;
     let noisy = error(&scene);
