@@ -284,7 +284,7 @@ pub(crate) const OFF: &[(&str, &[&str])] = &[
         "xray.receptor",
         &[
             "#collection_swank = 0.92    # noise of the collection of light in CsI; needs a converter",
-            "#grid = { ratio = 8, lines_per_cm = 40, focus_mm = 1100 }    # anti-scatter grid",
+            "#grid = { ratio = 8, lines_per_cm = 40, focus_mm = 1100 }    # anti-scatter grid; moving = false leaves its lines",
             "#blur = { lorentzian = { h_mm2 = 0.45 } }    # of the converter; noise_h_mm2 = 0.3 beside it for noise that is blurred less",
         ],
     ),

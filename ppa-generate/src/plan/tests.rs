@@ -87,6 +87,26 @@ fn noise_transfers_are_read_and_written_only_where_given() {
 }
 
 #[test]
+fn grids_move_unless_the_plan_says_otherwise() {
+    let folder = tempfile::tempdir().unwrap();
+    for (key, moving) in [
+        ("", true),
+        (", moving = true", true),
+        (", moving = false", false),
+    ] {
+        let keys = format!("grid = {{ ratio = 8, lines_per_cm = 40{key} }}");
+        let plan = read(&format!("[xray.receptor]\n{keys}\n")).unwrap();
+        assert_eq!(plan.xray.receptor.grid.as_ref().unwrap().moving, moving);
+        let copy = folder.path().join(format!("copy{}.toml", key.len()));
+        plan.write(&copy).unwrap();
+        assert_eq!(Plan::read(&copy).unwrap().xray.receptor, plan.xray.receptor);
+        let text = std::fs::read_to_string(&copy).unwrap();
+        let mut keys = text.lines().filter(|line| !line.starts_with('#'));
+        assert_eq!(keys.any(|line| line.contains("moving")), !moving);
+    }
+}
+
+#[test]
 fn left_out_they_are_a_point_and_an_ideal_detector() {
     let plan = read("").unwrap();
     assert_eq!(plan.xray.source, Source::default());

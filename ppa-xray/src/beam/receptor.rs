@@ -114,8 +114,7 @@ fn default_packing() -> f64 {
     0.8
 }
 
-/// A linear anti-scatter grid: thin absorbing strips with spacers between them, seen as a mean over the strips' phase,
-/// as a moving grid is.
+/// A linear anti-scatter grid: thin absorbing strips with spacers between them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -139,6 +138,10 @@ pub struct AntiScatterGrid {
     /// Device axis that the strips run along.
     #[serde(default)]
     pub lines_along: LinesAlong,
+    /// Whether the grid moves during the exposure: images then have the mean over the phase of the strips. A stationary grid, with one strip on the centre of the detector, leaves
+    /// its lines in the image, and moiré where the pixels do not resolve them.
+    #[serde(default = "moves", skip_serializing_if = "is_true")]
+    pub moving: bool,
 }
 
 setters!(Receptor {
@@ -157,10 +160,11 @@ setters!(AntiScatterGrid {
     with_ratio: ratio = f64,
     with_lines_per_cm: lines_per_cm = f64,
     with_lines_along: lines_along = LinesAlong,
+    with_moving: moving = bool,
 });
 
 impl AntiScatterGrid {
-    /// A grid with strips of 0.05 mm of lead along device y, spaces of aluminium and parallel strips, as plans assume by default.
+    /// A moving grid with strips of 0.05 mm of lead along device y, spaces of aluminium and parallel strips, as plans assume by default.
     #[must_use]
     pub fn new(ratio: f64, lines_per_cm: f64) -> Self {
         Self {
@@ -171,6 +175,7 @@ impl AntiScatterGrid {
             interspace: default_interspace(),
             focus_mm: None,
             lines_along: LinesAlong::default(),
+            moving: true,
         }
     }
 }
@@ -193,6 +198,18 @@ fn default_strip_mm() -> f64 {
 
 fn default_strip() -> String {
     "lead".to_owned()
+}
+
+fn moves() -> bool {
+    true
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde calls it with a reference"
+)]
+fn is_true(value: &bool) -> bool {
+    *value
 }
 
 fn default_interspace() -> String {

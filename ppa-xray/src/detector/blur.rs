@@ -55,6 +55,11 @@ impl Spread {
         self.spot_pixels
     }
 
+    /// Transfer of the signal at a frequency in cycles per pixel.
+    pub fn transfer(&self, frequency: f64) -> f64 {
+        self.mtf.at(frequency)
+    }
+
     /// How photons are displaced before they are counted; none where they are not.
     pub fn displacement(&self) -> Option<&Displacement> {
         self.lubberts

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use crate::beam::receptor::{AntiScatterGrid, LinesAlong, ReceptorError, require};
 use crate::detector::energy_nodes::EnergyNodes;
+use crate::detector::strip_pattern::{StripPattern, Strips};
 use crate::matter::material::Material;
 use crate::vector_math::exp;
 
@@ -16,8 +17,8 @@ use crate::vector_math::exp;
 #[derive(Debug, Clone)]
 pub(crate) struct Grid {
     height_mm: f64,
-    strip_mm: f64,
-    pitch_mm: f64,
+    strips: Strips,
+    moving: bool,
     /// 1/distance of the focal line, 1/mm; 0 for parallel strips.
     convergence_per_mm: f64,
     /// Axis across the strips, and the grid's centre on it.
@@ -78,8 +79,11 @@ impl Grid {
         };
         Ok(Self {
             height_mm: grid.ratio * (pitch_mm - grid.strip_mm),
-            strip_mm: grid.strip_mm,
-            pitch_mm,
+            strips: Strips {
+                strip_mm: grid.strip_mm,
+                pitch_mm,
+            },
+            moving: grid.moving,
             convergence_per_mm: grid.focus_mm.map_or(0.0, |focus_mm| 1.0 / focus_mm),
             across,
             centre_mm: centre_mm[across],
@@ -101,21 +105,88 @@ impl Grid {
         [0, 1].map(|part| from[part] + t * (to[part] - from[part]))
     }
 
+    /// Whether the strips move, so that only the mean over their phase matters.
+    pub fn is_moving(&self) -> bool {
+        self.moving
+    }
+
+    /// Axis of the device across the strips.
+    pub fn across(&self) -> usize {
+        self.across
+    }
+
+    pub fn pitch_mm(&self) -> f64 {
+        self.strips.pitch_mm
+    }
+
+    /// Length of a way through the grid.
+    pub fn way_mm(&self, direction: &Vector3<f64>) -> f64 {
+        self.height_mm / direction.z
+    }
+
+    /// How far photons move across the strips, in the frame where these are upright.
+    #[inline]
+    fn signed_sideways_mm(&self, at_mm: [f64; 2], direction: &Vector3<f64>) -> f64 {
+        let lean = (at_mm[self.across] - self.centre_mm) * self.convergence_per_mm;
+        self.height_mm * (direction[self.across] / direction.z - lean)
+    }
+
+    /// The move of photons across the strips, at least one too small to matter: along the strips attenuation per sideways move is infinite and the move zero.
+    #[inline]
+    fn sideways_mm(&self, signed_mm: f64) -> f64 {
+        signed_mm.abs().max(1e-9 * self.strips.pitch_mm)
+    }
+
+    /// Where photons that cross the detector plane at device (x, y) and move sideways by `signed_mm` have moved to, as if they moved to higher values; from the grid's
+    /// centre, which is that of a strip. The grid ends at the detector plane.
+    #[inline]
+    fn exit_mm(&self, at_mm: [f64; 2], signed_mm: f64) -> f64 {
+        at_mm[self.across] - self.centre_mm + (-signed_mm).max(0.0)
+    }
+
+    /// Probability to pass a stationary grid without interacting; attenuations in 1/mm.
+    #[inline]
+    pub fn transmission_in_place(
+        &self,
+        at_mm: [f64; 2],
+        direction: &Vector3<f64>,
+        [strip, space]: [f64; 2],
+    ) -> f64 {
+        let signed_mm = self.signed_sideways_mm(at_mm, direction);
+        let sideways_mm = self.sideways_mm(signed_mm);
+        let exit_mm = self.exit_mm(at_mm, signed_mm);
+        let share = self.strips.in_strips_mm(exit_mm, sideways_mm) / sideways_mm;
+        (-self.way_mm(direction) * (space + share * (strip - space))).exp()
+    }
+
+    /// Shadow of the strips of a stationary grid in photons that cross the plane about device (x, y) in one direction over a way of `way_mm`, and where those
+    /// photons lie on it. Attenuation by the spaces is left out.
+    pub fn pattern(
+        &self,
+        at_mm: [f64; 2],
+        direction: &Vector3<f64>,
+        way_mm: f64,
+        [strip, space]: [f64; 2],
+    ) -> (StripPattern, f64) {
+        let signed_mm = self.signed_sideways_mm(at_mm, direction);
+        let sideways_mm = self.sideways_mm(signed_mm);
+        let kappa_per_mm = (strip - space) * way_mm / sideways_mm;
+        let pattern = StripPattern::new(self.strips, sideways_mm, kappa_per_mm);
+        (pattern, self.exit_mm(at_mm, signed_mm))
+    }
+
     /// How photons cross the grid at device (x, y); `direction` is a unit vector in the device frame with z > 0.
     #[inline]
     pub fn crossing(&self, at_mm: [f64; 2], direction: &Vector3<f64>) -> Crossing {
-        let lean = (at_mm[self.across] - self.centre_mm) * self.convergence_per_mm;
-        let (d, p) = (self.strip_mm, self.pitch_mm);
-        let slope = (direction[self.across] / direction.z - lean).abs();
-        // Along the strips attenuation per sideways move is infinite and the move zero: take a move too small to matter.
-        let sideways_mm = (self.height_mm * slope).max(1e-9 * p);
+        let (d, p) = (self.strips.strip_mm, self.strips.pitch_mm);
+        let sideways_mm = self.sideways_mm(self.signed_sideways_mm(at_mm, direction));
         let periods = (sideways_mm / p).floor();
         let rest = sideways_mm - periods * p;
         let least = (rest + d - p).max(0.0);
         let most = rest.min(d);
         let plateau = (rest - d).abs();
         Crossing {
-            way_mm: self.height_mm / direction.z,
+            way_mm: self.way_mm(direction),
             per_sideways_mm: 1.0 / sideways_mm,
             certain_mm: periods * d + least,
             more_mm: most - least,
@@ -238,6 +309,48 @@ mod tests {
                 "{energy_kev} keV, slope {slope}: {found}, marched {marched}"
             );
         }
+    }
+
+    /// Over even steps of the phase, whichever way photons lean: the mean of stationary strips is that of moving ones.
+    #[test]
+    fn stationary_strips_have_the_mean_of_moving_ones() {
+        const STEPS: usize = 20_000;
+        let grid = Grid::new(&clinical().with_focus_mm(None), [3.0, -7.0]).unwrap();
+        for (energy_kev, slope) in [(40.0, 0.0), (60.0, 0.01), (60.0, -0.03), (88.5, 0.2)] {
+            let direction = Vector3::new(slope, 0.2, 1.0).normalize();
+            let attenuation = grid.attenuation(energy_kev);
+            let expected = grid
+                .crossing([40.0, 0.0], &direction)
+                .transmission(attenuation);
+            let places = (0..STEPS).map(|i| 40.0 + 0.25 * i as f64 / STEPS as f64);
+            let sum: f64 = places
+                .map(|x| grid.transmission_in_place([x, 0.0], &direction, attenuation))
+                .sum();
+            let found = sum / STEPS as f64;
+            assert!(
+                (found - expected).abs() < 1e-4,
+                "{slope}: {found}, {expected}"
+            );
+            let (pattern, _) = grid.pattern(
+                [40.0, 0.0],
+                &direction,
+                grid.way_mm(&direction),
+                attenuation,
+            );
+            let spaces = (-attenuation[1] * grid.way_mm(&direction)).exp();
+            assert!((pattern.mean() * spaces / expected - 1.0).abs() < 1e-6);
+        }
+        // Photons along the strips: the strip on the centre stops them, the space beside it does not.
+        let along = |x_mm: f64| {
+            grid.transmission_in_place([x_mm, 0.0], &Vector3::z(), grid.attenuation(40.0))
+        };
+        assert!(along(3.0) < 1e-10 && along(3.024) < 1e-10 && along(2.976) < 1e-10);
+        assert!(along(3.026) > 0.5 && along(2.974) > 0.5 && along(3.25) < 1e-10);
+        // A photon that comes from lower x has met what lies there.
+        let from_low = Vector3::new(0.05, 0.0, 1.0).normalize();
+        let at =
+            |x_mm: f64| grid.transmission_in_place([x_mm, 0.0], &from_low, grid.attenuation(40.0));
+        assert!(at(3.06) < 0.1 * at(2.94), "{} {}", at(3.06), at(2.94));
     }
 
     /// Along the strips: D/(D + d) · exp(−μ h) of the spaces, plus what lead of 2 mm lets through (nothing at 60 keV),

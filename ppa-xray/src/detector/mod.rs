@@ -14,4 +14,5 @@ pub(crate) mod open_field;
 mod quadrature;
 pub(crate) mod readout;
 pub(crate) mod response;
+pub(crate) mod strip_pattern;
 pub(crate) mod tabulated_response;

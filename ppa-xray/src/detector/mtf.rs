@@ -114,6 +114,14 @@ impl Mtf {
         &self.terms
     }
 
+    /// The value at a frequency in cycles per pixel.
+    pub fn at(&self, frequency: f64) -> f64 {
+        let terms = self.terms.iter();
+        terms
+            .map(|&(w, sigma)| w * gaussian_mtf(sigma, frequency))
+            .sum()
+    }
+
     /// Values at all pairs of `frequencies`, in cycles per pixel.
     pub fn plane(&self, frequencies: &[f64]) -> DMatrix<f64> {
         let terms = self.terms.iter();

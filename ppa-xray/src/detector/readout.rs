@@ -58,6 +58,11 @@ impl Readout {
         self.blur.as_ref().map_or(0.0, Spread::spot_pixels)
     }
 
+    /// Transfer of the signal by the blur at a frequency in cycles per pixel; none without blur.
+    pub fn transfer(&self, frequency: f64) -> Option<f64> {
+        self.blur.as_ref().map(|blur| blur.transfer(frequency))
+    }
+
     /// How photons are to be displaced before they are counted; none for those that stay where they are.
     pub fn displacement(&self) -> Option<&Displacement> {
         self.blur.as_ref().and_then(Spread::displacement)

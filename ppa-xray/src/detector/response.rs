@@ -54,20 +54,16 @@ impl Response {
             .copied()
     }
 
-    /// Mean and mean square of the energy that a photon leaves which crosses the plane at device (x, y).
+    /// Mean and mean square of the energy that a photon leaves which crosses the plane at device (x, y); over the phase of the strips, if there is a grid.
     ///
     /// `direction` is a unit vector in the device frame with z > 0.
     #[inline]
     pub fn moments(&self, energy_kev: f64, at_mm: [f64; 2], direction: &Vector3<f64>) -> Moments {
         let passes = self.passes(energy_kev, at_mm, direction);
-        let left = self.absorbed(energy_kev, direction.z);
-        Moments {
-            mean_kev: passes * left.mean_kev,
-            square_kev2: passes * left.square_kev2,
-        }
+        self.absorbed(energy_kev, direction.z).scaled(passes)
     }
 
-    /// The energy that an arriving photon leaves, keV: a draw whose first two moments are [`Response::moments`].
+    /// The energy that an arriving photon leaves, keV: a draw whose first two moments are [`Response::moments`], or behind the strips of a stationary grid those at its place.
     ///
     /// The draw is ⟨ε²⟩/⟨ε⟩ with probability ⟨ε⟩²/⟨ε²⟩ (absorption times Swank factor), and 0 otherwise.
     #[inline]
@@ -76,7 +72,15 @@ impl Response {
             return arrival.energy_kev;
         }
         let at_mm = [arrival.x_mm, arrival.y_mm];
-        let left = self.moments(arrival.energy_kev, at_mm, &arrival.direction);
+        let left = match &self.grid {
+            Some(grid) if !grid.is_moving() => {
+                let attenuation = grid.attenuation(arrival.energy_kev);
+                let passes = grid.transmission_in_place(at_mm, &arrival.direction, attenuation);
+                let left = self.absorbed(arrival.energy_kev, arrival.direction.z);
+                left.scaled(passes)
+            }
+            _ => self.moments(arrival.energy_kev, at_mm, &arrival.direction),
+        };
         let counts = left.mean_kev * left.mean_kev / left.square_kev2;
         if rng.unit() < counts {
             left.square_kev2 / left.mean_kev
@@ -194,6 +198,7 @@ mod tests {
                 interspace: "polyethylene".to_owned(),
                 focus_mm: Some(1_000.0),
                 lines_along: LinesAlong::X,
+                moving: true,
             }),
             ..Receptor::default()
         }

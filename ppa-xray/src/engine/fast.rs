@@ -15,6 +15,7 @@ use crate::engine::exposure::Exposure;
 use crate::engine::fast_progress::Monitor;
 use crate::engine::fast_settings::FastSettings;
 use crate::engine::first_collisions::{ESTIMATES, FirstFlights};
+use crate::engine::grid_shadow::{self, ShadowedPrimary};
 use crate::engine::importance::ImportanceModel;
 use crate::engine::later_collisions::{Histories, VarianceReduction};
 use crate::engine::lines::Lines;
@@ -144,7 +145,7 @@ fn expose(
     let mut primary = primary_moments(
         &exposure,
         &paths,
-        lines,
+        lines.clone(),
         settings.samples_per_side,
         settings.dose_histories,
         monitor,
@@ -172,6 +173,11 @@ fn expose(
     if let Some(marker) = &projection.marker {
         shade(marker, detector, &mut primary, &mut scattered, &mut shared);
     }
+    let ShadowedPrimary {
+        expected: primary,
+        counted,
+    } = grid_shadow::shadowed(&exposure, &paths, lines, primary);
+    monitor.check()?;
     let primary_kev = primary.iter().map(|pixel| pixel.mean_kev).sum::<f64>();
     let sums = CategorySums::from_kev(|category| match category {
         Category::Primary => (primary_kev, 0.0),
@@ -185,7 +191,9 @@ fn expose(
         variance_kev2: scatter.variance_kev2,
     });
     let primary = ExpectedLayer {
-        counted: readout.displaced(&primary, columns),
+        counted: readout
+            .displaced(counted.as_ref().unwrap_or(&primary), columns)
+            .or(counted),
         variance_kev2: vec![0.0; primary.len()],
         moments: primary,
     };

@@ -26,6 +26,7 @@ pub(crate) mod fast;
 mod fast_progress;
 pub(crate) mod fast_settings;
 mod first_collisions;
+mod grid_shadow;
 mod importance;
 #[cfg(test)]
 mod invariance;

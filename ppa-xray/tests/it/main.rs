@@ -23,6 +23,7 @@ mod scattering;
 mod scenes;
 mod shared;
 mod spectra;
+mod stationary_grid;
 mod statistics;
 mod tg195;
 mod threads;

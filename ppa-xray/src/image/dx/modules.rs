@@ -276,8 +276,12 @@ fn put_grid(to: &mut Elements, grid: &AntiScatterGrid) {
     } else {
         "PARALLEL"
     };
-    // The strips are seen as their mean, as those of a grid that moves.
-    to.text(tags::GRID, &format!("RECIPROCATING\\{kind}"));
+    let motion = if grid.moving {
+        "RECIPROCATING"
+    } else {
+        "FIXED"
+    };
+    to.text(tags::GRID, &format!("{motion}\\{kind}"));
     let pitch_mm = 10.0 / grid.lines_per_cm;
     to.text(tags::GRID_ABSORBING_MATERIAL, &grid.strip);
     to.text(tags::GRID_SPACING_MATERIAL, &grid.interspace);
