@@ -285,6 +285,8 @@ pub(crate) const OFF: &[(&str, &[&str])] = &[
         &[
             "#collection_swank = 0.92    # noise of the collection of light in CsI; needs a converter",
             "#grid = { ratio = 8, lines_per_cm = 40, focus_mm = 1100 }    # anti-scatter grid; moving = false leaves its lines",
+            "#gain_error = 0.01    # of pixels after calibration, relative",
+            "#panel = 1    # serial number of the panel; 0 when left out, others have another pattern of gains",
             "#blur = { lorentzian = { h_mm2 = 0.45 } }    # of the converter; noise_h_mm2 = 0.3 beside it for noise that is blurred less",
         ],
     ),

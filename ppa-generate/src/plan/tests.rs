@@ -87,6 +87,23 @@ fn noise_transfers_are_read_and_written_only_where_given() {
 }
 
 #[test]
+fn gains_of_a_panel_are_read_and_written_only_where_given() {
+    let folder = tempfile::tempdir().unwrap();
+    for (keys, expected) in [("", (0.0, 0)), ("gain_error = 0.01\npanel = 3", (0.01, 3))] {
+        let plan = read(&format!("[xray.receptor]\n{keys}\n")).unwrap();
+        let receptor = &plan.xray.receptor;
+        assert_eq!((receptor.gain_error, receptor.panel), expected);
+        let copy = folder.path().join(format!("copy{}.toml", keys.len()));
+        plan.write(&copy).unwrap();
+        assert_eq!(&Plan::read(&copy).unwrap().xray.receptor, receptor);
+        let text = std::fs::read_to_string(&copy).unwrap();
+        let mut lines = text.lines();
+        let written = lines.any(|line| line.starts_with("gain_error") || line.starts_with("panel"));
+        assert_eq!(written, !keys.is_empty(), "{text}");
+    }
+}
+
+#[test]
 fn grids_move_unless_the_plan_says_otherwise() {
     let folder = tempfile::tempdir().unwrap();
     for (key, moving) in [

@@ -21,6 +21,12 @@ pub struct Receptor {
     pub blur: Option<Blur>,
     /// Standard deviation of the electronic noise of a pixel, as energy in the converter, keV.
     pub electronic_noise_kev: f64,
+    /// Standard deviation of the gain of pixels about 1 that calibration leaves, 0 to 0.2: the same pattern in every image of a panel.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub gain_error: f64,
+    /// Serial number of the panel, which selects the gains.
+    #[serde(skip_serializing_if = "is_first")]
+    pub panel: u32,
 }
 
 impl Default for Receptor {
@@ -32,6 +38,8 @@ impl Default for Receptor {
             grid: None,
             blur: None,
             electronic_noise_kev: 0.0,
+            gain_error: 0.0,
+            panel: 0,
         }
     }
 }
@@ -42,6 +50,22 @@ impl Default for Receptor {
 )]
 fn is_one(value: &f64) -> bool {
     *value == 1.0
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde calls it with a reference"
+)]
+pub(crate) fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde calls it with a reference"
+)]
+pub(crate) fn is_first(panel: &u32) -> bool {
+    *panel == 0
 }
 
 /// Spread of the signal in the converter: its modulation transfer function, without that of the pixels' aperture, which
@@ -150,6 +174,8 @@ setters!(Receptor {
     with_grid: grid = impl Into<Option<AntiScatterGrid>>,
     with_blur: blur = impl Into<Option<Blur>>,
     with_electronic_noise_kev: electronic_noise_kev = f64,
+    with_gain_error: gain_error = f64,
+    with_panel: panel = u32,
 });
 
 setters!(AntiScatterGrid {

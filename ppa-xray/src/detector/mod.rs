@@ -4,6 +4,7 @@ pub(crate) mod absorption;
 pub(crate) mod blur;
 pub(crate) mod energy_nodes;
 mod escape;
+pub(crate) mod gains;
 pub(crate) mod grid;
 pub(crate) mod kernel;
 mod layer;

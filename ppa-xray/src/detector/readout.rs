@@ -5,17 +5,20 @@ use serde::{Deserialize, Serialize};
 use crate::beam::detector::Detector;
 use crate::beam::receptor::{Receptor, ReceptorError, require};
 use crate::detector::blur::Spread;
+use crate::detector::gains::Gains;
 use crate::detector::lubberts::Displacement;
 use crate::transport::tally::Moments;
 
 /// Blur and electronic noise, ready to be applied.
 ///
-/// Blur acts on every layer and its quantum noise alike, see [`Spread`]. Electronic noise comes on top.
+/// Blur acts on every layer and its quantum noise alike, see [`Spread`]. Then every pixel has its gain, and electronic noise comes on top.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Readout {
     blur: Option<Spread>,
     electronic_noise_kev: f64,
+    #[serde(default, skip_serializing_if = "Gains::are_even")]
+    gains: Gains,
 }
 
 /// One image plane, row-major, eV/cm² per history.
@@ -50,7 +53,13 @@ impl Readout {
                 .map(|blur| Spread::of(blur, detector.pixel_mm))
                 .transpose()?,
             electronic_noise_kev,
+            gains: Gains::of(receptor)?,
         })
+    }
+
+    /// Gains of the pixels.
+    pub fn gains(&self) -> &Gains {
+        &self.gains
     }
 
     /// Side in pixels of the square over which photons are to be spread when they are counted; 0 without blur.

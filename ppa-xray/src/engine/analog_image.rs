@@ -73,6 +73,7 @@ impl ImageSetup {
             sums,
             largest_score_share: None,
         };
+        let image = image.with_gains(self.readout.gains());
         image.with_electronic_noise(self.readout.electronic_noise_kev())
     }
 }

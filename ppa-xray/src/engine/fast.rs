@@ -121,6 +121,7 @@ impl PreparedPhantom<'_> {
     ) -> Result<Radiograph, TransportError> {
         let binned = Projection {
             detector: preview::detector(&projection.detector),
+            receptor: preview::receptor(&projection.receptor, &projection.detector),
             ..projection.clone()
         };
         self.fast_with_progress(spectrum, &binned, &preview::settings(settings), observe)
@@ -218,6 +219,7 @@ fn expose(
         sums,
         largest_score_share: Some(scatter.largest_share),
     };
+    let image = image.with_gains(readout.gains());
     Ok(image.with_electronic_noise(readout.electronic_noise_kev()))
 }
 

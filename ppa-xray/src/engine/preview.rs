@@ -1,6 +1,7 @@
 //! What a preview of a fast exposure simulates: larger pixels, fewer histories for the scatter.
 
 use crate::beam::detector::Detector;
+use crate::beam::receptor::Receptor;
 use crate::engine::fast_settings::FastSettings;
 
 /// Fewest pixels along the shorter side of a preview, unless the image has fewer.
@@ -21,10 +22,21 @@ pub(super) fn settings(image: &FastSettings) -> FastSettings {
     }
 }
 
+/// The receptor with gains of larger pixels, which differ as means of those of the image do.
+pub(super) fn receptor(image: &Receptor, detector: &Detector) -> Receptor {
+    let mut receptor = image.clone();
+    receptor.gain_error /= f64::from(binning(detector));
+    receptor
+}
+
+/// Pixels of the image along the side of a pixel of its preview.
+fn binning(image: &Detector) -> u32 {
+    (image.columns.min(image.rows) / LEAST_PIXELS).max(1)
+}
+
 /// The detector with larger pixels; both have the same corner at low x and y.
 pub(super) fn detector(image: &Detector) -> Detector {
-    let shorter = image.columns.min(image.rows);
-    let binning = (shorter / LEAST_PIXELS).max(1);
+    let binning = binning(image);
     let [columns, rows] = [image.columns, image.rows].map(|count| count.div_ceil(binning));
     let pixel_mm = image.pixel_mm * f64::from(binning);
     let beyond_mm =

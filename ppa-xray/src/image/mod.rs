@@ -5,6 +5,7 @@ pub(crate) mod dx;
 mod electronic_noise;
 pub(crate) mod enhancement;
 pub(crate) mod exposure_index;
+mod gains;
 mod latitude;
 mod layer_sizes;
 mod log_exposure;

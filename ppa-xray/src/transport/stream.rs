@@ -12,4 +12,5 @@ pub(crate) enum Stream {
     MultipleScatterStarts = 6,
     SingleScatterSampling = 7,
     MultipleScatterSampling = 8,
+    Gain = 9,
 }

@@ -11,6 +11,7 @@ mod exposure;
 mod exposure_index;
 mod fast_engine;
 mod files;
+mod gains;
 mod interpolation;
 mod marker;
 mod mcgpu;
