@@ -277,6 +277,7 @@ pub(crate) const OFF: &[(&str, &[&str])] = &[
         "xray.source",
         &[
             "#blades_mm = 250    # from the focal spot to the collimator blades: the field gets a penumbra",
+            "#extrafocal = { ratio = 0.08, size_mm = 20 }    # extrafocal radiation over that of the focal spot; needs blades_mm",
             "#heel_effect = { anode_towards_deg = -90 }    # from the device's x towards its y; -90 is the head's side",
         ],
     ),
@@ -284,8 +285,8 @@ pub(crate) const OFF: &[(&str, &[&str])] = &[
         "xray.receptor",
         &[
             "#collection_swank = 0.92    # noise of the collection of light in CsI; needs a converter",
-            "#grid = { ratio = 8, lines_per_cm = 40, focus_mm = 1100 }    # anti-scatter grid; moving = false leaves its lines",
-            "#gain_error = 0.01    # of pixels after calibration, relative",
+            "#grid = { ratio = 8, lines_per_cm = 40, focus_mm = 1100 }    # anti-scatter grid; with moving = false the image shows its lines",
+            "#gain_error = 0.01    # relative standard deviation of the pixels' gains after calibration",
             "#panel = 1    # serial number of the panel; 0 when left out, others have another pattern of gains",
             "#blur = { lorentzian = { h_mm2 = 0.45 } }    # of the converter; noise_h_mm2 = 0.3 beside it for noise that is blurred less",
         ],

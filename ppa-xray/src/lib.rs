@@ -86,7 +86,7 @@ pub use beam::projection_error::ProjectionError;
 pub use beam::receptor::{
     AntiScatterGrid, Blur, DetectorModel, LinesAlong, Receptor, ReceptorError,
 };
-pub use beam::source::{Collimation, FocalSpot, HeelEffect, Source, SpotShape};
+pub use beam::source::{Collimation, Extrafocal, FocalSpot, HeelEffect, Source, SpotShape};
 pub use beam::spectrum::Spectrum;
 pub use beam::spectrum_error::SpectrumError;
 pub use beam::tube::{Filter, TubeSpec};

@@ -59,20 +59,27 @@ impl Blades {
         count: usize,
         at: Point2<f64>,
     ) -> f64 {
-        if self.edge_per_spot == 0.0 || spot.is_point() {
-            return f64::from(u8::from(self.field.contains(&at)));
-        }
+        let lit = self.lit_part(spot, at);
         let along = |axis: usize| {
-            // Spot positions s that light x: low − k s ≤ x ≤ high − k s.
-            let per_mm = 1.0 / (self.edge_per_spot * self.axes[axis]);
-            let first = spot.share_below((self.field.low_mm[axis] - at[axis]) * per_mm);
-            let last = spot.share_below((self.field.high_mm[axis] - at[axis]) * per_mm);
             let strip = strips[axis] as f64;
             let [first, last] =
-                [first, last].map(|share| (share * count as f64).clamp(strip, strip + 1.0));
+                lit[axis].map(|share| (share * count as f64).clamp(strip, strip + 1.0));
             last - first
         };
         along(0) * along(1)
+    }
+
+    /// The part of the spot that lights a place: along device x and y, the shares of the spot below its first and its last point.
+    pub fn lit_part(&self, spot: &FocalSpot, at: Point2<f64>) -> [[f64; 2]; 2] {
+        if self.edge_per_spot == 0.0 || spot.is_point() {
+            return [[0.0, f64::from(u8::from(self.field.contains(&at)))]; 2];
+        }
+        [0, 1].map(|axis| {
+            // Spot positions s that light x: low − k s ≤ x ≤ high − k s.
+            let per_mm = 1.0 / (self.edge_per_spot * self.axes[axis]);
+            let edges_mm = [self.field.low_mm[axis], self.field.high_mm[axis]];
+            edges_mm.map(|edge_mm| spot.share_below((edge_mm - at[axis]) * per_mm))
+        })
     }
 
     /// The field grown by the same length on all sides.

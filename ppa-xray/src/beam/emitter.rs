@@ -46,11 +46,24 @@ const SPOT_POINTS: usize = 5;
 const FIELD_POINTS: u32 = 96;
 
 impl Emitter {
+    /// The focal spot's photons.
+    ///
     /// # Errors
     /// [`ProjectionError`] when heel effect, focal spot or field make no sense.
     pub fn new(projection: &Projection, spectrum: &Spectrum) -> Result<Self, ProjectionError> {
         projection.validate()?;
-        let spot = projection.source.focal_spot;
+        Self::of_spot(projection, spectrum, projection.source.focal_spot)
+    }
+
+    /// Photons that leave another area than the focal spot; the projection is valid.
+    ///
+    /// # Errors
+    /// [`ProjectionError`] when the heel effect makes no sense.
+    pub fn of_spot(
+        projection: &Projection,
+        spectrum: &Spectrum,
+        spot: FocalSpot,
+    ) -> Result<Self, ProjectionError> {
         let plane = SpotPlane::square_to(&projection.central_ray);
         let distance_mm = projection.source_detector_mm;
         let blades = Blades::new(
@@ -61,7 +74,7 @@ impl Emitter {
         );
         let field = blades.reached(&spot);
         let tilt: f64 = plane.axes.iter().map(|axis| axis.z.abs()).sum();
-        // A spot of 2 % of the distance, the largest there is, takes less than a tenth of it away.
+        // An area of a tenth of the distance, the largest there is, takes less than a tenth of it away.
         let nearest_mm = distance_mm - spot.reach_mm() * tilt;
         let spots = points_of(&spot, &plane, SPOT_POINTS);
         let heel = match &projection.source.heel_effect {
@@ -86,6 +99,11 @@ impl Emitter {
         let sent_sr = spots.iter().map(|spot| emitter.emitted_from_sr(spot));
         emitter.emitted_sr = sent_sr.sum::<f64>() / spots.len() as f64;
         Ok(emitter)
+    }
+
+    /// ∫ I dΩ over the field, mean over the spot: I is 1 on the central ray.
+    pub fn emitted_sr(&self) -> f64 {
+        self.emitted_sr
     }
 
     /// ∫ I dΩ over the field for photons from one point of the spot.
@@ -189,6 +207,11 @@ impl Emitter {
         self.blades.lit_share(&self.spot, strips, count, at)
     }
 
+    /// The part of the focal spot that lights a place, see [`Blades::lit_part`].
+    pub fn lit_part(&self, at: Point2<f64>) -> [[f64; 2]; 2] {
+        self.blades.lit_part(&self.spot, at)
+    }
+
     /// The focal spot.
     pub fn spot(&self) -> &FocalSpot {
         &self.spot
@@ -244,7 +267,7 @@ impl Emitter {
         }
     }
 
-    /// Histories of one mAs: photons that the tube sends into the field, if the spectrum came from the tube model.
+    /// Photons that the spot sends into the field per mAs, if the spectrum came from the tube model.
     pub fn photons_per_mas(&self) -> Option<f64> {
         const CM2_PER_SR_AT_1M: f64 = 1e4;
         let fluence = self.spectrum.fluence_per_mas_cm2_at_1m()?;
@@ -256,17 +279,6 @@ fn points_of(spot: &FocalSpot, plane: &SpotPlane, per_side: usize) -> Vec<Point3
     let strips = spot.strips_mm(if spot.is_point() { 1 } else { per_side });
     let row = |&y: &f64| strips.iter().map(move |&x| plane.at([x, y]));
     strips.iter().flat_map(row).collect()
-}
-
-impl Projection {
-    /// Histories of one mAs: photons that the tube sends into the field. None if `spectrum` does not come from the
-    /// tube model, which alone knows.
-    ///
-    /// # Errors
-    /// [`ProjectionError`] when the exposure makes no sense.
-    pub fn photons_per_mas(&self, spectrum: &Spectrum) -> Result<Option<f64>, ProjectionError> {
-        Ok(Emitter::new(self, spectrum)?.photons_per_mas())
-    }
 }
 
 #[cfg(test)]
@@ -310,11 +322,20 @@ mod tests {
     }
 
     /// Photons drawn one by one fall where the fluence says: chi² over 6 x 6 cells of the field, 35 degrees
-    /// of freedom, for a plain and for a demanding source.
+    /// of freedom, for a plain and for a demanding source, and for an area of 80 mm.
     #[test]
     fn photons_fall_as_the_fluence_says() {
-        for projection in [projection(Source::default()), demanding()] {
-            let emitter = Emitter::new(&projection, &spectrum()).unwrap();
+        let area = FocalSpot {
+            size_mm: 80.0,
+            ..FocalSpot::default()
+        };
+        let emitters = [
+            Emitter::new(&projection(Source::default()), &spectrum()),
+            Emitter::new(&demanding(), &spectrum()),
+            Emitter::of_spot(&demanding(), &spectrum(), area),
+        ];
+        for emitter in emitters {
+            let emitter = emitter.unwrap();
             let (field, draws) = (*emitter.field(), 60_000_u32);
             let size = field.size_mm();
             let mut found = [0.0_f64; 36];
@@ -383,22 +404,5 @@ mod tests {
         let softest = emitter.spectra().last().unwrap().mean_energy_kev();
         let hardest = emitter.spectra()[0].mean_energy_kev();
         assert!(hardest > softest + 0.3, "{hardest} and {softest} keV");
-    }
-
-    /// Photons per mAs: the fluence of the tube model times the area at 1 m of a small field.
-    #[test]
-    fn histories_per_mas_follow_from_the_fluence_at_1_m() {
-        let collimation = Collimation::Rectangle {
-            size_mm: [10.0, 10.0],
-            centre_mm: [0.0, 0.0],
-        };
-        let source = Source {
-            collimation,
-            ..Source::default()
-        };
-        let spectrum = spectrum();
-        let photons = projection(source).photons_per_mas(&spectrum);
-        let expected = spectrum.fluence_per_mas_cm2_at_1m().unwrap(); // 1 cm² at 1 m
-        assert!((photons.unwrap().unwrap() / expected - 1.0).abs() < 1e-4);
     }
 }

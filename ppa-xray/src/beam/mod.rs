@@ -3,6 +3,7 @@
 pub(crate) mod blades;
 pub(crate) mod detector;
 pub(crate) mod emitter;
+pub(crate) mod extrafocal;
 pub(crate) mod field;
 pub(crate) mod heel;
 pub(crate) mod marker;

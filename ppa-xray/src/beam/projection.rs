@@ -8,7 +8,7 @@ use crate::beam::marker::SideMarker;
 use crate::beam::projection_error::ProjectionError;
 use crate::beam::raster::MAX_PIXELS;
 use crate::beam::receptor::Receptor;
-use crate::beam::source::{Collimation, Source};
+use crate::beam::source::{Collimation, Extrafocal, Source};
 use crate::setters::setters;
 
 /// One exposure: source, field and detector, and where they stand in the CT.
@@ -43,6 +43,9 @@ setters!(Projection {
     with_receptor: receptor = Receptor,
     with_marker: marker = impl Into<Option<SideMarker>>,
 });
+
+/// Width of the penumbra of extrafocal radiation over the shorter side of the field beyond which next to no photon would pass the blades.
+const MOST_PENUMBRA: f64 = 20.0;
 
 impl Projection {
     /// A point source that sends photons evenly in solid angle, all to the detector, which takes all their energy.
@@ -145,6 +148,7 @@ impl Projection {
             });
         }
         self.check_blades(&field)?;
+        self.check_extrafocal()?;
         if let Some(marker) = &self.marker {
             marker.check(&self.detector)?;
         }
@@ -162,6 +166,35 @@ impl Projection {
         if self.central_ray.z < 0.1 {
             return Err(ProjectionError::CentralRay {
                 angle_deg: self.central_ray.z.acos().to_degrees(),
+            });
+        }
+        Ok(())
+    }
+
+    /// Refuses extrafocal radiation out of proportion, and any without blades: sharp edges would hide it.
+    fn check_extrafocal(&self) -> Result<(), ProjectionError> {
+        let Some(Extrafocal { ratio, size_mm }) = self.source.extrafocal else {
+            return Ok(());
+        };
+        let most_mm = 0.1 * self.source_detector_mm;
+        let possible = ratio > 0.0 && ratio <= 1.0 && size_mm > 0.0 && size_mm <= most_mm;
+        if !possible {
+            return Err(ProjectionError::Extrafocal {
+                ratio,
+                size_mm,
+                most_mm,
+            });
+        }
+        let Some(blades_mm) = self.source.blades_mm else {
+            return Err(ProjectionError::ExtrafocalWithoutBlades);
+        };
+        let penumbra_mm = size_mm * (self.source_detector_mm / blades_mm - 1.0);
+        let field_mm = self.field().size_mm();
+        let most_mm = MOST_PENUMBRA * field_mm[0].min(field_mm[1]);
+        if penumbra_mm > most_mm {
+            return Err(ProjectionError::ExtrafocalPenumbra {
+                penumbra_mm,
+                most_mm,
             });
         }
         Ok(())

@@ -67,6 +67,33 @@ pub enum ProjectionError {
         /// Distance from the source to the detector plane, mm.
         source_detector_mm: f64,
     },
+    /// Extrafocal radiation out of proportion.
+    #[error(
+        "the extrafocal radiation is {ratio} of that of the focal spot from a square of {size_mm} mm, expected above 0 to 1 from above 0 to {most_mm} mm, a tenth of the distance to the detector"
+    )]
+    Extrafocal {
+        /// Its photons over those of the focal spot.
+        ratio: f64,
+        /// Side of the square that it leaves from, mm.
+        size_mm: f64,
+        /// Largest side, mm.
+        most_mm: f64,
+    },
+    /// Blades so close to the focal spot that next to no extrafocal photon passes them.
+    #[error(
+        "the penumbra of the extrafocal radiation is {penumbra_mm:.0} mm wide, expected at most {most_mm:.0} mm, twenty times the shorter side of the field"
+    )]
+    ExtrafocalPenumbra {
+        /// Its width on the detector plane, mm.
+        penumbra_mm: f64,
+        /// Largest width, mm.
+        most_mm: f64,
+    },
+    /// Extrafocal radiation and a field with sharp edges.
+    #[error(
+        "extrafocal radiation needs the distance of the collimator blades, which it passes beyond the field"
+    )]
+    ExtrafocalWithoutBlades,
     /// Opening angles of the fan.
     #[error("the x-ray field opens by {} x {} degrees, expected above 0 and below 170", found_deg[0], found_deg[1])]
     FanAngle {

@@ -33,7 +33,7 @@ impl Raster {
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
-    /// The place that lies `step` cells from another along x and y; from the inside of the raster not beyond it, as if it continued as its mirror image.
+    /// The place `step` cells from another along x and y. A step from inside the raster is reflected at its edges.
     pub fn moved(&self, from_mm: [f64; 2], step: [f64; 2]) -> [f64; 2] {
         if self.cell_at(from_mm[0], from_mm[1]).is_none() {
             return from_mm;

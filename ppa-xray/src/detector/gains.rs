@@ -26,6 +26,9 @@ impl Gains {
     pub fn of(receptor: &Receptor) -> Result<Self, ReceptorError> {
         let what = "the relative standard deviation of the pixels' gains";
         require(what, receptor.gain_error, 0.0..=0.2, "0 to 0.2")?;
+        if receptor.gain_error == 0.0 {
+            return Ok(Self::default());
+        }
         Ok(Self {
             error: receptor.gain_error,
             panel: receptor.panel,
@@ -37,7 +40,7 @@ impl Gains {
         self.error == 0.0
     }
 
-    /// Of a row-major pixel.
+    /// The gain of a pixel by its row-major number.
     fn of_pixel(&self, pixel: usize) -> f32 {
         let mut rng = Philox::new(self.panel.into(), Stream::Gain as u32, pixel as u64);
         loop {

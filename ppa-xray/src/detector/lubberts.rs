@@ -86,7 +86,7 @@ impl Lubberts {
                             mtf: signal.value,
                         });
                     }
-                    // What N multiplies: an error of A matters where N is large.
+                    // The image has N times A: an error of A matters where N is large.
                     Ok(CurvePoint {
                         value: signal.value / noise.value.max(f64::MIN_POSITIVE),
                         weight: noise.value,
@@ -125,7 +125,7 @@ impl Displacement {
                     left -= weight;
                     left < 0.0
                 });
-                // Rounding may leave a hair after the last term.
+                // By rounding the weights may sum to less than 1.
                 term.or(mixture.terms().last()).map_or(0.0, |term| term.1)
             }
         };

@@ -31,6 +31,7 @@ impl OpenField {
     /// The shape, and the reading at the centre in eV/cm² per history.
     pub fn of(transport: &Transport, response: &Response) -> (Self, f64) {
         let emitter = &transport.emitter;
+        let open_over_focal = transport.open_over_focal();
         let source_detector_mm = transport.projection.source_detector_mm;
         let lines = emitter.lines();
         let at_lines = response.at_lines(&lines.energy_kev);
@@ -41,7 +42,8 @@ impl OpenField {
             let photons = lines.mixed(emitter.mixture(&direction));
             let left = at_lines.moments(at.into(), &direction);
             let signal_kev: f64 = photons.zip(left).map(|(n, left)| n * left.mean_kev).sum();
-            1e3 * signal_kev * emitter.open_fluence_cm2(&Point3::origin(), at)
+            let focal_cm2 = emitter.open_fluence_cm2(&Point3::origin(), at);
+            1e3 * signal_kev * focal_cm2 * open_over_focal
         };
         let detector = transport.projection.detector;
         let Field { low_mm, high_mm } = detector.field();

@@ -86,15 +86,21 @@ impl Readout {
         };
         let mean_kev = spread(|pixel| pixel.mean_kev);
         let square_kev2 = spread(|pixel| pixel.square_kev2);
+        // Beside sharp edges the kernel rings to just below 0, where the ratio of both would be arbitrary.
+        let quanta_kev = moments.iter().filter(|pixel| pixel.mean_kev > 0.0);
+        let quanta_kev = quanta_kev.map(|pixel| pixel.square_kev2 / pixel.mean_kev);
+        let [least_kev, most_kev] = quanta_kev.fold([f64::MAX, 0.0], |[least, most], kev| {
+            [kev.min(least), kev.max(most)]
+        });
         let displaced = mean_kev.into_iter().zip(square_kev2).map(|(mean, square)| {
-            // The kernel rings beside sharp edges, to a hair below 0.
-            if mean > 0.0 && square > 0.0 {
-                Moments {
-                    mean_kev: f64::from(mean),
-                    square_kev2: f64::from(square),
-                }
-            } else {
-                Moments::default()
+            let (mean_kev, square_kev2) = (f64::from(mean), f64::from(square));
+            if mean_kev <= 0.0 {
+                return Moments::default();
+            }
+            let quantum_kev = (square_kev2 / mean_kev).max(least_kev).min(most_kev);
+            Moments {
+                mean_kev,
+                square_kev2: mean_kev * quantum_kev,
             }
         });
         Some(displaced.collect())

@@ -93,7 +93,12 @@ pub(crate) fn entrance_gy_per_history(transport: &Transport) -> Option<f64> {
         })
         .sum();
     // Across the ray, and nearer to the focus.
-    let foot_cm2 = transport.emitter.open_fluence_cm2(&Point3::origin(), foot) / central.z;
+    let lit_over_focal = transport
+        .extrafocal
+        .as_ref()
+        .map_or(1.0, |beside| beside.lit_over_focal(foot, skin_mm / foot_mm));
+    let focal_cm2 = transport.emitter.open_fluence_cm2(&Point3::origin(), foot);
+    let foot_cm2 = lit_over_focal * focal_cm2 / central.z;
     let skin_cm2 = foot_cm2 * (foot_mm / skin_mm).powi(2);
     Some(kerma_kev_cm2_g * GRAY_PER_KEV_G * skin_cm2)
 }

@@ -275,7 +275,7 @@ struct Cut<'a> {
     tolerance_kev: f64,
 }
 
-/// A part of a pixel, and the part of the focal spot that the ray to its centre leaves from.
+/// A part of a pixel, and the strips of the focal spot, or of what lights the place of it, that the ray to its centre leaves from.
 #[derive(Clone, Copy)]
 struct Part {
     field: Field,
@@ -337,11 +337,16 @@ impl Cut<'_> {
         let strips_mm = &self.strips_mm[part.cuts];
         let emitter = &self.rays.transport.emitter;
         let at = centre(part.field);
-        let lit = emitter.lit_share(part.strips, strips_mm.len(), at);
+        let lit_part = emitter.lit_part(at);
+        let lit: f64 = lit_part.iter().map(|[first, last]| last - first).product();
         if lit == 0.0 {
             return Moments::default();
         }
-        let spot = emitter.spot_at(part.strips.map(|strip| strips_mm[strip]));
+        // In a penumbra the strips divide the part of the spot that lights the place: dark strips would end the cuts too early.
+        let spot = emitter.spot();
+        let offsets_mm =
+            [0, 1].map(|axis| spot.strip_of_part_mm(lit_part[axis], part.strips[axis], strips_mm));
+        let spot = emitter.spot_at(offsets_mm);
         self.rays.behind(&spot, at, scratch).scaled(lit)
     }
 }
@@ -351,8 +356,8 @@ mod tests {
     use super::*;
     use crate::beam::detector::Detector;
     use crate::beam::projection::Projection;
-    use crate::engine::fast::PRIMARY_ENERGIES;
     use crate::engine::small_limb;
+    use crate::engine::spectral_quadrature::PRIMARY_ENERGIES;
     use crate::engine::spectral_quadrature::compressed;
     use crate::matter::compton::ComptonModel;
 

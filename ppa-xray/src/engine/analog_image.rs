@@ -34,7 +34,7 @@ impl ImageSetup {
             open_field_ev_cm2,
             open_field,
             readout: exposure.readout.clone(),
-            histories_per_mas: transport.emitter.photons_per_mas(),
+            histories_per_mas: transport.histories_per_mas(),
         }
     }
 

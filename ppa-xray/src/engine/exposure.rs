@@ -49,4 +49,24 @@ impl<'a> Exposure<'a> {
             transport: Transport::new(tables, spectrum, projection)?,
         })
     }
+
+    /// The same photons and response with another detector in the same plane, about the same centre.
+    pub fn with_projection<'b>(&'b self, projection: &'b Projection) -> Exposure<'b> {
+        Exposure {
+            transport: self.transport.with_projection(projection),
+            response: self.response.clone(),
+            readout: self.readout.clone(),
+        }
+    }
+
+    /// The same exposure by its extrafocal photons alone, and their share of the histories.
+    pub fn of_extrafocal(&self) -> Option<(Self, f64)> {
+        let (transport, share) = self.transport.of_extrafocal()?;
+        let alone = Self {
+            transport,
+            response: self.response.clone(),
+            readout: self.readout.clone(),
+        };
+        Some((alone, share))
+    }
 }

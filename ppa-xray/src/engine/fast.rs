@@ -7,50 +7,19 @@ use std::ops::ControlFlow;
 use crate::beam::projection::Projection;
 use crate::beam::spectrum::Spectrum;
 use crate::detector::open_field::OpenField;
-use crate::detector::tabulated_response::TabulatedResponse;
-use crate::engine::adaptive_nodes::single_scatter_field;
-use crate::engine::adaptive_primary::primary_moments;
-use crate::engine::collision_map::CollisionMap;
+use crate::engine::expected_image::ExpectedImage;
 use crate::engine::exposure::Exposure;
-use crate::engine::fast_progress::Monitor;
+use crate::engine::fast_progress::Observer;
 use crate::engine::fast_settings::FastSettings;
-use crate::engine::first_collisions::{ESTIMATES, FirstFlights};
 use crate::engine::grid_shadow::{self, ShadowedPrimary};
-use crate::engine::importance::ImportanceModel;
-use crate::engine::later_collisions::{Histories, VarianceReduction};
-use crate::engine::lines::Lines;
 use crate::engine::marker_shadow::shade;
-use crate::engine::multiple_scatter::MultipleScatter;
-use crate::engine::node_grid::NodeGrid;
 use crate::engine::noise::{self, ExpectedLayer};
-use crate::engine::paths::Paths;
 use crate::engine::prepared_phantom::PreparedPhantom;
 use crate::engine::preview;
-use crate::engine::primary_signal::PrimarySignal;
-use crate::engine::scatter_field::ScatterField;
-use crate::engine::single_scatter::SingleScatter;
-use crate::engine::spectral_quadrature::{Accuracy, compressed};
 use crate::image::radiograph::{CategorySums, Engine, Radiograph};
-use crate::matter::scatter_density::ScatterDensities;
 use crate::phantom::voxels::VoxelPhantom;
 use crate::transport::tally::Category;
 use crate::transport::tracking::TransportError;
-
-/// Energies of the quadrature over the spectrum: errors are then 3e-5 of the primary behind any thickness, and 1e-3 of the scatter.
-pub(crate) const PRIMARY_ENERGIES: Accuracy = Accuracy {
-    most: 12,
-    tolerance: 1e-5,
-};
-pub(crate) const SCATTER_ENERGIES: Accuracy = Accuracy {
-    most: 8,
-    tolerance: 3e-4,
-};
-
-/// How much farther apart than for single scatter the points for multiple scatter are.
-const MULTIPLE_SPACING: f64 = 1.4;
-
-/// First collisions on a list for each that a point of the detector in the dark samples.
-const LISTED_PER_CHOICE: f64 = 32.0;
 
 /// Simulates a radiograph of [`FastSettings::dose_histories`] photons at a fraction of the work.
 ///
@@ -84,10 +53,11 @@ impl PreparedPhantom<'_> {
         settings: &FastSettings,
     ) -> Result<Radiograph, TransportError> {
         self.check_model(settings.compton_model)?;
-        expose(self, spectrum, projection, settings, &Monitor::silent())
+        let unobserved = |_| ControlFlow::Continue(());
+        expose(self, spectrum, projection, settings, &unobserved)
     }
 
-    /// As [`PreparedPhantom::fast`]; `observe` receives the share of the work that is done, about a hundred times and from any thread.
+    /// As [`PreparedPhantom::fast`]; `observe` receives the share of the work that is done, a hundred or two hundred times and from any thread.
     ///
     /// The radiograph is the same, bit for bit, as without an observer. Once `observe` returns [`ControlFlow::Break`], the
     /// work ends within a few hundredths of its time.
@@ -102,7 +72,7 @@ impl PreparedPhantom<'_> {
         observe: &(dyn Fn(f64) -> ControlFlow<()> + Sync),
     ) -> Result<Radiograph, TransportError> {
         self.check_model(settings.compton_model)?;
-        expose(self, spectrum, projection, settings, &Monitor::new(observe))
+        expose(self, spectrum, projection, settings, observe)
     }
 
     /// The same exposure on 96 to 191 pixels along the shorter side, or as many as the image has if they are fewer, with fewer rays and a thirty-second of the histories for the scatter.
@@ -134,51 +104,28 @@ fn expose(
     spectrum: &Spectrum,
     projection: &Projection,
     settings: &FastSettings,
-    monitor: &Monitor,
+    observe: Observer,
 ) -> Result<Radiograph, TransportError> {
     settings.validate(&projection.detector)?;
     let tables = phantom.tables();
     let exposure = Exposure::with_tables(tables.transport.clone(), spectrum, projection)?;
     let transport = &exposure.transport;
     let detector = &projection.detector;
-    let paths = Paths::with_tables(transport, tables.paths.clone());
-    let lines = compressed(&exposure, PRIMARY_ENERGIES);
-    let mut primary = primary_moments(
-        &exposure,
-        &paths,
-        lines.clone(),
-        settings.samples_per_side,
-        settings.dose_histories,
-        monitor,
-    );
-    monitor.check()?;
     let (open_field, open_field_ev_cm2) = OpenField::of(transport, &exposure.response);
-    let signal = PrimarySignal {
-        detector,
-        moments: &primary,
-        open_kev: open_field_ev_cm2 * detector.pixel_cm2() / 1e3,
-    };
-    let scatter = Scatter::new(
-        &exposure,
-        &paths,
-        &signal,
-        &tables.densities,
-        settings,
-        VarianceReduction::default(),
-        monitor,
-    );
-    monitor.check()?;
-    let [compton, rayleigh, _] = &scatter.fields;
-    let mut shared = compton.covariance_kev2(rayleigh, detector);
-    let mut scattered = scatter.fields.map(|field| field.on_pixels(detector));
+    let open_kev = open_field_ev_cm2 * detector.pixel_cm2() / 1e3;
+    let ExpectedImage {
+        mut primary,
+        mut scattered,
+        mut shared,
+        largest_share,
+    } = ExpectedImage::of_all_photons(&exposure, tables, settings, open_kev, observe)?;
     if let Some(marker) = &projection.marker {
         shade(marker, detector, &mut primary, &mut scattered, &mut shared);
     }
     let ShadowedPrimary {
         expected: primary,
         counted,
-    } = grid_shadow::shadowed(&exposure, &paths, lines, primary);
-    monitor.check()?;
+    } = grid_shadow::shadowed(&exposure, &tables.paths, primary);
     let primary_kev = primary.iter().map(|pixel| pixel.mean_kev).sum::<f64>();
     let sums = CategorySums::from_kev(|category| match category {
         Category::Primary => (primary_kev, 0.0),
@@ -205,7 +152,7 @@ fn expose(
         detector: projection.detector,
         engine: Engine::Fast,
         histories: settings.dose_histories,
-        histories_per_mas: transport.emitter.photons_per_mas(),
+        histories_per_mas: transport.histories_per_mas(),
         seed: settings.seed,
         source_detector_mm: projection.source_detector_mm,
         open_field_ev_cm2,
@@ -217,86 +164,10 @@ fn expose(
             .collect(),
         electronic: None,
         sums,
-        largest_score_share: Some(scatter.largest_share),
+        largest_score_share: Some(largest_share),
     };
     let image = image.with_gains(readout.gains());
     Ok(image.with_electronic_noise(readout.electronic_noise_kev()))
-}
-
-/// Scatter of an exposure, before interpolation.
-pub(crate) struct Scatter {
-    /// Compton, Rayleigh, multiple.
-    pub fields: [ScatterField; 3],
-    pub largest_share: f64,
-}
-
-impl Scatter {
-    pub fn new(
-        exposure: &Exposure,
-        paths: &Paths,
-        primary: &PrimarySignal,
-        densities: &[ScatterDensities],
-        settings: &FastSettings,
-        variance_reduction: VarianceReduction,
-        monitor: &Monitor,
-    ) -> Self {
-        let transport = &exposure.transport;
-        let detector = primary.detector;
-        let lines = Lines::new(exposure, paths, densities, SCATTER_ENERGIES);
-        let mut map = CollisionMap::new(transport, paths, &lines);
-        let importance_model = ImportanceModel::new(transport, paths, densities, &map);
-        map.set_density(&importance_model.importance(&map.cells, &primary.tolerances(transport)));
-        let first = FirstFlights {
-            transport,
-            paths,
-            lines: &lines,
-            map: &map,
-            importance_model: &importance_model,
-        };
-        let in_all = ESTIMATES as u64 * u64::from(variance_reduction.splitting);
-        let listed = settings.scatter_histories.div_ceil(in_all);
-        let lists = first.lists(settings.seed, listed);
-        let response = TabulatedResponse::new(&exposure.response, lines.energies_kev());
-        let single = SingleScatter {
-            transport,
-            response: &response,
-            paths,
-            importance_model: &importance_model,
-            lines: &lines,
-            lists: &lists,
-        };
-        let ([compton, rayleigh], single_share) = single_scatter_field(
-            &single,
-            detector,
-            settings.scatter_pixel_mm,
-            (settings.seed, listed as f64 / LISTED_PER_CHOICE),
-            primary,
-            monitor,
-        );
-        let nodes = NodeGrid::new(detector, MULTIPLE_SPACING * settings.scatter_pixel_mm);
-        let multiple = MultipleScatter {
-            histories: Histories {
-                transport,
-                paths,
-                lines: &lines,
-                lists: &lists,
-                importance_model: &importance_model,
-                variance_reduction,
-            },
-            response: &response,
-            densities,
-            nodes,
-        };
-        let estimate = multiple.fluence(settings.seed, monitor);
-        let multiple = ScatterField {
-            grid: nodes,
-            estimates: estimate.fluence,
-        };
-        Self {
-            fields: [compton, rayleigh, multiple],
-            largest_share: single_share.max(estimate.largest_share),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -20,8 +20,10 @@ mod depth_table;
 #[cfg(test)]
 mod energy_balance;
 mod entrance_kerma;
+mod expected_image;
 mod expected_scores;
 pub(crate) mod exposure;
+mod extrafocal_primary;
 pub(crate) mod fast;
 mod fast_progress;
 pub(crate) mod fast_settings;

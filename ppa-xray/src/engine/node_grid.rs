@@ -29,6 +29,17 @@ impl NodeGrid {
         }
     }
 
+    /// The centres of a detector's pixels.
+    pub fn of_pixels(detector: &Detector) -> Self {
+        let low_mm = detector.field().low_mm;
+        Self {
+            columns: detector.columns as usize,
+            rows: detector.rows as usize,
+            low_mm: low_mm.map(|low| low + 0.5 * detector.pixel_mm),
+            step_mm: [detector.pixel_mm; 2],
+        }
+    }
+
     /// The grid with a node between every two neighbours.
     pub fn refined(&self) -> Self {
         Self {

@@ -22,10 +22,14 @@ pub(super) fn settings(image: &FastSettings) -> FastSettings {
     }
 }
 
-/// The receptor with gains of larger pixels, which differ as means of those of the image do.
+/// The receptor with gains of larger pixels, which differ as means of those of the image do, and with the mean of a stationary grid, whose lines larger
+/// pixels would show as other moiré.
 pub(super) fn receptor(image: &Receptor, detector: &Detector) -> Receptor {
     let mut receptor = image.clone();
     receptor.gain_error /= f64::from(binning(detector));
+    if let Some(grid) = &mut receptor.grid {
+        grid.moving |= binning(detector) > 1;
+    }
     receptor
 }
 

@@ -13,7 +13,7 @@ use crate::engine::paths::Paths;
 use crate::engine::primary_rays::{PrimaryRays, Scratch, area_cm2};
 use crate::matter::compton::ComptonModel;
 use crate::phantom::voxels::VoxelPhantom;
-use crate::transport::tally::Moments;
+use crate::transport::tally::{Moments, mix};
 use crate::transport::tracking::TransportError;
 
 /// Points per side of a focal spot.
@@ -35,22 +35,30 @@ pub fn primary(
 ) -> Result<Vec<f64>, TransportError> {
     check_samples(samples_per_side)?;
     let exposure = Exposure::new(phantom, spectrum, projection, ComptonModel::default())?;
-    let transport = &exposure.transport;
-    let paths = Paths::new(transport);
-    let rays = PrimaryRays::new(&exposure, &paths, transport.emitter.lines());
-    let spots = transport.emitter.spot_points(SPOT_POINTS);
-    let ev_cm2 = 1e3 / projection.detector.pixel_cm2();
-    let pixels = 0..projection.detector.pixels();
-    let mut moments = rays.per_pixel(pixels.into_par_iter(), |pixel, scratch| {
-        rays.lit(pixel).map_or_else(Moments::default, |lit| {
-            sampled(&rays, &spots, lit, samples_per_side, scratch)
-        })
-    });
+    let mut moments = of_spot(&exposure, samples_per_side);
+    if let Some((extrafocal, share)) = exposure.of_extrafocal() {
+        mix(&mut moments, &of_spot(&extrafocal, samples_per_side), share);
+    }
     let marker = projection.marker.iter();
     for (pixel, share) in marker.flat_map(|marker| marker.covered(&projection.detector)) {
         moments[pixel] = moments[pixel].scaled(1.0 - share);
     }
+    let ev_cm2 = 1e3 / projection.detector.pixel_cm2();
     Ok(moments.iter().map(|m| m.mean_kev * ev_cm2).collect())
+}
+
+/// First two moments per history of the primary energy in every pixel, for the spot of the exposure's emitter.
+fn of_spot(exposure: &Exposure, samples_per_side: u32) -> Vec<Moments> {
+    let transport = &exposure.transport;
+    let paths = Paths::new(transport);
+    let rays = PrimaryRays::new(exposure, &paths, transport.emitter.lines());
+    let spots = transport.emitter.spot_points(SPOT_POINTS);
+    let pixels = 0..transport.projection.detector.pixels();
+    rays.per_pixel(pixels.into_par_iter(), |pixel, scratch| {
+        rays.lit(pixel).map_or_else(Moments::default, |lit| {
+            sampled(&rays, &spots, lit, samples_per_side, scratch)
+        })
+    })
 }
 
 pub(crate) fn check_samples(samples_per_side: u32) -> Result<(), TransportError> {

@@ -16,6 +16,16 @@ pub(crate) struct Accuracy {
     pub tolerance: f64,
 }
 
+/// Energies of the quadrature over the spectrum: errors are then 3e-5 of the primary behind any thickness, and 1e-3 of the scatter.
+pub(crate) const PRIMARY_ENERGIES: Accuracy = Accuracy {
+    most: 12,
+    tolerance: 1e-5,
+};
+pub(crate) const SCATTER_ENERGIES: Accuracy = Accuracy {
+    most: 8,
+    tolerance: 3e-4,
+};
+
 /// Thicknesses at which errors are evaluated: attenuation exponents at the mean energy of the spectrum.
 const EXPONENTS: [f64; 7] = [0.0, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
 

@@ -13,4 +13,5 @@ pub(crate) enum Stream {
     SingleScatterSampling = 7,
     MultipleScatterSampling = 8,
     Gain = 9,
+    Extrafocal = 10,
 }

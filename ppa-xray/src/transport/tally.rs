@@ -75,6 +75,15 @@ impl std::iter::Sum for Moments {
     }
 }
 
+/// Weights the moments of two kinds of photons, each per history of its own, by their shares of all histories; `share` is that of `those`.
+pub(crate) fn mix(these: &mut [Moments], those: &[Moments], share: f64) {
+    for (this, that) in these.iter_mut().zip(those) {
+        *this = [this.scaled(1.0 - share), that.scaled(share)]
+            .into_iter()
+            .sum();
+    }
+}
+
 impl Moments {
     /// Both moments times `factor`.
     pub fn scaled(self, factor: f64) -> Self {

@@ -3,8 +3,10 @@
 use std::sync::Arc;
 
 use nalgebra::Point3;
+use ppa_core::random::Philox;
 
-use crate::beam::emitter::Emitter;
+use crate::beam::emitter::{Emission, Emitter};
+use crate::beam::extrafocal::ExtrafocalEmitter;
 use crate::beam::projection::Projection;
 use crate::beam::projection_error::ProjectionError;
 use crate::beam::spectrum::Spectrum;
@@ -82,7 +84,10 @@ pub(crate) struct Transport<'a> {
     pub tables: Arc<PhantomTables<'a>>,
     pub spectrum: &'a Spectrum,
     pub projection: &'a Projection,
+    /// Photons of the focal spot.
     pub emitter: Emitter,
+    /// Photons from beside it.
+    pub extrafocal: Option<ExtrafocalEmitter>,
     pub lattice: Lattice,
 }
 
@@ -94,6 +99,7 @@ impl<'a> Transport<'a> {
     ) -> Result<Self, TransportError> {
         let phantom = &*tables.phantom;
         let emitter = Emitter::new(projection, spectrum)?;
+        let extrafocal = ExtrafocalEmitter::beside(&emitter, projection, spectrum)?;
         check_placement(phantom, projection)?;
         let outside = |[low_kev, high_kev]: [f64; 2]| -> f64 {
             spectrum
@@ -122,9 +128,63 @@ impl<'a> Transport<'a> {
             spectrum,
             projection,
             emitter,
+            extrafocal,
             lattice: Lattice::new(phantom.grid(), &projection.ct_from_device),
             tables,
         })
+    }
+
+    /// A photon of the tube, focal or extrafocal.
+    #[inline]
+    pub fn emit(&self, rng: &mut Philox) -> Emission {
+        match &self.extrafocal {
+            Some(beside) if rng.unit() < beside.share => beside.emitter.emit(rng),
+            _ => self.emitter.emit(rng),
+        }
+    }
+
+    /// The spectrum of a plain beam: all photons leave the origin, evenly in solid angle.
+    pub fn plain_beam(&self) -> Option<&Spectrum> {
+        let spectrum = self.emitter.plain_beam()?;
+        self.extrafocal.is_none().then_some(spectrum)
+    }
+
+    /// Histories of one mAs: photons that the tube sends into the field, if the spectrum came from the tube model.
+    pub fn histories_per_mas(&self) -> Option<f64> {
+        let focal = self.emitter.photons_per_mas()?;
+        let beside = self.extrafocal.as_ref();
+        Some(beside.map_or(focal, |beside| beside.histories(focal)))
+    }
+
+    /// Fluence per history with the collimator wide open, over that of the focal spot's photons per history of theirs.
+    pub fn open_over_focal(&self) -> f64 {
+        let beside = self.extrafocal.as_ref();
+        beside.map_or(1.0, ExtrafocalEmitter::open_over_focal)
+    }
+
+    /// The same photons to another detector in the same plane.
+    pub fn with_projection<'b>(&'b self, projection: &'b Projection) -> Transport<'b> {
+        Transport {
+            tables: self.tables.clone(),
+            spectrum: self.spectrum,
+            projection,
+            emitter: self.emitter.clone(),
+            extrafocal: self.extrafocal.clone(),
+            lattice: self.lattice.clone(),
+        }
+    }
+
+    /// The same exposure by its extrafocal photons alone, and their share of the histories.
+    pub fn of_extrafocal(&self) -> Option<(Self, f64)> {
+        let beside = self.extrafocal.as_ref()?;
+        let alone = Self {
+            tables: self.tables.clone(),
+            emitter: beside.emitter.clone(),
+            extrafocal: None,
+            lattice: self.lattice.clone(),
+            ..*self
+        };
+        Some((alone, beside.share))
     }
 }
 

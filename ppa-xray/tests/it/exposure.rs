@@ -3,9 +3,10 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;
 use ppa_xray::{
-    AnalogSettings, AntiScatterGrid, Blur, Category, Collimation, Detector, DetectorModel,
-    FastSettings, FocalSpot, HeelEffect, Material, Projection, Receptor, Source, Spectrum,
-    SpotShape, TubeSpec, VoxelPhantom, analog, fast, primary,
+    AnalogSettings, AntiScatterGrid, Blur, Category, Collimation, ComptonModel, Detector,
+    DetectorModel, Extrafocal, FastSettings, FocalSpot, HeelEffect, Material, PreparedPhantom,
+    Projection, Receptor, Source, Spectrum, SpotShape, TubeSpec, VoxelPhantom, analog, fast,
+    primary,
 };
 
 use crate::scenes::{frontal, slab};
@@ -209,6 +210,82 @@ fn blades_blur_the_edges_of_the_field() {
     );
     let (sharp, blurred) = (sharp.iter().sum::<f64>(), image.iter().sum::<f64>());
     assert!((blurred / sharp - 1.0).abs() < 2e-3, "{blurred} {sharp}");
+}
+
+/// A place x beyond the edge of the field is lit by the part of the area on the other side: ½ − x / ((D/b − 1) · side) of it.
+#[test]
+fn extrafocal_radiation_passes_beyond_the_field() {
+    let vacuum = slab(10.0, 1e-9);
+    let spectrum = Spectrum::monoenergetic(50.0).unwrap();
+    let mut projection = frontal(100, 2.0);
+    projection.detector.rows = 1;
+    projection.source.collimation = Collimation::Rectangle {
+        size_mm: [100.0; 2],
+        centre_mm: [0.0; 2],
+    };
+    projection.source.blades_mm = Some(275.0);
+    let (ratio, size_mm) = (0.1, 20.0);
+    projection.source.extrafocal = Some(Extrafocal::new(ratio, size_mm));
+    let settings = FastSettings::default()
+        .with_dose_histories(f64::INFINITY)
+        .with_scatter_histories(320);
+    let image = fast(&vacuum, &spectrum, &projection, &settings).unwrap();
+    let values = image.total();
+    // All of the area lights the middle of the field.
+    let open = f64::from(values[50]) / (1.0 + ratio);
+    assert!((f64::from(values[50]) / image.open_field_ev_cm2 - 1.0).abs() < 2e-3);
+    for (pixel, value) in values.into_iter().enumerate() {
+        let x_mm = (2.0 * pixel as f64 - 99.0).abs();
+        let cos = 1_100.0 / f64::hypot(1_100.0, x_mm);
+        let lit = (0.5 - (x_mm - 50.0) / (3.0 * size_mm)).clamp(0.0, 1.0);
+        let inside = f64::from(u8::from(x_mm < 50.0));
+        let expected = (inside + ratio * lit) * cos.powi(3) * open;
+        let error = (f64::from(value) - expected) / open;
+        // Over the 20 mm of the area cos³θ is not quite even.
+        assert!(error.abs() < 1e-3, "{x_mm} mm: {error}");
+    }
+}
+
+/// Kerma at the skin per mAs: more by the ratio where the blades leave the whole area visible.
+#[test]
+fn extrafocal_radiation_adds_to_the_entrance_kerma() {
+    let (phantom, spectrum) = (slab(80.0, 1.0), spectrum());
+    let mut projection = frontal(20, 10.0);
+    projection.source.blades_mm = Some(250.0);
+    let gy_per_mas = |projection: &Projection| {
+        let prepared = PreparedPhantom::new(&phantom, ComptonModel::default());
+        let per_history = prepared.entrance_air_kerma_gy_per_history(&spectrum, projection);
+        per_history.unwrap().unwrap() * projection.photons_per_mas(&spectrum).unwrap().unwrap()
+    };
+    let focal = gy_per_mas(&projection);
+    projection.source.extrafocal = Some(Extrafocal::new(0.08, 20.0));
+    let ratio = gy_per_mas(&projection) / focal;
+    assert!((ratio - 1.08).abs() < 1e-6, "{ratio}");
+}
+
+#[test]
+fn extrafocal_radiation_out_of_proportion_is_refused() {
+    let refused = |extrafocal: Extrafocal, blades_mm: Option<f64>| {
+        let mut projection = frontal(10, 1.0);
+        projection.source.extrafocal = Some(extrafocal);
+        projection.source.blades_mm = blades_mm;
+        projection.validate().unwrap_err().to_string()
+    };
+    for (ratio, size_mm) in [
+        (0.0, 20.0),
+        (1.1, 20.0),
+        (f64::NAN, 20.0),
+        (0.1, 0.0),
+        (0.1, 111.0),
+    ] {
+        let error = refused(Extrafocal::new(ratio, size_mm), Some(275.0));
+        assert!(error.contains("a tenth of the distance"), "{error}");
+    }
+    // 20 mm · (1100 / 50 − 1) in a field of 10 mm.
+    let error = refused(Extrafocal::new(0.1, 20.0), Some(50.0));
+    assert!(error.contains("420 mm wide"), "{error}");
+    let error = refused(Extrafocal::new(0.1, 20.0), None);
+    assert!(error.contains("collimator blades"), "{error}");
 }
 
 #[test]

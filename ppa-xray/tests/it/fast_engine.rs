@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;
 use ppa_xray::{
-    AnalogSettings, Category, Detector, FastSettings, FocalSpot, Material, Projection, Radiograph,
-    Spectrum, SpotShape, VoxelPhantom, analog, fast, primary,
+    AnalogSettings, Category, Collimation, Detector, Extrafocal, FastSettings, FocalSpot, Material,
+    Projection, Radiograph, Source, Spectrum, SpotShape, VoxelPhantom, analog, fast, primary,
 };
 
 use crate::scenes::{demanding_source, frontal, limb, sixty_kvp};
@@ -160,6 +160,80 @@ fn scatter_of_a_demanding_source_is_that_of_analog() {
     let sharp = fast(&phantom, &spectrum, &projection, &settings).unwrap();
     let share = found[0].0 / primaries(&sharp)[0].0;
     assert!((0.4..0.8).contains(&share), "{share} of the corner is left");
+}
+
+/// Extrafocal radiation of half the intensity from 30 mm, in a field of 90 mm: the field's edge reaches 45 mm to both sides.
+#[test]
+fn extrafocal_radiation_is_that_of_analog() {
+    let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
+    let collimation = Collimation::Rectangle {
+        size_mm: [90.0; 2],
+        centre_mm: [10.0, 0.0],
+    };
+    let source = Source::default()
+        .with_collimation(collimation)
+        .with_blades_mm(Some(275.0))
+        .with_extrafocal(Some(Extrafocal::new(0.5, 30.0)));
+    let projection = frontal(24, 6.0).with_source(source);
+    let settings = analog_settings(600_000, 15);
+    let expected = analog(&phantom, &spectrum, &projection, &settings).unwrap();
+    let settings = expected_image(40_000, 16);
+    let image = fast(&phantom, &spectrum, &projection, &settings).unwrap();
+    assert_scatter_agrees(&image, &expected);
+    let (found, counted) = (
+        blocks(&image, Category::Primary, 6),
+        blocks(&expected, Category::Primary, 6),
+    );
+    let terms = found.iter().zip(&counted);
+    let chi2: f64 = terms
+        .map(|((found, _), (expected, variance))| (found - expected).powi(2) / variance)
+        .sum();
+    assert!(chi2 < 79.0, "chi² = {chi2:.1} with 36 degrees of freedom"); // 5e-5
+    // The same rays by the deterministic primary.
+    let exact: f64 = primary(&phantom, &spectrum, &projection, 4)
+        .unwrap()
+        .iter()
+        .sum();
+    let rays = &image.layer(Category::Primary).value;
+    let sum: f64 = rays.iter().map(|&value| f64::from(value)).sum();
+    assert!((sum / exact - 1.0).abs() < 2e-3, "{sum} {exact}");
+    assert_eq!(image.histories_per_mas, expected.histories_per_mas);
+    assert!((image.open_field_ev_cm2 / expected.open_field_ev_cm2 - 1.0).abs() < 1e-12);
+}
+
+/// Extrafocal photons alone change the image by up to a third; their rays go to pixels of 2 mm, against 64 points of the area and
+/// 9 rays for each pixel of 1 mm.
+#[test]
+fn primary_of_extrafocal_photons_is_that_of_many_rays() {
+    let (phantom, spectrum) = (limb(&Isometry3::identity()), sixty_kvp());
+    let collimation = Collimation::Rectangle {
+        size_mm: [30.0, 90.0],
+        centre_mm: [10.0, 0.0],
+    };
+    let source = Source::default()
+        .with_collimation(collimation)
+        .with_blades_mm(Some(275.0))
+        .with_extrafocal(Some(Extrafocal::new(0.5, 30.0)));
+    let projection = frontal(50, 1.0).with_source(source);
+    let exact = primary(&phantom, &spectrum, &projection, 3).unwrap();
+    let largest = exact.iter().copied().fold(0.0, f64::max);
+    let sum: f64 = exact.iter().sum();
+    for histories in [f64::INFINITY, 1e12] {
+        let settings = expected_image(320, 1).with_dose_histories(histories);
+        let image = fast(&phantom, &spectrum, &projection, &settings).unwrap();
+        let values = image.layer(Category::Primary).value.iter();
+        let errors = values
+            .zip(&exact)
+            .map(|(&value, exact)| f64::from(value) - exact);
+        let errors: Vec<f64> = errors.collect();
+        let bias = errors.iter().sum::<f64>() / sum;
+        let worst = errors
+            .iter()
+            .fold(0.0, |most: f64, error| most.max(error.abs()))
+            / largest;
+        println!("{histories:e}: sum {bias:.1e}, largest {worst:.1e}");
+        assert!(bias.abs() < 1e-3 && worst < 0.02, "{bias} {worst}");
+    }
 }
 
 /// Rays that are added where they are needed, and few energies for the spectrum, against 64 x 64 rays per pixel and all energies.

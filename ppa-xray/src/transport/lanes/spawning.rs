@@ -131,11 +131,10 @@ impl Lanes<'_, '_> {
     /// Directions and energies of waiting photons from the first random block of each.
     fn leave_source(&mut self, first: u64, count: usize) {
         let transport = self.transport;
-        let emitter = &transport.emitter;
         let mut kept = [0; LANES];
-        let plain = emitter.plain_beam();
+        let plain = transport.plain_beam();
         if plain.is_some() {
-            let field = emitter.field();
+            let field = transport.emitter.field();
             self.isa.run(PlainBeam {
                 low_mm: field.low_mm.map(|low| low as f32),
                 size_mm: field.size_mm().map(|size| size as f32),
@@ -161,7 +160,7 @@ impl Lanes<'_, '_> {
                     if plain.is_none() {
                         rng = rng.after(self.draws.block(i));
                     }
-                    let emission = emitter.emit(&mut rng);
+                    let emission = transport.emit(&mut rng);
                     for axis in 0..3 {
                         let flights = &mut self.waiting.flights;
                         flights.direction[axis][i] = emission.direction[axis] as f32;

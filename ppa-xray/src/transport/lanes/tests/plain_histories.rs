@@ -51,7 +51,7 @@ fn plain_history(transport: &Transport, rng: &mut Philox, ends: &mut Ends) {
         origin_mm: mut position,
         mut direction,
         mut energy_kev,
-    } = transport.emitter.emit(rng);
+    } = transport.emit(rng);
     let mut order = 0;
     let mut category = Category::Primary;
     loop {
