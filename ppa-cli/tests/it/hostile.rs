@@ -119,7 +119,9 @@ fn with_memory(folder: &Path, megabytes: usize, arguments: &str) -> bool {
     let mut command = Command::new("sh");
     command
         .current_dir(folder)
-        .args(["-c", &script, env!("CARGO_BIN_EXE_ppa")]);
+        .args(["-c", &script, env!("CARGO_BIN_EXE_ppa")])
+        // glibc reserves address space for every thread that happens to allocate.
+        .env("MALLOC_ARENA_MAX", "1");
     let output = ended(command);
     if !output.status.success() {
         sentence(&output);
