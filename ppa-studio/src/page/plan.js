@@ -22,13 +22,14 @@ const WITHOUT_FILE = { "depth.rig": "built-in Azure Kinect pair", "xray.calibrat
 
 const WRITTEN = " written";
 
-const placeholder = ({ default: standard, example }) => standard ?? (example ? `off; such as ${example}` : "off");
+// What a field shows that has no value.
+const withoutValue = ({ default: standard, example }) => standard ?? (example ? `off; such as ${example}` : "off");
 
 function typed(input, set) {
   input.addEventListener("change", () => set(input.value.trim() || null));
   return [input, (field) => {
     input.value = field.value ?? "";
-    input.placeholder = placeholder(field);
+    input.placeholder = withoutValue(field);
   }];
 }
 
@@ -48,7 +49,8 @@ function nameInput(field, id, set) {
   select.append(standard, ...field.names.map(([name, meaning]) => new Option(`${name}: ${meaning}`, name)));
   select.addEventListener("change", () => set(select.value || null));
   return [select, (field) => {
-    standard.textContent = `default: ${field.default}`;
+    // There is no default of cameras while the rig of the plan cannot be read.
+    standard.textContent = field.default === null ? "no default" : `default: ${field.default}`;
     standard.hidden = field.required;
     select.value = field.value ?? "";
   }];
