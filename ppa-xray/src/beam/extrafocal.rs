@@ -40,9 +40,10 @@ impl ExtrafocalEmitter {
         }))
     }
 
-    /// Histories of one mAs, from those of the focal spot alone.
-    pub fn histories(&self, focal: f64) -> f64 {
-        focal / (1.0 - self.share)
+    /// Histories of one mAs: photons of the focal spot and of what is `beside` it, if the spectrum came from the tube model.
+    pub fn histories_per_mas(focal: &Emitter, beside: Option<&Self>) -> Option<f64> {
+        let share = beside.map_or(0.0, |beside| beside.share);
+        Some(focal.photons_per_mas()? / (1.0 - share))
     }
 
     /// Fluence per history with the collimator wide open, over that of the focal spot's photons per history of theirs.
@@ -73,9 +74,11 @@ impl Projection {
     /// [`ProjectionError`] when the exposure makes no sense.
     pub fn photons_per_mas(&self, spectrum: &Spectrum) -> Result<Option<f64>, ProjectionError> {
         let focal = Emitter::new(self, spectrum)?;
-        let extrafocal = ExtrafocalEmitter::beside(&focal, self, spectrum)?;
-        let photons = focal.photons_per_mas();
-        Ok(photons.map(|focal| extrafocal.map_or(focal, |beside| beside.histories(focal))))
+        let beside = ExtrafocalEmitter::beside(&focal, self, spectrum)?;
+        Ok(ExtrafocalEmitter::histories_per_mas(
+            &focal,
+            beside.as_ref(),
+        ))
     }
 }
 
@@ -86,17 +89,7 @@ mod tests {
     use super::*;
     use crate::beam::detector::Detector;
     use crate::beam::source::{Collimation, Extrafocal, Source};
-    use crate::beam::tube::TubeSpec;
-
-    fn spectrum() -> Spectrum {
-        let filters = vec!["Al:2.5".parse().unwrap()];
-        Spectrum::tungsten(&TubeSpec {
-            kvp: 70.0,
-            anode_angle_deg: 14.0,
-            filters,
-        })
-        .unwrap()
-    }
+    use crate::scenes::sixty_kvp;
 
     /// A field of 10 mm at 1 m; blades at 250 mm.
     fn projection(extrafocal: Option<Extrafocal>) -> Projection {
@@ -118,7 +111,7 @@ mod tests {
     /// of the extrafocal area.
     #[test]
     fn histories_per_mas_follow_from_the_fluence_at_1_m() {
-        let spectrum = spectrum();
+        let spectrum = sixty_kvp();
         let expected = spectrum.fluence_per_mas_cm2_at_1m().unwrap(); // 1 cm² at 1 m
         for (extrafocal, factor) in [(None, 1.0), (Some(Extrafocal::new(0.25, 30.0)), 1.25)] {
             let photons = projection(extrafocal).photons_per_mas(&spectrum);
@@ -131,8 +124,9 @@ mod tests {
     #[test]
     fn blades_cover_a_part_of_the_area() {
         let projection = projection(Some(Extrafocal::new(0.25, 30.0)));
-        let focal = Emitter::new(&projection, &spectrum()).unwrap();
-        let beside = ExtrafocalEmitter::beside(&focal, &projection, &spectrum());
+        let spectrum = sixty_kvp();
+        let focal = Emitter::new(&projection, &spectrum).unwrap();
+        let beside = ExtrafocalEmitter::beside(&focal, &projection, &spectrum);
         let beside = beside.unwrap().unwrap();
         assert!((beside.open_over_focal() - 0.8 * 1.25).abs() < 1e-3);
         // On the detector plane: 10 mm of 3 · 30 mm along both axes.

@@ -151,9 +151,7 @@ impl<'a> Transport<'a> {
 
     /// Histories of one mAs: photons that the tube sends into the field, if the spectrum came from the tube model.
     pub fn histories_per_mas(&self) -> Option<f64> {
-        let focal = self.emitter.photons_per_mas()?;
-        let beside = self.extrafocal.as_ref();
-        Some(beside.map_or(focal, |beside| beside.histories(focal)))
+        ExtrafocalEmitter::histories_per_mas(&self.emitter, self.extrafocal.as_ref())
     }
 
     /// Fluence per history with the collimator wide open, over that of the focal spot's photons per history of theirs.
