@@ -1,5 +1,6 @@
 //! Core hours of tasks: those that ended tasks have used, by the line that each leaves in its log, and those of the estimate.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::io;
 use std::path::Path;
@@ -14,7 +15,7 @@ use crate::submission::{Submission, Work};
 pub struct CoreHours {
     /// Of tasks that have ended, by their logs. Tasks that run, and tasks that were killed, are not counted.
     pub used: f64,
-    /// Of poses or histories, from the time that one was measured to take; trainings have no estimate.
+    /// Of poses or histories, from the time that one was measured to take; of trainings, from those that are finished.
     #[serde(flatten)]
     pub estimate: Option<Estimate>,
 }
@@ -31,7 +32,7 @@ pub struct Estimate {
 }
 
 impl CoreHours {
-    /// `made` are the poses or histories, and the tasks, that are done, `running` the tasks that run now, `logs` the folder of the
+    /// `made` are the poses, trainings or histories, and the tasks, that are done, `running` the tasks that run now, `logs` the folder of the
     /// logs.
     ///
     /// # Errors
@@ -43,6 +44,7 @@ impl CoreHours {
         logs: &Path,
     ) -> Result<Self, FolderError> {
         let cores = running as f64 * f64::from(submission.settings.cpus);
+        let used_s = used_core_s(logs, |_| true)?;
         let estimate = match &submission.work {
             Work::Poses(work) => {
                 let cpu_s = |poses: u64, shards: u64| {
@@ -61,10 +63,17 @@ impl CoreHours {
                     cost.total_cpu_s(histories, parts)
                 })
             }),
-            Work::Trainings(_) => None,
+            Work::Trainings(_) => {
+                let last = format!("{}.log", submission.work.last_name());
+                let mean_s = used_core_s(logs, |name| *name != *last)? / made.1.max(1) as f64;
+                let all = submission.work.tasks();
+                let cpu_s = |_, tasks: u64| mean_s * tasks as f64;
+                let is_known = made.1 > 0 && mean_s > 0.0;
+                is_known.then(|| Estimate::of((all, all), made, cores, cpu_s))
+            }
         };
         Ok(Self {
-            used: used_core_s(logs)? / 3600.0,
+            used: used_s / 3600.0,
             estimate,
         })
     }
@@ -109,7 +118,8 @@ pub(crate) fn core_s(line: &str) -> Option<f64> {
     Some(seconds as f64 * f64::from(cores))
 }
 
-fn used_core_s(logs: &Path) -> Result<f64, FolderError> {
+/// Core seconds of the tasks whose logs have names that are `counted`.
+fn used_core_s(logs: &Path, counted: impl Fn(&OsStr) -> bool) -> Result<f64, FolderError> {
     let entries = match fs::read_dir(logs) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0.0),
         entries => entries.map_err(FolderError::at("read", logs))?,
@@ -117,6 +127,9 @@ fn used_core_s(logs: &Path) -> Result<f64, FolderError> {
     let mut used = 0.0;
     for entry in entries {
         let path = entry.map_err(FolderError::at("read", logs))?.path();
+        if !path.file_name().is_some_and(&counted) {
+            continue;
+        }
         let text = fs::read(&path).map_err(FolderError::at("read", &path))?;
         used += String::from_utf8_lossy(&text)
             .lines()
@@ -144,8 +157,11 @@ mod tests {
         fs::write(folder.path().join("shard_1.log"), log).unwrap();
         let log = format!("\u{fffd}job 3 ended\n{}", line("3", "1800"));
         fs::write(folder.path().join("merge.log"), log).unwrap();
-        assert_eq!(used_core_s(folder.path()).unwrap(), 2.0 * 3600.0);
-        assert_eq!(used_core_s(&folder.path().join("none")).unwrap(), 0.0);
+        assert_eq!(used_core_s(folder.path(), |_| true).unwrap(), 2.0 * 3600.0);
+        assert_eq!(
+            used_core_s(&folder.path().join("none"), |_| true).unwrap(),
+            0.0
+        );
     }
 
     #[test]
@@ -194,13 +210,30 @@ mod tests {
         assert!((estimate.left - 0.51).abs() < 1e-12);
     }
 
+    /// Of three trainings one is finished; another one was stopped after half an hour.
     #[test]
-    fn trainings_have_no_estimate() {
+    fn trainings_are_estimated_from_those_that_are_finished() {
         let logs = tempfile::tempdir().unwrap();
-        let hours = CoreHours::of(&trainings(), (1, 1), 1, logs.path()).unwrap();
+        let hours =
+            |made, running| CoreHours::of(&trainings(), made, running, logs.path()).unwrap();
         assert_eq!(
-            serde_json::to_value(hours).unwrap(),
+            serde_json::to_value(hours((0, 0), 1)).unwrap(),
             serde_json::json!({"used": 0.0})
         );
+        let line = |seconds: &str| ended_line(1).replace("$SECONDS", seconds);
+        for (log, seconds) in [
+            ("training_1", "3600"),
+            ("training_2", "1800"),
+            ("tables", "360"),
+        ] {
+            fs::write(logs.path().join(format!("{log}.log")), line(seconds)).unwrap();
+        }
+        let found = hours((1, 1), 2);
+        assert!((found.used - 1.6).abs() < 1e-12);
+        let estimate = found.estimate.unwrap();
+        assert!((estimate.estimated - 4.5).abs() < 1e-12, "{estimate:?}");
+        assert!((estimate.left - 3.0).abs() < 1e-12, "{estimate:?}");
+        let cores = 2.0 * f64::from(trainings().settings.cpus);
+        assert_eq!(estimate.left_hours, Some(estimate.left / cores));
     }
 }
