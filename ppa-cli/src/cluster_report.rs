@@ -96,8 +96,8 @@ impl ClusterReport {
         };
         let numbers = 1..=submission.work.tasks();
         let shards: Vec<_> = match &submission.work {
-            Work::Poses(_) => numbers
-                .map(|shard| task(shard, None, &Found::dataset(&folder.shard(shard))))
+            Work::Poses(work) => numbers
+                .map(|shard| task(shard, None, &Found::dataset(&folder.shard(work, shard))))
                 .collect(),
             Work::Trainings(work) => numbers
                 .zip(work.trainings())
@@ -122,8 +122,8 @@ impl ClusterReport {
         let log = log.is_file().then_some(log);
         let is_done = folder.is_done()?;
         let last = match &submission.work {
-            Work::Poses(_) => {
-                let merged = Found::dataset(&folder.dataset());
+            Work::Poses(work) => {
+                let merged = Found::dataset(&folder.dataset(work));
                 Found {
                     complete: merged.complete && is_done,
                     ..merged

@@ -23,6 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let cost = PoseCost {
         pose_cpu_s: 60.0,
         limb_cpu_s: 10.0,
+        resumes: false,
     };
     let bundle = bundle(362, cost, settings.cpus, settings.time)?;
     let work = Work::Poses(PoseWork {
@@ -30,6 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         cost,
         cost_source: CostSource::Given,
         bundle,
+        archive: false,
     });
     let (plan, hash) = ("plan.toml".into(), "0".repeat(64));
     let submission = Submission::new(plan, hash, work, settings);

@@ -14,6 +14,9 @@ pub(crate) const RESERVE: f64 = 1.5;
 /// minute earlier than asked.
 const SIGNAL_S: f64 = 60.0;
 
+/// More than it takes to stop a pose that resumes and to save what was made of it, seconds.
+const SAVE_S: f64 = 60.0;
+
 /// Processor time of the work, seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PoseCost {
@@ -21,6 +24,9 @@ pub struct PoseCost {
     pub pose_cpu_s: f64,
     /// Processor time to read and shape a limb before its first pose, seconds.
     pub limb_cpu_s: f64,
+    /// Whether a stopped pose resumes where it was stopped, as one of the analog engine does.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub resumes: bool,
 }
 
 /// A division of a plan into shards.
@@ -86,7 +92,7 @@ pub fn bundle(
         }
     }
     let warning = warning_s(cost);
-    let first_s = cost.limb_cpu_s + cost.pose_cpu_s;
+    let first_s = cost.limb_cpu_s + least_pose_s(cost);
     let usable_s = limit.seconds() as f64 - warning as f64;
     if usable_s < first_s {
         let least = warning as f64 + first_s;
@@ -113,7 +119,15 @@ pub fn bundle(
 
 /// A pose in progress keeps at least one processor, and the preparation of a limb is not interrupted.
 fn warning_s(cost: PoseCost) -> u64 {
-    (SIGNAL_S + 2.0 * (cost.pose_cpu_s + cost.limb_cpu_s)).ceil() as u64
+    (SIGNAL_S + 2.0 * (least_pose_s(cost) + cost.limb_cpu_s)).ceil() as u64
+}
+
+/// Processor time of a pose that is not interrupted, seconds.
+fn least_pose_s(cost: PoseCost) -> f64 {
+    match cost.resumes {
+        true => cost.pose_cpu_s.min(SAVE_S),
+        false => cost.pose_cpu_s,
+    }
 }
 
 #[cfg(test)]
@@ -128,6 +142,7 @@ mod tests {
         PoseCost {
             pose_cpu_s,
             limb_cpu_s: 0.0,
+            resumes: false,
         }
     }
 
@@ -172,6 +187,19 @@ mod tests {
         assert!(said.contains("00:02:00 is too short"), "{said}");
         let least = said.split("--time ").nth(1).unwrap().parse().unwrap();
         assert!(bundle(5, cost(100.0), 4, least).is_ok(), "{said}");
+    }
+
+    /// 2e10 histories take hours, longer than many partitions allow.
+    #[test]
+    fn poses_that_resume_may_exceed_the_limit() {
+        let resuming = PoseCost {
+            resumes: true,
+            ..cost(20_000.0)
+        };
+        let found = bundle(5, resuming, 1, TWO_HOURS).unwrap();
+        assert_eq!((found.shards, found.warning_s), (5, 180));
+        assert!(bundle(5, cost(20_000.0), 1, TWO_HOURS).is_err());
+        assert!(bundle(5, resuming, 1, TimeLimit::from_seconds(180)).is_err());
     }
 
     #[test]

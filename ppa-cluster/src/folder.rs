@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 
 use crate::error::FolderError;
-use crate::submission::Work;
+use crate::submission::{PoseWork, Work};
 
 /// The folder that `ppa submit` fills: `slurm/` with plan, scripts and logs; `shards/` and `dataset/`, `runs/` with
 /// trainings and tables, or `parts/` with tallies.
@@ -142,9 +142,10 @@ impl ClusterFolder {
         self.logs().join(format!("{}.log", work.last_name()))
     }
 
-    /// The folder of a shard, counted from 1.
-    pub fn shard(&self, number: u64) -> PathBuf {
-        self.root.join("shards").join(number.to_string())
+    /// The folder or archive of a shard, counted from 1.
+    pub fn shard(&self, work: &PoseWork, number: u64) -> PathBuf {
+        let ending = work.ending();
+        self.root.join("shards").join(format!("{number}{ending}"))
     }
 
     /// The folder of the tallies of a part, counted from 1.
@@ -152,9 +153,9 @@ impl ClusterFolder {
         self.root.join(PARTS).join(number.to_string())
     }
 
-    /// The merged dataset.
-    pub fn dataset(&self) -> PathBuf {
-        self.root.join("dataset")
+    /// The folder or archive of the merged dataset.
+    pub fn dataset(&self, work: &PoseWork) -> PathBuf {
+        self.root.join(format!("dataset{}", work.ending()))
     }
 
     /// Trainings and tables of experiments.

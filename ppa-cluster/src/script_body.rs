@@ -7,7 +7,7 @@ use crate::folder::{DONE, FINISHED, PARTS, TALLY};
 use crate::histories::{HistoryCommand, HistoryWork};
 use crate::quote::{shell_quoted, unicode};
 use crate::results::Results;
-use crate::submission::TrainingWork;
+use crate::submission::{PoseWork, TrainingWork};
 
 /// What differs between scripts.
 pub(crate) struct ScriptBody {
@@ -25,15 +25,28 @@ const OF_TASK: &str = "number=$(($1 + SLURM_ARRAY_TASK_ID))\n\
 const OF_LAST: &str = "task=$SLURM_JOB_ID\n";
 
 /// The scripts of the shards of a plan.
-pub(crate) fn of_poses(shards: u64, cpus: u32) -> (ScriptBody, ScriptBody) {
+pub(crate) fn of_poses(work: &PoseWork, cpus: u32) -> (ScriptBody, ScriptBody) {
+    let shards = work.bundle.shards;
+    let ending = work.ending();
+    let begun = if work.archive { "-s" } else { "-d" };
+    let held = if work.archive { "" } else { "/.ppa" };
     let task = ScriptBody {
         title: format!("Makes one shard of {shards}: argument 1 plus the index of the task."),
         number: OF_TASK,
         run: format!(
             "# The shard is given: indices of the array are not those of the shards.\n\
              run env -u SLURM_ARRAY_TASK_ID \"$ppa\" --threads {cpus} generate slurm/plan.toml \\\n    \
-             --shard \"$number/{shards}\" --out \"shards/$number\" --progress plain\n"
+             --shard \"$number/{shards}\" --out \"shards/$number{ending}\" --progress plain\n"
         ),
+    };
+    // Analog histories of a pose, which take hours, are not followed again.
+    let (read_back, verify) = match work.cost.resumes {
+        true => (" --verify", String::new()),
+        false => {
+            let plan = "--plan slurm/plan.toml --progress plain";
+            let verify = format!("run \"$ppa\" --threads {cpus} verify dataset{ending} {plan}\n");
+            ("", verify)
+        }
     };
     let last = ScriptBody {
         title: format!("Merges {shards} shards and verifies the dataset."),
@@ -43,15 +56,15 @@ pub(crate) fn of_poses(shards: u64, cpus: u32) -> (ScriptBody, ScriptBody) {
              missing=\n\
              shards=()\n\
              for ((shard = 1; shard <= {shards}; shard++)); do\n    \
-             [ -d \"shards/$shard/.ppa\" ] || missing+=\" $shard\"\n    \
-             shards+=(\"shards/$shard\")\n\
+             [ {begun} \"shards/$shard{ending}{held}\" ] || missing+=\" $shard\"\n    \
+             shards+=(\"shards/$shard{ending}\")\n\
              done\n\
              if [ -n \"$missing\" ]; then\n    \
              echo \"no dataset: these shards were never begun:$missing\"\n    \
              exit 1\n\
              fi\n\
-             run \"$ppa\" --threads {cpus} merge \"${{shards[@]}}\" --out dataset --progress plain\n\
-             run \"$ppa\" --threads {cpus} verify dataset --plan slurm/plan.toml --progress plain\n\
+             run \"$ppa\" --threads {cpus} merge \"${{shards[@]}}\" --out dataset{ending}{read_back} --progress plain\n\
+             {verify}\
              : >{DONE}\n"
         ),
     };

@@ -59,7 +59,7 @@ impl Scripts {
     ) -> Result<Self, ScriptError> {
         let head = head(folder, submission, program)?;
         let (task, last) = match &submission.work {
-            Work::Poses(work) => of_poses(work.bundle.shards, submission.settings.cpus),
+            Work::Poses(work) => of_poses(work, submission.settings.cpus),
             Work::Trainings(work) => of_trainings(work, submission.settings.cpus),
             Work::Histories(work) => of_histories(work, submission.settings.cpus)?,
         };

@@ -88,6 +88,9 @@ pub struct PoseWork {
     pub cost_source: CostSource,
     /// The division into shards.
     pub bundle: Bundle,
+    /// Whether each shard, and the merged dataset, is one tar archive instead of a folder.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub archive: bool,
 }
 
 /// The trainings of experiments.
@@ -106,6 +109,13 @@ pub struct ExperimentTrainings {
     pub experiment: String,
     /// The folder of each training, as seen from the folder of all trainings. Task k makes number k of them.
     pub trainings: Vec<String>,
+}
+
+impl PoseWork {
+    /// How the names of shards and dataset end.
+    pub(crate) fn ending(&self) -> &'static str {
+        if self.archive { ".tar" } else { "" }
+    }
 }
 
 impl Work {
@@ -295,6 +305,7 @@ pub(crate) mod tests {
         let cost = PoseCost {
             pose_cpu_s: 1200.0,
             limb_cpu_s: 0.1,
+            resumes: false,
         };
         let bundle = crate::bundle(5, cost, 2, settings.time).unwrap();
         let work = Work::Poses(PoseWork {
@@ -302,6 +313,7 @@ pub(crate) mod tests {
             cost,
             cost_source: CostSource::Given,
             bundle,
+            archive: false,
         });
         Submission::new("plan.toml".into(), "ab".repeat(32), work, settings)
     }

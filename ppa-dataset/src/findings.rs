@@ -10,6 +10,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::archive::require_folder;
 use crate::files::{FileError, read_text};
 use crate::layout::LimbId;
 
@@ -158,14 +159,22 @@ impl Findings {
     /// # Errors
     /// [`FileError`] when the file cannot be read or is malformed.
     pub fn read(root: &Path) -> Result<Self, FileError> {
+        require_folder(root)?;
         let path = root.join(Self::FILE);
         match fs::exists(&path) {
             Ok(false) => return Ok(Self::default()),
             Err(error) => return Err(FileError::at("read", &path)(error)),
             Ok(true) => {}
         }
-        serde_json::from_str(&read_text(&path)?)
-            .map_err(|e| FileError::at("parse", &path)(io::Error::from(e)))
+        Self::of_text(&read_text(&path)?, &path)
+    }
+
+    /// The findings in the text of a `findings.json`, which was read from `path`.
+    ///
+    /// # Errors
+    /// [`FileError`] when it is malformed.
+    pub fn of_text(text: &str, path: &Path) -> Result<Self, FileError> {
+        serde_json::from_str(text).map_err(|e| FileError::at("parse", path)(io::Error::from(e)))
     }
 
     /// `findings.json` as text.

@@ -12,6 +12,7 @@
 //! Source of the layout: Laufer et al., Patient Pose Assessment Using a CT-Based Framework for
 //! Synthetic Data Generation, MELBA 2026:027, doi:10.59275/j.melba.2026-c874.
 
+pub mod archive;
 mod body_shape;
 pub mod checksums;
 pub mod export;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use ppa_core::TransformRows;
 use serde::{Deserialize, Serialize};
 
+use crate::archive::require_folder;
 use crate::body_shape::BodyShape;
 use crate::files::{FileError, read_text};
 use crate::layout::{LimbId, View};
@@ -146,6 +147,7 @@ impl Manifest {
     /// # Errors
     /// [`FileError`] when the file is missing or one of its lines is not a row.
     pub fn read(root: &Path) -> Result<Self, FileError> {
+        require_folder(root)?;
         let path = root.join(Self::FILE);
         let text = read_text(&path)?;
         let row = |(i, line)| {

@@ -8,10 +8,10 @@ use ppa_dataset::findings::Findings;
 use ppa_dataset::manifest::{FileRow, Manifest};
 use rayon::prelude::*;
 
+use crate::dataset_files::DatasetFiles;
 use crate::dataset_lock::{DatasetLock, FolderError, lock_existing};
 use crate::limb_jobs::LimbJobs;
 use crate::lists::{Lists, stands};
-use crate::part_file::read_part;
 use crate::planned::Planned;
 use crate::record::{FoundRecord, PoseJob, Record};
 use crate::staging::is_interrupted;
@@ -109,19 +109,29 @@ pub(crate) struct Recorded {
     _lock: DatasetLock,
     pub planned: Planned,
     pub limbs: Vec<LimbJobs>,
+    /// Where an archive was extracted.
+    scratch: Option<tempfile::TempDir>,
     root: PathBuf,
 }
 
 impl Recorded {
     pub fn open(root: &Path) -> Result<Self, FolderError> {
         let lock = lock_existing(root)?;
-        let planned = Planned::read(root)?;
+        let files = DatasetFiles::open(root)?;
+        let planned = files.planned()?;
         Ok(Self {
             _lock: lock,
-            limbs: planned.part(read_part(root)?),
+            limbs: planned.part(files.part()?),
             planned,
+            scratch: files.extracted()?,
             root: root.to_owned(),
         })
+    }
+
+    /// The folder with its files.
+    pub fn folder(&self) -> &Path {
+        let scratch = self.scratch.as_ref();
+        scratch.map_or(&self.root, |scratch| scratch.path())
     }
 
     /// Compares all files with their records.
@@ -150,10 +160,10 @@ impl Recorded {
     }
 
     fn pose_job(&self, pose_job: &PoseJob) -> (Option<Record>, Vec<Problem>) {
-        let path = self.root.join(pose_job.id().record_file());
+        let path = self.folder().join(pose_job.id().record_file());
         let found = Record::look(&path, pose_job.id()).unwrap_or(FoundRecord::Damaged);
         let unit_name = pose_job.to_string();
-        if is_interrupted(&self.root, pose_job.id()) {
+        if is_interrupted(self.folder(), pose_job.id()) {
             return (
                 None,
                 vec![Problem::Interrupted {
@@ -190,7 +200,7 @@ impl Recorded {
         }
         let of_image = |row: &FileRow| {
             let file = row.file.clone();
-            match sha256_of_file(&self.root.join(&file)) {
+            match sha256_of_file(&self.folder().join(&file)) {
                 Err(_) => Some(Problem::Unreadable { file }),
                 Ok(found) => (found != row.sha256).then_some(Problem::Altered { file }),
             }
@@ -210,11 +220,11 @@ impl Recorded {
             let is_sealed = self.planned.sealed || file != Checksums::FILE;
             if file == Manifest::FILE {
                 problems.extend(self.manifest(text, &lists.rows));
-            } else if is_sealed && !stands(&self.root, list) {
+            } else if is_sealed && !stands(self.folder(), list) {
                 problems.push(Problem::List { file: file.clone() });
             }
         }
-        if !lists.holds(Findings::FILE) && self.root.join(Findings::FILE).exists() {
+        if !lists.holds(Findings::FILE) && self.folder().join(Findings::FILE).exists() {
             let file = Findings::FILE.to_owned();
             problems.push(Problem::List { file });
         }
@@ -223,7 +233,7 @@ impl Recorded {
 
     fn manifest(&self, text: &str, rows: &[FileRow]) -> Option<Problem> {
         let file = Manifest::FILE.to_owned();
-        let Ok(found) = read_text(&self.root.join(&file)) else {
+        let Ok(found) = read_text(&self.folder().join(&file)) else {
             return Some(Problem::List { file });
         };
         if found == text {
@@ -240,8 +250,8 @@ impl Recorded {
     }
 }
 
-/// Reads every image of the dataset in `root` and compares it with its hash, and the lists with the records they were made
-/// from. Changes nothing.
+/// Reads every image of the dataset in the folder or archive `root` and compares it with its hash, and the lists with the records they were made
+/// from. Changes nothing. An archive is extracted to a temporary folder for it.
 ///
 /// # Errors
 /// [`FolderError`] when `root` holds no dataset or is being written.

@@ -10,6 +10,7 @@ use ppa_dataset::files::FileError;
 use ppa_dataset::manifest::DESCRIPTION_FILE;
 use ppa_dataset::manifest::Manifest;
 
+use crate::archive_path::is_archive;
 use crate::pose_id::FOLDER;
 use crate::survey::DatasetDiffers;
 
@@ -84,19 +85,22 @@ fn how_to_ask(part: Part) -> String {
 /// Held while a process relies on a dataset's files; released when dropped or when the process dies.
 pub(crate) struct DatasetLock(#[expect(dead_code, reason = "holds the lock")] Option<fs::File>);
 
-/// Locks a folder that holds a dataset, finished or not, for reading. Writes nothing, and several readers may do so.
+/// Locks a folder or an archive that holds a dataset, finished or not, for reading. Writes nothing, and several readers may do so.
 pub(crate) fn lock_existing(root: &Path) -> Result<DatasetLock, FolderError> {
-    if !root.join(FOLDER).is_dir() {
-        return Err(not_a_dataset(root)?);
-    }
-    let path = lock_file(root);
+    let path = match is_archive(root) {
+        true => root.to_owned(),
+        false if root.join(FOLDER).is_dir() => lock_file(root),
+        false => return Err(not_a_dataset(root)?),
+    };
     match fs::File::open(&path) {
         Ok(lock) => {
-            locked(root, lock.try_lock_shared())?;
+            require_lock(root, &path, lock.try_lock_shared())?;
             Ok(DatasetLock(Some(lock)))
         }
         // Nobody has written here since the folder was copied.
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(DatasetLock(None)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound && path != root => {
+            Ok(DatasetLock(None))
+        }
         Err(error) => Err(FileError::at("read", &path)(error).into()),
     }
 }
@@ -118,7 +122,7 @@ pub(crate) fn lock(root: &Path) -> Result<DatasetLock, FolderError> {
     let lock = options
         .open(&path)
         .map_err(FileError::at("create", &path))?;
-    locked(root, lock.try_lock())?;
+    require_lock(root, &path, lock.try_lock())?;
     Ok(DatasetLock(Some(lock)))
 }
 
@@ -126,10 +130,15 @@ fn lock_file(root: &Path) -> PathBuf {
     root.join(FOLDER).join("lock")
 }
 
-fn locked(root: &Path, tried: Result<(), fs::TryLockError>) -> Result<(), FolderError> {
+/// Refuses a dataset whose lock file, of the given path, another process holds.
+pub(crate) fn require_lock(
+    root: &Path,
+    file: &Path,
+    tried: Result<(), fs::TryLockError>,
+) -> Result<(), FolderError> {
     tried.map_err(|error| match error {
         fs::TryLockError::WouldBlock => FolderError::Busy(root.to_owned()),
-        fs::TryLockError::Error(e) => FileError::at("lock", &lock_file(root))(e).into(),
+        fs::TryLockError::Error(e) => FileError::at("lock", file)(e).into(),
     })
 }
 

@@ -85,6 +85,9 @@ pub struct Forecast {
 /// Prepares every limb of the plan, makes `fraction` of its poses, at least one, in a temporary
 /// folder, one after the other, and estimates what all will take in the folder `root`.
 ///
+/// Of a plan with many analog histories, two short exposures of each pose are measured instead, and the time of all histories
+/// follows from their difference.
+///
 /// The poses are spread evenly, and differently for every limb. What cannot work with one of them
 /// would not work in the run. Once `stop` is true no other pose begins. Whether the disk has room for all is for [`Forecast::fits`] to say.
 ///
@@ -100,7 +103,10 @@ pub fn forecast(
     if !(0.0..=1.0).contains(&fraction) {
         return Err(ForecastError::Fraction(fraction));
     }
-    let work = Work::of_plan(plan)?;
+    let plans = measured_plans(plan);
+    let works = plans.iter().map(Work::of_plan);
+    let works: Vec<_> = works.collect::<Result<_, _>>()?;
+    let work = &works[0];
     let poses = plan.rotation.poses().map_err(GenerateError::from)?;
     let limbs = jobs_of_part(work.planned(), &poses, Part::WHOLE);
     // None stays prepared: the time of all of them is measured.
@@ -113,15 +119,23 @@ pub fn forecast(
     let (mut preparing_s, mut unit_s, mut bytes) = (0.0, Vec::new(), 0);
     for (i, limb) in limbs.iter().enumerate() {
         let begun = ProcessTime::now();
-        let make = work.prepare(limb.limb, scratch.path())?;
+        let make = work.prepare(limb.limb, scratch.path(), None)?;
         preparing_s += begun.elapsed().as_secs_f64();
+        let others = works[1..].iter();
+        let others = others.map(|other| other.prepare(limb.limb, scratch.path(), None));
+        let others: Vec<_> = others.collect::<Result<_, _>>()?;
         let shift = (i as f64 + 0.5) / limbs.len() as f64;
         for pose in spread(&poses, of_limb, shift) {
             go_on(stop)?;
-            let begun = ProcessTime::now();
-            let images = make(limb.pose_job(pose))?;
-            unit_s.push(begun.elapsed().as_secs_f64());
-            for row in &images.files {
+            let (mut seconds, mut files) = (Vec::new(), Vec::new());
+            for make in others.iter().chain([&make]) {
+                let begun = ProcessTime::now();
+                let images = make(limb.pose_job(pose))?;
+                seconds.push(begun.elapsed().as_secs_f64());
+                files = images.files;
+            }
+            unit_s.push(pose_s(plan, &seconds));
+            for row in &files {
                 let path = scratch.path().join(&row.file);
                 let size = std::fs::metadata(&path).map_err(FileError::at("read", &path))?;
                 bytes += size.len();
@@ -166,6 +180,37 @@ impl Forecast {
             }),
             _ => Ok(()),
         }
+    }
+}
+
+/// Analog histories that are followed to measure the time of more.
+const MEASURED_HISTORIES: u64 = 2_000_000;
+
+/// The plan, or in place of one with many analog histories a plan with few and one with twice as many, to tell the time of the
+/// histories from that of everything else.
+fn measured_plans(plan: &Plan) -> Vec<Plan> {
+    let Some(analog) = plan.xray.analog else {
+        return vec![plan.clone()];
+    };
+    if analog.histories <= 2 * MEASURED_HISTORIES {
+        return vec![plan.clone()];
+    }
+    let with = |histories| {
+        let mut plan = plan.clone();
+        plan.xray.analog = Some(analog.with_histories(histories));
+        plan
+    };
+    vec![with(MEASURED_HISTORIES), with(2 * MEASURED_HISTORIES)]
+}
+
+/// Processor time of a pose, from that of the same pose in each of [`measured_plans`], the first plan last, seconds.
+fn pose_s(plan: &Plan, seconds: &[f64]) -> f64 {
+    match (plan.xray.analog, seconds) {
+        (Some(analog), &[twice, few]) => {
+            let more = analog.histories as f64 / MEASURED_HISTORIES as f64 - 1.0;
+            few + (twice - few).max(0.0) * more
+        }
+        _ => seconds.iter().sum(),
     }
 }
 
@@ -245,6 +290,26 @@ mod tests {
             said.contains("600 more bytes in dataset, where 599"),
             "{said}"
         );
+    }
+
+    #[test]
+    fn many_histories_are_extrapolated_from_few() {
+        let text = "version = 1\n[[case]]\nfile = \"leg.toml\"\n";
+        let mut plan = Plan::of_text(text, Path::new("plan.toml")).unwrap();
+        assert_eq!(measured_plans(&plan).len(), 1);
+        let analog = ppa_xray::AnalogSettings::default();
+        plan.xray.analog = Some(analog.with_histories(2 * MEASURED_HISTORIES));
+        assert_eq!(measured_plans(&plan).len(), 1);
+        assert_eq!(pose_s(&plan, &[7.0]), 7.0);
+        plan.xray.analog = Some(analog.with_histories(100 * MEASURED_HISTORIES));
+        let measured = measured_plans(&plan);
+        let histories = measured
+            .iter()
+            .map(|plan| plan.xray.analog.unwrap().histories);
+        let expected = [MEASURED_HISTORIES, 2 * MEASURED_HISTORIES];
+        assert!(histories.eq(expected));
+        // 3 s of everything else, 2 s for each of the measured histories.
+        assert_eq!(pose_s(&plan, &[7.0, 5.0]), 203.0);
     }
 
     #[test]

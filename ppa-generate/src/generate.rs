@@ -11,6 +11,9 @@ use ppa_dataset::layout::LimbId;
 use ppa_dataset::stop::{Stopped, go_on};
 use ppa_scene::SweepError;
 
+use crate::analog_histories::AnalogHistories;
+use crate::archive_path::is_archive;
+use crate::archived_run::ArchivedRun;
 use crate::case::{Case, CaseError};
 use crate::description::{Description, Settings};
 use crate::job::{Job, JobError, MakePose, Progress, Summary};
@@ -18,6 +21,7 @@ use crate::limb_jobs::{LimbJobs, PlannedLimb, jobs_of_part};
 use crate::plan::Plan;
 use crate::posable_limb::PosableLimb;
 use crate::pose_error::PoseError;
+use crate::pose_id::{FOLDER, PoseId};
 use crate::prepared_limb::{PrepareError, PreparedLimb};
 use crate::record::Record;
 use crate::scene_setup::{SceneSetup, SceneSetupError};
@@ -112,7 +116,8 @@ pub struct GenerateSettings<'a> {
     pub part: Part,
     /// Bytes that the images may take; poses that are being made may exceed it for a moment.
     pub disk_limit: Option<u64>,
-    /// Once true, poses under way are finished and no other begins.
+    /// Once true, poses under way are finished and no other begins. Analog radiographs under way end, and the next run resumes
+    /// from their histories.
     pub stop: Option<&'a AtomicBool>,
     /// Whether poses of other settings, scans or sources are replaced, and those that the plan does not have removed.
     pub replace: bool,
@@ -130,7 +135,7 @@ impl Default for GenerateSettings<'_> {
     }
 }
 
-/// Makes what is missing of the plan's dataset in the folder `root`.
+/// Makes what is missing of the plan's dataset in the folder `root`, or in the tar archive of this path if it ends in `.tar`.
 ///
 /// Every pose is generated on its own: its files appear whole, its record last, so a run that was
 /// killed resumes where it stopped. A pose is made again when its record is missing or damaged, or when one of its files
@@ -139,6 +144,9 @@ impl Default for GenerateSettings<'_> {
 /// A folder with poses that follow from something else (plan settings, case, code and physics data) or that the plan does
 /// not have is refused, unless `settings` ask to replace them. Then each of them stays until its successor is whole, and
 /// those without a successor until all others are.
+///
+/// An archive holds the files of the folder. Poses are made in a temporary folder and added to it one by one; at the end it is
+/// written in a fixed order.
 ///
 /// # Errors
 /// [`GenerateError`], naming the file or pose at fault.
@@ -149,7 +157,36 @@ pub fn generate(
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Summary, GenerateError> {
     let work = Work::of_plan(plan)?;
-    let poses = plan.rotation.poses()?;
+    let stop = settings.stop;
+    if is_archive(root) {
+        let mut folder = root.as_os_str().to_owned();
+        folder.push(".histories");
+        let folder = folder.into();
+        return ArchivedRun::complete(root, |run| {
+            let histories = AnalogHistories { folder, stop };
+            let kept = |pose: PoseId, record: &Record| run.add(pose, record);
+            let made = generate_in(&work, run.folder(), settings, progress, &histories, &kept);
+            made.map_err(|error| match error {
+                GenerateError::Job(error) => GenerateError::Job(error.of_archive(run)),
+                error => error,
+            })
+        });
+    }
+    let folder = root.join(FOLDER).join("histories");
+    let histories = AnalogHistories { folder, stop };
+    generate_in(&work, root, settings, progress, &histories, &|_, _| Ok(()))
+}
+
+/// Makes what is missing in a folder, and calls `kept` after each pose that was made.
+fn generate_in(
+    work: &Work,
+    root: &Path,
+    settings: &GenerateSettings,
+    progress: &(dyn Fn(Progress) + Sync),
+    histories: &AnalogHistories,
+    kept: &(dyn Fn(PoseId, &Record) -> Result<(), FileError> + Sync),
+) -> Result<Summary, GenerateError> {
+    let poses = work.plan.rotation.poses()?;
     let limbs = jobs_of_part(work.planned(), &poses, settings.part);
     let findings = work.findings(&limbs, root, limbs_at_once())?;
     progress(Progress::Findings(&findings));
@@ -162,16 +199,22 @@ pub fn generate(
         disk_limit: settings.disk_limit,
         replace: settings.replace,
         progress,
+        kept: &|pose, record| {
+            kept(pose, record)?;
+            histories.remove(pose)
+        },
     };
-    job.complete(|limb| {
+    let summary = job.complete(|limb| {
         settings.stop.map_or(Ok(()), go_on)?;
-        let make = work.prepare(limb.limb, &staging)?;
+        let make = work.prepare(limb.limb, &staging, Some(histories))?;
         let make: MakePose<GenerateError> = Box::new(move |pose_job| {
             settings.stop.map_or(Ok(()), go_on)?;
             make(pose_job)
         });
         Ok(make)
-    })
+    })?;
+    histories.remove_if_empty().map_err(JobError::from)?;
+    Ok(summary)
 }
 
 /// A plan with its cases and its scene setup: all that poses are generated from.
@@ -268,6 +311,7 @@ impl<'a> Work<'a> {
         &'m self,
         id: LimbId,
         root: &'m Path,
+        histories: Option<&'m AnalogHistories>,
     ) -> Result<MakePose<'m, GenerateError>, GenerateError> {
         let limb = self.limb(id);
         let case = || limb.file.clone();
@@ -284,11 +328,14 @@ impl<'a> Work<'a> {
         })?;
         Ok(Box::new(move |pose_job| {
             posable
-                .make(pose_job.pose, root)
-                .map_err(|source| GenerateError::Pose {
-                    case: limb.file.clone(),
-                    angle_deg: pose_job.pose.angle_deg,
-                    source,
+                .make(pose_job.pose, root, histories)
+                .map_err(|source| match source {
+                    PoseError::Stopped(stopped) => stopped.into(),
+                    source => GenerateError::Pose {
+                        case: limb.file.clone(),
+                        angle_deg: pose_job.pose.angle_deg,
+                        source,
+                    },
                 })
         }))
     }

@@ -13,11 +13,12 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::dataset_lock::{DatasetLock, FolderError, lock};
+use crate::held_part::require_part;
 use crate::limb_jobs::LimbJobs;
 use crate::lists::Lists;
 use crate::overview::Overview;
-use crate::part_file::require_part;
 use crate::posable_limb::Images;
+use crate::pose_id::PoseId;
 use crate::record::{FoundRecord, PoseJob, Record};
 use crate::several_limbs::for_each_limb;
 use crate::staging::{Staging, staging_folder};
@@ -46,6 +47,24 @@ pub struct Summary {
     pub healed: Vec<String>,
     /// Where files lie now that stood in the place of others and were not written by ppa, or altered since.
     pub set_aside: Vec<String>,
+}
+
+impl Summary {
+    /// Of a dataset with the given lists, in which nothing was replaced.
+    pub(crate) fn new(pose_jobs: usize, made: usize, lists: Lists) -> Self {
+        let count = |kind| lists.rows.iter().filter(|row| row.kind == kind).count();
+        Self {
+            pose_jobs,
+            made,
+            depth_images: count(FileKind::Depth),
+            radiographs: count(FileKind::Radiograph),
+            findings: lists.findings,
+            replaced: 0,
+            removed: 0,
+            healed: Vec::new(),
+            set_aside: Vec::new(),
+        }
+    }
 }
 
 /// What a run reports while it continues.
@@ -101,6 +120,8 @@ pub(crate) struct Job<'a> {
     /// Whether poses of other settings are replaced, and those of other plans removed.
     pub replace: bool,
     pub progress: &'a (dyn Fn(Progress) + Sync),
+    /// Called after each pose that was made, once it is in its place.
+    pub kept: &'a (dyn Fn(PoseId, &Record) -> Result<(), FileError> + Sync),
 }
 
 impl Job<'_> {
@@ -134,18 +155,12 @@ impl Job<'_> {
         self.remove_others(&survey, &overview)
             .map_err(JobError::from)?;
         let lists = self.finish(&overview).map_err(JobError::from)?;
-        let count = |kind| lists.rows.iter().filter(|row| row.kind == kind).count();
-        let healed = overview.into_healed();
         Ok(Summary {
-            pose_jobs,
-            made,
-            depth_images: count(FileKind::Depth),
-            radiographs: count(FileKind::Radiograph),
             replaced: survey.stale.len(),
             removed: survey.beyond.len(),
-            healed,
+            healed: overview.into_healed(),
             set_aside: staging.aside.into_kept(),
-            findings: lists.findings,
+            ..Summary::new(pose_jobs, made, lists)
         })
     }
 
@@ -248,6 +263,7 @@ impl Job<'_> {
         }
         overview.open(&self.limbs)?;
         overview.staging.put(pose_job.id(), record)?;
+        (self.kept)(pose_job.id(), record)?;
         used.fetch_sub(earlier, Ordering::Relaxed);
         Ok(())
     }

@@ -11,6 +11,10 @@
 //! Source of the method: Laufer et al., Patient Pose Assessment Using a CT-Based Framework for
 //! Synthetic Data Generation, MELBA 2026:027, doi:10.59275/j.melba.2026-c874.
 
+mod analog_histories;
+mod archive_path;
+mod archived_dataset;
+mod archived_run;
 mod case;
 mod case_check;
 mod case_names;
@@ -22,6 +26,7 @@ mod coverage_study;
 mod cut_error;
 mod cut_findings;
 mod cut_share;
+mod dataset_files;
 mod dataset_lock;
 mod depth_views;
 mod description;
@@ -31,6 +36,7 @@ mod forecast;
 mod frames;
 mod gates;
 mod generate;
+mod held_part;
 mod job;
 #[cfg(test)]
 mod job_trials;
@@ -67,6 +73,7 @@ mod technique;
 mod toml_edits;
 mod toml_file;
 mod verify;
+mod write_archive;
 
 pub use case::{Case, CaseError, Found, Source};
 pub use case_check::{CaseCheck, CaseCheckError, Drift};
@@ -85,11 +92,12 @@ pub use forecast::{Forecast, ForecastError, forecast, free_bytes};
 pub use frames::Frames;
 pub use gates::NotALimb;
 pub use generate::{GenerateError, GenerateSettings, generate};
+pub use held_part::held_part;
 pub use job::{JobError, Progress, Summary};
 pub use loaded_scan::LoadedScan;
 pub use made_images::{MadeImages, made_images};
 pub use merge::{MergeError, merge};
-pub use part_file::held_part;
+
 pub use plan::{
     DepthSettings, MarkerPlace, Plan, PlanCase, PlanError, PlanRoom, RoomFile, XraySettings,
 };

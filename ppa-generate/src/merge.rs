@@ -1,24 +1,29 @@
 //! Shards joined to one dataset: the same bytes as a run over the whole plan.
 
+use std::cell::RefCell;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use crate::pose_id::PoseId;
 use ppa_core::Part;
 use ppa_dataset::files::{FileError, hex, write_whole};
+use ppa_dataset::manifest::{DESCRIPTION_FILE, FileRow};
 use ppa_dataset::stop::{Stopped, go_on};
 use sha2::{Digest, Sha256};
 
+use crate::archive_path::is_archive;
+use crate::dataset_files::DatasetFiles;
 use crate::dataset_lock::{FolderError, lock_existing};
 use crate::differences::differences;
 use crate::job::{Job, JobError, Progress, Summary};
 use crate::limb_jobs::LimbJobs;
+use crate::lists::Lists;
 use crate::planned::Planned;
 use crate::posable_limb::Images;
-use crate::pose_id::FOLDER;
-use crate::record::{FoundRecord, PoseJob, Record, record_names};
+use crate::pose_id::PoseId;
+use crate::record::{FoundRecord, PoseJob, Record};
 use crate::staging::staging_folder;
+use crate::write_archive::{NamedBytes, write_archive};
 
 /// Why shards could not be joined.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +44,12 @@ pub enum MergeError {
     /// No folder was given.
     #[error("no shard to merge: name at least one folder")]
     NoShard,
+    /// The archive to write exists.
+    #[error(
+        "{} exists and does not hold the dataset of these shards; --replace replaces it, --out names another one",
+        .0.display()
+    )]
+    Exists(PathBuf),
     /// A shard would be merged into itself.
     #[error("{} is one of the shards; merge them into another folder", .0.display())]
     IntoShard(PathBuf),
@@ -93,10 +104,11 @@ pub enum MergeError {
     Altered(PathBuf),
 }
 
-/// Joins the shards of one plan in the folder `root`, copying their images.
+/// Joins the shards of one plan in the folder `root`, copying their images, or in the tar archive of this path if it ends in
+/// `.tar`. Shards may be folders and archives.
 ///
 /// Every image is compared with its recorded hash before it is written. What is there already is
-/// kept, so a merge that was killed can be repeated. Another dataset in `root` is refused, or made this one where `replace` is
+/// kept, so a merge that was killed can be repeated; an archive is written whole or not at all. Another dataset in `root` is refused, or made this one where `replace` is
 /// set, as by [`generate`](crate::generate). Once `stop` is true no other pose begins.
 ///
 /// # Errors
@@ -112,6 +124,9 @@ pub fn merge(
     let shards = Shards::open(shards, root)?;
     let limbs = shards.planned.part(Part::WHOLE);
     shards.require_all(&limbs)?;
+    if is_archive(root) {
+        return shards.merge_into_archive(&limbs, root, replace, stop, progress);
+    }
     let job = Job {
         root,
         description: &shards.planned.text,
@@ -120,63 +135,88 @@ pub fn merge(
         disk_limit: None,
         replace,
         progress,
+        kept: &|_, _| Ok(()),
     };
     let staging = staging_folder(root);
     job.complete(|_| {
         Ok(Box::new(|pose_job: PoseJob| {
             go_on(stop)?;
-            shards.copy(&pose_job, &staging)
+            let (record, images) = shards.pose(&pose_job)?;
+            for (file, bytes) in images {
+                write_whole(&staging.join(file), &bytes)?;
+            }
+            Ok(Images {
+                files: record.files,
+                rois: record.rois,
+                findings: record.findings,
+            })
         }))
     })
 }
 
-struct Shards<'a> {
+struct Shards {
     planned: Planned,
-    /// The folder that holds the record of a pose.
-    holder: HashMap<PoseId, &'a Path>,
+    files: Vec<DatasetFiles>,
+    /// Which of them holds the record of a pose.
+    holder: HashMap<PoseId, usize>,
 }
 
-impl<'a> Shards<'a> {
-    fn open(folders: &'a [PathBuf], root: &Path) -> Result<Self, MergeError> {
-        let first = folders.first().ok_or(MergeError::NoShard)?;
-        let planned = Planned::read(first)?;
-        let of_dataset = planned.part(Part::WHOLE);
-        let pose_jobs = of_dataset.iter().flat_map(LimbJobs::pose_jobs);
-        let pose_jobs: HashMap<_, _> = pose_jobs
-            .map(|pose_job| (pose_job.id(), pose_job))
-            .collect();
+impl Shards {
+    fn open(folders: &[PathBuf], root: &Path) -> Result<Self, MergeError> {
+        let mut files: Vec<DatasetFiles> = Vec::new();
+        let mut first: Option<Planned> = None;
+        let mut pose_jobs = HashMap::new();
         let mut holder = HashMap::new();
-        for folder in folders {
+        for (index, folder) in folders.iter().enumerate() {
             if same_folder(folder, root) {
                 return Err(MergeError::IntoShard(root.to_owned()));
-            }
-            let other = Planned::read(folder)?;
-            if planned.text != other.text {
-                let key = differences(&planned.text, &other.text).into_iter().next();
-                return Err(MergeError::OtherDataset {
-                    first: first.clone(),
-                    second: folder.clone(),
-                    key: key.map_or("the text of dataset.json".to_owned(), |key| key.key),
-                });
             }
             // Refuses a shard that is written now. The lock is not kept, since there may be more shards than files may be open;
             // a pose that changes later fails by its hash.
             lock_existing(folder)?;
-            for pose in record_names(&folder.join(FOLDER))? {
-                let Some(pose_job) = pose_jobs.get(&pose) else {
+            let shard = DatasetFiles::open(folder)?;
+            if shard.is_empty_archive() {
+                return Err(FolderError::NotADataset(folder.clone()).into());
+            }
+            let planned = shard.planned()?;
+            match &first {
+                None => {
+                    for limb in planned.part(Part::WHOLE) {
+                        let names = limb.pose_jobs().map(|one| (one.id(), one.to_string()));
+                        pose_jobs.extend(names);
+                    }
+                    first = Some(planned);
+                }
+                Some(first) if first.text != planned.text => {
+                    let key = differences(&first.text, &planned.text).into_iter().next();
+                    return Err(MergeError::OtherDataset {
+                        first: folders[0].clone(),
+                        second: folder.clone(),
+                        key: key.map_or("the text of dataset.json".to_owned(), |key| key.key),
+                    });
+                }
+                Some(_) => {}
+            }
+            for pose in shard.poses()? {
+                let Some(name) = pose_jobs.get(&pose) else {
                     let (root, record) = (folder.clone(), pose.record_name());
                     return Err(FolderError::OtherPlan { root, record }.into());
                 };
-                if let Some(first) = holder.insert(pose, folder.as_path()) {
+                if let Some(first) = holder.insert(pose, index) {
                     return Err(MergeError::Overlap {
-                        first: first.to_owned(),
+                        first: folders[first].clone(),
                         second: folder.clone(),
-                        pose_job: pose_job.to_string(),
+                        pose_job: name.clone(),
                     });
                 }
             }
+            files.push(shard);
         }
-        Ok(Self { planned, holder })
+        Ok(Self {
+            planned: first.ok_or(MergeError::NoShard)?,
+            files,
+            holder,
+        })
     }
 
     fn require_all(&self, limbs: &[LimbJobs]) -> Result<(), MergeError> {
@@ -192,42 +232,106 @@ impl<'a> Shards<'a> {
         }
     }
 
-    /// Copies the images of one pose from the shard that holds it below `to`.
-    fn copy(&self, pose_job: &PoseJob, to: &Path) -> Result<Images, MergeError> {
-        let shard = self.holder[&pose_job.id()];
-        let found = Record::look(&shard.join(pose_job.id().record_file()), pose_job.id())?;
-        let FoundRecord::Whole(Record {
-            key,
-            files,
-            rois,
-            findings,
-        }) = found
-        else {
+    /// The record of a pose and its images, from the shard that holds it.
+    fn pose(&self, pose_job: &PoseJob) -> Result<(Record, Vec<NamedBytes>), MergeError> {
+        let shard = &self.files[self.holder[&pose_job.id()]];
+        let FoundRecord::Whole(record) = shard.look(pose_job.id())? else {
             return Err(MergeError::Damaged {
-                shard: shard.to_owned(),
+                shard: shard.root().to_owned(),
                 pose_job: pose_job.to_string(),
             });
         };
-        if key != pose_job.key() {
+        if record.key != pose_job.key() {
             return Err(MergeError::Stale {
-                shard: shard.to_owned(),
+                shard: shard.root().to_owned(),
                 pose_job: pose_job.to_string(),
             });
         }
-        for row in &files {
-            let path = shard.join(&row.file);
-            let bytes =
-                ppa_core::regular_file::read(&path).map_err(FileError::at("read", &path))?;
-            if hex(&Sha256::digest(&bytes)) != row.sha256 {
-                return Err(MergeError::Altered(path));
+        let image = |row: &FileRow| {
+            let bytes = shard.required(&row.file)?;
+            match hex(&Sha256::digest(&bytes)) == row.sha256 {
+                true => Ok((row.file.clone(), bytes)),
+                false => Err(MergeError::Altered(shard.path(&row.file))),
             }
-            write_whole(&to.join(&row.file), &bytes)?;
+        };
+        let images = record.files.iter().map(image);
+        let images = images.collect::<Result<_, MergeError>>()?;
+        Ok((record, images))
+    }
+
+    /// Writes the dataset as one archive, pose by pose in the order of the plan.
+    fn merge_into_archive(
+        &self,
+        limbs: &[LimbJobs],
+        root: &Path,
+        replace: bool,
+        stop: &AtomicBool,
+        progress: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Summary, MergeError> {
+        let pose_jobs = || limbs.iter().flat_map(LimbJobs::pose_jobs);
+        progress(Progress::Total(pose_jobs().count()));
+        if root.exists() {
+            if let Some(records) = self.merged_before(limbs, root)? {
+                pose_jobs().for_each(|_| progress(Progress::Found));
+                return Ok(self.summary(limbs, records, 0));
+            }
+            if !replace {
+                return Err(MergeError::Exists(root.to_owned()));
+            }
         }
-        Ok(Images {
-            files,
-            rois,
-            findings,
-        })
+        let records = RefCell::new(Vec::new());
+        let poses = pose_jobs().map(|pose_job| {
+            go_on(stop)?;
+            let (record, mut files) = self.pose(&pose_job)?;
+            let text = record.to_text().into_bytes();
+            files.push((pose_job.id().record_file(), text));
+            records.borrow_mut().push(record);
+            progress(Progress::Made);
+            Ok(files)
+        });
+        let description = self.planned.text.clone().into_bytes();
+        let lists = || {
+            let lists = self.lists(limbs, records.borrow().clone()).files;
+            let bytes = lists
+                .into_iter()
+                .map(|(name, text)| (name, text.into_bytes()));
+            Ok::<_, MergeError>(bytes.collect())
+        };
+        let stated = [(DESCRIPTION_FILE.to_owned(), description)];
+        write_archive(root, &stated, poses, lists)?;
+        Ok(self.summary(limbs, records.into_inner(), pose_jobs().count()))
+    }
+
+    /// The records of an archive that holds the merged dataset; `None` where it holds another one, or an unfinished one.
+    fn merged_before(
+        &self,
+        limbs: &[LimbJobs],
+        root: &Path,
+    ) -> Result<Option<Vec<Record>>, MergeError> {
+        lock_existing(root)?;
+        let files = DatasetFiles::open(root)?;
+        if !files.is_finished_archive() || files.planned()?.text != self.planned.text {
+            return Ok(None);
+        }
+        let pose_jobs = limbs.iter().flat_map(LimbJobs::pose_jobs);
+        let record = |pose_job: PoseJob| {
+            let found = files.look(pose_job.id())?;
+            let is_same = |record: &&Record| record.key == pose_job.key();
+            Ok(found.whole().filter(is_same).cloned())
+        };
+        pose_jobs.map(record).collect()
+    }
+
+    fn lists(&self, limbs: &[LimbJobs], records: Vec<Record>) -> Lists {
+        let mut records = records.into_iter();
+        let next = |_: &PoseJob| records.next().ok_or(());
+        Lists::of(limbs, &self.planned.text, next).expect("each pose has a record")
+    }
+
+    fn summary(&self, limbs: &[LimbJobs], records: Vec<Record>, made: usize) -> Summary {
+        let pose_jobs = records.len();
+        let lists = self.lists(limbs, records);
+        Summary::new(pose_jobs, made, lists)
     }
 }
 

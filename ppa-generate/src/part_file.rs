@@ -5,12 +5,8 @@ use std::path::Path;
 
 use ppa_core::Part;
 use ppa_dataset::files::FileError;
-use ppa_dataset::manifest::DESCRIPTION_FILE;
 use serde::{Deserialize, Serialize};
 
-use crate::dataset_lock::FolderError;
-use crate::pose_id::FOLDER;
-use crate::record::record_names;
 use crate::seal::{Opened, opened, sealed};
 
 /// Path from the dataset's root.
@@ -37,7 +33,12 @@ pub(crate) fn read_part(root: &Path) -> Result<Part, FileError> {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Part::WHOLE),
         text => text.map_err(FileError::at("read", &path))?,
     };
-    let part = match opened(&text) {
+    part_of_text(&text, &path)
+}
+
+/// The part that a part file states, which was read from `path`.
+pub(crate) fn part_of_text(text: &str, path: &Path) -> Result<Part, FileError> {
+    let part = match opened(text) {
         Opened::Sealed(text) => {
             let file: Result<PartFile, _> = serde_json::from_str(&text);
             file.ok().and_then(|file| file.part.parse().ok())
@@ -46,41 +47,8 @@ pub(crate) fn read_part(root: &Path) -> Result<Part, FileError> {
         Opened::Unsealed => text.parse().ok(),
         Opened::Broken => None,
     };
-    let damaged = || FileError::at("use", &path)(io::Error::other("it is damaged"));
+    let damaged = || FileError::at("use", path)(io::Error::other("it is damaged"));
     part.ok_or_else(damaged)
-}
-
-/// The part of a plan that the folder `root` holds, or is to hold once the run that began it is resumed; `None` for a
-/// folder in which no run has begun.
-///
-/// # Errors
-/// [`FolderError`] when its files cannot be read or are damaged.
-pub fn held_part(root: &Path) -> Result<Option<Part>, FolderError> {
-    let folder = root.join(FOLDER);
-    if !folder.is_dir() {
-        return Ok(None);
-    }
-    let begun = root.join(DESCRIPTION_FILE).exists() || !record_names(&folder)?.is_empty();
-    Ok(if begun { Some(read_part(root)?) } else { None })
-}
-
-/// Refuses a run that is to make another part than the folder holds.
-pub(crate) fn require_part(root: &Path, asked: Part) -> Result<(), FolderError> {
-    match held_part(root) {
-        Ok(Some(held)) if held != asked => Err(FolderError::OtherPart {
-            root: root.to_owned(),
-            held,
-            asked,
-        }),
-        // A damaged file is not that of the whole plan, which has none. Shards may resume: records that are not
-        // theirs stop them.
-        Err(FolderError::File(error))
-            if error.path == root.join(PART_FILE) && asked != Part::WHOLE =>
-        {
-            Ok(())
-        }
-        held => held.map(|_| ()),
-    }
 }
 
 #[cfg(test)]
@@ -88,6 +56,7 @@ mod tests {
     use std::fs;
 
     use super::*;
+    use crate::pose_id::FOLDER;
 
     #[test]
     fn no_flipped_bit_names_another_part() {

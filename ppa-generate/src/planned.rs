@@ -30,20 +30,24 @@ struct PlannedPoses {
 impl Planned {
     pub fn read(root: &Path) -> Result<Self, FileError> {
         let path = root.join(DESCRIPTION_FILE);
-        let text = read_text(&path)?;
+        Self::of_text(read_text(&path)?, &path)
+    }
+
+    /// The content of a `dataset.json`, which was read from `path`.
+    pub fn of_text(text: String, path: &Path) -> Result<Self, FileError> {
         let seal = opened(&text);
         let planned: PlannedPoses =
-            serde_json::from_str(&text).map_err(|e| FileError::at("parse", &path)(e.into()))?;
+            serde_json::from_str(&text).map_err(|e| FileError::at("parse", path)(e.into()))?;
         let sealed = matches!(seal, Opened::Sealed(_));
         if !sealed && (planned.version > 1 || seal == Opened::Broken) {
             let damaged =
                 std::io::Error::other("it is damaged: its hash is not the one it carries");
-            return Err(FileError::at("use", &path)(damaged));
+            return Err(FileError::at("use", path)(damaged));
         }
         planned
             .rotation
             .poses()
-            .map_err(|e| FileError::at("use", &path)(std::io::Error::other(e)))?;
+            .map_err(|e| FileError::at("use", path)(std::io::Error::other(e)))?;
         Ok(Self {
             text,
             sealed,

@@ -15,6 +15,7 @@ use ppa_mesh::{Displacement, Mesh};
 use ppa_scene::{Placement, PoseAngle};
 use rayon::prelude::*;
 
+use crate::analog_histories::AnalogHistories;
 use crate::closed_skin::closed_skin;
 use crate::cut_error::PoseImage;
 use crate::cut_share::{self, CutFaces, PoseCuts};
@@ -22,6 +23,7 @@ use crate::exposable_limb::{ExposableLimb, PosedExposure};
 use crate::off_detector::off_detector;
 use crate::plan::Plan;
 use crate::pose_error::PoseError;
+use crate::pose_id::PoseId;
 use crate::prepared_limb::PreparedLimb;
 use crate::scene_setup::{PlacedCamera, SceneSetup};
 use crate::seed::{Purpose, item_seed};
@@ -148,8 +150,13 @@ impl<'a> PosableLimb<'a> {
         self.limb.prepared.landmarks.joint_centre.into()
     }
 
-    /// Makes all images of one pose under `root`.
-    pub(crate) fn make(&self, pose: PoseAngle, root: &Path) -> Result<Images, PoseError> {
+    /// Makes all images of one pose under `root`; `histories` keep those of an analog radiograph that is stopped.
+    pub(crate) fn make(
+        &self,
+        pose: PoseAngle,
+        root: &Path,
+        histories: Option<&AnalogHistories>,
+    ) -> Result<Images, PoseError> {
         let mut files = Vec::new();
         let noise_seed = item_seed(self.plan.seed, Purpose::DepthNoise, self.id, pose.step);
         // The skin of the scan decides the pose of the radiograph and the regions of interest.
@@ -185,7 +192,7 @@ impl<'a> PosableLimb<'a> {
                 });
             }
         }
-        files.extend(self.radiograph(pose, &exposure, root)?);
+        files.extend(self.radiograph(pose, &exposure, root, histories)?);
         let mut findings = self.limb.prepared.findings.clone();
         findings.extend(self.cuts_at(pose).and_then(|cuts| {
             let (skin, joint) = (&self.limb.prepared.limb.mesh, self.joint());
@@ -252,10 +259,18 @@ impl<'a> PosableLimb<'a> {
         pose: PoseAngle,
         exposure: &PosedExposure,
         root: &Path,
+        histories: Option<&AnalogHistories>,
     ) -> Result<[FileRow; 2], PoseError> {
         let cut = self.cuts_at(pose).map_or(0.0, PoseCuts::of_radiograph);
         let seed = item_seed(self.plan.seed, Purpose::Radiograph, self.id, pose.step);
-        let radiograph = exposure.radiograph(seed)?;
+        let radiograph = match (histories, self.plan.xray.analog) {
+            (Some(histories), Some(settings)) => {
+                let (limb, step) = (self.id, pose.step);
+                let settings = settings.with_seed(seed);
+                histories.radiograph(PoseId { limb, step }, exposure, &settings)?
+            }
+            _ => exposure.radiograph(seed)?,
+        };
         let png = self.id.radiograph_png(pose.step);
         radiograph.write_png(&prepare_folder(root, &png)?, &self.plan.xray.presentation)?;
         let exr = self.id.radiograph_exr(pose.step);

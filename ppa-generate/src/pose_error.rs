@@ -1,6 +1,6 @@
 //! Why a pose could not be made.
 
-use ppa_dataset::FileError;
+use ppa_dataset::{FileError, Stopped};
 
 use crate::cut_error::CutError;
 use crate::radiograph::JointError;
@@ -39,6 +39,15 @@ pub enum PoseError {
     /// The radiograph.
     #[error(transparent)]
     Transport(#[from] ppa_xray::TransportError),
+    /// The histories of an analog radiograph.
+    #[error(transparent)]
+    Run(#[from] ppa_xray::RunError),
+    /// The file that keeps them.
+    #[error(transparent)]
+    Tally(#[from] ppa_xray::TallyError),
+    /// It was asked to stop within a radiograph, whose histories are kept.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// The radiograph's files.
     #[error(transparent)]
     Output(#[from] ppa_xray::OutputError),

@@ -49,6 +49,30 @@ impl PoseId {
             .collect()
     }
 
+    /// The pose that an image of the given path belongs to.
+    pub fn of_image(file: &str) -> Option<Self> {
+        let mut parts = file.strip_prefix("patient_")?.split('/');
+        let patient = parts.next()?.parse().ok()?;
+        let (kind, side, name) = (parts.next()?, parts.next()?, parts.next_back()?);
+        let (stem, _) = name.rsplit_once('.')?;
+        let number = stem.rsplit('_').next()?;
+        let step = match kind {
+            "depth" => {
+                let (degrees, tenths) = number.split_once('.')?;
+                let halves = u32::from(tenths == "5");
+                degrees.parse::<u32>().ok()?.checked_mul(2)? + halves
+            }
+            _ => number.parse().ok()?,
+        };
+        let side = Side::ALL.into_iter().find(|known| known.letter() == side)?;
+        let limb = LimbId { patient, side };
+        let pose = Self { limb, step };
+        pose.images()
+            .iter()
+            .any(|image| image == file)
+            .then_some(pose)
+    }
+
     /// File name of its record.
     pub fn record_name(self) -> String {
         self.limb.unit_name(self.step) + ".json"
@@ -68,6 +92,28 @@ impl PoseId {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_pose_of_an_image_follows_from_its_path() {
+        let limb = LimbId {
+            patient: 12,
+            side: Side::Left,
+        };
+        for step in [0, 7, 180] {
+            let pose = PoseId { limb, step };
+            for image in pose.images() {
+                assert_eq!(PoseId::of_image(&image), Some(pose), "{image}");
+            }
+        }
+        for other in [
+            "patient_12/depth/l/orig/depth_cam_left_3.6.png",
+            "patient_12/xray/l/xray_image_007.png",
+            "patient_12/labels/l/roi_depth.json",
+            "manifest.jsonl",
+        ] {
+            assert_eq!(PoseId::of_image(other), None, "{other}");
+        }
+    }
 
     #[test]
     fn only_names_of_poses_are_read_as_poses() {

@@ -106,12 +106,15 @@ impl Record {
         match ppa_core::regular_file::read(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(FoundRecord::Absent),
             Err(error) => Err(FileError::at("read", path)(error)),
-            Ok(bytes) => {
-                let text = String::from_utf8(bytes).ok();
-                let record = text.and_then(|text| Self::parse(&text, pose));
-                Ok(record.map_or(FoundRecord::Damaged, FoundRecord::Whole))
-            }
+            Ok(bytes) => Ok(Self::of_bytes(bytes, pose)),
         }
+    }
+
+    /// What the bytes in the file of a pose's record are.
+    pub fn of_bytes(bytes: Vec<u8>, pose: PoseId) -> FoundRecord {
+        let text = String::from_utf8(bytes).ok();
+        let record = text.and_then(|text| Self::parse(&text, pose));
+        record.map_or(FoundRecord::Damaged, FoundRecord::Whole)
     }
 
     /// The record in a text, when it is as it was written and of the given pose.

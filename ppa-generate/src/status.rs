@@ -1,19 +1,15 @@
 //! Progress of a dataset: poses done, missing and damaged.
 
-use std::fs;
 use std::path::Path;
 
-use ppa_dataset::files::FileError;
-use ppa_dataset::findings::Findings;
 use ppa_dataset::layout::LimbId;
 use ppa_dataset::manifest::Manifest;
 use serde::Serialize;
 
+use crate::dataset_files::DatasetFiles;
 use crate::dataset_lock::{FolderError, lock_existing};
 use crate::limb_jobs::LimbJobs;
-use crate::part_file::read_part;
-use crate::planned::Planned;
-use crate::record::Record;
+use crate::record::FoundRecord;
 
 /// State of a dataset, by its records; its images are not read (see [`crate::check`]).
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -64,17 +60,24 @@ pub fn status(root: &Path) -> Result<Status, FolderError> {
         Err(FolderError::Busy(_)) => true,
         Err(error) => return Err(error),
     };
-    let part = read_part(root)?;
+    let files = DatasetFiles::open(root)?;
+    if files.is_empty_archive() {
+        return Err(FolderError::NotADataset(root.to_owned()));
+    }
+    let part = files.part()?;
     let (mut images, mut bytes) = (0, 0);
     let mut of_limb = |limb: &LimbJobs| {
-        let records = limb.pose_jobs().filter_map(|pose_job| {
-            let record = Record::read(root, &pose_job).ok()?;
-            (record.key == pose_job.key()).then_some(record)
-        });
+        let records =
+            limb.pose_jobs()
+                .filter_map(|pose_job| match files.look(pose_job.id()).ok()? {
+                    FoundRecord::Whole(record) if record.key == pose_job.key() => Some(record),
+                    _ => None,
+                });
         let mut made = 0;
         for record in records {
             // A pose whose images are gone is made again, so it does not count.
-            let Ok(size) = record.size(root) else {
+            let sizes = record.files.iter().map(|row| files.size(&row.file));
+            let Some(size) = sizes.sum::<Option<u64>>() else {
                 continue;
             };
             made += 1;
@@ -87,16 +90,16 @@ pub fn status(root: &Path) -> Result<Status, FolderError> {
             made,
         }
     };
-    let limbs: Vec<_> = Planned::read(root)?
+    let limbs: Vec<_> = files
+        .planned()?
         .part(part)
         .iter()
         .map(&mut of_limb)
         .collect();
     let pose_jobs = limbs.iter().map(|limb| limb.pose_jobs).sum();
     let made = limbs.iter().map(|limb| limb.made).sum();
-    let manifest = root.join(Manifest::FILE);
-    let listed = fs::exists(&manifest).map_err(FileError::at("read", &manifest))?;
-    let findings = Findings::read(root)?;
+    let listed = files.size(Manifest::FILE).is_some();
+    let findings = files.findings()?;
     Ok(Status {
         findings: findings.0.len(),
         open_findings: findings.0.iter().filter(|found| found.is_open()).count(),

@@ -62,7 +62,7 @@ pub struct Verification {
     pub findings: Findings,
 }
 
-/// Checks the dataset in `root` as [`check`](crate::check) does, then makes a share of its poses
+/// Checks the dataset in the folder or archive `root` as [`check`](crate::check) does, then makes a share of its poses
 /// again, at least one, in a temporary folder, and compares hashes, poses and regions of interest.
 ///
 /// `seed` decides which poses: another seed looks at others. Once `stop` is true no other pose begins.
@@ -90,7 +90,8 @@ pub fn verify(
             key: key.map_or("the text of dataset.json".to_owned(), |key| key.key),
         });
     }
-    let findings = Findings::read(root)?;
+    let folder = recorded.folder();
+    let findings = Findings::read(folder)?;
     progress(Progress::Findings(&findings));
     let check = recorded.check();
     let sample = sample(&recorded.limbs, fraction, seed);
@@ -99,10 +100,10 @@ pub fn verify(
     let scratch = tempfile::tempdir().map_err(FileError::at("create", &std::env::temp_dir()))?;
     let different = for_each_limb(&sample, |_, (limb, poses)| {
         go_on(stop)?;
-        let make = work.prepare(limb.limb, scratch.path())?;
+        let make = work.prepare(limb.limb, scratch.path(), None)?;
         let compare = |&pose: &PoseAngle| {
             go_on(stop)?;
-            let found = compare(&limb.pose_job(pose), &make, root, scratch.path())?;
+            let found = compare(&limb.pose_job(pose), &make, folder, scratch.path())?;
             progress(Progress::Made);
             Ok::<_, VerifyError>(found)
         };

@@ -44,7 +44,7 @@ fn of_cluster(root: &Path) -> Result<Vec<(Part, PathBuf)>, StudioError> {
     let count = work.bundle.shards;
     let parts = (1..=count).filter_map(|number| {
         let part: Part = format!("{number}/{count}").parse().ok()?;
-        Some((part, folder.shard(number)))
+        Some((part, folder.shard(&work, number)))
     });
     Ok(parts.collect())
 }

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use ppa_core::Part;
 use ppa_core::text::count;
-use ppa_dataset::Findings;
 use ppa_dataset::published::{Published, PublishedError};
 use ppa_generate::{GenerateSettings, Plan, Progress, Summary, generate, held_part};
 
@@ -24,6 +23,10 @@ shard, into a folder of its own; `ppa merge` joins them to the same bytes as one
   ppa generate plan.toml --shard 2/7 --out shard_2 --disk-limit 20GB
   ppa merge shard_1 shard_2 ... --out dataset --verify
 
+With --out NAME.tar the files of the dataset are put into one archive, for file systems that hold few files. Poses are made in \
+a temporary folder (TMPDIR) and added to the archive one by one. `ppa merge`, `ppa status` and `ppa verify` read archives; other \
+commands need the folder, which `tar -xf` extracts.
+
 The shard is also taken from a Slurm job array (SLURM_ARRAY_TASK_ID, _COUNT, _MIN, _MAX, _STEP), from the tasks of srun \
 (SLURM_PROCID, SLURM_STEP_NUM_TASKS), from mpirun (OMPI_COMM_WORLD_RANK, _SIZE) and from an indexed Kubernetes job \
 (JOB_COMPLETION_INDEX, and JOB_COMPLETIONS, which you set). Where two of them disagree, nothing is made. A folder keeps its \
@@ -35,7 +38,7 @@ removed at the end. Files that ppa did not write, or that were altered since, ar
 pub struct GenerateArgs {
     /// Plan file
     plan: PathBuf,
-    /// Folder of the dataset [default: a folder beside the plan, named after it and the shard]
+    /// Folder of the dataset, or a tar archive NAME.tar [default: a folder beside the plan, named after it and the shard]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Use another seed than the plan's
@@ -107,9 +110,9 @@ pub fn with_progress(
     interrupt: &Interrupt,
 ) -> anyhow::Result<Summary> {
     let summary = generate(plan, out, settings, &|progress| watch.report(progress));
-    if summary.is_ok() {
+    if let Ok(summary) = &summary {
         // Some are found in the poses.
-        watch.report(Progress::Findings(&Findings::read(out)?));
+        watch.report(Progress::Findings(&summary.findings));
     }
     watch.finish();
     interrupt.or_how(summary, || watch.how_to_resume())

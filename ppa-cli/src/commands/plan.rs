@@ -123,7 +123,7 @@ fn forecast_of(file: &Path, args: &PlanArgs, output: Output) -> anyhow::Result<(
         wall_hours: forecast.cpu_hours / threads as f64,
         threads,
         cluster: match &args.cluster {
-            Some(size) => Some(on_cluster(&forecast, size)?),
+            Some(size) => Some(on_cluster(&forecast, plan.xray.analog.is_some(), size)?),
             None => None,
         },
         forecast,
@@ -133,11 +133,12 @@ fn forecast_of(file: &Path, args: &PlanArgs, output: Output) -> anyhow::Result<(
     Ok(estimate.forecast.fits(&root)?)
 }
 
-/// The plan as `ppa submit` would divide it.
-fn on_cluster(forecast: &Forecast, size: &ClusterSize) -> anyhow::Result<Makespan> {
+/// The plan as `ppa submit` would divide it; `resumes` as in [`PoseCost`].
+fn on_cluster(forecast: &Forecast, resumes: bool, size: &ClusterSize) -> anyhow::Result<Makespan> {
     let cost = PoseCost {
         pose_cpu_s: forecast.cpu_s_per_unit,
         limb_cpu_s: forecast.cpu_s_per_limb,
+        resumes,
     };
     let divided = bundle(forecast.pose_jobs as u64, cost, size.cpus, size.time)?;
     let error = forecast.cpu_s_per_unit_error.unwrap_or(0.0);

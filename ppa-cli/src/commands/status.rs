@@ -14,7 +14,7 @@ use crate::stderr;
 
 #[derive(Debug, Args)]
 pub struct StatusArgs {
-    /// Folder of a dataset, of a shard, or of the jobs of `ppa submit`
+    /// Folder or archive of a dataset or a shard, or the folder of the jobs of `ppa submit`
     dataset: PathBuf,
     /// Repeat every ten seconds until nothing runs or waits
     #[arg(long)]

@@ -43,7 +43,8 @@ pub enum SubmitCommand {
 
 For a plan, one pose of the first limb is made here to measure its time, unless --pose-seconds gives it. Poses are bundled \
 into shards of 20 to 40 minutes, or two thirds of --time where that is shorter; a plan that takes less is one shard. \
-DIR/shards/K holds shard K, DIR/dataset the merged and verified dataset. Before its time limit a task finishes the poses in \
+DIR/shards/K holds shard K, DIR/dataset the merged and verified dataset; with --archive they are DIR/shards/K.tar and \
+DIR/dataset.tar, for file systems that hold few files. Before its time limit a task finishes the poses in \
 progress and is requeued.
 
   ppa submit slurm experiments.toml --out jobs --cpus 4 --gres gpu:1 --time 8:00:00
@@ -94,6 +95,9 @@ pub struct SlurmArgs {
     /// For a plan of poses: processor time of a pose in seconds, as `ppa plan` measures it; nothing is measured then
     #[arg(long, value_name = "SECONDS")]
     pose_seconds: Option<f64>,
+    /// For a plan of poses: make each shard one tar archive, and the dataset another one
+    #[arg(long)]
+    archive: bool,
     /// For a plan of experiments: only these, such as 1,2a [default: all that it has data for]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     experiments: Vec<Experiment>,
@@ -149,6 +153,7 @@ impl SubmittedPoses {
             cost,
             cost_source,
             bundle,
+            archive: _,
         }) = work
         else {
             return None;
@@ -196,12 +201,16 @@ fn slurm(args: &SlurmArgs, program: &Path, output: Output) -> anyhow::Result<()>
     let work = Input::read(args, &program)?;
     let experiments = ("--experiments", !args.experiments.is_empty());
     let pose_seconds = ("--pose-seconds", args.pose_seconds.is_some());
+    let archive = ("--archive", args.archive);
     let check = ("--check", args.check);
     let tasks = ("--tasks", args.tasks.is_some());
     let (kind, of_others) = match work {
         Input::Poses(..) => ("a plan of poses", vec![experiments, tasks]),
-        Input::Experiments(..) => ("a plan of experiments", vec![pose_seconds, check, tasks]),
-        Input::Command(_) => ("a command", vec![experiments, pose_seconds]),
+        Input::Experiments(..) => (
+            "a plan of experiments",
+            vec![pose_seconds, archive, check, tasks],
+        ),
+        Input::Command(_) => ("a command", vec![experiments, pose_seconds, archive]),
     };
     if let Some((option, _)) = of_others.iter().find(|(_, given)| *given) {
         bail!("{option} does not apply to {kind}");
@@ -314,10 +323,12 @@ fn damaged(
             Work::Histories(_) => damaged_tally(&folder.part(number), !dry_run)?,
             // A shard that is not done is made again anyway.
             _ if shard.report.state != ShardState::Done => None,
-            Work::Poses(_) | Work::Trainings(_) => {
-                let found = check(&folder.shard(number))?;
+            Work::Poses(work) => {
+                let found = check(&folder.shard(work, number))?;
                 found.problems.first().map(ToString::to_string)
             }
+            // --check is refused for trainings.
+            Work::Trainings(_) => None,
         };
         if let Some(problem) = problem {
             stderr::note(&format!(

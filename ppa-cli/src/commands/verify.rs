@@ -15,7 +15,7 @@ use crate::progress::ProgressArgs;
 
 #[derive(Debug, Args)]
 pub struct VerifyArgs {
-    /// Folder of a dataset, or of a shard
+    /// Folder or archive of a dataset, or of a shard
     dataset: PathBuf,
     /// Plan it was made from [default: the file beside the folder, named after it]
     #[arg(long, value_name = "FILE")]

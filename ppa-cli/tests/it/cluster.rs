@@ -252,3 +252,45 @@ fn a_damaged_shard_is_submitted_again_after_a_check() {
     );
     assert_eq!(submitted(" --check"), serde_json::json!([]));
 }
+
+#[test]
+fn a_submission_of_archives_is_few_files() {
+    let folder = with_slurm();
+    let here = folder.path();
+    let archive = format!("{THREE} --archive");
+    succeed(here, &archive);
+    let merge = fs::read_to_string(here.join("jobs/slurm/merge.sh")).unwrap();
+    contains(
+        &merge,
+        &[
+            "--out dataset.tar",
+            "verify dataset.tar",
+            "shards/$shard.tar",
+        ],
+    );
+    for shard in 1..=3 {
+        let out = format!("jobs/shards/{shard}.tar");
+        let plan = format!("generate jobs/slurm/plan.toml --shard {shard}/3 --out {out}");
+        crate::succeed(here, &plan);
+    }
+    let report = succeed(here, "status jobs");
+    assert_eq!(report["states"]["done"], 3);
+    assert_eq!(crate::contents(&here.join("jobs/shards")).len(), 3);
+    let submitted = |arguments: &str| succeed(here, arguments)["submitted"].clone();
+    let again = "submit slurm plan.toml --out jobs";
+    assert_eq!(submitted(again), serde_json::json!([]));
+    let path = here.join("jobs/shards/2.tar");
+    let mut bytes = fs::read(&path).unwrap();
+    let image = bytes.windows(4).position(|four| four == b"\x89PNG");
+    bytes[image.unwrap() + 50] ^= 1;
+    fs::write(&path, bytes).unwrap();
+    assert_eq!(submitted(again), serde_json::json!([]));
+    assert_eq!(
+        submitted(&format!("{again} --check")),
+        serde_json::json!([2])
+    );
+
+    succeed(here, &THREE.replace("jobs", "folders"));
+    let said = fail(here, "submit slurm plan.toml --out folders --archive");
+    assert!(said.contains("which --archive cannot change"), "{said}");
+}

@@ -95,6 +95,42 @@ fn a_stopped_dataset_resumes_to_the_same_bytes() {
     assert!(contents(&here.join("int")) == contents(&here.join("term")));
 }
 
+/// A radiograph of many analog histories is stopped within a pose.
+#[test]
+fn a_stopped_pose_resumes_from_its_histories() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let plan = write_plan(here, "[xray.analog]\nhistories = 8000000\n");
+    let text = fs::read_to_string(&plan).unwrap();
+    fs::write(&plan, text.replace("to_deg = 10.0", "to_deg = 0.0")).unwrap();
+    let run = "generate plan.toml --progress quiet --out";
+    succeed(here, &format!("{run} whole"));
+    for (out, histories) in [
+        ("data", "data/.ppa/histories"),
+        ("data.tar", "data.tar.histories"),
+    ] {
+        let tally = here.join(histories).join("patient_3_r_000.tally");
+        let mut command = ppa(here, &format!("{run} {out}"));
+        command.env("TMPDIR", here);
+        let mut stopped = spawn(command);
+        // The radiograph follows the depth images, which an archive's run makes in a folder of TMPDIR.
+        let image = ".ppa/new/patient_3/depth/r/orig/depth_cam_right_0.0.png";
+        let is_made = |name: &String| here.join(name).join(image).exists();
+        wait_for(&mut stopped, || names(here).iter().any(is_made));
+        send(&stopped, "TERM");
+        let (code, said) = ended(stopped);
+        assert_eq!(code, Some(143), "{said}");
+        assert!(tally.exists(), "{said}");
+        let kept = succeed(here, &format!("{run} {out}"));
+        contains(&kept, &["1 of them made now"]);
+        assert!(!tally.parent().unwrap().exists());
+    }
+    assert!(contents(&here.join("data")) == contents(&here.join("whole")));
+    succeed(here, &format!("{run} whole.tar"));
+    let read = |name: &str| fs::read(here.join(name)).unwrap();
+    assert!(read("data.tar") == read("whole.tar"));
+}
+
 #[test]
 fn a_second_ctrl_c_ends_at_once() {
     let folder = tempfile::tempdir().unwrap();

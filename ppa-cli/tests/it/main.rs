@@ -1,5 +1,6 @@
 //! The program as a user meets it.
 
+mod archives;
 mod auto_labels;
 mod bad_geometry;
 mod bad_input;

@@ -1,12 +1,13 @@
 //! WebDataset: tar archives whose neighbouring files of one name make a sample, for training programs that stream.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
 
+use crate::archive::ArchiveWriter;
 use crate::files::FileError;
 use crate::layout::View;
 use crate::published::{ImagePair, Pose, Published, PublishedError};
@@ -114,14 +115,10 @@ fn write_shard(
     stop: &AtomicBool,
 ) -> Result<(), WebDatasetError> {
     let file = File::create(path).map_err(FileError::at("write", path))?;
-    let mut archive = tar::Builder::new(BufWriter::new(file));
+    let mut archive = ArchiveWriter::new(BufWriter::new(file));
     let mut add = |name: String, bytes: &[u8]| {
-        let mut header = tar::Header::new_ustar();
-        header.set_size(bytes.len() as u64);
-        header.set_mode(0o644);
-        header.set_mtime(0);
         archive
-            .append_data(&mut header, &name, bytes)
+            .add(&name, bytes)
             .map_err(FileError::at("write", path))
     };
     for pair in pairs {
@@ -136,12 +133,8 @@ fn write_shard(
         let text = serde_json::to_string(pair).expect("rows hold only JSON values");
         add(format!("{name}.json"), text.as_bytes())?;
     }
-    let buffer = archive.into_inner().map_err(FileError::at("write", path))?;
-    let flushed = buffer
-        .into_inner()
-        .map_err(std::io::IntoInnerError::into_error);
-    let flushed = flushed.and_then(|mut file| file.flush());
-    Ok(flushed.map_err(FileError::at("write", path))?)
+    archive.finish().map_err(FileError::at("write", path))?;
+    Ok(())
 }
 
 fn images(pair: &ImagePair) -> impl Iterator<Item = (&'static str, &str)> {

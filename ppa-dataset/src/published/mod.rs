@@ -36,6 +36,7 @@ pub use self::flaw::Flaw;
 pub use self::gray16::{GrayImage16, ImageFileError};
 pub use self::inspect::{Inspection, inspect};
 pub use self::unpaired::Unpaired;
+use crate::archive::require_folder;
 use crate::body_shape::BodyShape;
 use crate::labels::{LabelFile, LabelName, LabelSource};
 use crate::layout::{LimbId, View};
@@ -213,6 +214,7 @@ impl Published {
     }
 
     fn list_labelled(root: &Path, labels: Option<&LabelName>) -> Result<Self, PublishedError> {
+        require_folder(root)?;
         let subjects = folders::subjects(root)?;
         let (mut pairs, mut unpaired) = (Vec::new(), Vec::new());
         for subject in &subjects.folders {

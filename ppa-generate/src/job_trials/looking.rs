@@ -8,7 +8,7 @@ use ppa_dataset::published::inspect;
 
 use super::Trial;
 use crate::check::check;
-use crate::part_file::held_part;
+use crate::held_part::held_part;
 use crate::status::status;
 
 /// Name, inode, time of change and size of everything below a folder, and of the folder.

@@ -1,5 +1,6 @@
 //! Tests: jobs with tiny images instead of rendered ones, so that thousands of runs take seconds.
 
+mod archived;
 mod copied;
 mod flips;
 mod interrupted;
@@ -23,10 +24,13 @@ use ppa_dataset::manifest::{FileKind, FileRow, RoiFile, RoiRow};
 use ppa_scene::Sweep;
 use sha2::{Digest, Sha256};
 
+use crate::archive_path::is_archive;
+use crate::archived_run::ArchivedRun;
 use crate::job::{Job, JobError, MakePose, Summary};
 use crate::limb_jobs::{LimbJobs, PlannedLimb, jobs_of_part};
 use crate::posable_limb::Images;
-use crate::record::PoseJob;
+use crate::pose_id::PoseId;
+use crate::record::{PoseJob, Record};
 use crate::seal::sealed;
 use crate::staging::staging_folder;
 
@@ -110,6 +114,20 @@ impl Trial {
     }
 
     fn run(&self, root: &Path) -> Result<Summary, JobError> {
+        if is_archive(root) {
+            return ArchivedRun::complete(root, |run| {
+                let made = self.run_in(run.folder(), &|pose, record| run.add(pose, record));
+                made.map_err(|error| error.of_archive(run))
+            });
+        }
+        self.run_in(root, &|_, _| Ok(()))
+    }
+
+    fn run_in(
+        &self,
+        root: &Path,
+        kept: &(dyn Fn(PoseId, &Record) -> Result<(), FileError> + Sync),
+    ) -> Result<Summary, JobError> {
         let staging = staging_folder(root);
         let count = AtomicUsize::new(0);
         let job = Job {
@@ -120,6 +138,7 @@ impl Trial {
             disk_limit: None,
             replace: self.replace,
             progress: &|_| {},
+            kept,
         };
         job.complete(|_| {
             let make = |pose_job: PoseJob| {

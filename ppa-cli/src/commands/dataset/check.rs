@@ -50,8 +50,9 @@ pub fn run(args: &CheckArgs, output: Output) -> anyhow::Result<()> {
             problems.push(problem);
         }
     }
-    let splits = Split::names(&args.dataset)?;
+    let mut splits = Vec::new();
     if found.is_ok() {
+        splits = Split::names(&args.dataset)?;
         problems.extend(split_problems(&args.dataset, &splits)?);
     }
     require_none(&args.dataset, &problems)?;

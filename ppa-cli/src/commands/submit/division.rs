@@ -154,6 +154,11 @@ fn divided(
                     "the plan is divided into {} already, which --pose-seconds cannot change; choose another --out",
                     count(work.bundle.shards, "shard")
                 );
+                ensure!(
+                    work.archive || !args.archive,
+                    "the shards of {} are folders, which --archive cannot change; choose another --out",
+                    folder.root().display()
+                );
                 bundle(work.poses, work.cost, settings.cpus, settings.time)?;
             }
             Work::Histories(_) => {}
@@ -200,6 +205,7 @@ fn poses(
             let cost = PoseCost {
                 pose_cpu_s,
                 limb_cpu_s,
+                resumes: plan.xray.analog.is_some(),
             };
             (cost, CostSource::Given)
         }
@@ -212,6 +218,7 @@ fn poses(
         cost,
         cost_source,
         bundle: bundle(poses, cost, settings.cpus, settings.time)?,
+        archive: args.archive || matches!(known, Some(Work::Poses(known)) if known.archive),
     })
 }
 
@@ -292,11 +299,12 @@ fn measured(plan: &Plan, folder: &ClusterFolder) -> anyhow::Result<PoseCost> {
     one.cases.truncate(1);
     let interrupt = Interrupt::listen()?;
     let working = working("measuring one pose");
-    let found = forecast(&one, &folder.dataset(), 0.0, interrupt.flag(), &|_| {});
+    let found = forecast(&one, folder.root(), 0.0, interrupt.flag(), &|_| {});
     working.finish_and_clear();
     let found = interrupt.or_how(found, || NOTHING_WRITTEN.to_owned())?;
     Ok(PoseCost {
         pose_cpu_s: found.cpu_s_per_unit,
         limb_cpu_s: found.cpu_s_per_limb,
+        resumes: plan.xray.analog.is_some(),
     })
 }

@@ -1,0 +1,145 @@
+//! The files of a dataset or shard, which lie in a folder or in an archive, for reading.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use ppa_core::Part;
+use ppa_dataset::files::FileError;
+use ppa_dataset::findings::Findings;
+use ppa_dataset::manifest::DESCRIPTION_FILE;
+
+use crate::archive_path::is_archive;
+use crate::archived_dataset::ArchivedDataset;
+use crate::dataset_lock::FolderError;
+use crate::part_file::{PART_FILE, part_of_text};
+use crate::planned::Planned;
+use crate::pose_id::{FOLDER, PoseId};
+use crate::record::{FoundRecord, Record, record_names};
+
+/// A dataset or shard, finished or not.
+pub(crate) struct DatasetFiles {
+    root: PathBuf,
+    /// `None` for a folder.
+    archive: Option<ArchivedDataset>,
+}
+
+impl DatasetFiles {
+    /// Looks at a folder or an archive.
+    ///
+    /// # Errors
+    /// [`FolderError`] for an archive that cannot be read or holds something else.
+    pub fn open(root: &Path) -> Result<Self, FolderError> {
+        let open = || ArchivedDataset::open(root);
+        Ok(Self {
+            root: root.to_owned(),
+            archive: is_archive(root).then(open).transpose()?,
+        })
+    }
+
+    /// Whether no run has written to an archive yet.
+    pub fn is_empty_archive(&self) -> bool {
+        self.archive.as_ref().is_some_and(ArchivedDataset::is_empty)
+    }
+
+    /// Whether it is an archive that was written as a whole, after the last pose.
+    pub fn is_finished_archive(&self) -> bool {
+        let archive = self.archive.as_ref();
+        archive.is_some_and(ArchivedDataset::is_finished)
+    }
+
+    /// The files of an archive in a temporary folder; `None` for a folder.
+    pub fn extracted(&self) -> Result<Option<tempfile::TempDir>, FileError> {
+        let Some(archive) = &self.archive else {
+            return Ok(None);
+        };
+        let temporary = std::env::temp_dir();
+        let folder =
+            tempfile::tempdir().map_err(FileError::at("create a folder in", &temporary))?;
+        archive.extract(folder.path())?;
+        Ok(Some(folder))
+    }
+
+    /// The folder or the archive.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// Where a file lies, for messages.
+    pub fn path(&self, file: &str) -> PathBuf {
+        self.root.join(file)
+    }
+
+    /// Reads a file; `None` where there is none of this name.
+    pub fn read(&self, file: &str) -> Result<Option<Vec<u8>>, FileError> {
+        if let Some(archive) = &self.archive {
+            return archive.read(file);
+        }
+        let path = self.path(file);
+        match ppa_core::regular_file::read(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            bytes => bytes.map(Some).map_err(FileError::at("read", &path)),
+        }
+    }
+
+    /// Reads a file.
+    pub fn required(&self, file: &str) -> Result<Vec<u8>, FileError> {
+        let absent = || FileError::at("read", &self.path(file))(io::ErrorKind::NotFound.into());
+        self.read(file)?.ok_or_else(absent)
+    }
+
+    fn text(&self, file: &str) -> Result<Option<String>, FileError> {
+        let Some(bytes) = self.read(file)? else {
+            return Ok(None);
+        };
+        let invalid = |_| io::Error::from(io::ErrorKind::InvalidData);
+        let text = String::from_utf8(bytes).map_err(invalid);
+        text.map(Some)
+            .map_err(FileError::at("read", &self.path(file)))
+    }
+
+    /// Bytes of a file; `None` where there is none of this name.
+    pub fn size(&self, file: &str) -> Option<u64> {
+        match &self.archive {
+            Some(archive) => archive.size(file),
+            None => fs::metadata(self.path(file)).ok().map(|found| found.len()),
+        }
+    }
+
+    /// What the dataset is to hold.
+    pub fn planned(&self) -> Result<Planned, FileError> {
+        let path = self.path(DESCRIPTION_FILE);
+        let absent = || FileError::at("read", &path)(io::ErrorKind::NotFound.into());
+        Planned::of_text(self.text(DESCRIPTION_FILE)?.ok_or_else(absent)?, &path)
+    }
+
+    /// The part of its plan that it is to hold.
+    pub fn part(&self) -> Result<Part, FileError> {
+        match self.text(PART_FILE)? {
+            None => Ok(Part::WHOLE),
+            Some(text) => part_of_text(&text, &self.path(PART_FILE)),
+        }
+    }
+
+    /// The poses that have a record, in order.
+    pub fn poses(&self) -> Result<Vec<PoseId>, FileError> {
+        match &self.archive {
+            Some(archive) => Ok(archive.poses()),
+            None => record_names(&self.path(FOLDER)),
+        }
+    }
+
+    /// What stands in the place of a pose's record.
+    pub fn look(&self, pose: PoseId) -> Result<FoundRecord, FileError> {
+        let bytes = self.read(&pose.record_file())?;
+        Ok(bytes.map_or(FoundRecord::Absent, |bytes| Record::of_bytes(bytes, pose)))
+    }
+
+    /// The findings of its limbs and poses.
+    pub fn findings(&self) -> Result<Findings, FileError> {
+        match self.text(Findings::FILE)? {
+            None => Ok(Findings::default()),
+            Some(text) => Findings::of_text(&text, &self.path(Findings::FILE)),
+        }
+    }
+}
