@@ -12,7 +12,6 @@ use ppa_core::text::count;
 use ppa_generate::Progress;
 use serde::Serialize;
 
-use crate::findings::lines;
 use crate::output::{Output, bar};
 use crate::stderr::warning;
 
@@ -163,7 +162,7 @@ impl Watch {
     pub fn report(&self, progress: Progress) {
         if let Progress::Findings(findings) = progress {
             let mut repeated = self.repeated.lock().unwrap_or_else(|e| e.into_inner());
-            for line in lines(findings, "") {
+            for line in findings.open_lines("") {
                 if !repeated.contains(&line) {
                     self.bar.suspend(|| warning(&line));
                     repeated.push(line);

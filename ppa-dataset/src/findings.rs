@@ -133,6 +133,20 @@ pub struct LimbFinding {
     pub finding: Finding,
 }
 
+impl Finding {
+    /// A severe one as commands repeat it, of a limb by its name; `more` is how many findings of the same code the limb has besides.
+    pub fn repeated(&self, limb: &str, more: usize) -> String {
+        let more = match more {
+            0 => String::new(),
+            more => format!(" (and {more} more)"),
+        };
+        format!(
+            "{} [{}] {limb}: {}{more}; acknowledge it in the case once you have looked",
+            self.severity, self.code, self.text
+        )
+    }
+}
+
 impl LimbFinding {
     /// Whether commands have to repeat it: severe, and not acknowledged.
     pub fn is_open(&self) -> bool {
@@ -177,6 +191,43 @@ impl Findings {
         serde_json::from_str(text).map_err(|e| FileError::at("parse", path)(io::Error::from(e)))
     }
 
+    /// The open findings of datasets that are about to be used, one line for each code and limb; a dataset that is named twice is read once.
+    ///
+    /// # Errors
+    /// As [`Findings::read`].
+    pub fn open_lines_of<'a>(
+        datasets: impl IntoIterator<Item = &'a Path>,
+    ) -> Result<Vec<String>, FileError> {
+        let mut known: Vec<&Path> = Vec::new();
+        let mut lines = Vec::new();
+        for dataset in datasets {
+            if !known.contains(&dataset) {
+                known.push(dataset);
+                let of = format!(" of {}", dataset.display());
+                lines.extend(Self::read(dataset)?.open_lines(&of));
+            }
+        }
+        Ok(lines)
+    }
+
+    /// The open findings, one line for each code and limb; `of` follows the limb's name.
+    pub fn open_lines(&self, of: &str) -> Vec<String> {
+        let open: Vec<&LimbFinding> = self.0.iter().filter(|found| found.is_open()).collect();
+        let alike =
+            |a: &LimbFinding, b: &LimbFinding| a.limb == b.limb && a.finding.code == b.finding.code;
+        let mut lines = Vec::new();
+        for (i, found) in open.iter().enumerate() {
+            if open[..i].iter().any(|earlier| alike(earlier, found)) {
+                continue;
+            }
+            let more = open[i + 1..].iter().filter(|later| alike(later, found));
+            let LimbId { patient, .. } = found.limb;
+            let limb = format!("limb {} of patient {patient}{of}", found.limb.side_letter());
+            lines.push(found.finding.repeated(&limb, more.count()));
+        }
+        lines
+    }
+
     /// `findings.json` as text.
     pub fn to_text(&self) -> String {
         serde_json::to_string_pretty(self).expect("findings hold only JSON values")
@@ -194,5 +245,57 @@ impl Findings {
                 });
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::Side;
+
+    fn found(
+        patient: u32,
+        code: FindingCode,
+        severity: Severity,
+        acknowledged: bool,
+    ) -> LimbFinding {
+        LimbFinding {
+            limb: LimbId {
+                patient,
+                side: Side::Right,
+            },
+            acknowledged,
+            finding: Finding {
+                code,
+                severity,
+                text: "the fibula lies medially".to_owned(),
+                value: None,
+                place_mm: None,
+            },
+        }
+    }
+
+    #[test]
+    fn open_findings_take_one_line_per_limb_and_code() {
+        use FindingCode::{CutInRegion, SideMismatch};
+        let findings = Findings(vec![
+            found(0, SideMismatch, Severity::Severe, false),
+            found(0, CutInRegion, Severity::Severe, false),
+            found(0, CutInRegion, Severity::Severe, false),
+            found(1, SideMismatch, Severity::Severe, true),
+            found(2, SideMismatch, Severity::Caution, false),
+        ]);
+        let end = "acknowledge it in the case once you have looked";
+        assert_eq!(
+            findings.open_lines(""),
+            [
+                format!(
+                    "severe [side-mismatch] limb r of patient 0: the fibula lies medially; {end}"
+                ),
+                format!(
+                    "severe [cut-in-region] limb r of patient 0: the fibula lies medially (and 1 more); {end}"
+                ),
+            ]
+        );
     }
 }

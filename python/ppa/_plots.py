@@ -45,7 +45,8 @@ def _coarse(vertices: Any, triangles: Any) -> tuple[Any, Any]:
     """A skin whose vertices in each cube are replaced by their mean: matplotlib draws some thousand triangles, not 10⁵."""
     _, cube, count = np.unique(np.floor(vertices / _COARSE_MM), axis=0, return_inverse=True, return_counts=True)
     cube = cube.ravel()
-    means = np.stack([np.bincount(cube, column) / count for column in vertices.T], axis=1)
+    columns: list[Any] = [np.bincount(cube, column) / count for column in vertices.T]
+    means: Any = np.stack(columns, axis=1)
     corners = cube[triangles]
     differ = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
     return means, corners[differ]

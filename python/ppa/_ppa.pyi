@@ -345,6 +345,7 @@ class Dataset:
         shapes: Sequence[str] | None = None,
         every_pose: int | None = None,
         labels: str | None = None,
+        unlabelled: bool = False,
         mirror: bool = False,
         transform: Callable[[_F32], Any] | None = None,
     ) -> Dataset: ...
@@ -409,6 +410,7 @@ def prepare(
     iso_hu: float = ...,
     crop: Sequence[Sequence[int]] | None = None,
     inside: npt.ArrayLike | None = None,
+    keep: npt.ArrayLike | None = None,
     joint: npt.ArrayLike | None = None,
     axis_source: Literal["bone", "limb"] | None = None,
     joint_region: npt.ArrayLike | None = None,

@@ -127,15 +127,29 @@ pub fn point(object: &Bound<'_, PyAny>, name: &str) -> PyResult<[f64; 3]> {
 
 /// Points, one in a row.
 pub fn points<const N: usize>(object: &Bound<'_, PyAny>, name: &str) -> PyResult<[[f64; 3]; N]> {
-    let values = numbers(object, name, &[N, 3])?;
+    let rows = rows_of_three(object, name, N)?;
+    Ok(rows.try_into().expect("as many as the shape holds"))
+}
+
+/// Any number of points, one in a row.
+pub fn point_list(object: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<[f64; 3]>> {
+    // An empty list has no second dimension.
+    match object.len() {
+        Ok(0) => Ok(Vec::new()),
+        _ => rows_of_three(object, name, 0),
+    }
+}
+
+/// Rows of three finite numbers; 0 rows stand for any number.
+fn rows_of_three(object: &Bound<'_, PyAny>, name: &str, rows: usize) -> PyResult<Vec<[f64; 3]>> {
+    let values = numbers(object, name, &[rows, 3])?;
     if let Some(bad) = values.iter().find(|value| !value.is_finite()) {
         return Err(PyValueError::new_err(format!(
             "{name} contains {bad}, expected finite numbers"
         )));
     }
-    Ok(std::array::from_fn(|row| {
-        std::array::from_fn(|axis| values[3 * row + axis])
-    }))
+    let (rows, _) = values.as_chunks::<3>();
+    Ok(rows.to_vec())
 }
 
 /// Rows of a 4 x 4 matrix.
@@ -192,25 +206,52 @@ pub fn converted<'py>(
     }
 }
 
-/// What `__dlpack__` gives: a copy of the array, since others may write to what they are given; `options` are numpy's.
+/// What `__dlpack__` gives of a read-only view; `options` are numpy's.
+///
+/// A copy, since not all libraries respect that an array is read-only; with `copy=False` the view itself, which numpy exports as
+/// read-only from version 2.1 on if the other side knows DLPack 1.0, and refuses otherwise.
 pub fn exported<'py>(
+    view: &Bound<'py, PyAny>,
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (copy, options) = split_copy(view.py(), options)?;
+    match copy {
+        Some(false) => view.call_method("__dlpack__", (), Some(&options)),
+        _ => {
+            let copied = view.call_method0("copy")?;
+            copied.call_method("__dlpack__", (), Some(&options))
+        }
+    }
+}
+
+/// What `__dlpack__` gives of an array that was computed for this export, and that nobody else has.
+pub fn given_away<'py>(
     array: &Bound<'py, PyAny>,
     options: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyAny>> {
+    let (copy, options) = split_copy(array.py(), options)?;
+    match copy {
+        Some(false) => Err(PyBufferError::new_err(
+            "the sum of the layers is computed for each export, but copy=False was given: export one of the layers",
+        )),
+        _ => array.call_method("__dlpack__", (), Some(&options)),
+    }
+}
+
+/// The option `copy` of `__dlpack__`, and the others.
+fn split_copy<'py>(
+    py: Python<'py>,
+    options: Option<&Bound<'py, PyDict>>,
+) -> PyResult<(Option<bool>, Bound<'py, PyDict>)> {
     let options = match options {
         Some(options) => options.copy()?,
-        None => PyDict::new(array.py()),
+        None => PyDict::new(py),
     };
-    if let Some(copy) = options.get_item("copy")? {
-        if !copy.is_none() && !copy.is_truthy()? {
-            return Err(PyBufferError::new_err(
-                "arrays of ppa are read-only: they are copied, but copy=False was given",
-            ));
-        }
-        options.del_item("copy")?;
-    }
-    let copied = array.call_method0("copy")?;
-    copied.call_method("__dlpack__", (), Some(&options))
+    let Some(copy) = options.get_item("copy")? else {
+        return Ok((None, options));
+    };
+    options.del_item("copy")?;
+    Ok((copy.extract()?, options))
 }
 
 /// What `__dlpack_device__` gives.

@@ -1,4 +1,4 @@
-//! `ppa.Dataset`: the labelled images of a dataset, as networks see them.
+//! `ppa.Dataset`: the images of a dataset, as networks see them.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -29,7 +29,7 @@ use crate::values::{from_table, table, to_table, word};
 /// Parameters
 /// ----------
 /// path : str or os.PathLike
-///     Folder of a dataset with labels, ours or the authors'.
+///     Folder of a dataset, ours or the authors'.
 /// views : {"pairs", "left", "right", "unified"}
 ///     Images of both cameras, of one, or of either alone.
 /// side : int
@@ -42,6 +42,8 @@ use crate::values::{from_table, table, to_table, word};
 ///     Every n-th angle of each limb, from the smallest.
 /// labels : str, optional
 ///     Name of the labels, those of labels.NAME.json.
+/// unlabelled : bool
+///     Take images without a label too; their label is NaN. By default, they are refused.
 /// mirror : bool
 ///     Show left limbs as right ones.
 /// transform : callable, optional
@@ -59,7 +61,7 @@ pub struct PyDataset {
 #[pymethods]
 impl PyDataset {
     #[new]
-    #[pyo3(signature = (path, *, views="pairs", side=224, patients=None, shapes=None, every_pose=None, labels=None, mirror=false, transform=None))]
+    #[pyo3(signature = (path, *, views="pairs", side=224, patients=None, shapes=None, every_pose=None, labels=None, unlabelled=false, mirror=false, transform=None))]
     #[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
     fn new(
         py: Python<'_>,
@@ -70,6 +72,7 @@ impl PyDataset {
         shapes: Option<Vec<String>>,
         every_pose: Option<usize>,
         labels: Option<&str>,
+        unlabelled: bool,
         mirror: bool,
         transform: Option<Py<PyAny>>,
     ) -> PyResult<Self> {
@@ -87,6 +90,10 @@ impl PyDataset {
             ("shapes", shapes.clone().into_pyobject(py)?.into_any()),
             ("every_pose", every_pose.into_pyobject(py)?.into_any()),
             ("labels", labels.into_pyobject(py)?.into_any()),
+            (
+                "unlabelled",
+                unlabelled.into_pyobject(py)?.to_owned().into_any(),
+            ),
             ("mirror", mirror.into_pyobject(py)?.to_owned().into_any()),
             (
                 "transform",
@@ -117,6 +124,7 @@ impl PyDataset {
                 shapes: shapes.as_deref(),
                 every_pose,
                 labels: labels.as_ref(),
+                unlabelled,
                 views,
                 frames_per_pose: FRAMES_PER_POSE,
                 mirror,
@@ -143,7 +151,7 @@ impl PyDataset {
     /// -------
     /// image : numpy.ndarray, shape (cameras, side, side), float32
     /// label : float
-    ///     Quality from 1 (ideal) to 3 (inadequate).
+    ///     Quality from 1 (ideal) to 3 (inadequate); NaN without a label.
     fn __getitem__<'py>(
         &self,
         py: Python<'py>,
@@ -157,7 +165,7 @@ impl PyDataset {
         Ok((image, sample.label))
     }
 
-    /// numpy.ndarray, shape (n,): labels of all samples, from 1 (ideal) to 3 (inadequate).
+    /// numpy.ndarray, shape (n,): labels of all samples, from 1 (ideal) to 3 (inadequate); NaN without a label.
     #[getter]
     fn labels<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_vec(py, self.samples.iter().map(|sample| sample.label).collect())

@@ -12,7 +12,7 @@ use ppa_scene::LandmarkOverrides;
 use pyo3::exceptions::{PyFileExistsError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{finite, point, points};
+use crate::arrays::{finite, point, point_list, points};
 use crate::background::{Watch, run};
 use crate::case::PyCase;
 use crate::errors::OrRaise;
@@ -114,6 +114,8 @@ fn with_bones(
 ///     Keep only this box of voxels: first and one past the last along i, j and k.
 /// inside : array_like, shape (3,), optional
 ///     A point inside the wanted limb when the scan shows several, ct frame, mm.
+/// keep : array_like, shape (n, 3), optional
+///     Points inside further bodies to keep as parts of the limb, ct frame, mm: a splint, or a part that only touches the limb.
 /// joint : array_like, shape (3,), optional
 ///     Centre of the joint, ct frame, mm.
 /// axis_source : {"bone", "limb"}, optional
@@ -141,7 +143,7 @@ fn with_bones(
 /// -------
 /// Case
 #[pyfunction]
-#[pyo3(signature = (volume, side, *, limb=None, iso_hu=-500.0, crop=None, inside=None, joint=None, axis_source=None, joint_region=None, calf_region=None, axis=None, anterior=None, plane=None, bones=None, bone_numbers=[3, 4, 1], segment_bones=None, replace=false, threads=None))]
+#[pyo3(signature = (volume, side, *, limb=None, iso_hu=-500.0, crop=None, inside=None, keep=None, joint=None, axis_source=None, joint_region=None, calf_region=None, axis=None, anterior=None, plane=None, bones=None, bone_numbers=[3, 4, 1], segment_bones=None, replace=false, threads=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub fn prepare(
     py: Python<'_>,
@@ -151,6 +153,7 @@ pub fn prepare(
     iso_hu: f64,
     crop: Option<[[usize; 2]; 3]>,
     inside: Option<&Bound<'_, PyAny>>,
+    keep: Option<&Bound<'_, PyAny>>,
     joint: Option<&Bound<'_, PyAny>>,
     axis_source: Option<&str>,
     joint_region: Option<&Bound<'_, PyAny>>,
@@ -174,6 +177,7 @@ pub fn prepare(
     let surface = LimbSettings {
         iso_hu,
         inside: inside.map(|inside| point(inside, "inside")).transpose()?,
+        kept: keep.map_or(Ok(Vec::new()), |keep| point_list(keep, "keep"))?,
         crop: crop.map(|crop| VoxelBox {
             low: crop.map(|[low, _]| low),
             high: crop.map(|[_, high]| high),

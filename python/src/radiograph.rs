@@ -9,7 +9,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{converted, device, exported, view};
+use crate::arrays::{converted, device, given_away, view};
 use crate::errors::OrRaise;
 use crate::values::{from_table, plain, table};
 use crate::volume::PyVolume;
@@ -308,7 +308,7 @@ impl PyRadiograph {
         this: &Bound<'py, Self>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        exported(&this.get().total(this.py())?.into_any(), options)
+        given_away(&this.get().total(this.py())?.into_any(), options)
     }
 
     fn __dlpack_device__<'py>(this: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {

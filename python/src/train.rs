@@ -1,9 +1,10 @@
 //! `ppa.train`: a network from datasets.
 
+use std::ffi::CString;
 use std::path::{Path, PathBuf};
 
-use ppa_learn::train::{TrainConfig, read_log, read_start, train as make};
-use pyo3::exceptions::PyTypeError;
+use ppa_learn::train::{TrainConfig, cautions, read_log, read_start, train as make};
+use pyo3::exceptions::{PyTypeError, PyUserWarning};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use toml::{Table, Value};
@@ -69,6 +70,11 @@ fn sources(object: &Bound<'_, PyAny>, name: &str) -> PyResult<Value> {
 /// **settings
 ///     Keys of a configuration in place of the preset's, e.g. ``steps=800``, ``views="pairs"`` or ``augmentation={"noise_probability": 0}``.
 ///
+/// Warns
+/// -----
+/// UserWarning
+///     Of severe findings of the datasets that no case acknowledges, and of a ``start`` trained with ``mirror`` where this training has none.
+///
 /// Returns
 /// -------
 /// dict
@@ -99,6 +105,10 @@ pub fn train<'py>(
         keys.insert("seed".to_owned(), Value::Integer(seed));
     }
     let config = TrainConfig::of_keys(keys, Path::new(SETTINGS)).or_raise()?;
+    for caution in cautions(&config).or_raise()? {
+        let (category, text) = (py.get_type::<PyUserWarning>(), CString::new(caution)?);
+        PyErr::warn(py, &category, &text, 1)?;
+    }
     let steps = config.schedule().steps();
     let observer = observer(py, progress)?;
     let folder = out.clone();

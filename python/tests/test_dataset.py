@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import multiprocessing
 import pickle
 import shutil
@@ -39,6 +40,28 @@ def test_samples_can_be_selected(labelled: Path) -> None:
     for refused in [{"patients": [7]}, {"shapes": ["round"]}, {"views": "above"}, {"side": 0}, {"every_pose": 0}, {"labels": "x"}]:
         with pytest.raises((ValueError, OSError)):
             ppa.Dataset(labelled, **refused)
+
+
+def test_images_without_labels_are_taken_on_request(labelled: Path, tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    shutil.copytree(labelled, data)
+    labels = data / "patient_0" / "labels" / "r" / "labels.json"
+    rows = json.loads(labels.read_text())
+    rows.pop(next(iter(rows)))
+    labels.write_text(json.dumps(rows))
+    with pytest.raises(ppa.PpaError, match="has no label in labels.json"):
+        ppa.Dataset(data)
+    some = ppa.Dataset(data, side=32, unlabelled=True)
+    assert np.isnan(some.labels).sum() == 2
+    labels.unlink()
+    none = pickle.loads(pickle.dumps(ppa.Dataset(data, side=32, unlabelled=True)))
+    every = ppa.Dataset(labelled, side=32)
+    assert len(none) == len(every) and np.isnan(none.labels).all()
+    for (image, label), (same, _), row in zip(none, every, none.rows):
+        np.testing.assert_array_equal(image, same)
+        assert math.isnan(label) and math.isnan(row["label"])
+    with pytest.raises(ppa.PpaError, match="NaN"):
+        none.drawn(0)
 
 
 def first_pixel(arguments: tuple[ppa.Dataset, int]) -> float:

@@ -46,8 +46,24 @@ def test_images_are_exported_by_dlpack(case: ppa.Case, scene: ppa.Scene) -> None
         exported = np.from_dlpack(image)
         np.testing.assert_array_equal(exported, array)
         assert not np.shares_memory(exported, array)
-        with pytest.raises(BufferError, match="copy=False"):
-            image.__dlpack__(copy=False)
+    with pytest.raises(BufferError, match="export one of the layers"):
+        radiograph.__dlpack__(copy=False)
+    with pytest.raises(BufferError):
+        depth.__dlpack__(copy=False)
+
+
+@pytest.mark.skipif(np.lib.NumpyVersion(np.__version__) < "2.1.0", reason="numpy knows DLPack 1.0 from 2.1 on")
+def test_views_are_exported_without_a_copy(case: ppa.Case, scene: ppa.Scene) -> None:
+    pose = case.place(0, scene=scene)
+    depth, layers = pose.depth(), pose.radiograph().layers
+    for image, array in [(depth, depth.z_mm), (layers["primary"], layers["primary"])]:
+        exported = np.from_dlpack(image, copy=False)
+        assert np.shares_memory(exported, array)
+        assert not exported.flags.writeable
+    kept = np.from_dlpack(depth, copy=False)
+    copied = depth.z_mm.copy()
+    del depth
+    np.testing.assert_array_equal(kept, copied)
 
 
 def test_images_are_tensors(case: ppa.Case, scene: ppa.Scene, labelled: Path) -> None:

@@ -36,6 +36,34 @@ def test_cases(files: Files) -> None:
     assert other.read_bytes() == (files.folder / "mine.case.toml").read_bytes()
 
 
+def test_cases_with_kept_bodies(files: Files) -> None:
+    whole = ppa.Volume.read(files.scan)
+    voxels = whole.voxels.copy()
+    # A block in the air beside the limb.
+    voxels[:16, :16, 20:60] = 100
+    assert (whole.voxels[:20, :20, 16:64] < -900).all()
+    scan = files.folder / "block.nii.gz"
+    ppa.Volume(voxels, whole.affine).save(scan)
+    points = [(whole.affine @ (*index, 1))[:3] for index in [(8, 8, 40), (8, 8, 30)]]
+    options = [f"--keep={','.join(map(repr, point.tolist()))}" for point in points]
+    command("prepare", scan, "--side", "r", *options, "--no-picture", "--out", files.folder / "kept.case.toml")
+    kept = ppa.prepare(ppa.Volume.read(scan), "r", keep=points)
+    kept.save(files.folder / "mine.case.toml")
+    assert (files.folder / "kept.case.toml").read_bytes() == (files.folder / "mine.case.toml").read_bytes()
+    limb = ppa.prepare(scan, "r", keep=[])
+    assert len(kept.vertices) > len(limb.vertices)
+    kept.joint = kept.joint
+    assert len(kept.vertices) > len(limb.vertices), "another choice"
+    for bad, says in [
+        ([(0, 0, 9000)], "(0, 0, 9000) mm of a body to keep is not in solid tissue"),
+        ((0.0, 0.0, 0.0), "keep has the shape (3,), expected (n, 3)"),
+        ([(0.0, 0.0, float("nan"))], "keep contains NaN"),
+    ]:
+        with pytest.raises(ValueError) as refused:
+            ppa.prepare(scan, "r", keep=bad)
+        assert says in str(refused.value)
+
+
 def test_depth_images(files: Files, tmp_path: Path) -> None:
     command("depth", "render", files.case, "--angle", 18, "--out", tmp_path / "d.png", "--exr", tmp_path / "d.exr")
     pose = ppa.Case.read(files.case).place(18)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import shutil
 import signal
 import threading
 import time
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +65,25 @@ def test_weights_are_those_of_the_command(persons: Path, tmp_path: Path) -> None
     assert again["last_loss"] is None
     other = ppa.train(of(persons, 0), tmp_path / "other", seed=8, steps=3, **QUICK)
     assert other["last_loss"] != trained["last_loss"]
+
+
+def test_trainings_warn_of_findings_and_of_another_mirror(persons: Path, tmp_path: Path) -> None:
+    data = tmp_path / "data"
+    shutil.copytree(persons, data)
+    finding = {"patient": 0, "side": "r", "acknowledged": False, "code": "side-mismatch", "severity": "severe",
+               "text": "the fibula lies medially"}
+    (data / "findings.json").write_text(json.dumps([finding]))
+    with pytest.warns(UserWarning, match=r"severe \[side-mismatch\] limb r of patient 0 of .*data: the fibula lies medially"):
+        ppa.train(of(data, 0), tmp_path / "mirrored", mirror=True, steps=1, **QUICK)
+    start = tmp_path / "mirrored" / "weights.safetensors"
+    with pytest.warns(UserWarning, match="was trained with mirror = true, this training shows left limbs as they are"):
+        ppa.train(of(persons, 0), tmp_path / "run", start=start, mirror=False, steps=1, **QUICK)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ppa.train(of(persons, 0), tmp_path / "again", start=start, mirror=True, steps=1, **QUICK)
+        with pytest.raises(UserWarning):
+            ppa.train(of(data, 0), tmp_path / "refused", steps=1, **QUICK)
+    assert not (tmp_path / "refused").exists()
 
 
 def test_drawn_samples_follow_from_the_seed(persons: Path) -> None:

@@ -4,14 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 use ppa_core::text::count;
-use ppa_learn::train::{Ended, TrainConfig, read_start, train};
-use ppa_learn::{Loaded, WeightsMetadata};
+use ppa_learn::Loaded;
+use ppa_learn::train::{Ended, TrainConfig, cautions, read_start, train};
 use serde::Serialize;
 
 use super::learn::not_taken;
 
 use crate::allocator::keep_freed_memory;
-use crate::findings::repeat_of_datasets;
 use crate::interrupt::Interrupt;
 use crate::output::{Output, bar};
 use crate::output_files::require_writable;
@@ -41,18 +40,10 @@ pub fn run(args: &TrainArgs, output: Output) -> anyhow::Result<()> {
     let config = TrainConfig::read(&args.config)?;
     let schedule = config.schedule();
     let steps = schedule.steps();
-    let sources = config.training.iter().chain(&config.evaluation);
-    repeat_of_datasets(sources.map(|source| &*source.dataset))?;
-    require_writable("--out", &args.out)?;
-    if let Some(start) = &config.start
-        && !config.mirror
-        && WeightsMetadata::read(start)?.mirror
-    {
-        warning(&format!(
-            "{} was trained with mirror = true, this training shows left limbs as they are",
-            start.display()
-        ));
+    for caution in cautions(&config)? {
+        warning(&caution);
     }
+    require_writable("--out", &args.out)?;
     let interrupt = Interrupt::listen()?;
     keep_freed_memory();
     let bar = bar("training");

@@ -57,6 +57,8 @@ pub struct Selection<'a> {
     pub every_pose: Option<NonZeroUsize>,
     /// Name of the labels, those of `labels.NAME.json`; of `labels.json` if `None`.
     pub labels: Option<&'a LabelName>,
+    /// Take images without a label too, with NaN for it; otherwise they are refused.
+    pub unlabelled: bool,
     /// Which cameras' images make a sample.
     pub views: Views,
     /// Frames that are used of a recorded pose.
@@ -74,6 +76,7 @@ impl Selection<'_> {
             shapes: None,
             every_pose: None,
             labels: None,
+            unlabelled: false,
             views,
             frames_per_pose: FRAMES_PER_POSE,
             mirror: false,
@@ -86,10 +89,10 @@ impl Selection<'_> {
     }
 }
 
-/// The labelled samples of a dataset that are selected, in the order of the dataset.
+/// The samples of a dataset that are selected, in the order of the dataset.
 ///
 /// # Errors
-/// [`DataError`] for a folder that is not a dataset, an image without label, without region or with one outside its camera's images, one
+/// [`DataError`] for a folder that is not a dataset, an image without label (unless [`Selection::unlabelled`]), without region or with one outside its camera's images, one
 /// that is no 16-bit PNG of the size of the others of its camera, as far as headers show, a person or body shape that is not there, or
 /// no image.
 pub fn read_samples(root: &Path, selection: &Selection) -> Result<Vec<Sample>, DataError> {
@@ -134,6 +137,7 @@ pub fn read_samples(root: &Path, selection: &Selection) -> Result<Vec<Sample>, D
     let mut reader = Reader {
         dataset: &dataset,
         labels,
+        unlabelled: selection.unlabelled,
         place: root.canonicalize().unwrap_or_else(|_| root.to_owned()),
         sizes: BTreeMap::new(),
     };
@@ -220,6 +224,7 @@ fn moments<'a>(pose: &'a [&ImagePair]) -> impl Iterator<Item = &'a &'a ImagePair
 struct Reader<'a> {
     dataset: &'a Published,
     labels: Option<&'a LabelName>,
+    unlabelled: bool,
     /// The one path of the dataset's folder, however it was spelled: persons of one dataset must be known again.
     place: PathBuf,
     /// Columns and rows of each camera's first image.
@@ -238,11 +243,16 @@ impl Reader<'_> {
         let files = views.iter().filter_map(|&view| pair.depth(view));
         let files: Vec<&DepthFile> = files.collect();
         let path = |file: &DepthFile| self.dataset.root.join(&file.file);
-        let no_label = || DataError::NoLabel {
-            image: path(files[0]),
-            labels: LabelFile::file_name(self.labels),
+        let (label, label_std) = match &pair.label {
+            Some(row) => (row.label, row.std),
+            None if self.unlabelled => (f64::NAN, f64::NAN),
+            None => {
+                return Err(DataError::NoLabel {
+                    image: path(files[0]),
+                    labels: LabelFile::file_name(self.labels),
+                });
+            }
         };
-        let label = pair.label.as_ref().ok_or_else(no_label)?;
         let images = views.iter().zip(&files);
         let images: Result<_, _> = images
             .map(|(&view, file)| self.image(view, file, mirrored))
@@ -250,8 +260,8 @@ impl Reader<'_> {
         Ok(Sample {
             id: files[0].file.clone(),
             images: images?,
-            label: label.label,
-            label_std: label.std,
+            label,
+            label_std,
             dataset: self.place.clone(),
             limb: pair.limb,
             camera: views[0],

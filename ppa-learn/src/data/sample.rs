@@ -57,7 +57,7 @@ pub struct Sample {
     pub id: String,
     /// One image, or those for the left and the right camera's input.
     pub images: Vec<SampleImage>,
-    /// Quality from 1 (ideal) to 3 (inadequate).
+    /// Quality from 1 (ideal) to 3 (inadequate); NaN without a label, see [`Selection::unlabelled`](super::Selection::unlabelled).
     pub label: f64,
     /// Standard deviation of the label over the readers, or over what was assumed.
     pub label_std: f64,

@@ -179,6 +179,7 @@ impl TrainConfig {
             shapes: source.shapes.as_deref(),
             every_pose: source.every_pose,
             labels: source.labels.as_ref(),
+            unlabelled: false,
             views: self.views,
             frames_per_pose: self.frames_per_pose,
             mirror: self.mirror,

@@ -7,6 +7,7 @@
 mod adam;
 mod average;
 mod batch_source;
+mod cautions;
 mod checkpoint;
 mod config;
 mod config_error;
@@ -29,6 +30,7 @@ mod tensorboard;
 mod trained;
 
 pub use adam::Adam;
+pub use cautions::cautions;
 pub use config::{LastLayer, Layers, NetworkConfig, Source, TrainConfig};
 pub use config_error::ConfigError;
 pub(crate) use config_file::merge;

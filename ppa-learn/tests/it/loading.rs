@@ -149,6 +149,13 @@ fn what_is_missing_or_of_another_size_is_named() {
         matches!(&error, DataError::NoLabel { image, .. } if image.ends_with("depth_cam_left_0.0.png")),
         "{error}"
     );
+    let unlabelled = Selection {
+        unlabelled: true,
+        ..Selection::all(Views::Left)
+    };
+    let taken = read_samples(folder.path(), &unlabelled).unwrap();
+    let without = |s: &&Sample| s.label.is_nan();
+    assert_eq!((taken.len(), taken.iter().filter(without).count()), (6, 3));
     let whole = Selection {
         patients: Some(&[0]),
         ..Selection::all(Views::Left)

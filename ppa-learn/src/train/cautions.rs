@@ -1,0 +1,30 @@
+//! What to tell a person before a training begins.
+
+use std::path::Path;
+
+use ppa_dataset::Findings;
+
+use super::config::TrainConfig;
+use super::error::TrainError;
+use crate::weights::WeightsMetadata;
+
+/// Sentences on what may make a training worthless and is not refused: severe findings of its datasets that no case acknowledges, and
+/// weights to start from that were trained with left limbs shown as right ones, where this training shows them as they are.
+///
+/// # Errors
+/// [`TrainError`] if findings or weights cannot be read.
+pub fn cautions(config: &TrainConfig) -> Result<Vec<String>, TrainError> {
+    let sources = config.training.iter().chain(&config.evaluation);
+    let datasets = sources.map(|source| -> &Path { &source.dataset });
+    let mut cautions = Findings::open_lines_of(datasets)?;
+    if let Some(start) = &config.start
+        && !config.mirror
+        && WeightsMetadata::read(start)?.mirror
+    {
+        cautions.push(format!(
+            "{} was trained with mirror = true, this training shows left limbs as they are",
+            start.display()
+        ));
+    }
+    Ok(cautions)
+}
