@@ -2,7 +2,7 @@
 //! physics data of the crates that make it, and the machine that they are compiled for.
 //!
 //! In a checkout these are files beside this crate. A published crate cannot see its neighbours; their versions, which stand
-//! in for their contents, and those of all other crates are added by `src/compiled.rs`.
+//! in for their contents, and in any case those of the crates of others are added by `src/compiled.rs`.
 
 use std::path::PathBuf;
 use std::{env, io};
@@ -28,13 +28,17 @@ fn main() -> io::Result<()> {
     let this = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").expect("set by cargo"));
     let beside = this.parent().expect("a crate lies in a folder");
     let in_crate = |name: &str| PARTS.map(|part| beside.join(name).join(part));
-    let mut roots: Vec<_> = CRATES.iter().flat_map(|name| in_crate(name)).collect();
-    if !beside.join("ppa-ct").is_dir() {
-        roots = PARTS.map(|part| this.join(part)).into();
-    }
+    let (roots, neighbours): (Vec<_>, _) = match beside.join("ppa-ct").is_dir() {
+        true => (
+            CRATES.iter().flat_map(|name| in_crate(name)).collect(),
+            "sources",
+        ),
+        false => (PARTS.map(|part| this.join(part)).into(), "compiled"),
+    };
 
     let code = source_hash(&roots)? + &machine();
     println!("cargo::rustc-env=PPA_CODE={code}");
+    println!("cargo::rustc-env=PPA_NEIGHBOURS={neighbours}");
     Ok(())
 }
 

@@ -25,6 +25,7 @@
 mod acquisition;
 #[cfg(feature = "audit")]
 pub mod audit;
+mod compiled_with;
 mod derived_grids;
 #[cfg(feature = "dicom")]
 mod dicom_series;
@@ -70,6 +71,7 @@ mod volume_error;
 mod write;
 
 pub use acquisition::Acquisition;
+pub use compiled_with::compiled_with;
 #[cfg(feature = "dicom")]
 pub use dicom_write::write as write_dicom;
 pub use error::{Gap, ReadError, WriteError};

@@ -15,6 +15,7 @@
 pub mod archive;
 mod body_shape;
 pub mod checksums;
+mod compiled_with;
 pub mod export;
 pub mod files;
 pub mod findings;
@@ -28,6 +29,7 @@ pub mod stop;
 pub mod whole_folder;
 
 pub use body_shape::BodyShape;
+pub use compiled_with::compiled_with;
 pub use files::{FileError, sha256_of_file, write_whole};
 pub use findings::{Finding, FindingCode, Findings, LimbFinding, Severity};
 pub use manifest::{FileKind, FileRow, Manifest, RoiFile, RoiRow};

@@ -58,6 +58,7 @@
 //! ```
 
 mod camera;
+mod compiled_with;
 mod coverage;
 mod image;
 mod io;
@@ -75,6 +76,7 @@ pub use camera::rig::{MountedCamera, RigError, RigSpec};
 pub use camera::rigid::{isometry_from_rows, rows_from_isometry};
 pub use camera::spec::{CameraError, CameraModel, CameraSpec};
 pub use camera::viewpoint::Viewpoint;
+pub use compiled_with::compiled_with;
 pub use coverage::{Coverage, CoverageError, CoverageSettings, JointSurface};
 pub use image::{DepthError, DepthImage, DepthU16};
 pub use io::preview::false_colour;

@@ -13,18 +13,43 @@ use ppa_dataset::files::hex;
 /// `--locked`, `cargo install` ignores Cargo.lock and passes nothing of it to a build script. But the compiler knows. It
 /// mixes into the identity of a type that of its crate: version, features, profile and compiler, and those of all
 /// crates that it depends on.
+///
+/// For a crate in a checkout, Cargo adds its folder, counted from the workspace if it lies inside, so that a package built from the same
+/// files in another folder would seem to be another program. Such crates are known by their sources; only crates from a registry, which have
+/// no folder, are asked for the identity of a type.
 pub(crate) fn code() -> &'static str {
     static CODE: LazyLock<String> = LazyLock::new(|| {
-        let crates = [
-            TypeId::of::<ppa_ct::Volume>(),
-            TypeId::of::<ppa_dataset::Manifest>(),
-            TypeId::of::<ppa_mesh::LimbSettings>(),
-            TypeId::of::<ppa_scene::RoomSpec>(),
-            TypeId::of::<ppa_depth::CameraSpec>(),
-            TypeId::of::<ppa_xray::Spectrum>(),
+        let mut crates = vec![
+            TypeId::of::<nalgebra::Dyn>(),
+            TypeId::of::<rayon::iter::Empty<()>>(),
+            TypeId::of::<serde::de::IgnoredAny>(),
+            TypeId::of::<serde_json::Value>(),
+            TypeId::of::<Sha256>(),
+            TypeId::of::<tempfile::TempDir>(),
+            TypeId::of::<toml::Value>(),
+            TypeId::of::<toml_edit::DocumentMut>(),
         ];
+        crates.extend(ppa_ct::compiled_with());
+        crates.extend(ppa_dataset::compiled_with());
+        crates.extend(ppa_depth::compiled_with());
+        crates.extend(ppa_mesh::compiled_with());
+        if env!("PPA_NEIGHBOURS") == "compiled" {
+            crates.extend(neighbours());
+        }
         let hash = Sha256::digest(format!("{} {crates:?}", env!("PPA_CODE")));
         hex(&hash[..8])
     });
     &CODE
+}
+
+/// Our other crates, where their sources are not beside this one: crates of a registry, whose versions stand for their contents.
+fn neighbours() -> [TypeId; 6] {
+    [
+        TypeId::of::<ppa_ct::Volume>(),
+        TypeId::of::<ppa_dataset::Manifest>(),
+        TypeId::of::<ppa_mesh::LimbSettings>(),
+        TypeId::of::<ppa_scene::RoomSpec>(),
+        TypeId::of::<ppa_depth::CameraSpec>(),
+        TypeId::of::<ppa_xray::Spectrum>(),
+    ]
 }

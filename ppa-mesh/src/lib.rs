@@ -11,6 +11,7 @@
 //! Left out: decimation and any other file format.
 
 mod body_shape;
+mod compiled_with;
 mod dbscan;
 mod displacement;
 mod estimate_normals;
@@ -26,6 +27,7 @@ mod surface;
 mod topology;
 
 pub use body_shape::{Bump, BumpSite, ShapeError, add_bumps, offset, seeded_bumps};
+pub use compiled_with::compiled_with;
 pub use dbscan::{Clusters, dbscan};
 pub use displacement::Displacement;
 pub use estimate_normals::{CloudError, estimate_normals, mean_spacing_mm};

@@ -63,6 +63,91 @@ fn a_type_tells_versions_features_and_profile_of_its_crates() {
     assert_ne!(printed(here.path(), &[]), first, "another feature");
 }
 
+/// A crate of a registry that is compiled already, in the version of Cargo.lock: this workspace has it in the cache.
+const OF_REGISTRY: &str = "colorous";
+
+fn locked_version(name: &str) -> String {
+    let lock = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../Cargo.lock"));
+    let lock: toml::Table = lock.unwrap().parse().unwrap();
+    let packages = lock["package"].as_array().unwrap();
+    let package = packages
+        .iter()
+        .find(|p| p["name"].as_str() == Some(name))
+        .unwrap();
+    package["version"].as_str().unwrap().to_owned()
+}
+
+/// The identities of a type of a crate in a folder, and of one of a registry, in a program whose workspace does not contain that folder.
+fn identities_from_outside(root: &Path, arguments: &[&str]) -> [String; 2] {
+    write_workspace(root, "0.1.0", "");
+    let program = root.join("python");
+    fs::create_dir_all(program.join("src")).unwrap();
+    let version = locked_version(OF_REGISTRY);
+    let manifest = format!(
+        "[package]\nname = \"program\"\nversion = \"0.1.0\"\nedition = \"2024\"\n[workspace]\n\
+         [dependencies]\nmiddle = {{ path = \"../middle\" }}\n{OF_REGISTRY} = \"={version}\"\n"
+    );
+    fs::write(program.join("Cargo.toml"), manifest).unwrap();
+    let code = "use std::any::TypeId;\nfn main() {\n    println!(\"{:?}\", TypeId::of::<middle::Here>());\n    \
+                println!(\"{:?}\", TypeId::of::<colorous::Gradient>());\n}\n";
+    fs::write(program.join("src/main.rs"), code).unwrap();
+    let printed = printed(&program, arguments);
+    let lines: Vec<&str> = printed.lines().collect();
+    [lines[0].to_owned(), lines[1].to_owned()]
+}
+
+/// Why the code key asks types of registries only: the Python package is built outside the workspace, by pip in a folder with a new name.
+#[test]
+fn only_types_of_registries_are_free_of_folders() {
+    let [here, there] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let [folder, registry] = identities_from_outside(here.path(), &[]);
+    let [other_folder, same_registry] = identities_from_outside(there.path(), &[]);
+    assert_eq!(registry, same_registry);
+    assert_ne!(folder, other_folder);
+    let [_, released] = identities_from_outside(here.path(), &["--release"]);
+    assert_ne!(released, registry, "another profile");
+}
+
+/// Crates without influence on the bytes of an image: messages, measured time, exports, coloured previews, and how files are put into place.
+const WITHOUT_INFLUENCE: [&str; 7] = [
+    "atomic-write-file",
+    "colorous",
+    "cpu-time",
+    "csv",
+    "parquet",
+    "tar",
+    "thiserror",
+];
+
+#[test]
+fn the_code_key_knows_all_crates_that_make_images() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let read = |path: &str| fs::read_to_string(root.join(path)).unwrap();
+    let crates = [
+        "core", "ct", "dataset", "depth", "generate", "mesh", "scene", "xray",
+    ];
+    let build = read("ppa-generate/build.rs");
+    let known: String = ["ct", "dataset", "depth", "mesh"]
+        .map(|name| read(&format!("ppa-{name}/src/compiled_with.rs")))
+        .concat()
+        + &read("ppa-generate/src/compiled.rs");
+    for name in crates {
+        assert!(build.contains(&format!("\"ppa-{name}\"")), "{name}");
+        let manifest: toml::Table = read(&format!("ppa-{name}/Cargo.toml")).parse().unwrap();
+        for dependency in manifest["dependencies"].as_table().unwrap().keys() {
+            if let Some(ours) = dependency.strip_prefix("ppa-") {
+                assert!(crates.contains(&ours), "{dependency} of {name}");
+            } else if !WITHOUT_INFLUENCE.contains(&dependency.as_str()) {
+                let asked = match &**dependency {
+                    "sha2" => "TypeId::of::<Sha256>".to_owned(),
+                    other => format!("TypeId::of::<{}::", other.replace('-', "_")),
+                };
+                assert!(known.contains(&asked), "{dependency} of {name}");
+            }
+        }
+    }
+}
+
 /// Without it, `cargo install` takes the newest versions instead of those in Cargo.lock.
 #[test]
 fn every_documented_install_line_is_locked() {

@@ -1,0 +1,29 @@
+//! Identities of the crates of others that decide results of this one.
+
+use std::any::TypeId;
+
+/// The compiler's identities of crates of others that this one is compiled with, for the code key of datasets: each changes with version,
+/// features and profile of its crate and with the compiler, see `ppa-generate/src/compiled.rs`.
+pub fn compiled_with() -> Vec<TypeId> {
+    vec![
+        #[cfg(feature = "dicom")]
+        TypeId::of::<dicom_core::Tag>(),
+        #[cfg(feature = "dicom")]
+        TypeId::of::<dicom_dictionary_std::StandardDataDictionary>(),
+        #[cfg(feature = "dicom")]
+        TypeId::of::<dicom_object::InMemDicomObject>(),
+        #[cfg(feature = "dicom")]
+        TypeId::of::<hayro_jpeg2000::DecodeSettings>(),
+        #[cfg(feature = "dicom")]
+        TypeId::of::<libjpeg_turbo_rs::PixelFormat>(),
+        #[cfg(feature = "nifti")]
+        TypeId::of::<nifti::NiftiHeader>(),
+        #[cfg(any(
+            feature = "dicom",
+            feature = "nifti",
+            feature = "metaimage",
+            feature = "nrrd"
+        ))]
+        TypeId::of::<flate2::Compression>(),
+    ]
+}

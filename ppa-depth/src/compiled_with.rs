@@ -1,0 +1,13 @@
+//! Identities of the crates of others that decide results of this one.
+
+use std::any::TypeId;
+
+/// The compiler's identities of crates of others that this one is compiled with, for the code key of datasets: each changes with version,
+/// features and profile of its crate and with the compiler, see `ppa-generate/src/compiled.rs`.
+pub fn compiled_with() -> Vec<TypeId> {
+    vec![
+        TypeId::of::<exr::meta::attribute::ChannelDescription>(),
+        TypeId::of::<parry3d::bounding_volume::Aabb>(),
+        TypeId::of::<png::ColorType>(),
+    ]
+}
