@@ -81,10 +81,10 @@ fn depth(c: &mut Criterion<ProcessorTime>) {
         .expect("the limb is in view");
     let sensor = Sensor::new(SensorSpec::default(), 1).expect("the default sensor");
     group.bench_function("sensor", |b| {
-        b.iter(|| sensor.observe(&camera, &seen, 1, 0))
+        b.iter(|| sensor.observe(&camera, &seen, 1, 0).unwrap())
     });
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let noisy = sensor.observe(&camera, &seen, 1, 0);
+    let noisy = sensor.observe(&camera, &seen, 1, 0).unwrap();
     group.bench_function("write_png", |b| {
         b.iter(|| noisy.write_png(&folder.path().join("depth.png")))
     });
@@ -101,7 +101,7 @@ fn depth(c: &mut Criterion<ProcessorTime>) {
         b.iter(|| {
             for (stream, seen_from) in [placed(&limb), other].into_iter().enumerate() {
                 let seen = backdrop.before(&camera, &[seen_from]).expect("in view");
-                let noisy = sensor.observe(&camera, &seen, stream as u64, 0);
+                let noisy = sensor.observe(&camera, &seen, stream as u64, 0).unwrap();
                 noisy
                     .write_png(&folder.path().join("depth.png"))
                     .expect("written");

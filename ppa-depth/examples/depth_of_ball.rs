@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let camera = Camera::try_from(CameraSpec::azure_kinect(DepthMode::NfovUnbinned))?;
     let seen = Backdrop::new(&camera, &[]).before(&camera, &[placed])?;
-    let measured = Sensor::new(SensorSpec::default(), 1)?.observe(&camera, &seen, 7, 0);
+    let measured = Sensor::new(SensorSpec::default(), 1)?.observe(&camera, &seen, 7, 0)?;
 
     let folder = tempfile::tempdir()?;
     for (name, image) in [("ideal", &seen.image), ("measured", &measured)] {

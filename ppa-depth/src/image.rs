@@ -76,6 +76,14 @@ pub enum DepthError {
         /// Columns and rows of the second image.
         second: [u32; 2],
     },
+    /// An image is not of the size of a camera's images.
+    #[error("the depth image has {} x {} pixels, those of the camera have {} x {}", found[0], found[1], expected[0], expected[1])]
+    OtherCamera {
+        /// Columns and rows of the image.
+        found: [u32; 2],
+        /// Columns and rows of the camera.
+        expected: [u32; 2],
+    },
     /// The number of depths is not columns times rows.
     #[error("depth image of {width} x {height} pixels with {found} depths")]
     Length {

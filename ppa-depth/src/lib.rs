@@ -51,7 +51,7 @@
 //! for frame in 0..3 {
 //!     let motion = tremor.motion(&Point3::new(0.0, 0.0, 1000.0), 1, frame);
 //!     let seen = backdrop.before(&camera, &[place(&limb, motion, 1000.0)])?;
-//!     let image = sensor.observe(&camera, &seen, 1, frame);
+//!     let image = sensor.observe(&camera, &seen, 1, frame)?;
 //!     assert!(image.valid_pixels() > 50_000);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -98,7 +98,7 @@ impl Recorder {
             return Ok(image);
         };
         let seen = backdrop.before(&self.camera, &bodies)?;
-        let image = sensor.observe(&self.camera, &seen, self.seed, frame);
+        let image = sensor.observe(&self.camera, &seen, self.seed, frame)?;
         image.require_measured(seen.image.valid_pixels())?;
         Ok(image)
     }

@@ -351,7 +351,7 @@ pub(crate) fn depth_image(
         let seen = backdrop.before_with_walls(&camera.camera, &[placed], walls)?;
         // One frame per body shape and camera.
         let frame = 2 * shape as u64 + camera.view as u64;
-        let image = sensor.observe(&camera.camera, &seen, noise_seed, frame);
+        let image = sensor.observe(&camera.camera, &seen, noise_seed, frame)?;
         image.require_measured(seen.image.valid_pixels())?;
         return Ok(WalledImage {
             image,

@@ -87,7 +87,7 @@ pub(crate) fn absorbed_dose(
         } else {
             ControlFlow::Break(())
         }
-    });
+    })?;
     if ended == Stopped::Interrupted {
         return Err(StudioError::Superseded);
     }

@@ -95,6 +95,9 @@ pub enum StudioError {
     /// The radiograph.
     #[error(transparent)]
     Transport(#[from] ppa_xray::TransportError),
+    /// Its histories.
+    #[error(transparent)]
+    Run(#[from] ppa_xray::RunError),
     /// Its doses.
     #[error(transparent)]
     Dose(#[from] ppa_xray::DoseError),

@@ -129,7 +129,7 @@ pub use phantom::hu::HuCalibration;
 pub use phantom::interpolation::Interpolation;
 pub use phantom::segment::{Composition, Constituent, Segment};
 pub use phantom::voxels::{PhantomError, VoxelPhantom};
-pub use run::analog_run::AnalogRun;
+pub use run::analog_run::{AnalogRun, RunError};
 pub use run::analog_tally::AnalogTally;
 pub use run::progress::{Progress, Stop, Stopped};
 #[cfg(feature = "files")]

@@ -7,7 +7,7 @@ use ppa_generate::{ExposureError, XraySettings};
 use ppa_scene::PlaceError;
 use ppa_xray::{
     AnalogRun, AnalogSettings, Dose, DoseError, DoseSettings, FastSettings, Part, PreparedPhantom,
-    Projection, Radiograph, Spectrum, Stop, TransportError, TubeLoad, VoxelBox,
+    Projection, Radiograph, RunError, Spectrum, Stop, TransportError, TubeLoad, VoxelBox,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -27,6 +27,8 @@ pub enum ExposeError {
     Place(#[from] PlaceError),
     #[error(transparent)]
     Transport(#[from] TransportError),
+    #[error(transparent)]
+    Run(#[from] RunError),
     #[error(transparent)]
     Dose(#[from] DoseError),
 }
@@ -172,7 +174,7 @@ impl Analog {
                 progress.histories as f64,
                 progress.expected_histories as f64,
             )
-        });
+        })?;
         Ok((tally.radiograph(), tally.dose()))
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::Complex;
 use rayon::prelude::*;
 
 use crate::camera::projection::Camera;
-use crate::image::DepthImage;
+use crate::image::{DepthError, DepthImage};
 use crate::render::sampled::{SAMPLES, SampledImage};
 use crate::render::surface::{Surface, signal};
 use crate::sensor::modulation::phase_per_mm;
@@ -59,21 +59,31 @@ impl Sensor {
     /// The depth image that the sensor gives in one frame. Random numbers are addressed by (seed, frame, pixel): the same for any
     /// number of threads.
     ///
-    /// # Panics
-    /// If `seen` is not an image of `camera`.
+    /// # Errors
+    /// [`DepthError::OtherCamera`] if `seen` is not of the size of `camera`'s images.
     pub fn observe(
         &self,
         camera: &Camera,
         seen: &SampledImage,
         seed: u64,
         frame: u64,
-    ) -> DepthImage {
+    ) -> Result<DepthImage, DepthError> {
         let image = &seen.image;
-        assert_eq!(
-            image.z_mm.len(),
-            camera.rays().len(),
-            "another camera's image"
+        let (found, expected) = (
+            [image.width, image.height],
+            [camera.width(), camera.height()],
         );
+        if found != expected {
+            return Err(DepthError::OtherCamera { found, expected });
+        }
+        if image.z_mm.len() != camera.rays().len() {
+            let [width, height] = found;
+            return Err(DepthError::Length {
+                width,
+                height,
+                found: image.z_mm.len(),
+            });
+        }
         let surface = Surface::new(camera, image);
         let bounced = (self.spec.multipath).map(|multipath| one_bounce(&surface, image, multipath));
         let mut z_mm = vec![0.0; image.z_mm.len()];
@@ -120,11 +130,11 @@ impl Sensor {
                     *z_mm = (range_mm / ray).max(0.0) as f32;
                 }
             });
-        DepthImage {
+        Ok(DepthImage {
             width: image.width,
             height: image.height,
             z_mm,
-        }
+        })
     }
 
     /// Standard normal numbers of four pixels: of this frame, and of the device.

@@ -24,7 +24,9 @@ fn a_pixel_that_sees_two_walls_has_the_phase_of_their_light() {
         }),
         ..NONE
     };
-    let image = sensor(mixing.clone()).observe(&camera, &seen, 1, 0);
+    let image = sensor(mixing.clone())
+        .observe(&camera, &seen, 1, 0)
+        .unwrap();
     let at = |image: &DepthImage, column: usize| f64::from(image.z_mm[50 * 101 + column]);
     assert!((at(&image, 58) - near).abs() < 0.05 && (at(&image, 62) - far).abs() < 0.05);
     let length = (1.0 + (10.0_f64 / 1000.0).powi(2)).sqrt();
@@ -49,7 +51,7 @@ fn a_pixel_that_sees_two_walls_has_the_phase_of_their_light() {
             }),
             ..mixing.clone()
         };
-        let image = sensor(spec).observe(&camera, &seen, 1, 0);
+        let image = sensor(spec).observe(&camera, &seen, 1, 0).unwrap();
         assert_eq!(at(&image, 60) == 0.0, given_up);
         assert!(at(&image, 58) > 0.0 && at(&image, 62) > 0.0);
     }
@@ -87,7 +89,7 @@ fn triangles_that_are_skipped_would_not_have_been_seen() {
     let wall = wall(-9e3, 9e3, 1100.0);
     let [small, slow] = [small, slow].map(|mesh| {
         let seen = view(&camera, &[&wall], &Body::from(mesh));
-        mixing.observe(&camera, &seen, 1, 0)
+        mixing.observe(&camera, &seen, 1, 0).unwrap()
     });
     assert!(
         small.z_mm.iter().any(|z| (900.0..1050.0).contains(z)),

@@ -31,7 +31,7 @@ fn the_noise_of_a_recording_is_found_again() {
     });
     let frames: Vec<DepthImage> = (0..40)
         .map(|frame| {
-            let mut image = noisy.observe(&camera, &seen, 3, frame);
+            let mut image = noisy.observe(&camera, &seen, 3, frame).unwrap();
             image.z_mm.iter_mut().for_each(|z| *z = z.round());
             image
         })
@@ -88,7 +88,7 @@ fn the_least_signal_of_a_recording_is_found_again() {
     });
     let frames: Vec<DepthImage> = (0..5)
         .map(|frame| {
-            let mut image = device.observe(&camera, &seen, 3, frame);
+            let mut image = device.observe(&camera, &seen, 3, frame).unwrap();
             // Half of the frames show pixels that the others lack, as at the limit of a device.
             if frame == 0 {
                 image = seen.image.clone();

@@ -26,7 +26,7 @@ fn steep_walls_are_as_oblique_and_as_dim_as_they_are() {
                 invalid: Some(invalid),
                 ..NONE
             };
-            sensor(spec).observe(&camera, &seen, 1, 0).z_mm
+            sensor(spec).observe(&camera, &seen, 1, 0).unwrap().z_mm
         };
         // The signal in the middle of the image.
         let limit = cos;

@@ -72,10 +72,22 @@ fn with_all_parts_left_out_the_image_is_the_ideal_one() {
         &[&wall(-9e3, 9e3, 1500.0)],
         &wall(-100.0, 30.0, 1100.0),
     );
-    let image = sensor(NONE).observe(&camera, &seen, 1, 0);
+    let image = sensor(NONE).observe(&camera, &seen, 1, 0).unwrap();
     for (a, b) in image.z_mm.iter().zip(&seen.image.z_mm) {
         assert!((a - b).abs() < 1e-3);
     }
+}
+
+#[test]
+fn an_image_of_another_camera_is_refused() {
+    let camera = Camera::try_from(pinhole(8, 200.0)).unwrap();
+    let seen = view(&camera, &[], &wall(-9e3, 9e3, 1500.0));
+    let wider = Camera::try_from(pinhole(9, 200.0)).unwrap();
+    let refused = sensor(NONE).observe(&wider, &seen, 1, 0).unwrap_err();
+    assert!(
+        matches!(refused, DepthError::OtherCamera { .. }),
+        "{refused}"
+    );
 }
 
 /// The sum of squares of (measured − true range) / σ is χ² distributed; 4 standard errors.
@@ -91,7 +103,7 @@ fn the_random_error_grows_as_the_signal_falls() {
         random: Some(random),
         ..NONE
     });
-    let image = noisy.observe(&camera, &seen, 8, 3);
+    let image = noisy.observe(&camera, &seen, 8, 3).unwrap();
     let n = image.z_mm.len() as f64;
     let scaled = |(ray, z): (&Option<nalgebra::Vector2<f64>>, &f32)| {
         let length = (1.0 + ray.unwrap().norm_squared()).sqrt();
@@ -114,9 +126,12 @@ fn the_random_error_grows_as_the_signal_falls() {
         .num_threads(1)
         .build()
         .unwrap();
-    assert_eq!(one.install(|| noisy.observe(&camera, &seen, 8, 3)), image);
-    assert_ne!(noisy.observe(&camera, &seen, 8, 4), image);
-    assert_ne!(noisy.observe(&camera, &seen, 9, 3), image);
+    assert_eq!(
+        one.install(|| noisy.observe(&camera, &seen, 8, 3).unwrap()),
+        image
+    );
+    assert_ne!(noisy.observe(&camera, &seen, 8, 4).unwrap(), image);
+    assert_ne!(noisy.observe(&camera, &seen, 9, 3).unwrap(), image);
 }
 
 #[test]
@@ -134,7 +149,8 @@ fn the_systematic_error_stays_with_the_device() {
         };
         let image = Sensor::new(spec, seed)
             .unwrap()
-            .observe(&camera, &seen, frame, frame);
+            .observe(&camera, &seen, frame, frame)
+            .unwrap();
         f64::from(image.z_mm[0] - z_mm)
     };
     let errors: Vec<f64> = (0..400).map(|seed| error_at(1000.0, seed, 0)).collect();
@@ -172,7 +188,7 @@ fn the_fixed_pattern_stays_with_the_pixel() {
     };
     let frame = |device: u64, frame: u64| {
         let sensor = Sensor::new(fixed.clone(), device).unwrap();
-        sensor.observe(&camera, &seen, 1, frame)
+        sensor.observe(&camera, &seen, 1, frame).unwrap()
     };
     let image = frame(5, 0);
     assert_eq!(image, frame(5, 7));
@@ -202,7 +218,7 @@ fn dim_and_oblique_pixels_are_given_up() {
             invalid: Some(invalid),
             ..NONE
         };
-        sensor(spec).observe(&camera, &seen, 1, 0).z_mm
+        sensor(spec).observe(&camera, &seen, 1, 0).unwrap().z_mm
     };
     for (ray, (dim, oblique)) in camera
         .rays()
@@ -239,7 +255,7 @@ fn one_bounce_inside_a_sphere_lengthens_the_range_as_derived() {
         }),
         ..NONE
     });
-    let image = bounced.observe(&camera, &seen, 1, 0);
+    let image = bounced.observe(&camera, &seen, 1, 0).unwrap();
     let middle = 150 * 300 + 150;
     let longer_mm = f64::from(image.z_mm[middle] - seen.image.z_mm[middle]);
     let expected_mm = 2.0 / 3.0 * albedo * 1000.0 * (half / 2.0).sin().powi(3)

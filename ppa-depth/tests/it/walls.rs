@@ -128,7 +128,7 @@ fn a_cut_end_on_the_far_side_changes_nothing() {
                 .before_with_walls(&camera, &placed(body, away), walls)
                 .unwrap();
             assert!(seen.wall_pixels.is_empty());
-            sensor.observe(&camera, &seen, 1, 0)
+            sensor.observe(&camera, &seen, 1, 0).unwrap()
         });
         assert_eq!(hole, seen);
     }
@@ -187,6 +187,7 @@ fn an_invalid_wall_gives_no_light_to_a_sensor() {
         Sensor::new(spec.clone(), 1)
             .unwrap()
             .observe(&camera, &seen(walls), 1, 0)
+            .unwrap()
     };
     let (mixed, clean) = (
         observe(&spec, WallDepth::Flat),

@@ -35,7 +35,8 @@ impl Simulation {
         let projection = self.projection(station);
         let run = self.analog_run(station, &projection, length)?;
         let mut tally = run.tally(Part::WHOLE);
-        run.follow(&mut tally, &stop(length), |_, progress| observe(progress));
+        run.follow(&mut tally, &stop(length), |_, progress| observe(progress))
+            .expect("the tally is of this run");
         Ok((tally.radiograph(), tally.dose()))
     }
 

@@ -6,8 +6,55 @@ use std::path::Path;
 use crate::dose::report::{Dose, Estimate, Imparted};
 use crate::dose::settings::{DoseSettings, VoxelBox};
 use crate::image::output::write_whole;
+use crate::matter::material::Material;
 use crate::mcgpu::error::McgpuError;
 use crate::mcgpu::simulation::Simulation;
+
+/// Why a dose cannot be added to those of a scan.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScanDoseError {
+    /// The sums were begun for another simulation.
+    #[error(
+        "the sums hold {} listed materials and {} voxels, but the simulation has {} and {}",
+        found[0], found[1], expected[0], expected[1]
+    )]
+    Sums {
+        /// Listed materials and voxels of the sums.
+        found: [usize; 2],
+        /// Those of the simulation.
+        expected: [usize; 2],
+    },
+    /// Materials of another phantom.
+    #[error(
+        "the dose is of the materials {found}, but the voxels of the simulation have {expected}"
+    )]
+    Materials {
+        /// Names of the dose's materials.
+        found: String,
+        /// Names of the phantom's materials.
+        expected: String,
+    },
+    /// Doses of other voxels than the input file asks for.
+    #[error(
+        "the dose is of {}, but the input file asks for {}",
+        described(found),
+        described(expected)
+    )]
+    Voxels {
+        /// Voxels of the dose.
+        found: Option<VoxelBox>,
+        /// Voxels asked for.
+        expected: Option<VoxelBox>,
+    },
+}
+
+fn described(voxels: &Option<VoxelBox>) -> String {
+    voxels.as_ref().map_or_else(
+        || "no voxels".to_owned(),
+        |VoxelBox { low, high }| format!("the voxels {low:?} to {high:?}"),
+    )
+}
 
 /// Energy imparted by all projections of a scan, per history of all of them.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,9 +124,11 @@ impl ScanDose {
 
     /// Adds what one projection left.
     ///
-    /// # Panics
-    /// If `dose` was not counted with [`Simulation::dose_settings`] of the same simulation.
-    pub fn add(&mut self, simulation: &Simulation, dose: &Dose) {
+    /// # Errors
+    /// [`ScanDoseError`] if `dose` was not counted with [`Simulation::dose_settings`] of the same simulation, or if these sums were
+    /// begun for another one; they stay as they are.
+    pub fn add(&mut self, simulation: &Simulation, dose: &Dose) -> Result<(), ScanDoseError> {
+        self.check(simulation, dose)?;
         let histories = dose.histories as f64;
         self.histories += dose.histories;
         for (&listed, (_, imparted)) in simulation.listed().iter().zip(&dose.materials) {
@@ -89,12 +138,41 @@ impl ScanDose {
             self.materials_mass_g[listed] = imparted.mass_g;
         }
         if let Some(dose) = &dose.voxels {
-            assert_eq!(dose.ev_per_history.len(), self.voxels.len());
             let estimates = dose.ev_per_history.iter().zip(&dose.ev_per_history_se);
             for (sum, (&ev, &se)) in self.voxels.iter_mut().zip(estimates) {
                 sum.add(f64::from(ev), f64::from(se), histories);
             }
         }
+        Ok(())
+    }
+
+    /// Refuses a dose of other materials or voxels than those of the simulation.
+    fn check(&self, simulation: &Simulation, dose: &Dose) -> Result<(), ScanDoseError> {
+        let begun = Self::new(simulation);
+        let sizes = |sums: &Self| [sums.materials.len(), sums.voxels.len()];
+        if sizes(self) != sizes(&begun) {
+            return Err(ScanDoseError::Sums {
+                found: sizes(self),
+                expected: sizes(&begun),
+            });
+        }
+        let found: Vec<&str> = dose.materials.iter().map(|(name, _)| &**name).collect();
+        let materials = simulation.phantom().materials().iter();
+        let expected: Vec<&str> = materials.map(Material::name).collect();
+        if found != expected {
+            return Err(ScanDoseError::Materials {
+                found: found.join(", "),
+                expected: expected.join(", "),
+            });
+        }
+        let (found, expected) = (
+            dose.voxels.as_ref().map(|dose| dose.voxels),
+            simulation.dose_box(),
+        );
+        if found != expected {
+            return Err(ScanDoseError::Voxels { found, expected });
+        }
+        Ok(())
     }
 
     /// Histories of all projections.

@@ -27,7 +27,7 @@ mod values;
 mod voxel_file;
 mod voxel_header;
 
-pub use dose_file::ScanDose;
+pub use dose_file::{ScanDose, ScanDoseError};
 pub use error::McgpuError;
 pub use image_file::McgpuImage;
 pub use input::Input;

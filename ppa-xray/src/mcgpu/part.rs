@@ -94,7 +94,7 @@ impl Simulation {
                 }
             }
             observe(progress)
-        });
+        })?;
         if let Some(error) = failed {
             return Err(error.into());
         }

@@ -200,7 +200,7 @@ impl<'a> Scan<'a> {
                 }
             }
             observe(progress)
-        });
+        })?;
         if let Some(error) = failed {
             return Err(error.into());
         }
@@ -216,10 +216,8 @@ impl<'a> Scan<'a> {
     /// Adds a projection, and writes its image as [`Simulation::write_image`] does.
     ///
     /// # Errors
-    /// [`ScanError`] if a file cannot be written.
-    ///
-    /// # Panics
-    /// If `dose` was not counted with [`Simulation::dose_settings`] of the same simulation.
+    /// [`ScanError`] if a file cannot be written, or if `dose` was not counted with [`Simulation::dose_settings`] of the same
+    /// simulation; nothing is added then.
     pub fn add(
         &mut self,
         station: &Station,
@@ -227,14 +225,14 @@ impl<'a> Scan<'a> {
         dose: Option<&Dose>,
     ) -> Result<(), ScanError> {
         if self.projection(station).is_none() {
+            if let (Some(sums), Some(dose)) = (&mut self.dose, dose) {
+                sums.add(self.simulation, dose)?;
+            }
             self.complete.push(CompleteProjection {
                 number: station.number,
                 sums: radiograph.sums,
                 histories: radiograph.histories,
             });
-            if let (Some(sums), Some(dose)) = (&mut self.dose, dose) {
-                sums.add(self.simulation, dose);
-            }
         }
         self.write(&self.simulation.image_files(station, radiograph))
     }

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use crate::image::output::OutputError;
+use crate::mcgpu::dose_file::ScanDoseError;
+use crate::run::analog_run::RunError;
 use crate::run::tally_error::TallyError;
 use crate::transport::tracking::TransportError;
 
@@ -25,6 +27,12 @@ pub enum ScanError {
     /// The exposure makes no sense.
     #[error(transparent)]
     Transport(#[from] TransportError),
+    /// The histories of a projection cannot be followed.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// A dose of another simulation.
+    #[error(transparent)]
+    Dose(#[from] ScanDoseError),
     /// An image or dose file cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),

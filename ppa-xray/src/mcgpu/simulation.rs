@@ -38,7 +38,7 @@ const NARROWEST_MM: f64 = 1e-3;
 ///     let (radiograph, dose) = simulation.analog(&station, length, |_| ControlFlow::Continue(()))?;
 ///     simulation.write_image("results".as_ref(), &station, &radiograph)?;
 ///     if let Some(dose) = dose {
-///         scan_dose.add(&simulation, &dose);
+///         scan_dose.add(&simulation, &dose)?;
 ///     }
 /// }
 /// scan_dose.write("results".as_ref(), &simulation)?;

@@ -35,6 +35,22 @@ const FIRST_BATCH: u64 = 16_384;
 /// Fewest histories worth handing to the threads.
 const LEAST_BATCH: u64 = 1_024;
 
+/// Why a tally cannot be continued.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RunError {
+    /// Phantom, spectrum, exposure, models, doses or seed differ.
+    #[error(
+        "the tally is of another simulation: phantom, spectrum, exposure, models, doses or seed differ (key {found}, expected {expected})"
+    )]
+    OtherTally {
+        /// Key of the tally.
+        found: String,
+        /// Key of the run.
+        expected: String,
+    },
+}
+
 /// An exposure that is simulated photon by photon, as far and in as many parts as its user wants.
 ///
 /// What comes out depends on the settings and on which histories are counted, on nothing else: not on the number of
@@ -57,7 +73,7 @@ const LEAST_BATCH: u64 = 1_024;
 /// run.follow(&mut tally, &stop, |_, progress| {
 ///     eprintln!("{} histories, {:?} left", progress.histories, progress.remaining);
 ///     std::ops::ControlFlow::Continue(())
-/// });
+/// })?;
 /// let (radiograph, dose) = (tally.radiograph(), tally.dose().unwrap());
 /// assert!(dose.phantom.ev_per_history.value > radiograph.sums.total_ev_per_history());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -211,15 +227,20 @@ impl<'a> AnalogRun<'a> {
     /// is called and at the end, the tally is whole and may be written. When [`Stop`] ends a run that is not in
     /// parts, the run is complete at the histories counted until then.
     ///
-    /// # Panics
-    /// If `tally` is of another run.
+    /// # Errors
+    /// [`RunError`] if `tally` is of another run.
     pub fn follow(
         &self,
         tally: &mut AnalogTally,
         stop: &Stop,
         mut observe: impl FnMut(&AnalogTally, &Progress) -> ControlFlow<()>,
-    ) -> Stopped {
-        assert_eq!(tally.setup.key, self.key(), "the tally is of another run");
+    ) -> Result<Stopped, RunError> {
+        if tally.setup.key != self.key() {
+            return Err(RunError::OtherTally {
+                found: tally.setup.key.clone(),
+                expected: self.key().to_owned(),
+            });
+        }
         let start = Instant::now();
         let first = tally.done.end;
         let mut batch = FIRST_BATCH;
@@ -233,23 +254,23 @@ impl<'a> AnalogRun<'a> {
                 relative_error = Some(error);
                 if error <= target {
                     tally.end_here();
-                    return Stopped::Precise;
+                    return Ok(Stopped::Precise);
                 }
             }
             let left = tally.part.end - tally.done.end;
             if left == 0 {
-                return Stopped::Complete;
+                return Ok(Stopped::Complete);
             }
             let elapsed = start.elapsed();
             let rate = (tally.done.end - first) as f64 / elapsed.as_secs_f64();
             if tally.done.end > first {
                 let progress = foresee(tally, stop, relative_error, elapsed, rate);
                 if observe(tally, &progress).is_break() {
-                    return Stopped::Interrupted;
+                    return Ok(Stopped::Interrupted);
                 }
                 if stop.time.is_some_and(|time| elapsed >= time) {
                     tally.end_here();
-                    return Stopped::Time;
+                    return Ok(Stopped::Time);
                 }
                 let until = stop
                     .time

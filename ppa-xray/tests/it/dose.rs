@@ -23,7 +23,8 @@ fn dose(
     let mut tally = run.tally(Part::WHOLE);
     run.follow(&mut tally, &Stop::default(), |_, _| {
         ControlFlow::Continue(())
-    });
+    })
+    .unwrap();
     tally.dose().unwrap()
 }
 

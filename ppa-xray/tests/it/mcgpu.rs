@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Vector3};
-use ppa_xray::mcgpu::{McgpuError, RunLength, ScanDose, Simulation, Station};
+use ppa_xray::mcgpu::{McgpuError, RunLength, ScanDose, ScanDoseError, Simulation, Station};
 use ppa_xray::{Category, Radiograph};
 use serde_json::Value;
 
@@ -117,6 +117,37 @@ fn a_scan_has_the_projections_of_mcgpu_in_order() {
     }
 }
 
+#[test]
+fn a_dose_of_another_simulation_is_refused_and_not_added() {
+    let folder = tempfile::tempdir().unwrap();
+    let simulated = |sections: &Sections| {
+        let simulation = simulation(folder.path(), sections).unwrap();
+        let station = &simulation.input().stations()[0];
+        let length = RunLength::Histories(2_000);
+        let counted = simulation.analog(station, length, |_| ControlFlow::Continue(()));
+        (counted.unwrap().1.unwrap(), simulation)
+    };
+    let (dose, own) = simulated(&SCAN);
+    let (of_more_voxels, _) = simulated(&Sections {
+        dose: "YES\nYES\ndose.dat\n1 8\n1 6\n1 99",
+        ..SCAN
+    });
+    let (of_other_matter, other) = simulated(&Sections {
+        files: "box.vox\n#[SECTION MATERIAL FILE LIST]\nppa:water\nppa:air\nppa:pmma\nppa:air",
+        ..SCAN
+    });
+    let mut sums = ScanDose::new(&own);
+    let added = sums.add(&own, &of_more_voxels);
+    assert!(matches!(added, Err(ScanDoseError::Voxels { .. })));
+    let added = sums.add(&own, &of_other_matter);
+    assert!(matches!(added, Err(ScanDoseError::Materials { .. })));
+    let added = sums.add(&other, &of_other_matter);
+    assert!(matches!(added, Err(ScanDoseError::Sums { .. })));
+    assert_eq!(sums, ScanDose::new(&own));
+    sums.add(&own, &dose).unwrap();
+    assert_eq!(sums.histories(), 2_000);
+}
+
 /// Every file that MC-GPU would write, in its layout, and the sums of the text, the raw file and the result agree.
 #[test]
 fn images_and_doses_are_written_as_mcgpu_does() {
@@ -132,7 +163,7 @@ fn images_and_doses_are_written_as_mcgpu_does() {
             .unwrap();
         let dose = dose.unwrap();
         imparted_kev += 0.5e-3 * dose.phantom.ev_per_history.value;
-        scan_dose.add(&simulation, &dose);
+        scan_dose.add(&simulation, &dose).unwrap();
         simulation
             .write_image(folder.path(), station, &radiograph)
             .unwrap();

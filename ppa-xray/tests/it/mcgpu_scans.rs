@@ -67,7 +67,7 @@ fn a_scan_cut_into_pieces_writes_the_same_files() {
         let (image, dose) = simulation
             .analog(station, length, |_| ControlFlow::Continue(()))
             .unwrap();
-        scan_dose.add(&simulation, &dose.unwrap());
+        scan_dose.add(&simulation, &dose.unwrap()).unwrap();
         simulation.write_image(&whole, station, &image).unwrap();
     }
     scan_dose.write(&whole, &simulation).unwrap();

@@ -7,7 +7,7 @@ use std::time::Duration;
 use nalgebra::Isometry3;
 use ppa_xray::{
     AnalogRun, AnalogSettings, AnalogTally, Blur, DoseSettings, Part, Progress, Projection,
-    Spectrum, Stop, Stopped, TallyError, VoxelBox, VoxelPhantom, analog,
+    RunError, Spectrum, Stop, Stopped, TallyError, VoxelBox, VoxelPhantom, analog,
 };
 use proptest::prelude::*;
 
@@ -50,7 +50,8 @@ impl Scene {
         let run = self.run(histories, 3);
         let mut tally = run.tally(part.parse().unwrap());
         assert_eq!(
-            run.follow(&mut tally, &Stop::default(), |_, _| go_on()),
+            run.follow(&mut tally, &Stop::default(), |_, _| go_on())
+                .unwrap(),
             Stopped::Complete
         );
         let path = directory.join(format!("{}.tally", part.replace('/', "of")));
@@ -72,7 +73,8 @@ fn go_on() -> ControlFlow<()> {
 fn whole(scene: &Scene, histories: u64) -> AnalogTally {
     let run = scene.run(histories, 3);
     let mut tally = run.tally(Part::WHOLE);
-    run.follow(&mut tally, &Stop::default(), |_, _| go_on());
+    run.follow(&mut tally, &Stop::default(), |_, _| go_on())
+        .unwrap();
     tally
 }
 
@@ -135,19 +137,21 @@ fn an_interrupted_run_resumes_from_its_file() {
             }
         },
     );
-    assert_eq!(stopped, Stopped::Interrupted);
+    assert_eq!(stopped, Ok(Stopped::Interrupted));
     assert!(tally.done().end < histories);
     tally.write(&path).unwrap();
 
     let mut tally = scene.run(histories, 3).read(&path, Part::WHOLE).unwrap();
-    run.follow(&mut tally, &Stop::default(), |_, _| go_on());
+    run.follow(&mut tally, &Stop::default(), |_, _| go_on())
+        .unwrap();
     assert_eq!(tally.radiograph(), whole(&scene, histories).radiograph());
     tally.write(&path).unwrap();
 
     // A whole run continues to more histories, but not back to fewer.
     let more = scene.run(histories + 999, 3);
     let mut tally = more.read(&path, Part::WHOLE).unwrap();
-    more.follow(&mut tally, &Stop::default(), |_, _| go_on());
+    more.follow(&mut tally, &Stop::default(), |_, _| go_on())
+        .unwrap();
     assert_eq!(tally.dose(), whole(&scene, histories + 999).dose());
     let fewer = scene
         .run(histories - 1, 3)
@@ -339,10 +343,12 @@ fn a_time_limit_is_kept_and_leaves_a_complete_run() {
         ..Stop::default()
     };
     let mut last = None;
-    let stopped = run.follow(&mut tally, &stop, |_, progress| {
-        last = Some(*progress);
-        go_on()
-    });
+    let stopped = run
+        .follow(&mut tally, &stop, |_, progress| {
+            last = Some(*progress);
+            go_on()
+        })
+        .unwrap();
     assert_eq!(stopped, Stopped::Time);
     assert!(last.unwrap().elapsed < Duration::from_secs(2));
     assert_eq!(tally.done(), tally.part());
@@ -360,7 +366,7 @@ fn an_interruption_does_not_change_the_last_history() {
     };
     let mut straight = run.tally(Part::WHOLE);
     assert_eq!(
-        run.follow(&mut straight, &stop, |_, _| go_on()),
+        run.follow(&mut straight, &stop, |_, _| go_on()).unwrap(),
         Stopped::Precise
     );
     let error = straight.relative_error();
@@ -379,11 +385,25 @@ fn an_interruption_does_not_change_the_last_history() {
 
     let mut interrupted = run.tally(Part::WHOLE);
     loop {
-        if run.follow(&mut interrupted, &stop, |_, _| ControlFlow::Break(())) == Stopped::Precise {
+        let ended = run.follow(&mut interrupted, &stop, |_, _| ControlFlow::Break(()));
+        if ended.unwrap() == Stopped::Precise {
             break;
         }
     }
     assert_eq!(interrupted.radiograph(), image);
+}
+
+#[test]
+fn a_tally_of_another_run_is_refused_and_stays() {
+    let scene = Scene::new();
+    let mut tally = scene.run(3_000, 3).tally(Part::WHOLE);
+    let other = scene.run(3_000, 4);
+    let refused = other.follow(&mut tally, &Stop::default(), |_, _| go_on());
+    assert!(matches!(refused, Err(RunError::OtherTally { .. })));
+    assert_eq!(tally.done(), 0..0);
+    let own = scene.run(3_000, 3);
+    let ended = own.follow(&mut tally, &Stop::default(), |_, _| go_on());
+    assert_eq!(ended, Ok(Stopped::Complete));
 }
 
 /// The reading of a blurred detector is the mean of several pixels and so more precise than one of them; electronic noise
@@ -404,7 +424,8 @@ fn the_error_that_ends_a_run_is_that_of_the_image() {
         );
         let run = run.unwrap();
         let mut tally = run.tally(Part::WHOLE);
-        run.follow(&mut tally, &Stop::default(), |_, _| go_on());
+        run.follow(&mut tally, &Stop::default(), |_, _| go_on())
+            .unwrap();
         let image = tally.radiograph();
         let pixels = image.sigma().into_iter().zip(image.total());
         let mut errors: Vec<f32> = pixels.map(|(sigma, total)| sigma / total).collect();

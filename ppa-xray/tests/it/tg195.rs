@@ -75,7 +75,8 @@ fn dose(
     let mut tally = run.tally(Part::WHOLE);
     run.follow(&mut tally, &Stop::default(), |_, _| {
         std::ops::ControlFlow::Continue(())
-    });
+    })
+    .unwrap();
     tally.dose().unwrap()
 }
 

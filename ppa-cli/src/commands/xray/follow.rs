@@ -204,6 +204,7 @@ impl AnalogArgs {
             ControlFlow::Continue(())
         });
         bar.finish_and_clear();
+        let ended = ended?;
         if let Some(error) = failed {
             return Err(error.into());
         }

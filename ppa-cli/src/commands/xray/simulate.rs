@@ -170,7 +170,7 @@ impl SimulateArgs {
             time: Some(MEASURE),
             ..Stop::default()
         };
-        run.follow(&mut tally, &stop, |_, _| ControlFlow::Continue(()));
+        run.follow(&mut tally, &stop, |_, _| ControlFlow::Continue(()))?;
         let follow_cpu_s = watch.read().cpu_s - preparation_cpu_s;
         Ok(HistoryCost {
             million_cpu_s: follow_cpu_s * 1e6 / tally.done().end as f64,
