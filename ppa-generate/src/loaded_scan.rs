@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use ppa_ct::{Scan, Volume, Warning};
-use ppa_mesh::{Limb, LimbSettings, extract_limb};
+use ppa_mesh::{Limb, LimbSettings, extract_limb, toggle_body};
 use ppa_scene::{LandmarkOverrides, Side};
 
 use crate::case::{Case, Found};
@@ -69,13 +69,25 @@ impl LoadedScan {
     /// # Errors
     /// [`PrepareError`] when the scan holds no limb.
     pub fn extract(&self, side: Side, surface: &LimbSettings) -> Result<Limb, PrepareError> {
-        let surface = LimbSettings {
-            towards: surface.towards.or(Some([towards_left(side), 0.0, 0.0])),
-            ..surface.clone()
-        };
-        let limb = extract_limb(&self.volume, &surface)?;
+        let limb = extract_limb(&self.volume, &on_side(side, surface))?;
         require_limb(&limb.report, self.volume.grid().spacing_mm().into())?;
         Ok(limb)
+    }
+
+    /// As [`Self::extract`], with the body around `point` (`ct` frame, mm) kept as a part of the limb, or removed if it is kept; and the
+    /// points of [`LimbSettings::kept`] that say so.
+    ///
+    /// # Errors
+    /// [`PrepareError`] when the scan holds no limb, or the point is in no body beside it.
+    pub fn toggle_body(
+        &self,
+        side: Side,
+        surface: &LimbSettings,
+        point: [f64; 3],
+    ) -> Result<(Limb, Vec<[f64; 3]>), PrepareError> {
+        let (limb, kept) = toggle_body(&self.volume, &on_side(side, surface), point)?;
+        require_limb(&limb.report, self.volume.grid().spacing_mm().into())?;
+        Ok((limb, kept))
     }
 
     pub(crate) fn with_landmarks(
@@ -93,6 +105,14 @@ impl LoadedScan {
             surface,
             choices,
         )
+    }
+}
+
+/// Settings that take the limb of that side where nothing else is wanted.
+fn on_side(side: Side, surface: &LimbSettings) -> LimbSettings {
+    LimbSettings {
+        towards: surface.towards.or(Some([towards_left(side), 0.0, 0.0])),
+        ..surface.clone()
     }
 }
 

@@ -153,7 +153,7 @@ fn other_on_side(report: &LimbReport, side: Side, settings: &LimbSettings) -> Op
         severity: Severity::Severe,
         text,
         value: Some(beside.core_mm3),
-        place_mm: Some(beside.centre_mm),
+        place_mm: Some(beside.point_mm()),
     })
 }
 
@@ -170,7 +170,7 @@ fn bodies_kept(report: &LimbReport) -> Option<Finding> {
             "{bodies} of {millilitres:.0} ml (solid core) belong to the limb, as surface.kept of the case says: skin, placement, body shapes and radiographs include them"
         ),
         value: Some(1e3 * millilitres),
-        place_mm: Some(largest.centre_mm),
+        place_mm: Some(largest.point_mm()),
     })
 }
 
@@ -186,7 +186,7 @@ fn several_limbs(report: &LimbReport) -> Option<Finding> {
             "the scan shows {alike} limbs; the one around {x:.0}, {y:.0}, {z:.0} mm was taken (--inside takes another)"
         ),
         value: Some(alike as f64),
-        place_mm: Some(chosen.centre_mm),
+        place_mm: Some(chosen.point_mm()),
     })
 }
 
@@ -205,6 +205,7 @@ mod tests {
             bone_mm3: 1e-2 * core_mm3,
             side_cut_mm2: 0.0,
             centre_mm: [x, 80.0, 400.0],
+            inside_mm: None,
         }
     }
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use ppa_generate::{Case, Found, LoadedScan, PreparedLimb, VisibleLimb};
+use ppa_mesh::Limb;
 use ppa_scene::{LandmarkOverrides, Landmarks};
 
 use crate::error::StudioError;
@@ -33,7 +34,7 @@ pub(crate) struct Desk {
 
 impl Desk {
     pub fn new(scan: LoadedScan, case: Case) -> Result<Self, StudioError> {
-        let shown = Arc::new(shown(&scan, case, 1, None)?);
+        let shown = Arc::new(shown(&scan, case, 1, None, None)?);
         Ok(Self {
             scan,
             shown,
@@ -60,23 +61,15 @@ impl Desk {
     /// Keeps the body around a point as a part of the limb, or removes it if it is kept.
     ///
     /// # Errors
-    /// [`StudioError::Invalid`] for a point in the limb itself.
+    /// [`StudioError::Prepare`] for a point in air or in the limb itself.
     pub fn keep_or_remove(&mut self, point: [f64; 3]) -> Result<(), StudioError> {
         let mut case = self.shown.case.clone();
-        case.surface.kept.push(point);
-        let limb = self.scan.extract(case.side, &case.surface)?;
-        let mut bodies = limb.report.bodies.iter();
-        let body = bodies.find(|body| body.kept.contains(&point));
-        let body = body.ok_or_else(|| {
-            let [x, y, z] = point;
-            StudioError::Invalid(format!(
-                "the point {x}, {y}, {z} mm is in the limb itself, which stays; another body can be taken as the limb"
-            ))
-        })?;
-        if body.kept.len() > 1 {
-            case.surface.kept.retain(|kept| !body.kept.contains(kept));
-        }
-        self.change(case)
+        let (limb, kept) = self.scan.toggle_body(case.side, &case.surface, point)?;
+        case.surface.kept = kept;
+        let before = self.show_limb(case, Some(Arc::new(limb)))?;
+        self.earlier.push(before);
+        self.later.clear();
+        Ok(())
     }
 
     pub fn undo(&mut self) -> Result<(), StudioError> {
@@ -106,8 +99,13 @@ impl Desk {
 
     /// Shows the limb of a case, and returns the case before.
     fn show(&mut self, case: Case) -> Result<Case, StudioError> {
+        self.show_limb(case, None)
+    }
+
+    /// As [`Self::show`], with the limb that was extracted for the case.
+    fn show_limb(&mut self, case: Case, limb: Option<Arc<Limb>>) -> Result<Case, StudioError> {
         let revision = self.shown.revision + 1;
-        let next = shown(&self.scan, case, revision, Some(&self.shown))?;
+        let next = shown(&self.scan, case, revision, Some(&self.shown), limb)?;
         let before = std::mem::replace(&mut self.shown, Arc::new(next));
         Ok(before.case.clone())
     }
@@ -118,12 +116,14 @@ fn shown(
     case: Case,
     revision: u64,
     before: Option<&Shown>,
+    extracted: Option<Arc<Limb>>,
 ) -> Result<Shown, StudioError> {
     let same_skin =
         |shown: &&Shown| shown.case.side == case.side && shown.case.surface == case.surface;
     let kept = before.filter(same_skin);
-    let prepared = match kept {
-        Some(shown) => scan.find_landmarks_again(&case, shown.prepared().limb.clone())?,
+    let limb = extracted.or_else(|| kept.map(|shown| shown.prepared().limb.clone()));
+    let prepared = match limb {
+        Some(limb) => scan.find_landmarks_again(&case, limb)?,
         None => scan.prepare(&case)?,
     };
     let automatic = match kept {

@@ -103,11 +103,56 @@ pub fn bodies(tissue: &Tissue, least_depth_mm: f64, neck_ratio: f64) -> Bodies {
     compact(labels, &mut parent, &basins)
 }
 
+impl Bodies {
+    /// A point of each body in the `ct` frame, mm: the middle of its core where a voxel of the core is there, else the centre of
+    /// the core's voxel nearest to it, the first of those equally near. A hollow body has its middle outside.
+    pub fn points_inside(&self, lattice: &Lattice, grid: &Grid) -> Vec<Point3<f64>> {
+        let low = lattice.low.map(|low| low as f64);
+        let strides = lattice.strides();
+        let middles: Vec<Point3<f64>> = self
+            .basins
+            .iter()
+            .map(|basin| basin.centre(lattice, grid))
+            .collect();
+        let is_inside = |body: usize| {
+            let mean = self.basins[body].mean_index();
+            let at: usize = (0..3).map(|x| mean[x].round() as usize * strides[x]).sum();
+            self.labels[at] as usize == body
+        };
+        let mut points = middles.clone();
+        let hollow: Vec<bool> = (0..middles.len()).map(|body| !is_inside(body)).collect();
+        if !hollow.contains(&true) {
+            return points;
+        }
+        let mut nearest_sq = vec![f64::INFINITY; middles.len()];
+        for (at, &body) in self.labels.iter().enumerate() {
+            let body = body as usize;
+            // No body has the label NO_BODY.
+            if !hollow.get(body).is_some_and(|hollow| *hollow) {
+                continue;
+            }
+            let voxel = lattice.voxel(at);
+            let centre = grid.centre([0, 1, 2].map(|x| low[x] + voxel[x] as f64));
+            let distance_sq = (centre - middles[body]).norm_squared();
+            if distance_sq < nearest_sq[body] {
+                nearest_sq[body] = distance_sq;
+                points[body] = centre;
+            }
+        }
+        points
+    }
+}
+
 impl Basin {
     /// Middle of a body's core in the `ct` frame, mm.
     pub fn centre(&self, lattice: &Lattice, grid: &Grid) -> Point3<f64> {
-        let mean = |axis: usize| self.index_sum[axis] / self.voxels as f64;
-        grid.centre([0, 1, 2].map(|axis| lattice.low[axis] as f64 + mean(axis)))
+        let mean = self.mean_index();
+        grid.centre([0, 1, 2].map(|axis| lattice.low[axis] as f64 + mean[axis]))
+    }
+
+    /// Mean voxel of the core, within the box.
+    fn mean_index(&self) -> [f64; 3] {
+        self.index_sum.map(|sum| sum / self.voxels as f64)
     }
 }
 

@@ -62,11 +62,11 @@ pub fn kept(
     grid: &Grid,
     tissue: &Tissue,
     found: &Bodies,
-    settings: &LimbSettings,
+    points: &[[f64; 3]],
     chosen: u32,
 ) -> Result<Vec<Kept>, LimbError> {
     let mut kept: Vec<Kept> = Vec::new();
-    for &point in &settings.kept {
+    for &point in points {
         let body = body_at(grid, tissue, found, point).ok_or(LimbError::Kept(point))?;
         match kept.iter_mut().find(|kept| kept.body == body) {
             Some(kept) => kept.points.push(point),
@@ -78,6 +78,37 @@ pub fn kept(
         }
     }
     Ok(kept)
+}
+
+/// Keeps the body around a point, or removes it if it is kept; `is_near` says whether a voxel is so near to its body that it may be a part
+/// of it.
+pub fn toggle(
+    grid: &Grid,
+    tissue: &Tissue,
+    found: &Bodies,
+    kept: &mut Vec<Kept>,
+    point: [f64; 3],
+    chosen: u32,
+    is_near: impl Fn(usize) -> bool,
+) -> Result<(), LimbError> {
+    let at = tissue_at(grid, tissue, point).ok_or(LimbError::Kept(point))?;
+    if !is_near(at) {
+        return Err(LimbError::Thin(point));
+    }
+    let body = found.labels[at];
+    if body == chosen {
+        return Err(LimbError::InLimb(point));
+    }
+    match kept.iter().position(|kept| kept.body == body) {
+        Some(place) => {
+            kept.remove(place);
+        }
+        None => kept.push(Kept {
+            body,
+            points: vec![point],
+        }),
+    }
+    Ok(())
 }
 
 /// Whether each body weighs enough to be a limb like the heaviest.
@@ -105,6 +136,11 @@ fn weights(lattice: &Lattice, found: &Bodies) -> Vec<f64> {
 }
 
 fn body_at(grid: &Grid, tissue: &Tissue, found: &Bodies, point: [f64; 3]) -> Option<u32> {
+    tissue_at(grid, tissue, point).map(|at| found.labels[at])
+}
+
+/// The voxel of the box around a point, if it is tissue.
+fn tissue_at(grid: &Grid, tissue: &Tissue, point: [f64; 3]) -> Option<usize> {
     let lattice = &tissue.lattice;
     let voxel = grid.voxel_from_ct() * Point3::from(point);
     let place = [0, 1, 2].map(|x| voxel[x].round() - lattice.low[x] as f64);
@@ -113,5 +149,5 @@ fn body_at(grid: &Grid, tissue: &Tissue, found: &Bodies, point: [f64; 3]) -> Opt
     }
     let strides = lattice.strides();
     let at = (0..3).map(|x| place[x] as usize * strides[x]).sum();
-    tissue.is(at, TISSUE).then(|| found.labels[at])
+    tissue.is(at, TISSUE).then_some(at)
 }

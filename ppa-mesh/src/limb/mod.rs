@@ -105,6 +105,12 @@ pub enum LimbError {
     /// A point of a body that is to be kept lies outside the volume or in air.
     #[error("the point ({}, {}, {}) mm of a body to keep is not in solid tissue of the volume", .0[0], .0[1], .0[2])]
     Kept([f64; 3]),
+    /// A point of something that is no body, as it is thinner than twice [`LimbSettings::core_radius_mm`].
+    #[error("the point ({}, {}, {}) mm is in no body: sheets and other thin things cannot be kept", .0[0], .0[1], .0[2])]
+    Thin([f64; 3]),
+    /// The body to keep or to remove is the limb.
+    #[error("the point ({}, {}, {}) mm is in the limb itself, which stays; another body can be taken as the limb", .0[0], .0[1], .0[2])]
+    InLimb([f64; 3]),
     /// No surface could be made.
     #[error("the limb has no surface")]
     Surface(#[from] SurfaceError),
@@ -127,18 +133,44 @@ const WORKING_BYTES: usize = 12;
 /// # Errors
 /// [`LimbError`] when the settings do not fit, memory does not suffice or nothing solid is there.
 pub fn extract_limb(volume: &Volume, settings: &LimbSettings) -> Result<Limb, LimbError> {
+    extract(volume, settings, None)
+}
+
+/// As [`extract_limb`], with the body around `point` (`ct` frame, mm) kept as a part of the limb, or removed if it is kept; and the points
+/// of [`LimbSettings::kept`] that say so.
+///
+/// # Errors
+/// As [`extract_limb`]; [`LimbError::Kept`] for a point in air, [`LimbError::Thin`] for one in a sheet, [`LimbError::InLimb`] for one in the limb itself.
+pub fn toggle_body(
+    volume: &Volume,
+    settings: &LimbSettings,
+    point: [f64; 3],
+) -> Result<(Limb, Vec<[f64; 3]>), LimbError> {
+    let limb = extract(volume, settings, Some(point))?;
+    let mut points = settings.kept.clone();
+    points.push(point);
+    let is_kept = |point: &[f64; 3]| limb.report.bodies.iter().any(|b| b.kept.contains(point));
+    points.retain(is_kept);
+    Ok((limb, points))
+}
+
+fn extract(
+    volume: &Volume,
+    settings: &LimbSettings,
+    toggled: Option<[f64; 3]>,
+) -> Result<Limb, LimbError> {
     check(settings)?;
     volume
         .expect_room(WORKING_BYTES)
         .map_err(LimbError::Memory)?;
     let Some(crop) = settings.crop else {
-        return within(volume, settings);
+        return within(volume, settings, toggled);
     };
     let size = volume.grid().size();
     let part = volume
         .crop(crop.low, crop.high)
         .map_err(|source| LimbError::Crop { crop, size, source })?;
-    let mut limb = within(&part, settings)?;
+    let mut limb = within(&part, settings, toggled)?;
     let mut mask = vec![false; volume.grid().len()];
     for (at, _) in limb.mask.iter().enumerate().filter(|(_, m)| **m) {
         let voxel = part.grid().voxel(at);
@@ -204,14 +236,23 @@ fn check(settings: &LimbSettings) -> Result<(), LimbError> {
     Ok(())
 }
 
-fn within(volume: &Volume, settings: &LimbSettings) -> Result<Limb, LimbError> {
+fn within(
+    volume: &Volume,
+    settings: &LimbSettings,
+    toggled: Option<[f64; 3]>,
+) -> Result<Limb, LimbError> {
     match volume.values() {
-        Values::I16(hu) => within_values(volume.grid(), hu, settings),
-        Values::F32(hu) => within_values(volume.grid(), hu, settings),
+        Values::I16(hu) => within_values(volume.grid(), hu, settings, toggled),
+        Values::F32(hu) => within_values(volume.grid(), hu, settings, toggled),
     }
 }
 
-fn within_values<T: Hu>(grid: &Grid, hu: &[T], settings: &LimbSettings) -> Result<Limb, LimbError> {
+fn within_values<T: Hu>(
+    grid: &Grid,
+    hu: &[T],
+    settings: &LimbSettings,
+    toggled: Option<[f64; 3]>,
+) -> Result<Limb, LimbError> {
     if grid.size().contains(&1) {
         return Err(SurfaceError::TooThin(grid.size()).into());
     }
@@ -238,13 +279,18 @@ fn within_values<T: Hu>(grid: &Grid, hu: &[T], settings: &LimbSettings) -> Resul
     // bodies matters only near them, but a point given may be anywhere.
     let mut reach_sq: Vec<f32> = found.labels.iter().map(from_body).collect();
     let farthest_sq = farthest_sq(settings.core_radius_mm);
-    let is_automatic = settings.inside.is_none() && settings.kept.is_empty();
+    let is_automatic = settings.inside.is_none() && settings.kept.is_empty() && toggled.is_none();
     let limit_sq = is_automatic.then_some(farthest_sq);
+    let points_inside = found.points_inside(lattice, grid);
     let (size, spacing_mm) = (lattice.size, lattice.spacing_mm);
     spread(size, spacing_mm, &mut reach_sq, &mut found.labels, limit_sq);
     let chosen = choice::body(grid, &tissue, &found, settings)?;
-    let kept = choice::kept(grid, &tissue, &found, settings, chosen)?;
-    report.describe_bodies(grid, lattice, &found, chosen, &kept);
+    let mut kept = choice::kept(grid, &tissue, &found, &settings.kept, chosen)?;
+    if let Some(point) = toggled {
+        let is_near = |at: usize| reach_sq[at] <= farthest_sq;
+        choice::toggle(grid, &tissue, &found, &mut kept, point, chosen, is_near)?;
+    }
+    report.describe_bodies(grid, lattice, &found, &points_inside, chosen, &kept);
     let mut of_limb = vec![chosen];
     of_limb.extend(kept.iter().map(|kept| kept.body));
 

@@ -1,5 +1,6 @@
 //! Bodies found and parts cut away.
 
+use nalgebra::Point3;
 use ppa_ct::Grid;
 use serde::{Deserialize, Serialize};
 
@@ -27,6 +28,17 @@ pub struct Body {
     pub side_cut_mm2: f64,
     /// Middle of the core in the `ct` frame, mm.
     pub centre_mm: [f64; 3],
+    /// A point of the core, `ct` frame, mm: its middle, or where that lies outside, as in a splint, the centre of the core's voxel
+    /// nearest to it. None in cases of earlier programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inside_mm: Option<[f64; 3]>,
+}
+
+impl Body {
+    /// A point of the body to select it by, `ct` frame, mm.
+    pub fn point_mm(&self) -> [f64; 3] {
+        self.inside_mm.unwrap_or(self.centre_mm)
+    }
 }
 
 /// A face of the volume that cuts the limb.
@@ -83,6 +95,7 @@ impl LimbReport {
         grid: &Grid,
         lattice: &Lattice,
         found: &Bodies,
+        points_inside: &[Point3<f64>],
         chosen: u32,
         kept: &[Kept],
     ) {
@@ -100,6 +113,7 @@ impl LimbReport {
                 bone_mm3: basin.bone_voxels as f64 * lattice.voxel_mm3,
                 side_cut_mm2: basin.side_cut_mm2,
                 centre_mm: basin.centre(lattice, grid).into(),
+                inside_mm: Some(points_inside[at].into()),
             })
             .collect();
         self.bodies.sort_by(|a, b| {

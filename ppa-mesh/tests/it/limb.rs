@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use nalgebra::{Affine3, Matrix4, Point3};
 use ppa_ct::{Grid, Volume};
-use ppa_mesh::{Limb, LimbError, LimbSettings, SurfaceError, VoxelBox, extract_limb};
+use ppa_mesh::{Limb, LimbError, LimbSettings, SurfaceError, VoxelBox, extract_limb, toggle_body};
 use ppa_phantom::{LowerLeg, TableTop};
 
 use crate::fields::{on_grid, volume};
@@ -201,6 +201,103 @@ fn a_body_is_kept_where_a_person_points_at_it() {
     assert_eq!(of(&[in_leg]), Ok(removed));
     let air = centre - nalgebra::Vector3::new(20.0, 0.0, 0.0);
     assert_eq!(of(&[air]), Err(LimbError::Kept(air.into())));
+}
+
+#[test]
+fn a_toggled_body_is_kept_and_removed_as_its_points_say() {
+    let leg = LowerLeg::p01();
+    let scan = leg.voxelise(VOXEL_MM, TableTop::Absent).expect("phantom");
+    let alone = extract_limb(&scan, &LimbSettings::default()).expect("limb");
+    let (planted, centre) = with_block(&scan, &alone);
+    let none = LimbSettings::default();
+    let removed = extract_limb(&planted, &none).expect("limb");
+    let point: [f64; 3] = centre.into();
+    let (kept, points) = toggle_body(&planted, &none, point).expect("limb");
+    assert_eq!(points, [point]);
+    let settings = LimbSettings {
+        kept: points,
+        ..none.clone()
+    };
+    assert_eq!(extract_limb(&planted, &settings), Ok(kept.clone()));
+    let aside = (centre + nalgebra::Vector3::new(3.0, 0.0, 0.0)).into();
+    let again = toggle_body(&planted, &settings, aside).expect("limb");
+    assert_eq!(again, (removed.clone(), Vec::new()));
+
+    let in_leg = removed.report.bodies[0].point_mm();
+    let refused = toggle_body(&planted, &settings, in_leg);
+    assert_eq!(refused, Err(LimbError::InLimb(in_leg)));
+    let air = (centre - nalgebra::Vector3::new(20.0, 0.0, 0.0)).into();
+    let refused = toggle_body(&planted, &settings, air);
+    assert_eq!(refused, Err(LimbError::Kept(air)));
+
+    // A sheet 20 mm beyond the block is in no body, though some body is nearest.
+    let grid = planted.grid();
+    let sheet_y = centre.y - 15.0 - 20.0;
+    let hu = (0..grid.len()).map(|at| {
+        let p = grid.centre(grid.voxel(at).map(|v| v as f64));
+        let off = p - centre;
+        let in_sheet = (p.y - sheet_y).abs() < 2.0 && off.x.abs() < 12.0 && off.z.abs() < 12.0;
+        if in_sheet {
+            50.0
+        } else {
+            planted.values().at(at)
+        }
+    });
+    let with_sheet = Volume::new(grid.clone(), hu.collect()).expect("finite");
+    let in_sheet = [centre.x, sheet_y, centre.z];
+    let refused = toggle_body(&with_sheet, &none, in_sheet);
+    assert_eq!(refused, Err(LimbError::Thin(in_sheet)));
+}
+
+/// A gutter of 12 mm beside the shin, open towards the front: its middle lies in the air within it.
+#[test]
+fn a_hollow_body_is_kept_by_the_point_of_its_report() {
+    let leg = LowerLeg::p01();
+    let scan = leg.voxelise(VOXEL_MM, TableTop::Absent).expect("phantom");
+    let alone = extract_limb(&scan, &LimbSettings::default()).expect("limb");
+    let (planted, block) = with_block(&scan, &alone);
+    let grid = planted.grid();
+    // In place of the block, which is as far from the shin.
+    let axis = block + nalgebra::Vector3::new(-20.0, 0.0, 0.0);
+    let (inner_mm, outer_mm) = (20.0, 32.0);
+    let more = ((outer_mm + 25.0) / VOXEL_MM).ceil() as usize;
+    let [nx, ny, nz] = grid.size();
+    let first = grid.centre([-(more as f64), 0.0, 0.0]);
+    let wide = Grid::axis_aligned([nx + more, ny, nz], [VOXEL_MM; 3].into(), first).expect("grid");
+    let hu = (0..wide.len()).map(|at| {
+        let [i, j, k] = wide.voxel(at);
+        let off = wide.centre([i, j, k].map(|v| v as f64)) - axis;
+        let is_gutter = (inner_mm..outer_mm).contains(&off.x.hypot(off.y))
+            && off.z.abs() < 40.0
+            && (off.y > 0.0 || off.x.abs() > 10.0);
+        let in_block = off.x.abs() < 45.0 && off.z.abs() < 45.0;
+        match i.checked_sub(more).map(|i| planted.at([i, j, k])) {
+            _ if is_gutter => 50.0,
+            Some(_) if in_block => -1000.0,
+            Some(hu) => hu,
+            None => -1000.0,
+        }
+    });
+    let scan = Volume::new(wide.clone(), hu.collect()).expect("finite");
+    let found = extract_limb(&scan, &LimbSettings::default()).expect("limb");
+    let [leg, gutter] = &found.report.bodies[..] else {
+        panic!("{:?}", found.report.bodies)
+    };
+    assert_eq!(leg.inside_mm, Some(leg.centre_mm));
+    let off_axis = |p: [f64; 3]| (p[0] - axis.x).hypot(p[1] - axis.y);
+    assert!(off_axis(gutter.centre_mm) < inner_mm - 5.0, "{gutter:?}");
+    let point = gutter.point_mm();
+    // The core is what an erosion by 4 mm leaves.
+    let core = inner_mm + 4.0 - VOXEL_MM..outer_mm - 4.0 + VOXEL_MM;
+    assert!(core.contains(&off_axis(point)), "{point:?}");
+    let settings = |kept| LimbSettings {
+        kept: vec![kept],
+        ..LimbSettings::default()
+    };
+    let kept = extract_limb(&scan, &settings(point)).expect("limb");
+    assert_eq!(kept.report.bodies[1].kept, [point]);
+    let refused = extract_limb(&scan, &settings(gutter.centre_mm));
+    assert_eq!(refused, Err(LimbError::Kept(gutter.centre_mm)));
 }
 
 #[test]

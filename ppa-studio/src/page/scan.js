@@ -35,11 +35,11 @@ export function showSkin(doc, actions) {
     const state = body.chosen ? "taken: " : points.length ? "kept: " : "removed: ";
     const item = element("li", `${state}${fixed(body.core_mm3 / 1000, 0)} ml around ${point(body.centre_mm, 0)} mm `);
     const where = `the body around ${point(body.centre_mm, 0)} mm`;
-    item.append(button("Show", () => actions.place(body.centre_mm), `Show ${where}`));
+    item.append(button("Show", () => actions.place(body.inside_mm), `Show ${where}`));
     if (body.chosen) return item;
-    item.append(button("Take", () => actions.change("surface", { inside: body.centre_mm }), `Take ${where}`));
+    item.append(button("Take", () => actions.change("surface", { inside: body.inside_mm }), `Take ${where}`));
     const change = points.length ? "Remove" : "Keep";
-    item.append(button(change, () => actions.change("body", { point: points[0] ?? body.centre_mm }), `${change} ${where}`));
+    item.append(button(change, () => actions.change("body", { point: points[0] ?? body.inside_mm }), `${change} ${where}`));
     return item;
   }));
   byId("limb-find").disabled = !doc.inside;
