@@ -3,10 +3,12 @@
 use std::sync::{Mutex, PoisonError};
 
 use ppa_ct::{Interpolation, Volume};
-use ppa_mesh::{Border, Mesh, iso_surface};
+use ppa_generate::PreparedLimb;
+use ppa_mesh::{Border, Mesh, SurfaceError, iso_surface};
 
 use crate::display_mesh::display_mesh;
 use crate::error::StudioError;
+use crate::removed::removed;
 
 /// Most voxels of the coarse scan: its surface takes some tenths of a second.
 const MOST_VOXELS: f64 = 4e6;
@@ -21,6 +23,17 @@ impl CoarseScan {
         let coarse = self.volume(scan)?;
         let surface = iso_surface(&coarse, iso_hu, Border::Open)?;
         Ok(display_mesh(&surface, &[]).0)
+    }
+
+    /// The surface of what was removed beside and inside a limb, for display; none where nothing was.
+    pub fn removed(&self, limb: &PreparedLimb, iso_hu: f32) -> Result<Mesh, StudioError> {
+        let coarse = self.volume(&limb.volume)?;
+        let removed = removed(&coarse, &limb.volume, &limb.limb.mask, iso_hu)?;
+        match iso_surface(&removed, iso_hu, Border::Open) {
+            Ok(surface) => Ok(display_mesh(&surface, &[]).0),
+            Err(SurfaceError::Empty { .. }) => Ok(Mesh::default()),
+            Err(error) => Err(error.into()),
+        }
     }
 
     fn volume(&self, scan: &Volume) -> Result<Volume, StudioError> {

@@ -25,6 +25,7 @@ mod plan_keys;
 mod plan_limbs;
 mod png;
 mod pose_label;
+mod removed;
 mod routes;
 mod scene;
 mod server;

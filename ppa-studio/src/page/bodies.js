@@ -1,41 +1,57 @@
-// A click on a body in the view in three dimensions, in step 2: keeps it as a part of the limb, or removes it.
+// What was removed from the scan, in colour beside the skin in step 2, and clicks on bodies in three dimensions.
 
-import { surfaceAt } from "/page/surface.js";
+import { loadRemoved } from "/page/surface.js";
 
 const byId = (id) => document.getElementById(id);
 
-export class BodyPicker {
+export class Bodies {
   constructor(store, view, actions) {
     Object.assign(this, { store, view, actions, on: false });
+    // What was removed, asked for once for each limb.
+    this.removed = null;
     this.button = byId("body-pick");
     this.button.addEventListener("click", () => this.set(!this.on));
   }
 
-  // Shows all that is in the scan to be clicked on, or the skin again.
-  async set(on) {
-    if (on === this.on) return;
+  // Clicks are on bodies, or set the crosshair again.
+  set(on) {
     this.on = on;
     this.button.setAttribute("aria-pressed", String(on));
-    if (!on) return this.actions.surface();
-    this.button.ariaBusy = "true";
-    try {
-      const surface = await surfaceAt(this.store.doc.iso_hu);
-      if (this.on) {
-        this.view.show(surface);
-        this.view.draw();
-      }
-    } catch (error) {
-      // A newer surface was asked for.
-      if (error.status !== 409) this.actions.fail(error);
-    } finally {
-      this.button.ariaBusy = null;
-    }
+    return this.show();
   }
 
-  // The view shows the skin again: the limb has changed.
-  end() {
-    this.on = false;
-    this.button.setAttribute("aria-pressed", "false");
+  // Another limb, or another skin of it.
+  changed() {
+    this.removed = null;
+    this.view.showRemoved(null);
+    return this.set(false);
+  }
+
+  wanted() {
+    return this.store.step === "skin" && (this.store.showRemoved || this.on);
+  }
+
+  // Shows what was removed, or hides it.
+  async show() {
+    if (!this.store.doc) return;
+    let surface = null;
+    if (this.wanted()) {
+      this.removed ??= loadRemoved();
+      const asked = this.removed;
+      this.button.ariaBusy = "true";
+      try {
+        surface = await asked;
+      } catch (error) {
+        if (asked === this.removed) this.removed = null;
+        return this.actions.fail(error);
+      } finally {
+        this.button.ariaBusy = null;
+      }
+      // Of another limb by now.
+      if (asked !== this.removed) return;
+    }
+    this.view.showRemoved(this.wanted() ? surface : null);
+    this.view.draw();
   }
 
   // Whether a click was one on a body; the point lies inside it.

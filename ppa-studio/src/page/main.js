@@ -14,7 +14,7 @@ import { DatasetPanel } from "/page/dataset.js";
 import { GradingPanel } from "/page/grading.js";
 import { TrainingPanel } from "/page/training.js";
 import { LivePanel } from "/page/live.js";
-import { BodyPicker } from "/page/bodies.js";
+import { Bodies } from "/page/bodies.js";
 import { CropPanel, cropOf } from "/page/crop.js";
 import { showScan, showSkin } from "/page/scan.js";
 import { drawRoom, roomFacts } from "/page/room.js";
@@ -35,7 +35,7 @@ const view3d = new View3d(byId("view3d"), actions);
 const landmarks = new LandmarkPanel(store, actions);
 const crop = new CropPanel(store, actions);
 const shapes = new ShapePanel(store, { surface: () => showSurface(false).then(() => view3d.draw()).catch(fail) });
-const bodies = new BodyPicker(store, view3d, { change, fail, surface: () => showSurface(false).then(() => view3d.draw()).catch(fail) });
+const bodies = new Bodies(store, view3d, { change, fail });
 const whatIf = new WhatIfPanel(store, actions);
 const plan = new PlanPanel({
   fail,
@@ -119,8 +119,7 @@ async function show(doc) {
   showCommands();
   slices.forEach((view) => view.update());
   if (skinChanged || shapeChanged) {
-    bodies.end();
-    await showSurface(!before);
+    await Promise.all([showSurface(!before), bodies.changed()]);
   }
   drawLandmarks();
   whatIf.show();
@@ -130,7 +129,7 @@ async function show(doc) {
 async function showSurface(first) {
   if (first) framed = false;
   const surface = await shapes.load();
-  if (!surface || bodies.on) return;
+  if (!surface) return;
   view3d.show(surface);
   if (!framed) view3d.frame();
   framed = true;
@@ -141,6 +140,7 @@ async function showSurfaceAt(isoHu) {
   try {
     const surface = await surfaceAt(isoHu);
     if (Number(byId("iso").value) !== store.doc.iso_hu) {
+      view3d.showRemoved(null);
       view3d.show(surface);
       view3d.draw();
     }
@@ -225,8 +225,8 @@ function showRoom(next) {
 }
 
 function go(step) {
-  bodies.set(false);
   store.step = step;
+  bodies.set(false);
   document.body.dataset.step = step;
   for (const tab of document.querySelectorAll("[role=tab]")) {
     const chosen = tab.dataset.step === step;
@@ -376,6 +376,7 @@ function listen() {
   byId("side").addEventListener("change", (event) => change("surface", { side: event.target.value }));
   byId("show-removed").addEventListener("change", (event) => {
     store.showRemoved = event.target.checked;
+    bodies.show();
     slices.forEach((view) => view.draw());
   });
   for (const [name, level, width] of WINDOWS) byId("windows").append(button(name, () => setWindow({ level, width })));

@@ -7,6 +7,11 @@ export async function loadSurface() {
   return surfaceOf(await getBytes("skin"));
 }
 
+// What was removed beside the limb and inside it.
+export async function loadRemoved() {
+  return surfaceOf(await getBytes("removed"));
+}
+
 // The coarse surface of everything in the scan at a HU.
 export async function surfaceAt(isoHu) {
   return surfaceOf(await (await post("surface_at", { iso_hu: isoHu })).arrayBuffer());
@@ -29,9 +34,9 @@ function surfaceOf(bytes) {
 
 const vertex = (surface, id) => surface.positions.subarray(3 * id, 3 * id + 3);
 
-// Where a ray first meets the surface; null where it does not.
+// Where a ray first meets a surface, and the next place where it meets the same one, as distances along it; infinite where it does not.
 export function hit(surface, origin, direction) {
-  let nearest = Infinity;
+  let [nearest, next] = [Infinity, Infinity];
   const { corners } = surface;
   for (let t = 0; t < corners.length; t += 3) {
     const [a, b, c] = [corners[t], corners[t + 1], corners[t + 2]].map((id) => Array.from(vertex(surface, id)));
@@ -46,9 +51,11 @@ export function hit(surface, origin, direction) {
     const r = dot(direction, q) / det;
     if (r < 0 || p + r > 1) continue;
     const distance = dot(v, q) / det;
-    if (distance > 1e-6 && distance < nearest) nearest = distance;
+    if (distance <= 1e-6) continue;
+    if (distance < nearest) [nearest, next] = [distance, nearest];
+    else if (distance > nearest) next = Math.min(next, distance);
   }
-  return nearest < Infinity ? [0, 1, 2].map((i) => origin[i] + nearest * direction[i]) : null;
+  return { nearest, next };
 }
 
 export function bounds(surface) {

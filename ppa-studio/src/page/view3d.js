@@ -35,8 +35,12 @@ void main() {
   pixel = vec4(painted * light, colour.a);
 }`;
 
-// From a point of a surface into what is below it, along the line of sight; bodies are at least 8 mm thick.
+// From a point of a surface into what is below it, along the line of sight, at most; half-way through what is thinner.
 const INSIDE_MM = 5;
+
+const SKIN = [0.86, 0.68, 0.58, 1];
+// As in the slices; faint where the skin hides it.
+const REMOVED = { colour: [1, 0.58, 0.1], seen: 0.45, hidden: 0.1 };
 
 const FIELD_OF_VIEW = 30 * Math.PI / 180;
 
@@ -46,6 +50,8 @@ export class View3d {
     this.caption = figure.querySelector("figcaption");
     this.actions = actions;
     this.surface = null;
+    // What was removed, where it is shown with the skin.
+    this.removed = null;
     this.worldFromCt = IDENTITY;
     this.lines = [];
     this.points = [];
@@ -77,7 +83,8 @@ export class View3d {
     gl.bindAttribLocation(this.program, 2, "outwards");
     gl.linkProgram(this.program);
     this.uniform = (name) => gl.getUniformLocation(this.program, name);
-    this.buffers = { positions: gl.createBuffer(), normals: gl.createBuffer(), outwards: gl.createBuffer(), corners: gl.createBuffer(), lines: gl.createBuffer() };
+    const buffers = () => ({ positions: gl.createBuffer(), normals: gl.createBuffer(), outwards: gl.createBuffer(), corners: gl.createBuffer() });
+    this.buffers = { skin: buffers(), removed: buffers(), lines: gl.createBuffer() };
   }
 
   listen(figure) {
@@ -120,13 +127,23 @@ export class View3d {
 
   show(surface) {
     this.surface = surface;
+    this.mostMoved = surface.outwards?.reduce((most, mm) => Math.max(most, Math.abs(mm)), 0) ?? 0;
+    this.load(surface, this.buffers?.skin);
+  }
+
+  // A second surface, or none.
+  showRemoved(surface) {
+    this.removed = surface;
+    if (surface) this.load(surface, this.buffers?.removed);
+  }
+
+  load(surface, buffers) {
     if (!this.gl) return;
-    const { gl, buffers } = this;
+    const { gl } = this;
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.positions);
     gl.bufferData(gl.ARRAY_BUFFER, surface.positions, gl.STATIC_DRAW);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.normals);
     gl.bufferData(gl.ARRAY_BUFFER, surface.normals, gl.STATIC_DRAW);
-    this.mostMoved = surface.outwards?.reduce((most, mm) => Math.max(most, Math.abs(mm)), 0) ?? 0;
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers.outwards);
     gl.bufferData(gl.ARRAY_BUFFER, surface.outwards ?? new Float32Array(surface.positions.length / 3), gl.STATIC_DRAW);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.corners);
@@ -173,19 +190,42 @@ export class View3d {
     const eye = this.eye();
     const screen = this.screenFromWorld(eye);
     this.place(screen, eye, this.worldFromCt);
-    this.paint([0.86, 0.68, 0.58, 1], 1);
-    this.attribute(0, this.buffers.positions);
-    this.attribute(1, this.buffers.normals);
-    this.attribute(2, this.buffers.outwards, 1);
     gl.uniform1f(this.uniform("mostMoved"), this.mostMoved);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers.corners);
-    gl.drawElements(gl.TRIANGLES, this.surface.corners.length, gl.UNSIGNED_INT, 0);
+    this.paint(SKIN, 1);
+    this.triangles(this.surface, this.buffers.skin);
+    if (this.removed) this.drawRemoved();
     this.place(screen, eye, IDENTITY);
     gl.disableVertexAttribArray(1);
     gl.disableVertexAttribArray(2);
     gl.uniform1f(this.uniform("mostMoved"), 0);
     for (const { points, colour, through } of this.lines) this.segments(gl.LINES, points, colour, through);
     for (const { points, colour, through } of this.points) this.segments(gl.POINTS, points, colour, through);
+  }
+
+  // Translucent, over the skin.
+  drawRemoved() {
+    const { gl } = this;
+    gl.uniform1f(this.uniform("mostMoved"), 0);
+    gl.enable(gl.BLEND);
+    gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ZERO, gl.ONE);
+    gl.depthMask(false);
+    for (const [test, alpha] of [[gl.GREATER, REMOVED.hidden], [gl.LESS, REMOVED.seen]]) {
+      gl.depthFunc(test);
+      this.paint([...REMOVED.colour, alpha], 1);
+      this.triangles(this.removed, this.buffers.removed);
+    }
+    gl.depthFunc(gl.LESS);
+    gl.depthMask(true);
+    gl.disable(gl.BLEND);
+  }
+
+  triangles(surface, buffers) {
+    const { gl } = this;
+    this.attribute(0, buffers.positions);
+    this.attribute(1, buffers.normals);
+    this.attribute(2, buffers.outwards, 1);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.corners);
+    gl.drawElements(gl.TRIANGLES, surface.corners.length, gl.UNSIGNED_INT, 0);
   }
 
   segments(kind, points, colour, through) {
@@ -221,7 +261,7 @@ export class View3d {
     this.gl.uniformMatrix3fv(this.uniform("eyeFromModel"), false, facing.flat());
   }
 
-  // The point of the skin under the pointer, and one behind it, in the ct frame.
+  // The point of what is shown under the pointer, and one behind it, in the ct frame.
   pick(x, y) {
     if (!this.surface) return;
     const { at, right, up, back } = this.eye();
@@ -230,9 +270,12 @@ export class View3d {
     const [u, v] = [(2 * x / width - 1) * half * width / height, (1 - 2 * y / height) * half];
     const direction = unit(add(add(scale(right, u), scale(up, v)), scale(back, -1)));
     const ctFromWorld = inverse(this.worldFromCt);
-    const point = hit(this.surface, transform(ctFromWorld, at), rotate(ctFromWorld, direction));
-    if (!point) return;
-    const inside = add(point, scale(rotate(ctFromWorld, direction), INSIDE_MM));
+    const [origin, along] = [transform(ctFromWorld, at), rotate(ctFromWorld, direction)];
+    const hits = [this.surface, this.removed].filter(Boolean).map((surface) => hit(surface, origin, along));
+    const { nearest, next } = hits.reduce((one, other) => (other.nearest < one.nearest ? other : one));
+    if (nearest === Infinity) return;
+    const point = add(origin, scale(along, nearest));
+    const inside = add(point, scale(along, Math.min(INSIDE_MM, (next - nearest) / 2)));
     const rounded = (place) => place.map((c) => Math.round(10 * c) / 10);
     this.actions.picked(rounded(point), rounded(inside));
   }

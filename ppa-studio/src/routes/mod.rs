@@ -40,6 +40,7 @@ pub(crate) fn router(state: Arc<State>) -> Router {
         .route("/cameras", post(document::cameras))
         .route("/slice/{axis}/{index}", get(scan::slice))
         .route("/skin", get(scan::skin))
+        .route("/removed", get(scan::removed))
         .route("/body_shape", post(scan::body_shape))
         .route("/surface_at", post(scan::surface_at))
         .route("/room", post(room::room))

@@ -72,6 +72,19 @@ pub(super) async fn skin(Extracted(state): Extracted<Arc<State>>) -> Result<Resp
     .map(bytes)
 }
 
+/// What was removed beside the limb and inside it, as a coarse surface, to be seen with the skin.
+pub(super) async fn removed(Extracted(state): Extracted<Arc<State>>) -> Result<Response, Response> {
+    work(state, |state| {
+        let limb = state.limb()?;
+        let shown = limb.shown();
+        let iso_hu = shown.case.surface.iso_hu as f32;
+        let surface = limb.coarse.removed(shown.prepared(), iso_hu)?;
+        Ok(display_mesh::bytes(&surface, &[]))
+    })
+    .await
+    .map(bytes)
+}
+
 /// A body shape.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

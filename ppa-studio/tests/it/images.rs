@@ -266,6 +266,14 @@ fn a_surface_at_another_hu_shows_all_of_the_scan() {
 }
 
 #[test]
+fn nothing_is_shown_as_removed_where_nothing_was() {
+    let browser = Browser::new();
+    let removed = browser.get("/api/removed");
+    assert_eq!(removed.status, StatusCode::OK, "{}", removed.text());
+    assert_eq!(removed.body[..], [0; 8]);
+}
+
+#[test]
 fn a_body_shape_is_that_of_the_plans_dataset() {
     let folder = tempfile::tempdir().unwrap();
     let file = crate::plans::plan(folder.path());

@@ -56,6 +56,19 @@ fn prepared(folder: &Path, kept: &[[f64; 3]]) -> (Case, PreparedLimb) {
     prepare(&scan, &reading, Side::Right, &surface, &choices).unwrap()
 }
 
+/// Mean of the vertices that are shown of what was removed, and the number of triangles.
+fn removed(browser: &Browser) -> ([f64; 3], usize) {
+    let answer = browser.get("/api/removed");
+    assert_eq!(answer.status, StatusCode::OK, "{}", answer.text());
+    let word = |at: usize| <[u8; 4]>::try_from(&answer.body[at..at + 4]).unwrap();
+    let [vertices, triangles] = [0, 4].map(|at| u32::from_le_bytes(word(at)) as usize);
+    let of_axis = |axis: usize| {
+        let values = (0..vertices).map(|v| f32::from_le_bytes(word(8 + 4 * (3 * v + axis))));
+        values.map(f64::from).sum::<f64>() / vertices as f64
+    };
+    ([0, 1, 2].map(of_axis), triangles)
+}
+
 fn kept_points(state: &Value) -> usize {
     let bodies = state["report"]["bodies"].as_array().unwrap().iter();
     bodies.filter(|body| body.get("kept").is_some()).count()
@@ -68,9 +81,15 @@ fn a_kept_body_is_that_of_the_command_and_is_undone() {
     let browser = Browser::of(folder, file);
     let before = browser.get("/api/state").json();
     assert_eq!(kept_points(&before), 0);
+    // What was removed is the block, which no longer is when it is kept.
+    let (middle, triangles) = removed(&browser);
+    let off = std::iter::zip(middle, block).map(|(a, b)| (a - b).abs());
+    assert!(off.fold(0.0, f64::max) < 0.5, "{middle:?} {block:?}");
+    assert!(triangles > 1000, "{triangles}");
     let click = |point: [f64; 3]| browser.post("/api/body", &json!({ "point": point }));
     let state = click(block).json();
     assert_eq!(kept_points(&state), 1);
+    assert_eq!(removed(&browser).1, 0);
     let codes: Vec<&Value> = state["findings"]
         .as_array()
         .unwrap()
@@ -147,6 +166,31 @@ fn on_screen(point: [f64; 3], skin: &ppa_mesh::Mesh, [width, height]: [f64; 2]) 
     [0.5 * (width + u * height), 0.5 * (1.0 - v) * height]
 }
 
+/// Orange pixels of the view in three dimensions, as they are seen.
+async fn orange(page: &Page) -> usize {
+    let place = "(() => { const r = document.querySelector('#view3d canvas').getBoundingClientRect(); \
+                 return [r.x, r.y, r.width, r.height].map(Math.floor); })()";
+    let [x, y, width, height]: [u32; 4] = serde_json::from_value(page.value(place).await).unwrap();
+    let png = page.client.screenshot().await.unwrap();
+    let seen = image::load_from_memory(&png).unwrap().to_rgb8();
+    let view = image::imageops::crop_imm(&seen, x, y, width, height).to_image();
+    let is_orange = |[r, g, b]: [u8; 3]| {
+        let [r, g, b] = [r, g, b].map(u32::from);
+        r > 60 && 4 * g < 3 * r && 5 * b < 2 * r
+    };
+    view.pixels().filter(|pixel| is_orange(pixel.0)).count()
+}
+
+/// Waits until what was removed is shown in the view in three dimensions, or nothing is.
+async fn until_removed_is_shown(page: &Page, shown: bool) {
+    for _ in 0..200 {
+        if (orange(page).await > 200) == shown {
+            return;
+        }
+    }
+    panic!("{} orange pixels", orange(page).await);
+}
+
 #[test]
 #[ignore = "needs chromium and chromedriver"]
 fn a_body_is_kept_and_removed_by_buttons() {
@@ -157,11 +201,23 @@ fn a_body_is_kept_and_removed_by_buttons() {
         page.click("#tab-skin").await;
         let bodies = "document.getElementById('bodies').textContent";
         page.wait(&format!("{bodies}.includes('removed: ')")).await;
+        // In the view in three dimensions, what was removed is orange, and nothing is where it is not to be shown.
+        until_removed_is_shown(&page, true).await;
+        page.picture("skin_removed").await;
+        page.click("#show-removed").await;
+        until_removed_is_shown(&page, false).await;
+        page.click("#show-removed").await;
+        until_removed_is_shown(&page, true).await;
+        page.click("#tab-landmarks").await;
+        until_removed_is_shown(&page, false).await;
+        page.click("#tab-skin").await;
+        until_removed_is_shown(&page, true).await;
         page.click("#bodies [aria-label^='Show'] ~ [aria-label^='Keep']")
             .await;
         page.wait(&format!("{bodies}.includes('kept: ')")).await;
         page.wait("document.getElementById('command-list').textContent.includes('--keep=')")
             .await;
+        until_removed_is_shown(&page, false).await;
         page.picture("skin_kept").await;
         page.click("#undo").await;
         page.wait(&format!("!{bodies}.includes('kept: ')")).await;
@@ -206,6 +262,10 @@ fn a_body_is_kept_and_removed_by_buttons() {
         page.wait(&format!("{bodies}.includes('kept: ')")).await;
         page.client.set_window_size(600, 900).await.unwrap();
         page.picture("skin_kept_narrow").await;
+        page.click("#undo").await;
+        page.wait(&format!("!{bodies}.includes('kept: ')")).await;
+        page.wait("!document.body.ariaBusy").await;
+        page.picture("skin_removed_narrow").await;
         page.close().await;
     });
 }
