@@ -1,8 +1,12 @@
 //! Files beside a plan that it may name: camera rigs and tables of materials.
 
-use std::fs::DirEntry;
+use std::collections::HashMap;
+use std::fs::{DirEntry, Metadata};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::SystemTime;
 
+use ppa_core::text::error_chain;
 use ppa_dataset::files::FileError;
 use ppa_depth::RigSpec;
 use ppa_xray::HuCalibration;
@@ -15,41 +19,131 @@ const MAX_BYTES: u64 = 1024 * 1024;
 /// Names of files with what each of them holds, in the order of the names.
 type Named = Vec<(String, String)>;
 
-/// Files that the fields of a form offer.
-#[derive(Debug, Default)]
-pub(crate) struct FilesBeside {
-    /// Camera rigs, with the sizes of their images.
-    pub rigs: Named,
-    /// Tables from HU to material and density, with their segments.
-    pub tables: Named,
+/// Files that a field of a form offers.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Offered {
+    /// Those that can be read, with what they hold.
+    pub readable: Named,
+    /// Those that look like such a file and cannot be read, with the reason.
+    pub unreadable: Named,
 }
 
-impl FilesBeside {
-    /// Those in the folder of a plan that can be read as what they are offered for.
-    pub fn of(folder: &Path) -> Result<Self, StudioError> {
+/// Files that the fields of a form offer.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct FilesBeside {
+    /// Camera rigs, with the sizes of their images.
+    pub rigs: Offered,
+    /// Tables from HU to material and density, with their segments.
+    pub tables: Offered,
+}
+
+/// What a file is to a plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Rig,
+    Table,
+}
+
+/// What a file holds: its contents in short, or why it cannot be read; `None` for a file of another kind.
+type Meaning = Option<(Kind, Result<String, String>)>;
+
+/// Files that were read before, which are read again only when they have changed.
+#[derive(Default)]
+pub(crate) struct PlanFiles(Mutex<HashMap<PathBuf, Known>>);
+
+struct Known {
+    written: Option<SystemTime>,
+    bytes: u64,
+    meaning: Meaning,
+}
+
+impl PlanFiles {
+    /// Those in the folder of a plan.
+    pub fn beside(&self, folder: &Path) -> Result<FilesBeside, StudioError> {
         let entries = std::fs::read_dir(folder).map_err(FileError::at("read", folder))?;
         // Names that are not UTF-8 cannot stand in a plan; links may lead out of the folder.
-        let plain = |entry: &DirEntry| {
-            let about = entry.metadata();
-            about.is_ok_and(|about| about.is_file() && about.len() <= MAX_BYTES)
+        let plain = |entry: DirEntry| {
+            let about = entry.metadata().ok()?;
+            let is_plain = about.is_file() && about.len() <= MAX_BYTES;
+            Some((entry.file_name().into_string().ok()?, about)).filter(|_| is_plain)
         };
-        let names = entries.filter_map(Result::ok).filter(plain);
-        let mut names: Vec<String> = names
-            .filter_map(|entry| entry.file_name().into_string().ok())
-            .collect();
-        names.sort();
-        let named = |extension: &str, meaning: &dyn Fn(PathBuf) -> Option<String>| -> Named {
-            let files = names.iter().filter(|name| name.ends_with(extension));
-            files
-                .filter_map(|name| Some((name.clone(), meaning(folder.join(name))?)))
-                .collect()
-        };
-        Ok(Self {
-            rigs: named(".json", &|file| Some(sizes(&RigSpec::read(&file).ok()?))),
-            tables: named(".toml", &|file| {
-                Some(segments(&HuCalibration::read(&file).ok()?))
-            }),
-        })
+        let entries = entries.filter_map(Result::ok).filter_map(plain);
+        let mut files: Vec<(String, Metadata)> = entries.collect();
+        files.sort_by(|(a, _), (b, _)| a.cmp(b));
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut before = std::mem::take(&mut *known);
+        let mut found = FilesBeside::default();
+        for (name, about) in files {
+            let path = folder.join(&name);
+            let (written, bytes) = (about.modified().ok(), about.len());
+            let same =
+                |file: &Known| written.is_some() && (file.written, file.bytes) == (written, bytes);
+            let file = before.remove(&path).filter(same);
+            let file = file.unwrap_or_else(|| Known {
+                written,
+                bytes,
+                meaning: meaning(&path),
+            });
+            if let Some((kind, contents)) = file.meaning.clone() {
+                let offered = match kind {
+                    Kind::Rig => &mut found.rigs,
+                    Kind::Table => &mut found.tables,
+                };
+                match contents {
+                    Ok(contents) => offered.readable.push((name, contents)),
+                    Err(reason) => offered.unreadable.push((name, reason)),
+                }
+            }
+            known.insert(path, file);
+        }
+        Ok(found)
+    }
+}
+
+/// What a file holds. One that no plan can name, as its contents are of another kind, has no meaning.
+fn meaning(path: &Path) -> Meaning {
+    let is = |extension: &str| path.extension().is_some_and(|found| found == extension);
+    let kind = match (is("json"), is("toml")) {
+        (true, _) => Kind::Rig,
+        (_, true) => Kind::Table,
+        _ => return None,
+    };
+    let read = match kind {
+        Kind::Rig => RigSpec::read(path)
+            .map(|rig| sizes(&rig))
+            .map_err(|error| error_chain(&error)),
+        Kind::Table => HuCalibration::read(path)
+            .map(|table| segments(&table))
+            .map_err(|error| error_chain(&error)),
+    };
+    if read.is_err() && !looks_like(kind, path) {
+        return None;
+    }
+    // The file is named beside the reason.
+    let folder = path.parent().unwrap_or(Path::new("")).display().to_string();
+    let reason = |error: String| error.replace(&format!("{folder}/"), "");
+    Some((kind, read.map_err(reason)))
+}
+
+/// Whether a file that cannot be read was meant as one of its kind: a rig holds `left` or `right`, a table `segment`. JSON that is none might
+/// be a rig.
+fn looks_like(kind: Kind, path: &Path) -> bool {
+    let Ok(text) = std::fs::read_to_string(path) else {
+        return true;
+    };
+    match kind {
+        Kind::Rig => match serde_json::from_str::<serde_json::Value>(&text) {
+            Ok(value) => ["left", "right"]
+                .iter()
+                .any(|side| value.get(side).is_some()),
+            Err(_) => true,
+        },
+        Kind::Table => match text.parse::<toml::Table>() {
+            Ok(table) => table.contains_key("segment"),
+            Err(_) => text
+                .lines()
+                .any(|line| line.trim_start().starts_with("[[segment")),
+        },
     }
 }
 
@@ -66,4 +160,74 @@ fn sizes(rig: &RigSpec) -> String {
 fn segments(table: &HuCalibration) -> String {
     let names: Vec<&str> = table.segments.iter().map(|s| s.name.as_str()).collect();
     names.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TABLE: &str =
+        "[[segment]]\nname = \"water\"\nmaterial = \"water\"\ndensity = [[0, 1.0]]\n";
+
+    fn names(files: &Named) -> Vec<&str> {
+        files.iter().map(|(name, _)| name.as_str()).collect()
+    }
+
+    #[test]
+    fn unreadable_rigs_and_tables_are_named_with_the_reason() {
+        let folder = tempfile::tempdir().unwrap();
+        let rig = serde_json::to_string(&RigSpec::default()).unwrap();
+        let write = |name: &str, text: &str| {
+            std::fs::write(folder.path().join(name), text).unwrap();
+        };
+        write("good.json", &rig);
+        write("cut.json", &rig[..rig.len() / 2]);
+        write("one.json", "{\"left\": {}}");
+        write("splits.json", "{\"version\": 1}");
+        write("water.toml", TABLE);
+        write("typo.toml", &TABLE.replace("density", "densty"));
+        write("broken.toml", "[[segment]]\nname = \"water\n");
+        write("train.toml", "preset = \"quick\"\n");
+        write("notes.toml", "what = ever = this\n");
+        let found = PlanFiles::default().beside(folder.path()).unwrap();
+        assert_eq!(names(&found.rigs.readable), ["good.json"]);
+        assert_eq!(names(&found.rigs.unreadable), ["cut.json", "one.json"]);
+        assert_eq!(names(&found.tables.readable), ["water.toml"]);
+        let unreadable = &found.tables.unreadable;
+        assert_eq!(names(unreadable), ["broken.toml", "typo.toml"]);
+        assert!(unreadable[1].1.contains("densty"), "{unreadable:?}");
+        let folder = folder.path().to_string_lossy().into_owned();
+        let reasons = found.rigs.unreadable.iter().chain(unreadable);
+        for (_, reason) in reasons {
+            assert!(!reason.contains(&folder), "{reason}");
+        }
+    }
+
+    /// A file whose time and length are the same is not read again.
+    #[test]
+    fn files_are_read_again_only_when_they_change() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("water.toml");
+        let write = |text: &str, time: SystemTime| {
+            std::fs::write(&file, text).unwrap();
+            let file = std::fs::File::options().write(true).open(&file).unwrap();
+            file.set_modified(time).unwrap();
+        };
+        let time = SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(1_000_000);
+        let files = PlanFiles::default();
+        let contents = || {
+            let found = files.beside(folder.path()).unwrap();
+            found.tables.readable[0].1.clone()
+        };
+        write(TABLE, time);
+        assert_eq!(contents(), "water");
+        let other = TABLE.replace("name = \"water\"", "name = \"blood\"");
+        write(&other, time);
+        assert_eq!(contents(), "water");
+        write(&other, time + std::time::Duration::from_secs(1));
+        assert_eq!(contents(), "blood");
+        std::fs::remove_file(&file).unwrap();
+        let found = files.beside(folder.path()).unwrap();
+        assert_eq!(found, FilesBeside::default());
+    }
 }

@@ -7,7 +7,7 @@ use toml::{Table, Value};
 
 use crate::error::StudioError;
 use crate::plan_cameras::{CAMERAS, rig_value, rig_without, rows, within_cameras};
-use crate::plan_files::FilesBeside;
+use crate::plan_files::{FilesBeside, Offered};
 use crate::plan_keys::{PlanKey, plan_keys};
 
 /// Keys of files that are chosen from those beside the plan, each with the table that the plan may hold instead.
@@ -57,6 +57,8 @@ pub(crate) struct Field {
     pub required: bool,
     /// The table that the file holds in place of this file's name.
     pub instead: Option<&'static str>,
+    /// Files that are not offered since they cannot be read, with the reason.
+    pub unreadable: Vec<(String, String)>,
 }
 
 /// The fields of a plan file with this text. `cameras` are those of the plan, where they can be read; `files` lie beside it.
@@ -107,6 +109,7 @@ pub(crate) fn fields(
             example: example.map(|(_, value)| *value),
             required: has_cameras && camera_key.is_some() && left_out.is_none(),
             instead: instead.map(|(_, table)| table),
+            unreadable: offered(&key, files).map_or(Vec::new(), |files| files.unreadable.clone()),
         });
     }
     Ok(fields)
@@ -143,15 +146,17 @@ fn is_below(key: &PlanKey, field: &Field) -> bool {
 }
 
 fn names(key: &PlanKey, files: &FilesBeside) -> Vec<(String, String)> {
+    let names = key.names.iter();
+    let names = names.map(|(name, meaning)| ((*name).to_owned(), (*meaning).to_owned()));
+    offered(key, files).map_or_else(|| names.collect(), |files| files.readable.clone())
+}
+
+/// The files to choose from; `None` for a key of another kind.
+fn offered<'a>(key: &PlanKey, files: &'a FilesBeside) -> Option<&'a Offered> {
     match key.key {
-        "depth.rig" => files.rigs.clone(),
-        "xray.calibration_file" => files.tables.clone(),
-        _ => {
-            let names = key.names.iter();
-            names
-                .map(|(name, meaning)| ((*name).to_owned(), (*meaning).to_owned()))
-                .collect()
-        }
+        "depth.rig" => Some(&files.rigs),
+        "xray.calibration_file" => Some(&files.tables),
+        _ => None,
     }
 }
 

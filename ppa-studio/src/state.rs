@@ -16,6 +16,7 @@ use crate::network::Network;
 use crate::newest::Newest;
 use crate::opening::Opening;
 use crate::plan_file::PlanFile;
+use crate::plan_files::PlanFiles;
 use crate::stoppable::Stoppable;
 use crate::token::Token;
 use crate::training_errors::TrainingErrors;
@@ -51,6 +52,8 @@ pub(crate) struct State {
     pub network: Option<Network>,
     /// Frames that they judge as they come, if there are any.
     pub live: Option<Live>,
+    /// Files that the plan may name.
+    pub plan_files: PlanFiles,
     /// Trainings that were opened, or lie beside the plan.
     pub trainings: Trainings,
     /// Their errors.
@@ -112,6 +115,7 @@ impl State {
             grading: Mutex::default(),
             network,
             live,
+            plan_files: PlanFiles::default(),
             trainings,
             training_errors: TrainingErrors::default(),
             note: opened.note,

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use ppa_dataset::files::FileError;
 use ppa_dataset::manifest::DESCRIPTION_FILE;
@@ -33,6 +33,23 @@ pub(crate) struct Trainings {
     depth: usize,
     /// What was read of logs that have not changed since.
     known: Mutex<HashMap<PathBuf, KnownLog>>,
+    /// What folders held when they were read last.
+    folders: Mutex<HashMap<PathBuf, KnownFolder>>,
+}
+
+/// What a folder held when its entries changed last.
+struct KnownFolder {
+    changed: SystemTime,
+    holds: Held,
+}
+
+/// What a folder is to the search.
+#[derive(Clone)]
+enum Held {
+    Training,
+    /// A dataset holds no trainings.
+    Dataset,
+    Folders(Vec<PathBuf>),
 }
 
 /// What a log of some length held.
@@ -76,6 +93,7 @@ impl Trainings {
             start: start.to_owned(),
             depth: DEEPEST,
             known: Mutex::default(),
+            folders: Mutex::default(),
         }
     }
 
@@ -88,6 +106,7 @@ impl Trainings {
             start: folder.to_owned(),
             depth: 1,
             known: Mutex::default(),
+            folders: Mutex::default(),
         }
     }
 
@@ -129,11 +148,19 @@ impl Trainings {
         Ok(rows.chunks(together).map(mean).collect())
     }
 
+    /// The folders of all trainings. Folders whose entries have not changed since the last search are not read again.
     fn folders(&self) -> Result<Vec<PathBuf>, StudioError> {
-        let mut found = Vec::new();
-        search(&self.start, self.depth, &mut found).map_err(FileError::at("read", &self.start))?;
-        found.sort();
-        Ok(found)
+        let mut known = self.folders.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut search = Search {
+            before: std::mem::take(&mut *known),
+            now: HashMap::new(),
+            found: Vec::new(),
+        };
+        let searched = search.below(&self.start, self.depth);
+        *known = search.now;
+        searched.map_err(FileError::at("read", &self.start))?;
+        search.found.sort();
+        Ok(search.found)
     }
 
     fn name(&self, run: &Path) -> String {
@@ -192,23 +219,64 @@ pub(crate) fn is_training(folder: &Path) -> bool {
     folder.join(CONFIG_FILE).exists() && folder.join(LOG_FILE).exists()
 }
 
-/// Adds a training, or those at most `depth` folders below; what is below a training or a dataset is not looked at.
-fn search(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> std::io::Result<()> {
+/// A folder that changed less than this ago is read again: a later change may leave it the same time.
+const SETTLED: Duration = Duration::from_secs(2);
+
+/// A search for trainings, with what the last one knew of each folder.
+struct Search {
+    before: HashMap<PathBuf, KnownFolder>,
+    now: HashMap<PathBuf, KnownFolder>,
+    found: Vec<PathBuf>,
+}
+
+impl Search {
+    /// Adds a training, or those at most `depth` folders below; what is below a training or a dataset is not looked at.
+    fn below(&mut self, folder: &Path, depth: usize) -> std::io::Result<()> {
+        match self.held(folder)? {
+            Held::Training => self.found.push(folder.to_owned()),
+            Held::Folders(below) if depth > 0 => {
+                for folder in below {
+                    // A folder that cannot be read, or is gone again, holds no training to show.
+                    let _ = self.below(&folder, depth - 1);
+                }
+            }
+            Held::Dataset | Held::Folders(_) => {}
+        }
+        Ok(())
+    }
+
+    fn held(&mut self, folder: &Path) -> std::io::Result<Held> {
+        let changed = std::fs::metadata(folder)?.modified()?;
+        let same = |known: &KnownFolder| known.changed == changed;
+        let holds = match self.before.remove(folder).filter(same) {
+            Some(known) => known.holds,
+            None => held(folder)?,
+        };
+        let ago = SystemTime::now().duration_since(changed);
+        if ago.is_ok_and(|ago| ago > SETTLED) {
+            let holds = holds.clone();
+            self.now
+                .insert(folder.to_owned(), KnownFolder { changed, holds });
+        }
+        Ok(holds)
+    }
+}
+
+fn held(folder: &Path) -> std::io::Result<Held> {
     if is_training(folder) {
-        found.push(folder.to_owned());
-        return Ok(());
+        return Ok(Held::Training);
     }
-    if depth == 0 || folder.join(DESCRIPTION_FILE).exists() {
-        return Ok(());
+    if folder.join(DESCRIPTION_FILE).exists() {
+        return Ok(Held::Dataset);
     }
+    let mut below = Vec::new();
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
         if entry.file_type()?.is_dir() {
-            // A folder that cannot be read, or is gone again, holds no training to show.
-            let _ = search(&entry.path(), depth - 1, found);
+            below.push(entry.path());
         }
     }
-    Ok(())
+    Ok(Held::Folders(below))
 }
 
 fn silent_s(log: &Path) -> Option<f64> {
@@ -274,6 +342,48 @@ mod tests {
         for name in ["..", "", "1", "data", "/etc"] {
             assert!(below.folder(name).is_err(), "{name}");
         }
+    }
+
+    #[test]
+    fn trainings_that_come_and_go_are_found_at_the_next_search() {
+        let root = tempfile::tempdir().unwrap();
+        let at = |name: &str| root.path().join(name);
+        // As if written long ago, so that the search keeps what they hold.
+        let age = |name: &str| {
+            let folder = std::fs::File::open(at(name)).unwrap();
+            let long_ago = SystemTime::now() - Duration::from_secs(100);
+            folder.set_modified(long_ago).unwrap();
+        };
+        training(&at("group/a"), "");
+        for folder in ["", "group", "group/a"] {
+            age(folder);
+        }
+        let trainings = Trainings::below(root.path());
+        assert_eq!(names(&trainings), ["group/a"]);
+        assert_eq!(trainings.folders.lock().unwrap().len(), 3);
+        assert_eq!(names(&trainings), ["group/a"]);
+        training(&at("group/b"), "");
+        assert_eq!(names(&trainings), ["group/a", "group/b"]);
+        std::fs::remove_file(at("group/a").join(LOG_FILE)).unwrap();
+        assert_eq!(names(&trainings), ["group/b"]);
+        // One that settled is not read again: this one became a training without a change of its time.
+        std::fs::create_dir(at("late")).unwrap();
+        age("late");
+        assert_eq!(names(&trainings), ["group/b"]);
+        training(&at("late"), "");
+        age("late");
+        let changed = std::fs::metadata(at("late")).unwrap().modified().unwrap();
+        trainings
+            .folders
+            .lock()
+            .unwrap()
+            .get_mut(&at("late"))
+            .unwrap()
+            .changed = changed;
+        assert_eq!(names(&trainings), ["group/b"]);
+        training(&at("late/below"), "");
+        std::fs::remove_dir_all(at("late/below")).unwrap();
+        assert_eq!(names(&trainings), ["group/b", "late"]);
     }
 
     #[test]

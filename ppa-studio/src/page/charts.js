@@ -4,7 +4,23 @@ const SPACE = "http://www.w3.org/2000/svg";
 const [WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM] = [440, 250, 52, 12, 12, 36];
 
 // Colours that colour-blind people tell apart (Okabe and Ito), light enough for the dark page.
-export const COLOURS = ["#56b4e9", "#e69f00", "#2fc39b", "#f0e442", "#cc79a7", "#ff8a4c", "#9fb4ff", "#e8e8e8"];
+const COLOURS = ["#56b4e9", "#e69f00", "#2fc39b", "#f0e442", "#cc79a7", "#ff8a4c", "#9fb4ff", "#e8e8e8"];
+
+// When the colours are used up, dashes and the shape of the points tell series apart.
+const MARKS = [
+  { shape: "circle", dashes: "none" },
+  { shape: "square", dashes: "7 3" },
+  { shape: "triangle", dashes: "2 3" },
+  { shape: "diamond", dashes: "10 3 2 3" },
+];
+
+// Series that look different from each other.
+export const MOST_SERIES = COLOURS.length * MARKS.length;
+
+// How the series of a number looks: { colour, shape, dashes }.
+export function styleOf(number) {
+  return { colour: COLOURS[number % COLOURS.length], ...MARKS[Math.floor(number / COLOURS.length) % MARKS.length] };
+}
 
 // More points than these are drawn as a line only.
 const MOST_POINTS = 3000;
@@ -35,7 +51,7 @@ function range(values) {
 
 export const ROTATION = "medial rotation, degrees";
 
-// `axes`: { x, y }, what they show; `series`: { colour, points: [{ x, y, spread, ringed, of }] }; a click on a point calls `picked`, if there is one, with what it is of.
+// `axes`: { x, y }, what they show; `series`: { style, points: [{ x, y, spread, ringed, of }] }; a click on a point calls `picked`, if there is one, with what it is of.
 export function chart(title, axes, series, yRange, picked) {
   const all = series.flatMap((one) => one.points);
   const svg = node("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": `${title}, ${axes.y}, against ${axes.x}` });
@@ -51,18 +67,19 @@ export function chart(title, axes, series, yRange, picked) {
   }
   svg.append(node("text", { x: (LEFT + WIDTH) / 2, y: HEIGHT - 5, "text-anchor": "middle" }, axes.x));
   svg.append(node("text", { x: 12, y: TOP + (HEIGHT - TOP - BOTTOM) / 2, "text-anchor": "middle", transform: `rotate(-90 12 ${TOP + (HEIGHT - TOP - BOTTOM) / 2})` }, axes.y));
-  for (const { colour, points } of series) {
+  for (const { style, points } of series) {
+    const { colour, dashes } = style;
     if (points.some((p) => p.spread)) {
       const within = (value) => y(Math.max(ys[0], Math.min(ys[1], value)));
       const there = points.map((p) => `${x(p.x)},${within(p.y + p.spread)}`);
       const back = points.map((p) => `${x(p.x)},${within(p.y - p.spread)}`).reverse();
       svg.append(node("polygon", { points: [...there, ...back].join(" "), fill: colour, "fill-opacity": 0.25 }));
     }
-    svg.append(node("polyline", { points: points.map((p) => `${x(p.x)},${y(p.y)}`).join(" "), fill: "none", stroke: colour, "stroke-width": 1.3 }));
+    svg.append(node("polyline", { points: points.map((p) => `${x(p.x)},${y(p.y)}`).join(" "), fill: "none", stroke: colour, "stroke-width": 1.3, "stroke-dasharray": dashes }));
     for (const p of points) {
       if (p.ringed) svg.append(node("circle", { cx: x(p.x), cy: y(p.y), r: 8, fill: "none", stroke: "#ff8f8f", "stroke-width": 2 }));
       if (all.length > MOST_POINTS && !p.ringed) continue;
-      const dot = node("circle", { cx: x(p.x), cy: y(p.y), r: 3, fill: colour });
+      const dot = drawn(style, x(p.x), y(p.y), 3);
       if (picked) {
         dot.setAttribute("class", "pose");
         dot.addEventListener("click", () => picked(p.of));
@@ -73,9 +90,16 @@ export function chart(title, axes, series, yRange, picked) {
   return svg;
 }
 
-// A dot in the colour of a series.
-export function mark(colour) {
-  const svg = node("svg", { viewBox: "0 0 10 10", "aria-hidden": "true", class: "mark" });
-  svg.append(node("circle", { cx: 5, cy: 5, r: 5, fill: colour }));
+// A point of a series, about as large as a circle of radius `r`.
+function drawn({ colour, shape }, x, y, r) {
+  if (shape === "circle") return node("circle", { cx: x, cy: y, r, fill: colour });
+  const corners = { square: [[-1, -1], [1, -1], [1, 1], [-1, 1]], triangle: [[0, -1.3], [1.2, 0.9], [-1.2, 0.9]], diamond: [[0, -1.4], [1.4, 0], [0, 1.4], [-1.4, 0]] }[shape];
+  return node("polygon", { points: corners.map(([dx, dy]) => `${x + r * dx},${y + r * dy}`).join(" "), fill: colour });
+}
+
+// A piece of the line of a series with a point on it.
+export function mark(style) {
+  const svg = node("svg", { viewBox: "0 0 28 10", "aria-hidden": "true", class: "mark" });
+  svg.append(node("path", { d: "M0 5H28", fill: "none", stroke: style.colour, "stroke-width": 1.6, "stroke-dasharray": style.dashes }), drawn(style, 14, 5, 3.4));
   return svg;
 }

@@ -2,7 +2,7 @@
 
 import { Refused, getBytes, getJson, postJson } from "/page/server.js";
 import { button, commandRows, element, table } from "/page/elements.js";
-import { COLOURS, ROTATION, chart, mark } from "/page/charts.js";
+import { MOST_SERIES, ROTATION, chart, mark, styleOf } from "/page/charts.js";
 import { fixed } from "/page/geometry.js";
 
 const byId = (id) => document.getElementById(id);
@@ -79,20 +79,22 @@ export class DatasetPanel {
     const poses = this.chosen();
     const sweeps = Map.groupBy(poses, (pose) => `${limbName(pose)}, ${pose.shape}`);
     const names = [...sweeps.keys()];
-    const colour = (name) => COLOURS[names.indexOf(name) % COLOURS.length];
-    byId("legend").replaceChildren(...names.slice(0, 24).map((name) => {
+    const styles = new Map(names.map((name, number) => [name, styleOf(number)]));
+    const legend = names.slice(0, MOST_SERIES).map((name) => {
       const item = element("li", ` ${name}`);
-      item.prepend(mark(colour(name)));
+      item.prepend(mark(styles.get(name)));
       return item;
-    }));
-    byId("charts").replaceChildren(...CHARTS.flatMap((kind) => this.chart(kind, sweeps, colour)));
+    });
+    if (names.length > MOST_SERIES) legend.push(element("li", `and ${names.length - MOST_SERIES} more, which look like these: filter the poses to tell them apart`));
+    byId("legend").replaceChildren(...legend);
+    byId("charts").replaceChildren(...CHARTS.flatMap((kind) => this.chart(kind, sweeps, styles)));
     const odd = poses.filter((pose) => pose.stands_out.length > 0);
     const labelled = poses.filter((pose) => pose.label).length;
     byId("dataset-count").textContent = `${poses.length} of ${this.found.poses.length} poses, ${labelled} with a label, ${odd.length} outlier${odd.length === 1 ? "" : "s"}`;
     this.outliers(odd);
   }
 
-  chart({ title, unit, of, odd, spread, range, once, from0 }, sweeps, colour) {
+  chart({ title, unit, of, odd, spread, range, once, from0 }, sweeps, styles) {
     const limbs = new Set();
     const series = [...sweeps].flatMap(([name, poses]) => {
       const limb = limbKey(poses[0]);
@@ -102,7 +104,7 @@ export class DatasetPanel {
       const points = poses.filter((pose) => of(pose) !== undefined).map((pose) => ({
         x: pose.angle_deg, y: of(pose), spread: spread?.(pose), ringed: odd && pose.stands_out.includes(odd), of: pose,
       }));
-      return points.length ? [{ colour: colour(name), points }] : [];
+      return points.length ? [{ style: styles.get(name), points }] : [];
     });
     const largest = Math.max(0, ...series.flatMap((one) => one.points.map((p) => p.y)));
     if (series.length === 0 || (from0 && largest === 0)) return [];

@@ -14,7 +14,7 @@ const HINTS = {
 
 const MOST_PATIENT = 2 ** 32 - 1;
 
-// Each gives an element and how the value of a field, or none, is put into it.
+// Each gives an element, how the value of a field, or none, is put into it, and what stands below its meaning, if anything.
 const INPUTS = { name: nameInput, names: namesInput, file: fileInput, rows: rowsInput };
 
 // What holds where no file is chosen.
@@ -56,20 +56,22 @@ function nameInput(field, id, set) {
   }];
 }
 
-// A file beside the plan, nothing, or what the plan holds instead. Files come and go.
+// A file beside the plan, nothing, or what the plan holds instead, and why others are not offered. Files come and go.
 function fileInput(field, id, set) {
   const select = element("select", "", { id, class: "file" });
+  const refused = element("ul", "", { id: `${id}:unreadable`, class: "unreadable" });
   select.addEventListener("change", () => {
     if (select.value !== WRITTEN) set(select.value || null);
   });
-  return [select, ({ key, names, value, instead }) => {
+  return [select, ({ key, names, value, instead, unreadable }) => {
     const options = [new Option(`default: ${WITHOUT_FILE[key]}`, "")];
     if (instead) options.push(new Option(`written in the plan as ${instead}`, WRITTEN));
     options.push(...names.map(([name, meaning]) => new Option(`${name}: ${meaning}`, name)));
     if (value && !names.some(([name]) => name === value)) options.push(new Option(value));
     select.replaceChildren(...options);
     select.value = value ?? (instead ? WRITTEN : "");
-  }];
+    refused.replaceChildren(...unreadable.map(([name, reason]) => element("li", `${name} cannot be read: ${reason}`)));
+  }, refused];
 }
 
 function namesInput(field, id, set) {
@@ -210,13 +212,13 @@ export class PlanPanel {
         else this.actions.fail(refusal);
       }
     };
-    const [input, put] = (INPUTS[field.kind] ?? textInput)(field, id, set);
+    const [input, put, more = ""] = (INPUTS[field.kind] ?? textInput)(field, id, set);
     input.setAttribute("aria-describedby", `${id}:hint ${id}:refused`);
     const name = field.key.slice(field.key.lastIndexOf(".") + 1);
     const label = field.kind === "names" ? element("span", name, { id: `${id}:name` }) : element("label", name, { for: id });
     const standard = button("Default", () => set(null), `Default of ${field.key}`);
     const row = element("div", "", { class: "field" });
-    row.append(label, input, standard, element("p", field.meaning, { class: "hint", id: `${id}:hint` }), error);
+    row.append(label, input, standard, element("p", field.meaning, { class: "hint", id: `${id}:hint` }), more, error);
     this.updates.push((fields) => {
       const now = fields.get(field.key);
       row.classList.toggle("given", now.value !== null);

@@ -2,7 +2,7 @@
 
 import { Refused, getJson, postJson } from "/page/server.js";
 import { button, commandRows, element, table } from "/page/elements.js";
-import { COLOURS, ROTATION, chart, mark } from "/page/charts.js";
+import { MOST_SERIES, ROTATION, chart, mark, styleOf } from "/page/charts.js";
 import { fixed } from "/page/geometry.js";
 
 const byId = (id) => document.getElementById(id);
@@ -81,8 +81,8 @@ export class TrainingPanel {
     clearTimeout(this.timer);
   }
 
-  colour(name) {
-    return COLOURS[this.chosen.indexOf(name)];
+  style(name) {
+    return styleOf(this.chosen.indexOf(name));
   }
 
   table() {
@@ -118,10 +118,10 @@ export class TrainingPanel {
     const { name, step, steps, last, finished, error } = training;
     const choice = element("input", "", { type: "checkbox", id: `training-of-${name}` });
     choice.checked = this.chosen.includes(name);
-    choice.disabled = !choice.checked && this.chosen.length >= COLOURS.length;
+    choice.disabled = !choice.checked && this.chosen.length >= MOST_SERIES;
     choice.addEventListener("change", () => this.choose(choice.checked ? [...this.chosen, name] : this.chosen.filter((other) => other !== name)));
     const label = element("label", ` ${name}`, { for: choice.id });
-    if (choice.checked) label.prepend(" ", mark(this.colour(name)));
+    if (choice.checked) label.prepend(" ", mark(this.style(name)));
     const first = element("span");
     first.append(choice, label);
     let errors = "";
@@ -153,7 +153,7 @@ export class TrainingPanel {
     }
     const drawn = CURVES.flatMap(({ tag, title, y }) => {
       const series = this.chosen.map((name) => ({
-        colour: this.colour(name),
+        style: this.style(name),
         points: (this.logs.get(name)?.rows ?? []).filter((row) => typeof row[tag] === "number").map((row) => ({ x: row.step, y: row[tag] })),
       }));
       return this.figure(title, { x: "step", y }, series);
@@ -174,8 +174,8 @@ export class TrainingPanel {
     try {
       this.errors.set(name, await postJson("training/errors", { run: name }));
       this.worstOf = name;
-      // Of eight that are chosen, the last one gives way.
-      if (!this.chosen.includes(name)) await this.choose([...this.chosen.slice(0, COLOURS.length - 1), name]);
+      // Of as many as can be told apart, the last one gives way.
+      if (!this.chosen.includes(name)) await this.choose([...this.chosen.slice(0, MOST_SERIES - 1), name]);
       this.drawErrors();
       if (!this.visible) return;
       this.actions.tell("");
@@ -194,12 +194,12 @@ export class TrainingPanel {
     const rows = known.map((name) => {
       const { n, mae, spearman, accuracy, diagnostic_accuracy, sensitivity, specificity } = this.errors.get(name).evaluation.images;
       const first = element("span", ` ${name}`);
-      first.prepend(mark(this.colour(name)));
+      first.prepend(mark(this.style(name)));
       return [first, String(n), number(mae), number(spearman), ...[accuracy, diagnostic_accuracy, sensitivity, specificity].map(percent)];
     });
     byId("error-table").replaceChildren(table(["Training", "Images", "MAE", "r_s", "Accuracy", "Diagnostic", "Sensitivity", "Specificity"], rows));
     const curve = (key) => known.map((name) => ({
-      colour: this.colour(name),
+      style: this.style(name),
       points: this.errors.get(name).evaluation[key].map(([x, y]) => ({ x, y })),
     }));
     byId("error-charts").replaceChildren(

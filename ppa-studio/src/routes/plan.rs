@@ -14,7 +14,6 @@ use serde::{Deserialize, Serialize};
 use super::answer::work;
 use crate::error::StudioError;
 use crate::plan_file::PlanFile;
-use crate::plan_files::FilesBeside;
 use crate::plan_form::{Field, fields};
 use crate::plan_limbs::{LimbChange, cases_beside};
 use crate::state::State;
@@ -153,7 +152,7 @@ fn plan_form(state: &State) -> Result<PlanForm, StudioError> {
             &text,
             // A rig that cannot be read is reported where it is used.
             plan.depth.cameras().ok().as_ref(),
-            &FilesBeside::of(file.folder())?,
+            &state.plan_files.beside(file.folder())?,
         )?,
         materials: plan
             .xray

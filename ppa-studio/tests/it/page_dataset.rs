@@ -50,6 +50,13 @@ fn an_outlier_is_shown_and_opened_in_its_pose() {
         )
         .await;
 
+        // As many series as the legend has look different, also without colours that repeat.
+        let looks = "import('/page/charts.js').then(({ MOST_SERIES, styleOf }) => { \
+                     const all = Array.from({ length: MOST_SERIES }, (_, n) => JSON.stringify(styleOf(n))); \
+                     const shapes = new Set(Array.from({ length: MOST_SERIES / 8 }, (_, n) => styleOf(8 * n).shape)); \
+                     return [new Set(all).size, shapes.size, styleOf(MOST_SERIES).colour === styleOf(0).colour]; })";
+        assert_eq!(page.value(looks).await, json!([32, 4, true]));
+
         // A point of a chart is a pose; so is an angle that is typed.
         page.click(".chart .pose").await;
         page.wait("document.getElementById('pose').dataset.step === '0'")

@@ -122,10 +122,18 @@ fn cameras_and_materials_are_chosen_and_written_out() {
         let folder = tempfile::tempdir().unwrap();
         let file = plan(folder.path());
         let rig = write_files(folder.path());
+        let text = std::fs::read_to_string(folder.path().join("small.rig.json")).unwrap();
+        std::fs::write(folder.path().join("cut.rig.json"), &text[..text.len() / 2]).unwrap();
         let page = Page::of(folder, &file).await;
         page.click("#tab-generation").await;
         let field = |key: &str| format!("document.getElementById('plan:{key}')");
         page.wait(&format!("!!{}", field("depth.rig"))).await;
+        // A rig that cannot be read is named with the reason.
+        page.wait(&format!(
+            "/^cut.rig.json cannot be read: .*line 1/.test({}.textContent)",
+            field("depth.rig:unreadable")
+        ))
+        .await;
         let open = "document.querySelectorAll('#plan-form details').forEach((group) => { group.open = true; })";
         page.client.execute(open, vec![]).await.unwrap();
 

@@ -5,6 +5,7 @@ use serde_json::json;
 
 use crate::chromium::{Page, run};
 use crate::live::{watching, write_frames};
+use crate::networks::networks;
 use crate::page_access::{FAINT, NAMELESS};
 use crate::trainings::folder_of_trainings;
 
@@ -51,6 +52,50 @@ fn trainings_are_compared_and_their_errors_shown() {
         assert_eq!(page.value(FAINT).await, json!([]));
         page.fill("#training-filter", "stop").await;
         page.wait(&format!("{count}.startsWith('1 of 3')")).await;
+        page.close().await;
+    });
+}
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn more_than_eight_trainings_look_different() {
+    run(async {
+        let folder = tempfile::tempdir().unwrap();
+        let runs = folder.path().join("runs");
+        for number in 0..18 {
+            let training = runs.join(format!("run-{number:02}"));
+            std::fs::create_dir_all(&training).unwrap();
+            std::fs::copy(
+                networks().left.join("config.toml"),
+                training.join("config.toml"),
+            )
+            .unwrap();
+            let row = |step: i32| {
+                let loss = (f64::from(number) + 2.0) / f64::from(step + 4);
+                format!("{{\"step\":{step},\"seconds\":0.5,\"training/loss\":{loss}}}\n")
+            };
+            let log: String = (1..12).map(row).collect();
+            std::fs::write(training.join("log.jsonl"), log).unwrap();
+        }
+        let page = Page::of(folder, &runs).await;
+        let boxes = "document.querySelectorAll('#training-table input')";
+        page.wait(&format!("{boxes}.length === 18")).await;
+        let choose = "document.querySelectorAll('#training-table input').forEach((box) => { \
+                      const now = document.getElementById(box.id); if (!now.checked) now.click(); })";
+        page.client.execute(choose, vec![]).await.unwrap();
+        let looks = "[...document.querySelectorAll('#training-charts figure:first-child polyline')] \
+                     .map((line) => line.getAttribute('stroke') + line.getAttribute('stroke-dasharray'))";
+        page.wait(&format!(
+            "{looks}.length === 18 && new Set({looks}).size === 18"
+        ))
+        .await;
+        page.picture("training_many").await;
+        let place = "document.getElementById('training-charts').scrollIntoView()";
+        page.client.execute(place, vec![]).await.unwrap();
+        page.picture("training_many_charts").await;
+        page.client.set_window_size(600, 900).await.unwrap();
+        page.client.execute(place, vec![]).await.unwrap();
+        page.picture("training_many_narrow").await;
         page.close().await;
     });
 }

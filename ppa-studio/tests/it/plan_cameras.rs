@@ -81,6 +81,15 @@ fn files_are_offered_where_they_can_be_read() {
         assert_eq!(field["kind"], "file");
         field["names"].clone()
     };
+    // A table that cannot be read is named with the reason; JSON that is no rig is another file.
+    let unreadable = |key: &str| field(&form, key)["unreadable"].clone();
+    assert_eq!(unreadable("depth.rig"), json!([]));
+    let reason = &unreadable("xray.calibration_file")[0];
+    assert_eq!(reason[0], "odd.toml");
+    assert!(
+        reason[1].as_str().unwrap().contains("has no density knots"),
+        "{reason}"
+    );
     let rig = json!([["small.rig.json", "both 320 x 288 pixels"]]);
     assert_eq!(offered("depth.rig"), rig);
     let table = json!([["water.toml", "air, water"]]);
