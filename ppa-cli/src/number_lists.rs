@@ -3,7 +3,7 @@
 use nalgebra::Point3;
 use ppa_core::Roi;
 use ppa_dataset::labels::BoneNumbers;
-use ppa_mesh::{Bump, VoxelBox};
+use ppa_mesh::{Ball, Bump, VoxelBox};
 
 fn finite<const N: usize>(text: &str) -> Option<[f64; N]> {
     let numbers: Option<Vec<f64>> = text
@@ -30,6 +30,15 @@ pub fn bump(text: &str) -> Result<Bump, String> {
         centre: Point3::new(x, y, z),
         height_mm,
         sigma_mm,
+    })
+}
+
+/// `X,Y,Z,RADIUS`, mm.
+pub fn ball(text: &str) -> Result<Ball, String> {
+    let [x, y, z, radius_mm] = numbers(text)?;
+    Ok(Ball {
+        centre_mm: [x, y, z],
+        radius_mm,
     })
 }
 

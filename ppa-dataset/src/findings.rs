@@ -39,6 +39,8 @@ pub enum FindingCode {
     OtherLimbOnSide,
     /// A person kept a further body as a part of the limb.
     BodyKept,
+    /// A person removed a part of the scan.
+    PartRemoved,
     /// The limb is too thin or too short for one.
     LimbTooSmall,
     /// The limb is too thick for one: a trunk.

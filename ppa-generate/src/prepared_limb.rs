@@ -74,6 +74,7 @@ impl PreparedLimb {
             .map(of_warning)
             .chain(several_limbs(&limb.report))
             .chain(bodies_kept(&limb.report))
+            .chain(part_removed(&limb.report, surface))
             .chain(other_on_side(&limb.report, side, surface))
             .chain(cuts(&limb.walls, &limb.mesh, &landmarks))
             .chain(gates::findings(&volume, &limb, &landmarks)?)
@@ -171,6 +172,23 @@ fn bodies_kept(report: &LimbReport) -> Option<Finding> {
         ),
         value: Some(1e3 * millilitres),
         place_mm: Some(largest.point_mm()),
+    })
+}
+
+/// That something was cut off.
+fn part_removed(report: &LimbReport, settings: &LimbSettings) -> Option<Finding> {
+    let balls = settings.removed.iter();
+    let largest = balls.max_by(|a, b| a.radius_mm.total_cmp(&b.radius_mm))?;
+    let millilitres = report.removed_mm3 * 1e-3;
+    let balls = ppa_core::text::count_as(settings.removed.len(), "ball", "balls");
+    Some(Finding {
+        code: FindingCode::PartRemoved,
+        severity: Severity::Caution,
+        text: format!(
+            "{millilitres:.0} ml of tissue in {balls} are removed, as surface.removed of the case says: where that cuts the limb, its surface is not skin"
+        ),
+        value: Some(report.removed_mm3),
+        place_mm: Some(largest.centre_mm),
     })
 }
 

@@ -32,8 +32,8 @@ pub use dbscan::{Clusters, dbscan};
 pub use displacement::Displacement;
 pub use estimate_normals::{CloudError, estimate_normals, mean_spacing_mm};
 pub use limb::{
-    Body, CutFace, CutWalls, Limb, LimbError, LimbReport, LimbSettings, VoxelBox, WallMeasure,
-    extract_limb, toggle_body,
+    Ball, Body, CutFace, CutWalls, Limb, LimbError, LimbReport, LimbSettings, VoxelBox,
+    WallMeasure, extract_limb, toggle_body,
 };
 pub use mesh::{Mesh, PointCloud};
 pub use mesh_file::{

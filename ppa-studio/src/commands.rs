@@ -151,6 +151,14 @@ pub(crate) fn of_case(case: &Case, out: &Path) -> Commands {
     for point in &surface.kept {
         let _ = write!(line, " --keep={}", list(point));
     }
+    for ball in &surface.removed {
+        let _ = write!(
+            line,
+            " --remove={},{}",
+            list(&ball.centre_mm),
+            ball.radius_mm
+        );
+    }
     line += &of_choices(&case.choices);
     if let Some(bones) = &case.bones {
         line += &of_bones(bones);

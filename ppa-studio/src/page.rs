@@ -20,6 +20,7 @@ const FILES: &[(&str, &str)] = &[
     ("whatif.js", include_str!("page/whatif.js")),
     ("scan.js", include_str!("page/scan.js")),
     ("crop.js", include_str!("page/crop.js")),
+    ("cuts.js", include_str!("page/cuts.js")),
     ("bodies.js", include_str!("page/bodies.js")),
     ("cameras.js", include_str!("page/cameras.js")),
     ("room.js", include_str!("page/room.js")),

@@ -62,9 +62,12 @@ fn dilated(size: [usize; 3], mut mask: Vec<bool>) -> Vec<bool> {
         // Lines along the axis lie in blocks of `count` layers of `stride` voxels.
         let block = stride * count;
         for (grown, before) in mask.chunks_mut(block).zip(before.chunks(block)) {
-            for (at, grown) in grown.iter_mut().enumerate() {
-                *grown |= at >= stride && before[at - stride]
-                    || at + stride < block && before[at + stride];
+            let (lower, upper) = (&before[..block - stride], &before[stride..]);
+            for (grown, before) in grown[stride..].iter_mut().zip(lower) {
+                *grown |= before;
+            }
+            for (grown, before) in grown.iter_mut().zip(upper) {
+                *grown |= before;
             }
         }
     }

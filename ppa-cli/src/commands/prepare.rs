@@ -10,13 +10,13 @@ use ppa_dataset::Severity;
 use ppa_dataset::labels::{BoneFile, BoneNumbers};
 use ppa_generate::{Case, Found, prepare};
 use ppa_label::{check_bones, check_segmented_name, segment_checked_bones};
-use ppa_mesh::{LimbSettings, VoxelBox, write_mesh_file};
+use ppa_mesh::{Ball, LimbSettings, VoxelBox, write_mesh_file};
 use ppa_report::{case_picture, write_picture};
 use ppa_scene::{AxisSource, LandmarkOverrides, LimbKind, Side};
 
 use crate::commands::pictures::shown_name;
 use crate::interrupt::{NOTHING_WRITTEN, ends_at_once};
-use crate::number_lists::{bone_numbers, point, range, voxel_box};
+use crate::number_lists::{ball, bone_numbers, point, range, voxel_box};
 use crate::output::{Output, working};
 use crate::output_files::{MESH, NUMBERS, PICTURE, ReplaceArgs};
 use crate::scan_args::ScanArgs;
@@ -68,6 +68,9 @@ pub struct PrepareArgs {
     /// A point inside a further body to keep as a part of the limb, ct frame; may be given several times
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     keep: Vec<[f64; 3]>,
+    /// Cut off what lies in a ball, ct frame: its centre and radius, mm; may be given several times
+    #[arg(long, value_name = "X,Y,Z,RADIUS", value_parser = ball, allow_hyphen_values = true)]
+    remove: Vec<Ball>,
     /// Centre of the joint, ct frame
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     joint: Option<[f64; 3]>,
@@ -147,6 +150,7 @@ pub fn run(args: &PrepareArgs, output: Output) -> anyhow::Result<()> {
     let mut surface = LimbSettings {
         inside: args.inside,
         kept: args.keep.clone(),
+        removed: args.remove.clone(),
         crop: args.crop,
         ..LimbSettings::default()
     };

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use ppa_dataset::FindingCode;
 use ppa_generate::{Case, Plan, PlanCase, PreparedLimb};
 use serde_json::Value;
 
@@ -69,6 +70,41 @@ fn kept_bodies_are_named_in_the_case() {
         &format!("{prepare} --keep=0,0,9000 --out air.case.toml"),
     );
     contains(&said, &["(0, 0, 9000) mm", "is not in solid tissue"]);
+}
+
+#[test]
+fn a_removed_ball_is_named_in_the_case() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    own_case(folder);
+    let case = |name: &str| Case::read(&folder.join(name)).unwrap();
+    let leg = PreparedLimb::of_case(&case("leg.case.toml")).unwrap();
+    // The tip of the foot: the vertex farthest to the front.
+    let vertices = leg.limb.mesh.vertices.iter();
+    let tip = vertices.min_by(|a, b| a.y.total_cmp(&b.y)).unwrap();
+    let [x, y, z] = [tip.x, tip.y, tip.z].map(|c| c.round());
+    let prepare = "prepare p01.nii --side r --no-picture";
+    succeed(
+        folder,
+        &format!("{prepare} --remove={x},{y},{z},12 --out cut.case.toml"),
+    );
+    let cut = case("cut.case.toml");
+    assert_eq!(cut.surface.removed.len(), 1);
+    let ball = cut.surface.removed[0];
+    let expected = [x, y, z].map(f64::from);
+    assert_eq!((ball.centre_mm, ball.radius_mm), (expected, 12.0));
+    let found = PreparedLimb::of_case(&cut).unwrap();
+    let finding = found.findings.iter();
+    let finding = finding.filter(|f| f.code == FindingCode::PartRemoved);
+    let values: Vec<f64> = finding.filter_map(|finding| finding.value).collect();
+    assert_eq!(values, [found.limb.report.removed_mm3]);
+    assert!(values[0] > 100.0, "{values:?}");
+    assert!(found.limb.report.limb_voxels < leg.limb.report.limb_voxels);
+    let said = fail(
+        folder,
+        &format!("{prepare} --remove={x},{y},{z},0 --out none.case.toml"),
+    );
+    contains(&said, &["removed[].radius_mm is 0", "positive"]);
 }
 
 #[test]

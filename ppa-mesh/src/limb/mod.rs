@@ -1,12 +1,13 @@
 //! The limb in a scan: its skin surface and the voxels inside, without couch, sheets and neighbours.
 //!
-//! In order: tissue is what exceeds the skin's HU; the couch is removed by its shape, which does not
+//! In order: in balls that a person removes there is air; tissue is what exceeds the skin's HU; the couch is removed by its shape, which does not
 //! change along the scan axis; what solid flesh encloses (air, marrow) counts as flesh; solid bodies
 //! are what remains of denser tissue after an erosion that sheets do not survive, separated where they
 //! only touch; the limb is the body that holds most bone; its skin is grown back to the tissue border,
 //! but not along what merely touches it; air enclosed by that belongs to it; and of the surface of it
 //! all, connectivity and DBSCAN keep one piece.
 
+mod balls;
 mod bodies;
 mod choice;
 mod cleaned;
@@ -35,7 +36,7 @@ use distance::{FAR_MM2, spread};
 use growth::{farthest_sq, fill_enclosed, grown_back, keep_largest, keep_largest_of};
 use lattice::Lattice;
 pub use report::{Body, CutFace, LimbReport};
-pub use settings::{LimbSettings, VoxelBox};
+pub use settings::{Ball, LimbSettings, VoxelBox};
 use tissue::{ENCLOSED, Tissue};
 pub use walls::{CutWalls, WallMeasure};
 
@@ -118,6 +119,8 @@ pub enum LimbError {
 
 /// Working memory for each voxel: 5.4 times those of 16 bits where a limb fills the scan, and the mask.
 const WORKING_BYTES: usize = 12;
+/// At most, for each voxel of a volume of which something is cut off.
+const BYTES_OF_COPY: usize = 4;
 
 /// Finds the limb of a scan.
 ///
@@ -226,6 +229,7 @@ fn check(settings: &LimbSettings) -> Result<(), LimbError> {
             });
         }
     }
+    balls::check(&settings.removed)?;
     if settings.core_hu < settings.iso_hu {
         return Err(LimbError::Setting {
             name: "core_hu",
@@ -237,6 +241,24 @@ fn check(settings: &LimbSettings) -> Result<(), LimbError> {
 }
 
 fn within(
+    volume: &Volume,
+    settings: &LimbSettings,
+    toggled: Option<[f64; 3]>,
+) -> Result<Limb, LimbError> {
+    if settings.removed.is_empty() {
+        return searched(volume, settings, toggled);
+    }
+    volume
+        .expect_room(WORKING_BYTES + BYTES_OF_COPY)
+        .map_err(LimbError::Memory)?;
+    let emptied = balls::without(volume, &settings.removed, settings.iso_hu);
+    let (emptied, removed_mm3) = emptied.map_err(LimbError::Memory)?;
+    let mut limb = searched(&emptied, settings, toggled)?;
+    limb.report.removed_mm3 = removed_mm3;
+    Ok(limb)
+}
+
+fn searched(
     volume: &Volume,
     settings: &LimbSettings,
     toggled: Option<[f64; 3]>,

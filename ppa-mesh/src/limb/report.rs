@@ -34,6 +34,10 @@ pub struct Body {
     pub inside_mm: Option<[f64; 3]>,
 }
 
+fn is_none(volume_mm3: &f64) -> bool {
+    *volume_mm3 == 0.0
+}
+
 impl Body {
     /// A point of the body to select it by, `ct` frame, mm.
     pub fn point_mm(&self) -> [f64; 3] {
@@ -61,6 +65,9 @@ pub struct LimbReport {
     /// Middle of that contact in the `ct` frame, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact_centre_mm: Option<[f64; 3]>,
+    /// Tissue within the balls of [`LimbSettings::removed`](super::LimbSettings::removed), mm³.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub removed_mm3: f64,
     /// Columns along the scan axis that are couch.
     pub couch_columns: usize,
     /// Voxels of couch removed.

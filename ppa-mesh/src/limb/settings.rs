@@ -12,6 +12,16 @@ pub struct VoxelBox {
     pub high: [usize; 3],
 }
 
+/// A ball of the scan.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ball {
+    /// Centre in the `ct` frame, mm.
+    pub centre_mm: [f64; 3],
+    /// Radius, mm.
+    pub radius_mm: f64,
+}
+
 /// Choices of [`extract_limb`](crate::extract_limb); the default suits limbs in diagnostic CT.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -28,6 +38,10 @@ pub struct LimbSettings {
     /// limb. Their voxels are those of the limb in all that follows.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub kept: Vec<[f64; 3]>,
+    /// Balls of the scan in which nothing is limb: they cut something off. Of what a cut separates, the limb is the body that is chosen.
+    /// A ball that the limb encloses on all sides stays limb, as any hollow does.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub removed: Vec<Ball>,
     /// Of several limbs alike, side by side in this direction of the `ct` frame, take the one farthest along it;
     /// when absent the one with the most bone.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -59,6 +73,7 @@ impl Default for LimbSettings {
             crop: None,
             inside: None,
             kept: Vec::new(),
+            removed: Vec::new(),
             towards: None,
             bone_hu: 200.0,
             core_hu: -250.0,

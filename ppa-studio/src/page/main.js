@@ -16,6 +16,7 @@ import { TrainingPanel } from "/page/training.js";
 import { LivePanel } from "/page/live.js";
 import { Bodies } from "/page/bodies.js";
 import { CropPanel, cropOf } from "/page/crop.js";
+import { CutPanel } from "/page/cuts.js";
 import { showScan, showSkin } from "/page/scan.js";
 import { drawRoom, roomFacts } from "/page/room.js";
 import { button, commandRows } from "/page/elements.js";
@@ -26,7 +27,7 @@ const STEPS = ["scan", "skin", "landmarks", "room", "whatif", "generation", "dat
 const OF_LIMB = STEPS.slice(0, 5);
 const WINDOWS = [["Soft tissue", 40, 400], ["Bone", 400, 1800], ["Skin", -300, 1200], ["All", 200, 3000]];
 
-const store = { doc: null, step: "scan", cursor: [0, 0, 0], window: { level: 200, width: 1600 }, showRemoved: true, cropping: false };
+const store = { doc: null, step: "scan", cursor: [0, 0, 0], window: { level: 200, width: 1600 }, showRemoved: true, cropping: false, ball: null };
 
 const actions = { change, choose, crop: (box) => change("surface", { crop: box && cropOf(store, box) }), redraw: () => slices.forEach((view) => view.draw()), cursor: setCursor, place: setPlace, window: setWindow, point: showReading, picked, fail, tell, room: showRoom, commands: showImageCommands, prediction: showPrediction };
 
@@ -34,6 +35,7 @@ const slices = [...document.querySelectorAll(".view[data-axis]")].map((figure) =
 const view3d = new View3d(byId("view3d"), actions);
 const landmarks = new LandmarkPanel(store, actions);
 const crop = new CropPanel(store, actions);
+const cuts = new CutPanel(store, { crosshair, place: setPlace, redraw: actions.redraw, remove: (removed) => change("surface", { removed }) });
 const shapes = new ShapePanel(store, { surface: () => showSurface(false).then(() => view3d.draw()).catch(fail) });
 const bodies = new Bodies(store, view3d, { change, fail });
 const whatIf = new WhatIfPanel(store, actions);
@@ -115,6 +117,7 @@ async function show(doc) {
   showScan(doc, actions);
   showSkin(doc, actions);
   crop.show();
+  cuts.show();
   landmarks.show();
   showCommands();
   slices.forEach((view) => view.update());
@@ -195,6 +198,11 @@ function setCursor(voxel) {
 // The crosshair at a place in the scan, mm.
 function setPlace(place) {
   setCursor(transform(inverse(store.doc.grid.ct_from_voxel), place));
+}
+
+// The place of the crosshair in the scan, mm.
+function crosshair() {
+  return transform(store.doc.grid.ct_from_voxel, store.cursor).map((x) => Math.round(10 * x) / 10);
 }
 
 function setWindow(next) {
@@ -369,7 +377,6 @@ function listen() {
     follow(Number(event.target.value));
   });
   byId("iso").addEventListener("change", (event) => change("surface", { iso_hu: Number(event.target.value) }));
-  const crosshair = () => transform(store.doc.grid.ct_from_voxel, store.cursor).map((x) => Math.round(10 * x) / 10);
   byId("limb-here").addEventListener("click", () => change("surface", { inside: crosshair() }));
   byId("body-here").addEventListener("click", () => change("body", { point: crosshair() }));
   byId("limb-find").addEventListener("click", () => change("surface", { inside: null }));

@@ -2,6 +2,7 @@
 
 import { getBytes } from "/page/server.js";
 import { box, drawCrop, grabCrop, moveCrop } from "/page/crop.js";
+import { drawCuts } from "/page/cuts.js";
 import { add, dot, inverse, scale, sub, transform } from "/page/geometry.js";
 
 // Nearer than this a pointer holds what it points to, CSS pixels.
@@ -119,6 +120,7 @@ export class SliceView {
     context.drawImage(this.image, l.x, l.y, l.w, l.h);
     this.drawCross(context, l);
     if (this.store.step === "landmarks" || this.store.step === "scan") this.drawLandmarks(context, l);
+    if (this.store.step === "skin") drawCuts(context, this, l);
     const crop = this.crops() && (this.held?.crop ?? box(this.store));
     if (crop) drawCrop(context, this, crop, l);
     this.drawLetters(context, width, height);

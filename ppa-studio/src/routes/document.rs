@@ -9,7 +9,7 @@ use axum::response::Response;
 use ppa_dataset::files::write_whole;
 use ppa_dataset::{Finding, FindingCode};
 use ppa_generate::{Case, SceneSetupError};
-use ppa_mesh::{LimbReport, VoxelBox};
+use ppa_mesh::{Ball, LimbReport, VoxelBox};
 use ppa_scene::{LandmarkOverrides, Landmarks, LimbKind, Side};
 use ppa_xray::TubeLoad;
 use serde::{Deserialize, Serialize};
@@ -36,6 +36,8 @@ pub(super) struct Document {
     inside: Option<[f64; 3]>,
     /// The part of the scan that is used, if not all.
     crop: Option<VoxelBox>,
+    /// Balls of the scan that are cut off.
+    removed: Vec<Ball>,
     /// The highest HU that the surface may have.
     core_hu: f64,
     choices: LandmarkOverrides,
@@ -110,6 +112,8 @@ pub(super) struct SurfaceChange {
     /// The part of the scan to look at, or `null` for all of it.
     #[serde(default, with = "double_option")]
     crop: Option<Option<VoxelBox>>,
+    /// Balls to cut off.
+    removed: Option<Vec<Ball>>,
 }
 
 /// Tells an absent key from `null`.
@@ -135,6 +139,7 @@ pub(super) async fn surface(
             case.surface.kept.clear();
         }
         case.surface.crop = change.crop.unwrap_or(case.surface.crop);
+        case.surface.removed = change.removed.unwrap_or(case.surface.removed);
         case.side = change.side.unwrap_or(case.side);
         case
     })
@@ -294,6 +299,7 @@ pub(super) fn document(state: &State) -> Result<Document, StudioError> {
         iso_hu: shown.case.surface.iso_hu,
         inside: shown.case.surface.inside,
         crop: shown.case.surface.crop,
+        removed: shown.case.surface.removed.clone(),
         core_hu: shown.case.surface.core_hu,
         choices: shown.case.choices.clone(),
         landmarks: prepared.landmarks.clone(),

@@ -135,6 +135,44 @@ fn a_kept_body_is_that_of_the_command_and_is_undone() {
     assert_eq!(kept_points(&state), 1);
 }
 
+#[test]
+fn a_removed_ball_is_that_of_the_command_and_is_undone() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, [x, y, z]) = with_block(folder.path());
+    let browser = Browser::of(folder, file);
+    let before = browser.get("/api/state").json();
+    // Half of the block.
+    let ball = json!({ "centre_mm": [x - 20.0, y, z], "radius_mm": 20.0 });
+    let remove = |balls: Value| browser.post("/api/surface", &json!({ "removed": balls }));
+    let state = remove(json!([ball])).json();
+    assert_eq!(state["removed"], json!([ball]));
+    let findings = state["findings"].as_array().unwrap();
+    assert!(findings.iter().any(|f| f["code"] == "part-removed"));
+    let command = state["commands"]["prepare"].as_str().unwrap();
+    let flag = format!(" --remove={},{y},{z},20", x - 20.0);
+    assert!(command.contains(&flag), "{command}");
+    let volume = |state: &Value| state["report"]["bodies"][1]["core_mm3"].as_f64().unwrap();
+    assert!(volume(&state) < 0.8 * volume(&before));
+    assert_eq!(
+        state["report"]["limb_voxels"],
+        before["report"]["limb_voxels"]
+    );
+    let edited = Case::read(&browser.folder.path().join("p01.edited.case.toml")).unwrap();
+    let again = PreparedLimb::of_case(&edited).unwrap();
+    let shown = serde_json::to_value(&again.limb.report).unwrap();
+    assert_eq!(state["report"], shown);
+    let state = browser.post("/api/undo", &json!({})).json();
+    assert_eq!(state["report"], before["report"]);
+    let none = json!({ "centre_mm": [x, y, z], "radius_mm": -1.0 });
+    let refused = remove(json!([none]));
+    assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
+    assert!(
+        refused.text().contains("radius_mm is -1"),
+        "{}",
+        refused.text()
+    );
+}
+
 /// The place of a point in the canvas in three dimensions, as the page first looks at the skin: 30 degrees wide, turned by -0.6 and
 /// 0.25 rad.
 fn on_screen(point: [f64; 3], skin: &ppa_mesh::Mesh, [width, height]: [f64; 2]) -> [f64; 2] {
@@ -260,9 +298,30 @@ fn a_body_is_kept_and_removed_by_buttons() {
             .await;
         page.click("#body-here").await;
         page.wait(&format!("{bodies}.includes('kept: ')")).await;
+
+        // A ball around the tip of a toe, where a click on the skin puts the crosshair.
+        let vertices = skin.vertices.iter();
+        let tip = vertices.min_by(|a, b| a.y.total_cmp(&b.y)).unwrap();
+        click(tip.cast::<f64>().into()).await.unwrap();
+        page.click("#cut summary").await;
+        page.slide("cut-radius", 15.0).await;
+        page.picture("skin_cut_preview").await;
+        page.click("#cut-here").await;
+        let cuts = "document.getElementById('cuts').textContent";
+        page.wait(&format!("{cuts}.includes('ball of 15 mm')"))
+            .await;
+        page.wait("document.getElementById('command-list').textContent.includes('--remove=')")
+            .await;
+        page.wait("!document.body.ariaBusy").await;
+        page.picture("skin_cut").await;
+        page.client.set_window_size(600, 900).await.unwrap();
+        page.picture("skin_cut_narrow").await;
+        page.client.set_window_size(1280, 800).await.unwrap();
+        page.click("#cuts [aria-label^='Put back']").await;
+        page.wait(&format!("{cuts} === ''")).await;
         page.client.set_window_size(600, 900).await.unwrap();
         page.picture("skin_kept_narrow").await;
-        page.click("#undo").await;
+        page.click("#bodies [aria-label^='Remove']").await;
         page.wait(&format!("!{bodies}.includes('kept: ')")).await;
         page.wait("!document.body.ariaBusy").await;
         page.picture("skin_removed_narrow").await;
