@@ -43,15 +43,21 @@ pub(crate) fn removed(
         });
     let outside: Vec<bool> = inside.iter().map(|inside| !inside).collect();
     let (near_limb, near_rest) = (dilated(size, inside), dilated(size, outside));
-    let hu = (0..grid.len()).into_par_iter().map(|at| {
-        match (near_limb[at], near_rest[at]) {
-            (false, _) => coarse.values().at(at),
-            (true, false) => 2.0 * iso_hu - coarse.values().at(at),
-            (true, true) => NOTHING_HU,
-        }
-        .max(NOTHING_HU)
-    });
-    Volume::new(grid.clone(), hu.collect())
+    let mut hu = coarse.hu().into_owned();
+    hu.par_chunks_mut(size[0])
+        .enumerate()
+        .for_each(|(row, line)| {
+            let voxels = row * size[0]..row * size[0] + line.len();
+            let sides = near_limb[voxels.clone()].iter().zip(&near_rest[voxels]);
+            for (hu, (near_limb, near_rest)) in line.iter_mut().zip(sides) {
+                *hu = match (near_limb, near_rest) {
+                    (false, _) => hu.max(NOTHING_HU),
+                    (true, false) => (2.0 * iso_hu - *hu).max(NOTHING_HU),
+                    (true, true) => NOTHING_HU,
+                };
+            }
+        });
+    Volume::new(grid.clone(), hu)
 }
 
 /// The mask and the voxels that share a face, an edge or a corner with it.
