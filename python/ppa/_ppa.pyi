@@ -411,6 +411,7 @@ def prepare(
     crop: Sequence[Sequence[int]] | None = None,
     inside: npt.ArrayLike | None = None,
     keep: npt.ArrayLike | None = None,
+    remove: npt.ArrayLike | None = None,
     joint: npt.ArrayLike | None = None,
     axis_source: Literal["bone", "limb"] | None = None,
     joint_region: npt.ArrayLike | None = None,

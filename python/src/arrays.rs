@@ -127,28 +127,32 @@ pub fn point(object: &Bound<'_, PyAny>, name: &str) -> PyResult<[f64; 3]> {
 
 /// Points, one in a row.
 pub fn points<const N: usize>(object: &Bound<'_, PyAny>, name: &str) -> PyResult<[[f64; 3]; N]> {
-    let rows = rows_of_three(object, name, N)?;
+    let rows = rows_of(object, name, N)?;
     Ok(rows.try_into().expect("as many as the shape holds"))
 }
 
-/// Any number of points, one in a row.
-pub fn point_list(object: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<[f64; 3]>> {
+/// Any number of rows of N finite numbers, such as points.
+pub fn row_list<const N: usize>(object: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<[f64; N]>> {
     // An empty list has no second dimension.
     match object.len() {
         Ok(0) => Ok(Vec::new()),
-        _ => rows_of_three(object, name, 0),
+        _ => rows_of(object, name, 0),
     }
 }
 
-/// Rows of three finite numbers; 0 rows stand for any number.
-fn rows_of_three(object: &Bound<'_, PyAny>, name: &str, rows: usize) -> PyResult<Vec<[f64; 3]>> {
-    let values = numbers(object, name, &[rows, 3])?;
+/// Rows of N finite numbers; 0 rows stand for any number.
+fn rows_of<const N: usize>(
+    object: &Bound<'_, PyAny>,
+    name: &str,
+    rows: usize,
+) -> PyResult<Vec<[f64; N]>> {
+    let values = numbers(object, name, &[rows, N])?;
     if let Some(bad) = values.iter().find(|value| !value.is_finite()) {
         return Err(PyValueError::new_err(format!(
             "{name} contains {bad}, expected finite numbers"
         )));
     }
-    let (rows, _) = values.as_chunks::<3>();
+    let (rows, _) = values.as_chunks::<N>();
     Ok(rows.to_vec())
 }
 

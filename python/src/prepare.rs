@@ -7,12 +7,12 @@ use ppa_ct::{Acquisition, ReadError, ReadOptions, Scan, Volume, WriteError, read
 use ppa_dataset::labels::{BoneFile, BoneNumbers};
 use ppa_generate::{Case, PrepareError, PreparedLimb, prepare_scan};
 use ppa_label::{CaseBonesError, check_bones, check_segmented_name, segment_checked_bones};
-use ppa_mesh::{LimbSettings, VoxelBox};
+use ppa_mesh::{Ball, LimbSettings, VoxelBox};
 use ppa_scene::LandmarkOverrides;
 use pyo3::exceptions::{PyFileExistsError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{finite, point, point_list, points};
+use crate::arrays::{finite, point, points, row_list};
 use crate::background::{Watch, run};
 use crate::case::PyCase;
 use crate::errors::OrRaise;
@@ -116,6 +116,8 @@ fn with_bones(
 ///     A point inside the wanted limb when the scan shows several, ct frame, mm.
 /// keep : array_like, shape (n, 3), optional
 ///     Points inside further bodies to keep as parts of the limb, ct frame, mm: a splint, or a part that only touches the limb.
+/// remove : array_like, shape (n, 4), optional
+///     Balls in which nothing is limb: centre, ct frame, mm, and radius, mm.
 /// joint : array_like, shape (3,), optional
 ///     Centre of the joint, ct frame, mm.
 /// axis_source : {"bone", "limb"}, optional
@@ -143,7 +145,7 @@ fn with_bones(
 /// -------
 /// Case
 #[pyfunction]
-#[pyo3(signature = (volume, side, *, limb=None, iso_hu=-500.0, crop=None, inside=None, keep=None, joint=None, axis_source=None, joint_region=None, calf_region=None, axis=None, anterior=None, plane=None, bones=None, bone_numbers=[3, 4, 1], segment_bones=None, replace=false, threads=None))]
+#[pyo3(signature = (volume, side, *, limb=None, iso_hu=-500.0, crop=None, inside=None, keep=None, remove=None, joint=None, axis_source=None, joint_region=None, calf_region=None, axis=None, anterior=None, plane=None, bones=None, bone_numbers=[3, 4, 1], segment_bones=None, replace=false, threads=None))]
 #[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub fn prepare(
     py: Python<'_>,
@@ -154,6 +156,7 @@ pub fn prepare(
     crop: Option<[[usize; 2]; 3]>,
     inside: Option<&Bound<'_, PyAny>>,
     keep: Option<&Bound<'_, PyAny>>,
+    remove: Option<&Bound<'_, PyAny>>,
     joint: Option<&Bound<'_, PyAny>>,
     axis_source: Option<&str>,
     joint_region: Option<&Bound<'_, PyAny>>,
@@ -177,7 +180,8 @@ pub fn prepare(
     let surface = LimbSettings {
         iso_hu,
         inside: inside.map(|inside| point(inside, "inside")).transpose()?,
-        kept: keep.map_or(Ok(Vec::new()), |keep| point_list(keep, "keep"))?,
+        kept: keep.map_or(Ok(Vec::new()), |keep| row_list(keep, "keep"))?,
+        removed: remove.map_or(Ok(Vec::new()), balls)?,
         crop: crop.map(|crop| VoxelBox {
             low: crop.map(|[low, _]| low),
             high: crop.map(|[_, high]| high),
@@ -236,4 +240,13 @@ pub fn prepare(
         Ok::<_, PreparationError>(PosableCase::new(case, kept, prepared))
     })?;
     PyCase::of(limb.or_raise()?)
+}
+
+fn balls(rows: &Bound<'_, PyAny>) -> PyResult<Vec<Ball>> {
+    let rows = row_list(rows, "remove")?;
+    let ball = |[x, y, z, radius_mm]: [f64; 4]| Ball {
+        centre_mm: [x, y, z],
+        radius_mm,
+    };
+    Ok(rows.into_iter().map(ball).collect())
 }

@@ -36,7 +36,7 @@ def test_cases(files: Files) -> None:
     assert other.read_bytes() == (files.folder / "mine.case.toml").read_bytes()
 
 
-def test_cases_with_kept_bodies(files: Files) -> None:
+def test_cases_with_other_bodies(files: Files) -> None:
     whole = ppa.Volume.read(files.scan)
     voxels = whole.voxels.copy()
     # A block in the air beside the limb.
@@ -54,6 +54,12 @@ def test_cases_with_kept_bodies(files: Files) -> None:
     assert len(kept.vertices) > len(limb.vertices)
     kept.joint = kept.joint
     assert len(kept.vertices) > len(limb.vertices), "another choice"
+    ball = (*limb.vertices[len(limb.vertices) // 2].tolist(), 12.0)
+    option = f"--remove={','.join(map(repr, ball))}"
+    command("prepare", scan, "--side", "r", option, "--no-picture", "--out", files.folder / "cut.case.toml")
+    cut = ppa.prepare(ppa.Volume.read(scan), "r", remove=[ball])
+    cut.save(files.folder / "my_cut.case.toml")
+    assert (files.folder / "cut.case.toml").read_bytes() == (files.folder / "my_cut.case.toml").read_bytes()
     for bad, says in [
         ([(0, 0, 9000)], "(0, 0, 9000) mm of a body to keep is not in solid tissue"),
         ((0.0, 0.0, 0.0), "keep has the shape (3,), expected (n, 3)"),
