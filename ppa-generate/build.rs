@@ -2,7 +2,7 @@
 //! physics data of the crates that make it, and the machine that they are compiled for.
 //!
 //! In a checkout these are files beside this crate. A published crate cannot see its neighbours; their versions, which stand
-//! in for their contents, and in any case those of the crates of others are added by `src/compiled.rs`.
+//! in for their contents, and in any case those of third-party crates are added by `src/compiled.rs`.
 
 use std::path::PathBuf;
 use std::{env, io};

@@ -116,8 +116,13 @@ impl ClusterReport {
         let made = shards.iter().map(|shard| shard.report.made).sum();
         let with = |state| states.get(&state).copied().unwrap_or(0);
         let (done, running) = (with(ShardState::Done), with(ShardState::Running));
-        let finished = (made, done as u64);
-        let core_hours = CoreHours::of(submission, finished, running, &folder.logs())?;
+        let is_done = |shard: &&ShardReport| shard.report.state == ShardState::Done;
+        let finished = shards.iter().filter(is_done);
+        let finished: Vec<&Path> = finished
+            .filter_map(|shard| logs.get(&shard.shard).map(|log| log.as_path()))
+            .collect();
+        let made_by = (made, done as u64);
+        let core_hours = CoreHours::of(submission, made_by, &finished, running, &folder.logs())?;
         let log = folder.last_log(&submission.work);
         let log = log.is_file().then_some(log);
         let is_done = folder.is_done()?;

@@ -40,16 +40,16 @@ pub(crate) fn of_poses(work: &PoseWork, cpus: u32) -> (ScriptBody, ScriptBody) {
         ),
     };
     // Analog histories of a pose, which take hours, are not followed again.
-    let (read_back, verify) = match work.cost.resumes {
-        true => (" --verify", String::new()),
+    let (checks, read_back, verify) = match work.cost.resumes {
+        true => ("reads back", " --verify", String::new()),
         false => {
             let plan = "--plan slurm/plan.toml --progress plain";
             let verify = format!("run \"$ppa\" --threads {cpus} verify dataset{ending} {plan}\n");
-            ("", verify)
+            ("verifies", "", verify)
         }
     };
     let last = ScriptBody {
-        title: format!("Merges {shards} shards and verifies the dataset."),
+        title: format!("Merges {shards} shards and {checks} the dataset."),
         number: OF_LAST,
         run: format!(
             "# This job starts after all tasks, failed ones included: the merge refuses shards that are missing.\n\

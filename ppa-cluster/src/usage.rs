@@ -1,6 +1,5 @@
 //! Core hours of tasks: those that ended tasks have used, by the line that each leaves in its log, and those of the estimate.
 
-use std::ffi::OsStr;
 use std::fs;
 use std::io;
 use std::path::Path;
@@ -32,19 +31,19 @@ pub struct Estimate {
 }
 
 impl CoreHours {
-    /// `made` are the poses, trainings or histories, and the tasks, that are done, `running` the tasks that run now, `logs` the folder of the
-    /// logs.
+    /// `made` are the poses, trainings or histories, and the tasks, that are done, `finished` the logs of these tasks, `running` the
+    /// tasks that run now, `logs` the folder of the logs.
     ///
     /// # Errors
     /// [`FolderError::File`] when the logs cannot be read.
     pub fn of(
         submission: &Submission,
         made: (u64, u64),
+        finished: &[&Path],
         running: usize,
         logs: &Path,
     ) -> Result<Self, FolderError> {
         let cores = running as f64 * f64::from(submission.settings.cpus);
-        let used_s = used_core_s(logs, |_| true)?;
         let estimate = match &submission.work {
             Work::Poses(work) => {
                 let cpu_s = |poses: u64, shards: u64| {
@@ -64,16 +63,18 @@ impl CoreHours {
                 })
             }),
             Work::Trainings(_) => {
-                let last = format!("{}.log", submission.work.last_name());
-                let mean_s = used_core_s(logs, |name| *name != *last)? / made.1.max(1) as f64;
+                let mut of_finished_s = 0.0;
+                for log in finished {
+                    of_finished_s += core_s_of(log)?;
+                }
+                let mean_s = of_finished_s / finished.len().max(1) as f64;
                 let all = submission.work.tasks();
                 let cpu_s = |_, tasks: u64| mean_s * tasks as f64;
-                let is_known = made.1 > 0 && mean_s > 0.0;
-                is_known.then(|| Estimate::of((all, all), made, cores, cpu_s))
+                (mean_s > 0.0).then(|| Estimate::of((all, all), made, cores, cpu_s))
             }
         };
         Ok(Self {
-            used: used_s / 3600.0,
+            used: used_core_s(logs)? / 3600.0,
             estimate,
         })
     }
@@ -118,8 +119,8 @@ pub(crate) fn core_s(line: &str) -> Option<f64> {
     Some(seconds as f64 * f64::from(cores))
 }
 
-/// Core seconds of the tasks whose logs have names that are `counted`.
-fn used_core_s(logs: &Path, counted: impl Fn(&OsStr) -> bool) -> Result<f64, FolderError> {
+/// Core seconds of all tasks that have ended.
+fn used_core_s(logs: &Path) -> Result<f64, FolderError> {
     let entries = match fs::read_dir(logs) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0.0),
         entries => entries.map_err(FolderError::at("read", logs))?,
@@ -127,16 +128,15 @@ fn used_core_s(logs: &Path, counted: impl Fn(&OsStr) -> bool) -> Result<f64, Fol
     let mut used = 0.0;
     for entry in entries {
         let path = entry.map_err(FolderError::at("read", logs))?.path();
-        if !path.file_name().is_some_and(&counted) {
-            continue;
-        }
-        let text = fs::read(&path).map_err(FolderError::at("read", &path))?;
-        used += String::from_utf8_lossy(&text)
-            .lines()
-            .filter_map(core_s)
-            .sum::<f64>();
+        used += core_s_of(&path)?;
     }
     Ok(used)
+}
+
+fn core_s_of(log: &Path) -> Result<f64, FolderError> {
+    let text = fs::read(log).map_err(FolderError::at("read", log))?;
+    let text = String::from_utf8_lossy(&text);
+    Ok(text.lines().filter_map(core_s).sum())
 }
 
 #[cfg(test)]
@@ -157,11 +157,8 @@ mod tests {
         fs::write(folder.path().join("shard_1.log"), log).unwrap();
         let log = format!("\u{fffd}job 3 ended\n{}", line("3", "1800"));
         fs::write(folder.path().join("merge.log"), log).unwrap();
-        assert_eq!(used_core_s(folder.path(), |_| true).unwrap(), 2.0 * 3600.0);
-        assert_eq!(
-            used_core_s(&folder.path().join("none"), |_| true).unwrap(),
-            0.0
-        );
+        assert_eq!(used_core_s(folder.path()).unwrap(), 2.0 * 3600.0);
+        assert_eq!(used_core_s(&folder.path().join("none")).unwrap(), 0.0);
     }
 
     #[test]
@@ -177,7 +174,7 @@ mod tests {
         submission.settings.cpus = 2;
         let logs = tempfile::tempdir().unwrap();
         let hours = |made, running| {
-            let hours = CoreHours::of(&submission, made, running, logs.path());
+            let hours = CoreHours::of(&submission, made, &[], running, logs.path());
             hours.unwrap().estimate.unwrap()
         };
         let begun = hours((0, 0), 0);
@@ -194,7 +191,7 @@ mod tests {
         let logs = tempfile::tempdir().unwrap();
         let mut submission = histories();
         let estimate = |submission: &Submission| {
-            let hours = CoreHours::of(submission, (500, 1), 1, logs.path());
+            let hours = CoreHours::of(submission, (500, 1), &[], 1, logs.path());
             hours.unwrap().estimate
         };
         assert_eq!(estimate(&submission), None);
@@ -213,11 +210,13 @@ mod tests {
     /// Of three trainings one is finished; another one was stopped after half an hour.
     #[test]
     fn trainings_are_estimated_from_those_that_are_finished() {
-        let logs = tempfile::tempdir().unwrap();
-        let hours =
-            |made, running| CoreHours::of(&trainings(), made, running, logs.path()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let logs = folder.path();
+        let hours = |made, finished: &[&Path], running| {
+            CoreHours::of(&trainings(), made, finished, running, logs).unwrap()
+        };
         assert_eq!(
-            serde_json::to_value(hours((0, 0), 1)).unwrap(),
+            serde_json::to_value(hours((0, 0), &[], 1)).unwrap(),
             serde_json::json!({"used": 0.0})
         );
         let line = |seconds: &str| ended_line(1).replace("$SECONDS", seconds);
@@ -226,13 +225,13 @@ mod tests {
             ("training_2", "1800"),
             ("tables", "360"),
         ] {
-            fs::write(logs.path().join(format!("{log}.log")), line(seconds)).unwrap();
+            fs::write(logs.join(format!("{log}.log")), line(seconds)).unwrap();
         }
-        let found = hours((1, 1), 2);
+        let found = hours((1, 1), &[&logs.join("training_1.log")], 2);
         assert!((found.used - 1.6).abs() < 1e-12);
         let estimate = found.estimate.unwrap();
-        assert!((estimate.estimated - 4.5).abs() < 1e-12, "{estimate:?}");
-        assert!((estimate.left - 3.0).abs() < 1e-12, "{estimate:?}");
+        assert!((estimate.estimated - 3.0).abs() < 1e-12, "{estimate:?}");
+        assert!((estimate.left - 2.0).abs() < 1e-12, "{estimate:?}");
         let cores = 2.0 * f64::from(trainings().settings.cpus);
         assert_eq!(estimate.left_hours, Some(estimate.left / cores));
     }

@@ -44,8 +44,10 @@ pub struct Archive {
     pub members: Vec<Member>,
     /// Bytes of the file.
     pub length: u64,
-    /// Whether there are blocks that belong to no member, other than zeros.
-    pub is_damaged: bool,
+    /// Where the first block is that belongs to no member and is not zero, bytes from the start of the archive.
+    pub damage: Option<u64>,
+    /// Whether it ends within a member.
+    is_torn: bool,
 }
 
 impl Archive {
@@ -53,21 +55,26 @@ impl Archive {
     ///
     /// # Errors
     /// [`FileError`] when the file cannot be read. Any bytes are accepted: those that are no members are reported by
-    /// [`Archive::is_damaged`].
+    /// [`Archive::damage`].
     pub fn scan(path: &Path) -> Result<Self, FileError> {
         let scanned = ppa_core::regular_file::open(path).and_then(|mut file| scan(&mut file));
-        let (members, length, is_damaged) = scanned.map_err(FileError::at("read", path))?;
+        let scanned = scanned.map_err(FileError::at("read", path))?;
         Ok(Self {
             path: path.to_owned(),
-            members,
-            length,
-            is_damaged,
+            ..scanned
         })
     }
 
     /// Whether it ends as [`ArchiveWriter::finish`] ends an archive whose last member ends at `end`.
     pub fn ends_after(&self, end: u64) -> bool {
         self.length == end + END_BLOCKS * BLOCK
+    }
+
+    /// Whether blocks of zeros end it, as in each archive that a program has completed.
+    pub fn is_closed(&self) -> bool {
+        let end = self.members.last().map_or(0, Member::end);
+        let is_followed = self.is_torn || self.damage.is_some_and(|at| at >= end);
+        !is_followed && self.length >= end + END_BLOCKS * BLOCK
     }
 
     /// The file of the archive.
@@ -100,11 +107,11 @@ impl Archive {
     }
 }
 
-/// Members, length, and whether something is damaged.
-fn scan(file: &mut File) -> io::Result<(Vec<Member>, u64, bool)> {
+/// What an archive holds; its path is left empty.
+fn scan(file: &mut File) -> io::Result<Archive> {
     let length = file.metadata()?.len();
     let mut members = Vec::new();
-    let mut is_damaged = false;
+    let (mut damage, mut is_torn) = (None, false);
     let mut at = 0;
     while at + BLOCK <= length {
         file.seek(SeekFrom::Start(at))?;
@@ -112,7 +119,10 @@ fn scan(file: &mut File) -> io::Result<(Vec<Member>, u64, bool)> {
         file.read_exact(&mut block)?;
         let start = at + BLOCK;
         match header(&block) {
-            Some((_, size)) if size > length - start => break,
+            Some((_, size)) if size > length - start => {
+                is_torn = true;
+                break;
+            }
             Some((name, size)) => {
                 let member = Member {
                     name: name.unwrap_or_default(),
@@ -126,12 +136,20 @@ fn scan(file: &mut File) -> io::Result<(Vec<Member>, u64, bool)> {
             }
             // Headers begin at multiples of a block, so the next valid one is found after a damaged one.
             None => {
-                is_damaged |= block.iter().any(|byte| *byte != 0);
+                if block.iter().any(|byte| *byte != 0) {
+                    damage = damage.or(Some(at));
+                }
                 at = start;
             }
         }
     }
-    Ok((members, length, is_damaged))
+    Ok(Archive {
+        path: PathBuf::new(),
+        members,
+        length,
+        damage,
+        is_torn,
+    })
 }
 
 /// Name of the file, if it is one, and size of the data that follow a block; `None` unless the block is a header.
@@ -159,11 +177,15 @@ fn checksum(block: &[u8; BLOCK as usize]) -> u32 {
     sum(&block[..148]) + 8 * u32::from(b' ') + sum(&block[156..])
 }
 
+/// Whether a dataset of this path is an archive: its name ends in `.tar`, and it is no folder.
+pub fn is_archive(root: &Path) -> bool {
+    root.extension().is_some_and(|ending| ending == "tar") && !root.is_dir()
+}
+
 /// Refuses an archive where a dataset is to be read from a folder.
 pub(crate) fn require_folder(root: &Path) -> Result<(), FileError> {
-    let is_archive = root.extension().is_some_and(|ending| ending == "tar") && root.is_file();
     let extract = "it is an archive; extract it to a folder first, as with tar -xf";
-    match is_archive {
+    match is_archive(root) && root.exists() {
         true => Err(FileError::at("read", root)(io::Error::other(extract))),
         false => Ok(()),
     }
@@ -277,7 +299,7 @@ mod tests {
         });
         assert_eq!(found.collect::<Vec<_>>(), files());
         let (archive, _folder) = scanned(&bytes);
-        assert!(!archive.is_damaged);
+        assert_eq!(archive.damage, None);
         for (member, (name, bytes)) in archive.members.iter().zip(files()) {
             assert_eq!(
                 (&member.name, archive.read(member).unwrap()),
@@ -295,7 +317,7 @@ mod tests {
             let kept = whole.members.iter();
             let kept = kept.filter(|member| member.start + member.size <= length as u64);
             assert!(cut.members.iter().eq(kept), "{length}");
-            assert!(!cut.is_damaged, "{length}");
+            assert_eq!(cut.damage, None, "{length}");
         }
     }
 
@@ -311,7 +333,7 @@ mod tests {
                 let mut others = names(&whole);
                 others.remove(i);
                 assert_eq!(names(&damaged), others, "byte {byte} of {}", member.name);
-                assert!(damaged.is_damaged);
+                assert_eq!(damaged.damage, Some(member.start - BLOCK));
             }
         }
     }

@@ -13,11 +13,12 @@ use std::time::{Duration, Instant};
 use ppa_core::Part;
 use ppa_dataset::files::{FileError, remove_if_there};
 use ppa_dataset::stop::Stopped;
-use ppa_xray::{AnalogRun, AnalogSettings, AnalogTally, Radiograph, Stop};
+use ppa_xray::{AnalogRun, AnalogSettings, AnalogTally, Radiograph, Stop, TallyError};
 
 use crate::exposable_limb::PosedExposure;
 use crate::pose_error::PoseError;
 use crate::pose_id::PoseId;
+use crate::record::PoseJob;
 
 /// Time between two saved states of a tally: at most what a killed run loses of it.
 const SAVE_EVERY: Duration = Duration::from_secs(60);
@@ -29,23 +30,33 @@ pub(crate) struct AnalogHistories<'a> {
 }
 
 impl AnalogHistories<'_> {
-    /// The radiograph of a pose, which begins with the histories that an earlier run has followed. A tally of other settings
-    /// or a damaged one is replaced.
+    /// The radiograph of a pose, which begins with the histories that an earlier run of the same settings and code has followed.
+    /// A damaged tally is replaced.
     ///
     /// # Errors
-    /// [`PoseError::Stopped`] once the run is asked to stop; the histories are kept.
+    /// [`PoseError::Stopped`] once the run is asked to stop; the histories are kept. [`PoseError::Tally`] when they cannot be
+    /// read or saved.
     pub fn radiograph(
         &self,
-        pose: PoseId,
+        pose_job: &PoseJob,
         exposure: &PosedExposure,
         settings: &AnalogSettings,
     ) -> Result<Radiograph, PoseError> {
         let limb = exposure.limb;
         let (phantom, spectrum) = (limb.phantom.phantom(), &limb.spectrum);
         let run = AnalogRun::new(phantom, spectrum, &exposure.projection, settings)?;
-        let path = self.tally(pose);
-        let earlier = run.read(&path, Part::WHOLE);
-        let mut tally = earlier.unwrap_or_else(|_| run.tally(Part::WHOLE));
+        // The key covers the code, which the tally itself does not state.
+        let key = &pose_job.key()[..16];
+        let path = self
+            .folder
+            .join(format!("{}{key}.tally", prefix(pose_job.id())));
+        let mut tally = match run.read(&path, Part::WHOLE) {
+            Ok(tally) => tally,
+            Err(TallyError::Read { path, source }) if source.kind() != io::ErrorKind::NotFound => {
+                return Err(TallyError::Read { path, source }.into());
+            }
+            Err(_) => run.tally(Part::WHOLE),
+        };
         let mut saved = Instant::now();
         let mut failed = None;
         let is_asked = || self.stop.is_some_and(|stop| stop.load(Ordering::Relaxed));
@@ -75,22 +86,35 @@ impl AnalogHistories<'_> {
         Ok(tally.write(path)?)
     }
 
-    /// Removes the tally of a pose that is in its place.
+    /// Removes the tallies of a pose that is in its place.
     pub fn remove(&self, pose: PoseId) -> Result<(), FileError> {
-        remove_if_there(&self.tally(pose))
+        let prefix = prefix(pose);
+        let mut tallies = self.tallies().into_iter();
+        tallies.try_for_each(|name| match name.starts_with(&prefix) {
+            true => remove_if_there(&self.folder.join(name)),
+            false => Ok(()),
+        })
     }
 
-    /// Removes the folder if no pose is in progress.
-    pub fn remove_if_empty(&self) -> Result<(), FileError> {
-        match fs::remove_dir(&self.folder) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-            Err(error) if error.kind() == io::ErrorKind::DirectoryNotEmpty => Ok(()),
-            removed => removed.map_err(FileError::at("remove", &self.folder)),
+    /// Removes the tallies of all poses, those that are no longer planned included, and the folder if nothing else is in it.
+    pub fn remove_all(&self) {
+        // The dataset is complete: what cannot be removed takes space, but does no harm.
+        for name in self.tallies() {
+            let _ = fs::remove_file(self.folder.join(name));
         }
+        let _ = fs::remove_dir(&self.folder);
     }
 
-    fn tally(&self, pose: PoseId) -> PathBuf {
-        let name = pose.limb.unit_name(pose.step);
-        self.folder.join(format!("{name}.tally"))
+    fn tallies(&self) -> Vec<String> {
+        let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
+        let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+        names
+            .filter(|name| name.starts_with("patient_") && name.ends_with(".tally"))
+            .collect()
     }
+}
+
+/// How the names of the tallies of a pose begin.
+fn prefix(pose: PoseId) -> String {
+    format!("{}_", pose.limb.unit_name(pose.step))
 }

@@ -29,7 +29,7 @@ impl ArchivedDataset {
     /// [`FolderError`] when it cannot be read or holds something else.
     pub fn open(path: &Path) -> Result<Self, FolderError> {
         let archive = Archive::scan(path)?;
-        let current = current(&archive.members);
+        let current = current(&archive.members, archive.is_closed());
         if archive.length > 0 && !current.contains_key(DESCRIPTION_FILE) {
             return Err(FolderError::NotADataset(path.to_owned()));
         }
@@ -41,14 +41,16 @@ impl ArchivedDataset {
         self.current.is_empty()
     }
 
-    /// Whether it has bytes that belong to no member.
+    /// Whether it has bytes that belong to no member before the last one that counts. What follows that one is what a killed
+    /// run leaves.
     pub fn is_damaged(&self) -> bool {
-        self.archive.is_damaged
+        self.archive.damage.is_some_and(|at| at < self.end())
     }
 
     /// Whether it was written as a whole: it ends as archives do, after the lists of all poses and without other members.
     pub fn is_finished(&self) -> bool {
-        let is_whole = self.current.len() == self.archive.members.len() && !self.is_damaged();
+        let has_damage = self.archive.damage.is_some();
+        let is_whole = self.current.len() == self.archive.members.len() && !has_damage;
         is_whole && self.archive.ends_after(self.end()) && self.has(Manifest::FILE)
     }
 
@@ -102,7 +104,16 @@ impl ArchivedDataset {
         poses
     }
 
-    /// Writes all files below a temporary folder, without waiting for the disk.
+    /// Writes all files into a temporary folder, without waiting for the disk.
+    pub fn extracted(&self) -> Result<tempfile::TempDir, FileError> {
+        let temporary = std::env::temp_dir();
+        let folder = tempfile::tempdir();
+        let folder = folder.map_err(FileError::at("create a folder in", &temporary))?;
+        self.extract(folder.path())?;
+        Ok(folder)
+    }
+
+    /// Writes all files below a folder.
     pub fn extract(&self, to: &Path) -> Result<(), FileError> {
         let records = to.join(FOLDER);
         fs::create_dir_all(&records).map_err(FileError::at("create folder", &records))?;
@@ -123,8 +134,9 @@ fn recorded(file: &str) -> Option<PoseId> {
     PoseId::of_record(name)
 }
 
-/// Of each name the member that counts.
-fn current(members: &[Member]) -> BTreeMap<String, Member> {
+/// Of each name the member that counts. An archive that is closed was completed by a run or made by another program, in any
+/// order.
+fn current(members: &[Member], is_closed: bool) -> BTreeMap<String, Member> {
     let last_record = members
         .iter()
         .rposition(|one| recorded(&one.name).is_some());
@@ -150,8 +162,8 @@ fn current(members: &[Member]) -> BTreeMap<String, Member> {
                     .for_each(|image| add(&mut current, image));
             }
             add(&mut current, member);
-        } else if !(is_list(&member.name) && last_record.is_some_and(|last| i < last)) {
-            // Lists before a record do not list its pose.
+        } else if is_closed || !is_list(&member.name) || last_record.is_none_or(|last| i > last) {
+            // Of a run in progress, lists before a record do not list its pose.
             add(&mut current, member);
         }
     }

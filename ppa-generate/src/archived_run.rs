@@ -4,17 +4,17 @@
 //! system sees one file. A killed run loses the poses in progress; the next run extracts the others and resumes.
 
 use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use ppa_dataset::archive;
-use ppa_dataset::files::{FileError, write_whole};
+use ppa_dataset::files::FileError;
 use ppa_dataset::manifest::DESCRIPTION_FILE;
 
 use crate::archived_dataset::ArchivedDataset;
-use crate::dataset_lock::{FolderError, require_lock};
+use crate::dataset_lock::{FolderError, lock_archive};
 use crate::job::{JobError, Summary};
+use crate::keep_damaged::keep_damaged;
 use crate::limb_jobs::LimbJobs;
 use crate::part_file::{PART_FILE, read_part};
 use crate::planned::Planned;
@@ -64,18 +64,9 @@ impl<'a> ArchivedRun<'a> {
     }
 
     fn begin(path: &'a Path) -> Result<Self, FolderError> {
-        let folder = path.parent().filter(|above| !above.as_os_str().is_empty());
-        let folder = folder.unwrap_or(Path::new("."));
-        fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
-        let mut options = fs::OpenOptions::new();
-        let options = options.read(true).write(true).create(true).truncate(false);
-        let file = options.open(path).map_err(FileError::at("create", path))?;
-        require_lock(path, path, file.try_lock())?;
+        let file = lock_archive(path)?;
         let found = ArchivedDataset::open(path)?;
-        let temporary = std::env::temp_dir();
-        let scratch =
-            tempfile::tempdir().map_err(FileError::at("create a folder in", &temporary))?;
-        found.extract(scratch.path())?;
+        let scratch = found.extracted()?;
         Ok(Self {
             path,
             growing: Mutex::new(Growing {
@@ -206,23 +197,4 @@ fn names(root: &Path) -> Result<Vec<String>, FileError> {
     }
     names.retain(|name| *name != format!("{FOLDER}/lock"));
     Ok(names)
-}
-
-/// Gives an archive a second name under which it stays.
-fn keep_damaged(path: &Path) -> Result<PathBuf, FileError> {
-    let mut number = 1;
-    loop {
-        let mut name = path.as_os_str().to_owned();
-        name.push(format!(".damaged{number}"));
-        let kept = PathBuf::from(name);
-        match fs::hard_link(path, &kept) {
-            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
-            Ok(()) => return Ok(kept),
-            // Some file systems have no second names.
-            Err(_) => {
-                let bytes = fs::read(path).map_err(FileError::at("read", path))?;
-                return write_whole(&kept, &bytes).map(|()| kept);
-            }
-        }
-    }
 }

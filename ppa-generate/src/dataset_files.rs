@@ -5,11 +5,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use ppa_core::Part;
+use ppa_dataset::archive::is_archive;
 use ppa_dataset::files::FileError;
 use ppa_dataset::findings::Findings;
 use ppa_dataset::manifest::DESCRIPTION_FILE;
 
-use crate::archive_path::is_archive;
 use crate::archived_dataset::ArchivedDataset;
 use crate::dataset_lock::FolderError;
 use crate::part_file::{PART_FILE, part_of_text};
@@ -50,14 +50,8 @@ impl DatasetFiles {
 
     /// The files of an archive in a temporary folder; `None` for a folder.
     pub fn extracted(&self) -> Result<Option<tempfile::TempDir>, FileError> {
-        let Some(archive) = &self.archive else {
-            return Ok(None);
-        };
-        let temporary = std::env::temp_dir();
-        let folder =
-            tempfile::tempdir().map_err(FileError::at("create a folder in", &temporary))?;
-        archive.extract(folder.path())?;
-        Ok(Some(folder))
+        let archive = self.archive.as_ref();
+        archive.map(ArchivedDataset::extracted).transpose()
     }
 
     /// The folder or the archive.

@@ -5,12 +5,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use ppa_core::Part;
+use ppa_dataset::archive::is_archive;
 use ppa_dataset::checksums::Checksums;
 use ppa_dataset::files::FileError;
 use ppa_dataset::manifest::DESCRIPTION_FILE;
 use ppa_dataset::manifest::Manifest;
 
-use crate::archive_path::is_archive;
 use crate::pose_id::FOLDER;
 use crate::survey::DatasetDiffers;
 
@@ -130,8 +130,41 @@ fn lock_file(root: &Path) -> PathBuf {
     root.join(FOLDER).join("lock")
 }
 
+/// Opens an archive, which is created where it does not exist, and locks it for a run that writes.
+pub(crate) fn lock_archive(path: &Path) -> Result<fs::File, FolderError> {
+    let folder = path.parent().filter(|above| !above.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(FileError::at("create folder", folder))?;
+    loop {
+        let mut options = fs::OpenOptions::new();
+        let options = options.read(true).write(true).create(true).truncate(false);
+        let file = options.open(path).map_err(FileError::at("create", path))?;
+        require_lock(path, path, file.try_lock())?;
+        // Another run may have put a finished archive in its place between opening and locking.
+        if is_of_path(&file, path).map_err(FileError::at("read", path))? {
+            return Ok(file);
+        }
+    }
+}
+
+#[cfg(unix)]
+fn is_of_path(file: &fs::File, path: &Path) -> io::Result<bool> {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |found: fs::Metadata| (found.dev(), found.ino());
+    match fs::metadata(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        found => Ok(identity(found?) == identity(file.metadata()?)),
+    }
+}
+
+/// Other systems do not let a file be replaced while it is open.
+#[cfg(not(unix))]
+fn is_of_path(_: &fs::File, _: &Path) -> io::Result<bool> {
+    Ok(true)
+}
+
 /// Refuses a dataset whose lock file, of the given path, another process holds.
-pub(crate) fn require_lock(
+fn require_lock(
     root: &Path,
     file: &Path,
     tried: Result<(), fs::TryLockError>,

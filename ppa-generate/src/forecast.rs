@@ -294,7 +294,7 @@ mod tests {
 
     #[test]
     fn many_histories_are_extrapolated_from_few() {
-        let text = "version = 1\n[[case]]\nfile = \"leg.toml\"\n";
+        let text = "version = 1\n[[case]]\nfile = \"leg.toml\"\npatient = 0\n";
         let mut plan = Plan::of_text(text, Path::new("plan.toml")).unwrap();
         assert_eq!(measured_plans(&plan).len(), 1);
         let analog = ppa_xray::AnalogSettings::default();

@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use ppa_core::Part;
+use ppa_dataset::archive::is_archive;
 use ppa_dataset::files::FileError;
 use ppa_dataset::findings::{Finding, Findings};
 use ppa_dataset::layout::LimbId;
@@ -12,7 +13,6 @@ use ppa_dataset::stop::{Stopped, go_on};
 use ppa_scene::SweepError;
 
 use crate::analog_histories::AnalogHistories;
-use crate::archive_path::is_archive;
 use crate::archived_run::ArchivedRun;
 use crate::case::{Case, CaseError};
 use crate::description::{Description, Settings};
@@ -141,6 +141,9 @@ impl Default for GenerateSettings<'_> {
 /// killed resumes where it stopped. A pose is made again when its record is missing or damaged, or when one of its files
 /// is missing or altered; files that were altered are moved to `.ppa/altered`.
 ///
+/// Poses with analog radiographs are made one by one. Their histories are saved in `.ppa/histories`, or beside an archive in
+/// `NAME.tar.histories`, until the pose is complete.
+///
 /// A folder with poses that follow from something else (plan settings, case, code and physics data) or that the plan does
 /// not have is refused, unless `settings` ask to replace them. Then each of them stays until its successor is whole, and
 /// those without a successor until all others are.
@@ -199,6 +202,7 @@ fn generate_in(
         disk_limit: settings.disk_limit,
         replace: settings.replace,
         progress,
+        one_by_one: work.plan.xray.analog.is_some(),
         kept: &|pose, record| {
             kept(pose, record)?;
             histories.remove(pose)
@@ -213,7 +217,7 @@ fn generate_in(
         });
         Ok(make)
     })?;
-    histories.remove_if_empty().map_err(JobError::from)?;
+    histories.remove_all();
     Ok(summary)
 }
 
@@ -328,7 +332,7 @@ impl<'a> Work<'a> {
         })?;
         Ok(Box::new(move |pose_job| {
             posable
-                .make(pose_job.pose, root, histories)
+                .make(&pose_job, root, histories)
                 .map_err(|source| match source {
                     PoseError::Stopped(stopped) => stopped.into(),
                     source => GenerateError::Pose {

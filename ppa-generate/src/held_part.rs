@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use ppa_core::Part;
+use ppa_dataset::archive::is_archive;
 use ppa_dataset::manifest::DESCRIPTION_FILE;
 
-use crate::archive_path::is_archive;
 use crate::dataset_files::DatasetFiles;
 use crate::dataset_lock::FolderError;
 use crate::part_file::{PART_FILE, read_part};

@@ -120,6 +120,8 @@ pub(crate) struct Job<'a> {
     /// Whether poses of other settings are replaced, and those of other plans removed.
     pub replace: bool,
     pub progress: &'a (dyn Fn(Progress) + Sync),
+    /// Whether one pose is made after another, each on all threads. A thread that waits within a pose begins no other one then.
+    pub one_by_one: bool,
     /// Called after each pose that was made, once it is in its place.
     pub kept: &'a (dyn Fn(PoseId, &Record) -> Result<(), FileError> + Sync),
 }
@@ -145,12 +147,21 @@ impl Job<'_> {
                 unfinished.push((limb, missing));
             }
         }
-        for_each_limb(&unfinished, |_, (limb, missing)| {
-            let make = prepare(limb)?;
-            missing
-                .par_iter()
-                .try_for_each(|&pose| self.make(&limb.pose_job(pose), &make, &overview, &used))
-        })?;
+        if self.one_by_one {
+            for (limb, missing) in &unfinished {
+                let make = prepare(limb)?;
+                for &pose in missing {
+                    self.make(&limb.pose_job(pose), &make, &overview, &used)?;
+                }
+            }
+        } else {
+            for_each_limb(&unfinished, |_, (limb, missing)| {
+                let make = prepare(limb)?;
+                missing
+                    .par_iter()
+                    .try_for_each(|&pose| self.make(&limb.pose_job(pose), &make, &overview, &used))
+            })?;
+        }
         let made = unfinished.iter().map(|(_, missing)| missing.len()).sum();
         self.remove_others(&survey, &overview)
             .map_err(JobError::from)?;

@@ -12,7 +12,6 @@
 //! Synthetic Data Generation, MELBA 2026:027, doi:10.59275/j.melba.2026-c874.
 
 mod analog_histories;
-mod archive_path;
 mod archived_dataset;
 mod archived_run;
 mod case;
@@ -40,6 +39,7 @@ mod held_part;
 mod job;
 #[cfg(test)]
 mod job_trials;
+mod keep_damaged;
 mod limb_jobs;
 mod lists;
 #[cfg(test)]

@@ -40,6 +40,7 @@ fn twenty_thousand_poses_are_made_and_found_again() {
         disk_limit: Some(1),
         replace: false,
         progress,
+        one_by_one: false,
         kept: &|_, _| Ok(()),
     };
     let make = |_: &LimbJobs| {

@@ -6,16 +6,17 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use ppa_core::Part;
+use ppa_dataset::archive::is_archive;
 use ppa_dataset::files::{FileError, hex, write_whole};
 use ppa_dataset::manifest::{DESCRIPTION_FILE, FileRow};
 use ppa_dataset::stop::{Stopped, go_on};
 use sha2::{Digest, Sha256};
 
-use crate::archive_path::is_archive;
 use crate::dataset_files::DatasetFiles;
-use crate::dataset_lock::{FolderError, lock_existing};
+use crate::dataset_lock::{FolderError, lock_archive, lock_existing};
 use crate::differences::differences;
 use crate::job::{Job, JobError, Progress, Summary};
+use crate::keep_damaged::keep_damaged;
 use crate::limb_jobs::LimbJobs;
 use crate::lists::Lists;
 use crate::planned::Planned;
@@ -135,6 +136,7 @@ pub fn merge(
         disk_limit: None,
         replace,
         progress,
+        one_by_one: false,
         kept: &|_, _| Ok(()),
     };
     let staging = staging_folder(root);
@@ -270,13 +272,18 @@ impl Shards {
     ) -> Result<Summary, MergeError> {
         let pose_jobs = || limbs.iter().flat_map(LimbJobs::pose_jobs);
         progress(Progress::Total(pose_jobs().count()));
-        if root.exists() {
-            if let Some(records) = self.merged_before(limbs, root)? {
-                pose_jobs().for_each(|_| progress(Progress::Found));
-                return Ok(self.summary(limbs, records, 0));
-            }
-            if !replace {
-                return Err(MergeError::Exists(root.to_owned()));
+        let mut set_aside = Vec::new();
+        let exists = root.exists();
+        let _lock = exists.then(|| lock_archive(root)).transpose()?;
+        if exists {
+            match self.merged_before(limbs, root)? {
+                Merged::Whole(records) => {
+                    pose_jobs().for_each(|_| progress(Progress::Found));
+                    return Ok(self.summary(limbs, records, 0));
+                }
+                Merged::Damaged => set_aside.push(keep_damaged(root)?.display().to_string()),
+                Merged::Other if replace => {}
+                Merged::Other => return Err(MergeError::Exists(root.to_owned())),
             }
         }
         let records = RefCell::new(Vec::new());
@@ -299,27 +306,41 @@ impl Shards {
         };
         let stated = [(DESCRIPTION_FILE.to_owned(), description)];
         write_archive(root, &stated, poses, lists)?;
-        Ok(self.summary(limbs, records.into_inner(), pose_jobs().count()))
+        Ok(Summary {
+            set_aside,
+            ..self.summary(limbs, records.into_inner(), pose_jobs().count())
+        })
     }
 
-    /// The records of an archive that holds the merged dataset; `None` where it holds another one, or an unfinished one.
-    fn merged_before(
-        &self,
-        limbs: &[LimbJobs],
-        root: &Path,
-    ) -> Result<Option<Vec<Record>>, MergeError> {
-        lock_existing(root)?;
+    /// Compares an archive with the merged dataset: its records with the plan, images with their hashes, lists with the records.
+    fn merged_before(&self, limbs: &[LimbJobs], root: &Path) -> Result<Merged, MergeError> {
         let files = DatasetFiles::open(root)?;
-        if !files.is_finished_archive() || files.planned()?.text != self.planned.text {
-            return Ok(None);
+        if files.is_empty_archive() || files.planned()?.text != self.planned.text {
+            return Ok(Merged::Other);
         }
-        let pose_jobs = limbs.iter().flat_map(LimbJobs::pose_jobs);
-        let record = |pose_job: PoseJob| {
-            let found = files.look(pose_job.id())?;
-            let is_same = |record: &&Record| record.key == pose_job.key();
-            Ok(found.whole().filter(is_same).cloned())
-        };
-        pose_jobs.map(record).collect()
+        if !files.is_finished_archive() {
+            return Ok(Merged::Damaged);
+        }
+        let mut records = Vec::new();
+        for pose_job in limbs.iter().flat_map(LimbJobs::pose_jobs) {
+            match files.look(pose_job.id())? {
+                FoundRecord::Whole(record) if record.key == pose_job.key() => records.push(record),
+                _ => return Ok(Merged::Damaged),
+            }
+        }
+        let hash =
+            |file: &str| Ok::<_, FileError>(files.read(file)?.map(|b| hex(&Sha256::digest(b))));
+        for row in records.iter().flat_map(|record| &record.files) {
+            if hash(&row.file)?.as_deref() != Some(&*row.sha256) {
+                return Ok(Merged::Damaged);
+            }
+        }
+        for (file, text) in self.lists(limbs, records.clone()).files {
+            if files.read(&file)? != Some(text.into_bytes()) {
+                return Ok(Merged::Damaged);
+            }
+        }
+        Ok(Merged::Whole(records))
     }
 
     fn lists(&self, limbs: &[LimbJobs], records: Vec<Record>) -> Lists {
@@ -333,6 +354,16 @@ impl Shards {
         let lists = self.lists(limbs, records);
         Summary::new(pose_jobs, made, lists)
     }
+}
+
+/// What an archive that exists holds.
+enum Merged {
+    /// The merged dataset.
+    Whole(Vec<Record>),
+    /// The merged dataset, but damaged or incomplete.
+    Damaged,
+    /// Another dataset.
+    Other,
 }
 
 fn same_folder(a: &Path, b: &Path) -> bool {

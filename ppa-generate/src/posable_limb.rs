@@ -23,8 +23,8 @@ use crate::exposable_limb::{ExposableLimb, PosedExposure};
 use crate::off_detector::off_detector;
 use crate::plan::Plan;
 use crate::pose_error::PoseError;
-use crate::pose_id::PoseId;
 use crate::prepared_limb::PreparedLimb;
+use crate::record::PoseJob;
 use crate::scene_setup::{PlacedCamera, SceneSetup};
 use crate::seed::{Purpose, item_seed};
 use crate::shaped_skin::body_shape;
@@ -153,10 +153,11 @@ impl<'a> PosableLimb<'a> {
     /// Makes all images of one pose under `root`; `histories` keep those of an analog radiograph that is stopped.
     pub(crate) fn make(
         &self,
-        pose: PoseAngle,
+        pose_job: &PoseJob,
         root: &Path,
         histories: Option<&AnalogHistories>,
     ) -> Result<Images, PoseError> {
+        let pose = pose_job.pose;
         let mut files = Vec::new();
         let noise_seed = item_seed(self.plan.seed, Purpose::DepthNoise, self.id, pose.step);
         // The skin of the scan decides the pose of the radiograph and the regions of interest.
@@ -192,7 +193,7 @@ impl<'a> PosableLimb<'a> {
                 });
             }
         }
-        files.extend(self.radiograph(pose, &exposure, root, histories)?);
+        files.extend(self.radiograph(pose_job, &exposure, root, histories)?);
         let mut findings = self.limb.prepared.findings.clone();
         findings.extend(self.cuts_at(pose).and_then(|cuts| {
             let (skin, joint) = (&self.limb.prepared.limb.mesh, self.joint());
@@ -256,18 +257,17 @@ impl<'a> PosableLimb<'a> {
 
     fn radiograph(
         &self,
-        pose: PoseAngle,
+        pose_job: &PoseJob,
         exposure: &PosedExposure,
         root: &Path,
         histories: Option<&AnalogHistories>,
     ) -> Result<[FileRow; 2], PoseError> {
+        let pose = pose_job.pose;
         let cut = self.cuts_at(pose).map_or(0.0, PoseCuts::of_radiograph);
         let seed = item_seed(self.plan.seed, Purpose::Radiograph, self.id, pose.step);
         let radiograph = match (histories, self.plan.xray.analog) {
             (Some(histories), Some(settings)) => {
-                let (limb, step) = (self.id, pose.step);
-                let settings = settings.with_seed(seed);
-                histories.radiograph(PoseId { limb, step }, exposure, &settings)?
+                histories.radiograph(pose_job, exposure, &settings.with_seed(seed))?
             }
             _ => exposure.radiograph(seed)?,
         };

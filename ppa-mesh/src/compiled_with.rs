@@ -1,8 +1,8 @@
-//! Identities of the crates of others that decide results of this one.
+//! Identities of the third-party crates that decide results of this one.
 
 use std::any::TypeId;
 
-/// The compiler's identities of crates of others that this one is compiled with, for the code key of datasets: each changes with version,
+/// The compiler's identities of third-party crates that this one is compiled with, for the code key of datasets: each changes with version,
 /// features and profile of its crate and with the compiler, see `ppa-generate/src/compiled.rs`.
 pub fn compiled_with() -> Vec<TypeId> {
     vec![

@@ -125,8 +125,8 @@ fn meaning(path: &Path) -> Meaning {
     Some((kind, read.map_err(reason)))
 }
 
-/// Whether a file that cannot be read was meant as one of its kind: a rig holds `left` or `right`, a table `segment`. JSON that is none might
-/// be a rig.
+/// Whether a file that cannot be read was meant as one of its kind: a rig holds `left` or `right`, a table `segment`. Invalid JSON
+/// may be a damaged rig.
 fn looks_like(kind: Kind, path: &Path) -> bool {
     let Ok(text) = std::fs::read_to_string(path) else {
         return true;

@@ -23,7 +23,7 @@ shard, into a folder of its own; `ppa merge` joins them to the same bytes as one
   ppa generate plan.toml --shard 2/7 --out shard_2 --disk-limit 20GB
   ppa merge shard_1 shard_2 ... --out dataset --verify
 
-With --out NAME.tar the files of the dataset are put into one archive, for file systems that hold few files. Poses are made in \
+With --out NAME.tar the files of the dataset are put into one archive, for file systems with a limit on the number of files. Poses are made in \
 a temporary folder (TMPDIR) and added to the archive one by one. `ppa merge`, `ppa status` and `ppa verify` read archives; other \
 commands need the folder, which `tar -xf` extracts.
 

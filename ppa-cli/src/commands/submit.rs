@@ -43,8 +43,8 @@ pub enum SubmitCommand {
 
 For a plan, one pose of the first limb is made here to measure its time, unless --pose-seconds gives it. Poses are bundled \
 into shards of 20 to 40 minutes, or two thirds of --time where that is shorter; a plan that takes less is one shard. \
-DIR/shards/K holds shard K, DIR/dataset the merged and verified dataset; with --archive they are DIR/shards/K.tar and \
-DIR/dataset.tar, for file systems that hold few files. Before its time limit a task finishes the poses in \
+DIR/shards/K holds shard K, DIR/dataset the merged dataset, verified unless its engine is analog; with --archive they are DIR/shards/K.tar and \
+DIR/dataset.tar, for file systems with a limit on the number of files. Before its time limit a task finishes the poses in \
 progress and is requeued.
 
   ppa submit slurm experiments.toml --out jobs --cpus 4 --gres gpu:1 --time 8:00:00

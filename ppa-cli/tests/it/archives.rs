@@ -36,6 +36,12 @@ fn an_archive_extracts_to_the_dataset_in_a_folder() {
         succeed(here, "verify whole --plan plan.toml").replace("whole:", "whole.tar:")
     );
 
+    // An archive that tar made of a folder, in another order.
+    tar(here, &["-cf", "made_by_tar.tar", "-C", "whole", "."]);
+    let status = succeed(here, "status made_by_tar.tar");
+    assert!(status.contains("complete"), "{status}");
+    succeed(here, "verify made_by_tar.tar --plan plan.toml");
+
     // Shards in an archive of ppa, in a folder, and in an archive that tar made of a folder.
     succeed(here, "generate plan.toml --shard 1/3 --out 1.tar");
     succeed(here, "generate plan.toml --shard 2/3 --out 2");

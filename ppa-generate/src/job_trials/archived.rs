@@ -232,6 +232,19 @@ fn shards_of_both_kinds_are_merged_into_either() {
     assert_eq!(merged(&shards, &to_archive, false).unwrap().made, 20);
     assert!(fs::read(&to_archive).unwrap() == whole(&trial()));
     assert_eq!(merged(&shards, &to_archive, false).unwrap().made, 0);
+    // A damaged image of the merged archive is healed, and the damaged archive stays.
+    let whole = fs::read(&to_archive).unwrap();
+    let mut altered = whole.clone();
+    let image = whole
+        .windows(4)
+        .rposition(|four| four == b"\x89PNG")
+        .unwrap();
+    altered[image + 40] ^= 1;
+    fs::write(&to_archive, &altered).unwrap();
+    let healed = merged(&shards, &to_archive, false).unwrap();
+    assert_eq!((healed.made, healed.set_aside.len()), (20, 1));
+    assert!(fs::read(&to_archive).unwrap() == whole);
+    assert!(fs::read(folder.path().join("all.tar.damaged1")).unwrap() == altered);
     let into_itself = merged(&shards, &shards[0], true).unwrap_err().to_string();
     assert!(
         into_itself.contains("is one of the shards"),

@@ -17,6 +17,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use image::{ImageBuffer, Luma};
 use ppa_core::Part;
 use ppa_dataset::BodyShape;
+use ppa_dataset::archive::is_archive;
 use ppa_dataset::files::{FileError, sha256_of_file};
 use ppa_dataset::findings::{Finding, FindingCode, Severity};
 use ppa_dataset::layout::{LimbId, Side, View};
@@ -24,7 +25,6 @@ use ppa_dataset::manifest::{FileKind, FileRow, RoiFile, RoiRow};
 use ppa_scene::Sweep;
 use sha2::{Digest, Sha256};
 
-use crate::archive_path::is_archive;
 use crate::archived_run::ArchivedRun;
 use crate::job::{Job, JobError, MakePose, Summary};
 use crate::limb_jobs::{LimbJobs, PlannedLimb, jobs_of_part};
@@ -138,6 +138,7 @@ impl Trial {
             disk_limit: None,
             replace: self.replace,
             progress: &|_| {},
+            one_by_one: false,
             kept,
         };
         job.complete(|_| {

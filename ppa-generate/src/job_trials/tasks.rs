@@ -87,6 +87,7 @@ impl Tasks {
             disk_limit: None,
             replace: false,
             progress: &|_| {},
+            one_by_one: false,
             kept,
         };
         job.complete(|_| {

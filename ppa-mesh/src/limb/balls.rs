@@ -7,8 +7,10 @@ use super::lattice::Lattice;
 use super::settings::Ball;
 use super::{Hu, LimbError};
 
-/// HU of air, and of soft tissue above the iso value: the surface of a ball is as steep as that of skin.
+/// HU of what a ball removes.
 const AIR_HU: f32 = -1000.0;
+
+/// HU between the iso value and soft tissue, over a voxel: the surface of a ball is as steep as that of skin.
 const FLESH_HU: f64 = 550.0;
 
 /// The balls of the settings make sense.

@@ -34,15 +34,15 @@ pub struct Body {
     pub inside_mm: Option<[f64; 3]>,
 }
 
-fn is_none(volume_mm3: &f64) -> bool {
-    *volume_mm3 == 0.0
-}
-
 impl Body {
     /// A point of the body to select it by, `ct` frame, mm.
     pub fn point_mm(&self) -> [f64; 3] {
         self.inside_mm.unwrap_or(self.centre_mm)
     }
+}
+
+fn is_zero(volume_mm3: &f64) -> bool {
+    *volume_mm3 == 0.0
 }
 
 /// A face of the volume that cuts the limb.
@@ -66,7 +66,7 @@ pub struct LimbReport {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact_centre_mm: Option<[f64; 3]>,
     /// Tissue within the balls of [`LimbSettings::removed`](super::LimbSettings::removed), mm³.
-    #[serde(default, skip_serializing_if = "is_none")]
+    #[serde(default, skip_serializing_if = "is_zero")]
     pub removed_mm3: f64,
     /// Columns along the scan axis that are couch.
     pub couch_columns: usize,

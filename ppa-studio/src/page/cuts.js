@@ -36,7 +36,7 @@ function circle(context, view, l, { voxel, radius_mm }) {
 export class CutPanel {
   // `actions.remove` takes the balls to cut off, `actions.redraw` draws the slices again, `actions.crosshair` is a place in the scan, mm.
   constructor(store, actions) {
-    Object.assign(this, { store, actions });
+    Object.assign(this, { store, actions, shown: 0 });
     byId("cut-radius").addEventListener("input", () => this.changed());
     byId("cut").addEventListener("toggle", () => this.changed());
     byId("cut-here").addEventListener("click", () => {
@@ -61,6 +61,7 @@ export class CutPanel {
       item.append(button("Put back", () => this.actions.remove(balls.filter((_, other) => other !== number)), `Put back ${where}`));
       return item;
     }));
-    if (balls.length > 0) byId("cut").open = true;
+    if (balls.length > this.shown) byId("cut").open = true;
+    this.shown = balls.length;
   }
 }

@@ -14,7 +14,7 @@ const HINTS = {
 
 const MOST_PATIENT = 2 ** 32 - 1;
 
-// Each gives an element, how the value of a field, or none, is put into it, and what stands below its meaning, if anything.
+// Each gives an element, how the value of a field, or none, is put into it, and the note below its meaning, if there is one.
 const INPUTS = { name: nameInput, names: namesInput, file: fileInput, rows: rowsInput };
 
 // What holds where no file is chosen.

@@ -174,7 +174,7 @@ export class TrainingPanel {
     try {
       this.errors.set(name, await postJson("training/errors", { run: name }));
       this.worstOf = name;
-      // Of as many as can be told apart, the last one gives way.
+      // At the limit, the training that was chosen last is dropped.
       if (!this.chosen.includes(name)) await this.choose([...this.chosen.slice(0, MOST_SERIES - 1), name]);
       this.drawErrors();
       if (!this.visible) return;

@@ -107,13 +107,17 @@ impl Simulation {
     }
 }
 
+/// Materials and voxels whose doses are summed.
+fn sizes(simulation: &Simulation) -> [usize; 2] {
+    let voxels = simulation.dose_box();
+    let voxels = voxels.map_or(0, |voxels| voxels.size().iter().product());
+    [simulation.input().materials.len(), voxels]
+}
+
 impl ScanDose {
     /// No dose yet.
     pub fn new(simulation: &Simulation) -> Self {
-        let listed = simulation.input().materials.len();
-        let voxels = simulation
-            .dose_box()
-            .map_or(0, |voxels| voxels.size().iter().product());
+        let [listed, voxels] = sizes(simulation);
         Self {
             histories: 0,
             materials: vec![Sum::default(); listed],
@@ -148,13 +152,9 @@ impl ScanDose {
 
     /// Refuses a dose of other materials or voxels than those of the simulation.
     fn check(&self, simulation: &Simulation, dose: &Dose) -> Result<(), ScanDoseError> {
-        let begun = Self::new(simulation);
-        let sizes = |sums: &Self| [sums.materials.len(), sums.voxels.len()];
-        if sizes(self) != sizes(&begun) {
-            return Err(ScanDoseError::Sums {
-                found: sizes(self),
-                expected: sizes(&begun),
-            });
+        let (found, expected) = ([self.materials.len(), self.voxels.len()], sizes(simulation));
+        if found != expected {
+            return Err(ScanDoseError::Sums { found, expected });
         }
         let found: Vec<&str> = dose.materials.iter().map(|(name, _)| &**name).collect();
         let materials = simulation.phantom().materials().iter();
