@@ -196,7 +196,7 @@ pub(crate) fn require_folder(root: &Path) -> Result<(), FileError> {
 pub struct ArchiveWriter<W>(W);
 
 impl<W: Write> ArchiveWriter<W> {
-    /// Begins where `to` stands.
+    /// Writes from the current position of `to` on.
     pub fn new(to: W) -> Self {
         Self(to)
     }

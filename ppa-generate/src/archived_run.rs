@@ -35,7 +35,7 @@ struct Growing {
     file: fs::File,
     /// Where the next pose is written.
     end: u64,
-    /// `dataset.json` and `.ppa/part` as they stand in it.
+    /// `dataset.json` and `.ppa/part` as last written to it.
     stated: Vec<NamedBytes>,
 }
 
@@ -83,7 +83,7 @@ impl<'a> ArchivedRun<'a> {
         self.scratch.path()
     }
 
-    /// Adds a pose that stands in the folder, after the description that it belongs to.
+    /// Appends a pose of the folder to the archive, after `dataset.json` if that has changed.
     pub fn add(&self, pose: PoseId, record: &Record) -> Result<(), FileError> {
         let root = self.folder();
         let mut members = Vec::new();
@@ -145,7 +145,7 @@ impl<'a> ArchivedRun<'a> {
 }
 
 impl JobError {
-    /// Names the archive of a run in place of the folder in which it makes its poses.
+    /// Reports the path of the archive instead of the temporary folder.
     pub(crate) fn of_archive(mut self, run: &ArchivedRun) -> Self {
         match &mut self {
             Self::DiskLimit { root, .. } | Self::Folder(FolderError::OtherPart { root, .. }) => {

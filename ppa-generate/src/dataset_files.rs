@@ -1,4 +1,4 @@
-//! The files of a dataset or shard, which lie in a folder or in an archive, for reading.
+//! Reads the files of a dataset or shard from a folder or an archive.
 
 use std::fs;
 use std::io;
@@ -25,7 +25,7 @@ pub(crate) struct DatasetFiles {
 }
 
 impl DatasetFiles {
-    /// Looks at a folder or an archive.
+    /// Opens a folder or an archive.
     ///
     /// # Errors
     /// [`FolderError`] for an archive that cannot be read or holds something else.
@@ -59,7 +59,7 @@ impl DatasetFiles {
         &self.root
     }
 
-    /// Where a file lies, for messages.
+    /// Path of a file, for messages.
     pub fn path(&self, file: &str) -> PathBuf {
         self.root.join(file)
     }
@@ -78,8 +78,11 @@ impl DatasetFiles {
 
     /// Reads a file.
     pub fn required(&self, file: &str) -> Result<Vec<u8>, FileError> {
-        let absent = || FileError::at("read", &self.path(file))(io::ErrorKind::NotFound.into());
-        self.read(file)?.ok_or_else(absent)
+        self.read(file)?.ok_or_else(|| self.absent(file))
+    }
+
+    fn absent(&self, file: &str) -> FileError {
+        FileError::at("read", &self.path(file))(io::ErrorKind::NotFound.into())
     }
 
     fn text(&self, file: &str) -> Result<Option<String>, FileError> {
@@ -102,9 +105,9 @@ impl DatasetFiles {
 
     /// What the dataset is to hold.
     pub fn planned(&self) -> Result<Planned, FileError> {
-        let path = self.path(DESCRIPTION_FILE);
-        let absent = || FileError::at("read", &path)(io::ErrorKind::NotFound.into());
-        Planned::of_text(self.text(DESCRIPTION_FILE)?.ok_or_else(absent)?, &path)
+        let text = self.text(DESCRIPTION_FILE)?;
+        let text = text.ok_or_else(|| self.absent(DESCRIPTION_FILE))?;
+        Planned::of_text(text, &self.path(DESCRIPTION_FILE))
     }
 
     /// The part of its plan that it is to hold.
@@ -123,7 +126,7 @@ impl DatasetFiles {
         }
     }
 
-    /// What stands in the place of a pose's record.
+    /// Reads the record of a pose and reports whether it is whole, damaged or absent.
     pub fn look(&self, pose: PoseId) -> Result<FoundRecord, FileError> {
         let bytes = self.read(&pose.record_file())?;
         Ok(bytes.map_or(FoundRecord::Absent, |bytes| Record::of_bytes(bytes, pose)))

@@ -128,7 +128,7 @@ pub fn forecast(
         for pose in spread(&poses, of_limb, shift) {
             go_on(stop)?;
             let (mut seconds, mut files) = (Vec::new(), Vec::new());
-            for make in others.iter().chain([&make]) {
+            for make in [&make].into_iter().chain(&others) {
                 let begun = ProcessTime::now();
                 let images = make(limb.pose_job(pose))?;
                 seconds.push(begun.elapsed().as_secs_f64());
@@ -186,8 +186,8 @@ impl Forecast {
 /// Analog histories that are followed to measure the time of more.
 const MEASURED_HISTORIES: u64 = 2_000_000;
 
-/// The plan, or in place of one with many analog histories a plan with few and one with twice as many, to tell the time of the
-/// histories from that of everything else.
+/// The plans to measure: the plan itself, or for many analog histories one plan with few and one with twice as many, whose
+/// difference gives the time of the histories alone.
 fn measured_plans(plan: &Plan) -> Vec<Plan> {
     let Some(analog) = plan.xray.analog else {
         return vec![plan.clone()];
@@ -203,10 +203,10 @@ fn measured_plans(plan: &Plan) -> Vec<Plan> {
     vec![with(MEASURED_HISTORIES), with(2 * MEASURED_HISTORIES)]
 }
 
-/// Processor time of a pose, from that of the same pose in each of [`measured_plans`], the first plan last, seconds.
+/// Processor time of a pose, from that of the same pose in each of [`measured_plans`], seconds.
 fn pose_s(plan: &Plan, seconds: &[f64]) -> f64 {
     match (plan.xray.analog, seconds) {
-        (Some(analog), &[twice, few]) => {
+        (Some(analog), &[few, twice]) => {
             let more = analog.histories as f64 / MEASURED_HISTORIES as f64 - 1.0;
             few + (twice - few).max(0.0) * more
         }
@@ -309,7 +309,7 @@ mod tests {
         let expected = [MEASURED_HISTORIES, 2 * MEASURED_HISTORIES];
         assert!(histories.eq(expected));
         // 3 s of everything else, 2 s for each of the measured histories.
-        assert_eq!(pose_s(&plan, &[7.0, 5.0]), 203.0);
+        assert_eq!(pose_s(&plan, &[5.0, 7.0]), 203.0);
     }
 
     #[test]

@@ -68,7 +68,7 @@ pub struct PrepareArgs {
     /// A point inside a further body to keep as a part of the limb, ct frame; may be given several times
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     keep: Vec<[f64; 3]>,
-    /// Cut off what lies in a ball, ct frame: its centre and radius, mm; may be given several times
+    /// Remove a ball from the limb: centre and radius, ct frame, mm; may be given several times
     #[arg(long, value_name = "X,Y,Z,RADIUS", value_parser = ball, allow_hyphen_values = true)]
     remove: Vec<Ball>,
     /// Centre of the joint, ct frame
