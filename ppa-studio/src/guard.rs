@@ -1,5 +1,6 @@
-//! Who may use the page: a browser that was given the address, through a loopback host, from the page itself.
+//! Who may use the page: a browser that was given the address, by localhost or an IP address, from the page itself.
 
+use std::net::{Ipv4Addr, Ipv6Addr};
 use std::sync::Arc;
 
 use axum::body::Body;
@@ -57,10 +58,12 @@ enum Judged {
 fn judged(token: &Token, request: &Request) -> Judged {
     let headers = request.headers();
     let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
-    // A name that resolves to this machine, but belongs to a page of somebody else, is refused (DNS rebinding).
+    // A name that resolves to this machine may belong to a page of somebody else (DNS rebinding).
     let host = text(HOST).unwrap_or_default();
-    if !is_loopback(host) {
-        return Judged::Refused("this page is served to localhost only");
+    if !is_localhost_or_ip(host) {
+        return Judged::Refused(
+            "open this page by localhost or an IP address, not by another name",
+        );
     }
     if text(ORIGIN).is_some_and(|origin| origin.strip_prefix("http://") != Some(host)) {
         return Judged::Refused("requests of other pages are refused");
@@ -78,13 +81,19 @@ fn judged(token: &Token, request: &Request) -> Judged {
     Judged::Refused("the address needs its token: open the address that `ppa studio` printed")
 }
 
-/// Whether a Host header names this machine; the port may be that of a forwarding.
-fn is_loopback(host: &str) -> bool {
+/// Whether a Host header is localhost or an IP address, for which nobody else's name server can answer; the port may be that of a forwarding.
+fn is_localhost_or_ip(host: &str) -> bool {
     let name = match host.rsplit_once(':') {
         Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,
         _ => host,
     };
-    matches!(name, "localhost" | "127.0.0.1" | "[::1]")
+    let bare = name
+        .strip_prefix('[')
+        .and_then(|name| name.strip_suffix(']'));
+    match bare {
+        Some(name) => name.parse::<Ipv6Addr>().is_ok(),
+        None => name == "localhost" || name.parse::<Ipv4Addr>().is_ok(),
+    }
 }
 
 fn has_cookie(headers: &HeaderMap, token: &Token) -> bool {

@@ -2,11 +2,16 @@
 
 use std::net::TcpListener;
 use std::sync::mpsc::Receiver;
+use std::time::Duration;
 
 use crate::error::StudioError;
 use crate::studio::Studio;
 
-/// Serves a studio until `stop` receives something or loses its sender, the poses under way are finished and the answers under way are sent.
+/// How long answers under way are sent after the end was asked for; a browser may never read its answer, or never end its request.
+const LAST_ANSWERS: Duration = Duration::from_secs(2);
+
+/// Serves a studio until `stop` receives something or loses its sender. Poses and files under way are finished first, and for two
+/// seconds answers are sent.
 ///
 /// # Errors
 /// [`StudioError::Serve`] when the socket cannot be used.
@@ -14,10 +19,11 @@ pub fn serve(studio: Studio, listener: TcpListener, stop: Receiver<()>) -> Resul
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .max_blocking_threads(16)
-        .enable_io()
+        .enable_all()
         .build()
         .map_err(StudioError::Serve)?;
     let router = studio.router();
+    let (ending, ended) = tokio::sync::oneshot::channel();
     let stopped = async move {
         let wait = move || {
             // Both ends of the channel mean the same.
@@ -25,13 +31,22 @@ pub fn serve(studio: Studio, listener: TcpListener, stop: Receiver<()>) -> Resul
             studio.stop();
         };
         let _ = tokio::task::spawn_blocking(wait).await;
+        let _ = ending.send(());
+    };
+    let patience = async move {
+        let _ = ended.await;
+        tokio::time::sleep(LAST_ANSWERS).await;
     };
     let served = runtime.block_on(async {
         listener.set_nonblocking(true)?;
         let listener = tokio::net::TcpListener::from_std(listener)?;
-        axum::serve(listener, router)
-            .with_graceful_shutdown(stopped)
-            .await
+        let serving = axum::serve(listener, router).with_graceful_shutdown(stopped);
+        tokio::select! {
+            served = serving.into_future() => served,
+            () = patience => Ok(()),
+        }
     });
+    // Waits for the work that requests began, such as writing a file.
+    drop(runtime);
     served.map_err(StudioError::Serve)
 }

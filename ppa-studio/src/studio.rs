@@ -1,6 +1,6 @@
 //! A limb, open in the browser.
 
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::sync::Arc;
 
 use axum::Router;
@@ -22,8 +22,15 @@ impl Studio {
         Ok(Self(Arc::new(State::open(opening)?)))
     }
 
-    /// The address to open in a browser, with the token that lets it in.
-    pub fn address(&self, listening: SocketAddr) -> String {
+    /// The address to open in a browser on this machine, with the token that lets it in.
+    pub fn address(&self, mut listening: SocketAddr) -> String {
+        // Nothing can be asked of "all addresses of this machine".
+        if listening.ip().is_unspecified() {
+            listening.set_ip(match listening {
+                SocketAddr::V4(_) => Ipv4Addr::LOCALHOST.into(),
+                SocketAddr::V6(_) => Ipv6Addr::LOCALHOST.into(),
+            });
+        }
         format!("http://{listening}/?token={}", self.0.token)
     }
 
@@ -36,7 +43,7 @@ impl Studio {
         self.0.generation.finish();
     }
 
-    /// All that the page asks for. It answers only requests with the token or the cookie that the token gives, to a loopback host.
+    /// All that the page asks for. It answers only requests with the token or the cookie that the token gives, to localhost or an IP address.
     pub fn router(&self) -> Router {
         crate::routes::router(self.0.clone())
     }

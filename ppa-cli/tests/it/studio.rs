@@ -103,6 +103,39 @@ fn a_studio_serves_until_ctrl_c() {
 }
 
 #[test]
+fn slow_clients_delay_neither_the_page_nor_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = phantom().join("p01.toml");
+    let served = Served::start(folder.path(), &case.display().to_string());
+    let connected = |text: String| {
+        let mut stream = TcpStream::connect(&served.host).unwrap();
+        stream.write_all(text.as_bytes()).unwrap();
+        stream
+    };
+    let (host, cookie) = (&served.host, &served.cookie);
+    let open: Vec<TcpStream> = (0..40)
+        .flat_map(|_| {
+            let head = format!("host: {host}\r\ncookie: {cookie}\r\n");
+            [
+                // Half a request, a request without its body, and an answer that nobody reads.
+                "GET /api/sta".to_owned(),
+                format!("POST /api/depth HTTP/1.1\r\n{head}origin: http://{host}\r\ncontent-type: application/json\r\ncontent-length: 99\r\n\r\n{{"),
+                format!("GET /api/skin HTTP/1.1\r\n{head}\r\n"),
+            ]
+        })
+        .map(connected)
+        .collect();
+    let begun = Instant::now();
+    let state = String::from_utf8(served.get("/api/state")).unwrap();
+    contains(&state, &["HTTP/1.1 200"]);
+    assert!(begun.elapsed() < Duration::from_secs(10));
+    let (ended, end) = std::sync::mpsc::channel();
+    std::thread::spawn(move || ended.send(served.stop()));
+    assert_eq!(end.recv_timeout(Duration::from_secs(30)), Ok(Some(0)));
+    drop(open);
+}
+
+#[test]
 fn the_case_of_an_opened_scan_is_saved_on_request() {
     let folder = tempfile::tempdir().unwrap();
     let scan = phantom().join("p01.nii");

@@ -3,7 +3,9 @@
 use axum::body::Body;
 use axum::http::StatusCode;
 
-use crate::browser::{Browser, HOST, request};
+use ppa_studio::{Opening, Studio};
+
+use crate::browser::{Browser, HOST, phantom, request};
 
 #[test]
 fn requests_without_the_cookie_or_token_are_refused() {
@@ -29,7 +31,7 @@ fn other_hosts_and_other_pages_are_refused() {
     crossed.headers_mut().insert("origin", evil);
     silent.headers_mut().remove("origin");
     for (request, why) in [
-        (rebound, "localhost only"),
+        (rebound, "not by another name"),
         (crossed, "other pages"),
         (silent, "page itself"),
     ] {
@@ -47,6 +49,42 @@ fn other_hosts_and_other_pages_are_refused() {
     let origin = axum::http::HeaderValue::from_static("http://localhost:9000");
     headers.insert("origin", origin);
     assert_eq!(browser.send(forwarded).status, StatusCode::OK);
+}
+
+#[test]
+fn ip_addresses_are_hosts_and_other_names_are_not() {
+    let browser = Browser::new();
+    let status = |host: &'static str| {
+        let mut request = browser.posting("/api/undo", "{}".to_owned());
+        let headers = request.headers_mut();
+        headers.insert("host", axum::http::HeaderValue::from_static(host));
+        let origin = format!("http://{host}").parse().unwrap();
+        headers.insert("origin", origin);
+        browser.send(request).status
+    };
+    for host in ["192.0.2.7:8123", "[2001:db8::7]:8123", "[::1]", "localhost"] {
+        assert_eq!(status(host), StatusCode::OK, "{host}");
+    }
+    for host in [
+        "studio.example:8123",
+        "127.0.0.1.example",
+        "[evil.example]:8123",
+        "2001:db8::7",
+        "",
+    ] {
+        assert_eq!(status(host), StatusCode::FORBIDDEN, "{host}");
+    }
+}
+
+#[test]
+fn the_address_of_all_interfaces_is_one_that_opens() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = phantom(folder.path());
+    let studio = Studio::open(&Opening::of(&case)).unwrap();
+    let address = |listening: &str| studio.address(listening.parse().unwrap());
+    assert!(address("0.0.0.0:8123").starts_with("http://127.0.0.1:8123/?token="));
+    assert!(address("[::]:8123").starts_with("http://[::1]:8123/?token="));
+    assert!(address("192.0.2.7:8123").starts_with("http://192.0.2.7:8123/?token="));
 }
 
 #[test]
