@@ -25,8 +25,9 @@ impl Shown {
 }
 
 /// The limb that is shown, and the cases before and after it.
+#[derive(Clone)]
 pub(crate) struct Desk {
-    scan: LoadedScan,
+    scan: Arc<LoadedScan>,
     shown: Arc<Shown>,
     earlier: Vec<Case>,
     later: Vec<Case>,
@@ -36,7 +37,7 @@ impl Desk {
     pub fn new(scan: LoadedScan, case: Case) -> Result<Self, StudioError> {
         let shown = Arc::new(shown(&scan, case, 1, None, None)?);
         Ok(Self {
-            scan,
+            scan: Arc::new(scan),
             shown,
             earlier: Vec::new(),
             later: Vec::new(),

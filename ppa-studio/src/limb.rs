@@ -60,13 +60,17 @@ impl Limb {
         change: impl FnOnce(&mut Desk) -> Result<(), StudioError>,
     ) -> Result<(), StudioError> {
         let mut desk = self.desk();
-        let before = desk.shown().revision;
+        let before = desk.clone();
         change(&mut desk)?;
         let shown = desk.shown();
-        if shown.revision != before {
-            self.case_file().save_edits(&shown.case)?;
+        if shown.revision == before.shown().revision {
+            return Ok(());
         }
-        Ok(())
+        let saved = self.case_file().save_edits(&shown.case);
+        if saved.is_err() {
+            *desk = before;
+        }
+        saved
     }
 
     /// Where a plan with changes is saved: beside the case.

@@ -75,6 +75,12 @@ fn what_finds_nothing_changes_nothing() {
 #[test]
 fn a_file_that_another_program_changed_is_kept() {
     let browser = Browser::new();
+    let decisions = || {
+        let mut state = browser.get("/api/state").json();
+        state["files"].take();
+        state
+    };
+    let before = decisions();
     let edited = browser.folder.path().join("p01.edited.case.toml");
     std::fs::write(&edited, "somebody else's").unwrap();
     let refused = browser.post("/api/choices", &json!({ "joint_region": [8.0, 20.0] }));
@@ -85,6 +91,8 @@ fn a_file_that_another_program_changed_is_kept() {
         refused.text()
     );
     assert_eq!(std::fs::read_to_string(&edited).unwrap(), "somebody else's");
+    // What is not saved is not shown as if it were.
+    assert_eq!(decisions(), before);
 }
 
 #[test]
