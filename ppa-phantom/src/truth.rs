@@ -29,6 +29,8 @@ pub struct Truth {
     pub talocrural_centre: Point3<f64>,
     /// Internal rotation about the tibial shaft that turns both malleoli parallel to the detector.
     pub mortise_angle_rad: f64,
+    /// Across the shaft from the joint towards the focal spot of that view: the front of the mortise.
+    pub mortise_direction: Unit<Vector3<f64>>,
     /// Internal rotation at which rays run along the medial gutter.
     pub medial_gutter_angle_rad: f64,
     /// Internal rotation at which rays run along the lateral gutter.
@@ -99,6 +101,7 @@ impl Truth {
             talocrural_axis: direction(leg.mortise.axis(p)),
             talocrural_centre: point(leg.mortise.point(0.0, 0.0, leg.mortise.axis_z)),
             mortise_angle_rad: p.mortise_angle_rad,
+            mortise_direction: direction(leg.mortise.limb_from_mortise * -Vector3::y_axis()),
             medial_gutter_angle_rad: gutter_angle_rad(&leg.medial_facet(), 1.0),
             lateral_gutter_angle_rad: gutter_angle_rad(&leg.lateral_facet(), -1.0),
             superior_gutter_mm: p.superior_gutter_mm,

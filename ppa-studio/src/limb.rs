@@ -17,6 +17,8 @@ pub(crate) struct Limb {
     pub scenes: Scenes,
     pub coarse: CoarseScan,
     pub labels: Labels,
+    /// Front of the mortise, `ct` frame, where it is known: that of the built-in phantom.
+    pub mortise: Option<[f64; 3]>,
     desk: Mutex<Desk>,
     case_file: Mutex<CaseFile>,
 }
@@ -35,6 +37,7 @@ impl Limb {
             scenes: Scenes::default(),
             coarse: CoarseScan::default(),
             labels: Labels::default(),
+            mortise: None,
             desk: Mutex::new(desk),
             case_file: Mutex::new(case_file),
         })
@@ -54,7 +57,7 @@ impl Limb {
             .unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Changes what is shown and saves it beside the case.
+    /// Changes what is shown and saves it beside the case. What cannot be saved is not shown either.
     pub fn edit(
         &self,
         change: impl FnOnce(&mut Desk) -> Result<(), StudioError>,

@@ -50,7 +50,16 @@ impl Opening {
         let Some(path) = &self.path else {
             return match self.watch {
                 Some(_) => Ok(Opened::default()),
-                None => Opened::of_case(phantom()?),
+                None => Ok(Opened {
+                    mortise: Some(
+                        LowerLeg::p01()
+                            .truth()
+                            .mortise_direction
+                            .into_inner()
+                            .into(),
+                    ),
+                    ..Opened::of_case(phantom()?)?
+                }),
             };
         };
         if path
@@ -99,6 +108,8 @@ pub(crate) struct Opened {
     pub trainings: Option<Trainings>,
     /// Why landmarks have to be set by hand.
     pub note: Option<String>,
+    /// Front of the mortise of the built-in phantom, `ct` frame.
+    pub mortise: Option<[f64; 3]>,
 }
 
 impl Opened {

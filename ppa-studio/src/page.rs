@@ -16,6 +16,7 @@ const FILES: &[(&str, &str)] = &[
     ("surface.js", include_str!("page/surface.js")),
     ("shape.js", include_str!("page/shape.js")),
     ("view3d.js", include_str!("page/view3d.js")),
+    ("software.js", include_str!("page/software.js")),
     ("landmarks.js", include_str!("page/landmarks.js")),
     ("whatif.js", include_str!("page/whatif.js")),
     ("scan.js", include_str!("page/scan.js")),

@@ -99,7 +99,10 @@ impl State {
             Plan::new(Vec::new())
         };
         let limb = opened.limb.map(|(file, case)| Limb::open(file, case));
-        let limb = limb.transpose()?.map(Arc::new);
+        let mut limb = limb.transpose()?;
+        if let Some(limb) = &mut limb {
+            limb.mortise = opened.mortise;
+        }
         Ok(Self {
             token: Token::random()?,
             depth: Newest::default(),
@@ -122,7 +125,7 @@ impl State {
             opened_dataset: opened.dataset,
             plan: Mutex::new(Arc::new(plan)),
             plan_file: Mutex::new(plan_file),
-            limb: Mutex::new(limb),
+            limb: Mutex::new(limb.map(Arc::new)),
         })
     }
 

@@ -136,6 +136,28 @@ fn slow_clients_delay_neither_the_page_nor_its_end() {
 }
 
 #[test]
+fn the_mortise_of_the_built_in_phantom_faces_the_beam_at_18() {
+    let folder = tempfile::tempdir().unwrap();
+    let served = Served::start(folder.path(), "");
+    let json = |answer: Vec<u8>| {
+        let text = String::from_utf8(answer).unwrap();
+        let body = text.split_once("\r\n\r\n").unwrap().1;
+        serde_json::from_str::<Value>(&body[body.find('{').unwrap()..]).unwrap()
+    };
+    let state = json(served.get("/api/state"));
+    let mortise: [f64; 3] = serde_json::from_value(state["mortise"].clone()).unwrap();
+    let up = |angle: f64| {
+        let room = served.post("/api/room", &format!(r#"{{"angle_deg": {angle}}}"#));
+        let rows: [[f64; 4]; 4] =
+            serde_json::from_value(json(room)["room_from_ct"].clone()).unwrap();
+        (0..3).map(|i| rows[2][i] * mortise[i]).sum::<f64>()
+    };
+    // P01's mortise view is at 18 degrees; the axis that is found and the foot's rest on the table tilt it a little.
+    assert!(up(18.0) > 6.0_f64.to_radians().cos(), "{}", up(18.0));
+    assert!(up(0.0) < 12.0_f64.to_radians().cos(), "{}", up(0.0));
+}
+
+#[test]
 fn the_case_of_an_opened_scan_is_saved_on_request() {
     let folder = tempfile::tempdir().unwrap();
     let scan = phantom().join("p01.nii");

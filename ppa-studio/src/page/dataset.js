@@ -41,13 +41,16 @@ export class DatasetPanel {
     try {
       this.found = await getJson(`dataset?folder=${encodeURIComponent(folder)}`);
       byId("dataset-refused").textContent = "";
+      byId("dataset-absent").hidden = this.found !== null;
     } catch (error) {
       // A later request replaced this one.
       if (error.status === 409) return;
       this.found = null;
+      byId("dataset-absent").hidden = true;
       if (!(error instanceof Refused)) this.actions.fail(error);
       byId("dataset-refused").textContent = error.message;
     }
+    byId("dataset-check").disabled = !this.found;
     byId("dataset-found").hidden = !this.found;
     byId("panel-dataset-found").hidden = !this.found;
     if (!this.found) return;

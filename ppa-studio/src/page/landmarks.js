@@ -1,5 +1,6 @@
 // Axis, joint and plane: what was found and what was chosen.
 
+import { button as elementButton, element } from "/page/elements.js";
 import { COLOURS } from "/page/slices.js";
 import { add, angleDeg, fixed, norm, planeNormal, point, scale, sub } from "/page/geometry.js";
 
@@ -13,6 +14,8 @@ export class LandmarkPanel {
     this.store = store;
     this.actions = actions;
     this.picking = null;
+    // Landmarks on their way in the view in three dimensions.
+    this.moving = null;
     byId("limb-choice").addEventListener("change", (event) => actions.choose({ limb: event.target.value || null }));
     byId("axis-source").addEventListener("change", (event) => actions.choose({ axis_source: event.target.value }));
     PICKS.forEach((label, corner) => {
@@ -23,14 +26,16 @@ export class LandmarkPanel {
       button.addEventListener("click", () => this.pick(this.picking === corner ? null : corner));
       byId("picks").append(button);
     });
+    byId("joint-here").addEventListener("click", () => actions.choose({ joint_centre: actions.crosshair() }));
+    PICKS.forEach((label, corner) => byId("crosshair-picks").append(elementButton(label, () => this.place(corner, actions.crosshair()))));
     for (const [key, label] of REGIONS) byId("regions").append(this.regionInputs(key, label));
   }
 
   regionInputs(key, label) {
     const row = document.createElement("div");
     row.className = "pair";
-    const name = document.createElement("span");
-    name.textContent = label;
+    const name = element("span", ` ${label}`);
+    name.prepend(swatch(COLOURS[key]));
     row.append(name);
     for (const [end, word] of ["from", "to"].entries()) {
       const input = document.createElement("input");
@@ -56,14 +61,41 @@ export class LandmarkPanel {
   // A point of the skin was clicked. Returns whether it was for this panel.
   picked(place) {
     if (this.picking === null) return false;
-    const points = this.store.doc.landmarks.plane_points.map((p, i) => (i === this.picking ? place : p));
+    const corner = this.picking;
     this.pick(null);
-    this.actions.choose({ plane_points: points });
+    this.place(corner, place);
     return true;
+  }
+
+  place(corner, place) {
+    this.actions.choose({ plane_points: this.withCorner(corner, place) });
+  }
+
+  withCorner(corner, place) {
+    return this.store.doc.landmarks.plane_points.map((p, i) => (i === corner ? place : p));
+  }
+
+  // What can be dragged in three dimensions: the points of the plane along the skin, the joint across the line of sight.
+  handles() {
+    const { landmarks } = this.store.doc;
+    const handle = (at, onSkin, changed) => ({
+      at,
+      onSkin,
+      move: (place) => {
+        this.moving = place && changed(place);
+        this.actions.landmarks();
+      },
+      drop: (place) => this.actions.choose(changed(place)),
+    });
+    return [
+      handle(landmarks.joint_centre, false, (place) => ({ joint_centre: place })),
+      ...landmarks.plane_points.map((at, corner) => handle(at, true, (place) => ({ plane_points: this.withCorner(corner, place) }))),
+    ];
   }
 
   show() {
     const { doc } = this.store;
+    this.moving = null;
     const why = doc.limb === "other" && doc.note ? ` Not recognised: ${doc.note}.` : "";
     byId("limb-kind").textContent = `${KINDS[doc.limb]}.${why}`;
     byId("limb-choice").value = doc.choices.limb ?? "";
@@ -71,7 +103,17 @@ export class LandmarkPanel {
     for (const [key] of REGIONS) {
       doc.landmarks[key].range_mm.forEach((mm, end) => { byId(`${key}-${["from", "to"][end]}`).value = fixed(mm); });
     }
-    byId("landmark-table").tBodies[0].replaceChildren(...this.rows().map((row) => this.row(row)));
+    byId("landmark-table").tBodies[0].replaceChildren(...this.rows().map((row) => this.row(row)), ...this.truth());
+  }
+
+  // The mortise of the built-in phantom, which is known.
+  truth() {
+    const { mortise, landmarks } = this.store.doc;
+    if (!mortise) return [];
+    const row = element("tr");
+    const away = fixed(angleDeg(mortise, landmarks.anterior));
+    row.append(head("Mortise", COLOURS.mortise), element("td", point(mortise, 3)), element("td", `truth of the phantom, ${away}° from anterior`));
+    return [row];
   }
 
   // Each landmark with its value, the keys that choose it, and how far it is from what is found.
@@ -79,24 +121,21 @@ export class LandmarkPanel {
     const { landmarks: now, automatic } = this.store.doc;
     const away = (text) => (automatic ? text() : "");
     return [
-      { name: "Joint", value: `${point(now.joint_centre)} mm`, keys: ["joint_centre"],
+      { name: "Joint", colour: COLOURS.joint, value: `${point(now.joint_centre)} mm`, keys: ["joint_centre"],
         away: away(() => `${fixed(norm(sub(now.joint_centre, automatic.joint_centre)))} mm`) },
-      { name: "Axis", value: point(now.axis_direction, 4), keys: ["axis", "joint_region", "calf_region", "axis_source"],
+      { name: "Axis", colour: COLOURS.axis, value: point(now.axis_direction, 4), keys: ["axis", "joint_region", "calf_region", "axis_source"],
         away: away(() => `${fixed(angleDeg(now.axis_direction, automatic.axis_direction), 2)}°`) },
-      { name: "Anterior", value: point(now.anterior, 3), keys: ["anterior"],
+      { name: "Anterior", colour: COLOURS.joint, value: point(now.anterior, 3), keys: ["anterior"],
         away: away(() => `${fixed(angleDeg(now.anterior, automatic.anterior), 2)}°`) },
-      { name: "Plane", value: now.plane_points.map((p) => point(p)).join("; "), keys: ["plane_points"],
+      { name: "Plane", colour: COLOURS.plane, value: now.plane_points.map((p) => point(p)).join("\n"), keys: ["plane_points"],
         away: away(() => `${fixed(angleDeg(planeNormal(now.plane_points), planeNormal(automatic.plane_points)), 2)}°`) },
     ];
   }
 
-  row({ name, value, keys, away }) {
+  row({ name, colour, value, keys, away }) {
     const { choices } = this.store.doc;
     const chosen = keys.filter((key) => choices[key] !== undefined && choices[key] !== null);
     const row = document.createElement("tr");
-    const head = document.createElement("th");
-    head.scope = "row";
-    head.textContent = name;
     const what = document.createElement("td");
     what.textContent = value;
     const state = document.createElement("td");
@@ -112,13 +151,14 @@ export class LandmarkPanel {
       again.addEventListener("click", () => this.actions.choose(Object.fromEntries(chosen.map((key) => [key, null]))));
       state.append(again);
     }
-    row.append(head, what, state);
+    row.append(head(name, colour), what, state);
     return row;
   }
 
   // Lines and points for the view in three dimensions, ct frame.
   drawing() {
-    const { landmarks } = this.store.doc;
+    const landmarks = { ...this.store.doc.landmarks, ...this.moving };
+    const { mortise } = this.store.doc;
     const along = (s) => add(landmarks.axis_point, scale(landmarks.axis_direction, s));
     const [a, b, c] = landmarks.plane_points;
     const jointTo = (p) => add(landmarks.joint_centre, scale(p, 60));
@@ -127,6 +167,7 @@ export class LandmarkPanel {
         { points: [along(-300), along(300)], colour: COLOURS.axis, through: true },
         { points: [a, b, b, c, c, a], colour: COLOURS.plane, through: true },
         { points: [landmarks.joint_centre, jointTo(landmarks.anterior)], colour: COLOURS.joint, through: true },
+        ...(mortise ? [{ points: [landmarks.joint_centre, jointTo(mortise)], colour: COLOURS.mortise, through: true }] : []),
       ],
       points: [
         { points: landmarks.plane_points, colour: COLOURS.plane, through: true },
@@ -134,4 +175,17 @@ export class LandmarkPanel {
       ],
     };
   }
+}
+
+// The name of a landmark, with the colour in which it is drawn.
+function head(name, colour) {
+  const made = element("th", ` ${name}`, { scope: "row" });
+  made.prepend(swatch(colour));
+  return made;
+}
+
+function swatch(colour) {
+  const made = element("span", "", { class: "key" });
+  made.style.background = colour;
+  return made;
 }

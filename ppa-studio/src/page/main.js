@@ -29,7 +29,7 @@ const WINDOWS = [["Soft tissue", 40, 400], ["Bone", 400, 1800], ["Skin", -300, 1
 
 const store = { doc: null, step: "scan", cursor: [0, 0, 0], window: { level: 200, width: 1600 }, showRemoved: true, cropping: false, ball: null };
 
-const actions = { change, choose, crop: (box) => change("surface", { crop: box && cropOf(store, box) }), redraw: () => slices.forEach((view) => view.draw()), cursor: setCursor, place: setPlace, window: setWindow, point: showReading, picked, fail, tell, room: showRoom, commands: showImageCommands, prediction: showPrediction };
+const actions = { change, choose, crosshair, landmarks: drawLandmarks, crop: (box) => change("surface", { crop: box && cropOf(store, box) }), redraw: () => slices.forEach((view) => view.draw()), cursor: setCursor, place: setPlace, window: setWindow, point: showReading, picked, fail, tell, room: showRoom, commands: showImageCommands, prediction: showPrediction };
 
 const slices = [...document.querySelectorAll(".view[data-axis]")].map((figure) => new SliceView(figure, store, actions));
 const view3d = new View3d(byId("view3d"), actions);
@@ -76,15 +76,18 @@ function fail(error) {
 // Changes what the program knows, and shows what follows.
 async function change(path, body) {
   document.body.setAttribute("aria-busy", "true");
+  const slow = setTimeout(() => tell("computing …"), 300);
   try {
     await show(await postJson(path, body));
     tell("");
   } catch (error) {
     fail(error);
     landmarks.show();
+    drawLandmarks();
     crop.show();
     slices.forEach((view) => view.draw());
   } finally {
+    clearTimeout(slow);
     document.body.removeAttribute("aria-busy");
   }
 }
@@ -158,6 +161,7 @@ function drawLandmarks() {
   const drawing = landmarks.drawing();
   view3d.lines = drawing.lines;
   view3d.points = drawing.points;
+  view3d.handles = store.step === "landmarks" ? landmarks.handles() : [];
   view3d.draw();
 }
 
@@ -233,6 +237,8 @@ function showRoom(next) {
 }
 
 function go(step) {
+  // The panel of another step is read from its beginning.
+  if (store.step !== step) document.querySelector("aside").scrollTop = 0;
   store.step = step;
   bodies.set(false);
   document.body.dataset.step = step;

@@ -13,8 +13,16 @@ export function roomFacts(room) {
 
 const ring = (points) => points.flatMap((p, i) => [p, points[(i + 1) % points.length]]);
 
+// In step 4 at the cameras and the focal spot as well, else at the limb on the table.
+function look(view3d, room) {
+  const devices = [...room.detector, room.source, ...room.cameras.map(({ centre }) => centre)];
+  if (document.body.dataset.step === "room") view3d.fit(devices);
+  else view3d.frame(room.table_centre, 2000);
+}
+
 export function drawRoom(view3d, room, first) {
   view3d.worldFromCt = room.room_from_ct;
+  view3d.handles = [];
   const [w, l] = room.table_size_mm;
   const [x, y, z] = room.table_centre;
   const table = [[x - w / 2, y - 450, z], [x + w / 2, y - 450, z], [x + w / 2, y + l - 450, z], [x - w / 2, y + l - 450, z]];
@@ -31,6 +39,6 @@ export function drawRoom(view3d, room, first) {
     { points: [room.source], colour: "#ffd479" },
     { points: room.cameras.map((camera) => camera.centre), colour: "#ffffff" },
   ];
-  if (first) view3d.frame(room.table_centre, 3200);
+  if (first) look(view3d, room);
   else view3d.draw();
 }

@@ -7,6 +7,18 @@ export class Refused extends Error {
   }
 }
 
+// The program may have ended, or the way to it, such as a forwarded port.
+const SILENT = "ppa studio does not answer. Check the connection, or start it again and open the address that it prints: what was changed is saved.";
+
+async function request(path, options) {
+  try {
+    return await fetch(`/api/${path}`, options);
+  } catch (error) {
+    if (error.name === "AbortError") throw error;
+    throw new Refused(SILENT, 0);
+  }
+}
+
 async function answered(response) {
   if (response.ok) return response;
   const text = await response.text();
@@ -16,15 +28,15 @@ async function answered(response) {
 }
 
 export async function getJson(path) {
-  return (await answered(await fetch(`/api/${path}`))).json();
+  return (await answered(await request(path))).json();
 }
 
 export async function getBytes(path) {
-  return (await answered(await fetch(`/api/${path}`))).arrayBuffer();
+  return (await answered(await request(path))).arrayBuffer();
 }
 
 export async function post(path, body = {}, signal = undefined) {
-  const response = await fetch(`/api/${path}`, {
+  const response = await request(path, {
     method: "POST",
     headers: { "content-type": "application/json" },
     body: JSON.stringify(body),
@@ -46,7 +58,7 @@ export async function postPicture(path, body, signal) {
 
 // The same from an address that may have no image yet: null then.
 export async function getPicture(path, signal) {
-  const response = await answered(await fetch(`/api/${path}`, { signal }));
+  const response = await answered(await request(path, { signal }));
   if (response.status === 204) return null;
   return { picture: await response.blob(), report: JSON.parse(response.headers.get("x-report")) };
 }

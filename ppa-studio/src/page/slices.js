@@ -7,7 +7,7 @@ import { add, dot, inverse, scale, sub, transform } from "/page/geometry.js";
 
 // Nearer than this a pointer holds what it points to, CSS pixels.
 const GRAB_PX = 9;
-const COLOURS = { axis: "#6cb6ff", joint: "#ff7ad9", plane: "#7ee787", joint_region: "#ffd479", calf_region: "#b8a4ff", cross: "#9aa4b2" };
+const COLOURS = { axis: "#6cb6ff", joint: "#ff7ad9", plane: "#7ee787", joint_region: "#ffd479", calf_region: "#b8a4ff", mortise: "#f0e442", cross: "#9aa4b2" };
 const LETTERS = [["R", "L"], ["A", "P"], ["F", "H"]];
 
 export class SliceView {

@@ -1,7 +1,6 @@
 // The skin as triangles.
 
 import { getBytes, post } from "/page/server.js";
-import { cross, dot, sub } from "/page/geometry.js";
 
 export async function loadSurface() {
   return surfaceOf(await getBytes("skin"));
@@ -32,25 +31,37 @@ function surfaceOf(bytes) {
   return { positions, normals, corners, outwards };
 }
 
-const vertex = (surface, id) => surface.positions.subarray(3 * id, 3 * id + 3);
-
 // Where a ray first meets a surface, and the next place where it meets the same one, as distances along it; infinite where it does not.
-export function hit(surface, origin, direction) {
+// Numbers by name, not arrays: it runs through all triangles while a landmark is dragged.
+export function hit({ positions, corners }, [ox, oy, oz], [dx, dy, dz]) {
   let [nearest, next] = [Infinity, Infinity];
-  const { corners } = surface;
   for (let t = 0; t < corners.length; t += 3) {
-    const [a, b, c] = [corners[t], corners[t + 1], corners[t + 2]].map((id) => Array.from(vertex(surface, id)));
-    const [u, v] = [sub(b, a), sub(c, a)];
-    const h = cross(direction, v);
-    const det = dot(u, h);
+    const [a, b, c] = [3 * corners[t], 3 * corners[t + 1], 3 * corners[t + 2]];
+    const ax = positions[a];
+    const ay = positions[a + 1];
+    const az = positions[a + 2];
+    const ux = positions[b] - ax;
+    const uy = positions[b + 1] - ay;
+    const uz = positions[b + 2] - az;
+    const vx = positions[c] - ax;
+    const vy = positions[c + 1] - ay;
+    const vz = positions[c + 2] - az;
+    const hx = dy * vz - dz * vy;
+    const hy = dz * vx - dx * vz;
+    const hz = dx * vy - dy * vx;
+    const det = ux * hx + uy * hy + uz * hz;
     if (Math.abs(det) < 1e-9) continue;
-    const s = sub(origin, a);
-    const p = dot(s, h) / det;
+    const sx = ox - ax;
+    const sy = oy - ay;
+    const sz = oz - az;
+    const p = (sx * hx + sy * hy + sz * hz) / det;
     if (p < 0 || p > 1) continue;
-    const q = cross(s, u);
-    const r = dot(direction, q) / det;
+    const qx = sy * uz - sz * uy;
+    const qy = sz * ux - sx * uz;
+    const qz = sx * uy - sy * ux;
+    const r = (dx * qx + dy * qy + dz * qz) / det;
     if (r < 0 || p + r > 1) continue;
-    const distance = dot(v, q) / det;
+    const distance = (vx * qx + vy * qy + vz * qz) / det;
     if (distance <= 1e-6) continue;
     if (distance < nearest) [nearest, next] = [distance, nearest];
     else if (distance > nearest) next = Math.min(next, distance);

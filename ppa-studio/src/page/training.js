@@ -58,7 +58,7 @@ export class TrainingPanel {
     try {
       const { folder, trainings, watch } = await getJson("trainings");
       if (!this.visible) return;
-      byId("training-folder").textContent = folder;
+      byId("training-folder").textContent = folder === "." ? "this folder" : folder;
       this.trainings = trainings;
       this.watch = watch;
       // At first those that were written last.
@@ -98,7 +98,7 @@ export class TrainingPanel {
     this.shown = shown;
     const focused = document.activeElement?.id;
     const rows = found.slice(0, LISTED).map((training) => this.row(training));
-    const none = element("p", this.trainings.length ? "No name contains this text." : "There are no trainings here. `ppa train` makes one; `ppa studio FOLDER` opens a folder of trainings.", { class: "hint" });
+    const none = element("p", this.trainings.length ? "No name contains this text." : "There are no trainings here. “ppa train” makes one; “ppa studio FOLDER” opens a folder of trainings.", { class: "hint" });
     byId("training-table").replaceChildren(rows.length ? table(["Training", "Steps", "Loss", "MAE", "r_s", "State", "Errors"], rows) : none);
     if (found.length > LISTED) byId("training-table").append(element("p", `and ${found.length - LISTED} more: type a part of their names at the right`, { class: "hint" }));
     if (focused?.startsWith("training-of-")) byId(focused)?.focus();

@@ -1,6 +1,7 @@
-// The skin, the landmarks and the room in three dimensions (WebGL 2).
+// The skin, the landmarks and the room in three dimensions (WebGL 2, or the processor where a browser has none).
 
 import { IDENTITY, add, cross, dot, inverse, norm, rotate, scale, sub, transform, unit } from "/page/geometry.js";
+import { SoftwarePainter } from "/page/software.js";
 import { bounds, hit } from "/page/surface.js";
 
 const VERTEX = `#version 300 es
@@ -42,6 +43,13 @@ const SKIN = [0.86, 0.68, 0.58, 1];
 // As in the slices; faint where the skin hides it.
 const REMOVED = { colour: [1, 0.58, 0.1], seen: 0.45, hidden: 0.1 };
 
+// A press that moves less is a click.
+const CLICK_PX = 4;
+// Nearer than this a pointer holds what it points to, CSS pixels.
+const GRAB_PX = 10;
+// What lies deeper below the skin than this is hidden by it.
+const HIDDEN_MM = 8;
+
 const FIELD_OF_VIEW = 30 * Math.PI / 180;
 
 export class View3d {
@@ -58,12 +66,15 @@ export class View3d {
     this.turn = { azimuth: -0.6, elevation: 0.25 };
     this.centre = [0, 0, 0];
     this.distance = 1000;
+    // Places that can be dragged: where they are, whether they stay on the skin, and what to do with the place on the way and at the end.
+    this.handles = [];
     this.gl = this.canvas.getContext("webgl2", { antialias: true });
-    if (!this.gl) {
-      this.caption.textContent = "This browser has no WebGL 2: slices and images still work.";
-      return;
+    if (this.gl) {
+      this.prepare();
+    } else {
+      this.caption.textContent = "drawn without WebGL 2";
+      this.software = new SoftwarePainter(this.canvas);
     }
-    this.prepare();
     this.listen(figure);
   }
 
@@ -92,18 +103,30 @@ export class View3d {
     let held = null;
     this.canvas.addEventListener("pointerdown", (event) => {
       this.canvas.setPointerCapture(event.pointerId);
-      held = { x: event.offsetX, y: event.offsetY, moved: 0, ...this.turn };
+      held = { x: event.offsetX, y: event.offsetY, moved: 0, handle: this.handleAt(event.offsetX, event.offsetY), ...this.turn };
     });
     this.canvas.addEventListener("pointermove", (event) => {
-      if (!held) return;
+      if (!held) {
+        this.canvas.style.cursor = this.handleAt(event.offsetX, event.offsetY) ? "grab" : "";
+        return;
+      }
       const [dx, dy] = [event.offsetX - held.x, event.offsetY - held.y];
       held.moved = Math.max(held.moved, Math.hypot(dx, dy));
+      if (held.handle) {
+        if (held.moved >= CLICK_PX) held.place = this.drag(held.handle, event.offsetX, event.offsetY) ?? held.place;
+        return;
+      }
       this.turn.azimuth = held.azimuth - 0.008 * dx;
       this.turn.elevation = Math.max(-1.55, Math.min(1.55, held.elevation + 0.008 * dy));
       this.draw();
     });
     this.canvas.addEventListener("pointerup", (event) => {
-      if (held && held.moved < 4) this.pick(event.offsetX, event.offsetY);
+      if (held?.place) held.handle.drop(held.place);
+      else if (held && held.moved < CLICK_PX) this.pick(event.offsetX, event.offsetY);
+      held = null;
+    });
+    this.canvas.addEventListener("pointercancel", () => {
+      held?.handle?.move(null);
       held = null;
     });
     this.canvas.addEventListener("wheel", (event) => {
@@ -158,6 +181,21 @@ export class View3d {
     this.draw();
   }
 
+  // Looks at places in the world so that all are seen.
+  fit(places) {
+    const axes = [0, 1, 2].map((axis) => places.map((place) => place[axis]));
+    this.centre = axes.map((values) => (Math.min(...values) + Math.max(...values)) / 2);
+    const { right, up, back } = this.eye();
+    const half = 0.92 * Math.tan(FIELD_OF_VIEW / 2);
+    const aspect = this.canvas.clientWidth / this.canvas.clientHeight || 1;
+    const needed = places.map((place) => {
+      const from = sub(place, this.centre);
+      return dot(from, back) + Math.max(Math.abs(dot(from, up)), Math.abs(dot(from, right)) / aspect) / half;
+    });
+    this.distance = Math.max(...needed);
+    this.draw();
+  }
+
   // Eye, and the directions right, up and backwards on the screen, in the world.
   eye() {
     const { azimuth, elevation } = this.turn;
@@ -178,7 +216,14 @@ export class View3d {
 
   draw() {
     const { gl, canvas } = this;
-    if (!gl || !this.surface || !canvas.clientWidth || !canvas.clientHeight) return;
+    if (!this.surface || !canvas.clientWidth || !canvas.clientHeight) return;
+    if (this.software) {
+      const bytes = (colour) => colour.slice(0, 3).map((c) => 255 * c);
+      const eye = this.eye();
+      this.colour = { skin: bytes(SKIN), removed: bytes(REMOVED.colour), seen: REMOVED.seen, hidden: REMOVED.hidden };
+      this.software.draw(this, this.screenFromWorld(eye), eye);
+      return;
+    }
     const ratio = window.devicePixelRatio || 1;
     canvas.width = canvas.clientWidth * ratio;
     canvas.height = canvas.clientHeight * ratio;
@@ -261,22 +306,58 @@ export class View3d {
     this.gl.uniformMatrix3fv(this.uniform("eyeFromModel"), false, facing.flat());
   }
 
-  // The point of what is shown under the pointer, and one behind it, in the ct frame.
-  pick(x, y) {
-    if (!this.surface) return;
+  // The line of sight at a place of the canvas, in the ct frame.
+  sight(x, y) {
     const { at, right, up, back } = this.eye();
     const half = Math.tan(FIELD_OF_VIEW / 2);
     const { clientWidth: width, clientHeight: height } = this.canvas;
     const [u, v] = [(2 * x / width - 1) * half * width / height, (1 - 2 * y / height) * half];
     const direction = unit(add(add(scale(right, u), scale(up, v)), scale(back, -1)));
     const ctFromWorld = inverse(this.worldFromCt);
-    const [origin, along] = [transform(ctFromWorld, at), rotate(ctFromWorld, direction)];
+    return { origin: transform(ctFromWorld, at), along: rotate(ctFromWorld, direction), back: rotate(ctFromWorld, back) };
+  }
+
+  // The handle under the pointer that can be seen.
+  handleAt(x, y) {
+    if (!this.surface || this.handles.length === 0) return null;
+    const screen = this.screenFromWorld(this.eye());
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const away = ({ at }) => {
+      const place = transform(this.worldFromCt, at);
+      const [px, py, , w] = screen.map((row) => dot(row, place) + row[3]);
+      return w > 0 ? Math.hypot((1 + px / w) * width / 2 - x, (1 - py / w) * height / 2 - y) : Infinity;
+    };
+    const near = this.handles.filter((handle) => away(handle) < GRAB_PX).sort((a, b) => away(a) - away(b));
+    // A point on the far side would jump to this one.
+    return near.find(({ at, onSkin }) => {
+      if (!onSkin) return true;
+      const { origin } = this.sight(x, y);
+      const to = sub(at, origin);
+      return hit(this.surface, origin, unit(to)).nearest > norm(to) - HIDDEN_MM;
+    }) ?? null;
+  }
+
+  // Where a handle is dragged to: along the skin, or across the line of sight. Nothing where there is no skin.
+  drag(handle, x, y) {
+    const { origin, along, back } = this.sight(x, y);
+    const distance = handle.onSkin ? hit(this.surface, origin, along).nearest : dot(sub(handle.at, origin), back) / dot(along, back);
+    if (!Number.isFinite(distance)) return null;
+    const place = rounded(add(origin, scale(along, distance)));
+    handle.move(place);
+    return place;
+  }
+
+  // The point of what is shown under the pointer, and one behind it, in the ct frame.
+  pick(x, y) {
+    if (!this.surface) return;
+    const { origin, along } = this.sight(x, y);
     const hits = [this.surface, this.removed].filter(Boolean).map((surface) => hit(surface, origin, along));
     const { nearest, next } = hits.reduce((one, other) => (other.nearest < one.nearest ? other : one));
     if (nearest === Infinity) return;
     const point = add(origin, scale(along, nearest));
     const inside = add(point, scale(along, Math.min(INSIDE_MM, (next - nearest) / 2)));
-    const rounded = (place) => place.map((c) => Math.round(10 * c) / 10);
     this.actions.picked(rounded(point), rounded(inside));
   }
 }
+
+const rounded = (place) => place.map((c) => Math.round(10 * c) / 10);

@@ -8,7 +8,7 @@ use axum::response::Response;
 use ppa_dataset::layout::{LimbId, Side, View};
 use ppa_dataset::published::{GrayImage16, inspect};
 use ppa_dataset::split::Split;
-use ppa_dataset::{BodyShape, Findings, LimbFinding};
+use ppa_dataset::{BodyShape, Findings, LimbFinding, Manifest};
 use ppa_generate::Case;
 use ppa_report::{PoseRow, pose_rows};
 use serde::Serialize;
@@ -87,14 +87,18 @@ impl SplitState {
     }
 }
 
+/// What a dataset holds; nothing for one that the plan has yet to make.
 pub(super) async fn quality(
     Extracted(state): Extracted<Arc<State>>,
     Query(Dataset { folder }): Query<Dataset>,
-) -> Result<Json<Quality>, Response> {
+) -> Result<Json<Option<Quality>>, Response> {
     let ticket = state.quality.enter();
     work(state, move |state| {
         let _turn = state.quality.turn(&ticket)?;
         let root = state.dataset(&folder)?;
+        if state.opened_dataset.is_none() && !root.join(Manifest::FILE).exists() {
+            return Ok(Json(None));
+        }
         let poses = pose_rows(&root)?;
         let mut patients: Vec<u32> = poses.iter().map(|pose| pose.limb.patient).collect();
         patients.dedup();
@@ -102,13 +106,13 @@ pub(super) async fn quality(
         let splits = names
             .into_iter()
             .map(|name| SplitState::of(name, &root, &patients));
-        Ok(Json(Quality {
+        Ok(Json(Some(Quality {
             findings: Findings::read(&root)?.0,
             splits: splits.collect(),
             at_hand: at_hand(state),
             commands: of_dataset(&root),
             poses,
-        }))
+        })))
     })
     .await
 }

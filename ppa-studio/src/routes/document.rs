@@ -44,6 +44,8 @@ pub(super) struct Document {
     landmarks: Landmarks,
     /// What is found where nobody chooses.
     automatic: Option<Landmarks>,
+    /// Front of the mortise, `ct` frame, where it is known.
+    mortise: Option<[f64; 3]>,
     findings: Vec<Finding>,
     acknowledged: Vec<FindingCode>,
     report: LimbReport,
@@ -304,6 +306,7 @@ pub(super) fn document(state: &State) -> Result<Document, StudioError> {
         choices: shown.case.choices.clone(),
         landmarks: prepared.landmarks.clone(),
         automatic: shown.automatic.clone(),
+        mortise: limb.mortise,
         findings: prepared.findings.clone(),
         acknowledged: shown.case.acknowledged.clone(),
         report: prepared.limb.report.clone(),

@@ -7,9 +7,11 @@ use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use fantoccini::actions::{InputSource, MOUSE_BUTTON_LEFT, MouseActions, PointerAction};
 use fantoccini::wd::WebDriverCompatibleCommand;
 use fantoccini::{Client, ClientBuilder, Locator};
 use hyper_util::client::legacy::connect::HttpConnector;
+use image::RgbImage;
 use ppa_studio::{Opening, Studio, serve};
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -38,12 +40,18 @@ struct Served {
     thread: Option<JoinHandle<()>>,
 }
 
-impl Drop for Served {
-    fn drop(&mut self) {
+impl Served {
+    fn end(&mut self) {
         self.stop = None;
         if let Some(thread) = self.thread.take() {
             thread.join().unwrap();
         }
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.end();
     }
 }
 
@@ -69,6 +77,17 @@ impl Page {
     }
 
     pub async fn opened(folder: TempDir, opening: &Opening) -> Self {
+        Self::drawn_by(&WEBGL, folder, opening).await
+    }
+
+    /// In a browser that has no WebGL.
+    pub async fn without_webgl() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let case = fine_phantom(folder.path());
+        Self::drawn_by(&["--disable-3d-apis"], folder, &Opening::of(&case)).await
+    }
+
+    async fn drawn_by(graphics: &[&str], folder: TempDir, opening: &Opening) -> Self {
         let studio = Studio::open(opening).unwrap();
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = studio.address(listener.local_addr().unwrap());
@@ -78,7 +97,7 @@ impl Page {
             stop: Some(stop),
             thread: Some(thread),
         };
-        let (driver, client) = browser().await;
+        let (driver, client) = browser(graphics).await;
         client.goto(&address).await.unwrap();
         let page = Self {
             client,
@@ -175,6 +194,40 @@ impl Page {
         }
     }
 
+    /// Ends the program, but not the browser.
+    pub fn stop(&mut self) {
+        self.served.end();
+    }
+
+    /// A rectangle of the page as it is seen: left, top, width and height in the page, and its pixels.
+    pub async fn seen(&self, selector: &str) -> ([u32; 4], RgbImage) {
+        let script = "const r = document.querySelector(arguments[0]).getBoundingClientRect(); \
+                      return [r.x, r.y, r.width, r.height].map(Math.floor);";
+        let place = self.client.execute(script, vec![json!(selector)]).await;
+        let place: [u32; 4] = serde_json::from_value(place.unwrap()).unwrap();
+        let [x, y, width, height] = place;
+        let png = self.client.screenshot().await.unwrap();
+        let page = image::load_from_memory(&png).unwrap();
+        (place, page.crop_imm(x, y, width, height).to_rgb8())
+    }
+
+    /// Drags with the mouse from one place of the page to another.
+    pub async fn drag(&self, from: [f64; 2], to: [f64; 2]) {
+        let button = MOUSE_BUTTON_LEFT;
+        let at = |share: f64| PointerAction::MoveTo {
+            duration: Some(Duration::from_millis(30)),
+            x: from[0] + share * (to[0] - from[0]),
+            y: from[1] + share * (to[1] - from[1]),
+        };
+        let mouse = MouseActions::new("mouse".to_owned())
+            .then(at(0.0))
+            .then(PointerAction::Down { button })
+            .then(at(0.5))
+            .then(at(1.0))
+            .then(PointerAction::Up { button });
+        self.client.perform_actions(mouse).await.unwrap();
+    }
+
     /// Ends the browser; nothing may have gone wrong in its console.
     pub async fn close(self) {
         let log = self.client.issue_cmd(ConsoleLog).await.unwrap();
@@ -194,7 +247,10 @@ impl Page {
     }
 }
 
-async fn browser() -> (Driver, Client) {
+/// WebGL 2 on the processor.
+const WEBGL: [&str; 2] = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"];
+
+async fn browser(graphics: &[&str]) -> (Driver, Client) {
     let free = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = free.local_addr().unwrap().port();
     drop(free);
@@ -202,14 +258,13 @@ async fn browser() -> (Driver, Client) {
     command.arg(format!("--port={port}"));
     command.stdout(Stdio::null()).stderr(Stdio::null());
     let driver = Driver(command.spawn().expect("chromedriver is installed"));
-    let arguments = [
+    let always = [
         "--headless=new",
         "--no-sandbox",
         "--window-size=1280,800",
         "--force-device-scale-factor=1",
-        "--use-angle=swiftshader",
-        "--enable-unsafe-swiftshader",
     ];
+    let arguments = [&always, graphics].concat();
     let options = json!({ "args": arguments });
     let wishes =
         json!({ "goog:chromeOptions": options, "goog:loggingPrefs": { "browser": "ALL" } });

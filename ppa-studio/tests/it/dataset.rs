@@ -145,3 +145,12 @@ fn a_dataset_without_its_plan_shows_its_poses_alone() {
         answer.text()
     );
 }
+
+#[test]
+fn a_plan_without_its_dataset_has_no_poses_to_show() {
+    let browser = Browser::new();
+    let absent = browser.get("/api/dataset?folder=p01.plan");
+    assert_eq!(absent.json(), serde_json::Value::Null);
+    let outside = browser.get("/api/dataset?folder=..");
+    assert_eq!(outside.status, StatusCode::UNPROCESSABLE_ENTITY);
+}

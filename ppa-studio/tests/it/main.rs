@@ -16,6 +16,7 @@ mod page_access;
 mod page_dataset;
 mod page_generation;
 mod page_training;
+mod page_views;
 mod plan_cameras;
 mod plan_form;
 mod plans;

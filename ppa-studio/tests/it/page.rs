@@ -241,6 +241,8 @@ fn images_follow_the_sliders_and_the_newest_wins() {
             .await;
         let coverage = "document.getElementById('coverage').textContent";
         page.wait(&format!("{coverage}.includes('%')")).await;
+        let scrolled = "document.querySelector('aside').scrollTop";
+        assert_eq!(page.value(scrolled).await, json!(0));
         let planned = page.value(coverage).await;
         page.slide("camera-left-1", 300.0).await;
         page.wait(&format!("{coverage} !== {planned}")).await;
