@@ -176,7 +176,7 @@ fn a_body_shape_is_shown_with_its_shift_in_step_2_only() {
         page.pick("skin-shape", "bumps_a").await;
         let legend = "document.querySelector('#shape-legend').textContent";
         page.wait(&format!("{legend}.includes('Moved by')")).await;
-        page.picture("skin-shape").await;
+        page.picture("guide_skin").await;
         page.click("#tab-landmarks").await;
         page.wait(&format!("{legend} === ''")).await;
         page.click("#tab-skin").await;
@@ -221,7 +221,7 @@ fn images_follow_the_sliders_and_the_newest_wins() {
         // Offered when the radiograph of the newest exposure is whole.
         page.wait("!document.getElementById('dose-begin').disabled")
             .await;
-        page.picture("whatif_18").await;
+        page.picture("guide_whatif").await;
         page.click("#dose-begin").await;
         page.wait("document.getElementById('dose-table').textContent.includes('bone')")
             .await;
@@ -246,7 +246,7 @@ fn images_follow_the_sliders_and_the_newest_wins() {
         let planned = page.value(coverage).await;
         page.slide("camera-left-1", 300.0).await;
         page.wait(&format!("{coverage} !== {planned}")).await;
-        page.picture("room").await;
+        page.picture("guide_room").await;
         page.click("#cameras-back").await;
         page.wait(&format!("{coverage} === {planned}")).await;
         page.client.back().await.unwrap();
