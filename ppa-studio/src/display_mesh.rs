@@ -22,7 +22,12 @@ pub(crate) fn display_mesh(skin: &Mesh, values: &[f32]) -> (Mesh, Vec<f32>) {
         });
         let (position, direction, count) = &mut sums[index];
         *position += vertex.coords;
-        *direction += normal;
+        // Both faces of a sheet that is thinner than a cell become one, which is lit from either side.
+        *direction += if normal.dot(direction) < 0.0 {
+            -normal
+        } else {
+            *normal
+        };
         *count += 1.0;
         indices.push(index as u32);
     }
@@ -68,6 +73,26 @@ pub(crate) fn bytes(mesh: &Mesh, values: &[f32]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn both_faces_of_a_thin_sheet_become_one_that_is_lit() {
+        let point = |n: u32, z: f32| Point3::new((n % 40) as f32, (n / 40) as f32, z);
+        let faces = [(1.0, 1.0), (0.2, -1.0)];
+        let sheet = Mesh {
+            vertices: faces
+                .iter()
+                .flat_map(|(z, _)| (0..1600).map(|n| point(n, *z)))
+                .collect(),
+            normals: faces
+                .iter()
+                .flat_map(|(_, up)| vec![Vector3::z() * *up; 1600])
+                .collect(),
+            triangles: vec![[0, 10, 400]],
+        };
+        let (shown, _) = display_mesh(&sheet, &[]);
+        assert_eq!(shown.vertices.len(), 256);
+        assert!(shown.normals.iter().all(|normal| normal.z.abs() > 0.999));
+    }
 
     #[test]
     fn merged_vertices_stay_within_a_cell_of_the_skin() {
