@@ -19,7 +19,8 @@ pub struct SbatchCommand {
 }
 
 impl SbatchCommand {
-    /// The same job after others, whether they succeed or fail; `after` holds their identifiers.
+    /// The same job after others, whether they succeed or fail; `after` holds their identifiers, which the script gets as its
+    /// last argument, separated by commas.
     #[must_use]
     pub fn after(mut self, after: &[String]) -> Self {
         if !after.is_empty() {
@@ -27,6 +28,7 @@ impl SbatchCommand {
                 .push(format!("--dependency=afterany:{}", after.join(":")));
             // A job whose dependency cannot be met would wait for ever.
             self.arguments.push("--kill-on-invalid-dep=yes".to_owned());
+            self.script.push(after.join(","));
         }
         self
     }
@@ -151,6 +153,6 @@ mod tests {
             after.contains("--dependency=afterany:7:9 --kill-on-invalid-dep=yes"),
             "{after}"
         );
-        assert!(after.ends_with("slurm/merge.sh"), "{after}");
+        assert!(after.ends_with("slurm/merge.sh 7,9"), "{after}");
     }
 }

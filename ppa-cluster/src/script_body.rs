@@ -24,6 +24,17 @@ const OF_TASK: &str = "number=$(($1 + SLURM_ARRAY_TASK_ID))\n\
                        task=${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID}\n";
 const OF_LAST: &str = "task=$SLURM_JOB_ID\n";
 
+/// Shell of the last job, after a definition of `find_missing`. It starts after all tasks, failed ones included. NFS caches names, for up to a
+/// minute by default, so that files of another node may be seen late: where all tasks succeeded, they are waited for.
+const FIND_MISSING: &str = "\
+    # Files of other nodes may be seen late, since NFS caches names. If all tasks succeeded, none is missing.\n\
+    succeeded() { [ \"$(squeue --noheader --states=all --jobs=\"$1\" --format=%T | sort -u)\" = COMPLETED ]; }\n\
+    find_missing\n\
+    while [ ${#missing[@]} -gt 0 ] && [ \"$SECONDS\" -lt 180 ] && succeeded \"$1\"; do\n    \
+    sleep 5\n    \
+    find_missing\n\
+    done\n";
+
 /// The scripts of the shards of a plan.
 pub(crate) fn of_poses(work: &PoseWork, cpus: u32) -> (ScriptBody, ScriptBody) {
     let shards = work.bundle.shards;
@@ -52,15 +63,17 @@ pub(crate) fn of_poses(work: &PoseWork, cpus: u32) -> (ScriptBody, ScriptBody) {
         title: format!("Merges {shards} shards and {checks} the dataset."),
         number: OF_LAST,
         run: format!(
-            "# This job starts after all tasks, failed ones included: the merge refuses shards that are missing.\n\
-             missing=\n\
-             shards=()\n\
-             for ((shard = 1; shard <= {shards}; shard++)); do\n    \
-             [ {begun} \"shards/$shard{ending}{held}\" ] || missing+=\" $shard\"\n    \
-             shards+=(\"shards/$shard{ending}\")\n\
+            "find_missing() {{\n    \
+             missing=()\n    \
+             shards=()\n    \
+             for ((shard = 1; shard <= {shards}; shard++)); do\n        \
+             [ {begun} \"shards/$shard{ending}{held}\" ] || missing+=(\"$shard\")\n        \
+             shards+=(\"shards/$shard{ending}\")\n    \
              done\n\
-             if [ -n \"$missing\" ]; then\n    \
-             echo \"no dataset: these shards were never begun:$missing\"\n    \
+             }}\n\
+             {FIND_MISSING}\
+             if [ ${{#missing[@]}} -gt 0 ]; then\n    \
+             echo \"no dataset: these shards were never begun: ${{missing[*]}}\"\n    \
              exit 1\n\
              fi\n\
              run \"$ppa\" --threads {cpus} merge \"${{shards[@]}}\" --out dataset{ending}{read_back} --progress plain\n\
@@ -107,12 +120,15 @@ pub(crate) fn of_trainings(work: &TrainingWork, cpus: u32) -> (ScriptBody, Scrip
         title: format!("Writes the tables of {all} trainings."),
         number: OF_LAST,
         run: format!(
-            "# This job starts after all tasks, failed ones included. It trains nothing itself.\n\
-             missing=()\n\
-             while read -r training; do\n    \
-             [ -f \"runs/$training/{FINISHED}\" ] || missing+=(\"$training\")\n\
+            "find_missing() {{\n    \
+             missing=()\n    \
+             while read -r training; do\n        \
+             [ -f \"runs/$training/{FINISHED}\" ] || missing+=(\"$training\")\n    \
              done <<'END'\n\
              {folders}END\n\
+             }}\n\
+             {FIND_MISSING}\
+             # This job trains nothing itself.\n\
              if [ ${{#missing[@]}} -gt 0 ]; then\n    \
              echo \"no tables: ${{#missing[@]}} of {count} trainings are not finished, such as ${{missing[0]}}\"\n    \
              exit 1\n\
@@ -196,12 +212,17 @@ pub(crate) fn of_histories(
         title: format!("Merges {parts} parts and writes the results."),
         number: OF_LAST,
         run: format!(
-            "# This job starts after all tasks, failed ones included: the merge refuses parts that are missing.\n\
-             {enter}\
-             parts=()\n\
-             for ((part = 1; part <= {parts}; part++)); do\n    \
-             parts+=(\"$jobs/{PARTS}/$part\")\n\
+            "{enter}\
+             find_missing() {{\n    \
+             missing=()\n    \
+             parts=()\n    \
+             for ((part = 1; part <= {parts}; part++)); do\n        \
+             [ -d \"$jobs/{PARTS}/$part\" ] || missing+=(\"$part\")\n        \
+             parts+=(\"$jobs/{PARTS}/$part\")\n    \
              done\n\
+             }}\n\
+             {FIND_MISSING}\
+             # The merge refuses parts that are missing.\n\
              {}\
              {merged}\
              {}\
@@ -210,4 +231,34 @@ pub(crate) fn of_histories(
         ),
     };
     Ok((task, last))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::process::Command;
+
+    use super::FIND_MISSING;
+
+    /// What is missing in the end, of one file that appears after a wait, with these states of the tasks.
+    fn missing_in_the_end(states: &str) -> String {
+        let script = format!(
+            "waited=0\n\
+             sleep() {{ waited=1; }}\n\
+             squeue() {{ case \"$*\" in *--jobs=7,9*) printf '{states}' ;; esac; }}\n\
+             find_missing() {{ missing=(); [ $waited = 1 ] || missing+=(3); }}\n\
+             {FIND_MISSING}\
+             printf %s \"${{missing[*]}}\"\n"
+        );
+        let mut said = Command::new("bash");
+        said.args(["-c", &script, "merge.sh", "7,9"]);
+        String::from_utf8(said.output().unwrap().stdout).unwrap()
+    }
+
+    #[test]
+    fn late_files_are_waited_for_if_all_tasks_succeeded() {
+        assert_eq!(missing_in_the_end("COMPLETED\\nCOMPLETED\\n"), "");
+        assert_eq!(missing_in_the_end("COMPLETED\\nFAILED\\n"), "3");
+        // Jobs that ended long ago are unknown to squeue.
+        assert_eq!(missing_in_the_end(""), "3");
+    }
 }

@@ -52,7 +52,7 @@ fn each_training_of_an_experiment_is_a_task() {
         first[8].contains("--dependency=afterany:1:2:3:4:5:6:7:8 "),
         "{first:?}"
     );
-    assert!(first[8].ends_with("tables.sh"), "{first:?}");
+    assert!(first[8].ends_with("tables.sh 1,2,3,4,5,6,7,8"), "{first:?}");
     let script = fs::read_to_string(here.join("jobs/slurm/training.sh")).unwrap();
     assert!(script.contains("#SBATCH --gres=gpu:1\n"), "{script}");
 

@@ -44,7 +44,11 @@ fn a_radiograph_in_tasks_has_the_bytes_of_one_run() {
         (&3.into(), &20_000.into())
     );
     assert_eq!(said["cpu_s_per_million"], Value::Null);
-    assert!(calls(here)[2].ends_with("merge.sh"), "{:?}", calls(here));
+    assert!(
+        calls(here)[2].ends_with("merge.sh 1,2"),
+        "{:?}",
+        calls(here)
+    );
 
     let last = run_script(here, "jobs/slurm/merge.sh", None);
     assert!(!last.status.success());
