@@ -9,6 +9,14 @@ pub enum GridError {
     /// At least one side has no voxels.
     #[error("a volume of {} x {} x {} voxels is empty; every side needs at least one", .0[0], .0[1], .0[2])]
     Empty([usize; 3]),
+    /// A block that reaches beyond the lattice.
+    #[error("a block that ends before voxel ({}, {}, {}) leaves a volume of {} x {} x {} voxels", .high[0], .high[1], .high[2], .size[0], .size[1], .size[2])]
+    Outside {
+        /// Half-open end of the block.
+        high: [usize; 3],
+        /// Voxels along each axis.
+        size: [usize; 3],
+    },
     /// More voxels than the machine can count.
     #[error("a volume of {} x {} x {} voxels, expected at most {most} of them", .0[0], .0[1], .0[2], most = usize::MAX)]
     TooMany([usize; 3]),
@@ -167,12 +175,11 @@ impl Grid {
     /// The sub-lattice of voxels `low..high` (half-open on every axis), at the same world place.
     ///
     /// # Errors
-    /// [`GridError::Empty`] when the range is empty or leaves the lattice.
+    /// [`GridError::Outside`] when the range leaves the lattice, [`GridError::Empty`] when it is empty.
     pub fn crop(&self, low: [usize; 3], high: [usize; 3]) -> Result<Self, GridError> {
-        if (0..3).any(|axis| high[axis] > self.size[axis] || low[axis] >= high[axis]) {
-            return Err(GridError::Empty([0, 1, 2].map(|axis| {
-                high[axis].min(self.size[axis]).saturating_sub(low[axis])
-            })));
+        let size = self.size;
+        if (0..3).any(|axis| high[axis] > size[axis]) {
+            return Err(GridError::Outside { high, size });
         }
         let mut matrix = *self.ct_from_voxel.matrix();
         let origin = self.centre(low.map(|v| v as f64));
@@ -180,7 +187,7 @@ impl Grid {
             .fixed_view_mut::<3, 1>(0, 3)
             .copy_from(&origin.coords);
         Self::new(
-            [0, 1, 2].map(|axis| high[axis] - low[axis]),
+            [0, 1, 2].map(|axis| high[axis].saturating_sub(low[axis])),
             Affine3::from_matrix_unchecked(matrix),
         )
     }
@@ -257,6 +264,19 @@ mod tests {
         }
         // Micrometres, and the lean of a gantry far beyond any.
         assert!(of_axes([[1e-5, 0.0, 0.0], [0.0, 1e-5, 0.0], [0.0, 1.0, 1e-4]]).is_ok());
+    }
+
+    #[test]
+    fn blocks_that_leave_the_lattice_or_are_empty_are_refused() {
+        let (size, one) = ([4, 5, 6], Vector3::repeat(1.0));
+        let grid = Grid::axis_aligned(size, one, Point3::origin()).unwrap();
+        assert_eq!(grid.crop([0; 3], size), Ok(grid.clone()));
+        let high = [4, 6, 6];
+        let outside = grid.crop([0; 3], high);
+        assert_eq!(outside, Err(GridError::Outside { high, size }));
+        for (low, cut) in [([1, 2, 3], [2, 0, 0]), ([3, 0, 0], [0, 2, 3])] {
+            assert_eq!(grid.crop(low, [3, 2, 3]), Err(GridError::Empty(cut)));
+        }
     }
 
     #[test]
