@@ -13,9 +13,9 @@ def _library(image: Any) -> types.ModuleType:
 
 
 def _hounsfield(voxels: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Voxels as int16 where all are whole and fit, else as float32."""
+    """Voxels as int16 where all are whole and fit, else as float32; contiguous, which those of a turned image are not."""
     if voxels.dtype == np.int16 or voxels.dtype == np.float32:
-        return voxels
+        return voxels if voxels.flags.forc else np.asfortranarray(voxels)
     if voxels.dtype.kind not in "iuf":
         raise ValueError(f"the voxels of the image are of type {voxels.dtype}, expected numbers")
     limits = np.iinfo(np.int16)

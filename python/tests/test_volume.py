@@ -70,6 +70,20 @@ def test_nibabel_images_are_volumes(tmp_path: Path, volume: ppa.Volume) -> None:
     assert np.shares_memory(np.asanyarray(back.dataobj), volume.voxels)
 
 
+@pytest.mark.parametrize("dtype", [np.int16, np.float32, np.float64])
+def test_turned_nibabel_images_are_volumes(dtype: Any) -> None:
+    nibabel = pytest.importorskip("nibabel")
+    voxels = np.arange(2 * 3 * 4).reshape(2, 3, 4).astype(dtype)
+    affine = np.array([[0, 0, -2.0, 30], [-0.5, 0, 0, 10], [0, 0.7, 0, -20], [0, 0, 0, 1]])
+    turned = nibabel.as_closest_canonical(nibabel.Nifti1Image(voxels, affine))
+    assert not np.asanyarray(turned.dataobj).flags.forc
+    volume = ppa.Volume.from_image(turned)
+    np.testing.assert_array_equal(volume.voxels, np.asanyarray(turned.dataobj))
+    for index in np.ndindex(2, 3, 4):
+        at = np.linalg.solve(volume.affine, np.diag([-1, -1, 1, 1]) @ affine @ (*index, 1))[:3]
+        assert volume.voxels[tuple(np.rint(at).astype(int))] == voxels[index]
+
+
 def test_simpleitk_images_are_volumes(volume: ppa.Volume) -> None:
     pytest.importorskip("SimpleITK")
     image = ppa.Volume(np.arange(24, dtype=np.int16).reshape(2, 3, 4), AFFINE_RIGHT).to_simpleitk()
