@@ -116,6 +116,33 @@ def test_calls_from_several_threads_agree(case: ppa.Case, scene: ppa.Scene) -> N
     assert len(set(images)) == 1 and len(images) == 4
 
 
+def test_a_call_takes_less_than_a_tenth_of_a_millisecond() -> None:
+    """More than its work, which is none here; the quickest of many, since other programs run as well."""
+    quickest = float("inf")
+    for _ in range(2000):
+        begin = time.perf_counter()
+        ppa.permutation_test([1.0, 2.0], [0.5, 1.5])
+        quickest = min(quickest, time.perf_counter() - begin)
+    assert quickest < 1e-4
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the system does not say how much memory is used")
+def test_views_cases_and_poses_take_no_memory_for_voxels() -> None:
+    def used() -> int:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    fine = ppa.phantom(spacing_mm=1.5)
+    case = ppa.prepare(fine, "r")
+    poses = [case.place(0)]
+    voxels, before = fine.voxels.nbytes, used()
+    views = [fine.voxels for _ in range(30)] + [case.volume.voxels for _ in range(30)]
+    poses += [case.place(angle) for angle in range(30)]
+    assert used() - before < 3 * voxels
+    copies = [view.copy() for view in views[:30]]
+    assert used() - before > 10 * voxels
+    assert len(poses) == len(copies) + 1
+
+
 FORK = """
 import os, sys, time
 import numpy as np, ppa

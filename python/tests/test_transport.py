@@ -6,6 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 
 import ppa
 
@@ -91,3 +94,49 @@ def test_voxels_that_make_no_sense_are_refused(changes: Any, says: str) -> None:
     assert says in str(refused.value)
     with pytest.raises(ValueError, match="device|rotation|rigid|matrix"):
         cube().radiograph(np.diag([2.0, 1, 1, 1]), 1100.0, xray=XRAY)
+
+
+#: Arguments that make sense, and arrays of any type and shape.
+any_array = hnp.arrays(
+    dtype=st.one_of(hnp.unsigned_integer_dtypes(), hnp.floating_dtypes(), hnp.boolean_dtypes(), hnp.byte_string_dtypes()),
+    shape=hnp.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=3),
+)
+any_matrix = st.one_of(st.just(POSE), st.just(AFFINE), hnp.arrays(np.float64, (4, 4)), any_array, st.none(), st.text())
+
+
+@given(
+    material=st.one_of(hnp.arrays(np.uint8, (3, 3, 3), elements=st.integers(0, 1)), any_array),
+    density=st.one_of(hnp.arrays(np.float32, (3, 3, 3)), any_array),
+    materials=st.lists(st.one_of(st.sampled_from(["water", "air"]), st.text(), st.none()), max_size=3),
+    affine=any_matrix,
+)
+@settings(max_examples=300, deadline=None)
+def test_any_arrays_are_voxels_or_an_exception(material: Any, density: Any, materials: Any, affine: Any) -> None:
+    try:
+        transport = ppa.Transport(material, density, materials, affine)
+    except (ValueError, TypeError):
+        return
+    assert material.shape == density.shape and set(transport.materials) <= set(materials)
+
+
+common = {"seed": st.integers(), "threads": st.integers(-1, 2)}
+any_exposure = st.one_of(
+    st.fixed_dictionaries({}, optional={
+        "histories": st.floats(), "mas": st.floats(), "exposure_index": st.floats(), "target_error": st.floats(), **common}),
+    st.fixed_dictionaries({"engine": st.just("analog"), "histories": st.floats(max_value=1e4)}, optional={
+        "target_error": st.floats(), "seconds": st.floats(), "dose": st.sampled_from([True, "map", ""]), **common}),
+)
+
+
+@given(pose=any_matrix, distance=st.floats(), columns=st.integers(-2, 9), pixel_mm=st.floats(), exposure=any_exposure)
+@settings(max_examples=200, deadline=None)
+def test_any_exposure_is_a_radiograph_or_an_exception(
+    pose: Any, distance: float, columns: int, pixel_mm: float, exposure: Any
+) -> None:
+    xray = {"detector": {"columns": columns, "rows": 3, "pixel_mm": pixel_mm}, "engine": {"scatter_histories": 100}}
+    try:
+        radiograph = cube().radiograph(pose, distance, xray=xray, **exposure)
+    except (ValueError, TypeError):
+        return
+    assert radiograph.total.shape == (3, columns)
+    assert np.isfinite(radiograph.total).all()
