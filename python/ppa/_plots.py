@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from ._ppa import Case, DepthImage, Pose, Radiograph
+    from ._ppa import Case, DepthImage, Pose, Radiograph, Scene
 
+#: Half a side of the square of the table that is drawn, mm.
+_TABLE_MM = 400.0
 #: Edge of the cubes in which the vertices of a skin are drawn as one, mm.
 _COARSE_MM = 8.0
 
@@ -73,20 +75,42 @@ def case(limb: Case, ax: Any) -> Any:
     return axes
 
 
+def _room(axes: Any, room: Scene | Pose, limb: Any) -> Any:
+    """Central beam and cameras around the points `limb`, in the room."""
+    frames = room.frames
+    device = frames["room_from_device"]
+    beam = np.array([device @ (0.0, 0.0, z, 1.0) for z in (0.0, room.source_detector_mm)])[:, :3]
+    axes.plot(*beam.T, color="tab:blue", label="central beam")
+    for place, marker, name in zip(beam, "*s", ("x-ray source", "detector")):
+        axes.scatter(*place, marker=marker, color="tab:blue", label=name)
+    cameras = np.array([frames[f"room_from_{name}"][:3, 3] for name in ("left", "right")])
+    for place, colour, name in zip(cameras, ("tab:orange", "tab:green"), ("left", "right")):
+        axes.scatter(*place, color=colour, label=f"{name} camera")
+    axes.set(xlabel="x / mm", ylabel="y / mm", zlabel="z / mm")
+    everything = np.concatenate([limb, beam, cameras])
+    axes.set_box_aspect(np.maximum(np.ptp(everything, axis=0), 1.0))
+    axes.locator_params(nbins=4)
+    axes.legend(loc="upper left")
+    return axes
+
+
 def pose(posed: Pose, ax: Any) -> Any:
     """The skin in the room with x-ray source, detector and cameras."""
     axes = _axes(ax, projection="3d")
     vertices = posed.vertices
     _skin(axes, vertices, posed.triangles)
-    frames = posed.frames
-    device = frames["room_from_device"]
-    distance = posed.source_detector_mm
-    beam = np.array([device @ (0.0, 0.0, z, 1.0) for z in (0.0, distance)])[:, :3]
-    axes.plot(*beam.T, color="tab:blue", label="central beam")
-    for name in ("left", "right"):
-        axes.scatter(*frames[f"room_from_{name}"][:3, 3], label=f"{name} camera")
-    axes.set(xlabel="x / mm", ylabel="y / mm", zlabel="z / mm")
-    everything = np.concatenate([vertices, beam])
-    axes.set_box_aspect(np.maximum(np.ptp(everything, axis=0), 1.0))
-    axes.legend(loc="upper left")
-    return axes
+    return _room(axes, posed, vertices)
+
+
+def scene(room: Scene, ax: Any) -> Any:
+    """The table around the central beam, with x-ray source, detector and cameras."""
+    axes = _axes(ax, projection="3d")
+    normal, offset = room.table[:3], room.table[3]
+    source, ahead = room.frames["room_from_device"][:3, [3, 2]].T
+    centre = source + (offset - normal @ source) / (normal @ ahead) * ahead
+    along = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    along *= _TABLE_MM / np.linalg.norm(along)
+    across = np.cross(normal, along)
+    corners = centre + np.array([along + across, along - across, -along - across, across - along])
+    axes.plot_trisurf(*corners.T, triangles=[[0, 1, 2], [0, 2, 3]], color="silver", alpha=0.5)
+    return _room(axes, room, corners)

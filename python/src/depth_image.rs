@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
+use ppa_core::Roi;
 use ppa_depth::{Camera, DepthImage};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -17,6 +18,8 @@ use crate::values::plain;
 pub struct PyDepthImage {
     pub image: DepthImage,
     pub camera: Camera,
+    /// Square around the joint; None where the camera does not see it.
+    pub roi: Option<Roi>,
 }
 
 impl PyDepthImage {
@@ -52,6 +55,13 @@ impl PyDepthImage {
     #[getter]
     fn lens<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         plain(py, self.camera.spec())
+    }
+
+    /// (int, int, int) or None: square around the joint that networks see: first column, first row and size in pixels, as in
+    /// ``roi_depth.json``; None where the joint is not on the image.
+    #[getter]
+    fn roi(&self) -> Option<(u32, u32, u32)> {
+        self.roi.map(|roi| (roi.x_start, roi.y_start, roi.size))
     }
 
     /// Write the image: 16-bit PNG in mm, OpenEXR, or the points that are seen as PLY. A file that is there is replaced.

@@ -23,23 +23,33 @@ pub struct PyNetwork {
     predictor: Arc<PairPredictor>,
 }
 
-/// The region of an image: the square given, or all of a square image.
-fn region(roi: Option<[u32; 3]>, image: &Raster<u16>, name: &str) -> PyResult<Roi> {
-    let (width, height) = (image.width(), image.height());
-    let [x_start, y_start, size] = match roi {
-        Some(roi) => roi,
-        None if width == height => [0, 0, width as u32],
-        None => {
-            return Err(PyValueError::new_err(format!(
-                "depth_{name} has {width} x {height} pixels: give roi_{name}, the square around the joint as (x, y, size)"
-            )));
-        }
-    };
-    Ok(Roi {
+/// What a network looks at: the depths of an image, mm, and a square of them.
+struct Seen {
+    depths: Raster<u16>,
+    region: Roi,
+}
+
+/// An image with the square given, its own one around the joint, or all of a square image.
+fn seen(object: &Bound<'_, PyAny>, roi: Option<[u32; 3]>, name: &str) -> PyResult<Seen> {
+    let depths = depths(object, name)?;
+    let given = roi.map(|[x_start, y_start, size]| Roi {
         x_start,
         y_start,
         size,
-    })
+    });
+    let own = || object.cast::<PyDepthImage>().ok()?.get().roi;
+    let (width, height) = (depths.width(), depths.height());
+    let all = (width == height).then_some(Roi {
+        x_start: 0,
+        y_start: 0,
+        size: width as u32,
+    });
+    match given.or_else(own).or(all) {
+        Some(region) => Ok(Seen { depths, region }),
+        None => Err(PyValueError::new_err(format!(
+            "depth_{name} has {width} x {height} pixels: give roi_{name}, the square around the joint as (x, y, size)"
+        ))),
+    }
 }
 
 /// Depths of an image, mm.
@@ -131,7 +141,8 @@ impl PyNetwork {
     /// depth_left, depth_right : DepthImage or numpy.ndarray, shape (rows, columns), uint16
     ///     Depths in mm, 0 where there is none.
     /// roi_left, roi_right : (int, int, int), optional
-    ///     Square around the joint: first column, first row and size, as in ``roi_depth.json``; all of a square image by default.
+    ///     Square around the joint: first column, first row and size, as in ``roi_depth.json``; by default that of the
+    ///     DepthImage (:attr:`DepthImage.roi`), or all of a square array.
     /// threads : int, optional
     ///     Worker threads; one per core by default.
     ///
@@ -150,14 +161,11 @@ impl PyNetwork {
         roi_right: Option<[u32; 3]>,
         threads: Option<usize>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (left, right) = (depths(depth_left, "left")?, depths(depth_right, "right")?);
-        let regions = [
-            region(roi_left, &left, "left")?,
-            region(roi_right, &right, "right")?,
-        ];
-        let predictor = self.predictor.with_regions(regions);
+        let left = seen(depth_left, roi_left, "left")?;
+        let right = seen(depth_right, roi_right, "right")?;
+        let predictor = self.predictor.with_regions([left.region, right.region]);
         let answer = run(py, threads, None, move |_| {
-            predictor.predict_images([&left, &right])
+            predictor.predict_images([&left.depths, &right.depths])
         })?;
         plain(py, &answer.or_raise()?)
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use numpy::PyArray2;
 use ppa_dataset::layout::View;
-use ppa_depth::{DepthImage, SensorSpec};
+use ppa_depth::SensorSpec;
 use ppa_generate::{Frames, PlacedCamera, PoseError, SceneSetupError, VisibleLimb};
 use ppa_label::{Exposure as LabelExposure, PoseLabel};
 use ppa_scene::{Placement, ct_from_device};
@@ -211,10 +211,13 @@ impl PyPose {
                     skin.seen_by(&camera.placed(&scene, sensor)?, seed)?
                 }
             };
-            Ok::<(DepthImage, _), SightError>((seen.image, seen.camera))
+            Ok::<_, SightError>(PyDepthImage {
+                image: seen.image,
+                camera: seen.camera,
+                roi: seen.region,
+            })
         })?;
-        let (image, camera) = image.or_raise()?;
-        Ok(PyDepthImage { image, camera })
+        image.or_raise()
     }
 
     /// Radiograph of the limb.

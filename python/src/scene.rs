@@ -123,8 +123,24 @@ impl PyScene {
         PyArray1::from_slice(py, &[normal.x, normal.y, normal.z, plane.offset_mm])
     }
 
+    /// Distance from the x-ray source to the detector, mm.
+    #[getter]
+    fn source_detector_mm(&self) -> f64 {
+        self.scene.table.room.device.source_detector_mm
+    }
+
+    /// Draw table, x-ray source, detector and cameras with matplotlib, on axes that are given or in a new figure, which are returned.
+    #[pyo3(signature = (ax=None))]
+    fn plot<'py>(
+        this: &Bound<'py, Self>,
+        ax: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let plots = this.py().import("ppa._plots")?;
+        plots.call_method1("scene", (this, ax))
+    }
+
     fn __repr__(&self) -> String {
-        let distance = self.scene.table.room.device.source_detector_mm;
+        let distance = self.source_detector_mm();
         format!("<ppa.Scene with {distance} mm from the source to the detector>")
     }
 }

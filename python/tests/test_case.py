@@ -163,7 +163,7 @@ def test_pictures_are_drawn(case: ppa.Case, scene: ppa.Scene) -> None:
     matplotlib.use("Agg")
     pose = case.place(0, scene=scene)
     depth, radiograph = pose.depth(), pose.radiograph()
-    for drawn in [case, pose, depth, radiograph]:
+    for drawn in [case, pose, scene, depth, radiograph]:
         drawn.plot().figure.canvas.draw()
     for shown in [depth, radiograph]:
         assert shown._repr_png_().startswith(b"\x89PNG")

@@ -129,3 +129,20 @@ def test_networks_say_what_the_command_line_says(training: Path) -> None:
         network.predict(left, right, roi_left=(900, 0, 10), roi_right=regions[1])
     with pytest.raises(ValueError, match='side="l" or "r"'):
         ppa.Network.load(training / "run")
+
+
+def test_networks_look_at_the_joint_of_depth_images(training: Path, case: ppa.Case, scene: ppa.Scene) -> None:
+    network = ppa.Network.load(training / "run", side="r")
+    pose = case.place(10, scene=scene)
+    left, right = pose.depth("left"), pose.depth("right")
+    assert left.roi is not None and right.roi is not None
+    given = network.predict(left.to_uint16(), right.to_uint16(), roi_left=left.roi, roi_right=right.roi)
+    assert network.predict(left, right) == given
+    with pytest.raises(ValueError, match="outside"):
+        network.predict(left, right, roi_left=(900, 0, 10))
+    half = math.sqrt(0.5)
+    turned = np.array([[half, 0, half, 0], [0, 1, 0, 0], [-half, 0, half, 0], [0, 0, 0, 1]])
+    beside = pose.depth(ppa.Camera(pose.frames["room_from_left"] @ turned, left.lens))
+    assert beside.roi is None
+    with pytest.raises(ValueError, match="give roi_right"):
+        network.predict(left, beside)

@@ -138,6 +138,11 @@ def images(folder: Path) -> dict[str, bytes]:
 
 def test_datasets(files: Files, tmp_path: Path) -> None:
     command("generate", files.plan, "--out", tmp_path / "command")
+    rois = json.loads((tmp_path / "command/patient_0/labels/r/roi_depth.json").read_text())
+    pose = ppa.Case.read(files.case).place(10, scene=ppa.Scene(files.plan))
+    for view in ["left", "right"]:
+        row = rois[f"depth_cam_{view}_10.0.png"]
+        assert pose.depth(view).roi == (row["x_start"], row["y_start"], row["size"])
     seen: list[tuple[float, float]] = []
     summary = ppa.generate(ppa.Plan.read(files.plan), tmp_path / "mine", progress=lambda *at: seen.append(at), threads=1)
     assert summary["made"] == 3
