@@ -8,7 +8,6 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -19,9 +18,6 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// How long a call waits for work that was asked to stop. Work that takes longer ends by itself, and its result is dropped.
 const PATIENCE: Duration = Duration::from_millis(500);
-
-/// Most threads that can be asked for.
-const MOST_THREADS: usize = 1024;
 
 /// Bytes of the stack of a thread: as much as the main thread of the program has.
 const STACK: usize = 8 << 20;
@@ -60,11 +56,6 @@ static THREADS: Mutex<Option<(u32, usize, Arc<ThreadPool>)>> = Mutex::new(None);
 
 fn pool(threads: Option<usize>) -> PyResult<Arc<ThreadPool>> {
     let count = threads.unwrap_or(0);
-    if threads == Some(0) || count > MOST_THREADS {
-        return Err(PyValueError::new_err(format!(
-            "threads is {count}, expected 1 to {MOST_THREADS}, or None for one per core"
-        )));
-    }
     let process = std::process::id();
     // Held with the interpreter's lock, so that no fork of Python leaves it locked.
     let mut kept = THREADS.lock().unwrap_or_else(PoisonError::into_inner);

@@ -12,6 +12,7 @@ use ppa_scene::LandmarkOverrides;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::arguments::threads_of;
 use crate::arrays::{of_rows, point, points};
 use crate::background::run;
 use crate::errors::OrRaise;
@@ -88,7 +89,11 @@ impl PyCase {
     ///     Worker threads; one per core by default.
     #[staticmethod]
     #[pyo3(signature = (path, *, threads=None))]
-    fn read(py: Python<'_>, path: PathBuf, threads: Option<usize>) -> PyResult<Self> {
+    fn read(
+        py: Python<'_>,
+        path: PathBuf,
+        #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
+    ) -> PyResult<Self> {
         let case = Case::read(&path).or_raise()?;
         let limb = run(py, threads, None, move |_| {
             let scan = read_with(&case.source.path, &case.source.reading())?;
@@ -270,7 +275,7 @@ impl PyCase {
         py: Python<'_>,
         angle: f64,
         scene: Option<&Bound<'_, PyScene>>,
-        threads: Option<usize>,
+        #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
     ) -> PyResult<PyPose> {
         let given = scene.map(|scene| scene.get().scene.clone());
         PyPose::new(py, self.limb(), angle, given, threads)

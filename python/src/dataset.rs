@@ -16,6 +16,7 @@ use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+use crate::arguments::whole;
 use crate::background::run;
 use crate::errors::OrRaise;
 use crate::side::letter;
@@ -67,10 +68,10 @@ impl PyDataset {
         py: Python<'_>,
         path: PathBuf,
         views: &str,
-        side: usize,
-        patients: Option<Vec<u32>>,
+        #[pyo3(from_py_with = whole::<64, _>)] side: usize,
+        #[pyo3(from_py_with = whole::<32, _>)] patients: Option<Vec<u32>>,
         shapes: Option<Vec<String>>,
-        every_pose: Option<usize>,
+        #[pyo3(from_py_with = whole::<64, _>)] every_pose: Option<usize>,
         labels: Option<&str>,
         unlabelled: bool,
         mirror: bool,
@@ -196,8 +197,8 @@ impl PyDataset {
     fn drawn<'py>(
         &self,
         py: Python<'py>,
-        place: u64,
-        seed: u64,
+        #[pyo3(from_py_with = whole::<64, _>)] place: u64,
+        #[pyo3(from_py_with = whole::<64, _>)] seed: u64,
         balanced: bool,
         augmentation: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<(Bound<'py, PyAny>, f64)> {

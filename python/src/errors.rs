@@ -21,10 +21,34 @@ create_exception!(
     "A defect of ppa: a computation ended where it should not have."
 );
 
+/// Options of the command line that sentences of the libraries name, and what stands for them in Python; a longer one first.
+const KEYWORDS: [(&str, &str); 9] = [
+    (" --axis-source bone", " axis_source=\"bone\""),
+    (" --limb other", " limb=\"other\""),
+    (" --limb", " limb="),
+    (" --joint", " joint="),
+    (" --inside", " inside="),
+    (" --replace", " replace=True"),
+    (" --shard", " shard"),
+    (" --out", " out"),
+    (
+        "`ppa prepare --bones` or `--segment-bones`",
+        "ppa.prepare with bones= or segment_bones=",
+    ),
+];
+
+/// A sentence for callers of Python.
+fn in_python(sentence: &str) -> String {
+    let words = KEYWORDS.iter();
+    words.fold(sentence.to_owned(), |text, (option, keyword)| {
+        text.replace(option, keyword)
+    })
+}
+
 /// The exception of a library's error: `OSError`, or one of its kinds such as `FileNotFoundError`, where the system refused
 /// something, else [`PpaError`].
 pub fn raised(error: impl Error + 'static) -> PyErr {
-    let sentence = error_chain(&error);
+    let sentence = in_python(&error_chain(&error));
     let mut cause: Option<&(dyn Error + 'static)> = Some(&error);
     while let Some(error) = cause {
         if let Some(system) = error.downcast_ref::<io::Error>()

@@ -8,6 +8,7 @@ use ppa_core::Part;
 use ppa_generate::{GenerateSettings, Progress, generate as make};
 use pyo3::prelude::*;
 
+use crate::arguments::{threads_of, whole};
 use crate::background::{Watch, run};
 use crate::errors::OrRaise;
 use crate::plan::plan_of;
@@ -71,12 +72,12 @@ pub fn generate<'py>(
     py: Python<'py>,
     plan: &Bound<'py, PyAny>,
     out: PathBuf,
-    seed: Option<u64>,
+    #[pyo3(from_py_with = whole::<64, _>)] seed: Option<u64>,
     shard: Option<&str>,
     replace: bool,
-    disk_limit: Option<u64>,
+    #[pyo3(from_py_with = whole::<64, _>)] disk_limit: Option<u64>,
     progress: Option<&Bound<'py, PyAny>>,
-    threads: Option<usize>,
+    #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut plan = (*plan_of(Some(plan))?).clone();
     plan.seed = seed.unwrap_or(plan.seed);

@@ -15,6 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde::Serialize;
 
+use crate::arguments::threads_of;
 use crate::background::{Watch, run};
 use crate::errors::OrRaise;
 use crate::plan::plan_of;
@@ -153,7 +154,7 @@ pub fn label<'py>(
     thresholds: Option<&Bound<'py, PyAny>>,
     replace: bool,
     progress: Option<&Bound<'py, PyAny>>,
-    threads: Option<usize>,
+    #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let scale = scale_of(scale, thresholds)?;
     let name = name.map(str::parse::<LabelName>).transpose().or_raise()?;

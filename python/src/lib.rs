@@ -1,5 +1,6 @@
 //! The compiled module of the Python package `ppa`: arguments in, calls of the crates, arrays out.
 
+mod arguments;
 mod arrays;
 mod background;
 mod camera;

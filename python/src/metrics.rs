@@ -4,6 +4,7 @@ use ppa_metrics::{mean_per_seed, sign_flip_permutation};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::arguments::threads_of;
 use crate::arrays::numbers;
 use crate::background::run;
 use crate::errors::OrRaise;
@@ -59,7 +60,7 @@ pub fn permutation_test<'py>(
     a: &Bound<'py, PyAny>,
     b: &Bound<'py, PyAny>,
     seeds: Option<&Bound<'py, PyAny>>,
-    threads: Option<usize>,
+    #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (a, b) = (numbers(a, "a", &[0])?, numbers(b, "b", &[0])?);
     let seed = |seed: f64| {

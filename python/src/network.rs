@@ -11,6 +11,7 @@ use ppa_learn::frames::{FramesError, PairPredictor};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::arguments::{threads_of, whole};
 use crate::arrays::{required, untyped};
 use crate::background::run;
 use crate::depth_image::PyDepthImage;
@@ -157,9 +158,9 @@ impl PyNetwork {
         py: Python<'py>,
         depth_left: &Bound<'py, PyAny>,
         depth_right: &Bound<'py, PyAny>,
-        roi_left: Option<[u32; 3]>,
-        roi_right: Option<[u32; 3]>,
-        threads: Option<usize>,
+        #[pyo3(from_py_with = whole::<32, _>)] roi_left: Option<[u32; 3]>,
+        #[pyo3(from_py_with = whole::<32, _>)] roi_right: Option<[u32; 3]>,
+        #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let left = seen(depth_left, roi_left, "left")?;
         let right = seen(depth_right, roi_right, "right")?;

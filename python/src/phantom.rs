@@ -6,6 +6,7 @@ use ppa_phantom::{Limb, LowerLeg, Scanner, TableTop};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::arguments::{threads_of, whole};
 use crate::background::run;
 use crate::errors::OrRaise;
 use crate::values::plain;
@@ -69,14 +70,14 @@ pub fn phantom(
     py: Python<'_>,
     name: &str,
     side: &str,
-    seed: Option<u64>,
+    #[pyo3(from_py_with = whole::<64, _>)] seed: Option<u64>,
     plate: bool,
     spacing_mm: f64,
     table: bool,
     blur_mm: f64,
     noise_hu: f64,
-    noise_seed: u64,
-    threads: Option<usize>,
+    #[pyo3(from_py_with = whole::<64, _>)] noise_seed: u64,
+    #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
 ) -> PyResult<PyVolume> {
     let limb = limb(name, seed, crate::side::side(side)?, plate)?;
     let table = match table {
@@ -123,8 +124,8 @@ pub fn phantom_bones(
     volume: &PyVolume,
     name: &str,
     side: &str,
-    seed: Option<u64>,
-    threads: Option<usize>,
+    #[pyo3(from_py_with = whole::<64, _>)] seed: Option<u64>,
+    #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
 ) -> PyResult<PyVolume> {
     let limb = limb(name, seed, crate::side::side(side)?, false)?;
     let grid = volume.volume.grid().clone();
@@ -154,7 +155,7 @@ pub fn phantom_truth<'py>(
     py: Python<'py>,
     name: &str,
     side: &str,
-    seed: Option<u64>,
+    #[pyo3(from_py_with = whole::<64, _>)] seed: Option<u64>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let leg = lower_leg(name, seed, crate::side::side(side)?, false)?;
     plain(py, &leg.truth())

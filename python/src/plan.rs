@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 use toml::{Table, Value};
 
+use crate::arguments::whole;
 use crate::errors::{OrRaise, PpaError};
 use crate::values::{dictionary, from_table, table, to_table};
 
@@ -68,8 +69,8 @@ impl PyPlan {
     #[pyo3(signature = (cases=Vec::new(), *, seed=0, technique=None, rotation=None, shapes=None, soft_tissue=None, positioning=None, room=None, depth=None, xray=None))]
     #[expect(clippy::too_many_arguments, reason = "keywords of a Python function")]
     fn new(
-        cases: Vec<(PathBuf, u32)>,
-        seed: u64,
+        #[pyo3(from_py_with = whole::<32, _>)] cases: Vec<(PathBuf, u32)>,
+        #[pyo3(from_py_with = whole::<64, _>)] seed: u64,
         technique: Option<&str>,
         rotation: Option<&Bound<'_, PyDict>>,
         shapes: Option<&Bound<'_, PyDict>>,

@@ -12,6 +12,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::arguments::{threads_of, whole};
 use crate::arrays::of_rows;
 use crate::background::run;
 use crate::camera::PyCamera;
@@ -177,8 +178,8 @@ impl PyPose {
         py: Python<'_>,
         camera: Option<&Bound<'_, PyAny>>,
         sensor: Option<&Bound<'_, PyAny>>,
-        seed: u64,
-        threads: Option<usize>,
+        #[pyo3(from_py_with = whole::<64, _>)] seed: u64,
+        #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
     ) -> PyResult<PyDepthImage> {
         let chosen = match camera {
             None => Chosen::OfScene(View::Left),
@@ -270,9 +271,9 @@ impl PyPose {
         target_error: Option<f64>,
         seconds: Option<f64>,
         dose: Option<&Bound<'_, PyAny>>,
-        seed: u64,
+        #[pyo3(from_py_with = whole::<64, _>)] seed: u64,
         progress: Option<&Bound<'_, PyAny>>,
-        threads: Option<usize>,
+        #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
     ) -> PyResult<PyRadiograph> {
         let mut settings = xray_settings(&self.scene.plan.xray, technique, xray)?;
         if let Some(tube) = tube {
@@ -337,7 +338,7 @@ impl PyPose {
         py: Python<'py>,
         scale: &str,
         thresholds: Option<&Bound<'py, PyAny>>,
-        threads: Option<usize>,
+        #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let scale = scale_of(scale, thresholds)?;
         let (limb, scene, placement) = (self.limb.clone(), self.scene.clone(), self.placement);

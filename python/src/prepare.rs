@@ -12,6 +12,7 @@ use ppa_scene::LandmarkOverrides;
 use pyo3::exceptions::{PyFileExistsError, PyValueError};
 use pyo3::prelude::*;
 
+use crate::arguments::{threads_of, whole};
 use crate::arrays::{finite, point, points, row_list};
 use crate::background::{Watch, run};
 use crate::case::PyCase;
@@ -153,7 +154,7 @@ pub fn prepare(
     side: &str,
     limb: Option<&str>,
     iso_hu: f64,
-    crop: Option<[[usize; 2]; 3]>,
+    #[pyo3(from_py_with = whole::<64, _>)] crop: Option<[[usize; 2]; 3]>,
     inside: Option<&Bound<'_, PyAny>>,
     keep: Option<&Bound<'_, PyAny>>,
     remove: Option<&Bound<'_, PyAny>>,
@@ -165,10 +166,10 @@ pub fn prepare(
     anterior: Option<&Bound<'_, PyAny>>,
     plane: Option<&Bound<'_, PyAny>>,
     bones: Option<PathBuf>,
-    bone_numbers: [u8; 3],
+    #[pyo3(from_py_with = whole::<8, _>)] bone_numbers: [u8; 3],
     segment_bones: Option<PathBuf>,
     replace: bool,
-    threads: Option<usize>,
+    #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
 ) -> PyResult<PyCase> {
     if axis.is_some() && (axis_source.is_some() || joint_region.is_some() || calf_region.is_some())
     {

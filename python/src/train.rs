@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use toml::{Table, Value};
 
+use crate::arguments::threads_of;
 use crate::background::run;
 use crate::errors::OrRaise;
 use crate::progress::observer;
@@ -91,7 +92,7 @@ pub fn train<'py>(
     preset: &str,
     seed: Option<i64>,
     progress: Option<&Bound<'py, PyAny>>,
-    threads: Option<usize>,
+    #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
     settings: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let settings = settings.map(|settings| table(settings, "settings"));

@@ -10,6 +10,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::arguments::{threads_of, whole};
 use crate::arrays::{first_fastest, matrix};
 use crate::background::run;
 use crate::errors::OrRaise;
@@ -109,7 +110,7 @@ impl PyTransport {
         volume: &Bound<'_, PyVolume>,
         calibration: Option<&Bound<'_, PyDict>>,
         mask: Option<&Bound<'_, PyAny>>,
-        threads: Option<usize>,
+        #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
     ) -> PyResult<Self> {
         let volume = volume.get().volume.clone();
         let calibration: HuCalibration = match calibration {
@@ -181,9 +182,9 @@ impl PyTransport {
         target_error: Option<f64>,
         seconds: Option<f64>,
         dose: Option<&Bound<'_, PyAny>>,
-        seed: u64,
+        #[pyo3(from_py_with = whole::<64, _>)] seed: u64,
         progress: Option<&Bound<'_, PyAny>>,
-        threads: Option<usize>,
+        #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
     ) -> PyResult<PyRadiograph> {
         let mut settings = xray_settings(&self.settings, technique, xray)?;
         if settings.marker.take().is_some() && technique.is_none() {

@@ -8,6 +8,7 @@ use ppa_ct::{Grid, ReadOptions, Scan, SeriesChoice, Values, Volume, read_with, w
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use crate::arguments::{threads_of, whole};
 use crate::arrays::{first_fastest, matrix, untyped, view};
 use crate::background::run;
 use crate::errors::OrRaise;
@@ -117,7 +118,7 @@ impl PyVolume {
         series: Option<&Bound<'_, PyAny>>,
         fill_gaps: bool,
         force: bool,
-        threads: Option<usize>,
+        #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
     ) -> PyResult<Self> {
         let choice = |series: &Bound<'_, PyAny>| {
             let text = series.str()?.to_string();
@@ -179,7 +180,12 @@ impl PyVolume {
     /// path : str or os.PathLike
     ///     File or folder to write; a file that is there is replaced.
     #[pyo3(signature = (path, *, threads=None))]
-    fn save(&self, py: Python<'_>, path: PathBuf, threads: Option<usize>) -> PyResult<()> {
+    fn save(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        #[pyo3(from_py_with = threads_of)] threads: Option<usize>,
+    ) -> PyResult<()> {
         let volume = self.volume.clone();
         run(py, threads, None, move |_| write(&path, &volume))?.or_raise()
     }
@@ -251,7 +257,11 @@ impl PyVolume {
     /// Returns
     /// -------
     /// Volume
-    fn crop(&self, low: [usize; 3], high: [usize; 3]) -> PyResult<Self> {
+    fn crop(
+        &self,
+        #[pyo3(from_py_with = whole::<64, _>)] low: [usize; 3],
+        #[pyo3(from_py_with = whole::<64, _>)] high: [usize; 3],
+    ) -> PyResult<Self> {
         Ok(Self {
             volume: self.volume.crop(low, high).or_raise()?,
             file: None,

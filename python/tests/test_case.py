@@ -128,6 +128,8 @@ def test_the_analog_engine_stops_at_an_error(case: ppa.Case, scene: ppa.Scene) -
         ({"xray": {"kvp": object()}}, "xray.kvp is of type object"),
         ({"threads": 0}, "threads is 0"),
         ({"threads": 5000}, "threads is 5000"),
+        ({"threads": -1}, "threads is -1, expected 1 to 1024"),
+        ({"seed": -1}, "found -1, expected whole numbers from 0 to 18446744073709551615"),
     ],
 )
 def test_exposures_that_make_no_sense_are_refused(
@@ -156,6 +158,13 @@ def test_images_that_make_no_sense_are_refused(case: ppa.Case, scene: ppa.Scene,
     ]:
         with pytest.raises(ValueError):
             call()
+
+
+def test_refusals_name_keywords_and_no_options() -> None:
+    rod = np.full((40, 40, 40), -1000, np.int16)
+    rod[10:30, 10:30, :] = 50
+    with pytest.raises(ppa.PpaError, match='joint centre with joint=, or limb="other"'):
+        ppa.prepare(ppa.Volume(rod, np.diag([2.0, 2.0, 2.0, 1.0])), "r")
 
 
 def test_pictures_are_drawn(case: ppa.Case, scene: ppa.Scene) -> None:

@@ -146,3 +146,5 @@ def test_networks_look_at_the_joint_of_depth_images(training: Path, case: ppa.Ca
     assert beside.roi is None
     with pytest.raises(ValueError, match="give roi_right"):
         network.predict(left, beside)
+    with pytest.raises(ValueError, match=r"found \(-1, 0, 10\), expected whole numbers from 0 to 4294967295"):
+        network.predict(left, right, roi_left=(-1, 0, 10))

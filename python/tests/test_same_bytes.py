@@ -153,6 +153,7 @@ def test_datasets(files: Files, tmp_path: Path) -> None:
     with pytest.raises(ppa.PpaError) as refused:
         ppa.generate(files.plan, tmp_path / "mine", seed=6)
     assert "seed" in str(refused.value)
+    assert "replace=True" in str(refused.value)
 
 
 def test_the_package_runs_the_program(tmp_path: Path) -> None:
