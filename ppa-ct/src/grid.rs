@@ -10,12 +10,14 @@ pub enum GridError {
     #[error("a volume of {} x {} x {} voxels is empty; every side needs at least one", .0[0], .0[1], .0[2])]
     Empty([usize; 3]),
     /// A block that reaches beyond the lattice.
-    #[error("a block that ends before voxel ({}, {}, {}) leaves a volume of {} x {} x {} voxels", .high[0], .high[1], .high[2], .size[0], .size[1], .size[2])]
+    #[error("a block ends before voxel {end} along {axis}, but the volume has {voxels} along it")]
     Outside {
-        /// Half-open end of the block.
-        high: [usize; 3],
-        /// Voxels along each axis.
-        size: [usize; 3],
+        /// i, j or k.
+        axis: char,
+        /// Half-open end of the block along it.
+        end: usize,
+        /// Voxels along it.
+        voxels: usize,
     },
     /// More voxels than the machine can count.
     #[error("a volume of {} x {} x {} voxels, expected at most {most} of them", .0[0], .0[1], .0[2], most = usize::MAX)]
@@ -177,9 +179,10 @@ impl Grid {
     /// # Errors
     /// [`GridError::Outside`] when the range leaves the lattice, [`GridError::Empty`] when it is empty.
     pub fn crop(&self, low: [usize; 3], high: [usize; 3]) -> Result<Self, GridError> {
-        let size = self.size;
-        if (0..3).any(|axis| high[axis] > size[axis]) {
-            return Err(GridError::Outside { high, size });
+        for ((end, voxels), axis) in high.into_iter().zip(self.size).zip(['i', 'j', 'k']) {
+            if end > voxels {
+                return Err(GridError::Outside { axis, end, voxels });
+            }
         }
         let mut matrix = *self.ct_from_voxel.matrix();
         let origin = self.centre(low.map(|v| v as f64));
@@ -271,9 +274,9 @@ mod tests {
         let (size, one) = ([4, 5, 6], Vector3::repeat(1.0));
         let grid = Grid::axis_aligned(size, one, Point3::origin()).unwrap();
         assert_eq!(grid.crop([0; 3], size), Ok(grid.clone()));
-        let high = [4, 6, 6];
-        let outside = grid.crop([0; 3], high);
-        assert_eq!(outside, Err(GridError::Outside { high, size }));
+        let (axis, end, voxels) = ('j', 9, 5);
+        let outside = grid.crop([0; 3], [4, 9, 6]);
+        assert_eq!(outside, Err(GridError::Outside { axis, end, voxels }));
         for (low, cut) in [([1, 2, 3], [2, 0, 0]), ([3, 0, 0], [0, 2, 3])] {
             assert_eq!(grid.crop(low, [3, 2, 3]), Err(GridError::Empty(cut)));
         }
