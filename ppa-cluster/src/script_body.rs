@@ -24,8 +24,8 @@ const OF_TASK: &str = "number=$(($1 + SLURM_ARRAY_TASK_ID))\n\
                        task=${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID}\n";
 const OF_LAST: &str = "task=$SLURM_JOB_ID\n";
 
-/// Shell of the last job, after a definition of `find_missing`. It starts after all tasks, failed ones included. NFS caches names, for up to a
-/// minute by default, so that files of another node may be seen late: where all tasks succeeded, they are waited for.
+/// Shell code of the last job, which starts after all tasks, failed ones included; `find_missing` is defined before it. NFS caches names, by default
+/// for up to a minute. If all tasks succeeded, the job waits until it sees the files of the other nodes.
 const FIND_MISSING: &str = "\
     # Files of other nodes may be seen late, since NFS caches names. If all tasks succeeded, none is missing.\n\
     succeeded() { [ \"$(squeue --noheader --states=all --jobs=\"$1\" --format=%T | sort -u)\" = COMPLETED ]; }\n\

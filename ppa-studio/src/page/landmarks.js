@@ -14,7 +14,7 @@ export class LandmarkPanel {
     this.store = store;
     this.actions = actions;
     this.picking = null;
-    // Landmarks on their way in the view in three dimensions.
+    // Landmarks while they are dragged in three dimensions.
     this.moving = null;
     byId("limb-choice").addEventListener("change", (event) => actions.choose({ limb: event.target.value || null }));
     byId("axis-source").addEventListener("change", (event) => actions.choose({ axis_source: event.target.value }));
