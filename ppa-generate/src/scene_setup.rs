@@ -273,12 +273,7 @@ fn place_cameras(table: &Table, plan: &Plan) -> Result<Vec<PlacedCamera>, SceneS
 /// # Errors
 /// [`SceneSetupError::Spectrum`] for a filter that cannot be read.
 pub fn tube(settings: &XraySettings) -> Result<TubeSpec, SceneSetupError> {
-    let filters = settings.filters.iter().map(|filter| filter.parse());
-    Ok(TubeSpec::new(
-        settings.kvp,
-        settings.anode_angle_deg,
-        filters.collect::<Result<_, ppa_xray::SpectrumError>>()?,
-    ))
+    Ok(settings.tube()?)
 }
 
 /// The beam of a plan.

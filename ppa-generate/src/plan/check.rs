@@ -1,8 +1,9 @@
 //! Checks of a plan before anything is made.
 
+use nalgebra::Isometry3;
 use ppa_core::Side;
 use ppa_core::text::error_chain;
-use ppa_xray::AnalogSettings;
+use ppa_xray::{AnalogSettings, Projection, Spectrum};
 
 use super::Plan;
 
@@ -84,6 +85,7 @@ impl Plan {
                 return Err("xray.tube_load is given with xray.analog, whose histories are followed one by one".to_owned());
             }
         }
+        self.check_room_and_exposure()?;
         if let Some(place) = &self.xray.marker {
             for side in Side::ALL {
                 let marker = place.of(side).check(&self.xray.detector);
@@ -126,5 +128,26 @@ impl Plan {
             .poses()
             .map_err(|error| format!("rotation: {error}"))?;
         Ok(())
+    }
+
+    /// What is known of room, beam and image without a limb.
+    fn check_room_and_exposure(&self) -> Result<(), String> {
+        let (room, xray) = (&self.room.parametric, &self.xray);
+        // A recorded room has furniture of its own.
+        if self.room.ply.is_none() {
+            room.check()
+                .map_err(|error| format!("room.parametric: {error}"))?;
+        }
+        let (detector, distance_mm) = (xray.detector, room.source_detector_mm);
+        Projection::new(Isometry3::identity(), distance_mm, detector)
+            .with_source(xray.source)
+            .with_receptor(xray.receptor.clone())
+            .validate()
+            .map_err(|error| format!("xray: {error}"))?;
+        let beam = xray.tube().and_then(|tube| Spectrum::tungsten(&tube));
+        beam.map_err(|error| format!("xray: {}", error_chain(&error)))?;
+        xray.presentation
+            .validate()
+            .map_err(|error| format!("xray.presentation: {error}"))
     }
 }

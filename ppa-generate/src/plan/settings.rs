@@ -7,7 +7,7 @@ use ppa_depth::{RigSpec, SensorSpec, WallDepth};
 use ppa_scene::{PlaneSettings, RoomSpec};
 use ppa_xray::{
     AnalogSettings, Detector, FastSettings, FormFactors, HuCalibration, Interpolation,
-    Presentation, Receptor, Source, TubeLoad,
+    Presentation, Receptor, Source, SpectrumError, TubeLoad, TubeSpec,
 };
 use serde::{Deserialize, Serialize};
 
@@ -152,6 +152,19 @@ impl Default for XraySettings {
 }
 
 impl XraySettings {
+    /// The tube and its filters.
+    ///
+    /// # Errors
+    /// [`SpectrumError`] for a filter that cannot be read.
+    pub(crate) fn tube(&self) -> Result<TubeSpec, SpectrumError> {
+        let filters = self.filters.iter().map(|filter| filter.parse());
+        Ok(TubeSpec::new(
+            self.kvp,
+            self.anode_angle_deg,
+            filters.collect::<Result<_, SpectrumError>>()?,
+        ))
+    }
+
     /// Whether a limb has the same voxels with both.
     pub(crate) fn same_voxels(&self, other: &Self) -> bool {
         self.half_length_mm == other.half_length_mm

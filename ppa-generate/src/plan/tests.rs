@@ -256,3 +256,36 @@ fn cameras_that_make_no_sense_are_refused_by_name() {
         "{error}"
     );
 }
+
+#[test]
+fn room_beam_and_image_out_of_range_are_refused() {
+    let refused = [
+        (
+            "[room.parametric]\ntable_length_mm = -5",
+            "room.parametric: table_length_mm",
+        ),
+        (
+            "[room.parametric]\nsource_detector_mm = 300",
+            "room.parametric: source_detector_mm",
+        ),
+        ("[xray]\nkvp = 1000", "xray: tube voltage 1000 kV"),
+        ("[xray]\nfilters = [\"Al\"]", "xray: "),
+        (
+            "[xray]\ndetector = { columns = 8, rows = 8, pixel_mm = -0.5 }",
+            "xray: the pixel side is -0.5 mm",
+        ),
+        (
+            "[xray]\ndetector = { columns = 0, rows = 8, pixel_mm = 1 }",
+            "xray: the detector has 0 x",
+        ),
+        ("[xray.source]\nfocal_spot = { size_mm = 400 }", "xray: "),
+        ("[xray.presentation]\nwidth = 0", "xray.presentation: "),
+    ];
+    for (keys, expected) in refused {
+        let error = ppa_core::text::error_chain(&read(keys).unwrap_err());
+        assert!(error.contains(expected), "{keys}: {error}");
+    }
+    // A recorded room has no built-in table.
+    let recorded = "[room]\nply = \"room.ply\"\n[room.parametric]\ntable_length_mm = -5";
+    read(recorded).unwrap();
+}

@@ -72,7 +72,11 @@ const PEDESTAL_MM: f64 = 500.0;
 const FOOT_SPACE_MM: f64 = 1000.0;
 
 impl RoomSpec {
-    pub(crate) fn check(&self) -> Result<(), RoomError> {
+    /// Checks that lengths are in range and furniture does not overlap.
+    ///
+    /// # Errors
+    /// [`RoomError`] naming the length at fault.
+    pub fn check(&self) -> Result<(), RoomError> {
         let lengths = [
             ("table_length_mm", self.table_length_mm),
             ("table_width_mm", self.table_width_mm),
