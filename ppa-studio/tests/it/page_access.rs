@@ -86,3 +86,35 @@ fn a_narrow_page_scrolls_only_down() {
         page.close().await;
     });
 }
+
+/// What axe-core, in the file that `PPA_AXE` names, finds against WCAG 2.2, levels A and AA, and its own best practices.
+#[test]
+#[ignore = "needs chromium, chromedriver and axe-core"]
+fn axe_core_finds_nothing_against_the_page() {
+    let file = std::env::var_os("PPA_AXE").expect("PPA_AXE names axe.min.js");
+    let axe = std::fs::read_to_string(file).unwrap();
+    run(async {
+        let folder = tempfile::tempdir().unwrap();
+        dataset(folder.path());
+        let plan = folder.path().join("ankles.toml");
+        let page = Page::of(folder, &plan).await;
+        page.wait("document.querySelector('#skin-facts').textContent.includes('Points')")
+            .await;
+        page.client.execute(&axe, vec![]).await.unwrap();
+        let check = "const done = arguments[0]; \
+            axe.run(document, { resultTypes: ['violations'] }) \
+                .then((found) => done(found.violations.flatMap(({ id, help, nodes }) => nodes.map((n) => `${id}: ${help}: ${n.html.slice(0, 160)}`))), \
+                    (error) => done([String(error)]));";
+        let mut against = Vec::new();
+        for step in STEPS {
+            page.click(&format!("#tab-{step}")).await;
+            page.wait("document.getElementById('command-list').childElementCount > 0")
+                .await;
+            let found = page.client.execute_async(check, vec![]).await.unwrap();
+            let found: Vec<String> = serde_json::from_value(found).unwrap();
+            against.extend(found.into_iter().map(|one| format!("{step}: {one}")));
+        }
+        assert!(against.is_empty(), "{}", against.join("\n"));
+        page.close().await;
+    });
+}
