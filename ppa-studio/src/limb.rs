@@ -33,9 +33,10 @@ impl Limb {
             case
         };
         let desk = Desk::new(LoadedScan::of_case(&case)?, case)?;
+        let coarse = CoarseScan::new(&desk.shown().prepared().volume)?;
         Ok(Self {
             scenes: Scenes::default(),
-            coarse: CoarseScan::default(),
+            coarse,
             labels: Labels::default(),
             mortise: None,
             desk: Mutex::new(desk),
@@ -64,6 +65,9 @@ impl Limb {
     ) -> Result<(), StudioError> {
         let mut desk = self.desk();
         let before = desk.clone();
+        // All of it is of the limb before; the next one needs the memory.
+        self.scenes.forget_limb();
+        self.labels.forget_limb();
         change(&mut desk)?;
         let shown = desk.shown();
         if shown.revision == before.shown().revision {

@@ -15,6 +15,11 @@ pub(crate) struct Labels {
 }
 
 impl Labels {
+    /// Frees what was computed from the limb.
+    pub fn forget_limb(&self) {
+        *self.kept.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
     /// The label of a pose by the graded scale, by the place of the device in the `ct` frame; none where the case names no bones.
     pub fn of(
         &self,

@@ -102,6 +102,12 @@ pub(crate) enum Pass {
 }
 
 impl Scenes {
+    /// Frees what was computed from the limb.
+    pub fn forget_limb(&self) {
+        *self.shape.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        *self.phantom.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
     /// Room, cameras and beam of a plan: those of the request before, if nothing they depend on has changed.
     pub fn setup(&self, plan: &Plan) -> Result<Arc<SceneSetup>, StudioError> {
         let mut kept = self.setup.lock().unwrap_or_else(PoisonError::into_inner);

@@ -133,9 +133,7 @@ pub(super) async fn surface_at(
     work(state, move |state| {
         let _turn = state.surface.turn(&ticket)?;
         let limb = state.limb()?;
-        let surface = limb
-            .coarse
-            .surface(&limb.shown().prepared().volume, iso_hu)?;
+        let surface = limb.coarse.surface(iso_hu)?;
         Ok(display_mesh::bytes(&surface, &[]))
     })
     .await
