@@ -164,6 +164,14 @@ pub enum StudioError {
     /// Random bytes for the address.
     #[error("the operating system gives no random numbers: {0}")]
     Random(getrandom::Error),
+    /// The address cannot be used.
+    #[error("cannot listen on {address}")]
+    Listen {
+        /// The address.
+        address: std::net::SocketAddr,
+        /// Why.
+        source: std::io::Error,
+    },
     /// The listening socket.
     #[error("the page cannot be served")]
     Serve(#[source] std::io::Error),

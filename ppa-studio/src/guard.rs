@@ -2,6 +2,7 @@
 
 use std::net::{Ipv4Addr, Ipv6Addr};
 use std::sync::Arc;
+use std::time::UNIX_EPOCH;
 
 use axum::body::Body;
 use axum::extract::{Request, State as Extracted};
@@ -27,6 +28,9 @@ const HEADERS: [(HeaderName, &str); 4] = [
     (CACHE_CONTROL, "no-store"),
 ];
 
+/// Header by which a page notices that the program has been started again.
+const STARTED: HeaderName = HeaderName::from_static("x-started");
+
 /// Refuses requests of others, exchanges the token for a cookie, and adds the headers that protect the page.
 pub(crate) async fn guard(
     Extracted(state): Extracted<Arc<State>>,
@@ -34,7 +38,11 @@ pub(crate) async fn guard(
     next: Next,
 ) -> Response {
     let mut response = match judged(&state.token, &request) {
-        Judged::Known => next.run(request).await,
+        Judged::Known => {
+            let mut answer = next.run(request).await;
+            answer.headers_mut().insert(STARTED, start(&state));
+            answer
+        }
         Judged::Enters => admit(&state.token),
         Judged::Refused(why) => (StatusCode::FORBIDDEN, why).into_response(),
     };
@@ -43,6 +51,12 @@ pub(crate) async fn guard(
         headers.insert(name, HeaderValue::from_static(value));
     }
     response
+}
+
+/// When the program started, in a number that no other start has.
+fn start(state: &State) -> HeaderValue {
+    let since = state.started.duration_since(UNIX_EPOCH);
+    HeaderValue::from(since.unwrap_or_default().as_nanos() as u64)
 }
 
 /// Who sends a request.
@@ -97,19 +111,20 @@ fn is_localhost_or_ip(host: &str) -> bool {
 }
 
 fn has_cookie(headers: &HeaderMap, token: &Token) -> bool {
-    let texts = headers.get_all(COOKIE).iter();
+    let (texts, name) = (headers.get_all(COOKIE).iter(), token.cookie());
     texts
         .filter_map(|value| value.to_str().ok())
         .flat_map(|text| text.split(';'))
         .filter_map(|cookie| cookie.trim().split_once('='))
-        .any(|(key, value)| key == token.cookie() && token.is(value))
+        .any(|(key, value)| key == name && token.is(value))
 }
 
 /// Gives the cookie, and leads to the page without the token in its address.
 fn admit(token: &Token) -> Response {
     let cookie = format!(
-        "{}={token}; HttpOnly; SameSite=Strict; Path=/",
-        token.cookie()
+        "{}={}; HttpOnly; SameSite=Strict; Path=/",
+        token.cookie(),
+        token.secret()
     );
     let mut response = Response::new(Body::empty());
     *response.status_mut() = StatusCode::SEE_OTHER;

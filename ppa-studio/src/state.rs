@@ -2,6 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
 
 use ppa_dataset::layout::LimbId;
 use ppa_generate::{Case, Plan, PlanCase};
@@ -26,6 +27,8 @@ use crate::what_if::WhatIf;
 /// What is open, and the work under way.
 pub(crate) struct State {
     pub token: Token,
+    /// When the program started.
+    pub started: SystemTime,
     /// Depth images under way.
     pub depth: Newest,
     /// The radiograph under way.
@@ -69,7 +72,7 @@ pub(crate) struct State {
 
 impl State {
     /// Opens what there is, and takes up the changes that were saved beside them.
-    pub fn open(opening: &Opening) -> Result<Self, StudioError> {
+    pub fn open(opening: &Opening, token: Token) -> Result<Self, StudioError> {
         // First: what is opened may have to be made.
         let network = opening.networks.clone().map(Network::open).transpose()?;
         let live = match (&opening.networks, opening.watch.clone()) {
@@ -104,7 +107,8 @@ impl State {
             limb.mortise = opened.mortise;
         }
         Ok(Self {
-            token: Token::random()?,
+            token,
+            started: SystemTime::now(),
             depth: Newest::default(),
             radiograph: Newest::default(),
             surface: Newest::default(),

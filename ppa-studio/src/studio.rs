@@ -8,6 +8,7 @@ use axum::Router;
 use crate::error::StudioError;
 use crate::opening::Opening;
 use crate::state::State;
+use crate::token::Token;
 
 /// A limb, open in the browser. Clones share their state.
 #[derive(Clone)]
@@ -19,7 +20,15 @@ impl Studio {
     /// # Errors
     /// [`StudioError`] naming the file at fault.
     pub fn open(opening: &Opening) -> Result<Self, StudioError> {
-        Ok(Self(Arc::new(State::open(opening)?)))
+        Self::open_with(opening, Token::random()?)
+    }
+
+    /// The same with the token that the page needs.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_with(opening: &Opening, token: Token) -> Result<Self, StudioError> {
+        Ok(Self(Arc::new(State::open(opening, token)?)))
     }
 
     /// The address to open in a browser on this machine, with the token that lets it in.
@@ -31,7 +40,7 @@ impl Studio {
                 SocketAddr::V6(_) => Ipv6Addr::LOCALHOST.into(),
             });
         }
-        format!("http://{listening}/?token={}", self.0.token)
+        format!("http://{listening}/?token={}", self.0.token.secret())
     }
 
     /// Ends the images and the forecast under way, and a run after the poses under way.

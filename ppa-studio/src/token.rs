@@ -2,43 +2,71 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::StudioError;
 
-/// A random number that only the person who started the program knows.
-pub(crate) struct Token {
-    secret: String,
-    /// Name of the cookie: cookies of all ports of a host are sent to each of them, so every studio has its own.
-    cookie: String,
-}
+/// Digits of the cookie's name, those before the secret.
+const NAME_DIGITS: usize = 8;
+const DIGITS: usize = 40;
+
+/// A random number that only the person who started the program knows: the name of a cookie, and its secret value.
+///
+/// Cookies of all ports of a host are sent to each of them, so every studio has a cookie of its own.
+#[derive(Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Token(String);
 
 impl Token {
+    /// # Errors
+    /// [`StudioError::Random`] where the system has no random numbers.
     pub fn random() -> Result<Self, StudioError> {
-        let mut bytes = [0; 20];
+        let mut bytes = [0; DIGITS / 2];
         getrandom::fill(&mut bytes).map_err(StudioError::Random)?;
-        let digits = |bytes: &[u8]| bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-        let (name, secret) = bytes.split_at(4);
-        let name: String = digits(name);
-        Ok(Self {
-            secret: digits(secret),
-            cookie: format!("ppa_studio_{name}"),
-        })
+        Ok(Self(
+            bytes.iter().map(|byte| format!("{byte:02x}")).collect(),
+        ))
     }
 
     /// Name of the cookie that holds it.
-    pub fn cookie(&self) -> &str {
-        &self.cookie
+    pub(crate) fn cookie(&self) -> String {
+        format!("ppa_studio_{}", &self.0[..NAME_DIGITS])
+    }
+
+    pub(crate) fn secret(&self) -> &str {
+        &self.0[NAME_DIGITS..]
     }
 
     /// Compared in the same time wherever the first difference is.
-    pub fn is(&self, given: &str) -> bool {
-        let pairs = self.secret.bytes().zip(given.bytes());
+    pub(crate) fn is(&self, given: &str) -> bool {
+        let secret = self.secret();
+        let pairs = secret.bytes().zip(given.bytes());
         let differences = pairs.fold(0, |all, (a, b)| all | (a ^ b));
-        self.secret.len() == given.len() && differences == 0
+        secret.len() == given.len() && differences == 0
     }
 }
 
-impl fmt::Display for Token {
+/// Without the secret.
+impl fmt::Debug for Token {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.secret)
+        write!(f, "Token({})", self.cookie())
+    }
+}
+
+impl TryFrom<String> for Token {
+    type Error = &'static str;
+
+    fn try_from(text: String) -> Result<Self, &'static str> {
+        let is_digit = |byte: u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte);
+        match text.len() == DIGITS && text.bytes().all(is_digit) {
+            true => Ok(Self(text)),
+            false => Err("a token has 40 hexadecimal digits"),
+        }
+    }
+}
+
+impl From<Token> for String {
+    fn from(token: Token) -> Self {
+        token.0
     }
 }

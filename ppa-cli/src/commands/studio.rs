@@ -1,19 +1,20 @@
 //! `ppa studio`: the browser interface.
 
 use std::io::Write;
-use std::net::{IpAddr, Ipv4Addr, TcpListener};
-use std::path::PathBuf;
+use std::net::{IpAddr, Ipv4Addr};
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::mpsc::channel;
 
 use anyhow::{Context, bail};
 use clap::Args;
 use ppa_core::Roi;
-use ppa_studio::{Networks, Opening, Studio, Watch, serve};
+use ppa_studio::{Endpoint, Networks, Opening, Studio, Watch, serve};
 use serde::Serialize;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
+use crate::allocator::return_freed_memory;
 use crate::number_lists::square;
 use crate::output::{Output, working};
 use crate::side_name::SideName;
@@ -41,7 +42,7 @@ pub struct StudioArgs {
     /// The same in the right camera's frames
     #[arg(long, value_name = "X,Y,SIZE", value_parser = square, requires = "watch")]
     roi_right: Option<Roi>,
-    /// Port to listen on [default: a free one]
+    /// Port to listen on [default: that of the last studio on PATH, or a free one]
     #[arg(long, default_value_t = 0, hide_default_value = true)]
     port: u16,
     /// Address to listen on; any other than this machine's own needs --i-know
@@ -75,6 +76,12 @@ impl StudioArgs {
         }))
     }
 
+    /// The folder or file that the page is about; the built-in phantom lies in the working folder.
+    fn shown(&self) -> &Path {
+        let shown = self.path.as_ref().or(self.watch.as_ref());
+        shown.map_or(Path::new("."), PathBuf::as_path)
+    }
+
     fn watched(&self) -> Option<Watch> {
         Some(Watch {
             folder: self.watch.clone()?,
@@ -95,15 +102,18 @@ pub fn run(args: &StudioArgs, output: Output) -> anyhow::Result<()> {
         }
         warning(MEANING);
     }
-    let listener = TcpListener::bind((args.bind, args.port))
-        .with_context(|| format!("cannot listen on {}, port {}", args.bind, args.port))?;
+    return_freed_memory();
+    let last = Endpoint::file_of(args.shown());
+    let Endpoint { listener, token } =
+        Endpoint::open((args.bind, args.port).into(), last.as_deref())?;
     let working = working("finding the limb");
-    let studio = Studio::open(&Opening {
+    let opening = Opening {
         path: args.path.clone(),
         side: args.side.map(Into::into),
         networks: args.networks()?,
         watch: args.watched(),
-    })?;
+    };
+    let studio = Studio::open_with(&opening, token)?;
     working.finish_and_clear();
     let mut signals = Signals::new([SIGINT, SIGTERM]).context("cannot listen for Ctrl-C")?;
     let served = Served {

@@ -54,7 +54,9 @@ fn ppa(folder: &Path, arguments: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_ppa"));
     command
         .current_dir(folder)
-        .args(arguments.split_whitespace());
+        .args(arguments.split_whitespace())
+        // Nothing is kept outside the folder: no folder can be made there.
+        .env("XDG_STATE_HOME", "/dev/null");
     command
 }
 

@@ -21,7 +21,10 @@ pub struct Served {
 
 impl Served {
     pub fn start(folder: &Path, arguments: &str) -> Self {
-        let mut command = ppa(folder, &format!("studio --no-open {arguments}"));
+        Self::of(ppa(folder, &format!("studio --no-open {arguments}")))
+    }
+
+    fn of(mut command: Command) -> Self {
         let command = command.stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().unwrap();
         let mut address = String::new();
@@ -100,6 +103,29 @@ fn a_studio_serves_until_ctrl_c() {
     let state = String::from_utf8(served.get("/api/state")).unwrap();
     contains(&state, &["\"name\":\"p01.toml\"", "\"limb\":\"lower_leg\""]);
     assert_eq!(served.stop(), Some(0));
+}
+
+#[test]
+fn a_killed_studio_starts_again_at_the_same_address() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = phantom().join("p01.toml");
+    let start = || {
+        let mut command = ppa(folder.path(), "studio --no-open");
+        command.arg(&case).env("XDG_STATE_HOME", folder.path());
+        Served::of(command)
+    };
+    let mut first = start();
+    first.child.kill().unwrap();
+    first.child.wait().unwrap();
+    let second = start();
+    assert_eq!(first.host, second.host);
+    // The browser that has the first one's cookie is let in.
+    let state = String::from_utf8(first.get("/api/state")).unwrap();
+    contains(&state, &["HTTP/1.1 200", "\"name\":\"p01.toml\""]);
+    // A second studio beside it is another one.
+    let beside = start();
+    assert_ne!(beside.host, second.host);
+    assert_ne!(beside.cookie, second.cookie);
 }
 
 #[test]

@@ -1,7 +1,7 @@
-// Sliders that move the cameras from their places in the plan.
+// Sliders, and places in the room to drag, that move the cameras from their places in the plan.
 
 import { element } from "/page/elements.js";
-import { fixed } from "/page/geometry.js";
+import { add, fixed, inverse, rotate, sub, transform, turned } from "/page/geometry.js";
 
 const byId = (id) => document.getElementById(id);
 
@@ -17,31 +17,42 @@ const SLIDERS = [
   { label: "Roll", unit: "°", key: "turn_deg", at: 0, most: 180, step: 1 },
 ];
 
+// Distance from a camera to the place at which it is aimed: nearer than the limb, at which both cameras look.
+const AIM_MM = 600;
+
+// The place at which a camera is aimed.
+export const aim = ({ room_from_camera }) => transform(room_from_camera, [0, 0, AIM_MM]);
+
 const still = () => ({ shift_mm: [0, 0, 0], turn_deg: [0, 0, 0] });
 
 export class CameraForm {
   // Calls `changed` when a camera has moved.
   constructor(changed) {
     this.values = CAMERAS.map(still);
+    this.changed = changed;
     this.inputs = [];
-    byId("cameras-form").append(...CAMERAS.map((name, camera) => this.camera(name, camera, changed)));
+    byId("cameras-form").append(...CAMERAS.map((name, camera) => this.camera(name, camera)));
     byId("cameras-back").addEventListener("click", () => {
       this.values = CAMERAS.map(still);
-      this.inputs.forEach((show) => show());
-      byId("cameras-back").disabled = true;
-      changed();
+      this.moved();
     });
   }
 
-  camera(name, camera, changed) {
+  moved() {
+    this.inputs.forEach((show) => show());
+    byId("cameras-back").disabled = !this.moves();
+    this.changed();
+  }
+
+  camera(name, camera) {
     const details = element("details");
     details.open = true;
-    const sliders = SLIDERS.map((slider, index) => this.slider(`camera-${name}-${index}`, slider, camera, name, changed));
+    const sliders = SLIDERS.map((slider, index) => this.slider(`camera-${name}-${index}`, slider, camera, name));
     details.append(element("summary", `${name === "left" ? "Left" : "Right"} camera, moved by`), ...sliders);
     return details;
   }
 
-  slider(id, { label, unit, key, at, most, step }, camera, name, changed) {
+  slider(id, { label, unit, key, at, most, step }, camera, name) {
     const row = element("div", "", { class: "row" });
     const input = element("input", "", { type: "range", id, min: -most, max: most, step, "aria-label": `${label} of the ${name} camera` });
     const text = element("label", "", { for: id });
@@ -52,9 +63,7 @@ export class CameraForm {
     };
     input.addEventListener("input", () => {
       this.values[camera][key][at] = Number(input.value);
-      show();
-      byId("cameras-back").disabled = !this.moves();
-      changed();
+      this.moved();
     });
     this.inputs.push(show);
     row.append(text, input);
@@ -65,6 +74,39 @@ export class CameraForm {
   // Of both cameras; nothing while both are where the plan has them.
   moves() {
     const moved = this.values.some(({ shift_mm, turn_deg }) => [...shift_mm, ...turn_deg].some((value) => value !== 0));
-    return moved ? this.values : undefined;
+    return moved ? structuredClone(this.values) : undefined;
   }
+
+  // What can be dragged across the line of sight: a camera, which shifts it, and the place at which it is aimed, which pans and tilts it.
+  // `room` was computed with the moves `made`.
+  handles(room, made) {
+    const ctFromRoom = inverse(room.room_from_ct);
+    return room.cameras.flatMap((camera, i) => {
+      const from = made?.[i] ?? still();
+      const handle = (at, change) => {
+        const move = (place) => {
+          this.values[i] = place ? { ...from, ...change(transform(room.room_from_ct, place)) } : from;
+          this.moved();
+        };
+        return { at: transform(ctFromRoom, at), onSkin: false, move, drop: move };
+      };
+      return [
+        handle(camera.centre, (place) => shifted(from, rotate(inverse(room.room_from_device), sub(place, camera.centre)))),
+        handle(aim(camera), (place) => aimed(from, transform(inverse(camera.room_from_camera), place))),
+      ];
+    });
+  }
+}
+
+// A camera that is moved by `by` mm along the axes of the device.
+function shifted({ shift_mm }, by) {
+  return { shift_mm: add(shift_mm, by).map(Math.round) };
+}
+
+// A camera whose view goes through a place in its frame; the roll stays.
+function aimed({ turn_deg }, place) {
+  const [roll, tilt, pan] = turn_deg;
+  const [x, y, z] = turned(turned(turned(place, 2, roll), 0, tilt), 1, pan);
+  const degrees = (radians) => Math.round(10 * radians * 180 / Math.PI) / 10;
+  return { turn_deg: [roll, degrees(Math.atan2(-y, Math.hypot(x, z))), degrees(Math.atan2(x, z))] };
 }

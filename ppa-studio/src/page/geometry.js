@@ -21,6 +21,16 @@ export function rotate(rows, p) {
   return [0, 1, 2].map((i) => dot(rows[i], p));
 }
 
+// A vector that is rotated by an angle about an axis of the frame.
+export function turned(p, axis, degrees) {
+  const [sin, cos] = [Math.sin(degrees * Math.PI / 180), Math.cos(degrees * Math.PI / 180)];
+  const [b, c] = [(axis + 1) % 3, (axis + 2) % 3];
+  const made = [...p];
+  made[b] = cos * p[b] - sin * p[c];
+  made[c] = sin * p[b] + cos * p[c];
+  return made;
+}
+
 // Inverse of an affine transform.
 export function inverse(rows) {
   const columns = [0, 1, 2].map((j) => [0, 1, 2].map((i) => rows[i][j]));

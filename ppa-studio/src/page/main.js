@@ -1,6 +1,6 @@
 // The page: one store, one place that changes it, views that follow.
 
-import { getJson, newest, postJson } from "/page/server.js";
+import { getJson, newest, onAnswer, postJson } from "/page/server.js";
 import { fixed, inverse, point, transform, IDENTITY } from "/page/geometry.js";
 import { SliceView } from "/page/slices.js";
 import { surfaceAt } from "/page/surface.js";
@@ -229,11 +229,11 @@ function picked(place, inside) {
   setPlace(place);
 }
 
-function showRoom(next) {
+function showRoom(next, handles) {
   const first = !room;
   room = next;
   roomFacts(next);
-  if (store.step === "room" || store.step === "whatif") drawRoom(view3d, next, first);
+  if (store.step === "room" || store.step === "whatif") drawRoom(view3d, next, store.step === "room" ? handles : [], first);
 }
 
 function go(step) {
@@ -341,6 +341,18 @@ async function begin() {
   if (opened.limb) await show(await getJson("state"));
 }
 
+// The program answers again. One that was started again has what was saved.
+async function goOn(restarted) {
+  try {
+    allow(await getJson("opened"));
+    if (opened.limb && store.doc) await show(await getJson("state"));
+    go(store.step);
+    tell(restarted ? "ppa studio was started again" : "");
+  } catch (error) {
+    fail(error);
+  }
+}
+
 // The step that the address names, or the first one where that has nothing to show.
 function stepInAddress() {
   const step = location.hash.slice(1);
@@ -397,5 +409,6 @@ function listen() {
 }
 
 listen();
+onAnswer(goOn);
 setWindow(store.window);
 begin().catch(fail);

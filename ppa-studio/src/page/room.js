@@ -1,5 +1,6 @@
 // The room in three dimensions: table, detector, focal spot and view cones.
 
+import { aim } from "/page/cameras.js";
 import { facts } from "/page/elements.js";
 import { fixed } from "/page/geometry.js";
 
@@ -20,9 +21,9 @@ function look(view3d, room) {
   else view3d.frame(room.table_centre, 2000);
 }
 
-export function drawRoom(view3d, room, first) {
+export function drawRoom(view3d, room, handles, first) {
   view3d.worldFromCt = room.room_from_ct;
-  view3d.handles = [];
+  view3d.handles = handles;
   const [w, l] = room.table_size_mm;
   const [x, y, z] = room.table_centre;
   const table = [[x - w / 2, y - 450, z], [x + w / 2, y - 450, z], [x + w / 2, y + l - 450, z], [x - w / 2, y + l - 450, z]];
@@ -37,7 +38,7 @@ export function drawRoom(view3d, room, first) {
   ];
   view3d.points = [
     { points: [room.source], colour: "#ffd479" },
-    { points: room.cameras.map((camera) => camera.centre), colour: "#ffffff" },
+    { points: room.cameras.flatMap((camera) => [camera.centre, aim(camera)]), colour: "#ffffff", through: true },
   ];
   if (first) look(view3d, room);
   else view3d.draw();

@@ -8,15 +8,50 @@ export class Refused extends Error {
 }
 
 // The program may have ended, or the way to it, such as a forwarded port.
-const SILENT = "ppa studio does not answer. Check the connection, or start it again and open the address that it prints: what was changed is saved.";
+const SILENT = "ppa studio does not answer. Check the connection, or start it again: this page continues when it answers. What was changed is saved.";
+// Pause between two attempts to reach a program that does not answer, ms.
+const RETRY_MS = 1000;
+
+// When the program that answers was started.
+let started = null;
+let retrying = false;
+let answers = () => {};
+
+// Calls `call` when the program answers again; the value is true if it was started again since it answered last.
+export function onAnswer(call) {
+  answers = call;
+}
+
+// Whether a program that was started again gave an answer.
+function isOther(response) {
+  const now = response.headers.get("x-started");
+  const other = now !== null && started !== null && now !== started;
+  started = now ?? started;
+  return other;
+}
 
 async function request(path, options) {
   try {
-    return await fetch(`/api/${path}`, options);
+    const response = await fetch(`/api/${path}`, options);
+    if (isOther(response)) answers(true);
+    return response;
   } catch (error) {
     if (error.name === "AbortError") throw error;
+    retry();
     throw new Refused(SILENT, 0);
   }
+}
+
+async function retry() {
+  if (retrying) return;
+  retrying = true;
+  let response = null;
+  while (!response) {
+    await new Promise((done) => { setTimeout(done, RETRY_MS); });
+    response = await fetch("/api/opened").catch(() => null);
+  }
+  retrying = false;
+  answers(isOther(response));
 }
 
 async function answered(response) {

@@ -194,7 +194,8 @@ export class WhatIfPanel {
 
   async room(whatIf) {
     try {
-      this.actions.room(await postJson("room", whatIf));
+      const room = await postJson("room", whatIf);
+      this.actions.room(room, this.cameras.handles(room, whatIf.cameras));
     } catch (error) {
       this.failed(error);
     }

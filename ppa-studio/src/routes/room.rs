@@ -24,6 +24,7 @@ use crate::what_if::WhatIf;
 #[derive(Serialize)]
 pub(super) struct Room {
     room_from_ct: TransformRows,
+    room_from_device: TransformRows,
     contact: Contact,
     /// The focal spot.
     source: Point3<f64>,
@@ -38,6 +39,7 @@ pub(super) struct Room {
 #[derive(Serialize)]
 struct CameraState {
     view: View,
+    room_from_camera: TransformRows,
     centre: Point3<f64>,
     /// Points that the corners of the image see at a depth of 1 m, in turn.
     corners: Vec<Point3<f64>>,
@@ -140,6 +142,7 @@ pub(super) async fn room(
             let ray = |[u, v]: [f64; 2]| camera.unproject(&Point2::new(u, v));
             CameraState {
                 view: placed.view,
+                room_from_camera: rows_from_isometry(&room_from_camera),
                 centre: room_from_camera * Point3::origin(),
                 corners: corners
                     .into_iter()
@@ -150,6 +153,7 @@ pub(super) async fn room(
         });
         Ok(Json(Room {
             room_from_ct: rows_from_isometry(room_from_ct.isometry()),
+            room_from_device: rows_from_isometry(room_from_device),
             contact: placement.contact,
             source: device.source(),
             detector: corners.map(|[x, y]| room_from_device * Point3::new(x, y, z)),

@@ -12,7 +12,7 @@ use fantoccini::wd::WebDriverCompatibleCommand;
 use fantoccini::{Client, ClientBuilder, Locator};
 use hyper_util::client::legacy::connect::HttpConnector;
 use image::RgbImage;
-use ppa_studio::{Opening, Studio, serve};
+use ppa_studio::{Endpoint, Opening, Studio, serve};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -31,6 +31,9 @@ pub fn run(test: impl Future<Output = ()>) {
 pub struct Page {
     pub client: Client,
     pub folder: TempDir,
+    opening: Opening,
+    /// Folder of the address of the program, and so of the next one.
+    last: TempDir,
     served: Served,
     driver: Driver,
 }
@@ -41,6 +44,22 @@ struct Served {
 }
 
 impl Served {
+    /// Serves the page, where it was served before if it can be; returns the address too.
+    fn begin(opening: &Opening, last: &Path) -> (Self, String) {
+        let last = last.join("private/last.json");
+        let endpoint = Endpoint::open(([127, 0, 0, 1], 0).into(), Some(&last)).unwrap();
+        let Endpoint { listener, token } = endpoint;
+        let studio = Studio::open_with(opening, token).unwrap();
+        let address = studio.address(listener.local_addr().unwrap());
+        let (stop, stopped) = channel();
+        let thread = std::thread::spawn(move || serve(studio, listener, stopped).unwrap());
+        let served = Self {
+            stop: Some(stop),
+            thread: Some(thread),
+        };
+        (served, address)
+    }
+
     fn end(&mut self) {
         self.stop = None;
         if let Some(thread) = self.thread.take() {
@@ -88,20 +107,15 @@ impl Page {
     }
 
     async fn drawn_by(graphics: &[&str], folder: TempDir, opening: &Opening) -> Self {
-        let studio = Studio::open(opening).unwrap();
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let address = studio.address(listener.local_addr().unwrap());
-        let (stop, stopped) = channel();
-        let thread = std::thread::spawn(move || serve(studio, listener, stopped).unwrap());
-        let served = Served {
-            stop: Some(stop),
-            thread: Some(thread),
-        };
+        let last = tempfile::tempdir().unwrap();
+        let (served, address) = Served::begin(opening, last.path());
         let (driver, client) = browser(graphics).await;
         client.goto(&address).await.unwrap();
         let page = Self {
             client,
             folder,
+            opening: opening.clone(),
+            last,
             served,
             driver,
         };
@@ -197,6 +211,11 @@ impl Page {
     /// Ends the program, but not the browser.
     pub fn stop(&mut self) {
         self.served.end();
+    }
+
+    /// Starts the program again.
+    pub fn start_again(&mut self) {
+        self.served = Served::begin(&self.opening, self.last.path()).0;
     }
 
     /// A rectangle of the page as it is seen: left, top, width and height in the page, and its pixels.

@@ -195,9 +195,81 @@ fn a_landmark_is_placed_by_keys_alone() {
     });
 }
 
+/// Middles of all square marks of a colour in a picture that is in the page at `left` and `top`, from above to below.
+fn marks([left, top, ..]: [u32; 4], picture: &RgbImage, colour: [u8; 3]) -> Vec<[f64; 2]> {
+    let is_mark = |x: u32, y: u32| {
+        (0..9).all(|dy| (0..9).all(|dx| picture.get_pixel(x + dx, y + dy).0 == colour))
+    };
+    let mut found: Vec<[f64; 2]> = Vec::new();
+    for y in 0..picture.height() - 9 {
+        for x in 0..picture.width() - 9 {
+            let at = [f64::from(left + x) + 4.5, f64::from(top + y) + 4.5];
+            let near = |one: &&mut [f64; 2]| (one[0] - at[0]).hypot(one[1] - at[1]) < 9.0;
+            if is_mark(x, y) && !found.iter_mut().any(|one| near(&one)) {
+                found.push(at);
+            }
+        }
+    }
+    found
+}
+
+/// Drags a camera, and the middle of what it sees: both stay under the mouse, and the sliders follow.
 #[test]
 #[ignore = "needs chromium and chromedriver"]
-fn a_page_says_when_the_program_has_ended() {
+fn cameras_are_dragged_in_three_dimensions() {
+    const WHITE: [u8; 3] = [255, 255, 255];
+    run(async {
+        let page = Page::open().await;
+        page.wait(READY).await;
+        page.click("#tab-room").await;
+        page.wait("document.getElementById('coverage').textContent.includes('Seen by')")
+            .await;
+        let values = async || {
+            let ask = "[...document.querySelectorAll('#cameras-form input')].map((i) => Number(i.labels[0].textContent.match(/-?[\\d.]+/)[0]))";
+            let values = page.value(ask).await;
+            serde_json::from_value::<Vec<f64>>(values).unwrap()
+        };
+        let (place, picture) = page.seen(VIEW).await;
+        let before = marks(place, &picture, WHITE);
+        assert_eq!(before.len(), 4, "{before:?}");
+        page.picture("cameras_before").await;
+        // Cameras hang above what they see.
+        for (mark, kind) in [(0, 0..3), (3, 3..6)] {
+            let unmoved = values().await;
+            let (place, picture) = page.seen(VIEW).await;
+            let from = marks(place, &picture, WHITE)[mark];
+            let to = [from[0] + 30.0, from[1] - 12.0];
+            page.drag(from, to).await;
+            page.wait("!document.getElementById('cameras-back').disabled")
+                .await;
+            page.wait("!document.body.hasAttribute('aria-busy')").await;
+            tokio::time::sleep(std::time::Duration::from_secs(1)).await;
+            let (place, picture) = page.seen(VIEW).await;
+            let after = marks(place, &picture, WHITE);
+            let away = |at: &[f64; 2]| (at[0] - to[0]).hypot(at[1] - to[1]);
+            let nearest = after.iter().map(away).fold(f64::INFINITY, f64::min);
+            assert!(nearest < 3.0, "{to:?}: {after:?}");
+            let moved: Vec<usize> = (unmoved.iter().zip(values().await).enumerate())
+                .filter(|(_, (a, b))| *a != b)
+                .map(|(i, _)| i)
+                .collect();
+            // Of one camera, and only where it is or only where it looks.
+            assert!(!moved.is_empty());
+            assert!(
+                moved
+                    .iter()
+                    .all(|i| i / 6 == moved[0] / 6 && kind.contains(&(i % 6))),
+                "{moved:?}"
+            );
+        }
+        page.picture("cameras_dragged").await;
+        page.close().await;
+    });
+}
+
+#[test]
+#[ignore = "needs chromium and chromedriver"]
+fn a_page_goes_on_when_the_program_starts_again() {
     run(async {
         let mut page = Page::open().await;
         page.wait(READY).await;
@@ -207,7 +279,25 @@ fn a_page_says_when_the_program_has_ended() {
         page.click("#tab-landmarks").await;
         page.stop();
         page.click("#joint-here").await;
-        page.wait("document.getElementById('message').textContent.startsWith('ppa studio does not answer')")
+        let message = "document.getElementById('message').textContent";
+        page.wait(&format!(
+            "{message}.startsWith('ppa studio does not answer')"
+        ))
+        .await;
+        page.start_again();
+        page.wait(&format!("{message} === 'ppa studio was started again'"))
+            .await;
+        page.click("#joint-here").await;
+        page.wait("document.querySelectorAll('#landmark-table tbody tr')[0].textContent.includes('chosen')")
+            .await;
+
+        // A program that was started again unnoticed has what was saved.
+        page.stop();
+        page.start_again();
+        page.click("#undo").await;
+        page.wait(&format!("{message} !== ''")).await;
+        page.wait("document.getElementById('undo').disabled").await;
+        page.wait("document.querySelectorAll('#landmark-table tbody tr')[0].textContent.includes('chosen')")
             .await;
         page.client.clone().close().await.unwrap();
     });
