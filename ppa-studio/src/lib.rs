@@ -24,6 +24,7 @@ mod plan_files;
 mod plan_form;
 mod plan_keys;
 mod plan_limbs;
+mod plan_limits;
 mod png;
 mod pose_label;
 mod removed;

@@ -1,6 +1,6 @@
 // The form of the plan: a field for each key, as the types of the plan declare them.
 
-import { Refused, getJson, postJson } from "/page/server.js";
+import { Refused, getJson, newest, postJson } from "/page/server.js";
 import { button, element, table } from "/page/elements.js";
 
 const byId = (id) => document.getElementById(id);
@@ -90,6 +90,14 @@ function namesInput(field, id, set) {
   }];
 }
 
+// The numbers that a plan accepts, in words.
+function limitsText(limits) {
+  if (!limits) return "";
+  const end = (limit, included, excluded) => limit && `${limit.included ? included : excluded} ${Number(limit.value.toPrecision(6))}`;
+  const ends = [end(limits.low, "at least", "above"), end(limits.high, "at most", "below")].filter(Boolean);
+  return ends.length ? ` Accepted: ${ends.join(", ")}.` : "";
+}
+
 function materialRow({ segment, from_hu, materials, density }) {
   const knots = density.map(([hu, g_cm3]) => `${g_cm3} at ${hu}`);
   return [segment, from_hu === null ? "" : String(from_hu), materials.join(" to "), knots.join(", ")];
@@ -101,6 +109,7 @@ export class PlanPanel {
     this.plan = null;
     this.updates = [];
     this.materials = element("div", "", { id: "plan-materials" });
+    this.limits = newest((of) => this.showLimits(of));
     byId("plan-save").addEventListener("click", () => this.save());
     for (const step of ["undo", "redo"]) byId(`plan-${step}`).addEventListener("click", () => this.change(`plan/${step}`, {}));
     byId("plan-folder").addEventListener("change", () => actions.folder());
@@ -198,6 +207,15 @@ export class PlanPanel {
     return group;
   }
 
+  // Limits depend on the other settings, so they are asked for when a field is entered.
+  async showLimits({ key, hint }) {
+    try {
+      hint.textContent = limitsText(await postJson("plan/limits", { key }));
+    } catch (error) {
+      this.actions.fail(error);
+    }
+  }
+
   row(field) {
     const id = `plan:${field.key}`;
     const error = element("p", "", { class: "refused", id: `${id}:refused`, role: "alert" });
@@ -218,7 +236,13 @@ export class PlanPanel {
     const label = field.kind === "names" ? element("span", name, { id: `${id}:name` }) : element("label", name, { for: id });
     const standard = button("Default", () => set(null), `Default of ${field.key}`);
     const row = element("div", "", { class: "field" });
-    row.append(label, input, standard, element("p", field.meaning, { class: "hint", id: `${id}:hint` }), more, error);
+    const meaning = element("p", field.meaning, { class: "hint", id: `${id}:hint` });
+    if (field.kind === "number") {
+      const hint = element("span");
+      meaning.append(hint);
+      input.addEventListener("focus", () => this.limits({ key: field.key, hint }));
+    }
+    row.append(label, input, standard, meaning, more, error);
     this.updates.push((fields) => {
       const now = fields.get(field.key);
       row.classList.toggle("given", now.value !== null);

@@ -52,6 +52,7 @@ pub(crate) fn router(state: Arc<State>) -> Router {
         .route("/commands", post(images::commands))
         .route("/plan/form", get(plan::form))
         .route("/plan/key", post(plan::key))
+        .route("/plan/limits", post(plan::limits))
         .route("/plan/limbs", post(plan::limbs))
         .route("/plan/undo", post(plan::undo))
         .route("/plan/redo", post(plan::redo))

@@ -16,6 +16,7 @@ use crate::error::StudioError;
 use crate::plan_file::PlanFile;
 use crate::plan_form::{Field, fields};
 use crate::plan_limbs::{LimbChange, cases_beside};
+use crate::plan_limits::{self, Limits};
 use crate::state::State;
 
 /// A plan with its files.
@@ -88,6 +89,29 @@ pub(super) async fn key(
     .await
 }
 
+/// A key of the form.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LimitsOf {
+    key: String,
+}
+
+/// Which numbers the plan accepts for a key.
+pub(super) async fn limits(
+    Extracted(state): Extracted<Arc<State>>,
+    Json(LimitsOf { key }): Json<LimitsOf>,
+) -> Result<Json<Option<Limits>>, Response> {
+    work(state, move |state| {
+        let file = state.plan_file();
+        let text = file.text(|| state.case_on_disk())?;
+        let fields = form_fields(state, &file, &text)?;
+        let field = fields.iter().find(|field| field.key == key);
+        let field = field.ok_or_else(|| StudioError::Invalid(format!("the form has no {key}")))?;
+        Ok(Json(plan_limits::limits(&file, &text, field)))
+    })
+    .await
+}
+
 pub(super) async fn limbs(
     Extracted(state): Extracted<Arc<State>>,
     Json(change): Json<LimbChange>,
@@ -148,12 +172,7 @@ fn plan_form(state: &State) -> Result<PlanForm, StudioError> {
         other_cases: cases_beside(file.folder(), &plan)?,
         can_undo,
         can_redo,
-        fields: fields(
-            &text,
-            // A rig that cannot be read is reported where it is used.
-            plan.depth.cameras().ok().as_ref(),
-            &state.plan_files.beside(file.folder())?,
-        )?,
+        fields: form_fields(state, &file, &text)?,
         materials: plan
             .xray
             .calibration
@@ -162,6 +181,15 @@ fn plan_form(state: &State) -> Result<PlanForm, StudioError> {
             .map(material)
             .collect(),
     })
+}
+
+fn form_fields(state: &State, file: &PlanFile, text: &str) -> Result<Vec<Field>, StudioError> {
+    fields(
+        text,
+        // A rig that cannot be read is reported where it is used.
+        file.plan(text)?.depth.cameras().ok().as_ref(),
+        &state.plan_files.beside(file.folder())?,
+    )
 }
 
 fn material(segment: &Segment) -> Material {

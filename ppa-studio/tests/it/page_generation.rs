@@ -19,6 +19,12 @@ fn a_plan_is_changed_and_its_dataset_made() {
             .await;
         page.picture("plan").await;
 
+        // A field says which numbers it accepts when it is entered.
+        page.click("[id='plan:soft_tissue.distal_mm']").await;
+        page.wait("document.getElementById('plan:soft_tissue.distal_mm:hint').textContent.endsWith('Accepted: at least 0, at most 20.')")
+            .await;
+        page.picture("plan_limits").await;
+
         // A value that the plan refuses is said at its field.
         page.fill("[id='plan:rotation.step_deg']", "0.3").await;
         let refused = "document.getElementById('plan:rotation.step_deg:refused').textContent";

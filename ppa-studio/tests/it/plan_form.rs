@@ -244,3 +244,61 @@ fn the_last_limb_stays() {
         answer.text()
     );
 }
+
+#[test]
+fn limits_of_a_field_are_those_of_the_plan() {
+    let browser = opened();
+    let limits = |key: &str| {
+        browser
+            .post("/api/plan/limits", &json!({ "key": key }))
+            .json()
+    };
+    let limit = |value: f64, included: bool| json!({ "value": value, "included": included });
+    assert_eq!(limits("soft_tissue.distal_mm")["low"], limit(0.0, true));
+    // Angles are multiples of half a degree, and steps divide the sweep.
+    assert_eq!(limits("rotation.step_deg"), Value::Null);
+    assert_eq!(limits("rotation.from_deg"), Value::Null);
+    // What is refused beyond a limit is accepted at it or just within.
+    for key in [
+        "xray.kvp",
+        "xray.detector.columns",
+        "positioning.tilt_deg",
+        "soft_tissue.distal_mm",
+    ] {
+        let found = limits(key);
+        for (end, sign) in [("low", -1.0), ("high", 1.0)] {
+            let Some(value) = found[end]["value"].as_f64() else {
+                continue;
+            };
+            let whole = key.ends_with("columns");
+            let nearby = if whole {
+                1.0
+            } else {
+                1e-6 * value.abs().max(1.0)
+            };
+            let typed = |value: f64| {
+                if whole {
+                    format!("{value:.0}")
+                } else {
+                    format!("{value:?}")
+                }
+            };
+            let answer = set(&browser, key, json!(typed(value + sign * nearby)));
+            assert_eq!(
+                answer.status,
+                StatusCode::UNPROCESSABLE_ENTITY,
+                "{key} {found}"
+            );
+            let inside = if found[end]["included"] == true {
+                value
+            } else {
+                value - sign * nearby
+            };
+            set(&browser, key, json!(typed(inside))).json();
+            browser.post("/api/plan/undo", &json!({})).json();
+        }
+    }
+    assert_eq!(limits("depth.rig"), Value::Null);
+    let answer = browser.post("/api/plan/limits", &json!({ "key": "case" }));
+    assert_eq!(answer.status, StatusCode::UNPROCESSABLE_ENTITY);
+}
