@@ -44,7 +44,8 @@ pub(crate) fn limits(file: &PlanFile, text: &str, field: &Field) -> Option<Limit
             true => format!("{value:.0}"),
             false => format!("{value:?}"),
         };
-        file.changed(text, &field.key, Some(&typed)).is_ok()
+        let is_of_type = !is_whole || value.fract() == 0.0;
+        is_of_type && file.changed(text, &field.key, Some(&typed)).is_ok()
     };
     if !accepts(now) {
         return None;

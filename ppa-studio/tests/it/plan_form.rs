@@ -298,6 +298,9 @@ fn limits_of_a_field_are_those_of_the_plan() {
             browser.post("/api/plan/undo", &json!({})).json();
         }
     }
+    // At its own limit a whole number has limits as well.
+    set(&browser, "xray.detector.columns", json!("1")).json();
+    assert_eq!(limits("xray.detector.columns")["low"], limit(1.0, true));
     assert_eq!(limits("depth.rig"), Value::Null);
     let answer = browser.post("/api/plan/limits", &json!({ "key": "case" }));
     assert_eq!(answer.status, StatusCode::UNPROCESSABLE_ENTITY);
