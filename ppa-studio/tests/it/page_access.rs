@@ -44,14 +44,19 @@ pub const FAINT: &str = "(() => { \
             return [(Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), e.outerHTML.slice(0, 120)]; }) \
         .filter(([ratio]) => ratio < 4.5); })()";
 
+/// The page of a plan whose dataset is made.
+async fn page_of_plan() -> Page {
+    let folder = tempfile::tempdir().unwrap();
+    dataset(folder.path());
+    let plan = folder.path().join("ankles.toml");
+    Page::of(folder, &plan).await
+}
+
 #[test]
 #[ignore = "needs chromium and chromedriver"]
 fn controls_have_names_and_texts_enough_contrast() {
     run(async {
-        let folder = tempfile::tempdir().unwrap();
-        dataset(folder.path());
-        let plan = folder.path().join("ankles.toml");
-        let page = Page::of(folder, &plan).await;
+        let page = page_of_plan().await;
         page.wait("document.querySelector('#skin-facts').textContent.includes('Points')")
             .await;
         for step in STEPS {
@@ -69,10 +74,7 @@ fn controls_have_names_and_texts_enough_contrast() {
 #[ignore = "needs chromium and chromedriver"]
 fn a_narrow_page_scrolls_only_down() {
     run(async {
-        let folder = tempfile::tempdir().unwrap();
-        dataset(folder.path());
-        let plan = folder.path().join("ankles.toml");
-        let page = Page::of(folder, &plan).await;
+        let page = page_of_plan().await;
         page.client.set_window_size(500, 900).await.unwrap();
         for step in STEPS {
             page.click(&format!("#tab-{step}")).await;
@@ -94,10 +96,7 @@ fn axe_core_finds_nothing_against_the_page() {
     let file = std::env::var_os("PPA_AXE").expect("PPA_AXE names axe.min.js");
     let axe = std::fs::read_to_string(file).unwrap();
     run(async {
-        let folder = tempfile::tempdir().unwrap();
-        dataset(folder.path());
-        let plan = folder.path().join("ankles.toml");
-        let page = Page::of(folder, &plan).await;
+        let page = page_of_plan().await;
         page.wait("document.querySelector('#skin-facts').textContent.includes('Points')")
             .await;
         page.client.execute(&axe, vec![]).await.unwrap();
