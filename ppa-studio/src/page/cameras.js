@@ -1,7 +1,7 @@
 // Sliders, and places in the room to drag, that move the cameras from their places in the plan.
 
 import { element } from "/page/elements.js";
-import { add, fixed, inverse, rotate, sub, transform, turned } from "/page/geometry.js";
+import { add, fixed, inverse, rotate, sub, transform, rotatedAbout } from "/page/geometry.js";
 
 const byId = (id) => document.getElementById(id);
 
@@ -106,7 +106,7 @@ function shifted({ shift_mm }, by) {
 // A camera whose view goes through a place in its frame; the roll stays.
 function aimed({ turn_deg }, place) {
   const [roll, tilt, pan] = turn_deg;
-  const [x, y, z] = turned(turned(turned(place, 2, roll), 0, tilt), 1, pan);
+  const [x, y, z] = rotatedAbout(rotatedAbout(rotatedAbout(place, 2, roll), 0, tilt), 1, pan);
   const degrees = (radians) => Math.round(10 * radians * 180 / Math.PI) / 10;
   return { turn_deg: [roll, degrees(Math.atan2(-y, Math.hypot(x, z))), degrees(Math.atan2(x, z))] };
 }

@@ -22,7 +22,7 @@ export function rotate(rows, p) {
 }
 
 // A vector that is rotated by an angle about an axis of the frame.
-export function turned(p, axis, degrees) {
+export function rotatedAbout(p, axis, degrees) {
   const [sin, cos] = [Math.sin(degrees * Math.PI / 180), Math.cos(degrees * Math.PI / 180)];
   const [b, c] = [(axis + 1) % 3, (axis + 2) % 3];
   const made = [...p];

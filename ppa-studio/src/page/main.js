@@ -342,7 +342,7 @@ async function begin() {
 }
 
 // The program answers again. One that was started again has what was saved.
-async function goOn(restarted) {
+async function refresh(restarted) {
   try {
     allow(await getJson("opened"));
     if (opened.limb && store.doc) await show(await getJson("state"));
@@ -409,6 +409,6 @@ function listen() {
 }
 
 listen();
-onAnswer(goOn);
+onAnswer(refresh);
 setWindow(store.window);
 begin().catch(fail);
