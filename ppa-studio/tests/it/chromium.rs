@@ -19,7 +19,7 @@ use tempfile::TempDir;
 use crate::browser::fine_phantom;
 
 /// How long anything on the page may take.
-const PATIENCE: Duration = Duration::from_secs(120);
+pub const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Drives a browser.
 pub fn run(test: impl Future<Output = ()>) {
