@@ -1,4 +1,5 @@
-//! Arithmetic on channels-last images: rows of pixels, each pixel with all its channels in a row of f32.
+//! Arithmetic on channels-last images: rows of pixels, each pixel with all its channels in a row of f32. Inference also has rows of
+//! pixels with 16 channels each (`panel_rows`).
 //!
 //! Every kernel is vector code chosen when the program runs; the plain copy gives equal results to rounding.
 
@@ -6,8 +7,10 @@ pub(crate) mod batch_norm;
 pub(crate) mod buffer;
 pub(crate) mod depthwise;
 pub(crate) mod depthwise_backward;
+pub(crate) mod filter;
 pub(crate) mod gradient;
 pub(crate) mod matrix;
+pub(crate) mod panel_rows;
 pub(crate) mod panels;
 pub(crate) mod pointwise;
 pub(crate) mod simd;

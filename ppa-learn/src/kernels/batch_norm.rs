@@ -107,51 +107,6 @@ impl WithSimd for Activate<'_> {
     }
 }
 
-/// out = SiLU(affine(x)), whose sum over the pixels, few enough for f32, is added to `sums` for each channel.
-pub fn activate_and_add(pixels: &[f32], affine: &Affine, out: &mut [f32], sums: &mut [f64]) {
-    let mut part = vec![0.0; sums.len()];
-    dispatch(
-        sums.len(),
-        ActivateAndAdd {
-            pixels,
-            affine,
-            out,
-            sums: &mut part,
-        },
-    );
-    add(sums, &part);
-}
-
-struct ActivateAndAdd<'a> {
-    pixels: &'a [f32],
-    affine: &'a Affine,
-    out: &'a mut [f32],
-    sums: &'a mut [f32],
-}
-
-impl WithSimd for ActivateAndAdd<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let (scale, shift) = (
-            lanes::<S>(&self.affine.scale),
-            lanes::<S>(&self.affine.shift),
-        );
-        let sums = lanes_mut::<S>(self.sums);
-        let channels = scale.len();
-        let pixels = lanes::<S>(self.pixels).chunks_exact(channels);
-        for (pixel, out) in pixels.zip(lanes_mut::<S>(self.out).chunks_exact_mut(channels)) {
-            let vectors = pixel.iter().zip(scale).zip(shift).zip(out).zip(&mut *sums);
-            for ((((x, scale), shift), out), sum) in vectors {
-                let y = fma(simd, *x, *scale, *shift);
-                *out = simd.mul_f32s(y, sigmoid(simd, y));
-                *sum = simd.add_f32s(*sum, *out);
-            }
-        }
-    }
-}
-
 /// Adds sum SiLU(affine(x)) of each channel to `sums`.
 pub fn add_activated(pixels: &[f32], affine: &Affine, sums: &mut [f64]) {
     let mut part = vec![0.0; sums.len()];

@@ -2,34 +2,72 @@
 
 use pulp::{Simd, WithSimd};
 
+use super::panel_rows::PanelRows;
 use super::panels::{PANEL, Panels, groups, widest};
-use super::simd::{dispatch, fma, lanes, lanes_mut, sigmoid};
+use super::simd::{dispatch, fma, lanes, silu, store};
 
-/// out = SiLU(convolution), pixel `p` of which begins at `place(p)`, of pixels [pixels, columns], few enough for the second-level cache.
-pub fn activated(input: &[f32], panels: &Panels, place: impl Fn(usize) -> usize, out: &mut [f32]) {
-    let added = None;
-    dispatch(
-        PANEL,
-        Forward::<true, _> {
-            input,
-            panels,
-            place,
-            added,
-            out,
-        },
-    );
+/// SiLU(convolution) of pixels [pixels, columns], few enough for the second-level cache: `out` [pixels, channels].
+pub fn activated(input: &[f32], panels: &Panels, out: &mut [f32]) {
+    let channels = panels.channels();
+    forward::<true>(input, panels, None, channels, pixel_by_pixel(channels), out);
+}
+
+/// [`activated`], channels of pixel `p` in a panel apart from the others: in rows of `width` pixels, of which row `y` begins at `start(y)`.
+pub fn activated_rows(
+    input: &[f32],
+    panels: &Panels,
+    width: usize,
+    first: usize,
+    out: &mut PanelRows,
+) {
+    let count = input.len() / panels.columns();
+    let places: Vec<usize> = (0..count / width)
+        .flat_map(|y| {
+            let start = out.start(first + y);
+            (0..width).map(move |x| start + x * PANEL)
+        })
+        .collect();
+    let panel = out.panel();
+    let place =
+        |pixel: usize, channel: usize| places[pixel] + channel / PANEL * panel + channel % PANEL;
+    let stored = panels.channels().next_multiple_of(PANEL);
+    forward::<true>(input, panels, None, stored, place, out.values_mut());
 }
 
 /// out = convolution of pixels [pixels, columns], plus what the block was given where it adds it.
 pub fn normalised(input: &[f32], panels: &Panels, added: Option<&[f32]>, out: &mut [f32]) {
-    let place = |pixel| pixel * panels.channels();
+    let channels = panels.channels();
+    forward::<false>(
+        input,
+        panels,
+        added,
+        channels,
+        pixel_by_pixel(channels),
+        out,
+    );
+}
+
+/// Where a channel of a pixel is in [pixels, channels].
+fn pixel_by_pixel(channels: usize) -> impl Fn(usize, usize) -> usize {
+    move |pixel, channel| pixel * channels + channel
+}
+
+fn forward<const ACTIVATE: bool>(
+    input: &[f32],
+    panels: &Panels,
+    added: Option<&[f32]>,
+    stored: usize,
+    place: impl Fn(usize, usize) -> usize,
+    out: &mut [f32],
+) {
     dispatch(
         PANEL,
-        Forward::<false, _> {
+        Forward::<ACTIVATE, _> {
             input,
             panels,
-            place,
             added,
+            stored,
+            place,
             out,
         },
     );
@@ -38,12 +76,15 @@ pub fn normalised(input: &[f32], panels: &Panels, added: Option<&[f32]>, out: &m
 struct Forward<'a, const ACTIVATE: bool, P> {
     input: &'a [f32],
     panels: &'a Panels,
-    place: P,
     added: Option<&'a [f32]>,
+    /// Channels that are stored.
+    stored: usize,
+    /// Where a channel of a pixel goes; those of a vector are beside each other.
+    place: P,
     out: &'a mut [f32],
 }
 
-impl<const ACTIVATE: bool, P: Fn(usize) -> usize> WithSimd for Forward<'_, ACTIVATE, P> {
+impl<const ACTIVATE: bool, P: Fn(usize, usize) -> usize> WithSimd for Forward<'_, ACTIVATE, P> {
     type Output = ();
 
     #[inline(always)]
@@ -63,7 +104,7 @@ impl<const ACTIVATE: bool, P: Fn(usize) -> usize> WithSimd for Forward<'_, ACTIV
     }
 }
 
-impl<const ACTIVATE: bool, P: Fn(usize) -> usize> Forward<'_, ACTIVATE, P> {
+impl<const ACTIVATE: bool, P: Fn(usize, usize) -> usize> Forward<'_, ACTIVATE, P> {
     /// The channels of one group, from the first one on, of all pixels.
     #[inline(always)]
     fn group<S: Simd, const M: usize, const V: usize>(&mut self, simd: S, first: usize) {
@@ -73,43 +114,41 @@ impl<const ACTIVATE: bool, P: Fn(usize) -> usize> Forward<'_, ACTIVATE, P> {
         let weights = lanes::<S>(&self.panels.values[first * columns..][..width * columns]);
         let shift = lanes::<S>(&self.panels.shift[first..][..width]);
         let shift: [S::f32s; V] = std::array::from_fn(|v| shift[v]);
-        let channels = width.min(self.panels.channels() - first);
         for start in (0..pixels).step_by(M) {
             // The last pixel stands in for those beyond it.
             let row = |m: usize| &self.input[(start + m).min(pixels - 1) * columns..][..columns];
             let sums = tile::<S, M, V>(simd, std::array::from_fn(row), weights, shift);
             for (m, sums) in sums.into_iter().enumerate() {
                 if start + m < pixels {
-                    let at = (self.place)(start + m) + first;
-                    self.store(simd, at..at + channels, sums);
+                    self.store(simd, start + m, first, sums);
                 }
             }
         }
     }
 
+    /// The channels of a pixel from `first` on.
     #[inline(always)]
     fn store<S: Simd, const V: usize>(
         &mut self,
         simd: S,
-        at: std::ops::Range<usize>,
+        pixel: usize,
+        first: usize,
         sums: [S::f32s; V],
     ) {
         for (v, sum) in sums.into_iter().enumerate() {
-            let from = (at.start + v * S::F32_LANES).min(at.end);
-            let at = from..at.end.min(from + S::F32_LANES);
+            let channel = first + v * S::F32_LANES;
+            let count = self.stored.saturating_sub(channel).min(S::F32_LANES);
+            if count == 0 {
+                return;
+            }
+            let at = (self.place)(pixel, channel);
+            let at = at..at + count;
             let y = match self.added {
                 Some(added) => simd.add_f32s(sum, simd.partial_load_f32s(&added[at.clone()])),
                 None => sum,
             };
-            let y = if ACTIVATE {
-                simd.mul_f32s(y, sigmoid(simd, y))
-            } else {
-                y
-            };
-            match &mut self.out[at] {
-                out if out.len() == S::F32_LANES => lanes_mut::<S>(out)[0] = y,
-                out => simd.partial_store_f32s(out, y),
-            }
+            let y = if ACTIVATE { silu(simd, y) } else { y };
+            store::<S>(simd, y, &mut self.out[at]);
         }
     }
 }
@@ -170,14 +209,14 @@ mod tests {
         };
         simd.vectorize(lay_out);
         let mut out = vec![0.0; input.len() / panels.columns() * panels.channels()];
-        let place = |pixel| pixel * panels.channels();
-        let (panels, out_of) = (&panels, &mut out[..]);
+        let stored = panels.channels();
         simd.vectorize(Forward::<false, _> {
             input,
-            panels,
-            place,
+            panels: &panels,
             added: None,
-            out: out_of,
+            stored,
+            place: pixel_by_pixel(stored),
+            out: &mut out,
         });
         out
     }
@@ -219,15 +258,21 @@ mod tests {
             let sums: Vec<f32> = expected.iter().zip(&added).map(|(x, added)| x + added).collect();
             prop_assert_eq!(&out, &sums);
 
-            // With a gap of three values after each pixel, which stays as it is.
-            let mut out = vec![9.0; pixels * (channels + 3)];
-            activated(&input, &panels, |pixel| pixel * (channels + 3), &mut out);
-            for (out, expected) in out.chunks(channels + 3).zip(expected.chunks(channels)) {
-                prop_assert_eq!(&out[channels..], &[9.0; 3]);
-                for (out, x) in out.iter().zip(expected) {
-                    let silu = x / (1.0 + (-x).exp());
-                    prop_assert!((out - silu).abs() <= 1e-6 * silu.abs() + 1e-6, "{out} {silu}");
-                }
+            let silu = |x: f32| x / (1.0 + (-x).exp());
+            let close = |out: f32, x: f32| (out - silu(x)).abs() <= 1e-6 * silu(x).abs() + 1e-6;
+            activated(&input, &panels, &mut out);
+            for (out, x) in out.iter().zip(&expected) {
+                prop_assert!(close(*out, *x), "{out} {x}");
+            }
+            // The same as rows 2, 3 and so on of an image with four columns and a padding of two.
+            let whole = pixels / 4 * 4;
+            let mut rows = PanelRows::new(&pool, pixels.div_ceil(4) + 1, [pixels, 4], 2, channels);
+            activated_rows(&input[..whole * columns], &panels, 4, 2, &mut rows);
+            for (i, x) in expected[..whole * channels].iter().enumerate() {
+                let (pixel, c) = (i / channels, i % channels);
+                let at = rows.start(2 + pixel / 4) + pixel % 4 * PANEL + c / PANEL * rows.panel() + c % PANEL;
+                let out = rows.values_mut()[at];
+                prop_assert!(close(out, *x), "{out} {x}");
             }
         }
     }

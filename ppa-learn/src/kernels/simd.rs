@@ -34,6 +34,16 @@ pub fn lanes_mut<S: Simd>(values: &mut [f32]) -> &mut [S::f32s] {
     vectors
 }
 
+/// Writes a vector, or as much of its beginning as `to` has room for.
+#[inline(always)]
+pub fn store<S: Simd>(simd: S, vector: S::f32s, to: &mut [f32]) {
+    if to.len() == S::F32_LANES {
+        lanes_mut::<S>(to)[0] = vector;
+    } else {
+        simd.partial_store_f32s(to, vector);
+    }
+}
+
 /// a b + c, rounded once where the machine can. (The plain copy would call a function for each.)
 #[inline(always)]
 pub fn fma<S: Simd>(simd: S, a: S::f32s, b: S::f32s, c: S::f32s) -> S::f32s {
@@ -44,37 +54,59 @@ pub fn fma<S: Simd>(simd: S, a: S::f32s, b: S::f32s, c: S::f32s) -> S::f32s {
     }
 }
 
-/// 1 / (1 + exp(-y)) to 2e-7.
+/// 1 / (1 + exp(-y)) to 3e-7.
 ///
-/// exp(x) = 2^n exp(r) with |r| <= ln(2)/2, and exp(r) by the polynomial of Cephes' expf (Moshier 1992).
-/// -y is held within ±87, where exp is a normal number: beyond, the sigmoid is 0 or 1 to 2e-38.
+/// exp(-y) = 2^n exp(-r) with |r| <= ln(2)/2, and exp(-r) by the polynomial of degree 5 with the least relative error, 7.5e-8.
+/// y is held within ±87, where exp is a normal number: beyond, the sigmoid is 0 or 1 to 2e-38.
 #[inline(always)]
 pub fn sigmoid<S: Simd>(simd: S, y: S::f32s) -> S::f32s {
     const LN2_HIGH: f32 = 0.693_359_4;
     const LN2_LOW: f32 = -2.121_944_4e-4;
-    // Adding 1.5 * 2^23 leaves the nearest integer in the low bits of the mantissa.
-    const ROUND: f32 = 12_582_912.0;
+    // Adding 1.5 * 2^23 leaves the nearest integer in the low bits of the mantissa, here plus the bias of an exponent.
+    const ROUND: f32 = 12_582_912.0 + 127.0;
     let splat = |value| simd.splat_f32s(value);
-    let x = simd.min_f32s(simd.max_f32s(simd.neg_f32s(y), splat(-87.0)), splat(87.0));
-    let shifted = fma(simd, x, splat(std::f32::consts::LOG2_E), splat(ROUND));
+    let y = simd.min_f32s(simd.max_f32s(y, splat(-87.0)), splat(87.0));
+    let shifted = fma(simd, y, splat(-std::f32::consts::LOG2_E), splat(ROUND));
     let n = simd.sub_f32s(shifted, splat(ROUND));
-    let r = fma(simd, n, splat(-LN2_HIGH), x);
-    let r = fma(simd, n, splat(-LN2_LOW), r);
-    let mut p = splat(1.987_569_1e-4);
+    let r = fma(simd, n, splat(LN2_HIGH), y);
+    let r = fma(simd, n, splat(LN2_LOW), r);
+    let mut minus_exp = splat(8.297_655e-3);
     for coefficient in [
-        1.398_2e-3,
-        8.333_452e-3,
-        4.166_579_6e-2,
-        1.666_666_5e-1,
-        0.5,
+        -4.191_538e-2,
+        1.666_757_5e-1,
+        -4.999_889_5e-1,
+        9.999_997e-1,
+        -1.0,
     ] {
-        p = fma(simd, p, r, splat(coefficient));
+        minus_exp = fma(simd, minus_exp, r, splat(coefficient));
     }
-    let exp_r = fma(simd, p, simd.mul_f32s(r, r), simd.add_f32s(r, splat(1.0)));
-    let exponent = simd.add_u32s(simd.transmute_u32s_f32s(shifted), simd.splat_u32s(127));
-    let power = simd.wrapping_dyn_shl_u32s(exponent, simd.splat_u32s(23));
-    let exp = simd.mul_f32s(exp_r, simd.transmute_f32s_u32s(power));
-    simd.div_f32s(splat(1.0), simd.add_f32s(splat(1.0), exp))
+    let power = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(shifted), simd.splat_u32s(23));
+    let power = simd.transmute_f32s_u32s(power);
+    minus_reciprocal(simd, fma(simd, minus_exp, power, splat(-1.0)))
+}
+
+/// -1 / x of normal negative numbers to 1.2e-7, without a division, which takes half as long as all of a sigmoid's other steps.
+///
+/// The difference of bit patterns is a first approximation, as in the fast inverse square root; a step of Newton's method whose constant
+/// is shifted with it leaves an error of 1.3e-3, and a step of third order 2e-9 before rounding.
+#[inline(always)]
+fn minus_reciprocal<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
+    const BITS: u32 = 0x7ef3_2880;
+    const NEWTON: f32 = 2.001_3;
+    let one = simd.splat_f32s(1.0);
+    // BITS - the bits of -x
+    let bits = simd.not_u32s(simd.transmute_u32s_f32s(x));
+    let bits = simd.add_u32s(bits, simd.splat_u32s(BITS.wrapping_sub(0x7fff_ffff)));
+    let first = simd.transmute_f32s_u32s(bits);
+    let second = simd.mul_f32s(first, fma(simd, x, first, simd.splat_f32s(NEWTON)));
+    let error = fma(simd, x, second, one);
+    fma(simd, second, fma(simd, error, error, error), second)
+}
+
+/// SiLU y s(y).
+#[inline(always)]
+pub fn silu<S: Simd>(simd: S, y: S::f32s) -> S::f32s {
+    simd.mul_f32s(y, sigmoid(simd, y))
 }
 
 /// SiLU y s(y) and its derivative s (1 + y (1 - s)).

@@ -19,6 +19,25 @@ fn neighbours(image: &[f32], width: usize, y: usize, x: usize) -> [f32; TAPS] {
     })
 }
 
+/// The neighbours [width of the output, taps] of the pixels of output row `y`.
+pub fn neighbours_of_row(image: &[f32], width: usize, y: usize, out: &mut [f32]) {
+    // A zero before each row, and one or two after it.
+    let mut padded = vec![0.0; width + 3];
+    for ky in 0..3 {
+        let row = (2 * y + ky)
+            .checked_sub(1)
+            .and_then(|y| image.chunks_exact(width).nth(y));
+        match row {
+            Some(row) => padded[1..=width].copy_from_slice(row),
+            None => padded.fill(0.0),
+        }
+        let under = padded.windows(3).step_by(2);
+        for (out, under) in out.chunks_exact_mut(TAPS).zip(under) {
+            out[3 * ky..3 * ky + 3].copy_from_slice(under);
+        }
+    }
+}
+
 /// Output row `y` [width of the output, channels] from an image in rows of `width`; `weights` [3, 3, channels].
 pub fn forward_row(image: &[f32], width: usize, y: usize, weights: &[f32], out: &mut [f32]) {
     let channels = weights.len() / TAPS;

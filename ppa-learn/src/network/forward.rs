@@ -72,23 +72,17 @@ impl Forward<'_> {
 
 impl Layers for Forward<'_> {
     type Image = Images;
-    type Expanded = Normed;
     type Filtered = Filtered;
     type Gate = Squeeze;
     type Features = (Vec<f32>, Tape);
     type Error = Infallible;
 
-    fn expand(&mut self, block: &Block, input: &Images) -> Result<Normed, Infallible> {
+    fn filter(&mut self, block: &Block, input: &Images) -> Result<Filtered, Infallible> {
         let place = &block.expand;
-        Ok(
-            self.normed(place, input.size, |pass, size, out| match place.kind {
-                ConvKind::Pointwise => pass.pointwise(place, &input.pixels, size, out),
-                ConvKind::Stem | ConvKind::Depthwise => pass.stem(place, input, size, out),
-            }),
-        )
-    }
-
-    fn depthwise(&mut self, block: &Block, expand: Normed) -> Result<Filtered, Infallible> {
+        let expand = self.normed(place, input.size, |pass, size, out| match place.kind {
+            ConvKind::Pointwise => pass.pointwise(place, &input.pixels, size, out),
+            ConvKind::Stem | ConvKind::Depthwise => pass.stem(place, input, size, out),
+        });
         let place = &block.depthwise;
         let depthwise = self.normed(place, expand.size, |pass, size, out| {
             pass.depthwise(place, &expand, size, out)

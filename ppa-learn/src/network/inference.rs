@@ -1,22 +1,23 @@
 //! Inference: what each normalisation does is known beforehand, so that a convolution's output is normalised, activated and pooled
-//! while it is in registers or the cache, and each image is written and read once between two convolutions.
+//! while it is in registers or the cache. An expanded image is never there as a whole: its rows are computed as the depthwise convolution
+//! needs them.
 //!
-//! An image's rows and pixels are shared out among threads in the same parts whatever their number.
+//! What is computed of a row or a pixel does not depend on how they are shared out among threads, and sums of rows are added in their order.
 
 use std::convert::Infallible;
+use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::architecture::{Architecture, Block, ConvPlace};
-use super::folded::{Expansion, Folded, Taps};
+use super::architecture::{Architecture, Block, ConvKind, ConvPlace};
+use super::folded::Folded;
 use super::layers::Layers;
 use super::squeeze::Squeeze;
 use super::tape::{Images, Size, tile_pixels};
-use crate::kernels::batch_norm::{activate, activate_and_add};
-use crate::kernels::buffer::{Buffer, Pool};
-use crate::kernels::depthwise::forward_row;
-use crate::kernels::panels::Panels;
-use crate::kernels::pointwise::{activated, normalised};
+use crate::kernels::buffer::Pool;
+use crate::kernels::filter::filter_rows;
+use crate::kernels::panel_rows::PanelRows;
+use crate::kernels::pointwise::{activated, activated_rows, normalised};
 use crate::kernels::stem;
 
 /// Everything that a pass reads.
@@ -26,14 +27,6 @@ pub struct Inference<'a> {
     pub folded: &'a Folded,
     pub parameters: &'a [f32],
     pub pool: &'a Pool,
-}
-
-/// An activated image [height, width + 2 padding, channels], zero in the padding.
-pub struct Padded {
-    values: Buffer,
-    /// Without the padding.
-    size: Size,
-    row: usize,
 }
 
 /// The activated output of a depthwise convolution, and the mean of each channel.
@@ -66,104 +59,88 @@ impl Inference<'_> {
         of_each(images, of_image).concat()
     }
 
-    /// The first convolution, activated, with the padding that `next` needs.
-    fn stem(&self, taps: &Taps, next: &ConvPlace, image: &Images, size: Size) -> Padded {
-        let margin = next.window.padding() * next.channels;
-        self.padded(next, size, 8, |first, row, out| {
-            let mut raw = self.pool.take(size.width * next.channels);
-            for (y, out) in out.chunks_exact_mut(row).enumerate() {
-                let (pixels, columns) = (&image.pixels, image.size.width);
-                stem::forward_row(pixels, columns, first + y, &taps.weights, &mut raw);
-                activate(&raw, &taps.affine, None, &mut out[margin..row - margin]);
+    /// The stem or the expansion of a block: some rows of its output.
+    fn expand(&self, block: &Block, input: &Images, rows: Range<usize>, out: &mut PanelRows) {
+        let panels = &self.folded.blocks[block.number].expand;
+        let width = block.expand.window.output(input.size.width);
+        let row = width * panels.columns();
+        if block.expand.kind == ConvKind::Stem {
+            let mut neighbours = self.pool.take(rows.len() * row);
+            for (y, neighbours) in rows.clone().zip(neighbours.chunks_exact_mut(row)) {
+                stem::neighbours_of_row(&input.pixels, input.size.width, y, neighbours);
             }
-        })
+            activated_rows(&neighbours, panels, width, rows.start, out);
+        } else {
+            let input = &input.pixels[rows.start * row..rows.end * row];
+            activated_rows(input, panels, width, rows.start, out);
+        }
     }
 
-    /// The pointwise convolution at the beginning of a block, activated, with the padding that `next` needs.
-    fn pointwise(&self, panels: &Panels, next: &ConvPlace, input: &Images) -> Padded {
-        let (channels, columns) = (panels.channels(), panels.columns());
-        let (size, width) = (input.size, input.size.width);
-        let rows = tile_pixels(channels + columns).div_ceil(width);
-        let margin = next.window.padding() * channels;
-        self.padded(next, size, rows, |first, row, out| {
-            let input = &input.pixels[first * width * columns..];
-            let input = &input[..out.len() / row * width * columns];
-            let place = |pixel| pixel / width * row + margin + pixel % width * channels;
-            activated(input, panels, place, out);
-        })
-    }
-
-    /// An image for the convolution `next`, whose rows between their padding `make` writes, `at_once` of them from a first one
-    /// on, each of so many values.
-    fn padded(
+    /// Rows of a block's depthwise convolution from `first` on: [rows, width, channels], and their sums [rows, channels].
+    fn filter_part(
         &self,
-        next: &ConvPlace,
-        size: Size,
-        at_once: usize,
-        make: impl Fn(usize, usize, &mut [f32]) + Sync,
-    ) -> Padded {
-        let margin = next.window.padding() * next.channels;
-        let row = size.width * next.channels + 2 * margin;
-        let mut values = self.pool.take(size.height * row);
-        let parts = values.chunks_mut(at_once * row).collect();
-        of_each(parts, |number, out: &mut [f32]| {
-            for out in out.chunks_exact_mut(row) {
-                out[..margin].fill(0.0);
-                out[row - margin..].fill(0.0);
+        block: &Block,
+        input: &Images,
+        first: usize,
+        out: &mut [f32],
+        sums: &mut [f32],
+    ) {
+        let taps = &self.folded.blocks[block.number].depthwise;
+        let (channels, window) = (block.depthwise.channels, block.depthwise.window);
+        let expanded = input.size.after(block.expand.window);
+        let count = sums.len() / channels;
+        let row = out.len() / count;
+        // The expanded row under the top of the kernel, and the one after its bottom.
+        let top = |y: usize| ((first + y) * window.stride) as isize - window.padding() as isize;
+        let end = |y: usize| (top(y) + window.kernel as isize).cast_unsigned();
+        let last = end(count - 1).min(expanded.height);
+
+        let at_once = tile_pixels(channels).div_ceil(expanded.width);
+        let room = expanded.height.min(at_once + window.kernel - 1);
+        let shape = [expanded.height, expanded.width];
+        let mut rows = PanelRows::new(self.pool, room, shape, window.padding(), channels);
+        let (mut next, mut done) = (top(0).max(0).cast_unsigned(), 0);
+        while done < count {
+            let until = last.min(next + at_once);
+            self.expand(block, input, next..until, &mut rows);
+            next = until;
+            let ready = (done..count)
+                .take_while(|&y| end(y).min(last) <= next)
+                .count();
+            if ready > 0 {
+                let out = &mut out[done * row..][..ready * row];
+                let sums = &mut sums[done * channels..][..ready * channels];
+                filter_rows(taps, &rows, top(done), out, sums);
+                done += ready;
             }
-            make(number * at_once, row, out);
-        });
-        Padded { values, size, row }
+        }
     }
 }
 
 impl Layers for Inference<'_> {
     type Image = Images;
-    type Expanded = Padded;
     type Filtered = Filtered;
     type Gate = Vec<f32>;
     type Features = Vec<f32>;
     type Error = Infallible;
 
-    fn expand(&mut self, block: &Block, input: &Images) -> Result<Padded, Infallible> {
-        let (size, next) = (input.size.after(block.expand.window), &block.depthwise);
-        Ok(match &self.folded.blocks[block.number].expand {
-            Expansion::Pointwise(panels) => self.pointwise(panels, next, input),
-            Expansion::Stem(taps) => self.stem(taps, next, input, size),
-        })
-    }
-
-    fn depthwise(&mut self, block: &Block, input: Padded) -> Result<Filtered, Infallible> {
-        let taps = &self.folded.blocks[block.number].depthwise;
+    fn filter(&mut self, block: &Block, input: &Images) -> Result<Filtered, Infallible> {
         let (channels, window) = (block.depthwise.channels, block.depthwise.window);
-        let size = input.size.after(window);
-        let zeros = vec![0.0; input.row];
+        let size = input.size.after(block.expand.window).after(window);
         let row = size.width * channels;
         let mut pixels = self.pool.take(size.height * row);
-        let at_once = size.height.div_ceil(8);
-        let parts = pixels.chunks_mut(at_once * row).collect();
-        let parts = of_each(parts, |number, out: &mut [f32]| {
-            let mut sums = vec![0.0; channels];
-            let mut raw = self.pool.take(row);
-            for (y, out) in out.chunks_exact_mut(row).enumerate() {
-                let first = (number * at_once + y) * window.stride;
-                let under: [&[f32]; 5] = std::array::from_fn(|ky| {
-                    let y = (first + ky).wrapping_sub(window.padding());
-                    if y < input.size.height {
-                        &input.values[y * input.row..][..input.row]
-                    } else {
-                        &zeros[..]
-                    }
-                });
-                let under = &under[..window.kernel];
-                forward_row(window, under, &taps.weights, channels, &mut raw);
-                activate_and_add(&raw, &taps.affine, out, &mut sums);
-            }
-            sums
+        let mut sums = self.pool.take(size.height * channels);
+        // Rows that two parts need are expanded twice: a fifth of the rows at most.
+        let least = 4 * window.kernel;
+        let task = (size.height.div_ceil(rayon::current_num_threads())).max(least);
+        let parts = pixels.chunks_mut(task * row);
+        let parts = parts.zip(sums.chunks_mut(task * channels)).collect();
+        of_each(parts, |number, (out, sums): (&mut [f32], &mut [f32])| {
+            self.filter_part(block, input, number * task, out, sums);
         });
         Ok(Filtered {
             image: Images { pixels, size },
-            pooled: means(&parts, size.pixels()),
+            pooled: means(&sums, channels, size.pixels()),
         })
     }
 
@@ -172,7 +149,7 @@ impl Layers for Inference<'_> {
         Ok(Squeeze::forward(&block.squeeze, self.parameters, pooled).gate)
     }
 
-    /// The gates are multiplied into the weights, which are fewer than the pixels' values.
+    /// The gates are multiplied into the weights, or into the pixels where these have fewer values.
     fn project(
         &mut self,
         block: &Block,
@@ -182,8 +159,14 @@ impl Layers for Inference<'_> {
     ) -> Result<Images, Infallible> {
         let panels = &self.folded.blocks[block.number].project;
         let (channels, columns) = (panels.channels(), panels.columns());
-        let gated = panels.gated(&gate, self.pool);
-        let (input, size) = (filtered.image.pixels, filtered.image.size);
+        let (mut input, size) = (filtered.image.pixels, filtered.image.size);
+        let gated = (size.pixels() >= channels).then(|| panels.gated(&gate, self.pool));
+        if gated.is_none() {
+            for pixel in input.chunks_exact_mut(columns) {
+                pixel.iter_mut().zip(&gate).for_each(|(x, gate)| *x *= gate);
+            }
+        }
+        let panels = gated.as_ref().unwrap_or(panels);
         let mut pixels = self.pool.take(size.pixels() * channels);
         let tile = tile_pixels(channels + columns);
         let parts = pixels.chunks_mut(tile * channels).collect();
@@ -193,7 +176,7 @@ impl Layers for Inference<'_> {
             let added = block
                 .residual
                 .then(|| &added.pixels[start * channels..][..out.len()]);
-            normalised(input, &gated, added, out);
+            normalised(input, panels, added, out);
         });
         Ok(Images { pixels, size })
     }
@@ -201,27 +184,25 @@ impl Layers for Inference<'_> {
     fn head(&mut self, _: &ConvPlace, input: Images) -> Result<Vec<f32>, Infallible> {
         let panels = &self.folded.head;
         let (channels, columns) = (panels.channels(), panels.columns());
-        let parts = input
-            .pixels
-            .chunks(tile_pixels(channels + columns) * columns)
-            .collect();
-        let parts = of_each(parts, |_, input: &[f32]| {
-            let mut active = self.pool.take(input.len() / columns * channels);
-            activated(input, panels, |pixel| pixel * channels, &mut active);
-            let mut sums = vec![0.0; channels];
-            for pixel in active.chunks_exact(channels) {
-                for (sum, x) in sums.iter_mut().zip(pixel) {
-                    *sum += f64::from(*x);
-                }
-            }
-            sums
+        let tile = tile_pixels(channels + columns);
+        let mut active = self.pool.take(input.size.pixels() * channels);
+        let parts = active.chunks_mut(tile * channels);
+        let parts = parts.zip(input.pixels.chunks(tile * columns)).collect();
+        of_each(parts, |_, (out, input): (&mut [f32], &[f32])| {
+            activated(input, panels, out);
         });
-        Ok(means(&parts, input.size.pixels()))
+        Ok(means(&active, channels, input.size.pixels()))
     }
 }
 
-/// The mean of each channel, from the sums of some parts in their order.
-fn means(parts: &[Vec<f64>], pixels: usize) -> Vec<f32> {
-    let mean = |c: usize| (parts.iter().map(|sums| sums[c]).sum::<f64>() / pixels as f64) as f32;
-    (0..parts[0].len()).map(mean).collect()
+/// The mean of each channel of some pixels, from sums [sums, channels] over one or more of them each.
+fn means(sums: &[f32], channels: usize, pixels: usize) -> Vec<f32> {
+    let mut total = vec![0.0; channels];
+    for sums in sums.chunks_exact(channels) {
+        for (total, sum) in total.iter_mut().zip(sums) {
+            *total += f64::from(*sum);
+        }
+    }
+    let mean = |sum: &f64| (sum / pixels as f64) as f32;
+    total.iter().map(mean).collect()
 }

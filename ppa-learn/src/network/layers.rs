@@ -8,23 +8,15 @@ use super::architecture::{Architecture, Block, ConvPlace};
 pub trait Layers {
     /// Images, or the output of a block.
     type Image;
-    type Expanded;
     type Filtered;
     /// A gate for each channel.
     type Gate;
     type Features;
     type Error;
 
-    /// The stem or the expansion, its normalisation and SiLU.
-    fn expand(&mut self, block: &Block, input: &Self::Image)
-    -> Result<Self::Expanded, Self::Error>;
-
-    /// The depthwise convolution, its normalisation and SiLU.
-    fn depthwise(
-        &mut self,
-        block: &Block,
-        expanded: Self::Expanded,
-    ) -> Result<Self::Filtered, Self::Error>;
+    /// The stem or the expansion and the depthwise convolution, each with its normalisation and SiLU.
+    fn filter(&mut self, block: &Block, input: &Self::Image)
+    -> Result<Self::Filtered, Self::Error>;
 
     /// The squeeze-and-excitation, up to its gates.
     fn squeeze(
@@ -51,8 +43,7 @@ pub trait Layers {
 
     /// The output of a block.
     fn block(&mut self, block: &Block, input: Self::Image) -> Result<Self::Image, Self::Error> {
-        let expanded = self.expand(block, &input)?;
-        let filtered = self.depthwise(block, expanded)?;
+        let filtered = self.filter(block, &input)?;
         let gate = self.squeeze(block, &filtered)?;
         self.project(block, filtered, gate, input)
     }

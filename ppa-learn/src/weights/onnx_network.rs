@@ -147,18 +147,14 @@ struct Nodes<'a> {
 
 impl Layers for Nodes<'_> {
     type Image = String;
-    type Expanded = String;
     type Filtered = String;
     type Gate = String;
     type Features = String;
     type Error = Infallible;
 
-    fn expand(&mut self, block: &Block, x: &String) -> Result<String, Infallible> {
+    fn filter(&mut self, block: &Block, x: &String) -> Result<String, Infallible> {
         let x = self.conv(&format!("block{}.expand", block.number), x, &block.expand);
-        Ok(self.builder.silu(&x))
-    }
-
-    fn depthwise(&mut self, block: &Block, x: String) -> Result<String, Infallible> {
+        let x = self.builder.silu(&x);
         let name = format!("block{}.depthwise", block.number);
         let x = self.conv(&name, &x, &block.depthwise);
         Ok(self.builder.silu(&x))

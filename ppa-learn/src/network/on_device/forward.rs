@@ -57,19 +57,15 @@ pub struct Filtered {
 
 impl Layers for Forward<'_> {
     type Image = Tensor;
-    type Expanded = Expanded;
     type Filtered = Filtered;
     type Gate = Gate;
     type Features = Tensor;
     type Error = Error;
 
-    fn expand(&mut self, block: &Block, x: &Tensor) -> Result<Expanded> {
+    fn filter(&mut self, block: &Block, x: &Tensor) -> Result<Filtered> {
         let normed = self.conv(&block.expand, x, true)?;
         let image = normed.image(None, None)?;
-        Ok(Expanded { normed, image })
-    }
-
-    fn depthwise(&mut self, block: &Block, expanded: Expanded) -> Result<Filtered> {
+        let expanded = Expanded { normed, image };
         let normed = self.conv(&block.depthwise, &expanded.image, true)?;
         Ok(Filtered { expanded, normed })
     }
