@@ -27,6 +27,9 @@ const gutterText = (gutter) => `${gutter.name} gutter ${fixed(100 * gutter.openn
 
 const VERDICTS = { yes: "diagnostic", no: "not diagnostic", not_sure: "not sure whether diagnostic" };
 
+// Whether a later request for the same image has replaced the one that failed.
+const isReplaced = (error) => error instanceof Refused && error.status === 409;
+
 // What networks say of the depth images; nothing if none are open.
 function networkText(answer) {
   if (!answer) return "";
@@ -243,7 +246,9 @@ export class WhatIfPanel {
         if (pass === "final" && !exposing.signal.aborted) this.dose.offer(report.mas);
       }
     } catch (error) {
-      if (error.name !== "AbortError") this.failed(error);
+      if (exposing.signal.aborted) return;
+      byId("radiograph").querySelector("figcaption").textContent = isReplaced(error) ? "not finished: another request replaced it" : "";
+      this.failed(error);
     }
   }
 
@@ -266,8 +271,7 @@ export class WhatIfPanel {
 
   // A request that a later one replaced is no failure.
   failed(error) {
-    if (error instanceof Refused && error.status === 409) return;
-    this.actions.fail(error);
+    if (!isReplaced(error)) this.actions.fail(error);
   }
 
   // All angles from 0 to 90 degrees, each as soon as the one before is shown.

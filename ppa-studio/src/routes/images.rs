@@ -15,12 +15,11 @@ use crate::scene::Pass;
 use crate::state::State;
 use crate::what_if::WhatIf;
 
-/// Both depth images; of several requests only the newest is answered. Ends the radiograph under way, which is of another pose.
+/// Both depth images; of several requests only the newest is answered.
 pub(super) async fn depth(
     Extracted(state): Extracted<Arc<State>>,
     Json(what_if): Json<WhatIf>,
 ) -> Result<Response, Response> {
-    state.radiograph.cancel();
     let ticket = state.depth.enter();
     let made = work(state, move |state| {
         let _turn = state.depth.turn(&ticket)?;
