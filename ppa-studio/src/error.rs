@@ -158,6 +158,12 @@ pub enum StudioError {
     /// A file that the person has not agreed to replace.
     #[error("{} exists", .0.display())]
     Exists(PathBuf),
+    /// A dataset without the list of its images.
+    #[error(
+        "{} is not a complete dataset: manifest.jsonl is missing, which is written when all images are made",
+        .0.display()
+    )]
+    NotMade(PathBuf),
     /// A later request of the page has replaced this one.
     #[error("a later request replaced this one")]
     Superseded,

@@ -144,6 +144,12 @@ impl Plan {
             .with_receptor(xray.receptor.clone())
             .validate()
             .map_err(|error| format!("xray: {error}"))?;
+        xray.receptor
+            .check(&detector)
+            .map_err(|error| format!("xray.receptor: {}", error_chain(&error)))?;
+        xray.engine
+            .check(&detector)
+            .map_err(|error| format!("xray.engine: {}", error_chain(&error)))?;
         let beam = xray.tube().and_then(|tube| Spectrum::tungsten(&tube));
         beam.map_err(|error| format!("xray: {}", error_chain(&error)))?;
         xray.presentation

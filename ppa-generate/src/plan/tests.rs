@@ -280,6 +280,19 @@ fn room_beam_and_image_out_of_range_are_refused() {
         ),
         ("[xray.source]\nfocal_spot = { size_mm = 400 }", "xray: "),
         ("[xray.presentation]\nwidth = 0", "xray.presentation: "),
+        (
+            "[xray.receptor]\nelectronic_noise_kev = -1",
+            "xray.receptor: the electronic noise per pixel in keV is -1",
+        ),
+        (
+            "[xray.receptor]\ngrid = { ratio = 8, lines_per_cm = 40, strip_mm = 0.3 }",
+            "xray.receptor: grid strips of 0.3 mm",
+        ),
+        (
+            "[xray.engine]\nscatter_histories = 0",
+            "xray.engine: the number of histories for the scatter is 0",
+        ),
+        ("[xray.engine]\nsamples_per_side = 0", "xray.engine: "),
     ];
     for (keys, expected) in refused {
         let error = ppa_core::text::error_chain(&read(keys).unwrap_err());

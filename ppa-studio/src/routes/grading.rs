@@ -33,6 +33,15 @@ impl Place {
         state.dataset(&self.folder)
     }
 
+    /// The images of the dataset.
+    fn manifest(&self, state: &State) -> Result<Manifest, StudioError> {
+        let root = self.root(state)?;
+        if !root.join(Manifest::FILE).exists() {
+            return Err(StudioError::NotMade(root));
+        }
+        Ok(Manifest::read(&root)?)
+    }
+
     /// The folder for readers.
     fn sheets(&self, state: &State) -> Result<PathBuf, StudioError> {
         let root = self.root(state)?;
@@ -94,7 +103,7 @@ pub(super) async fn begin(
         } = begin;
         let _turn = state.grading.lock().unwrap_or_else(PoisonError::into_inner);
         let (root, sheets, key) = (place.root(state)?, place.sheets(state)?, place.key(state)?);
-        let manifest = Manifest::read(&root)?;
+        let manifest = place.manifest(state)?;
         let key_found = key.exists();
         let shown = if key_found {
             read_key(&key)?
@@ -175,7 +184,7 @@ pub(super) async fn import(
     work(state, move |state| {
         let _turn = state.grading.lock().unwrap_or_else(PoisonError::into_inner);
         let shown = read_key(&place.key(state)?)?;
-        let manifest = Manifest::read(&place.root(state)?)?;
+        let manifest = place.manifest(state)?;
         let sheets = GradeSheet::files(&place.sheets(state)?)?;
         Ok(Json(import_grades(&manifest, &shown, &sheets)?))
     })

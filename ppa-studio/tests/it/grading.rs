@@ -107,6 +107,18 @@ fn a_grade_is_saved_at_once_and_found_again() {
 }
 
 #[test]
+fn a_dataset_not_made_yet_is_refused_for_grading() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = crate::plans::plan(folder.path());
+    let browser = Browser::opened(folder, &ppa_studio::Opening::of(&file));
+    let refused = browser.post("/api/grading", &begin("Anna"));
+    assert_eq!(refused.status, StatusCode::UNPROCESSABLE_ENTITY);
+    let text = refused.text();
+    assert!(text.contains("ankles is not a complete dataset"), "{text}");
+    assert!(!browser.folder.path().join("graded.key.csv").exists());
+}
+
+#[test]
 fn grades_of_all_readers_become_labels() {
     let browser = opened();
     let twin = tempfile::tempdir().unwrap();

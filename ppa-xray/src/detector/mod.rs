@@ -2,6 +2,7 @@
 
 pub(crate) mod absorption;
 pub(crate) mod blur;
+mod check;
 pub(crate) mod energy_nodes;
 mod escape;
 pub(crate) mod gains;

@@ -106,7 +106,7 @@ fn expose(
     settings: &FastSettings,
     observe: Observer,
 ) -> Result<Radiograph, TransportError> {
-    settings.validate(&projection.detector)?;
+    settings.check(&projection.detector)?;
     let tables = phantom.tables();
     let exposure = Exposure::with_tables(tables.transport.clone(), spectrum, projection)?;
     let transport = &exposure.transport;

@@ -61,7 +61,11 @@ impl FastSettings {
     /// Most points for scatter before any are set closer; a point and those around it take about 2 kB.
     const MOST_NODES: f64 = 1e5;
 
-    pub(crate) fn validate(&self, detector: &Detector) -> Result<(), TransportError> {
+    /// Checks the settings for an image on a detector.
+    ///
+    /// # Errors
+    /// [`TransportError::Setting`] naming the number at fault.
+    pub fn check(&self, detector: &Detector) -> Result<(), TransportError> {
         let [width, height] = detector.field().size_mm();
         let along = |size_mm: f64| (size_mm / self.scatter_pixel_mm).ceil() + 1.0;
         let distance_mm = self.scatter_pixel_mm;
