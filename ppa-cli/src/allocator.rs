@@ -5,7 +5,7 @@
 use libc::{M_MMAP_THRESHOLD, M_TRIM_THRESHOLD};
 
 /// Keeps freed memory in the process instead of returning it to the system. A training step frees gradients of all weights and
-/// allocates as many in the next one; their pages would be mapped anew each time, a quarter of the CPU time of `standard`.
+/// allocates as many in the next one; their pages would be mapped again each time, a quarter of the CPU time of `standard`.
 ///
 /// Returns whether the allocator took the settings; only glibc's has them.
 pub fn keep_freed_memory() -> bool {

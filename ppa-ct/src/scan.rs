@@ -92,7 +92,7 @@ pub struct Warning {
 pub enum WarningCode {
     /// The slice step is not along the slice normal; the affine is sheared.
     GantryTilt,
-    /// One slice: its thickness stands in for the step.
+    /// One slice: its thickness is used as the step.
     SingleSlice,
     /// Localizers (scout views) were left out.
     LocalizersDropped,

@@ -2,7 +2,7 @@
 //!
 //! DEVICE is where `train` and `infer` compute, `cpu` by default; steps on a device wait for each other through the loss.
 //!
-//! `load` makes training batches with the paper's augmentation from depth images of 640 x 576 pixels on disk, read anew each time;
+//! `load` makes training batches with the paper's augmentation from depth images of 640 x 576 pixels on disk, read again each time;
 //! `augment` from those that were read before. THREADS are the loader's then.
 //!
 //! Prints one JSON object with the images, wall and processor seconds after one step to warm up, for benches beside other programs.

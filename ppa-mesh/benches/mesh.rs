@@ -59,7 +59,7 @@ fn benches(c: &mut Criterion<ProcessorTime>) {
     group.bench_function("surface_points", |b| {
         b.iter(|| dbscan(black_box(&skin.vertices), 4.0, 8));
     });
-    // The library that ours stands in for.
+    // The library that our code replaces.
     let table = Array2::from_shape_fn((skin.vertices.len(), 3), |(row, axis)| {
         f64::from(skin.vertices[row][axis])
     });

@@ -58,7 +58,7 @@ impl Stack {
                 warnings.push(Warning {
                     code: WarningCode::SingleSlice,
                     text: format!(
-                        "a single slice: its thickness of {thickness_mm} mm stands in for the step"
+                        "a single slice: its thickness of {thickness_mm} mm is used as the step"
                     ),
                 });
                 normal * thickness_mm

@@ -23,7 +23,7 @@ pub enum TableError {
     /// Labels of a limb.
     #[error(transparent)]
     Labels(#[from] LabelFileError),
-    /// Labels of radiographs that were made anew since.
+    /// Labels of radiographs that were made again since.
     #[error("{}: the label of step {step} was given to another radiograph than the one there now; label them again", path.display())]
     Outdated {
         /// `labels.json` of the limb.

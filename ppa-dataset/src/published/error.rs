@@ -50,7 +50,7 @@ pub enum PublishedError {
         /// The angle in its name.
         angle: String,
     },
-    /// Labels of radiographs that were made anew since.
+    /// Labels of radiographs that were made again since.
     #[error(
         "{}: labels of other radiographs than those there now: {}, the first of step {step}; make them again \
          (`ppa label auto` or `ppa label import`) or remove the file",

@@ -49,7 +49,7 @@ pub enum Flaw {
     /// What no image pair mentions.
     #[error("{0}")]
     Unpaired(Unpaired),
-    /// Labels of radiographs that were made anew since.
+    /// Labels of radiographs that were made again since.
     #[error("limb {} of patient {}: labels of other radiographs than those there now: {}, the first of step {step}",
         limb.side_letter(), limb.patient, ppa_core::text::count(*count, "label"))]
     Outdated {

@@ -177,7 +177,7 @@ impl Published {
     ///
     /// # Errors
     /// [`PublishedError`] naming the first file or entry that fits neither layout, or labels of radiographs that were made
-    /// anew since.
+    /// again since.
     pub fn read(root: &Path) -> Result<Self, PublishedError> {
         Self::read_labelled(root, None)
     }

@@ -1,4 +1,4 @@
-//! Labels of radiographs that were made anew since.
+//! Labels of radiographs that were made again since.
 
 use super::{Layout, Published, PublishedError};
 use crate::labels::{LabelFile, LabelName};

@@ -28,7 +28,7 @@ impl Viewpoint {
 
     /// Directions above `lowest_deg` about `step_deg` apart, at each of some distances; straight above is one of them.
     ///
-    /// Rings of equal elevation, from above, with directions so many that they are no further apart than the rings; the first of
+    /// Rings of equal elevation, from above, with enough directions that they are no further apart than the rings; the first of
     /// each ring lies along x.
     pub fn dome(step_deg: f64, lowest_deg: f64, distances_mm: &[f64]) -> Vec<Self> {
         let rings = ((90.0 - lowest_deg) / step_deg + 1e-9).floor().max(0.0) as u32;

@@ -1,7 +1,7 @@
 //! Triangles into the distorted image.
 //!
 //! A changed mesh of 1.4 million triangles becomes an image in a fifteenth of the processor time of Embree, which builds its tree
-//! anew (bench `depth`, docs/performance.md).
+//! again (bench `depth`, docs/performance.md).
 //!
 //! The corners are projected through the lens in single precision, which finds the few pixels that a triangle may cover; at
 //! each the exact ray of the pixel is tested in double precision. So distortion is exact, and edges are those of the triangle

@@ -54,7 +54,7 @@ impl Default for Augmentation {
 impl Augmentation {
     /// Prepared images (mm) of the cameras of one pose as the network sees them in training, `side * side` values each.
     ///
-    /// All cameras are changed in the same way, noise included; pixels are lost anew for each. `seed` and `index` name the
+    /// All cameras are changed in the same way, noise included; the lost pixels are different for each. `seed` and `index` name the
     /// random numbers: equal ones give equal images.
     ///
     /// # Panics

@@ -115,7 +115,7 @@ impl<const ACTIVATE: bool, P: Fn(usize, usize) -> usize> Forward<'_, ACTIVATE, P
         let shift = lanes::<S>(&self.panels.shift[first..][..width]);
         let shift: [S::f32s; V] = std::array::from_fn(|v| shift[v]);
         for start in (0..pixels).step_by(M) {
-            // The last pixel stands in for those beyond it.
+            // The last pixel is repeated for those beyond it.
             let row = |m: usize| &self.input[(start + m).min(pixels - 1) * columns..][..columns];
             let sums = tile::<S, M, V>(simd, std::array::from_fn(row), weights, shift);
             for (m, sums) in sums.into_iter().enumerate() {

@@ -61,7 +61,7 @@ pub struct Shortcut {
 
 /// How a sign configuration is filled.
 pub enum Filling {
-    /// One loop with triangles that do not depend on the values: so many of these.
+    /// One loop with triangles that do not depend on the values: their number, and their corners.
     Triangles(usize, [[EdgePlace; 3]; 4]),
     /// One loop of four crossings.
     Quad(Quad),

@@ -173,7 +173,7 @@ mod tests {
     }
 
     /// Below the K edges nothing of note gets out: what is left is absorption, E (1 − exp(−μ t / cos)). Densities and
-    /// units anew: 200 µm, of which four fifths are crystal of 4.51 g/cm³, and 50 µm of selenium of 4.28 g/cm³.
+    /// units are computed here: 200 µm, of which four fifths are crystal of 4.51 g/cm³, and 50 µm of selenium of 4.28 g/cm³.
     #[test]
     fn below_the_edge_a_layer_absorbs_as_beer_and_lambert_say() {
         for (layer, material, g_cm2, energy_kev, cos) in [
@@ -194,7 +194,7 @@ mod tests {
     }
 
     /// The tabulated layer against photons followed one by one, with flights, K x-rays and Compton scattering
-    /// sampled anew (Klein–Nishina by rejection, Rayleigh left out as in the table), secondaries followed to the end.
+    /// sampled by code of this test (Klein–Nishina by rejection, Rayleigh left out as in the table), secondaries followed to the end.
     #[test]
     fn a_layer_leaves_what_photons_followed_one_by_one_leave() {
         for (energy_kev, cos, material, solid_um, absorption) in [

@@ -263,7 +263,7 @@ mod tests {
         crossing.transmission(grid.attenuation(energy_kev))
     }
 
-    /// Rays marched through strips and spaces at random phases, geometry and attenuation written down anew.
+    /// Rays marched through strips and spaces at random phases, with geometry and attenuation by code of this test.
     #[test]
     fn the_closed_form_is_the_mean_over_the_phase() {
         let settings = AntiScatterGrid {

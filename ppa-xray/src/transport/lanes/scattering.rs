@@ -143,7 +143,7 @@ impl Lanes<'_, '_> {
         });
     }
 
-    /// sin²(θ/2) and the energy in keV after Compton scattering; what an attempt leaves open is drawn anew.
+    /// sin²(θ/2) and the energy in keV after Compton scattering; photons whose attempts all failed are sampled one by one.
     #[inline(always)]
     fn compton(&mut self, site: &Site, n: usize) -> (f32, f32) {
         let sin2_half_theta = self.scattering.attempts.sin2_half_theta[n];
@@ -151,12 +151,12 @@ impl Lanes<'_, '_> {
         if scattered_kev > 0.0 {
             return (sin2_half_theta, scattered_kev);
         }
-        self.compton_anew(site, (scattered_kev == 0.0).then_some(sin2_half_theta))
+        self.sample_one_compton(site, (scattered_kev == 0.0).then_some(sin2_half_theta))
     }
 
     #[cold]
     #[inline(never)]
-    fn compton_anew(&mut self, site: &Site, sin2_half_theta: Option<f32>) -> (f32, f32) {
+    fn sample_one_compton(&mut self, site: &Site, sin2_half_theta: Option<f32>) -> (f32, f32) {
         let photon = &self.photons[site.lane()];
         let energy_kev = f64::from(photon.energy_kev);
         let mut rng = self.generator(photon);
