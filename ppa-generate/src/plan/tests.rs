@@ -292,7 +292,10 @@ fn room_beam_and_image_out_of_range_are_refused() {
             "[xray.engine]\nscatter_histories = 0",
             "xray.engine: the number of histories for the scatter is 0",
         ),
-        ("[xray.engine]\nsamples_per_side = 0", "xray.engine: "),
+        (
+            "[xray.engine]\nsamples_per_side = 0",
+            "xray.engine: the number of rays per pixel side is 0",
+        ),
     ];
     for (keys, expected) in refused {
         let error = ppa_core::text::error_chain(&read(keys).unwrap_err());
