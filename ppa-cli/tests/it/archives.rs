@@ -5,7 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::{contents, fail, succeed, write_plan};
+use crate::shards::write_quick_plan;
+use crate::{contents, fail, succeed};
 
 fn tar(folder: &Path, arguments: &[&str]) {
     let mut tar = Command::new("tar");
@@ -24,7 +25,7 @@ fn files(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 fn an_archive_extracts_to_the_dataset_in_a_folder() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    write_plan(here, "");
+    write_quick_plan(here);
     succeed(here, "generate plan.toml --out whole");
     succeed(here, "generate plan.toml --out whole.tar");
     fs::create_dir(here.join("extracted")).unwrap();
@@ -59,7 +60,7 @@ fn an_archive_extracts_to_the_dataset_in_a_folder() {
 fn commands_that_need_a_folder_say_how_to_extract_it() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    write_plan(here, "");
+    write_quick_plan(here);
     succeed(here, "generate plan.toml --out whole.tar");
     let training = "preset = \"quick\"\n[[training]]\ndataset = \"whole.tar\"\n";
     fs::write(here.join("train.toml"), training).unwrap();

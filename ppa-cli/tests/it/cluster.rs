@@ -9,12 +9,13 @@ use std::process::Command;
 
 use serde_json::Value;
 
-use crate::{contains, ppa, write_plan};
+use crate::shards::write_quick_plan;
+use crate::{contains, ppa};
 
 /// A folder with the quick plan of five poses, and a folder `bin` for programs of Slurm.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    write_plan(folder.path(), "");
+    write_quick_plan(folder.path());
     fs::create_dir(folder.path().join("bin")).unwrap();
     folder
 }
