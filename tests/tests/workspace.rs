@@ -166,20 +166,6 @@ fn crates_depend_only_along_the_arrows() {
     }
 }
 
-/// Else the wheel would compile the dependencies once more.
-#[test]
-fn the_python_package_has_the_profiles_of_the_workspace() {
-    let profiles = |path: &str| manifest(&root().join(path))["profile"].clone();
-    let (workspace, python) = (profiles("Cargo.toml"), profiles("python/Cargo.toml"));
-    for name in ["dev", "release"] {
-        let packages = python[name]["package"].as_table().unwrap();
-        for (package, settings) in packages {
-            let expected = workspace[name]["package"].get(package);
-            assert_eq!(Some(settings), expected, "{name}: {package}");
-        }
-    }
-}
-
 /// What all crates share must not grow unnoticed.
 #[test]
 fn the_shared_crate_has_exactly_its_listed_dependencies() {

@@ -5,6 +5,8 @@ use std::path::Path;
 use dicom_core::{DataElement, PrimitiveValue, Tag, VR};
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
+use flate2::Compression;
+use flate2::write::DeflateEncoder;
 use nalgebra::{Point3, Vector3};
 
 /// One slice to be written.
@@ -126,16 +128,26 @@ impl SliceSpec {
             PrimitiveValue::U16(self.stored.iter().copied().collect()),
         ));
         change(&mut object);
-        object
-            .with_meta(
-                FileMetaTableBuilder::new()
-                    .transfer_syntax(self.syntax)
-                    .media_storage_sop_class_uid(uids::CT_IMAGE_STORAGE)
-                    .media_storage_sop_instance_uid("2.25.1"),
-            )
-            .expect("a valid meta group")
-            .write_to_file(path)
-            .expect("a writable folder");
+        let file = |syntax| {
+            let meta = FileMetaTableBuilder::new()
+                .transfer_syntax(syntax)
+                .media_storage_sop_class_uid(uids::CT_IMAGE_STORAGE)
+                .media_storage_sop_instance_uid("2.25.1");
+            object.clone().with_meta(meta).expect("a valid meta group")
+        };
+        if self.syntax == uids::DEFLATED_EXPLICIT_VR_LITTLE_ENDIAN {
+            // dicom-object needs a feature for this, which the program is built without.
+            let mut bytes = [&[0; 128][..], b"DICM"].concat();
+            file(self.syntax).meta().write(&mut bytes).unwrap();
+            let mut encoder = DeflateEncoder::new(&mut bytes, Compression::fast());
+            let data_set = file(uids::EXPLICIT_VR_LITTLE_ENDIAN);
+            data_set.write_dataset(&mut encoder).unwrap();
+            encoder.finish().unwrap();
+            std::fs::write(path, bytes).expect("a writable folder");
+        } else {
+            let written = file(self.syntax).write_to_file(path);
+            written.expect("a writable folder");
+        }
     }
 }
 
