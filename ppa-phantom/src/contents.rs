@@ -32,6 +32,16 @@ fn cortical_hu(cortex_mm: f64) -> f64 {
     CORTICAL_HU[0] + t * (CORTICAL_HU[1] - CORTICAL_HU[0])
 }
 
+/// Soft tissues whose boundary may pass near a point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Near {
+    /// Skin or the fat below it; if not, the point is deep inside.
+    pub skin: bool,
+    /// Fat bodies away from the skin.
+    pub deep_fat: bool,
+    pub tendon: bool,
+}
+
 /// Distances at one point to everything that can change there, limb frame.
 #[derive(Debug, Default)]
 pub(super) struct Local {
@@ -62,10 +72,12 @@ impl Limb {
         let envelope = &self.envelope;
         if skin > -envelope.skin_mm() {
             Tissue::Skin
-        } else if skin > -envelope.cover_mm(p) || envelope.deep_fat_distance(p) < 0.0 {
+        } else if skin > -envelope.cover_mm(p) {
             Tissue::Fat
         } else if envelope.tendon_distance(p) < 0.0 {
             Tissue::Tendon
+        } else if envelope.deep_fat_distance(p) < 0.0 {
+            Tissue::Fat
         } else {
             Tissue::SoftTissue
         }
@@ -113,7 +125,13 @@ impl Limb {
     }
 
     /// Mean Hounsfield unit of a ball of diameter `width_mm`, and the share of it that lies in the limb.
-    pub(super) fn mixture(&self, p: &Point3<f64>, local: &Local, width_mm: f64) -> (f64, f64) {
+    pub(super) fn mixture(
+        &self,
+        p: &Point3<f64>,
+        near: Near,
+        local: &Local,
+        width_mm: f64,
+    ) -> (f64, f64) {
         let inside = local.skin_mm.map_or(1.0, |d| share_inside(d, width_mm));
         if inside == 0.0 {
             return (AIR_HU, 0.0);
@@ -153,7 +171,7 @@ impl Limb {
         let soft_share = (inside - bone_share).max(0.0);
         let mut hu = bone_hu + (1.0 - inside) * AIR_HU;
         if soft_share > 0.0 {
-            hu += soft_share * self.soft_hu(p, local.skin_mm, inside, width_mm);
+            hu += soft_share * self.soft_hu(p, near, local.skin_mm, inside, width_mm);
         }
         if let Some(plate) = &self.plate {
             let metal = share_inside(plate.distance(p), width_mm);
@@ -163,17 +181,36 @@ impl Limb {
     }
 
     /// Mean Hounsfield unit of the part of a ball that lies below the skin surface, bones left out.
-    fn soft_hu(&self, p: &Point3<f64>, skin_mm: Option<f64>, inside: f64, width_mm: f64) -> f64 {
+    fn soft_hu(
+        &self,
+        p: &Point3<f64>,
+        near: Near,
+        skin_mm: Option<f64>,
+        inside: f64,
+        width_mm: f64,
+    ) -> f64 {
         let envelope = &self.envelope;
-        let fat = share_inside(envelope.deep_fat_distance(p), width_mm);
-        let tendon = share_inside(envelope.tendon_distance(p), width_mm);
-        let muscle = SOFT_HU + tendon * (TENDON_HU - SOFT_HU);
-        let deep = muscle + fat * (FAT_HU - muscle);
         let Some(skin) = skin_mm else {
-            return deep;
+            return self.deep_hu(p, near, width_mm);
         };
         let below_skin = share_inside(skin + envelope.skin_mm(), width_mm) / inside;
         let below_fat = share_inside(skin + envelope.cover_mm(p), width_mm) / inside;
-        (1.0 - below_skin) * SKIN_HU + (below_skin - below_fat) * FAT_HU + below_fat * deep
+        let mut hu = (1.0 - below_skin) * SKIN_HU + (below_skin - below_fat) * FAT_HU;
+        if below_fat > 0.0 {
+            hu += below_fat * self.deep_hu(p, near, width_mm);
+        }
+        hu
+    }
+
+    /// Mean Hounsfield unit below the fat under the skin, bones left out.
+    fn deep_hu(&self, p: &Point3<f64>, near: Near, width_mm: f64) -> f64 {
+        let envelope = &self.envelope;
+        let distance = |near, mm: &dyn Fn() -> f64| if near { mm() } else { f64::INFINITY };
+        let tendon_mm = distance(near.tendon, &|| envelope.tendon_distance(p));
+        let fat_mm = distance(near.deep_fat, &|| envelope.deep_fat_distance(p));
+        let tendon = share_inside(tendon_mm, width_mm);
+        let fat = share_inside(fat_mm.max(-tendon_mm), width_mm);
+        let muscle = SOFT_HU + tendon * (TENDON_HU - SOFT_HU);
+        muscle + fat * (FAT_HU - muscle)
     }
 }

@@ -84,11 +84,11 @@ impl Envelope {
         self.skin_mm + even_mm + calf_mm + sole_mm
     }
 
-    /// Signed distance to the fat bodies away from the skin.
+    /// Signed distance to the fat bodies away from the skin. The tendon, which may run through them, is not taken out.
     pub(super) fn deep_fat_distance(&self, p: &Point3<f64>) -> f64 {
         let fat = self.fat.iter().map(|fat| fat.distance(p));
         let fat = fat.reduce(|a, b| smooth_min(a, b, 1.0));
-        fat.unwrap_or(f64::INFINITY).max(-self.tendon_distance(p))
+        fat.unwrap_or(f64::INFINITY)
     }
 
     /// Signed distance to the tendon.

@@ -131,12 +131,13 @@ impl Limb {
         if skin > 0.0 {
             return skin;
         }
+        let tendon = envelope.tendon_distance(p);
         let mut clearance = [
             skin,
             skin + envelope.skin_mm(),
             skin + envelope.cover_mm(p),
-            envelope.deep_fat_distance(p),
-            envelope.tendon_distance(p),
+            envelope.deep_fat_distance(p).max(-tendon),
+            tendon,
         ]
         .map(f64::abs)
         .into_iter()

@@ -8,7 +8,7 @@ use ppa_ct::Grid;
 use ppa_ct::with_room;
 use ppa_ct::{Volume, VolumeError};
 
-use super::contents::Local;
+use super::contents::{Local, Near};
 use super::limb::Limb;
 
 /// Why a phantom cannot be voxelised.
@@ -224,7 +224,8 @@ impl Painter<'_> {
             .flat_map(|k| (low[1]..high[1]).map(move |j| (j, k)))
             .flat_map(|(j, k)| (low[0]..high[0]).map(move |i| [i, j, k]));
 
-        if skin_mm > CAUTION * radius_mm + 1.0 {
+        let reach_mm = CAUTION * radius_mm + 1.0;
+        if skin_mm > reach_mm {
             let y = |voxel: [usize; 3]| self.grid.centre(voxel.map(|v| v as f64)).y;
             for voxel in voxels {
                 hu[slot(voxel)] = background_hu(y(voxel), half, self.table_top_mm) as f32;
@@ -232,38 +233,41 @@ impl Painter<'_> {
             return;
         }
         let cover_mm = limb.envelope.cover_mm(&centre) + 1.0;
-        let near_skin = skin_mm > -(CAUTION * radius_mm + cover_mm);
+        let near = Near {
+            skin: skin_mm > -(CAUTION * radius_mm + cover_mm),
+            deep_fat: limb.envelope.deep_fat_distance(&centre) < reach_mm,
+            tendon: limb.envelope.tendon_distance(&centre) < reach_mm,
+        };
         let bones: Vec<usize> = (0..limb.skeleton.bones().len())
             .filter(|&b| {
                 limb.skeleton.box_distance(b, &centre) < radius_mm
-                    && limb.skeleton.distance(b, &centre) < CAUTION * radius_mm + 1.0
+                    && limb.skeleton.distance(b, &centre) < reach_mm
             })
             .collect();
         let (mut local, mut part) = (Local::default(), Local::default());
         for voxel in voxels {
             let centre = self.grid.centre(voxel.map(|v| v as f64));
-            hu[slot(voxel)] =
-                self.voxel_hu(&centre, near_skin, &bones, [&mut local, &mut part]) as f32;
+            hu[slot(voxel)] = self.voxel_hu(&centre, near, &bones, [&mut local, &mut part]) as f32;
         }
     }
 
     fn voxel_hu(
         &self,
         centre: &Point3<f64>,
-        near_skin: bool,
+        near: Near,
         bones: &[usize],
         [local, part]: [&mut Local; 2],
     ) -> f64 {
         let limb = self.limb;
         let p = limb.limb_from_right(centre);
-        limb.measure(&p, near_skin, bones.iter().copied(), local);
+        limb.measure(&p, near.skin, bones.iter().copied(), local);
         let half = 0.5 * self.spacing_mm;
         let background = background_hu(centre.y, half, self.table_top_mm);
         let blend = |(hu, inside): (f64, f64)| hu + (1.0 - inside) * (background - AIR_HU);
         let parts = (self.spacing_mm / FLAT_MM).ceil() as usize;
         let reach_mm = half * 3.0_f64.sqrt() * CAUTION;
         if parts == 1 || !limb.boundary_near(&p, local, reach_mm) {
-            return blend(limb.mixture(&p, local, self.spacing_mm));
+            return blend(limb.mixture(&p, near, local, self.spacing_mm));
         }
         // Only what can change inside the voxel is measured again.
         let near_skin = local
@@ -281,7 +285,7 @@ impl Painter<'_> {
             );
             let q = limb.limb_from_right(&(centre + shift));
             limb.measure(&q, near_skin, local.bones.iter().map(|b| b.0), part);
-            sum += blend(limb.mixture(&q, part, width_mm));
+            sum += blend(limb.mixture(&q, near, part, width_mm));
         }
         sum / parts.pow(3) as f64
     }
