@@ -39,12 +39,24 @@ def seconds_until_interrupted(call: Callable[[], Any], after: float) -> float:
     return time.monotonic() - sent[0]
 
 
+def computes_on() -> bool:
+    """Whether this process still computes some seconds later."""
+    for _ in range(10):
+        before = time.process_time()
+        time.sleep(0.5)
+        if time.process_time() - before < 0.1:
+            return False
+    return True
+
+
 def test_ctrl_c_ends_a_radiograph_within_a_second(case: ppa.Case, scene: ppa.Scene) -> None:
     pose = case.place(0, scene=scene)
     pose.radiograph()
     assert seconds_until_interrupted(lambda: pose.radiograph(engine="analog", histories=1e11), 0.5) < 1
+    assert not computes_on()
     fine = {"engine": {"scatter_histories": 50_000_000}}
     assert seconds_until_interrupted(lambda: pose.radiograph(xray=fine), 0.5) < 1
+    assert not computes_on()
 
 
 def test_ctrl_c_ends_what_cannot_stop_within_a_second() -> None:

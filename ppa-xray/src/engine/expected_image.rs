@@ -204,7 +204,7 @@ impl Scatter {
         };
         let in_all = ESTIMATES as u64 * u64::from(variance_reduction.splitting);
         let listed = settings.scatter_histories.div_ceil(in_all);
-        let lists = first.lists(settings.seed, listed);
+        let lists = first.lists(settings.seed, listed, monitor);
         let response = TabulatedResponse::new(&exposure.response, lines.energies_kev());
         let single = SingleScatter {
             transport,

@@ -57,10 +57,11 @@ impl PreparedPhantom<'_> {
         expose(self, spectrum, projection, settings, &unobserved)
     }
 
-    /// As [`PreparedPhantom::fast`]; `observe` receives the share of the work that is done, a hundred or two hundred times and from any thread.
+    /// As [`PreparedPhantom::fast`]; `observe` receives the share of the work that is done, at each percent and about every 100 ms in between,
+    /// from any thread.
     ///
-    /// The radiograph is the same, bit for bit, as without an observer. Once `observe` returns [`ControlFlow::Break`], the
-    /// work ends within a few hundredths of its time.
+    /// The radiograph is the same, bit for bit, as without an observer. Once `observe` returns [`ControlFlow::Break`], each
+    /// thread ends with the row, node or histories (at most 8192) that it is at.
     ///
     /// # Errors
     /// As [`PreparedPhantom::fast`]; [`TransportError::Cancelled`] after [`ControlFlow::Break`].

@@ -2,12 +2,16 @@
 
 use std::ops::{ControlFlow, Range};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Instant;
 
 use crate::transport::tracking::TransportError;
 
 /// Shares of the work after which the primary and single scatter are done, for the report of progress.
 pub(super) const PRIMARY_DONE: f64 = 0.2;
 pub(super) const SINGLE_DONE: f64 = 0.6;
+
+/// Longest time between two reports while units are completed: an observer that cancels waits no longer.
+const REPORT_EVERY_MS: u64 = 100;
 
 /// Receives the share of the work that is done, 0 to 1, and cancels the rest with [`ControlFlow::Break`].
 pub(crate) type Observer<'a> = &'a (dyn Fn(f64) -> ControlFlow<()> + Sync);
@@ -16,6 +20,9 @@ pub(crate) type Observer<'a> = &'a (dyn Fn(f64) -> ControlFlow<()> + Sync);
 pub(crate) struct Monitor<'a> {
     observe: Observer<'a>,
     cancelled: AtomicBool,
+    begun: Instant,
+    /// When the last report was made, since the beginning.
+    reported_ms: AtomicU64,
 }
 
 impl<'a> Monitor<'a> {
@@ -23,6 +30,8 @@ impl<'a> Monitor<'a> {
         Self {
             observe,
             cancelled: AtomicBool::new(false),
+            begun: Instant::now(),
+            reported_ms: AtomicU64::new(0),
         }
     }
 
@@ -40,6 +49,17 @@ impl<'a> Monitor<'a> {
             units: units.max(1) as f64,
             done: AtomicU64::new(0),
         }
+    }
+
+    /// Whether the last report was made too long ago; true for one thread only, which then reports.
+    fn is_due(&self) -> bool {
+        let now = self.begun.elapsed().as_millis() as u64;
+        let last = self.reported_ms.load(Ordering::Relaxed);
+        now >= last + REPORT_EVERY_MS
+            && self
+                .reported_ms
+                .compare_exchange(last, now, Ordering::Relaxed, Ordering::Relaxed)
+                .is_ok()
     }
 
     /// # Errors
@@ -61,7 +81,7 @@ pub(crate) struct Phase<'a> {
 }
 
 impl Phase<'_> {
-    /// Counts one more unit, and reports each whole percent of the work.
+    /// Counts one more unit, and reports each whole percent of the work, or after a while without a report.
     pub fn advance(&self) {
         let before = self.done.fetch_add(1, Ordering::Relaxed) as f64;
         let [before, after] = [before, before + 1.0].map(|done| {
@@ -69,7 +89,8 @@ impl Phase<'_> {
             start + (done / self.units).min(1.0) * (end - start)
         });
         let percent = |share: f64| (100.0 * share) as u32;
-        if percent(before) == percent(after) || self.is_cancelled() {
+        let whole = percent(before) != percent(after);
+        if self.is_cancelled() || !(self.monitor.is_due() || whole) {
             return;
         }
         if (self.monitor.observe)(after).is_break() {
@@ -80,5 +101,30 @@ impl Phase<'_> {
     /// Whether the rest of the work may be left out, because nobody will see its result.
     pub fn is_cancelled(&self) -> bool {
         self.monitor.cancelled.load(Ordering::Relaxed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::thread::sleep;
+    use std::time::Duration;
+
+    use super::*;
+
+    /// A percent of a long exposure takes minutes.
+    #[test]
+    fn an_observer_can_cancel_within_a_percent() {
+        let reports = AtomicU64::new(0);
+        let observe = |_: f64| {
+            reports.fetch_add(1, Ordering::Relaxed);
+            ControlFlow::Break(())
+        };
+        let monitor = Monitor::new(&observe);
+        let phase = monitor.phase(0.0..1.0, 1_000_000);
+        sleep(Duration::from_millis(REPORT_EVERY_MS));
+        phase.advance();
+        assert_eq!(reports.load(Ordering::Relaxed), 1);
+        assert!(phase.is_cancelled());
+        assert_eq!(monitor.check(), Err(TransportError::Cancelled));
     }
 }

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::engine::attenuation_basis::BasisMass;
 use crate::engine::attenuation_basis::{LANES, dot};
 use crate::engine::collision_map::{Collision, CollisionMap};
+use crate::engine::fast_progress::{Monitor, PRIMARY_DONE, Phase};
 use crate::engine::importance::ImportanceModel;
 use crate::engine::lines::{Line, Lines};
 use crate::engine::paths::Paths;
@@ -37,6 +38,9 @@ pub(crate) struct FirstCollisions {
     cdf: Vec<f64>,
 }
 
+/// Collisions after which a list looks whether it shall go on.
+const CANCEL_EVERY: usize = 1024;
+
 /// What is needed to draw first collisions.
 pub(crate) struct FirstFlights<'a> {
     pub transport: &'a Transport<'a>,
@@ -47,30 +51,37 @@ pub(crate) struct FirstFlights<'a> {
 }
 
 impl FirstFlights<'_> {
-    /// [`ESTIMATES`] lists of `collisions` each.
-    pub fn lists(&self, seed: u64, collisions: u64) -> Vec<FirstCollisions> {
+    /// [`ESTIMATES`] lists of `collisions` each; shorter ones once the monitor is cancelled.
+    pub fn lists(&self, seed: u64, collisions: u64, monitor: &Monitor) -> Vec<FirstCollisions> {
+        let phase = monitor.phase(PRIMARY_DONE..PRIMARY_DONE, 1);
         (0..ESTIMATES as u64)
             .into_par_iter()
             .map(|list| {
                 let mut rng = Philox::new(seed, Stream::SingleScatter as u32, list);
-                self.list(collisions, &mut rng)
+                self.list(collisions, &mut rng, &phase)
             })
             .collect()
     }
 
-    fn list(&self, collisions: u64, rng: &mut Philox) -> FirstCollisions {
+    fn list(&self, collisions: u64, rng: &mut Philox, phase: &Phase) -> FirstCollisions {
+        let goes_on = |n: usize| {
+            if n.is_multiple_of(CANCEL_EVERY) {
+                phase.advance();
+            }
+            !phase.is_cancelled()
+        };
+        let collisions = collisions as usize;
         let mut points = QuasiRandom::<3>::new(rng);
-        let mut drawn: Vec<Collision> = (0..collisions)
-            .map(|_| {
-                self.map
-                    .draw(points.next(), self.transport, self.paths, rng)
-            })
-            .collect();
+        let mut drawn: Vec<Collision> = Vec::with_capacity(collisions);
+        drawn.extend((0..collisions).take_while(|&n| goes_on(n)).map(|_| {
+            self.map
+                .draw(points.next(), self.transport, self.paths, rng)
+        }));
         // Neighbours beside each other: even steps through the list are then even in space too.
         drawn.sort_by_key(|collision| collision.cell);
         let mut list = FirstCollisions::default();
         let mut mass = vec![[0.0; LANES]; self.paths.basis.groups];
-        for collision in &drawn {
+        for (_, collision) in drawn.iter().enumerate().take_while(|(n, _)| goes_on(*n)) {
             self.enter(
                 collision,
                 1.0 / collisions as f64,
