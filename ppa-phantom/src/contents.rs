@@ -205,9 +205,13 @@ impl Limb {
     /// Mean Hounsfield unit below the fat under the skin, bones left out.
     fn deep_hu(&self, p: &Point3<f64>, near: Near, width_mm: f64) -> f64 {
         let envelope = &self.envelope;
-        let distance = |near, mm: &dyn Fn() -> f64| if near { mm() } else { f64::INFINITY };
-        let tendon_mm = distance(near.tendon, &|| envelope.tendon_distance(p));
-        let fat_mm = distance(near.deep_fat, &|| envelope.deep_fat_distance(p));
+        let [mut tendon_mm, mut fat_mm] = [f64::INFINITY; 2];
+        if near.tendon {
+            tendon_mm = envelope.tendon_distance(p);
+        }
+        if near.deep_fat {
+            fat_mm = envelope.deep_fat_distance(p);
+        }
         let tendon = share_inside(tendon_mm, width_mm);
         let fat = share_inside(fat_mm.max(-tendon_mm), width_mm);
         let muscle = SOFT_HU + tendon * (TENDON_HU - SOFT_HU);
