@@ -1,6 +1,6 @@
 #!/bin/sh
 # Makes scans, cases and the three datasets of the experiments on phantoms, and puts their plan beside them: make_data.sh FOLDER
-# Needs the program ppa on the PATH, an hour and a half of processor time and about 3 GB in FOLDER. What is there is not made again.
+# Needs the program ppa on the PATH, forty minutes of processor time and about 3 GB in FOLDER. What is there is not made again.
 set -eu
 plans=$(cd "$(dirname "$0")" && pwd)
 

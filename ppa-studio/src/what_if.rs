@@ -174,9 +174,16 @@ mod tests {
             "tilt_deg is -60 degrees, expected -45 to 45"
         );
         let technique = WhatIf {
-            technique: Some("elbow".to_owned()),
+            technique: Some("chest".to_owned()),
             ..WhatIf::default()
         };
         assert!(refused(technique).contains("expected ankle, knee"));
+    }
+
+    #[test]
+    fn the_page_offers_every_technique() {
+        let names = Technique::ALL.map(|(name, _)| format!("{name:?}"));
+        let list = format!("const TECHNIQUES = [{}];", names.join(", "));
+        assert!(include_str!("page/whatif.js").contains(&list), "{list}");
     }
 }

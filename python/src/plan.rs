@@ -21,7 +21,7 @@ use crate::values::{dictionary, from_table, table, to_table};
 ///     Case files with the number N of each person's folder ``patient_N``.
 /// seed : int
 ///     Everything random follows from it.
-/// technique : {"ankle", "knee"}, optional
+/// technique : {"ankle", "knee", "lower-leg", "foot", "hand", "wrist", "elbow"}, optional
 ///     Usual exposure of an examination; keys of ``xray`` replace its values.
 /// rotation, shapes, soft_tissue, positioning, room, depth, xray : dict, optional
 ///     The tables of plan.toml, e.g. ``rotation={"from_deg": 0, "to_deg": 30, "step_deg": 5}``. A key that is left out has its default;

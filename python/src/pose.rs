@@ -227,7 +227,7 @@ impl PyPose {
     /// ----------
     /// tube : dict, optional
     ///     ``kvp``, ``filters`` and ``anode_angle_deg``.
-    /// technique : {"ankle", "knee"}, optional
+    /// technique : {"ankle", "knee", "lower-leg", "foot", "hand", "wrist", "elbow"}, optional
     ///     Usual exposure of an examination: tube voltage and load, focal spot, collimation, CsI detector.
     /// xray : dict, optional
     ///     Further keys of ``[xray]`` of plan.toml, in place of those of scene and technique.

@@ -118,7 +118,7 @@ def test_the_analog_engine_stops_at_an_error(case: ppa.Case, scene: ppa.Scene) -
         ({"mas": 4, "histories": 1e9}, "exclude each other"),
         ({"mas": -1}, "tube load in mAs"),
         ({"histories": -5}, "histories"),
-        ({"technique": "elbow"}, 'technique is "elbow"'),
+        ({"technique": "chest"}, 'technique is "chest"'),
         ({"tube": {"kV": 60}}, 'tube has the key "kV"'),
         ({"tube": {"kvp": 1e9}}, "1000000000"),
         ({"xray": {"detector": {"columns": 5}}}, "xray"),

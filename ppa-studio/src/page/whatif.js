@@ -25,6 +25,8 @@ const SLIDERS = [
 
 const gutterText = (gutter) => `${gutter.name} gutter ${fixed(100 * gutter.openness, 0)} % open, grade ${fixed(gutter.grade)}`;
 
+const TECHNIQUES = ["ankle", "knee", "lower-leg", "foot", "hand", "wrist", "elbow"];
+
 const VERDICTS = { yes: "diagnostic", no: "not diagnostic", not_sure: "not sure whether diagnostic" };
 
 // Whether a later request for the same image has replaced the one that failed.
@@ -70,7 +72,7 @@ export class WhatIfPanel {
     form.addEventListener("submit", (event) => event.preventDefault());
     for (const slider of SLIDERS) form.append(this.slider(slider));
     form.append(this.select("shape", "Body shape that the cameras see", [["", "that of the scan"], ["big", "big"], ["small", "small"], ["bumps_a", "bumps a"], ["bumps_b", "bumps b"]], (value) => { this.shape = value || null; }));
-    form.append(this.select("technique", "Technique", [["", "that of the plan"], ["ankle", "ankle"], ["knee", "knee"]], (value) => { this.technique = value || null; }));
+    form.append(this.select("technique", "Technique", [["", "that of the plan"], ...TECHNIQUES.map((name) => [name, name.replace("-", " ")])], (value) => { this.technique = value || null; }));
     form.append(this.select("grid", "Anti-scatter grid", [["", "that of the plan"], ["yes", "8:1, 40 lines per cm"], ["no", "none"]],
       (value) => { this.grid = value === "" ? null : value === "yes"; }));
     const label = document.createElement("label");
