@@ -1,6 +1,7 @@
 //! The manifest: `manifest.jsonl` with one row per image, `dataset.json` with the settings common to all.
 
 use std::collections::BTreeMap;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use ppa_core::TransformRows;
@@ -149,7 +150,14 @@ impl Manifest {
     pub fn read(root: &Path) -> Result<Self, FileError> {
         require_folder(root)?;
         let path = root.join(Self::FILE);
-        let text = read_text(&path)?;
+        let text = read_text(&path).map_err(|mut error| {
+            if error.source.kind() == io::ErrorKind::NotFound {
+                let why = "`ppa generate` and `ppa merge` write it once all poses are made; \
+                           datasets of other programs have none";
+                error.source = io::Error::new(io::ErrorKind::NotFound, why);
+            }
+            error
+        })?;
         let row = |(i, line)| {
             let row: FileRow =
                 serde_json::from_str(line).map_err(|e| format!("line {}: {e}", i + 1))?;
@@ -159,7 +167,7 @@ impl Manifest {
         let rows = text.lines().enumerate().map(row).collect::<Result<_, _>>();
         Ok(Self {
             root: root.to_owned(),
-            files: rows.map_err(|e| FileError::at("parse", &path)(std::io::Error::other(e)))?,
+            files: rows.map_err(|e| FileError::at("parse", &path)(io::Error::other(e)))?,
         })
     }
 

@@ -263,7 +263,7 @@ fn the_page_of_a_dataset_stands_by_itself() {
     fs::remove_file(folder.path().join("data/manifest.jsonl")).unwrap();
     let said = fail(folder.path(), "qa data --out third.html");
     assert!(
-        said.contains("has no manifest.jsonl, which the page needs"),
+        said.contains("manifest.jsonl: `ppa generate` and `ppa merge` write it"),
         "{said}"
     );
     assert!(!folder.path().join("third.html").exists());

@@ -1,7 +1,5 @@
 //! Why a dataset has no quality report.
 
-use std::path::PathBuf;
-
 use ppa_dataset::files::FileError;
 use ppa_dataset::published::PublishedError;
 use ppa_dataset::split::SplitError;
@@ -12,13 +10,6 @@ use crate::contact_sheet::ContactSheetError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum QaError {
-    /// The list of images that the page follows is missing.
-    #[error(
-        "{} has no manifest.jsonl, which the page needs: `ppa generate` and `ppa merge` write it once all poses are made, \
-         datasets of other programs have none",
-        .0.display()
-    )]
-    NoManifest(PathBuf),
     /// A file of the dataset.
     #[error(transparent)]
     File(#[from] FileError),

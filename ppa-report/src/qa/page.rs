@@ -21,11 +21,8 @@ use super::verdict::Tally;
 /// # Errors
 /// [`QaError`] naming the file at fault. Flaws of single images stand on the page, and a cross in their place.
 pub fn qa_page(root: &Path) -> Result<String, QaError> {
-    if root.is_dir() && !root.join(Manifest::FILE).exists() {
-        return Err(QaError::NoManifest(root.to_owned()));
-    }
-    let inspection = inspect(root)?;
     let manifest = Manifest::read(root)?;
+    let inspection = inspect(root)?;
     let dataset = Published::list(root)?;
     let scene = Scene::read(root)?;
     let findings = Findings::read(root)?;

@@ -42,9 +42,6 @@ pub struct PoseRow {
 /// # Errors
 /// [`QaError`] naming the file at fault.
 pub fn pose_rows(root: &Path) -> Result<Vec<PoseRow>, QaError> {
-    if root.is_dir() && !root.join(Manifest::FILE).exists() {
-        return Err(QaError::NoManifest(root.to_owned()));
-    }
     let manifest = Manifest::read(root)?;
     let scene = Scene::read(root)?;
     let labels = labels(&Published::list(root)?);

@@ -140,7 +140,7 @@ fn a_dataset_without_its_plan_shows_its_poses_alone() {
     std::fs::remove_file(browser.case.join(Manifest::FILE)).unwrap();
     let answer = browser.get("/api/dataset?folder=ankles");
     assert!(
-        answer.text().contains("has no manifest.jsonl"),
+        answer.text().contains("ankles/manifest.jsonl"),
         "{}",
         answer.text()
     );
