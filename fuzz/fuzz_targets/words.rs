@@ -1,4 +1,4 @@
-//! What stands in one argument: a shard, a series.
+//! The contents of one argument: a shard, a series.
 
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Where the tasks of a submission stand: from their files, their logs and the queue.
+//! State of the tasks of a submission, from their files, their logs and the queue.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -42,7 +42,7 @@ pub enum FolderError {
     /// Another `ppa submit` works on the folder.
     #[error("{} is in use by another ppa submit; wait for its end", .0.display())]
     Busy(PathBuf),
-    /// The path cannot stand in a job script.
+    /// The path cannot be used in a job script.
     #[error("{} is not valid UTF-8, which a job script needs", .0.display())]
     NotUnicode(PathBuf),
 }
@@ -61,7 +61,7 @@ impl FolderError {
     }
 }
 
-/// Why Slurm could not be asked, or refused.
+/// Why Slurm could not be queried, or why it refused.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SlurmError {

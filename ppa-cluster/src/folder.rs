@@ -1,4 +1,4 @@
-//! The folder of a submission: where its files lie.
+//! The folder of a submission, and the paths of its files.
 
 use std::fs;
 use std::io;

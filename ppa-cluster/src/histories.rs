@@ -72,7 +72,7 @@ pub struct HistoryCost {
 }
 
 impl HistoryCost {
-    /// Of that many histories in that many tasks, seconds.
+    /// Processor time of `histories` in `tasks` tasks, seconds.
     pub fn total_cpu_s(&self, histories: u64, tasks: u64) -> f64 {
         self.million_cpu_s * histories as f64 / 1e6 + self.preparation_cpu_s * tasks as f64
     }

@@ -1,5 +1,5 @@
-//! Outputs of a divided command: the last job makes them in the folder of the jobs, then puts them where the command names them. A job that was
-//! stopped in between can run again, and a file that somebody created there since the submission stays.
+//! Outputs of a divided command: the last job makes them in the folder of the jobs, then puts them in the places that the command names. A job that
+//! was stopped in between can run again, and a file created there since the submission is kept.
 
 use std::fmt::Write;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Where a shard stands, from its files and the queue.
+//! State of a shard, from its files and the queue.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Core hours of tasks: those that ended tasks have used, by the line that each leaves in its log, and those of the estimate.
+//! Core hours of tasks: those that finished tasks have used, from the line that each leaves in its log, and those of the estimate.
 
 use std::fs;
 use std::io;

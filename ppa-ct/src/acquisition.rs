@@ -30,7 +30,7 @@ pub struct Acquisition {
 }
 
 impl Acquisition {
-    /// What can be said of a scan as a whole from what its slices say.
+    /// What holds for a scan as a whole, given what its slices state.
     pub fn of_slices<'a>(slices: impl IntoIterator<Item = &'a Self>) -> Self {
         let mut slices = slices.into_iter();
         let Some(first) = slices.next() else {

@@ -25,8 +25,8 @@ impl Grid {
     /// each side has as many voxels as come closest to filling it.
     ///
     /// # Errors
-    /// [`VolumeError::Spacing`] unless each is a length above 0, [`VolumeError::TooCoarse`] if none
-    /// fills a side best, [`VolumeError::TooFine`] if they make more than 2^32 voxels.
+    /// [`VolumeError::Spacing`] unless each is a length above 0, [`VolumeError::TooCoarse`] if a side would be left without a voxel,
+    /// [`VolumeError::TooFine`] if they make more than 2^32 voxels.
     pub fn with_spacing(&self, spacing_mm: Vector3<f64>) -> Result<Self, VolumeError> {
         if let Some(bad) = spacing_mm.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
             return Err(VolumeError::Spacing(*bad));

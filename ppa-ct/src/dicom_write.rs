@@ -19,13 +19,13 @@ use ct_image::CtSeries;
 ///
 /// Explicit VR little endian, 16 bit signed. Whole numbers that fit are stored as they are
 /// (slope 1, intercept 0). Others are rounded to the nearest of 65535 levels from the smallest to
-/// the largest value, so a value is off by at most (largest - smallest) / 131068. Places are
-/// decimal strings of 16 characters. A gantry tilt is kept: each slice has its own position.
+/// the largest value, so a value is off by at most (largest - smallest) / 131068. Positions are decimal strings of 16 characters. A gantry tilt is
+/// kept: each slice has its own position.
 /// A left-handed lattice is written too; readers that sort by position, as ours does, hand it
 /// back with k reversed, and every voxel at its place.
 ///
-/// Nothing is known about a person, and nothing is said. UIDs follow from the voxels and their
-/// places, so that the same volume gives the same bytes.
+/// Nothing is known about the patient, so nothing is stated. UIDs are derived from the voxels and their positions, so that the same volume gives the
+/// same bytes.
 ///
 /// The folder must not exist yet, or be empty; it appears whole or not at all.
 ///

@@ -1,4 +1,4 @@
-//! A volume looked at in the order of the body's axes, without copying it.
+//! A view of a volume in the order of the body's axes, without copying it.
 
 use crate::volume::Volume;
 

@@ -1,5 +1,4 @@
-//! MetaImage in and out: a text header, then raw or deflated voxels, in the same file (`.mha`) or in one
-//! beside it (`.mhd`).
+//! MetaImage in and out: a text header, then raw or deflated voxels, in the same file (`.mha`) or in a separate one next to it (`.mhd`).
 //!
 //! Keys as in the MetaIO documentation and as ITK, which the format comes from, understands them:
 //! the world is LPS, `TransformMatrix` lists the directions of the axes i, j, k one after the other,

@@ -13,8 +13,7 @@ impl Volume {
     /// The volume with axes coarser than `max_spacing_mm` resampled to at most that spacing.
     ///
     /// The first and the last centre of every axis stay where they are, values between centres
-    /// are interpolated trilinearly, and axes that are fine enough are kept. It adds no
-    /// information, but spares thick slices their stairs.
+    /// are interpolated trilinearly, and axes that are fine enough are kept. This adds no information, but avoids the staircase of thick slices.
     ///
     /// # Errors
     /// [`VolumeError::Spacing`] unless `max_spacing_mm` is above 0, [`VolumeError::TooFine`] if it

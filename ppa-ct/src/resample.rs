@@ -16,8 +16,8 @@ pub enum Interpolation {
     Nearest,
     /// Trilinear: exact for linear fields, never outside the range of the values.
     Linear,
-    /// Keys' cubic convolution with a = −1/2 (doi:10.1109/TASSP.1981.1163711): exact for
-    /// quadratic fields but for the outermost cells, and may overshoot at edges.
+    /// Keys' cubic convolution with a = −1/2 (doi:10.1109/TASSP.1981.1163711): exact for quadratic fields except in the outermost cells, and may
+    /// overshoot at edges.
     Cubic,
 }
 
@@ -43,14 +43,14 @@ impl Volume {
         self.resampled_to(&grid, how, 0.0)
     }
 
-    /// The values at the centres of another lattice, turned and sheared as it may be;
+    /// The values at the centres of another lattice, which may be rotated and sheared;
     /// `outside_hu` beyond the faces of this volume.
     ///
     /// Axes along which the other lattice is coarser are low-passed first, except with
     /// [`Interpolation::Nearest`]. The result is the same for any number of threads.
     ///
     /// # Errors
-    /// [`VolumeError::NotFinite`] when `outside_hu` is needed and no number, [`VolumeError::Memory`]
+    /// [`VolumeError::NotFinite`] when `outside_hu` is needed and not finite, [`VolumeError::Memory`]
     /// when the lattice has more voxels than fit.
     pub fn resampled_to(
         &self,

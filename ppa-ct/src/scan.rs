@@ -18,9 +18,9 @@ pub struct Scan {
     pub modality: Option<String>,
     /// All DICOM series found, of which one was read; empty for other formats.
     pub series: Vec<SeriesSummary>,
-    /// What the source says about its own making.
+    /// What the source states about its acquisition.
     pub acquisition: Acquisition,
-    /// What was odd, but did not stop the reading.
+    /// Oddities that did not prevent reading.
     pub warnings: Vec<Warning>,
 }
 

@@ -78,9 +78,9 @@ impl Volume {
         self.voxels.values()
     }
 
-    /// Whether memory holds `bytes` more for each voxel, and some for all that is small.
+    /// Checks that memory has room for `bytes` more per voxel, plus a margin for small allocations.
     ///
-    /// The memory is asked for and given back: an allocation that fails later ends the program.
+    /// The memory is allocated and released again: an allocation that failed later would end the program.
     ///
     /// # Errors
     /// [`VolumeError::Memory`].

@@ -1,4 +1,4 @@
-//! Identities of the third-party crates that decide results of this one.
+//! Identities of the third-party crates that affect the results of this one.
 
 use std::any::TypeId;
 

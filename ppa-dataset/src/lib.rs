@@ -5,7 +5,7 @@
 //! converts them; [`labels`] reads and writes labels; a [`Split`] divides persons into parts; [`export`] writes tables,
 //! metadata and archives for other programs.
 //!
-//! `ppa-generate` makes datasets; this crate reads them without the crates that are needed for that.
+//! `ppa-generate` makes datasets; this crate reads them without depending on the crates needed to make them.
 //!
 //! Units: mm, degrees in files; 16-bit depth in mm, 0 invalid.
 //!

@@ -33,7 +33,7 @@ pub struct Split {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SplitError {
-    /// The file cannot be read or written, or is none.
+    /// The file cannot be read or written, or is not a split.
     #[error(transparent)]
     File(#[from] FileError),
     /// The file is of another format version.
@@ -60,7 +60,7 @@ pub enum SplitError {
         /// Its part.
         part: String,
     },
-    /// A part whose name could not be that of a file everywhere.
+    /// A part whose name is not a valid file name on every system.
     #[error("a part is called {0:?}, expected letters, digits, _ and -, the last not in front")]
     Name(String),
     /// Shares that cannot be drawn.
@@ -162,7 +162,7 @@ impl Split {
         Some(name)
     }
 
-    /// Whether every person of a dataset stands in exactly one part, and nobody else.
+    /// Checks that every person of a dataset is in exactly one part, and that nobody else is.
     ///
     /// # Errors
     /// [`SplitError`] naming the person at fault.

@@ -1,4 +1,4 @@
-//! Long work that ends early because it was asked to.
+//! Long-running work that ends early on request.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -60,7 +60,7 @@ pub enum DepthError {
         /// Pixels with a depth.
         pixels: usize,
     },
-    /// Something else is in front of all that was to be seen.
+    /// Something else hides everything that was to be seen.
     #[error(
         "the surface is hidden: in all of its {pixels} pixels something stands before it (check the poses)"
     )]

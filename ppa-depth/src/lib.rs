@@ -11,9 +11,9 @@
 //! z forward (OpenCV). Depth is the z coordinate of the surface, not the length of the ray; 0 means that a pixel saw
 //! nothing. Row-major images, first row at the top.
 //!
-//! [`render`] gives ideal depths at pixel centres. [`Backdrop`] renders what stands still once, with samples inside the
-//! pixels; a [`Sensor`] makes of it what a Time-of-Flight device might: random and systematic error, mixed pixels, pixels
-//! given up, one bounce of light. [`Recorder`] makes frames of it. Nobody can say how close that is to a device before [`fit_noise`] has seen a recording of it.
+//! [`render`] gives ideal depths at pixel centres. [`Backdrop`] renders the static scene once, with samples inside the pixels; a [`Sensor`] turns it
+//! into what a Time-of-Flight device might measure: random and systematic error, mixed pixels, invalid pixels, one bounce of light. [`Recorder`]
+//! makes frames of it. How close that is to a device is unknown until [`fit_noise`] has been run on a recording of it.
 //!
 //! Repeatable: images depend on scene and seeds only, whatever the number of threads.
 //!
@@ -31,7 +31,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The same triangle before a wall, as three frames of a sensor see it while it trembles:
+//! The same triangle in front of a wall, in three frames of a sensor while it trembles:
 //!
 //! ```
 //! use nalgebra::{Isometry3, Point3};

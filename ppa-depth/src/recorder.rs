@@ -1,4 +1,4 @@
-//! Frames of a recording: bodies that tremble before a camera, ideal or with the errors of a sensor.
+//! Frames of a recording: bodies that tremble in front of a camera, ideal or with the errors of a sensor.
 
 use nalgebra::{Point3, Vector3};
 

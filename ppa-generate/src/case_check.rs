@@ -1,4 +1,4 @@
-//! Carries a case out again and compares it with what was found.
+//! Carries out the decisions of a case again and compares the result with what was found before.
 
 use std::path::Path;
 

@@ -74,8 +74,8 @@ impl CutFaces {
         Ok(share(roi, background.width, &seen.wall_pixels))
     }
 
-    /// Share of the rays of a radiograph's region that pass through a wall: they enter or leave the scan inside the limb, so
-    /// that a part of what they pass is missing. The region is the square of `roi_mm` around the joint (`ct` frame) as it falls on the
+    /// Share of the rays of a radiograph's region that pass through a wall: they enter or leave the scan inside the limb, so that part of what they
+    /// pass through is missing. The region is the square of `roi_mm` around the joint (`ct` frame) as it falls on the
     /// detector, or the whole detector where that misses it.
     pub fn in_radiograph(
         &self,

@@ -92,7 +92,7 @@ pub struct Forecast {
 /// would not work in the run. Once `stop` is true no other pose begins. Whether the disk has room for all is for [`Forecast::fits`] to say.
 ///
 /// # Errors
-/// [`ForecastError`], naming the case or pose that stands against the plan.
+/// [`ForecastError`], naming the case or pose that rules the plan out.
 pub fn forecast(
     plan: &Plan,
     root: &Path,

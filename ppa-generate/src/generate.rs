@@ -265,7 +265,7 @@ impl<'a> Work<'a> {
         })
     }
 
-    /// What is doubted about limbs, before any pose of them is made. Limbs that have a pose in the folder `root` are not
+    /// The findings about limbs, before any pose of them is made. Limbs that have a pose in the folder `root` are not
     /// prepared for it. The first `keep` limbs stay prepared for their poses; the others are prepared twice, since memory may not
     /// hold them all.
     pub fn findings(

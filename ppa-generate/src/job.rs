@@ -70,7 +70,7 @@ impl Summary {
 /// What a run reports while it continues.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Progress<'a> {
-    /// What is doubted about the limbs, first of all.
+    /// The findings about the limbs, first of all.
     Findings(&'a Findings),
     /// The number of poses, before the first of them.
     Total(usize),
@@ -120,7 +120,7 @@ pub(crate) struct Job<'a> {
     /// Whether poses of other settings are replaced, and those of other plans removed.
     pub replace: bool,
     pub progress: &'a (dyn Fn(Progress) + Sync),
-    /// Whether one pose is made after another, each on all threads. A thread that waits within a pose begins no other one then.
+    /// Whether one pose is made after another, each on all threads. A thread that waits within a pose then does not start another one.
     pub one_by_one: bool,
     /// Called after each pose that was made, once it is in its place.
     pub kept: &'a (dyn Fn(PoseId, &Record) -> Result<(), FileError> + Sync),

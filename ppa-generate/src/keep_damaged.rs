@@ -1,4 +1,4 @@
-//! A damaged archive stays beside the one that takes its place.
+//! Keeps a damaged archive next to the one that replaces it.
 
 use std::fs::{self, File};
 use std::io;

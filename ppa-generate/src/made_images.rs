@@ -1,4 +1,4 @@
-//! The images of a dataset that are made so far, while others are missing.
+//! The images of a dataset that have been made so far, while others are missing.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! The files that describe a dataset as a whole, kept true while its poses change: `dataset.json`, part and lists.
+//! The files that describe a dataset as a whole, kept up to date while its poses change: `dataset.json`, part and lists.
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -1,4 +1,4 @@
-//! What stands beside the keys of a plan: headings, meanings, and settings that are off. A new key gets its line here.
+//! The comments in a plan file: headings, meanings of keys, and settings that are off. A new key gets its line here.
 
 /// The first lines.
 pub(crate) const HEADER: &str = "\

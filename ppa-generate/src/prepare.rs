@@ -1,4 +1,4 @@
-//! From a CT to a case: every decision proposed automatically, every one open to change.
+//! From a CT to a case: every decision is proposed automatically and can be changed.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,8 +13,8 @@ use crate::prepared_limb::{PrepareError, PreparedLimb};
 
 /// Proposes a case for one limb of the scan at `path`, read with the options `reading`.
 ///
-/// Given `surface` and `choices` are kept; what they leave open is found. Of two limbs side by side the one on
-/// `side` of the patient is taken, and a warning says so; one says as well when the image shows too little of that one.
+/// Given `surface` and `choices` are kept; what they leave open is found. Of two limbs side by side the one on `side` of the patient is taken, and a
+/// warning says so; a warning is also given when the image shows too little of that limb.
 ///
 /// # Errors
 /// [`PrepareError`] when the scan is unreadable, holds no limb, or shows no landmarks.

@@ -41,7 +41,7 @@ pub enum SceneSetupError {
     /// The errors of the cameras' sensors.
     #[error("depth.sensor of the plan")]
     Sensor(#[from] SensorError),
-    /// Points or triangles of a recorded room that the cameras cannot be shown.
+    /// Points or triangles of a recorded room that cannot be rendered.
     #[error("{}", path.display())]
     RoomFile {
         /// The file.

@@ -1,4 +1,4 @@
-//! New values in a TOML file whose comments and order stay.
+//! New values in a TOML file, keeping its comments and order.
 
 use toml_edit::{DocumentMut, Item, TableLike, TomlError};
 

@@ -1,4 +1,4 @@
-//! A sample of a dataset made again and compared, byte by byte.
+//! Regenerates a sample of a dataset and compares it byte by byte.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;

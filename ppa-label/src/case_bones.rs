@@ -88,7 +88,7 @@ pub fn segment_checked_bones(
     Ok(bones.volume()?)
 }
 
-/// Refuses names for segmented bones under which nothing, or the scan no more, would be found later.
+/// Refuses names for segmented bones under which they could not be found later, or which would overwrite the scan.
 ///
 /// # Errors
 /// [`CaseBonesError::Name`], [`CaseBonesError::Dicom`] or [`CaseBonesError::Scan`].

@@ -1,7 +1,7 @@
 //! Arithmetic on channels-last images: rows of pixels, each pixel with all its channels in a row of f32. Inference also has rows of
 //! pixels with 16 channels each (`panel_rows`).
 //!
-//! Every kernel is vector code chosen when the program runs; the plain copy gives equal results to rounding.
+//! Every kernel is vector code selected at run time; the plain copy gives the same results up to rounding.
 
 pub(crate) mod batch_norm;
 pub(crate) mod buffer;

@@ -1,4 +1,4 @@
-//! Random numbers by address: (seed, purpose, index) names a stream, whoever draws from it and whenever.
+//! Random numbers by address: (seed, purpose, index) identifies a stream, no matter who draws from it and when.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -1,4 +1,4 @@
-//! Other body shapes from one skin surface: thicker, thinner, swollen here and there.
+//! Other body shapes from one skin surface: thicker, thinner, locally swollen.
 
 use std::cmp::Ordering;
 use std::collections::{BinaryHeap, HashMap};

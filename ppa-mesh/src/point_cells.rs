@@ -1,4 +1,4 @@
-//! Points sorted into cubes as wide as a radius, so that those within it are found by looking at few.
+//! Points sorted into cubes as wide as a search radius, so that few have to be examined to find those within it.
 
 use std::ops::Range;
 

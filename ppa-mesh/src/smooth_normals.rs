@@ -1,4 +1,4 @@
-//! Normals that vary so slowly over a skin that moving along them leaves it whole.
+//! Normals that vary so slowly over a skin that moving its vertices along them does not fold it.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;

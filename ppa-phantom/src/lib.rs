@@ -4,7 +4,7 @@
 //! trochlea in its mortise, the other twenty-five bones of the foot, two sesamoids, muscle, fat and skin. [`LowerLeg::p01`]
 //! is that of an average adult man; P02 to P17 and any further by seed spread over published means and standard
 //! deviations (`data/family.toml` names the sources). [`Limb::knee`] is another joint. They are phantoms, not persons:
-//! what goes together with what in people is mostly unknown and left out.
+//! how dimensions correlate in people is mostly unknown and left out.
 //!
 //! The same shape gives voxels ([`Limb::voxelise`], blurred and noisy through a [`Scanner`]), the skin and its normal, what a
 //! ray passes through ([`Limb::chords`]), labels of the bones, the joint gutters, and the numbers that

@@ -1,7 +1,6 @@
 //! Navicular, cuboid, cuneiforms, metatarsals, phalanges and sesamoids.
 //!
-//! Solids overlap on purpose: each yields a joint space to its neighbours, which gives the flat and
-//! cupped faces of the real bones.
+//! Solids overlap on purpose: each is cut back to leave a joint space to its neighbours, which gives the flat and cupped faces of real bones.
 
 use nalgebra::{Rotation3, Vector3};
 

@@ -1,9 +1,8 @@
 //! Signed-distance shapes and their smooth combinations.
 //!
 //! Every shape answers with a signed distance in mm, negative inside. Spheres, round cones and half-spaces are
-//! exact; ellipsoids, lofts and smooth combinations are first-order estimates: exact on the surface,
-//! slope near 1 beside it. Smooth combinations follow the quadratic polynomial blend, which never
-//! raises the slope above that of its parts.
+//! exact; ellipsoids, lofts and smooth combinations are first-order estimates: exact on the surface, with a slope near 1 close to it. Smooth
+//! combinations follow the quadratic polynomial blend, which never raises the slope above that of its parts.
 
 use nalgebra::{Point3, Rotation3, Unit, Vector3};
 

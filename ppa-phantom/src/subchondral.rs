@@ -1,4 +1,4 @@
-//! Subchondral plates: below the surfaces of a joint the cortex is thicker than elsewhere, and not the same all over.
+//! Subchondral plates: below the surfaces of a joint the cortex is thicker than elsewhere, and its thickness varies.
 
 use nalgebra::{Point3, Unit, Vector3};
 

@@ -1,4 +1,4 @@
-//! The phantoms measured back: from their shapes and from their voxels.
+//! Measurements of the phantoms, on their shapes and in their voxels.
 
 mod anatomy;
 mod apart;

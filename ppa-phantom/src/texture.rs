@@ -1,4 +1,4 @@
-//! Spongy bone is not even: a random field whose spectrum is that of trabecular bone in radiographs.
+//! Texture of spongy bone: a random field whose spectrum is that of trabecular bone in radiographs.
 //!
 //! The field is a sum of octaves, each twice as coarse as the one before: random numbers at the points of a lattice, joined by
 //! quadratic B-splines. An octave is flat in frequency up to about a quarter of a wave per cell and falls off

@@ -1,4 +1,4 @@
-//! The files of the case: the original, and the changes beside it.
+//! The files of the case: the original, and the changes saved next to it.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! Commands that do the same as the page, to copy.
+//! Command lines that do the same as the page, to be copied.
 
 use std::fmt::Write;
 use std::path::Path;

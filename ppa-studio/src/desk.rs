@@ -48,7 +48,7 @@ impl Desk {
         self.shown.clone()
     }
 
-    /// Decides otherwise. If nothing is found that way, all stays as it was.
+    /// Changes the decisions. If nothing is found with them, everything stays as it was.
     pub fn change(&mut self, case: Case) -> Result<(), StudioError> {
         if case == self.shown.case {
             return Ok(());

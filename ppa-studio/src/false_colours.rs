@@ -1,4 +1,4 @@
-//! Depth images in false colour, beside each other.
+//! Depth images in false colour, side by side.
 
 use image::{Rgb, RgbImage};
 use ppa_dataset::published::GrayImage16;

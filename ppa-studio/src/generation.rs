@@ -1,4 +1,4 @@
-//! The generation of a dataset, beside the page.
+//! The generation of a dataset, while the page remains usable.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};

@@ -1,4 +1,4 @@
-//! What networks say of the frames that a recorder writes into a folder.
+//! Predictions of networks for the frames that a recorder writes into a folder.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -68,7 +68,7 @@ pub(crate) struct LiveReport {
 }
 
 impl LivePair {
-    /// How old the frames are, seconds: a clock that is ahead makes them no younger than the look at them.
+    /// Age of the frames, seconds; at least the time since they were found, in case the clock that dated them is ahead.
     pub fn age_s(&self) -> f64 {
         let written = SystemTime::now().duration_since(self.written);
         let since = written.unwrap_or_default().max(self.found.elapsed());

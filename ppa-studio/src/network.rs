@@ -1,4 +1,4 @@
-//! What trained networks say of the pose that is shown.
+//! Predictions of trained networks for the pose that is shown.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,4 +1,4 @@
-//! The file of the plan: the original, and the changes beside it.
+//! The file of the plan: the original, and the changes saved next to it.
 
 use std::path::{Component, Path, PathBuf};
 

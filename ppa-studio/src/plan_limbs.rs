@@ -1,4 +1,4 @@
-//! The limbs of a plan, and the cases beside it.
+//! The limbs of a plan, and the cases in its folder.
 
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! The numbers that a plan accepts for a key, found by asking its own checks.
+//! The numbers that a plan accepts for a key, found by trying its own checks.
 
 use serde::Serialize;
 

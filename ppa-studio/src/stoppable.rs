@@ -1,4 +1,4 @@
-//! Work that a flag ends: of several requests only the newest goes on.
+//! Work that a flag cancels: of several requests, only the newest continues.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};

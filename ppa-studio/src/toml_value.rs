@@ -1,4 +1,4 @@
-//! Values of a TOML file, put in the place of others; comments stay.
+//! Replacement of values in a TOML file, keeping its comments.
 
 use toml_edit::{Item, Table, TableLike, Value};
 

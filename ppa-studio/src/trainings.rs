@@ -1,4 +1,4 @@
-//! The trainings below a folder: how far they are, and what their logs hold.
+//! The trainings below a folder: their progress, and the contents of their logs.
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Methods `with_…` of settings, which other crates cannot write as a struct: fields may be added without breaking them.
+//! Methods `with_…` of settings, which other crates cannot construct as struct literals, so that fields can be added without breaking them.
 
 /// Writes methods that take a value by themselves and give back the changed settings.
 macro_rules! setters {

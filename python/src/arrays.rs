@@ -1,4 +1,4 @@
-//! Arrays of numpy: what is taken from Python is checked first, what is given out is not copied where its owner lives on.
+//! Arrays of numpy: those taken from Python are checked first, those handed to Python are not copied as long as their owner stays alive.
 
 use numpy::ndarray::{ArrayView, Dimension, ShapeBuilder};
 use numpy::{

@@ -1,4 +1,4 @@
-//! Long calls: they run beside the interpreter, report their progress and end on Ctrl-C.
+//! Long calls: they run while other Python threads do, report their progress and end on Ctrl-C.
 
 use std::any::Any;
 use std::ops::ControlFlow;

@@ -1,4 +1,4 @@
-//! One interpreter of a process: the threads and caches of the module belong to it.
+//! Only one interpreter per process is supported: the threads and caches of the module belong to it.
 
 use std::sync::atomic::{AtomicI64, Ordering};
 

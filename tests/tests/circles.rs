@@ -1,4 +1,4 @@
-//! Data flow one way: no circle of imports between the modules of a crate, nor between the files of a module.
+//! Dependencies run one way: no import cycle between the modules of a crate, nor between the files of a module.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -1,6 +1,6 @@
 //! What the code key of a dataset builds on: the identity of a type reveals how its crate was compiled.
 //!
-//! Neither Cargo nor the compiler promises it, so it is tried here with crates of a few lines.
+//! Neither Cargo nor the compiler guarantees it, so it is tested here with crates of a few lines.
 
 use std::fs;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! The documentation is true of the repository: links resolve, and the sources and tests it names exist.
+//! The documentation matches the repository: links resolve, and the sources and tests it names exist.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! What a radiograph shows of an ankle's joint space agrees with what its geometry lets through, the more the less noise there is.
+//! What a radiograph shows of an ankle's joint space agrees with what the geometry lets through, and more closely the less noise there is.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use ppa_dataset::labels::BoneNumbers;

@@ -1,4 +1,4 @@
-//! The structure of the workspace: which crate may know which.
+//! The structure of the workspace: which crate may depend on which.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,5 +1,4 @@
-//! Random numbers addressed by (seed, purpose, index): whoever draws the number at an address, whenever and on whatever thread,
-//! gets the same one.
+//! Random numbers addressed by (seed, purpose, index): the number at an address is the same no matter when, where and on which thread it is drawn.
 //!
 //! What a number is for, the purpose, is an enumeration of the crate that draws it.
 

@@ -4,7 +4,7 @@
 /// The odd number next to 2⁶⁴ / golden ratio, by which the state of the generator grows.
 const GAMMA: u64 = 0x9E37_79B9_7F4A_7C15;
 
-/// The number that a generator in this state gives next: every bit of the state reaches every bit of it.
+/// The number that a generator in this state gives next: every bit of the state affects every bit of it.
 #[inline]
 pub fn split_mix(state: u64) -> u64 {
     let z = state.wrapping_add(GAMMA);

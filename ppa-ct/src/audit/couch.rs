@@ -1,4 +1,4 @@
-//! Is there a couch, and is it where the patient's position says?
+//! Whether there is a couch, and whether it is where the patient position implies.
 
 use std::iter;
 use std::ops::Range;

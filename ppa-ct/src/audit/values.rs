@@ -1,4 +1,4 @@
-//! Are these Hounsfield units, whole and of a limb?
+//! Whether the values are Hounsfield units, unclipped, and those of a limb.
 
 use ppa_core::text::{count, number};
 
@@ -22,7 +22,7 @@ const LEAST_SHARE: f64 = 0.005;
 pub(super) struct Peaks {
     pub air_hu: Option<f64>,
     pub tissue_hu: Option<f64>,
-    /// Air and tissue of a histogram that is one as a whole, but shifted.
+    /// Peaks of air and tissue in a histogram that looks like one in HU, but is shifted as a whole.
     shifted: Option<[f64; 2]>,
 }
 

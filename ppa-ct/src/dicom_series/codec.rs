@@ -1,6 +1,6 @@
 //! Decoding of compressed frames into little-endian samples.
 //!
-//! Decoders: RLE and JPEG-LS are ours (no maintained crate of Rust alone holds the latter), JPEG is libjpeg-turbo-rs,
+//! Decoders: RLE and JPEG-LS are ours (no maintained pure-Rust crate decodes the latter), JPEG is libjpeg-turbo-rs,
 //! JPEG 2000 hayro-jpeg2000. All are Rust; sizes are compared with the header before any of them reserves memory.
 
 mod jpeg;
@@ -48,7 +48,7 @@ impl Codec {
         }
     }
 
-    /// Most bytes that come out of one byte of a right stream: constant frames pack best.
+    /// Most bytes that one byte of a valid stream can decode to: constant frames compress best.
     ///
     /// RLE makes 128 bytes of 2; a JPEG pixel takes at least a bit, a block of 8 x 8 pixels two. `None` where nothing
     /// bounds it: JPEG-LS puts whole equal lines into a bit each, a JPEG 2000 frame may be empty.

@@ -1,7 +1,7 @@
 //! Where the elements of a DICOM data set lie in its bytes (PS3.5, section 7).
 //!
-//! Lengths are followed only as far as the bytes reach and nothing is copied. So a damaged length costs an error and no
-//! memory (dicom-object reserves whatever length a file claims, up to 4 GiB), and pixels are read from where they lie.
+//! Lengths are followed only as far as the bytes reach and nothing is copied. A damaged length is therefore an error and reserves no memory
+//! (dicom-object reserves whatever length a file claims, up to 4 GiB), and pixels are read in place.
 //! A series of 512 slices takes a quarter of SimpleITK's processor time and 0.29 of its memory (bench `dicom`,
 //! docs/performance.md).
 
@@ -20,10 +20,10 @@ pub(super) enum Encoding {
 /// Why bytes are no data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Fault {
-    /// An element continues behind the last byte.
+    /// An element continues beyond the last byte.
     #[error("an element extends beyond the end of the data")]
     Short,
-    /// No element, or sequences in sequences beyond all measure.
+    /// Not an element, or sequences nested too deeply.
     #[error("no valid element begins at byte {0} of the data set")]
     Damaged(usize),
     /// A deflated header beyond all measure.

@@ -1,4 +1,4 @@
-//! One DICOM file: its encoding, and its pixels where they lie.
+//! One DICOM file: its encoding, and the location of its pixels.
 
 mod open;
 
@@ -25,7 +25,7 @@ pub(super) struct DicomFile {
     pixels: Option<PixelData>,
     /// Where the data set begins in the file, if it is deflated from there on.
     deflated_at: Option<u64>,
-    /// The pixels of a file of several frames that cannot be read piecewise, once it is to be read.
+    /// All pixels of a multi-frame file that cannot be read frame by frame, once they are needed.
     held: OnceLock<Vec<u8>>,
 }
 

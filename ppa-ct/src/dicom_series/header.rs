@@ -17,7 +17,7 @@ use crate::error::ReadError;
 
 /// What a DICOM file turned out to be.
 pub(super) enum Found {
-    /// The slices of a CT, or of whatever was asked to be taken for one.
+    /// The slices of a CT, or of another modality that is to be read as one.
     Slices(Series, Vec<Slice>),
     /// An image that cannot be one of its series, and why.
     Refused(Series, ReadError),

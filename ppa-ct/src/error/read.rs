@@ -144,7 +144,7 @@ pub enum ReadError {
         /// What the decoder says.
         source: Cause,
     },
-    /// The pixel data do not have the size that the header promises, or are compressed beyond belief.
+    /// The pixel data do not have the size that the header promises, or are compressed more than is plausible.
     #[error("{} holds {found} bytes of pixels, from which its header expects {expected}", path.display())]
     PixelCount {
         /// The file.

@@ -18,9 +18,8 @@ use crate::volume::Volume;
 ///
 /// Voxels are deflated; whole numbers that fit are stored as int16, anything else as float32. The
 /// affine may be sheared. A file appears whole or not at all, and its bytes depend on the volume and
-/// the file name only. The data file of `leg.mhd` is called `leg.<checksum of the voxels>.zraw`: the
-/// pair that stood there before, if any, stays readable until the new header takes its place, and
-/// then its data file is removed.
+/// the file name only. The data file of `leg.mhd` is called `leg.<checksum of the voxels>.zraw`: an earlier pair of that name, if any, stays readable
+/// until the new header replaces its own, and then its data file is removed.
 ///
 /// # Errors
 /// [`WriteError`] for another extension, a name that the header cannot hold, and a file system that refuses.

@@ -18,8 +18,8 @@ const VOXELS_AT: f32 = 352.0;
 
 /// Writes a volume as NIfTI-1: `.nii`, or `.nii.gz` compressed.
 ///
-/// Whole numbers that fit are stored as int16, anything else as float32. The affine stands in the
-/// sform, and in the qform too unless it is sheared; both hold it as f32. The file appears whole
+/// Whole numbers that fit are stored as int16, anything else as float32. The affine is stored in the sform, and in the qform too unless it is
+/// sheared; both hold it as f32. The file appears whole
 /// or not at all, and its bytes depend on the volume only.
 ///
 /// # Errors

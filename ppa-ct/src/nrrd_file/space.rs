@@ -1,4 +1,4 @@
-//! Where the voxels of an NRRD header lie.
+//! Where an NRRD header places the voxels.
 
 use nalgebra::{Affine3, Matrix4, Vector3, Vector4};
 

@@ -1,4 +1,4 @@
-//! BagIt (RFC 8493): a copy of a dataset with the hash of every file, as archives and journals take it.
+//! BagIt (RFC 8493): a copy of a dataset with the hash of every file, as archives and journals accept it.
 
 use std::collections::HashMap;
 use std::fs::{self, File};
@@ -40,7 +40,7 @@ pub enum BagError {
     /// `ppa generate` began it and did not finish it.
     #[error("{} is not finished: it has no manifest.jsonl; run ppa generate again", .0.display())]
     Unfinished(PathBuf),
-    /// A link or device, whose contents are no part of the dataset.
+    /// A link or device, whose contents are not part of the dataset.
     #[error("{} is neither a file nor a folder, and a bag holds nothing else", .0.display())]
     Special(PathBuf),
     /// It was asked to stop.
@@ -62,7 +62,7 @@ pub enum BagError {
 const NOT_TO_BE_BAGGED: [&[u8]; 2] = [b"image,reader,grade", b"name,image,sha256"];
 
 /// Copies the dataset in `root`, of either published layout, into the bag `to`, whole or not at all. Hidden files and folders,
-/// among them the records of `ppa generate`, and tables of readers' grades and keys, by whatever name, stay behind. Once `stop` is
+/// among them the records of `ppa generate`, and tables of readers' grades and keys, by whatever name, are left out. Once `stop` is
 /// true it ends before the next file, and leaves nothing.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! WebDataset: tar archives whose neighbouring files of one name make a sample, for training programs that stream.
+//! WebDataset: tar archives in which consecutive files of one base name form a sample, for training programs that stream their data.
 
 use std::fs::File;
 use std::io::BufWriter;

@@ -19,12 +19,12 @@ const DATASHEET: &str = "datasheet.md";
 const NEW_DATASHEET: &str = "datasheet.new.md";
 
 /// Writes `manifest.csv`, `croissant.json` (Croissant 1.1), `ro-crate-metadata.json` (RO-Crate 1.1) and `datasheet.md` into the
-/// dataset in `root`, each whole or not at all; `split` names the split that stands in the table. A datasheet that is there, in
-/// which people may have answered, stays; one that differs is written beside it as `datasheet.new.md`. Names of the files written.
+/// dataset in `root`, each whole or not at all; `split` names the split that is listed in the table. An existing datasheet, which people may have
+/// filled in, is kept; one that differs is written next to it as `datasheet.new.md`. Returns the names of the files written.
 ///
 /// # Errors
-/// [`TableError`] naming the file at fault, among them one that is there and differs without `replace`, or what of the metadata is no
-/// name, address or day; nothing is written then.
+/// [`TableError`] naming the file at fault, among them an existing one that differs when `replace` is not set, or the part of the metadata that is
+/// not a valid name, address or date; nothing is written then.
 pub fn write_metadata(
     root: &Path,
     metadata: &Metadata,

@@ -32,8 +32,8 @@ pub enum LabelFileError {
 
 /// The labels of one limb's radiographs.
 ///
-/// A radiograph has one label: that of readers where there is one, else a computed one. All computed labels stand in a
-/// file of their own as well, [`LabelFile::computed_path`].
+/// A radiograph has one label: that of readers where there is one, else a computed one. All computed labels are also kept in a file of their own,
+/// [`LabelFile::computed_path`].
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LabelFile {
     /// By name of the radiograph, `xray_image_STEP.png`.
@@ -49,18 +49,18 @@ struct Labelled {
 }
 
 impl LabelFile {
-    /// Where it lies: beside the regions of interest.
+    /// Its path, next to the regions of interest.
     pub fn path(root: &Path, limb: LimbId) -> PathBuf {
         root.join(limb.roi_file()).with_file_name("labels.json")
     }
 
-    /// Where computed labels lie, those included that readers' labels replace in [`LabelFile::path`].
+    /// Path of the computed labels, including those that readers' labels replace in [`LabelFile::path`].
     pub fn computed_path(root: &Path, limb: LimbId) -> PathBuf {
         root.join(limb.roi_file())
             .with_file_name("labels.computed.json")
     }
 
-    /// Where the labels of a name lie, beside [`LabelFile::path`]; that file itself without a name.
+    /// Path of the labels of a name, next to [`LabelFile::path`]; without a name, that path itself.
     pub fn named_path(root: &Path, limb: LimbId, name: Option<&LabelName>) -> PathBuf {
         Self::path(root, limb).with_file_name(Self::file_name(name))
     }

@@ -1,7 +1,7 @@
 //! Labels of poses in files.
 //!
-//! [`LabelFile`] is `labels.json`, in which a reader's label wins over a computed one. Further sets of labels stand beside it by name,
-//! in `labels.NAME.json`.
+//! [`LabelFile`] is `labels.json`, in which a reader's label takes precedence over a computed one. Further named sets of labels are stored next to
+//! it, in `labels.NAME.json`.
 
 mod bone_file;
 mod file;

@@ -60,7 +60,7 @@ pub struct Converted {
 
 /// Writes the dataset in the other layout, in the folder `to`, whole or not at all.
 ///
-/// *Synthetic to specimen*: all poses stand under `flexion`, since a scan does not show it; the step becomes the image
+/// *Synthetic to specimen*: all poses are filed under `flexion`, since a scan does not show it; the step becomes the image
 /// number, the body shape the time stamp (0 `orig`, 1 `big`, 2 `small`, 3 `bumps_a`, 4 `bumps_b`). The other flexions get empty
 /// lists, without which the authors' loader stops.
 ///

@@ -7,7 +7,7 @@
 //! specimen   patient_1_l/{min,medium,max}/data/dataset/depth/depth_cam_{left,right}_orig_{image}_{timestamp}.png
 //!            …/xray/xray_{image}.png   …/label/quality/labels.json   …/label/roi/roi_depth.json
 //! ```
-//! In both, N of `patient_N` is the person, so that `patient_1_l` and `patient_1_r` are two feet of one. A side, a flexion, a
+//! In both, N of `patient_N` is the person, so that `patient_1_l` and `patient_1_r` are the two feet of one person. A side, a flexion, a
 //! body shape, a camera, radiographs, labels and regions of interest may be missing; what is there must fit the layout.
 //!
 //! [`Published::read`] looks at names and JSON files; [`GrayImage16::read`] decodes an image.
@@ -165,7 +165,7 @@ pub struct Published {
     pub layout: Layout,
     /// By person, side and pose.
     pub pairs: Vec<ImagePair>,
-    /// What else is there: of poses without depth images.
+    /// Other files: those of poses without depth images.
     pub unpaired: Vec<Unpaired>,
 }
 

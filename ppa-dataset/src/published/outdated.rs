@@ -1,4 +1,4 @@
-//! Labels of radiographs that were made again since.
+//! Labels of radiographs that have been regenerated since.
 
 use super::{Layout, Published, PublishedError};
 use crate::labels::{LabelFile, LabelName};

@@ -81,12 +81,12 @@ const ORBBEC_MODELS: &[&str] = &[
 const DEFAULT_METRIC_RADIUS: f64 = 1.7;
 
 impl CameraSpec {
-    /// Reads any of the files a depth camera is described in: a camera JSON of ours, the raw calibration JSON of an Azure
-    /// Kinect or of an Orbbec camera in its place, an Orbbec `OBCameraParam` as JSON (`depth_intrinsic`,
-    /// `depth_distortion`), or an OpenCV file storage in YAML (`.yml`, `.yaml`).
+    /// Reads the description of a depth camera from a camera JSON of ours, the raw calibration JSON of an Azure Kinect or of
+    /// an Orbbec camera that emulates one, an Orbbec `OBCameraParam` as JSON (`depth_intrinsic`, `depth_distortion`), or an
+    /// OpenCV file storage in YAML (`.yml`, `.yaml`).
     ///
-    /// The Orbbec reader follows the field names of the public SDK and takes the lens for `brown_conrady`; no file of a device was at
-    /// hand. Compare a few pixels with the SDK before trusting it.
+    /// The Orbbec reader follows the field names of the public SDK and takes the lens for `brown_conrady`; no file from a device was available.
+    /// Compare a few pixels with the SDK before trusting it.
     ///
     /// Only the raw calibration depends on the `mode`: it holds for the whole sensor. The numbers are checked by
     /// `Camera::try_from`.

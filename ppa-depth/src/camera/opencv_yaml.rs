@@ -1,7 +1,7 @@
 //! The camera in an OpenCV file storage (YAML), as `cv::FileStorage` and ROS write it.
 //!
-//! A file storage is no YAML 1.2 (its first line is `%YAML:1.0`, matrices carry a tag of their own), so the few entries that
-//! make a camera are looked up line by line.
+//! A file storage is not YAML 1.2 (its first line is `%YAML:1.0`, matrices carry a tag of their own), so the few entries that describe a camera are
+//! looked up line by line.
 
 use crate::camera::spec::CameraSpec;
 

@@ -1,4 +1,4 @@
-//! A camera whose numbers make sense.
+//! A camera whose parameters have been checked.
 
 use std::sync::{Arc, OnceLock};
 

@@ -1,4 +1,4 @@
-//! Where a camera stands that looks at a point.
+//! Position of a camera that looks at a given point.
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};

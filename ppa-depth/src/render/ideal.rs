@@ -14,8 +14,8 @@ use crate::render::surfel_body::SurfelBody;
 /// Depth image of the bodies as the camera sees them: per pixel the z coordinate (mm) of the nearest surface on the ray
 /// through the pixel's centre, or 0.
 ///
-/// Rays follow the exact inverse of the lens distortion ([`Camera::rays`]); pixels without a ray stay 0. Bodies occlude
-/// each other and themselves, and walls are surfaces as any. An image of nothing is all 0: see [`DepthImage::require_visible`]. A body whose pose is not finite or
+/// Rays follow the exact inverse of the lens distortion ([`Camera::rays`]); pixels without a ray stay 0. Bodies occlude each other and themselves,
+/// and walls are surfaces like any other. An image of nothing is all 0: see [`DepthImage::require_visible`]. A body whose pose is not finite or
 /// further than 1e9 mm is not seen.
 pub fn render(camera: &Camera, bodies: &[PlacedBody]) -> DepthImage {
     draw(camera, &SeenBody::all(camera, bodies))

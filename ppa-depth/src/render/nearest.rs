@@ -1,4 +1,4 @@
-//! Nearest primitive along a ray, through parry's bounding volume hierarchy. The only module that speaks glam.
+//! Nearest primitive along a ray, through parry's bounding volume hierarchy. The only module that uses glam.
 //!
 //! parry works in f32. Its boxes are only used to skip what a ray cannot meet, and are widened so that rounding never
 //! skips a primitive that is met; the primitives themselves are tested in f64 by the bodies.

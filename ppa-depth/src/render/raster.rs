@@ -1,11 +1,11 @@
-//! Triangles into the distorted image.
+//! Rasterises triangles into the distorted image.
 //!
-//! A changed mesh of 1.4 million triangles becomes an image in a fifteenth of the processor time of Embree, which builds its tree
-//! again (bench `depth`, docs/performance.md).
+//! Rendering a changed mesh of 1.4 million triangles takes a fifteenth of the processor time of Embree, which has to rebuild its tree (bench `depth`,
+//! docs/performance.md).
 //!
 //! The corners are projected through the lens in single precision, which finds the few pixels that a triangle may cover; at
-//! each the exact ray of the pixel is tested in double precision. So distortion is exact, and edges are those of the triangle
-//! although they bow in the image.
+//! each the exact ray of the pixel is tested in double precision. Distortion is therefore exact, and so are edges, although they are curved in the
+//! image.
 
 use std::ops::Range;
 use std::sync::OnceLock;

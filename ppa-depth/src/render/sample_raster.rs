@@ -1,4 +1,4 @@
-//! Triangles into the samples of pixels at edges.
+//! Rasterises triangles into the samples of pixels at edges.
 
 use nalgebra::Point2;
 use rayon::prelude::*;

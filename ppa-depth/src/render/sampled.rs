@@ -27,7 +27,7 @@ const OFFSETS: [[f64; 2]; SAMPLES] = {
 /// Neighbouring depths further apart than this, mm, may have an edge between them: such pixels are sampled.
 pub(crate) const EDGE_MM: f32 = 8.0;
 
-/// What stands still: rendered once per camera, then merged with what moves before it.
+/// The static scene: rendered once per camera, then merged with what moves in front of it.
 #[derive(Debug, Clone)]
 pub struct Backdrop {
     /// Depth at the centres of the pixels.
@@ -172,7 +172,7 @@ impl Sites {
 }
 
 impl Backdrop {
-    /// Renders what stands still. Takes a while: every pixel is sampled.
+    /// Renders the static scene. Takes a while: every pixel is sampled.
     pub fn new(camera: &Camera, bodies: &[PlacedBody]) -> Self {
         let pixels = camera.rays().len();
         let sites = Sites::new(camera, 0..pixels as u32);
@@ -190,7 +190,7 @@ impl Backdrop {
         }
     }
 
-    /// The bodies before the backdrop, with samples inside the pixels at edges; walls are surfaces as any.
+    /// The bodies in front of the backdrop, with samples inside the pixels at edges; walls are surfaces like any other.
     ///
     /// # Errors
     /// [`DepthError::SizeMismatch`] if the backdrop is another camera's, [`DepthError::NothingVisible`] or [`DepthError::Hidden`] if
@@ -203,8 +203,8 @@ impl Backdrop {
         self.before_with_walls(camera, bodies, WallDepth::Flat)
     }
 
-    /// [`before`](Self::before), where `walls` says what becomes of the bodies' walls. If they are to be invalid, no pixel has a depth of
-    /// which the centre or, at an edge, any sample sees a wall; walls send no light to other pixels either.
+    /// [`before`](Self::before), where `walls` says what becomes of the bodies' walls. If they are to be invalid, a pixel has no depth if its centre
+    /// or, at an edge, any of its samples sees a wall; walls send no light to other pixels either.
     ///
     /// # Errors
     /// As [`before`](Self::before).

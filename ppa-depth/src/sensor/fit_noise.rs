@@ -1,4 +1,4 @@
-//! The noise of a real camera, from a recording of a scene that stands still.
+//! The noise of a real camera, from a recording of a static scene.
 
 use crate::camera::projection::Camera;
 use crate::image::{DepthError, DepthImage};

@@ -9,8 +9,7 @@ const SIDE: usize = 4;
 #[derive(Debug, Clone)]
 pub(super) struct Blocks {
     size: [usize; 3],
-    /// Blocks to the next mixed one or beyond the lattice, whichever is nearer, along the axis on which that is farther
-    /// (chessboard distance); 0 is a mixed block.
+    /// Chessboard distance, in blocks, to the nearest mixed block or to the outside of the lattice, whichever is nearer; 0 for a mixed block.
     distance: Vec<u8>,
     /// The value of each block that is not mixed.
     values: Vec<bool>,

@@ -70,8 +70,8 @@ impl Fan<'_> {
         Some([first, last].map(|n| n as f64 * STEP_MM))
     }
 
-    /// The most medial place of a bone's lateral outline between two tubercles, mm from lateral: the line that the floor of
-    /// the incisura throws.
+    /// The most medial place of a bone's lateral outline between two tubercles, mm from lateral: the line as which the floor of the incisura is
+    /// projected.
     pub fn notch(&self, bone: AnkleBone) -> Option<f64> {
         let body = self.bones.body(bone);
         let depths = self.columns.first()?.points().count();

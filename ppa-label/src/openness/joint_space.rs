@@ -154,8 +154,8 @@ impl JointSpace {
 
     /// How open the gutters are to an exposure.
     ///
-    /// Medial and lateral gutter, whose faces are nearly plane: the area through which rays pass that run along the gap and
-    /// meet at most so much of the two bones beside it ([`FREE_CHORDS_MM`]), relative to the largest such area from any direction around the
+    /// Medial and lateral gutter, whose faces are nearly plane: the area through which rays pass that run along the gap and meet at most a tolerated
+    /// length ([`FREE_CHORDS_MM`]) of the two bones next to it, relative to the largest such area from any direction around the
     /// limb. For a slab of width w and depth L this is 1 − L tan φ / w at an angle φ off its plane.
     ///
     /// Superior gutter: the plafond's edges reach below the dome, so that no ray is free of bone. Its contrast counts,

@@ -38,9 +38,9 @@ const LEAST_CNR: f64 = 3.0;
 const BESIDE_MM: f64 = 2.0;
 
 impl JointSpace {
-    /// Visibility of each gutter: over the places of the gutter, the mean contrast ln(reading in the gap / reading beside it)
-    /// against that of its two margins from which it differs less, where it exceeds three standard errors, else 0. A gap that the beam
-    /// crosses aslant has no such contrast.
+    /// Visibility of each gutter: the mean over its places of the contrast ln(reading in the gap / reading next to it), which is taken against the
+    /// margin from which it differs less and counts as 0 unless it exceeds three standard errors. A gap that the beam crosses obliquely has no such
+    /// contrast.
     pub fn visibility(&self, reading: &Reading) -> Visibility {
         let of = |gaps: &[Gap]| {
             let contrasts = gaps.iter().map(|gap| reading.contrast(gap).unwrap_or(0.0));

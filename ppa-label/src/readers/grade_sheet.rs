@@ -45,7 +45,7 @@ pub enum GradeSheetError {
         /// Its first line.
         found: String,
     },
-    /// The file holds anything else but grades of pictures of the key.
+    /// The file holds something other than grades of pictures in the key.
     #[error(transparent)]
     Grades(#[from] ImportError),
     /// The file cannot be written.

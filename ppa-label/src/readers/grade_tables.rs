@@ -1,4 +1,4 @@
-//! Grades by image and reader, from tables that name images as they like.
+//! Grades by image and reader, from tables that may name images in any way.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! Grades of readers, and the radiographs that they are of.
+//! Grades of readers, and the radiographs they refer to.
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};

@@ -1,9 +1,9 @@
-//! Bones of an ankle separated in a CT that nobody labelled.
+//! Separation of the bones of an ankle in an unlabelled CT.
 //!
 //! Bone is what is at least half as dense as the densest place nearby ([`solid`]), so that a joint space counts as one
-//! even where blur and partial volume fill it up to the density of spongy bone. Where bones still hang together, a watershed between shaft,
-//! talus and whatever else separates by itself parts them at the least dense place ([`flood`]). What touches over a larger area
-//! than a bridge of noise was not separated: tibia, fibula and talus are refused then, with the place.
+//! even where blur and partial volume fill it up to the density of spongy bone. Where bones are still connected, a watershed between shaft, talus and
+//! whatever else separates by itself divides them at the least dense place ([`flood`]). Bones that touch over a larger area than a bridge of noise
+//! were not separated: tibia, fibula and talus are then refused, with the place.
 
 mod contacts;
 mod fill;
@@ -79,7 +79,7 @@ const LEAST_PIECE_MM3: f64 = 10.0;
 /// First number of the other bones.
 const FIRST_OTHER: usize = 5;
 
-/// Tells the bones within 60 mm of an ankle apart.
+/// Separates the bones within 60 mm of an ankle.
 ///
 /// `limb` says of each voxel of the scan whether it belongs to the limb; `ct_from_patient` has the joint at its origin and z
 /// along the limb towards proximal.

@@ -1,4 +1,4 @@
-//! Sampling for training: labels that are rare in the data as frequent as others, or all samples alike.
+//! Sampling for training: rare labels are drawn as often as others, or all samples with equal probability.
 
 use rand::RngExt;
 

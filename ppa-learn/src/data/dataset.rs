@@ -225,7 +225,7 @@ struct Reader<'a> {
     dataset: &'a Published,
     labels: Option<&'a LabelName>,
     unlabelled: bool,
-    /// The one path of the dataset's folder, however it was spelled: persons of one dataset must be known again.
+    /// The canonical path of the dataset's folder, however it was spelled: persons of one dataset must be recognised.
     place: PathBuf,
     /// Columns and rows of each camera's first image.
     sizes: BTreeMap<View, [usize; 2]>,

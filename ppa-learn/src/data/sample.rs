@@ -49,7 +49,7 @@ impl SampleImage {
     }
 }
 
-/// What a network gets at once and the label it shall give: an image of one camera, or of both. Of a left limb that is shown as a
+/// The input of a network and the label that it should predict: an image of one camera, or of both. Of a left limb that is shown as a
 /// right one, the cameras are exchanged.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
@@ -61,7 +61,7 @@ pub struct Sample {
     pub label: f64,
     /// Standard deviation of the label over the readers, or over what was assumed.
     pub label_std: f64,
-    /// Folder of the dataset, by its one path however it was spelled. Persons of different datasets are different ones.
+    /// Folder of the dataset, by its canonical path. Persons of different datasets are different ones.
     pub dataset: PathBuf,
     /// N of `patient_N`, and which of the person's limbs.
     pub limb: LimbId,

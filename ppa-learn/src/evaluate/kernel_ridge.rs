@@ -1,4 +1,4 @@
-//! Kernel ridge regression: what small images say without a network (Saunders, Gammerman & Vovk, ICML 1998).
+//! Kernel ridge regression on small images, as a baseline without a network (Saunders, Gammerman & Vovk, ICML 1998).
 
 use nalgebra::{DMatrix, DVector};
 

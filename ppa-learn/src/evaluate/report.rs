@@ -1,4 +1,4 @@
-//! All that is said of the predictions on a test set.
+//! Everything that is reported about the predictions for a test set.
 
 use std::collections::BTreeMap;
 

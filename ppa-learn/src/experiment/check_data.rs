@@ -1,4 +1,4 @@
-//! The data of all trainings, looked at before the first one begins.
+//! Checks of the data of all trainings before the first one begins.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -22,7 +22,7 @@ impl Runner<'_> {
     /// from 0, as the trainings will, and at the weights that some begin with.
     ///
     /// # Errors
-    /// [`ExperimentError::Unusable`] with all that stands against a training.
+    /// [`ExperimentError::Unusable`] with every reason why a training could not run.
     pub fn check_data(&self, mine: impl Fn(usize) -> bool) -> Result<(), ExperimentError> {
         // Seeds draw from the same images: one of them stands for all.
         let picked = self.runs().into_iter().enumerate();

@@ -1,4 +1,4 @@
-//! Results that the paper states, to be shown beside ours.
+//! Results that the paper states, to be shown next to ours.
 
 use super::configuration::Configuration;
 use super::metric::Metric;

@@ -1,4 +1,4 @@
-//! Calibration: what networks say of persons whom they were not trained with.
+//! Calibration on the predictions of networks for persons whom they were not trained with.
 
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;

@@ -1,4 +1,4 @@
-//! Blocks of memory that are used again: fresh ones cost a page fault every 4 KiB, as much as the arithmetic.
+//! Reused blocks of memory: fresh ones would cost a page fault every 4 KiB, as much time as the arithmetic.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,4 +1,4 @@
-//! A few rows of an image whose channels lie apart in panels, as a depthwise convolution reads them.
+//! A few rows of an image whose channels are stored in separate panels, as a depthwise convolution reads them.
 
 use super::buffer::{Buffer, Pool};
 use super::panels::PANEL;

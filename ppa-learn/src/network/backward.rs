@@ -1,7 +1,7 @@
 //! The backward pass: the gradient of every parameter from that of the features.
 //!
-//! With a batch normalisation the gradient of a pixel needs sums over all pixels first. Each pass over the pixels
-//! therefore applies what the previous one summed, and sums for the next.
+//! With a batch normalisation the gradient of a pixel needs sums over all pixels first. Each pass over the pixels therefore applies the sums of the
+//! previous one and accumulates those for the next.
 
 mod depthwise;
 mod expand;

@@ -1,7 +1,7 @@
 //! The forward pass of training, layer by layer on channels-last images.
 //!
-//! A convolution is kept before its normalisation; whoever reads it normalises and activates it on the way, a tile of
-//! pixels or a few rows at a time, so that activated images never go through memory.
+//! The output of a convolution is stored before its normalisation; whatever reads it normalises and activates it on the fly, a tile of pixels or a
+//! few rows at a time, so that activated images never go through memory.
 
 mod convolutions;
 

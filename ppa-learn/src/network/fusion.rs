@@ -1,4 +1,4 @@
-//! How the images of both cameras become one answer, as the authors' repository offers it besides separate networks
+//! Fusion of the images of both cameras into one prediction, which the authors' repository offers besides separate networks
 //! (github.com/INB-KI-SIGS/patient-pose-assessment, commit 3bbf3e9).
 
 use candle_core::{Device, Tensor, Var};

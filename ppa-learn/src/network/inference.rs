@@ -1,8 +1,8 @@
 //! Inference: what each normalisation does is known beforehand, so that a convolution's output is normalised, activated and pooled
-//! while it is in registers or the cache. An expanded image is never there as a whole: its rows are computed as the depthwise convolution
+//! while it is in registers or the cache. An expanded image never exists as a whole: its rows are computed as the depthwise convolution
 //! needs them.
 //!
-//! What is computed of a row or a pixel does not depend on how they are shared out among threads, and sums of rows are added in their order.
+//! The result for a row or pixel does not depend on how they are divided among threads, and sums of rows are added in their order.
 
 use std::convert::Infallible;
 use std::ops::Range;

@@ -1,5 +1,5 @@
-//! The backbone on devices: products of matrices and small tensors by candle, passes over images by `device/kernels.cu`. Of small images, starting a kernel
-//! takes longer than its work, so each kernel does all that one pass over an image allows.
+//! The backbone on devices: products of matrices and small tensors by candle, passes over images by `device/kernels.cu`. For small images, launching
+//! a kernel takes longer than its work, so each kernel does as much as one pass over an image allows.
 
 mod backward;
 mod depthwise;

@@ -1,4 +1,4 @@
-//! The network as devices compute it, by emulated kernels, beside our kernels of the CPU and PyTorch.
+//! The network as devices compute it, by emulated kernels, compared with our CPU kernels and with PyTorch.
 
 use std::collections::HashMap;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! What to tell a person before a training begins.
+//! Warnings to give before a training begins.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Why a configuration cannot be.
+//! Why a configuration is not valid.
 
 use std::path::PathBuf;
 
@@ -14,7 +14,7 @@ pub enum ConfigError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// It is no TOML, or lacks or has too many keys.
+    /// It is not TOML, or has missing or unknown keys.
     #[error("{}: {message}", path.display())]
     Parse {
         /// The file.

@@ -1,4 +1,4 @@
-//! Where numbers that are not finite began.
+//! Where the first non-finite numbers appeared.
 
 use std::fmt;
 

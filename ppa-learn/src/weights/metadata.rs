@@ -1,4 +1,4 @@
-//! What users of a weight file must know beside its values.
+//! What users of a weight file must know besides its values.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,7 +13,7 @@ const MIRROR: &str = "mirror";
 /// Key of the unit of corrections in safetensors and ONNX.
 const CORRECTION_UNIT: &str = "correction_unit_deg";
 
-/// What users of a weight file must know beside its values; in the metadata of safetensors and ONNX.
+/// What users of a weight file must know besides its values; in the metadata of safetensors and ONNX.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct WeightsMetadata {

@@ -9,7 +9,7 @@ use crate::network::{
     LinearPlace, SqueezePlace, running,
 };
 
-/// A graph that grows, and what stands before the names of what is added now.
+/// A graph under construction, and the prefix of the names of what is added now.
 #[derive(Default)]
 pub struct Builder {
     pub graph: Graph,

@@ -1,5 +1,5 @@
-//! Models as any reader finds them: what each node needs is there before it, normalisations are gone, and what the nodes say by
-//! candle's own operations is what the network says.
+//! Models as any reader sees them: each node comes after those that it needs, normalisations are folded away, and evaluating the nodes with candle's
+//! own operations gives the outputs of the network.
 
 use std::collections::{HashMap, HashSet};
 

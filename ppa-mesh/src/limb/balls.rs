@@ -1,4 +1,4 @@
-//! Balls of a scan in which nothing is limb: a person cuts something off.
+//! Balls of a scan in which nothing counts as limb, by which a person cuts something off.
 
 use nalgebra::Point3;
 use ppa_ct::{Grid, Values, Volume, VolumeError};

@@ -18,8 +18,7 @@ const ALIKE: f64 = 0.4;
 /// of one limb do not.
 const SIDE_BY_SIDE: f64 = 0.5;
 
-/// The body around the point that was given; else the heaviest, or of those alike that lie beside it in the
-/// direction that was given the farthest.
+/// The body around the given point; else the heaviest or, of similarly heavy bodies that lie next to it in the given direction, the farthest.
 pub fn body(
     grid: &Grid,
     tissue: &Tissue,

@@ -1,11 +1,10 @@
 //! The limb in a scan: its skin surface and the voxels inside, without couch, sheets and neighbours.
 //!
-//! In order: in balls that a person removes there is air; tissue is what exceeds the skin's HU; the couch is removed by its shape, which does not
+//! In order: balls that a person removes become air; tissue is what exceeds the skin's HU; the couch is removed by its shape, which does not
 //! change along the scan axis; what solid flesh encloses (air, marrow) counts as flesh; solid bodies
 //! are what remains of denser tissue after an erosion that sheets do not survive, separated where they
 //! only touch; the limb is the body that holds most bone; its skin is grown back to the tissue border,
-//! but not along what merely touches it; air enclosed by that belongs to it; and of the surface of it
-//! all, connectivity and DBSCAN keep one piece.
+//! but not along what merely touches it; air enclosed by that belongs to it; and of the resulting surface, connectivity and DBSCAN keep one piece.
 
 mod balls;
 mod bodies;
@@ -129,9 +128,8 @@ const BYTES_OF_COPY: usize = 4;
 ///
 /// Where two limbs are pressed together HU do not show whose skin is whose: there the border is found by
 /// depth, in a scan of two hands up to 4 voxels from where an eye puts it. A hollow that the end of the
-/// scan cuts open is not filled. Working memory goes with the
-/// box around all tissue: once that of the scan's 16-bit voxels where a limb lies in the middle of it, over
-/// four times where limbs fill it.
+/// scan cuts open is not filled. Working memory depends on the box around all tissue: as much as the scan's 16-bit voxels take where a limb lies in
+/// the middle of it, over four times as much where limbs fill it.
 ///
 /// # Errors
 /// [`LimbError`] when the settings do not fit, memory does not suffice or nothing solid is there.

@@ -2,8 +2,7 @@
 //!
 //! The skin ends in the planes of the outermost voxel centres. In each of these planes its boundary edges, with the
 //! corners of the rectangle of voxel centres, are triangulated (constrained Delaunay); the triangles inside the limb
-//! are the wall. Walls therefore have no vertices of their own but corners of the volume, and a skin that is
-//! moved takes its walls along.
+//! are the wall. Walls therefore have no vertices of their own except corners of the volume, and move with the skin.
 
 use std::collections::HashSet;
 use std::ops::Range;

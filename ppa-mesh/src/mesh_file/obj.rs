@@ -1,6 +1,6 @@
 //! OBJ (Wavefront): text with one vertex, normal or face per line.
 //!
-//! tobj 4.0 writes no files and cannot read those of the tests: it returns no points for a cloud and none that no face names,
+//! tobj 4.0 writes no files and cannot read those of the tests: it returns no points for a cloud and drops points that no face uses,
 //! refuses a vertex with weight and colour, and reports neither the line nor the index at fault.
 
 use std::io::{self, Write};

@@ -1,7 +1,7 @@
 //! Iso-surface of a volume by marching cubes in parts of equal work.
 //!
 //! It takes 0.58 of the processor time of VTK 9's flying edges with normals (bench `mesh`, docs/performance.md), and has the
-//! topology of the trilinear interpolant, which VTK's surface has not.
+//! topology of the trilinear interpolant, which VTK's surface does not.
 
 mod cell;
 mod cells;

@@ -1,5 +1,4 @@
-//! Cells with one loop and no ambiguous face: nearly all, filled without a look at their values or only
-//! at those that choose a diagonal.
+//! Cells with one loop and no ambiguous face: nearly all of them, filled without looking at their values, or only at those that select a diagonal.
 
 use std::sync::LazyLock;
 

@@ -1,4 +1,4 @@
-//! All that is known of the agreement of readers, from their grades by image.
+//! All statistics of the agreement of readers, from their grades by image.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Bones keep apart, and lie below the skin: the narrowest places, searched for and measured exactly.
+//! Bones do not touch, and lie below the skin: the narrowest gaps are searched for and measured exactly.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Every parameter measured back from the voxels.
+//! Every parameter, recovered by measurement from the voxels.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! What of points and lines lies within the axes.
+//! Clipping of points and lines to the axes.
 
 /// The nearest point within the axes; the same one if it lies there.
 pub fn point(point: [f64; 2], ranges: [[f64; 2]; 2]) -> [f64; 2] {

@@ -1,4 +1,4 @@
-//! Where points of space fall in a panel: a parallel projection.
+//! Parallel projection of points in space onto a panel.
 
 use nalgebra::{Point3, Vector3};
 

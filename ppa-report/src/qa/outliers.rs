@@ -1,12 +1,12 @@
 //! Poses that do not follow from their neighbours.
 //!
-//! A limb that turns step by step rises and tilts smoothly. A value whose distance from the line between its two neighbours is
-//! much larger than the bend usual in its sweep explains is reported. Where poses are missing, that line is longer: a smooth curve
-//! leaves it by half its second derivative times the product of the steps on both sides.
+//! A limb that turns step by step rises and tilts smoothly. A value is reported if its distance from the line between its two neighbours is much
+//! larger than the bend usual in its sweep explains. Where poses are missing, that line is longer: a smooth curve deviates from it by half its second
+//! derivative times the product of the steps on both sides.
 //!
 //! The first and the last pose have neighbours on one side only. Such an end must lie off two lines, through the first and second and
-//! through the third and fourth pose from it: if one of these four is the outlier, one of the lines does not know it. The pose
-//! beside an end that stands out is compared with the line through the two poses after it.
+//! through the third and fourth pose from it: if one of these four is the outlier, one of the lines does not contain it. The pose next to an end that
+//! stands out is compared with the line through the two poses after it.
 
 /// How far beyond the usual bend a pose must be.
 const FACTOR: f64 = 8.0;

@@ -1,4 +1,4 @@
-//! Errors of positioning: a limb that is tilted, or whose joint lies beside the central beam.
+//! Errors of positioning: a limb that is tilted, or whose joint is off the central beam.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! Trainings: how far they are, their curves, their errors and the images with the largest.
+//! Trainings: their progress, their curves, their errors and the images with the largest.
 
 use std::sync::Arc;
 

@@ -45,7 +45,7 @@ impl Blades {
         self.grown(self.edge_per_spot * spot.reach_mm())
     }
 
-    /// What the whole spot lights, but for the last 3e-3 of a Gaussian one; sides are negative where there is no such place.
+    /// The area that the whole spot illuminates, except for the outermost 3e-3 of a Gaussian one; sides are negative where there is none.
     pub fn fully_lit(&self, spot: &FocalSpot) -> Field {
         self.grown(-self.edge_per_spot * spot.shadow_reach_mm())
     }

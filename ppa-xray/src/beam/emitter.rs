@@ -136,7 +136,7 @@ impl Emitter {
         intensity * ray.z / length_mm.powi(3)
     }
 
-    /// A photon; as many random numbers as it takes.
+    /// A photon, drawn with as many random numbers as it takes.
     #[inline]
     pub fn emit(&self, rng: &mut Philox) -> Emission {
         let d = self.distance_mm;

@@ -1,4 +1,4 @@
-//! Photons from outside the focal spot, beside those of the focal spot.
+//! Photons from outside the focal spot, in addition to those from it.
 
 use nalgebra::Point2;
 
@@ -10,7 +10,7 @@ use crate::beam::spectrum::Spectrum;
 /// Extrafocal radiation of one exposure.
 #[derive(Debug, Clone)]
 pub(crate) struct ExtrafocalEmitter {
-    /// Sends the photons, with their whole area as its spot.
+    /// Emits the photons, with the whole extrafocal area as its focal spot.
     pub emitter: Emitter,
     /// Share of the histories that are extrafocal: of all photons that pass the blades.
     pub share: f64,

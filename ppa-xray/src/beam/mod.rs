@@ -1,4 +1,4 @@
-//! What leaves the focal spot, and towards where.
+//! The photons that leave the focal spot, and their directions.
 
 pub(crate) mod blades;
 pub(crate) mod detector;

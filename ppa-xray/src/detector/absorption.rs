@@ -1,4 +1,4 @@
-//! Energy that a photon leaves in a converter layer: its mean and its mean square.
+//! Energy that a photon deposits in a converter layer: its mean and its mean square.
 
 use crate::beam::receptor::{DetectorModel, Receptor, ReceptorError, require};
 use crate::detector::energy_nodes::EnergyNodes;

@@ -6,9 +6,8 @@
 //!
 //! Σ T²(f + k) sinc²(fx + kx) sinc²(fy + ky) over all k, f in cycles per pixel.
 //!
-//! Blurring pixels that have counted whole photons would give T² instead, too much below the Nyquist frequency: an image
-//! that is drawn has noise and signal spread separately, and one that is counted has each photon spread over a small
-//! square first.
+//! Blurring pixels that have counted whole photons would give T² instead, too much noise below the Nyquist frequency: an image whose noise is drawn
+//! has noise and signal spread separately, and one whose photons are counted has each photon spread over a small square first.
 //!
 //! Where the blur depends on the depth of the interaction, noise is blurred less than the signal: by N in place of T in the sum above, see
 //! [`Lubberts`].

@@ -8,7 +8,7 @@ const RANGE_KEV: [f64; 2] = [MIN_ENERGY_KEV, MAX_ENERGY_KEV];
 /// Ratio of neighbouring nodes: linear interpolation of E⁻³ is right to 6e-4 in between.
 const RATIO: f64 = 1.02;
 
-/// Distance of the two nodes that stand for an edge from it, relative: more than tables of different origin differ by.
+/// Relative distance from an absorption edge of the two nodes around it; tables of different origin place an edge within less than this.
 const EDGE_GAP: f64 = 2e-5;
 
 /// Cells per keV of the guide.

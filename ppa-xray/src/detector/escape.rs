@@ -1,4 +1,4 @@
-//! What gets out of a layer again: K x-rays and scattered photons.
+//! Photons that escape from a layer: K x-rays and scattered photons.
 
 use std::f64::consts::TAU;
 

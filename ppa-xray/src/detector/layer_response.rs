@@ -1,4 +1,4 @@
-//! What photons of one energy leave in a layer.
+//! What photons of one energy deposit in a layer.
 
 use crate::detector::escape::{KRay, Loss, Scattered};
 use crate::detector::layer::Layer;

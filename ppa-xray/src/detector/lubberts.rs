@@ -2,12 +2,13 @@
 //!
 //! With the MTF T of the signal and the noise transfer N ≥ T, the root of the normalised noise power, the DQE is lower by the ratio R = T²/N² (Lubberts, J. Opt. Soc.
 //! Am. 58 (1968) 1475). Photons whose light is spread by the same kernel of transfer N, about a point displaced at random from where they
-//! interact, have that noise, as displaced photons are as independent of each other as others are; and the signal T if the distribution of the displacement has the characteristic
-//! function A = T/N. With 1/(1 + H f²) for T and 1/(1 + H_N f²) for N that is
+//! interact, have that noise, since displaced photons are as independent of each other as others; and they have the signal T if the distribution of
+//! the displacement has the characteristic function A = T/N. With 1/(1 + H f²) for T and 1/(1 + H_N f²) for N that is
 //!
 //! A = H_N/H + (1 − H_N/H) / (1 + H f²):
 //!
-//! a share H_N/H of the photons stays, the others move by a Gaussian whose variance along either axis is exponentially distributed, H/2π² in the mean.
+//! a share H_N/H of the photons stays, the others are displaced by a Gaussian whose variance along either axis is exponentially distributed, with
+//! mean H/2π².
 //!
 //! This gives signal and noise power of depth-dependent blur, not the light of single photons.
 

@@ -32,7 +32,7 @@ impl Response {
         })
     }
 
-    /// Whether every photon leaves all its energy.
+    /// Whether every photon deposits all its energy.
     pub fn is_ideal(&self) -> bool {
         self.absorption.is_none() && self.grid.is_none()
     }
@@ -46,7 +46,7 @@ impl Response {
         self.grid.as_ref()
     }
 
-    /// Energies at which a photon leaves abruptly more or less.
+    /// Energies at which the deposited energy changes abruptly.
     pub fn edges_kev(&self) -> impl Iterator<Item = f64> {
         let absorption = self.absorption.iter().flat_map(Absorption::edges_kev);
         absorption
@@ -54,7 +54,8 @@ impl Response {
             .copied()
     }
 
-    /// Mean and mean square of the energy that a photon leaves which crosses the plane at device (x, y); over the phase of the strips, if there is a grid.
+    /// Mean and mean square of the energy that a photon deposits when it crosses the plane at device (x, y); averaged over the phase of the strips,
+    /// if there is a grid.
     ///
     /// `direction` is a unit vector in the device frame with z > 0.
     #[inline]
@@ -63,7 +64,8 @@ impl Response {
         self.absorbed(energy_kev, direction.z).scaled(passes)
     }
 
-    /// The energy that an arriving photon leaves, keV: a draw whose first two moments are [`Response::moments`], or behind the strips of a stationary grid those at its place.
+    /// The energy that an arriving photon deposits, keV: a draw whose first two moments are [`Response::moments`], or, with a stationary grid, those
+    /// at its position.
     ///
     /// The draw is ⟨ε²⟩/⟨ε⟩ with probability ⟨ε⟩²/⟨ε²⟩ (absorption times Swank factor), and 0 otherwise.
     #[inline]

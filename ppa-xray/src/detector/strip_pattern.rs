@@ -1,4 +1,4 @@
-//! Transmission of the strips of a stationary grid by place.
+//! Transmission of the strips of a stationary grid as a function of position.
 //!
 //! In the frame sheared along its strips, see [`Grid`](crate::detector::grid::Grid), a photon that leaves the grid at v has moved over [v − Δ, v]. The part of Δ in strips is a
 //! continuous function of v, straight between four points of a period: where either end of the way enters or leaves a strip. So integrals of exp(−κ · part) over v

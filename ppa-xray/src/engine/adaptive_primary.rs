@@ -288,7 +288,7 @@ impl Part {
     ///
     /// Of 4ⁿ quarters of quarters each is seen from another of 4ⁿ places of the spot, and the four of a rectangle from one in each
     /// quarter of the spot: the spot's quarters are the pixel's in reverse order, as in the set of Hammersley, Ann. N. Y. Acad.
-    /// Sci. 86 (1960) 844. They are turned by a right angle, lest to move on the spot undo to move in the pixel.
+    /// Sci. 86 (1960) 844. They are rotated by a right angle, so that a step on the spot does not cancel the step in the pixel.
     fn quarter(&self, [upper_x, upper_y]: [bool; 2]) -> Self {
         let middle = centre(self.field);
         let mut field = self.field;

@@ -1,8 +1,8 @@
 //! The attenuation of all materials as mixtures of a few of them.
 //!
-//! Bone between spongy and compact is a mixture of soft tissue and cortical bone, and so is its attenuation; all
-//! tissues differ by little more than how much of two or three smooth functions of the energy they hold (Alvarez and
-//! Macovski, Phys. Med. Biol. 21 (1976) 733). So a ray need not keep the mass of 27 materials apart, but that of four.
+//! Bone between spongy and compact is a mixture of soft tissue and cortical bone, and so is its attenuation; the attenuation of every tissue is
+//! nearly a combination of the same two or three smooth functions of energy (Alvarez and Macovski, Phys. Med. Biol. 21 (1976) 733). A ray therefore
+//! need not accumulate the masses of 27 materials separately, but only those of four.
 //! docs/physics.md, "Fast engine", primary.
 
 use crate::matter::energy_range::{CUTOFF_KEV, MAX_ENERGY_KEV};

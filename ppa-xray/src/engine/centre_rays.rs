@@ -1,4 +1,4 @@
-//! Rays through the centres of pixels: on a lattice of pixels, and in between only where interpolation would not do.
+//! Rays through the centres of pixels: on a lattice of pixels, and in between only where interpolation would not be accurate enough.
 //!
 //! docs/physics.md, "Fast engine", primary.
 

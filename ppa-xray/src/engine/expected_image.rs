@@ -1,7 +1,7 @@
 //! The expected image of one source, and of focal and extrafocal radiation together.
 //!
-//! Photons of both add up without interference, so their images do: each is computed by itself, per history of its own, and weighted by
-//! its share of the histories. docs/physics.md, "Extrafocal radiation".
+//! The signals of both are additive, and so are their images: each is computed separately, per history of its own, and weighted by its share of the
+//! histories. docs/physics.md, "Extrafocal radiation".
 
 use ppa_core::random::Philox;
 

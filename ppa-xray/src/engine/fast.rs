@@ -25,8 +25,8 @@ use crate::transport::tracking::TransportError;
 ///
 /// Geometry, physics and units are those of [`crate::analog`].
 /// Primary: line integrals averaged over each pixel.
-/// Scatter, which varies slowly: forced detection at points of the detector, close together where it bends, and cubic
-/// interpolation to the pixels. Then every layer gets the noise of an energy-integrating detector. The standard errors
+/// Scatter, which varies slowly: forced detection at points of the detector, closer together where it is curved, and cubic interpolation to the
+/// pixels. Then every layer gets the noise of an energy-integrating detector. The standard errors
 /// hold both that noise and the error of the scatter estimate, which neighbouring pixels share.
 ///
 /// # Errors
@@ -60,8 +60,8 @@ impl PreparedPhantom<'_> {
     /// As [`PreparedPhantom::fast`]; `observe` receives the share of the work that is done, at each percent and about every 100 ms in between,
     /// from any thread.
     ///
-    /// The radiograph is the same, bit for bit, as without an observer. Once `observe` returns [`ControlFlow::Break`], each
-    /// thread ends with the row, node or histories (at most 8192) that it is at.
+    /// The radiograph is the same, bit for bit, as without an observer. Once `observe` returns [`ControlFlow::Break`], each thread finishes the row,
+    /// node or histories (at most 8192) that it is working on.
     ///
     /// # Errors
     /// As [`PreparedPhantom::fast`]; [`TransportError::Cancelled`] after [`ControlFlow::Break`].

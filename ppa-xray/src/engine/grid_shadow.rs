@@ -1,8 +1,8 @@
 //! Lines of a stationary grid in the expected primary.
 //!
 //! The primary of a pixel, a mean over the phase of the strips, is multiplied by the transmission of the strips over its aperture relative to that mean, weighted with the
-//! spectrum behind the phantom at its centre. Within the pixel the light in front of the grid is taken as even, and extrafocal photons, whose shadows of the strips are
-//! up to 0.04 mm aside, have the lines of those of the focal spot.
+//! spectrum behind the phantom at its centre. Within the pixel the fluence in front of the grid is taken as uniform, and extrafocal photons, whose
+//! shadows of the strips are displaced by up to 0.04 mm, are given the lines of those of the focal spot.
 //!
 //! docs/physics.md, "Detector", grid.
 
@@ -33,10 +33,10 @@ const MOST_CYCLES: f64 = 16.0;
 
 /// Primary of all pixels behind the strips.
 pub(super) struct ShadowedPrimary {
-    /// What a blur of pixels turns into the expected signal: blur multiplies a harmonic above the Nyquist frequency by its transfer at the alias, so here
-    /// the harmonic is larger by the transfer at its own frequency over that.
+    /// Primary that the blur of the pixels turns into the expected signal. The blur multiplies a harmonic above the Nyquist frequency by the transfer
+    /// at its alias; to compensate, such a harmonic is scaled here by the transfer at its own frequency divided by that at the alias.
     pub expected: Vec<Moments>,
-    /// What falls on the pixels, if that differs.
+    /// Primary that reaches the pixels, if it differs.
     pub counted: Option<Vec<Moments>>,
 }
 

@@ -1,4 +1,4 @@
-//! Test: splitting, roulette, coarse cells and distance of points change no expectation.
+//! Test: splitting, roulette, coarse cells and the distance between points do not change any expected value.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use ppa_ct::Grid;

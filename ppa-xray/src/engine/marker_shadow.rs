@@ -1,4 +1,4 @@
-//! The shadow of the side marker in what the pixels hold in the mean.
+//! The shadow of the side marker in the expected signal of the pixels.
 
 use crate::beam::detector::Detector;
 use crate::beam::marker::SideMarker;

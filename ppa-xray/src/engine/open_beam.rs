@@ -1,4 +1,4 @@
-//! What unattenuated photons of every line leave in the detector, by place: tabulated once, shared by all rays.
+//! Energy that unattenuated photons of every line deposit in the detector, by position: tabulated once, shared by all rays.
 //!
 //! Fluence, spectrum and response vary over centimetres (cos³θ, heel effect, incidence on converter and grid): linear interpolation between
 //! nodes 2 mm apart is right to 1e-5.

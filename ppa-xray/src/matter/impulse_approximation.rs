@@ -1,7 +1,7 @@
 //! Compton scattering off bound, moving electrons: the impulse approximation.
 //!
-//! dσ/dΩ = ½ rₑ² τ² (τ + 1/τ − sin²θ) Σ f Θ(E − U) n(p_max), and within an angle the electron's momentum p along the scattering
-//! vector from its one-electron profile up to p_max, which frees it just so; p gives the energy (Ribberfors and Berggren 1982,
+//! dσ/dΩ = ½ rₑ² τ² (τ + 1/τ − sin²θ) Σ f Θ(E − U) n(p_max), and at a given angle the electron's momentum p along the scattering vector from its
+//! one-electron profile up to p_max, at which it is only just freed; p gives the energy (Ribberfors and Berggren 1982,
 //! doi:10.1103/PhysRevA.26.3325; Brusa et al. 1996, doi:10.1016/0168-9002(96)00652-3, as in PENELOPE and MC-GPU).
 //! Momenta are in units of mₑc.
 

@@ -1,8 +1,9 @@
 //! Measured molecular form factors of D. E. Peplow and K. Verghese, Phys. Med. Biol. 43 (1998) 2431.
 //!
 //! The numbers are those that EGSnrc distributes with permission (`HEN_HOUSE/data/molecular_form_factors`), which lists F/√M with
-//! M in g/mol over q = sin(θ/2)/λ in 1/Å, up to 0.9/Å; beyond that its tables hold free atoms. Values below 0.1/Å of tissues of mostly water, and below
-//! 0.05/Å of fat, are constant: the tables extrapolate there. That of water, 0.5871, is the limit of q = 0 which its compressibility sets.
+//! M in g/mol over q = sin(θ/2)/λ in 1/Å, up to 0.9/Å; beyond that its tables hold the values of free atoms. Values below 0.1/Å of tissues of mostly
+//! water, and below 0.05/Å of fat, are constant: the tables extrapolate there. That of water, 0.5871, is the limit at q = 0 set by its
+//! compressibility.
 
 /// A substance whose form factor was measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

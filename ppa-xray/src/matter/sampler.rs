@@ -115,8 +115,8 @@ impl MaterialTables {
         }
     }
 
-    /// Energy in keV of the K photon that follows photoelectric absorption, if one does above 5 keV; it leaves in any
-    /// direction alike. `u` uniform in [0, 1). Materials made from tables emit none.
+    /// Energy in keV of the K photon that follows photoelectric absorption, if one does above 5 keV; it is emitted isotropically.
+    /// `u` uniform in [0, 1). Materials made from tables emit none.
     #[inline]
     #[must_use]
     pub fn k_fluorescence(&self, energy_kev: f64, u: f64) -> Option<f64> {

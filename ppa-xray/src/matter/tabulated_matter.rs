@@ -1,4 +1,4 @@
-//! Photon data of one material, checked and ready to be asked.
+//! Photon data of one material, checked and ready for use.
 
 use crate::matter::cross_sections::{CrossSections, LogLog, SectionTables};
 use crate::matter::electron_shell::Shell;

@@ -11,7 +11,7 @@ use crate::mcgpu::values::{NamedFile, Values};
 /// What an input file says. Lengths in cm, in the frame of the voxel box: its corner with the lowest coordinates is the
 /// origin.
 ///
-/// The numbers of the graphics card, its threads, and the histories per thread are read over.
+/// The numbers of the graphics card, its threads, and the histories per thread are ignored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Input {
     /// The input file.

@@ -1,4 +1,4 @@
-//! Damaged files, to try the parsers on.
+//! Damaged files, to test the parsers with.
 
 use std::io::Write;
 use std::path::Path;

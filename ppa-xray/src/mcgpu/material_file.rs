@@ -22,7 +22,7 @@ const LARGEST_X: f64 = 146.5;
 ///
 /// The densities of the voxels scale the mean free paths; the one of the file is nominal. The form factor is the
 /// derivative of the rational inverse cumulative distribution that MC-GPU samples. The table that helps its search (ITL,
-/// ITU) and the largest cumulative probability of each energy follow from the rest and are read over.
+/// ITU) and the largest cumulative probability of each energy follow from the rest and are ignored.
 ///
 /// # Errors
 /// [`McgpuError`] naming line, what was found and what expected, and mean free paths that contradict their total.

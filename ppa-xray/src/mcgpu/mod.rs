@@ -4,7 +4,7 @@
 //! detector, scan, doses; text or gzip. Paths resolve against the folder of the input file. A material line `ppa:NAME` stands
 //! for a material of this library ([`Material::named`](crate::Material::named)). Results have the layout of MC-GPU's.
 //!
-//! Where this is not what MC-GPU does, on purpose, stands in `docs/physics.md`, section "Agreement with other codes".
+//! Deliberate differences from MC-GPU are listed in `docs/physics.md`, section "Agreement with other codes".
 
 mod analog;
 mod dose_file;

@@ -1,4 +1,4 @@
-//! Sections of an input file that say more than one value after the other.
+//! Sections of an input file that consist of several values: run length, trajectory, dose box, materials.
 
 use std::path::{Path, PathBuf};
 

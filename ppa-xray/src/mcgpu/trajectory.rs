@@ -1,4 +1,4 @@
-//! Where source and detector of an MC-GPU scan stand.
+//! Positions of source and detector in an MC-GPU scan.
 
 use nalgebra::{
     Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,

@@ -1,6 +1,6 @@
 //! JPEG-LS, lossless and near-lossless, of one component (ISO/IEC 14495-1, the same as ITU-T T.87).
 //!
-//! No maintained crate of Rust alone decodes it. A series takes 0.6 of the processor time of SimpleITK (bench `dicom`,
+//! No maintained pure-Rust crate decodes it. Reading a series takes 0.6 times the processor time of SimpleITK (bench `dicom`,
 //! docs/performance.md).
 
 mod bits;

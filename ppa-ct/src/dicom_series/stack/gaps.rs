@@ -1,4 +1,4 @@
-//! Slices between those that are there.
+//! Interpolated slices that fill the gaps of a stack.
 
 use std::path::Path;
 

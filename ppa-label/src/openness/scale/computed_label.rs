@@ -1,4 +1,4 @@
-//! What a scale says of an exposure.
+//! The label that a scale gives an exposure.
 
 use serde::Serialize;
 

@@ -14,8 +14,8 @@ use super::{Given, KERNELS, Launch};
 /// Threads of a block.
 const BLOCK: u32 = 256;
 
-/// A device with one stream for all threads, as networks of two cameras run on two: of `Device::new_cuda` each thread has a stream
-/// of its own, and none waits for what another still computes.
+/// A device with one stream for all threads, since the networks of two cameras run on two threads: with `Device::new_cuda` each thread would have a
+/// stream of its own, and none would wait for what another is still computing.
 pub fn open(number: usize) -> Result<Device> {
     let device = Device::new_cuda_with_stream(number)?;
     // SAFETY: events order the work of several streams, and this device has one. To record them costs as much as a launch.

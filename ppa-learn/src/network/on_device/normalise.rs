@@ -1,4 +1,4 @@
-//! Batch normalisation and the activation behind it, with their gradients (Ioffe and Szegedy 2015, arXiv:1502.03167).
+//! Batch normalisation and the activation after it, with their gradients (Ioffe and Szegedy 2015, arXiv:1502.03167).
 
 use candle_core::{Result, Shape, Tensor};
 

@@ -1,4 +1,4 @@
-//! The cross-sections of a limb, measured once for all that is asked of them.
+//! The cross-sections of a limb, measured once and used by all measures.
 
 use nalgebra::{Point3, Vector3};
 use ppa_ct::Volume;

@@ -1,8 +1,8 @@
 //! Integrals of the differential cross sections over all paths through the sphere.
 //!
-//! No sampling of angles or free paths and no tracking enters them: the nodes are the additive recurrence of irrational steps (Niederreiter,
-//! *Random Number Generation and Quasi-Monte Carlo Methods*, 1992, ch. 3), which fill the space of the paths evenly. Other starting
-//! points move the integrals by up to 0.4 % in a ring and 0.1 % in all (single scatter), 2 % and 0.4 % (multiple scatter).
+//! They involve no sampling of angles or free paths and no tracking: the nodes are the additive recurrence of irrational steps (Niederreiter,
+//! *Random Number Generation and Quasi-Monte Carlo Methods*, 1992, ch. 3), which fills the space of the paths evenly. Other starting points change
+//! the integrals by up to 0.4 % in a ring and 0.1 % in all (single scatter), 2 % and 0.4 % (multiple scatter).
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! The scene of the proof: a sphere of one material in the middle of a narrow beam, and a detector behind it in rings.
+//! The scene of the verification: a sphere of one material in the middle of a narrow beam, and a detector behind it in rings.
 
 use std::f64::consts::PI;
 

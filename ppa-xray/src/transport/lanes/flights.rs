@@ -1,6 +1,6 @@
 //! Straight flights of many photons, and the box they fly through, as arrays that loops turn into vector instructions.
 //!
-//! A photon's place is in cells from the corner of the voxel box, its way in mm.
+//! A photon's position is in cells from the corner of the voxel box, its path length in mm.
 
 /// Photons under way at once.
 pub(crate) const LANES: usize = 64;

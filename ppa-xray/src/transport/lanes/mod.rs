@@ -2,7 +2,7 @@
 //!
 //! Every round takes each flight one step: to the wall of the cube over which its bound holds, or to a tentative collision.
 //! A photon whose history ends makes room for the next one. The random numbers of a history depend on nothing but the
-//! seed and its index, so the company it travels in changes nothing.
+//! seed and its index, so the histories that run alongside it change nothing.
 
 mod advance;
 mod collisions;

@@ -1,7 +1,7 @@
-//! Upper bound of the work that a JPEG 2000 codestream asks for, from its headers (ISO/IEC 15444-1, annexes A and B).
+//! Upper bound on the work of decoding a JPEG 2000 codestream, from its headers (ISO/IEC 15444-1, annexes A and B).
 //!
-//! The decoder reserves memory by tile, precinct, code-block and layer before it looks at their data, so that some
-//! bytes could ask for gigabytes. All of these are counted here first and compared with the bytes and pixels that are there.
+//! The decoder reserves memory by tile, precinct, code-block and layer before it looks at their data, so that a few bytes could make it reserve
+//! gigabytes. All of these are therefore counted here first and compared with the numbers of bytes and pixels present.
 
 use super::super::{CodecError, expect_grey};
 use super::segments::{Coding, Segments, Size};

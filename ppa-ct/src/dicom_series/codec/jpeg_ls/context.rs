@@ -11,7 +11,7 @@ pub(super) struct Context {
     pub correction: i32,
     /// Errors counted, `N`.
     count: i64,
-    /// The Golomb parameter `k`, found when learning since decoding waits for it.
+    /// The Golomb parameter `k`, computed when the statistics are updated, since decoding would have to wait for it.
     pub golomb: u32,
 }
 
